@@ -1,0 +1,29 @@
+//! Directions of the upper hemisphere: angles, polar grids, half vectors. Small-scale frame: z up, angles in radians.
+
+mod polar_grid;
+
+use glam::Vec3;
+
+pub use polar_grid::{PolarGrid, Tap};
+
+/// The unit vector at `theta` from +z and `phi` from +x towards +y.
+pub fn from_angles(theta: f32, phi: f32) -> Vec3 {
+    let (sin_theta, cos_theta) = theta.sin_cos();
+    let (sin_phi, cos_phi) = phi.sin_cos();
+    Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
+}
+
+/// `(theta, phi)` of a unit vector, `phi` in `[0, 2π)`; accurate near the pole.
+pub fn to_angles(direction: Vec3) -> (f32, f32) {
+    let theta = direction.x.hypot(direction.y).atan2(direction.z);
+    let phi = direction.y.atan2(direction.x);
+    (theta, if phi < 0.0 { (phi + std::f32::consts::TAU).min(TAU_BELOW) } else { phi })
+}
+
+/// The largest f32 below 2π: an azimuth never rounds up to a full turn.
+const TAU_BELOW: f32 = std::f32::consts::TAU.next_down();
+
+/// `(i+o)/|i+o|`; +z where the two are opposite.
+pub fn half_vector(i: Vec3, o: Vec3) -> Vec3 {
+    (i + o).try_normalize().unwrap_or(Vec3::Z)
+}

@@ -1,0 +1,91 @@
+//! One shape of error for everything a person hands in: where it is, what was found, what was expected.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// What can go wrong in the library. `Input` is the caller's to mend (exit code 2), `Failed` is ours (exit code 1).
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    #[error("{0}")]
+    Input(Box<InputError>),
+    #[error("{0}")]
+    Failed(String),
+}
+
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// A complaint about something handed in.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InputError {
+    pub file: Option<PathBuf>,
+    /// The field (`tile.geometry.depth`) or the place in the file (`line 12`, `byte 36`).
+    pub place: String,
+    pub found: String,
+    pub expected: String,
+    /// A suggestion that would mend it.
+    pub hint: Option<String>,
+}
+
+impl InputError {
+    pub fn new(place: impl Into<String>, found: impl fmt::Display, expected: impl fmt::Display) -> Self {
+        Self { place: place.into(), found: found.to_string(), expected: expected.to_string(), ..Self::default() }
+    }
+
+    pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {
+        self.file = Some(file.as_ref().to_owned());
+        self
+    }
+
+    pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+}
+
+impl fmt::Display for InputError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(file) = &self.file {
+            write!(out, "{}: ", file.display())?;
+        }
+        if !self.place.is_empty() {
+            write!(out, "{}: ", self.place)?;
+        }
+        write!(out, "found {}, expected {}", self.found, self.expected)?;
+        match &self.hint {
+            Some(hint) => write!(out, " ({hint})"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl From<InputError> for Error {
+    fn from(error: InputError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
+impl Error {
+    /// A failure that is not the caller's doing.
+    pub fn failed(what: impl fmt::Display) -> Self {
+        Self::Failed(what.to_string())
+    }
+
+    /// Names the file in a complaint that does not name one yet.
+    pub fn in_file(self, file: impl AsRef<Path>) -> Self {
+        match self {
+            Self::Input(mut error) if error.file.is_none() => {
+                error.file = Some(file.as_ref().to_owned());
+                Self::Input(error)
+            }
+            other => other,
+        }
+    }
+
+    /// The process exit code of the command line's contract.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Input(_) => 2,
+            Self::Failed(_) => 1,
+        }
+    }
+}

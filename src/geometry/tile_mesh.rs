@@ -1,0 +1,92 @@
+//! One period of the small-scale surface as triangles.
+
+use std::sync::Arc;
+
+use glam::{UVec2, Vec2, Vec3};
+
+/// One period of an endlessly repeated surface: x in `[0, size.x)`, y in `[0, size.y)`, z up. Triangles may reach
+/// over the tile's edge (their periodic copies come back in on the other side); they are never cut.
+#[derive(Debug, Clone, Default)]
+pub struct TileMesh {
+    /// Extent of the period in x and y, in tile units.
+    pub size: Vec2,
+    pub positions: Vec<Vec3>,
+    /// Vertex indices, counter-clockwise seen from the side that reflects.
+    pub triangles: Vec<[u32; 3]>,
+    /// Corner normals of each triangle, only where the source had them (`vn`); else normals are geometric.
+    pub corner_normals: Option<Vec<[Vec3; 3]>>,
+    /// Index into `slots`, per triangle.
+    pub triangle_slot: Vec<u16>,
+    /// Names of the material slots.
+    pub slots: Vec<String>,
+    /// Colour weights that vary over the tile.
+    pub color: ColorField,
+    /// Where the surface is a height-field: its samples.
+    pub height_grid: Option<HeightGrid>,
+}
+
+/// Colour weights over the tile, multiplied with a material's own colour.
+#[derive(Debug, Clone, Default)]
+pub enum ColorField {
+    #[default]
+    Uniform,
+    /// Linear RGB texels, row 0 at y = 0, sampled bilinearly and wrapped; texel centres at `((i+½)/w, (j+½)/h)`.
+    Image { size: UVec2, texels: Arc<Vec<Vec3>> },
+}
+
+/// Samples of a height-field: sample (i, j) sits at `((i+½)/w, (j+½)/h)` of the tile, row 0 at y = 0, wrapped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightGrid {
+    pub size: UVec2,
+    /// Heights in tile units, row by row.
+    pub heights: Vec<f32>,
+}
+
+impl TileMesh {
+    /// Corner positions of a triangle.
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.triangles[triangle].map(|index| self.positions[index as usize])
+    }
+
+    /// Unit geometric normal; zero for a triangle without area.
+    pub fn geometric_normal(&self, triangle: usize) -> Vec3 {
+        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+        (b - a).cross(c - a).try_normalize().unwrap_or_default().as_vec3()
+    }
+
+    pub fn triangle_area(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Lowest and highest z of all vertices; `(0, 0)` for an empty mesh.
+    pub fn z_range(&self) -> (f32, f32) {
+        let range = self.positions.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), p| (lo.min(p.z), hi.max(p.z)));
+        if range.0 <= range.1 { range } else { (0.0, 0.0) }
+    }
+
+    /// Base area `A` of the tile.
+    pub fn base_area(&self) -> f32 {
+        self.size.x * self.size.y
+    }
+}
+
+impl ColorField {
+    /// Colour weight at tile coordinates `xy` of a tile of extent `size`.
+    pub fn at(&self, xy: Vec2, tile_size: Vec2) -> Vec3 {
+        match self {
+            Self::Uniform => Vec3::ONE,
+            Self::Image { size, texels } => {
+                let at = xy / tile_size * size.as_vec2() - 0.5;
+                let (base, f) = (at.floor(), at - at.floor());
+                let texel = |dx: i64, dy: i64| {
+                    let x = (base.x as i64 + dx).rem_euclid(i64::from(size.x)) as usize;
+                    let y = (base.y as i64 + dy).rem_euclid(i64::from(size.y)) as usize;
+                    texels[y * size.x as usize + x]
+                };
+                let row = |dy| texel(0, dy).lerp(texel(1, dy), f.x);
+                row(0).lerp(row(1), f.y)
+            }
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! GPU device, shader loading and validation, buffers. Everything works without one.

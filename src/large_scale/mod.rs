@@ -1,0 +1,1 @@
+//! The large-scale object: meshes with tangents, camera, lights, G-buffer, shading.

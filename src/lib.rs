@@ -1,0 +1,19 @@
+//! biscale: what does a surface with tiny structures look like from far away?
+//!
+//! ```text
+//! Scene (TOML) ─▶ EffectPlan ─▶ TileMesh ─▶ Facets ─▶ Visibility ─▶ Bvndf ─┐
+//!                     │                                                     ├▶ EffectiveBrdf ─▶ picture | table | plots
+//!                     └────────────▶ small-scale Brdf ─▶ RotatedBasis ─────┘
+//! ```
+
+pub mod brdf;
+pub mod directions;
+pub mod error;
+pub mod filtering;
+pub mod geometry;
+pub mod gpu;
+pub mod large_scale;
+pub mod scene;
+pub mod visibility;
+
+pub use error::{Error, InputError, Result};
