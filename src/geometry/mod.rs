@@ -1,5 +1,6 @@
 //! From a geometry description to a periodic triangle mesh, and from the mesh to facets.
 
+mod facet_order;
 mod facets;
 mod tile_mesh;
 
