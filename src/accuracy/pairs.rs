@@ -21,7 +21,7 @@ pub struct Pair {
 pub fn mirror_biased_pairs(count: usize, seed: u64) -> Vec<Pair> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let lowest = 85.0_f32.to_radians().cos();
-    let mut direction = |rng: &mut ChaCha8Rng| {
+    let direction = |rng: &mut ChaCha8Rng| {
         let cosine: f32 = lowest + (1.0 - lowest) * rng.random::<f32>();
         from_angles(cosine.acos(), TAU * rng.random::<f32>())
     };

@@ -10,7 +10,7 @@ use super::gemm;
 use super::gram::{eigen, rank_for};
 use crate::directions::PolarGrid;
 use crate::error::Result;
-use crate::visibility::Horizons;
+use crate::visibility::Visibility;
 
 /// Visibility of a group of facets on the nodes of a direction grid, dense: `[node][facet]`.
 #[derive(Debug)]
@@ -21,28 +21,26 @@ pub struct VisibilityRows {
 }
 
 impl VisibilityRows {
-    pub fn new(horizons: &Horizons, grid: PolarGrid) -> Self {
-        let mut rows = vec![0.0; grid.len() * horizons.facets];
-        rows.par_chunks_mut(horizons.facets.max(1)).enumerate().for_each(|(node, row)| horizons.fill(grid.direction(node), row));
-        Self { grid, facets: horizons.facets, rows }
-    }
-
-    /// The same, of a run of facets only.
-    pub fn part(&self, facets: std::ops::Range<usize>) -> Self {
-        let rows = self.rows.chunks(self.facets.max(1)).flat_map(|row| row[facets.clone()].iter().copied()).collect();
-        Self { grid: self.grid, facets: facets.len(), rows }
+    /// Of a run of facets.
+    pub fn new(visibility: &Visibility, facets: std::ops::Range<usize>, grid: PolarGrid) -> Self {
+        let mut rows = vec![0.0; grid.len() * facets.len()];
+        rows.par_chunks_mut(facets.len().max(1))
+            .enumerate()
+            .for_each(|(node, row)| visibility.fill(grid.direction(node), facets.clone(), row));
+        Self { grid, facets: facets.len(), rows }
     }
 
     /// Each facet's visibility times `(n·d)+`.
-    pub fn with_cosines(mut self, normals: &[Vec3]) -> Self {
+    pub fn with_cosines(&self, normals: &[Vec3]) -> Self {
         let grid = self.grid;
-        self.rows.par_chunks_mut(self.facets.max(1)).enumerate().for_each(|(node, row)| {
+        let mut rows = self.rows.clone();
+        rows.par_chunks_mut(self.facets.max(1)).enumerate().for_each(|(node, row)| {
             let direction = grid.direction(node);
             for (v, normal) in row.iter_mut().zip(normals) {
                 *v *= normal.dot(direction).max(0.0);
             }
         });
-        self
+        Self { rows, ..*self }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The effective BRDF as a live sum over facets: horizons for visibility, exact lobes, no table.
+//! The effective BRDF as a live sum over facets: soft visibility, exact lobes, no table of the product.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -6,13 +6,13 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::facet_sum::FacetSum;
-use crate::visibility::Horizons;
+use crate::visibility::Visibility;
 
-/// Sums over facets at the query; exact in the lobes, interpolated only in the horizons.
+/// Sums over facets at the query; exact in the lobes, interpolated only in the visibility.
 #[derive(Debug, Clone)]
 pub struct Direct {
     pub sum: Arc<FacetSum>,
-    pub horizons: Arc<Horizons>,
+    pub visibility: Arc<Visibility>,
 }
 
 #[derive(Default)]
@@ -32,11 +32,11 @@ impl Direct {
             let facets = self.sum.facet_count();
             scratch.v_i.resize(facets, 0.0);
             scratch.v_o.resize(facets, 0.0);
-            self.horizons.fill(o, &mut scratch.v_o);
+            self.visibility.fill(o, 0..facets, &mut scratch.v_o);
             let area = self.sum.projected_area(&scratch.v_o, o);
             for (k, &i) in lights.iter().enumerate() {
                 if i.z > 0.0 && o.z > 0.0 && area > 0.0 {
-                    self.horizons.fill(i, &mut scratch.v_i);
+                    self.visibility.fill(i, 0..facets, &mut scratch.v_i);
                     out(k, self.sum.sum(i, o, &scratch.v_i, &scratch.v_o));
                 } else {
                     out(k, DVec3::ZERO);

@@ -69,7 +69,7 @@ pub struct GroupFacets<'a> {
 impl Channel {
     /// A Lambertian lobe: one table of `Σ w V(i)(n·i)+ V(o)(n·o)+ / π`, smooth on its own.
     pub fn lambertian(group: &GroupFacets<'_>, tint: Tint) -> Self {
-        let cosines = group.visibility.part(0..group.visibility.facets).with_cosines(group.normals);
+        let cosines = group.visibility.with_cosines(group.normals);
         let y = vec![std::f32::consts::FRAC_1_PI; group.weights.len()];
         let u = visibility_table(&cosines, group.weights, &y, 1);
         Self { u: Arc::new(u), p: None, columns: 1, tint, ranks: (1, 1) }

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::math::{exp_negative, ln_one_minus};
-use super::{BLOCK, LANES, multiversion};
+use super::{LANES, blocks, lane, multiversion};
 use crate::directions::half_vector;
 
 /// The vectors of one pair of directions.
@@ -126,52 +126,44 @@ fn masking(pair: &PairVectors) -> f32 {
     2.0 / pair.i_dot_h.max(1e-20)
 }
 
+/// Values of a lane of facets; 0 where a normal faces away from either direction (as the padding does).
+#[inline(always)]
+fn lobe_lane(pair: &PairVectors, normals: [&[f32]; 3], at: usize, value: impl Fn(Seen) -> f32) -> [f32; LANES] {
+    let [x, y, z] = [lane(normals[0], at), lane(normals[1], at), lane(normals[2], at)];
+    let mut values = [0.0_f32; LANES];
+    for l in 0..LANES {
+        let seen = see(pair, x[l], y[l], z[l]);
+        let f = value(seen);
+        values[l] = if seen.lit() { f } else { 0.0 };
+    }
+    values
+}
+
 #[inline(always)]
 fn sum<const C: usize>(
     pair: &PairVectors,
-    [nx, ny, nz]: [&[f32]; 3],
+    normals: [&[f32]; 3],
     weights: [&[f32]; C],
     v_i: &[f32],
     v_o: &[f32],
     value: impl Fn(Seen) -> f32,
 ) -> [f64; C] {
-    let n = v_i.len();
-    let (nx, ny, nz, v_o) = (&nx[..n], &ny[..n], &nz[..n], &v_o[..n]);
-    let weights = weights.map(|w| &w[..n]);
-    let one = |s: usize| -> f32 {
-        let seen = see(pair, nx[s], ny[s], nz[s]);
-        let visible = if seen.lit() { v_i[s] * v_o[s] } else { 0.0 };
-        value(seen) * visible
-    };
     let mut totals = [0.0; C];
-    let mut start = 0;
-    while start < n {
-        let end = (start + BLOCK).min(n);
+    for block in blocks(v_i.len()) {
         let mut lanes = [[0.0_f32; LANES]; C];
-        let mut s = start;
-        while s + LANES <= end {
-            let mut values = [0.0_f32; LANES];
-            for (l, value) in values.iter_mut().enumerate() {
-                *value = one(s + l);
-            }
+        for at in block {
+            let values = lobe_lane(pair, normals, at, &value);
+            let (v_i, v_o) = (lane(v_i, at), lane(v_o, at));
             for c in 0..C {
+                let w = lane(weights[c], at);
                 for l in 0..LANES {
-                    lanes[c][l] += values[l] * weights[c][s + l];
+                    lanes[c][l] += values[l] * (v_i[l] * v_o[l]) * w[l];
                 }
             }
-            s += LANES;
-        }
-        while s < end {
-            let value = one(s);
-            for c in 0..C {
-                lanes[c][0] += value * weights[c][s];
-            }
-            s += 1;
         }
         for c in 0..C {
             totals[c] += lanes[c].iter().map(|&x| f64::from(x)).sum::<f64>();
         }
-        start = end;
     }
     totals
 }
@@ -198,12 +190,10 @@ multiversion! {
 }
 
 #[inline(always)]
-fn each(pair: &PairVectors, [nx, ny, nz]: [&[f32]; 3], out: &mut [f32], value: impl Fn(Seen) -> f32) {
-    let n = out.len();
-    let (nx, ny, nz) = (&nx[..n], &ny[..n], &nz[..n]);
-    for s in 0..n {
-        let seen = see(pair, nx[s], ny[s], nz[s]);
-        out[s] = if seen.lit() { value(seen) } else { 0.0 };
+fn each(pair: &PairVectors, normals: [&[f32]; 3], out: &mut [f32], value: impl Fn(Seen) -> f32) {
+    for (k, out) in out.chunks_mut(LANES).enumerate() {
+        let values = lobe_lane(pair, normals, k * LANES, &value);
+        out.copy_from_slice(&values[..out.len()]);
     }
 }
 

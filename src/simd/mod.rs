@@ -9,7 +9,7 @@ mod visibility;
 
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, lobe_sums, lobe_values};
-pub use visibility::{floating_visibility, ground_visibility, masked_sum, projected_area};
+pub use visibility::{blend_bits, ground_visibility, masked_sum, projected_area};
 
 /// Compiles a function for the baseline, AVX2 and AVX-512, and picks at run time.
 macro_rules! multiversion {
@@ -44,8 +44,28 @@ macro_rules! multiversion {
 }
 pub(crate) use multiversion;
 
-/// Values worked on together: two registers of AVX2, one of AVX-512.
-pub(crate) const LANES: usize = 16;
+/// Values worked on together: enough that the compiler keeps the loop over them and vectorises it.
+pub(crate) const LANES: usize = 64;
 
 /// Facets summed in f32 before the sum is carried over to f64: bounds the rounding error of a sum over any number.
 pub(crate) const BLOCK: usize = 1024;
+
+/// Starts of the lanes of each block of `n` values.
+#[inline(always)]
+pub(crate) fn blocks(n: usize) -> impl Iterator<Item = impl Iterator<Item = usize>> {
+    (0..n).step_by(BLOCK).map(move |start| (start..(start + BLOCK).min(n)).step_by(LANES))
+}
+
+/// The values of one lane; zeros beyond the end.
+#[inline(always)]
+pub(crate) fn lane(values: &[f32], at: usize) -> [f32; LANES] {
+    match values[at..].first_chunk::<LANES>() {
+        Some(lane) => *lane,
+        None => {
+            let mut lane = [0.0; LANES];
+            let rest = &values[at..];
+            lane[..rest.len()].copy_from_slice(rest);
+            lane
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Visibility of many facets along one direction, and sums over what is visible.
 
-use super::{BLOCK, LANES, multiversion};
+use super::{LANES, blocks, lane, multiversion};
 
 #[inline(always)]
 fn soft_step(x: f32) -> f32 {
@@ -18,23 +18,26 @@ multiversion! {
 }
 
 multiversion! {
-    /// Multiplies `out` by what one layer of blocked intervals (`[low, high]`) leaves, blended between two azimuths.
-    pub fn floating_visibility(
-        from: [&[f32]; 2],
-        to: [&[f32]; 2],
-        blend: f32,
-        elevation: f32,
-        sharpness: f32,
-        out: &mut [f32],
-    ) {
-        let [from_low, from_high] = from;
-        let [to_low, to_high] = to;
-        let inside = |low: f32, high: f32| soft_step((elevation - low) * sharpness) - soft_step((elevation - high) * sharpness);
-        let n = out.len();
-        let (from_low, from_high, to_low, to_high) = (&from_low[..n], &from_high[..n], &to_low[..n], &to_high[..n]);
-        for s in 0..n {
-            let blocked = inside(from_low[s], from_high[s]) * (1.0 - blend) + inside(to_low[s], to_high[s]) * blend;
-            out[s] *= 1.0 - blocked;
+    /// Bits of four rows, weighted and summed: facet `first + k` into `out[k]`.
+    pub fn blend_bits(rows: [&[u32]; 4], weights: [f32; 4], first: usize, out: &mut [f32]) {
+        let word_at = |row: &[u32], k: usize| -> u32 {
+            // Words of facets from `first` on, whatever its place in a word.
+            let (word, shift) = ((first + k) / 32, (first + k) % 32);
+            let low = row[word] >> shift;
+            if shift == 0 || word + 1 >= row.len() { low } else { low | row[word + 1] << (32 - shift) }
+        };
+        let mut k = 0;
+        while k < out.len() {
+            let words = rows.map(|row| word_at(row, k));
+            let width = (out.len() - k).min(32);
+            let mut values = [0.0_f32; 32];
+            for (word, weight) in words.iter().zip(weights) {
+                for (l, value) in values.iter_mut().enumerate() {
+                    *value += if word >> l & 1 == 1 { weight } else { 0.0 };
+                }
+            }
+            out[k..k + width].copy_from_slice(&values[..width]);
+            k += 32;
         }
     }
 }
@@ -42,32 +45,21 @@ multiversion! {
 multiversion! {
     /// `Σ w a b`, f64 between blocks, for each of the weight columns: the visible area of facets that share a normal.
     pub fn masked_sum<const C: usize>(weights: [&[f32]; C], a: &[f32], b: &[f32]) -> [f64; C] {
-        let n = a.len().min(b.len());
         let mut totals = [0.0; C];
-        let mut start = 0;
-        while start < n {
-            let end = (start + BLOCK).min(n);
+        for block in blocks(a.len()) {
             let mut lanes = [[0.0_f32; LANES]; C];
-            let mut s = start;
-            while s + LANES <= end {
-                for l in 0..LANES {
-                    let seen = a[s + l] * b[s + l];
-                    for c in 0..C {
-                        lanes[c][l] += weights[c][s + l] * seen;
+            for at in block {
+                let (a, b) = (lane(a, at), lane(b, at));
+                for c in 0..C {
+                    let w = lane(weights[c], at);
+                    for l in 0..LANES {
+                        lanes[c][l] += w[l] * a[l] * b[l];
                     }
                 }
-                s += LANES;
-            }
-            while s < end {
-                for c in 0..C {
-                    lanes[c][0] += weights[c][s] * a[s] * b[s];
-                }
-                s += 1;
             }
             for c in 0..C {
                 totals[c] += lanes[c].iter().map(|&x| f64::from(x)).sum::<f64>();
             }
-            start = end;
         }
         totals
     }
@@ -76,27 +68,17 @@ multiversion! {
 multiversion! {
     /// `Σ w v (n·d)+`: the visible projected area along `d` (Wu et al. 2011, Eq. 10), f64 between blocks.
     pub fn projected_area(normals: [&[f32]; 3], weights: &[f32], v: &[f32], d: glam::Vec3) -> f64 {
-        let n = v.len();
-        let [nx, ny, nz] = normals.map(|x| &x[..n]);
-        let weights = &weights[..n];
         let mut total = 0.0;
-        let mut start = 0;
-        while start < n {
-            let end = (start + BLOCK).min(n);
+        for block in blocks(v.len()) {
             let mut lanes = [0.0_f32; LANES];
-            let one = |s: usize| weights[s] * v[s] * (nx[s] * d.x + ny[s] * d.y + nz[s] * d.z).max(0.0);
-            let mut s = start;
-            while s + LANES <= end {
-                for (l, lane) in lanes.iter_mut().enumerate() {
-                    *lane += one(s + l);
+            for at in block {
+                let [x, y, z] = [lane(normals[0], at), lane(normals[1], at), lane(normals[2], at)];
+                let (w, v) = (lane(weights, at), lane(v, at));
+                for l in 0..LANES {
+                    lanes[l] += w[l] * v[l] * (x[l] * d.x + y[l] * d.y + z[l] * d.z).max(0.0);
                 }
-                s += LANES;
-            }
-            for s in s..end {
-                lanes[0] += one(s);
             }
             total += lanes.iter().map(|&x| f64::from(x)).sum::<f64>();
-            start = end;
         }
         total
     }

@@ -30,7 +30,8 @@ impl PeriodicGrid {
             let (cell, tile) = walk.cell();
             if self.z_max[cell] > origin.z + walk.entered * rise {
                 for &entry in self.entries(cell) {
-                    if entry.triangle != own && meets(origin, to, self.copy_corners(entry, tile)) {
+                    let corners = self.copy_corners(entry, tile);
+                    if meets(origin, to, corners) && !(entry.triangle == own && self.lies_on(origin, corners)) {
                         return true;
                     }
                 }
@@ -40,6 +41,14 @@ impl PeriodicGrid {
             }
             walk.advance();
         }
+    }
+}
+
+impl PeriodicGrid {
+    /// Is this copy of a facet's triangle the one it lies on? Other copies block it like any other surface.
+    pub(super) fn lies_on(&self, origin: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
+        let normal = (b - a).cross(c - a);
+        normal.dot(origin - a).abs() <= normal.length() * (10.0 * LIFT * self.tile_size.length())
     }
 }
 

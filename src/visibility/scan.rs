@@ -15,6 +15,16 @@ pub(super) struct BlockedSlopes {
 }
 
 impl BlockedSlopes {
+    /// The highest blocked slope: the horizon of a surface without overhangs.
+    pub fn highest(&self) -> f32 {
+        self.floating.last().map_or(self.ground, |interval| interval.1)
+    }
+
+    /// Is this slope blocked?
+    pub fn contains(&self, slope: f32) -> bool {
+        slope <= self.ground || self.floating.iter().any(|&(low, high)| low <= slope && slope <= high)
+    }
+
     fn clear(&mut self) {
         self.ground = 0.0;
         self.floating.clear();
@@ -51,7 +61,7 @@ impl BlockedSlopes {
 }
 
 /// The lowest elevation that is resolved: a walk ends where what is left could block no more than this slope.
-const LOWEST_SLOPE: f32 = 0.0017;
+const LOWEST_SLOPE: f32 = 0.005;
 
 impl PeriodicGrid {
     /// Fills `blocked` with what a point sees blocked along the unit plane direction `along`; `own` is ignored.
@@ -67,10 +77,12 @@ impl PeriodicGrid {
             let (cell, tile) = walk.cell();
             if self.z_max[cell] - origin.z > walk.entered * blocked.ground {
                 for &entry in self.entries(cell) {
-                    if entry.triangle != own {
-                        if let Some((low, high)) = slice(origin, along, self.copy_corners(entry, tile)) {
-                            blocked.insert(low, high);
-                        }
+                    let corners = self.copy_corners(entry, tile);
+                    if entry.triangle == own && self.lies_on(origin, corners) {
+                        continue;
+                    }
+                    if let Some((low, high)) = slice(origin, along, corners) {
+                        blocked.insert(low, high);
                     }
                 }
                 if blocked.ground == f32::INFINITY {
