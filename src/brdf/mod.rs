@@ -3,16 +3,20 @@
 //! An analytic term is a scalar lobe times a colour, `f = tint(i·h) · lobe_cos`; a measured one is a table over half
 //! and difference angles, made reciprocal when it is read. [`Brdf::from_specs`] makes either from a scene.
 
+mod albedo;
 mod analytic;
 mod fast_math;
 mod from_specs;
+mod half_difference;
 mod measured;
+mod merl;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
 pub use analytic::schlick_weight;
+pub use half_difference::HalfDifferenceTable;
 pub use measured::{Measured, MeasuredCache, MeasuredKind, MeasuredReport};
 
 use crate::directions::half_vector;
