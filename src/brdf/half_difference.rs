@@ -56,12 +56,21 @@ impl HalfDifferenceTable {
         debug_assert!(
             shape.iter().all(|&n| n >= 2) && samples.len() == shape.iter().product::<usize>()
         );
-        Self {
+        let mut table = Self {
             name,
             shape,
             samples,
             report,
-        }
+        };
+        table.report.max_albedo =
+            max_albedo(|angles| table.f_r(angles) * (angles.n_dot_i * angles.n_dot_o));
+        table
+    }
+
+    /// Records how far the table is from what it was made of.
+    pub(super) fn with_resampling_error(mut self, error: f32) -> Self {
+        self.report.resampling_error = error;
+        self
     }
 
     /// The bilinear corners along an axis: lower index and weight of the upper one; constant beyond the outer centres.

@@ -73,8 +73,11 @@ impl MeasuredCache {
         if let Some(table) = self.tables.get(&key) {
             return Ok(Arc::clone(table));
         }
-        Err(InputError::new("", "a measured BRDF", "an analytic one")
-            .in_file(path)
-            .into())
+        let table: Arc<dyn Measured> = match kind {
+            MeasuredKind::Merl => Arc::new(super::merl::load(path)?),
+            MeasuredKind::Rgl => Arc::new(super::rgl::load(path)?),
+        };
+        self.tables.insert(key, Arc::clone(&table));
+        Ok(table)
     }
 }

@@ -5,17 +5,20 @@
 
 mod albedo;
 mod analytic;
+mod color_basis;
 mod fast_math;
 mod from_specs;
 mod half_difference;
 mod measured;
 mod merl;
+mod rgl;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
 pub use analytic::schlick_weight;
+pub use color_basis::ColorBasis;
 pub use half_difference::HalfDifferenceTable;
 pub use measured::{Measured, MeasuredCache, MeasuredKind, MeasuredReport};
 
