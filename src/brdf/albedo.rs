@@ -32,7 +32,7 @@ pub(super) fn max_albedo(f_cos: impl Fn(&LobeAngles) -> Vec3) -> f32 {
 
 fn albedo_of(f_cos: impl Fn(&LobeAngles) -> Vec3, theta: f32, samples: usize) -> Vec3 {
     let (sin_i, cos_i) = f64::from(theta).sin_cos();
-    if !(cos_i as f32 > 1e-7) || samples == 0 {
+    if cos_i.is_nan() || cos_i < 1e-7 || samples == 0 {
         return Vec3::ZERO;
     }
     let step = (LOGIT_RANGE[1] - LOGIT_RANGE[0]) / samples as f64;

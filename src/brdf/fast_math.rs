@@ -7,7 +7,8 @@ pub(super) fn exp_nonpositive(x: f32) -> f32 {
     /// Adding and taking away 1.5·2²³ rounds to an integer.
     const ROUND: f32 = 12_582_912.0;
     let t = x.max(-88.0) * std::f32::consts::LOG2_E;
-    let k = (t + ROUND) - ROUND;
+    let shifted = t + ROUND;
+    let k = shifted - ROUND;
     // 2^f on [-½, ½]: Taylor in f ln 2 to the seventh power, error 4e-9.
     let y = (t - k) * std::f32::consts::LN_2;
     let p = 1.0
@@ -16,8 +17,9 @@ pub(super) fn exp_nonpositive(x: f32) -> f32 {
                 + y * (1.0 / 6.0
                     + y * (1.0 / 24.0
                         + y * (1.0 / 120.0 + y * (1.0 / 720.0 + y * (1.0 / 5040.0)))))));
-    // k is within [-127, 0]; -127 makes the exponent bits 0, which is the number 0.
-    let scale = f32::from_bits(((k as i32 + 127) as u32) << 23);
+    // The low bits of the shifted number are k, within [-127, 0]; -127 makes the exponent bits 0: the number 0.
+    let biased = shifted.to_bits().wrapping_sub(ROUND.to_bits() - 127);
+    let scale = f32::from_bits(biased << 23);
     if x < -87.0 { 0.0 } else { p * scale }
 }
 
@@ -51,7 +53,7 @@ pub(super) fn ln_cos_squared(sin2: f32, cos: f32) -> f32 {
 /// `acos x / √(1-x)` for `0 <= x <= 1` (Abramowitz and Stegun 4.4.46): absolute error of the angle 2e-8 and rounding.
 #[inline]
 pub(super) fn acos_over_sqrt_one_minus(x: f32) -> f32 {
-    1.570_796_3
+    std::f32::consts::FRAC_PI_2
         + x * (-0.214_598_8
             + x * (0.088_978_99
                 + x * (-0.050_174_3

@@ -19,7 +19,7 @@ use super::{LobeAngles, Measured, MeasuredReport};
 pub struct HalfDifferenceTable {
     name: String,
     shape: [usize; 3],
-    /// `[θ_h][θ_d][φ_d]`, `φ_d` fastest; RGB [1/sr] and 1 where measured, all 0 where not.
+    /// `[θ_d][θ_h][φ_d]`, `φ_d` fastest: the facets under one pair of directions share `θ_d`, so all they read is near; RGB [1/sr] and 1 where measured, all 0 where not.
     samples: Vec<Vec4>,
     report: MeasuredReport,
 }
@@ -37,6 +37,11 @@ pub(super) fn bin_angles(shape: [usize; 3], bin: [f64; 3]) -> [f64; 3] {
     ]
 }
 
+/// The bins in `θ_h` and `θ_d` of a row of `φ_d`.
+pub(super) fn row_bins(shape: [usize; 3], row: usize) -> [usize; 2] {
+    [row % shape[0], row / shape[0]]
+}
+
 /// The two cosines `n·i`, `n·o` of half and difference angles.
 pub(super) fn cosines([theta_h, theta_d, phi_d]: [f64; 3]) -> (f64, f64) {
     let common = theta_h.cos() * theta_d.cos();
@@ -45,7 +50,7 @@ pub(super) fn cosines([theta_h, theta_d, phi_d]: [f64; 3]) -> (f64, f64) {
 }
 
 impl HalfDifferenceTable {
-    /// `samples` as stored: `shape` entries, `φ_d` fastest, the fourth component 1 where valid and all 0 elsewhere.
+    /// `samples` as stored: rows of `φ_d` in the order of [`row_bins`], the fourth component 1 where valid and all 0 elsewhere.
     /// Each axis has at least two bins.
     pub(super) fn new(
         name: String,
@@ -109,10 +114,10 @@ impl Measured for HalfDifferenceTable {
         let (h, t_h) = Self::tap(bins_h as f32 * (theta_h * FRAC_2_PI).sqrt() - 0.5, bins_h);
         let (d, t_d) = Self::tap(bins_d as f32 * (theta_d * FRAC_2_PI) - 0.5, bins_d);
         let (p, t_p) = Self::tap(bins_phi as f32 * (phi_d * FRAC_2_PI) - 0.5, bins_phi);
-        let first = (h * bins_d + d) * bins_phi + p;
+        let first = (d * bins_h + h) * bins_phi + p;
         let along_phi = |at: usize| self.samples[at] * (1.0 - t_p) + self.samples[at + 1] * t_p;
-        let along_d = |at: usize| along_phi(at) * (1.0 - t_d) + along_phi(at + bins_phi) * t_d;
-        let sum = along_d(first) * (1.0 - t_h) + along_d(first + bins_d * bins_phi) * t_h;
+        let along_h = |at: usize| along_phi(at) * (1.0 - t_h) + along_phi(at + bins_phi) * t_h;
+        let sum = along_h(first) * (1.0 - t_d) + along_h(first + bins_h * bins_phi) * t_d;
         // The weights of the valid neighbours, renormalised.
         if sum.w > 0.0 {
             sum.truncate() / sum.w
@@ -143,6 +148,8 @@ impl std::fmt::Debug for HalfDifferenceTable {
 
 #[cfg(test)]
 mod tests {
+    use std::f32::consts::TAU;
+
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -189,8 +196,8 @@ mod tests {
         let table = random_table(&mut rng);
         let [bins_h, bins_d, bins_phi] = table.shape.map(|n| n as i64);
         for _ in 0..20_000 {
-            let i = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..6.28));
-            let o = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..6.28));
+            let i = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
+            let o = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
             let [theta_h, theta_d, phi_d] = rotated_angles(i, o);
             // Folded: over the swap of i and o (+π) and the mirror image (negation).
             let folded = phi_d.abs().min(std::f64::consts::PI - phi_d.abs());
@@ -208,7 +215,7 @@ mod tests {
                     })
                     .product();
                 let at = |k: usize, n: i64| (bins[k] as i64 + upper[k]).clamp(0, n - 1);
-                let sample = table.samples[((at(0, bins_h) * bins_d + at(1, bins_d)) * bins_phi
+                let sample = table.samples[((at(1, bins_d) * bins_h + at(0, bins_h)) * bins_phi
                     + at(2, bins_phi)) as usize];
                 if sample.w > 0.0 {
                     sum += weight * sample.truncate().as_dvec3();
@@ -233,8 +240,8 @@ mod tests {
     fn cosines_agree_with_vectors() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         for _ in 0..1000 {
-            let i = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..6.28));
-            let o = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..6.28));
+            let i = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
+            let o = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
             let (n_dot_i, n_dot_o) = cosines(rotated_angles(i, o));
             assert!(
                 (n_dot_i - f64::from(i.z)).abs() < 1e-6 && (n_dot_o - f64::from(o.z)).abs() < 1e-6

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::{Vec3, Vec4};
 
-use super::half_difference::{HalfDifferenceTable, MERL_SHAPE, bin_angles};
+use super::half_difference::{HalfDifferenceTable, MERL_SHAPE, bin_angles, row_bins};
 use super::measured::MeasuredReport;
 use crate::error::{InputError, Result};
 
@@ -84,9 +84,11 @@ fn table_from_planes(name: String, planes: &[u8]) -> HalfDifferenceTable {
     let (mut difference, mut power) = (0.0, 0.0);
     let weight = weights();
     for row in 0..BINS_H * BINS_D {
+        let [h, d] = row_bins(MERL_SHAPE, row);
+        let first = (h * BINS_D + d) * BINS_PHI;
         for phi in 0..BINS_PHI / 2 {
-            let there = sample_at(planes, row * BINS_PHI + phi);
-            let back = sample_at(planes, row * BINS_PHI + BINS_PHI - 1 - phi);
+            let there = sample_at(planes, first + phi);
+            let back = sample_at(planes, first + BINS_PHI - 1 - phi);
             report.invalid_samples += usize::from(there.is_none()) + usize::from(back.is_none());
             samples.push(match (there, back) {
                 (Some(there), Some(back)) => {
@@ -118,7 +120,8 @@ fn weights() -> impl Fn(usize, usize) -> f64 {
     // dω_h = sinθ_h dθ_h and dθ_h ∝ √θ_h on the stretched axis.
     let rows: Vec<[f64; 3]> = (0..BINS_H * BINS_D)
         .map(|row| {
-            let (h, d) = (h[row / BINS_D], d[row % BINS_D]);
+            let [row_h, row_d] = row_bins(MERL_SHAPE, row);
+            let (h, d) = (h[row_h], d[row_d]);
             [
                 h.cos() * d.cos(),
                 h.sin() * d.sin(),

@@ -1,3 +1,4 @@
+use std::f32::consts::TAU;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::PathBuf;
 
@@ -73,7 +74,7 @@ fn a_tabulated_ggx_is_read_back_within_interpolation_error() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (mut error, mut power) = (0.0, 0.0);
     for k in 0..50_000 {
-        let i = from_angles(rng.random_range(0.0..1.48), rng.random_range(0.0..6.28));
+        let i = from_angles(rng.random_range(0.0..1.48), rng.random_range(0.0..TAU));
         let near = if k % 2 == 0 { 0.3 } else { 3.0 };
         let mirrored = Vec3::new(-i.x, -i.y, i.z)
             + near * Vec3::new(rng.random(), rng.random(), rng.random())
@@ -128,7 +129,7 @@ fn invalid_samples_are_left_out_one_channel_or_all() {
     let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0, 1e300];
     let bytes = file_of(|h, d, p| {
         let k = (h * 1e6 + d * 1e3 + p * 10.0) as usize;
-        if k % 7 == 0 {
+        if k.is_multiple_of(7) {
             [2.0, bad[k % 5], 2.0]
         } else {
             [2.0, 4.0, 8.0]
@@ -140,7 +141,7 @@ fn invalid_samples_are_left_out_one_channel_or_all() {
     for _ in 0..10_000 {
         let (i, o) = (
             from_angles(rng.random_range(0.0..1.5), 0.0),
-            from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..6.28)),
+            from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU)),
         );
         let found = table.f_r(&LobeAngles::new(Vec3::Z, i, o, half_vector(i, o)));
         let whole = (found - Vec3::new(2.0, 4.0, 8.0)).abs().max_element() < 1e-4;

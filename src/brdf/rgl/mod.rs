@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::LobeAngles;
-use super::half_difference::{HalfDifferenceTable, bin_angles, cosines};
+use super::half_difference::{HalfDifferenceTable, bin_angles, cosines, row_bins};
 use super::measured::{Measured, MeasuredReport};
 use crate::error::{InputError, Result};
 use tensor_file::TensorFile;
@@ -182,10 +182,11 @@ impl RglBrdf {
         let rows: Vec<(Vec<Vec4>, Residual)> = (0..bins_h * bins_d)
             .into_par_iter()
             .map(|row| {
+                let [h, d] = row_bins(SHAPE, row);
                 let mut residual = Residual::default();
                 let samples = (0..bins_phi)
                     .map(|phi| {
-                        let bin = [(row / bins_d) as f64, (row % bins_d) as f64, phi as f64];
+                        let bin = [h as f64, d as f64, phi as f64];
                         let angles = bin_angles(SHAPE, bin);
                         let Some((i, o)) = directions(angles) else {
                             return Vec4::ZERO;
