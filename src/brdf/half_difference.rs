@@ -11,14 +11,15 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{Vec3, Vec4};
 
 use super::albedo::max_albedo;
-use super::fast_math::{acos_over_sqrt_one_minus, acos_unit};
+use super::fast_math::acos_over_sqrt_one_minus;
 use super::{LobeAngles, Measured, MeasuredReport};
 
 /// Samples at bin centres, `θ_h` index `N √(θ_h / 90°)`, `θ_d` and `φ_d` evenly over [0, π/2].
 #[derive(Clone)]
 pub struct HalfDifferenceTable {
     name: String,
-    shape: [usize; 3],
+    /// Bins in `θ_h`, `θ_d`, `φ_d`; i32 is what converts to f32 in one instruction.
+    shape: [i32; 3],
     /// `[θ_d][θ_h][φ_d]`, `φ_d` fastest: the facets under one pair of directions share `θ_d`, so all they read is near; RGB [1/sr] and 1 where measured, all 0 where not.
     samples: Vec<Vec4>,
     report: MeasuredReport,
@@ -63,7 +64,7 @@ impl HalfDifferenceTable {
         );
         let mut table = Self {
             name,
-            shape,
+            shape: shape.map(|n| n as i32),
             samples,
             report,
         };
@@ -78,12 +79,11 @@ impl HalfDifferenceTable {
         self
     }
 
-    /// The bilinear corners along an axis: lower index and weight of the upper one; constant beyond the outer centres.
+    /// The bilinear corners `unit` (0 to 1) along an axis: lower index and weight of the upper one; constant beyond the outer centres.
     #[inline]
-    fn tap(position: f32, bins: usize) -> (usize, f32) {
-        let last = (bins - 1) as f32;
-        let position = position.max(0.0).min(last);
-        let lower = (position as usize).min(bins - 2);
+    fn tap(unit: f32, bins: i32) -> (i32, f32) {
+        let position = (unit * bins as f32 - 0.5).max(0.0).min((bins - 1) as f32);
+        let lower = (position as i32).min(bins - 2);
         (lower, position - lower as f32)
     }
 }
@@ -98,9 +98,6 @@ impl Measured for HalfDifferenceTable {
         let sin2_h = angles.sin2_theta_h.clamp(0.0, 1.0);
         let cos_d = angles.i_dot_h.clamp(0.0, 1.0);
         let sin2_d = 1.0 - cos_d * cos_d;
-        // 1 - cos = sin²/(1 + cos): exact at the pole.
-        let theta_h = (sin2_h / (1.0 + cos_h)).sqrt() * acos_over_sqrt_one_minus(cos_h);
-        let theta_d = acos_unit(cos_d);
         // Where either sine is 0 every azimuth is the same direction.
         let double_sines = 2.0 * (sin2_h * sin2_d).sqrt();
         let cosine_difference = (angles.n_dot_o - angles.n_dot_i).abs();
@@ -109,15 +106,20 @@ impl Measured for HalfDifferenceTable {
         } else {
             1.0
         };
-        let phi_d = acos_unit(cos_phi);
+        // All three arc cosines at once; 1 - cosθ_h = sin²/(1 + cos) is exact at the pole.
+        let one_minus = Vec4::new(sin2_h / (1.0 + cos_h), 1.0 - cos_d, 1.0 - cos_phi, 0.0);
+        let angles =
+            one_minus.sqrt() * acos_over_sqrt_one_minus(Vec4::new(cos_h, cos_d, cos_phi, 0.0));
+        let [theta_h, theta_d, phi_d, _] = (angles * FRAC_2_PI).to_array();
 
-        let (h, t_h) = Self::tap(bins_h as f32 * (theta_h * FRAC_2_PI).sqrt() - 0.5, bins_h);
-        let (d, t_d) = Self::tap(bins_d as f32 * (theta_d * FRAC_2_PI) - 0.5, bins_d);
-        let (p, t_p) = Self::tap(bins_phi as f32 * (phi_d * FRAC_2_PI) - 0.5, bins_phi);
-        let first = (d * bins_h + h) * bins_phi + p;
+        let (h, t_h) = Self::tap(theta_h.sqrt(), bins_h);
+        let (d, t_d) = Self::tap(theta_d, bins_d);
+        let (p, t_p) = Self::tap(phi_d, bins_phi);
+        let first = ((d * bins_h + h) * bins_phi + p) as usize;
+        let (to_next_h, to_next_d) = (bins_phi as usize, (bins_h * bins_phi) as usize);
         let along_phi = |at: usize| self.samples[at] * (1.0 - t_p) + self.samples[at + 1] * t_p;
-        let along_h = |at: usize| along_phi(at) * (1.0 - t_h) + along_phi(at + bins_phi) * t_h;
-        let sum = along_h(first) * (1.0 - t_d) + along_h(first + bins_h * bins_phi) * t_d;
+        let along_h = |at: usize| along_phi(at) * (1.0 - t_h) + along_phi(at + to_next_h) * t_h;
+        let sum = along_h(first) * (1.0 - t_d) + along_h(first + to_next_d) * t_d;
         // The weights of the valid neighbours, renormalised.
         if sum.w > 0.0 {
             sum.truncate() / sum.w
@@ -194,7 +196,7 @@ mod tests {
     fn lookup_equals_trilinear_interpolation_over_valid_neighbours_from_rotated_angles() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let table = random_table(&mut rng);
-        let [bins_h, bins_d, bins_phi] = table.shape.map(|n| n as i64);
+        let [bins_h, bins_d, bins_phi] = table.shape.map(i64::from);
         for _ in 0..20_000 {
             let i = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
             let o = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
