@@ -93,6 +93,13 @@ fn nanoseconds_per_evaluation() {
             })
         };
         let (near, far) = (colour(&facets), colour(&random));
+        if let Some(table) = term.measured() {
+            let mut out = vec![Vec3::ZERO; facets.len()];
+            let many = nanoseconds(facets.len(), || {
+                table.f_r_many(black_box(&facets), &mut out)
+            });
+            eprintln!("{:<24} f_r_many {many:.1} ns", table.name());
+        }
         let basis = super::ColorBasis::of(&brdf);
         eprintln!(
             "{:<24} lobe_cos_many {many:5.2} ns, f_cos {near:5.1} ns (facets) {far:5.1} ns (random)  colours {:?} {:?}",
