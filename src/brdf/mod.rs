@@ -3,16 +3,23 @@
 //! An analytic term is a scalar lobe times a colour, `f = tint(i·h) · lobe_cos`; a measured one is a table over half
 //! and difference angles, made reciprocal when it is read. [`Brdf::from_specs`] makes either from a scene.
 
+mod albedo;
 mod analytic;
+mod color_basis;
 mod fast_math;
 mod from_specs;
+mod half_difference;
 mod measured;
+mod merl;
+mod rgl;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
 pub use analytic::schlick_weight;
+pub use color_basis::ColorBasis;
+pub use half_difference::HalfDifferenceTable;
 pub use measured::{Measured, MeasuredCache, MeasuredKind, MeasuredReport};
 
 use crate::directions::half_vector;
@@ -104,23 +111,44 @@ impl Term {
     /// [`Term::lobe_cos`] of many angles at once: the choice of model is made once, so that the loop vectorises.
     /// Bit for bit what one call each gives. Fills as many as the shorter slice has.
     pub fn lobe_cos_many(&self, angles: &[LobeAngles], out: &mut [f32]) {
-        fn fill(angles: &[LobeAngles], out: &mut [f32], lobe: impl Fn(&LobeAngles) -> f32) {
-            for (out, angles) in out.iter_mut().zip(angles) {
+        struct Fill<'a>(&'a [LobeAngles], &'a mut [f32]);
+        impl LobeVisitor for Fill<'_> {
+            type Output = ();
+            fn visit(self, lobe_cos: impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync) {
+                for (out, angles) in self.1.iter_mut().zip(self.0) {
+                    *out = lobe_cos(angles);
+                }
+            }
+        }
+        self.visit_lobe(Fill(angles, out));
+    }
+
+    /// Hands the visitor [`Term::lobe_cos`] as a function of this term's own kind, without a branch in it for the
+    /// analytic ones: loops written against it compile once a kind and vectorise.
+    pub fn visit_lobe<V: LobeVisitor>(&self, visitor: V) -> V::Output {
+        fn above(
+            lobe: impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync,
+        ) -> impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync {
+            move |angles| {
                 let value = lobe(angles);
-                *out = if angles.above() { value } else { 0.0 };
+                if angles.above() { value } else { 0.0 }
             }
         }
         match *self {
-            Self::Lambertian { .. } => fill(angles, out, analytic::lambertian),
+            Self::Lambertian { .. } => visitor.visit(above(analytic::lambertian)),
             Self::BlinnPhong { exponent, .. } => {
-                fill(angles, out, |a| analytic::blinn_phong(exponent, a))
+                visitor.visit(above(move |a| analytic::blinn_phong(exponent, a)))
             }
             Self::CookTorrance { roughness, .. } => {
-                fill(angles, out, |a| analytic::cook_torrance(roughness, a))
+                visitor.visit(above(move |a| analytic::cook_torrance(roughness, a)))
             }
-            Self::Ward { roughness, .. } => fill(angles, out, |a| analytic::ward(roughness, a)),
-            Self::Ggx { roughness, .. } => fill(angles, out, |a| analytic::ggx(roughness, a)),
-            Self::Measured(_) => fill(angles, out, |a| self.lobe_cos(a)),
+            Self::Ward { roughness, .. } => {
+                visitor.visit(above(move |a| analytic::ward(roughness, a)))
+            }
+            Self::Ggx { roughness, .. } => {
+                visitor.visit(above(move |a| analytic::ggx(roughness, a)))
+            }
+            Self::Measured(_) => visitor.visit(|a| self.lobe_cos(a)),
         }
     }
 
@@ -169,6 +197,12 @@ impl Term {
     }
 }
 
+/// A computation over a term's scalar lobe, compiled for each kind of term ([`Term::visit_lobe`]).
+pub trait LobeVisitor {
+    type Output;
+    fn visit(self, lobe_cos: impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync) -> Self::Output;
+}
+
 /// Rec. 709 luminance weights of linear RGB.
 pub const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
@@ -194,3 +228,6 @@ impl Brdf {
         self.terms.iter().map(|term| term.f_cos(angles)).sum()
     }
 }
+
+#[cfg(test)]
+mod speed_tests;
