@@ -45,7 +45,7 @@ fn brdfs() -> Vec<(&'static str, Term)> { let w=Vec3::ONE; vec![("lambert",Term:
             let mut line = format!("{tn:7} {bn:8} ref {:.1}s se {:.2}%", t_ref.as_secs_f64(), 100.*se);
             for (n, az) in [(2000,48),(4000,48),(8000,48)] {
                 let t=Instant::now();
-                let mut f = Facets::sample(&mesh, n, 0.5, Vec2::ZERO); f.sort_for_sums();
+                let mut f = Facets::sample(&mesh, n, 0); f.sort_for_sums();
                 let overhang = (0..mesh.triangles.len()).any(|t| mesh.geometric_normal(t).z < -1e-6) ;
                 let h = if overhang { Visibility::Maps(SoftMaps::scan(&grid, &f, PolarGrid::new(az/2, az))) } else if let Some(g)=&mesh.height_grid { Visibility::Horizons(Horizons::march(g, mesh.size, &f, az, 0.02)) } else { Visibility::Horizons(Horizons::scan(&grid, &f, az, 0.02)) };
                 let t_h=t.elapsed();
@@ -60,7 +60,7 @@ fn brdfs() -> Vec<(&'static str, Term)> { let w=Vec3::ONE; vec![("lambert",Term:
     }
 }
 #[test] fn speed() {
-    let n=8000; let mesh=&tiles()[1].1; let mut f=Facets::sample(mesh,n,0.5,Vec2::ZERO); f.sort_for_sums();
+    let n=8000; let mesh=&tiles()[1].1; let mut f=Facets::sample(mesh,n,0); f.sort_for_sums();
     let v=vec![1.0f32;n]; let i=from_angles(0.5,0.3); let o=from_angles(0.9,2.0);
     for (name,t) in brdfs().into_iter().chain([("ggx",Term::Ggx{roughness:0.2,f0:Vec3::ONE})]) { let s=FacetSum::new(&f,&[0],&[SumMaterial{brdf:Brdf{terms:vec![t]},color:Vec3::ONE}]);
         let mut best=1e9f64; let mut x=DVec3::ZERO; for _ in 0..200 { let t=Instant::now(); x+=s.sum(i,o,&v,&v); best=best.min(t.elapsed().as_secs_f64()); }
@@ -70,5 +70,5 @@ fn brdfs() -> Vec<(&'static str, Term)> { let w=Vec3::ONE; vec![("lambert",Term:
         let mut out=vec![0.0f32;n]; let mut best=1e9f64; for k in 0..200 { let t=Instant::now(); vis.fill(from_angles(0.5+k as f32*0.001,0.3),0..n,&mut out); best=best.min(t.elapsed().as_secs_f64()); }
         println!("{nm} fill {:.2} ns/facet", best*1e9/n as f64); }
     let t=Instant::now(); let h=Horizons::march(mesh.height_grid.as_ref().unwrap(),mesh.size,&f,32,0.02); println!("march {:.2} us/scan/2cores", t.elapsed().as_secs_f64()*1e6/(32*n) as f64); drop(h);
-    for (tn,mesh) in tiles() { let g=PeriodicGrid::new(&mesh); let mut f=Facets::sample(&mesh,n,0.5,Vec2::ZERO); f.sort_for_sums(); let t=Instant::now(); SoftMaps::scan(&g,&f,PolarGrid::new(16,16)); println!("{tn} scan {:.2} us", t.elapsed().as_secs_f64()*1e6/(16*n) as f64); }
+    for (tn,mesh) in tiles() { let g=PeriodicGrid::new(&mesh); let mut f=Facets::sample(&mesh,n,0); f.sort_for_sums(); let t=Instant::now(); SoftMaps::scan(&g,&f,PolarGrid::new(16,16)); println!("{tn} scan {:.2} us", t.elapsed().as_secs_f64()*1e6/(16*n) as f64); }
 }

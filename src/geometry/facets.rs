@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::TileMesh;
 
 /// Samples of the surface, one entry a facet in every array. Areas sum to the surface area of the tile.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Facets {
     /// Centres, wrapped into the tile in x and y.
     pub positions: Vec<Vec3>,
@@ -21,6 +21,8 @@ pub struct Facets {
     pub colors: Vec<Vec3>,
     /// The triangle each lies on: a ray that leaves a facet ignores it.
     pub triangles: Vec<u32>,
+    /// Triangles of the mesh that have no area and were left out.
+    pub skipped_triangles: usize,
 }
 
 impl Facets {
@@ -32,81 +34,190 @@ impl Facets {
         self.positions.is_empty()
     }
 
-    /// `count` facets: triangles picked systematically along the cumulative area (in an order that keeps like normals and near places together) at `(k + shift)/count`, a point of the
-    /// R2 sequence, offset by `offset`, inside each. Triangles without area or with corners that are not finite are passed over.
-    pub fn sample(mesh: &TileMesh, count: usize, shift: f32, offset: Vec2) -> Self {
-        let areas: Vec<f64> = (0..mesh.triangles.len()).map(|t| mesh.triangle_area(t)).map(|a| if a.is_finite() { a } else { 0.0 }).collect();
-        let order = stratified_order(mesh);
-        let areas: Vec<f64> = order.iter().map(|&t| areas[t as usize]).collect();
-        let total: f64 = areas.iter().sum();
-        let mut facets = Self::default();
-        if total <= 0.0 || count == 0 {
+    /// `count` systematic samples; `seed` shifts them.
+    pub fn sample(mesh: &TileMesh, count: usize, seed: u64) -> Self {
+        FacetSampler::new(mesh).sample(mesh, count, SampleShift::from_seed(seed))
+    }
+
+    /// Adds a facet at a point of a triangle; areas are filled in by the caller.
+    pub(super) fn push(&mut self, mesh: &TileMesh, triangle: u32, barycentric: Vec3, area: f32) {
+        let index = triangle as usize;
+        let [a, b, c] = mesh.corners(index);
+        let position = wrap(
+            a * barycentric.x + b * barycentric.y + c * barycentric.z,
+            mesh.size,
+        );
+        let geometric = mesh.geometric_normal(index);
+        let interpolated = mesh.corner_normals.as_ref().and_then(|normals| {
+            let [a, b, c] = normals[index];
+            (a * barycentric.x + b * barycentric.y + c * barycentric.z).try_normalize()
+        });
+        self.positions.push(position);
+        self.normals.push(interpolated.unwrap_or(geometric));
+        self.geometric_normals.push(geometric);
+        self.areas.push(area);
+        self.slots.push(mesh.triangle_slot[index]);
+        self.colors
+            .push(mesh.color.at(position.truncate(), mesh.size));
+        self.triangles.push(triangle);
+    }
+}
+
+/// Moves a position by whole tiles into `[0, size)`.
+fn wrap(position: Vec3, size: Vec2) -> Vec3 {
+    let into = |x: f32, size: f32| {
+        let wrapped = x.rem_euclid(size);
+        // A tiny negative x rounds to the size itself.
+        if wrapped < size { wrapped } else { 0.0 }
+    };
+    Vec3::new(
+        into(position.x, size.x),
+        into(position.y, size.y),
+        position.z,
+    )
+}
+
+/// Shifts of a systematic sample, each in `[0, 1)`: the same surface sampled anew.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SampleShift {
+    /// Along the cumulative area, in strata.
+    pub along: f32,
+    /// Of the points inside their triangles, on the unit torus.
+    pub inside: Vec2,
+}
+
+impl SampleShift {
+    /// The shift of pass `seed`: passes fill the unit cube evenly (an R3 sequence; Roberts 2018). Pass 0 is centred.
+    pub fn from_seed(seed: u64) -> Self {
+        // 1/g, 1/g², 1/g³ of the real root g of x⁴ = x + 1.
+        let at = |step: f64| (0.5 + (seed % (1 << 40)) as f64 * step).fract() as f32;
+        let below_one = |x: f32| x.min(1f32.next_down());
+        Self {
+            along: below_one(at(0.819_172_513_396_164_4)),
+            inside: Vec2::new(
+                below_one(at(0.671_043_606_703_789_2)),
+                below_one(at(0.549_700_477_901_970_3)),
+            ),
+        }
+    }
+}
+
+/// The cumulative area of a mesh's triangles along a curve through the tile: made once, sampled often.
+#[derive(Debug, Clone)]
+pub struct FacetSampler {
+    order: Vec<u32>,
+    /// Area of all triangles up to and including `order[k]`.
+    cumulative: Vec<f64>,
+    skipped: usize,
+}
+
+impl FacetSampler {
+    pub fn new(mesh: &TileMesh) -> Self {
+        let mut keyed: Vec<(u32, u32)> = Vec::with_capacity(mesh.triangles.len());
+        for triangle in 0..mesh.triangles.len() {
+            let corners = mesh.corners(triangle);
+            let is_sound = corners.iter().all(|corner| corner.is_finite())
+                && mesh.geometric_normal(triangle) != Vec3::ZERO;
+            if is_sound {
+                let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+                let place = wrap(centre, mesh.size).truncate() / mesh.size;
+                let normal = mesh.geometric_normal(triangle);
+                keyed.push((stratum(normal, place), triangle as u32));
+            }
+        }
+        let skipped = mesh.triangles.len() - keyed.len();
+        // The triangle's number decides between equals: the order is the same everywhere.
+        keyed.sort_unstable();
+        let order: Vec<u32> = keyed.into_iter().map(|(_, triangle)| triangle).collect();
+        let mut sum = 0.0;
+        let accumulate = |triangle: &u32| {
+            sum += mesh.triangle_area(*triangle as usize);
+            sum
+        };
+        let cumulative = order.iter().map(accumulate).collect();
+        Self {
+            order,
+            cumulative,
+            skipped,
+        }
+    }
+
+    /// Surface area of the tile.
+    pub fn area(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// The triangle at a part `at` in `[0, 1)` of the cumulative area, and its position in the order.
+    pub(super) fn triangle_at(&self, at: f64) -> u32 {
+        let k = self
+            .cumulative
+            .partition_point(|sum| *sum <= at * self.area());
+        self.order[k.min(self.order.len() - 1)]
+    }
+
+    /// Systematic samples: facet k lies on the triangle at `(k + shift)/count` of the cumulative area, at a point of an R2
+    /// sequence (Roberts 2018) folded into it, and stands for `area/count`. Empty for a mesh without area.
+    pub fn sample(&self, mesh: &TileMesh, count: usize, shift: SampleShift) -> Facets {
+        let mut facets = Facets {
+            skipped_triangles: self.skipped,
+            ..Facets::default()
+        };
+        if self.order.is_empty() {
             return facets;
         }
-        let area = (total / count as f64) as f32;
-        let (mut triangle, mut passed) = (0, areas[0]);
-        for k in 0..count {
-            let at = (k as f64 + f64::from(shift)) / count as f64 * total;
-            while passed < at && triangle + 1 < areas.len() {
-                triangle += 1;
-                passed += areas[triangle];
+        let area = (self.area() / count as f64) as f32;
+        let mut k = 0;
+        for facet in 0..count {
+            let target = (facet as f64 + f64::from(shift.along)) / count as f64 * self.area();
+            while k + 1 < self.order.len() && self.cumulative[k] <= target {
+                k += 1;
             }
-            let point = r2_point(k, offset);
-            // Fold the square onto the triangle.
-            let (u, v) = if point.x + point.y > 1.0 { (1.0 - point.x, 1.0 - point.y) } else { (point.x, point.y) };
-            facets.push(mesh, order[triangle] as usize, [1.0 - u - v, u, v], area);
+            facets.push(mesh, self.order[k], fold(r2(facet, shift.inside)), area);
         }
         facets
     }
-
-    /// The facets of one independent pass of the reference.
-    pub fn sample_pass(mesh: &TileMesh, count: usize, seed: u64, pass: usize) -> Self {
-        use rand::{RngExt, SeedableRng};
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(pass as u64 + 1);
-        let shift = rng.random::<f32>();
-        let offset = Vec2::new(rng.random(), rng.random());
-        let mut facets = Self::sample(mesh, count, shift, offset);
-        facets.sort_for_sums();
-        facets
-    }
-
-    fn push(&mut self, mesh: &TileMesh, triangle: usize, weights: [f32; 3], area: f32) {
-        let blend = |corners: [Vec3; 3]| corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        let geometric = mesh.geometric_normal(triangle);
-        let position = blend(mesh.corners(triangle));
-        let wrapped = position.truncate() - (position.truncate() / mesh.size).floor() * mesh.size;
-        self.positions.push(wrapped.extend(position.z));
-        self.geometric_normals.push(geometric);
-        self.normals.push(mesh.corner_normals.as_ref().map_or(geometric, |normals| blend(normals[triangle]).normalize_or(geometric)));
-        self.areas.push(area);
-        self.slots.push(mesh.triangle_slot[triangle]);
-        self.colors.push(mesh.color.at(wrapped, mesh.size));
-        self.triangles.push(triangle as u32);
-    }
 }
 
-/// Point `k` of the R2 sequence (Roberts 2018), offset and wrapped into the unit square.
-fn r2_point(k: usize, offset: Vec2) -> Vec2 {
-    const G: f64 = 1.324_717_957_244_746;
-    let at = |power: f64, offset: f32| ((k as f64 + 1.0) / power + f64::from(offset)).fract() as f32;
-    Vec2::new(at(G, offset.x), at(G * G, offset.y))
+/// Point `index` of the R2 sequence, shifted on the unit torus.
+fn r2(index: usize, shift: Vec2) -> Vec2 {
+    // 1/g and 1/g² of the plastic number g.
+    let at = |step: f64, shift: f32| (f64::from(shift) + index as f64 * step).fract() as f32;
+    Vec2::new(
+        at(0.754_877_666_246_692_8, shift.x),
+        at(0.569_840_290_998_053_3, shift.y),
+    )
 }
 
-/// Triangles along a Morton curve through normal and place together: a systematic selection along it samples evenly
-/// what lobes see (normals) and what shadows see (places).
-fn stratified_order(mesh: &TileMesh) -> Vec<u32> {
-    const BITS: u32 = 8;
-    let key = |t: u32| -> u32 {
-        let [a, b, c] = mesh.corners(t as usize);
-        let centre = ((a + b + c) / 3.0).truncate() / mesh.size;
-        let place = centre - centre.floor();
-        let normal = mesh.geometric_normal(t as usize);
-        let axes = [0.5 + 0.5 * normal.x, 0.5 + 0.5 * normal.y, place.x, place.y];
-        let steps = axes.map(|v| ((v * (1 << BITS) as f32) as u32).min((1 << BITS) - 1));
-        (0..BITS).rev().fold(0, |key, bit| steps.iter().fold(key, |key, step| key << 1 | (step >> bit & 1)))
+/// The unit square folded onto barycentric coordinates.
+pub(super) fn fold(point: Vec2) -> Vec3 {
+    let point = if point.x + point.y > 1.0 {
+        Vec2::ONE - point
+    } else {
+        point
     };
-    let mut order: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-    order.sort_by_cached_key(|&t| key(t));
-    order
+    Vec3::new(1.0 - point.x - point.y, point.x, point.y)
+}
+
+/// Position along a Morton curve through normal and place together: a systematic selection along it samples evenly what
+/// lobes see (normals) and what shadows see (places). Place alone leaves three times the error on a glossy egg-crate.
+fn stratum(normal: Vec3, place: Vec2) -> u32 {
+    const BITS: u32 = 8;
+    let axes = [0.5 + 0.5 * normal.x, 0.5 + 0.5 * normal.y, place.x, place.y];
+    let steps = axes.map(|v| ((v * (1 << BITS) as f32) as u32).min((1 << BITS) - 1));
+    (0..BITS).rev().fold(0, |key, bit| {
+        steps.iter().fold(key, |key, step| key << 1 | (step >> bit & 1))
+    })
+}
+
+/// `A cos θ_o` of a surface without shadows, from facets: for tests of sampling.
+#[cfg(test)]
+pub(super) fn unshadowed_projected_area(facets: &Facets, theta: f32, phi: f32) -> f64 {
+    let o = crate::directions::from_angles(theta, phi).as_dvec3();
+    let term = |(normal, area): (&Vec3, &f32)| normal.as_dvec3().dot(o).max(0.0) * f64::from(*area);
+    facets
+        .geometric_normals
+        .iter()
+        .zip(&facets.areas)
+        .map(term)
+        .sum()
 }

@@ -1,8 +1,70 @@
 //! From a geometry description to a periodic triangle mesh, and from the mesh to facets.
 
+mod builder;
+pub mod closure;
 mod facet_order;
 mod facets;
+mod flat;
+mod grooves;
+pub mod heightfield;
+pub mod image_file;
+mod kd_tree;
+mod mesh_file;
+pub mod obj;
+mod pyramids;
+mod rods;
 mod tile_mesh;
+mod voronoi;
+mod weave;
 
-pub use facets::Facets;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+use std::sync::Arc;
+
+pub use facets::{FacetSampler, Facets, SampleShift};
 pub use tile_mesh::{ColorField, HeightGrid, TileMesh};
+
+use crate::error::{InputError, Result};
+use crate::scene::{Geometry, Tile};
+
+/// The mesh of a tile; `base_dir` is the scene file's folder, where relative paths start.
+///
+/// # Errors
+/// A file that is missing or not what it should be.
+pub fn build(tile: &Tile, base_dir: &Path) -> Result<TileMesh> {
+    let size = tile.size;
+    let (mut mesh, color_path) = match &tile.geometry {
+        Geometry::Grooves(spec) => (grooves::build(spec, size), None),
+        Geometry::Pyramids(spec) => (pyramids::build(spec, size), None),
+        Geometry::Rods(spec) => (rods::build(spec, size), None),
+        Geometry::Weave(spec) => (weave::build(spec, size), None),
+        Geometry::Heightfield(spec) => (
+            heightfield::build(spec, size, base_dir)?,
+            spec.color_path.as_deref(),
+        ),
+        Geometry::Flat(spec) => (flat::build(spec, size), spec.color_path.as_deref()),
+        Geometry::Mesh(spec) => (
+            mesh_file::build(spec, size, base_dir)?,
+            spec.color_path.as_deref(),
+        ),
+    };
+    if let Some(path) = color_path {
+        let image = image_file::read_colors(base_dir, path)?;
+        mesh.color = ColorField::Image {
+            size: image.size,
+            texels: Arc::new(image.values),
+        };
+    }
+    if !mesh.positions.iter().all(|position| position.is_finite()) {
+        let found = "a mesh with coordinates that are not finite";
+        return Err(InputError::new(
+            "tile.geometry",
+            found,
+            "parameters that give finite coordinates",
+        )
+        .into());
+    }
+    Ok(mesh)
+}

@@ -23,6 +23,10 @@ pub struct TileMesh {
     pub color: ColorField,
     /// Where the surface is a height-field: its samples.
     pub height_grid: Option<HeightGrid>,
+    /// Every ray from above ends on a side that reflects: `a_v(o) = A cos θ_o` holds (with geometric normals).
+    pub closes_plane: bool,
+    /// What a person should know about how the parameters were met (snapped rotations, rounded counts).
+    pub notes: Vec<String>,
 }
 
 /// Colour weights over the tile, multiplied with a material's own colour.
@@ -51,7 +55,11 @@ impl TileMesh {
     /// Unit geometric normal; zero for a triangle without area.
     pub fn geometric_normal(&self, triangle: usize) -> Vec3 {
         let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
-        (b - a).cross(c - a).try_normalize().unwrap_or_default().as_vec3()
+        (b - a)
+            .cross(c - a)
+            .try_normalize()
+            .unwrap_or_default()
+            .as_vec3()
     }
 
     pub fn triangle_area(&self, triangle: usize) -> f64 {
@@ -61,8 +69,32 @@ impl TileMesh {
 
     /// Lowest and highest z of all vertices; `(0, 0)` for an empty mesh.
     pub fn z_range(&self) -> (f32, f32) {
-        let range = self.positions.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), p| (lo.min(p.z), hi.max(p.z)));
-        if range.0 <= range.1 { range } else { (0.0, 0.0) }
+        let range = self
+            .positions
+            .iter()
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), p| {
+                (lo.min(p.z), hi.max(p.z))
+            });
+        if range.0 <= range.1 {
+            range
+        } else {
+            (0.0, 0.0)
+        }
+    }
+
+    /// Is it a single-valued surface without overhang, vertical walls allowed? Then light and view come only from above.
+    pub fn is_height_field(&self) -> bool {
+        let mut projected = 0.0;
+        for triangle in 0..self.triangles.len() {
+            let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+            let area_normal = 0.5 * (b - a).cross(c - a);
+            if area_normal.z < -1e-6 * area_normal.length() {
+                return false;
+            }
+            projected += area_normal.z;
+        }
+        let base = f64::from(self.base_area());
+        self.closes_plane && (projected - base).abs() <= 1e-3 * base
     }
 
     /// Base area `A` of the tile.

@@ -1,10 +1,43 @@
 //! What a person edits: plain types that mirror the scene file, their defaults, and their validation.
-//! Lengths are in tile units, angles in radians unless a field ends in `_deg`, colour is linear RGB.
+//! Lengths are in tile units, angles in degrees in fields that end in `_deg`, colour is linear RGB.
+//!
+//! [`open`] reads a file or a shipped name; the catalogue ([`Field`]) lists every key with its range and meaning.
 
-use std::path::PathBuf;
+mod check;
+mod color;
+mod edits;
+pub mod files;
+mod load;
+mod material;
+mod overrides;
+mod quality;
+mod schema;
+pub mod shipped;
+mod tile;
+mod view;
 
-use glam::{Vec2, Vec3};
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashSet;
+use std::sync::LazyLock;
+
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
+
+pub use load::{LoadedScene, load, load_with_overrides, open, parse};
+pub use material::{BrdfSpec, Material, TermSpec};
+pub use quality::{BACKENDS, METHODS, NORMALS, PRESETS, Quality};
+pub use schema::{Field, Kind, Shape};
+pub use tile::{
+    Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile,
+    Grooves, Heightfield, MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
+};
+pub use view::{Camera, DirectionalSpec, Light, OBJECT_KINDS, Object, TONE_MAPS};
+
+use check::{Problem, Step};
+
+use crate::error::{InputError, Result};
 
 /// A whole scene file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,151 +62,230 @@ fn one() -> u32 {
     1
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Tile {
-    #[serde(default = "unit_square")]
-    pub size: Vec2,
-    #[serde(default = "millimetre")]
-    pub unit: String,
-    pub geometry: Geometry,
-}
-
-fn unit_square() -> Vec2 {
-    Vec2::ONE
-}
-
-fn millimetre() -> String {
-    "mm".to_owned()
-}
-
-/// The geometry families; each is a struct of its own in `scene::geometry`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Geometry {
-    Flat {},
-    Mesh { path: PathBuf },
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Material {
-    pub name: String,
-    pub brdf: BrdfSpec,
-    #[serde(default = "white")]
+/// The material that a slot gets, everything looked up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlotMaterial<'a> {
+    /// Index into [`Scene::materials`]; `None` for the grey of a scene without materials.
+    pub index: Option<usize>,
+    pub name: &'a str,
+    pub brdf: &'a BrdfSpec,
+    /// Multiplies the BRDF.
     pub color: Vec3,
 }
 
-fn white() -> Vec3 {
-    Vec3::ONE
-}
+/// What everything is made of in a scene without materials.
+static GREY: LazyLock<BrdfSpec> = LazyLock::new(|| {
+    BrdfSpec::One(TermSpec::Lambertian {
+        albedo: Vec3::splat(0.5),
+    })
+});
 
-/// One BRDF term or a sum of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum BrdfSpec {
-    One(TermSpec),
-    Sum(Vec<TermSpec>),
-}
+const DEFAULT_MATERIAL: &str = "default";
+const MATERIAL: Shape = Shape::Table(Material::fields);
 
-impl BrdfSpec {
-    pub fn terms(&self) -> &[TermSpec] {
-        match self {
-            Self::One(term) => std::slice::from_ref(term),
-            Self::Sum(terms) => terms,
+impl Scene {
+    /// A scene that is all defaults but for its geometry.
+    pub fn of(geometry: Geometry) -> Self {
+        Self {
+            version: 1,
+            tile: Tile {
+                size: glam::Vec2::ONE,
+                unit: "mm".to_owned(),
+                geometry,
+            },
+            materials: Vec::new(),
+            object: Object::default(),
+            light: Light::default(),
+            camera: None,
+            quality: Quality::default(),
         }
     }
-}
 
-/// A BRDF term as written in a scene (DESIGN.md, Sec. 3). Colours accept a scalar for an RGB triple.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum TermSpec {
-    Lambertian { albedo: Vec3 },
-    BlinnPhong { exponent: f32, specular: Vec3 },
-    CookTorrance { roughness: f32, f0: Vec3 },
-    Ward { roughness: f32, specular: Vec3 },
-    Ggx { roughness: f32, f0: Vec3 },
-    Merl { path: PathBuf },
-    Rgl { path: PathBuf },
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Object {
-    /// `sphere`, `plate`, `cup`, `cylinder`, `pillow`, `skirt`, `teapot` or `mesh`.
-    pub kind: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub path: Option<PathBuf>,
-}
-
-impl Default for Object {
-    fn default() -> Self {
-        Self { kind: "sphere".to_owned(), path: None }
+    /// The catalogue of the whole scene file.
+    pub fn fields() -> Vec<Field> {
+        let optional = |key, shape, doc| Field::new(key, "", shape, None, doc);
+        vec![
+            optional(
+                "version",
+                Shape::Integer { min: 1, max: 1 },
+                "Version of the file format.",
+            ),
+            Field::required(
+                "tile",
+                Shape::Table(Tile::fields),
+                "The small-scale surface.",
+            ),
+            optional(
+                "material",
+                Shape::List {
+                    of: &MATERIAL,
+                    min: 0,
+                    max: 4096,
+                },
+                "Materials by slot name.",
+            ),
+            optional(
+                "object",
+                Shape::Table(Object::fields),
+                "The large-scale object.",
+            ),
+            optional("light", Shape::Table(Light::fields), "What lights it."),
+            optional(
+                "camera",
+                Shape::Table(Camera::fields),
+                "Where the picture is taken from.",
+            ),
+            optional("quality", Shape::Table(Quality::fields), "How accurately."),
+        ]
     }
-}
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Light {
-    /// `studio`, `clear_sky`, `overcast_sky`, `sun`, `none`, or a path to a .hdr / .exr file.
-    pub environment: String,
-    /// How many directional lights stand for the environment.
-    pub count: usize,
-    /// Turns the environment about the vertical.
-    pub rotation_deg: f32,
-    /// Scales the environment's radiance.
-    pub intensity: f32,
-    pub directional: Vec<DirectionalSpec>,
-}
-
-impl Default for Light {
-    fn default() -> Self {
-        Self { environment: "studio".to_owned(), count: 32, rotation_deg: 0.0, intensity: 1.0, directional: Vec::new() }
+    /// The material of a mesh slot: its own, else `default`, else (in a scene without materials) a grey Lambertian one.
+    ///
+    /// # Errors
+    /// There are materials, but none of the slot's name and no `default`.
+    pub fn material_for_slot(&self, slot: &str) -> Result<SlotMaterial<'_>> {
+        if self.materials.is_empty() {
+            return Ok(SlotMaterial {
+                index: None,
+                name: DEFAULT_MATERIAL,
+                brdf: &GREY,
+                color: Vec3::ONE,
+            });
+        }
+        let find = |name: &str| {
+            self.materials
+                .iter()
+                .position(|material| material.name == name)
+        };
+        let index = find(slot)
+            .or_else(|| find(DEFAULT_MATERIAL))
+            .ok_or_else(|| {
+                let names: Vec<String> = self
+                    .materials
+                    .iter()
+                    .map(|material| material.name.clone())
+                    .collect();
+                let error = InputError::new(
+                    "material",
+                    names.join(", "),
+                    format!("a material `{slot}` or `{DEFAULT_MATERIAL}`"),
+                );
+                match check::nearest(slot, names.iter().map(String::as_str)) {
+                    Some(name) => error.with_hint(format!("did you mean `{name}`?")),
+                    None => error,
+                }
+            })?;
+        let material = &self.materials[index];
+        let brdf = material.brdf.as_ref().or_else(|| {
+            find(DEFAULT_MATERIAL).and_then(|index| self.materials[index].brdf.as_ref())
+        });
+        let brdf = brdf.ok_or_else(|| {
+            InputError::new(
+                format!("material.{}.brdf", material.name),
+                "nothing",
+                "a BRDF here or in the material `default`",
+            )
+        })?;
+        Ok(SlotMaterial {
+            index: Some(index),
+            name: &material.name,
+            brdf,
+            color: material.color,
+        })
     }
-}
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DirectionalSpec {
-    /// Towards the light, world frame, y up; any length but zero.
-    pub direction: Vec3,
-    /// Irradiance on a surface that faces the light.
-    pub irradiance: Vec3,
-}
-
-/// Where the picture is taken from; framed automatically where a scene has none.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Camera {
-    pub azimuth_deg: f32,
-    pub elevation_deg: f32,
-    /// Distance in radii of the object's bounding sphere; 0 frames the object.
-    pub distance: f32,
-    pub fov_deg: f32,
-    pub exposure_ev: f32,
-    /// `filmic` or `plain`.
-    pub tone_map: String,
-}
-
-impl Default for Camera {
-    fn default() -> Self {
-        Self { azimuth_deg: 25.0, elevation_deg: 20.0, distance: 0.0, fov_deg: 30.0, exposure_ev: 0.0, tone_map: "filmic".to_owned() }
-    }
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Quality {
-    /// `draft`, `standard`, `fine`, `reference` or `wu2011`.
-    pub preset: String,
-    pub seed: u64,
-    /// `auto`, `gpu` or `cpu`.
-    pub backend: String,
-}
-
-impl Default for Quality {
-    fn default() -> Self {
-        Self { preset: "standard".to_owned(), seed: 1, backend: "auto".to_owned() }
+    /// Rules that tie fields to each other, which the catalogue cannot say.
+    fn check_relations(&self) -> std::result::Result<(), Problem> {
+        let key = |name: &str| Step::Key(name.to_owned());
+        let problem = |path: Vec<Step>, found: &str, expected: &str| {
+            Err(Problem {
+                path,
+                found: found.to_owned(),
+                expected: expected.to_owned(),
+                hint: None,
+            })
+        };
+        let geometry = |name: &str| vec![key("tile"), key("geometry"), key(name)];
+        match &self.tile.geometry {
+            Geometry::Mesh(mesh) if mesh.path.as_os_str().is_empty() => {
+                return problem(geometry("path"), "nothing", "an OBJ file");
+            }
+            Geometry::Heightfield(field) => match (&field.path, &field.values) {
+                (Some(_), Some(_)) => {
+                    return problem(
+                        geometry("values"),
+                        "both `path` and `values`",
+                        "one of them",
+                    );
+                }
+                (None, None) => {
+                    return problem(
+                        geometry("path"),
+                        "nothing",
+                        "`path` (an image) or `values` (rows of heights)",
+                    );
+                }
+                (None, Some(rows)) if rows.iter().any(|row| row.len() != rows[0].len()) => {
+                    return problem(
+                        geometry("values"),
+                        "rows of different lengths",
+                        "rows of one length",
+                    );
+                }
+                _ => {}
+            },
+            Geometry::Weave(Weave {
+                pattern: WeavePattern::Matrix(rows),
+                ..
+            }) if rows.iter().any(|row| row.len() != rows[0].len()) => {
+                return problem(
+                    geometry("pattern"),
+                    "rows of different lengths",
+                    "rows of one length",
+                );
+            }
+            _ => {}
+        }
+        let mut names = HashSet::new();
+        for (index, material) in self.materials.iter().enumerate() {
+            let path = |field: &str| vec![key("material"), Step::Entry(index, None), key(field)];
+            if !names.insert(material.name.as_str()) {
+                return problem(
+                    path("name"),
+                    &format!("`{}` a second time", material.name),
+                    "each name once",
+                );
+            }
+            let inherits = self
+                .materials
+                .iter()
+                .any(|other| other.name == DEFAULT_MATERIAL && other.brdf.is_some());
+            if material.brdf.is_none() && !inherits {
+                return problem(
+                    path("brdf"),
+                    "nothing",
+                    "a BRDF here or in the material `default`",
+                );
+            }
+        }
+        if self.object.kind == "mesh" && self.object.path.is_none() {
+            return problem(vec![key("object"), key("path")], "nothing", "an OBJ file");
+        }
+        for (index, light) in self.light.directional.iter().enumerate() {
+            if light.direction.try_normalize().is_none() {
+                let path = vec![
+                    key("light"),
+                    key("directional"),
+                    Step::Entry(index, None),
+                    key("direction"),
+                ];
+                return problem(
+                    path,
+                    "a vector without length",
+                    "a direction towards the light",
+                );
+            }
+        }
+        Ok(())
     }
 }

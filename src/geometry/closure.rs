@@ -1,0 +1,133 @@
+//! Does a mesh close the plane? Welds corners modulo the tile and looks at the edges.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, I64Vec3};
+
+use super::TileMesh;
+
+/// Corners nearer than this part of the tile are one corner.
+const WELD: f64 = 2e-6;
+
+/// Is the mesh closed modulo the tile (every edge is passed as often one way as the other), and does it cover the plane
+/// once (signed projected area = base area)? Then every ray from above meets a side that reflects before any other.
+pub fn is_closed_sheet(mesh: &TileMesh) -> bool {
+    open_edges(mesh) == 0
+        && (signed_projected_area(mesh) / f64::from(mesh.base_area()) - 1.0).abs() < 1e-3
+}
+
+/// `Σ A_t n_t·z`.
+pub fn signed_projected_area(mesh: &TileMesh) -> f64 {
+    let area = |triangle| {
+        let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
+        0.5 * (b - a).cross(c - a).z
+    };
+    (0..mesh.triangles.len()).map(area).sum()
+}
+
+/// Number of edges that are passed more often one way than the other, after welding.
+pub fn open_edges(mesh: &TileMesh) -> usize {
+    let representatives = weld(mesh);
+    let mut balance: HashMap<(u32, u32), i32> = HashMap::new();
+    for triangle in &mesh.triangles {
+        let corner = triangle.map(|index| representatives[index as usize]);
+        for (from, to) in [
+            (corner[0], corner[1]),
+            (corner[1], corner[2]),
+            (corner[2], corner[0]),
+        ] {
+            *balance.entry((from.min(to), from.max(to))).or_default() +=
+                if from < to { 1 } else { -1 };
+        }
+    }
+    balance
+        .iter()
+        .filter(|((from, to), count)| from != to && **count != 0)
+        .count()
+}
+
+/// For every vertex the first one at the same place modulo the tile.
+fn weld(mesh: &TileMesh) -> Vec<u32> {
+    let size = mesh.size.as_dvec2();
+    let (low, high) = mesh.z_range();
+    let scale = DVec3::new(
+        size.x,
+        size.y,
+        size.max_element().max(f64::from(high - low)),
+    );
+    let cells = (1.0 / WELD) as i64;
+    let mut found: HashMap<I64Vec3, u32> = HashMap::new();
+    let wrap =
+        |cell: I64Vec3| I64Vec3::new(cell.x.rem_euclid(cells), cell.y.rem_euclid(cells), cell.z);
+    let mut representative = |(index, position): (usize, &glam::Vec3)| {
+        let cell = (position.as_dvec3() / scale * cells as f64)
+            .round()
+            .as_i64vec3();
+        let around = (-1..=1)
+            .flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| I64Vec3::new(x, y, z))));
+        let known = std::iter::once(I64Vec3::ZERO)
+            .chain(around)
+            .find_map(|step| found.get(&wrap(cell + step)).copied());
+        known.unwrap_or_else(|| {
+            found.insert(wrap(cell), index as u32);
+            index as u32
+        })
+    };
+    mesh.positions
+        .iter()
+        .enumerate()
+        .map(&mut representative)
+        .collect()
+}
+
+/// For tests of closed families.
+#[cfg(test)]
+pub fn assert_closes_plane(mesh: &TileMesh) {
+    assert_eq!(open_edges(mesh), 0, "open edges");
+    let ratio = signed_projected_area(mesh) / f64::from(mesh.base_area());
+    assert!(
+        (ratio - 1.0).abs() < 1e-5,
+        "projected area {ratio} of the base area"
+    );
+    assert!(mesh.closes_plane);
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec2, Vec3};
+
+    use super::*;
+
+    fn plane(far_edge: f32) -> TileMesh {
+        TileMesh {
+            size: Vec2::ONE,
+            positions: vec![
+                Vec3::ZERO,
+                Vec3::new(far_edge, 0.0, 0.0),
+                Vec3::new(far_edge, 1.0, 0.0),
+                Vec3::Y,
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            triangle_slot: vec![0, 0],
+            slots: vec!["default".to_owned()],
+            ..TileMesh::default()
+        }
+    }
+
+    #[test]
+    fn a_plane_closes_itself_over_the_tiles_edge_and_a_gap_is_seen() {
+        assert!(is_closed_sheet(&plane(1.0)));
+        assert!(is_closed_sheet(&plane(1.0 + 1e-7)));
+        assert_eq!(open_edges(&plane(0.99)), 2);
+        assert!(!is_closed_sheet(&plane(0.99)));
+    }
+
+    #[test]
+    fn a_plane_seen_from_behind_does_not_close() {
+        let mut mesh = plane(1.0);
+        mesh.triangles
+            .iter_mut()
+            .for_each(|triangle| triangle.swap(1, 2));
+        assert!(!is_closed_sheet(&mesh));
+    }
+}

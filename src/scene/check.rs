@@ -1,0 +1,306 @@
+//! Holds a scene as TOML against the catalogue: unknown keys and kinds, wrong types, values out of range.
+
+use std::fmt::Write as _;
+
+use toml::{Table, Value};
+
+use super::schema::{Field, Shape};
+use crate::error::InputError;
+
+/// One step into a document.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Step {
+    Key(String),
+    /// An entry of a list, with its `name` where it has one.
+    Entry(usize, Option<String>),
+}
+
+/// The first thing that is wrong with a document.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    pub path: Vec<Step>,
+    pub found: String,
+    pub expected: String,
+    pub hint: Option<String>,
+}
+
+impl Problem {
+    fn new(path: &[Step], found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self {
+            path: path.to_vec(),
+            found: found.into(),
+            expected: expected.into(),
+            hint: None,
+        }
+    }
+
+    /// As an error; `line` is where in the file it stands, if it stands in a file.
+    pub fn into_error(self, line: Option<usize>) -> InputError {
+        let field = path_text(&self.path);
+        let place = match line {
+            Some(line) if field.is_empty() => format!("line {line}"),
+            Some(line) => format!("line {line}, {field}"),
+            None => field,
+        };
+        let error = InputError::new(place, self.found, self.expected);
+        match self.hint {
+            Some(hint) => error.with_hint(hint),
+            None => error,
+        }
+    }
+}
+
+/// `material.sides.brdf.roughness`, as `--set` takes it.
+pub fn path_text(path: &[Step]) -> String {
+    let mut text = String::new();
+    for step in path {
+        if !text.is_empty() {
+            text.push('.');
+        }
+        match step {
+            Step::Key(key) => text.push_str(key),
+            Step::Entry(_, Some(name)) => text.push_str(name),
+            Step::Entry(index, None) => {
+                let _ = write!(text, "{index}");
+            }
+        }
+    }
+    text
+}
+
+/// The candidate that is most like `found`, if any is like enough to be meant.
+pub fn nearest<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let score = |candidate: &str| strsim::jaro_winkler(&found.to_lowercase(), candidate);
+    let best = candidates
+        .into_iter()
+        .max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    (score(best) > 0.7).then_some(best)
+}
+
+fn did_you_mean<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    nearest(found, candidates).map(|name| format!("did you mean `{name}`?"))
+}
+
+/// Checks a table against its fields.
+pub fn check_table(table: &Table, fields: &[Field], path: &mut Vec<Step>) -> Result<(), Problem> {
+    check_keys(table, fields, None, path)
+}
+
+fn check_keys(
+    table: &Table,
+    fields: &[Field],
+    tag: Option<&str>,
+    path: &mut Vec<Step>,
+) -> Result<(), Problem> {
+    let known = || tag.into_iter().chain(fields.iter().map(|field| field.key));
+    for key in table.keys() {
+        if !known().any(|name| name == key) {
+            path.push(Step::Key(key.clone()));
+            let mut problem = Problem::new(
+                path,
+                format!("unknown key `{key}`"),
+                format!("one of {}", list(known())),
+            );
+            problem.hint = did_you_mean(key, known());
+            return Err(problem);
+        }
+    }
+    for field in fields {
+        path.push(Step::Key(field.key.to_owned()));
+        match table.get(field.key) {
+            Some(value) => check_value(value, &field.shape, path)?,
+            None if field.required => {
+                let mut problem =
+                    Problem::new(path, "nothing", format!("`{}`: {}", field.key, field.doc));
+                if let Some(tag) = table.get("kind").and_then(Value::as_str) {
+                    problem.hint = Some(format!("`{tag}` needs it"));
+                }
+                return Err(problem);
+            }
+            None => {}
+        }
+        path.pop();
+    }
+    Ok(())
+}
+
+fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(), Problem> {
+    match *shape {
+        Shape::Number { min, max, .. } => check_number(value, min, max, path),
+        Shape::Integer { min, max } => match value {
+            Value::Integer(number) if (min..=max).contains(number) => Ok(()),
+            other => Err(Problem::new(
+                path,
+                show(other),
+                format!("a whole number from {min} to {max}"),
+            )),
+        },
+        Shape::Color { max } => match value {
+            Value::Array(values) if values.len() == 3 => check_entries(
+                values,
+                &Shape::Number {
+                    min: 0.0,
+                    max,
+                    soft_max: max,
+                },
+                path,
+            ),
+            Value::Integer(_) | Value::Float(_) => check_number(value, 0.0, max, path),
+            other => Err(Problem::new(
+                path,
+                show(other),
+                format!("a number or a triple [r, g, b] from 0 to {max}"),
+            )),
+        },
+        Shape::Vector { length, min, max } => match value {
+            Value::Array(values) if values.len() == length => check_entries(
+                values,
+                &Shape::Number {
+                    min,
+                    max,
+                    soft_max: max,
+                },
+                path,
+            ),
+            other => Err(Problem::new(
+                path,
+                show(other),
+                format!("a list of {length} numbers"),
+            )),
+        },
+        Shape::Text => check_text(value, "a text", path).map(drop),
+        Shape::Path => match check_text(value, "a file name", path)? {
+            "" => Err(Problem::new(path, "an empty text", "a file name")),
+            _ => Ok(()),
+        },
+        Shape::Choice(names) => {
+            let expected = format!("one of {}", list(names.iter().copied()));
+            let found = check_text(value, &expected, path)?;
+            if names.contains(&found) {
+                return Ok(());
+            }
+            let mut problem = Problem::new(path, show(value), expected);
+            problem.hint = did_you_mean(found, names.iter().copied());
+            Err(problem)
+        }
+        Shape::Table(fields) => match value {
+            Value::Table(table) => check_keys(table, &fields(), None, path),
+            other => Err(Problem::new(path, show(other), "a table")),
+        },
+        Shape::Tagged(kinds) => {
+            let kinds = kinds();
+            let names = || kinds.iter().map(|kind| kind.kind);
+            let Value::Table(table) = value else {
+                return Err(Problem::new(
+                    path,
+                    show(value),
+                    "a table { kind = ..., ... }",
+                ));
+            };
+            path.push(Step::Key("kind".to_owned()));
+            let expected = format!("one of {}", list(names()));
+            let Some(tag) = table.get("kind") else {
+                return Err(Problem::new(path, "nothing", expected));
+            };
+            let tag = check_text(tag, &expected, path)?;
+            let Some(kind) = kinds.iter().find(|kind| kind.kind == tag) else {
+                let mut problem = Problem::new(path, format!("unknown kind \"{tag}\""), expected);
+                problem.hint = did_you_mean(tag, names());
+                return Err(problem);
+            };
+            path.pop();
+            check_keys(table, &kind.fields, Some("kind"), path)
+        }
+        Shape::List { of, min, max } => match value {
+            Value::Array(values) if (min..=max).contains(&values.len()) => {
+                check_entries(values, of, path)
+            }
+            Value::Array(values) => Err(Problem::new(
+                path,
+                format!("{} entries", values.len()),
+                format!("{min} to {max} entries"),
+            )),
+            other => Err(Problem::new(path, show(other), "a list")),
+        },
+        Shape::AnyOf(shapes) => {
+            let fitting = shapes.iter().find(|shape| takes_type(shape, value));
+            match fitting.or(shapes.first()) {
+                Some(shape) => check_value(value, shape, path),
+                None => Ok(()),
+            }
+        }
+    }
+}
+
+fn check_entries(values: &[Value], of: &Shape, path: &mut Vec<Step>) -> Result<(), Problem> {
+    for (index, value) in values.iter().enumerate() {
+        let name = value
+            .get("name")
+            .and_then(Value::as_str)
+            .filter(|name| !name.is_empty());
+        path.push(Step::Entry(index, name.map(str::to_owned)));
+        check_value(value, of, path)?;
+        path.pop();
+    }
+    Ok(())
+}
+
+fn check_number(value: &Value, min: f64, max: f64, path: &[Step]) -> Result<(), Problem> {
+    let number = match value {
+        Value::Integer(number) => *number as f64,
+        Value::Float(number) => *number,
+        other => {
+            return Err(Problem::new(
+                path,
+                show(other),
+                format!("a number from {min} to {max}"),
+            ));
+        }
+    };
+    // Scenes hold f32: a value that rounds to the end of the range is at the end of the range.
+    let in_range = number as f32 >= min as f32 && number as f32 <= max as f32;
+    if in_range {
+        Ok(())
+    } else {
+        Err(Problem::new(
+            path,
+            show(value),
+            format!("a number from {min} to {max}"),
+        ))
+    }
+}
+
+fn check_text<'a>(value: &'a Value, expected: &str, path: &[Step]) -> Result<&'a str, Problem> {
+    value
+        .as_str()
+        .ok_or_else(|| Problem::new(path, show(value), expected))
+}
+
+fn takes_type(shape: &Shape, value: &Value) -> bool {
+    match shape {
+        Shape::Number { .. } | Shape::Integer { .. } => {
+            matches!(value, Value::Integer(_) | Value::Float(_))
+        }
+        Shape::Text | Shape::Path | Shape::Choice(_) => value.is_str(),
+        Shape::Table(_) | Shape::Tagged(_) => value.is_table(),
+        Shape::List { .. } | Shape::Vector { .. } | Shape::Color { .. } => value.is_array(),
+        Shape::AnyOf(shapes) => shapes.iter().any(|shape| takes_type(shape, value)),
+    }
+}
+
+fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// A value as a message shows it, cut where it is long.
+fn show(value: &Value) -> String {
+    match value {
+        Value::Array(values) => format!("a list of {} entries", values.len()),
+        Value::Table(_) => "a table".to_owned(),
+        Value::String(text) if text.chars().count() > 60 => {
+            format!("\"{}...\"", text.chars().take(60).collect::<String>())
+        }
+        Value::String(text) => format!("\"{text}\""),
+        other => other.to_string(),
+    }
+}

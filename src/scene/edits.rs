@@ -1,0 +1,103 @@
+//! Small edits that need no person: what `biscale profile --edit` moves.
+
+use toml::{Table, Value};
+
+use super::Scene;
+use super::material::TermSpec;
+use super::schema::{Kind, Shape};
+use super::tile::Geometry;
+
+impl Scene {
+    /// Moves the first numeric parameter of the geometry by 5 % and says which (`tile.geometry.depth`); `None` where
+    /// the family has none. A value at the end of its range goes the other way.
+    pub fn nudge_geometry(&mut self) -> Option<String> {
+        let (moved, key) = nudged(
+            &self.tile.geometry,
+            Geometry::kinds(),
+            self.tile.geometry.kind(),
+        )?;
+        self.tile.geometry = moved;
+        Some(format!("tile.geometry.{key}"))
+    }
+
+    /// Moves the first numeric BRDF parameter of the first material that has one by 5 % and says which.
+    pub fn nudge_brdf(&mut self) -> Option<String> {
+        for material in &mut self.materials {
+            for term in material.brdf.iter_mut().flat_map(|brdf| brdf.terms_mut()) {
+                if let Some((moved, key)) = nudged(term, TermSpec::kinds(), term.kind()) {
+                    *term = moved;
+                    return Some(format!("material.{}.brdf.{key}", material.name));
+                }
+            }
+        }
+        None
+    }
+
+    /// Makes the first material's colour 5 % darker and says which.
+    pub fn nudge_color(&mut self) -> Option<String> {
+        let material = self.materials.first_mut()?;
+        material.color *= 0.95;
+        Some(format!("material.{}.color", material.name))
+    }
+}
+
+/// A copy with its first number (else its first colour, else its first whole number) moved, and that one's key.
+fn nudged<T>(item: &T, kinds: Vec<Kind>, kind: &str) -> Option<(T, &'static str)>
+where
+    T: serde::Serialize + serde::de::DeserializeOwned,
+{
+    let kind = kinds.into_iter().find(|candidate| candidate.kind == kind)?;
+    let mut table = Table::try_from(item).ok()?;
+    let rank = |shape: &Shape| match shape {
+        Shape::Number { .. } => Some(0),
+        Shape::Color { .. } => Some(1),
+        Shape::Integer { .. } => Some(2),
+        _ => None,
+    };
+    let mut fields: Vec<_> = kind
+        .fields
+        .iter()
+        .filter_map(|field| Some((rank(&field.shape)?, field)))
+        .collect();
+    fields.sort_by_key(|(rank, _)| *rank);
+    let field = fields
+        .into_iter()
+        .map(|(_, field)| field)
+        .find(|field| table.contains_key(field.key))?;
+    let value = table.get_mut(field.key)?;
+    *value = match (&*value, field.shape) {
+        (Value::Float(number), Shape::Number { min, max, soft_max }) => {
+            Value::Float(step(*number, min, max, soft_max - min))
+        }
+        (Value::Integer(number), Shape::Integer { min, max }) => {
+            let by = (number / 20).max(1);
+            Value::Integer(if number + by <= max {
+                number + by
+            } else {
+                (number - by).max(min)
+            })
+        }
+        (Value::Array(values), Shape::Color { max }) => {
+            let moved = values
+                .iter()
+                .filter_map(Value::as_float)
+                .map(|number| Value::Float(step(number, 0.0, max, 1.0)));
+            Value::Array(moved.collect())
+        }
+        _ => return None,
+    };
+    Some((table.try_into().ok()?, field.key))
+}
+
+fn step(number: f64, min: f64, max: f64, span: f64) -> f64 {
+    let by = if number == 0.0 {
+        0.05 * span
+    } else {
+        0.05 * number
+    };
+    if (min..=max).contains(&(number + by)) {
+        number + by
+    } else {
+        (number - by).clamp(min, max)
+    }
+}

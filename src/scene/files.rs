@@ -1,0 +1,54 @@
+//! Files that a scene names: on disk beside the scene, or `asset:name`, embedded in the binary.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use super::check;
+use super::shipped;
+use crate::error::{InputError, Result};
+
+/// The bytes of a file named in a scene whose folder is `base_dir`, at most `limit` of them.
+///
+/// # Errors
+/// A missing, unreadable or larger file; names the file.
+pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8]>> {
+    if let Some(name) = path.to_str().and_then(|path| path.strip_prefix("asset:")) {
+        return match shipped::asset(name) {
+            Some(bytes) => Ok(Cow::Borrowed(bytes)),
+            None => {
+                let names = shipped::ASSETS.iter().map(|(name, _)| *name);
+                let expected = format!("one of {}", names.clone().collect::<Vec<_>>().join(", "));
+                let error =
+                    InputError::new("", format!("no asset `{name}`"), expected).in_file(path);
+                Err(match check::nearest(name, names) {
+                    Some(name) => error.with_hint(format!("did you mean `asset:{name}`?")),
+                    None => error,
+                }
+                .into())
+            }
+        };
+    }
+    let full = resolve(base_dir, path);
+    let complain =
+        |found: String, expected: &str| InputError::new("", found, expected).in_file(&full);
+    let metadata = std::fs::metadata(&full)
+        .map_err(|error| complain(error.to_string(), "a file that can be read"))?;
+    if !metadata.is_file() {
+        return Err(complain("a folder or device".to_owned(), "a file").into());
+    }
+    if metadata.len() > limit {
+        return Err(complain(
+            format!("{} bytes", metadata.len()),
+            &format!("at most {limit} bytes"),
+        )
+        .into());
+    }
+    std::fs::read(&full)
+        .map(Cow::Owned)
+        .map_err(|error| complain(error.to_string(), "a file that can be read").into())
+}
+
+/// Where a path named in a scene points to on disk.
+pub fn resolve(base_dir: &Path, path: &Path) -> PathBuf {
+    base_dir.join(path)
+}

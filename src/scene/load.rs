@@ -1,0 +1,209 @@
+//! From a file, a shipped name or a text to a checked [`Scene`], and back.
+
+use std::path::{Path, PathBuf};
+
+use toml::Table;
+use toml::de::{DeTable, DeValue};
+
+use super::check::{self, Problem, Step};
+use super::{Scene, overrides, shipped};
+use crate::error::{Error, InputError, Result};
+
+/// A scene with the folder that its relative paths start from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedScene {
+    pub scene: Scene,
+    /// Folder of the scene file; empty (the working directory) for shipped scenes.
+    pub base_dir: PathBuf,
+    /// The file's stem or the shipped name, for titles.
+    pub name: String,
+}
+
+/// A scene file is text written by people: more than this is something else.
+const LARGEST_FILE: u64 = 64 << 20;
+
+/// Opens `scene`, a file or the name of a shipped material, with `--set` overrides (`key.path=value`) applied.
+pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
+    let path = Path::new(scene);
+    if path.is_file() {
+        return load(path, overrides);
+    }
+    if let Some(source) = shipped::source(scene) {
+        let parsed = load_with_overrides(source, overrides)
+            .map_err(|error| error.in_file(format!("{scene} (shipped)")))?;
+        return Ok(LoadedScene {
+            scene: parsed,
+            base_dir: PathBuf::new(),
+            name: scene.to_owned(),
+        });
+    }
+    let error = if path.is_dir() {
+        InputError::new("", "a folder", "a scene file").in_file(path)
+    } else {
+        let error = InputError::new(
+            "",
+            format!("no file and no shipped material `{scene}`"),
+            "a scene file or a name that `biscale materials` lists",
+        );
+        match check::nearest(scene, shipped::names()) {
+            Some(name) => error.with_hint(format!("did you mean `{name}`?")),
+            None => error,
+        }
+    };
+    Err(error.into())
+}
+
+/// Loads a scene file.
+pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScene> {
+    let complain = |found: String| {
+        Error::from(InputError::new("", found, "a scene file (TOML, UTF-8)").in_file(path))
+    };
+    let length = std::fs::metadata(path)
+        .map_err(|error| complain(error.to_string()))?
+        .len();
+    if length > LARGEST_FILE {
+        return Err(complain(format!("{length} bytes")));
+    }
+    let source = std::fs::read_to_string(path).map_err(|error| complain(error.to_string()))?;
+    let scene = load_with_overrides(&source, overrides).map_err(|error| error.in_file(path))?;
+    let name = path
+        .file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    Ok(LoadedScene {
+        scene,
+        base_dir: path.parent().unwrap_or(Path::new("")).to_owned(),
+        name,
+    })
+}
+
+/// A scene from its text.
+pub fn parse(source: &str) -> Result<Scene> {
+    load_with_overrides(source, &[])
+}
+
+/// A scene from its text, with overrides applied to the text's table before it is checked.
+pub fn load_with_overrides(source: &str, overrides: &[String]) -> Result<Scene> {
+    let mut table: Table = toml::from_str(source).map_err(|error| syntax_error(source, &error))?;
+    for text in overrides {
+        overrides::apply(&mut table, text)?;
+    }
+    let fail = |problem: Problem| {
+        let field = check::path_text(&problem.path);
+        match overrides
+            .iter()
+            .rev()
+            .find(|text| overrides::touches(text, &problem.path))
+        {
+            Some(text) => {
+                let mut error = problem.into_error(None);
+                error.place = if field.is_empty() {
+                    format!("--set {text}")
+                } else {
+                    format!("--set {text}: {field}")
+                };
+                Error::from(error)
+            }
+            None => {
+                let line = line_of(source, &problem.path);
+                problem.into_error(line).into()
+            }
+        }
+    };
+    check::check_table(&table, &Scene::fields(), &mut Vec::new()).map_err(fail)?;
+    // The catalogue decides what is legal; what serde still refuses would be a gap in it.
+    let scene: Scene = table.try_into().map_err(|error: toml::de::Error| {
+        Error::from(InputError::new(
+            "",
+            error.message(),
+            "a scene as DESIGN.md, Sec. 6 describes it",
+        ))
+    })?;
+    scene.check_relations().map_err(fail)?;
+    Ok(scene)
+}
+
+fn syntax_error(source: &str, error: &toml::de::Error) -> Error {
+    let place = error
+        .span()
+        .map(|span| format!("line {}", line_at(source, span.start)))
+        .unwrap_or_default();
+    InputError::new(place, error.message().replace('\n', "; "), "TOML").into()
+}
+
+fn line_at(source: &str, offset: usize) -> usize {
+    let offset = offset.min(source.len());
+    1 + source.as_bytes()[..offset]
+        .iter()
+        .filter(|&&byte| byte == b'\n')
+        .count()
+}
+
+/// The line on which the deepest part of `path` that the text holds stands.
+fn line_of(source: &str, path: &[Step]) -> Option<usize> {
+    let document = DeTable::parse(source).ok()?;
+    let mut offset = None;
+    let mut table = Some(document.get_ref());
+    let mut value: Option<&DeValue<'_>> = None;
+    for step in path {
+        let next = match step {
+            Step::Key(key) => {
+                let found = table
+                    .or(value.and_then(DeValue::as_table))?
+                    .iter()
+                    .find(|(name, _)| name.get_ref() == key);
+                let Some((name, next)) = found else { break };
+                offset = Some(name.span().start);
+                next
+            }
+            Step::Entry(index, _) => {
+                let Some(next) = value
+                    .and_then(DeValue::as_array)
+                    .and_then(|array| array.get(*index))
+                else {
+                    break;
+                };
+                offset = Some(next.span().start);
+                next
+            }
+        };
+        table = None;
+        value = Some(next.get_ref());
+    }
+    offset.map(|offset| line_at(source, offset))
+}
+
+impl Scene {
+    /// The scene as the text of a scene file.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self)
+            .map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))
+    }
+
+    /// Checks a scene that was made or changed in memory: ranges, names, and that fields go together.
+    pub fn validate(&self) -> Result<()> {
+        let table = Table::try_from(self)
+            .map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))?;
+        let fail = |problem: Problem| Error::from(problem.into_error(None));
+        check::check_table(&table, &Self::fields(), &mut Vec::new()).map_err(fail)?;
+        self.check_relations().map_err(fail)
+    }
+
+    /// Writes the scene file; the file is replaced only when the whole text is on disk.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        self.validate()?;
+        let text = self.to_toml()?;
+        let complain = |error: std::io::Error| {
+            Error::from(
+                InputError::new("", error, "a place where a file can be written").in_file(path),
+            )
+        };
+        let partial = path.with_extension("toml.partial");
+        std::fs::write(&partial, text).map_err(complain)?;
+        std::fs::rename(&partial, path).map_err(|error| {
+            // The new text could not take its place: leave nothing behind.
+            let _ = std::fs::remove_file(&partial);
+            complain(error)
+        })
+    }
+}

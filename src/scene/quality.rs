@@ -1,0 +1,55 @@
+//! The `[quality]` table: a preset, and any of its knobs turned by hand.
+
+use super::schema::{Shape, number, scene_table};
+
+pub const PRESETS: &[&str] = &["draft", "standard", "fine", "reference", "wu2011"];
+pub const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
+pub const METHODS: &[&str] = &["auto", "direct", "low_rank", "table"];
+pub const NORMALS: &[&str] = &["exact", "binned"];
+
+const GRID_SIDE: Shape = Shape::Integer { min: 2, max: 512 };
+
+scene_table! {
+    /// How accurately, and on what. A knob that is not given is the preset's.
+    Quality {
+        /// Preset: draft, standard, fine, reference or wu2011.
+        preset: String = "standard".to_owned(), Shape::Choice(PRESETS), "";
+        /// Seed of every sampling.
+        seed: u64 = 1, Shape::Integer { min: 0, max: i64::MAX }, "";
+        /// Where to compute: auto, gpu or cpu.
+        backend: String = "auto".to_owned(), Shape::Choice(BACKENDS), "";
+        /// Facets that stand for the surface.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        facets: Option<usize> = None, Shape::Integer { min: 16, max: 4_000_000 }, "";
+        /// Azimuths at which visibility is computed.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        azimuths: Option<usize> = None, Shape::Integer { min: 4, max: 1024 }, "";
+        /// Elevation rings at which visibility is computed.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        rings: Option<usize> = None, Shape::Integer { min: 2, max: 512 }, "";
+        /// How the product is computed: auto, direct, low_rank or table.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        method: Option<String> = None, Shape::Choice(METHODS), "";
+        /// Part of the BRDF matrix' power that is kept.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        keep_m: Option<f32> = None, number(0.5, 1.0), "";
+        /// Part of the visible normal distribution's power that is kept.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        keep_n: Option<f32> = None, number(0.5, 1.0), "";
+        /// Colour directions kept of a measured BRDF.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        colors: Option<usize> = None, Shape::Integer { min: 1, max: 3 }, "";
+        /// Rings and azimuths of the direction grid of the factored form.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        grid: Option<[usize; 2]> = None, Shape::List { of: &GRID_SIDE, min: 2, max: 2 }, "";
+        /// Rays or samples of the reference for each pair of directions.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        reference_samples: Option<usize> = None, Shape::Integer { min: 16, max: 1_000_000_000 }, "";
+        /// Angle over which visibility fades at a horizon.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        penumbra_deg: Option<f32> = None, number(0.0, 45.0), "degrees";
+        /// Facet normals as they are, or the nearest of a grid: exact or binned.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        normals: Option<String> = None, Shape::Choice(NORMALS), "";
+    }
+}

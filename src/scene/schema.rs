@@ -1,0 +1,193 @@
+//! The catalogue of scene keys: what each is called, its unit, range and meaning. Validation, the editor's sliders and
+//! the documentation read the same entries.
+
+/// One key of a scene file.
+#[derive(Debug, Clone)]
+pub struct Field {
+    pub key: &'static str,
+    /// `tile units`, `degrees`, ... or empty.
+    pub unit: &'static str,
+    pub shape: Shape,
+    /// Default of a numeric key.
+    pub default: Option<f64>,
+    pub required: bool,
+    /// One line for a tooltip.
+    pub doc: &'static str,
+}
+
+impl Field {
+    pub fn new(
+        key: &'static str,
+        unit: &'static str,
+        shape: Shape,
+        default: Option<f64>,
+        doc: &'static str,
+    ) -> Self {
+        Self {
+            key,
+            unit,
+            shape,
+            default,
+            required: false,
+            doc: doc.trim_ascii(),
+        }
+    }
+
+    pub fn required(key: &'static str, shape: Shape, doc: &'static str) -> Self {
+        Self {
+            required: true,
+            ..Self::new(key, "", shape, None, doc)
+        }
+    }
+
+    /// The key as a caption: `side_angle_deg` reads `Side angle`.
+    pub fn label(&self) -> String {
+        let words = self.key.trim_end_matches("_deg").replace('_', " ");
+        let mut letters = words.chars();
+        letters
+            .next()
+            .map(|first| first.to_uppercase().chain(letters).collect())
+            .unwrap_or_default()
+    }
+}
+
+/// What a key may hold. Ranges are inclusive.
+#[derive(Debug, Clone, Copy)]
+pub enum Shape {
+    /// Any number in `min..=max`; a slider ends at `soft_max`, beyond which values are legal but rarely meant.
+    Number {
+        min: f64,
+        max: f64,
+        soft_max: f64,
+    },
+    Integer {
+        min: i64,
+        max: i64,
+    },
+    /// A linear RGB triple of numbers in `0..=max`, or one number for all three.
+    Color {
+        max: f64,
+    },
+    Vector {
+        length: usize,
+        min: f64,
+        max: f64,
+    },
+    Text,
+    /// A file, relative to the scene file, or `asset:name` for one that ships in the binary.
+    Path,
+    Choice(&'static [&'static str]),
+    Table(fn() -> Vec<Field>),
+    /// A table whose `kind` says which keys it has.
+    Tagged(fn() -> Vec<Kind>),
+    List {
+        of: &'static Shape,
+        min: usize,
+        max: usize,
+    },
+    /// The first alternative of the value's TOML type decides.
+    AnyOf(&'static [Shape]),
+}
+
+/// One alternative of a tagged table: a geometry family, a BRDF model.
+#[derive(Debug, Clone)]
+pub struct Kind {
+    pub kind: &'static str,
+    pub doc: &'static str,
+    pub fields: Vec<Field>,
+}
+
+/// A number in `min..=max`.
+pub const fn number(min: f64, max: f64) -> Shape {
+    Shape::Number {
+        min,
+        max,
+        soft_max: max,
+    }
+}
+
+/// A length in tile units: any up to 1000, sliders end at `soft_max`.
+pub const fn length(min: f64, soft_max: f64) -> Shape {
+    Shape::Number {
+        min,
+        max: 1000.0,
+        soft_max,
+    }
+}
+
+/// The default of a field as the catalogue shows it: numbers have one, other types do not.
+pub trait DefaultNumber {
+    fn default_number(&self) -> Option<f64> {
+        None
+    }
+}
+
+macro_rules! numeric_defaults {
+    ($($number:ty),*) => { $(impl DefaultNumber for $number {
+        fn default_number(&self) -> Option<f64> {
+            Some(*self as f64)
+        }
+    })* };
+}
+numeric_defaults!(f32, u32, u64, usize);
+
+impl<T> DefaultNumber for Option<T> {}
+impl DefaultNumber for String {}
+impl DefaultNumber for glam::Vec2 {}
+impl DefaultNumber for glam::Vec3 {}
+impl<T> DefaultNumber for Vec<T> {}
+
+/// Declares a table of a scene once: its serde struct, its defaults, and its catalogue entries (`Type::fields()`).
+macro_rules! scene_table {
+    ($(#[doc = $struct_doc:literal])* $name:ident {
+        $( #[doc = $doc:literal] $(#[$attribute:meta])* $field:ident: $type:ty = $default:expr, $shape:expr, $unit:literal; )*
+    }) => {
+        $(#[doc = $struct_doc])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $name {
+            $( #[doc = $doc] $(#[$attribute])* pub $field: $type, )*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $( $field: $default, )* }
+            }
+        }
+
+        impl $name {
+            /// The catalogue entries of this table, in the order of the fields.
+            pub fn fields() -> Vec<$crate::scene::schema::Field> {
+                let defaults = Self::default();
+                vec![ $( $crate::scene::schema::Field::new(
+                    stringify!($field), $unit, $shape,
+                    $crate::scene::schema::DefaultNumber::default_number(&defaults.$field), $doc,
+                ), )* ]
+            }
+        }
+    };
+}
+pub(super) use scene_table;
+
+/// A field-less enum that reads and writes as its snake-case names, with the list of them as a [`Shape`].
+macro_rules! scene_choice {
+    ($(#[doc = $enum_doc:literal])* $name:ident { $( #[doc = $doc:literal] $variant:ident = $text:literal, )* }) => {
+        $(#[doc = $enum_doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+        pub enum $name {
+            $( #[doc = $doc] #[serde(rename = $text)] $variant, )*
+        }
+
+        impl $name {
+            pub const NAMES: &[&str] = &[$($text),*];
+            pub const ALL: &[Self] = &[$(Self::$variant),*];
+
+            pub fn name(self) -> &'static str {
+                match self { $( Self::$variant => $text, )* }
+            }
+        }
+
+        impl $crate::scene::schema::DefaultNumber for $name {}
+    };
+}
+pub(super) use scene_choice;

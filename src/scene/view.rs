@@ -1,0 +1,97 @@
+//! What is seen, and how it is lit and looked at: `[object]`, `[light]`, `[camera]`.
+
+use std::path::PathBuf;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::color;
+use super::schema::{Field, Shape, number, scene_table};
+
+/// Objects that `object.kind` names; `mesh` reads `object.path`.
+pub const OBJECT_KINDS: &[&str] = &[
+    "sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh",
+];
+
+/// Tone maps that `camera.tone_map` names.
+pub const TONE_MAPS: &[&str] = &["filmic", "plain"];
+
+scene_table! {
+    /// The large-scale object that wears the material.
+    Object {
+        /// Shape: sphere, plate, cup, cylinder, pillow, skirt, teapot or mesh.
+        kind: String = "sphere".to_owned(), Shape::Choice(OBJECT_KINDS), "";
+        /// The OBJ file of the kind `mesh`.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        path: Option<PathBuf> = None, Shape::Path, "";
+    }
+}
+
+const LIGHT: Shape = Shape::Table(DirectionalSpec::fields);
+
+scene_table! {
+    /// What lights it.
+    Light {
+        /// A built-in sky (studio, clear_sky, overcast_sky, sun, none) or a .hdr / .exr file.
+        environment: String = "studio".to_owned(), Shape::Text, "";
+        /// How many directional lights stand for the environment.
+        count: usize = 32, Shape::Integer { min: 0, max: 4096 }, "";
+        /// Turns the environment about the vertical.
+        rotation_deg: f32 = 0.0, number(-360.0, 360.0), "degrees";
+        /// Scales the environment's radiance.
+        intensity: f32 = 1.0, Shape::Number { min: 0.0, max: 1e6, soft_max: 10.0 }, "";
+        /// Further directional lights.
+        directional: Vec<DirectionalSpec> = Vec::new(), Shape::List { of: &LIGHT, min: 0, max: 4096 }, "";
+    }
+}
+
+/// One directional light.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DirectionalSpec {
+    /// Towards the light, world frame, y up; any length but zero.
+    pub direction: Vec3,
+    /// Irradiance on a surface that faces the light.
+    #[serde(with = "color")]
+    pub irradiance: Vec3,
+}
+
+impl DirectionalSpec {
+    pub fn fields() -> Vec<Field> {
+        let direction = Shape::Vector {
+            length: 3,
+            min: -1e6,
+            max: 1e6,
+        };
+        vec![
+            Field::required(
+                "direction",
+                direction,
+                "Towards the light, y up; any length but zero.",
+            ),
+            Field::required(
+                "irradiance",
+                Shape::Color { max: 1e6 },
+                "Irradiance on a surface that faces the light.",
+            ),
+        ]
+    }
+}
+
+scene_table! {
+    /// Where the picture is taken from; framed automatically where a scene has none.
+    Camera {
+        /// Turns the camera about the vertical.
+        azimuth_deg: f32 = 25.0, number(-360.0, 360.0), "degrees";
+        /// Height of the camera above the horizon.
+        elevation_deg: f32 = 20.0, number(-90.0, 90.0), "degrees";
+        /// Distance in radii of the object's bounding sphere; 0 frames the object.
+        distance: f32 = 0.0, Shape::Number { min: 0.0, max: 1e4, soft_max: 20.0 }, "radii";
+        /// Vertical field of view.
+        fov_deg: f32 = 30.0, number(1.0, 150.0), "degrees";
+        /// Exposure in stops.
+        exposure_ev: f32 = 0.0, Shape::Number { min: -40.0, max: 40.0, soft_max: 8.0 }, "EV";
+        /// How radiance becomes a pixel: filmic or plain.
+        tone_map: String = "filmic".to_owned(), Shape::Choice(TONE_MAPS), "";
+    }
+}
