@@ -12,7 +12,7 @@ use super::parametric::{MeshBuilder, evenly};
 pub(super) fn pillow() -> ObjectMesh {
     let mut builder = MeshBuilder::default();
     let samples = evenly(96);
-    builder.add_patch(&samples, &samples, |u, v| panel(u, v));
+    builder.add_patch(&samples, &samples, panel);
     // The back is the front turned half about the vertical: same cut, and tile x still runs to its viewer's right.
     builder.add_patch(&samples, &samples, |u, v| {
         let p = panel(u, v);
