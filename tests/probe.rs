@@ -72,3 +72,34 @@ fn brdfs() -> Vec<(&'static str, Term)> { let w=Vec3::ONE; vec![("lambert",Term:
     let t=Instant::now(); let h=Horizons::march(mesh.height_grid.as_ref().unwrap(),mesh.size,&f,32,0.02); println!("march {:.2} us/scan/2cores", t.elapsed().as_secs_f64()*1e6/(32*n) as f64); drop(h);
     for (tn,mesh) in tiles() { let g=PeriodicGrid::new(&mesh); let mut f=Facets::sample(&mesh,n,0); f.sort_for_sums(); let t=Instant::now(); SoftMaps::scan(&g,&f,PolarGrid::new(16,16)); println!("{tn} scan {:.2} us", t.elapsed().as_secs_f64()*1e6/(16*n) as f64); }
 }
+#[test] fn lowrank() {
+    let pairs = mirror_biased_pairs(400, 7);
+    for (tn, mesh) in tiles() {
+        if std::env::var("TILE").is_ok_and(|b| b!=tn) {continue}
+        let grid = PeriodicGrid::new(&mesh);
+        let mut f = Facets::sample(&mesh, 2000, 0); f.sort_for_sums();
+        let overhang = !mesh.is_height_field() && tn=="rods";
+        let vis = Arc::new(if overhang { Visibility::Maps(SoftMaps::scan(&grid, &f, PolarGrid::new(24, 48))) } else if let Some(g)=&mesh.height_grid { Visibility::Horizons(Horizons::march(g, mesh.size, &f, 48, 0.02)) } else { Visibility::Horizons(Horizons::scan(&grid, &f, 48, 0.02)) });
+        for (bn, term) in brdfs() {
+            if std::env::var("BRDF").is_ok_and(|b| !b.split(',').any(|b| b==bn)) {continue}
+            let materials = vec![SumMaterial{brdf: Brdf{terms: vec![term.clone()]}, color: Vec3::ONE}];
+            let d = EffectiveBrdf{form: Form::Direct(Direct{sum: Arc::new(FacetSum::new(&f,&[0],&materials)), visibility: vis.clone()}), base_area: 1.0};
+            let rv: Vec<Vec3> = pairs.iter().map(|p| d.eval(p.i,p.o)).collect();
+            let mut line = format!("{tn:7} {bn:8}");
+            let run = |dirs: (usize,usize), hd: (usize,usize,usize,usize), nr: usize, km: f64, kn: f64, mr: usize| -> String {
+                let s = LowRankSettings{directions: PolarGrid::new(dirs.0,dirs.1), basis: BasisGrid{pairs: HalfDifferenceGrid{rings: hd.0, azimuths: hd.1, difference: hd.2, turn: hd.3}, normal_rings: nr, whole_sphere: overhang}, keep_m: km, keep_n: kn, max_rank: mr, colors: None, keep_color: 0.999, seed: 1};
+                let t=Instant::now();
+                let lr = LowRank::build(&f,&vis,&[0],&materials,&s).unwrap(); let tb=t.elapsed().as_secs_f64();
+                let ranks=lr.channels[0].ranks; let mb=lr.bytes()/1000000;
+                let e = EffectiveBrdf{form: Form::LowRank(lr), base_area: 1.0};
+                let t=Instant::now();
+                let v: Vec<Vec3> = pairs.iter().map(|p| e.eval(p.i,p.o)).collect();
+                let er=compare(&v,&rv);
+                format!(" | {:.1}dB {:.2}% r{:?} {:.2}s {mb}MB q{:.2}us", er.psnr_db, 100.*er.rel_l2, ranks, tb, t.elapsed().as_secs_f64()*1e6/400.)
+            };
+            if std::env::var("TILE").is_ok_and(|b| b!=tn) {continue}
+            for v in [((16,36),(32,64,10,8),64),((16,36),(32,64,20,8),64),((16,36),(32,64,10,16),64),((16,36),(32,64,20,16),64),((16,36),(64,64,10,8),64),((16,36),(32,128,10,8),64),((16,36),(32,64,10,8),128),((32,64),(32,64,10,8),64),((32,64),(48,64,20,16),64)] { println!("{line} {v:?} {}", run(v.0,v.1,v.2,0.9998,0.9998,40)); }
+            println!("{line}");
+        }
+    }
+}

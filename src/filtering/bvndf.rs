@@ -30,6 +30,12 @@ impl VisibilityRows {
         Self { grid, facets: facets.len(), rows }
     }
 
+    /// The same, of a run of its facets.
+    pub fn part(&self, facets: std::ops::Range<usize>) -> Self {
+        let rows = self.rows.chunks(self.facets.max(1)).flat_map(|row| row[facets.clone()].iter().copied()).collect();
+        Self { grid: self.grid, facets: facets.len(), rows }
+    }
+
     /// Each facet's visibility times `(n·d)+`.
     pub fn with_cosines(&self, normals: &[Vec3]) -> Self {
         let grid = self.grid;

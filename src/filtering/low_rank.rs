@@ -7,10 +7,13 @@ use glam::{DVec3, Vec3};
 
 use super::bvndf::{VisibilityRows, leading_features, visibility_table};
 use super::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
-use crate::brdf::Term;
-use crate::directions::{HalfDifferenceGrid, PolarGrid};
+use super::facet_sum::{SumMaterial, lobe};
+use crate::brdf::{Brdf, ColorBasis, Term};
+use crate::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
 use crate::error::Result;
+use crate::geometry::Facets;
 use crate::simd;
+use crate::visibility::Visibility;
 
 /// Resolution and truncation of the low-rank form.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +26,9 @@ pub struct LowRankSettings {
     /// Energy of N, in M's metric, that is kept.
     pub keep_n: f64,
     pub max_rank: usize,
+    /// Colour directions of a measured BRDF; `None`: as many as keep `keep_color` of its energy.
+    pub colors: Option<usize>,
+    pub keep_color: f64,
     pub seed: u64,
 }
 
@@ -96,9 +102,100 @@ impl Channel {
     }
 }
 
-/// Makes the basis of a lobe at the settings' resolution.
-pub fn basis(lobe: RotatedLobe<'_>, settings: &LowRankSettings) -> Result<RotatedBasis> {
-    RotatedBasis::new(lobe, settings.basis, settings.keep_m)
+/// A run of facets with one material, and what stands before its terms.
+#[derive(Debug)]
+struct Group<'a> {
+    range: std::ops::Range<usize>,
+    material: &'a SumMaterial,
+    /// Area times colour weight, and the colour that column stands for: one for equal colours, else three.
+    columns: Vec<(Vec<f32>, Vec3)>,
+}
+
+/// Facets by slot, skipping black materials. Facets are sorted by slot.
+fn groups<'a>(facets: &Facets, material_of_slot: &[usize], materials: &'a [SumMaterial]) -> Vec<Group<'a>> {
+    let mut groups = Vec::new();
+    let mut start = 0;
+    while start < facets.len() {
+        let slot = facets.slots[start];
+        let end = start + facets.slots[start..].iter().take_while(|&&other| other == slot).count();
+        let range = start..end;
+        start = end;
+        let material = &materials[material_of_slot[usize::from(slot)]];
+        if material.color == Vec3::ZERO {
+            continue;
+        }
+        let colors = &facets.colors[range.clone()];
+        let areas = &facets.areas[range.clone()];
+        let columns = if colors.iter().all(|&color| color == colors[0]) {
+            vec![(areas.to_vec(), colors[0])]
+        } else {
+            (0..3).map(|c| (colors.iter().zip(areas).map(|(color, area)| color[c] * area).collect(), Vec3::AXES[c])).collect()
+        };
+        groups.push(Group { range, material, columns });
+    }
+    groups
+}
+
+impl LowRank {
+    /// Factors everything: the bases of all materials, then N of each group in their metric.
+    ///
+    /// # Errors
+    /// A factorization that does not converge, or is handed values that are not finite.
+    pub fn build(
+        facets: &Facets,
+        visibility: &Visibility,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        settings: &LowRankSettings,
+    ) -> Result<Self> {
+        let all = VisibilityRows::new(visibility, 0..facets.len(), settings.directions);
+        let projected_area = projected_area_table(facets, &all);
+        let mut channels = Vec::new();
+        for group in groups(facets, material_of_slot, materials) {
+            let rows = all.part(group.range.clone());
+            let normals = &facets.normals[group.range.clone()];
+            for term in &group.material.brdf.terms {
+                for (weights, column_color) in &group.columns {
+                    let color = group.material.color * *column_color;
+                    let part = GroupFacets { visibility: &rows, normals, weights };
+                    match term {
+                        Term::Lambertian { .. } => channels.push(Channel::lambertian(&part, Tint::Term(term.clone(), color))),
+                        Term::Measured(table) => {
+                            let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
+                            for direction in &colors.directions[..settings.colors.unwrap_or_else(|| colors.count_for(settings.keep_color)).clamp(1, 3)] {
+                                let lobe = RotatedLobe::Measured { table: table.as_ref(), along: *direction };
+                                let basis = RotatedBasis::new(lobe, settings.basis, settings.keep_m)?;
+                                channels.push(Channel::factored(&part, &basis, settings, Tint::Fixed(*direction * color))?);
+                            }
+                        }
+                        analytic => {
+                            if let Some(lobe) = lobe(analytic) {
+                                let basis = RotatedBasis::new(RotatedLobe::Analytic(lobe), settings.basis, settings.keep_m)?;
+                                channels.push(Channel::factored(&part, &basis, settings, Tint::Term(term.clone(), color))?);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        Ok(Self { directions: settings.directions, pairs: settings.basis.pairs, channels, projected_area: Arc::new(projected_area) })
+    }
+}
+
+/// `a_v(o) / cos θ_o` at each node, in tile units squared.
+fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32> {
+    let component = |pick: fn(&Vec3) -> f32| -> Vec<f32> { facets.normals.iter().map(pick).collect() };
+    let (x, y, z) = (component(|n| n.x), component(|n| n.y), component(|n| n.z));
+    let grid = visibility.grid;
+    visibility
+        .rows
+        .chunks(facets.len().max(1))
+        .enumerate()
+        .map(|(node, row)| {
+            let direction = grid.direction(node);
+            (simd::projected_area([&x, &y, &z], &facets.areas, row, direction) / f64::from(direction.z)) as f32
+        })
+        .collect()
 }
 
 impl LowRank {
@@ -122,7 +219,7 @@ impl LowRank {
                 (a * nodes + b, wa * wb)
             });
             let hd = self.pairs.taps(i, o);
-            let i_dot_h = i.dot(crate::directions::half_vector(i, o));
+            let i_dot_h = i.dot(half_vector(i, o));
             let mut total = DVec3::ZERO;
             for channel in &self.channels {
                 let value = match &channel.p {

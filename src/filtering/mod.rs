@@ -15,7 +15,7 @@ pub use bvndf::VisibilityRows;
 pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial};
-pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint, basis};
+pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 
 /// What the large scale asks of a material: all it knows of the small scale.

@@ -313,3 +313,43 @@ fn factor_block(blocks: &[f32], grid: BasisGrid, frequency: usize) -> Result<Vec
         })
         .collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::lobe_values;
+
+    /// The basis rebuilds `f` at the grid's own nodes for a normal between its rings.
+    #[test]
+    fn features_times_left_functions_rebuild_the_rotated_brdf() {
+        let grid = BasisGrid {
+            pairs: HalfDifferenceGrid { rings: 20, azimuths: 64, difference: 8, turn: 6 },
+            normal_rings: 48,
+            whole_sphere: false,
+        };
+        for lobe in [Lobe::cook_torrance(0.3), Lobe::ward(0.4), Lobe::Lambertian] {
+            let basis = RotatedBasis::new(RotatedLobe::Analytic(lobe), grid, 0.999_99).unwrap();
+            for (theta, phi) in [(0.05, 0.3), (0.4, 2.0), (0.7, 5.1)] {
+                let normal = from_angles(theta, phi);
+                let mut features = vec![0.0; basis.features()];
+                basis.write_features(normal, &mut features);
+                let table = basis.left_table(&features, 1);
+                let (mut error, mut norm) = (0.0_f64, 0.0_f64);
+                for (node, &got) in table.iter().enumerate() {
+                    let p = grid.pairs;
+                    let (turn, rest) = (node % p.turn, node / p.turn);
+                    let (difference, rest) = (rest % p.difference, rest / p.difference);
+                    let (azimuth, ring) = (rest % p.azimuths, rest / p.azimuths);
+                    let (i, o) = HalfDifferenceGrid::pair(p.theta_h(ring), p.phi_h(azimuth), p.theta_d(difference), p.phi_d(turn));
+                    let mut want = [0.0];
+                    lobe_values(lobe, &PairVectors::new(i, o), [&[normal.x], &[normal.y], &[normal.z]], &mut want);
+                    let weight = f64::from(p.theta_h(ring).sin() * p.theta_d(difference).sin() * p.theta_d(difference).cos());
+                    error += weight * f64::from(got - want[0]).powi(2);
+                    norm += weight * f64::from(want[0]).powi(2);
+                }
+                let relative = (error / norm).sqrt();
+                assert!(relative < 0.02, "{lobe:?} at {theta}, {phi}: {relative}");
+            }
+        }
+    }
+}
