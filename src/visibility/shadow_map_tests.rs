@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-use super::{PackedVisibility, visibility_maps_cpu};
+use super::{GpuShadowMaps, PackedVisibility, visibility_maps_cpu, visibility_maps_gpu};
 use crate::geometry::{Facets, TileMesh};
+use crate::gpu::Gpu;
 
 mod meshes {
     use super::*;
@@ -162,7 +163,6 @@ impl<'a> RayCaster<'a> {
         let end = (top - p.z) / w.z;
         let mut t = 0.0;
         let mut cell = (p.truncate() / cell_size).floor();
-        let mut own_done = false;
         loop {
             let (cx, cy) = (cell.x as i64, cell.y as i64);
             let tile = [cx.div_euclid(self.cells), cy.div_euclid(self.cells)];
@@ -174,7 +174,7 @@ impl<'a> RayCaster<'a> {
                 if let Some(hit) = moller_trumbore(p, w, a, b, c) {
                     // The facet's own triangle, but not the copies of it further on, lies at distance 0 up to rounding.
                     let is_own = k == own && hit < 1e-5;
-                    own_done |= is_own;
+                    
                     if hit > 1e-7 && !is_own {
                         return true;
                     }
@@ -288,5 +288,129 @@ fn resolution_against_error() {
         }
         let worst = (0..directions.len()).map(|d| (projected_area_ratio(&mesh, &facets, directions[d], d, &exact) - 1.0).abs());
         println!("{name}: exact a_v / (A cos θ) is off by at most {:.2} % with these facets", 100.0 * worst.fold(0.0, f64::max));
+    }
+}
+
+/// The device, or a loud word that its tests are skipped.
+fn open_gpu() -> Option<Gpu> {
+    Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
+}
+
+fn all_meshes() -> [(&'static str, TileMesh, u32); 5] {
+    [
+        ("egg-crate", meshes::egg_crate(64), 256),
+        ("dunes", meshes::dunes(64), 256),
+        ("V-grooves", meshes::v_grooves(), 256),
+        ("rods", meshes::rods(), 512),
+        ("pillar", meshes::pillar(), 256),
+    ]
+}
+
+#[test]
+fn maps_agree_with_exact_rays_within_three_in_a_thousand_up_to_85_degrees() {
+    let directions = polar_directions(9, 5, 85.0);
+    for (name, mesh, resolution) in all_meshes() {
+        let facets = sample(&mesh, 1200);
+        let exact = RayCaster::new(&mesh, 32).visibility(&facets, &directions);
+        let maps = visibility_maps_cpu(&mesh, &facets, &directions, resolution);
+        let error = disagreement(&facets, &directions, &maps, &exact);
+        assert!(error < 3e-3, "{name}: {:.3} %", 100.0 * error);
+    }
+}
+
+#[test]
+fn the_gpu_answers_as_the_cpu_does() {
+    let Some(gpu) = open_gpu() else { return };
+    let pipelines = GpuShadowMaps::new(&gpu).unwrap();
+    let mut directions = polar_directions(9, 5, 85.0);
+    directions.extend([direction(89.9, 40.0), Vec3::X, Vec3::NEG_Z, Vec3::NAN, Vec3::Z]);
+    for (name, mesh, _) in all_meshes() {
+        let facets = sample(&mesh, 1201);
+        let cpu = visibility_maps_cpu(&mesh, &facets, &directions, 128);
+        let gpu = pipelines.visibility(&gpu, &mesh, &facets, &directions, 128).unwrap();
+        let differ = disagreement(&facets, &directions[..45], &gpu, &cpu);
+        // Texels whose centre lies on an edge up to rounding, and ties in height.
+        assert!(differ < 3e-4, "{name}: {:.4} %", 100.0 * differ);
+        assert!(gpu.row(46).iter().chain(gpu.row(47)).chain(gpu.row(48)).all(|&word| word == 0), "{name}");
+    }
+}
+
+#[test]
+fn projected_area_is_base_area_times_cosine_up_to_grazing() {
+    let mesh = meshes::egg_crate(64);
+    let facets = sample(&mesh, 40_000);
+    for (theta, tolerance) in [(0.0, 0.002), (45.0, 0.003), (75.0, 0.005), (85.0, 0.01), (89.0, 0.05)] {
+        let directions: Vec<Vec3> = (0..4).map(|k| direction(theta, 13.0 + 90.0 * k as f32 / 4.0)).collect();
+        let maps = visibility_maps_cpu(&mesh, &facets, &directions, 512);
+        for (d, &w) in directions.iter().enumerate() {
+            let ratio = projected_area_ratio(&mesh, &facets, w, d, &maps);
+            assert!((ratio - 1.0).abs() < tolerance, "{theta}°, {d}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let mesh = meshes::rods();
+    let (facets, directions) = (sample(&mesh, 500), polar_directions(5, 6, 90.0));
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| visibility_maps_cpu(&mesh, &facets, &directions, 100))
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn broken_meshes_and_no_facets_do_not_panic() {
+    let directions = polar_directions(3, 3, 90.0);
+    let whole = meshes::pillar();
+    let facets = sample(&whole, 10);
+    let mut broken = whole.clone();
+    broken.positions[3] = Vec3::new(f32::NAN, 0.0, f32::INFINITY);
+    broken.positions[9] = Vec3::new(-3.0, 5.0, -2.0);
+    assert_eq!(visibility_maps_cpu(&broken, &facets, &directions, 50).direction_count, 9);
+    let empty = TileMesh { size: Vec2::ONE, ..TileMesh::default() };
+    assert_eq!(visibility_maps_cpu(&empty, &Facets::default(), &directions, 50).facet_count, 0);
+    assert!(visibility_maps_cpu(&empty, &facets, &[Vec3::Z], 50).is_visible(0, 0));
+    let Some(gpu) = open_gpu() else { return };
+    visibility_maps_gpu(&gpu, &broken, &facets, &directions, 50).unwrap();
+    assert!(visibility_maps_gpu(&gpu, &empty, &facets, &[Vec3::Z], 50).unwrap().is_visible(0, 0));
+}
+
+#[test]
+#[ignore = "a table of speed on both routes; run with --ignored --nocapture"]
+fn speed_of_both_routes() {
+    let Some(gpu) = open_gpu() else { return };
+    println!("{}, tier {:?}", gpu.description(), gpu.tier);
+    let pipelines = GpuShadowMaps::new(&gpu).unwrap();
+    let directions = polar_directions(9, 32, 85.0);
+    for (name, mesh) in [("egg-crate 128", meshes::egg_crate(128)), ("rods", meshes::rods()), ("V-grooves", meshes::v_grooves())] {
+        let facets = sample(&mesh, 8000);
+        for resolution in [256, 512, 1024] {
+            let time = |run: &dyn Fn() -> PackedVisibility| {
+                run();
+                let mut times: Vec<f64> = (0..3)
+                    .map(|_| {
+                        let start = Instant::now();
+                        run();
+                        start.elapsed().as_secs_f64()
+                    })
+                    .collect();
+                times.sort_by(f64::total_cmp);
+                times[1]
+            };
+            let cpu = time(&|| visibility_maps_cpu(&mesh, &facets, &directions, resolution));
+            let device = time(&|| pipelines.visibility(&gpu, &mesh, &facets, &directions, resolution).unwrap());
+            let triangles = 1e-6 * (mesh.triangles.len() * directions.len()) as f64;
+            let pairs = 1e-6 * (facets.len() * directions.len()) as f64;
+            for (route, seconds) in [("cpu", cpu), ("gpu", device)] {
+                println!(
+                    "{name:<14} {resolution:>5} {route}: {:>8.2} ms/direction, {:>8.3} Mtriangles/s, {:>7.2} M facet-direction pairs/s",
+                    1e3 * seconds / directions.len() as f64,
+                    triangles / seconds,
+                    pairs / seconds
+                );
+            }
+        }
     }
 }

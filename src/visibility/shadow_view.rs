@@ -14,6 +14,11 @@ use crate::geometry::TileMesh;
 /// cos θ of the most grazing direction a map is drawn for, 89.99°; lower ones above the horizon are raised to it.
 pub const LOWEST_COSINE: f64 = 1.745e-4;
 
+/// What lies nearer than this many texels does not block. Only facetted neighbourhoods need it, where the triangles are as
+/// small as the texels: measured on a 128x128 egg-crate with 256 texels 0.31 % wrong without, 0.03 % with any of 0.03
+/// to 0.3, while rods on a floor begin to lose contact shadows at 0.3.
+const NEAR_TEXELS: f64 = 0.15;
+
 /// Texels along the longer side of the widest map.
 const MAX_SIDE: f64 = 8192.0;
 /// Texels along the shorter side of the narrowest map.
@@ -32,7 +37,7 @@ pub struct ShadowView {
     pub texel_from_tile: [Vec3; 2],
     /// Steps on the base plane from a texel to the next one along each axis.
     pub plane_from_texel: [Vec2; 2],
-    /// Distances to a plane below this are rounding [tile units].
+    /// A hit nearer than this to a facet's plane does not block the facet [tile units].
     pub tolerance: f32,
 }
 
@@ -69,10 +74,10 @@ impl ShadowView {
         let texel_from_tile = [row(0), row(1)];
         let steps = [plane_from_texel.x_axis.as_vec2(), plane_from_texel.y_axis.as_vec2()];
 
-        // Rounding of texel coordinates, in texels, times the longest step; and of heights, along the ray.
+        // Besides: rounding of texel coordinates, in texels, times the longest step; and of heights, along the ray.
         let rounding = 4.0 * f32::EPSILON * extent;
         let texels = rounding * texel_from_tile[0].length().max(texel_from_tile[1].length());
-        let tolerance = texels * steps[0].length().max(steps[1].length()) + rounding / cos as f32;
+        let tolerance = texels * steps[0].length().max(steps[1].length()) + rounding / cos as f32 + (NEAR_TEXELS * spacing) as f32;
         let view = Self {
             direction: direction.as_vec3(),
             size: [columns as u32, rows as u32],
