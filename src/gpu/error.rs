@@ -8,14 +8,22 @@ pub enum GpuError {
          also has a software one; Fedora: `dnf install mesa-vulkan-drivers`), or use `--backend cpu`"
     )]
     NoAdapter(String),
-    #[error("the graphics adapter {adapter} gave no device: {reason}; update its driver, or use `--backend cpu`")]
+    #[error(
+        "the graphics adapter {adapter} gave no device: {reason}; update its driver, or use `--backend cpu`"
+    )]
     NoDevice { adapter: String, reason: String },
     #[error("the graphics device was lost ({0}); start again, or use `--backend cpu`")]
     Lost(String),
     #[error("out of graphics memory while {0}; lower the resolution, or use `--backend cpu`")]
     OutOfMemory(String),
-    #[error("the graphics adapter allows {allowed} bytes for {what}, but {needed} are needed; use `--backend cpu`")]
-    TooLarge { what: String, needed: u64, allowed: u64 },
+    #[error(
+        "the graphics adapter allows {allowed} bytes for {what}, but {needed} are needed; use `--backend cpu`"
+    )]
+    TooLarge {
+        what: String,
+        needed: u64,
+        allowed: u64,
+    },
     #[error("the graphics driver refused while {during}: {reason}")]
     Refused { during: String, reason: String },
     #[error("the graphics device did not answer within {seconds} s while {during}")]

@@ -8,7 +8,10 @@ use super::GpuError;
 /// Every file in `shaders/`, by name without the ending.
 pub const SHADERS: &[(&str, &str)] = &[
     ("shadow_map", include_str!("../../shaders/shadow_map.wgsl")),
-    ("shadow_view", include_str!("../../shaders/shadow_view.wgsl")),
+    (
+        "shadow_view",
+        include_str!("../../shaders/shadow_view.wgsl"),
+    ),
 ];
 
 const IMPORT: &str = "//!import ";
@@ -25,7 +28,10 @@ fn take_in(name: &str, source: &mut String, taken: &mut Vec<String>) -> Result<(
         return Ok(());
     }
     taken.push(name.to_owned());
-    let (_, text) = SHADERS.iter().find(|(known, _)| *known == name).ok_or_else(|| GpuError::UnknownShader(name.to_owned()))?;
+    let (_, text) = SHADERS
+        .iter()
+        .find(|(known, _)| *known == name)
+        .ok_or_else(|| GpuError::UnknownShader(name.to_owned()))?;
     for line in text.lines() {
         match line.strip_prefix(IMPORT) {
             Some(import) => take_in(import.trim(), source, taken)?,
@@ -47,6 +53,9 @@ mod tests {
         let source = shader_source("shadow_map").unwrap();
         assert_eq!(source.matches("struct View").count(), 1);
         assert!(!source.contains(IMPORT));
-        assert_eq!(shader_source("nothing"), Err(GpuError::UnknownShader("nothing".to_owned())));
+        assert_eq!(
+            shader_source("nothing"),
+            Err(GpuError::UnknownShader("nothing".to_owned()))
+        );
     }
 }
