@@ -214,3 +214,20 @@ fn broken_meshes_and_no_facets_do_not_panic() {
             .is_visible(0, 0)
     );
 }
+
+/// The device, or a loud word that its tests are skipped.
+fn open_gpu() -> Option<Gpu> {
+    Gpu::open()
+        .map_err(|error| eprintln!("SKIPPED: {error}"))
+        .ok()
+}
+
+fn all_meshes() -> [(&'static str, TileMesh, u32); 5] {
+    [
+        ("egg-crate", meshes::egg_crate(64), 256),
+        ("dunes", meshes::dunes(64), 256),
+        ("V-grooves", meshes::v_grooves(), 256),
+        ("rods", meshes::rods(), 512),
+        ("pillar", meshes::pillar(), 256),
+    ]
+}
