@@ -20,6 +20,7 @@ pub mod render;
 pub mod shading;
 pub mod shading_points;
 pub mod shadow;
+pub mod shadow_cache;
 pub mod tone_map;
 
 pub use camera::CameraView;

@@ -5,6 +5,7 @@ use std::time::Instant;
 use super::shading::{self, Background};
 use super::shading_points::ShadingPoints;
 use super::shadow::Occluder;
+use super::shadow_cache::ShadowCache;
 use super::{CameraView, DirectionalLight, GBuffer, ObjectMesh, Picture};
 use crate::error::{InputError, Result};
 use crate::filtering::Reflectance;
@@ -18,6 +19,8 @@ pub struct RenderInput<'a> {
     pub mesh: &'a ObjectMesh,
     /// Made once per mesh by [`Occluder::of`]; `None` leaves self-shadowing out.
     pub occluder: Option<&'a Occluder>,
+    /// From [`Occluder::cache`], where the camera moves about a scene that stays: most shadow rays are saved.
+    pub shadow_cache: Option<&'a ShadowCache>,
     pub lights: &'a [DirectionalLight],
     pub camera: &'a scene::Camera,
     pub reflectance: &'a dyn Reflectance,
@@ -53,9 +56,23 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
     let points = ShadingPoints::new(&buffer, &view, input.samples_per_side);
     drop(buffer);
     let after_gbuffer = Instant::now();
-    let visible = input.occluder.map(|occluder| occluder.visible(input.mesh, &points, input.lights));
+    let visible = input.occluder.map(|occluder| {
+        occluder.visible(
+            input.mesh,
+            &points,
+            input.lights,
+            view.eye,
+            input.shadow_cache,
+        )
+    });
     let after_shadows = Instant::now();
-    let radiance = shading::radiance(&points, input.lights, visible.as_ref(), view.eye, input.reflectance);
+    let radiance = shading::radiance(
+        &points,
+        input.lights,
+        visible.as_ref(),
+        view.eye,
+        input.reflectance,
+    );
     let picture = shading::gather(&points, &radiance, &view, input.background);
     let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
     let times = StageTimes {
@@ -63,15 +80,23 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
         shadows_ms: ms(after_gbuffer, after_shadows),
         shading_ms: ms(after_shadows, Instant::now()),
     };
-    Ok(Rendered { picture, times, points: points.len() })
+    Ok(Rendered {
+        picture,
+        times,
+        points: points.len(),
+    })
 }
 
 fn check_size([width, height]: [usize; 2], samples_per_side: usize) -> Result<()> {
-    let samples = [width, height, samples_per_side, samples_per_side].into_iter().try_fold(1usize, usize::checked_mul);
+    let samples = [width, height, samples_per_side, samples_per_side]
+        .into_iter()
+        .try_fold(1usize, usize::checked_mul);
     match samples {
         Some(samples) if (1..=MAX_SAMPLES).contains(&samples) => Ok(()),
         _ => {
-            let found = format!("{width} x {height} pixels with {samples_per_side} x {samples_per_side} samples each");
+            let found = format!(
+                "{width} x {height} pixels with {samples_per_side} x {samples_per_side} samples each"
+            );
             Err(InputError::new("size", found, format!("1 to {MAX_SAMPLES} samples in all")).into())
         }
     }

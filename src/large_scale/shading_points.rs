@@ -3,9 +3,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::CameraView;
 use super::gbuffer::{GBuffer, perpendicular};
 use super::raster::NOTHING;
-use super::CameraView;
 
 /// Samples of a pixel whose normals differ less (cosine of 2°) may share one evaluation.
 const SAME_NORMAL: f32 = 0.999_39;
@@ -38,7 +38,10 @@ impl ShadingPoints {
                 for column in 0..width {
                     samples.clear();
                     for k in 0..samples_per_side * samples_per_side {
-                        let (x, y) = (column * samples_per_side + k % samples_per_side, row * samples_per_side + k / samples_per_side);
+                        let (x, y) = (
+                            column * samples_per_side + k % samples_per_side,
+                            row * samples_per_side + k / samples_per_side,
+                        );
                         samples.push(y * buffer.width + x);
                     }
                     points.add_pixel((row * width + column) as u32, buffer, view, &samples);
@@ -58,21 +61,47 @@ impl ShadingPoints {
     }
 
     fn add_pixel(&mut self, pixel: u32, buffer: &GBuffer, view: &CameraView, samples: &[usize]) {
-        let Some(&first) = samples.first() else { return };
+        let Some(&first) = samples.first() else {
+            return;
+        };
         let share = 1.0 / samples.len() as f32;
         if samples.len() > 1 && are_alike(buffer, view, samples) {
             let mean = |values: &[Vec3]| samples.iter().map(|&k| values[k]).sum::<Vec3>() * share;
-            let normal = mean(&buffer.normals).try_normalize().unwrap_or(buffer.normals[first]);
+            let normal = mean(&buffer.normals)
+                .try_normalize()
+                .unwrap_or(buffer.normals[first]);
             let tangent = perpendicular(mean(&buffer.tangents), normal);
-            self.add(pixel, 1.0, mean(&buffer.positions), normal, tangent, buffer.triangles[first]);
+            self.add(
+                pixel,
+                1.0,
+                mean(&buffer.positions),
+                normal,
+                tangent,
+                buffer.triangles[first],
+            );
             return;
         }
         for &k in samples.iter().filter(|&&k| buffer.triangles[k] != NOTHING) {
-            self.add(pixel, share, buffer.positions[k], buffer.normals[k], buffer.tangents[k], buffer.triangles[k]);
+            self.add(
+                pixel,
+                share,
+                buffer.positions[k],
+                buffer.normals[k],
+                buffer.tangents[k],
+                buffer.triangles[k],
+            );
         }
     }
 
-    fn add(&mut self, pixel: u32, weight: f32, position: Vec3, normal: Vec3, tangent: Vec3, triangle: u32) {
+    fn add(
+        &mut self,
+        pixel: u32,
+        weight: f32,
+        position: Vec3,
+        normal: Vec3,
+        tangent: Vec3,
+        triangle: u32,
+    ) {
         self.pixels.push(pixel);
         self.weights.push(weight);
         self.positions.push(position);
@@ -99,7 +128,11 @@ fn are_alike(buffer: &GBuffer, view: &CameraView, samples: &[usize]) -> bool {
     if samples.iter().any(|&k| buffer.triangles[k] == NOTHING) {
         return false;
     }
-    let (position, normal, tangent) = (buffer.positions[first], buffer.normals[first], buffer.tangents[first]);
+    let (position, normal, tangent) = (
+        buffer.positions[first],
+        buffer.normals[first],
+        buffer.tangents[first],
+    );
     let step = view.pixel_extent() * (position - view.eye).length();
     samples[1..].iter().all(|&k| {
         buffer.normals[k].dot(normal) >= SAME_NORMAL
@@ -120,7 +153,10 @@ impl Visible {
     /// No point sees any light.
     pub fn none(points: usize, lights: usize) -> Self {
         let words_per_point = lights.div_ceil(32).max(1);
-        Self { words_per_point, words: vec![0; points * words_per_point] }
+        Self {
+            words_per_point,
+            words: vec![0; points * words_per_point],
+        }
     }
 
     pub fn words_per_point(&self) -> usize {

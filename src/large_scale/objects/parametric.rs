@@ -23,7 +23,9 @@ impl MeshBuilder {
     /// Adds the patch `surface(u, v)` sampled at `us` x `vs`; `∂P/∂u × ∂P/∂v` points outside. `surface` is asked a little
     /// outside of the first and last u (wrapped patches are periodic there), never outside of the v.
     pub fn add_patch(&mut self, us: &[f64], vs: &[f64], surface: impl Fn(f64, f64) -> DVec3) {
-        let (Some(&v_first), Some(&v_last)) = (vs.first(), vs.last()) else { return };
+        let (Some(&v_first), Some(&v_last)) = (vs.first(), vs.last()) else {
+            return;
+        };
         let base = self.positions.len() as u32;
         let frame = |u: f64, v: f64| {
             let (v_below, v_above) = ((v - STEP).max(v_first), (v + STEP).min(v_last));
@@ -35,7 +37,11 @@ impl MeshBuilder {
             for &u in us {
                 let (mut along_u, mut normal) = frame(u, v);
                 if normal.length() < 1e-3 * along_u.length().max(1e-3) {
-                    let inside = if v - v_first < v_last - v { v + POLE_STEP } else { v - POLE_STEP };
+                    let inside = if v - v_first < v_last - v {
+                        v + POLE_STEP
+                    } else {
+                        v - POLE_STEP
+                    };
                     (along_u, normal) = frame(u, inside);
                 }
                 let normal = normal.try_normalize().unwrap_or(DVec3::Y);
@@ -78,7 +84,12 @@ impl MeshBuilder {
     }
 
     pub fn finish(self, two_sided: bool) -> ObjectMesh {
-        let narrow = |vectors: Vec<DVec3>| vectors.into_iter().map(|v| v.as_vec3()).collect::<Vec<Vec3>>();
+        let narrow = |vectors: Vec<DVec3>| {
+            vectors
+                .into_iter()
+                .map(|v| v.as_vec3())
+                .collect::<Vec<Vec3>>()
+        };
         let positions = narrow(self.positions);
         let bounds = Bounds::of(&positions);
         ObjectMesh {
