@@ -7,6 +7,7 @@
 mod buffers;
 mod device;
 mod error;
+pub mod pipelines;
 mod shaders;
 
 pub use device::{Gpu, Tier};

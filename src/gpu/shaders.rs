@@ -7,11 +7,14 @@ use super::GpuError;
 
 /// Every file in `shaders/`, by name without the ending.
 pub const SHADERS: &[(&str, &str)] = &[
+    ("gbuffer", include_str!("../../shaders/gbuffer.wgsl")),
+    ("light_rays", include_str!("../../shaders/light_rays.wgsl")),
     ("shadow_map", include_str!("../../shaders/shadow_map.wgsl")),
     (
         "shadow_view",
         include_str!("../../shaders/shadow_view.wgsl"),
     ),
+    ("vectors", include_str!("../../shaders/vectors.wgsl")),
 ];
 
 const IMPORT: &str = "//!import ";

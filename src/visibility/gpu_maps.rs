@@ -12,7 +12,8 @@ use glam::Vec3;
 use super::PackedVisibility;
 use super::shadow_view::{ShadowView, extent};
 use crate::geometry::{Facets, TileMesh};
-use crate::gpu::{Gpu, GpuError, shader_source};
+use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
+use crate::gpu::{Gpu, GpuError};
 
 /// Bytes of the maps of one batch: what a small card has to spare.
 const BATCH_BYTES: u64 = 128 << 20;
@@ -101,46 +102,14 @@ struct Buffers {
 
 impl GpuShadowMaps {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let source = shader_source("shadow_map")?;
-        gpu.checked("building the shadow map shaders", || {
-            let device = &gpu.device;
-            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("shadow_map"),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            });
-            let entries = [false, true, true, true, true, false, false, false]
-                .into_iter()
-                .enumerate();
-            let entries: Vec<_> = entries
-                .map(|(binding, read_only)| layout_entry(binding as u32, read_only))
-                .collect();
-            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("shadow_map"),
-                entries: &entries,
-            });
-            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("shadow_map"),
-                bind_group_layouts: &[Some(&layout)],
-                immediate_size: 0,
-            });
-            let pipeline = |entry_point| {
-                device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                    label: Some(entry_point),
-                    layout: Some(&pipeline_layout),
-                    module: &module,
-                    entry_point: Some(entry_point),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    cache: None,
-                })
-            };
-            let [draw_heights, draw_triangles, test_facets] =
-                ["draw_heights", "draw_triangles", "test_facets"].map(pipeline);
-            Ok(Self {
-                layout,
-                draw_heights,
-                draw_triangles,
-                test_facets,
-            })
+        let module = gpu.module("shadow_map")?;
+        let bindings = [UNIFORM, READ, READ, READ, READ, WRITE, WRITE, WRITE];
+        let layout = gpu.layout("shadow maps", wgpu::ShaderStages::COMPUTE, &bindings)?;
+        Ok(Self {
+            draw_heights: gpu.compute_pipeline(&module, "draw_heights", &[&layout])?,
+            draw_triangles: gpu.compute_pipeline(&module, "draw_triangles", &[&layout])?,
+            test_facets: gpu.compute_pipeline(&module, "test_facets", &[&layout])?,
+            layout,
         })
     }
 
@@ -258,21 +227,8 @@ impl GpuShadowMaps {
         let bound = [
             &params, &views, &corners, &normals, &facets, &heights, &triangles, &visible,
         ];
-        let entries = bound.iter().enumerate();
-        let entries: Vec<_> = entries
-            .map(|(k, buffer)| wgpu::BindGroupEntry {
-                binding: k as u32,
-                resource: buffer.as_entire_binding(),
-            })
-            .collect();
-        let description = wgpu::BindGroupDescriptor {
-            label: Some("shadow_map"),
-            layout: &self.layout,
-            entries: &entries,
-        };
-        let group = gpu.checked("binding shadow maps", || {
-            Ok(gpu.device.create_bind_group(&description))
-        })?;
+        let bound = bound.map(|buffer| buffer.as_entire_binding());
+        let group = gpu.group("shadow maps", &self.layout, &bound)?;
         Ok(Buffers {
             heights,
             triangles,
@@ -311,25 +267,6 @@ impl GpuShadowMaps {
             buffers.visible.size(),
         );
         gpu.queue.submit([encoder.finish()]);
-    }
-}
-
-/// Binding 0 is the uniform block, the rest are storage buffers.
-fn layout_entry(binding: u32, read_only: bool) -> wgpu::BindGroupLayoutEntry {
-    let kind = if binding == 0 {
-        wgpu::BufferBindingType::Uniform
-    } else {
-        wgpu::BufferBindingType::Storage { read_only }
-    };
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty: kind,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
     }
 }
 
