@@ -4,10 +4,13 @@
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GpuError {
     #[error(
-        "no graphics adapter found: {0}; install a Vulkan driver (Debian, Ubuntu: `apt install mesa-vulkan-drivers` \
+        "no graphics adapter found; install a Vulkan driver (Debian, Ubuntu: `apt install mesa-vulkan-drivers` \
          also has a software one; Fedora: `dnf install mesa-vulkan-drivers`), or use `--backend cpu`"
     )]
-    NoAdapter(String),
+    NoAdapter(
+        /// What was looked for, in wgpu's words.
+        String,
+    ),
     #[error(
         "the graphics adapter {adapter} gave no device: {reason}; update its driver, or use `--backend cpu`"
     )]

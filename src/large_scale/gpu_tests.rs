@@ -172,3 +172,57 @@ fn both_routes_see_the_same_lights() {
             .is_empty()
     );
 }
+
+#[test]
+#[ignore = "a table of times on both routes; run with --ignored --nocapture"]
+fn times_of_both_routes() {
+    let Some(gpu) = open_gpu() else { return };
+    println!("{}, tier {:?}", gpu.description(), gpu.tier);
+    let (draw, trace) = (
+        GpuGBuffer::new(&gpu).unwrap(),
+        GpuLightRays::new(&gpu).unwrap(),
+    );
+    let lights: Vec<_> = (0..32)
+        .map(|k| Vec3::new((k as f32).cos(), 0.5, (k as f32).sin()).normalize())
+        .map(|direction| DirectionalLight {
+            direction,
+            irradiance: Vec3::ONE,
+        })
+        .collect();
+    for kind in ["cup", "skirt", "teapot"] {
+        let mesh = object(kind);
+        let view = CameraView::new(&scene::Camera::default(), &mesh, [384, 384]).unwrap();
+        let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
+        let occluder = Occluder::of(&mesh).unwrap();
+        let on_device = GpuOccluder::new(&gpu, &occluder).unwrap();
+        let median = |work: &dyn Fn()| {
+            work();
+            let mut ms: Vec<f64> = (0..5)
+                .map(|_| {
+                    let start = std::time::Instant::now();
+                    work();
+                    start.elapsed().as_secs_f64() * 1e3
+                })
+                .collect();
+            ms.sort_by(f64::total_cmp);
+            ms[2]
+        };
+        let rows = [
+            (
+                "G-buffer, 4 samples a pixel",
+                median(&|| drop(GBuffer::new(&mesh, &view, 2))),
+                median(&|| drop(draw.draw(&gpu, &mesh, &view, 2))),
+            ),
+            (
+                "32 lights, 1 point a pixel",
+                median(&|| drop(occluder.visible(&mesh, &points, &lights, view.eye, None))),
+                median(&|| {
+                    drop(trace.visible(&gpu, &on_device, &mesh, &points, &lights, view.eye))
+                }),
+            ),
+        ];
+        for (what, cpu, device) in rows {
+            println!("{kind:<8} {what}: cpu {cpu:.1} ms, gpu {device:.1} ms");
+        }
+    }
+}
