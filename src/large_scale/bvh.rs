@@ -35,6 +35,19 @@ impl Bounds3 {
         }
     }
 
+    /// Whether a ray forwards from `origin` meets the box, by the slab test.
+    fn is_entered(&self, origin: Vec3, inverse_direction: Vec3) -> bool {
+        let (t_low, t_high) = (
+            (self.low - origin) * inverse_direction,
+            (self.high - origin) * inverse_direction,
+        );
+        let enter = t_low.min(t_high).max_element().max(0.0);
+        let leave = t_low.max(t_high).min_element();
+        // Rounding must not lose boxes that are flat, and a NaN (a ray within a slab's plane) counts as a hit.
+        let misses = enter > leave * 1.000_001;
+        !misses
+    }
+
     fn half_area(&self) -> f32 {
         let d = (self.high - self.low).max(Vec3::ZERO);
         d.x * d.y + d.y * d.z + d.z * d.x
@@ -136,20 +149,10 @@ impl Bvh {
         // Division by zero gives the infinities the slab test wants.
         let inverse = direction.recip();
         let mut stack = [0u32; MAX_DEPTH + 4];
-        let mut depth = 1;
+        let mut depth = usize::from(self.nodes[0].bounds.is_entered(origin, inverse));
         while depth > 0 {
             depth -= 1;
             let node = &self.nodes[stack[depth] as usize];
-            let (t_low, t_high) = (
-                (node.bounds.low - origin) * inverse,
-                (node.bounds.high - origin) * inverse,
-            );
-            let enter = t_low.min(t_high).max_element().max(0.0);
-            let leave = t_low.max(t_high).min_element();
-            // Written so that a NaN (origin on a slab, direction within it) counts as a hit of the box.
-            if enter > leave * 1.000_001 {
-                continue;
-            }
             if node.count > 0 {
                 let range = node.first as usize..(node.first + node.count) as usize;
                 if self.blockers[range]
@@ -158,10 +161,16 @@ impl Bvh {
                 {
                     return true;
                 }
-            } else if depth + 2 <= stack.len() {
-                stack[depth] = node.first;
-                stack[depth + 1] = node.first + 1;
-                depth += 2;
+                continue;
+            }
+            for child in [node.first, node.first + 1] {
+                if self.nodes[child as usize]
+                    .bounds
+                    .is_entered(origin, inverse)
+                {
+                    stack[depth] = child;
+                    depth += 1;
+                }
             }
         }
         false

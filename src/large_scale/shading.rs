@@ -3,7 +3,8 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::shading_points::{ShadingPoints, Visible};
+use super::shading_points::ShadingPoints;
+use super::shadow::Visible;
 use super::{CameraView, DirectionalLight, Picture};
 use crate::filtering::Reflectance;
 

@@ -71,10 +71,11 @@ impl ShadingPoints {
                 .try_normalize()
                 .unwrap_or(buffer.normals[first]);
             let tangent = perpendicular(mean(&buffer.tangents), normal);
+            // A place on the surface, not the mean: across a concave edge that lies inside the object, in the dark.
             self.add(
                 pixel,
                 1.0,
-                mean(&buffer.positions),
+                buffer.positions[first],
                 normal,
                 tangent,
                 buffer.triangles[first],
@@ -139,31 +140,4 @@ fn are_alike(buffer: &GBuffer, view: &CameraView, samples: &[usize]) -> bool {
             && buffer.tangents[k].dot(tangent) >= SAME_TANGENT
             && (buffer.positions[k] - position).dot(normal).abs() <= step
     })
-}
-
-/// One bit per point and light.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Visible {
-    words_per_point: usize,
-    /// Light `k` of a point is bit `k % 32` of its word `k / 32`.
-    pub words: Vec<u32>,
-}
-
-impl Visible {
-    /// No point sees any light.
-    pub fn none(points: usize, lights: usize) -> Self {
-        let words_per_point = lights.div_ceil(32).max(1);
-        Self {
-            words_per_point,
-            words: vec![0; points * words_per_point],
-        }
-    }
-
-    pub fn words_per_point(&self) -> usize {
-        self.words_per_point
-    }
-
-    pub fn sees(&self, point: usize, light: usize) -> bool {
-        self.words[point * self.words_per_point + light / 32] >> (light % 32) & 1 == 1
-    }
 }

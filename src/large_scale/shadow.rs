@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::shading_points::{ShadingPoints, Visible};
+use super::shading_points::ShadingPoints;
 use super::shadow_cache::ShadowCache;
 use super::{DirectionalLight, ObjectMesh};
 
@@ -52,6 +52,33 @@ pub fn can_self_shadow(mesh: &ObjectMesh) -> bool {
     })
 }
 
+/// One bit per point and light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Visible {
+    words_per_point: usize,
+    /// Light `k` of a point is bit `k % 32` of its word `k / 32`.
+    pub words: Vec<u32>,
+}
+
+impl Visible {
+    /// No point sees any light.
+    pub fn none(points: usize, lights: usize) -> Self {
+        let words_per_point = lights.div_ceil(32).max(1);
+        Self {
+            words_per_point,
+            words: vec![0; points * words_per_point],
+        }
+    }
+
+    pub fn words_per_point(&self) -> usize {
+        self.words_per_point
+    }
+
+    pub fn sees(&self, point: usize, light: usize) -> bool {
+        self.words[point * self.words_per_point + light / 32] >> (light % 32) & 1 == 1
+    }
+}
+
 /// What is needed to shadow an object by itself; made once per mesh.
 #[derive(Debug, Clone)]
 pub struct Occluder {
@@ -66,7 +93,8 @@ impl Occluder {
         })
     }
 
-    /// Worth making where more than one picture is taken of the same mesh under the same lights.
+    /// Worth making where the camera moves about the same mesh and lights, and mostly already for one picture whose
+    /// shading points outnumber the mesh's vertices (measured: plate 385 ms with, 1140 without; bunny 1470 and 1025).
     pub fn cache(&self, mesh: &ObjectMesh, lights: &[DirectionalLight]) -> ShadowCache {
         ShadowCache::new(mesh, &self.bvh, lights, LIFT * mesh.bounds.radius)
     }

@@ -54,7 +54,7 @@ impl ToneMap {
         let exposed = radiance * self.gain;
         match self.curve {
             ToneCurve::Filmic => exposed.map(filmic),
-            ToneCurve::Plain => exposed.map(|x| x.max(0.0).min(1.0)),
+            ToneCurve::Plain => exposed.map(|x| within(x, 1.0)),
         }
     }
 }
@@ -62,8 +62,13 @@ impl ToneMap {
 /// Our own rational curve `x (1 + p x) / (1 + q x + r x²)`, `p = 83/64`, `q = 3/4`, `r = 21/16`: the solution of
 /// `f'(0) = 1, f(1) = 3/4, f(8) = 1, f'(8) = 0`; it rises all the way from 0 to 8 and stays at 1 beyond.
 fn filmic(x: f32) -> f32 {
-    let x = x.max(0.0).min(8.0);
+    let x = within(x, 8.0);
     x * (1.0 + 1.296_875 * x) / (1.0 + 0.75 * x + 1.3125 * x * x)
+}
+
+/// `x` cut to `0..=high`; a NaN is not above 0 and becomes 0.
+fn within(x: f32, high: f32) -> f32 {
+    if x > 0.0 { x.min(high) } else { 0.0 }
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) to 8 bits.

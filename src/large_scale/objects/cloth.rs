@@ -12,7 +12,7 @@ use super::parametric::{MeshBuilder, evenly};
 pub(super) fn pillow() -> ObjectMesh {
     let mut builder = MeshBuilder::default();
     let samples = evenly(96);
-    builder.add_patch(&samples, &samples, |u, v| panel(u, v));
+    builder.add_patch(&samples, &samples, panel);
     // The back is the front turned half about the vertical: same cut, and tile x still runs to its viewer's right.
     builder.add_patch(&samples, &samples, |u, v| {
         let p = panel(u, v);
@@ -70,7 +70,7 @@ fn drape(u: f64, v: f64) -> DVec3 {
         * below_band.powf(1.25);
     let cone = 0.27 + 0.27 * below_band.powf(1.1) + 0.09 * smooth_step(below_band / 0.4);
     let radius = cone + depth * phase.cos();
-    let bulge = 0.65 * below_band.powf(0.8) * phase.sin() / FOLDS;
+    let bulge = 0.45 * below_band.powf(0.8) * phase.sin() / FOLDS;
     let sway = 0.06 * below_band * below_band * (3.0 * angle + 0.4).sin();
     let height = 1.25 * v - 0.15 * depth * phase.cos() * below_band;
     let (sin, cos) = (angle + bulge + sway).sin_cos();

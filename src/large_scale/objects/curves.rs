@@ -118,17 +118,17 @@ pub(super) struct RoundedPolyline {
 impl RoundedPolyline {
     /// `corners`: `(x, y, rounding radius)`; the radius of the first and last is ignored. Neighbouring roundings must fit.
     pub fn new(corners: &[(f64, f64, f64)]) -> Self {
-        let point = |k: usize| DVec2::new(corners[k].0, corners[k].1);
+        let point = |corner: (f64, f64, f64)| DVec2::new(corner.0, corner.1);
         let mut pieces = Vec::new();
-        let mut from = point(0);
-        for k in 1..corners.len() - 1 {
-            let corner = point(k);
+        let mut from = point(corners[0]);
+        for three in corners.windows(3) {
+            let corner = point(three[1]);
             let (back, on) = (
-                (point(k - 1) - corner).normalize_or_zero(),
-                (point(k + 1) - corner).normalize_or_zero(),
+                (point(three[0]) - corner).normalize_or_zero(),
+                (point(three[2]) - corner).normalize_or_zero(),
             );
             let turn = (-back).angle_to(on);
-            let radius = corners[k].2;
+            let radius = three[1].2;
             let cut = radius * (turn.abs() / 2.0).tan();
             let start = corner + back * cut;
             pieces.push(Piece::Line { from, to: start });
@@ -144,7 +144,7 @@ impl RoundedPolyline {
         }
         pieces.push(Piece::Line {
             from,
-            to: point(corners.len() - 1),
+            to: point(corners[corners.len() - 1]),
         });
         let total: f64 = pieces.iter().map(Piece::length).sum();
         let ends = pieces

@@ -36,7 +36,7 @@ pub(super) fn sweep(
 pub(super) fn sphere() -> ObjectMesh {
     let mut builder = MeshBuilder::default();
     let meridian = |v: f64| DVec2::from_angle(PI * v - FRAC_PI_2);
-    builder.add_patch(&evenly(128), &evenly(64), lathe(meridian));
+    builder.add_patch(&evenly(96), &evenly(48), lathe(meridian));
     builder.finish(false)
 }
 

@@ -20,7 +20,7 @@ pub const KINDS: [&str; 8] = [
     "sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh",
 ];
 
-/// An object in its own world: y up, about two units in size where it is ours, as in the file where it is an OBJ.
+/// An object in its own world: y up, about two units in size (OBJ files are moved to the origin and scaled to radius 1).
 ///
 /// The tangent frame of a vertex is `x = tangents[k]` (along ∂P/∂u), `z = normals[k]`, `y = z × x`: always
 /// right-handed, because a tile is a real surface and cannot be mirrored.

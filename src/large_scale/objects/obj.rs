@@ -190,8 +190,25 @@ impl RawMesh {
         );
     }
 
+    /// Moves the mesh to the origin and scales it to radius 1: no later stage need fear tiny or huge units.
+    fn normalize(&mut self) {
+        let Some(first) = self.positions.first().map(|p| p.as_dvec3()) else {
+            return;
+        };
+        let wide = || self.positions.iter().map(|p| p.as_dvec3());
+        let (low, high) = wide().fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+        let center = 0.5 * (low + high);
+        let radius = wide().map(|p| p.distance(center)).fold(0.0, f64::max);
+        if radius > 0.0 {
+            self.positions
+                .iter_mut()
+                .for_each(|p| *p = ((p.as_dvec3() - center) / radius).as_vec3());
+        }
+    }
+
     fn finish(mut self) -> Result<ObjectMesh> {
         let mut warnings = Vec::new();
+        self.normalize();
         let all = self.triangles.len();
         let area_vector = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|k| self.positions[k as usize].as_dvec3());
@@ -343,6 +360,31 @@ mod tests {
                 .unwrap();
         assert!(turned.warnings.iter().any(|w| w.contains("inwards")));
         assert!(turned.normals[0].dot(Vec3::splat(-1.0)) > 1.7);
+    }
+
+    #[test]
+    fn any_unit_of_length_gives_the_same_mesh() {
+        let original = parse(TETRAHEDRON).unwrap();
+        assert!((original.bounds.radius - 1.0).abs() < 1e-6);
+        for unit in ["1e-30", "1e30"] {
+            let scaled = parse(
+                &TETRAHEDRON
+                    .replace("v 1", &format!("v {unit}"))
+                    .replace(" 1\nf", &format!(" {unit}\nf"))
+                    .replace("0 1 0\nv", &format!("0 {unit} 0\nv")),
+            )
+            .unwrap();
+            for (a, b) in original.positions.iter().zip(&scaled.positions) {
+                assert!(a.distance(*b) < 1e-6, "{unit}: {a} {b}");
+            }
+            assert!(
+                original
+                    .normals
+                    .iter()
+                    .zip(&scaled.normals)
+                    .all(|(a, b)| a.distance(*b) < 1e-5)
+            );
+        }
     }
 
     #[test]
