@@ -7,12 +7,12 @@ use super::ObjectMesh;
 const BINS: usize = 16;
 const LEAF_TRIANGLES: usize = 4;
 /// Deeper nodes become leaves, whatever they hold; bounds the traversal's stack.
-const MAX_DEPTH: usize = 60;
+pub(super) const MAX_DEPTH: usize = 60;
 
 #[derive(Debug, Clone, Copy)]
-struct Bounds3 {
-    low: Vec3,
-    high: Vec3,
+pub(super) struct Bounds3 {
+    pub(super) low: Vec3,
+    pub(super) high: Vec3,
 }
 
 impl Bounds3 {
@@ -55,25 +55,25 @@ impl Bounds3 {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    bounds: Bounds3,
+pub(super) struct Node {
+    pub(super) bounds: Bounds3,
     /// Leaf: its first triangle. Inner node: its first child; the second follows it.
-    first: u32,
+    pub(super) first: u32,
     /// Triangles of a leaf; 0 for an inner node.
-    count: u32,
+    pub(super) count: u32,
 }
 
 /// Triangle as a corner and two edges.
 #[derive(Debug, Clone, Copy)]
-struct Blocker {
-    corner: Vec3,
-    edges: [Vec3; 2],
+pub(super) struct Blocker {
+    pub(super) corner: Vec3,
+    pub(super) edges: [Vec3; 2],
 }
 
 #[derive(Debug, Clone)]
 pub struct Bvh {
-    nodes: Vec<Node>,
-    blockers: Vec<Blocker>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) blockers: Vec<Blocker>,
 }
 
 struct Item {

@@ -12,6 +12,10 @@ pub mod bvh;
 pub mod camera;
 pub mod environment;
 pub mod gbuffer;
+pub mod gpu_gbuffer;
+pub mod gpu_light_rays;
+#[cfg(test)]
+mod gpu_tests;
 pub mod lights;
 pub mod objects;
 pub mod picture;

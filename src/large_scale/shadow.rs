@@ -82,7 +82,7 @@ impl Visible {
 /// What is needed to shadow an object by itself; made once per mesh.
 #[derive(Debug, Clone)]
 pub struct Occluder {
-    bvh: Bvh,
+    pub(super) bvh: Bvh,
 }
 
 impl Occluder {
@@ -137,7 +137,7 @@ impl Occluder {
 /// Where shadow rays of a point start: lifted from the flat triangle to the curved surface that the vertex normals describe
 /// (Hanika 2021, "Hacking the Shadow Terminator"), so that the facets of a smooth object cast no steps on themselves.
 /// Also whether the back of the triangle is the side that faces the eye (shading normals cannot tell: they may lean away).
-fn ray_origin(mesh: &ObjectMesh, triangle: usize, p: Vec3, eye: Vec3) -> (Vec3, bool) {
+pub(super) fn ray_origin(mesh: &ObjectMesh, triangle: usize, p: Vec3, eye: Vec3) -> (Vec3, bool) {
     let corners = mesh.corners(triangle);
     let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let per_area = 1.0 / area.length_squared().max(f32::MIN_POSITIVE);

@@ -3,22 +3,29 @@
 //! [`Visibility`] is what the rest of the program reads: soft visibility of every facet along any direction, held as
 //! horizons where nothing overhangs and as maps of bits where something does.
 
+mod gpu_maps;
 mod height_march;
 mod horizons;
 mod packed;
 mod periodic_grid;
 mod ray_cast;
 mod scan;
+mod shadow_map;
+#[cfg(test)]
+mod shadow_map_tests;
+mod shadow_view;
 mod soft_maps;
 
 use std::ops::Range;
 
 use glam::Vec3;
 
+pub use gpu_maps::{GpuShadowMaps, visibility_maps_gpu};
 pub use horizons::Horizons;
 pub use packed::PackedVisibility;
 pub use periodic_grid::PeriodicGrid;
 pub use ray_cast::{lifted_origins, ray_cast, sees};
+pub use shadow_map::visibility_maps_cpu;
 pub use soft_maps::SoftMaps;
 
 /// Visibility of all facets along any direction.
