@@ -6,8 +6,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::bvh;
-use super::shading_points::{ShadingPoints, Visible};
-use super::shadow::{Occluder, ray_origin};
+use super::shading_points::ShadingPoints;
+use super::shadow::{Occluder, Visible, ray_origin};
 use super::{DirectionalLight, ObjectMesh};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
