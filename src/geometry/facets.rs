@@ -64,7 +64,7 @@ impl Facets {
 }
 
 /// Moves a position by whole tiles into `[0, size)`.
-fn wrap(position: Vec3, size: Vec2) -> Vec3 {
+pub(super) fn wrap(position: Vec3, size: Vec2) -> Vec3 {
     let into = |x: f32, size: f32| {
         let wrapped = x.rem_euclid(size);
         // A tiny negative x rounds to the size itself.
@@ -102,9 +102,14 @@ impl SampleShift {
     }
 }
 
-/// The cumulative area of a mesh's triangles along a curve through the tile: made once, sampled often.
+/// The cumulative area of a mesh's triangles: made once, sampled often.
+///
+/// Strata are as compact as the order of the triangles is coherent. That of our generators is: sorting their triangles
+/// along a Hilbert curve, by normal, or by both left 1.1 to 2.6 % on lobes behind moving shadow edges with 2,000 facets,
+/// their own order 1.0 to 1.3 %. OBJ files are sorted when they are read.
 #[derive(Debug, Clone)]
 pub struct FacetSampler {
+    /// Triangles that have an area.
     order: Vec<u32>,
     /// Area of all triangles up to and including `order[k]`.
     cumulative: Vec<f64>,
@@ -113,23 +118,13 @@ pub struct FacetSampler {
 
 impl FacetSampler {
     pub fn new(mesh: &TileMesh) -> Self {
-        let mut keyed: Vec<(u32, u32)> = Vec::with_capacity(mesh.triangles.len());
-        for triangle in 0..mesh.triangles.len() {
-            let corners = mesh.corners(triangle);
-            let is_sound = corners.iter().all(|corner| corner.is_finite())
-                && mesh.geometric_normal(triangle) != Vec3::ZERO;
-            if is_sound {
-                let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-                keyed.push((
-                    hilbert_index(wrap(centre, mesh.size).truncate() / mesh.size),
-                    triangle as u32,
-                ));
-            }
-        }
-        let skipped = mesh.triangles.len() - keyed.len();
-        // The triangle's number decides between equals: the order is the same everywhere.
-        keyed.sort_unstable();
-        let order: Vec<u32> = keyed.into_iter().map(|(_, triangle)| triangle).collect();
+        let is_sound = |triangle: &u32| {
+            let index = *triangle as usize;
+            mesh.corners(index).iter().all(|corner| corner.is_finite())
+                && mesh.geometric_normal(index) != Vec3::ZERO
+        };
+        let order: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_sound).collect();
+        let skipped = mesh.triangles.len() - order.len();
         let mut sum = 0.0;
         let accumulate = |triangle: &u32| {
             sum += mesh.triangle_area(*triangle as usize);
@@ -148,7 +143,7 @@ impl FacetSampler {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    /// The triangle at a part `at` in `[0, 1)` of the cumulative area, and its position in the order.
+    /// The triangle at a part `at` in `[0, 1)` of the cumulative area.
     pub(super) fn triangle_at(&self, at: f64) -> u32 {
         let k = self
             .cumulative
@@ -197,28 +192,6 @@ pub(super) fn fold(point: Vec2) -> Vec3 {
         point
     };
     Vec3::new(1.0 - point.x - point.y, point.x, point.y)
-}
-
-/// Position along a Hilbert curve of 2^24 cells of a point of the unit square.
-fn hilbert_index(point: Vec2) -> u32 {
-    const BITS: u32 = 12;
-    let side = 1u32 << BITS;
-    let cell = |x: f32| ((x * side as f32) as u32).min(side - 1);
-    let (mut x, mut y) = (cell(point.x), cell(point.y));
-    let mut index = 0;
-    let mut s = side / 2;
-    while s > 0 {
-        let (right, upper) = (u32::from(x & s > 0), u32::from(y & s > 0));
-        index += s * s * ((3 * right) ^ upper);
-        if upper == 0 {
-            if right == 1 {
-                (x, y) = (side - 1 - x, side - 1 - y);
-            }
-            (x, y) = (y, x);
-        }
-        s /= 2;
-    }
-    index
 }
 
 /// `A cos θ_o` of a surface without shadows, from facets: for tests of sampling.
