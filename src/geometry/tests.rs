@@ -353,3 +353,36 @@ proptest! {
         prop_assert!(facets.len() == 64 && facets.positions.iter().all(|p| p.is_finite()));
     }
 }
+
+#[test]
+fn every_shipped_scene_builds_and_each_slot_has_a_material() {
+    for name in crate::scene::shipped::names() {
+        let loaded = crate::scene::open(name, &[]).unwrap();
+        let mesh = build(&loaded.scene.tile, &loaded.base_dir)
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(mesh.closes_plane, "{name}");
+        for slot in &mesh.slots {
+            loaded
+                .scene
+                .material_for_slot(slot)
+                .unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+        for material in loaded
+            .scene
+            .materials
+            .iter()
+            .filter(|material| !name.starts_with("table3") && material.name != "default")
+        {
+            assert!(
+                mesh.slots.contains(&material.name),
+                "{name}: no slot `{}`",
+                material.name
+            );
+        }
+        eprintln!(
+            "{name}: {} triangles {:?}",
+            mesh.triangles.len(),
+            mesh.notes
+        );
+    }
+}
