@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
+use super::spatial_order::spatial_order;
 use super::{TileMesh, closure, obj};
 use crate::error::Result;
 use crate::scene::{MeshFile, files};
@@ -47,6 +48,16 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         mesh.corner_normals = Some(file.triangles.iter().map(shading).collect());
     }
     mesh.positions = file.positions;
+    let order = spatial_order(&mesh);
+    let sorted = |k: &u32| *k as usize;
+    mesh.triangles = order.iter().map(|k| mesh.triangles[sorted(k)]).collect();
+    mesh.triangle_slot = order
+        .iter()
+        .map(|k| mesh.triangle_slot[sorted(k)])
+        .collect();
+    mesh.corner_normals = mesh
+        .corner_normals
+        .map(|normals| order.iter().map(|k| normals[sorted(k)]).collect());
     mesh.closes_plane = closure::is_closed_sheet(&mesh);
     if !mesh.closes_plane {
         mesh.notes.push(format!(
@@ -106,8 +117,13 @@ mod tests {
             .unwrap()
             .corner_normals
             .unwrap();
-        assert_eq!(normals[0], [Vec3::Z; 3]);
-        assert!((normals[2][0] - Vec3::new(0.5f32.sqrt(), 0.0, 0.5f32.sqrt())).length() < 1e-6);
-        assert_eq!(normals[3], [Vec3::Z; 3]);
+        let slanted = Vec3::new(0.5f32.sqrt(), 0.0, 0.5f32.sqrt());
+        let is = |expected: Vec3| {
+            normals
+                .iter()
+                .filter(|corners| corners.iter().all(|n| (*n - expected).length() < 1e-6))
+                .count()
+        };
+        assert_eq!((normals.len(), is(Vec3::Z), is(slanted)), (4, 3, 1));
     }
 }

@@ -13,10 +13,13 @@ mod mesh_file;
 pub mod obj;
 mod pyramids;
 mod rods;
+mod spatial_order;
 mod tile_mesh;
 mod voronoi;
 mod weave;
 
+#[cfg(test)]
+mod height_images;
 #[cfg(test)]
 mod tests;
 
