@@ -6,6 +6,7 @@
 //!                     └────────────▶ small-scale Brdf ─▶ RotatedBasis ─────┘
 //! ```
 
+pub mod accuracy;
 pub mod brdf;
 pub mod directions;
 pub mod error;
@@ -14,6 +15,7 @@ pub mod geometry;
 pub mod gpu;
 pub mod large_scale;
 pub mod scene;
+pub mod simd;
 pub mod visibility;
 
 pub use error::{Error, InputError, Result};

@@ -1,11 +1,31 @@
 //! Small-scale BRDFs: isotropic, per colour channel, evaluated at any normal (DESIGN.md, Sec. 3).
+//!
+//! An analytic term is a scalar lobe times a colour, `f = tint(i·h) · lobe_cos`; a measured one is a table over half
+//! and difference angles, made reciprocal when it is read. [`Brdf::from_specs`] makes either from a scene.
+
+mod albedo;
+mod analytic;
+mod color_basis;
+mod fast_math;
+mod from_specs;
+mod half_difference;
+mod measured;
+mod merl;
+mod rgl;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
+pub use analytic::schlick_weight;
+pub use color_basis::ColorBasis;
+pub use half_difference::HalfDifferenceTable;
+pub use measured::{Measured, MeasuredCache, MeasuredKind, MeasuredReport};
+
+use crate::directions::half_vector;
+
 /// The cosines an isotropic BRDF depends on. `n·h`, `n·i`, `n·o` may be negative: then the BRDF is 0.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LobeAngles {
     pub n_dot_i: f32,
     pub n_dot_o: f32,
@@ -16,15 +36,23 @@ pub struct LobeAngles {
 }
 
 impl LobeAngles {
-    /// All unit vectors; `h` is [`crate::directions::half_vector`] of `i` and `o`.
+    /// All unit vectors; `h` is [`crate::directions::half_vector`] of `i` and `o`. Swapping `i` and `o` swaps the two
+    /// cosines and leaves every other bit as it is.
+    #[inline]
     pub fn new(n: Vec3, i: Vec3, o: Vec3, h: Vec3) -> Self {
         Self {
             n_dot_i: n.dot(i),
             n_dot_o: n.dot(o),
             n_dot_h: n.dot(h),
             sin2_theta_h: n.cross(h).length_squared(),
-            i_dot_h: i.dot(h),
+            i_dot_h: 0.5 * (i + o).dot(h),
         }
+    }
+
+    /// Whether both directions are above the surface: elsewhere every BRDF is 0.
+    #[inline]
+    pub fn above(&self) -> bool {
+        self.n_dot_i > 0.0 && self.n_dot_o > 0.0
     }
 }
 
@@ -46,10 +74,160 @@ pub enum Term {
     Measured(Arc<dyn Measured>),
 }
 
-/// A tabulated BRDF, already made reciprocal.
-pub trait Measured: std::fmt::Debug + Send + Sync {
-    /// `f_r` [1/sr]; finite and not negative; 0 where `n·i` or `n·o` is not positive.
-    fn f_r(&self, angles: &LobeAngles) -> Vec3;
-    /// Where it came from, for messages.
-    fn name(&self) -> &str;
+impl Term {
+    /// The measured table, where the term is one: the terms that [`Term::lobe_cos`] and [`Term::tint`] do not describe.
+    pub fn measured(&self) -> Option<&Arc<dyn Measured>> {
+        match self {
+            Self::Measured(table) => Some(table),
+            _ => None,
+        }
+    }
+
+    /// Whether the colour changes with `i·h` (Fresnel).
+    pub fn has_fresnel(&self) -> bool {
+        matches!(self, Self::CookTorrance { .. } | Self::Ggx { .. })
+    }
+
+    /// The scalar lobe `f_r / tint · (n·i)+ (n·o)+` [1/sr]: finite, not negative, the same bits with `i` and `o`
+    /// swapped. A measured term has no scalar lobe; its luminance stands in (with a white tint) where only the shape
+    /// matters, and [`Term::f_cos`] is its value.
+    #[inline]
+    pub fn lobe_cos(&self, angles: &LobeAngles) -> f32 {
+        if !angles.above() {
+            return 0.0;
+        }
+        match self {
+            Self::Lambertian { .. } => analytic::lambertian(angles),
+            Self::BlinnPhong { exponent, .. } => analytic::blinn_phong(*exponent, angles),
+            Self::CookTorrance { roughness, .. } => analytic::cook_torrance(*roughness, angles),
+            Self::Ward { roughness, .. } => analytic::ward(*roughness, angles),
+            Self::Ggx { roughness, .. } => analytic::ggx(*roughness, angles),
+            Self::Measured(table) => {
+                table.f_r(angles).dot(LUMINANCE) * (angles.n_dot_i * angles.n_dot_o)
+            }
+        }
+    }
+
+    /// [`Term::lobe_cos`] of many angles at once: the choice of model is made once, so that the loop vectorises.
+    /// Bit for bit what one call each gives. Fills as many as the shorter slice has.
+    pub fn lobe_cos_many(&self, angles: &[LobeAngles], out: &mut [f32]) {
+        struct Fill<'a>(&'a [LobeAngles], &'a mut [f32]);
+        impl LobeVisitor for Fill<'_> {
+            type Output = ();
+            fn visit(self, lobe_cos: impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync) {
+                for (out, angles) in self.1.iter_mut().zip(self.0) {
+                    *out = lobe_cos(angles);
+                }
+            }
+        }
+        self.visit_lobe(Fill(angles, out));
+    }
+
+    /// Hands the visitor [`Term::lobe_cos`] as a function of this term's own kind, without a branch in it for the
+    /// analytic ones: loops written against it compile once a kind and vectorise.
+    pub fn visit_lobe<V: LobeVisitor>(&self, visitor: V) -> V::Output {
+        fn above(
+            lobe: impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync,
+        ) -> impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync {
+            move |angles| {
+                let value = lobe(angles);
+                if angles.above() { value } else { 0.0 }
+            }
+        }
+        match *self {
+            Self::Lambertian { .. } => visitor.visit(above(analytic::lambertian)),
+            Self::BlinnPhong { exponent, .. } => {
+                visitor.visit(above(move |a| analytic::blinn_phong(exponent, a)))
+            }
+            Self::CookTorrance { roughness, .. } => {
+                visitor.visit(above(move |a| analytic::cook_torrance(roughness, a)))
+            }
+            Self::Ward { roughness, .. } => {
+                visitor.visit(above(move |a| analytic::ward(roughness, a)))
+            }
+            Self::Ggx { roughness, .. } => {
+                visitor.visit(above(move |a| analytic::ggx(roughness, a)))
+            }
+            Self::Measured(_) => visitor.visit(|a| self.lobe_cos(a)),
+        }
+    }
+
+    /// The colour that multiplies [`Term::lobe_cos`]: albedo, specular colour, or Schlick's Fresnel
+    /// `f0 + (1-f0)(1-i·h)^5`; white for a measured term.
+    #[inline]
+    pub fn tint(&self, i_dot_h: f32) -> Vec3 {
+        match *self {
+            Self::Lambertian { albedo } => albedo,
+            Self::BlinnPhong { specular, .. } | Self::Ward { specular, .. } => specular,
+            Self::CookTorrance { f0, .. } | Self::Ggx { f0, .. } => {
+                f0 + (Vec3::ONE - f0) * schlick_weight(i_dot_h)
+            }
+            Self::Measured(_) => Vec3::ONE,
+        }
+    }
+
+    /// `f = f_r (n·i)+ (n·o)+` [1/sr].
+    #[inline]
+    pub fn f_cos(&self, angles: &LobeAngles) -> Vec3 {
+        match self {
+            Self::Measured(table) if angles.above() => {
+                table.f_r(angles) * (angles.n_dot_i * angles.n_dot_o)
+            }
+            Self::Measured(_) => Vec3::ZERO,
+            _ => self.tint(angles.i_dot_h) * self.lobe_cos(angles),
+        }
+    }
+
+    /// `f_r` [1/sr]; the models whose `f_r` grows without bound at the horizon end at the largest f32.
+    pub fn f_r(&self, angles: &LobeAngles) -> Vec3 {
+        if !angles.above() {
+            return Vec3::ZERO;
+        }
+        match self {
+            Self::Measured(table) => table.f_r(angles),
+            Self::Lambertian { albedo } => *albedo / std::f32::consts::PI,
+            Self::BlinnPhong { exponent, specular } => {
+                *specular * analytic::blinn_phong_without_cosines(*exponent, angles)
+            }
+            _ => {
+                let cosines = (angles.n_dot_i * angles.n_dot_o).max(f32::MIN_POSITIVE);
+                (self.f_cos(angles) / cosines).min(Vec3::splat(f32::MAX))
+            }
+        }
+    }
 }
+
+/// A computation over a term's scalar lobe, compiled for each kind of term ([`Term::visit_lobe`]).
+pub trait LobeVisitor {
+    type Output;
+    fn visit(self, lobe_cos: impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync) -> Self::Output;
+}
+
+/// Rec. 709 luminance weights of linear RGB.
+pub const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+
+impl Brdf {
+    /// `f = Σ f_r (n·i)+ (n·o)+` [1/sr] of unit vectors; 0 where either direction is not above the surface.
+    pub fn f(&self, n: Vec3, i: Vec3, o: Vec3) -> Vec3 {
+        self.f_cos(&LobeAngles::new(n, i, o, half_vector(i, o)))
+    }
+
+    /// `f_r` [1/sr] of unit vectors; 0 where either direction is not above the surface.
+    pub fn f_r(&self, n: Vec3, i: Vec3, o: Vec3) -> Vec3 {
+        let angles = LobeAngles::new(n, i, o, half_vector(i, o));
+        self.terms
+            .iter()
+            .map(|term| term.f_r(&angles))
+            .sum::<Vec3>()
+            .min(Vec3::splat(f32::MAX))
+    }
+
+    /// [`Brdf::f`] from the cosines.
+    #[inline]
+    pub fn f_cos(&self, angles: &LobeAngles) -> Vec3 {
+        self.terms.iter().map(|term| term.f_cos(angles)).sum()
+    }
+}
+
+#[cfg(test)]
+mod speed_tests;

@@ -1,6 +1,22 @@
 //! From facets, visibility and BRDFs to the effective BRDF.
 
+mod bvndf;
+mod direct;
+mod effective_brdf;
+mod facet_sum;
+mod gemm;
+mod gram;
+mod low_rank;
+mod rotated_basis;
+
 use glam::Vec3;
+
+pub use bvndf::VisibilityRows;
+pub use direct::Direct;
+pub use effective_brdf::{EffectiveBrdf, Form};
+pub use facet_sum::{FacetSum, SumMaterial};
+pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint};
+pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 
 /// What the large scale asks of a material: all it knows of the small scale.
 pub trait Reflectance: Sync {

@@ -64,7 +64,7 @@ impl Facets {
 }
 
 /// Moves a position by whole tiles into `[0, size)`.
-pub(super) fn wrap(position: Vec3, size: Vec2) -> Vec3 {
+fn wrap(position: Vec3, size: Vec2) -> Vec3 {
     let into = |x: f32, size: f32| {
         let wrapped = x.rem_euclid(size);
         // A tiny negative x rounds to the size itself.
@@ -102,14 +102,9 @@ impl SampleShift {
     }
 }
 
-/// The cumulative area of a mesh's triangles: made once, sampled often.
-///
-/// Strata are as compact as the order of the triangles is coherent. That of our generators is: sorting their triangles
-/// along a Hilbert curve, by normal, or by both left 1.1 to 2.6 % on lobes behind moving shadow edges with 2,000 facets,
-/// their own order 1.0 to 1.3 %. OBJ files are sorted when they are read.
+/// The cumulative area of a mesh's triangles along a curve through normals and places: made once, sampled often.
 #[derive(Debug, Clone)]
 pub struct FacetSampler {
-    /// Triangles that have an area.
     order: Vec<u32>,
     /// Area of all triangles up to and including `order[k]`.
     cumulative: Vec<f64>,
@@ -118,13 +113,22 @@ pub struct FacetSampler {
 
 impl FacetSampler {
     pub fn new(mesh: &TileMesh) -> Self {
-        let is_sound = |triangle: &u32| {
-            let index = *triangle as usize;
-            mesh.corners(index).iter().all(|corner| corner.is_finite())
-                && mesh.geometric_normal(index) != Vec3::ZERO
-        };
-        let order: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_sound).collect();
-        let skipped = mesh.triangles.len() - order.len();
+        let mut keyed: Vec<(u32, u32)> = Vec::with_capacity(mesh.triangles.len());
+        for triangle in 0..mesh.triangles.len() {
+            let corners = mesh.corners(triangle);
+            let is_sound = corners.iter().all(|corner| corner.is_finite())
+                && mesh.geometric_normal(triangle) != Vec3::ZERO;
+            if is_sound {
+                let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+                let place = wrap(centre, mesh.size).truncate() / mesh.size;
+                let normal = mesh.geometric_normal(triangle);
+                keyed.push((stratum(normal, place), triangle as u32));
+            }
+        }
+        let skipped = mesh.triangles.len() - keyed.len();
+        // The triangle's number decides between equals: the order is the same everywhere.
+        keyed.sort_unstable();
+        let order: Vec<u32> = keyed.into_iter().map(|(_, triangle)| triangle).collect();
         let mut sum = 0.0;
         let accumulate = |triangle: &u32| {
             sum += mesh.triangle_area(*triangle as usize);
@@ -143,7 +147,7 @@ impl FacetSampler {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    /// The triangle at a part `at` in `[0, 1)` of the cumulative area.
+    /// The triangle at a part `at` in `[0, 1)` of the cumulative area, and its position in the order.
     pub(super) fn triangle_at(&self, at: f64) -> u32 {
         let k = self
             .cumulative
@@ -192,6 +196,21 @@ pub(super) fn fold(point: Vec2) -> Vec3 {
         point
     };
     Vec3::new(1.0 - point.x - point.y, point.x, point.y)
+}
+
+/// Position along a Morton curve through normal and place together: a systematic selection along it samples evenly what
+/// lobes see (normals) and what shadows see (places). Place alone leaves three times the error on a glossy egg-crate. The
+/// rows of a height-field as they come are up to 1.9 times better where their stride is lucky (1.1 against 1.9 % for lobes
+/// behind shadow edges, 2,000 facets) and 3.5 times worse where it divides the row (8.2 against 2.4 %, 1,024 facets).
+fn stratum(normal: Vec3, place: Vec2) -> u32 {
+    const BITS: u32 = 8;
+    let axes = [0.5 + 0.5 * normal.x, 0.5 + 0.5 * normal.y, place.x, place.y];
+    let steps = axes.map(|v| ((v * (1 << BITS) as f32) as u32).min((1 << BITS) - 1));
+    (0..BITS).rev().fold(0, |key, bit| {
+        steps
+            .iter()
+            .fold(key, |key, step| key << 1 | (step >> bit & 1))
+    })
 }
 
 /// `A cos θ_o` of a surface without shadows, from facets: for tests of sampling.

@@ -2,6 +2,7 @@
 
 mod builder;
 pub mod closure;
+mod facet_order;
 mod facets;
 mod flat;
 mod grooves;
@@ -12,7 +13,6 @@ mod mesh_file;
 pub mod obj;
 mod pyramids;
 mod rods;
-mod spatial_order;
 mod tile_mesh;
 mod voronoi;
 mod weave;

@@ -1,1 +1,35 @@
-//! The large-scale object: meshes with tangents, camera, lights, G-buffer, shading.
+//! The large scale: an object that carries the material, the lights on it, and the picture of it.
+//!
+//! ```text
+//! scene::Object ─▶ ObjectMesh ─▶ GBuffer ─▶ ShadingPoints ─▶ light visibility ─▶ radiance ─▶ Picture ─▶ PNG | EXR
+//!                                  ▲                               ▲                ▲
+//! scene::Camera ─▶ CameraView ─────┘      scene::Light ─▶ lights ──┴────────────────┘  (and a Reflectance)
+//! ```
+//!
+//! World frame y up, right-handed. Each arrow is a plain function; [`render::render`] runs them all and times them.
+
+pub mod bvh;
+pub mod camera;
+pub mod environment;
+pub mod gbuffer;
+pub mod gpu_gbuffer;
+pub mod gpu_light_rays;
+#[cfg(test)]
+mod gpu_tests;
+pub mod lights;
+pub mod objects;
+pub mod picture;
+pub mod raster;
+pub mod render;
+pub mod shading;
+pub mod shading_points;
+pub mod shadow;
+pub mod shadow_cache;
+pub mod tone_map;
+
+pub use camera::CameraView;
+pub use gbuffer::GBuffer;
+pub use lights::DirectionalLight;
+pub use objects::ObjectMesh;
+pub use picture::Picture;
+pub use render::{RenderInput, Rendered, render};

@@ -1,5 +1,71 @@
 //! Which facets of the endlessly repeated tile does a direction see?
+//!
+//! [`Visibility`] is what the rest of the program reads: soft visibility of every facet along any direction, held as
+//! horizons where nothing overhangs and as maps of bits where something does.
 
+mod gpu_maps;
+mod height_march;
+mod horizons;
 mod packed;
+mod periodic_grid;
+mod ray_cast;
+mod scan;
+mod shadow_map;
+#[cfg(test)]
+mod shadow_map_tests;
+mod shadow_view;
+mod soft_maps;
 
+use std::ops::Range;
+
+use glam::Vec3;
+
+pub use gpu_maps::{GpuShadowMaps, visibility_maps_gpu};
+pub use horizons::Horizons;
 pub use packed::PackedVisibility;
+pub use periodic_grid::PeriodicGrid;
+pub use ray_cast::{lifted_origins, ray_cast, sees};
+pub use shadow_map::visibility_maps_cpu;
+pub use soft_maps::SoftMaps;
+
+/// Visibility of all facets along any direction.
+#[derive(Debug, Clone)]
+pub enum Visibility {
+    /// A flat tile: every facet sees everything.
+    Unblocked { facets: usize },
+    Horizons(Horizons),
+    Maps(SoftMaps),
+}
+
+impl Visibility {
+    pub fn facets(&self) -> usize {
+        match self {
+            Self::Unblocked { facets } => *facets,
+            Self::Horizons(horizons) => horizons.facets(),
+            Self::Maps(maps) => maps.packed.facet_count,
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Unblocked { .. } => 0,
+            Self::Horizons(horizons) => horizons.bytes(),
+            Self::Maps(maps) => 4 * maps.packed.words.len(),
+        }
+    }
+
+    /// Writes the visibility in `[0, 1]` of a run of facets along `direction`; whether a facet faces it is not included.
+    /// 0 at and under the horizon.
+    pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
+        if direction.z <= 0.0 {
+            out.fill(0.0);
+            return;
+        }
+        match self {
+            Self::Unblocked { .. } => out.fill(1.0),
+            Self::Horizons(horizons) => horizons.fill(direction, range, out),
+            Self::Maps(maps) => maps.fill(direction, range, out),
+        }
+    }
+}

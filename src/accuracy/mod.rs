@@ -1,0 +1,9 @@
+//! What is right: the reference sum with its own error, metrics, and the direction pairs they are taken over.
+
+mod metrics;
+mod pairs;
+mod reference;
+
+pub use metrics::{Errors, compare};
+pub use pairs::{Pair, mirror_biased_pairs};
+pub use reference::{Estimate, Reference, ReferenceSettings};

@@ -1,0 +1,241 @@
+//! The container of RGL `.bsdf` files: named arrays.
+//!
+//! `tensor_file\0`, two version bytes (1, 0), u32 field count; per field u16 name length, name, u16 dimensions, u8 type,
+//! u64 offset from the start of the file, u64 per dimension; then the arrays, last dimension fastest. Little-endian.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::InputError;
+
+const MAGIC: &[u8; 12] = b"tensor_file\0";
+/// The largest published file (anisotropic, spectral) is 550 MB; isotropic RGB ones are under 1 MB.
+const LARGEST_FILE: u64 = 256 << 20;
+/// The published files have at most 12 fields of at most 5 dimensions.
+const MOST_FIELDS: u32 = 256;
+const MOST_DIMENSIONS: u16 = 8;
+
+/// A file in memory, its table of contents checked against its size.
+pub(super) struct TensorFile {
+    bytes: Vec<u8>,
+    fields: Vec<Field>,
+}
+
+struct Field {
+    name: String,
+    kind: u8,
+    offset: usize,
+    shape: Vec<usize>,
+}
+
+/// Element types that BRDF files use.
+const U8: u8 = 1;
+const F32: u8 = 10;
+const F64: u8 = 11;
+
+impl TensorFile {
+    pub(super) fn read(path: &Path) -> Result<Self, InputError> {
+        let unreadable =
+            |error: std::io::Error| InputError::new("", error, "an RGL file that can be read");
+        let file = File::open(path).map_err(unreadable)?;
+        let len = file.metadata().map_err(unreadable)?.len();
+        if len > LARGEST_FILE {
+            let expected = format!("at most {LARGEST_FILE} bytes");
+            return Err(InputError::new(
+                "file size",
+                format!("{len} bytes"),
+                expected,
+            ));
+        }
+        let mut bytes = Vec::with_capacity(len as usize);
+        file.take(LARGEST_FILE)
+            .read_to_end(&mut bytes)
+            .map_err(unreadable)?;
+        Self::parse(bytes)
+    }
+
+    pub(super) fn parse(bytes: Vec<u8>) -> Result<Self, InputError> {
+        let mut reader = Reader {
+            bytes: &bytes,
+            at: 0,
+        };
+        if reader.take::<12>("header")? != *MAGIC {
+            return Err(InputError::new("header", "other bytes", "\"tensor_file\"")
+                .with_hint("is this an RGL .bsdf file?"));
+        }
+        let version = reader.take::<2>("version")?;
+        if version != [1, 0] {
+            return Err(InputError::new("version", format!("{version:?}"), "[1, 0]"));
+        }
+        let count = u32::from_le_bytes(reader.take("field count")?);
+        if count > MOST_FIELDS {
+            return Err(InputError::new(
+                "field count",
+                count,
+                format!("at most {MOST_FIELDS}"),
+            ));
+        }
+        let fields = (0..count)
+            .map(|_| reader.field())
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { bytes, fields })
+    }
+
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.fields.iter().any(|field| field.name == name)
+    }
+
+    fn field(&self, name: &str) -> Result<&Field, InputError> {
+        self.fields
+            .iter()
+            .find(|field| field.name == name)
+            .ok_or_else(|| {
+                let names: Vec<_> = self
+                    .fields
+                    .iter()
+                    .map(|field| field.name.as_str())
+                    .collect();
+                InputError::new(
+                    "fields",
+                    names.join(", "),
+                    format!("a field named \"{name}\""),
+                )
+            })
+    }
+
+    /// The shape and the finite numbers of a field of `DIMENSIONS` dimensions.
+    pub(super) fn floats<const DIMENSIONS: usize>(
+        &self,
+        name: &str,
+    ) -> Result<([usize; DIMENSIONS], Vec<f64>), InputError> {
+        let field = self.field(name)?;
+        let place = || format!("field \"{name}\"");
+        let shape: [usize; DIMENSIONS] = field.shape.as_slice().try_into().map_err(|_| {
+            InputError::new(
+                place(),
+                format!("shape {:?}", field.shape),
+                format!("{DIMENSIONS} dimensions"),
+            )
+        })?;
+        let bytes = &self.bytes[field.offset..];
+        let count: usize = shape.iter().product();
+        let values: Vec<f64> = match field.kind {
+            U8 => bytes
+                .iter()
+                .take(count)
+                .map(|&byte| f64::from(byte))
+                .collect(),
+            F32 => bytes
+                .as_chunks()
+                .0
+                .iter()
+                .take(count)
+                .map(|&b| f64::from(f32::from_le_bytes(b)))
+                .collect(),
+            F64 => bytes
+                .as_chunks()
+                .0
+                .iter()
+                .take(count)
+                .map(|&b| f64::from_le_bytes(b))
+                .collect(),
+            other => {
+                return Err(InputError::new(
+                    place(),
+                    format!("element type {other}"),
+                    "1 (u8), 10 (f32) or 11 (f64)",
+                ));
+            }
+        };
+        match values.iter().position(|value| !value.is_finite()) {
+            Some(at) => Err(InputError::new(
+                format!("{}, element {at}", place()),
+                values[at],
+                "a finite number",
+            )),
+            None => Ok((shape, values)),
+        }
+    }
+}
+
+struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Reader<'_> {
+    fn slice(&mut self, len: usize, what: &str) -> Result<&[u8], InputError> {
+        let end = self.at.saturating_add(len);
+        let slice = self.bytes.get(self.at..end).ok_or_else(|| {
+            InputError::new(
+                format!("{what} at byte {}", self.at),
+                format!("the end of the file at byte {}", self.bytes.len()),
+                format!("{len} bytes"),
+            )
+        })?;
+        self.at = end;
+        Ok(slice)
+    }
+
+    fn take<const N: usize>(&mut self, what: &str) -> Result<[u8; N], InputError> {
+        let mut array = [0; N];
+        array.copy_from_slice(self.slice(N, what)?);
+        Ok(array)
+    }
+
+    /// One entry of the table of contents; after it, the array is known to lie within the file.
+    fn field(&mut self) -> Result<Field, InputError> {
+        let name_len = u16::from_le_bytes(self.take("name length")?);
+        let name =
+            String::from_utf8_lossy(self.slice(usize::from(name_len), "field name")?).into_owned();
+        let place = format!("field \"{name}\"");
+        let dimensions = u16::from_le_bytes(self.take(&place)?);
+        if dimensions > MOST_DIMENSIONS {
+            return Err(InputError::new(
+                place,
+                format!("{dimensions} dimensions"),
+                format!("at most {MOST_DIMENSIONS}"),
+            ));
+        }
+        let [kind] = self.take(&place)?;
+        let offset = u64::from_le_bytes(self.take(&place)?);
+        let shape: Vec<u64> = (0..dimensions)
+            .map(|_| self.take(&place).map(u64::from_le_bytes))
+            .collect::<Result<_, _>>()?;
+        // Types 1 to 11: u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64.
+        let size = match kind {
+            1 | 2 => 1,
+            3 | 4 | 9 => 2,
+            5 | 6 | 10 => 4,
+            7 | 8 | 11 => 8,
+            other => {
+                return Err(InputError::new(
+                    place,
+                    format!("element type {other}"),
+                    "1 to 11",
+                ));
+            }
+        };
+        let end = shape
+            .iter()
+            .try_fold(size, |bytes: u64, &n| bytes.checked_mul(n))
+            .and_then(|bytes| bytes.checked_add(offset));
+        match end {
+            Some(end) if end <= self.bytes.len() as u64 => {
+                let shape = shape.into_iter().map(|n| n as usize).collect();
+                Ok(Field {
+                    name,
+                    kind,
+                    offset: offset as usize,
+                    shape,
+                })
+            }
+            _ => Err(InputError::new(
+                place,
+                format!("shape {shape:?} at byte {offset}"),
+                format!("an array within the file's {} bytes", self.bytes.len()),
+            )),
+        }
+    }
+}

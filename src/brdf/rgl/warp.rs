@@ -1,0 +1,279 @@
+//! Functions on the unit square given at the vertices of a grid, bilinear between them, one per light elevation.
+
+use crate::error::InputError;
+
+/// A grid: `width` values along x (fastest), `height` along y, both at least 2.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    pub width: usize,
+    pub height: usize,
+}
+
+/// A cell and the position in it.
+#[derive(Clone, Copy)]
+struct Cell {
+    column: usize,
+    row: usize,
+    x: f64,
+    y: f64,
+}
+
+impl Grid {
+    pub(super) fn new(place: &str, width: usize, height: usize) -> Result<Self, InputError> {
+        if width < 2 || height < 2 {
+            let found = format!("a grid of {height} x {width}");
+            return Err(InputError::new(
+                format!("field \"{place}\""),
+                found,
+                "at least 2 x 2",
+            ));
+        }
+        Ok(Self { width, height })
+    }
+
+    pub(super) fn len(self) -> usize {
+        self.width * self.height
+    }
+
+    fn cell(self, [u, v]: [f64; 2]) -> Cell {
+        let split = |t: f64, n: usize| {
+            let position = t.clamp(0.0, 1.0) * (n - 1) as f64;
+            let lower = (position as usize).min(n - 2);
+            (lower, position - lower as f64)
+        };
+        let ((column, x), (row, y)) = (split(u, self.width), split(v, self.height));
+        Cell { column, row, x, y }
+    }
+
+    /// Bilinear interpolation of `values`.
+    pub(super) fn eval(self, values: &[f64], at: [f64; 2]) -> f64 {
+        let Cell { column, row, x, y } = self.cell(at);
+        let along = |row: usize| {
+            let first = row * self.width + column;
+            lerp(values[first], values[first + 1], x)
+        };
+        lerp(along(row), along(row + 1), y)
+    }
+}
+
+fn lerp(a: f64, b: f64, t: f64) -> f64 {
+    a + (b - a) * t
+}
+
+/// A position between two slices of a parameter: the lower one, and the weight of the next.
+#[derive(Clone, Copy)]
+pub(super) struct Between {
+    pub lower: usize,
+    pub weight: f64,
+}
+
+impl Between {
+    /// Of strictly increasing `values`; constant beyond the ends.
+    pub(super) fn find(values: &[f64], value: f64) -> Self {
+        let upper = values
+            .partition_point(|&v| v <= value)
+            .clamp(1, values.len().max(2) - 1);
+        match (values.get(upper - 1), values.get(upper)) {
+            (Some(&a), Some(&b)) => Self {
+                lower: upper - 1,
+                weight: ((value - a) / (b - a)).clamp(0.0, 1.0),
+            },
+            _ => Self {
+                lower: 0,
+                weight: 0.0,
+            },
+        }
+    }
+
+    /// Interpolates what `of` gives for each slice.
+    pub(super) fn mix(self, of: impl Fn(usize) -> f64) -> f64 {
+        if self.weight == 0.0 {
+            of(self.lower)
+        } else {
+            lerp(of(self.lower), of(self.lower + 1), self.weight)
+        }
+    }
+}
+
+/// Densities per slice, and the map from their domain to uniform numbers (Dupuy and Jakob 2018, Sec. 4): first the
+/// marginal over y, then x given y. Integrals are in grid units, every slice scaled to a total of 1.
+pub(super) struct Warp {
+    grid: Grid,
+    density: Vec<f64>,
+    /// Integral along a row up to each column; its last column is the row's total.
+    along_row: Vec<f64>,
+    /// Integral over the rows up to each.
+    over_rows: Vec<f64>,
+}
+
+impl Warp {
+    /// `density`: slices of `grid`, one after the other, not negative, none all 0.
+    pub(super) fn new(grid: Grid, mut density: Vec<f64>) -> Result<Self, InputError> {
+        let mut along_row = vec![0.0; density.len()];
+        let mut over_rows = Vec::with_capacity(density.len() / grid.width);
+        for (slice, (density, along_row)) in density
+            .chunks_exact_mut(grid.len())
+            .zip(along_row.chunks_exact_mut(grid.len()))
+            .enumerate()
+        {
+            for (density, along_row) in density
+                .chunks_exact(grid.width)
+                .zip(along_row.chunks_exact_mut(grid.width))
+            {
+                for column in 1..grid.width {
+                    along_row[column] =
+                        along_row[column - 1] + 0.5 * (density[column - 1] + density[column]);
+                }
+            }
+            let row_total = |row: usize| along_row[row * grid.width + grid.width - 1];
+            let totals: Vec<f64> = (1..grid.height)
+                .scan(0.0, |sum, row| {
+                    *sum += 0.5 * (row_total(row - 1) + row_total(row));
+                    Some(*sum)
+                })
+                .collect();
+            let total = totals.last().copied().unwrap_or(0.0);
+            if !(total > 0.0 && total.is_finite()) || density.iter().any(|&value| value < 0.0) {
+                return Err(InputError::new(
+                    format!("field \"vndf\", slice {slice}"),
+                    format!("a density that adds up to {total}"),
+                    "values that are not negative and add up to more than 0",
+                ));
+            }
+            over_rows.push(0.0);
+            over_rows.extend(totals.iter().map(|sum| sum / total));
+            density
+                .iter_mut()
+                .chain(along_row)
+                .for_each(|value| *value /= total);
+        }
+        Ok(Self {
+            grid,
+            density,
+            along_row,
+            over_rows,
+        })
+    }
+
+    /// The uniform numbers that the warp of the interpolated slice would take to `at`.
+    pub(super) fn invert(&self, slice: Between, at: [f64; 2]) -> [f64; 2] {
+        let Cell { column, row, x, y } = self.grid.cell(at);
+        let Grid { width, height } = self.grid;
+        let mix = |values: &[f64], row: usize, column: usize| {
+            slice.mix(|slice| values[(slice * height + row) * width + column])
+        };
+        // The integral of a linear function over the first part of its cell.
+        let part = |a: f64, b: f64, t: f64| t * (a + 0.5 * t * (b - a));
+        let total = [row, row + 1].map(|row| mix(&self.along_row, row, width - 1));
+        let below = slice.mix(|slice| self.over_rows[slice * height + row]);
+        let partial = [row, row + 1].map(|row| {
+            let (a, b) = (
+                mix(&self.density, row, column),
+                mix(&self.density, row, column + 1),
+            );
+            mix(&self.along_row, row, column) + part(a, b, x)
+        });
+        let row_total = lerp(total[0], total[1], y);
+        // Where a whole row is 0, every number is as good.
+        let across = if row_total > 0.0 {
+            lerp(partial[0], partial[1], y) / row_total
+        } else {
+            at[0]
+        };
+        [
+            across.clamp(0.0, 1.0),
+            (below + part(total[0], total[1], y)).clamp(0.0, 1.0),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid {
+        width: 5,
+        height: 4,
+    };
+
+    /// Two slices with zeros among their values.
+    fn densities() -> Vec<f64> {
+        (0..2 * GRID.len())
+            .map(|k| ((k * 7) % 5) as f64 + if k >= GRID.len() { 1.0 } else { 0.0 })
+            .collect()
+    }
+
+    #[test]
+    fn inversion_is_the_cumulative_integral_of_the_interpolated_density() {
+        let warp = Warp::new(GRID, densities()).unwrap();
+        let slice = Between {
+            lower: 0,
+            weight: 0.3,
+        };
+        let density = |at: [f64; 2]| {
+            slice.mix(|s| GRID.eval(&warp.density[s * GRID.len()..(s + 1) * GRID.len()], at))
+        };
+        let n = 400;
+        let at = [0.63, 0.41];
+        let mid = |k: usize, end: f64| (k as f64 + 0.5) / n as f64 * end;
+        let row = |end: f64, y: f64| (0..n).map(|k| density([mid(k, end), y])).sum::<f64>() * end;
+        let expected_x = row(at[0], at[1]) / row(1.0, at[1]);
+        let area = |end: f64| (0..n).map(|k| row(1.0, mid(k, end))).sum::<f64>() * end;
+        let expected_y = area(at[1]) / area(1.0);
+        let [x, y] = warp.invert(slice, at);
+        assert!(
+            (x - expected_x).abs() < 1e-4 && (y - expected_y).abs() < 1e-4,
+            "{x} {expected_x} {y} {expected_y}"
+        );
+    }
+
+    #[test]
+    fn a_constant_density_warps_nothing_and_corners_stay() {
+        let flat = Warp::new(GRID, vec![3.0; GRID.len()]).unwrap();
+        let only = Between {
+            lower: 0,
+            weight: 0.0,
+        };
+        for at in [[0.0, 0.0], [0.2, 0.9], [0.77, 0.5], [1.0, 1.0]] {
+            let [x, y] = flat.invert(only, at);
+            assert!((x - at[0]).abs() < 1e-12 && (y - at[1]).abs() < 1e-12);
+        }
+        let warp = Warp::new(GRID, densities()).unwrap();
+        let [x, y] = warp.invert(
+            Between {
+                lower: 0,
+                weight: 0.5,
+            },
+            [1.0, 1.0],
+        );
+        assert!((x - 1.0).abs() < 1e-12 && (y - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn parameters_are_found_between_and_held_beyond_the_ends() {
+        let values = [0.0, 1.0, 4.0];
+        for (value, lower, weight) in [
+            (-1.0, 0, 0.0),
+            (0.5, 0, 0.5),
+            (1.0, 1, 0.0),
+            (3.0, 1, 2.0 / 3.0),
+            (9.0, 1, 1.0),
+        ] {
+            let found = Between::find(&values, value);
+            assert!(
+                found.lower == lower && (found.weight - weight).abs() < 1e-12,
+                "{value}"
+            );
+        }
+        let alone = Between::find(&[0.5], 3.0);
+        assert!(alone.lower == 0 && alone.weight == 0.0);
+    }
+
+    #[test]
+    fn densities_that_cannot_be_sampled_are_refused() {
+        assert!(Warp::new(GRID, vec![0.0; GRID.len()]).is_err());
+        let mut negative = vec![1.0; GRID.len()];
+        negative[3] = -0.5;
+        assert!(Warp::new(GRID, negative).is_err());
+    }
+}

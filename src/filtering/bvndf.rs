@@ -1,0 +1,149 @@
+//! The BVNDF in the metric of the rotated basis, by randomized SVD; N itself is never stored (Wu et al. 2011, Sec. 3.4).
+
+use glam::Vec3;
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::gemm;
+use super::gram::{eigen, rank_for};
+use crate::directions::PolarGrid;
+use crate::error::Result;
+use crate::visibility::Visibility;
+
+/// Visibility of a group of facets on the nodes of a direction grid, dense: `[node][facet]`.
+#[derive(Debug)]
+pub struct VisibilityRows {
+    pub grid: PolarGrid,
+    pub facets: usize,
+    pub rows: Vec<f32>,
+}
+
+impl VisibilityRows {
+    /// Of a run of facets.
+    pub fn new(visibility: &Visibility, facets: std::ops::Range<usize>, grid: PolarGrid) -> Self {
+        let mut rows = vec![0.0; grid.len() * facets.len()];
+        rows.par_chunks_mut(facets.len().max(1))
+            .enumerate()
+            .for_each(|(node, row)| visibility.fill(grid.direction(node), facets.clone(), row));
+        Self { grid, facets: facets.len(), rows }
+    }
+
+    /// The same, of a run of its facets.
+    pub fn part(&self, facets: std::ops::Range<usize>) -> Self {
+        let rows = self.rows.chunks(self.facets.max(1)).flat_map(|row| row[facets.clone()].iter().copied()).collect();
+        Self { grid: self.grid, facets: facets.len(), rows }
+    }
+
+    /// Each facet's visibility times `(n·d)+`.
+    pub fn with_cosines(&self, normals: &[Vec3]) -> Self {
+        let grid = self.grid;
+        let mut rows = self.rows.clone();
+        rows.par_chunks_mut(self.facets.max(1)).enumerate().for_each(|(node, row)| {
+            let direction = grid.direction(node);
+            for (v, normal) in row.iter_mut().zip(normals) {
+                *v *= normal.dot(direction).max(0.0);
+            }
+        });
+        Self { rows, ..*self }
+    }
+}
+
+/// Random vectors used beyond the wanted rank.
+const EXTRA: usize = 20;
+
+/// The leading right vectors of N in the metric of the features: row-major `features x rank`.
+///
+/// Khatri-Rao projection `Q = Σ_s w_s (g·V_s)(h·V_s) x_s` with `count` random pairs `(g, h)`, weighted by √(solid angle).
+pub fn leading_features(
+    visibility: &VisibilityRows,
+    weights: &[f32],
+    features: &[f32],
+    feature_count: usize,
+    kept: f64,
+    max_rank: usize,
+    seed: u64,
+) -> Result<(Vec<f32>, usize)> {
+    let (facets, nodes) = (visibility.facets, visibility.grid.len());
+    let count = 2 * max_rank + EXTRA;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = || -> Vec<f32> {
+        (0..count * nodes).map(|k| gaussian(&mut rng) * visibility.grid.solid_angle(k % nodes).sqrt()).collect()
+    };
+    let (g, h) = (random(), random());
+    let project = |vectors: &[f32]| {
+        let mut out = vec![0.0; count * facets];
+        gemm::multiply_parallel(count, nodes, facets, vectors, &visibility.rows, &mut out);
+        out
+    };
+    let mut mixed = project(&g);
+    for (row, other) in mixed.chunks_mut(facets.max(1)).zip(project(&h).chunks(facets.max(1))) {
+        for ((x, y), w) in row.iter_mut().zip(other).zip(weights) {
+            *x *= y * w;
+        }
+    }
+    let mut q = vec![0.0; count * feature_count];
+    gemm::multiply_parallel(count, facets, feature_count, &mixed, features, &mut q);
+    // The smaller of the two Gram matrices has the same leading values.
+    let (values, vectors) = if count < feature_count {
+        let transposed: Vec<f32> = (0..feature_count).flat_map(|f| (0..count).map({ let q = &q; move |k| q[k * feature_count + f] })).collect();
+        let solved = eigen(gemm::gram(feature_count, count, &transposed))?;
+        // Right vectors from left ones: Qᵀ u / σ.
+        let wide = DMatrix::<f64>::from_fn(feature_count, count, |f, k| f64::from(q[k * feature_count + f]));
+        let mut right = wide * &solved.vectors;
+        for (k, mut column) in right.column_iter_mut().enumerate() {
+            let length = solved.values[k].sqrt();
+            column *= if length > 0.0 { 1.0 / length } else { 0.0 };
+        }
+        (solved.values, right)
+    } else {
+        let solved = eigen(gemm::gram(count, feature_count, &q))?;
+        (solved.values, solved.vectors)
+    };
+    let rank = rank_for(&values, kept).min(max_rank).min(feature_count);
+    let leading = (0..feature_count).flat_map(|f| (0..rank).map({ let vectors = &vectors; move |k| vectors[(f, k)] as f32 })).collect();
+    Ok((leading, rank))
+}
+
+/// A normal deviate by Box and Muller.
+fn gaussian(rng: &mut ChaCha8Rng) -> f32 {
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    (radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()) as f32
+}
+
+/// `U_c(i,o) = Σ_s w_s y_c(s) V_s(i) V_s(o)` on all pairs of nodes: `[o][i][c]`, `c` contiguous. `y` is row-major
+/// `facets x columns`. A weighted Gram matrix a column, in blocks of views; symmetric in `i` and `o`.
+pub fn visibility_table(visibility: &VisibilityRows, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
+    const VIEWS: usize = 48;
+    let (facets, nodes) = (visibility.facets, visibility.grid.len());
+    let mut table = vec![0.0_f32; nodes * nodes * columns];
+    // Whole blocks right of the diagonal; the rest is mirrored afterwards.
+    table.par_chunks_mut(VIEWS * nodes * columns).enumerate().for_each(|(block, table)| {
+        let first = block * VIEWS;
+        let views = (nodes - first).min(VIEWS);
+        let width = nodes - first;
+        let mut scaled = vec![0.0_f32; views * facets];
+        let mut product = vec![0.0_f32; views * width];
+        for c in 0..columns {
+            for (scaled, row) in scaled.chunks_mut(facets.max(1)).zip(visibility.rows[first * facets..].chunks(facets.max(1))) {
+                for (s, (x, v)) in scaled.iter_mut().zip(row).enumerate() {
+                    *x = v * weights[s] * y[s * columns + c];
+                }
+            }
+            gemm::multiply_transposed(views, facets, width, &scaled, &visibility.rows[first * facets..], &mut product);
+            for view in 0..views {
+                for light in 0..width {
+                    table[(view * nodes + first + light) * columns + c] = product[view * width + light];
+                }
+            }
+        }
+    });
+    for o in 0..nodes {
+        for i in 0..(o / VIEWS) * VIEWS {
+            let (from, to) = ((i * nodes + o) * columns, (o * nodes + i) * columns);
+            table.copy_within(from..from + columns, to);
+        }
+    }
+    table
+}

@@ -1,0 +1,48 @@
+//! The effective BRDF as a live sum over facets: soft visibility, exact lobes, no table of the product.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::facet_sum::FacetSum;
+use crate::visibility::Visibility;
+
+/// Sums over facets at the query; exact in the lobes, interpolated only in the visibility.
+#[derive(Debug, Clone)]
+pub struct Direct {
+    pub sum: Arc<FacetSum>,
+    pub visibility: Arc<Visibility>,
+}
+
+#[derive(Default)]
+struct Scratch {
+    v_i: Vec<f32>,
+    v_o: Vec<f32>,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+impl Direct {
+    /// `a_v(o)` and, for each light, `Σ ΔA V V f = a_v f̄` into `out`.
+    pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let facets = self.sum.facet_count();
+            scratch.v_i.resize(facets, 0.0);
+            scratch.v_o.resize(facets, 0.0);
+            self.visibility.fill(o, 0..facets, &mut scratch.v_o);
+            let area = self.sum.projected_area(&scratch.v_o, o);
+            for (k, &i) in lights.iter().enumerate() {
+                if i.z > 0.0 && o.z > 0.0 && area > 0.0 {
+                    self.visibility.fill(i, 0..facets, &mut scratch.v_i);
+                    out(k, self.sum.sum(i, o, &scratch.v_i, &scratch.v_o));
+                } else {
+                    out(k, DVec3::ZERO);
+                }
+            }
+            area
+        })
+    }
+}

@@ -1,0 +1,62 @@
+//! The effective BRDF: one `eval`, whatever form holds it.
+
+use glam::{DVec3, Vec3};
+
+use super::{Direct, LowRank, Reflectance};
+
+/// How `G` is held.
+#[derive(Debug, Clone)]
+pub enum Form {
+    /// A live sum over facets with exact lobes.
+    Direct(Direct),
+    /// Visibility factors on an (i,o) grid times lobe factors on an (h,d) grid.
+    LowRank(LowRank),
+}
+
+/// The effective large-scale BRDF of a tile (Wu et al. 2011, Eq. 7). `f̄` includes the light's cosine.
+#[derive(Debug, Clone)]
+pub struct EffectiveBrdf {
+    pub form: Form,
+    /// Base area `A` of the tile.
+    pub base_area: f64,
+}
+
+impl EffectiveBrdf {
+    /// `f̄(i, o)` [1/sr], the light's cosine included; 0 where `i` or `o` is at or under the horizon.
+    pub fn eval(&self, i: Vec3, o: Vec3) -> Vec3 {
+        let mut out = [Vec3::ZERO];
+        self.eval_lights(&[i], o, &mut out);
+        out[0]
+    }
+
+    /// `G(i,o) = a_v(o) f̄(i,o) / A` [1/sr]: reciprocal and bounded, the quantity that tables store.
+    pub fn g(&self, i: Vec3, o: Vec3) -> Vec3 {
+        let mut g = DVec3::ZERO;
+        self.sums(&[i], o, |_, sum| g = sum);
+        (g / self.base_area).as_vec3()
+    }
+
+    /// `a_v(o) / A`: the visible projected area along `o` a unit of base area; `cos θ_o` for a tile that closes the plane.
+    pub fn relative_projected_area(&self, o: Vec3) -> f32 {
+        (self.sums(&[], o, |_, _| {}) / self.base_area) as f32
+    }
+
+    /// `a_v(o)`, and `a_v f̄` of each light into `out`.
+    fn sums(&self, lights: &[Vec3], o: Vec3, out: impl FnMut(usize, DVec3)) -> f64 {
+        match &self.form {
+            Form::Direct(direct) => direct.sums(lights, o, out),
+            Form::LowRank(factors) => factors.sums(lights, o, out),
+        }
+    }
+}
+
+impl Reflectance for EffectiveBrdf {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        let area = self.sums(lights, o, |k, sum| out[k] = sum.as_vec3());
+        // What no facet shows reflects nothing.
+        let scale = if area > 1e-12 * self.base_area { (1.0 / area) as f32 } else { 0.0 };
+        for value in out.iter_mut().take(lights.len()) {
+            *value *= scale;
+        }
+    }
+}

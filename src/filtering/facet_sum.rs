@@ -1,0 +1,219 @@
+//! The plain sum over facets, `Σ_s ΔA_s V_s(i) V_s(o) f(n_s, i, o)` (Wu et al. 2011, Eq. 5 and 10), made fast:
+//! analytic lobes over contiguous normals, one lobe for all facets that share a normal, tints outside the loop.
+
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use crate::brdf::{Brdf, LobeAngles, Measured, Term};
+use crate::geometry::Facets;
+use crate::simd::{self, Lobe, PairVectors};
+
+/// A material as the sum sees it.
+#[derive(Debug, Clone)]
+pub struct SumMaterial {
+    pub brdf: Brdf,
+    /// Multiplies the sum of the terms.
+    pub color: Vec3,
+}
+
+/// Facets grouped by material, in arrays that the inner loops walk.
+#[derive(Debug, Clone)]
+pub struct FacetSum {
+    normals: [Vec<f32>; 3],
+    areas: Vec<f32>,
+    groups: Vec<Group>,
+}
+
+#[derive(Debug, Clone)]
+struct Group {
+    range: Range<usize>,
+    color: Vec3,
+    lobes: Vec<(Lobe, Term)>,
+    measured: Vec<std::sync::Arc<dyn Measured>>,
+    /// Areas times colour weights, where those differ between the facets of the group.
+    rgb_areas: Option<[Vec<f32>; 3]>,
+    /// Runs of facets with one normal, where there are few of them.
+    patches: Option<Vec<Patch>>,
+}
+
+#[derive(Debug, Clone)]
+struct Patch {
+    range: Range<usize>,
+    normal: Vec3,
+}
+
+/// A run must be this long on average for one lobe a run to pay.
+const FACETS_A_PATCH: usize = 8;
+
+/// Normals closer than this are one: rounding of coordinates, not shape.
+const SAME_NORMAL: f32 = 2e-5;
+
+impl FacetSum {
+    /// Facets must be sorted by slot ([`Facets::sort_for_sums`]); `material_of_slot[slot]` indexes `materials`.
+    pub fn new(facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]) -> Self {
+        let component = |pick: fn(&Vec3) -> f32| facets.normals.iter().map(pick).collect();
+        let mut sum = Self {
+            normals: [component(|n| n.x), component(|n| n.y), component(|n| n.z)],
+            areas: facets.areas.clone(),
+            groups: Vec::new(),
+        };
+        let mut start = 0;
+        while start < facets.len() {
+            let slot = facets.slots[start];
+            let end = start + facets.slots[start..].iter().take_while(|&&other| other == slot).count();
+            sum.groups.push(Group::new(facets, start..end));
+            start = end;
+        }
+        sum.set_materials(facets, material_of_slot, materials);
+        sum
+    }
+
+    /// Swaps the materials and keeps the facets: all that an edit of a BRDF or a colour costs.
+    pub fn set_materials(&mut self, facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]) {
+        for group in &mut self.groups {
+            let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
+            group.color = material.color;
+            group.lobes = material.brdf.terms.iter().filter_map(|term| lobe(term).map(|lobe| (lobe, term.clone()))).collect();
+            group.measured = material
+                .brdf
+                .terms
+                .iter()
+                .filter_map(|term| if let Term::Measured(table) = term { Some(table.clone()) } else { None })
+                .collect();
+        }
+    }
+
+    pub fn facet_count(&self) -> usize {
+        self.areas.len()
+    }
+
+    /// Visible projected area `a_v(d)` for the visibility `v` along `d` (Eq. 10).
+    pub fn projected_area(&self, v: &[f32], d: Vec3) -> f64 {
+        simd::projected_area(self.normals(0..self.areas.len()), &self.areas, v, d)
+    }
+
+    /// `Σ_s ΔA_s V_s(i) V_s(o) f(n_s, i, o)`, from the visibilities along `i` and `o`.
+    pub fn sum(&self, i: Vec3, o: Vec3, v_i: &[f32], v_o: &[f32]) -> DVec3 {
+        let pair = PairVectors::new(i, o);
+        let mut total = DVec3::ZERO;
+        for group in &self.groups {
+            let black = group.color == Vec3::ZERO;
+            if !black {
+                total += group.color.as_dvec3() * self.group_sum(group, &pair, v_i, v_o);
+            }
+        }
+        total
+    }
+
+    /// Analytic terms that an evaluation touches, for the cost model: lobes times facets, and patches count once.
+    pub fn lobe_count(&self) -> usize {
+        self.groups
+            .iter()
+            .map(|group| group.patches.as_ref().map_or(group.range.len(), Vec::len) * group.lobes.len().max(1))
+            .sum()
+    }
+
+    /// Facets that carry a measured BRDF.
+    pub fn measured_count(&self) -> usize {
+        self.groups.iter().map(|group| group.patches.as_ref().map_or(group.range.len(), Vec::len) * group.measured.len()).sum()
+    }
+
+    /// Number of distinct normals, where they are few enough for one lobe each.
+    pub fn patch_count(&self) -> Option<usize> {
+        self.groups.iter().map(|group| group.patches.as_ref().map(Vec::len)).sum()
+    }
+
+    fn normals(&self, range: Range<usize>) -> [&[f32]; 3] {
+        [&self.normals[0][range.clone()], &self.normals[1][range.clone()], &self.normals[2][range]]
+    }
+
+    fn group_sum(&self, group: &Group, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
+        if let Some(patches) = &group.patches {
+            return patches.iter().map(|patch| self.patch_sum(group, patch, pair, v_i, v_o)).sum();
+        }
+        let range = group.range.clone();
+        let (v_i, v_o) = (&v_i[range.clone()], &v_o[range.clone()]);
+        let normals = self.normals(range.clone());
+        let mut total = DVec3::ZERO;
+        for (lobe, term) in &group.lobes {
+            let tint = term.tint(pair.i_dot_h).as_dvec3();
+            total += tint
+                * match &group.rgb_areas {
+                    None => DVec3::splat(simd::lobe_sums(*lobe, pair, normals, [&self.areas[range.clone()]], v_i, v_o)[0]),
+                    Some([r, g, b]) => DVec3::from_array(simd::lobe_sums(*lobe, pair, normals, [r, g, b], v_i, v_o)),
+                };
+        }
+        for table in &group.measured {
+            for s in 0..range.len() {
+                let seen = v_i[s] * v_o[s];
+                let normal = Vec3::new(normals[0][s], normals[1][s], normals[2][s]);
+                let angles = LobeAngles::new(normal, pair.i, pair.o, pair.h);
+                if seen > 0.0 && angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
+                    let weight = match &group.rgb_areas {
+                        None => Vec3::splat(self.areas[range.start + s]),
+                        Some([r, g, b]) => Vec3::new(r[s], g[s], b[s]),
+                    };
+                    total += (table.f_r(&angles) * (weight * (angles.n_dot_i * angles.n_dot_o * seen))).as_dvec3();
+                }
+            }
+        }
+        total
+    }
+
+    fn patch_sum(&self, group: &Group, patch: &Patch, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
+        let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
+        if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let range = patch.range.clone();
+        let seen = match &group.rgb_areas {
+            None => DVec3::splat(simd::masked_sum([&self.areas[range.clone()]], &v_i[range.clone()], &v_o[range])[0]),
+            Some(rgb) => {
+                let inside = range.start - group.range.start..range.end - group.range.start;
+                let [r, g, b] = rgb.each_ref().map(|areas| &areas[inside.clone()]);
+                DVec3::from_array(simd::masked_sum([r, g, b], &v_i[range.clone()], &v_o[range]))
+            }
+        };
+        let mut value = Vec3::ZERO;
+        for (_, term) in &group.lobes {
+            value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
+        }
+        for table in &group.measured {
+            value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
+        }
+        seen * value.as_dvec3()
+    }
+}
+
+impl Group {
+    fn new(facets: &Facets, range: Range<usize>) -> Self {
+        let colors = &facets.colors[range.clone()];
+        let uniform = colors.iter().all(|&color| color == Vec3::ONE);
+        let rgb_areas = (!uniform).then(|| {
+            std::array::from_fn(|c| colors.iter().zip(&facets.areas[range.clone()]).map(|(color, area)| color[c] * area).collect())
+        });
+        let mut patches: Vec<Patch> = Vec::new();
+        for s in range.clone() {
+            let normal = facets.normals[s];
+            match patches.last_mut() {
+                Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
+                _ => patches.push(Patch { range: s..s + 1, normal }),
+            }
+        }
+        let few = patches.len() * FACETS_A_PATCH <= range.len();
+        Self { range, color: Vec3::ONE, lobes: Vec::new(), measured: Vec::new(), rgb_areas, patches: few.then_some(patches) }
+    }
+}
+
+/// The inner-loop form of an analytic term.
+pub(super) fn lobe(term: &Term) -> Option<Lobe> {
+    Some(match *term {
+        Term::Lambertian { .. } => Lobe::Lambertian,
+        Term::BlinnPhong { exponent, .. } => Lobe::blinn_phong(exponent),
+        Term::CookTorrance { roughness, .. } => Lobe::cook_torrance(roughness),
+        Term::Ward { roughness, .. } => Lobe::ward(roughness),
+        Term::Ggx { roughness, .. } => Lobe::ggx(roughness),
+        Term::Measured(_) => return None,
+    })
+}

@@ -1,0 +1,244 @@
+//! The product with its factors kept apart until the query: `G(i,o) = Σ_c U_c(i,o) P_c(h,d)` (Wu et al. 2011, Eq. 12;
+//! DESIGN.md, Sec. 4, "Interpolate only what is smooth").
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::bvndf::{VisibilityRows, leading_features, visibility_table};
+use super::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
+use super::facet_sum::{SumMaterial, lobe};
+use crate::brdf::{Brdf, ColorBasis, Term};
+use crate::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
+use crate::error::Result;
+use crate::geometry::Facets;
+use crate::simd;
+use crate::visibility::Visibility;
+
+/// Resolution and truncation of the low-rank form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowRankSettings {
+    /// Directions of the visibility factor.
+    pub directions: PolarGrid,
+    pub basis: BasisGrid,
+    /// Energy of M that is kept.
+    pub keep_m: f64,
+    /// Energy of N, in M's metric, that is kept.
+    pub keep_n: f64,
+    pub max_rank: usize,
+    /// Colour directions of a measured BRDF; `None`: as many as keep `keep_color` of its energy.
+    pub colors: Option<usize>,
+    pub keep_color: f64,
+    pub seed: u64,
+}
+
+/// What multiplies a channel's scalar at the query.
+#[derive(Debug, Clone)]
+pub enum Tint {
+    /// The tint of an analytic term, exact at the query's `i·h`, times a colour.
+    Term(Term, Vec3),
+    /// A colour direction of a measured BRDF, times a colour.
+    Fixed(Vec3),
+}
+
+/// One scalar BRDF over one group of facets with one set of weights.
+#[derive(Debug, Clone)]
+pub struct Channel {
+    u: Arc<Vec<f32>>,
+    /// `None` for a Lambertian lobe, whose cosines are in `u`.
+    p: Option<Arc<Vec<f32>>>,
+    columns: usize,
+    pub tint: Tint,
+    /// Rank of the basis that was used, and of N in its metric.
+    pub ranks: (usize, usize),
+}
+
+/// The effective BRDF as low-rank factors.
+#[derive(Debug, Clone)]
+pub struct LowRank {
+    pub directions: PolarGrid,
+    pub pairs: HalfDifferenceGrid,
+    pub channels: Vec<Channel>,
+    /// `a_v(o) / cos θ_o` on the nodes of `directions`.
+    pub projected_area: Arc<Vec<f32>>,
+}
+
+/// Facets of one group as the factors want them.
+#[derive(Debug)]
+pub struct GroupFacets<'a> {
+    pub visibility: &'a VisibilityRows,
+    pub normals: &'a [Vec3],
+    /// Area times colour weight.
+    pub weights: &'a [f32],
+}
+
+impl Channel {
+    /// A Lambertian lobe: one table of `Σ w V(i)(n·i)+ V(o)(n·o)+ / π`, smooth on its own.
+    pub fn lambertian(group: &GroupFacets<'_>, tint: Tint) -> Self {
+        let cosines = group.visibility.with_cosines(group.normals);
+        let y = vec![std::f32::consts::FRAC_1_PI; group.weights.len()];
+        let u = visibility_table(&cosines, group.weights, &y, 1);
+        Self { u: Arc::new(u), p: None, columns: 1, tint, ranks: (1, 1) }
+    }
+
+    /// Any lobe, through its rotated basis.
+    pub fn factored(group: &GroupFacets<'_>, basis: &RotatedBasis, settings: &LowRankSettings, tint: Tint) -> Result<Self> {
+        let count = basis.features();
+        let mut features = vec![0.0; group.normals.len() * count];
+        for (normal, row) in group.normals.iter().zip(features.chunks_mut(count.max(1))) {
+            basis.write_features(*normal, row);
+        }
+        let (leading, rank) =
+            leading_features(group.visibility, group.weights, &features, count, settings.keep_n, settings.max_rank, settings.seed)?;
+        let mut y = vec![0.0; group.normals.len() * rank];
+        super::gemm::multiply_parallel(group.normals.len(), count, rank, &features, &leading, &mut y);
+        let u = visibility_table(group.visibility, group.weights, &y, rank);
+        let p = basis.left_table(&leading, rank);
+        Ok(Self { u: Arc::new(u), p: Some(Arc::new(p)), columns: rank, tint, ranks: (basis.rank, rank) })
+    }
+
+    pub fn bytes(&self) -> usize {
+        4 * (self.u.len() + self.p.as_ref().map_or(0, |p| p.len()))
+    }
+}
+
+/// A run of facets with one material, and what stands before its terms.
+#[derive(Debug)]
+struct Group<'a> {
+    range: std::ops::Range<usize>,
+    material: &'a SumMaterial,
+    /// Area times colour weight, and the colour that column stands for: one for equal colours, else three.
+    columns: Vec<(Vec<f32>, Vec3)>,
+}
+
+/// Facets by slot, skipping black materials. Facets are sorted by slot.
+fn groups<'a>(facets: &Facets, material_of_slot: &[usize], materials: &'a [SumMaterial]) -> Vec<Group<'a>> {
+    let mut groups = Vec::new();
+    let mut start = 0;
+    while start < facets.len() {
+        let slot = facets.slots[start];
+        let end = start + facets.slots[start..].iter().take_while(|&&other| other == slot).count();
+        let range = start..end;
+        start = end;
+        let material = &materials[material_of_slot[usize::from(slot)]];
+        if material.color == Vec3::ZERO {
+            continue;
+        }
+        let colors = &facets.colors[range.clone()];
+        let areas = &facets.areas[range.clone()];
+        let columns = if colors.iter().all(|&color| color == colors[0]) {
+            vec![(areas.to_vec(), colors[0])]
+        } else {
+            (0..3).map(|c| (colors.iter().zip(areas).map(|(color, area)| color[c] * area).collect(), Vec3::AXES[c])).collect()
+        };
+        groups.push(Group { range, material, columns });
+    }
+    groups
+}
+
+impl LowRank {
+    /// Factors everything: the bases of all materials, then N of each group in their metric.
+    ///
+    /// # Errors
+    /// A factorization that does not converge, or is handed values that are not finite.
+    pub fn build(
+        facets: &Facets,
+        visibility: &Visibility,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        settings: &LowRankSettings,
+    ) -> Result<Self> {
+        let all = VisibilityRows::new(visibility, 0..facets.len(), settings.directions);
+        let projected_area = projected_area_table(facets, &all);
+        let mut channels = Vec::new();
+        for group in groups(facets, material_of_slot, materials) {
+            let rows = all.part(group.range.clone());
+            let normals = &facets.normals[group.range.clone()];
+            for term in &group.material.brdf.terms {
+                for (weights, column_color) in &group.columns {
+                    let color = group.material.color * *column_color;
+                    let part = GroupFacets { visibility: &rows, normals, weights };
+                    match term {
+                        Term::Lambertian { .. } => channels.push(Channel::lambertian(&part, Tint::Term(term.clone(), color))),
+                        Term::Measured(table) => {
+                            let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
+                            for direction in &colors.directions[..settings.colors.unwrap_or_else(|| colors.count_for(settings.keep_color)).clamp(1, 3)] {
+                                let lobe = RotatedLobe::Measured { table: table.as_ref(), along: *direction };
+                                let basis = RotatedBasis::new(lobe, settings.basis, settings.keep_m)?;
+                                channels.push(Channel::factored(&part, &basis, settings, Tint::Fixed(*direction * color))?);
+                            }
+                        }
+                        analytic => {
+                            if let Some(lobe) = lobe(analytic) {
+                                let basis = RotatedBasis::new(RotatedLobe::Analytic(lobe), settings.basis, settings.keep_m)?;
+                                channels.push(Channel::factored(&part, &basis, settings, Tint::Term(term.clone(), color))?);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        Ok(Self { directions: settings.directions, pairs: settings.basis.pairs, channels, projected_area: Arc::new(projected_area) })
+    }
+}
+
+/// `a_v(o) / cos θ_o` at each node, in tile units squared.
+fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32> {
+    let component = |pick: fn(&Vec3) -> f32| -> Vec<f32> { facets.normals.iter().map(pick).collect() };
+    let (x, y, z) = (component(|n| n.x), component(|n| n.y), component(|n| n.z));
+    let grid = visibility.grid;
+    visibility
+        .rows
+        .chunks(facets.len().max(1))
+        .enumerate()
+        .map(|(node, row)| {
+            let direction = grid.direction(node);
+            (simd::projected_area([&x, &y, &z], &facets.areas, row, direction) / f64::from(direction.z)) as f32
+        })
+        .collect()
+}
+
+impl LowRank {
+    /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
+    pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        if o.z <= 0.0 {
+            (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
+            return 0.0;
+        }
+        let nodes = self.directions.len();
+        let view = self.directions.taps(o);
+        let relative: f32 = view.iter().map(|&(node, w)| w * self.projected_area[node]).sum();
+        for (k, &i) in lights.iter().enumerate() {
+            if i.z <= 0.0 {
+                out(k, DVec3::ZERO);
+                continue;
+            }
+            let light = self.directions.taps(i);
+            let io: [(usize, f32); 16] = std::array::from_fn(|t| {
+                let ((a, wa), (b, wb)) = (view[t / 4], light[t % 4]);
+                (a * nodes + b, wa * wb)
+            });
+            let hd = self.pairs.taps(i, o);
+            let i_dot_h = i.dot(half_vector(i, o));
+            let mut total = DVec3::ZERO;
+            for channel in &self.channels {
+                let value = match &channel.p {
+                    Some(p) => simd::gathered_dot(&channel.u, &io, p, &hd, channel.columns),
+                    None => io.iter().map(|&(node, w)| w * channel.u[node]).sum(),
+                };
+                let tint = match &channel.tint {
+                    Tint::Term(term, color) => term.tint(i_dot_h) * *color,
+                    Tint::Fixed(color) => *color,
+                };
+                total += (tint * value).as_dvec3();
+            }
+            // Truncated factors may fall a little below zero; no BRDF does.
+            out(k, total.max(DVec3::ZERO));
+        }
+        f64::from(relative * o.z)
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.channels.iter().map(Channel::bytes).sum()
+    }
+}

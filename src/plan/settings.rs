@@ -1,0 +1,198 @@
+//! Presets and knobs: how accurately everything is computed, as typed settings.
+
+use crate::directions::{HalfDifferenceGrid, PolarGrid};
+use crate::filtering::{BasisGrid, LowRankSettings};
+use crate::scene::Quality;
+
+/// Named settings of the `[quality]` table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preset {
+    Draft,
+    Standard,
+    Fine,
+    Reference,
+    Wu2011,
+}
+
+impl Preset {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Standard => "standard",
+            Self::Fine => "fine",
+            Self::Reference => "reference",
+            Self::Wu2011 => "wu2011",
+        }
+    }
+}
+
+/// How the product is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Whatever the plan expects to be fastest within the tolerance.
+    Auto,
+    Direct,
+    LowRank,
+}
+
+/// Where to compute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Backend {
+    Auto,
+    Gpu,
+    Cpu,
+}
+
+/// Every knob, set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    pub preset: Preset,
+    /// Facets that stand for the surface.
+    pub facets: usize,
+    /// Azimuths of horizon maps.
+    pub horizon_azimuths: usize,
+    /// Rings and azimuths of visibility maps, for overhangs.
+    pub map_grid: PolarGrid,
+    /// Width of the soft step at a horizon [rad].
+    pub penumbra: f32,
+    pub method: Method,
+    pub keep_m: f64,
+    pub keep_n: f64,
+    pub max_rank: usize,
+    /// Directions of the visibility factor.
+    pub grid: PolarGrid,
+    pub pairs: HalfDifferenceGrid,
+    pub normal_rings: usize,
+    pub colors: Option<usize>,
+    pub keep_color: f64,
+    /// Relative L2 that the factored form may differ from the direct sum by.
+    pub tolerance: f64,
+    pub reference_facets: usize,
+    pub reference_passes: usize,
+    pub backend: Backend,
+    pub seed: u64,
+}
+
+impl Settings {
+    /// The preset's knobs, overridden by those given.
+    pub fn from_quality(quality: &Quality) -> Self {
+        let preset = match quality.preset.as_str() {
+            "draft" => Preset::Draft,
+            "fine" => Preset::Fine,
+            "reference" => Preset::Reference,
+            "wu2011" => Preset::Wu2011,
+            _ => Preset::Standard,
+        };
+        let mut settings = Self::of_preset(preset);
+        settings.seed = quality.seed;
+        settings.backend = match quality.backend.as_str() {
+            "gpu" => Backend::Gpu,
+            "cpu" => Backend::Cpu,
+            _ => Backend::Auto,
+        };
+        let set = |knob: &mut usize, value: Option<usize>| {
+            if let Some(value) = value {
+                *knob = value;
+            }
+        };
+        set(&mut settings.facets, quality.facets);
+        if let Some(azimuths) = quality.azimuths {
+            settings.horizon_azimuths = azimuths;
+            settings.map_grid = PolarGrid::new(settings.map_grid.rings, azimuths);
+        }
+        if let Some(rings) = quality.rings {
+            settings.map_grid = PolarGrid::new(rings, settings.map_grid.azimuths);
+        }
+        match quality.method.as_deref() {
+            Some("direct") => settings.method = Method::Direct,
+            Some("low_rank") => settings.method = Method::LowRank,
+            Some("auto") => settings.method = Method::Auto,
+            _ => {}
+        }
+        if let Some(kept) = quality.keep_m {
+            settings.keep_m = f64::from(kept);
+        }
+        if let Some(kept) = quality.keep_n {
+            settings.keep_n = f64::from(kept);
+        }
+        if let Some([rings, azimuths]) = quality.grid {
+            settings.grid = PolarGrid::new(rings, azimuths);
+        }
+        if let Some(degrees) = quality.penumbra_deg {
+            settings.penumbra = degrees.to_radians();
+        }
+        if let Some(samples) = quality.reference_samples {
+            settings.reference_passes = samples.div_ceil(settings.reference_facets).max(2);
+        }
+        settings.colors = quality.colors.or(settings.colors);
+        settings
+    }
+
+    pub fn of_preset(preset: Preset) -> Self {
+        let standard = Self {
+            preset,
+            facets: 8192,
+            horizon_azimuths: 48,
+            map_grid: PolarGrid::new(32, 64),
+            penumbra: 0.02,
+            method: Method::Auto,
+            keep_m: 0.9995,
+            keep_n: 0.9995,
+            max_rank: 40,
+            grid: PolarGrid::new(16, 36),
+            pairs: HalfDifferenceGrid { rings: 32, azimuths: 64, difference: 16, turn: 8 },
+            normal_rings: 64,
+            colors: None,
+            keep_color: 0.999,
+            tolerance: 0.04,
+            reference_facets: 16_384,
+            reference_passes: 16,
+            backend: Backend::Auto,
+            seed: 1,
+        };
+        match preset {
+            Preset::Standard | Preset::Wu2011 => standard,
+            Preset::Draft => Self {
+                facets: 2048,
+                horizon_azimuths: 32,
+                map_grid: PolarGrid::new(24, 48),
+                keep_m: 0.999,
+                keep_n: 0.999,
+                max_rank: 32,
+                grid: PolarGrid::new(12, 24),
+                pairs: HalfDifferenceGrid { rings: 24, azimuths: 48, difference: 12, turn: 6 },
+                normal_rings: 48,
+                tolerance: 0.12,
+                ..standard
+            },
+            Preset::Fine | Preset::Reference => Self {
+                facets: 32_768,
+                horizon_azimuths: 96,
+                map_grid: PolarGrid::new(64, 128),
+                penumbra: 0.01,
+                keep_m: 0.9999,
+                keep_n: 0.9999,
+                max_rank: 64,
+                grid: PolarGrid::new(24, 48),
+                pairs: HalfDifferenceGrid { rings: 48, azimuths: 96, difference: 20, turn: 10 },
+                normal_rings: 64,
+                tolerance: 0.015,
+                ..standard
+            },
+        }
+    }
+
+    /// What the factored form needs to know.
+    pub fn low_rank(&self, whole_sphere: bool) -> LowRankSettings {
+        LowRankSettings {
+            directions: self.grid,
+            basis: BasisGrid { pairs: self.pairs, normal_rings: self.normal_rings, whole_sphere },
+            keep_m: self.keep_m,
+            keep_n: self.keep_n,
+            max_rank: self.max_rank,
+            colors: self.colors,
+            keep_color: self.keep_color,
+            seed: self.seed,
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Branch-free f32 functions that vectorise.
+
+/// `e^x` for `x <= 0`, relative error below 3e-7; 0 under -60, so that no product of it is ever denormal (and slow).
+#[inline(always)]
+pub(crate) fn exp_negative(x: f32) -> f32 {
+    let t = x.max(-70.0) * std::f32::consts::LOG2_E;
+    // Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low bits.
+    const MAGIC: f32 = 12_582_912.0;
+    let shifted = t + MAGIC;
+    let f = (t - (shifted - MAGIC)) * std::f32::consts::LN_2;
+    let power = 1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0))))));
+    let exponent = (shifted.to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32).wrapping_add(127);
+    let scale = f32::from_bits((exponent as u32) << 23);
+    if x < -60.0 { 0.0 } else { power * scale }
+}
+
+/// `ln(1 - s)` for `0 <= s < 1` with an error relative to `s` (not to 1): exact where huge exponents multiply it.
+#[inline(always)]
+pub(crate) fn ln_one_minus(s: f32) -> f32 {
+    let y = (1.0 - s).max(1e-30);
+    // What the subtraction rounded away.
+    let lost = ((1.0 - y) - s) / y;
+    // y = m 2^k with m in [2/3, 4/3).
+    const TWO_THIRDS_BITS: i32 = 0x3f2a_aaab;
+    let k = (y.to_bits() as i32).wrapping_sub(TWO_THIRDS_BITS) >> 23;
+    let m = f32::from_bits((y.to_bits() as i32).wrapping_sub(k << 23) as u32);
+    let r = (m - 1.0) / (m + 1.0);
+    let r2 = r * r;
+    let series = 2.0 * r * (1.0 + r2 * (1.0 / 3.0 + r2 * (1.0 / 5.0 + r2 * (1.0 / 7.0 + r2 * (1.0 / 9.0 + r2 * (1.0 / 11.0))))));
+    series + k as f32 * std::f32::consts::LN_2 + lost
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponential_matches_the_library_to_single_precision() {
+        for k in 0..20_000 {
+            let x = -(k as f32) * 0.004;
+            let exact = f64::from(x).exp();
+            let error = (f64::from(exp_negative(x)) - exact).abs();
+            assert!(error <= 3e-7 * exact + 1e-26, "{x}: {} against {exact}", exp_negative(x));
+        }
+        assert_eq!(exp_negative(0.0), 1.0);
+        assert!(exp_negative(f32::NEG_INFINITY) < 1e-37);
+    }
+
+    #[test]
+    fn logarithm_is_accurate_relative_to_its_small_argument() {
+        for k in 1..4000 {
+            let s = (k as f32 / 4000.0).powi(6);
+            let exact = (-f64::from(s)).ln_1p();
+            let error = (f64::from(ln_one_minus(s)) - exact).abs() / exact.abs();
+            assert!(error < 5e-7, "{s}: {error}");
+        }
+        assert_eq!(ln_one_minus(0.0), 0.0);
+    }
+}

@@ -1,0 +1,85 @@
+//! Visibility of many facets along one direction, and sums over what is visible.
+
+use super::{LANES, blocks, lane, multiversion};
+
+#[inline(always)]
+fn soft_step(x: f32) -> f32 {
+    (x + 0.5).clamp(0.0, 1.0)
+}
+
+multiversion! {
+    /// `out = 1` above the horizon interpolated between two azimuths, 0 below, with a ramp of `1/sharpness` radians.
+    pub fn ground_visibility(from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32, out: &mut [f32]) {
+        for ((out, &from), &to) in out.iter_mut().zip(from).zip(to) {
+            let horizon = from + (to - from) * blend;
+            *out = soft_step((elevation - horizon) * sharpness);
+        }
+    }
+}
+
+multiversion! {
+    /// Bits of four rows, weighted and summed: facet `first + k` into `out[k]`.
+    pub fn blend_bits(rows: [&[u32]; 4], weights: [f32; 4], first: usize, out: &mut [f32]) {
+        let word_at = |row: &[u32], k: usize| -> u32 {
+            // Words of facets from `first` on, whatever its place in a word.
+            let (word, shift) = ((first + k) / 32, (first + k) % 32);
+            let low = row[word] >> shift;
+            if shift == 0 || word + 1 >= row.len() { low } else { low | row[word + 1] << (32 - shift) }
+        };
+        let mut k = 0;
+        while k < out.len() {
+            let words = rows.map(|row| word_at(row, k));
+            let width = (out.len() - k).min(32);
+            let mut values = [0.0_f32; 32];
+            for (word, weight) in words.iter().zip(weights) {
+                for (l, value) in values.iter_mut().enumerate() {
+                    *value += if word >> l & 1 == 1 { weight } else { 0.0 };
+                }
+            }
+            out[k..k + width].copy_from_slice(&values[..width]);
+            k += 32;
+        }
+    }
+}
+
+multiversion! {
+    /// `Σ w a b`, f64 between blocks, for each of the weight columns: the visible area of facets that share a normal.
+    pub fn masked_sum<const C: usize>(weights: [&[f32]; C], a: &[f32], b: &[f32]) -> [f64; C] {
+        let mut totals = [0.0; C];
+        for block in blocks(a.len()) {
+            let mut lanes = [[0.0_f32; LANES]; C];
+            for at in block {
+                let (a, b) = (lane(a, at), lane(b, at));
+                for c in 0..C {
+                    let w = lane(weights[c], at);
+                    for l in 0..LANES {
+                        lanes[c][l] += w[l] * a[l] * b[l];
+                    }
+                }
+            }
+            for c in 0..C {
+                totals[c] += lanes[c].iter().map(|&x| f64::from(x)).sum::<f64>();
+            }
+        }
+        totals
+    }
+}
+
+multiversion! {
+    /// `Σ w v (n·d)+`: the visible projected area along `d` (Wu et al. 2011, Eq. 10), f64 between blocks.
+    pub fn projected_area(normals: [&[f32]; 3], weights: &[f32], v: &[f32], d: glam::Vec3) -> f64 {
+        let mut total = 0.0;
+        for block in blocks(v.len()) {
+            let mut lanes = [0.0_f32; LANES];
+            for at in block {
+                let [x, y, z] = [lane(normals[0], at), lane(normals[1], at), lane(normals[2], at)];
+                let (w, v) = (lane(weights, at), lane(v, at));
+                for l in 0..LANES {
+                    lanes[l] += w[l] * v[l] * (x[l] * d.x + y[l] * d.y + z[l] * d.z).max(0.0);
+                }
+            }
+            total += lanes.iter().map(|&x| f64::from(x)).sum::<f64>();
+        }
+        total
+    }
+}

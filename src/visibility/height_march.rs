@@ -1,0 +1,80 @@
+//! Horizons of a height-field by walking its samples: the highest slope is reached where the slice crosses a mesh edge.
+
+use glam::{Vec2, Vec3};
+
+use crate::geometry::HeightGrid;
+
+/// A height-field seen from points on it. Cells are split along the diagonal from (i, j) to (i+1, j+1).
+#[derive(Debug)]
+pub(super) struct HeightMarch<'a> {
+    heights: &'a HeightGrid,
+    samples_from_tile: Vec2,
+    top: f32,
+}
+
+impl<'a> HeightMarch<'a> {
+    pub fn new(heights: &'a HeightGrid, tile_size: Vec2) -> Self {
+        let top = heights.heights.iter().fold(f32::NEG_INFINITY, |top, &z| top.max(z));
+        Self { heights, samples_from_tile: heights.size.as_vec2() / tile_size, top }
+    }
+
+    fn sample(&self, x: i32, y: i32) -> f32 {
+        let (w, h) = (self.heights.size.x as i32, self.heights.size.y as i32);
+        self.heights.heights[(y.rem_euclid(h) * w + x.rem_euclid(w)) as usize]
+    }
+
+    /// The tangent of the horizon's elevation along the unit plane direction; 0 where nothing rises above `from`.
+    pub fn highest_slope(&self, from: Vec3, along: Vec2) -> f32 {
+        let clearance = self.top - from.z;
+        if clearance <= 0.0 {
+            return 0.0;
+        }
+        let at = from.truncate() * self.samples_from_tile - 0.5;
+        let speed = along * self.samples_from_tile;
+        let mut slope = 0.0;
+        // Edges x = k, where heights lie between rows; y = k, between columns; x - y = k, along the diagonals.
+        self.cross(at.x, speed.x, from.z, clearance, &mut slope, |line, r| {
+            let y = at.y + speed.y * r;
+            let low = y.floor();
+            let (a, b) = (self.sample(line, low as i32), self.sample(line, low as i32 + 1));
+            a + (b - a) * (y - low)
+        });
+        self.cross(at.y, speed.y, from.z, clearance, &mut slope, |line, r| {
+            let x = at.x + speed.x * r;
+            let low = x.floor();
+            let (a, b) = (self.sample(low as i32, line), self.sample(low as i32 + 1, line));
+            a + (b - a) * (x - low)
+        });
+        self.cross(at.x - at.y, speed.x - speed.y, from.z, clearance, &mut slope, |line, r| {
+            let x = at.x + speed.x * r;
+            let low = x.floor();
+            let (i, j) = (low as i32, low as i32 - line);
+            let (a, b) = (self.sample(i, j), self.sample(i + 1, j + 1));
+            a + (b - a) * (x - low)
+        });
+        slope
+    }
+
+    /// Visits the crossings of one family of edges at increasing distance `r`, until nothing further can rise higher.
+    fn cross(&self, at: f32, speed: f32, z: f32, clearance: f32, slope: &mut f32, height: impl Fn(i32, f32) -> f32) {
+        /// Nothing below this slope is resolved.
+        const LOWEST: f32 = 0.005;
+        if speed.abs() < 1e-9 {
+            return;
+        }
+        let step = 1.0 / speed.abs();
+        let (mut line, turn) = if speed > 0.0 { (at.floor() as i32 + 1, 1) } else { (at.ceil() as i32 - 1, -1) };
+        let mut r = (line as f32 - at) / speed;
+        while r * slope.max(LOWEST) < clearance {
+            // At its own edge a point sees itself.
+            if r > 1e-6 * step {
+                let rise = height(line, r) - z;
+                if rise > *slope * r {
+                    *slope = rise / r;
+                }
+            }
+            r += step;
+            line += turn;
+        }
+    }
+}

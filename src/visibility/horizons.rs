@@ -1,0 +1,94 @@
+//! Horizon maps: per facet and azimuth the elevation below which all is blocked, which interpolates smoothly.
+
+use std::f32::consts::{FRAC_PI_2, TAU};
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::PeriodicGrid;
+use super::height_march::HeightMarch;
+use super::ray_cast::lifted_origin;
+use super::scan::BlockedSlopes;
+use crate::directions::{from_angles, to_angles};
+use crate::geometry::{Facets, HeightGrid};
+use crate::simd;
+
+/// For each azimuth and facet the elevation [rad] below which all is blocked; right for surfaces without overhangs.
+///
+/// Between azimuths the horizon itself is interpolated (not yes/no), which is why few azimuths do (DESIGN.md, Sec. 4).
+/// Visibility ends in a ramp of `ramp` radians, so that what is computed from it is continuous.
+#[derive(Debug, Clone)]
+pub struct Horizons {
+    azimuths: usize,
+    facets: usize,
+    ramp: f32,
+    /// `[azimuth][facet]`; [`Horizons::FREE`] where nothing blocks, [`Horizons::BLOCKED`] where all is.
+    elevations: Vec<f32>,
+}
+
+impl Horizons {
+    /// A horizon so low that the soft step never reaches above 0.
+    const FREE: f32 = -0.02;
+    /// A horizon so high that the soft step never reaches the zenith.
+    const BLOCKED: f32 = FRAC_PI_2 + 0.02;
+
+    /// Slices the mesh along every azimuth, for every facet: exact in elevation.
+    pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
+        let diagonal = grid.tile_size.length();
+        Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
+            let mut blocked = BlockedSlopes::default();
+            for (facet, horizon) in row.iter_mut().enumerate() {
+                let origin = lifted_origin(facets, facet, diagonal);
+                grid.scan(origin, along.truncate(), facets.triangles[facet], &mut blocked);
+                *horizon = blocked.highest();
+            }
+        })
+    }
+
+    /// Walks the samples of a height-field: the same horizons as [`Horizons::scan`], several times faster.
+    pub fn march(heights: &HeightGrid, tile_size: glam::Vec2, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
+        let march = HeightMarch::new(heights, tile_size);
+        Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
+            for (position, horizon) in facets.positions.iter().zip(row) {
+                *horizon = march.highest_slope(*position, along.truncate());
+            }
+        })
+    }
+
+    /// `fill` writes slopes (tangents) of the horizon along a plane direction; they become elevations here.
+    fn fill_rows(facets: usize, azimuths: usize, ramp: f32, fill: impl Fn(Vec3, &mut [f32]) + Sync) -> Self {
+        let mut elevations = vec![0.0; facets * azimuths];
+        elevations.par_chunks_mut(facets.max(1)).enumerate().for_each(|(azimuth, row)| {
+            fill(from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32), row);
+            for slope in row {
+                *slope = if *slope <= 0.0 {
+                    Self::FREE
+                } else if *slope == f32::INFINITY {
+                    Self::BLOCKED
+                } else {
+                    slope.atan()
+                };
+            }
+        });
+        Self { azimuths, facets, ramp: ramp.clamp(1e-6, -2.0 * Self::FREE), elevations }
+    }
+
+    pub fn facets(&self) -> usize {
+        self.facets
+    }
+
+    pub fn bytes(&self) -> usize {
+        4 * self.elevations.len()
+    }
+
+    /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
+    pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
+        let (theta, phi) = to_angles(direction);
+        let at = phi / TAU * self.azimuths as f32;
+        let from = at as usize % self.azimuths;
+        let to = (from + 1) % self.azimuths;
+        let row = |azimuth: usize| &self.elevations[azimuth * self.facets..][range.clone()];
+        simd::ground_visibility(row(from), row(to), at - at.floor(), FRAC_PI_2 - theta, 1.0 / self.ramp, out);
+    }
+}

@@ -1,0 +1,201 @@
+//! Triangles of the periodic tile in a plane grid: short rays and vertical slices walk its cells.
+
+use glam::{IVec2, Vec2, Vec3};
+
+use crate::geometry::TileMesh;
+
+/// A triangle copy that reaches into a cell: its index and how many tiles the copy is moved by.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CellEntry {
+    pub triangle: u32,
+    pub shift: [i16; 2],
+}
+
+/// A uniform grid over one period. A cell lists every periodic copy of a triangle whose xy-bounds reach into it.
+#[derive(Debug)]
+pub struct PeriodicGrid {
+    pub(super) tile_size: Vec2,
+    pub(super) cells: IVec2,
+    pub(super) cell_size: Vec2,
+    starts: Vec<u32>,
+    entries: Vec<CellEntry>,
+    /// Highest z in each cell, of the triangles' parts anywhere (a bound).
+    pub(super) z_max: Vec<f32>,
+    /// Highest z of the tile.
+    pub(super) top: f32,
+    /// Corners of each triangle.
+    pub(super) corners: Vec<[Vec3; 3]>,
+}
+
+/// A triangle may reach over this many cells; larger ones are listed in every cell of the grid anyway.
+const CELLS_PER_TRIANGLE: f32 = 1.5;
+const MAX_CELLS_A_SIDE: i32 = 512;
+
+impl PeriodicGrid {
+    /// Triangles with corners that are not finite, or without area, block nothing.
+    pub fn new(mesh: &TileMesh) -> Self {
+        let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
+        let solid: Vec<u32> = (0..corners.len() as u32)
+            .filter(|&t| corners[t as usize].iter().all(|p| p.is_finite()) && mesh.triangle_area(t as usize) > 0.0)
+            .collect();
+        let cells = cell_counts(mesh.size, &corners, &solid);
+        let cell_size = mesh.size / cells.as_vec2();
+        let cell_total = (cells.x * cells.y) as usize;
+
+        let mut grid = Self {
+            tile_size: mesh.size,
+            cells,
+            cell_size,
+            starts: vec![0; cell_total + 1],
+            entries: Vec::new(),
+            z_max: vec![f32::NEG_INFINITY; cell_total],
+            top: f32::NEG_INFINITY,
+            corners,
+        };
+        // Two passes: count, then fill.
+        let mut counts = vec![0_u32; cell_total];
+        for &t in &solid {
+            let highest = grid.corners[t as usize].iter().fold(f32::NEG_INFINITY, |z, p| z.max(p.z));
+            grid.top = grid.top.max(highest);
+            grid.for_each_cell(t, |cell, _| counts[cell] += 1);
+        }
+        for (cell, count) in counts.iter().enumerate() {
+            grid.starts[cell + 1] = grid.starts[cell] + count;
+        }
+        let mut next = grid.starts.clone();
+        let mut entries = vec![CellEntry { triangle: 0, shift: [0; 2] }; grid.starts[cell_total] as usize];
+        let mut z_max = std::mem::take(&mut grid.z_max);
+        for &t in &solid {
+            let highest = grid.corners[t as usize].iter().fold(f32::NEG_INFINITY, |z, p| z.max(p.z));
+            grid.for_each_cell(t, |cell, shift| {
+                entries[next[cell] as usize] = CellEntry { triangle: t, shift: [shift.x as i16, shift.y as i16] };
+                next[cell] += 1;
+                z_max[cell] = z_max[cell].max(highest);
+            });
+        }
+        grid.entries = entries;
+        grid.z_max = z_max;
+        grid
+    }
+
+    pub(super) fn entries(&self, cell: usize) -> &[CellEntry] {
+        &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// Corners of the copy that an entry names, seen from the tile copy `at` (in tiles).
+    pub(super) fn copy_corners(&self, entry: CellEntry, at: IVec2) -> [Vec3; 3] {
+        let shift = (at + IVec2::new(i32::from(entry.shift[0]), i32::from(entry.shift[1]))).as_vec2() * self.tile_size;
+        self.corners[entry.triangle as usize].map(|p| p + shift.extend(0.0))
+    }
+
+    /// Calls `visit(cell, shift)` for each cell of the base period that a copy of the triangle, moved by `shift` tiles,
+    /// reaches into. A separating-axis test on the triangle's edges drops the corners of its bounding box.
+    fn for_each_cell(&self, triangle: u32, mut visit: impl FnMut(usize, IVec2)) {
+        let corners = self.corners[triangle as usize].map(|p| p.truncate());
+        let low = corners[0].min(corners[1]).min(corners[2]) / self.cell_size;
+        let high = corners[0].max(corners[1]).max(corners[2]) / self.cell_size;
+        // A hair wider than the bounds: rounding must not lose a copy at a cell's edge.
+        let slack = Vec2::splat(1e-3);
+        let (first, last) = ((low - slack).floor().as_ivec2(), (high + slack).floor().as_ivec2());
+        for y in first.y..=last.y {
+            for x in first.x..=last.x {
+                if !self.overlaps(&corners, IVec2::new(x, y)) {
+                    continue;
+                }
+                let tile = IVec2::new(x.div_euclid(self.cells.x), y.div_euclid(self.cells.y));
+                let local = IVec2::new(x, y) - tile * self.cells;
+                visit((local.y * self.cells.x + local.x) as usize, -tile);
+            }
+        }
+    }
+
+    fn overlaps(&self, corners: &[Vec2; 3], cell: IVec2) -> bool {
+        let centre = (cell.as_vec2() + 0.5) * self.cell_size;
+        let half = self.cell_size * 0.501;
+        (0..3).all(|k| {
+            let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
+            let axis = (b - a).perp();
+            let radius = half.dot(axis.abs());
+            let (edge, opposite, at) = (axis.dot(a), axis.dot(c), axis.dot(centre));
+            at + radius >= edge.min(opposite) && at - radius <= edge.max(opposite)
+        })
+    }
+}
+
+/// About one and a half cells a triangle, following the tile's shape, and no finer than a large triangle warrants.
+fn cell_counts(tile_size: Vec2, corners: &[[Vec3; 3]], solid: &[u32]) -> IVec2 {
+    let wanted = (solid.len() as f32 / CELLS_PER_TRIANGLE).max(16.0);
+    // Grid density must not let a few huge triangles fill the entry list: bound the summed bounding-box areas.
+    let boxes: f64 = solid
+        .iter()
+        .map(|&t| {
+            let [a, b, c] = corners[t as usize].map(|p| p.truncate());
+            let extent = a.max(b).max(c) - a.min(b).min(c);
+            f64::from(extent.x * extent.y)
+        })
+        .sum::<f64>()
+        / f64::from(tile_size.x * tile_size.y).max(f64::MIN_POSITIVE);
+    let wanted = wanted.min((4e7 / boxes.max(1e-3)) as f32);
+    let aspect = (tile_size.x / tile_size.y).clamp(1.0 / 64.0, 64.0);
+    let x = (wanted * aspect).sqrt().round() as i32;
+    let y = (wanted / aspect).sqrt().round() as i32;
+    IVec2::new(x, y).clamp(IVec2::ONE, IVec2::splat(MAX_CELLS_A_SIDE))
+}
+
+/// Walks the grid's cells from a point along a plane direction; endless, the caller stops.
+#[derive(Debug)]
+pub(super) struct CellWalk {
+    position: IVec2,
+    step: IVec2,
+    next: Vec2,
+    delta: Vec2,
+    cells: IVec2,
+    /// Distance at which the present cell is entered, in lengths of the direction.
+    pub entered: f32,
+}
+
+impl CellWalk {
+    pub fn new(grid: &PeriodicGrid, from: Vec2, direction: Vec2) -> Self {
+        let at = from / grid.cell_size;
+        let speed = direction / grid.cell_size;
+        let position = at.floor().as_ivec2();
+        let axis = |at: f32, speed: f32, cell: i32| {
+            if speed > 0.0 {
+                (1, ((cell + 1) as f32 - at) / speed, 1.0 / speed)
+            } else if speed < 0.0 {
+                (-1, (at - cell as f32) / -speed, -1.0 / speed)
+            } else {
+                (0, f32::INFINITY, f32::INFINITY)
+            }
+        };
+        let (step_x, next_x, delta_x) = axis(at.x, speed.x, position.x);
+        let (step_y, next_y, delta_y) = axis(at.y, speed.y, position.y);
+        Self {
+            position,
+            step: IVec2::new(step_x, step_y),
+            next: Vec2::new(next_x, next_y),
+            delta: Vec2::new(delta_x, delta_y),
+            cells: grid.cells,
+            entered: 0.0,
+        }
+    }
+
+    /// Index of the present cell in the base period, and the tile copy it belongs to.
+    pub fn cell(&self) -> (usize, IVec2) {
+        let tile = IVec2::new(self.position.x.div_euclid(self.cells.x), self.position.y.div_euclid(self.cells.y));
+        let local = self.position - tile * self.cells;
+        ((local.y * self.cells.x + local.x) as usize, tile)
+    }
+
+    pub fn advance(&mut self) {
+        if self.next.x <= self.next.y {
+            self.entered = self.next.x;
+            self.next.x += self.delta.x;
+            self.position.x += self.step.x;
+        } else {
+            self.entered = self.next.y;
+            self.next.y += self.delta.y;
+            self.position.y += self.step.y;
+        }
+    }
+}
