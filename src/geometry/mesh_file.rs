@@ -4,7 +4,6 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::spatial_order::spatial_order;
 use super::{TileMesh, closure, obj};
 use crate::error::Result;
 use crate::scene::{MeshFile, files};
@@ -48,16 +47,6 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         mesh.corner_normals = Some(file.triangles.iter().map(shading).collect());
     }
     mesh.positions = file.positions;
-    let order = spatial_order(&mesh);
-    let sorted = |k: &u32| *k as usize;
-    mesh.triangles = order.iter().map(|k| mesh.triangles[sorted(k)]).collect();
-    mesh.triangle_slot = order
-        .iter()
-        .map(|k| mesh.triangle_slot[sorted(k)])
-        .collect();
-    mesh.corner_normals = mesh
-        .corner_normals
-        .map(|normals| order.iter().map(|k| normals[sorted(k)]).collect());
     mesh.closes_plane = closure::is_closed_sheet(&mesh);
     if !mesh.closes_plane {
         mesh.notes.push(format!(

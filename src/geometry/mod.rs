@@ -13,7 +13,6 @@ mod mesh_file;
 pub mod obj;
 mod pyramids;
 mod rods;
-mod spatial_order;
 mod tile_mesh;
 mod voronoi;
 mod weave;
