@@ -207,7 +207,7 @@ impl Group {
 }
 
 /// The inner-loop form of an analytic term.
-fn lobe(term: &Term) -> Option<Lobe> {
+pub(super) fn lobe(term: &Term) -> Option<Lobe> {
     Some(match *term {
         Term::Lambertian { .. } => Lobe::Lambertian,
         Term::BlinnPhong { exponent, .. } => Lobe::blinn_phong(exponent),
