@@ -4,6 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{DVec3, Vec2, Vec3};
 
+use super::visible_normals::BinnedFacets;
 use super::*;
 use crate::brdf::{Brdf, Term};
 use crate::directions::ParaboloidSphere;
