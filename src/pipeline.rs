@@ -8,13 +8,16 @@ use glam::Vec3;
 
 use crate::accuracy::{Errors, Reference, compare, mirror_biased_pairs};
 use crate::brdf::{Brdf, MeasuredCache, Term};
+use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
-use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, LowRank, Reflectance, SumMaterial};
+use crate::filtering::{
+    Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, Reflectance, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings,
+};
 use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
 use crate::plan::{Backend, Costs, Findings, Plan, Preset, Route, Settings, decide};
 use crate::scene::{LoadedScene, Material, Scene, Tile};
-use crate::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility, visibility_maps_gpu};
+use crate::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
 pub type StageTimes = Vec<(&'static str, f64)>;
@@ -56,7 +59,7 @@ struct Shape {
 }
 
 type FacetKey = (usize, u64);
-type VisibilityKey = (Route, usize, crate::directions::PolarGrid, u32);
+type VisibilityKey = (Route, usize, PolarGrid, u32, u32);
 
 /// What the stages made of a scene.
 #[derive(Debug, Clone)]
@@ -81,6 +84,8 @@ pub struct Pipeline {
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     materials: Stage<(Vec<Material>, Vec<String>, PathBuf), (Vec<usize>, Vec<SumMaterial>)>,
+    /// M of each material, factored as the paper does.
+    paper_factors: Vec<Option<Arc<MaterialFactors>>>,
     /// The last effective BRDF, if nothing upstream changed.
     last: Option<(Settings, Outcome)>,
 }
@@ -116,7 +121,10 @@ impl Pipeline {
         let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
         let found = self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings);
         let mut plan = decide(&found, &settings, &Costs::default());
-        let key = (plan.route, settings.horizon_azimuths, settings.map_grid, settings.penumbra.to_bits());
+        if settings.preset == Preset::Wu2011 {
+            return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_new);
+        }
+        let key = (plan.route, settings.horizon_azimuths, settings.map_grid, settings.map_resolution, settings.penumbra.to_bits());
         let gpu = self.gpu.as_ref();
         let (visibility, visibility_new) =
             self.visibility.get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
@@ -150,6 +158,42 @@ impl Pipeline {
         let outcome = Outcome { brdf, plan, settings: settings.clone(), times, factored, notes };
         self.last = Some((settings, outcome.clone()));
         Ok(outcome)
+    }
+
+    /// The paper's own way (Sec. 3.2 to 3.7): its directions, its facets, its truncations. M is kept between edits.
+    #[expect(clippy::too_many_arguments, reason = "the whole of the pipeline's state after the facets")]
+    fn wu2011(
+        &mut self,
+        shape: &Shape,
+        facets: &Facets,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        plan: Plan,
+        settings: Settings,
+        mut times: StageTimes,
+        materials_new: bool,
+    ) -> Result<Outcome> {
+        let knobs = Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
+        let timed = |times: &mut StageTimes, name, start: Instant| times.push((name, start.elapsed().as_secs_f64() * 1e3));
+        let start = Instant::now();
+        let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
+        let visibility = visibility_maps_cpu(&shape.mesh, facets, directions.directions(), settings.map_resolution);
+        timed(&mut times, "visibility", start);
+        if materials_new || self.paper_factors.len() != materials.len() {
+            let start = Instant::now();
+            self.paper_factors = materials
+                .iter()
+                .map(|material| MaterialFactors::new(material, &knobs).map(|factors| Some(Arc::new(factors))))
+                .collect::<Result<_>>()?;
+            timed(&mut times, "basis", start);
+        }
+        let start = Instant::now();
+        let base_area = f64::from(shape.mesh.base_area());
+        let tile = VisibleFacets { facets, visibility: &visibility, directions: &directions, base_area };
+        let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &self.paper_factors, &knobs)?;
+        timed(&mut times, "product", start);
+        let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone() })
     }
 
     /// The tile's mesh.
@@ -187,7 +231,7 @@ impl Pipeline {
             let mesh = geometry::build(&loaded.scene.tile, &loaded.base_dir)?;
             let (low, high) = mesh.z_range();
             let flat = high - low <= 1e-7 * mesh.size.max_element();
-            let height_field = mesh.is_height_field();
+            let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
             Ok(Shape { mesh, flat, height_field })
         })
     }
@@ -264,6 +308,11 @@ impl Pipeline {
     }
 }
 
+/// Without a surface that faces down, what blocks a point blocks everything below it too: one horizon tells all.
+fn nothing_faces_down(mesh: &TileMesh) -> bool {
+    (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
+}
+
 /// Facets of a tile, in the order that sums want.
 fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
     let mut facets = if settings.preset == Preset::Wu2011 {
@@ -283,15 +332,16 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
         (Route::HeightMarch | Route::HorizonScan, ..) => {
             Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(mesh), facets, azimuths, ramp))
         }
-        (Route::GpuMaps, _, Some(gpu)) => {
-            const RESOLUTION: u32 = 512;
-            match visibility_maps_gpu(gpu, mesh, facets, &settings.map_grid.directions(), RESOLUTION) {
-                Ok(packed) => Visibility::Maps(SoftMaps { grid: settings.map_grid, packed }),
-                // A GPU that fails is no reason to stop: the slices give the same answer.
-                Err(_) => Visibility::Maps(SoftMaps::scan(&PeriodicGrid::new(mesh), facets, settings.map_grid)),
-            }
+        (Route::GpuMaps | Route::CpuMaps, ..) => {
+            let (grid, resolution) = (settings.map_grid, settings.map_resolution);
+            // A GPU that fails is no reason to stop: the CPU's maps are the same.
+            let packed = match (route, gpu) {
+                (Route::GpuMaps, Some(gpu)) => visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution).ok(),
+                _ => None,
+            };
+            let packed = packed.unwrap_or_else(|| visibility_maps_cpu(mesh, facets, &grid.directions(), resolution));
+            Visibility::Maps(SoftMaps { grid, packed })
         }
-        (Route::GpuMaps | Route::MapScan, ..) => Visibility::Maps(SoftMaps::scan(&PeriodicGrid::new(mesh), facets, settings.map_grid)),
     })
 }
 

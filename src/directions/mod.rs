@@ -1,11 +1,13 @@
 //! Directions of the upper hemisphere: angles, polar grids, half vectors. Small-scale frame: z up, angles in radians.
 
 mod half_difference;
+mod paraboloid;
 mod polar_grid;
 
 use glam::Vec3;
 
 pub use half_difference::HalfDifferenceGrid;
+pub use paraboloid::{ParaboloidMap, ParaboloidSphere};
 pub use polar_grid::{PolarGrid, Tap};
 
 /// The unit vector at `theta` from +z and `phi` from +x towards +y.

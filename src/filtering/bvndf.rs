@@ -115,8 +115,13 @@ fn gaussian(rng: &mut ChaCha8Rng) -> f32 {
 /// `U_c(i,o) = Σ_s w_s y_c(s) V_s(i) V_s(o)` on all pairs of nodes: `[o][i][c]`, `c` contiguous. `y` is row-major
 /// `facets x columns`. A weighted Gram matrix a column, in blocks of views; symmetric in `i` and `o`.
 pub fn visibility_table(visibility: &VisibilityRows, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
+    pair_table(&visibility.rows, visibility.grid.len(), weights, y, columns)
+}
+
+/// [`visibility_table`] of dense rows `[node][facet]` over any set of directions.
+pub(super) fn pair_table(rows: &[f32], nodes: usize, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
     const VIEWS: usize = 48;
-    let (facets, nodes) = (visibility.facets, visibility.grid.len());
+    let facets = weights.len();
     let mut table = vec![0.0_f32; nodes * nodes * columns];
     // Whole blocks right of the diagonal; the rest is mirrored afterwards.
     table.par_chunks_mut(VIEWS * nodes * columns).enumerate().for_each(|(block, table)| {
@@ -126,12 +131,12 @@ pub fn visibility_table(visibility: &VisibilityRows, weights: &[f32], y: &[f32],
         let mut scaled = vec![0.0_f32; views * facets];
         let mut product = vec![0.0_f32; views * width];
         for c in 0..columns {
-            for (scaled, row) in scaled.chunks_mut(facets.max(1)).zip(visibility.rows[first * facets..].chunks(facets.max(1))) {
+            for (scaled, row) in scaled.chunks_mut(facets.max(1)).zip(rows[first * facets..].chunks(facets.max(1))) {
                 for (s, (x, v)) in scaled.iter_mut().zip(row).enumerate() {
                     *x = v * weights[s] * y[s * columns + c];
                 }
             }
-            gemm::multiply_transposed(views, facets, width, &scaled, &visibility.rows[first * facets..], &mut product);
+            gemm::multiply_transposed(views, facets, width, &scaled, &rows[first * facets..], &mut product);
             for view in 0..views {
                 for light in 0..width {
                     table[(view * nodes + first + light) * columns + c] = product[view * width + light];

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{Direct, LowRank, Reflectance};
+use super::{Direct, LowRank, Reflectance, Wu2011};
 
 /// How `G` is held.
 #[derive(Debug, Clone)]
@@ -11,6 +11,8 @@ pub enum Form {
     Direct(Direct),
     /// Visibility factors on an (i,o) grid times lobe factors on an (h,d) grid.
     LowRank(LowRank),
+    /// The paper's own tables.
+    Wu2011(Wu2011),
 }
 
 impl Form {
@@ -21,6 +23,7 @@ impl Form {
                 Some(count) => format!("exact lobes of {count} normals over {} facets", direct.sum.facet_count()),
                 None => format!("direct sum over {} facets", direct.sum.facet_count()),
             },
+            Self::Wu2011(tables) => format!("the paper's tables, {} bytes", tables.bytes()),
             Self::LowRank(factors) => format!(
                 "factors: ranks {} on {} directions",
                 factors.channels.iter().map(|channel| channel.ranks.1.to_string()).collect::<Vec<_>>().join(" + "),
@@ -63,6 +66,7 @@ impl EffectiveBrdf {
         match &self.form {
             Form::Direct(direct) => direct.sums(lights, o, out),
             Form::LowRank(factors) => factors.sums(lights, o, out),
+            Form::Wu2011(tables) => tables.sums(lights, o, out),
         }
     }
 }

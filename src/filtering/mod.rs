@@ -8,6 +8,7 @@ mod gemm;
 mod gram;
 mod low_rank;
 mod rotated_basis;
+mod wu2011;
 
 use glam::Vec3;
 
@@ -17,6 +18,7 @@ pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
+pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 
 /// What the large scale asks of a material: all it knows of the small scale.
 pub trait Reflectance: Sync {

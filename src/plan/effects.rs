@@ -24,8 +24,8 @@ pub enum Route {
     HeightMarch,
     /// Slicing the mesh of a surface without overhangs.
     HorizonScan,
-    /// Slicing the mesh into maps of bits.
-    MapScan,
+    /// Toroidal shadow maps on the CPU.
+    CpuMaps,
     /// Toroidal shadow maps on a real GPU.
     GpuMaps,
 }
@@ -63,6 +63,7 @@ pub struct Costs {
     pub march_ns: f64,
     pub scan_ns: f64,
     pub factor_query_ns: f64,
+    pub texel_ns: f64,
     pub threads: f64,
 }
 
@@ -75,6 +76,7 @@ impl Default for Costs {
             march_ns: 1_000.0,
             scan_ns: 4_000.0,
             factor_query_ns: 1_500.0,
+            texel_ns: 10.0,
             threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),
         }
     }
@@ -121,13 +123,9 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             format!("no overhangs: horizons along {} azimuths, slicing {} triangles", settings.horizon_azimuths, found.triangles),
             facets * settings.horizon_azimuths as f64 * costs.scan_ns * 1e-6 / costs.threads,
         ),
-        Route::MapScan => (
-            format!(
-                "surfaces overhang: yes/no maps of {} directions, slicing along {} azimuths",
-                settings.map_grid.len(),
-                settings.map_grid.azimuths
-            ),
-            facets * settings.map_grid.azimuths as f64 * 3.0 * costs.scan_ns * 1e-6 / costs.threads,
+        Route::CpuMaps => (
+            format!("surfaces overhang: {} toroidal shadow maps of {} texels a side", settings.map_grid.len(), settings.map_resolution),
+            settings.map_grid.len() as f64 * (settings.map_resolution as f64).powi(2) * costs.texel_ns * 1e-6 / costs.threads,
         ),
         Route::GpuMaps => (
             format!("surfaces overhang and a GPU is at hand: {} toroidal shadow maps", settings.map_grid.len()),
@@ -238,6 +236,6 @@ fn route(found: &Findings) -> Route {
     } else if found.hardware_gpu {
         Route::GpuMaps
     } else {
-        Route::MapScan
+        Route::CpuMaps
     }
 }

@@ -53,6 +53,8 @@ pub struct Settings {
     pub horizon_azimuths: usize,
     /// Rings and azimuths of visibility maps, for overhangs.
     pub map_grid: PolarGrid,
+    /// Texels a side of the shadow maps behind them.
+    pub map_resolution: u32,
     /// Width of the soft step at a horizon [rad].
     pub penumbra: f32,
     pub method: Method,
@@ -134,6 +136,7 @@ impl Settings {
             facets: 8192,
             horizon_azimuths: 48,
             map_grid: PolarGrid::new(32, 64),
+            map_resolution: 256,
             penumbra: 0.02,
             method: Method::Auto,
             keep_m: 0.9995,
@@ -151,11 +154,13 @@ impl Settings {
             seed: 1,
         };
         match preset {
-            Preset::Standard | Preset::Wu2011 => standard,
+            Preset::Standard => standard,
+            Preset::Wu2011 => Self { facets: 12_000, map_resolution: 512, ..standard },
             Preset::Draft => Self {
                 facets: 2048,
                 horizon_azimuths: 32,
-                map_grid: PolarGrid::new(24, 48),
+                map_grid: PolarGrid::new(20, 40),
+                map_resolution: 160,
                 keep_m: 0.999,
                 keep_n: 0.999,
                 max_rank: 32,
@@ -168,7 +173,8 @@ impl Settings {
             Preset::Fine | Preset::Reference => Self {
                 facets: 32_768,
                 horizon_azimuths: 96,
-                map_grid: PolarGrid::new(64, 128),
+                map_grid: PolarGrid::new(56, 112),
+                map_resolution: 384,
                 penumbra: 0.01,
                 keep_m: 0.9999,
                 keep_n: 0.9999,

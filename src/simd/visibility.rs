@@ -1,6 +1,6 @@
 //! Visibility of many facets along one direction, and sums over what is visible.
 
-use super::{LANES, blocks, lane, multiversion};
+use super::{BLOCK, LANES, blocks, lane, multiversion};
 
 #[inline(always)]
 fn soft_step(x: f32) -> f32 {
@@ -45,23 +45,27 @@ multiversion! {
 multiversion! {
     /// `Σ w a b`, f64 between blocks, for each of the weight columns: the visible area of facets that share a normal.
     pub fn masked_sum<const C: usize>(weights: [&[f32]; C], a: &[f32], b: &[f32]) -> [f64; C] {
-        let mut totals = [0.0; C];
-        for block in blocks(a.len()) {
-            let mut lanes = [[0.0_f32; LANES]; C];
-            for at in block {
-                let (a, b) = (lane(a, at), lane(b, at));
-                for c in 0..C {
-                    let w = lane(weights[c], at);
-                    for l in 0..LANES {
-                        lanes[c][l] += w[l] * a[l] * b[l];
+        // Narrow lanes: there is little work a facet, and patches are short.
+        const WIDTH: usize = 16;
+        weights.map(|weights| {
+            let mut total = 0.0;
+            for ((w, a), b) in weights.chunks(BLOCK).zip(a.chunks(BLOCK)).zip(b.chunks(BLOCK)) {
+                let mut lanes = [0.0_f32; WIDTH];
+                let (w_head, w_tail) = w.as_chunks::<WIDTH>();
+                let (a_head, a_tail) = a.as_chunks::<WIDTH>();
+                let (b_head, b_tail) = b.as_chunks::<WIDTH>();
+                for ((w, a), b) in w_head.iter().zip(a_head).zip(b_head) {
+                    for l in 0..WIDTH {
+                        lanes[l] += w[l] * a[l] * b[l];
                     }
                 }
+                for (((lane, w), a), b) in lanes.iter_mut().zip(w_tail).zip(a_tail).zip(b_tail) {
+                    *lane += w * a * b;
+                }
+                total += f64::from(lanes.iter().sum::<f32>());
             }
-            for c in 0..C {
-                totals[c] += lanes[c].iter().map(|&x| f64::from(x)).sum::<f64>();
-            }
-        }
-        totals
+            total
+        })
     }
 }
 
