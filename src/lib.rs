@@ -10,6 +10,7 @@ pub mod accuracy;
 pub mod brdf;
 pub mod directions;
 pub mod error;
+pub mod export;
 pub mod filtering;
 pub mod geometry;
 pub mod gpu;
