@@ -71,32 +71,38 @@ fn is_hit(blocker: Blocker, origin: vec3f, direction: vec3f) -> bool {
     return v >= 0.0 && u + v <= 1.0 && dot(blocker.edge_2, q) * inverse > 0.0;
 }
 
+// Whether a ray meets a node's box, by the slab test; rounding must not lose boxes that are flat.
+fn is_entered(index: u32, origin: vec3f, inverse: vec3f) -> bool {
+    let t_low = (nodes[index].low - origin) * inverse;
+    let t_high = (nodes[index].high - origin) * inverse;
+    let near = min(t_low, t_high);
+    let far = max(t_low, t_high);
+    let enter = max(max(near.x, near.y), max(near.z, 0.0));
+    let leave = min(far.x, min(far.y, far.z));
+    return !(enter > leave * 1.000001);
+}
+
 fn is_blocked(origin: vec3f, light: Light) -> bool {
     var stack: array<u32, STACK>;
     stack[0] = 0u;
-    var depth = 1u;
+    var depth = select(0u, 1u, is_entered(0u, origin, light.inverse));
     while depth > 0u {
         depth--;
-        let node = nodes[stack[depth]];
-        let t_low = (node.low - origin) * light.inverse;
-        let t_high = (node.high - origin) * light.inverse;
-        let near = min(t_low, t_high);
-        let far = max(t_low, t_high);
-        let enter = max(max(near.x, near.y), max(near.z, 0.0));
-        let leave = min(far.x, min(far.y, far.z));
-        if enter > leave * 1.000001 {
-            continue;
-        }
-        if node.count > 0u {
-            for (var k = node.first; k < node.first + node.count; k++) {
+        let first = nodes[stack[depth]].first;
+        let count = nodes[stack[depth]].count;
+        if count > 0u {
+            for (var k = first; k < first + count; k++) {
                 if is_hit(blockers[k], origin, light.direction) {
                     return true;
                 }
             }
-        } else if depth + 2u <= STACK {
-            stack[depth] = node.first;
-            stack[depth + 1u] = node.first + 1u;
-            depth += 2u;
+            continue;
+        }
+        for (var child = first; child <= first + 1u; child++) {
+            if depth < STACK && is_entered(child, origin, light.inverse) {
+                stack[depth] = child;
+                depth++;
+            }
         }
     }
     return false;

@@ -15,6 +15,8 @@ pub mod filtering;
 pub mod geometry;
 pub mod gpu;
 pub mod large_scale;
+pub mod pipeline;
+pub mod plan;
 pub mod scene;
 pub mod simd;
 pub mod visibility;

@@ -1,1 +1,167 @@
-fn main() {}
+//! The `biscale` program: the command line in front of the library.
+
+mod commands;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// What does a surface with tiny structures look like from far away?
+#[derive(Debug, Parser)]
+#[command(name = "biscale", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Shade the scene's object and write a picture (.png or linear .exr).
+    Render(RenderArgs),
+    /// Evaluate f̄ [1/sr] (the light's cosine included) at direction pairs of a CSV file.
+    Eval(EvalArgs),
+    /// Write the effective BRDF as a table: .npz, .csv or .exr by the file's ending.
+    Export(ExportArgs),
+    /// List every effect: on or off, why, and what it costs.
+    Plan(SceneArgs),
+    /// Factor every material's rotated BRDF and list the sizes (Table 3 of Wu et al. 2011).
+    Basis(SceneArgs),
+    /// Time the stages from an edit to the effective BRDF (or the picture).
+    Profile(ProfileArgs),
+    /// List the materials that ship with the program.
+    Materials(MaterialsArgs),
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Quality {
+    Draft,
+    Standard,
+    Fine,
+    Reference,
+    Wu2011,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Backend {
+    Auto,
+    Gpu,
+    Cpu,
+}
+
+#[derive(Debug, Args)]
+struct SceneArgs {
+    /// A scene file, or the name of a shipped material (see `biscale materials`).
+    scene: String,
+    /// Override any field: `--set material.default.brdf.roughness=0.3` (repeatable).
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
+    /// Preset of accuracy and cost.
+    #[arg(long)]
+    quality: Option<Quality>,
+    /// Where to compute.
+    #[arg(long)]
+    backend: Option<Backend>,
+    /// Seed of all sampling.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Machine-readable output on standard output.
+    #[arg(long)]
+    json: bool,
+    /// No notes on standard error.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct RenderArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The picture to write: .png (tone-mapped) or .exr (linear).
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Width and height in pixels.
+    #[arg(long, default_value = "768x768", value_parser = commands::parse_size)]
+    size: [usize; 2],
+    /// Samples a pixel side at edges.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=8))]
+    samples: u8,
+}
+
+#[derive(Debug, Args)]
+struct EvalArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// CSV with the header theta_i,phi_i,theta_o,phi_o (radians); `-` is standard input.
+    #[arg(long)]
+    pairs: PathBuf,
+    /// CSV to write; `-` is standard output.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Also write the columns se_r,se_g,se_b: the standard error (at `reference`; zero elsewhere).
+    #[arg(long)]
+    standard_error: bool,
+}
+
+#[derive(Debug, Args)]
+struct ExportArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The table to write; the ending chooses the format. `-` is standard output (CSV).
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Steps of theta and phi for each direction.
+    #[arg(long, default_value = "16x32", value_parser = commands::parse_size)]
+    resolution: [usize; 2],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Edit {
+    Geometry,
+    Brdf,
+    Color,
+    Camera,
+}
+
+#[derive(Debug, Args)]
+struct ProfileArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// What is edited; without it everything is computed from nothing.
+    #[arg(long)]
+    edit: Option<Edit>,
+    /// Timed runs after one warm-up; medians are printed.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeat: u32,
+}
+
+#[derive(Debug, Args)]
+struct MaterialsArgs {
+    /// Machine-readable output.
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        Command::Render(args) => commands::render::run(&args),
+        Command::Eval(args) => commands::eval::run(&args),
+        Command::Export(args) => commands::export::run(&args),
+        Command::Plan(args) => commands::plan::run(&args),
+        Command::Basis(args) => commands::basis::run(&args),
+        Command::Profile(args) => commands::profile::run(&args),
+        Command::Materials(args) => commands::materials::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // A reader that closed the pipe has all it wanted.
+            if commands::is_broken_pipe(&error) {
+                return ExitCode::SUCCESS;
+            }
+            eprintln!("biscale: {error:#}");
+            ExitCode::from(error.downcast_ref::<biscale::Error>().map_or(1, biscale::Error::exit_code))
+        }
+    }
+}

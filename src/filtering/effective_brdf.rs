@@ -13,6 +13,23 @@ pub enum Form {
     LowRank(LowRank),
 }
 
+impl Form {
+    /// What holds the BRDF, in words.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Direct(direct) => match direct.sum.patch_count() {
+                Some(count) => format!("exact lobes of {count} normals over {} facets", direct.sum.facet_count()),
+                None => format!("direct sum over {} facets", direct.sum.facet_count()),
+            },
+            Self::LowRank(factors) => format!(
+                "factors: ranks {} on {} directions",
+                factors.channels.iter().map(|channel| channel.ranks.1.to_string()).collect::<Vec<_>>().join(" + "),
+                factors.directions.len()
+            ),
+        }
+    }
+}
+
 /// The effective large-scale BRDF of a tile (Wu et al. 2011, Eq. 7). `f̄` includes the light's cosine.
 #[derive(Debug, Clone)]
 pub struct EffectiveBrdf {

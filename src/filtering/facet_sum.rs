@@ -74,7 +74,7 @@ impl FacetSum {
         for group in &mut self.groups {
             let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
             group.color = material.color;
-            group.lobes = material.brdf.terms.iter().filter_map(|term| lobe(term).map(|lobe| (lobe, term.clone()))).collect();
+            group.lobes = material.brdf.terms.iter().filter_map(|term| analytic_lobe(term).map(|lobe| (lobe, term.clone()))).collect();
             group.measured = material
                 .brdf
                 .terms
@@ -117,6 +117,11 @@ impl FacetSum {
     /// Facets that carry a measured BRDF.
     pub fn measured_count(&self) -> usize {
         self.groups.iter().map(|group| group.patches.as_ref().map_or(group.range.len(), Vec::len) * group.measured.len()).sum()
+    }
+
+    /// Do colour weights differ between facets of one material?
+    pub fn colors_vary(&self) -> bool {
+        self.groups.iter().any(|group| group.rgb_areas.is_some())
     }
 
     /// Number of distinct normals, where they are few enough for one lobe each.
@@ -206,8 +211,8 @@ impl Group {
     }
 }
 
-/// The inner-loop form of an analytic term.
-pub(super) fn lobe(term: &Term) -> Option<Lobe> {
+/// The inner-loop form of an analytic term; `None` for a measured one.
+pub fn analytic_lobe(term: &Term) -> Option<Lobe> {
     Some(match *term {
         Term::Lambertian { .. } => Lobe::Lambertian,
         Term::BlinnPhong { exponent, .. } => Lobe::blinn_phong(exponent),

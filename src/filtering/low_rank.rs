@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::bvndf::{VisibilityRows, leading_features, visibility_table};
 use super::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
-use super::facet_sum::{SumMaterial, lobe};
+use super::facet_sum::{SumMaterial, analytic_lobe};
 use crate::brdf::{Brdf, ColorBasis, Term};
 use crate::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
 use crate::error::Result;
@@ -169,7 +169,7 @@ impl LowRank {
                             }
                         }
                         analytic => {
-                            if let Some(lobe) = lobe(analytic) {
+                            if let Some(lobe) = analytic_lobe(analytic) {
                                 let basis = RotatedBasis::new(RotatedLobe::Analytic(lobe), settings.basis, settings.keep_m)?;
                                 channels.push(Channel::factored(&part, &basis, settings, Tint::Term(term.clone(), color))?);
                             }

@@ -14,7 +14,7 @@ use glam::Vec3;
 pub use bvndf::VisibilityRows;
 pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
-pub use facet_sum::{FacetSum, SumMaterial};
+pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 

@@ -103,6 +103,8 @@ pub struct RotatedBasis {
     pub rank: usize,
     /// Fraction of the squared Frobenius norm that is kept.
     pub kept_energy: f64,
+    /// Energy and multiplicity of every function found, descending.
+    spectrum: Vec<(f64, usize)>,
 }
 
 impl RotatedBasis {
@@ -117,10 +119,17 @@ impl RotatedBasis {
         let count = rank_for(&energies, kept);
         let total: f64 = energies.iter().sum();
         let kept_energy = if total > 0.0 { energies[..count.min(energies.len())].iter().sum::<f64>() / total } else { 1.0 };
+        let spectrum = modes.iter().map(|(energy, mode)| (*energy, mode.multiplicity(grid))).collect();
         modes.truncate(count);
         let modes: Vec<Mode> = modes.into_iter().map(|mode| mode.1).collect();
         let rank = modes.iter().map(|mode| mode.multiplicity(grid)).sum();
-        Ok(Self { grid, modes, rank, kept_energy })
+        Ok(Self { grid, modes, rank, kept_energy, spectrum })
+    }
+
+    /// The rank, as a real matrix, that another fraction of the energy would need.
+    pub fn rank_at(&self, kept: f64) -> usize {
+        let energies: Vec<f64> = self.spectrum.iter().map(|entry| entry.0).collect();
+        self.spectrum.iter().take(rank_for(&energies, kept)).map(|entry| entry.1).sum()
     }
 
     /// Number of real features a normal has.

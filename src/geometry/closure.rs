@@ -1,5 +1,6 @@
 //! Does a mesh close the plane? Welds corners modulo the tile and looks at the edges.
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use glam::{DVec3, I64Vec3};
@@ -25,25 +26,28 @@ pub fn signed_projected_area(mesh: &TileMesh) -> f64 {
     (0..mesh.triangles.len()).map(area).sum()
 }
 
-/// Number of edges that are passed more often one way than the other, after welding.
+/// Number of edges that are passed more often one way than the other, after welding. Edges between the same corners that
+/// go round the tile differently are different edges.
 pub fn open_edges(mesh: &TileMesh) -> usize {
     let representatives = weld(mesh);
-    let mut balance: HashMap<(u32, u32), i32> = HashMap::new();
+    let size = mesh.size.as_dvec2();
+    let place = |index: u32| mesh.positions[index as usize].as_dvec3().truncate();
+    let mut balance: HashMap<(u32, u32, [i64; 2]), i32> = HashMap::new();
     for triangle in &mesh.triangles {
-        let corner = triangle.map(|index| representatives[index as usize]);
-        for (from, to) in [
-            (corner[0], corner[1]),
-            (corner[1], corner[2]),
-            (corner[2], corner[0]),
-        ] {
-            *balance.entry((from.min(to), from.max(to))).or_default() +=
-                if from < to { 1 } else { -1 };
+        for (from, to) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (triangle[a], triangle[b])) {
+            let (a, b) = (representatives[from as usize], representatives[to as usize]);
+            let turns = ((place(to) - place(from) - (place(b) - place(a))) / size).round();
+            let turns = [turns.x as i64, turns.y as i64];
+            let forwards = (a, b, turns);
+            let backwards = (b, a, [-turns[0], -turns[1]]);
+            *balance.entry(forwards.min(backwards)).or_default() += match forwards.cmp(&backwards) {
+                Ordering::Less => 1,
+                Ordering::Equal => 0,
+                Ordering::Greater => -1,
+            };
         }
     }
-    balance
-        .iter()
-        .filter(|((from, to), count)| from != to && **count != 0)
-        .count()
+    balance.values().filter(|count| **count != 0).count()
 }
 
 /// For every vertex the first one at the same place modulo the tile.

@@ -18,6 +18,8 @@ mod voronoi;
 mod weave;
 
 #[cfg(test)]
+mod height_images;
+#[cfg(test)]
 mod tests;
 
 use std::path::Path;

@@ -7,8 +7,7 @@ use rayon::prelude::*;
 
 use super::bvh;
 use super::shading_points::ShadingPoints;
-use super::shadow::Visible;
-use super::shadow::{Occluder, ray_origin};
+use super::shadow::{Occluder, Visible, ray_origin};
 use super::{DirectionalLight, ObjectMesh};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};

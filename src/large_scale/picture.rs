@@ -81,7 +81,7 @@ impl Picture {
 }
 
 /// Writes beside `path` and renames, so that `path` holds either its old content or all of the new.
-fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
+pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
     let unwritable = |error: std::io::Error| {
         InputError::new("output", error, "a place that can be written").in_file(path)
     };

@@ -17,7 +17,7 @@ mod tile;
 mod view;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use std::collections::HashSet;
 use std::sync::LazyLock;

@@ -13,10 +13,42 @@ macro_rules! assets {
 }
 
 /// Name and text of every file in `materials/`, sorted.
-pub const MATERIALS: &[(&str, &str)] = materials!["default"];
+pub const MATERIALS: &[(&str, &str)] = materials![
+    "default",
+    "fig1b_silver_shallow",
+    "fig1c_silver_deep",
+    "fig1d_yellow_sides",
+    "fig1e_lambertian",
+    "fig4a_pearl_cup",
+    "fig4b_bicolor_cup",
+    "fig4c_ward_cup",
+    "fig5a_isotropic",
+    "fig5b_anisotropic",
+    "fig5c_uneven",
+    "fig5d_pentagonal",
+    "fig6a_velvet_spread",
+    "fig6b_velvet_concentrated",
+    "fig6c_velvet_up",
+    "fig6d_velvet_left",
+    "fig7a_shot_silk",
+    "fig7b_shot_silk_wide_weft",
+    "fig8a_hammered",
+    "fig8b_ripples",
+    "fig8c_brushed",
+    "fig8d_leather",
+    "fig9a_cylinder_grooves",
+    "fig9b_cylinder_stripes",
+    "table3",
+    "table4_cup",
+    "table4_pillow",
+    "table4_plate",
+    "table4_skirt",
+    "table4_teapot",
+];
 
 /// Name and content of every file in `assets/`, sorted.
-pub const ASSETS: &[(&str, &[u8])] = assets![];
+pub const ASSETS: &[(&str, &[u8])] =
+    assets!["brushed.png", "hammered.png", "leather.png", "ripples.png"];
 
 /// Names of the shipped scenes.
 pub fn names() -> impl Iterator<Item = &'static str> {

@@ -1,1 +1,611 @@
+//! Scene files: defaults, errors, overrides, round trips.
 
+use glam::Vec3;
+use proptest::prelude::*;
+use toml::{Table, Value};
+
+use super::check::{Step, check_table};
+use super::*;
+
+const GROOVES: &str = "[tile]\ngeometry = { kind = \"grooves\" }\n";
+
+fn error(source: &str) -> String {
+    parse(source).unwrap_err().to_string()
+}
+
+fn set(source: &str, overrides: &[&str]) -> Result<Scene> {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    load_with_overrides(source, &overrides)
+}
+
+#[test]
+fn only_the_tile_is_required_and_the_rest_has_the_documented_defaults() {
+    let scene = parse(GROOVES).unwrap();
+    assert_eq!(scene, Scene::of(Geometry::Grooves(Grooves::default())));
+    assert_eq!(
+        (
+            scene.object.kind.as_str(),
+            scene.light.environment.as_str(),
+            scene.light.count
+        ),
+        ("sphere", "studio", 32)
+    );
+    assert_eq!(scene.quality.preset, "standard");
+    assert!(error("").contains("tile"));
+    assert!(error("[tile]\n").contains("tile.geometry"));
+}
+
+#[test]
+fn integers_stand_for_floats_and_scalars_for_colours() {
+    let text = "version = 1\n[tile]\nsize = [1, 2]\ngeometry = { kind = \"grooves\", depth = 1 }\n\
+        [[material]]\nname = \"default\"\ncolor = 1\nbrdf = [{ kind = \"lambertian\", albedo = 0.25 }, { kind = \"ggx\", roughness = 1, f0 = [1, 0, 0.5] }]\n";
+    let scene = parse(text).unwrap();
+    assert_eq!(scene.tile.size, glam::Vec2::new(1.0, 2.0));
+    assert_eq!(scene.materials[0].color, Vec3::ONE);
+    let expected = [
+        TermSpec::Lambertian {
+            albedo: Vec3::splat(0.25),
+        },
+        TermSpec::Ggx {
+            roughness: 1.0,
+            f0: Vec3::new(1.0, 0.0, 0.5),
+        },
+    ];
+    assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms(), expected);
+}
+
+#[test]
+fn the_example_of_the_design_loads() {
+    let text = r#"
+[tile]
+size = [1.0, 1.0]
+geometry = { kind = "mesh", path = "tile.obj" }
+[[material]]
+name = "default"
+brdf = { kind = "cook_torrance", roughness = 0.2, f0 = [0.9, 0.6, 0.3] }
+color = [1.0, 1.0, 1.0]
+[object]
+kind = "sphere"
+[light]
+environment = "studio"
+count = 32
+directional = [{ direction = [0, 1, 0], irradiance = 3 }]
+[camera]
+[quality]
+preset = "standard"
+"#;
+    let scene = parse(text).unwrap();
+    assert_eq!(scene.light.directional[0].irradiance, Vec3::splat(3.0));
+    assert_eq!(scene.camera, Some(Camera::default()));
+}
+
+#[test]
+fn unknown_keys_are_named_in_full_with_line_and_suggestion_at_every_level() {
+    for (text, parts) in [
+        (
+            "tiel = 1\n[tile]\ngeometry = { kind = \"flat\" }",
+            ["line 1", "tiel", "did you mean `tile`?"],
+        ),
+        (
+            "[tile]\nsise = [1, 1]\ngeometry = { kind = \"flat\" }",
+            ["line 2", "tile.sise", "`size`"],
+        ),
+        (
+            "[tile]\n\n[tile.geometry]\nkind = \"grooves\"\ndpeth = 1",
+            ["line 5", "tile.geometry.dpeth", "`depth`"],
+        ),
+        (
+            "[tile]\ngeometry = { kind = \"flat\" }\n[[material]]\nname = \"a\"\nbrdf = { kind = \"ward\", rougness = 0.2 }",
+            ["line 5", "material.a.brdf.rougness", "`roughness`"],
+        ),
+        (
+            "[tile]\ngeometry = { kind = \"flat\" }\n[[material]]\nname = \"a\"\nbrdf = [{ kind = \"lambertian\", f0 = 0.2 }]",
+            ["line 5", "material.a.brdf.0.f0", "albedo"],
+        ),
+        (
+            "[tile]\ngeometry = { kind = \"flat\" }\n[light]\ndirectional = [{ direction = [0,1,0], irradiance = 1, colour = 1 }]",
+            ["line 4", "light.directional.0.colour", "irradiance"],
+        ),
+        (
+            "[tile]\ngeometry = { kind = \"grroves\" }",
+            ["line 2", "tile.geometry.kind", "did you mean `grooves`?"],
+        ),
+        (
+            "[tile]\ngeometry = { depth = 1 }",
+            ["line 2", "tile.geometry.kind", "one of grooves"],
+        ),
+        (
+            "[tile]\ngeometry = { kind = \"flat\" }\n[quality]\npreset = \"standart\"",
+            ["line 4", "quality.preset", "`standard`"],
+        ),
+    ] {
+        let message = error(text);
+        for part in parts {
+            assert!(
+                message.contains(part),
+                "{text:?}\n  {message}\n  lacks {part}"
+            );
+        }
+    }
+}
+
+#[test]
+fn values_out_of_range_or_of_the_wrong_type_name_field_found_and_expected() {
+    for (value, found, expected) in [
+        ("nan", "nan", "from 0 to 1000"),
+        ("inf", "inf", "from 0 to 1000"),
+        ("-1", "found -1", "from 0 to 1000"),
+        ("1e9", "1000000000", "from 0 to 1000"),
+        ("\"deep\"", "\"deep\"", "a number"),
+        ("[1]", "a list", "a number"),
+        ("true", "true", "a number"),
+    ] {
+        let message = error(&format!(
+            "[tile.geometry]\nkind = \"grooves\"\ndepth = {value}\n"
+        ));
+        for part in ["line 3", "tile.geometry.depth", found, expected] {
+            assert!(message.contains(part), "{value}: {message} lacks {part}");
+        }
+    }
+    assert!(error("version = 2\n[tile]\ngeometry = { kind = \"flat\" }").contains("version"));
+    assert!(error("[tile]\nsize = [0, 1]\ngeometry = { kind = \"flat\" }").contains("tile.size.0"));
+    assert!(
+        error("[tile]\nsize = 1\ngeometry = { kind = \"flat\" }").contains("a list of 2 numbers")
+    );
+    assert!(
+        error("[tile]\ngeometry = { kind = \"grooves\", count = 2.5 }").contains("a whole number")
+    );
+    assert!(error("[tile\n").contains("line 1"));
+    assert!(error("[tile]\ngeometry = 3").contains("tile.geometry"));
+    assert!(error("tile = [1]").contains("tile"));
+}
+
+#[test]
+fn fields_that_belong_together_are_checked_together() {
+    let with = |text: &str| error(&format!("{GROOVES}{text}"));
+    assert!(with("[object]\nkind = \"mesh\"").contains("object.path"));
+    assert!(
+        with("[light]\ndirectional = [{ direction = 0, irradiance = 1 }]")
+            .contains("light.directional.0.direction")
+    );
+    assert!(
+        with("[light]\ndirectional = [{ direction = [0, 0, 0], irradiance = 1 }]")
+            .contains("without length")
+    );
+    assert!(with("[[material]]\nname = \"a\"").contains("a BRDF"));
+    let twice = "[[material]]\nname = \"a\"\nbrdf = { kind = \"ggx\" }\n".repeat(2);
+    assert!(with(&twice).contains("a second time"));
+    assert!(error("[tile]\ngeometry = { kind = \"mesh\" }").contains("an OBJ file"));
+    assert!(error("[tile]\ngeometry = { kind = \"heightfield\" }").contains("`path`"));
+    assert!(
+        error("[tile]\ngeometry = { kind = \"heightfield\", values = [[1], [1, 2]] }")
+            .contains("one length")
+    );
+    assert!(
+        error("[tile]\ngeometry = { kind = \"weave\", pattern = [[1], [1, 0]] }")
+            .contains("one length")
+    );
+    assert!(
+        error("[tile]\ngeometry = { kind = \"weave\", pattern = [[2]] }").contains("pattern.0.0")
+    );
+    assert!(
+        error("[tile]\ngeometry = { kind = \"weave\", pattern = \"twil\" }").contains("`twill`")
+    );
+}
+
+#[test]
+fn slots_get_their_own_material_else_default_else_an_error() {
+    let scene = parse(GROOVES).unwrap();
+    let grey = scene.material_for_slot("bottom").unwrap();
+    assert_eq!(
+        (grey.index, grey.brdf.terms()),
+        (
+            None,
+            &[TermSpec::Lambertian {
+                albedo: Vec3::splat(0.5)
+            }][..]
+        )
+    );
+
+    let bottom = "[[material]]\nname = \"bottom\"\ncolor = [0, 1, 0]\n";
+    let default = "[[material]]\nname = \"default\"\nbrdf = { kind = \"ward\", roughness = 0.3, specular = 1 }\n";
+    let scene = parse(&format!("{GROOVES}{bottom}{default}")).unwrap();
+    let found = scene.material_for_slot("bottom").unwrap();
+    assert_eq!(
+        (found.index, found.color, found.brdf.terms()[0].kind()),
+        (Some(0), Vec3::Y, "ward")
+    );
+    assert_eq!(scene.material_for_slot("sides").unwrap().index, Some(1));
+
+    let scene = parse(&format!("{GROOVES}{bottom}brdf = {{ kind = \"ggx\" }}\n")).unwrap();
+    let message = scene.material_for_slot("botom").unwrap_err().to_string();
+    assert!(
+        message.contains("`botom` or `default`") && message.contains("did you mean `bottom`?"),
+        "{message}"
+    );
+}
+
+const TWO_COLOURS: &str = "[tile]\ngeometry = { kind = \"grooves\" }\n\
+    [[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.2, f0 = 0.9 }\n\
+    [[material]]\nname = \"sides\"\ncolor = [1, 1, 0]\n";
+
+#[test]
+fn overrides_reach_by_index_name_and_star_and_make_missing_tables() {
+    let scene = set(
+        TWO_COLOURS,
+        &[
+            "tile.geometry.depth = 0.7",
+            "material.0.brdf.roughness=0.5",
+            "material.sides.color=[0, 0, 1]",
+            "camera.fov_deg=50",
+            "quality.preset=fine",
+        ],
+    )
+    .unwrap();
+    let Geometry::Grooves(grooves) = &scene.tile.geometry else {
+        panic!()
+    };
+    assert_eq!(grooves.depth, 0.7);
+    assert!(matches!(
+        scene.materials[0].brdf.as_ref().unwrap().terms()[0],
+        TermSpec::CookTorrance { roughness: 0.5, .. }
+    ));
+    assert_eq!(scene.materials[1].color, Vec3::Z);
+    assert_eq!(
+        (scene.camera.unwrap().fov_deg, scene.quality.preset.as_str()),
+        (50.0, "fine")
+    );
+    let scene = set(TWO_COLOURS, &["material.*.color=0.5"]).unwrap();
+    assert!(
+        scene
+            .materials
+            .iter()
+            .all(|material| material.color == Vec3::splat(0.5))
+    );
+    let scene = set(GROOVES, &["material.default.brdf={kind=\"ward\"}"]).unwrap();
+    assert_eq!(
+        scene.material_for_slot("sides").unwrap().brdf.terms()[0].kind(),
+        "ward"
+    );
+}
+
+#[test]
+fn a_measured_paint_takes_the_place_of_an_analytic_stand_in_in_any_of_the_usual_ways() {
+    let expected = TermSpec::Merl {
+        path: "/paints/pearl.binary".into(),
+    };
+    for overrides in [
+        &["material.default.brdf.path=/paints/pearl.binary"][..],
+        &["material.0.brdf={ kind = \"merl\", path = \"/paints/pearl.binary\" }"],
+        &[
+            "material.default.brdf.kind=merl",
+            "material.default.brdf.path=/paints/pearl.binary",
+        ],
+        &[
+            "material.default.brdf.path=/paints/pearl.binary",
+            "material.default.brdf.kind=merl",
+        ],
+    ] {
+        let sum = TWO_COLOURS.replace(
+            "{ kind = \"cook_torrance\", roughness = 0.2, f0 = 0.9 }",
+            "[{ kind = \"lambertian\" }, { kind = \"ggx\" }]",
+        );
+        for source in [TWO_COLOURS, &sum] {
+            let scene = set(source, overrides).unwrap();
+            for slot in ["bottom", "sides"] {
+                assert_eq!(
+                    scene.material_for_slot(slot).unwrap().brdf.terms(),
+                    std::slice::from_ref(&expected)
+                );
+            }
+        }
+    }
+    let scene = set(TWO_COLOURS, &["material.default.brdf.path=x.bsdf"]).unwrap();
+    assert_eq!(
+        scene.materials[0].brdf.as_ref().unwrap().terms()[0].kind(),
+        "rgl"
+    );
+}
+
+#[test]
+fn a_new_geometry_kind_drops_the_old_kinds_keys() {
+    let source = "[tile]\ngeometry = { kind = \"grooves\", depth = 0.3, count = 7 }\n";
+    let scene = set(source, &["tile.geometry.kind=rods"]).unwrap();
+    assert_eq!(
+        scene.tile.geometry,
+        Geometry::Rods(Rods {
+            count: 7,
+            ..Rods::default()
+        })
+    );
+}
+
+#[test]
+fn wrong_overrides_are_named() {
+    for (text, part) in [
+        ("tile.geometry.depth", "key.path=value"),
+        ("=3", "key.path=value"),
+        ("tile..depth=3", "key.path=value"),
+        ("tile.geometry.dept=3", "did you mean `depth`?"),
+        ("tile.geometry.depth=deep", "\"deep\""),
+        ("tile.geometry.depth=nan", "nan"),
+        ("tile.geometry.depth.x=1", "a table"),
+        ("material.7.color=1", "an index from 0 to 1"),
+        ("material.side.color=1", "did you mean `sides`?"),
+        ("tile=3", "a table"),
+    ] {
+        let message = set(TWO_COLOURS, &[text]).unwrap_err().to_string();
+        assert!(
+            message.contains("--set") && message.contains(part),
+            "{text}: {message}"
+        );
+    }
+}
+
+#[test]
+fn files_named_on_the_command_line_are_found_from_the_working_directory() {
+    let scene = set(
+        TWO_COLOURS,
+        &["material.default.brdf={kind=\"merl\", path=\"Cargo.toml\"}"],
+    )
+    .unwrap();
+    let TermSpec::Merl { path } = &scene.materials[0].brdf.as_ref().unwrap().terms()[0] else {
+        panic!()
+    };
+    assert!(path.is_absolute());
+    let scene = set(TWO_COLOURS, &["material.default.brdf.path=no/such.binary"]).unwrap();
+    assert_eq!(
+        scene.materials[0].brdf.as_ref().unwrap().terms()[0],
+        TermSpec::Merl {
+            path: "no/such.binary".into()
+        }
+    );
+}
+
+#[test]
+fn unknown_scenes_suggest_the_nearest_shipped_name() {
+    let message = open("defualt", &[]).unwrap_err().to_string();
+    assert!(message.contains("did you mean `default`?"), "{message}");
+    assert_eq!(open(".", &[]).unwrap_err().exit_code(), 2);
+    let loaded = open("default", &[]).unwrap();
+    assert_eq!(loaded.name, "default");
+}
+
+#[test]
+fn files_keep_their_folder_and_errors_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    let scene = parse(TWO_COLOURS).unwrap();
+    scene.save(&path).unwrap();
+    let loaded = open(path.to_str().unwrap(), &[]).unwrap();
+    assert_eq!(
+        (
+            &loaded.scene,
+            loaded.base_dir.as_path(),
+            loaded.name.as_str()
+        ),
+        (&scene, folder.path(), "a")
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    std::fs::write(&path, "[tile]\nx = 1").unwrap();
+    assert!(
+        load(&path, &[])
+            .unwrap_err()
+            .to_string()
+            .contains("a.toml: line 2, tile.x")
+    );
+    std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
+    assert!(load(&path, &[]).unwrap_err().to_string().contains("a.toml"));
+    assert!(
+        scene
+            .save(&folder.path().join("no/such/folder.toml"))
+            .is_err()
+    );
+}
+
+#[test]
+fn scenes_changed_in_memory_are_held_to_the_same_ranges() {
+    let mut scene = parse(TWO_COLOURS).unwrap();
+    scene.validate().unwrap();
+    scene.tile.geometry = Geometry::Grooves(Grooves {
+        depth: f32::NAN,
+        ..Grooves::default()
+    });
+    let message = scene.validate().unwrap_err().to_string();
+    assert!(
+        message.contains("tile.geometry.depth") && message.contains("nan"),
+        "{message}"
+    );
+}
+
+#[test]
+fn edits_move_the_first_numeric_parameter_by_five_percent() {
+    let mut scene = parse(TWO_COLOURS).unwrap();
+    assert_eq!(
+        scene.nudge_geometry().as_deref(),
+        Some("tile.geometry.depth")
+    );
+    let Geometry::Grooves(grooves) = &scene.tile.geometry else {
+        panic!()
+    };
+    assert!((grooves.depth / Grooves::default().depth - 1.05).abs() < 1e-6);
+    assert_eq!(
+        scene.nudge_brdf().as_deref(),
+        Some("material.default.brdf.roughness")
+    );
+    assert!(
+        matches!(scene.materials[0].brdf.as_ref().unwrap().terms()[0], TermSpec::CookTorrance { roughness, .. } if (roughness - 0.21).abs() < 1e-6)
+    );
+    assert_eq!(
+        scene.nudge_color().as_deref(),
+        Some("material.default.color")
+    );
+    scene.validate().unwrap();
+    let mut measured = set(TWO_COLOURS, &["material.default.brdf.path=x.binary"]).unwrap();
+    assert_eq!(measured.nudge_brdf(), None);
+    for kind in Geometry::kinds() {
+        let mut scene = Scene::of(Geometry::with_defaults(kind.kind).unwrap());
+        let before = scene.clone();
+        assert_eq!(
+            scene.nudge_geometry().is_some(),
+            kind.kind != "mesh",
+            "{}",
+            kind.kind
+        );
+        assert_eq!(scene == before, kind.kind == "mesh");
+    }
+}
+
+#[test]
+fn every_number_of_the_catalogue_has_a_default_in_its_range_and_a_doc() {
+    for kind in Geometry::kinds().into_iter().chain(TermSpec::kinds()) {
+        for field in kind.fields {
+            assert!(
+                !field.doc.is_empty() && !field.label().is_empty(),
+                "{}.{}",
+                kind.kind,
+                field.key
+            );
+            match (field.shape, field.default) {
+                (Shape::Number { min, max, soft_max }, default) => {
+                    assert!(
+                        min < soft_max && soft_max <= max,
+                        "{}.{}",
+                        kind.kind,
+                        field.key
+                    );
+                    assert!(
+                        default.is_none_or(|value| (min..=soft_max).contains(&value)),
+                        "{}.{}",
+                        kind.kind,
+                        field.key
+                    );
+                }
+                (Shape::Integer { min, max }, Some(value)) => {
+                    assert!((min as f64..=max as f64).contains(&value))
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn the_catalogue_lists_exactly_the_keys_that_serde_takes() {
+    for kind in Geometry::kinds() {
+        let geometry = Geometry::with_defaults(kind.kind).unwrap();
+        assert_eq!(geometry.kind(), kind.kind);
+        let table = Table::try_from(&geometry).unwrap();
+        assert!(
+            table
+                .keys()
+                .all(|key| key == "kind" || kind.fields.iter().any(|field| field.key == key))
+        );
+    }
+    for kind in TermSpec::kinds() {
+        let mut table =
+            Table::from_iter([("kind".to_owned(), Value::String(kind.kind.to_owned()))]);
+        for field in kind.fields.iter().filter(|field| field.required) {
+            table.insert(field.key.to_owned(), Value::String("file".to_owned()));
+        }
+        let term: TermSpec = table.try_into().unwrap();
+        let written = Table::try_from(&term).unwrap();
+        assert_eq!(written.len(), kind.fields.len() + 1);
+        for field in &kind.fields {
+            let value = written[field.key].as_float().map(|value| value as f32);
+            assert_eq!(
+                value,
+                field.default.map(|value| value as f32),
+                "{}.{}",
+                kind.kind,
+                field.key
+            );
+        }
+    }
+}
+
+/// A value that the catalogue allows: ends of ranges, and between.
+pub(crate) fn value_of(shape: Shape) -> BoxedStrategy<Value> {
+    let number = |min: f64, max: f64| {
+        let inside = (0.0..=1.0).prop_map(move |t| (min + t * (max - min)) as f32);
+        let inside = inside.prop_map(move |x| f64::from(x.clamp(min as f32, max as f32)));
+        prop_oneof![1 => Just(f64::from(min as f32)), 1 => Just(f64::from(max as f32)), 6 => inside]
+    };
+    match shape {
+        Shape::Number { min, soft_max, .. } => number(min, soft_max).prop_map(Value::Float).boxed(),
+        Shape::Integer { min, max } => (min..=max.min(min.saturating_add(64)))
+            .prop_map(Value::Integer)
+            .boxed(),
+        Shape::Color { max } => {
+            proptest::collection::vec(number(0.0, max.min(2.0)).prop_map(Value::Float), 3)
+                .prop_map(Value::Array)
+                .boxed()
+        }
+        Shape::Vector { length, min, max } => proptest::collection::vec(
+            number(min.max(0.1), max.min(4.0)).prop_map(Value::Float),
+            length,
+        )
+        .prop_map(Value::Array)
+        .boxed(),
+        Shape::Choice(names) => proptest::sample::select(names)
+            .prop_map(|name| Value::String(name.to_owned()))
+            .boxed(),
+        Shape::Text | Shape::Path => "[a-z ./\\\\\"é]{1,9}".prop_map(Value::String).boxed(),
+        Shape::AnyOf(shapes) => value_of(shapes[0]),
+        Shape::Table(fields) => table_of(fields()).prop_map(Value::Table).boxed(),
+        Shape::Tagged(kinds) => proptest::sample::select(kinds())
+            .prop_flat_map(|kind| {
+                let tag = Value::String(kind.kind.to_owned());
+                table_of(kind.fields).prop_map(move |mut table| {
+                    table.insert("kind".to_owned(), tag.clone());
+                    Value::Table(table)
+                })
+            })
+            .boxed(),
+        Shape::List { of, min, max } => {
+            proptest::collection::vec(value_of(*of), min..=max.min(min + 3))
+                .prop_map(Value::Array)
+                .boxed()
+        }
+    }
+}
+
+fn table_of(fields: Vec<Field>) -> BoxedStrategy<Table> {
+    let entries: Vec<_> = fields
+        .into_iter()
+        .map(|field| {
+            let present = if field.required {
+                Just(true).boxed()
+            } else {
+                any::<bool>().boxed()
+            };
+            (present, value_of(field.shape))
+                .prop_map(move |(present, value)| present.then(|| (field.key.to_owned(), value)))
+        })
+        .collect();
+    entries
+        .prop_map(|entries| entries.into_iter().flatten().collect())
+        .boxed()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    #[test]
+    fn scenes_go_through_toml_and_back_exactly(table in table_of(Scene::fields())) {
+        prop_assert_eq!(check_table(&table, &Scene::fields(), &mut Vec::<Step>::new()), Ok(()));
+        let scene: Scene = table.try_into().map_err(|error: toml::de::Error| TestCaseError::fail(error.to_string()))?;
+        let text = scene.to_toml().map_err(|error| TestCaseError::fail(error.to_string()))?;
+        let back: Scene = toml::from_str(&text).map_err(|error| TestCaseError::fail(format!("{error}\n{text}")))?;
+        prop_assert_eq!(&back, &scene);
+        // Whatever relations it breaks, it breaks with an error.
+        let _ = parse(&text);
+    }
+
+    #[test]
+    fn no_text_and_no_override_makes_the_loader_panic(text in ".{0,60}", key in "[a-z.0-9*]{0,20}", value in ".{0,12}") {
+        let _ = parse(&text);
+        let _ = load_with_overrides(TWO_COLOURS, &[format!("{key}={value}")]);
+        let _ = load_with_overrides(TWO_COLOURS, &[text]);
+    }
+}

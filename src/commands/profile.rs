@@ -1,0 +1,104 @@
+//! `biscale profile`: milliseconds from an edit to the effective BRDF, or to the picture.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::time::Instant;
+
+use anyhow::Result;
+use biscale::pipeline::Pipeline;
+use biscale::{Error, InputError};
+use serde::Serialize;
+
+use super::print_json;
+use super::render::Stage;
+use crate::{Edit, ProfileArgs};
+
+#[derive(Serialize)]
+struct Report {
+    stages: BTreeMap<&'static str, f64>,
+    total_ms: f64,
+    /// What was moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    edited: Option<String>,
+    runs: u32,
+    form: String,
+}
+
+pub fn run(args: &ProfileArgs) -> Result<()> {
+    let loaded = args.scene.open()?;
+    let mut edited = loaded.clone();
+    let moved = match args.edit {
+        Some(Edit::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| nothing("tile.geometry"))?),
+        Some(Edit::Brdf) => Some(edited.scene.nudge_brdf().ok_or_else(|| nothing("material"))?),
+        Some(Edit::Color) => Some(edited.scene.nudge_color().ok_or_else(|| nothing("material"))?),
+        Some(Edit::Camera) | None => None,
+    };
+    let mut pipeline = Pipeline::new();
+    let mut outcome = pipeline.effective(&loaded)?;
+    args.scene.notes(&outcome);
+    let form = outcome.brdf.form.describe();
+    let camera = (args.edit == Some(Edit::Camera)).then(|| Stage::new(&loaded)).transpose()?;
+    let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
+    for run in 0..=args.repeat {
+        let start = Instant::now();
+        let times = match (&camera, args.edit) {
+            (Some(stage), _) => {
+                let times = stage.render(outcome.brdf.as_ref(), [384, 384], 1)?.times;
+                vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
+            }
+            (None, Some(_)) => {
+                // To and fro: every run is an edit.
+                outcome = pipeline.effective(if run % 2 == 0 { &edited } else { &loaded })?;
+                outcome.times.clone()
+            }
+            (None, None) => {
+                outcome = Pipeline::new().effective(&loaded)?;
+                outcome.times.clone()
+            }
+        };
+        let total = start.elapsed().as_secs_f64() * 1e3;
+        // The first warms caches up.
+        if run > 0 {
+            runs.push((total, times));
+        }
+    }
+    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
+    for (_, times) in &runs {
+        for (name, ms) in times {
+            stages.entry(name).or_default().push(*ms);
+        }
+    }
+    let report = Report {
+        stages: stages.into_iter().map(|(name, ms)| (name, median(ms))).collect(),
+        total_ms: median(runs.iter().map(|run| run.0).collect()),
+        edited: moved,
+        runs: args.repeat,
+        form,
+    };
+    if args.scene.json {
+        return print_json(&report);
+    }
+    let mut out = std::io::stdout().lock();
+    if let Some(edited) = &report.edited {
+        writeln!(out, "edited {edited}")?;
+    }
+    for (name, ms) in &report.stages {
+        writeln!(out, "{name:<12} {ms:>10.2} ms")?;
+    }
+    writeln!(out, "{:<12} {:>10.2} ms   (median of {} runs; {})", "total", report.total_ms, report.runs, report.form)?;
+    Ok(())
+}
+
+fn nothing(place: &str) -> Error {
+    InputError::new(place, "no numeric parameter", "one that can be moved by 5 %").into()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    match n {
+        0 => 0.0,
+        _ if n % 2 == 1 => values[n / 2],
+        _ => 0.5 * (values[n / 2 - 1] + values[n / 2]),
+    }
+}

@@ -1,0 +1,329 @@
+//! The stages in order, each with its last result and the input that made it: an edit recomputes what lies downstream.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::Vec3;
+
+use crate::accuracy::{Errors, Reference, compare, mirror_biased_pairs};
+use crate::brdf::{Brdf, MeasuredCache, Term};
+use crate::error::Result;
+use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, LowRank, Reflectance, SumMaterial};
+use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use crate::gpu::Gpu;
+use crate::plan::{Backend, Costs, Findings, Plan, Preset, Route, Settings, decide};
+use crate::scene::{LoadedScene, Material, Scene, Tile};
+use crate::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility, visibility_maps_gpu};
+
+/// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
+pub type StageTimes = Vec<(&'static str, f64)>;
+
+/// A stage's last result and the key it was made from.
+#[derive(Debug)]
+struct Stage<K, T> {
+    last: Option<(K, Arc<T>)>,
+}
+
+impl<K, T> Default for Stage<K, T> {
+    fn default() -> Self {
+        Self { last: None }
+    }
+}
+
+impl<K: PartialEq, T> Stage<K, T> {
+    /// The last result if `key` is the same, else a new one, timed.
+    fn get(&mut self, name: &'static str, key: K, times: &mut StageTimes, make: impl FnOnce() -> Result<T>) -> Result<(Arc<T>, bool)> {
+        if let Some((last, value)) = &self.last
+            && *last == key
+        {
+            return Ok((value.clone(), false));
+        }
+        let start = Instant::now();
+        let value = Arc::new(make()?);
+        times.push((name, start.elapsed().as_secs_f64() * 1e3));
+        self.last = Some((key, value.clone()));
+        Ok((value, true))
+    }
+}
+
+/// A geometry that is drawn on: the mesh and its parts that later stages ask for.
+#[derive(Debug)]
+struct Shape {
+    mesh: TileMesh,
+    flat: bool,
+    height_field: bool,
+}
+
+type FacetKey = (usize, u64);
+type VisibilityKey = (Route, usize, crate::directions::PolarGrid, u32);
+
+/// What the stages made of a scene.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    pub brdf: Arc<EffectiveBrdf>,
+    pub plan: Plan,
+    pub settings: Settings,
+    /// What ran this time.
+    pub times: StageTimes,
+    /// The factored form against the direct sum, where it was tried.
+    pub factored: Option<Errors>,
+    pub notes: Vec<String>,
+}
+
+/// All stages from scene to effective BRDF.
+#[derive(Debug, Default)]
+pub struct Pipeline {
+    cache: MeasuredCache,
+    gpu: Option<Gpu>,
+    gpu_asked: bool,
+    shape: Stage<(Tile, PathBuf), Shape>,
+    facets: Stage<FacetKey, Facets>,
+    visibility: Stage<VisibilityKey, Visibility>,
+    materials: Stage<(Vec<Material>, Vec<String>, PathBuf), (Vec<usize>, Vec<SumMaterial>)>,
+    /// The last effective BRDF, if nothing upstream changed.
+    last: Option<(Settings, Outcome)>,
+}
+
+/// Pairs that the factored form is checked on.
+const CHECK_PAIRS: usize = 256;
+
+impl Pipeline {
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The effective BRDF of a scene at its own quality.
+    ///
+    /// # Errors
+    /// A file the scene names cannot be used, or a factorization fails.
+    pub fn effective(&mut self, loaded: &LoadedScene) -> Result<Outcome> {
+        let scene = &loaded.scene;
+        let settings = Settings::from_quality(&scene.quality);
+        let mut times = StageTimes::new();
+        let (shape, shape_new) = self.shape(loaded, &mut times)?;
+        let (materials, materials_new) = self.materials(loaded, &shape.mesh, &mut times)?;
+        let (material_of_slot, sum_materials) = (&materials.0, &materials.1);
+
+        if shape_new {
+            self.facets.last = None;
+        }
+        let facet_key = (settings.facets, settings.seed);
+        let (facets, facets_new) = self.facets.get("facets", facet_key, &mut times, || Ok(sample(&shape.mesh, &settings)))?;
+        if facets_new {
+            self.visibility.last = None;
+        }
+        let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
+        let found = self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings);
+        let mut plan = decide(&found, &settings, &Costs::default());
+        let key = (plan.route, settings.horizon_azimuths, settings.map_grid, settings.penumbra.to_bits());
+        let gpu = self.gpu.as_ref();
+        let (visibility, visibility_new) =
+            self.visibility.get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
+
+        if let Some((last, outcome)) = &self.last
+            && *last == settings
+            && !(shape_new || materials_new || facets_new || visibility_new)
+        {
+            return Ok(Outcome { times, ..outcome.clone() });
+        }
+        let start = Instant::now();
+        let (form, factored) = product(&plan, &facets, &visibility, sum, material_of_slot, sum_materials, &shape, &settings)?;
+        times.push(("product", start.elapsed().as_secs_f64() * 1e3));
+        for (name, ms) in &times {
+            plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
+        }
+        let brdf = Arc::new(EffectiveBrdf { form, base_area: f64::from(shape.mesh.base_area()) });
+        let mut notes = shape.mesh.notes.clone();
+        if facets.skipped_triangles > 0 {
+            notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
+        }
+        if let Some(errors) = factored
+            && matches!(brdf.form, Form::Direct(_))
+        {
+            notes.push(format!(
+                "the factored form differs from the direct sum by {:.1} %, more than {:.1} %: summed directly",
+                errors.rel_l2 * 100.0,
+                settings.tolerance * 100.0
+            ));
+        }
+        let outcome = Outcome { brdf, plan, settings: settings.clone(), times, factored, notes };
+        self.last = Some((settings, outcome.clone()));
+        Ok(outcome)
+    }
+
+    /// The tile's mesh.
+    ///
+    /// # Errors
+    /// A file the geometry names cannot be used.
+    pub fn mesh(&mut self, loaded: &LoadedScene) -> Result<TileMesh> {
+        Ok(self.shape(loaded, &mut StageTimes::new())?.0.mesh.clone())
+    }
+
+    /// The materials of a scene, as sums see them, and the one of each slot of the mesh.
+    ///
+    /// # Errors
+    /// A slot without a material, or a BRDF file that cannot be used.
+    pub fn sum_materials(&mut self, loaded: &LoadedScene) -> Result<(Vec<usize>, Vec<SumMaterial>)> {
+        let mut times = StageTimes::new();
+        let shape = self.shape(loaded, &mut times)?.0;
+        Ok(self.materials(loaded, &shape.mesh, &mut times)?.0.as_ref().clone())
+    }
+
+    /// Hands a reference evaluator of the scene to `work`.
+    ///
+    /// # Errors
+    /// As [`Pipeline::effective`].
+    pub fn with_reference<T>(&mut self, loaded: &LoadedScene, work: impl FnOnce(&Reference<'_>) -> T) -> Result<T> {
+        let mut times = StageTimes::new();
+        let shape = self.shape(loaded, &mut times)?.0;
+        let materials = self.materials(loaded, &shape.mesh, &mut times)?.0;
+        Ok(work(&Reference::new(&shape.mesh, &materials.0, &materials.1)))
+    }
+
+    fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, bool)> {
+        let key = (loaded.scene.tile.clone(), loaded.base_dir.clone());
+        self.shape.get("geometry", key, times, || {
+            let mesh = geometry::build(&loaded.scene.tile, &loaded.base_dir)?;
+            let (low, high) = mesh.z_range();
+            let flat = high - low <= 1e-7 * mesh.size.max_element();
+            let height_field = mesh.is_height_field();
+            Ok(Shape { mesh, flat, height_field })
+        })
+    }
+
+    fn materials(
+        &mut self,
+        loaded: &LoadedScene,
+        mesh: &TileMesh,
+        times: &mut StageTimes,
+    ) -> Result<(Arc<(Vec<usize>, Vec<SumMaterial>)>, bool)> {
+        let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
+        let cache = &mut self.cache;
+        self.materials.get("materials", key, times, || {
+            let mut material_of_slot = Vec::with_capacity(mesh.slots.len());
+            let mut materials: Vec<SumMaterial> = Vec::new();
+            let mut made: Vec<Option<usize>> = Vec::new();
+            for slot in &mesh.slots {
+                let found = loaded.scene.material_for_slot(slot)?;
+                if let Some(at) = made.iter().position(|index| *index == found.index) {
+                    material_of_slot.push(at);
+                    continue;
+                }
+                let brdf = Brdf::from_specs(found.brdf, &loaded.base_dir, cache)?;
+                materials.push(SumMaterial { brdf, color: found.color });
+                made.push(found.index);
+                material_of_slot.push(materials.len() - 1);
+            }
+            Ok((material_of_slot, materials))
+        })
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one place that gathers all there is to know")]
+    fn findings(
+        &mut self,
+        scene: &Scene,
+        shape: &Shape,
+        facets: &Facets,
+        sum: &FacetSum,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        settings: &Settings,
+    ) -> Findings {
+        let needs_maps = !shape.flat && !shape.height_field;
+        if needs_maps && settings.backend != Backend::Cpu && !self.gpu_asked {
+            self.gpu_asked = true;
+            self.gpu = Gpu::open().ok();
+        }
+        let hardware_gpu = settings.backend != Backend::Cpu
+            && self.gpu.as_ref().is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.tier == crate::gpu::Tier::Hardware);
+        let mut used: Vec<usize> = facets.slots.iter().map(|slot| material_of_slot[usize::from(*slot)]).collect();
+        used.sort_unstable();
+        used.dedup();
+        let is_black = |index: &&usize| materials[**index].color == Vec3::ZERO;
+        let black_materials = used.iter().filter(is_black).count();
+        let is_lambertian = |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
+        Findings {
+            flat: shape.flat,
+            height_samples: shape.mesh.height_grid.is_some(),
+            height_field: shape.height_field,
+            closes_plane: shape.mesh.closes_plane,
+            hardware_gpu,
+            triangles: shape.mesh.triangles.len(),
+            materials: used.len() - black_materials,
+            black_materials,
+            colors_vary: sum.colors_vary(),
+            lobes: sum.lobe_count(),
+            lookups: sum.measured_count(),
+            only_lambertian: used.iter().all(is_lambertian),
+            distinct_normals: sum.patch_count(),
+            object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
+            lights: scene.light.count + scene.light.directional.len(),
+            lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
+        }
+    }
+}
+
+/// Facets of a tile, in the order that sums want.
+fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
+    let mut facets = if settings.preset == Preset::Wu2011 {
+        Facets::sample_wu2011(mesh, settings.facets, settings.seed)
+    } else {
+        FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
+    };
+    facets.sort_for_sums();
+    facets
+}
+
+fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu: Option<&Gpu>) -> Result<Visibility> {
+    let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
+    Ok(match (route, &mesh.height_grid, gpu) {
+        (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
+        (Route::HeightMarch, Some(heights), _) => Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp)),
+        (Route::HeightMarch | Route::HorizonScan, ..) => {
+            Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(mesh), facets, azimuths, ramp))
+        }
+        (Route::GpuMaps, _, Some(gpu)) => {
+            const RESOLUTION: u32 = 512;
+            match visibility_maps_gpu(gpu, mesh, facets, &settings.map_grid.directions(), RESOLUTION) {
+                Ok(packed) => Visibility::Maps(SoftMaps { grid: settings.map_grid, packed }),
+                // A GPU that fails is no reason to stop: the slices give the same answer.
+                Err(_) => Visibility::Maps(SoftMaps::scan(&PeriodicGrid::new(mesh), facets, settings.map_grid)),
+            }
+        }
+        (Route::GpuMaps | Route::MapScan, ..) => Visibility::Maps(SoftMaps::scan(&PeriodicGrid::new(mesh), facets, settings.map_grid)),
+    })
+}
+
+/// The form that the plan asks for; a factored one only if it agrees with the direct sum.
+#[expect(clippy::too_many_arguments, reason = "the last stage reads all others")]
+fn product(
+    plan: &Plan,
+    facets: &Facets,
+    visibility: &Arc<Visibility>,
+    sum: FacetSum,
+    material_of_slot: &[usize],
+    materials: &[SumMaterial],
+    shape: &Shape,
+    settings: &Settings,
+) -> Result<(Form, Option<Errors>)> {
+    let direct = Form::Direct(Direct { sum: Arc::new(sum), visibility: visibility.clone() });
+    if !plan.try_low_rank {
+        return Ok((direct, None));
+    }
+    let factors = LowRank::build(facets, visibility, material_of_slot, materials, &settings.low_rank(!shape.height_field))?;
+    let base_area = f64::from(shape.mesh.base_area());
+    let direct = EffectiveBrdf { form: direct, base_area };
+    let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };
+    let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
+    let values = |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
+    let errors = compare(&values(&factored), &values(&direct));
+    let keep = settings.method == crate::plan::Method::LowRank || errors.rel_l2 <= settings.tolerance;
+    Ok((if keep { factored.form } else { direct.form }, Some(errors)))
+}
+
+impl Reflectance for Outcome {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        self.brdf.eval_lights(lights, o, out);
+    }
+}

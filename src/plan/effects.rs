@@ -1,0 +1,243 @@
+//! The decisions: every effect on or off, with a reason a person can read.
+
+use serde::Serialize;
+
+use super::{Method, Preset, Settings};
+
+/// One effect of the plan, as `biscale plan --json` prints it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    pub name: &'static str,
+    pub on: bool,
+    pub reason: String,
+    pub predicted_ms: f64,
+    /// `None` until the stage has run.
+    pub measured_ms: Option<f64>,
+}
+
+/// How visibility is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Route {
+    /// A flat tile blocks nothing.
+    None,
+    /// Walking the samples of a height-field.
+    HeightMarch,
+    /// Slicing the mesh of a surface without overhangs.
+    HorizonScan,
+    /// Slicing the mesh into maps of bits.
+    MapScan,
+    /// Toroidal shadow maps on a real GPU.
+    GpuMaps,
+}
+
+/// What the scene is like: all that the decisions rest on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Findings {
+    pub flat: bool,
+    pub height_samples: bool,
+    pub height_field: bool,
+    pub closes_plane: bool,
+    pub hardware_gpu: bool,
+    pub triangles: usize,
+    /// Materials that facets carry, black ones not counted.
+    pub materials: usize,
+    pub black_materials: usize,
+    /// Do colour weights differ within a material?
+    pub colors_vary: bool,
+    /// Lobes that a direct evaluation adds up, and measured look-ups.
+    pub lobes: usize,
+    pub lookups: usize,
+    pub only_lambertian: bool,
+    pub distinct_normals: Option<usize>,
+    pub object_self_shadows: bool,
+    pub lights: usize,
+    pub lights_below: usize,
+}
+
+/// Prices on the machine at hand, in nanoseconds; refined by what stages measure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    pub lobe_ns: f64,
+    pub lookup_ns: f64,
+    pub facet_fill_ns: f64,
+    pub march_ns: f64,
+    pub scan_ns: f64,
+    pub factor_query_ns: f64,
+    pub threads: f64,
+}
+
+impl Default for Costs {
+    fn default() -> Self {
+        Self {
+            lobe_ns: 1.5,
+            lookup_ns: 30.0,
+            facet_fill_ns: 0.3,
+            march_ns: 1_000.0,
+            scan_ns: 4_000.0,
+            factor_query_ns: 1_500.0,
+            threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),
+        }
+    }
+}
+
+/// Queries of the picture that the cost model has in mind: 384x384, 32 lights, a third of them lit and covered.
+const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+
+/// What will be done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    pub route: Route,
+    /// Try the factored form first; it must pass its check against the direct sum.
+    pub try_low_rank: bool,
+    pub effects: Vec<Effect>,
+}
+
+impl Plan {
+    /// Notes what a stage took beside what was predicted.
+    pub fn measured(&mut self, name: &str, ms: f64) {
+        for effect in &mut self.effects {
+            if effect.name == name {
+                effect.measured_ms = Some(ms);
+            }
+        }
+    }
+}
+
+/// Decides everything from what was found.
+pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
+    let mut effects = Vec::new();
+    let mut note = |name, on, reason: String, predicted_ms: f64| {
+        effects.push(Effect { name, on, reason, predicted_ms, measured_ms: None });
+    };
+    let facets = settings.facets as f64;
+    let route = route(found);
+    let (what, predicted) = match route {
+        Route::None => ("the tile is flat: every facet sees every direction".to_owned(), 0.0),
+        Route::HeightMarch => (
+            format!("a height-field: horizons along {} azimuths, walking its samples", settings.horizon_azimuths),
+            facets * settings.horizon_azimuths as f64 * costs.march_ns * 1e-6 / costs.threads,
+        ),
+        Route::HorizonScan => (
+            format!("no overhangs: horizons along {} azimuths, slicing {} triangles", settings.horizon_azimuths, found.triangles),
+            facets * settings.horizon_azimuths as f64 * costs.scan_ns * 1e-6 / costs.threads,
+        ),
+        Route::MapScan => (
+            format!(
+                "surfaces overhang: yes/no maps of {} directions, slicing along {} azimuths",
+                settings.map_grid.len(),
+                settings.map_grid.azimuths
+            ),
+            facets * settings.map_grid.azimuths as f64 * 3.0 * costs.scan_ns * 1e-6 / costs.threads,
+        ),
+        Route::GpuMaps => (
+            format!("surfaces overhang and a GPU is at hand: {} toroidal shadow maps", settings.map_grid.len()),
+            settings.map_grid.len() as f64 * found.triangles as f64 * 2e-6,
+        ),
+    };
+    note("visibility", route != Route::None, what, predicted);
+
+    let direct_query = (found.lobes as f64 * costs.lobe_ns + found.lookups as f64 * costs.lookup_ns + facets * costs.facet_fill_ns)
+        * 1e-6
+        / costs.threads;
+    let direct_ms = PICTURE_QUERIES * direct_query;
+    let low_rank_ms = 800.0 + PICTURE_QUERIES * costs.factor_query_ns * 1e-6 / costs.threads;
+    let allowed = !matches!(settings.preset, Preset::Reference | Preset::Wu2011);
+    let try_low_rank = match settings.method {
+        Method::Direct => false,
+        Method::LowRank => true,
+        Method::Auto => allowed && low_rank_ms < direct_ms,
+    };
+    let comparison =
+        format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored");
+    note(
+        "low_rank",
+        try_low_rank,
+        match settings.method {
+            Method::Auto if try_low_rank => format!("{comparison}; kept if within {:.1} % of the direct sum", settings.tolerance * 100.0),
+            Method::Auto => comparison,
+            _ => "asked for by quality.method".to_owned(),
+        },
+        if try_low_rank { 800.0 } else { 0.0 },
+    );
+    note(
+        "exact_lobes",
+        found.distinct_normals.is_some(),
+        match found.distinct_normals {
+            Some(count) => format!("{count} distinct normals: one exact lobe each, whatever the number of facets"),
+            None => "normals differ from facet to facet".to_owned(),
+        },
+        0.0,
+    );
+    note(
+        "color_weights",
+        found.colors_vary,
+        if found.colors_vary {
+            "colour weights differ between facets of one material: three sums, one a channel".to_owned()
+        } else {
+            "each material has one colour: one sum and a multiplication".to_owned()
+        },
+        0.0,
+    );
+    note(
+        "material_groups",
+        found.materials > 1,
+        match (found.materials, found.black_materials) {
+            (n, 0) if n > 1 => format!("{n} materials, each summed over its own facets"),
+            (n, black) if n > 1 => format!("{n} materials, each summed over its own facets; {black} black and skipped"),
+            (_, 0) => "one material".to_owned(),
+            (_, black) => format!("one material that reflects; {black} black and skipped"),
+        },
+        0.0,
+    );
+    note(
+        "measured_brdf",
+        found.lookups > 0,
+        if found.lookups > 0 { "a measured BRDF is looked up".to_owned() } else { "all BRDFs are analytic".to_owned() },
+        0.0,
+    );
+    note(
+        "projected_area",
+        !found.closes_plane,
+        if found.closes_plane {
+            "the tile closes the plane: a_v = A cos θ, and the sum's own estimate of it".to_owned()
+        } else {
+            "the tile leaves holes: the measured projected area normalises".to_owned()
+        },
+        0.0,
+    );
+    note(
+        "self_shadow",
+        found.object_self_shadows && found.lights > 0,
+        if !found.object_self_shadows {
+            "the object is convex: it cannot shadow itself".to_owned()
+        } else if found.lights == 0 {
+            "no light".to_owned()
+        } else {
+            format!("the object can shadow itself: rays to {} lights", found.lights)
+        },
+        0.0,
+    );
+    note("lights", found.lights > 0, format!("{} directional lights, {} of them under the horizon of the world", found.lights, found.lights_below), 0.0);
+    for (name, reason) in [
+        ("interreflection", "small-scale interreflection: not asked for; light that facets send to each other is left out, as in the paper"),
+        ("transmission", "light through thin slabs (Dai et al. 2009): not asked for"),
+        ("color_map_filtering", "filtered colour maps (Heitz et al. 2013): not asked for"),
+    ] {
+        note(name, false, reason.to_owned(), 0.0);
+    }
+    Plan { route, try_low_rank, effects }
+}
+
+fn route(found: &Findings) -> Route {
+    if found.flat {
+        Route::None
+    } else if found.height_samples {
+        Route::HeightMarch
+    } else if found.height_field {
+        Route::HorizonScan
+    } else if found.hardware_gpu {
+        Route::GpuMaps
+    } else {
+        Route::MapScan
+    }
+}
