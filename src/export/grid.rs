@@ -1,0 +1,156 @@
+//! The grid of an exported table: which pairs of directions it holds, in which order.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::Vec3;
+
+use crate::directions::{from_angles, to_angles};
+use crate::error::{InputError, Result};
+
+/// Numbers of elevations and azimuths of the light and of the viewer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExportResolution {
+    pub theta_i: usize,
+    pub phi_i: usize,
+    pub theta_o: usize,
+    pub phi_o: usize,
+}
+
+impl Default for ExportResolution {
+    /// 16 x 32 directions each: 262,144 pairs, 3 MB a quantity, 5.6° between neighbours at most 11° in azimuth.
+    fn default() -> Self {
+        Self {
+            theta_i: 16,
+            phi_i: 32,
+            theta_o: 16,
+            phi_o: 32,
+        }
+    }
+}
+
+/// More pairs are refused before memory for them is taken (0.8 GB); it also keeps an `.npz` under ZIP's 4 GiB.
+const MAX_PAIRS: usize = 1 << 25;
+/// An axis is at most this long.
+const MAX_AXIS: usize = 1024;
+
+impl ExportResolution {
+    /// The grid, if it is of a size that can be made.
+    pub(super) fn grid(&self) -> Result<Grid> {
+        let counts = [self.theta_i, self.phi_i, self.theta_o, self.phi_o];
+        for (name, count) in ["theta_i", "phi_i", "theta_o", "phi_o"].iter().zip(counts) {
+            if !(1..=MAX_AXIS).contains(&count) {
+                return Err(InputError::new(
+                    format!("resolution.{name}"),
+                    count,
+                    format!("1 to {MAX_AXIS} samples"),
+                )
+                .into());
+            }
+        }
+        // At most 2^40, so it cannot overflow.
+        let pairs: u64 = counts.iter().map(|&count| count as u64).product();
+        if pairs > MAX_PAIRS as u64 {
+            let found = format!(
+                "{} x {} x {} x {} = {pairs} pairs",
+                counts[0], counts[1], counts[2], counts[3]
+            );
+            return Err(
+                InputError::new("resolution", found, format!("at most {MAX_PAIRS} pairs")).into(),
+            );
+        }
+        Ok(Grid {
+            light: Axes::new(self.theta_i, self.phi_i),
+            view: Axes::new(self.theta_o, self.phi_o),
+        })
+    }
+}
+
+/// Elevations at the middles of equal steps, azimuths from 0: `θ_a = (a+½)(π/2)/Nθ`, `φ_b = 2πb/Nφ`, in radians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axes {
+    pub theta: Vec<f32>,
+    pub phi: Vec<f32>,
+}
+
+impl Axes {
+    fn new(rings: usize, azimuths: usize) -> Self {
+        Self {
+            theta: (0..rings)
+                .map(|a| ((a as f64 + 0.5) * FRAC_PI_2 / rings as f64) as f32)
+                .collect(),
+            phi: (0..azimuths)
+                .map(|b| (b as f64 * TAU / azimuths as f64) as f32)
+                .collect(),
+        }
+    }
+
+    /// Number of directions.
+    pub fn len(&self) -> usize {
+        self.theta.len() * self.phi.len()
+    }
+
+    /// Unit vectors, azimuth fastest.
+    pub fn directions(&self) -> Vec<Vec3> {
+        self.theta
+            .iter()
+            .flat_map(|&theta| self.phi.iter().map(move |&phi| from_angles(theta, phi)))
+            .collect()
+    }
+
+    /// Nodes and weights of the bilinear reading at a direction: wrapped in azimuth, across the pole to the ring half a
+    /// turn on, constant beyond the last ring.
+    pub fn taps(&self, direction: Vec3) -> [(usize, f32); 4] {
+        let (theta, phi) = to_angles(direction);
+        let rings = self.theta.len();
+        let at = (theta / std::f32::consts::FRAC_PI_2) * rings as f32 - 0.5;
+        let base = at.floor();
+        let part = at - base;
+        let mut taps = [(0, 0.0); 4];
+        for (step, weight) in [(0, 1.0 - part), (1, part)] {
+            let ring = base as i64 + step;
+            let (ring, turn) = if ring < 0 {
+                (0, std::f32::consts::PI)
+            } else {
+                ((ring as usize).min(rings - 1), 0.0)
+            };
+            let azimuths = self.phi.len();
+            let along = (phi + turn) / std::f32::consts::TAU * azimuths as f32;
+            let first = along.floor();
+            let blend = along - first;
+            let slot = 2 * step as usize;
+            taps[slot] = (
+                ring * azimuths + first as usize % azimuths,
+                weight * (1.0 - blend),
+            );
+            taps[slot + 1] = (
+                ring * azimuths + (first as usize + 1) % azimuths,
+                weight * blend,
+            );
+        }
+        taps
+    }
+}
+
+/// Axes of light and viewer. Entry `(ti, pi, to, po)` of a table is at `((ti Nφ_i + pi) Nθ_o + to) Nφ_o + po`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    pub light: Axes,
+    pub view: Axes,
+}
+
+impl Grid {
+    /// Number of pairs.
+    pub fn pairs(&self) -> usize {
+        self.light.len() * self.view.len()
+    }
+
+    /// `[Nθ_i, Nφ_i, Nθ_o, Nφ_o]`.
+    pub fn shape(&self) -> [usize; 4] {
+        [
+            self.light.theta.len(),
+            self.light.phi.len(),
+            self.view.theta.len(),
+            self.view.phi.len(),
+        ]
+    }
+}

@@ -1,0 +1,72 @@
+//! Writing a file so that it holds either its old content or all of the new.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, InputError, Result};
+
+/// Writes `bytes` beside `path` and renames.
+///
+/// # Errors
+/// A place that cannot be written; what was there stays.
+pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    replacing(path, |out| out.write_all(bytes))
+}
+
+/// Opens a file beside `path`, lets `content` fill it, and renames it to `path`.
+pub(super) fn replacing<T>(
+    path: &Path,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<T>,
+) -> Result<T> {
+    let unwritable = |error: io::Error| -> Error {
+        InputError::new("output", error, "a place that can be written")
+            .in_file(path)
+            .into()
+    };
+    // Through a link, the file it leads to is replaced, not the link.
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if let Ok(there) = fs::metadata(&target) {
+        if there.is_dir() {
+            return Err(InputError::new("output", "a folder", "a name for a file")
+                .in_file(path)
+                .into());
+        }
+        if there.permissions().readonly() {
+            return Err(InputError::new(
+                "output",
+                "a file that is read-only",
+                "a place that can be written",
+            )
+            .in_file(path)
+            .into());
+        }
+    }
+    let temporary = Temporary(beside(&target));
+    let mut file = BufWriter::new(File::create_new(&temporary.0).map_err(unwritable)?);
+    let value = content(&mut file).map_err(unwritable)?;
+    file.into_inner()
+        .map_err(|error| unwritable(error.into_error()))?
+        .sync_all()
+        .map_err(unwritable)?;
+    fs::rename(&temporary.0, &target).map_err(unwritable)?;
+    Ok(value)
+}
+
+/// Removed when it goes, unless it has been renamed by then.
+struct Temporary(PathBuf);
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // Gone already where all went well; else the first error is the one that matters.
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+fn beside(path: &Path) -> PathBuf {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.part", std::process::id()));
+    path.with_file_name(name)
+}
