@@ -80,6 +80,8 @@ pub struct Pipeline {
     cache: MeasuredCache,
     gpu: Option<Gpu>,
     gpu_asked: bool,
+    /// Work of one slice of the present mesh.
+    scan_work: f64,
     shape: Stage<(Tile, PathBuf), Shape>,
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
@@ -119,7 +121,7 @@ impl Pipeline {
             self.visibility.last = None;
         }
         let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
-        let found = self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings);
+        let found = self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_new);
         let mut plan = decide(&found, &settings, &Costs::default());
         if settings.preset == Preset::Wu2011 {
             return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_new);
@@ -273,6 +275,7 @@ impl Pipeline {
         material_of_slot: &[usize],
         materials: &[SumMaterial],
         settings: &Settings,
+        facets_new: bool,
     ) -> Findings {
         let needs_maps = !shape.flat && !shape.height_field;
         if needs_maps && settings.backend != Backend::Cpu && !self.gpu_asked {
@@ -294,6 +297,13 @@ impl Pipeline {
             closes_plane: shape.mesh.closes_plane,
             hardware_gpu,
             triangles: shape.mesh.triangles.len(),
+            scan_work: if facets_new && needs_maps && !hardware_gpu {
+                self.scan_work = SoftMaps::scan_work(&PeriodicGrid::new(&shape.mesh), facets);
+                self.scan_work
+            } else {
+                self.scan_work
+            },
+            area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>() / f64::from(shape.mesh.base_area()),
             materials: used.len() - black_materials,
             black_materials,
             colors_vary: sum.colors_vary(),
@@ -332,6 +342,7 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
         (Route::HeightMarch | Route::HorizonScan, ..) => {
             Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(mesh), facets, azimuths, ramp))
         }
+        (Route::MapScan, ..) => Visibility::Maps(SoftMaps::scan(&PeriodicGrid::new(mesh), facets, settings.map_grid)),
         (Route::GpuMaps | Route::CpuMaps, ..) => {
             let (grid, resolution) = (settings.map_grid, settings.map_resolution);
             // A GPU that fails is no reason to stop: the CPU's maps are the same.

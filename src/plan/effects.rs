@@ -24,6 +24,8 @@ pub enum Route {
     HeightMarch,
     /// Slicing the mesh of a surface without overhangs.
     HorizonScan,
+    /// Slicing the mesh into maps of bits.
+    MapScan,
     /// Toroidal shadow maps on the CPU.
     CpuMaps,
     /// Toroidal shadow maps on a real GPU.
@@ -39,6 +41,10 @@ pub struct Findings {
     pub closes_plane: bool,
     pub hardware_gpu: bool,
     pub triangles: usize,
+    /// Cells and triangles that one slice of the mesh looks at.
+    pub scan_work: f64,
+    /// Surface area over base area.
+    pub area_ratio: f64,
     /// Materials that facets carry, black ones not counted.
     pub materials: usize,
     pub black_materials: usize,
@@ -63,6 +69,8 @@ pub struct Costs {
     pub march_ns: f64,
     pub scan_ns: f64,
     pub factor_query_ns: f64,
+    pub slice_ns: f64,
+    pub triangle_ns: f64,
     pub texel_ns: f64,
     pub threads: f64,
 }
@@ -76,6 +84,8 @@ impl Default for Costs {
             march_ns: 1_000.0,
             scan_ns: 4_000.0,
             factor_query_ns: 1_500.0,
+            slice_ns: 6.0,
+            triangle_ns: 60.0,
             texel_ns: 10.0,
             threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),
         }
@@ -112,7 +122,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         effects.push(Effect { name, on, reason, predicted_ms, measured_ms: None });
     };
     let facets = settings.facets as f64;
-    let route = route(found);
+    let route = route(found, settings, costs);
     let (what, predicted) = match route {
         Route::None => ("the tile is flat: every facet sees every direction".to_owned(), 0.0),
         Route::HeightMarch => (
@@ -123,9 +133,23 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             format!("no overhangs: horizons along {} azimuths, slicing {} triangles", settings.horizon_azimuths, found.triangles),
             facets * settings.horizon_azimuths as f64 * costs.scan_ns * 1e-6 / costs.threads,
         ),
+        Route::MapScan => (
+            format!(
+                "surfaces overhang: yes/no maps of {} directions, slicing along {} azimuths (shadow maps: {:.0} ms)",
+                settings.map_grid.len(),
+                settings.map_grid.azimuths,
+                maps_ms(found, settings, costs)
+            ),
+            scan_ms(found, settings, costs),
+        ),
         Route::CpuMaps => (
-            format!("surfaces overhang: {} toroidal shadow maps of {} texels a side", settings.map_grid.len(), settings.map_resolution),
-            settings.map_grid.len() as f64 * (settings.map_resolution as f64).powi(2) * costs.texel_ns * 1e-6 / costs.threads,
+            format!(
+                "surfaces overhang: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
+                settings.map_grid.len(),
+                settings.map_resolution,
+                scan_ms(found, settings, costs)
+            ),
+            maps_ms(found, settings, costs),
         ),
         Route::GpuMaps => (
             format!("surfaces overhang and a GPU is at hand: {} toroidal shadow maps", settings.map_grid.len()),
@@ -226,7 +250,20 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     Plan { route, try_low_rank, effects }
 }
 
-fn route(found: &Findings) -> Route {
+/// Slicing for maps: cells and triangles looked at, facet by facet.
+fn scan_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
+    let slices = settings.facets as f64 * settings.map_grid.azimuths as f64;
+    slices * found.scan_work * costs.slice_ns * 1e-6 / costs.threads
+}
+
+/// Shadow maps: triangles set up and texels covered, direction by direction.
+fn maps_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
+    let texels = f64::from(settings.map_resolution).powi(2) * found.area_ratio;
+    let direction = found.triangles as f64 * costs.triangle_ns + texels * costs.texel_ns;
+    settings.map_grid.len() as f64 * direction * 1e-6 / costs.threads
+}
+
+fn route(found: &Findings, settings: &Settings, costs: &Costs) -> Route {
     if found.flat {
         Route::None
     } else if found.height_samples {
@@ -235,6 +272,8 @@ fn route(found: &Findings) -> Route {
         Route::HorizonScan
     } else if found.hardware_gpu {
         Route::GpuMaps
+    } else if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) {
+        Route::MapScan
     } else {
         Route::CpuMaps
     }

@@ -23,15 +23,16 @@ impl<'a> HeightMarch<'a> {
         self.heights.heights[(y.rem_euclid(h) * w + x.rem_euclid(w)) as usize]
     }
 
-    /// The tangent of the horizon's elevation along the unit plane direction; 0 where nothing rises above `from`.
-    pub fn highest_slope(&self, from: Vec3, along: Vec2) -> f32 {
+    /// The tangent of the horizon's elevation along the unit plane direction, no lower than what a facet of this normal
+    /// faces; 0 where nothing rises above `from`.
+    pub fn highest_slope(&self, from: Vec3, normal: Vec3, along: Vec2) -> f32 {
         let clearance = self.top - from.z;
+        let mut slope = (-normal.truncate().dot(along) / normal.z.max(1e-6)).max(0.0);
         if clearance <= 0.0 {
-            return 0.0;
+            return slope;
         }
         let at = from.truncate() * self.samples_from_tile - 0.5;
         let speed = along * self.samples_from_tile;
-        let mut slope = 0.0;
         // Edges x = k, where heights lie between rows; y = k, between columns; x - y = k, along the diagonals.
         self.cross(at.x, speed.x, from.z, clearance, &mut slope, |line, r| {
             let y = at.y + speed.y * r;

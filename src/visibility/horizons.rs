@@ -40,7 +40,7 @@ impl Horizons {
             let mut blocked = BlockedSlopes::default();
             for (facet, horizon) in row.iter_mut().enumerate() {
                 let origin = lifted_origin(facets, facet, diagonal);
-                grid.scan(origin, along.truncate(), facets.triangles[facet], &mut blocked);
+                grid.scan(origin, facets.normals[facet], along.truncate(), facets.triangles[facet], &mut blocked);
                 *horizon = blocked.highest();
             }
         })
@@ -50,8 +50,8 @@ impl Horizons {
     pub fn march(heights: &HeightGrid, tile_size: glam::Vec2, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let march = HeightMarch::new(heights, tile_size);
         Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
-            for (position, horizon) in facets.positions.iter().zip(row) {
-                *horizon = march.highest_slope(*position, along.truncate());
+            for ((position, normal), horizon) in facets.positions.iter().zip(&facets.normals).zip(row) {
+                *horizon = march.highest_slope(*position, *normal, along.truncate());
             }
         })
     }

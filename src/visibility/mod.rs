@@ -55,7 +55,8 @@ impl Visibility {
         }
     }
 
-    /// Writes the visibility in `[0, 1]` of a run of facets along `direction`; whether a facet faces it is not included.
+    /// Writes the visibility in `[0, 1]` of a run of facets along `direction`; directions a facet does not face count as blocked or
+    /// not, as the route has it: its cosine decides them.
     /// 0 at and under the horizon.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
         if direction.z <= 0.0 {

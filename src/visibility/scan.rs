@@ -12,6 +12,8 @@ pub(super) struct BlockedSlopes {
     pub ground: f32,
     /// Further blocked intervals above it.
     pub floating: Vec<(f32, f32)>,
+    /// Cells and triangles looked at since this was made.
+    pub work: u64,
 }
 
 impl BlockedSlopes {
@@ -25,9 +27,18 @@ impl BlockedSlopes {
         slope <= self.ground || self.floating.iter().any(|&(low, high)| low <= slope && slope <= high)
     }
 
-    fn clear(&mut self) {
-        self.ground = 0.0;
+    /// What a facet does not face: nothing else about it needs to be known, so walks end early.
+    fn start_from_facing(&mut self, normal: Vec3, along: Vec2) {
         self.floating.clear();
+        let ahead = normal.truncate().dot(along);
+        self.ground = if normal.z > 0.0 {
+            (-ahead / normal.z).max(0.0)
+        } else if ahead <= 0.0 {
+            f32::INFINITY
+        } else {
+            self.floating.push((ahead / -normal.z, f32::INFINITY));
+            0.0
+        };
     }
 
     fn insert(&mut self, mut low: f32, mut high: f32) {
@@ -64,9 +75,12 @@ impl BlockedSlopes {
 const LOWEST_SLOPE: f32 = 0.005;
 
 impl PeriodicGrid {
-    /// Fills `blocked` with what a point sees blocked along the unit plane direction `along`; `own` is ignored.
-    pub(super) fn scan(&self, origin: Vec3, along: Vec2, own: u32, blocked: &mut BlockedSlopes) {
-        blocked.clear();
+    /// Fills `blocked` with what a facet does not see along the unit plane direction `along`; `own` is ignored.
+    pub(super) fn scan(&self, origin: Vec3, normal: Vec3, along: Vec2, own: u32, blocked: &mut BlockedSlopes) {
+        blocked.start_from_facing(normal, along);
+        if blocked.ground == f32::INFINITY {
+            return;
+        }
         let clearance = self.top - origin.z;
         if clearance <= 0.0 {
             return;
@@ -75,7 +89,9 @@ impl PeriodicGrid {
         // What a cell at distance r can block at most: clearance / r.
         while walk.entered * blocked.ground.max(LOWEST_SLOPE) < clearance {
             let (cell, tile) = walk.cell();
+            blocked.work += 1;
             if self.z_max[cell] - origin.z > walk.entered * blocked.ground {
+                blocked.work += self.entries(cell).len() as u64;
                 for &entry in self.entries(cell) {
                     let corners = self.copy_corners(entry, tile);
                     if entry.triangle == own && self.lies_on(origin, corners) {

@@ -21,6 +21,23 @@ pub struct SoftMaps {
 }
 
 impl SoftMaps {
+    /// Cells and triangles that one slice looks at on average, from a few of them: what [`SoftMaps::scan`] will cost.
+    pub fn scan_work(periodic: &PeriodicGrid, facets: &Facets) -> f64 {
+        const FACETS: usize = 48;
+        const AZIMUTHS: usize = 5;
+        let mut blocked = BlockedSlopes::default();
+        let chosen = (0..FACETS).map(|k| k * facets.len() / FACETS).filter(|facet| *facet < facets.len());
+        let diagonal = periodic.tile_size.length();
+        for facet in chosen {
+            for azimuth in 0..AZIMUTHS {
+                let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
+                let origin = lifted_origin(facets, facet, diagonal);
+                periodic.scan(origin, facets.normals[facet], along, facets.triangles[facet], &mut blocked);
+            }
+        }
+        blocked.work as f64 / (FACETS * AZIMUTHS) as f64
+    }
+
     /// Slices the mesh along every azimuth and reads all rings off each slice: exact at the nodes.
     pub fn scan(periodic: &PeriodicGrid, facets: &Facets, grid: PolarGrid) -> Self {
         let diagonal = periodic.tile_size.length();
@@ -33,7 +50,8 @@ impl SoftMaps {
                 let mut blocked = BlockedSlopes::default();
                 let mut bits = vec![0_u32; words * slopes.len()];
                 for facet in 0..facets.len() {
-                    periodic.scan(lifted_origin(facets, facet, diagonal), along, facets.triangles[facet], &mut blocked);
+                    let origin = lifted_origin(facets, facet, diagonal);
+                    periodic.scan(origin, facets.normals[facet], along, facets.triangles[facet], &mut blocked);
                     for (ring, &slope) in slopes.iter().enumerate() {
                         if !blocked.contains(slope) {
                             bits[ring * words + facet / 32] |= 1 << (facet % 32);
