@@ -1,0 +1,161 @@
+//! The same picture on both routes, for each form of the effective BRDF and each kind of visibility.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::gpu_render::GpuRenderer;
+use super::lights;
+use super::shading::Background;
+use super::shadow::Occluder;
+use super::{Picture, RenderInput, objects, render, render_gpu};
+use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form};
+use crate::gpu::Gpu;
+use crate::pipeline::Pipeline;
+use crate::scene::{self, LoadedScene};
+use crate::visibility::Visibility;
+
+/// Largest distance of a pixel in 99 % of the pictures, and of the mean, relative to the mean of the picture. The rest are
+/// edges, where the adapter may show the neighbouring triangle.
+const PIXEL_TOLERANCE: f32 = 2e-3;
+const MEAN_TOLERANCE: f32 = 2e-4;
+
+fn open_gpu() -> Option<Gpu> {
+    Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
+}
+
+const GROOVES: &str = "{ kind = \"grooves\" }";
+const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
+const RODS: &str = "{ kind = \"rods\" }";
+const FLAT: &str = "{ kind = \"flat\" }";
+
+fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
+    let text = format!(
+        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\ncolor = [0.9, 0.7, 0.5]\n\
+         [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 600\n"
+    );
+    LoadedScene { scene: scene::parse(&text).unwrap(), base_dir: ".".into(), name: String::new() }
+}
+
+fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
+    Pipeline::new().effective(loaded).unwrap().brdf.as_ref().clone()
+}
+
+/// The CPU's picture and the device's, 64 x 64.
+fn both(gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) -> [Picture; 2] {
+    let mesh = objects::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap();
+    let occluder = Occluder::of(&mesh);
+    let lights = lights::build(&scene::Light { count: 12, ..scene::Light::default() }, Path::new(".")).unwrap();
+    let input = RenderInput {
+        mesh: &mesh,
+        occluder: occluder.as_ref(),
+        shadow_cache: None,
+        lights: &lights.directional,
+        camera: &scene::Camera::default(),
+        reflectance: brdf,
+        size: [64, 64],
+        samples_per_side: 1,
+        background: &Background::Uniform(Vec3::ZERO),
+    };
+    [render(&input).unwrap().picture, render_gpu(gpu, &input, brdf).unwrap().picture]
+}
+
+fn assert_same(what: &str, [cpu, gpu]: &[Picture; 2]) {
+    let mean = |picture: &Picture| picture.pixels.iter().sum::<Vec3>() / picture.pixels.len() as f32;
+    let level = mean(cpu).max_element();
+    assert!(level > 1e-4 && gpu.pixels.iter().all(|pixel| pixel.is_finite()), "{what}: {level}");
+    let mut distances: Vec<f32> =
+        cpu.pixels.iter().zip(&gpu.pixels).map(|(a, b)| (*a - *b).abs().max_element() / (level + a.max_element())).collect();
+    distances.sort_by(f32::total_cmp);
+    let most = distances[distances.len() * 99 / 100];
+    let means = (mean(cpu) - mean(gpu)).abs().max_element() / level;
+    eprintln!("{what}: 99 % within {most:.1e}, largest {:.1e}, means {means:.1e}", distances[distances.len() - 1]);
+    assert!(most < PIXEL_TOLERANCE && means < MEAN_TOLERANCE, "{what}: 99 % within {most}, means {means}");
+}
+
+const LOBES: [&str; 5] = [
+    "{ kind = \"lambertian\", albedo = [0.8, 0.5, 0.2] }",
+    "{ kind = \"blinn_phong\", exponent = 60.0, specular = [0.5, 0.4, 0.3] }",
+    "{ kind = \"cook_torrance\", roughness = 0.25, f0 = [0.9, 0.6, 0.3] }",
+    "{ kind = \"ward\", roughness = 0.2, specular = [0.3, 0.4, 0.5] }",
+    "{ kind = \"ggx\", roughness = 0.2, f0 = [0.04, 0.05, 0.06] }",
+];
+
+#[test]
+fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
+    let Some(gpu) = open_gpu() else { return };
+    let mut seen = [false; 3];
+    for (geometry, kind) in [(FLAT, "cup"), (PYRAMIDS, "sphere"), (GROOVES, "cup"), (RODS, "sphere")] {
+        for brdf in LOBES {
+            let brdf_form = effective(&open(geometry, brdf, "direct"));
+            let Form::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
+            seen[match direct.visibility.as_ref() {
+                Visibility::Unblocked { .. } => 0,
+                Visibility::Horizons(_) => 1,
+                Visibility::Maps(_) => 2,
+            }] = true;
+            assert_same(&format!("{geometry} {brdf}"), &both(&gpu, kind, &brdf_form));
+        }
+    }
+    assert_eq!(seen, [true; 3], "kinds of visibility met");
+}
+
+#[test]
+fn factors_give_the_same_picture_for_tables_and_lobes() {
+    let Some(gpu) = open_gpu() else { return };
+    let sum = format!("[{}, {}]", LOBES[0], LOBES[4]);
+    for (geometry, brdf) in [(GROOVES, LOBES[0]), (PYRAMIDS, LOBES[2]), (RODS, sum.as_str())] {
+        let brdf_form = effective(&open(geometry, brdf, "low_rank"));
+        assert!(matches!(brdf_form.form, Form::LowRank(_)), "{geometry} {brdf}");
+        assert_same(&format!("{geometry} {brdf}"), &both(&gpu, "cup", &brdf_form));
+    }
+}
+
+#[test]
+fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
+    let Some(gpu) = open_gpu() else { return };
+    // A painted height-field: the colour of every facet is its own.
+    let mut facets = crate::geometry::Facets::default();
+    for k in 0..300 {
+        let (theta, phi) = (0.9 * (k as f32 * 0.618).fract(), 2.4 * k as f32);
+        facets.normals.push(crate::directions::from_angles(theta, phi));
+        facets.areas.push(1.0 / 300.0);
+        facets.colors.push(Vec3::new(0.2, 0.9, 0.5) * (0.5 + 0.5 * phi.sin()));
+        facets.slots.push(0);
+    }
+    let material = |brdf: &str| {
+        let loaded = open(FLAT, brdf, "direct");
+        Pipeline::new().sum_materials(&loaded).unwrap().1
+    };
+    let form = |brdf: &str| EffectiveBrdf {
+        form: Form::Direct(Direct {
+            sum: FacetSum::new(&facets, &[0], &material(brdf)).into(),
+            visibility: Visibility::Unblocked { facets: 300 }.into(),
+        }),
+        base_area: 1.0,
+    };
+    let (first, second) = (form(LOBES[4]), form(&format!("[{}, {}]", LOBES[0], LOBES[2])));
+    let Form::Direct(direct) = &first.form else { panic!("not direct") };
+    assert!(direct.sum.colors_vary());
+    assert_same("coloured facets, ggx", &both(&gpu, "sphere", &first));
+
+    let mesh = objects::build(&scene::Object { kind: "sphere".to_owned(), path: None }, Path::new(".")).unwrap();
+    let light = super::DirectionalLight { direction: Vec3::new(0.6, 0.48, 0.64), irradiance: Vec3::new(1.0, 2.0, 3.0) };
+    let mut renderer = GpuRenderer::new(&gpu, None, &first).unwrap();
+    renderer.set_brdf(&gpu, &second).unwrap();
+    let input = RenderInput {
+        mesh: &mesh,
+        occluder: None,
+        shadow_cache: None,
+        lights: &[light; 9],
+        camera: &scene::Camera::default(),
+        reflectance: &second,
+        size: [64, 64],
+        samples_per_side: 2,
+        background: &Background::Wall,
+    };
+    let pictures = [render(&input).unwrap().picture, renderer.render(&gpu, &input).unwrap().picture];
+    assert_same("coloured facets, lambertian and cook_torrance after ggx", &pictures);
+    let none = RenderInput { lights: &[], ..input };
+    assert_same("no lights", &[render(&none).unwrap().picture, renderer.render(&gpu, &none).unwrap().picture]);
+}
