@@ -1,5 +1,6 @@
 // (e+8)/(8π) (n·h)^e (n·i)(n·o), the power as exp(e/2 ln(1-sin²)); shape is e/2.
 
+//!import exp_negative
 //!import lobe_input
 //!import tint_fixed
 

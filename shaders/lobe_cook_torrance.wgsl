@@ -1,5 +1,6 @@
 // D G / 4: Beckmann's distribution and V-cavity shadowing (Cook and Torrance 1982); shape is 1/m².
 
+//!import exp_negative
 //!import lobe_input
 //!import tint_fresnel
 

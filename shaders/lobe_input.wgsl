@@ -31,8 +31,3 @@ fn see(n: vec3f, pair: Pair) -> Seen {
 fn is_lit(seen: Seen) -> bool {
     return seen.n_dot_i * seen.n_dot_o > 0.0;
 }
-
-// e^x for x <= 0; 0 under -60, as the CPU's.
-fn exp_negative(x: f32) -> f32 {
-    return select(exp(x), 0.0, x < -60.0);
-}

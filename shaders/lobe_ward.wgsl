@@ -1,5 +1,6 @@
 // exp(-tan²/α²) sqrt((n·i)(n·o)) / (4πα²) (Ward 1992); shape is 1/α².
 
+//!import exp_negative
 //!import lobe_input
 //!import tint_fixed
 

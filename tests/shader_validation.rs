@@ -53,8 +53,15 @@ fn every_combination_of_effects_parses_and_validates() {
 #[test]
 fn what_a_scene_does_not_call_for_is_not_in_the_shader() {
     let flat = biscale::gpu::swapped_source("shade_direct", &[]).expect("known files");
-    for absent in ["horizons", "bits", "rgb_areas", "patches", "exp(", "visible["] {
-        assert!(!flat.contains(absent), "{absent}");
+    let all = [
+        ("shadows_none", "shadows_bits"),
+        ("visibility_unblocked", "visibility_horizons"),
+        ("lobe_lambertian", "lobe_cook_torrance"),
+        ("sum_facets", "sum_patches"),
+    ];
+    let rich = biscale::gpu::swapped_source("shade_direct", &all).expect("known files");
+    for absent in ["fn turn_of", "horizons[", "array<Patch>", "exp(", "visible["] {
+        assert!(!flat.contains(absent) && rich.contains(absent), "{absent}");
     }
 }
 
