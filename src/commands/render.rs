@@ -36,18 +36,20 @@ impl Stage {
     /// The route that the scene's back end asks for: `gpu` any adapter or an error that says why not, `cpu` none, `auto` a
     /// graphics processor that is more than the CPU in disguise, where it can shade this BRDF.
     pub fn route(&self, outcome: &Outcome) -> Result<Route> {
-        let open = || -> std::result::Result<Route, GpuError> {
-            let gpu = Gpu::open()?;
-            if outcome.settings.backend == Backend::Auto && gpu.tier != Tier::Hardware {
-                return Ok(Route::Cpu);
-            }
-            let renderer = GpuRenderer::new(&gpu, self.occluder.as_ref(), &outcome.brdf)?;
-            Ok(Route::Gpu(Box::new((gpu, renderer))))
+        let backend = outcome.settings.backend;
+        if backend == Backend::Cpu {
+            return Ok(Route::Cpu { refused: None });
+        }
+        let required = backend == Backend::Gpu;
+        let gpu = match Gpu::open() {
+            Ok(gpu) if required || gpu.tier == Tier::Hardware => gpu,
+            Err(error) if required => return Err(Error::from(error).into()),
+            _ => return Ok(Route::Cpu { refused: None }),
         };
-        match outcome.settings.backend {
-            Backend::Cpu => Ok(Route::Cpu),
-            Backend::Gpu => Ok(open().map_err(Error::from)?),
-            Backend::Auto => Ok(open().unwrap_or(Route::Cpu)),
+        match GpuRenderer::new(&gpu, self.occluder.as_ref(), &outcome.brdf) {
+            Ok(renderer) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, required }))),
+            Err(error) if required => Err(Error::from(error).into()),
+            Err(error) => Ok(Route::Cpu { refused: Some(error) }),
         }
     }
 
@@ -64,24 +66,37 @@ impl Stage {
             background: &Background::default(),
         };
         Ok(match route {
-            Route::Cpu => render(&input)?,
-            Route::Gpu(on_device) => on_device.1.render(&on_device.0, &input)?,
+            Route::Cpu { .. } => render(&input)?,
+            Route::Gpu(device) => match device.renderer.render(&device.gpu, &input) {
+                // What the device fails at the CPU still does, unless the device was asked for.
+                Err(Error::Failed(_)) if !device.required => render(&input)?,
+                rendered => rendered?,
+            },
         })
     }
 }
 
 /// Where pictures are made.
 pub enum Route {
-    Cpu,
-    Gpu(Box<(Gpu, GpuRenderer)>),
+    /// `refused`: why the graphics processor, which is there, does not.
+    Cpu { refused: Option<GpuError> },
+    Gpu(Box<OnDevice>),
+}
+
+/// A device and what it holds of the scene.
+pub struct OnDevice {
+    gpu: Gpu,
+    renderer: GpuRenderer,
+    /// Whether the person asked for it.
+    required: bool,
 }
 
 impl Route {
     /// `cpu`, or the adapter.
     pub fn describe(&self) -> String {
         match self {
-            Self::Cpu => "cpu".to_owned(),
-            Self::Gpu(on_device) => on_device.0.description(),
+            Self::Cpu { .. } => "cpu".to_owned(),
+            Self::Gpu(device) => device.gpu.description(),
         }
     }
 }
@@ -110,6 +125,9 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     }
     args.scene.notes(&outcome);
     let route = stage.route(&outcome)?;
+    if let (Route::Cpu { refused: Some(error) }, false) = (&route, args.scene.quiet) {
+        eprintln!("note: shaded on the CPU: {error}");
+    }
     let rendered = stage.render(&route, &outcome.brdf, args.size, usize::from(args.samples))?;
     rendered.picture.write(&args.output, &tone_map)?;
     if args.scene.json {
