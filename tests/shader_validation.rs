@@ -5,6 +5,66 @@ use std::path::Path;
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
+/// What naga says against a source, if anything. No optional capabilities: what passes here runs on every adapter.
+fn complaint(source: &str) -> Option<String> {
+    let module = match naga::front::wgsl::parse_str(source) {
+        Ok(module) => module,
+        Err(error) => return Some(error.emit_to_string(source)),
+    };
+    let validated = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+    validated.err().map(|error| error.emit_to_string(source))
+}
+
+#[test]
+fn every_combination_of_effects_parses_and_validates() {
+    let mut failures = Vec::new();
+    let mut check = |name: &str, swaps: &[(&'static str, &'static str)]| {
+        let found = match biscale::gpu::swapped_source(name, swaps) {
+            Ok(source) => complaint(&source),
+            Err(error) => Some(error.to_string()),
+        };
+        failures.extend(found.map(|error| format!("{name} with {swaps:?}: {error}")));
+    };
+    for shadows in ["shadows_none", "shadows_bits"] {
+        for tint in ["tint_fixed", "tint_fresnel"] {
+            check("shade_low_rank", &[("shadows_none", shadows), ("tint_fixed", tint)]);
+        }
+        for see in ["visibility_unblocked", "visibility_horizons", "visibility_maps"] {
+            check("projected_area", &[("visibility_unblocked", see)]);
+            for lobe in ["lobe_lambertian", "lobe_blinn_phong", "lobe_cook_torrance", "lobe_ward", "lobe_ggx"] {
+                for weights in ["weights_area", "weights_rgb"] {
+                    for sum in ["sum_facets", "sum_patches"] {
+                        let swaps = [
+                            ("shadows_none", shadows),
+                            ("visibility_unblocked", see),
+                            ("lobe_lambertian", lobe),
+                            ("weights_area", weights),
+                            ("sum_facets", sum),
+                        ];
+                        check("shade_direct", &swaps);
+                    }
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{} fail:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn what_a_scene_does_not_call_for_is_not_in_the_shader() {
+    let flat = biscale::gpu::swapped_source("shade_direct", &[]).expect("known files");
+    let all = [
+        ("shadows_none", "shadows_bits"),
+        ("visibility_unblocked", "visibility_horizons"),
+        ("lobe_lambertian", "lobe_cook_torrance"),
+        ("sum_facets", "sum_patches"),
+    ];
+    let rich = biscale::gpu::swapped_source("shade_direct", &all).expect("known files");
+    for absent in ["fn turn_of", "horizons[", "array<Patch>", "exp(", "visible["] {
+        assert!(!flat.contains(absent) && rich.contains(absent), "{absent}");
+    }
+}
+
 #[test]
 fn every_shader_parses_and_validates_with_its_imports() {
     let mut failures = Vec::new();
@@ -16,19 +76,7 @@ fn every_shader_parses_and_validates_with_its_imports() {
                 continue;
             }
         };
-        let module = match naga::front::wgsl::parse_str(&source) {
-            Ok(module) => module,
-            Err(error) => {
-                failures.push(format!("{name}: {}", error.emit_to_string(&source)));
-                continue;
-            }
-        };
-        // No optional capabilities: what passes here runs on every adapter.
-        if let Err(error) =
-            Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module)
-        {
-            failures.push(format!("{name}: {}", error.emit_to_string(&source)));
-        }
+        failures.extend(complaint(&source).map(|error| format!("{name}: {error}")));
     }
     assert!(
         failures.is_empty(),

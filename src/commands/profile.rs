@@ -37,13 +37,19 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let mut outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
     let form = outcome.brdf.form.describe();
-    let camera = (args.edit == Some(Edit::Camera)).then(|| Stage::new(&loaded)).transpose()?;
+    let camera = if args.edit == Some(Edit::Camera) {
+        let stage = Stage::new(&loaded)?;
+        let route = stage.route(&outcome)?;
+        Some((stage, route))
+    } else {
+        None
+    };
     let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
     for run in 0..=args.repeat {
         let start = Instant::now();
         let times = match (&camera, args.edit) {
-            (Some(stage), _) => {
-                let times = stage.render(outcome.brdf.as_ref(), [384, 384], 1)?.times;
+            (Some((stage, route)), _) => {
+                let times = stage.render(route, &outcome.brdf, [384, 384], 1)?.times;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
             }
             (None, Some(_)) => {

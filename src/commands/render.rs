@@ -1,13 +1,16 @@
 //! `biscale render`: the object of a scene, shaded.
 
 use anyhow::Result;
-use biscale::filtering::Reflectance;
+use biscale::Error;
+use biscale::filtering::EffectiveBrdf;
+use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::lights::{self, Lights};
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::shadow::Occluder;
 use biscale::large_scale::tone_map::ToneMap;
-use biscale::large_scale::{ObjectMesh, RenderInput, Rendered, objects, render};
-use biscale::pipeline::Pipeline;
+use biscale::large_scale::{GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render};
+use biscale::pipeline::{Outcome, Pipeline};
+use biscale::plan::Backend;
 use biscale::scene::{Camera, LoadedScene};
 use serde::Serialize;
 
@@ -30,18 +33,71 @@ impl Stage {
         Ok(Self { mesh, occluder, lights, camera: loaded.scene.camera.clone().unwrap_or_default() })
     }
 
-    pub fn render(&self, reflectance: &dyn Reflectance, size: [usize; 2], samples_per_side: usize) -> Result<Rendered> {
-        Ok(render(&RenderInput {
+    /// The route that the scene's back end asks for: `gpu` any adapter or an error that says why not, `cpu` none, `auto` a
+    /// graphics processor that is more than the CPU in disguise, where it can shade this BRDF.
+    pub fn route(&self, outcome: &Outcome) -> Result<Route> {
+        let backend = outcome.settings.backend;
+        if backend == Backend::Cpu {
+            return Ok(Route::Cpu { refused: None });
+        }
+        let required = backend == Backend::Gpu;
+        let gpu = match Gpu::open() {
+            Ok(gpu) if required || gpu.tier == Tier::Hardware => gpu,
+            Err(error) if required => return Err(Error::from(error).into()),
+            _ => return Ok(Route::Cpu { refused: None }),
+        };
+        match GpuRenderer::new(&gpu, self.occluder.as_ref(), &outcome.brdf) {
+            Ok(renderer) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, required }))),
+            Err(error) if required => Err(Error::from(error).into()),
+            Err(error) => Ok(Route::Cpu { refused: Some(error) }),
+        }
+    }
+
+    pub fn render(&self, route: &Route, brdf: &EffectiveBrdf, size: [usize; 2], samples_per_side: usize) -> Result<Rendered> {
+        let input = RenderInput {
             mesh: &self.mesh,
             occluder: self.occluder.as_ref(),
             shadow_cache: None,
             lights: &self.lights.directional,
             camera: &self.camera,
-            reflectance,
+            reflectance: brdf,
             size,
             samples_per_side,
             background: &Background::default(),
-        })?)
+        };
+        Ok(match route {
+            Route::Cpu { .. } => render(&input)?,
+            Route::Gpu(device) => match device.renderer.render(&device.gpu, &input) {
+                // What the device fails at the CPU still does, unless the device was asked for.
+                Err(Error::Failed(_)) if !device.required => render(&input)?,
+                rendered => rendered?,
+            },
+        })
+    }
+}
+
+/// Where pictures are made.
+pub enum Route {
+    /// `refused`: why the graphics processor, which is there, does not.
+    Cpu { refused: Option<GpuError> },
+    Gpu(Box<OnDevice>),
+}
+
+/// A device and what it holds of the scene.
+pub struct OnDevice {
+    gpu: Gpu,
+    renderer: GpuRenderer,
+    /// Whether the person asked for it.
+    required: bool,
+}
+
+impl Route {
+    /// `cpu`, or the adapter.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Cpu { .. } => "cpu".to_owned(),
+            Self::Gpu(device) => device.gpu.description(),
+        }
     }
 }
 
@@ -52,6 +108,8 @@ struct Report {
     height: usize,
     lights: usize,
     points: usize,
+    /// Where it was shaded: `cpu`, or the adapter.
+    device: String,
     stages: serde_json::Map<String, serde_json::Value>,
 }
 
@@ -66,7 +124,11 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         }
     }
     args.scene.notes(&outcome);
-    let rendered = stage.render(outcome.brdf.as_ref(), args.size, usize::from(args.samples))?;
+    let route = stage.route(&outcome)?;
+    if let (Route::Cpu { refused: Some(error) }, false) = (&route, args.scene.quiet) {
+        eprintln!("note: shaded on the CPU: {error}");
+    }
+    let rendered = stage.render(&route, &outcome.brdf, args.size, usize::from(args.samples))?;
     rendered.picture.write(&args.output, &tone_map)?;
     if args.scene.json {
         let times = rendered.times;
@@ -78,6 +140,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             height: args.size[1],
             lights: stage.lights.directional.len(),
             points: rendered.points,
+            device: route.describe(),
             stages,
         });
     }

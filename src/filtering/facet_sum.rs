@@ -25,22 +25,24 @@ pub struct FacetSum {
     groups: Vec<Group>,
 }
 
+/// A run of facets with one material.
 #[derive(Debug, Clone)]
-struct Group {
-    range: Range<usize>,
-    color: Vec3,
-    lobes: Vec<(Lobe, Term)>,
-    measured: Vec<std::sync::Arc<dyn Measured>>,
+pub(crate) struct Group {
+    pub(crate) range: Range<usize>,
+    pub(crate) color: Vec3,
+    pub(crate) lobes: Vec<(Lobe, Term)>,
+    pub(crate) measured: Vec<std::sync::Arc<dyn Measured>>,
     /// Areas times colour weights, where those differ between the facets of the group.
-    rgb_areas: Option<[Vec<f32>; 3]>,
+    pub(crate) rgb_areas: Option<[Vec<f32>; 3]>,
     /// Runs of facets with one normal, where there are few of them.
-    patches: Option<Vec<Patch>>,
+    pub(crate) patches: Option<Vec<Patch>>,
 }
 
+/// A run of facets with one normal.
 #[derive(Debug, Clone)]
-struct Patch {
-    range: Range<usize>,
-    normal: Vec3,
+pub(crate) struct Patch {
+    pub(crate) range: Range<usize>,
+    pub(crate) normal: Vec3,
 }
 
 /// A run must be this long on average for one lobe a run to pay.
@@ -127,6 +129,16 @@ impl FacetSum {
     /// Number of distinct normals, where they are few enough for one lobe each.
     pub fn patch_count(&self) -> Option<usize> {
         self.groups.iter().map(|group| group.patches.as_ref().map(Vec::len)).sum()
+    }
+
+    /// The runs of facets, for twins of the sum on other devices.
+    pub(crate) fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    /// Normal and area of a facet.
+    pub(crate) fn facet(&self, s: usize) -> (Vec3, f32) {
+        (Vec3::new(self.normals[0][s], self.normals[1][s], self.normals[2][s]), self.areas[s])
     }
 
     fn normals(&self, range: Range<usize>) -> [&[f32]; 3] {

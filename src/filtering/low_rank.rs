@@ -44,10 +44,10 @@ pub enum Tint {
 /// One scalar BRDF over one group of facets with one set of weights.
 #[derive(Debug, Clone)]
 pub struct Channel {
-    u: Arc<Vec<f32>>,
+    pub(crate) u: Arc<Vec<f32>>,
     /// `None` for a Lambertian lobe, whose cosines are in `u`.
-    p: Option<Arc<Vec<f32>>>,
-    columns: usize,
+    pub(crate) p: Option<Arc<Vec<f32>>>,
+    pub(crate) columns: usize,
     pub tint: Tint,
     /// Rank of the basis that was used, and of N in its metric.
     pub ranks: (usize, usize),

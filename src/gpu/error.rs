@@ -31,6 +31,9 @@ pub enum GpuError {
     Refused { during: String, reason: String },
     #[error("the graphics device did not answer within {seconds} s while {during}")]
     Timeout { during: String, seconds: u64 },
+    /// Work that only the CPU route does, and why.
+    #[error("the graphics processor does not do this: {0}; use `--backend cpu`")]
+    Unsupported(String),
     #[error("no shader is called `{0}`")]
     UnknownShader(String),
 }

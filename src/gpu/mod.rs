@@ -12,4 +12,4 @@ mod shaders;
 
 pub use device::{Gpu, Tier};
 pub use error::GpuError;
-pub use shaders::{SHADERS, shader_source};
+pub use shaders::{SHADERS, Swaps, shader_source, swapped_source};

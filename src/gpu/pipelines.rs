@@ -1,6 +1,6 @@
 //! Shader modules, bindings and pipelines in few words. Bindings are numbered in order.
 
-use super::{Gpu, GpuError, shader_source};
+use super::{Gpu, GpuError, Swaps, swapped_source};
 
 /// A uniform block.
 pub const UNIFORM: wgpu::BindingType = buffer(wgpu::BufferBindingType::Uniform);
@@ -20,9 +20,14 @@ const fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
 impl Gpu {
     /// Compiles `shaders/name.wgsl` with its imports.
     pub fn module(&self, name: &str) -> Result<wgpu::ShaderModule, GpuError> {
+        self.swapped_module(name, &[])
+    }
+
+    /// Compiles `shaders/name.wgsl` with its imports, some of them swapped ([`swapped_source`]).
+    pub fn swapped_module(&self, name: &str, swaps: Swaps<'_>) -> Result<wgpu::ShaderModule, GpuError> {
         let description = wgpu::ShaderModuleDescriptor {
             label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(shader_source(name)?.into()),
+            source: wgpu::ShaderSource::Wgsl(swapped_source(name, swaps)?.into()),
         };
         self.checked(&format!("compiling the shader {name}"), || {
             Ok(self.device.create_shader_module(description))
@@ -101,13 +106,27 @@ impl Gpu {
         entry_point: &str,
         groups: &[&wgpu::BindGroupLayout],
     ) -> Result<wgpu::ComputePipeline, GpuError> {
+        self.compute_pipeline_with(module, entry_point, groups, &[])
+    }
+
+    /// A compute pipeline of one entry point with some of the module's overridable constants set.
+    pub fn compute_pipeline_with(
+        &self,
+        module: &wgpu::ShaderModule,
+        entry_point: &str,
+        groups: &[&wgpu::BindGroupLayout],
+        constants: &[(&str, f64)],
+    ) -> Result<wgpu::ComputePipeline, GpuError> {
         let layout = self.pipeline_layout(groups)?;
         let description = wgpu::ComputePipelineDescriptor {
             label: Some(entry_point),
             layout: Some(&layout),
             module,
             entry_point: Some(entry_point),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants,
+                ..wgpu::PipelineCompilationOptions::default()
+            },
             cache: None,
         };
         self.checked(&format!("building the pipeline {entry_point}"), || {

@@ -2,31 +2,66 @@
 //!
 //! A line `//!import name` is replaced by `shaders/name.wgsl`, which may import in turn; a file is taken in only once, at
 //! its first import. To WGSL the line is a comment, so every file stays plain WGSL for editors.
+//!
+//! An import may be swapped for another file with the same functions: so a shader holds the code of the effects that a
+//! scene calls for and of no other.
 
 use super::GpuError;
 
 /// Every file in `shaders/`, by name without the ending.
 pub const SHADERS: &[(&str, &str)] = &[
+    ("angles", include_str!("../../shaders/angles.wgsl")),
+    ("exp_negative", include_str!("../../shaders/exp_negative.wgsl")),
+    ("facets", include_str!("../../shaders/facets.wgsl")),
     ("gbuffer", include_str!("../../shaders/gbuffer.wgsl")),
     ("light_rays", include_str!("../../shaders/light_rays.wgsl")),
+    ("lobe_blinn_phong", include_str!("../../shaders/lobe_blinn_phong.wgsl")),
+    ("lobe_cook_torrance", include_str!("../../shaders/lobe_cook_torrance.wgsl")),
+    ("lobe_ggx", include_str!("../../shaders/lobe_ggx.wgsl")),
+    ("lobe_input", include_str!("../../shaders/lobe_input.wgsl")),
+    ("lobe_lambertian", include_str!("../../shaders/lobe_lambertian.wgsl")),
+    ("lobe_ward", include_str!("../../shaders/lobe_ward.wgsl")),
+    ("polar_grid", include_str!("../../shaders/polar_grid.wgsl")),
+    ("projected_area", include_str!("../../shaders/projected_area.wgsl")),
+    ("scales", include_str!("../../shaders/scales.wgsl")),
+    ("shade_direct", include_str!("../../shaders/shade_direct.wgsl")),
+    ("shade_low_rank", include_str!("../../shaders/shade_low_rank.wgsl")),
+    ("shading_points", include_str!("../../shaders/shading_points.wgsl")),
     ("shadow_map", include_str!("../../shaders/shadow_map.wgsl")),
-    (
-        "shadow_view",
-        include_str!("../../shaders/shadow_view.wgsl"),
-    ),
+    ("shadow_view", include_str!("../../shaders/shadow_view.wgsl")),
+    ("shadows_bits", include_str!("../../shaders/shadows_bits.wgsl")),
+    ("shadows_none", include_str!("../../shaders/shadows_none.wgsl")),
+    ("sum_facets", include_str!("../../shaders/sum_facets.wgsl")),
+    ("sum_patches", include_str!("../../shaders/sum_patches.wgsl")),
+    ("tint_fixed", include_str!("../../shaders/tint_fixed.wgsl")),
+    ("tint_fresnel", include_str!("../../shaders/tint_fresnel.wgsl")),
     ("vectors", include_str!("../../shaders/vectors.wgsl")),
+    ("visibility_horizons", include_str!("../../shaders/visibility_horizons.wgsl")),
+    ("visibility_maps", include_str!("../../shaders/visibility_maps.wgsl")),
+    ("visibility_unblocked", include_str!("../../shaders/visibility_unblocked.wgsl")),
+    ("weights_area", include_str!("../../shaders/weights_area.wgsl")),
+    ("weights_rgb", include_str!("../../shaders/weights_rgb.wgsl")),
 ];
 
 const IMPORT: &str = "//!import ";
 
+/// Imports and the files that stand in for them.
+pub type Swaps<'a> = &'a [(&'static str, &'static str)];
+
 /// The source of a shader with its imports in place.
 pub fn shader_source(name: &str) -> Result<String, GpuError> {
+    swapped_source(name, &[])
+}
+
+/// The source of a shader where each import that `swaps` names first is replaced by the file it names second.
+pub fn swapped_source(name: &str, swaps: Swaps<'_>) -> Result<String, GpuError> {
     let (mut source, mut taken) = (String::new(), Vec::new());
-    take_in(name, &mut source, &mut taken)?;
+    take_in(name, swaps, &mut source, &mut taken)?;
     Ok(source)
 }
 
-fn take_in(name: &str, source: &mut String, taken: &mut Vec<String>) -> Result<(), GpuError> {
+fn take_in(name: &str, swaps: Swaps<'_>, source: &mut String, taken: &mut Vec<String>) -> Result<(), GpuError> {
+    let name = swaps.iter().find(|(from, _)| *from == name).map_or(name, |(_, to)| to);
     if taken.iter().any(|known| known == name) {
         return Ok(());
     }
@@ -37,7 +72,7 @@ fn take_in(name: &str, source: &mut String, taken: &mut Vec<String>) -> Result<(
         .ok_or_else(|| GpuError::UnknownShader(name.to_owned()))?;
     for line in text.lines() {
         match line.strip_prefix(IMPORT) {
-            Some(import) => take_in(import.trim(), source, taken)?,
+            Some(import) => take_in(import.trim(), swaps, source, taken)?,
             None => {
                 source.push_str(line);
                 source.push('\n');

@@ -14,6 +14,10 @@ pub mod environment;
 pub mod gbuffer;
 pub mod gpu_gbuffer;
 pub mod gpu_light_rays;
+pub mod gpu_render;
+pub mod gpu_shading;
+#[cfg(test)]
+mod gpu_shading_tests;
 #[cfg(test)]
 mod gpu_tests;
 pub mod lights;
@@ -29,6 +33,7 @@ pub mod tone_map;
 
 pub use camera::CameraView;
 pub use gbuffer::GBuffer;
+pub use gpu_render::{GpuRenderer, render_gpu};
 pub use lights::DirectionalLight;
 pub use objects::ObjectMesh;
 pub use picture::Picture;

@@ -87,7 +87,7 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
     })
 }
 
-fn check_size([width, height]: [usize; 2], samples_per_side: usize) -> Result<()> {
+pub(super) fn check_size([width, height]: [usize; 2], samples_per_side: usize) -> Result<()> {
     let samples = [width, height, samples_per_side, samples_per_side]
         .into_iter()
         .try_fold(1usize, usize::checked_mul);

@@ -78,6 +78,20 @@ impl Horizons {
         self.facets
     }
 
+    pub(crate) fn azimuths(&self) -> usize {
+        self.azimuths
+    }
+
+    /// Width of the soft step [rad].
+    pub(crate) fn ramp(&self) -> f32 {
+        self.ramp
+    }
+
+    /// Elevation [rad] below which all is blocked along one azimuth.
+    pub(crate) fn elevation(&self, azimuth: usize, facet: usize) -> f32 {
+        self.elevations[azimuth * self.facets + facet]
+    }
+
     pub fn bytes(&self) -> usize {
         4 * self.elevations.len()
     }

@@ -1,0 +1,34 @@
+// Deferred shading with a live sum over facets: the twin of Direct::sums (src/filtering/direct.rs) for one term of one
+// group of facets. What the scene does not call for is not here: the imports below are swapped for what it does.
+
+//!import shading_points
+//!import scales
+//!import shadows_none
+//!import visibility_unblocked
+//!import weights_area
+//!import lobe_lambertian
+//!import sum_facets
+
+@compute @workgroup_size(64)
+fn shade(@builtin(global_invocation_id) id: vec3u) {
+    let point = params.first_point + id.x;
+    if point >= params.end_point || scales[point] == 0.0 {
+        return;
+    }
+    let frame = frame_of(point);
+    let o = view_of(point, frame);
+    let to_viewer = sight_along(o);
+    var total = vec3f(0.0);
+    let end = min((id.y + 1u) * SLICE, params.light_count);
+    for (var k = id.y * SLICE; k < end; k++) {
+        let i = in_tangent(frame, lights[k].direction);
+        if i.z <= 0.0 || !sees_light(point, k) {
+            continue;
+        }
+        let h = half_vector(i, o);
+        let pair = Pair(i, o, h, 0.5 * (dot(i, h) + dot(o, h)));
+        let value = vec3f(sum_of_pair(pair, sight_along(i), to_viewer));
+        total += lights[k].irradiance * tint(sum.tint, pair.i_dot_h) * value;
+    }
+    add_radiance(point, id.y, total * sum.color * scales[point]);
+}

@@ -1,0 +1,77 @@
+// What every shading pass shares: points, lights and where radiance goes. Directions are formed as in
+// src/large_scale/shading.rs.
+
+//!import vectors
+
+struct Params {
+    eye: vec3f,
+    // Points in all.
+    point_count: u32,
+    // The points of this dispatch.
+    first_point: u32,
+    end_point: u32,
+    light_count: u32,
+    words_per_point: u32,
+    // A projected area below this shows nothing.
+    least_area: f32,
+    pad_0: u32,
+    pad_1: u32,
+    pad_2: u32,
+}
+
+struct Point {
+    position: vec3f,
+    pad_p: u32,
+    normal: vec3f,
+    pad_n: u32,
+    tangent: vec3f,
+    pad_t: u32,
+}
+
+struct Light {
+    // Towards it, in world space.
+    direction: vec3f,
+    pad_d: u32,
+    irradiance: vec3f,
+    pad_i: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> points: array<Point>;
+@group(0) @binding(2) var<storage, read> lights: array<Light>;
+// Binding 3: the bits of shadows_bits.wgsl.
+// One row of points for each slice of the lights; the rows are added up afterwards.
+@group(0) @binding(4) var<storage, read_write> radiance: array<vec4f>;
+// Binding 5: scales.wgsl.
+
+// Lights that one thread adds up.
+const SLICE: u32 = 8u;
+
+struct Frame {
+    x: vec3f,
+    y: vec3f,
+    z: vec3f,
+}
+
+fn frame_of(point: u32) -> Frame {
+    let z = points[point].normal;
+    let x = points[point].tangent;
+    return Frame(x, cross(z, x), z);
+}
+
+fn in_tangent(frame: Frame, d: vec3f) -> vec3f {
+    return vec3f(dot(d, frame.x), dot(d, frame.y), dot(d, frame.z));
+}
+
+// The direction to the viewer in the tangent frame.
+fn view_of(point: u32, frame: Frame) -> vec3f {
+    return in_tangent(frame, unit_or(params.eye - points[point].position, frame.z));
+}
+
+fn half_vector(i: vec3f, o: vec3f) -> vec3f {
+    return unit_or(i + o, vec3f(0.0, 0.0, 1.0));
+}
+
+fn add_radiance(point: u32, slice: u32, value: vec3f) {
+    radiance[slice * params.point_count + point] += vec4f(value, 0.0);
+}

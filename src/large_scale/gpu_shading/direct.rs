@@ -1,0 +1,201 @@
+//! Passes of the live sum over facets: a projected area, then one pass a term of each group of facets.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::{GpuShading, Padded, Pass, Second, Variant, padded, shadow_swap};
+use crate::brdf::Term;
+use crate::filtering::Direct;
+use crate::gpu::{Gpu, GpuError};
+use crate::simd::Lobe;
+use crate::visibility::{Horizons, SoftMaps, Visibility};
+
+/// `Sum` in `facets.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct Sum {
+    first: u32,
+    end: u32,
+    azimuths: u32,
+    rings: u32,
+    nodes: u32,
+    sharpness: f32,
+    shape: f32,
+    scale: f32,
+    tint: Vec3,
+    facet_count: u32,
+    color: Vec3,
+    pad: u32,
+}
+
+/// `Patch` in `sum_patches.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Patch {
+    normal: Vec3,
+    first: u32,
+    end: u32,
+    pad: [u32; 3],
+}
+
+/// The buffers that all passes read.
+struct Shared {
+    facets: wgpu::Buffer,
+    visibility: wgpu::Buffer,
+    patches: wgpu::Buffer,
+}
+
+impl GpuShading {
+    pub(super) fn direct_passes(&mut self, gpu: &Gpu, form: &Direct, shadowed: bool) -> Result<Vec<Pass>, GpuError> {
+        let groups = form.sum.groups();
+        if groups.iter().any(|group| !group.measured.is_empty() && group.color != Vec3::ZERO) {
+            return Err(GpuError::Unsupported("tables of measured BRDFs are summed over facets on the CPU only".to_owned()));
+        }
+        let facet_count = form.sum.facet_count();
+        let (blank, see) = (Sum { facet_count: facet_count as u32, ..Sum::default() }, visibility_file(&form.visibility));
+        let blank = with_visibility(blank, &form.visibility);
+        let mut patches: Vec<Patch> = Vec::new();
+        let mut shared = Shared {
+            facets: gpu.upload("facets", &facet_rows(form), wgpu::BufferUsages::STORAGE)?,
+            visibility: upload_visibility(gpu, &form.visibility)?,
+            patches: gpu.upload::<u32>("patches", &[], wgpu::BufferUsages::STORAGE)?,
+        };
+        let mut planned = Vec::new();
+        for group in groups.iter().filter(|group| group.color != Vec3::ZERO) {
+            let range = match &group.patches {
+                None => group.range.clone(),
+                Some(runs) => {
+                    let first = patches.len();
+                    patches.extend(runs.iter().map(|run| Patch {
+                        normal: run.normal,
+                        first: run.range.start as u32,
+                        end: run.range.end as u32,
+                        pad: [0; 3],
+                    }));
+                    first..patches.len()
+                }
+            };
+            for (lobe, term) in &group.lobes {
+                let (file, shape, scale) = lobe_file(*lobe);
+                let [first, end] = [range.start as u32, range.end as u32];
+                let sum = Sum { first, end, shape, scale, tint: base_tint(term), color: group.color, ..blank };
+                let swaps = vec![
+                    shadow_swap(shadowed),
+                    ("visibility_unblocked", see),
+                    ("lobe_lambertian", file),
+                    ("weights_area", if group.rgb_areas.is_some() { "weights_rgb" } else { "weights_area" }),
+                    ("sum_facets", if group.patches.is_some() { "sum_patches" } else { "sum_facets" }),
+                ];
+                planned.push((swaps, sum, group.range.len() as u64));
+            }
+        }
+        if !patches.is_empty() {
+            shared.patches = gpu.upload("patches", &patches, wgpu::BufferUsages::STORAGE)?;
+        }
+        let area = Variant {
+            shader: "projected_area",
+            entry_point: "measure",
+            swaps: vec![("visibility_unblocked", see)],
+            constants: Vec::new(),
+        };
+        let mut passes = vec![Pass {
+            pipeline: self.pipeline(gpu, area, Second::Facets)?,
+            group: self.sum_group(gpu, &shared, Sum { end: facet_count as u32, ..blank })?,
+            work: facet_count as u64,
+            each_light: false,
+        }];
+        for (swaps, sum, work) in planned {
+            let variant = Variant { shader: "shade_direct", entry_point: "shade", swaps, constants: Vec::new() };
+            passes.push(Pass {
+                pipeline: self.pipeline(gpu, variant, Second::Facets)?,
+                group: self.sum_group(gpu, &shared, sum)?,
+                work,
+                each_light: true,
+            });
+        }
+        Ok(passes)
+    }
+
+    fn sum_group(&self, gpu: &Gpu, shared: &Shared, sum: Sum) -> Result<wgpu::BindGroup, GpuError> {
+        let uniform = gpu.upload("sum", &[sum], wgpu::BufferUsages::UNIFORM)?;
+        let bound = [&uniform, &shared.facets, &shared.visibility, &shared.patches];
+        gpu.group("facets", &self.facets, &bound.map(|buffer| buffer.as_entire_binding()))
+    }
+}
+
+/// Normal and area of each facet; where the colours of any differ, area times colour of each after that.
+fn facet_rows(form: &Direct) -> Vec<Padded> {
+    let facets = (0..form.sum.facet_count()).map(|s| form.sum.facet(s));
+    let mut rows: Vec<Padded> = facets.map(|(v, pad)| Padded { v, pad }).collect();
+    if form.sum.colors_vary() {
+        for group in form.sum.groups() {
+            for s in group.range.clone() {
+                let k = s - group.range.start;
+                rows.push(padded(match &group.rgb_areas {
+                    Some([r, g, b]) => Vec3::new(r[k], g[k], b[k]),
+                    None => Vec3::splat(form.sum.facet(s).1),
+                }));
+            }
+        }
+    }
+    rows
+}
+
+fn visibility_file(visibility: &Visibility) -> &'static str {
+    match visibility {
+        Visibility::Unblocked { .. } => "visibility_unblocked",
+        Visibility::Horizons(_) => "visibility_horizons",
+        Visibility::Maps(_) => "visibility_maps",
+    }
+}
+
+fn with_visibility(sum: Sum, visibility: &Visibility) -> Sum {
+    match visibility {
+        Visibility::Unblocked { .. } => sum,
+        Visibility::Horizons(horizons) => {
+            Sum { azimuths: horizons.azimuths() as u32, sharpness: 1.0 / horizons.ramp(), ..sum }
+        }
+        Visibility::Maps(maps) => Sum {
+            azimuths: maps.grid.azimuths as u32,
+            rings: maps.grid.rings as u32,
+            nodes: maps.grid.len() as u32,
+            ..sum
+        },
+    }
+}
+
+/// Side by side what neighbouring points read of one facet: they look along neighbouring directions.
+fn upload_visibility(gpu: &Gpu, visibility: &Visibility) -> Result<wgpu::Buffer, GpuError> {
+    let usage = wgpu::BufferUsages::STORAGE;
+    match visibility {
+        Visibility::Unblocked { .. } => gpu.upload::<u32>("visibility", &[], usage),
+        Visibility::Horizons(horizons) => gpu.upload("horizons", &horizons_by_facet(horizons), usage),
+        Visibility::Maps(maps) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
+    }
+}
+
+fn horizons_by_facet(horizons: &Horizons) -> Vec<f32> {
+    let azimuths = horizons.azimuths();
+    (0..horizons.facets() * azimuths).map(|k| horizons.elevation(k % azimuths, k / azimuths)).collect()
+}
+
+fn bits_by_facet(maps: &SoftMaps) -> Vec<u32> {
+    let (words, nodes) = (maps.packed.words_per_row(), maps.packed.direction_count);
+    (0..words * nodes).map(|k| maps.packed.words[k % nodes * words + k / nodes]).collect()
+}
+
+/// The file of a lobe and its two constants.
+fn lobe_file(lobe: Lobe) -> (&'static str, f32, f32) {
+    match lobe {
+        Lobe::Lambertian => ("lobe_lambertian", 0.0, 0.0),
+        Lobe::BlinnPhong { half_exponent, scale } => ("lobe_blinn_phong", half_exponent, scale),
+        Lobe::CookTorrance { inverse_m2, scale } => ("lobe_cook_torrance", inverse_m2, scale),
+        Lobe::Ward { inverse_alpha2, scale } => ("lobe_ward", inverse_alpha2, scale),
+        Lobe::Ggx { alpha2, scale } => ("lobe_ggx", alpha2, scale),
+    }
+}
+
+/// The tint at `i·h = 1`.
+pub(super) fn base_tint(term: &Term) -> Vec3 {
+    term.tint(1.0)
+}

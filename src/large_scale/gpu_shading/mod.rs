@@ -1,0 +1,221 @@
+//! Deferred shading on wgpu: the twin of [`shading::radiance`](super::shading::radiance) with an [`EffectiveBrdf`].
+//!
+//! A material becomes a list of compute passes over points and slices of eight lights. Each pass is compiled for what it
+//! meets (a lobe, a kind of visibility, shadows or none): an effect that a scene does not call for leaves no instruction.
+
+mod direct;
+mod low_rank;
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::DirectionalLight;
+use super::shading_points::ShadingPoints;
+use super::shadow::Visible;
+use crate::filtering::{EffectiveBrdf, Form};
+use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
+use crate::gpu::{Gpu, GpuError, Swaps};
+
+/// Lobes or table rows that one submission adds up: a fraction of a second on slow cards, far from any watchdog.
+const BATCH_WORK: u64 = 1 << 28;
+const THREADS: u32 = 64;
+/// Lights that one thread adds up, as in the shader.
+const SLICE: u32 = 8;
+/// The most workgroups of a dispatch along one axis.
+const MAX_GROUPS: u32 = 65_535;
+
+/// The layouts of all shading passes, and the pipelines compiled so far: build once, use for any material.
+#[derive(Debug)]
+pub struct GpuShading {
+    points: wgpu::BindGroupLayout,
+    facets: wgpu::BindGroupLayout,
+    factors: wgpu::BindGroupLayout,
+    compiled: Vec<(Variant, wgpu::ComputePipeline)>,
+}
+
+/// What tells one pipeline from another.
+#[derive(Debug, Clone, PartialEq)]
+struct Variant {
+    shader: &'static str,
+    entry_point: &'static str,
+    swaps: Vec<(&'static str, &'static str)>,
+    constants: Vec<(&'static str, f64)>,
+}
+
+/// An effective BRDF on the device.
+#[derive(Debug)]
+pub struct GpuMaterial {
+    passes: Vec<Pass>,
+    least_area: f32,
+    /// Whether the passes were compiled to read the bits of shadows.
+    shadowed: bool,
+}
+
+#[derive(Debug)]
+struct Pass {
+    pipeline: wgpu::ComputePipeline,
+    group: wgpu::BindGroup,
+    /// Lobes or table rows of one point, and one light if there is a thread for each slice of those.
+    work: u64,
+    each_light: bool,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Params {
+    eye: Vec3,
+    point_count: u32,
+    first_point: u32,
+    end_point: u32,
+    light_count: u32,
+    words_per_point: u32,
+    least_area: f32,
+    pad: [u32; 3],
+}
+
+/// A vector and padding to the 16 bytes WGSL gives it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Padded {
+    v: Vec3,
+    pad: f32,
+}
+
+fn padded(v: Vec3) -> Padded {
+    Padded { v, pad: 0.0 }
+}
+
+impl GpuShading {
+    pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        let layout = |label, bindings: &[wgpu::BindingType]| gpu.layout(label, wgpu::ShaderStages::COMPUTE, bindings);
+        Ok(Self {
+            points: layout("shading points", &[UNIFORM, READ, READ, READ, WRITE, WRITE])?,
+            facets: layout("facets", &[UNIFORM, READ, READ, READ])?,
+            factors: layout("factors", &[UNIFORM, READ, READ, READ])?,
+            compiled: Vec::new(),
+        })
+    }
+
+    /// Uploads a BRDF and compiles what it needs. `shadowed`: points come with the lights they see.
+    ///
+    /// # Errors
+    /// [`GpuError::Unsupported`] for what only the CPU does (measured BRDFs that are not factored), and what devices refuse.
+    pub fn material(&mut self, gpu: &Gpu, brdf: &EffectiveBrdf, shadowed: bool) -> Result<GpuMaterial, GpuError> {
+        let passes = match &brdf.form {
+            Form::Direct(form) => self.direct_passes(gpu, form, shadowed)?,
+            Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
+        };
+        Ok(GpuMaterial { passes, least_area: (1e-12 * brdf.base_area) as f32, shadowed })
+    }
+
+    /// Radiance towards the eye of each point, as [`shading::radiance`](super::shading::radiance) gives it but for
+    /// rounding. `visible` is read by materials that were made for shadows, and must then be there.
+    pub fn radiance(
+        &self,
+        gpu: &Gpu,
+        material: &GpuMaterial,
+        points: &ShadingPoints,
+        lights: &[DirectionalLight],
+        visible: Option<&Visible>,
+        eye: Vec3,
+    ) -> Result<Vec<Vec3>, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        if points.is_empty() || lights.is_empty() {
+            return Ok(vec![Vec3::ZERO; points.len()]);
+        }
+        let slices = lights.len().div_ceil(SLICE as usize);
+        if lights.len() > (MAX_GROUPS * SLICE) as usize || u32::try_from(points.len() * slices).is_err() {
+            return Err(GpuError::Unsupported(format!("{} points with {} lights", points.len(), lights.len())));
+        }
+        if material.shadowed && visible.is_none() {
+            return Err(GpuError::Unsupported("shadows without an occluder".to_owned()));
+        }
+        let point_data: Vec<[Padded; 3]> =
+            (0..points.len()).map(|k| [points.positions[k], points.normals[k], points.tangents[k]].map(padded)).collect();
+        let light_data: Vec<[Padded; 2]> = lights.iter().map(|light| [light.direction, light.irradiance].map(padded)).collect();
+        let params = gpu.buffer("parameters", size_of::<Params>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
+        let radiance = gpu.buffer("radiance", (16 * points.len() * slices) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
+        let bound = [
+            gpu.upload("shading points", &point_data, Usage::STORAGE)?,
+            gpu.upload("lights", &light_data, Usage::STORAGE)?,
+            gpu.upload("light visibility", visible.map_or(&[], |visible| &visible.words[..]), Usage::STORAGE)?,
+            radiance.clone(),
+            gpu.buffer("scales", 4 * points.len() as u64, Usage::STORAGE)?,
+        ];
+        let resources: Vec<_> = std::iter::once(&params).chain(&bound).map(wgpu::Buffer::as_entire_binding).collect();
+        let group = gpu.group("shading points", &self.points, &resources)?;
+        let batch = material.points_of_a_batch(lights.len());
+        for first in (0..points.len()).step_by(batch) {
+            let end = (first + batch).min(points.len());
+            gpu.write(
+                &params,
+                &[Params {
+                    eye,
+                    point_count: points.len() as u32,
+                    first_point: first as u32,
+                    end_point: end as u32,
+                    light_count: lights.len() as u32,
+                    words_per_point: visible.map_or(0, Visible::words_per_point) as u32,
+                    least_area: material.least_area,
+                    pad: [0; 3],
+                }],
+            )?;
+            gpu.checked("shading", || {
+                let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                for pass in &material.passes {
+                    let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+                    compute.set_pipeline(&pass.pipeline);
+                    compute.set_bind_group(0, &group, &[]);
+                    compute.set_bind_group(1, &pass.group, &[]);
+                    let rows = if pass.each_light { slices as u32 } else { 1 };
+                    compute.dispatch_workgroups(((end - first) as u32).div_ceil(THREADS), rows, 1);
+                }
+                gpu.queue.submit([encoder.finish()]);
+                Ok(())
+            })?;
+        }
+        let rows: Vec<[f32; 4]> = gpu.read(&radiance)?;
+        let mut total = vec![Vec3::ZERO; points.len()];
+        for row in rows.chunks_exact(points.len()).take(slices) {
+            for (total, [r, g, b, _]) in total.iter_mut().zip(row) {
+                *total += Vec3::new(*r, *g, *b);
+            }
+        }
+        Ok(total)
+    }
+
+    fn pipeline(&mut self, gpu: &Gpu, variant: Variant, second: Second) -> Result<wgpu::ComputePipeline, GpuError> {
+        if let Some((_, pipeline)) = self.compiled.iter().find(|(known, _)| *known == variant) {
+            return Ok(pipeline.clone());
+        }
+        let swaps: Swaps<'_> = &variant.swaps;
+        let module = gpu.swapped_module(variant.shader, swaps)?;
+        let layout = match second {
+            Second::Facets => &self.facets,
+            Second::Factors => &self.factors,
+        };
+        let pipeline = gpu.compute_pipeline_with(&module, variant.entry_point, &[&self.points, layout], &variant.constants)?;
+        self.compiled.push((variant, pipeline.clone()));
+        Ok(pipeline)
+    }
+}
+
+/// What the second group of bindings holds.
+#[derive(Debug, Clone, Copy)]
+enum Second {
+    Facets,
+    Factors,
+}
+
+impl GpuMaterial {
+    fn points_of_a_batch(&self, lights: usize) -> usize {
+        let work: u64 = self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum();
+        let most = u64::from(MAX_GROUPS * THREADS);
+        (BATCH_WORK / work.max(1)).clamp(u64::from(THREADS), most) as usize
+    }
+}
+
+/// The import that shadows stand behind, and what stands in for it.
+fn shadow_swap(shadowed: bool) -> (&'static str, &'static str) {
+    ("shadows_none", if shadowed { "shadows_bits" } else { "shadows_none" })
+}

@@ -1,0 +1,228 @@
+//! The same picture on both routes, for each form of the effective BRDF and each kind of visibility.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::gpu_render::GpuRenderer;
+use super::gpu_shading::GpuShading;
+use super::shading::{self, Background};
+use super::shading_points::ShadingPoints;
+use super::shadow::Occluder;
+use super::{CameraView, GBuffer, Picture, lights, RenderInput, objects, render, render_gpu};
+use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
+use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
+use crate::gpu::{Gpu, GpuError};
+use crate::pipeline::Pipeline;
+use crate::scene::{self, LoadedScene};
+use crate::visibility::Visibility;
+
+/// Shading of the same points: the largest distance, relative to the point's radiance and the mean. Single precision on
+/// either side, lobes that multiply the rounding of half vectors by up to 1/roughness². Measured on lavapipe: 5e-6.
+const SHADING_TOLERANCE: f32 = 5e-5;
+/// Pictures: 99 % of the pixels, and the mean. The G-buffers differ by up to 1e-3 in normals in 99 % of the samples
+/// (gpu_tests.rs), which lobes of width 0.2 turn into a percent; the rest are edges, where the adapter may show the
+/// neighbouring triangle.
+const PIXEL_TOLERANCE: f32 = 0.02;
+const MEAN_TOLERANCE: f32 = 2e-3;
+
+fn open_gpu() -> Option<Gpu> {
+    Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
+}
+
+const GROOVES: &str = "{ kind = \"grooves\" }";
+const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
+const RODS: &str = "{ kind = \"rods\" }";
+const FLAT: &str = "{ kind = \"flat\" }";
+
+fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
+    let text = format!(
+        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\ncolor = [0.9, 0.7, 0.5]\n\
+         [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 300\n"
+    );
+    LoadedScene { scene: scene::parse(&text).unwrap(), base_dir: ".".into(), name: String::new() }
+}
+
+fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
+    Pipeline::new().effective(loaded).unwrap().brdf.as_ref().clone()
+}
+
+/// Both routes on an object: points of one G-buffer shaded by both, and both pictures, 64 x 64.
+fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
+    let mesh = objects::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap();
+    let occluder = Occluder::of(&mesh);
+    let lights = lights::build(&scene::Light { count: 10, ..scene::Light::default() }, Path::new(".")).unwrap();
+    let camera = scene::Camera::default();
+    let input = RenderInput {
+        mesh: &mesh,
+        occluder: occluder.as_ref(),
+        shadow_cache: None,
+        lights: &lights.directional,
+        camera: &camera,
+        reflectance: brdf,
+        size: [64, 64],
+        samples_per_side: 1,
+        background: &Background::Uniform(Vec3::ZERO),
+    };
+    let view = CameraView::new(&camera, &mesh, input.size).unwrap();
+    let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
+    let visible = occluder.as_ref().map(|o| o.visible(&mesh, &points, &lights.directional, view.eye, None));
+    let mut shading = GpuShading::new(gpu).unwrap();
+    let material = shading.material(gpu, brdf, visible.is_some()).unwrap();
+    let cpu = shading::radiance(&points, &lights.directional, visible.as_ref(), view.eye, brdf);
+    let device = shading.radiance(gpu, &material, &points, &lights.directional, visible.as_ref(), view.eye).unwrap();
+    let (_, worst, _) = distances(&cpu, &device);
+    let pictures = [render(&input).unwrap().picture, render_gpu(gpu, &input, brdf).unwrap().picture];
+    eprint!("{what}: shading within {worst:.1e}; ");
+    assert!(worst < SHADING_TOLERANCE, "{what}: shading of the same points differs by {worst}");
+    assert_same_picture(what, &pictures);
+}
+
+/// Distances relative to a value and the mean: of 99 %, the largest, and of the means.
+fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
+    let mean = |values: &[Vec3]| values.iter().sum::<Vec3>() / values.len() as f32;
+    let level = mean(cpu).max_element();
+    assert!(level > 1e-4 && gpu.iter().all(|value| value.is_finite()), "{level}");
+    let mut all: Vec<f32> =
+        cpu.iter().zip(gpu).map(|(a, b)| (*a - *b).abs().max_element() / (level + a.max_element())).collect();
+    all.sort_by(f32::total_cmp);
+    (all[all.len() * 99 / 100], all[all.len() - 1], (mean(cpu) - mean(gpu)).abs().max_element() / level)
+}
+
+fn assert_same_picture(what: &str, [cpu, gpu]: &[Picture; 2]) {
+    let (most, worst, means) = distances(&cpu.pixels, &gpu.pixels);
+    eprintln!("{what}: 99 % of the pixels within {most:.1e}, largest {worst:.1e}, means {means:.1e}");
+    assert!(most < PIXEL_TOLERANCE && means < MEAN_TOLERANCE, "{what}: 99 % within {most}, means {means}");
+}
+
+const LOBES: [&str; 5] = [
+    "{ kind = \"lambertian\", albedo = [0.8, 0.5, 0.2] }",
+    "{ kind = \"blinn_phong\", exponent = 60.0, specular = [0.5, 0.4, 0.3] }",
+    "{ kind = \"cook_torrance\", roughness = 0.25, f0 = [0.9, 0.6, 0.3] }",
+    "{ kind = \"ward\", roughness = 0.2, specular = [0.3, 0.4, 0.5] }",
+    "{ kind = \"ggx\", roughness = 0.2, f0 = [0.04, 0.05, 0.06] }",
+];
+
+#[test]
+fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
+    let Some(gpu) = open_gpu() else { return };
+    let mut seen = [false; 3];
+    let [lambertian, phong, beckmann, _, ggx] = LOBES;
+    for (geometry, kind, lobes) in [
+        (FLAT, "sphere", vec![lambertian, beckmann]),
+        (PYRAMIDS, "sphere", LOBES.to_vec()),
+        (GROOVES, "cup", vec![phong, ggx]),
+        (RODS, "sphere", LOBES.to_vec()),
+    ] {
+        for brdf in lobes {
+            let brdf_form = effective(&open(geometry, brdf, "direct"));
+            let Form::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
+            seen[match direct.visibility.as_ref() {
+                Visibility::Unblocked { .. } => 0,
+                Visibility::Horizons(_) => 1,
+                Visibility::Maps(_) => 2,
+            }] = true;
+            assert_same(&format!("{geometry} {brdf}"), &gpu, kind, &brdf_form);
+        }
+    }
+    assert_eq!(seen, [true; 3], "kinds of visibility met");
+}
+
+#[test]
+fn factors_give_the_same_picture_for_tables_and_lobes() {
+    let Some(gpu) = open_gpu() else { return };
+    let sum = format!("[{}, {}]", LOBES[0], LOBES[4]);
+    for (geometry, brdf) in [(GROOVES, LOBES[0]), (PYRAMIDS, LOBES[2]), (RODS, sum.as_str())] {
+        let brdf_form = effective(&open(geometry, brdf, "low_rank"));
+        assert!(matches!(brdf_form.form, Form::LowRank(_)), "{geometry} {brdf}");
+        assert_same(&format!("{geometry} {brdf}"), &gpu, "cup", &brdf_form);
+    }
+}
+
+#[test]
+fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
+    let Some(gpu) = open_gpu() else { return };
+    // The colour of every facet is its own.
+    let mut facets = crate::geometry::Facets::default();
+    for k in 0..300 {
+        let (theta, phi) = (0.9 * (k as f32 * 0.618).fract(), 2.4 * k as f32);
+        facets.positions.push(Vec3::ZERO);
+        facets.normals.push(crate::directions::from_angles(theta, phi));
+        facets.areas.push(1.0 / 300.0);
+        facets.colors.push(Vec3::new(0.2, 0.9, 0.5) * (0.5 + 0.5 * phi.sin()));
+        facets.slots.push(0);
+    }
+    let material = |brdf: &str| {
+        let loaded = open(FLAT, brdf, "direct");
+        Pipeline::new().sum_materials(&loaded).unwrap().1
+    };
+    let form = |brdf: &str| EffectiveBrdf {
+        form: Form::Direct(Direct {
+            sum: FacetSum::new(&facets, &[0], &material(brdf)).into(),
+            visibility: Visibility::Unblocked { facets: 300 }.into(),
+        }),
+        base_area: 1.0,
+    };
+    let (first, second) = (form(LOBES[4]), form(&format!("[{}, {}]", LOBES[0], LOBES[2])));
+    let Form::Direct(direct) = &first.form else { panic!("not direct") };
+    assert!(direct.sum.colors_vary());
+    assert_same("coloured facets, ggx", &gpu, "sphere", &first);
+
+    let mesh = objects::build(&scene::Object { kind: "sphere".to_owned(), path: None }, Path::new(".")).unwrap();
+    let light = super::DirectionalLight { direction: Vec3::new(0.6, 0.48, 0.64), irradiance: Vec3::new(1.0, 2.0, 3.0) };
+    let mut renderer = GpuRenderer::new(&gpu, None, &first).unwrap();
+    renderer.set_brdf(&gpu, &second).unwrap();
+    let input = RenderInput {
+        mesh: &mesh,
+        occluder: None,
+        shadow_cache: None,
+        lights: &[light; 9],
+        camera: &scene::Camera::default(),
+        reflectance: &second,
+        size: [64, 64],
+        samples_per_side: 2,
+        background: &Background::Wall,
+    };
+    let pictures = [render(&input).unwrap().picture, renderer.render(&gpu, &input).unwrap().picture];
+    assert_same_picture("coloured facets, lambertian and cook_torrance after ggx", &pictures);
+    let none = RenderInput { lights: &[], ..input };
+    assert_same_picture("no lights", &[render(&none).unwrap().picture, renderer.render(&gpu, &none).unwrap().picture]);
+}
+
+#[derive(Debug, Default)]
+struct White(MeasuredReport);
+
+impl Measured for White {
+    fn f_r(&self, _: &LobeAngles) -> Vec3 {
+        Vec3::ONE
+    }
+    fn name(&self) -> &str {
+        "white"
+    }
+    fn report(&self) -> &MeasuredReport {
+        &self.0
+    }
+}
+
+#[test]
+fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
+    let Some(gpu) = open_gpu() else { return };
+    let mut facets = crate::geometry::Facets::default();
+    facets.positions.push(Vec3::ZERO);
+    facets.normals.push(Vec3::Z);
+    facets.areas.push(1.0);
+    facets.colors.push(Vec3::ONE);
+    facets.slots.push(0);
+    let material = |color| SumMaterial { brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] }, color };
+    let form = |color| EffectiveBrdf {
+        form: Form::Direct(Direct {
+            sum: FacetSum::new(&facets, &[0], &[material(color)]).into(),
+            visibility: Visibility::Unblocked { facets: 1 }.into(),
+        }),
+        base_area: 1.0,
+    };
+    let refused = GpuRenderer::new(&gpu, None, &form(Vec3::ONE)).map(drop);
+    assert!(matches!(&refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured")), "{refused:?}");
+    // Black: it is never asked.
+    GpuRenderer::new(&gpu, None, &form(Vec3::ZERO)).map(drop).unwrap();
+}
