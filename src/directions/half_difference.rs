@@ -48,7 +48,7 @@ impl HalfDifferenceGrid {
 
     /// Steps shrink towards grazing, `θ_d = π/2 (1 - (1-x)²)`: there, where `tan θ_d` counts the slope of a normal many
     /// times over, masking and the facing cutoff turn a lobe off within a few degrees. With equal steps they leave half
-    /// as much error again (V-groove and pyramids, Cook-Torrance 0.2 and 0.5, `tests/factor_floors.rs`).
+    /// as much error again (V-groove and pyramids, Cook-Torrance 0.2 and 0.5, `tests/factors.rs`).
     pub fn theta_d(&self, step: usize) -> f32 {
         let left = 1.0 - step as f32 / (self.difference - 1) as f32;
         FRAC_PI_2 * (1.0 - left * left)
