@@ -46,8 +46,24 @@ impl HalfDifferenceGrid {
         TAU * azimuth as f32 / self.azimuths as f32
     }
 
+    /// Steps shrink towards grazing, `θ_d = π/2 (1 - (1-x)²)`: there, where `tan θ_d` counts the slope of a normal many
+    /// times over, masking and the facing cutoff turn a lobe off within a few degrees. With equal steps they leave half
+    /// as much error again (V-groove and pyramids, Cook-Torrance 0.2 and 0.5, `tests/factors.rs`).
     pub fn theta_d(&self, step: usize) -> f32 {
-        FRAC_PI_2 * step as f32 / (self.difference - 1) as f32
+        let left = 1.0 - step as f32 / (self.difference - 1) as f32;
+        FRAC_PI_2 * (1.0 - left * left)
+    }
+
+    /// `x` of [`HalfDifferenceGrid::theta_d`], in `[0, 1]`.
+    fn difference_at(theta_d: f32) -> f32 {
+        1.0 - (1.0 - (theta_d / FRAC_PI_2).clamp(0.0, 1.0)).sqrt()
+    }
+
+    /// `sin θ_d cos θ_d dθ_d` of a step, up to a constant: its share of all pairs.
+    pub fn difference_measure(&self, step: usize) -> f32 {
+        let theta_d = self.theta_d(step);
+        let left = 1.0 - step as f32 / (self.difference - 1) as f32;
+        theta_d.sin() * theta_d.cos().max(0.0) * left
     }
 
     pub fn phi_d(&self, step: usize) -> f32 {
@@ -79,7 +95,7 @@ impl HalfDifferenceGrid {
         };
         let (a, fa) = on(theta_h, FRAC_PI_2, self.rings);
         let (b, fb) = around(phi_h, TAU, self.azimuths);
-        let (c, fc) = on(theta_d, FRAC_PI_2, self.difference);
+        let (c, fc) = on(Self::difference_at(theta_d), 1.0, self.difference);
         let (d, fd) = around(phi_d, PI, self.turn);
         std::array::from_fn(|k| {
             let [p, q, r, s] = [k >> 3 & 1, k >> 2 & 1, k >> 1 & 1, k & 1];

@@ -285,13 +285,12 @@ fn factor_block(blocks: &[f32], grid: BasisGrid, frequency: usize) -> Result<Vec
     let part = |k: usize| &blocks[(2 * frequency + k) * rows * rings..(2 * frequency + k + 1) * rows * rings];
     let (real, imaginary) = (part(0), part(1));
     let half_turn = grid.half_turn();
-    // √ of the measure: sinθ_h (sinθ_d cosθ_d) for pairs, sinθ_n for normals.
+    // √ of the measure: sinθ_h (sinθ_d cosθ_d dθ_d) for pairs, sinθ_n for normals.
     let row_weight: Vec<f32> = (0..rows)
         .map(|row| {
             let (ring, difference, turn) = (row / (grid.pairs.difference * half_turn), row / half_turn % grid.pairs.difference, row % half_turn);
-            let (theta_h, theta_d) = (grid.pairs.theta_h(ring), grid.pairs.theta_d(difference));
             let folded = if turn == 0 || turn + 1 == half_turn { 1.0 } else { 2.0 };
-            (theta_h.sin() * theta_d.sin() * theta_d.cos().max(0.0) * folded).sqrt()
+            (grid.pairs.theta_h(ring).sin() * grid.pairs.difference_measure(difference) * folded).sqrt()
         })
         .collect();
     let ring_weight: Vec<f32> = (0..rings).map(|ring| grid.theta_n(ring).sin().sqrt()).collect();

@@ -3,11 +3,15 @@
 /// `e^x` for `x <= 0`, relative error below 3e-7; 0 under -60, so that no product of it is ever denormal (and slow).
 #[inline(always)]
 pub(crate) fn exp_negative(x: f32) -> f32 {
-    let t = x.max(-70.0) * std::f32::consts::LOG2_E;
+    let x = x.max(-70.0);
     // Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low bits.
     const MAGIC: f32 = 12_582_912.0;
-    let shifted = t + MAGIC;
-    let f = (t - (shifted - MAGIC)) * std::f32::consts::LN_2;
+    // ln 2 in two parts, the first so short that k times it is exact (Cody and Waite).
+    const LN_2_HIGH: f32 = 355.0 / 512.0;
+    const LN_2_LOW: f32 = -2.121_944_4e-4;
+    let shifted = x * std::f32::consts::LOG2_E + MAGIC;
+    let k = shifted - MAGIC;
+    let f = (x - k * LN_2_HIGH) - k * LN_2_LOW;
     let power = 1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0))))));
     let exponent = (shifted.to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32).wrapping_add(127);
     let scale = f32::from_bits((exponent as u32) << 23);

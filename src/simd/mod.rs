@@ -5,6 +5,8 @@
 mod gather;
 mod lobes;
 mod math;
+#[cfg(test)]
+mod tests;
 mod visibility;
 
 pub use gather::gathered_dot;
