@@ -111,7 +111,7 @@ struct ExportArgs {
     #[arg(short, long)]
     output: PathBuf,
     /// Steps of theta and phi for each direction.
-    #[arg(long, default_value = "16x32", value_parser = commands::parse_size)]
+    #[arg(long, default_value = "16x64", value_parser = commands::parse_size)]
     resolution: [usize; 2],
 }
 

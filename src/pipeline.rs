@@ -58,6 +58,9 @@ struct Shape {
     height_field: bool,
 }
 
+/// The material of each slot of a mesh, by number, and the materials.
+type Assigned = (Vec<usize>, Vec<SumMaterial>);
+type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
 type FacetKey = (usize, u64);
 type VisibilityKey = (Route, usize, PolarGrid, u32, u32);
 
@@ -85,7 +88,7 @@ pub struct Pipeline {
     shape: Stage<(Tile, PathBuf), Shape>,
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
-    materials: Stage<(Vec<Material>, Vec<String>, PathBuf), (Vec<usize>, Vec<SumMaterial>)>,
+    materials: Stage<MaterialKey, Assigned>,
     /// M of each material, factored as the paper does.
     paper_factors: Vec<Option<Arc<MaterialFactors>>>,
     /// The last effective BRDF, if nothing upstream changed.
@@ -210,7 +213,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// A slot without a material, or a BRDF file that cannot be used.
-    pub fn sum_materials(&mut self, loaded: &LoadedScene) -> Result<(Vec<usize>, Vec<SumMaterial>)> {
+    pub fn sum_materials(&mut self, loaded: &LoadedScene) -> Result<Assigned> {
         let mut times = StageTimes::new();
         let shape = self.shape(loaded, &mut times)?.0;
         Ok(self.materials(loaded, &shape.mesh, &mut times)?.0.as_ref().clone())
@@ -243,7 +246,7 @@ impl Pipeline {
         loaded: &LoadedScene,
         mesh: &TileMesh,
         times: &mut StageTimes,
-    ) -> Result<(Arc<(Vec<usize>, Vec<SumMaterial>)>, bool)> {
+    ) -> Result<(Arc<Assigned>, bool)> {
         let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
         let cache = &mut self.cache;
         self.materials.get("materials", key, times, || {

@@ -17,13 +17,13 @@ pub struct ExportResolution {
 }
 
 impl Default for ExportResolution {
-    /// 16 x 32 directions each: 262,144 pairs, 3 MB a quantity, 5.6° between neighbours at most 11° in azimuth.
+    /// 16 x 64 directions each: a million pairs, 12 MB a quantity, 5.6° between neighbours.
     fn default() -> Self {
         Self {
             theta_i: 16,
-            phi_i: 32,
+            phi_i: 64,
             theta_o: 16,
-            phi_o: 32,
+            phi_o: 64,
         }
     }
 }

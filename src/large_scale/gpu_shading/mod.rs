@@ -104,6 +104,7 @@ impl GpuShading {
         let passes = match &brdf.form {
             Form::Direct(form) => self.direct_passes(gpu, form, shadowed)?,
             Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
+            Form::Wu2011(_) => return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned())),
         };
         Ok(GpuMaterial { passes, least_area: (1e-12 * brdf.base_area) as f32, shadowed })
     }
