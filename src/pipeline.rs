@@ -155,9 +155,11 @@ impl Pipeline {
             && matches!(brdf.form, Form::Direct(_))
         {
             notes.push(format!(
-                "the factored form differs from the direct sum by {:.1} %, more than {:.1} %: summed directly",
+                "the factored form differs from the direct sum by {:.1} % ({:.0} dB), more than {:.1} % ({:.0} dB): summed directly",
                 errors.rel_l2 * 100.0,
-                settings.tolerance * 100.0
+                errors.psnr_db,
+                settings.tolerance * 100.0,
+                settings.tolerance_db
             ));
         }
         let outcome = Outcome { brdf, plan, settings: settings.clone(), times, factored, notes };
@@ -382,7 +384,8 @@ fn product(
     let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
     let values = |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
     let errors = compare(&values(&factored), &values(&direct));
-    let keep = settings.method == crate::plan::Method::LowRank || errors.rel_l2 <= settings.tolerance;
+    let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
+    let keep = settings.method == crate::plan::Method::LowRank || close;
     Ok((if keep { factored.form } else { direct.form }, Some(errors)))
 }
 

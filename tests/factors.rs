@@ -95,8 +95,24 @@ fn row(visibility: &Visibility, direction: Vec3) -> Vec<f32> {
 }
 
 /// Interpolating a facet's visibility at `i` and at `o` is interpolating U with nothing truncated.
-fn price_of_u(facets: &Facets, visibility: &Visibility, term: &Term, pairs: &[Pair], grid: PolarGrid) -> Vec<Vec3> {
-    let table = VisibilityRows::new(visibility, 0..facets.len(), grid);
+fn price_of_u(facets: &Facets, visibility: &Visibility, term: &Term, pairs: &[Pair], grid: PolarGrid, lift: bool) -> Vec<Vec3> {
+    let mut table = VisibilityRows::new(visibility, 0..facets.len(), grid);
+    if lift {
+        table.rows.par_chunks_mut(facets.len()).enumerate().for_each(|(node, row)| {
+            let d = grid.direction(node);
+            for s in 0..facets.len() {
+                let n = facets.normals[s];
+                let along = d.truncate().normalize_or_zero();
+                let own = if n.z > 1e-3 { (-n.truncate().dot(along) / n.z).atan() } else { -2.0 };
+                let e = d.z.asin();
+                if e < own + 0.011 && own + 0.011 < 1.57 {
+                    let e = own + 0.011;
+                    let d = (along * e.cos()).extend(e.sin());
+                    visibility.fill(d, s..s + 1, &mut row[s..s + 1]);
+                }
+            }
+        });
+    }
     let at = |direction: Vec3| -> Vec<f32> {
         let taps = grid.taps(direction);
         (0..facets.len()).map(|s| taps.iter().map(|&(node, w)| w * table.rows[node * facets.len() + s]).sum()).collect()
@@ -126,7 +142,7 @@ fn price_of_p(facets: &Facets, visibility: &Visibility, term: &Term, pairs: &[Pa
 #[ignore = "prints a table of several minutes"]
 fn table_of_what_each_interpolation_costs() {
     let pairs = mirror_biased_pairs(200, 7);
-    for (name, geometry) in [("v-grooves", V_GROOVES), ("pyramids", PYRAMIDS), ("rods", RODS)] {
+    for (name, geometry) in [("v-grooves", V_GROOVES), ("pyramids", PYRAMIDS), ("heights", &heights()), ("twill", r#"{ kind = "weave", pattern = "twill" }"#), ("rods", RODS)] {
         let mesh = tile(geometry);
         let (facets, visibility) = sample(&mesh, 1024);
         for roughness in [0.2, 0.5] {
@@ -140,8 +156,9 @@ fn table_of_what_each_interpolation_costs() {
                 .collect();
             let percent = |values: Vec<Vec3>| compare(&values, &exact).rel_l2 * 100.0;
             for (rings, azimuths) in [(12, 24), (16, 36), (24, 48), (32, 64)] {
-                let error = percent(price_of_u(&facets, &visibility, &term, &pairs, PolarGrid::new(rings, azimuths)));
-                eprintln!("{name:<10} cook-torrance {roughness}  U {rings}x{azimuths}: {error:.2} %");
+                let error = percent(price_of_u(&facets, &visibility, &term, &pairs, PolarGrid::new(rings, azimuths), false));
+                let error2 = percent(price_of_u(&facets, &visibility, &term, &pairs, PolarGrid::new(rings, azimuths), true));
+                eprintln!("{name:<10} cook-torrance {roughness}  U {rings}x{azimuths}: {error:.2} %, lifted {error2:.2}");
             }
             for [rings, azimuths, difference, turn] in [[32, 64, 16, 8], [48, 96, 20, 10], [32, 64, 16, 16], [48, 96, 16, 16], [32, 64, 32, 20]] {
                 let grid = HalfDifferenceGrid { rings, azimuths, difference, turn };
@@ -150,4 +167,11 @@ fn table_of_what_each_interpolation_costs() {
             }
         }
     }
+}
+
+fn heights() -> String {
+    let at = |k: usize| (k as f32 + 0.5) / 40.0;
+    let t = std::f32::consts::TAU;
+    let rows: Vec<String> = (0..40).map(|j| { let r: Vec<String> = (0..40).map(|i| { let (x, y) = (at(i), at(j)); format!("{:.5}", 0.04 * (t * (x + 2.0 * y)).sin() + 0.03 * (t * (3.0 * x - y) + 1.0).sin() + 0.01 * (t * (5.0 * y + 4.0 * x)).cos()) }).collect(); format!("[{}]", r.join(",")) }).collect();
+    format!(r#"{{ kind = "heightfield", values = [{}] }}"#, rows.join(","))
 }

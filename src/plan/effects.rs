@@ -175,7 +175,9 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         "low_rank",
         try_low_rank,
         match settings.method {
-            Method::Auto if try_low_rank => format!("{comparison}; kept if within {:.1} % of the direct sum", settings.tolerance * 100.0),
+            Method::Auto if try_low_rank => {
+                format!("{comparison}; kept if within {:.1} % and {:.0} dB of the direct sum", settings.tolerance * 100.0, settings.tolerance_db)
+            },
             Method::Auto => comparison,
             _ => "asked for by quality.method".to_owned(),
         },

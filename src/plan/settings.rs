@@ -69,6 +69,8 @@ pub struct Settings {
     pub keep_color: f64,
     /// Relative L2 that the factored form may differ from the direct sum by.
     pub tolerance: f64,
+    /// And the PSNR [dB] that it must reach against it: where `f̄` is broad, a small relative error is still a low PSNR.
+    pub tolerance_db: f64,
     pub reference_facets: usize,
     pub reference_passes: usize,
     pub backend: Backend,
@@ -148,6 +150,7 @@ impl Settings {
             colors: None,
             keep_color: 0.999,
             tolerance: 0.04,
+            tolerance_db: 38.0,
             reference_facets: 16_384,
             reference_passes: 16,
             backend: Backend::Auto,
@@ -168,6 +171,7 @@ impl Settings {
                 pairs: HalfDifferenceGrid { rings: 24, azimuths: 48, difference: 12, turn: 6 },
                 normal_rings: 48,
                 tolerance: 0.12,
+                tolerance_db: 28.0,
                 ..standard
             },
             Preset::Fine | Preset::Reference => Self {
@@ -183,6 +187,7 @@ impl Settings {
                 pairs: HalfDifferenceGrid { rings: 48, azimuths: 96, difference: 20, turn: 10 },
                 normal_rings: 64,
                 tolerance: 0.015,
+                tolerance_db: 46.0,
                 ..standard
             },
         }
