@@ -222,6 +222,12 @@ fn annulus(outer: &[DVec2], inner: &[DVec2]) -> Vec<[DVec2; 3]> {
             at_outer = next;
         }
     }
+    // Where the outlines touch, the strip between them has no width.
+    let widest = outer
+        .iter()
+        .map(|corner| corner.length_squared())
+        .fold(0.0, f64::max);
+    triangles.retain(|[a, b, c]| (*b - *a).perp_dot(*c - *a) > 1e-9 * widest);
     triangles
 }
 
@@ -272,6 +278,8 @@ mod tests {
             ..Pyramids::default()
         };
         let mesh = build(&spec, Vec2::ONE);
+        // No floor is left, nor triangles without area in its place.
+        assert_eq!(mesh.triangles.len(), 4 * 16);
         // Four faces of base 1/4 and slant √(h² + (1/8)²) on each of 16 cells.
         let slant = (0.2f64 * 0.2 + 0.125 * 0.125).sqrt();
         assert!((slot_area(&mesh, FACES) - 16.0 * 2.0 * 0.25 * slant).abs() < 1e-5);
