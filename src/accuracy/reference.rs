@@ -13,7 +13,7 @@ use crate::visibility::{PeriodicGrid, lifted_origins};
 pub struct ReferenceSettings {
     /// Facets a pass.
     pub facets: usize,
-    /// At most this many independent passes; at least 2 are made.
+    /// At most this many independent passes; at least four are made.
     pub max_passes: usize,
     /// Stops when the relative L2 of the standard errors falls below this.
     pub target: f64,
@@ -25,6 +25,9 @@ impl Default for ReferenceSettings {
         Self { facets: 8192, max_passes: 16, target: 2e-3, seed: 1 }
     }
 }
+
+/// With fewer, the spread of the passes says little about their mean.
+const LEAST_PASSES: usize = 4;
 
 /// `f̄` of one pair with its standard error, per channel [1/sr].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -77,7 +80,7 @@ impl<'a> Reference<'a> {
         let mut moments = vec![Moments::default(); pairs.len()];
         let mut estimates = vec![Estimate::default(); pairs.len()];
         let sampler = FacetSampler::new(self.mesh);
-        for pass in 0..settings.max_passes.max(2) {
+        for pass in 0..settings.max_passes.max(LEAST_PASSES) {
             // Shifts of one low-discrepancy sequence: the passes together are better than independent ones would be,
             // so the standard error is, if anything, too large.
             let shift = SampleShift::from_seed(settings.seed.wrapping_mul(4096).wrapping_add(pass as u64));
@@ -104,7 +107,7 @@ impl<'a> Reference<'a> {
                 norm += estimate.f_bar.as_dvec3().length_squared();
             }
             let relative = if error == 0.0 { 0.0 } else { (error / norm).sqrt() };
-            if !progress(passes, relative) || (passes >= 2 && relative < settings.target) {
+            if !progress(passes, relative) || (passes >= LEAST_PASSES && relative < settings.target) {
                 break;
             }
         }

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::scan::FACING_MARGIN;
 use crate::geometry::HeightGrid;
 
 /// A height-field seen from points on it. Cells are split along the diagonal from (i, j) to (i+1, j+1).
@@ -24,10 +25,10 @@ impl<'a> HeightMarch<'a> {
     }
 
     /// The tangent of the horizon's elevation along the unit plane direction, no lower than what a facet of this normal
-    /// faces; 0 where nothing rises above `from`.
+    /// is well turned away from; 0 where nothing rises above `from`.
     pub fn highest_slope(&self, from: Vec3, normal: Vec3, along: Vec2) -> f32 {
         let clearance = self.top - from.z;
-        let mut slope = (-normal.truncate().dot(along) / normal.z.max(1e-6)).max(0.0);
+        let mut slope = (-(normal.truncate().dot(along) + FACING_MARGIN) / normal.z.max(1e-6)).max(0.0);
         if clearance <= 0.0 {
             return slope;
         }

@@ -27,17 +27,20 @@ impl BlockedSlopes {
         slope <= self.ground || self.floating.iter().any(|&(low, high)| low <= slope && slope <= high)
     }
 
-    /// What a facet does not face: nothing else about it needs to be known, so walks end early.
+    /// What a facet is turned away from: nothing else about it needs to be known, so walks end early. Directions within
+    /// [`FACING_MARGIN`] behind the facet still count as faced: what is interpolated there must not jump.
     fn start_from_facing(&mut self, normal: Vec3, along: Vec2) {
         self.floating.clear();
-        let ahead = normal.truncate().dot(along);
-        self.ground = if normal.z > 0.0 {
-            (-ahead / normal.z).max(0.0)
-        } else if ahead <= 0.0 {
-            f32::INFINITY
-        } else {
-            self.floating.push((ahead / -normal.z, f32::INFINITY));
+        let ahead = normal.truncate().dot(along) + FACING_MARGIN;
+        self.ground = if ahead >= 0.0 {
+            if normal.z < -1e-5 {
+                self.floating.push((ahead / -normal.z, f32::INFINITY));
+            }
             0.0
+        } else if normal.z > 1e-5 {
+            -ahead / normal.z
+        } else {
+            f32::INFINITY
         };
     }
 
@@ -70,6 +73,9 @@ impl BlockedSlopes {
         }
     }
 }
+
+/// Sine of how far behind a facet its visibility is still computed: more than the step between azimuths.
+pub(super) const FACING_MARGIN: f32 = 0.3;
 
 /// The lowest elevation that is resolved: a walk ends where what is left could block no more than this slope.
 const LOWEST_SLOPE: f32 = 0.005;
