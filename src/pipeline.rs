@@ -58,6 +58,10 @@ struct Shape {
 type FacetKey = (usize, u64);
 type VisibilityKey = (Route, usize, crate::directions::PolarGrid, u32);
 
+type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
+/// The material of each slot, and the materials.
+type SlotMaterials = (Vec<usize>, Vec<SumMaterial>);
+
 /// What the stages made of a scene.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -80,7 +84,7 @@ pub struct Pipeline {
     shape: Stage<(Tile, PathBuf), Shape>,
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
-    materials: Stage<(Vec<Material>, Vec<String>, PathBuf), (Vec<usize>, Vec<SumMaterial>)>,
+    materials: Stage<MaterialKey, SlotMaterials>,
     /// The last effective BRDF, if nothing upstream changed.
     last: Option<(Settings, Outcome)>,
 }
@@ -199,7 +203,7 @@ impl Pipeline {
         loaded: &LoadedScene,
         mesh: &TileMesh,
         times: &mut StageTimes,
-    ) -> Result<(Arc<(Vec<usize>, Vec<SumMaterial>)>, bool)> {
+    ) -> Result<(Arc<SlotMaterials>, bool)> {
         let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
         let cache = &mut self.cache;
         self.materials.get("materials", key, times, || {

@@ -14,7 +14,9 @@ struct Desk {
 
 impl Desk {
     fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+        }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -44,7 +46,11 @@ impl Desk {
     /// Runs the program, which must succeed; its standard output.
     fn text(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
-        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{arguments:?}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         String::from_utf8(output.stdout).unwrap()
     }
 
@@ -58,16 +64,25 @@ impl Desk {
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
         for word in words {
-            assert!(said.contains(word), "{arguments:?} said `{said}`, without `{word}`");
+            assert!(
+                said.contains(word),
+                "{arguments:?} said `{said}`, without `{word}`"
+            );
         }
         assert!(!said.contains("panicked"), "{said}");
-        assert!(output.stdout.is_empty(), "{arguments:?} printed {:?}", String::from_utf8_lossy(&output.stdout));
+        assert!(
+            output.stdout.is_empty(),
+            "{arguments:?} printed {:?}",
+            String::from_utf8_lossy(&output.stdout)
+        );
     }
 
     /// Names of all files in the folder.
     fn files(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            std::fs::read_dir(self.folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<String> = std::fs::read_dir(self.folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         names
     }
@@ -97,10 +112,18 @@ preset = "draft"
 facets = 256
 "#;
 
-const PAIRS: &str = "theta_i,phi_i,theta_o,phi_o\n0,0,0,0\n0.5,1,0.7,2\n1.2,-1,1.0,4\n1.5,0.3,0.2,0.1\n";
+const PAIRS: &str =
+    "theta_i,phi_i,theta_o,phi_o\n0,0,0,0\n0.5,1,0.7,2\n1.2,-1,1.0,4\n1.5,0.3,0.2,0.1\n";
 
 fn rows(text: &str) -> Vec<Vec<f64>> {
-    text.lines().skip(1).map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect()
+    text.lines()
+        .skip(1)
+        .map(|line| {
+            line.split(',')
+                .map(|field| field.parse().unwrap())
+                .collect()
+        })
+        .collect()
 }
 
 fn name(path: &Path) -> &str {
@@ -118,9 +141,15 @@ fn materials_lists_at_least_sixteen_names_with_what_they_show() {
     for row in listed {
         assert!(!row["description"].as_str().unwrap().is_empty(), "{row}");
     }
-    let names: Vec<&str> = listed.iter().map(|row| row["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> = listed
+        .iter()
+        .map(|row| row["name"].as_str().unwrap())
+        .collect();
     for table in ["plate", "teapot", "pillow", "cup", "skirt"] {
-        assert!(names.contains(&format!("table4_{table}").as_str()), "{table} of Table 4 is missing");
+        assert!(
+            names.contains(&format!("table4_{table}").as_str()),
+            "{table} of Table 4 is missing"
+        );
     }
 }
 
@@ -132,12 +161,23 @@ fn plan_has_the_shape_of_the_contract_and_a_reason_for_everything() {
     let effects = plan["effects"].as_array().unwrap();
     assert!(effects.len() >= 5);
     for effect in effects {
-        assert!(effect["name"].is_string() && effect["on"].is_boolean(), "{effect}");
+        assert!(
+            effect["name"].is_string() && effect["on"].is_boolean(),
+            "{effect}"
+        );
         assert!(effect["reason"].as_str().unwrap().len() > 5, "{effect}");
         assert!(effect["predicted_ms"].as_f64().unwrap() >= 0.0);
         assert!(effect["measured_ms"].is_null() || effect["measured_ms"].as_f64().unwrap() >= 0.0);
     }
-    let find = |plan: &Value, name: &str| plan["effects"].as_array().unwrap().iter().find(|e| e["name"] == name).unwrap()["on"] == true;
+    let find = |plan: &Value, name: &str| {
+        plan["effects"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|e| e["name"] == name)
+            .unwrap()["on"]
+            == true
+    };
     assert!(find(&plan, "visibility"));
     desk.write("flat.toml", FLAT);
     let flat = desk.json(&["plan", "flat.toml", "--json", "--quiet"]);
@@ -151,7 +191,10 @@ fn a_flat_lambertian_tile_is_albedo_over_pi_times_the_cosine() {
     desk.write("pairs.csv", PAIRS);
     desk.text(&["eval", "flat.toml", "--pairs", "pairs.csv", "-o", "out.csv"]);
     let text = std::fs::read_to_string(desk.path("out.csv")).unwrap();
-    assert_eq!(text.lines().next(), Some("theta_i,phi_i,theta_o,phi_o,r,g,b"));
+    assert_eq!(
+        text.lines().next(),
+        Some("theta_i,phi_i,theta_o,phi_o,r,g,b")
+    );
     let (given, got) = (rows(PAIRS), rows(&text));
     assert_eq!(given.len(), got.len());
     for (given, got) in given.iter().zip(&got) {
@@ -173,9 +216,21 @@ fn directions_at_and_under_the_horizon_reflect_nothing() {
     let right = std::f64::consts::FRAC_PI_2;
     let header = "theta_i,phi_i,theta_o,phi_o\n";
     desk.write("pairs.csv", format!("{header}{right},0,0.3,0\n0.3,0,{right},1\n2,0,0.1,0\n0.1,0,3.1,0\n{right},0,{right},0\n"));
-    for scene in [GROOVES.to_owned(), FLAT.to_owned(), GROOVES.replace("facets = 256", "facets = 256\nmethod = \"low_rank\"")] {
+    for scene in [
+        GROOVES.to_owned(),
+        FLAT.to_owned(),
+        GROOVES.replace("facets = 256", "facets = 256\nmethod = \"low_rank\""),
+    ] {
         desk.write("scene.toml", scene);
-        let text = desk.text(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "-", "--quiet"]);
+        let text = desk.text(&[
+            "eval",
+            "scene.toml",
+            "--pairs",
+            "pairs.csv",
+            "-o",
+            "-",
+            "--quiet",
+        ]);
         for row in rows(&text) {
             assert_eq!(row[4..], [0.0, 0.0, 0.0], "{row:?}");
         }
@@ -186,26 +241,70 @@ fn directions_at_and_under_the_horizon_reflect_nothing() {
 fn columns_may_stand_in_any_order_and_standard_errors_come_on_request() {
     let desk = Desk::new();
     desk.write("flat.toml", FLAT);
-    desk.write("pairs.csv", "# angles\nphi_o, theta_o, phi_i, theta_i\n0,0,0,1\n\n");
-    let text = desk.text(&["eval", "flat.toml", "--pairs", "pairs.csv", "-o", "-", "--standard-error", "--quality", "reference"]);
-    assert_eq!(text.lines().next(), Some("theta_i,phi_i,theta_o,phi_o,r,g,b,se_r,se_g,se_b"));
+    desk.write(
+        "pairs.csv",
+        "# angles\nphi_o, theta_o, phi_i, theta_i\n0,0,0,1\n\n",
+    );
+    let text = desk.text(&[
+        "eval",
+        "flat.toml",
+        "--pairs",
+        "pairs.csv",
+        "-o",
+        "-",
+        "--standard-error",
+        "--quality",
+        "reference",
+    ]);
+    assert_eq!(
+        text.lines().next(),
+        Some("theta_i,phi_i,theta_o,phi_o,r,g,b,se_r,se_g,se_b")
+    );
     let row = &rows(&text)[0];
     assert_eq!(row[..4], [1.0, 0.0, 0.0, 0.0]);
-    assert!((row[4] - 0.2 / PI * 1_f64.cos()).abs() < 1e-6 && row[7] < 1e-6, "{row:?}");
+    assert!(
+        (row[4] - 0.2 / PI * 1_f64.cos()).abs() < 1e-6 && row[7] < 1e-6,
+        "{row:?}"
+    );
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bytes_with_any_number_of_threads() {
     let desk = Desk::new();
     desk.write("pairs.csv", PAIRS);
-    let pyramids = GROOVES.replace(r#"{ kind = "grooves", profile = "v", count = 4, depth = 0.1, side_angle_deg = 40 }"#, r#"{ kind = "pyramids" }"#);
+    let pyramids = GROOVES.replace(
+        r#"{ kind = "grooves", profile = "v", count = 4, depth = 0.1, side_angle_deg = 40 }"#,
+        r#"{ kind = "pyramids" }"#,
+    );
     for (scene, method) in [(GROOVES, "direct"), (pyramids.as_str(), "low_rank")] {
         desk.write("scene.toml", scene);
         let method = format!("quality.method=\"{method}\"");
-        let arguments = ["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "-", "--quiet", "--backend", "cpu", "--set", &method, "--seed", "7"];
-        let runs: Vec<Vec<u8>> =
-            ["1", "2", "3"].iter().map(|threads| desk.run_with(&arguments, &[("RAYON_NUM_THREADS", threads)]).stdout).collect();
-        assert!(!runs[0].is_empty() && runs.iter().all(|run| *run == runs[0]), "{method}");
+        let arguments = [
+            "eval",
+            "scene.toml",
+            "--pairs",
+            "pairs.csv",
+            "-o",
+            "-",
+            "--quiet",
+            "--backend",
+            "cpu",
+            "--set",
+            &method,
+            "--seed",
+            "7",
+        ];
+        let runs: Vec<Vec<u8>> = ["1", "2", "3"]
+            .iter()
+            .map(|threads| {
+                desk.run_with(&arguments, &[("RAYON_NUM_THREADS", threads)])
+                    .stdout
+            })
+            .collect();
+        assert!(
+            !runs[0].is_empty() && runs.iter().all(|run| *run == runs[0]),
+            "{method}"
+        );
     }
 }
 
@@ -214,7 +313,19 @@ fn another_seed_moves_the_facets() {
     let desk = Desk::new();
     desk.write("pairs.csv", PAIRS);
     desk.write("scene.toml", GROOVES);
-    let run = |seed| desk.text(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "-", "--quiet", "--seed", seed]);
+    let run = |seed| {
+        desk.text(&[
+            "eval",
+            "scene.toml",
+            "--pairs",
+            "pairs.csv",
+            "-o",
+            "-",
+            "--quiet",
+            "--seed",
+            seed,
+        ])
+    };
     assert_ne!(run("1"), run("2"));
 }
 
@@ -223,12 +334,29 @@ fn render_writes_pictures_of_the_size_asked_for() {
     let desk = Desk::new();
     desk.write("scene.toml", GROOVES);
     for file in ["picture.png", "picture.exr"] {
-        desk.text(&["render", "scene.toml", "-o", file, "--size", "48x32", "--samples", "1", "--backend", "cpu", "--quiet"]);
+        desk.text(&[
+            "render",
+            "scene.toml",
+            "-o",
+            file,
+            "--size",
+            "48x32",
+            "--samples",
+            "1",
+            "--backend",
+            "cpu",
+            "--quiet",
+        ]);
     }
     let picture = image::open(desk.path("picture.png")).unwrap().to_rgb8();
     assert_eq!(picture.dimensions(), (48, 32));
-    let distinct: std::collections::BTreeSet<[u8; 3]> = picture.pixels().map(|pixel| pixel.0).collect();
-    assert!(distinct.len() > 20, "a shaded sphere has more than {} colours", distinct.len());
+    let distinct: std::collections::BTreeSet<[u8; 3]> =
+        picture.pixels().map(|pixel| pixel.0).collect();
+    assert!(
+        distinct.len() > 20,
+        "a shaded sphere has more than {} colours",
+        distinct.len()
+    );
     let exr = exr::prelude::read_first_rgba_layer_from_file(
         desk.path("picture.exr"),
         |size, _| (size, Vec::<f32>::new()),
@@ -237,7 +365,11 @@ fn render_writes_pictures_of_the_size_asked_for() {
     .unwrap();
     let (size, values) = exr.layer_data.channel_data.pixels;
     assert_eq!((size.width(), size.height()), (48, 32));
-    assert!(values.iter().all(|value| value.is_finite() && *value >= 0.0));
+    assert!(
+        values
+            .iter()
+            .all(|value| value.is_finite() && *value >= 0.0)
+    );
 }
 
 #[test]
@@ -263,18 +395,45 @@ fn profile_lists_the_stages_downstream_of_the_edit_and_no_others() {
     let desk = Desk::new();
     desk.write("scene.toml", GROOVES);
     let stages = |edit: &[&str]| -> Vec<String> {
-        let mut arguments = vec!["profile", "scene.toml", "--json", "--repeat", "1", "--quiet"];
+        let mut arguments = vec![
+            "profile",
+            "scene.toml",
+            "--json",
+            "--repeat",
+            "1",
+            "--quiet",
+        ];
         arguments.extend(edit);
         let report = desk.json(&arguments);
         assert!(report["total_ms"].as_f64().unwrap() >= 0.0);
-        assert!(report["stages"].as_object().unwrap().values().all(|ms| ms.as_f64().unwrap() >= 0.0));
-        report["stages"].as_object().unwrap().keys().cloned().collect()
+        assert!(
+            report["stages"]
+                .as_object()
+                .unwrap()
+                .values()
+                .all(|ms| ms.as_f64().unwrap() >= 0.0)
+        );
+        report["stages"]
+            .as_object()
+            .unwrap()
+            .keys()
+            .cloned()
+            .collect()
     };
-    assert_eq!(stages(&[]), ["facets", "geometry", "materials", "product", "visibility"]);
-    assert_eq!(stages(&["--edit", "geometry"]), ["facets", "geometry", "product", "visibility"]);
+    assert_eq!(
+        stages(&[]),
+        ["facets", "geometry", "materials", "product", "visibility"]
+    );
+    assert_eq!(
+        stages(&["--edit", "geometry"]),
+        ["facets", "geometry", "product", "visibility"]
+    );
     assert_eq!(stages(&["--edit", "brdf"]), ["materials", "product"]);
     assert_eq!(stages(&["--edit", "color"]), ["materials", "product"]);
-    assert_eq!(stages(&["--edit", "camera"]), ["g_buffer", "shading", "shadows"]);
+    assert_eq!(
+        stages(&["--edit", "camera"]),
+        ["g_buffer", "shading", "shadows"]
+    );
 }
 
 #[test]
@@ -282,16 +441,35 @@ fn scenes_that_cannot_be_used_are_refused_with_file_field_found_and_expected() {
     let desk = Desk::new();
     desk.write("pairs.csv", PAIRS);
     let eval = |desk: &Desk, scene: &str, words: &[&str]| {
-        desk.refused(&["eval", scene, "--pairs", "pairs.csv", "-o", "out.csv"], words);
+        desk.refused(
+            &["eval", scene, "--pairs", "pairs.csv", "-o", "out.csv"],
+            words,
+        );
     };
-    eval(&desk, "missing.toml", &["missing.toml", "found", "expected"]);
+    eval(
+        &desk,
+        "missing.toml",
+        &["missing.toml", "found", "expected"],
+    );
     eval(&desk, "table4_plat", &["did you mean `table4_plate`?"]);
     for (find, replace, words) in [
         ("depth", "depht", &["depht", "depth", "tile.geometry"][..]),
         ("0.1,", "nan,", &["depth", "nan", "expected"]),
-        ("roughness = 0.3", "roughness = inf", &["roughness", "inf", "expected"]),
-        ("roughness = 0.3", "roughness = -1", &["roughness", "-1", "expected"]),
-        ("facets = 256", "facets = 99999999999", &["facets", "99999999999", "expected"]),
+        (
+            "roughness = 0.3",
+            "roughness = inf",
+            &["roughness", "inf", "expected"],
+        ),
+        (
+            "roughness = 0.3",
+            "roughness = -1",
+            &["roughness", "-1", "expected"],
+        ),
+        (
+            "facets = 256",
+            "facets = 99999999999",
+            &["facets", "99999999999", "expected"],
+        ),
         ("\"grooves\"", "\"grove\"", &["grove", "grooves"]),
         ("[object]", "[objekt]", &["objekt", "object"]),
         ("[tile]", "[tile", &["found", "expected"]),
@@ -304,8 +482,14 @@ fn scenes_that_cannot_be_used_are_refused_with_file_field_found_and_expected() {
         eval(&desk, "bad.toml", &all);
     }
     desk.write("grooves.toml", GROOVES);
-    desk.refused(&["plan", "grooves.toml", "--set", "tile.geometry.depth=9e9"], &["depth", "expected"]);
-    desk.refused(&["plan", "grooves.toml", "--set", "tile.geometry.dept=0.1"], &["dept", "depth"]);
+    desk.refused(
+        &["plan", "grooves.toml", "--set", "tile.geometry.depth=9e9"],
+        &["depth", "expected"],
+    );
+    desk.refused(
+        &["plan", "grooves.toml", "--set", "tile.geometry.dept=0.1"],
+        &["dept", "depth"],
+    );
     assert!(!desk.path("out.csv").exists());
 }
 
@@ -313,31 +497,101 @@ fn scenes_that_cannot_be_used_are_refused_with_file_field_found_and_expected() {
 fn measured_files_and_meshes_that_are_broken_are_refused_and_named() {
     let desk = Desk::new();
     desk.write("pairs.csv", PAIRS);
-    let header: Vec<u8> = [90_i32, 90, 180].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let merl = |name: &str| FLAT.replace("kind = \"lambertian\", albedo = [0.2, 0.5, 0.8]", &format!("kind = \"merl\", path = \"{name}\""));
-    let mesh = |name: &str| FLAT.replace("kind = \"flat\"", &format!("kind = \"mesh\", path = \"{name}\""));
+    let header: Vec<u8> = [90_i32, 90, 180]
+        .iter()
+        .flat_map(|n| n.to_le_bytes())
+        .collect();
+    let merl = |name: &str| {
+        FLAT.replace(
+            "kind = \"lambertian\", albedo = [0.2, 0.5, 0.8]",
+            &format!("kind = \"merl\", path = \"{name}\""),
+        )
+    };
+    let mesh = |name: &str| {
+        FLAT.replace(
+            "kind = \"flat\"",
+            &format!("kind = \"mesh\", path = \"{name}\""),
+        )
+    };
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
     let files: [(&str, Vec<u8>, &[&str]); 9] = [
-        ("short.binary", [header.clone(), vec![0; 1000]].concat(), &["1012", "expected"]),
-        ("shape.binary", [[90_i32, 90, 90].iter().flat_map(|n| n.to_le_bytes()).collect(), vec![0; 1000]].concat(), &["90", "180"]),
+        (
+            "short.binary",
+            [header.clone(), vec![0; 1000]].concat(),
+            &["1012", "expected"],
+        ),
+        (
+            "shape.binary",
+            [
+                [90_i32, 90, 90]
+                    .iter()
+                    .flat_map(|n| n.to_le_bytes())
+                    .collect(),
+                vec![0; 1000],
+            ]
+            .concat(),
+            &["90", "180"],
+        ),
         ("empty.binary", Vec::new(), &["expected"]),
         ("points.obj", square.into(), &["no faces"]),
-        ("range.obj", format!("{square}f 1 2 3\nf 1 2 9\n").into(), &["line 6", "9", "expected"]),
-        ("nan.obj", format!("v nan 0 0\n{square}f 1 2 3\n").into(), &["line 1", "nan", "finite"]),
-        ("zero.obj", format!("{square}f 0 1 2\n").into(), &["line 5", "expected"]),
+        (
+            "range.obj",
+            format!("{square}f 1 2 3\nf 1 2 9\n").into(),
+            &["line 6", "9", "expected"],
+        ),
+        (
+            "nan.obj",
+            format!("v nan 0 0\n{square}f 1 2 3\n").into(),
+            &["line 1", "nan", "finite"],
+        ),
+        (
+            "zero.obj",
+            format!("{square}f 0 1 2\n").into(),
+            &["line 5", "expected"],
+        ),
         ("text.obj", b"hello\n".to_vec(), &["expected"]),
         ("binary.obj", vec![0, 159, 146, 150, 255], &["expected"]),
     ];
     for (file, bytes, words) in files {
         desk.write(file, bytes);
-        desk.write("scene.toml", if file.ends_with("obj") { mesh(file) } else { merl(file) });
+        desk.write(
+            "scene.toml",
+            if file.ends_with("obj") {
+                mesh(file)
+            } else {
+                merl(file)
+            },
+        );
         let mut all = vec![file, "found"];
         all.extend(words);
-        desk.refused(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "out.csv"], &all);
+        desk.refused(
+            &[
+                "eval",
+                "scene.toml",
+                "--pairs",
+                "pairs.csv",
+                "-o",
+                "out.csv",
+            ],
+            &all,
+        );
     }
-    for (scene, file) in [(merl("none.binary"), "none.binary"), (mesh("none.obj"), "none.obj")] {
+    for (scene, file) in [
+        (merl("none.binary"), "none.binary"),
+        (mesh("none.obj"), "none.obj"),
+    ] {
         desk.write("scene.toml", scene);
-        desk.refused(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "out.csv"], &[file]);
+        desk.refused(
+            &[
+                "eval",
+                "scene.toml",
+                "--pairs",
+                "pairs.csv",
+                "-o",
+                "out.csv",
+            ],
+            &[file],
+        );
     }
     assert!(!desk.path("out.csv").exists());
 }
@@ -349,16 +603,31 @@ fn bad_pairs_are_refused_with_their_line() {
     for (text, words) in [
         ("", &["line 1", "theta_i,phi_i,theta_o,phi_o"][..]),
         ("theta_i,phi_i,theta_o\n0,0,0\n", &["line 1", "expected"]),
-        ("theta_i,phi_i,theta_o,phi_o\n0,0,0,0\n0,0,x,0\n", &["line 3", "`x`", "theta_o"]),
-        ("theta_i,phi_i,theta_o,phi_o\n0,0,nan,0\n", &["line 2", "nan"]),
-        ("theta_i,phi_i,theta_o,phi_o\n0,0,0\n", &["line 2", "3 values", "4 values"]),
+        (
+            "theta_i,phi_i,theta_o,phi_o\n0,0,0,0\n0,0,x,0\n",
+            &["line 3", "`x`", "theta_o"],
+        ),
+        (
+            "theta_i,phi_i,theta_o,phi_o\n0,0,nan,0\n",
+            &["line 2", "nan"],
+        ),
+        (
+            "theta_i,phi_i,theta_o,phi_o\n0,0,0\n",
+            &["line 2", "3 values", "4 values"],
+        ),
     ] {
         desk.write("pairs.csv", text);
         let mut all = vec!["pairs.csv"];
         all.extend(words);
-        desk.refused(&["eval", "flat.toml", "--pairs", "pairs.csv", "-o", "out.csv"], &all);
+        desk.refused(
+            &["eval", "flat.toml", "--pairs", "pairs.csv", "-o", "out.csv"],
+            &all,
+        );
     }
-    desk.refused(&["eval", "flat.toml", "--pairs", "none.csv", "-o", "out.csv"], &["none.csv"]);
+    desk.refused(
+        &["eval", "flat.toml", "--pairs", "none.csv", "-o", "out.csv"],
+        &["none.csv"],
+    );
     assert!(!desk.path("out.csv").exists());
 }
 
@@ -368,14 +637,26 @@ fn an_output_that_cannot_be_written_fails_and_leaves_what_was_there() {
     desk.write("flat.toml", FLAT);
     let pairs = desk.write("pairs.csv", PAIRS);
     let nowhere = "no/such/folder/out.csv";
-    desk.refused(&["eval", "flat.toml", "--pairs", name(&pairs), "-o", nowhere], &[nowhere]);
-    desk.refused(&["render", "flat.toml", "-o", "picture.bmp", "--size", "8x8"], &["picture.bmp", "png"]);
+    desk.refused(
+        &["eval", "flat.toml", "--pairs", name(&pairs), "-o", nowhere],
+        &[nowhere],
+    );
+    desk.refused(
+        &["render", "flat.toml", "-o", "picture.bmp", "--size", "8x8"],
+        &["picture.bmp", "png"],
+    );
     // An error must not touch what a file held before.
     let kept = desk.write("kept.csv", "mine");
     desk.write("bad.csv", "theta_i,phi_i,theta_o,phi_o\n0,0,x,0\n");
-    desk.refused(&["eval", "flat.toml", "--pairs", "bad.csv", "-o", name(&kept)], &["bad.csv"]);
+    desk.refused(
+        &["eval", "flat.toml", "--pairs", "bad.csv", "-o", name(&kept)],
+        &["bad.csv"],
+    );
     assert_eq!(std::fs::read_to_string(kept).unwrap(), "mine");
-    assert_eq!(desk.files(), ["bad.csv", "flat.toml", "kept.csv", "pairs.csv"]);
+    assert_eq!(
+        desk.files(),
+        ["bad.csv", "flat.toml", "kept.csv", "pairs.csv"]
+    );
 }
 
 #[test]

@@ -7,29 +7,54 @@ use biscale::brdf::{Brdf, Term};
 use biscale::directions::{PolarGrid, from_angles};
 use biscale::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
 use biscale::geometry::{FacetSampler, Facets, HeightGrid, SampleShift, TileMesh};
-use biscale::visibility::{Horizons, PackedVisibility, PeriodicGrid, SoftMaps, Visibility, lifted_origins, ray_cast, sees, visibility_maps_cpu};
+use biscale::visibility::{
+    Horizons, PackedVisibility, PeriodicGrid, SoftMaps, Visibility, lifted_origins, ray_cast, sees,
+    visibility_maps_cpu,
+};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
 fn mesh(size: Vec2, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> TileMesh {
     let triangle_slot = vec![0; triangles.len()];
-    TileMesh { size, positions, triangles, triangle_slot, slots: vec!["default".into()], closes_plane: true, ..TileMesh::default() }
+    TileMesh {
+        size,
+        positions,
+        triangles,
+        triangle_slot,
+        slots: vec!["default".into()],
+        closes_plane: true,
+        ..TileMesh::default()
+    }
 }
 
 /// A height-field with its samples kept, split along the diagonal from (i, j) to (i+1, j+1).
 fn height_field(n: u32, height: impl Fn(f32, f32) -> f32) -> TileMesh {
     let at = |k: u32| (k as f32 + 0.5) / n as f32;
     let heights: Vec<f32> = (0..n * n).map(|k| height(at(k % n), at(k / n))).collect();
-    let positions =
-        (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| Vec3::new(at(i), at(j), heights[(j % n * n + i % n) as usize])).collect();
+    let positions = (0..=n)
+        .flat_map(|j| (0..=n).map(move |i| (i, j)))
+        .map(|(i, j)| Vec3::new(at(i), at(j), heights[(j % n * n + i % n) as usize]))
+        .collect();
     let cells = (0..n).flat_map(|j| (0..n).map(move |i| j * (n + 1) + i));
-    let triangles = cells.flat_map(|k| [[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]]).collect();
-    TileMesh { height_grid: Some(HeightGrid { size: UVec2::splat(n), heights }), ..mesh(Vec2::ONE, positions, triangles) }
+    let triangles = cells
+        .flat_map(|k| [[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]])
+        .collect();
+    TileMesh {
+        height_grid: Some(HeightGrid {
+            size: UVec2::splat(n),
+            heights,
+        }),
+        ..mesh(Vec2::ONE, positions, triangles)
+    }
 }
 
 fn dunes(n: u32) -> TileMesh {
-    height_field(n, |x, y| 0.1 * (TAU * (x + 2.0 * y)).sin() + 0.06 * (TAU * (3.0 * x - y) + 1.0).sin() + 0.02 * (TAU * (5.0 * y + 4.0 * x)).cos())
+    height_field(n, |x, y| {
+        0.1 * (TAU * (x + 2.0 * y)).sin()
+            + 0.06 * (TAU * (3.0 * x - y) + 1.0).sin()
+            + 0.02 * (TAU * (5.0 * y + 4.0 * x)).cos()
+    })
 }
 
 /// A table on four thin legs over a floor: the slab hangs over the floor and reaches over the tile's edge.
@@ -38,9 +63,25 @@ fn tables() -> TileMesh {
     let mut triangles = vec![[0, 1, 2], [0, 2, 3]];
     let mut block = |low: Vec3, high: Vec3| {
         let base = positions.len() as u32;
-        positions.extend((0..8).map(|k| Vec3::select(glam::BVec3::new(k & 1 == 1, k & 2 == 2, k & 4 == 4), high, low)));
-        for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
-            triangles.extend([[base + a, base + b, base + c], [base + a, base + c, base + d]]);
+        positions.extend((0..8).map(|k| {
+            Vec3::select(
+                glam::BVec3::new(k & 1 == 1, k & 2 == 2, k & 4 == 4),
+                high,
+                low,
+            )
+        }));
+        for [a, b, c, d] in [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ] {
+            triangles.extend([
+                [base + a, base + b, base + c],
+                [base + a, base + c, base + d],
+            ]);
         }
     };
     block(Vec3::new(0.55, 0.3, 0.25), Vec3::new(1.15, 0.8, 0.32));
@@ -51,10 +92,20 @@ fn tables() -> TileMesh {
 /// A flat floor with one wall as high as eight tiles are wide.
 fn wall() -> TileMesh {
     let positions = vec![
-        Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y,
-        Vec3::new(0.5, 0.0, 0.0), Vec3::new(0.5, 1.0, 0.0), Vec3::new(0.5, 1.0, 8.0), Vec3::new(0.5, 0.0, 8.0),
+        Vec3::ZERO,
+        Vec3::X,
+        Vec3::new(1.0, 1.0, 0.0),
+        Vec3::Y,
+        Vec3::new(0.5, 0.0, 0.0),
+        Vec3::new(0.5, 1.0, 0.0),
+        Vec3::new(0.5, 1.0, 8.0),
+        Vec3::new(0.5, 0.0, 8.0),
     ];
-    mesh(Vec2::ONE, positions, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    mesh(
+        Vec2::ONE,
+        positions,
+        vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+    )
 }
 
 fn sample(mesh: &TileMesh, count: usize) -> Facets {
@@ -63,11 +114,23 @@ fn sample(mesh: &TileMesh, count: usize) -> Facets {
 
 /// Directions up to 85°, off any grid.
 fn directions(count: usize) -> Vec<Vec3> {
-    (0..count).map(|k| from_angles(85_f32.to_radians() * ((k as f32 + 0.5) / count as f32), TAU * (0.618_034 * k as f32).fract())).collect()
+    (0..count)
+        .map(|k| {
+            from_angles(
+                85_f32.to_radians() * ((k as f32 + 0.5) / count as f32),
+                TAU * (0.618_034 * k as f32).fract(),
+            )
+        })
+        .collect()
 }
 
 /// Share of the projected area that two routes judge differently.
-fn disagreement(facets: &Facets, directions: &[Vec3], one: &PackedVisibility, other: impl Fn(usize, usize) -> bool) -> f64 {
+fn disagreement(
+    facets: &Facets,
+    directions: &[Vec3],
+    one: &PackedVisibility,
+    other: impl Fn(usize, usize) -> bool,
+) -> f64 {
     let (mut differ, mut all) = (0.0, 0.0);
     for (d, direction) in directions.iter().enumerate() {
         for s in 0..facets.len() {
@@ -81,7 +144,7 @@ fn disagreement(facets: &Facets, directions: &[Vec3], one: &PackedVisibility, ot
     differ / all
 }
 
-/// Rows of soft visibility along directions on azimuths that a route holds exactly.
+/// Rows of soft visibility.
 fn filled(visibility: &Visibility, directions: &[Vec3]) -> Vec<Vec<f32>> {
     directions
         .iter()
@@ -97,7 +160,16 @@ const AZIMUTHS: usize = 24;
 
 /// Directions up to 85° on the azimuths of the horizon maps.
 fn on_azimuths() -> Vec<Vec3> {
-    (0..AZIMUTHS).flat_map(|b| (0..6).map(move |a| from_angles((7.0 + 15.6 * a as f32).to_radians(), TAU * b as f32 / AZIMUTHS as f32))).collect()
+    (0..AZIMUTHS)
+        .flat_map(|b| {
+            (0..6).map(move |a| {
+                from_angles(
+                    (7.0 + 15.6 * a as f32).to_radians(),
+                    TAU * b as f32 / AZIMUTHS as f32,
+                )
+            })
+        })
+        .collect()
 }
 
 #[test]
@@ -109,14 +181,25 @@ fn all_routes_agree_on_a_height_field_up_to_85_degrees() {
     let exact = ray_cast(&grid, &facets, &directions);
     let sharp = 1e-6;
     let heights = mesh.height_grid.as_ref().unwrap();
-    let march = filled(&Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, AZIMUTHS, sharp)), &directions);
-    let scan = filled(&Visibility::Horizons(Horizons::scan(&grid, &facets, AZIMUTHS, sharp)), &directions);
+    let march = filled(
+        &Visibility::Horizons(Horizons::march(
+            heights, mesh.size, &facets, AZIMUTHS, sharp,
+        )),
+        &directions,
+    );
+    let scan = filled(
+        &Visibility::Horizons(Horizons::scan(&grid, &facets, AZIMUTHS, sharp)),
+        &directions,
+    );
     let maps = visibility_maps_cpu(&mesh, &facets, &directions, 512);
     let marched = disagreement(&facets, &directions, &exact, |d, s| march[d][s] > 0.5);
     let scanned = disagreement(&facets, &directions, &exact, |d, s| scan[d][s] > 0.5);
     let mapped = disagreement(&facets, &directions, &exact, |d, s| maps.is_visible(d, s));
     eprintln!("height-field: march {marched:.5}, scan {scanned:.5}, maps {mapped:.5}");
-    assert!(marched < 0.003 && scanned < 0.003 && mapped < 0.003, "{marched} {scanned} {mapped}");
+    assert!(
+        marched < 0.003 && scanned < 0.003 && mapped < 0.003,
+        "{marched} {scanned} {mapped}"
+    );
 }
 
 #[test]
@@ -126,9 +209,13 @@ fn all_routes_agree_under_overhangs_up_to_85_degrees() {
     let grid = PeriodicGrid::new(&mesh);
     let nodes = PolarGrid::new(10, AZIMUTHS);
     let soft = SoftMaps::scan(&grid, &facets, nodes);
-    let on_nodes: Vec<Vec3> = (0..9 * AZIMUTHS).map(|node| nodes.direction(node)).collect();
+    let on_nodes: Vec<Vec3> = (0..9 * AZIMUTHS)
+        .map(|node| nodes.direction(node))
+        .collect();
     let exact = ray_cast(&grid, &facets, &on_nodes);
-    let scanned = disagreement(&facets, &on_nodes, &exact, |d, s| soft.packed.is_visible(d, s));
+    let scanned = disagreement(&facets, &on_nodes, &exact, |d, s| {
+        soft.packed.is_visible(d, s)
+    });
     let maps = visibility_maps_cpu(&mesh, &facets, &on_nodes, 512);
     let mapped = disagreement(&facets, &on_nodes, &exact, |d, s| maps.is_visible(d, s));
     eprintln!("overhangs: scan {scanned:.5}, maps {mapped:.5}");
@@ -143,7 +230,12 @@ fn walking_the_samples_finds_the_horizons_that_slicing_the_mesh_does() {
     // A wide ramp turns differences of the horizon into differences of visibility.
     let ramp = 0.04;
     let march = Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, AZIMUTHS, ramp));
-    let scan = Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(&mesh), &facets, AZIMUTHS, ramp));
+    let scan = Visibility::Horizons(Horizons::scan(
+        &PeriodicGrid::new(&mesh),
+        &facets,
+        AZIMUTHS,
+        ramp,
+    ));
     let directions = on_azimuths();
     let (march, scan) = (filled(&march, &directions), filled(&scan, &directions));
     let mut differ = 0;
@@ -151,7 +243,10 @@ fn walking_the_samples_finds_the_horizons_that_slicing_the_mesh_does() {
         differ += usize::from((a - b).abs() * ramp > 2e-3);
     }
     let total = march.len() * facets.len();
-    assert!(differ * 500 < total, "{differ} of {total} horizons differ by more than 2 mrad");
+    assert!(
+        differ * 500 < total,
+        "{differ} of {total} horizons differ by more than 2 mrad"
+    );
 }
 
 /// Does a ray meet any of the copies of the tile around the base one? Möller and Trumbore 1997, in f64.
@@ -159,7 +254,11 @@ fn brute_force(mesh: &TileMesh, origin: Vec3, to: Vec3, own: u32, reach: i32) ->
     let (p, w) = (origin.as_dvec3(), to.as_dvec3());
     (-reach..=reach).any(|y| {
         (-reach..=reach).any(|x| {
-            let shift = DVec3::new(f64::from(x) * f64::from(mesh.size.x), f64::from(y) * f64::from(mesh.size.y), 0.0);
+            let shift = DVec3::new(
+                f64::from(x) * f64::from(mesh.size.x),
+                f64::from(y) * f64::from(mesh.size.y),
+                0.0,
+            );
             (0..mesh.triangles.len()).any(|t| {
                 let [a, b, c] = mesh.corners(t).map(|v| v.as_dvec3() + shift);
                 let (e1, e2) = (b - a, c - a);
@@ -174,7 +273,11 @@ fn brute_force(mesh: &TileMesh, origin: Vec3, to: Vec3, own: u32, reach: i32) ->
                 let v = w.dot(r) / determinant;
                 let distance = e2.dot(r) / determinant;
                 let lies_on = e1.cross(e2).normalize().dot(s).abs() < 1e-4;
-                u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0 && !(t as u32 == own && lies_on)
+                u >= 0.0
+                    && v >= 0.0
+                    && u + v <= 1.0
+                    && distance > 0.0
+                    && !(t as u32 == own && lies_on)
             })
         })
     })
@@ -182,7 +285,11 @@ fn brute_force(mesh: &TileMesh, origin: Vec3, to: Vec3, own: u32, reach: i32) ->
 
 #[test]
 fn ray_casting_is_the_brute_force_over_explicit_copies() {
-    for (name, mesh, reach) in [("dunes", dunes(10), 5), ("tables", tables(), 5), ("wall", wall(), 9)] {
+    for (name, mesh, reach) in [
+        ("dunes", dunes(10), 5),
+        ("tables", tables(), 5),
+        ("wall", wall(), 9),
+    ] {
         let facets = sample(&mesh, 150);
         let grid = PeriodicGrid::new(&mesh);
         let origins = lifted_origins(&facets, mesh.size);
@@ -214,15 +321,29 @@ fn a_tall_wall_shadows_tiles_far_away() {
     let grid = PeriodicGrid::new(&mesh);
     // At 45° across the walls every point of the floor is in some wall's shadow; along them none is.
     let across = ray_cast(&grid, &facets, &[from_angles(45_f32.to_radians(), 0.0)]);
-    let along = ray_cast(&grid, &facets, &[from_angles(80_f32.to_radians(), TAU / 4.0)]);
+    let along = ray_cast(
+        &grid,
+        &facets,
+        &[from_angles(80_f32.to_radians(), TAU / 4.0)],
+    );
     // 0.02 rad off the walls' own direction, a ray climbs to their height over 76 tiles along y and 1.5 across.
-    let oblique = ray_cast(&grid, &facets, &[from_angles(84_f32.to_radians(), TAU / 4.0 - 0.02)]);
+    let oblique = ray_cast(
+        &grid,
+        &facets,
+        &[from_angles(84_f32.to_radians(), TAU / 4.0 - 0.02)],
+    );
     for s in 0..facets.len() {
         if facets.normals[s].z > 0.9 {
-            assert!(!across.is_visible(0, s) && along.is_visible(0, s), "facet {s} at {}", facets.positions[s]);
+            assert!(
+                !across.is_visible(0, s) && along.is_visible(0, s),
+                "facet {s} at {}",
+                facets.positions[s]
+            );
         }
     }
-    let lit = (0..facets.len()).filter(|&s| facets.normals[s].z > 0.9 && oblique.is_visible(0, s)).count();
+    let lit = (0..facets.len())
+        .filter(|&s| facets.normals[s].z > 0.9 && oblique.is_visible(0, s))
+        .count();
     assert_eq!(lit, 0);
 }
 
@@ -246,7 +367,9 @@ fn check_projected_area(count: usize, tolerance: f64) {
             .map(|&direction| {
                 let area: f64 = (0..facets.len())
                     .filter(|&s| sees(&grid, &facets, s, direction))
-                    .map(|s| f64::from(facets.areas[s]) * f64::from(facets.normals[s].dot(direction)))
+                    .map(|s| {
+                        f64::from(facets.areas[s]) * f64::from(facets.normals[s].dot(direction))
+                    })
                     .sum();
                 (area / f64::from(mesh.base_area() * direction.z) - 1.0).abs()
             })
@@ -265,23 +388,45 @@ fn effective(mesh: &TileMesh, count: usize, term: Term, maps: bool) -> Effective
     } else {
         Visibility::Horizons(Horizons::scan(&grid, &facets, 48, 0.02))
     };
-    let material = SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::ONE };
-    let form = Form::Direct(Direct { sum: Arc::new(FacetSum::new(&facets, &[0], &[material])), visibility: Arc::new(visibility) });
-    EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
+    let material = SumMaterial {
+        brdf: Brdf { terms: vec![term] },
+        color: Vec3::ONE,
+    };
+    let form = Form::Direct(Direct {
+        sum: Arc::new(FacetSum::new(&facets, &[0], &[material])),
+        visibility: Arc::new(visibility),
+    });
+    EffectiveBrdf {
+        form,
+        base_area: f64::from(mesh.base_area()),
+    }
 }
 
 #[test]
-fn the_direct_form_is_reciprocal_to_rounding() {
+fn the_direct_form_is_reciprocal_to_the_last_bit() {
     for (mesh, maps) in [(dunes(24), false), (tables(), true)] {
         for term in [
             Term::Lambertian { albedo: Vec3::ONE },
-            Term::CookTorrance { roughness: 0.3, f0: Vec3::splat(0.5) },
-            Term::BlinnPhong { exponent: 50.0, specular: Vec3::ONE },
+            Term::Ward {
+                roughness: 0.3,
+                specular: Vec3::ONE,
+            },
+            Term::Ggx {
+                roughness: 0.2,
+                f0: Vec3::splat(0.5),
+            },
+            Term::CookTorrance {
+                roughness: 0.3,
+                f0: Vec3::splat(0.5),
+            },
+            Term::BlinnPhong {
+                exponent: 50.0,
+                specular: Vec3::ONE,
+            },
         ] {
             let brdf = effective(&mesh, 2000, term, maps);
             for pair in mirror_biased_pairs(80, 11) {
-                let (forward, backward) = (brdf.g(pair.i, pair.o), brdf.g(pair.o, pair.i));
-                assert!((forward - backward).abs().max_element() <= 1e-5 * forward.max_element() + 1e-12, "{pair:?}: {forward} {backward}");
+                assert_eq!(brdf.g(pair.i, pair.o), brdf.g(pair.o, pair.i), "{pair:?}");
             }
         }
     }
@@ -289,19 +434,36 @@ fn the_direct_form_is_reciprocal_to_rounding() {
 
 /// The mesh turned by a quarter about z and moved back onto the tile.
 fn quarter_turn(mesh: &TileMesh) -> TileMesh {
-    let positions = mesh.positions.iter().map(|p| Vec3::new(1.0 - p.y, p.x, p.z)).collect();
-    TileMesh { positions, height_grid: None, ..mesh.clone() }
+    let positions = mesh
+        .positions
+        .iter()
+        .map(|p| Vec3::new(1.0 - p.y, p.x, p.z))
+        .collect();
+    TileMesh {
+        positions,
+        height_grid: None,
+        ..mesh.clone()
+    }
 }
 
 #[test]
 fn turning_the_tile_with_the_directions_changes_nothing_but_the_sampling() {
     let turn = |d: Vec3| Vec3::new(-d.y, d.x, d.z);
     for (mesh, maps) in [(dunes(24), false), (tables(), true)] {
-        let term = Term::CookTorrance { roughness: 0.4, f0: Vec3::ONE };
-        let (plain, turned) = (effective(&mesh, 6000, term.clone(), maps), effective(&quarter_turn(&mesh), 6000, term, maps));
+        let term = Term::CookTorrance {
+            roughness: 0.4,
+            f0: Vec3::ONE,
+        };
+        let (plain, turned) = (
+            effective(&mesh, 6000, term.clone(), maps),
+            effective(&quarter_turn(&mesh), 6000, term, maps),
+        );
         let (mut difference, mut norm) = (0.0, 0.0);
         for pair in mirror_biased_pairs(120, 5) {
-            let (a, b) = (plain.eval(pair.i, pair.o), turned.eval(turn(pair.i), turn(pair.o)));
+            let (a, b) = (
+                plain.eval(pair.i, pair.o),
+                turned.eval(turn(pair.i), turn(pair.o)),
+            );
             difference += (a - b).length_squared();
             norm += a.length_squared();
         }

@@ -51,7 +51,8 @@ pub struct Settings {
     pub facets: usize,
     /// Azimuths of horizon maps.
     pub horizon_azimuths: usize,
-    /// Rings and azimuths of visibility maps, for overhangs.
+    /// Rings and azimuths of visibility maps, for overhangs. Azimuths count more than rings: on leaning rods with 8192
+    /// facets 32x64, 96x64, 64x128 and 64x256 leave 38.8, 38.6, 40.2 and 43.0 dB; 48x192 with 32,768 facets 46.0 dB.
     pub map_grid: PolarGrid,
     /// Width of the soft step at a horizon [rad].
     pub penumbra: f32,
@@ -135,7 +136,7 @@ impl Settings {
             preset,
             facets: 8192,
             horizon_azimuths: 48,
-            map_grid: PolarGrid::new(32, 64),
+            map_grid: PolarGrid::new(32, 128),
             penumbra: 0.02,
             method: Method::Auto,
             keep_m: 0.9995,
@@ -172,7 +173,7 @@ impl Settings {
             Preset::Fine | Preset::Reference => Self {
                 facets: 32_768,
                 horizon_azimuths: 96,
-                map_grid: PolarGrid::new(64, 128),
+                map_grid: PolarGrid::new(48, 192),
                 penumbra: 0.01,
                 keep_m: 0.9999,
                 keep_n: 0.9999,

@@ -53,7 +53,7 @@ multiversion! {
                 for c in 0..C {
                     let w = lane(weights[c], at);
                     for l in 0..LANES {
-                        lanes[c][l] += w[l] * a[l] * b[l];
+                        lanes[c][l] += w[l] * (a[l] * b[l]);
                     }
                 }
             }
