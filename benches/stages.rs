@@ -9,8 +9,7 @@ use biscale::accuracy::mirror_biased_pairs;
 use biscale::brdf::{Brdf, Term};
 use biscale::directions::from_angles;
 use biscale::filtering::{
-    Direct, EffectiveBrdf, FacetSum, Form, LowRank, RotatedBasis, RotatedLobe, SumMaterial,
-    analytic_lobe,
+    Direct, EffectiveBrdf, FacetSum, Form, LowRank, RotatedBasis, RotatedLobe, SumMaterial, analytic_lobe,
 };
 use biscale::geometry::{self, Facets, TileMesh};
 use biscale::plan::{Preset, Settings};
@@ -31,10 +30,7 @@ impl Bench {
     fn new() -> Self {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
         let mut bench = Self {
-            filter: arguments
-                .iter()
-                .find(|argument| !argument.starts_with('-'))
-                .cloned(),
+            filter: arguments.iter().find(|argument| !argument.starts_with('-')).cloned(),
             once: !arguments.iter().any(|argument| argument == "--bench"),
             yardstick_ms: 0.0,
         };
@@ -45,14 +41,8 @@ impl Bench {
             }
             sum
         });
-        println!(
-            "yardstick: a million dependent square roots, {:.3} ms",
-            bench.yardstick_ms
-        );
-        println!(
-            "{:<40} {:>12} {:>14} {:>12}",
-            "stage", "median", "each", "yardsticks"
-        );
+        println!("yardstick: a million dependent square roots, {:.3} ms", bench.yardstick_ms);
+        println!("{:<40} {:>12} {:>14} {:>12}", "stage", "median", "each", "yardsticks");
         bench
     }
 
@@ -74,19 +64,12 @@ impl Bench {
 
     /// `count` things of the kind `each` are done in one call of `work`.
     fn line<T>(&self, name: &str, count: usize, each: &str, work: impl FnMut() -> T) {
-        if self
-            .filter
-            .as_ref()
-            .is_some_and(|filter| !name.contains(filter))
-        {
+        if self.filter.as_ref().is_some_and(|filter| !name.contains(filter)) {
             return;
         }
         let ms = self.median_ms(work);
         let ns = ms * 1e6 / count as f64;
-        println!(
-            "{name:<40} {ms:>9.3} ms {ns:>10.1} ns/{each} {:>9.2}",
-            ms / self.yardstick_ms
-        );
+        println!("{name:<40} {ms:>9.3} ms {ns:>10.1} ns/{each} {:>9.2}", ms / self.yardstick_ms);
     }
 }
 
@@ -103,53 +86,16 @@ fn facets_of(mesh: &TileMesh, count: usize) -> Facets {
 
 fn terms() -> Vec<(&'static str, Term)> {
     vec![
-        (
-            "lambertian",
-            Term::Lambertian {
-                albedo: Vec3::splat(0.5),
-            },
-        ),
-        (
-            "blinn_phong 50",
-            Term::BlinnPhong {
-                exponent: 50.0,
-                specular: Vec3::ONE,
-            },
-        ),
-        (
-            "cook_torrance 0.2",
-            Term::CookTorrance {
-                roughness: 0.2,
-                f0: Vec3::splat(0.8),
-            },
-        ),
-        (
-            "ward 0.3",
-            Term::Ward {
-                roughness: 0.3,
-                specular: Vec3::ONE,
-            },
-        ),
-        (
-            "ggx 0.2",
-            Term::Ggx {
-                roughness: 0.2,
-                f0: Vec3::splat(0.8),
-            },
-        ),
+        ("lambertian", Term::Lambertian { albedo: Vec3::splat(0.5) }),
+        ("blinn_phong 50", Term::BlinnPhong { exponent: 50.0, specular: Vec3::ONE }),
+        ("cook_torrance 0.2", Term::CookTorrance { roughness: 0.2, f0: Vec3::splat(0.8) }),
+        ("ward 0.3", Term::Ward { roughness: 0.3, specular: Vec3::ONE }),
+        ("ggx 0.2", Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) }),
     ]
 }
 
 fn materials(term: &Term, slots: usize) -> (Vec<usize>, Vec<SumMaterial>) {
-    (
-        vec![0; slots],
-        vec![SumMaterial {
-            brdf: Brdf {
-                terms: vec![term.clone()],
-            },
-            color: Vec3::ONE,
-        }],
-    )
+    (vec![0; slots], vec![SumMaterial { brdf: Brdf { terms: vec![term.clone()] }, color: Vec3::ONE }])
 }
 
 fn main() -> Result<(), biscale::Error> {
@@ -160,59 +106,33 @@ fn main() -> Result<(), biscale::Error> {
     let azimuths = settings.horizon_azimuths;
 
     for (name, mesh) in [("height-field", &field), ("rods", &rods)] {
-        bench.line(&format!("facets, {name}"), count, "facet", || {
-            facets_of(mesh, count)
-        });
-        bench.line(
-            &format!("periodic grid, {name}"),
-            mesh.triangles.len(),
-            "triangle",
-            || PeriodicGrid::new(mesh),
-        );
+        bench.line(&format!("facets, {name}"), count, "facet", || facets_of(mesh, count));
+        bench.line(&format!("periodic grid, {name}"), mesh.triangles.len(), "triangle", || PeriodicGrid::new(mesh));
     }
     let (facets, rod_facets) = (facets_of(&field, count), facets_of(&rods, count));
     if let Some(heights) = &field.height_grid {
-        bench.line(
-            "horizons, march over the samples",
-            count * azimuths,
-            "azimuth",
-            || Horizons::march(heights, field.size, &facets, azimuths, settings.penumbra),
-        );
+        bench.line("horizons, march over the samples", count * azimuths, "azimuth", || {
+            Horizons::march(heights, field.size, &facets, azimuths, settings.penumbra)
+        });
     }
     let (grid, rod_grid) = (PeriodicGrid::new(&field), PeriodicGrid::new(&rods));
-    bench.line(
-        "horizons, scan of the triangles",
-        count * azimuths,
-        "azimuth",
-        || Horizons::scan(&grid, &facets, azimuths, settings.penumbra),
-    );
-    bench.line(
-        "maps, scan of the triangles (rods)",
-        count * settings.map_grid.len(),
-        "direction",
-        || SoftMaps::scan(&rod_grid, &rod_facets, settings.map_grid),
-    );
+    bench.line("horizons, scan of the triangles", count * azimuths, "azimuth", || {
+        Horizons::scan(&grid, &facets, azimuths, settings.penumbra)
+    });
+    bench.line("maps, scan of the triangles (rods)", count * settings.map_grid.len(), "direction", || {
+        SoftMaps::scan(&rod_grid, &rod_facets, settings.map_grid)
+    });
 
     let (i, o) = (from_angles(0.5, 0.3), from_angles(0.9, 2.0));
-    let horizons = Arc::new(Visibility::Horizons(Horizons::scan(
-        &grid,
-        &facets,
-        azimuths,
-        settings.penumbra,
-    )));
+    let horizons = Arc::new(Visibility::Horizons(Horizons::scan(&grid, &facets, azimuths, settings.penumbra)));
     let maps = Visibility::Maps(SoftMaps::scan(&rod_grid, &rod_facets, settings.map_grid));
     let mut seen = vec![0.0; count];
     for (name, visibility) in [("horizons", horizons.as_ref()), ("maps", &maps)] {
         // As many as were asked for, within the rounding of strata.
         seen.resize(visibility.facets(), 0.0);
-        bench.line(
-            &format!("visibility of a direction, {name}"),
-            seen.len(),
-            "facet",
-            || {
-                visibility.fill(black_box(i), 0..seen.len(), &mut seen);
-            },
-        );
+        bench.line(&format!("visibility of a direction, {name}"), seen.len(), "facet", || {
+            visibility.fill(black_box(i), 0..seen.len(), &mut seen);
+        });
     }
 
     let pairs = mirror_biased_pairs(64, 1);
@@ -220,12 +140,9 @@ fn main() -> Result<(), biscale::Error> {
     for (name, term) in terms() {
         let (material_of_slot, materials) = materials(&term, field.slots.len());
         let sum = FacetSum::new(&facets, &material_of_slot, &materials);
-        bench.line(
-            &format!("sum of a pair, {name}"),
-            facets.len(),
-            "facet",
-            || sum.sum(black_box(i), o, &all_seen, &all_seen),
-        );
+        bench.line(&format!("sum of a pair, {name}"), facets.len(), "facet", || {
+            sum.sum(black_box(i), o, &all_seen, &all_seen)
+        });
         let low_rank = settings.low_rank(false);
         if let Some(lobe) = analytic_lobe(&term) {
             let entries = low_rank.basis.pairs.nodes() * low_rank.basis.normal_rings;
@@ -235,33 +152,14 @@ fn main() -> Result<(), biscale::Error> {
             });
         }
         let build = || LowRank::build(&facets, &horizons, &material_of_slot, &materials, &low_rank);
-        bench.line(
-            &format!("factors with their basis, {name}"),
-            facets.len(),
-            "facet",
-            build,
-        );
+        bench.line(&format!("factors with their basis, {name}"), facets.len(), "facet", build);
         let base_area = f64::from(field.base_area());
-        let direct = Direct {
-            sum: Arc::new(sum),
-            visibility: horizons.clone(),
-        };
-        for (form_name, form) in [
-            ("direct", Form::Direct(direct)),
-            ("factors", Form::LowRank(build()?)),
-        ] {
+        let direct = Direct { sum: Arc::new(sum), visibility: horizons.clone() };
+        for (form_name, form) in [("direct", Form::Direct(direct)), ("factors", Form::LowRank(build()?))] {
             let brdf = EffectiveBrdf { form, base_area };
-            bench.line(
-                &format!("eval, {form_name}, {name}"),
-                pairs.len(),
-                "pair",
-                || {
-                    pairs
-                        .iter()
-                        .map(|pair| brdf.eval(pair.i, pair.o))
-                        .sum::<Vec3>()
-                },
-            );
+            bench.line(&format!("eval, {form_name}, {name}"), pairs.len(), "pair", || {
+                pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).sum::<Vec3>()
+            });
         }
     }
     Ok(())

@@ -27,17 +27,8 @@ pub struct InputError {
 }
 
 impl InputError {
-    pub fn new(
-        place: impl Into<String>,
-        found: impl fmt::Display,
-        expected: impl fmt::Display,
-    ) -> Self {
-        Self {
-            place: place.into(),
-            found: found.to_string(),
-            expected: expected.to_string(),
-            ..Self::default()
-        }
+    pub fn new(place: impl Into<String>, found: impl fmt::Display, expected: impl fmt::Display) -> Self {
+        Self { place: place.into(), found: found.to_string(), expected: expected.to_string(), ..Self::default() }
     }
 
     pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {

@@ -11,7 +11,8 @@ use crate::brdf::{Brdf, MeasuredCache, Term};
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
 use crate::filtering::{
-    Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, Reflectance, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings,
+    Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, Reflectance, SumMaterial, VisibleFacets, Wu2011,
+    Wu2011Settings,
 };
 use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
@@ -36,7 +37,13 @@ impl<K, T> Default for Stage<K, T> {
 
 impl<K: PartialEq, T> Stage<K, T> {
     /// The last result if `key` is the same, else a new one, timed.
-    fn get(&mut self, name: &'static str, key: K, times: &mut StageTimes, make: impl FnOnce() -> Result<T>) -> Result<(Arc<T>, bool)> {
+    fn get(
+        &mut self,
+        name: &'static str,
+        key: K,
+        times: &mut StageTimes,
+        make: impl FnOnce() -> Result<T>,
+    ) -> Result<(Arc<T>, bool)> {
         if let Some((last, value)) = &self.last
             && *last == key
         {
@@ -119,7 +126,8 @@ impl Pipeline {
             self.facets.last = None;
         }
         let facet_key = (settings.facets, settings.seed);
-        let (facets, facets_new) = self.facets.get("facets", facet_key, &mut times, || Ok(sample(&shape.mesh, &settings)))?;
+        let (facets, facets_new) =
+            self.facets.get("facets", facet_key, &mut times, || Ok(sample(&shape.mesh, &settings)))?;
         if facets_new {
             self.visibility.last = None;
         }
@@ -129,10 +137,17 @@ impl Pipeline {
         if settings.preset == Preset::Wu2011 {
             return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_new);
         }
-        let key = (plan.route, settings.horizon_azimuths, settings.map_grid, settings.map_resolution, settings.penumbra.to_bits());
+        let key = (
+            plan.route,
+            settings.horizon_azimuths,
+            settings.map_grid,
+            settings.map_resolution,
+            settings.penumbra.to_bits(),
+        );
         let gpu = self.gpu.as_ref();
-        let (visibility, visibility_new) =
-            self.visibility.get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
+        let (visibility, visibility_new) = self
+            .visibility
+            .get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
 
         if let Some((last, outcome)) = &self.last
             && *last == settings
@@ -141,7 +156,8 @@ impl Pipeline {
             return Ok(Outcome { times, ..outcome.clone() });
         }
         let start = Instant::now();
-        let (form, factored) = product(&plan, &facets, &visibility, sum, material_of_slot, sum_materials, &shape, &settings)?;
+        let (form, factored) =
+            product(&plan, &facets, &visibility, sum, material_of_slot, sum_materials, &shape, &settings)?;
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
         for (name, ms) in &times {
             plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
@@ -180,8 +196,10 @@ impl Pipeline {
         mut times: StageTimes,
         materials_new: bool,
     ) -> Result<Outcome> {
-        let knobs = Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
-        let timed = |times: &mut StageTimes, name, start: Instant| times.push((name, start.elapsed().as_secs_f64() * 1e3));
+        let knobs =
+            Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
+        let timed =
+            |times: &mut StageTimes, name, start: Instant| times.push((name, start.elapsed().as_secs_f64() * 1e3));
         let start = Instant::now();
         let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
         let visibility = visibility_maps_cpu(&shape.mesh, facets, directions.directions(), settings.map_resolution);
@@ -288,13 +306,17 @@ impl Pipeline {
             self.gpu = Gpu::open().ok();
         }
         let hardware_gpu = settings.backend != Backend::Cpu
-            && self.gpu.as_ref().is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.tier == crate::gpu::Tier::Hardware);
+            && self
+                .gpu
+                .as_ref()
+                .is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.tier == crate::gpu::Tier::Hardware);
         let mut used: Vec<usize> = facets.slots.iter().map(|slot| material_of_slot[usize::from(*slot)]).collect();
         used.sort_unstable();
         used.dedup();
         let is_black = |index: &&usize| materials[**index].color == Vec3::ZERO;
         let black_materials = used.iter().filter(is_black).count();
-        let is_lambertian = |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
+        let is_lambertian =
+            |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
         Findings {
             flat: shape.flat,
             height_samples: shape.mesh.height_grid.is_some(),
@@ -308,7 +330,8 @@ impl Pipeline {
             } else {
                 self.scan_work
             },
-            area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>() / f64::from(shape.mesh.base_area()),
+            area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>()
+                / f64::from(shape.mesh.base_area()),
             materials: used.len() - black_materials,
             black_materials,
             colors_vary: sum.colors_vary(),
@@ -343,7 +366,9 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
     let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
     Ok(match (route, &mesh.height_grid, gpu) {
         (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
-        (Route::HeightMarch, Some(heights), _) => Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp)),
+        (Route::HeightMarch, Some(heights), _) => {
+            Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp))
+        }
         (Route::HeightMarch | Route::HorizonScan, ..) => {
             Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(mesh), facets, azimuths, ramp))
         }
@@ -352,7 +377,9 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
             let (grid, resolution) = (settings.map_grid, settings.map_resolution);
             // A GPU that fails is no reason to stop: the CPU's maps are the same.
             let packed = match (route, gpu) {
-                (Route::GpuMaps, Some(gpu)) => visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution).ok(),
+                (Route::GpuMaps, Some(gpu)) => {
+                    visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution).ok()
+                }
                 _ => None,
             };
             let packed = packed.unwrap_or_else(|| visibility_maps_cpu(mesh, facets, &grid.directions(), resolution));
@@ -377,7 +404,8 @@ fn product(
     if !plan.try_low_rank {
         return Ok((direct, None));
     }
-    let factors = LowRank::build(facets, visibility, material_of_slot, materials, &settings.low_rank(!shape.height_field))?;
+    let factors =
+        LowRank::build(facets, visibility, material_of_slot, materials, &settings.low_rank(!shape.height_field))?;
     let base_area = f64::from(shape.mesh.base_area());
     let direct = EffectiveBrdf { form: direct, base_area };
     let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };

@@ -1,4 +1,5 @@
 //! What a person gets against what is right, on tiles that nobody tuned anything for.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -34,7 +35,12 @@ fn random_heights(seed: u64) -> String {
     let rows: Vec<String> = (0..N)
         .map(|j| {
             let row: Vec<String> = (0..N)
-                .map(|i| waves.iter().map(|[kx, ky, phase, height]| height * (TAU * (kx * at(i) + ky * at(j)) + phase).sin()).sum::<f32>())
+                .map(|i| {
+                    waves
+                        .iter()
+                        .map(|[kx, ky, phase, height]| height * (TAU * (kx * at(i) + ky * at(j)) + phase).sin())
+                        .sum::<f32>()
+                })
                 .map(|z| format!("{z:.6}"))
                 .collect();
             format!("[{}]", row.join(","))
@@ -64,7 +70,12 @@ fn evaluate(brdf: &EffectiveBrdf, pairs: &[Pair]) -> Vec<Vec3> {
 }
 
 /// The reference at the pairs, and the relative L2 of its own standard errors.
-fn reference(pipeline: &mut Pipeline, scene: &LoadedScene, pairs: &[Pair], settings: &ReferenceSettings) -> (Vec<Vec3>, f64) {
+fn reference(
+    pipeline: &mut Pipeline,
+    scene: &LoadedScene,
+    pairs: &[Pair],
+    settings: &ReferenceSettings,
+) -> (Vec<Vec3>, f64) {
     let mut own = 0.0;
     let estimates = pipeline
         .with_reference(scene, |reference| {
@@ -78,22 +89,47 @@ fn reference(pipeline: &mut Pipeline, scene: &LoadedScene, pairs: &[Pair], setti
 }
 
 fn check(name: &str, errors: Errors, own: f64) {
-    eprintln!("{name}: {:.1} dB, {:.2} % (the reference's own {:.2} %)", errors.psnr_db, errors.rel_l2 * 100.0, own * 100.0);
-    assert!(own < 0.02, "{name}: the reference itself is only good to {own}");
+    eprintln!(
+        "{name}: {:.1} dB, {:.2} % (the reference's own {:.2} %)",
+        errors.psnr_db,
+        errors.rel_l2 * 100.0,
+        own * 100.0
+    );
+    assert!(own < 0.03, "{name}: the reference itself is only good to {own}");
     assert!(errors.psnr_db >= 35.0 && errors.rel_l2 <= 0.10, "{name}: {errors:?}");
 }
 
+/// Three lobes in one material, a channel each: one reference answers for all three.
+const CHANNELS: &str = r#"[
+    { kind = "lambertian", albedo = [0.7, 0, 0] },
+    { kind = "ward", roughness = 0.3, specular = [0, 0.5, 0] },
+    { kind = "blinn_phong", exponent = 50, specular = [0, 0, 0.5] },
+]"#;
+
 #[test]
 fn standard_reaches_35_db_and_ten_percent_on_tiles_nobody_tuned_for() {
-    let pairs = mirror_biased_pairs(150, 77);
-    let settings = ReferenceSettings { facets: 4096, max_passes: 2, target: 2e-3, seed: 99 };
+    let pairs = mirror_biased_pairs(100, 77);
+    let settings = ReferenceSettings { facets: 3072, max_passes: 2, target: 2e-3, seed: 99 };
+    let [lambertian, cook_torrance_2, cook_torrance_5, ward, blinn_phong] = BRDFS;
+    let references = [
+        (CHANNELS.replace('\n', " "), vec![lambertian, ward, blinn_phong]),
+        (cook_torrance_2.1.to_owned(), vec![cook_torrance_2]),
+        (cook_torrance_5.1.to_owned(), vec![cook_torrance_5]),
+    ];
     for (tile, geometry) in tiles() {
         let mut pipeline = Pipeline::new();
-        for (name, brdf) in BRDFS {
-            let scene = open(&geometry, brdf, "standard");
-            let got = evaluate(&pipeline.effective(&scene).unwrap().brdf, &pairs);
+        for (together, parts) in &references {
+            let scene = open(&geometry, together, "standard");
             let (right, own) = reference(&mut pipeline, &scene, &pairs, &settings);
-            check(&format!("{tile}, {name}"), compare(&got, &right), own);
+            for (channel, (name, brdf)) in parts.iter().enumerate() {
+                let scene = open(&geometry, brdf, "standard");
+                let got = evaluate(&pipeline.effective(&scene).unwrap().brdf, &pairs);
+                let right: Vec<Vec3> = right
+                    .iter()
+                    .map(|f_bar| if parts.len() > 1 { Vec3::splat(f_bar[channel]) } else { *f_bar })
+                    .collect();
+                check(&format!("{tile}, {name}"), compare(&got, &right), own);
+            }
         }
     }
 }
@@ -115,10 +151,12 @@ fn merl_spec(path: &Path) -> String {
 
 #[test]
 fn standard_reaches_35_db_and_ten_percent_with_a_measured_paint() {
-    let Some(path) = merl("silver-paint.binary") else { return };
-    let pairs = mirror_biased_pairs(100, 78);
+    let Some(path) = merl("silver-paint.binary") else {
+        return;
+    };
+    let pairs = mirror_biased_pairs(60, 78);
     let settings = ReferenceSettings { facets: 4096, max_passes: 2, target: 2e-3, seed: 99 };
-    for (tile, geometry) in tiles() {
+    for (tile, geometry) in tiles().into_iter().step_by(2) {
         let mut pipeline = Pipeline::new();
         let scene = open(&geometry, &merl_spec(&path), "standard");
         let got = evaluate(&pipeline.effective(&scene).unwrap().brdf, &pairs);
@@ -137,7 +175,8 @@ fn a_flat_tile_has_the_small_scale_brdf_in_every_preset() {
             let mut pipeline = Pipeline::new();
             let got = evaluate(&pipeline.effective(&scene).unwrap().brdf, &pairs);
             let material = &pipeline.sum_materials(&scene).unwrap().1[0];
-            let want: Vec<Vec3> = pairs.iter().map(|pair| material.color * material.brdf.f(Vec3::Z, pair.i, pair.o) / pair.o.z).collect();
+            let want: Vec<Vec3> =
+                pairs.iter().map(|pair| material.color * material.brdf.f(Vec3::Z, pair.i, pair.o) / pair.o.z).collect();
             let errors = compare(&got, &want);
             assert!(errors.rel_l2 < 1e-5, "{name}, {preset}: {errors:?}");
         }
@@ -148,11 +187,18 @@ fn a_flat_tile_has_the_small_scale_brdf_in_every_preset() {
 #[ignore = "the whole table of DESIGN.md's Sec. 7: half an hour on two cores"]
 fn table_of_presets_scenes_and_brdfs_at_500_pairs() {
     let pairs = mirror_biased_pairs(500, 77);
-    let mut brdfs: Vec<(String, String)> = BRDFS.iter().map(|&(name, spec)| (name.to_owned(), spec.to_owned())).collect();
+    let mut brdfs: Vec<(String, String)> =
+        BRDFS.iter().map(|&(name, spec)| (name.to_owned(), spec.to_owned())).collect();
     if let Some(path) = merl("silver-paint.binary") {
         brdfs.push(("silver-paint".to_owned(), merl_spec(&path)));
     }
-    let presets = [("draft", 0.0, 1.0), ("standard", 35.0, 0.10), ("fine", 43.0, 0.04), ("reference", 50.0, 0.01), ("wu2011", 0.0, 10.0)];
+    let presets = [
+        ("draft", 0.0, 1.0),
+        ("standard", 35.0, 0.10),
+        ("fine", 43.0, 0.04),
+        ("reference", 50.0, 0.01),
+        ("wu2011", 0.0, 10.0),
+    ];
     let settings = ReferenceSettings { facets: 16_384, max_passes: 16, target: 2e-3, seed: 99 };
     eprintln!("{:<16} {:<18} {:>9} {:>8} {:>8} {:>9}  form", "tile", "brdf", "preset", "dB", "%", "ms");
     let mut missed = Vec::new();
@@ -166,14 +212,21 @@ fn table_of_presets_scenes_and_brdfs_at_500_pairs() {
                 let start = std::time::Instant::now();
                 let (got, form) = if preset == "reference" {
                     // Another seed than that of what it is compared with.
-                    (reference(&mut pipeline, &scene, &pairs, &ReferenceSettings { seed: 1, ..settings }).0, "reference".to_owned())
+                    (
+                        reference(&mut pipeline, &scene, &pairs, &ReferenceSettings { seed: 1, ..settings }).0,
+                        "reference".to_owned(),
+                    )
                 } else {
                     let outcome = pipeline.effective(&scene).unwrap();
                     (evaluate(&outcome.brdf, &pairs), outcome.brdf.form.describe())
                 };
                 let ms = start.elapsed().as_secs_f64() * 1e3;
                 let errors = compare(&got, &right);
-                eprintln!("{tile:<16} {name:<18} {preset:>9} {:>8.1} {:>8.2} {ms:>9.0}  {form}", errors.psnr_db, errors.rel_l2 * 100.0);
+                eprintln!(
+                    "{tile:<16} {name:<18} {preset:>9} {:>8.1} {:>8.2} {ms:>9.0}  {form}",
+                    errors.psnr_db,
+                    errors.rel_l2 * 100.0
+                );
                 if errors.psnr_db < psnr_db || errors.rel_l2 > rel_l2 {
                     missed.push(format!("{tile}, {name}, {preset}: {errors:?}"));
                 }

@@ -1,4 +1,5 @@
 //! The built program from outside: what it prints, what it writes, and what it says about bad input.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -66,8 +67,10 @@ impl Desk {
 
     /// Names of all files in the folder.
     fn files(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            std::fs::read_dir(self.folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<String> = std::fs::read_dir(self.folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         names
     }
@@ -137,7 +140,9 @@ fn plan_has_the_shape_of_the_contract_and_a_reason_for_everything() {
         assert!(effect["predicted_ms"].as_f64().unwrap() >= 0.0);
         assert!(effect["measured_ms"].is_null() || effect["measured_ms"].as_f64().unwrap() >= 0.0);
     }
-    let find = |plan: &Value, name: &str| plan["effects"].as_array().unwrap().iter().find(|e| e["name"] == name).unwrap()["on"] == true;
+    let find = |plan: &Value, name: &str| {
+        plan["effects"].as_array().unwrap().iter().find(|e| e["name"] == name).unwrap()["on"] == true
+    };
     assert!(find(&plan, "visibility"));
     desk.write("flat.toml", FLAT);
     let flat = desk.json(&["plan", "flat.toml", "--json", "--quiet"]);
@@ -172,8 +177,13 @@ fn directions_at_and_under_the_horizon_reflect_nothing() {
     desk.write("grooves.toml", GROOVES);
     let right = std::f64::consts::FRAC_PI_2;
     let header = "theta_i,phi_i,theta_o,phi_o\n";
-    desk.write("pairs.csv", format!("{header}{right},0,0.3,0\n0.3,0,{right},1\n2,0,0.1,0\n0.1,0,3.1,0\n{right},0,{right},0\n"));
-    for scene in [GROOVES.to_owned(), FLAT.to_owned(), GROOVES.replace("facets = 256", "facets = 256\nmethod = \"low_rank\"")] {
+    desk.write(
+        "pairs.csv",
+        format!("{header}{right},0,0.3,0\n0.3,0,{right},1\n2,0,0.1,0\n0.1,0,3.1,0\n{right},0,{right},0\n"),
+    );
+    for scene in
+        [GROOVES.to_owned(), FLAT.to_owned(), GROOVES.replace("facets = 256", "facets = 256\nmethod = \"low_rank\"")]
+    {
         desk.write("scene.toml", scene);
         let text = desk.text(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "-", "--quiet"]);
         for row in rows(&text) {
@@ -187,7 +197,17 @@ fn columns_may_stand_in_any_order_and_standard_errors_come_on_request() {
     let desk = Desk::new();
     desk.write("flat.toml", FLAT);
     desk.write("pairs.csv", "# angles\nphi_o, theta_o, phi_i, theta_i\n0,0,0,1\n\n");
-    let text = desk.text(&["eval", "flat.toml", "--pairs", "pairs.csv", "-o", "-", "--standard-error", "--quality", "reference"]);
+    let text = desk.text(&[
+        "eval",
+        "flat.toml",
+        "--pairs",
+        "pairs.csv",
+        "-o",
+        "-",
+        "--standard-error",
+        "--quality",
+        "reference",
+    ]);
     assert_eq!(text.lines().next(), Some("theta_i,phi_i,theta_o,phi_o,r,g,b,se_r,se_g,se_b"));
     let row = &rows(&text)[0];
     assert_eq!(row[..4], [1.0, 0.0, 0.0, 0.0]);
@@ -198,13 +218,32 @@ fn columns_may_stand_in_any_order_and_standard_errors_come_on_request() {
 fn the_same_seed_gives_the_same_bytes_with_any_number_of_threads() {
     let desk = Desk::new();
     desk.write("pairs.csv", PAIRS);
-    let pyramids = GROOVES.replace(r#"{ kind = "grooves", profile = "v", count = 4, depth = 0.1, side_angle_deg = 40 }"#, r#"{ kind = "pyramids" }"#);
+    let pyramids = GROOVES.replace(
+        r#"{ kind = "grooves", profile = "v", count = 4, depth = 0.1, side_angle_deg = 40 }"#,
+        r#"{ kind = "pyramids" }"#,
+    );
     for (scene, method) in [(GROOVES, "direct"), (pyramids.as_str(), "low_rank")] {
         desk.write("scene.toml", scene);
         let method = format!("quality.method=\"{method}\"");
-        let arguments = ["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "-", "--quiet", "--backend", "cpu", "--set", &method, "--seed", "7"];
-        let runs: Vec<Vec<u8>> =
-            ["1", "2", "3"].iter().map(|threads| desk.run_with(&arguments, &[("RAYON_NUM_THREADS", threads)]).stdout).collect();
+        let arguments = [
+            "eval",
+            "scene.toml",
+            "--pairs",
+            "pairs.csv",
+            "-o",
+            "-",
+            "--quiet",
+            "--backend",
+            "cpu",
+            "--set",
+            &method,
+            "--seed",
+            "7",
+        ];
+        let runs: Vec<Vec<u8>> = ["1", "2", "3"]
+            .iter()
+            .map(|threads| desk.run_with(&arguments, &[("RAYON_NUM_THREADS", threads)]).stdout)
+            .collect();
         assert!(!runs[0].is_empty() && runs.iter().all(|run| *run == runs[0]), "{method}");
     }
 }
@@ -223,7 +262,19 @@ fn render_writes_pictures_of_the_size_asked_for() {
     let desk = Desk::new();
     desk.write("scene.toml", GROOVES);
     for file in ["picture.png", "picture.exr"] {
-        desk.text(&["render", "scene.toml", "-o", file, "--size", "48x32", "--samples", "1", "--backend", "cpu", "--quiet"]);
+        desk.text(&[
+            "render",
+            "scene.toml",
+            "-o",
+            file,
+            "--size",
+            "48x32",
+            "--samples",
+            "1",
+            "--backend",
+            "cpu",
+            "--quiet",
+        ]);
     }
     let picture = image::open(desk.path("picture.png")).unwrap().to_rgb8();
     assert_eq!(picture.dimensions(), (48, 32));
@@ -314,12 +365,18 @@ fn measured_files_and_meshes_that_are_broken_are_refused_and_named() {
     let desk = Desk::new();
     desk.write("pairs.csv", PAIRS);
     let header: Vec<u8> = [90_i32, 90, 180].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let merl = |name: &str| FLAT.replace("kind = \"lambertian\", albedo = [0.2, 0.5, 0.8]", &format!("kind = \"merl\", path = \"{name}\""));
+    let merl = |name: &str| {
+        FLAT.replace("kind = \"lambertian\", albedo = [0.2, 0.5, 0.8]", &format!("kind = \"merl\", path = \"{name}\""))
+    };
     let mesh = |name: &str| FLAT.replace("kind = \"flat\"", &format!("kind = \"mesh\", path = \"{name}\""));
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
     let files: [(&str, Vec<u8>, &[&str]); 9] = [
         ("short.binary", [header.clone(), vec![0; 1000]].concat(), &["1012", "expected"]),
-        ("shape.binary", [[90_i32, 90, 90].iter().flat_map(|n| n.to_le_bytes()).collect(), vec![0; 1000]].concat(), &["90", "180"]),
+        (
+            "shape.binary",
+            [[90_i32, 90, 90].iter().flat_map(|n| n.to_le_bytes()).collect(), vec![0; 1000]].concat(),
+            &["90", "180"],
+        ),
         ("empty.binary", Vec::new(), &["expected"]),
         ("points.obj", square.into(), &["no faces"]),
         ("range.obj", format!("{square}f 1 2 3\nf 1 2 9\n").into(), &["line 6", "9", "expected"]),

@@ -1,4 +1,5 @@
 //! Every shader in `shaders/` parses and validates, whatever the machine: naga needs no adapter.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -78,26 +79,14 @@ fn every_shader_parses_and_validates_with_its_imports() {
         };
         failures.extend(complaint(&source).map(|error| format!("{name}: {error}")));
     }
-    assert!(
-        failures.is_empty(),
-        "{} shaders fail:\n{}",
-        failures.len(),
-        failures.join("\n")
-    );
+    assert!(failures.is_empty(), "{} shaders fail:\n{}", failures.len(), failures.join("\n"));
 }
 
 #[test]
 fn the_table_of_shaders_is_the_folder() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let files = std::fs::read_dir(&folder)
-        .expect("shaders/ is there")
-        .map(|entry| entry.expect("readable").path());
-    let files: BTreeSet<_> = files
-        .filter_map(|path| Some(path.file_name()?.to_str()?.to_owned()))
-        .collect();
-    let table: BTreeSet<_> = biscale::gpu::SHADERS
-        .iter()
-        .map(|(name, _)| format!("{name}.wgsl"))
-        .collect();
+    let files = std::fs::read_dir(&folder).expect("shaders/ is there").map(|entry| entry.expect("readable").path());
+    let files: BTreeSet<_> = files.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
+    let table: BTreeSet<_> = biscale::gpu::SHADERS.iter().map(|(name, _)| format!("{name}.wgsl")).collect();
     assert_eq!(files, table);
 }

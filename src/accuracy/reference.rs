@@ -71,12 +71,22 @@ impl Moments {
 
 impl<'a> Reference<'a> {
     pub fn new(mesh: &'a TileMesh, material_of_slot: &[usize], materials: &[SumMaterial]) -> Self {
-        Self { mesh, grid: PeriodicGrid::new(mesh), material_of_slot: material_of_slot.to_vec(), materials: materials.to_vec() }
+        Self {
+            mesh,
+            grid: PeriodicGrid::new(mesh),
+            material_of_slot: material_of_slot.to_vec(),
+            materials: materials.to_vec(),
+        }
     }
 
     /// Estimates `f̄` at each pair. `progress(passes done, relative L2 of the standard errors)` after each pass; it
     /// returns whether to go on.
-    pub fn estimate(&self, pairs: &[Pair], settings: &ReferenceSettings, mut progress: impl FnMut(usize, f64) -> bool) -> Vec<Estimate> {
+    pub fn estimate(
+        &self,
+        pairs: &[Pair],
+        settings: &ReferenceSettings,
+        mut progress: impl FnMut(usize, f64) -> bool,
+    ) -> Vec<Estimate> {
         let mut moments = vec![Moments::default(); pairs.len()];
         let mut estimates = vec![Estimate::default(); pairs.len()];
         let sampler = FacetSampler::new(self.mesh);
@@ -115,7 +125,15 @@ impl<'a> Reference<'a> {
     }
 
     /// `(Σ ΔA V V f, a_v)` of one set of facets.
-    fn one_pass(&self, facets: &Facets, sum: &FacetSum, origins: &[Vec3], pair: Pair, v_i: &mut [f32], v_o: &mut [f32]) -> (DVec3, f64) {
+    fn one_pass(
+        &self,
+        facets: &Facets,
+        sum: &FacetSum,
+        origins: &[Vec3],
+        pair: Pair,
+        v_i: &mut [f32],
+        v_o: &mut [f32],
+    ) -> (DVec3, f64) {
         let Pair { i, o } = pair;
         if i.z <= 0.0 || o.z <= 0.0 {
             return (DVec3::ZERO, 0.0);

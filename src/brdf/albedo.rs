@@ -24,10 +24,7 @@ impl Brdf {
 /// The largest directional albedo of any channel from normal incidence to 80°.
 pub(super) fn max_albedo(f_cos: impl Fn(&LobeAngles) -> Vec3) -> f32 {
     let angles = [0.0_f32, 20.0, 40.0, 60.0, 80.0];
-    angles
-        .iter()
-        .map(|degrees| albedo_of(&f_cos, degrees.to_radians(), 48).max_element())
-        .fold(0.0, f32::max)
+    angles.iter().map(|degrees| albedo_of(&f_cos, degrees.to_radians(), 48).max_element()).fold(0.0, f32::max)
 }
 
 fn albedo_of(f_cos: impl Fn(&LobeAngles) -> Vec3, theta: f32, samples: usize) -> Vec3 {
@@ -54,8 +51,7 @@ fn albedo_of(f_cos: impl Fn(&LobeAngles) -> Vec3, theta: f32, samples: usize) ->
                 i_dot_h: i_dot_h as f32,
             };
             if i_dot_h > 0.0 {
-                sum += f_cos(&angles).as_dvec3()
-                    * (4.0 * i_dot_h * sin_h * theta_h_max * u * (1.0 - u));
+                sum += f_cos(&angles).as_dvec3() * (4.0 * i_dot_h * sin_h * theta_h_max * u * (1.0 - u));
             }
         }
     }
@@ -68,21 +64,13 @@ mod tests {
     use super::*;
 
     fn albedo(term: Term, degrees: f32, samples: usize) -> f32 {
-        Brdf { terms: vec![term] }
-            .directional_albedo(degrees.to_radians(), samples)
-            .x
+        Brdf { terms: vec![term] }.directional_albedo(degrees.to_radians(), samples).x
     }
 
     #[test]
     fn a_lambertian_reflects_its_albedo_at_every_angle() {
         for degrees in [0.0, 30.0, 60.0, 80.0, 85.0] {
-            let found = albedo(
-                Term::Lambertian {
-                    albedo: Vec3::splat(0.6),
-                },
-                degrees,
-                96,
-            );
+            let found = albedo(Term::Lambertian { albedo: Vec3::splat(0.6) }, degrees, 96);
             assert!((found / 0.6 - 1.0).abs() < 1e-3, "{degrees}: {found}");
         }
     }
@@ -91,21 +79,10 @@ mod tests {
     fn blinn_phong_has_its_closed_form_at_normal_incidence() {
         // c = n·h, n·o = 2c²-1, dω_o = 4c dω_h: (e+8)/(8π) 2π ∫ c^e (2c²-1) 4c dc from cos 45° to 1.
         for e in [1.0_f64, 10.0, 100.0, 1000.0, 1e6] {
-            let antiderivative =
-                |c: f64| 2.0 * c.powf(e + 4.0) / (e + 4.0) - c.powf(e + 2.0) / (e + 2.0);
+            let antiderivative = |c: f64| 2.0 * c.powf(e + 4.0) / (e + 4.0) - c.powf(e + 2.0) / (e + 2.0);
             let expected = (e + 8.0) * (antiderivative(1.0) - antiderivative(0.5_f64.sqrt()));
-            let found = f64::from(albedo(
-                Term::BlinnPhong {
-                    exponent: e as f32,
-                    specular: Vec3::ONE,
-                },
-                0.0,
-                96,
-            ));
-            assert!(
-                (found / expected - 1.0).abs() < 1e-3,
-                "{e}: {found} for {expected}"
-            );
+            let found = f64::from(albedo(Term::BlinnPhong { exponent: e as f32, specular: Vec3::ONE }, 0.0, 96));
+            assert!((found / expected - 1.0).abs() < 1e-3, "{e}: {found} for {expected}");
         }
     }
 
@@ -113,16 +90,7 @@ mod tests {
     fn a_perfect_mirror_of_facets_never_gains_energy() {
         for roughness in [1e-4, 1e-3, 0.01, 0.1, 0.2, 0.5, 1.0] {
             for degrees in [0.0, 20.0, 40.0, 60.0, 75.0, 85.0, 89.0] {
-                for term in [
-                    Term::CookTorrance {
-                        roughness,
-                        f0: Vec3::ONE,
-                    },
-                    Term::Ggx {
-                        roughness,
-                        f0: Vec3::ONE,
-                    },
-                ] {
+                for term in [Term::CookTorrance { roughness, f0: Vec3::ONE }, Term::Ggx { roughness, f0: Vec3::ONE }] {
                     let found = albedo(term.clone(), degrees, 96);
                     assert!(found <= 1.002 && found > 0.2, "{term:?} {degrees}: {found}");
                     // Nothing is lost while the lobe is far narrower than its distance to the horizon.
@@ -137,10 +105,7 @@ mod tests {
     #[test]
     fn the_horizon_and_below_reflect_nothing() {
         for degrees in [90.0, 120.0, f32::NAN] {
-            assert_eq!(
-                albedo(Term::Lambertian { albedo: Vec3::ONE }, degrees, 8),
-                0.0
-            );
+            assert_eq!(albedo(Term::Lambertian { albedo: Vec3::ONE }, degrees, 8), 0.0);
         }
     }
 }

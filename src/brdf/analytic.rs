@@ -23,9 +23,7 @@ pub(super) fn blinn_phong(exponent: f32, angles: &LobeAngles) -> f32 {
 /// `(e+8)/(8π) (n·h)^e`. A power of `n·h` itself would lose `e ε` near the mirror direction: 6 % at e = 10⁶.
 #[inline]
 pub(super) fn blinn_phong_without_cosines(exponent: f32, angles: &LobeAngles) -> f32 {
-    let power = exp_nonpositive(
-        (0.5 * exponent) * ln_cos_squared(angles.sin2_theta_h, angles.n_dot_h).min(0.0),
-    );
+    let power = exp_nonpositive((0.5 * exponent) * ln_cos_squared(angles.sin2_theta_h, angles.n_dot_h).min(0.0));
     (exponent + 8.0) / (8.0 * PI) * power
 }
 
@@ -40,11 +38,7 @@ pub(super) fn cook_torrance(roughness: f32, angles: &LobeAngles) -> f32 {
     let distribution = exponential / (PI * m2 * cos2 * cos2).max(1e-16);
     // min(1, 2 (n·h) min(n·i, n·o) / i·h) without dividing by an i·h that is 0 for opposite directions.
     let cavity = (2.0 * angles.n_dot_h * angles.n_dot_i.min(angles.n_dot_o)).max(0.0);
-    let shadowing = if cavity < angles.i_dot_h {
-        cavity / angles.i_dot_h
-    } else {
-        1.0
-    };
+    let shadowing = if cavity < angles.i_dot_h { cavity / angles.i_dot_h } else { 1.0 };
     0.25 * distribution * shadowing
 }
 
@@ -68,11 +62,7 @@ pub(super) fn ggx(roughness: f32, angles: &LobeAngles) -> f32 {
     let slope_i = (a2 + (1.0 - a2) * ni * ni).sqrt();
     let slope_o = (a2 + (1.0 - a2) * no * no).sqrt();
     let denominator = no * slope_i + ni * slope_o;
-    let shadowing = if denominator > 0.0 {
-        0.5 * (ni * no) / denominator
-    } else {
-        0.0
-    };
+    let shadowing = if denominator > 0.0 { 0.5 * (ni * no) / denominator } else { 0.0 };
     distribution * shadowing
 }
 

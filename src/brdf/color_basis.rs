@@ -43,8 +43,7 @@ impl ColorBasis {
     pub fn count_for(&self, kept: f64) -> usize {
         // Rounding in the Gram matrix is not a colour.
         let wanted = kept - 1e-12;
-        1 + usize::from(self.energy[0] < wanted)
-            + usize::from(self.energy[0] + self.energy[1] < wanted)
+        1 + usize::from(self.energy[0] < wanted) + usize::from(self.energy[0] + self.energy[1] < wanted)
     }
 
     /// The coordinates of a colour along each direction.
@@ -53,10 +52,7 @@ impl ColorBasis {
     }
 
     fn from_gram(gram: Matrix3<f64>) -> Self {
-        let black = Self {
-            directions: [Vec3::X, Vec3::Y, Vec3::Z],
-            energy: [0.0; 3],
-        };
+        let black = Self { directions: [Vec3::X, Vec3::Y, Vec3::Z], energy: [0.0; 3] };
         let scale = gram.amax();
         if !(scale > 0.0 && scale.is_finite()) {
             return black;
@@ -69,16 +65,9 @@ impl ColorBasis {
         let directions = order.map(|k| {
             let column = eigen.eigenvectors.column(k);
             let direction = DVec3::new(column[0], column[1], column[2]);
-            if direction.element_sum() < 0.0 {
-                -direction.as_vec3()
-            } else {
-                direction.as_vec3()
-            }
+            if direction.element_sum() < 0.0 { -direction.as_vec3() } else { direction.as_vec3() }
         });
-        Self {
-            directions,
-            energy: values.map(|value| value / total),
-        }
+        Self { directions, energy: values.map(|value| value / total) }
     }
 }
 
@@ -119,10 +108,7 @@ mod tests {
     #[test]
     fn one_tint_is_one_direction_with_all_the_energy() {
         let color = Vec3::new(0.9, 0.3, 0.1);
-        let found = basis(vec![Term::Ward {
-            roughness: 0.2,
-            specular: color,
-        }]);
+        let found = basis(vec![Term::Ward { roughness: 0.2, specular: color }]);
         assert!(found.directions[0].dot(color.normalize()) > 1.0 - 1e-6);
         assert!(found.energy[0] > 1.0 - 1e-9 && found.count_for(1.0) == 1);
         assert_orthonormal(&found);
@@ -131,10 +117,7 @@ mod tests {
     #[test]
     fn disjoint_colours_are_found_with_their_share_of_the_energy() {
         // Red where green and blue are 0: the eigenvectors are the axes, the energies the lobes' own.
-        let term = |specular| Term::Ward {
-            roughness: 0.3,
-            specular,
-        };
+        let term = |specular| Term::Ward { roughness: 0.3, specular };
         let (red, green) = (term(Vec3::X * 2.0), Term::Lambertian { albedo: Vec3::Y });
         let alone = |term: &Term, c: usize| {
             let mut sum = 0.0;
@@ -160,27 +143,14 @@ mod tests {
     #[test]
     fn three_lobes_of_three_colours_need_three_directions_and_rebuild_exactly() {
         let terms = vec![
-            Term::Lambertian {
-                albedo: Vec3::new(0.1, 0.2, 0.8),
-            },
-            Term::Ward {
-                roughness: 0.1,
-                specular: Vec3::new(0.9, 0.1, 0.1),
-            },
-            Term::BlinnPhong {
-                exponent: 4.0,
-                specular: Vec3::new(0.1, 0.9, 0.1),
-            },
+            Term::Lambertian { albedo: Vec3::new(0.1, 0.2, 0.8) },
+            Term::Ward { roughness: 0.1, specular: Vec3::new(0.9, 0.1, 0.1) },
+            Term::BlinnPhong { exponent: 4.0, specular: Vec3::new(0.1, 0.9, 0.1) },
         ];
         let found = basis(terms);
         assert_eq!(found.count_for(1.0), 3);
         let color = Vec3::new(0.2, 0.7, 0.4);
-        let rebuilt: Vec3 = found
-            .project(color)
-            .iter()
-            .zip(found.directions)
-            .map(|(&c, d)| c * d)
-            .sum();
+        let rebuilt: Vec3 = found.project(color).iter().zip(found.directions).map(|(&c, d)| c * d).sum();
         assert!((rebuilt - color).length() < 1e-6);
     }
 
@@ -190,16 +160,15 @@ mod tests {
         let [bins_h, bins_d, bins_phi] = SAMPLED_BINS;
         let lambertian = Term::Lambertian { albedo: Vec3::X };
         let mut sum = 0.0;
-        for bin in (0..bins_h * bins_d * bins_phi)
-            .map(|k| [k / (bins_d * bins_phi), k / bins_phi % bins_d, k % bins_phi])
+        for bin in
+            (0..bins_h * bins_d * bins_phi).map(|k| [k / (bins_d * bins_phi), k / bins_phi % bins_d, k % bins_phi])
         {
             let (angles, weight) = sample_point(bin);
             sum += f64::from(lambertian.f_cos(&angles).x).powi(2) * weight;
         }
         use std::f64::consts::{FRAC_PI_2, PI};
         // θ_h = (π/2) t²: dθ_h = 2 √(π/2) √θ_h dt. All φ_h (2π), φ_d four times a quarter turn.
-        let widths = 2.0 * FRAC_PI_2.sqrt() / bins_h as f64 * FRAC_PI_2 / bins_d as f64 * FRAC_PI_2
-            / bins_phi as f64;
+        let widths = 2.0 * FRAC_PI_2.sqrt() / bins_h as f64 * FRAC_PI_2 / bins_d as f64 * FRAC_PI_2 / bins_phi as f64;
         let integral = sum * 4.0 * widths * 2.0 * PI * 4.0;
         assert!((integral / (4.0 / 9.0) - 1.0).abs() < 0.01, "{integral}");
     }

@@ -14,9 +14,7 @@ pub(super) fn exp_nonpositive(x: f32) -> f32 {
     let p = 1.0
         + y * (1.0
             + y * (1.0 / 2.0
-                + y * (1.0 / 6.0
-                    + y * (1.0 / 24.0
-                        + y * (1.0 / 120.0 + y * (1.0 / 720.0 + y * (1.0 / 5040.0)))))));
+                + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0 + y * (1.0 / 720.0 + y * (1.0 / 5040.0)))))));
     // The low bits of the shifted number are k, within [-127, 0]; -127 makes the exponent bits 0: the number 0.
     let biased = shifted.to_bits().wrapping_sub(ROUND.to_bits() - 127);
     let scale = f32::from_bits(biased << 23);
@@ -28,9 +26,7 @@ pub(super) fn exp_nonpositive(x: f32) -> f32 {
 pub(super) fn ln_cos_squared(sin2: f32, cos: f32) -> f32 {
     // ln x = k ln 2 + 2 atanh z with z = (m-1)/(m+1), m = x 2^-k in [1/√2, √2); near the pole 1 - sin² is m itself.
     let x = (cos * cos).max(f32::MIN_POSITIVE);
-    let biased = x
-        .to_bits()
-        .wrapping_sub(std::f32::consts::FRAC_1_SQRT_2.to_bits());
+    let biased = x.to_bits().wrapping_sub(std::f32::consts::FRAC_1_SQRT_2.to_bits());
     let exponent = (biased as i32) >> 23;
     let mantissa = f32::from_bits(x.to_bits().wrapping_sub((exponent << 23) as u32));
     let near_pole = sin2 < 0.5;
@@ -40,9 +36,7 @@ pub(super) fn ln_cos_squared(sin2: f32, cos: f32) -> f32 {
     let z = numerator / denominator;
     let w = z * z;
     let series = 1.0
-        + w * (1.0 / 3.0
-            + w * (1.0 / 5.0
-                + w * (1.0 / 7.0 + w * (1.0 / 9.0 + w * (1.0 / 11.0 + w * (1.0 / 13.0))))));
+        + w * (1.0 / 3.0 + w * (1.0 / 5.0 + w * (1.0 / 7.0 + w * (1.0 / 9.0 + w * (1.0 / 11.0 + w * (1.0 / 13.0))))));
     k * std::f32::consts::LN_2 + 2.0 * z * series
 }
 
@@ -87,11 +81,7 @@ mod tests {
             let theta = (f64::from(k) / 100_000.0).powi(4) * std::f64::consts::FRAC_PI_2;
             let (sin2, cos) = ((theta.sin().powi(2)) as f32, theta.cos() as f32);
             // The arguments as f32 hold them.
-            let exact = if sin2 < 0.5 {
-                (-f64::from(sin2)).ln_1p()
-            } else {
-                2.0 * f64::from(cos).ln()
-            };
+            let exact = if sin2 < 0.5 { (-f64::from(sin2)).ln_1p() } else { 2.0 * f64::from(cos).ln() };
             let error = (f64::from(ln_cos_squared(sin2, cos)) - exact).abs();
             assert!(error <= 3e-7 * exact.abs(), "{theta}: {error} of {exact}");
         }
@@ -104,10 +94,7 @@ mod tests {
             let x = k as f32 / 100_000.0;
             let found = (1.0 - x).sqrt() * acos_over_sqrt_one_minus(x);
             let exact = f64::from(x).acos();
-            assert!(
-                (f64::from(found) - exact).abs() <= 1e-6 * exact + 1e-7,
-                "{x}"
-            );
+            assert!((f64::from(found) - exact).abs() <= 1e-6 * exact + 1e-7, "{x}");
         }
     }
 }

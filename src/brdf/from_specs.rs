@@ -23,45 +23,28 @@ impl Brdf {
         if terms.is_empty() {
             return Err(InputError::new("brdf", "an empty list", "at least one term").into());
         }
-        Ok(Self {
-            terms: terms
-                .iter()
-                .map(|term| term_from_spec(term, base_dir, cache))
-                .collect::<Result<_>>()?,
-        })
+        Ok(Self { terms: terms.iter().map(|term| term_from_spec(term, base_dir, cache)).collect::<Result<_>>()? })
     }
 }
 
 fn term_from_spec(spec: &TermSpec, base_dir: &Path, cache: &mut MeasuredCache) -> Result<Term> {
     Ok(match spec {
-        TermSpec::Lambertian { albedo } => Term::Lambertian {
-            albedo: color("brdf.albedo", *albedo)?,
-        },
+        TermSpec::Lambertian { albedo } => Term::Lambertian { albedo: color("brdf.albedo", *albedo)? },
         TermSpec::BlinnPhong { exponent, specular } => Term::BlinnPhong {
             exponent: number("brdf.exponent", *exponent, EXPONENT_RANGE)?,
             specular: color("brdf.specular", *specular)?,
         },
-        TermSpec::CookTorrance { roughness, f0 } => Term::CookTorrance {
-            roughness: self::roughness(*roughness)?,
-            f0: color("brdf.f0", *f0)?,
-        },
-        TermSpec::Ward {
-            roughness,
-            specular,
-        } => Term::Ward {
-            roughness: self::roughness(*roughness)?,
-            specular: color("brdf.specular", *specular)?,
-        },
-        TermSpec::Ggx { roughness, f0 } => Term::Ggx {
-            roughness: self::roughness(*roughness)?,
-            f0: color("brdf.f0", *f0)?,
-        },
-        TermSpec::Merl { path } => {
-            Term::Measured(cache.load(MeasuredKind::Merl, &base_dir.join(path))?)
+        TermSpec::CookTorrance { roughness, f0 } => {
+            Term::CookTorrance { roughness: self::roughness(*roughness)?, f0: color("brdf.f0", *f0)? }
         }
-        TermSpec::Rgl { path } => {
-            Term::Measured(cache.load(MeasuredKind::Rgl, &base_dir.join(path))?)
+        TermSpec::Ward { roughness, specular } => {
+            Term::Ward { roughness: self::roughness(*roughness)?, specular: color("brdf.specular", *specular)? }
         }
+        TermSpec::Ggx { roughness, f0 } => {
+            Term::Ggx { roughness: self::roughness(*roughness)?, f0: color("brdf.f0", *f0)? }
+        }
+        TermSpec::Merl { path } => Term::Measured(cache.load(MeasuredKind::Merl, &base_dir.join(path))?),
+        TermSpec::Rgl { path } => Term::Measured(cache.load(MeasuredKind::Rgl, &base_dir.join(path))?),
     })
 }
 
@@ -70,10 +53,7 @@ fn roughness(value: f32) -> Result<f32> {
 }
 
 fn color(place: &str, value: Vec3) -> Result<Vec3> {
-    value
-        .to_array()
-        .iter()
-        .try_for_each(|&channel| number(place, channel, COLOR_RANGE).map(drop))?;
+    value.to_array().iter().try_for_each(|&channel| number(place, channel, COLOR_RANGE).map(drop))?;
     Ok(value)
 }
 
@@ -103,15 +83,9 @@ mod tests {
     fn one_term_and_a_list_become_terms() {
         let mut cache = MeasuredCache::default();
         let one = "brdf = { kind = 'ggx', roughness = 0.2, f0 = [0.9, 0.6, 0.3] }";
-        assert!(matches!(
-            build(one, Path::new(""), &mut cache).unwrap().terms[..],
-            [Term::Ggx { .. }]
-        ));
+        assert!(matches!(build(one, Path::new(""), &mut cache).unwrap().terms[..], [Term::Ggx { .. }]));
         let two = "brdf = [{ kind = 'lambertian', albedo = [0.5, 0.5, 0.5] }, { kind = 'ward', roughness = 0.3, specular = [1.0, 1.0, 1.0] }]";
-        assert_eq!(
-            build(two, Path::new(""), &mut cache).unwrap().terms.len(),
-            2
-        );
+        assert_eq!(build(two, Path::new(""), &mut cache).unwrap().terms.len(), 2);
     }
 
     #[test]
@@ -121,36 +95,16 @@ mod tests {
                 "kind = 'ggx', roughness = 0.0, f0 = [1.0, 1.0, 1.0]",
                 "brdf.roughness: found 0, expected a number from 0.0001 to 2",
             ),
-            (
-                "kind = 'ward', roughness = nan, specular = [1.0, 1.0, 1.0]",
-                "brdf.roughness: found NaN",
-            ),
-            (
-                "kind = 'lambertian', albedo = [0.5, -0.1, 0.5]",
-                "brdf.albedo: found -0.1",
-            ),
-            (
-                "kind = 'blinn_phong', exponent = inf, specular = [1.0, 1.0, 1.0]",
-                "brdf.exponent: found inf",
-            ),
+            ("kind = 'ward', roughness = nan, specular = [1.0, 1.0, 1.0]", "brdf.roughness: found NaN"),
+            ("kind = 'lambertian', albedo = [0.5, -0.1, 0.5]", "brdf.albedo: found -0.1"),
+            ("kind = 'blinn_phong', exponent = inf, specular = [1.0, 1.0, 1.0]", "brdf.exponent: found inf"),
         ];
         for (spec, message) in cases {
-            let error = build(
-                &format!("brdf = {{ {spec} }}"),
-                Path::new(""),
-                &mut MeasuredCache::default(),
-            )
-            .unwrap_err();
-            assert!(
-                error.to_string().contains(message) && error.exit_code() == 2,
-                "{error}"
-            );
+            let error =
+                build(&format!("brdf = {{ {spec} }}"), Path::new(""), &mut MeasuredCache::default()).unwrap_err();
+            assert!(error.to_string().contains(message) && error.exit_code() == 2, "{error}");
         }
-        let empty = Brdf::from_specs(
-            &BrdfSpec::Sum(Vec::new()),
-            Path::new(""),
-            &mut MeasuredCache::default(),
-        );
+        let empty = Brdf::from_specs(&BrdfSpec::Sum(Vec::new()), Path::new(""), &mut MeasuredCache::default());
         assert!(empty.unwrap_err().to_string().contains("at least one term"));
     }
 
@@ -158,28 +112,18 @@ mod tests {
     fn a_measured_file_is_read_once_until_it_changes() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("white.binary");
-        let mut bytes: Vec<u8> = [90_i32, 90, 180]
-            .iter()
-            .flat_map(|n| n.to_le_bytes())
-            .collect();
+        let mut bytes: Vec<u8> = [90_i32, 90, 180].iter().flat_map(|n| n.to_le_bytes()).collect();
         bytes.extend(std::iter::repeat_n(1000.0_f64.to_le_bytes(), 3 * 90 * 90 * 180).flatten());
         std::fs::write(&path, &bytes).unwrap();
         let mut cache = MeasuredCache::default();
         let spec = "brdf = { kind = 'merl', path = 'white.binary' }";
-        let mut table = || {
-            build(spec, directory.path(), &mut cache)
-                .map(|brdf| brdf.terms[0].measured().cloned().unwrap())
-        };
+        let mut table =
+            || build(spec, directory.path(), &mut cache).map(|brdf| brdf.terms[0].measured().cloned().unwrap());
         let (first, second) = (table().unwrap(), table().unwrap());
         assert!(std::sync::Arc::ptr_eq(&first, &second));
         bytes.pop();
         std::fs::write(&path, &bytes).unwrap();
-        assert!(
-            table()
-                .unwrap_err()
-                .to_string()
-                .contains("found 34992011 bytes")
-        );
+        assert!(table().unwrap_err().to_string().contains("found 34992011 bytes"));
         std::fs::remove_file(&path).unwrap();
         assert!(table().unwrap_err().to_string().contains("white.binary"));
     }

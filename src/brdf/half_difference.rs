@@ -31,11 +31,7 @@ pub(super) const MERL_SHAPE: [usize; 3] = [90, 90, 90];
 /// The angles of a bin's centre, radians. `bin` may be fractional: a position between centres.
 pub(super) fn bin_angles(shape: [usize; 3], bin: [f64; 3]) -> [f64; 3] {
     let at = |axis: usize| (bin[axis] + 0.5) / shape[axis] as f64;
-    [
-        at(0).powi(2) * FRAC_PI_2,
-        at(1) * FRAC_PI_2,
-        at(2) * FRAC_PI_2,
-    ]
+    [at(0).powi(2) * FRAC_PI_2, at(1) * FRAC_PI_2, at(2) * FRAC_PI_2]
 }
 
 /// The bins in `θ_h` and `θ_d` of a row of `φ_d`.
@@ -53,23 +49,10 @@ pub(super) fn cosines([theta_h, theta_d, phi_d]: [f64; 3]) -> (f64, f64) {
 impl HalfDifferenceTable {
     /// `samples` as stored: rows of `φ_d` in the order of [`row_bins`], the fourth component 1 where valid and all 0 elsewhere.
     /// Each axis has at least two bins.
-    pub(super) fn new(
-        name: String,
-        shape: [usize; 3],
-        samples: Vec<Vec4>,
-        report: MeasuredReport,
-    ) -> Self {
-        debug_assert!(
-            shape.iter().all(|&n| n >= 2) && samples.len() == shape.iter().product::<usize>()
-        );
-        let mut table = Self {
-            name,
-            shape: shape.map(|n| n as i32),
-            samples,
-            report,
-        };
-        table.report.max_albedo =
-            max_albedo(|angles| table.f_r(angles) * (angles.n_dot_i * angles.n_dot_o));
+    pub(super) fn new(name: String, shape: [usize; 3], samples: Vec<Vec4>, report: MeasuredReport) -> Self {
+        debug_assert!(shape.iter().all(|&n| n >= 2) && samples.len() == shape.iter().product::<usize>());
+        let mut table = Self { name, shape: shape.map(|n| n as i32), samples, report };
+        table.report.max_albedo = max_albedo(|angles| table.f_r(angles) * (angles.n_dot_i * angles.n_dot_o));
         table
     }
 
@@ -101,40 +84,22 @@ impl HalfDifferenceTable {
         let cosine_difference = (angles.n_dot_o - angles.n_dot_i).abs();
         let cos_phi = (cosine_difference / double_sines.max(f32::MIN_POSITIVE)).min(1.0);
         // acos of each over π/2; 1 - cosθ_h = sin²/(1 + cos) is exact at the pole.
-        let unit =
-            |one_minus: f32, cos: f32| one_minus.sqrt() * acos_over_sqrt_one_minus(cos) * FRAC_2_PI;
+        let unit = |one_minus: f32, cos: f32| one_minus.sqrt() * acos_over_sqrt_one_minus(cos) * FRAC_2_PI;
         let (h, t_h) = Self::tap(unit(sin2_h / (1.0 + cos_h), cos_h).sqrt(), bins_h);
         let (d, t_d) = Self::tap(unit(1.0 - cos_d, cos_d), bins_d);
         let (p, t_p) = Self::tap(unit(1.0 - cos_phi, cos_phi), bins_phi);
-        Cell {
-            first: (d * bins_h + h) * bins_phi + p,
-            t: [t_h, t_d, t_p],
-        }
+        Cell { first: (d * bins_h + h) * bins_phi + p, t: [t_h, t_d, t_p] }
     }
 
     /// The valid corners of a cell, their weights renormalised.
     #[inline]
-    fn interpolate(
-        &self,
-        Cell {
-            first,
-            t: [t_h, t_d, t_p],
-        }: Cell,
-    ) -> Vec3 {
+    fn interpolate(&self, Cell { first, t: [t_h, t_d, t_p] }: Cell) -> Vec3 {
         let [bins_h, _, bins_phi] = self.shape;
-        let (first, to_next_h, to_next_d) = (
-            first as usize,
-            bins_phi as usize,
-            (bins_h * bins_phi) as usize,
-        );
+        let (first, to_next_h, to_next_d) = (first as usize, bins_phi as usize, (bins_h * bins_phi) as usize);
         let along_phi = |at: usize| self.samples[at] * (1.0 - t_p) + self.samples[at + 1] * t_p;
         let along_h = |at: usize| along_phi(at) * (1.0 - t_h) + along_phi(at + to_next_h) * t_h;
         let sum = along_h(first) * (1.0 - t_d) + along_h(first + to_next_d) * t_d;
-        if sum.w > 0.0 {
-            sum.truncate() / sum.w
-        } else {
-            Vec3::ZERO
-        }
+        if sum.w > 0.0 { sum.truncate() / sum.w } else { Vec3::ZERO }
     }
 }
 
@@ -147,11 +112,7 @@ struct Cell {
 
 impl Measured for HalfDifferenceTable {
     fn f_r(&self, angles: &LobeAngles) -> Vec3 {
-        if angles.above() {
-            self.interpolate(self.locate(angles))
-        } else {
-            Vec3::ZERO
-        }
+        if angles.above() { self.interpolate(self.locate(angles)) } else { Vec3::ZERO }
     }
 
     /// Locates a block and then reads it, so that the arithmetic vectorises and reads do not wait for it.
@@ -211,12 +172,7 @@ mod tests {
                 }
             })
             .collect();
-        HalfDifferenceTable::new(
-            "random".to_owned(),
-            shape,
-            samples,
-            MeasuredReport::default(),
-        )
+        HalfDifferenceTable::new("random".to_owned(), shape, samples, MeasuredReport::default())
     }
 
     /// Half and difference angles by rotating the light's direction, in f64; `φ_d` in (-π, π].
@@ -224,13 +180,8 @@ mod tests {
         let (i, o) = (i.as_dvec3(), o.as_dvec3());
         let h = (i + o) / (i + o).length();
         let (theta_h, phi_h) = (h.x.hypot(h.y).atan2(h.z), h.y.atan2(h.x));
-        let unturned =
-            glam::DQuat::from_rotation_y(-theta_h) * (glam::DQuat::from_rotation_z(-phi_h) * i);
-        [
-            theta_h,
-            unturned.x.hypot(unturned.y).atan2(unturned.z),
-            unturned.y.atan2(unturned.x),
-        ]
+        let unturned = glam::DQuat::from_rotation_y(-theta_h) * (glam::DQuat::from_rotation_z(-phi_h) * i);
+        [theta_h, unturned.x.hypot(unturned.y).atan2(unturned.z), unturned.y.atan2(unturned.x)]
     }
 
     #[test]
@@ -258,8 +209,8 @@ mod tests {
                     })
                     .product();
                 let at = |k: usize, n: i64| (bins[k] as i64 + upper[k]).clamp(0, n - 1);
-                let sample = table.samples[((at(1, bins_d) * bins_h + at(0, bins_h)) * bins_phi
-                    + at(2, bins_phi)) as usize];
+                let sample =
+                    table.samples[((at(1, bins_d) * bins_h + at(0, bins_h)) * bins_phi + at(2, bins_phi)) as usize];
                 if sample.w > 0.0 {
                     sum += weight * sample.truncate().as_dvec3();
                     weights += weight;
@@ -269,9 +220,7 @@ mod tests {
                 continue;
             }
             let expected = sum / weights;
-            let found = table
-                .f_r(&LobeAngles::new(Vec3::Z, i, o, half_vector(i, o)))
-                .as_dvec3();
+            let found = table.f_r(&LobeAngles::new(Vec3::Z, i, o, half_vector(i, o))).as_dvec3();
             assert!(
                 (found - expected).abs().max_element() < 2e-3 * expected.max_element(),
                 "{i} {o}: {found} {expected}"
@@ -286,9 +235,7 @@ mod tests {
             let i = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
             let o = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
             let (n_dot_i, n_dot_o) = cosines(rotated_angles(i, o));
-            assert!(
-                (n_dot_i - f64::from(i.z)).abs() < 1e-6 && (n_dot_o - f64::from(o.z)).abs() < 1e-6
-            );
+            assert!((n_dot_i - f64::from(i.z)).abs() < 1e-6 && (n_dot_o - f64::from(o.z)).abs() < 1e-6);
         }
     }
 
@@ -296,39 +243,17 @@ mod tests {
     fn lookups_are_reciprocal_to_the_bit_and_bounded_at_degenerate_angles() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let table = random_table(&mut rng);
-        let edge = [
-            f32::MIN_POSITIVE,
-            1e-20,
-            1e-7,
-            1e-3,
-            0.5,
-            0.999_999_9,
-            1.0,
-            1.000_000_2,
-        ];
+        let edge = [f32::MIN_POSITIVE, 1e-20, 1e-7, 1e-3, 0.5, 0.999_999_9, 1.0, 1.000_000_2];
         for n_dot_i in edge {
             for n_dot_o in edge {
                 for n_dot_h in edge {
                     for sin2_theta_h in edge.iter().copied().chain([0.0]) {
                         for i_dot_h in edge.iter().copied().chain([0.0, -1e-7]) {
-                            let there = LobeAngles {
-                                n_dot_i,
-                                n_dot_o,
-                                n_dot_h,
-                                sin2_theta_h,
-                                i_dot_h,
-                            };
-                            let back = LobeAngles {
-                                n_dot_i: n_dot_o,
-                                n_dot_o: n_dot_i,
-                                ..there
-                            };
+                            let there = LobeAngles { n_dot_i, n_dot_o, n_dot_h, sin2_theta_h, i_dot_h };
+                            let back = LobeAngles { n_dot_i: n_dot_o, n_dot_o: n_dot_i, ..there };
                             let value = table.f_r(&there);
                             assert_eq!(value, table.f_r(&back));
-                            assert!(
-                                value.min_element() >= 0.0 && value.max_element() <= 100.1,
-                                "{there:?}: {value}"
-                            );
+                            assert!(value.min_element() >= 0.0 && value.max_element() <= 100.1, "{there:?}: {value}");
                         }
                     }
                 }
@@ -356,12 +281,8 @@ mod tests {
 
     #[test]
     fn no_valid_neighbour_gives_zero() {
-        let table = HalfDifferenceTable::new(
-            "none".to_owned(),
-            [2, 2, 2],
-            vec![Vec4::ZERO; 8],
-            MeasuredReport::default(),
-        );
+        let table =
+            HalfDifferenceTable::new("none".to_owned(), [2, 2, 2], vec![Vec4::ZERO; 8], MeasuredReport::default());
         let angles = LobeAngles::new(Vec3::Z, Vec3::Z, Vec3::Z, Vec3::Z);
         assert_eq!(table.f_r(&angles), Vec3::ZERO);
     }

@@ -67,15 +67,9 @@ struct FileKey {
 impl MeasuredCache {
     /// The table of a file, read if it is new or has changed.
     pub fn load(&mut self, kind: MeasuredKind, path: &Path) -> Result<Arc<dyn Measured>> {
-        let metadata = std::fs::metadata(path).map_err(|error| {
-            InputError::new("", error, "a measured BRDF that can be read").in_file(path)
-        })?;
-        let key = FileKey {
-            kind,
-            path: path.to_owned(),
-            modified: metadata.modified().ok(),
-            len: metadata.len(),
-        };
+        let metadata = std::fs::metadata(path)
+            .map_err(|error| InputError::new("", error, "a measured BRDF that can be read").in_file(path))?;
+        let key = FileKey { kind, path: path.to_owned(), modified: metadata.modified().ok(), len: metadata.len() };
         if let Some(table) = self.tables.get(&key) {
             return Ok(Arc::clone(table));
         }

@@ -24,40 +24,26 @@ const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// Reads a file whole (35 MB) and keeps a third of it.
 pub(super) fn load(path: &Path) -> Result<HalfDifferenceTable> {
-    let unreadable = |error: std::io::Error| {
-        InputError::new("", error, "a MERL file that can be read").in_file(path)
-    };
+    let unreadable = |error: std::io::Error| InputError::new("", error, "a MERL file that can be read").in_file(path);
     let file = File::open(path).map_err(unreadable)?;
     let len = file.metadata().map_err(unreadable)?.len();
     // A wrong header says more than a wrong size, so as much as there is is read up to the size of a real one.
     let mut bytes = Vec::with_capacity(len.min(FILE_BYTES as u64) as usize);
-    file.take(FILE_BYTES as u64)
-        .read_to_end(&mut bytes)
-        .map_err(unreadable)?;
+    file.take(FILE_BYTES as u64).read_to_end(&mut bytes).map_err(unreadable)?;
     check_header(&bytes, len).map_err(|error| error.in_file(path))?;
-    let name = path.file_stem().map_or_else(
-        || path.display().to_string(),
-        |stem| stem.to_string_lossy().into_owned(),
-    );
+    let name = path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned());
     Ok(table_from_planes(name, &bytes[HEADER_BYTES..]))
 }
 
 /// Dimensions and size; after it, the planes are whole.
 fn check_header(bytes: &[u8], len: u64) -> std::result::Result<(), InputError> {
     let Some(header) = bytes.first_chunk::<HEADER_BYTES>() else {
-        return Err(InputError::new(
-            "header",
-            format!("{len} bytes"),
-            format!("{FILE_BYTES} bytes (MERL .binary)"),
-        ));
+        return Err(InputError::new("header", format!("{len} bytes"), format!("{FILE_BYTES} bytes (MERL .binary)")));
     };
-    let dims = [0, 4, 8]
-        .map(|at| i32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]));
+    let dims = [0, 4, 8].map(|at| i32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]));
     if dims != [BINS_H as i32, BINS_D as i32, BINS_PHI as i32] {
-        return Err(
-            InputError::new("header", format!("dimensions {dims:?}"), "[90, 90, 180]")
-                .with_hint("is this a MERL .binary file?"),
-        );
+        return Err(InputError::new("header", format!("dimensions {dims:?}"), "[90, 90, 180]")
+            .with_hint("is this a MERL .binary file?"));
     }
     if len != FILE_BYTES as u64 || bytes.len() != FILE_BYTES {
         return Err(InputError::new(
@@ -76,10 +62,7 @@ fn check_header(bytes: &[u8], len: u64) -> std::result::Result<(), InputError> {
 
 /// The mean over the swap of light and view, and the mirror image: `φ_d` and `π - φ_d`, whichever are valid.
 fn table_from_planes(name: String, planes: &[u8]) -> HalfDifferenceTable {
-    let mut report = MeasuredReport {
-        total: PLANE,
-        ..MeasuredReport::default()
-    };
+    let mut report = MeasuredReport { total: PLANE, ..MeasuredReport::default() };
     let mut samples = Vec::with_capacity(PLANE / 2);
     let (mut difference, mut power) = (0.0, 0.0);
     let weight = weights();
@@ -113,20 +96,14 @@ fn table_from_planes(name: String, planes: &[u8]) -> HalfDifferenceTable {
 fn weights() -> impl Fn(usize, usize) -> f64 {
     // One bin per axis is enough: the cosines are products of the axes' own.
     let [h, d, phi]: [Vec<f64>; 3] = std::array::from_fn(|axis| {
-        (0..MERL_SHAPE[axis])
-            .map(|bin| bin_angles(MERL_SHAPE, [bin as f64; 3])[axis])
-            .collect()
+        (0..MERL_SHAPE[axis]).map(|bin| bin_angles(MERL_SHAPE, [bin as f64; 3])[axis]).collect()
     });
     // dω_h = sinθ_h dθ_h and dθ_h ∝ √θ_h on the stretched axis.
     let rows: Vec<[f64; 3]> = (0..BINS_H * BINS_D)
         .map(|row| {
             let [row_h, row_d] = row_bins(MERL_SHAPE, row);
             let (h, d) = (h[row_h], d[row_d]);
-            [
-                h.cos() * d.cos(),
-                h.sin() * d.sin(),
-                h.sin() * h.sqrt() * d.sin() * d.cos(),
-            ]
+            [h.cos() * d.cos(), h.sin() * d.sin(), h.sin() * h.sqrt() * d.sin() * d.cos()]
         })
         .collect();
     let cos_phi: Vec<f64> = phi.into_iter().map(f64::cos).collect();

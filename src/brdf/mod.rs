@@ -102,9 +102,7 @@ impl Term {
             Self::CookTorrance { roughness, .. } => analytic::cook_torrance(*roughness, angles),
             Self::Ward { roughness, .. } => analytic::ward(*roughness, angles),
             Self::Ggx { roughness, .. } => analytic::ggx(*roughness, angles),
-            Self::Measured(table) => {
-                table.f_r(angles).dot(LUMINANCE) * (angles.n_dot_i * angles.n_dot_o)
-            }
+            Self::Measured(table) => table.f_r(angles).dot(LUMINANCE) * (angles.n_dot_i * angles.n_dot_o),
         }
     }
 
@@ -136,18 +134,12 @@ impl Term {
         }
         match *self {
             Self::Lambertian { .. } => visitor.visit(above(analytic::lambertian)),
-            Self::BlinnPhong { exponent, .. } => {
-                visitor.visit(above(move |a| analytic::blinn_phong(exponent, a)))
-            }
+            Self::BlinnPhong { exponent, .. } => visitor.visit(above(move |a| analytic::blinn_phong(exponent, a))),
             Self::CookTorrance { roughness, .. } => {
                 visitor.visit(above(move |a| analytic::cook_torrance(roughness, a)))
             }
-            Self::Ward { roughness, .. } => {
-                visitor.visit(above(move |a| analytic::ward(roughness, a)))
-            }
-            Self::Ggx { roughness, .. } => {
-                visitor.visit(above(move |a| analytic::ggx(roughness, a)))
-            }
+            Self::Ward { roughness, .. } => visitor.visit(above(move |a| analytic::ward(roughness, a))),
+            Self::Ggx { roughness, .. } => visitor.visit(above(move |a| analytic::ggx(roughness, a))),
             Self::Measured(_) => visitor.visit(|a| self.lobe_cos(a)),
         }
     }
@@ -159,9 +151,7 @@ impl Term {
         match *self {
             Self::Lambertian { albedo } => albedo,
             Self::BlinnPhong { specular, .. } | Self::Ward { specular, .. } => specular,
-            Self::CookTorrance { f0, .. } | Self::Ggx { f0, .. } => {
-                f0 + (Vec3::ONE - f0) * schlick_weight(i_dot_h)
-            }
+            Self::CookTorrance { f0, .. } | Self::Ggx { f0, .. } => f0 + (Vec3::ONE - f0) * schlick_weight(i_dot_h),
             Self::Measured(_) => Vec3::ONE,
         }
     }
@@ -170,9 +160,7 @@ impl Term {
     #[inline]
     pub fn f_cos(&self, angles: &LobeAngles) -> Vec3 {
         match self {
-            Self::Measured(table) if angles.above() => {
-                table.f_r(angles) * (angles.n_dot_i * angles.n_dot_o)
-            }
+            Self::Measured(table) if angles.above() => table.f_r(angles) * (angles.n_dot_i * angles.n_dot_o),
             Self::Measured(_) => Vec3::ZERO,
             _ => self.tint(angles.i_dot_h) * self.lobe_cos(angles),
         }
@@ -215,11 +203,7 @@ impl Brdf {
     /// `f_r` [1/sr] of unit vectors; 0 where either direction is not above the surface.
     pub fn f_r(&self, n: Vec3, i: Vec3, o: Vec3) -> Vec3 {
         let angles = LobeAngles::new(n, i, o, half_vector(i, o));
-        self.terms
-            .iter()
-            .map(|term| term.f_r(&angles))
-            .sum::<Vec3>()
-            .min(Vec3::splat(f32::MAX))
+        self.terms.iter().map(|term| term.f_r(&angles)).sum::<Vec3>().min(Vec3::splat(f32::MAX))
     }
 
     /// [`Brdf::f`] from the cosines.

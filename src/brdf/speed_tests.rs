@@ -29,8 +29,7 @@ fn nanoseconds(items: usize, mut run: impl FnMut()) -> f64 {
 #[ignore = "measures speed"]
 fn nanoseconds_per_evaluation() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut direction =
-        |most: f32| from_angles(rng.random_range(0.0..most), rng.random_range(0.0..TAU));
+    let mut direction = |most: f32| from_angles(rng.random_range(0.0..most), rng.random_range(0.0..TAU));
     // 64 direction pairs, 512 normals each: as a sum over facets sees them; and everything at random.
     let mut facets = Vec::new();
     for _ in 0..64 {
@@ -47,68 +46,35 @@ fn nanoseconds_per_evaluation() {
     let color = Vec3::new(0.9, 0.6, 0.3);
     let mut terms = vec![
         Term::Lambertian { albedo: color },
-        Term::BlinnPhong {
-            exponent: 50.0,
-            specular: color,
-        },
-        Term::CookTorrance {
-            roughness: 0.2,
-            f0: color,
-        },
-        Term::Ward {
-            roughness: 0.3,
-            specular: color,
-        },
-        Term::Ggx {
-            roughness: 0.2,
-            f0: color,
-        },
+        Term::BlinnPhong { exponent: 50.0, specular: color },
+        Term::CookTorrance { roughness: 0.2, f0: color },
+        Term::Ward { roughness: 0.3, specular: color },
+        Term::Ggx { roughness: 0.2, f0: color },
     ];
     let mut cache = MeasuredCache::default();
     let merl = PathBuf::from("/tmp/merl/gold-metallic-paint.binary");
-    terms.extend(
-        cache
-            .load(MeasuredKind::Merl, &merl)
-            .ok()
-            .map(Term::Measured),
-    );
-    let rgl = PathBuf::from(std::env::var("BISCALE_DATA").unwrap_or_default())
-        .join("vch_silk_blue_rgb.bsdf");
+    terms.extend(cache.load(MeasuredKind::Merl, &merl).ok().map(Term::Measured));
+    let rgl = PathBuf::from(std::env::var("BISCALE_DATA").unwrap_or_default()).join("vch_silk_blue_rgb.bsdf");
     terms.extend(cache.load(MeasuredKind::Rgl, &rgl).ok().map(Term::Measured));
     for term in terms {
-        let many = nanoseconds(facets.len(), || {
-            term.lobe_cos_many(black_box(&facets), &mut out)
-        });
-        let brdf = Brdf {
-            terms: vec![term.clone()],
-        };
+        let many = nanoseconds(facets.len(), || term.lobe_cos_many(black_box(&facets), &mut out));
+        let brdf = Brdf { terms: vec![term.clone()] };
         let colour = |angles: &[LobeAngles]| {
             nanoseconds(angles.len(), || {
-                black_box(
-                    black_box(angles)
-                        .iter()
-                        .map(|a| brdf.f_cos(a))
-                        .sum::<Vec3>(),
-                );
+                black_box(black_box(angles).iter().map(|a| brdf.f_cos(a)).sum::<Vec3>());
             })
         };
         let (near, far) = (colour(&facets), colour(&random));
         if let Some(table) = term.measured() {
             let mut out = vec![Vec3::ZERO; facets.len()];
-            let many = nanoseconds(facets.len(), || {
-                table.f_r_many(black_box(&facets), &mut out)
-            });
+            let many = nanoseconds(facets.len(), || table.f_r_many(black_box(&facets), &mut out));
             eprintln!("{:<24} f_r_many {many:.1} ns", table.name());
         }
         let basis = super::ColorBasis::of(&brdf);
         eprintln!(
             "{:<24} lobe_cos_many {many:5.2} ns, f_cos {near:5.1} ns (facets) {far:5.1} ns (random)  colours {:?} {:?}",
             term.measured().map_or_else(
-                || format!("{term:?}")
-                    .split(' ')
-                    .next()
-                    .unwrap_or_default()
-                    .to_owned(),
+                || format!("{term:?}").split(' ').next().unwrap_or_default().to_owned(),
                 |t| t.name().to_owned()
             ),
             basis.energy,

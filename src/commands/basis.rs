@@ -120,10 +120,19 @@ pub fn run(args: &SceneArgs) -> Result<()> {
         write!(
             out,
             "{:<24} {:>9} {:>8} {:>10.1} {:>8.2} {:>6} {:>8} {:>9.2}",
-            row.material, row.rows, row.columns, row.full_mb, row.kept_mb, row.rank, row.rank_at_98_percent_norm, row.seconds
+            row.material,
+            row.rows,
+            row.columns,
+            row.full_mb,
+            row.kept_mb,
+            row.rank,
+            row.rank_at_98_percent_norm,
+            row.seconds
         )?;
         match row.paper {
-            Some(p) => writeln!(out, "   ({} {} {} {} {} {})", p.rows, p.columns, p.full_mb, p.kept_mb, p.rank, p.seconds)?,
+            Some(p) => {
+                writeln!(out, "   ({} {} {} {} {} {})", p.rows, p.columns, p.full_mb, p.kept_mb, p.rank, p.seconds)?
+            }
             None => writeln!(out)?,
         }
     }

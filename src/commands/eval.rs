@@ -83,7 +83,9 @@ fn progress(passes: usize, quiet: bool) -> indicatif::ProgressBar {
         return indicatif::ProgressBar::hidden();
     }
     let bar = indicatif::ProgressBar::new(passes as u64);
-    if let Ok(style) = indicatif::ProgressStyle::with_template("reference {wide_bar} {pos}/{len} passes, {msg}, {eta} left") {
+    if let Ok(style) =
+        indicatif::ProgressStyle::with_template("reference {wide_bar} {pos}/{len} passes, {msg}, {eta} left")
+    {
         bar.set_style(style);
     }
     bar
@@ -117,7 +119,9 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let names: Vec<&str> = match lines.next() {
         Some((_, header)) => header.split(',').map(str::trim).collect(),
-        None => return Err(complain("line 1".to_owned(), "an empty file".to_owned(), HEADER).into()),
+        None => {
+            return Err(complain("line 1".to_owned(), "an empty file".to_owned(), HEADER).into());
+        }
     };
     let mut columns = [0; 4];
     for (column, wanted) in columns.iter_mut().zip(HEADER.split(',')) {
@@ -135,11 +139,9 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
                 let field = fields.get(column).ok_or_else(|| {
                     complain(place(), format!("{} values", fields.len()), &format!("{} values", names.len()))
                 })?;
-                *angle = field
-                    .parse::<f64>()
-                    .ok()
-                    .filter(|angle| angle.is_finite())
-                    .ok_or_else(|| complain(place(), format!("`{field}` for {}", names[column]), "an angle in radians"))?;
+                *angle = field.parse::<f64>().ok().filter(|angle| angle.is_finite()).ok_or_else(|| {
+                    complain(place(), format!("`{field}` for {}", names[column]), "an angle in radians")
+                })?;
             }
             Ok(Row { angles })
         })

@@ -16,8 +16,9 @@ struct Row {
 }
 
 pub fn run(args: &MaterialsArgs) -> Result<()> {
-    let rows: Vec<Row> =
-        shipped::names().map(|name| Row { name, description: shipped::description(name).unwrap_or_default() }).collect();
+    let rows: Vec<Row> = shipped::names()
+        .map(|name| Row { name, description: shipped::description(name).unwrap_or_default() })
+        .collect();
     if args.json {
         return print_json(&rows);
     }

@@ -58,7 +58,8 @@ impl SceneArgs {
 pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
     let complain = || format!("found `{text}`, expected two numbers like 384x384");
     let (a, b) = text.split_once(['x', 'X', '×']).ok_or_else(complain)?;
-    let number = |text: &str| text.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n)).ok_or_else(complain);
+    let number =
+        |text: &str| text.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n)).ok_or_else(complain);
     Ok([number(a)?, number(b)?])
 }
 
@@ -74,6 +75,8 @@ pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
 pub fn is_broken_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
-            || cause.downcast_ref::<serde_json::Error>().is_some_and(|error| error.io_error_kind() == Some(std::io::ErrorKind::BrokenPipe))
+            || cause
+                .downcast_ref::<serde_json::Error>()
+                .is_some_and(|error| error.io_error_kind() == Some(std::io::ErrorKind::BrokenPipe))
     })
 }

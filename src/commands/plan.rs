@@ -25,7 +25,8 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     writeln!(out, "{:<20} {:<4} {:>12} {:>12}  reason", "effect", "", "predicted", "measured")?;
     for effect in &outcome.plan.effects {
         let measured = effect.measured_ms.map_or("-".to_owned(), |ms| format!("{ms:.1} ms"));
-        let predicted = if effect.predicted_ms > 0.0 { format!("{:.1} ms", effect.predicted_ms) } else { "-".to_owned() };
+        let predicted =
+            if effect.predicted_ms > 0.0 { format!("{:.1} ms", effect.predicted_ms) } else { "-".to_owned() };
         let on = if effect.on { "on" } else { "off" };
         writeln!(out, "{:<20} {on:<4} {predicted:>12} {measured:>12}  {}", effect.name, effect.reason)?;
     }

@@ -53,7 +53,13 @@ impl Stage {
         }
     }
 
-    pub fn render(&self, route: &Route, brdf: &EffectiveBrdf, size: [usize; 2], samples_per_side: usize) -> Result<Rendered> {
+    pub fn render(
+        &self,
+        route: &Route,
+        brdf: &EffectiveBrdf,
+        size: [usize; 2],
+        samples_per_side: usize,
+    ) -> Result<Rendered> {
         let input = RenderInput {
             mesh: &self.mesh,
             occluder: self.occluder.as_ref(),
@@ -79,7 +85,9 @@ impl Stage {
 /// Where pictures are made.
 pub enum Route {
     /// `refused`: why the graphics processor, which is there, does not.
-    Cpu { refused: Option<GpuError> },
+    Cpu {
+        refused: Option<GpuError>,
+    },
     Gpu(Box<OnDevice>),
 }
 
@@ -133,7 +141,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     if args.scene.json {
         let times = rendered.times;
         let large = [("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)];
-        let stages = outcome.times.iter().copied().chain(large).map(|(name, ms)| (name.to_owned(), ms.into())).collect();
+        let stages =
+            outcome.times.iter().copied().chain(large).map(|(name, ms)| (name.to_owned(), ms.into())).collect();
         return print_json(&Report {
             picture: args.output.display().to_string(),
             width: args.size[0],

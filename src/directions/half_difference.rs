@@ -125,7 +125,8 @@ mod tests {
     #[test]
     fn swapping_light_and_view_reads_the_same_nodes() {
         for k in 0..200 {
-            let (i, o) = (from_angles(0.01 + k as f32 * 0.006, k as f32), from_angles(1.3 - k as f32 * 0.006, 2.0 * k as f32));
+            let (i, o) =
+                (from_angles(0.01 + k as f32 * 0.006, k as f32), from_angles(1.3 - k as f32 * 0.006, 2.0 * k as f32));
             let field = |node: usize| (node % 97) as f32;
             let read = |i, o| GRID.taps(i, o).iter().map(|&(node, w)| field(node) * w).sum::<f32>();
             assert!((read(i, o) - read(o, i)).abs() < 0.2, "{k}: {} {}", read(i, o), read(o, i));

@@ -21,14 +21,7 @@ pub fn from_angles(theta: f32, phi: f32) -> Vec3 {
 pub fn to_angles(direction: Vec3) -> (f32, f32) {
     let theta = direction.x.hypot(direction.y).atan2(direction.z);
     let phi = direction.y.atan2(direction.x);
-    (
-        theta,
-        if phi < 0.0 {
-            (phi + std::f32::consts::TAU).min(TAU_BELOW)
-        } else {
-            phi
-        },
-    )
+    (theta, if phi < 0.0 { (phi + std::f32::consts::TAU).min(TAU_BELOW) } else { phi })
 }
 
 /// The largest f32 below 2π: an azimuth never rounds up to a full turn.

@@ -25,27 +25,20 @@ impl ParaboloidMap {
     /// At least two pixels a side, at most 256.
     pub fn new(side: usize) -> Self {
         let side = side.clamp(2, 256);
-        let mut map = Self {
-            side,
-            node_of_pixel: vec![EMPTY; side * side],
-            directions: Vec::new(),
-            solid_angles: Vec::new(),
-        };
+        let mut map =
+            Self { side, node_of_pixel: vec![EMPTY; side * side], directions: Vec::new(), solid_angles: Vec::new() };
         for pixel in 0..side * side {
             let centre = map.centre(pixel % side, pixel / side);
             let r2 = centre.length_squared();
             if r2 <= 1.0 {
                 map.node_of_pixel[pixel] = map.directions.len() as u32;
-                map.directions
-                    .push((2.0 * centre).extend(1.0 - r2) / (1.0 + r2));
+                map.directions.push((2.0 * centre).extend(1.0 - r2) / (1.0 + r2));
                 map.solid_angles.push(4.0 / (1.0 + r2).powi(2));
             }
         }
         // What rim pixels lose and gain across the disc's edge is shared out: the weights sum to the hemisphere.
         let total: f32 = map.solid_angles.iter().sum();
-        map.solid_angles
-            .iter_mut()
-            .for_each(|omega| *omega *= TAU / total);
+        map.solid_angles.iter_mut().for_each(|omega| *omega *= TAU / total);
         map
     }
 
@@ -55,19 +48,12 @@ impl ParaboloidMap {
         let around = (count as f64 * 4.0 / std::f64::consts::PI).sqrt() as usize;
         let nodes = |side: usize| {
             let half = 0.5 * (side as f64 - 1.0);
-            let row = |y: usize| {
-                (0..side)
-                    .filter(|&x| (x as f64 - half).hypot(y as f64 - half) <= 0.5 * side as f64)
-                    .count()
-            };
+            let row =
+                |y: usize| (0..side).filter(|&x| (x as f64 - half).hypot(y as f64 - half) <= 0.5 * side as f64).count();
             (0..side).map(row).sum::<usize>()
         };
         let candidates = around.min(256).saturating_sub(2).max(2)..=around.min(254) + 2;
-        Self::new(
-            candidates
-                .min_by_key(|&side| nodes(side).abs_diff(count))
-                .unwrap_or(2),
-        )
+        Self::new(candidates.min_by_key(|&side| nodes(side).abs_diff(count)).unwrap_or(2))
     }
 
     /// Number of nodes.
@@ -98,14 +84,10 @@ impl ParaboloidMap {
         let mut innermost = (f32::INFINITY, 0);
         for (k, tap) in taps.iter_mut().enumerate() {
             let (right, down) = (k as i32 & 1, k as i32 >> 1);
-            let (column, row) = (
-                (x + right).clamp(0, last) as usize,
-                (y + down).clamp(0, last) as usize,
-            );
+            let (column, row) = ((x + right).clamp(0, last) as usize, (y + down).clamp(0, last) as usize);
             let node = self.node_of_pixel[row * self.side + column];
             if node != EMPTY {
-                let weight = (if right == 1 { f.x } else { 1.0 - f.x })
-                    * if down == 1 { f.y } else { 1.0 - f.y };
+                let weight = (if right == 1 { f.x } else { 1.0 - f.x }) * if down == 1 { f.y } else { 1.0 - f.y };
                 *tap = (node as usize, weight);
                 sum += weight;
                 let radius = self.centre(column, row).length_squared();
@@ -117,12 +99,7 @@ impl ParaboloidMap {
         if sum > 1e-6 {
             taps.iter_mut().for_each(|tap| tap.1 /= sum);
         } else {
-            taps = [
-                (innermost.1, 1.0),
-                (innermost.1, 0.0),
-                (innermost.1, 0.0),
-                (innermost.1, 0.0),
-            ];
+            taps = [(innermost.1, 1.0), (innermost.1, 0.0), (innermost.1, 0.0), (innermost.1, 0.0)];
         }
         taps
     }
@@ -194,11 +171,7 @@ impl ParaboloidSphere {
     pub fn nearest(&self, direction: Vec3) -> usize {
         let (upper, upper_cosine) = self.half.nearest(direction);
         let (lower, lower_cosine) = self.half.nearest(direction * Vec3::new(1.0, 1.0, -1.0));
-        if lower_cosine > upper_cosine {
-            self.half.len() + lower
-        } else {
-            upper
-        }
+        if lower_cosine > upper_cosine { self.half.len() + lower } else { upper }
     }
 }
 
@@ -219,23 +192,13 @@ mod tests {
     fn nodes_are_unit_vectors_of_the_upper_half_and_their_solid_angles_fill_it() {
         for side in [2, 7, 12, 31] {
             let map = ParaboloidMap::new(side);
-            assert!(
-                map.directions()
-                    .iter()
-                    .all(|d| (d.length() - 1.0).abs() < 1e-6 && d.z >= -1e-6)
-            );
+            assert!(map.directions().iter().all(|d| (d.length() - 1.0).abs() < 1e-6 && d.z >= -1e-6));
             let (sum, cosine) = (0..map.len()).fold((0.0, 0.0), |(sum, cosine), node| {
-                (
-                    sum + map.solid_angle(node),
-                    cosine + map.solid_angle(node) * map.directions()[node].z,
-                )
+                (sum + map.solid_angle(node), cosine + map.solid_angle(node) * map.directions()[node].z)
             });
             assert!((sum - TAU).abs() < 1e-4);
             // ∫ cosθ dω = π: the distortion is that of the map.
-            assert!(
-                side < 12 || (cosine - 0.5 * TAU).abs() < 0.06,
-                "{side}: {cosine}"
-            );
+            assert!(side < 12 || (cosine - 0.5 * TAU).abs() < 0.06, "{side}: {cosine}");
         }
     }
 
@@ -244,12 +207,7 @@ mod tests {
         for side in [2, 3, 13, 24] {
             let map = ParaboloidMap::new(side);
             for (node, &direction) in map.directions().iter().enumerate() {
-                let own: f32 = map
-                    .taps(direction)
-                    .iter()
-                    .filter(|tap| tap.0 == node)
-                    .map(|tap| tap.1)
-                    .sum();
+                let own: f32 = map.taps(direction).iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
                 assert!((own - 1.0).abs() < 1e-4, "{side} {node}");
             }
             for k in 0..2000 {
@@ -266,11 +224,7 @@ mod tests {
         let field = |d: Vec3| 0.3 + (d.x - 2.0 * d.y) / (1.0 + d.z);
         for k in 0..300 {
             let d = from_angles(1.2 * (k as f32 / 300.0).sqrt(), k as f32 * 2.4);
-            let value: f32 = map
-                .taps(d)
-                .iter()
-                .map(|&(node, w)| w * field(map.directions()[node]))
-                .sum();
+            let value: f32 = map.taps(d).iter().map(|&(node, w)| w * field(map.directions()[node])).sum();
             assert!((value - field(d)).abs() < 1e-5);
         }
     }
@@ -280,13 +234,8 @@ mod tests {
         let sphere = ParaboloidSphere::new(ParaboloidMap::new(9));
         for k in 0..800 {
             let d = from_angles(k as f32 / 799.0 * 0.5 * TAU, k as f32 * 2.399);
-            let best = (0..sphere.len())
-                .map(|node| sphere.direction(node).dot(d))
-                .fold(-1.0, f32::max);
-            assert!(
-                (sphere.direction(sphere.nearest(d)).dot(d) - best).abs() < 1e-6,
-                "{d}"
-            );
+            let best = (0..sphere.len()).map(|node| sphere.direction(node).dot(d)).fold(-1.0, f32::max);
+            assert!((sphere.direction(sphere.nearest(d)).dot(d) - best).abs() < 1e-6, "{d}");
         }
     }
 }

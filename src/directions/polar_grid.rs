@@ -25,10 +25,7 @@ impl PolarGrid {
     pub const HORIZON_DEG: f32 = 89.9;
 
     pub fn new(rings: usize, azimuths: usize) -> Self {
-        Self {
-            rings: rings.max(2),
-            azimuths: (azimuths.max(4) + 1) & !1,
-        }
+        Self { rings: rings.max(2), azimuths: (azimuths.max(4) + 1) & !1 }
     }
 
     /// Rings including the one at the horizon.
@@ -55,10 +52,7 @@ impl PolarGrid {
     }
 
     pub fn direction(&self, node: usize) -> Vec3 {
-        from_angles(
-            self.theta(node / self.azimuths),
-            self.phi(node % self.azimuths),
-        )
+        from_angles(self.theta(node / self.azimuths), self.phi(node % self.azimuths))
     }
 
     pub fn directions(&self) -> Vec<Vec3> {
@@ -86,21 +80,14 @@ impl PolarGrid {
         } else {
             let ring = (at as usize).min(self.rings - 1);
             let (from, to) = (self.theta(ring), self.theta(ring + 1));
-            (
-                Some(ring),
-                ring + 1,
-                ((theta - from) / (to - from)).clamp(0.0, 1.0),
-            )
+            (Some(ring), ring + 1, ((theta - from) / (to - from)).clamp(0.0, 1.0))
         };
         let on_ring = |phi: f32, weight: f32, ring: usize| {
             let at = phi.rem_euclid(TAU) / TAU * self.azimuths as f32;
             let b = at as usize;
             let f = at - b as f32;
             let row = ring * self.azimuths;
-            [
-                (row + b % self.azimuths, weight * (1.0 - f)),
-                (row + (b + 1) % self.azimuths, weight * f),
-            ]
+            [(row + b % self.azimuths, weight * (1.0 - f)), (row + (b + 1) % self.azimuths, weight * f)]
         };
         let first = match lower {
             Some(ring) => on_ring(phi, 1.0 - t, ring),
@@ -120,11 +107,7 @@ mod tests {
         let grid = PolarGrid::new(8, 24);
         for node in 0..grid.len() {
             let taps = grid.taps(grid.direction(node));
-            let own: f32 = taps
-                .iter()
-                .filter(|tap| tap.0 == node)
-                .map(|tap| tap.1)
-                .sum();
+            let own: f32 = taps.iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
             assert!((own - 1.0).abs() < 1e-3, "node {node}: {taps:?}");
         }
         for k in 0..500 {
@@ -145,29 +128,15 @@ mod tests {
     #[test]
     fn interpolation_is_continuous_across_the_pole_and_the_seam() {
         let grid = PolarGrid::new(8, 24);
-        let field: Vec<f32> = grid
-            .directions()
-            .iter()
-            .map(|d| d.x + 2.0 * d.y + 0.3 * d.z)
-            .collect();
-        let eval = |d: Vec3| {
-            grid.taps(d)
-                .iter()
-                .map(|tap| tap.1 * field[tap.0])
-                .sum::<f32>()
-        };
+        let field: Vec<f32> = grid.directions().iter().map(|d| d.x + 2.0 * d.y + 0.3 * d.z).collect();
+        let eval = |d: Vec3| grid.taps(d).iter().map(|tap| tap.1 * field[tap.0]).sum::<f32>();
         for k in 0..64 {
             let phi = k as f32 * 0.1;
-            let (a, b) = (
-                eval(from_angles(1e-4, phi)),
-                eval(from_angles(1e-4, phi + PI)),
-            );
+            let (a, b) = (eval(from_angles(1e-4, phi)), eval(from_angles(1e-4, phi + PI)));
             assert!((a - b).abs() < 1e-3, "{a} {b}");
         }
         for theta in [0.2, 0.9, 1.5] {
-            assert!(
-                (eval(from_angles(theta, 1e-5)) - eval(from_angles(theta, -1e-5))).abs() < 1e-3
-            );
+            assert!((eval(from_angles(theta, 1e-5)) - eval(from_angles(theta, -1e-5))).abs() < 1e-3);
         }
     }
 }

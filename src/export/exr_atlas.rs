@@ -7,8 +7,8 @@ use std::io::{self, Cursor, Write};
 
 use exr::image::RgbChannels;
 use exr::prelude::{
-    Encoding, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, SpecificChannels,
-    Text, Vec2, WritableImage as _,
+    Encoding, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, SpecificChannels, Text, Vec2,
+    WritableImage as _,
 };
 use glam::Vec3;
 use serde::Serialize;
@@ -42,29 +42,12 @@ pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) 
     let comments = Text::new_or_none(ascii(&serde_json::to_string(&comments)?));
     let [ti, pi, to, po] = grid.shape();
     let size = Vec2(pi * po, ti * to);
-    let attributes = |name: &str| LayerAttributes {
-        comments: comments.clone(),
-        ..LayerAttributes::named(name)
-    };
+    let attributes = |name: &str| LayerAttributes { comments: comments.clone(), ..LayerAttributes::named(name) };
     let image = Image::empty(ImageAttributes::new(IntegerBounds::from_dimensions(size)))
-        .with_layer(Layer::new(
-            size,
-            attributes("brdf"),
-            Encoding::SMALL_LOSSLESS,
-            channels(table, &table.brdf),
-        ))
-        .with_layer(Layer::new(
-            size,
-            attributes("reciprocal_g"),
-            Encoding::SMALL_LOSSLESS,
-            channels(table, &table.g),
-        ));
+        .with_layer(Layer::new(size, attributes("brdf"), Encoding::SMALL_LOSSLESS, channels(table, &table.brdf)))
+        .with_layer(Layer::new(size, attributes("reciprocal_g"), Encoding::SMALL_LOSSLESS, channels(table, &table.g)));
     let mut bytes = Cursor::new(Vec::new());
-    image
-        .write()
-        .non_parallel()
-        .to_buffered(&mut bytes)
-        .map_err(io::Error::other)?;
+    image.write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;
     out.write_all(bytes.get_ref())
 }
 
@@ -75,10 +58,7 @@ fn channels<'a>(
 ) -> SpecificChannels<impl Fn(Vec2<usize>) -> (f32, f32, f32) + Sync + 'a, RgbChannels> {
     let [_, pi, to, po] = table.grid.shape();
     SpecificChannels::rgb(move |at: Vec2<usize>| {
-        let (light, view) = (
-            at.y() / to * pi + at.x() / po,
-            at.y() % to * po + at.x() % po,
-        );
+        let (light, view) = (at.y() / to * pi + at.x() / po, at.y() % to * po + at.x() % po);
         values[light * (to * po) + view].into()
     })
 }

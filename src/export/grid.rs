@@ -19,12 +19,7 @@ pub struct ExportResolution {
 impl Default for ExportResolution {
     /// 16 x 64 directions each: a million pairs, 12 MB a quantity, 5.6° between neighbours.
     fn default() -> Self {
-        Self {
-            theta_i: 16,
-            phi_i: 64,
-            theta_o: 16,
-            phi_o: 64,
-        }
+        Self { theta_i: 16, phi_i: 64, theta_o: 16, phi_o: 64 }
     }
 }
 
@@ -39,29 +34,18 @@ impl ExportResolution {
         let counts = [self.theta_i, self.phi_i, self.theta_o, self.phi_o];
         for (name, count) in ["theta_i", "phi_i", "theta_o", "phi_o"].iter().zip(counts) {
             if !(1..=MAX_AXIS).contains(&count) {
-                return Err(InputError::new(
-                    format!("resolution.{name}"),
-                    count,
-                    format!("1 to {MAX_AXIS} samples"),
-                )
-                .into());
+                return Err(
+                    InputError::new(format!("resolution.{name}"), count, format!("1 to {MAX_AXIS} samples")).into()
+                );
             }
         }
         // At most 2^40, so it cannot overflow.
         let pairs: u64 = counts.iter().map(|&count| count as u64).product();
         if pairs > MAX_PAIRS as u64 {
-            let found = format!(
-                "{} x {} x {} x {} = {pairs} pairs",
-                counts[0], counts[1], counts[2], counts[3]
-            );
-            return Err(
-                InputError::new("resolution", found, format!("at most {MAX_PAIRS} pairs")).into(),
-            );
+            let found = format!("{} x {} x {} x {} = {pairs} pairs", counts[0], counts[1], counts[2], counts[3]);
+            return Err(InputError::new("resolution", found, format!("at most {MAX_PAIRS} pairs")).into());
         }
-        Ok(Grid {
-            light: Axes::new(self.theta_i, self.phi_i),
-            view: Axes::new(self.theta_o, self.phi_o),
-        })
+        Ok(Grid { light: Axes::new(self.theta_i, self.phi_i), view: Axes::new(self.theta_o, self.phi_o) })
     }
 }
 
@@ -75,12 +59,8 @@ pub struct Axes {
 impl Axes {
     fn new(rings: usize, azimuths: usize) -> Self {
         Self {
-            theta: (0..rings)
-                .map(|a| ((a as f64 + 0.5) * FRAC_PI_2 / rings as f64) as f32)
-                .collect(),
-            phi: (0..azimuths)
-                .map(|b| (b as f64 * TAU / azimuths as f64) as f32)
-                .collect(),
+            theta: (0..rings).map(|a| ((a as f64 + 0.5) * FRAC_PI_2 / rings as f64) as f32).collect(),
+            phi: (0..azimuths).map(|b| (b as f64 * TAU / azimuths as f64) as f32).collect(),
         }
     }
 
@@ -91,10 +71,7 @@ impl Axes {
 
     /// Unit vectors, azimuth fastest.
     pub fn directions(&self) -> Vec<Vec3> {
-        self.theta
-            .iter()
-            .flat_map(|&theta| self.phi.iter().map(move |&phi| from_angles(theta, phi)))
-            .collect()
+        self.theta.iter().flat_map(|&theta| self.phi.iter().map(move |&phi| from_angles(theta, phi))).collect()
     }
 
     /// Nodes and weights of the bilinear reading at a direction: wrapped in azimuth, across the pole to the ring half a
@@ -108,24 +85,14 @@ impl Axes {
         let mut taps = [(0, 0.0); 4];
         for (step, weight) in [(0, 1.0 - part), (1, part)] {
             let ring = base as i64 + step;
-            let (ring, turn) = if ring < 0 {
-                (0, std::f32::consts::PI)
-            } else {
-                ((ring as usize).min(rings - 1), 0.0)
-            };
+            let (ring, turn) = if ring < 0 { (0, std::f32::consts::PI) } else { ((ring as usize).min(rings - 1), 0.0) };
             let azimuths = self.phi.len();
             let along = (phi + turn) / std::f32::consts::TAU * azimuths as f32;
             let first = along.floor();
             let blend = along - first;
             let slot = 2 * step as usize;
-            taps[slot] = (
-                ring * azimuths + first as usize % azimuths,
-                weight * (1.0 - blend),
-            );
-            taps[slot + 1] = (
-                ring * azimuths + (first as usize + 1) % azimuths,
-                weight * blend,
-            );
+            taps[slot] = (ring * azimuths + first as usize % azimuths, weight * (1.0 - blend));
+            taps[slot + 1] = (ring * azimuths + (first as usize + 1) % azimuths, weight * blend);
         }
         taps
     }
@@ -146,11 +113,6 @@ impl Grid {
 
     /// `[Nθ_i, Nφ_i, Nθ_o, Nφ_o]`.
     pub fn shape(&self) -> [usize; 4] {
-        [
-            self.light.theta.len(),
-            self.light.phi.len(),
-            self.view.theta.len(),
-            self.view.phi.len(),
-        ]
+        [self.light.theta.len(), self.light.phi.len(), self.view.theta.len(), self.view.phi.len()]
     }
 }

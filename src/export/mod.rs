@@ -48,9 +48,7 @@ enum Format {
 
 impl Format {
     fn of(path: &Path) -> Result<Self> {
-        let ending = path
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
         let complaint = match ending.as_deref() {
             Some("npz") => return Ok(Self::Npz),
             Some("csv") => return Ok(Self::Csv),
@@ -59,16 +57,10 @@ impl Format {
                 let found = format!("the ending .{later}, which this version does not write yet");
                 InputError::new("output", found, format!("a name that ends in {WRITTEN}"))
             }
-            Some(other) => InputError::new(
-                "output",
-                format!("the ending .{other}"),
-                format!("a name that ends in {WRITTEN}"),
-            ),
-            None => InputError::new(
-                "output",
-                "a name without an ending",
-                format!("a name that ends in {WRITTEN}"),
-            ),
+            Some(other) => {
+                InputError::new("output", format!("the ending .{other}"), format!("a name that ends in {WRITTEN}"))
+            }
+            None => InputError::new("output", "a name without an ending", format!("a name that ends in {WRITTEN}")),
         };
         Err(complaint.in_file(path).into())
     }
@@ -99,20 +91,13 @@ pub fn write(
     replace::replacing(path, |out| {
         let table = Table::new(brdf, grid, progress);
         let description = Description::new(meta, &table, brdf);
-        let mut counted = Counted {
-            inner: out,
-            bytes: 0,
-        };
+        let mut counted = Counted { inner: out, bytes: 0 };
         match format {
             Format::Npz => npz::write(&table, &description, &mut counted)?,
             Format::Csv => csv::write(&table, &description, &mut counted)?,
             Format::Exr => exr_atlas::write(&table, &description, &mut counted)?,
         }
-        Ok(ExportReport {
-            pairs: table.grid.pairs(),
-            bytes: counted.bytes,
-            resampling: description.resampling,
-        })
+        Ok(ExportReport { pairs: table.grid.pairs(), bytes: counted.bytes, resampling: description.resampling })
     })
 }
 
@@ -130,10 +115,7 @@ pub fn write_csv(
     let grid = resolution.grid()?;
     let table = Table::new(brdf, grid, progress);
     let description = Description::new(meta, &table, brdf);
-    let mut counted = Counted {
-        inner: out,
-        bytes: 0,
-    };
+    let mut counted = Counted { inner: out, bytes: 0 };
     let written = {
         let mut buffered = BufWriter::new(&mut counted);
         csv::write(&table, &description, &mut buffered).and_then(|()| buffered.flush())
@@ -144,11 +126,7 @@ pub fn write_csv(
         }
         _ => {}
     }
-    Ok(ExportReport {
-        pairs: table.grid.pairs(),
-        bytes: counted.bytes,
-        resampling: description.resampling,
-    })
+    Ok(ExportReport { pairs: table.grid.pairs(), bytes: counted.bytes, resampling: description.resampling })
 }
 
 /// Counts what passes through.

@@ -7,11 +7,7 @@ use super::table::Table;
 use super::zip::ZipWriter;
 
 /// Numbers are written in the byte order of the machine, and said to be.
-const ORDER: char = if cfg!(target_endian = "big") {
-    '>'
-} else {
-    '<'
-};
+const ORDER: char = if cfg!(target_endian = "big") { '>' } else { '<' };
 
 /// Arrays `theta_i`, `phi_i`, `theta_o`, `phi_o`, `brdf[ti,pi,to,po,3]`, `g[ti,pi,to,po,3]`, `projected_area[to,po]`, all
 /// f32; 0-d: `base_area`, `resampling_rel_l2` (f64), `seed` (u64), `meta` (JSON in unicode).
@@ -26,89 +22,29 @@ pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) 
         ("phi_o", &grid.view.phi),
     ];
     for (name, axis) in axes {
-        array(
-            &mut zip,
-            name,
-            "f4",
-            &[axis.len()],
-            bytemuck::cast_slice(axis),
-        )?;
+        array(&mut zip, name, "f4", &[axis.len()], bytemuck::cast_slice(axis))?;
     }
-    array(
-        &mut zip,
-        "brdf",
-        "f4",
-        &[ti, pi, to, po, 3],
-        bytemuck::cast_slice(&table.brdf),
-    )?;
-    array(
-        &mut zip,
-        "g",
-        "f4",
-        &[ti, pi, to, po, 3],
-        bytemuck::cast_slice(&table.g),
-    )?;
-    array(
-        &mut zip,
-        "projected_area",
-        "f4",
-        &[to, po],
-        bytemuck::cast_slice(&table.projected_area),
-    )?;
-    array(
-        &mut zip,
-        "base_area",
-        "f8",
-        &[],
-        bytemuck::bytes_of(&description.base_area),
-    )?;
-    array(
-        &mut zip,
-        "resampling_rel_l2",
-        "f8",
-        &[],
-        bytemuck::bytes_of(&description.resampling_rel_l2),
-    )?;
-    array(
-        &mut zip,
-        "seed",
-        "u8",
-        &[],
-        bytemuck::bytes_of(&description.meta.seed),
-    )?;
+    array(&mut zip, "brdf", "f4", &[ti, pi, to, po, 3], bytemuck::cast_slice(&table.brdf))?;
+    array(&mut zip, "g", "f4", &[ti, pi, to, po, 3], bytemuck::cast_slice(&table.g))?;
+    array(&mut zip, "projected_area", "f4", &[to, po], bytemuck::cast_slice(&table.projected_area))?;
+    array(&mut zip, "base_area", "f8", &[], bytemuck::bytes_of(&description.base_area))?;
+    array(&mut zip, "resampling_rel_l2", "f8", &[], bytemuck::bytes_of(&description.resampling_rel_l2))?;
+    array(&mut zip, "seed", "u8", &[], bytemuck::bytes_of(&description.meta.seed))?;
     let meta: Vec<u32> = description.json()?.chars().map(u32::from).collect();
-    array(
-        &mut zip,
-        "meta",
-        &format!("U{}", meta.len()),
-        &[],
-        bytemuck::cast_slice(&meta),
-    )?;
+    array(&mut zip, "meta", &format!("U{}", meta.len()), &[], bytemuck::cast_slice(&meta))?;
     zip.finish()
 }
 
 /// Adds `name.npy`: C order, `kind` without its byte order.
-fn array(
-    zip: &mut ZipWriter<'_>,
-    name: &str,
-    kind: &str,
-    shape: &[usize],
-    data: &[u8],
-) -> io::Result<()> {
+fn array(zip: &mut ZipWriter<'_>, name: &str, kind: &str, shape: &[usize], data: &[u8]) -> io::Result<()> {
     // Python tuples of one keep a comma; it does no harm in longer ones.
     let shape: String = shape.iter().map(|length| format!("{length},")).collect();
-    let mut header =
-        format!("{{'descr': '{ORDER}{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
+    let mut header = format!("{{'descr': '{ORDER}{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
     // Magic, version and length take 10 bytes; data starts at a multiple of 64, after a line break.
     while (10 + header.len() + 1) % 64 != 0 {
         header.push(' ');
     }
     header.push('\n');
-    let length = u16::try_from(header.len())
-        .map_err(io::Error::other)?
-        .to_le_bytes();
-    zip.member(
-        &format!("{name}.npy"),
-        &[b"\x93NUMPY\x01\x00", &length, header.as_bytes(), data],
-    )
+    let length = u16::try_from(header.len()).map_err(io::Error::other)?.to_le_bytes();
+    zip.member(&format!("{name}.npy"), &[b"\x93NUMPY\x01\x00", &length, header.as_bytes(), data])
 }

@@ -16,40 +16,26 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Opens a file beside `path`, lets `content` fill it, and renames it to `path`.
-pub(super) fn replacing<T>(
-    path: &Path,
-    content: impl FnOnce(&mut dyn Write) -> io::Result<T>,
-) -> Result<T> {
+pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T> {
     let unwritable = |error: io::Error| -> Error {
-        InputError::new("output", error, "a place that can be written")
-            .in_file(path)
-            .into()
+        InputError::new("output", error, "a place that can be written").in_file(path).into()
     };
     // Through a link, the file it leads to is replaced, not the link.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if let Ok(there) = fs::metadata(&target) {
         if there.is_dir() {
-            return Err(InputError::new("output", "a folder", "a name for a file")
-                .in_file(path)
-                .into());
+            return Err(InputError::new("output", "a folder", "a name for a file").in_file(path).into());
         }
         if there.permissions().readonly() {
-            return Err(InputError::new(
-                "output",
-                "a file that is read-only",
-                "a place that can be written",
-            )
-            .in_file(path)
-            .into());
+            return Err(InputError::new("output", "a file that is read-only", "a place that can be written")
+                .in_file(path)
+                .into());
         }
     }
     let temporary = Temporary(beside(&target));
     let mut file = BufWriter::new(File::create_new(&temporary.0).map_err(unwritable)?);
     let value = content(&mut file).map_err(unwritable)?;
-    file.into_inner()
-        .map_err(|error| unwritable(error.into_error()))?
-        .sync_all()
-        .map_err(unwritable)?;
+    file.into_inner().map_err(|error| unwritable(error.into_error()))?.sync_all().map_err(unwritable)?;
     fs::rename(&temporary.0, &target).map_err(unwritable)?;
     Ok(value)
 }

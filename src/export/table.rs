@@ -76,14 +76,8 @@ impl Table {
     /// What the grid costs: [`Table::f_bar`] against `eval` over a fixed set of pairs up to 85°.
     pub fn resampling(&self, brdf: &EffectiveBrdf) -> Errors {
         let pairs = mirror_biased_pairs(CHECKED_PAIRS, CHECKED_SEED);
-        let read: Vec<Vec3> = pairs
-            .iter()
-            .map(|pair| self.f_bar(pair.i, pair.o))
-            .collect();
-        let exact: Vec<Vec3> = pairs
-            .par_iter()
-            .map(|pair| brdf.eval(pair.i, pair.o))
-            .collect();
+        let read: Vec<Vec3> = pairs.iter().map(|pair| self.f_bar(pair.i, pair.o)).collect();
+        let exact: Vec<Vec3> = pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect();
         compare(&read, &exact)
     }
 }

@@ -14,12 +14,7 @@ use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
 use crate::geometry::{Facets, TileMesh, heightfield};
 use crate::visibility::{Horizons, Visibility};
 
-const SMALL: ExportResolution = ExportResolution {
-    theta_i: 4,
-    phi_i: 6,
-    theta_o: 5,
-    phi_o: 8,
-};
+const SMALL: ExportResolution = ExportResolution { theta_i: 4, phi_i: 6, theta_o: 5, phi_o: 8 };
 
 fn silent(_: f32) {}
 
@@ -27,42 +22,21 @@ fn brdf_of(mesh: &TileMesh, term: Term) -> EffectiveBrdf {
     let mut facets = Facets::sample(mesh, 300, 1);
     facets.sort_for_sums();
     let visibility = match &mesh.height_grid {
-        Some(heights) => {
-            Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, 16, 0.02))
-        }
-        None => Visibility::Unblocked {
-            facets: facets.len(),
-        },
+        Some(heights) => Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, 16, 0.02)),
+        None => Visibility::Unblocked { facets: facets.len() },
     };
-    let materials = [SumMaterial {
-        brdf: Brdf { terms: vec![term] },
-        color: Vec3::new(1.0, 0.5, 0.25),
-    }];
+    let materials = [SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::new(1.0, 0.5, 0.25) }];
     let sum = FacetSum::new(&facets, &[0], &materials);
-    let form = Form::Direct(Direct {
-        sum: Arc::new(sum),
-        visibility: Arc::new(visibility),
-    });
-    EffectiveBrdf {
-        form,
-        base_area: f64::from(mesh.base_area()),
-    }
+    let form = Form::Direct(Direct { sum: Arc::new(sum), visibility: Arc::new(visibility) });
+    EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
 }
 
 /// A corrugated tile: anisotropic, so that mixed-up axes show.
 fn corrugated() -> EffectiveBrdf {
-    let wave = |at: Vec2| {
-        0.15 * (std::f32::consts::TAU * at.x).sin()
-            + 0.05 * (std::f32::consts::TAU * (at.x + at.y)).cos()
-    };
+    let wave =
+        |at: Vec2| 0.15 * (std::f32::consts::TAU * at.x).sin() + 0.05 * (std::f32::consts::TAU * (at.x + at.y)).cos();
     let mesh = heightfield::from_function(UVec2::splat(16), Vec2::new(1.0, 2.0), wave);
-    brdf_of(
-        &mesh,
-        Term::CookTorrance {
-            roughness: 0.5,
-            f0: Vec3::new(0.9, 0.6, 0.3),
-        },
-    )
+    brdf_of(&mesh, Term::CookTorrance { roughness: 0.5, f0: Vec3::new(0.9, 0.6, 0.3) })
 }
 
 /// A flat Lambertian tile, albedo 0.8: `f̄ / cos θ_i` is albedo times colour over π everywhere.
@@ -76,12 +50,7 @@ fn flat() -> EffectiveBrdf {
         closes_plane: true,
         ..TileMesh::default()
     };
-    brdf_of(
-        &mesh,
-        Term::Lambertian {
-            albedo: Vec3::splat(0.8),
-        },
-    )
+    brdf_of(&mesh, Term::Lambertian { albedo: Vec3::splat(0.8) })
 }
 
 fn meta() -> ExportMeta {
@@ -111,10 +80,7 @@ fn expected(brdf: &EffectiveBrdf, resolution: &ExportResolution) -> Vec<([f32; 4
                         theta(to, resolution.theta_o),
                         phi(po, resolution.phi_o),
                     ];
-                    let (i, o) = (
-                        from_angles(angles[0], angles[1]),
-                        from_angles(angles[2], angles[3]),
-                    );
+                    let (i, o) = (from_angles(angles[0], angles[1]), from_angles(angles[2], angles[3]));
                     rows.push((angles, brdf.eval(i, o) / i.z, brdf.g(i, o)));
                 }
             }
@@ -143,10 +109,7 @@ fn read_npz(bytes: &[u8]) -> HashMap<String, (String, Vec<u8>)> {
         let header_end = 10 + usize::from(u16::from_le_bytes([npy[8], npy[9]]));
         assert_eq!(header_end % 64, 0);
         let header = String::from_utf8(npy[10..header_end].to_vec()).unwrap();
-        members.insert(
-            name.trim_end_matches(".npy").to_owned(),
-            (header, npy[header_end..].to_vec()),
-        );
+        members.insert(name.trim_end_matches(".npy").to_owned(), (header, npy[header_end..].to_vec()));
         at += 46 + name_length;
     }
     assert_eq!(at, end);
@@ -154,11 +117,7 @@ fn read_npz(bytes: &[u8]) -> HashMap<String, (String, Vec<u8>)> {
 }
 
 fn floats(data: &[u8]) -> Vec<f32> {
-    data.as_chunks::<4>()
-        .0
-        .iter()
-        .map(|bytes| f32::from_ne_bytes(*bytes))
-        .collect()
+    data.as_chunks::<4>().0.iter().map(|bytes| f32::from_ne_bytes(*bytes)).collect()
 }
 
 #[test]
@@ -168,32 +127,15 @@ fn an_npz_holds_what_eval_says_at_every_pair() {
     let brdf = corrugated();
     let report = write(&brdf, &meta(), &SMALL, &path, &silent).unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    assert_eq!(
-        (report.pairs, report.bytes),
-        (4 * 6 * 5 * 8, bytes.len() as u64)
-    );
+    assert_eq!((report.pairs, report.bytes), (4 * 6 * 5 * 8, bytes.len() as u64));
     let members = read_npz(&bytes);
-    assert!(
-        members["brdf"].0.contains("'shape': (4,6,5,8,3,)"),
-        "{}",
-        members["brdf"].0
-    );
-    assert!(
-        members["projected_area"].0.contains("'shape': (5,8,)")
-            && members["meta"].0.contains("'shape': ()")
-    );
+    assert!(members["brdf"].0.contains("'shape': (4,6,5,8,3,)"), "{}", members["brdf"].0);
+    assert!(members["projected_area"].0.contains("'shape': (5,8,)") && members["meta"].0.contains("'shape': ()"));
     let (values, g) = (floats(&members["brdf"].1), floats(&members["g"].1));
     let axes = ["theta_i", "phi_i", "theta_o", "phi_o"].map(|name| floats(&members[name].1));
-    for (k, (angles, expected_brdf, expected_g)) in expected(&brdf, &SMALL).into_iter().enumerate()
-    {
-        assert!(
-            close(Vec3::from_slice(&values[3 * k..]), expected_brdf),
-            "{angles:?}"
-        );
-        assert!(
-            close(Vec3::from_slice(&g[3 * k..]), expected_g),
-            "{angles:?}"
-        );
+    for (k, (angles, expected_brdf, expected_g)) in expected(&brdf, &SMALL).into_iter().enumerate() {
+        assert!(close(Vec3::from_slice(&values[3 * k..]), expected_brdf), "{angles:?}");
+        assert!(close(Vec3::from_slice(&g[3 * k..]), expected_g), "{angles:?}");
         let index = [k / 240, k / 40 % 6, k / 8 % 5, k % 8];
         for axis in 0..4 {
             assert!((axes[axis][index[axis]] - angles[axis]).abs() < 1e-6);
@@ -202,13 +144,8 @@ fn an_npz_holds_what_eval_says_at_every_pair() {
     let areas = floats(&members["projected_area"].1);
     let o = from_angles(axes[2][3], axes[3][2]);
     assert_eq!(areas[3 * 8 + 2], brdf.relative_projected_area(o));
-    let text: String = members["meta"]
-        .1
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|c| char::from_u32(u32::from_ne_bytes(*c)).unwrap())
-        .collect();
+    let text: String =
+        members["meta"].1.as_chunks::<4>().0.iter().map(|c| char::from_u32(u32::from_ne_bytes(*c)).unwrap()).collect();
     let described: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(described["scene"], meta().scene.as_str());
     assert_eq!(described["base_area"], 2.0);
@@ -223,31 +160,16 @@ fn a_csv_has_a_header_and_a_row_a_pair() {
     write(&brdf, &meta(), &SMALL, &path, &silent).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines().skip_while(|line| line.starts_with('#'));
-    assert_eq!(
-        lines.next(),
-        Some("theta_i,phi_i,theta_o,phi_o,r,g,b,g_r,g_g,g_b")
-    );
+    assert_eq!(lines.next(), Some("theta_i,phi_i,theta_o,phi_o,r,g,b,g_r,g_g,g_b"));
     let mut rows = 0;
     for (line, (angles, brdf, g)) in lines.by_ref().zip(expected(&brdf, &SMALL)) {
-        let row: Vec<f32> = line
-            .split(',')
-            .map(|number| number.parse().unwrap())
-            .collect();
-        assert!(
-            (0..4).all(|axis| (row[axis] - angles[axis]).abs() < 1e-6) && row.len() == 10,
-            "{line}"
-        );
-        assert!(
-            close(Vec3::from_slice(&row[4..]), brdf) && close(Vec3::from_slice(&row[7..]), g),
-            "{line}"
-        );
+        let row: Vec<f32> = line.split(',').map(|number| number.parse().unwrap()).collect();
+        assert!((0..4).all(|axis| (row[axis] - angles[axis]).abs() < 1e-6) && row.len() == 10, "{line}");
+        assert!(close(Vec3::from_slice(&row[4..]), brdf) && close(Vec3::from_slice(&row[7..]), g), "{line}");
         rows += 1;
     }
     assert_eq!((rows, lines.next()), (4 * 6 * 5 * 8, None));
-    assert!(
-        text.contains("# scene: a \"quoted\" näme and a line\n"),
-        "{text:.2000}"
-    );
+    assert!(text.contains("# scene: a \"quoted\" näme and a line\n"), "{text:.2000}");
     let mut streamed = Vec::new();
     write_csv(&brdf, &meta(), &SMALL, &mut streamed, &silent).unwrap();
     assert_eq!(streamed, text.as_bytes());
@@ -260,11 +182,8 @@ fn an_exr_is_an_atlas_of_both_quantities() {
     let brdf = corrugated();
     write(&brdf, &meta(), &SMALL, &path, &silent).unwrap();
     let image = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
-    let names: Vec<String> = image
-        .layer_data
-        .iter()
-        .map(|layer| layer.attributes.layer_name.as_ref().unwrap().to_string())
-        .collect();
+    let names: Vec<String> =
+        image.layer_data.iter().map(|layer| layer.attributes.layer_name.as_ref().unwrap().to_string()).collect();
     assert_eq!(names, ["brdf", "reciprocal_g"]);
     let pixel = |part: usize, at: usize| {
         // Channels are sorted by name: B, G, R.
@@ -275,17 +194,9 @@ fn an_exr_is_an_atlas_of_both_quantities() {
     for (k, (angles, brdf, g)) in expected(&brdf, &SMALL).into_iter().enumerate() {
         let [ti, pi, to, po] = [k / 240, k / 40 % 6, k / 8 % 5, k % 8];
         let at = (ti * 5 + to) * (6 * 8) + pi * 8 + po;
-        assert!(
-            close(pixel(0, at), brdf) && close(pixel(1, at), g),
-            "{angles:?}"
-        );
+        assert!(close(pixel(0, at), brdf) && close(pixel(1, at), g), "{angles:?}");
     }
-    let comments = image.layer_data[0]
-        .attributes
-        .comments
-        .as_ref()
-        .unwrap()
-        .to_string();
+    let comments = image.layer_data[0].attributes.comments.as_ref().unwrap().to_string();
     let described: serde_json::Value = serde_json::from_str(&comments).unwrap();
     assert_eq!(described["scene"], meta().scene.as_str());
     assert_eq!(described["phi_o"].as_array().unwrap().len(), 8);
@@ -299,10 +210,7 @@ fn a_flat_lambertian_tile_is_albedo_over_pi_and_resamples_without_error() {
     let value = Vec3::new(1.0, 0.5, 0.25) * 0.8 * FRAC_1_PI;
     for (k, (brdf, g)) in table.brdf.iter().zip(&table.g).enumerate() {
         assert!(close(*brdf, value));
-        let (light, view) = (
-            table.grid.light.directions()[k / 40],
-            table.grid.view.directions()[k % 40],
-        );
+        let (light, view) = (table.grid.light.directions()[k / 40], table.grid.view.directions()[k % 40]);
         assert!(close(*g, value * light.z * view.z), "{g} {k}");
     }
     assert!(table.resampling(&brdf).rel_l2 < 1e-5);
@@ -318,10 +226,7 @@ fn bilinear_reading_hits_the_nodes_and_is_continuous_across_pole_and_seam() {
     }
     let near = |a: (f32, f32), b: (f32, f32)| {
         let o = from_angles(0.6, 0.3);
-        let (a, b) = (
-            table.f_bar(from_angles(a.0, a.1), o),
-            table.f_bar(from_angles(b.0, b.1), o),
-        );
+        let (a, b) = (table.f_bar(from_angles(a.0, a.1), o), table.f_bar(from_angles(b.0, b.1), o));
         (a - b).length() < 0.01 * b.length()
     };
     assert!(near((1e-3, 0.4), (1e-3, 0.4 + PI)) && near((0.7, 1e-4), (0.7, 2.0 * PI - 1e-4)));
@@ -331,22 +236,12 @@ fn bilinear_reading_hits_the_nodes_and_is_continuous_across_pole_and_seam() {
 fn a_finer_grid_resamples_better_and_the_report_says_so() {
     let brdf = corrugated();
     let error = |rings| {
-        let resolution = ExportResolution {
-            theta_i: rings,
-            phi_i: 2 * rings,
-            theta_o: rings,
-            phi_o: 2 * rings,
-        };
-        Table::new(&brdf, resolution.grid().unwrap(), &silent)
-            .resampling(&brdf)
-            .rel_l2
+        let resolution = ExportResolution { theta_i: rings, phi_i: 2 * rings, theta_o: rings, phi_o: 2 * rings };
+        Table::new(&brdf, resolution.grid().unwrap(), &silent).resampling(&brdf).rel_l2
     };
     // Shadow edges are kinks, so halving the step halves the error; a smooth function would quarter it.
     let (coarse, fine) = (error(6), error(12));
-    assert!(
-        fine < 0.7 * coarse && fine > 0.0 && coarse < 0.5,
-        "{coarse} {fine}"
-    );
+    assert!(fine < 0.7 * coarse && fine > 0.0 && coarse < 0.5, "{coarse} {fine}");
 }
 
 #[test]
@@ -355,12 +250,8 @@ fn files_are_the_same_bytes_again_with_any_number_of_threads() {
     for name in ["a.npz", "a.csv", "a.exr"] {
         let path = folder.path().join(name);
         let bytes = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
-            pool.install(|| write(&corrugated(), &meta(), &SMALL, &path, &silent))
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| write(&corrugated(), &meta(), &SMALL, &path, &silent)).unwrap();
             std::fs::read(&path).unwrap()
         };
         assert!(bytes(1) == bytes(3), "{name}");
@@ -370,9 +261,7 @@ fn files_are_the_same_bytes_again_with_any_number_of_threads() {
 #[test]
 fn progress_goes_from_nothing_to_all() {
     let told = std::cell::RefCell::new(Vec::new());
-    Table::new(&flat(), SMALL.grid().unwrap(), &|part| {
-        told.borrow_mut().push(part)
-    });
+    Table::new(&flat(), SMALL.grid().unwrap(), &|part| told.borrow_mut().push(part));
     let told = told.into_inner();
     assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted());
 }
@@ -384,14 +273,7 @@ fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
     let old = folder.path().join("old.npz");
     std::fs::write(&old, b"old").unwrap();
     let attempt = |name: &str, resolution: &ExportResolution| {
-        let error = write(
-            &flat(),
-            &meta(),
-            resolution,
-            &folder.path().join(name),
-            &silent,
-        )
-        .unwrap_err();
+        let error = write(&flat(), &meta(), resolution, &folder.path().join(name), &silent).unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
         error.to_string()
     };
@@ -407,40 +289,13 @@ fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
         let error = attempt(name, &SMALL);
         assert!(error.contains(says) && error.contains(name), "{error}");
     }
-    assert!(
-        attempt(
-            "old.npz",
-            &ExportResolution {
-                theta_o: 0,
-                ..SMALL
-            }
-        )
-        .contains("theta_o")
-    );
-    assert!(
-        attempt(
-            "old.npz",
-            &ExportResolution {
-                phi_i: usize::MAX,
-                ..SMALL
-            }
-        )
-        .contains("phi_i")
-    );
-    let huge = ExportResolution {
-        theta_i: 1024,
-        phi_i: 1024,
-        theta_o: 1024,
-        phi_o: 1024,
-    };
+    assert!(attempt("old.npz", &ExportResolution { theta_o: 0, ..SMALL }).contains("theta_o"));
+    assert!(attempt("old.npz", &ExportResolution { phi_i: usize::MAX, ..SMALL }).contains("phi_i"));
+    let huge = ExportResolution { theta_i: 1024, phi_i: 1024, theta_o: 1024, phi_o: 1024 };
     assert!(attempt("old.npz", &huge).contains("pairs"));
     assert!(check_ending(Path::new("a.npz")).is_ok() && check_ending(Path::new("a.npy")).is_err());
     assert_eq!(std::fs::read(&old).unwrap(), b"old");
-    assert_eq!(
-        std::fs::read_dir(folder.path()).unwrap().count(),
-        2,
-        "no temporary files are left"
-    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no temporary files are left");
 }
 
 #[test]
@@ -453,13 +308,7 @@ fn a_failure_while_writing_leaves_the_old_file_whole() {
         Err::<(), _>(io::Error::other("disk full"))
     });
     let error = full.unwrap_err();
-    assert!(
-        error.exit_code() == 2
-            && error
-                .to_string()
-                .contains("old.npz: output: found disk full"),
-        "{error}"
-    );
+    assert!(error.exit_code() == 2 && error.to_string().contains("old.npz: output: found disk full"), "{error}");
     assert_eq!(std::fs::read(&old).unwrap(), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     replace_file(&old, b"new").unwrap();
@@ -496,11 +345,7 @@ fn numpy_loads_an_npz() {
         g = z['brdf'] * numpy.cos(z['theta_i'])[:, None, None, None, None] * z['projected_area'][..., None]\n\
         assert numpy.allclose(g, z['g'], rtol=1e-4, atol=1e-7)\n\
         print(*z['brdf'][3, 1, 2, 5])\n";
-    let Ok(run) = std::process::Command::new("python3")
-        .args(["-c", script])
-        .arg(&path)
-        .output()
-    else {
+    let Ok(run) = std::process::Command::new("python3").args(["-c", script]).arg(&path).output() else {
         return eprintln!("SKIPPED: no python3 to load the .npz with");
     };
     if run.status.code() == Some(77) {
@@ -509,10 +354,7 @@ fn numpy_loads_an_npz() {
     let said = String::from_utf8(run.stdout).unwrap();
     let complaint = String::from_utf8_lossy(&run.stderr);
     assert!(run.status.success(), "{complaint}");
-    let loaded: Vec<f32> = said
-        .split_whitespace()
-        .map(|number| number.parse().unwrap())
-        .collect();
+    let loaded: Vec<f32> = said.split_whitespace().map(|number| number.parse().unwrap()).collect();
     let (_, value, _) = expected(&brdf, &SMALL)[((3 * 6 + 1) * 5 + 2) * 8 + 5];
     assert!(close(Vec3::from_slice(&loaded), value), "{said} {value}");
 }

@@ -20,12 +20,7 @@ pub struct ZipWriter<'a> {
 
 impl<'a> ZipWriter<'a> {
     pub fn new(out: &'a mut dyn Write) -> Self {
-        Self {
-            out,
-            offset: 0,
-            directory: Vec::new(),
-            members: 0,
-        }
+        Self { out, offset: 0, directory: Vec::new(), members: 0 }
     }
 
     /// Adds a member whose content is `parts`, joined.
@@ -90,9 +85,7 @@ fn narrow(size: u64) -> io::Result<u32> {
 /// CRC-32 (ISO 3309), the polynomial of ZIP and PNG, reflected.
 fn crc32(parts: &[&[u8]]) -> u32 {
     let bytes = parts.iter().copied().flatten();
-    !bytes.fold(!0, |crc: u32, &byte| {
-        CRC_OF_BYTE[usize::from((crc as u8) ^ byte)] ^ (crc >> 8)
-    })
+    !bytes.fold(!0, |crc: u32, &byte| CRC_OF_BYTE[usize::from((crc as u8) ^ byte)] ^ (crc >> 8))
 }
 
 const CRC_OF_BYTE: [u32; 256] = {
@@ -102,11 +95,7 @@ const CRC_OF_BYTE: [u32; 256] = {
         let mut crc = byte as u32;
         let mut bit = 0;
         while bit < 8 {
-            crc = if crc & 1 == 1 {
-                0xedb8_8320 ^ (crc >> 1)
-            } else {
-                crc >> 1
-            };
+            crc = if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
             bit += 1;
         }
         table[byte] = crc;

@@ -87,7 +87,14 @@ pub fn leading_features(
     gemm::multiply_parallel(count, facets, feature_count, &mixed, features, &mut q);
     // The smaller of the two Gram matrices has the same leading values.
     let (values, vectors) = if count < feature_count {
-        let transposed: Vec<f32> = (0..feature_count).flat_map(|f| (0..count).map({ let q = &q; move |k| q[k * feature_count + f] })).collect();
+        let transposed: Vec<f32> = (0..feature_count)
+            .flat_map(|f| {
+                (0..count).map({
+                    let q = &q;
+                    move |k| q[k * feature_count + f]
+                })
+            })
+            .collect();
         let solved = eigen(gemm::gram(feature_count, count, &transposed))?;
         // Right vectors from left ones: Qᵀ u / σ.
         let wide = DMatrix::<f64>::from_fn(feature_count, count, |f, k| f64::from(q[k * feature_count + f]));
@@ -102,7 +109,14 @@ pub fn leading_features(
         (solved.values, solved.vectors)
     };
     let rank = rank_for(&values, kept).min(max_rank).min(feature_count);
-    let leading = (0..feature_count).flat_map(|f| (0..rank).map({ let vectors = &vectors; move |k| vectors[(f, k)] as f32 })).collect();
+    let leading = (0..feature_count)
+        .flat_map(|f| {
+            (0..rank).map({
+                let vectors = &vectors;
+                move |k| vectors[(f, k)] as f32
+            })
+        })
+        .collect();
     Ok((leading, rank))
 }
 
@@ -180,7 +194,8 @@ mod tests {
             for i in 0..nodes {
                 for c in 0..columns {
                     let v = |node: usize, s: usize| f64::from(visibility.rows[node * facets + s]);
-                    let want: f64 = (0..facets).map(|s| f64::from(weights[s] * y[s * columns + c]) * v(i, s) * v(o, s)).sum();
+                    let want: f64 =
+                        (0..facets).map(|s| f64::from(weights[s] * y[s * columns + c]) * v(i, s) * v(o, s)).sum();
                     let got = f64::from(table[(o * nodes + i) * columns + c]);
                     assert!((got - want).abs() < 1e-5 * want.abs() + 1e-6, "{i} {o} {c}: {got} {want}");
                 }
@@ -189,7 +204,14 @@ mod tests {
     }
 
     /// `‖N - N L Lᵀ‖² / ‖N‖²` with N built, over pairs of nodes weighted by solid angle.
-    fn lost(visibility: &VisibilityRows, weights: &[f32], features: &[f32], count: usize, leading: &[f32], rank: usize) -> f64 {
+    fn lost(
+        visibility: &VisibilityRows,
+        weights: &[f32],
+        features: &[f32],
+        count: usize,
+        leading: &[f32],
+        rank: usize,
+    ) -> f64 {
         let (nodes, facets) = (visibility.grid.len(), visibility.facets);
         let (mut all, mut left) = (0.0, 0.0);
         for o in 0..nodes {
@@ -205,7 +227,8 @@ mod tests {
                             .sum()
                     })
                     .collect();
-                let kept: Vec<f64> = (0..rank).map(|k| (0..count).map(|f| n[f] * f64::from(leading[f * rank + k])).sum()).collect();
+                let kept: Vec<f64> =
+                    (0..rank).map(|k| (0..count).map(|f| n[f] * f64::from(leading[f * rank + k])).sum()).collect();
                 let norm: f64 = n.iter().map(|x| x * x).sum();
                 all += measure * norm;
                 left += measure * (norm - kept.iter().map(|x| x * x).sum::<f64>());
@@ -220,8 +243,11 @@ mod tests {
         let visibility = rows(grid, facets);
         let weights = noise(facets, 8);
         // Features that fall off, as those of a basis do.
-        let features: Vec<f32> =
-            noise(facets * count, 9).iter().enumerate().map(|(k, x)| (x - 0.5) * 0.75_f32.powi((k % count) as i32)).collect();
+        let features: Vec<f32> = noise(facets * count, 9)
+            .iter()
+            .enumerate()
+            .map(|(k, x)| (x - 0.5) * 0.75_f32.powi((k % count) as i32))
+            .collect();
         let mut last = 0;
         for kept in [0.9, 0.99, 0.999] {
             let (leading, rank) = leading_features(&visibility, &weights, &features, count, kept, count, 1).unwrap();
@@ -245,8 +271,14 @@ mod tests {
         let visibility = rows(grid, facets);
         let (weights, plain) = (noise(facets, 8), noise(facets * 3, 9));
         // Sixty features spanned by three: more features than random vectors, the other branch.
-        let features: Vec<f32> =
-            (0..facets).flat_map(|s| (0..60).map({ let plain = &plain; move |f| plain[s * 3 + f % 3] * (1.0 + f as f32) })).collect();
+        let features: Vec<f32> = (0..facets)
+            .flat_map(|s| {
+                (0..60).map({
+                    let plain = &plain;
+                    move |f| plain[s * 3 + f % 3] * (1.0 + f as f32)
+                })
+            })
+            .collect();
         let (leading, rank) = leading_features(&visibility, &weights, &features, 60, 0.999_999, 8, 1).unwrap();
         assert_eq!(rank, 3);
         assert!(lost(&visibility, &weights, &features, 60, &leading, rank) < 1e-5);

@@ -76,7 +76,12 @@ impl FacetSum {
         for group in &mut self.groups {
             let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
             group.color = material.color;
-            group.lobes = material.brdf.terms.iter().filter_map(|term| analytic_lobe(term).map(|lobe| (lobe, term.clone()))).collect();
+            group.lobes = material
+                .brdf
+                .terms
+                .iter()
+                .filter_map(|term| analytic_lobe(term).map(|lobe| (lobe, term.clone())))
+                .collect();
             group.measured = material
                 .brdf
                 .terms
@@ -118,7 +123,10 @@ impl FacetSum {
 
     /// Facets that carry a measured BRDF.
     pub fn measured_count(&self) -> usize {
-        self.groups.iter().map(|group| group.patches.as_ref().map_or(group.range.len(), Vec::len) * group.measured.len()).sum()
+        self.groups
+            .iter()
+            .map(|group| group.patches.as_ref().map_or(group.range.len(), Vec::len) * group.measured.len())
+            .sum()
     }
 
     /// Do colour weights differ between facets of one material?
@@ -157,7 +165,9 @@ impl FacetSum {
             let tint = term.tint(pair.i_dot_h).as_dvec3();
             total += tint
                 * match &group.rgb_areas {
-                    None => DVec3::splat(simd::lobe_sums(*lobe, pair, normals, [&self.areas[range.clone()]], v_i, v_o)[0]),
+                    None => {
+                        DVec3::splat(simd::lobe_sums(*lobe, pair, normals, [&self.areas[range.clone()]], v_i, v_o)[0])
+                    }
                     Some([r, g, b]) => DVec3::from_array(simd::lobe_sums(*lobe, pair, normals, [r, g, b], v_i, v_o)),
                 };
         }
@@ -208,7 +218,9 @@ impl Group {
         let colors = &facets.colors[range.clone()];
         let uniform = colors.iter().all(|&color| color == Vec3::ONE);
         let rgb_areas = (!uniform).then(|| {
-            std::array::from_fn(|c| colors.iter().zip(&facets.areas[range.clone()]).map(|(color, area)| color[c] * area).collect())
+            std::array::from_fn(|c| {
+                colors.iter().zip(&facets.areas[range.clone()]).map(|(color, area)| color[c] * area).collect()
+            })
         });
         let mut patches: Vec<Patch> = Vec::new();
         for s in range.clone() {
@@ -219,7 +231,14 @@ impl Group {
             }
         }
         let few = patches.len() * FACETS_A_PATCH <= range.len();
-        Self { range, color: Vec3::ONE, lobes: Vec::new(), measured: Vec::new(), rgb_areas, patches: few.then_some(patches) }
+        Self {
+            range,
+            color: Vec3::ONE,
+            lobes: Vec::new(),
+            measured: Vec::new(),
+            rgb_areas,
+            patches: few.then_some(patches),
+        }
     }
 }
 

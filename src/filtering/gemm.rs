@@ -7,7 +7,22 @@ pub fn multiply(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c: &mut [f32
     assert!(a.len() >= m * k && b.len() >= k * n && c.len() >= m * n, "slices hold the matrices");
     // SAFETY: the lengths were just checked, and the strides are those of row-major matrices of these sizes.
     unsafe {
-        matrixmultiply::sgemm(m, k, n, 1.0, a.as_ptr(), k as isize, 1, b.as_ptr(), n as isize, 1, 0.0, c.as_mut_ptr(), n as isize, 1);
+        matrixmultiply::sgemm(
+            m,
+            k,
+            n,
+            1.0,
+            a.as_ptr(),
+            k as isize,
+            1,
+            b.as_ptr(),
+            n as isize,
+            1,
+            0.0,
+            c.as_mut_ptr(),
+            n as isize,
+            1,
+        );
     }
 }
 
@@ -16,7 +31,22 @@ pub fn multiply_transposed(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c
     assert!(a.len() >= m * k && b.len() >= k * n && c.len() >= m * n, "slices hold the matrices");
     // SAFETY: as above; `b` is read with its strides swapped.
     unsafe {
-        matrixmultiply::sgemm(m, k, n, 1.0, a.as_ptr(), k as isize, 1, b.as_ptr(), 1, k as isize, 0.0, c.as_mut_ptr(), n as isize, 1);
+        matrixmultiply::sgemm(
+            m,
+            k,
+            n,
+            1.0,
+            a.as_ptr(),
+            k as isize,
+            1,
+            b.as_ptr(),
+            1,
+            k as isize,
+            0.0,
+            c.as_mut_ptr(),
+            n as isize,
+            1,
+        );
     }
 }
 
@@ -27,7 +57,10 @@ pub fn multiply_parallel(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c: 
         c.fill(0.0);
         return;
     }
-    c[..m * n].par_chunks_mut(ROWS * n).zip(a.par_chunks(ROWS * k)).for_each(|(c, a)| multiply(c.len() / n, k, n, a, b, c));
+    c[..m * n]
+        .par_chunks_mut(ROWS * n)
+        .zip(a.par_chunks(ROWS * k))
+        .for_each(|(c, a)| multiply(c.len() / n, k, n, a, b, c));
 }
 
 /// `aᵀ a` in f64 for row-major `a: m x n`, of f32 entries.
@@ -37,7 +70,20 @@ pub fn gram(m: usize, n: usize, a: &[f32]) -> nalgebra::DMatrix<f64> {
     // SAFETY: `wide` holds m x n values read once as n x m and once as m x n; `out` is n x n, and symmetric.
     unsafe {
         matrixmultiply::dgemm(
-            n, m, n, 1.0, wide.as_ptr(), 1, n as isize, wide.as_ptr(), n as isize, 1, 0.0, out.as_mut_slice().as_mut_ptr(), 1, n as isize,
+            n,
+            m,
+            n,
+            1.0,
+            wide.as_ptr(),
+            1,
+            n as isize,
+            wide.as_ptr(),
+            n as isize,
+            1,
+            0.0,
+            out.as_mut_slice().as_mut_ptr(),
+            1,
+            n as isize,
         );
     }
     out

@@ -59,13 +59,20 @@ mod tests {
     #[test]
     fn clustered_and_huge_values_are_rebuilt_to_rounding() {
         for scale in [1e-30, 1.0, 1e30] {
-            let base = DMatrix::from_fn(20, 9, |r, c| if r == 0 && c == 0 { 1e8 } else { ((r * 7 + c * 3) % 11) as f64 - 5.0 });
+            let base =
+                DMatrix::from_fn(
+                    20,
+                    9,
+                    |r, c| if r == 0 && c == 0 { 1e8 } else { ((r * 7 + c * 3) % 11) as f64 - 5.0 },
+                );
             let gram = base.transpose() * &base * scale;
             let solved = eigen(gram.clone()).unwrap();
-            let rebuilt = &solved.vectors * DMatrix::from_diagonal(&solved.values.clone().into()) * solved.vectors.transpose();
+            let rebuilt =
+                &solved.vectors * DMatrix::from_diagonal(&solved.values.clone().into()) * solved.vectors.transpose();
             let ratio = (rebuilt - &gram).norm() / (gram.norm() * 9.0 * f64::EPSILON);
             assert!(ratio < 50.0, "{scale}: {ratio}");
-            let orthogonal = (solved.vectors.transpose() * &solved.vectors - DMatrix::identity(9, 9)).norm() / (9.0 * f64::EPSILON);
+            let orthogonal =
+                (solved.vectors.transpose() * &solved.vectors - DMatrix::identity(9, 9)).norm() / (9.0 * f64::EPSILON);
             assert!(orthogonal < 50.0, "{orthogonal}");
         }
     }

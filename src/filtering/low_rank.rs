@@ -6,8 +6,8 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::bvndf::{VisibilityRows, leading_features, visibility_table};
-use super::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 use super::facet_sum::{SumMaterial, analytic_lobe};
+use super::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 use crate::brdf::{Brdf, ColorBasis, Term};
 use crate::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
 use crate::error::Result;
@@ -82,14 +82,26 @@ impl Channel {
     }
 
     /// Any lobe, through its rotated basis.
-    pub fn factored(group: &GroupFacets<'_>, basis: &RotatedBasis, settings: &LowRankSettings, tint: Tint) -> Result<Self> {
+    pub fn factored(
+        group: &GroupFacets<'_>,
+        basis: &RotatedBasis,
+        settings: &LowRankSettings,
+        tint: Tint,
+    ) -> Result<Self> {
         let count = basis.features();
         let mut features = vec![0.0; group.normals.len() * count];
         for (normal, row) in group.normals.iter().zip(features.chunks_mut(count.max(1))) {
             basis.write_features(*normal, row);
         }
-        let (leading, rank) =
-            leading_features(group.visibility, group.weights, &features, count, settings.keep_n, settings.max_rank, settings.seed)?;
+        let (leading, rank) = leading_features(
+            group.visibility,
+            group.weights,
+            &features,
+            count,
+            settings.keep_n,
+            settings.max_rank,
+            settings.seed,
+        )?;
         let mut y = vec![0.0; group.normals.len() * rank];
         super::gemm::multiply_parallel(group.normals.len(), count, rank, &features, &leading, &mut y);
         let u = visibility_table(group.visibility, group.weights, &y, rank);
@@ -129,7 +141,9 @@ fn groups<'a>(facets: &Facets, material_of_slot: &[usize], materials: &'a [SumMa
         let columns = if colors.iter().all(|&color| color == colors[0]) {
             vec![(areas.to_vec(), colors[0])]
         } else {
-            (0..3).map(|c| (colors.iter().zip(areas).map(|(color, area)| color[c] * area).collect(), Vec3::AXES[c])).collect()
+            (0..3)
+                .map(|c| (colors.iter().zip(areas).map(|(color, area)| color[c] * area).collect(), Vec3::AXES[c]))
+                .collect()
         };
         groups.push(Group { range, material, columns });
     }
@@ -159,26 +173,46 @@ impl LowRank {
                     let color = group.material.color * *column_color;
                     let part = GroupFacets { visibility: &rows, normals, weights };
                     match term {
-                        Term::Lambertian { .. } => channels.push(Channel::lambertian(&part, Tint::Term(term.clone(), color))),
+                        Term::Lambertian { .. } => {
+                            channels.push(Channel::lambertian(&part, Tint::Term(term.clone(), color)))
+                        }
                         Term::Measured(table) => {
                             let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
-                            for direction in &colors.directions[..settings.colors.unwrap_or_else(|| colors.count_for(settings.keep_color)).clamp(1, 3)] {
+                            for direction in &colors.directions
+                                [..settings.colors.unwrap_or_else(|| colors.count_for(settings.keep_color)).clamp(1, 3)]
+                            {
                                 let lobe = RotatedLobe::Measured { table: table.as_ref(), along: *direction };
                                 let basis = RotatedBasis::new(lobe, settings.basis, settings.keep_m)?;
-                                channels.push(Channel::factored(&part, &basis, settings, Tint::Fixed(*direction * color))?);
+                                channels.push(Channel::factored(
+                                    &part,
+                                    &basis,
+                                    settings,
+                                    Tint::Fixed(*direction * color),
+                                )?);
                             }
                         }
                         analytic => {
                             if let Some(lobe) = analytic_lobe(analytic) {
-                                let basis = RotatedBasis::new(RotatedLobe::Analytic(lobe), settings.basis, settings.keep_m)?;
-                                channels.push(Channel::factored(&part, &basis, settings, Tint::Term(term.clone(), color))?);
+                                let basis =
+                                    RotatedBasis::new(RotatedLobe::Analytic(lobe), settings.basis, settings.keep_m)?;
+                                channels.push(Channel::factored(
+                                    &part,
+                                    &basis,
+                                    settings,
+                                    Tint::Term(term.clone(), color),
+                                )?);
                             }
                         }
                     }
                 }
             }
         }
-        Ok(Self { directions: settings.directions, pairs: settings.basis.pairs, channels, projected_area: Arc::new(projected_area) })
+        Ok(Self {
+            directions: settings.directions,
+            pairs: settings.basis.pairs,
+            channels,
+            projected_area: Arc::new(projected_area),
+        })
     }
 }
 

@@ -21,7 +21,10 @@ use crate::simd::{self, Lobe, PairVectors};
 pub enum RotatedLobe<'a> {
     Analytic(Lobe),
     /// A measured BRDF projected onto a colour direction.
-    Measured { table: &'a dyn Measured, along: Vec3 },
+    Measured {
+        table: &'a dyn Measured,
+        along: Vec3,
+    },
 }
 
 impl RotatedLobe<'_> {
@@ -118,7 +121,8 @@ impl RotatedBasis {
         let energies: Vec<f64> = modes.iter().map(|mode| mode.0).collect();
         let count = rank_for(&energies, kept);
         let total: f64 = energies.iter().sum();
-        let kept_energy = if total > 0.0 { energies[..count.min(energies.len())].iter().sum::<f64>() / total } else { 1.0 };
+        let kept_energy =
+            if total > 0.0 { energies[..count.min(energies.len())].iter().sum::<f64>() / total } else { 1.0 };
         let spectrum = modes.iter().map(|(energy, mode)| (*energy, mode.multiplicity(grid))).collect();
         modes.truncate(count);
         let modes: Vec<Mode> = modes.into_iter().map(|mode| mode.1).collect();
@@ -166,7 +170,11 @@ impl RotatedBasis {
             let v: f32 = taps
                 .iter()
                 .zip(weights)
-                .map(|(&(ring, crossed), weight)| if crossed && odd { -weight * mode.right[ring] } else { weight * mode.right[ring] })
+                .map(
+                    |(&(ring, crossed), weight)| {
+                        if crossed && odd { -weight * mode.right[ring] } else { weight * mode.right[ring] }
+                    },
+                )
                 .sum();
             let (sin, cos) = (mode.frequency as f32 * phi).sin_cos();
             *out = [mode.sigma * v * cos, mode.sigma * v * sin];
@@ -203,8 +211,13 @@ impl RotatedBasis {
                     for (k, mode) in self.modes.iter().enumerate() {
                         let scale = mode.kappa(grid) / mode.sigma;
                         let (re, im) = (mode.left[0][row] * scale, mode.left[1][row] * scale * sign);
-                        let (w_cos, w_sin) = (&weights[2 * k * columns..(2 * k + 1) * columns], &weights[(2 * k + 1) * columns..(2 * k + 2) * columns]);
-                        let (out_re, out_im) = spectrum[2 * mode.frequency * columns..(2 * mode.frequency + 2) * columns].split_at_mut(columns);
+                        let (w_cos, w_sin) = (
+                            &weights[2 * k * columns..(2 * k + 1) * columns],
+                            &weights[(2 * k + 1) * columns..(2 * k + 2) * columns],
+                        );
+                        let (out_re, out_im) = spectrum
+                            [2 * mode.frequency * columns..(2 * mode.frequency + 2) * columns]
+                            .split_at_mut(columns);
                         for c in 0..columns {
                             out_re[c] += re * w_cos[c] + im * w_sin[c];
                             out_im[c] += im * w_cos[c] - re * w_sin[c];
@@ -213,7 +226,8 @@ impl RotatedBasis {
                     gemm::multiply(azimuths, 2 * frequencies, columns, &inverse, &spectrum, &mut turned);
                     for azimuth in 0..azimuths {
                         let node = (azimuth * grid.pairs.difference + difference) * grid.pairs.turn + turn;
-                        table[node * columns..(node + 1) * columns].copy_from_slice(&turned[azimuth * columns..(azimuth + 1) * columns]);
+                        table[node * columns..(node + 1) * columns]
+                            .copy_from_slice(&turned[azimuth * columns..(azimuth + 1) * columns]);
                     }
                 }
             }
@@ -258,11 +272,16 @@ fn transformed(lobe: RotatedLobe<'_>, grid: BasisGrid) -> Vec<f32> {
     let spectra: Vec<Vec<f32>> = (0..rows)
         .into_par_iter()
         .map(|row| {
-            let (ring, difference, turn) = (row / (grid.pairs.difference * half_turn), row / half_turn % grid.pairs.difference, row % half_turn);
+            let (ring, difference, turn) =
+                (row / (grid.pairs.difference * half_turn), row / half_turn % grid.pairs.difference, row % half_turn);
             let mut values = vec![0.0_f32; azimuths * rings];
             for (b, values) in values.chunks_mut(rings).enumerate() {
-                let (i, o) =
-                    HalfDifferenceGrid::pair(grid.pairs.theta_h(ring), grid.pairs.phi_h(b), grid.pairs.theta_d(difference), grid.pairs.phi_d(turn));
+                let (i, o) = HalfDifferenceGrid::pair(
+                    grid.pairs.theta_h(ring),
+                    grid.pairs.phi_h(b),
+                    grid.pairs.theta_d(difference),
+                    grid.pairs.phi_d(turn),
+                );
                 lobe.values(i, o, [&x, &y, &z], values);
             }
             let mut spectrum = vec![0.0_f32; parts * rings];
@@ -288,14 +307,19 @@ fn factor_block(blocks: &[f32], grid: BasisGrid, frequency: usize) -> Result<Vec
     // √ of the measure: sinθ_h (sinθ_d cosθ_d dθ_d) for pairs, sinθ_n for normals.
     let row_weight: Vec<f32> = (0..rows)
         .map(|row| {
-            let (ring, difference, turn) = (row / (grid.pairs.difference * half_turn), row / half_turn % grid.pairs.difference, row % half_turn);
+            let (ring, difference, turn) =
+                (row / (grid.pairs.difference * half_turn), row / half_turn % grid.pairs.difference, row % half_turn);
             let folded = if turn == 0 || turn + 1 == half_turn { 1.0 } else { 2.0 };
             (grid.pairs.theta_h(ring).sin() * grid.pairs.difference_measure(difference) * folded).sqrt()
         })
         .collect();
     let ring_weight: Vec<f32> = (0..rings).map(|ring| grid.theta_n(ring).sin().sqrt()).collect();
     let weighted = |block: &[f32]| -> Vec<f32> {
-        block.chunks(rings).zip(&row_weight).flat_map(|(row, &w)| row.iter().zip(&ring_weight).map(move |(&x, &c)| x * w * c)).collect()
+        block
+            .chunks(rings)
+            .zip(&row_weight)
+            .flat_map(|(row, &w)| row.iter().zip(&ring_weight).map(move |(&x, &c)| x * w * c))
+            .collect()
     };
     let gram = gemm::gram(rows, rings, &weighted(real)) + gemm::gram(rows, rings, &weighted(imaginary));
     let solved = eigen(gram)?;
@@ -304,8 +328,15 @@ fn factor_block(blocks: &[f32], grid: BasisGrid, frequency: usize) -> Result<Vec
     // Below this a Gram matrix of f32 entries holds rounding only.
     let count = solved.values.iter().take_while(|&&value| value > largest * 1e-9 && value > 0.0).count();
     // B v for all kept v at once.
-    let mixing: Vec<f32> =
-        (0..rings).flat_map(|ring| (0..count).map({ let solved = &solved; let w = ring_weight[ring]; move |k| solved.vectors[(ring, k)] as f32 * w })).collect();
+    let mixing: Vec<f32> = (0..rings)
+        .flat_map(|ring| {
+            (0..count).map({
+                let solved = &solved;
+                let w = ring_weight[ring];
+                move |k| solved.vectors[(ring, k)] as f32 * w
+            })
+        })
+        .collect();
     let mut left = [vec![0.0_f32; rows * count], vec![0.0_f32; rows * count]];
     gemm::multiply(rows, rings, count, real, &mixing, &mut left[0]);
     gemm::multiply(rows, rings, count, imaginary, &mixing, &mut left[1]);
@@ -348,10 +379,16 @@ mod tests {
                     let (turn, rest) = (node % p.turn, node / p.turn);
                     let (difference, rest) = (rest % p.difference, rest / p.difference);
                     let (azimuth, ring) = (rest % p.azimuths, rest / p.azimuths);
-                    let (i, o) = HalfDifferenceGrid::pair(p.theta_h(ring), p.phi_h(azimuth), p.theta_d(difference), p.phi_d(turn));
+                    let (i, o) = HalfDifferenceGrid::pair(
+                        p.theta_h(ring),
+                        p.phi_h(azimuth),
+                        p.theta_d(difference),
+                        p.phi_d(turn),
+                    );
                     let mut want = [0.0];
                     lobe_values(lobe, &PairVectors::new(i, o), [&[normal.x], &[normal.y], &[normal.z]], &mut want);
-                    let weight = f64::from(p.theta_h(ring).sin() * p.theta_d(difference).sin() * p.theta_d(difference).cos());
+                    let weight =
+                        f64::from(p.theta_h(ring).sin() * p.theta_d(difference).sin() * p.theta_d(difference).cos());
                     error += weight * f64::from(got - want[0]).powi(2);
                     norm += weight * f64::from(want[0]).powi(2);
                 }

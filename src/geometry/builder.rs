@@ -19,10 +19,7 @@ impl MeshBuilder {
             closes_plane: true,
             ..TileMesh::default()
         };
-        Self {
-            mesh,
-            size: size.as_dvec2(),
-        }
+        Self { mesh, size: size.as_dvec2() }
     }
 
     /// A convex polygon, counter-clockwise seen from the side that reflects, as a fan.
@@ -30,11 +27,7 @@ impl MeshBuilder {
         let centre = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
         let shift = (centre.truncate() / self.size).floor() * self.size;
         let first = self.mesh.positions.len() as u32;
-        self.mesh.positions.extend(
-            corners
-                .iter()
-                .map(|corner| (*corner - shift.extend(0.0)).as_vec3()),
-        );
+        self.mesh.positions.extend(corners.iter().map(|corner| (*corner - shift.extend(0.0)).as_vec3()));
         for k in 1..corners.len().saturating_sub(1) as u32 {
             self.mesh.triangles.push([first, first + k, first + k + 1]);
             self.mesh.triangle_slot.push(slot);

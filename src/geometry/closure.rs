@@ -13,8 +13,7 @@ const WELD: f64 = 2e-6;
 /// Is the mesh closed modulo the tile (every edge is passed as often one way as the other), and does it cover the plane
 /// once (signed projected area = base area)? Then every ray from above meets a side that reflects before any other.
 pub fn is_closed_sheet(mesh: &TileMesh) -> bool {
-    open_edges(mesh) == 0
-        && (signed_projected_area(mesh) / f64::from(mesh.base_area()) - 1.0).abs() < 1e-3
+    open_edges(mesh) == 0 && (signed_projected_area(mesh) / f64::from(mesh.base_area()) - 1.0).abs() < 1e-3
 }
 
 /// `Σ A_t n_t·z`.
@@ -54,34 +53,21 @@ pub fn open_edges(mesh: &TileMesh) -> usize {
 fn weld(mesh: &TileMesh) -> Vec<u32> {
     let size = mesh.size.as_dvec2();
     let (low, high) = mesh.z_range();
-    let scale = DVec3::new(
-        size.x,
-        size.y,
-        size.max_element().max(f64::from(high - low)),
-    );
+    let scale = DVec3::new(size.x, size.y, size.max_element().max(f64::from(high - low)));
     let cells = (1.0 / WELD) as i64;
     let mut found: HashMap<I64Vec3, u32> = HashMap::new();
-    let wrap =
-        |cell: I64Vec3| I64Vec3::new(cell.x.rem_euclid(cells), cell.y.rem_euclid(cells), cell.z);
+    let wrap = |cell: I64Vec3| I64Vec3::new(cell.x.rem_euclid(cells), cell.y.rem_euclid(cells), cell.z);
     let mut representative = |(index, position): (usize, &glam::Vec3)| {
-        let cell = (position.as_dvec3() / scale * cells as f64)
-            .round()
-            .as_i64vec3();
-        let around = (-1..=1)
-            .flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| I64Vec3::new(x, y, z))));
-        let known = std::iter::once(I64Vec3::ZERO)
-            .chain(around)
-            .find_map(|step| found.get(&wrap(cell + step)).copied());
+        let cell = (position.as_dvec3() / scale * cells as f64).round().as_i64vec3();
+        let around = (-1..=1).flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| I64Vec3::new(x, y, z))));
+        let known =
+            std::iter::once(I64Vec3::ZERO).chain(around).find_map(|step| found.get(&wrap(cell + step)).copied());
         known.unwrap_or_else(|| {
             found.insert(wrap(cell), index as u32);
             index as u32
         })
     };
-    mesh.positions
-        .iter()
-        .enumerate()
-        .map(&mut representative)
-        .collect()
+    mesh.positions.iter().enumerate().map(&mut representative).collect()
 }
 
 /// For tests of closed families.
@@ -89,10 +75,7 @@ fn weld(mesh: &TileMesh) -> Vec<u32> {
 pub fn assert_closes_plane(mesh: &TileMesh) {
     assert_eq!(open_edges(mesh), 0, "open edges");
     let ratio = signed_projected_area(mesh) / f64::from(mesh.base_area());
-    assert!(
-        (ratio - 1.0).abs() < 1e-5,
-        "projected area {ratio} of the base area"
-    );
+    assert!((ratio - 1.0).abs() < 1e-5, "projected area {ratio} of the base area");
     assert!(mesh.closes_plane);
 }
 
@@ -105,12 +88,7 @@ mod tests {
     fn plane(far_edge: f32) -> TileMesh {
         TileMesh {
             size: Vec2::ONE,
-            positions: vec![
-                Vec3::ZERO,
-                Vec3::new(far_edge, 0.0, 0.0),
-                Vec3::new(far_edge, 1.0, 0.0),
-                Vec3::Y,
-            ],
+            positions: vec![Vec3::ZERO, Vec3::new(far_edge, 0.0, 0.0), Vec3::new(far_edge, 1.0, 0.0), Vec3::Y],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             triangle_slot: vec![0, 0],
             slots: vec!["default".to_owned()],
@@ -129,9 +107,7 @@ mod tests {
     #[test]
     fn a_plane_seen_from_behind_does_not_close() {
         let mut mesh = plane(1.0);
-        mesh.triangles
-            .iter_mut()
-            .for_each(|triangle| triangle.swap(1, 2));
+        mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         assert!(!is_closed_sheet(&mesh));
     }
 }

@@ -43,10 +43,7 @@ impl Facets {
     pub(super) fn push(&mut self, mesh: &TileMesh, triangle: u32, barycentric: Vec3, area: f32) {
         let index = triangle as usize;
         let [a, b, c] = mesh.corners(index);
-        let position = wrap(
-            a * barycentric.x + b * barycentric.y + c * barycentric.z,
-            mesh.size,
-        );
+        let position = wrap(a * barycentric.x + b * barycentric.y + c * barycentric.z, mesh.size);
         let geometric = mesh.geometric_normal(index);
         let interpolated = mesh.corner_normals.as_ref().and_then(|normals| {
             let [a, b, c] = normals[index];
@@ -57,8 +54,7 @@ impl Facets {
         self.geometric_normals.push(geometric);
         self.areas.push(area);
         self.slots.push(mesh.triangle_slot[index]);
-        self.colors
-            .push(mesh.color.at(position.truncate(), mesh.size));
+        self.colors.push(mesh.color.at(position.truncate(), mesh.size));
         self.triangles.push(triangle);
     }
 }
@@ -70,11 +66,7 @@ fn wrap(position: Vec3, size: Vec2) -> Vec3 {
         // A tiny negative x rounds to the size itself.
         if wrapped < size { wrapped } else { 0.0 }
     };
-    Vec3::new(
-        into(position.x, size.x),
-        into(position.y, size.y),
-        position.z,
-    )
+    Vec3::new(into(position.x, size.x), into(position.y, size.y), position.z)
 }
 
 /// Shifts of a systematic sample, each in `[0, 1)`: the same surface sampled anew.
@@ -94,10 +86,7 @@ impl SampleShift {
         let below_one = |x: f32| x.min(1f32.next_down());
         Self {
             along: below_one(at(0.819_172_513_396_164_4)),
-            inside: Vec2::new(
-                below_one(at(0.671_043_606_703_789_2)),
-                below_one(at(0.549_700_477_901_970_3)),
-            ),
+            inside: Vec2::new(below_one(at(0.671_043_606_703_789_2)), below_one(at(0.549_700_477_901_970_3))),
         }
     }
 }
@@ -116,8 +105,8 @@ impl FacetSampler {
         let mut keyed: Vec<(u32, u32)> = Vec::with_capacity(mesh.triangles.len());
         for triangle in 0..mesh.triangles.len() {
             let corners = mesh.corners(triangle);
-            let is_sound = corners.iter().all(|corner| corner.is_finite())
-                && mesh.geometric_normal(triangle) != Vec3::ZERO;
+            let is_sound =
+                corners.iter().all(|corner| corner.is_finite()) && mesh.geometric_normal(triangle) != Vec3::ZERO;
             if is_sound {
                 let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
                 let place = wrap(centre, mesh.size).truncate() / mesh.size;
@@ -135,11 +124,7 @@ impl FacetSampler {
             sum
         };
         let cumulative = order.iter().map(accumulate).collect();
-        Self {
-            order,
-            cumulative,
-            skipped,
-        }
+        Self { order, cumulative, skipped }
     }
 
     /// Surface area of the tile.
@@ -149,19 +134,14 @@ impl FacetSampler {
 
     /// The triangle at a part `at` in `[0, 1)` of the cumulative area, and its position in the order.
     pub(super) fn triangle_at(&self, at: f64) -> u32 {
-        let k = self
-            .cumulative
-            .partition_point(|sum| *sum <= at * self.area());
+        let k = self.cumulative.partition_point(|sum| *sum <= at * self.area());
         self.order[k.min(self.order.len() - 1)]
     }
 
     /// Systematic samples: facet k lies on the triangle at `(k + shift)/count` of the cumulative area, at a point of an R2
     /// sequence (Roberts 2018) folded into it, and stands for `area/count`. Empty for a mesh without area.
     pub fn sample(&self, mesh: &TileMesh, count: usize, shift: SampleShift) -> Facets {
-        let mut facets = Facets {
-            skipped_triangles: self.skipped,
-            ..Facets::default()
-        };
+        let mut facets = Facets { skipped_triangles: self.skipped, ..Facets::default() };
         if self.order.is_empty() {
             return facets;
         }
@@ -182,19 +162,12 @@ impl FacetSampler {
 fn r2(index: usize, shift: Vec2) -> Vec2 {
     // 1/g and 1/g² of the plastic number g.
     let at = |step: f64, shift: f32| (f64::from(shift) + index as f64 * step).fract() as f32;
-    Vec2::new(
-        at(0.754_877_666_246_692_8, shift.x),
-        at(0.569_840_290_998_053_3, shift.y),
-    )
+    Vec2::new(at(0.754_877_666_246_692_8, shift.x), at(0.569_840_290_998_053_3, shift.y))
 }
 
 /// The unit square folded onto barycentric coordinates.
 pub(super) fn fold(point: Vec2) -> Vec3 {
-    let point = if point.x + point.y > 1.0 {
-        Vec2::ONE - point
-    } else {
-        point
-    };
+    let point = if point.x + point.y > 1.0 { Vec2::ONE - point } else { point };
     Vec3::new(1.0 - point.x - point.y, point.x, point.y)
 }
 
@@ -206,11 +179,7 @@ fn stratum(normal: Vec3, place: Vec2) -> u32 {
     const BITS: u32 = 8;
     let axes = [0.5 + 0.5 * normal.x, 0.5 + 0.5 * normal.y, place.x, place.y];
     let steps = axes.map(|v| ((v * (1 << BITS) as f32) as u32).min((1 << BITS) - 1));
-    (0..BITS).rev().fold(0, |key, bit| {
-        steps
-            .iter()
-            .fold(key, |key, step| key << 1 | (step >> bit & 1))
-    })
+    (0..BITS).rev().fold(0, |key, bit| steps.iter().fold(key, |key, step| key << 1 | (step >> bit & 1)))
 }
 
 /// `A cos θ_o` of a surface without shadows, from facets: for tests of sampling.
@@ -218,10 +187,5 @@ fn stratum(normal: Vec3, place: Vec2) -> u32 {
 pub(super) fn unshadowed_projected_area(facets: &Facets, theta: f32, phi: f32) -> f64 {
     let o = crate::directions::from_angles(theta, phi).as_dvec3();
     let term = |(normal, area): (&Vec3, &f32)| normal.as_dvec3().dot(o).max(0.0) * f64::from(*area);
-    facets
-        .geometric_normals
-        .iter()
-        .zip(&facets.areas)
-        .map(term)
-        .sum()
+    facets.geometric_normals.iter().zip(&facets.areas).map(term).sum()
 }

@@ -12,9 +12,7 @@ const SECOND: u16 = 1;
 pub fn build(spec: &Flat, size: Vec2) -> TileMesh {
     let edges = |periods: u32| -> Vec<f64> {
         let ratio = f64::from(spec.ratio);
-        let inner = (0..periods)
-            .flat_map(|k| [f64::from(k), f64::from(k) + ratio])
-            .map(|at| at / f64::from(periods));
+        let inner = (0..periods).flat_map(|k| [f64::from(k), f64::from(k) + ratio]).map(|at| at / f64::from(periods));
         inner.chain([1.0]).collect()
     };
     let whole = vec![0.0, 1.0];
@@ -23,11 +21,7 @@ pub fn build(spec: &Flat, size: Vec2) -> TileMesh {
         FlatPattern::Stripes => (edges(spec.count), whole),
         FlatPattern::Checks => (edges(spec.count), edges(spec.count)),
     };
-    let slots: &[&str] = if spec.pattern == FlatPattern::Plain {
-        &["default"]
-    } else {
-        &["first", "second"]
-    };
+    let slots: &[&str] = if spec.pattern == FlatPattern::Plain { &["default"] } else { &["first", "second"] };
     let mut builder = MeshBuilder::new(size, slots);
     let size = size.as_dvec2();
     for (j, y) in rows.windows(2).enumerate() {
@@ -42,15 +36,7 @@ pub fn build(spec: &Flat, size: Vec2) -> TileMesh {
                 FlatPattern::Checks => SECOND,
             };
             let corner = |x: f64, y: f64| (DVec2::new(x, y) * size).extend(0.0);
-            builder.polygon(
-                &[
-                    corner(x[0], y[0]),
-                    corner(x[1], y[0]),
-                    corner(x[1], y[1]),
-                    corner(x[0], y[1]),
-                ],
-                slot,
-            );
+            builder.polygon(&[corner(x[0], y[0]), corner(x[1], y[0]), corner(x[1], y[1]), corner(x[0], y[1])], slot);
         }
     }
     builder.finish()
@@ -63,18 +49,8 @@ mod tests {
 
     #[test]
     fn stripes_and_checks_share_the_area_as_asked() {
-        for (pattern, expected) in [
-            (FlatPattern::Stripes, 0.3),
-            (FlatPattern::Checks, 0.3 * 0.3 + 0.7 * 0.7),
-        ] {
-            let mesh = build(
-                &Flat {
-                    pattern,
-                    ratio: 0.3,
-                    ..Flat::default()
-                },
-                Vec2::new(2.0, 1.0),
-            );
+        for (pattern, expected) in [(FlatPattern::Stripes, 0.3), (FlatPattern::Checks, 0.3 * 0.3 + 0.7 * 0.7)] {
+            let mesh = build(&Flat { pattern, ratio: 0.3, ..Flat::default() }, Vec2::new(2.0, 1.0));
             let first: f64 = (0..mesh.triangles.len())
                 .filter(|&t| mesh.triangle_slot[t] == FIRST)
                 .map(|t| mesh.triangle_area(t))
@@ -89,20 +65,9 @@ mod tests {
     fn a_plain_plane_has_the_slot_default_and_extreme_ratios_one_slot() {
         assert_eq!(build(&Flat::default(), Vec2::ONE).slots, ["default"]);
         for ratio in [0.0, 1.0] {
-            let mesh = build(
-                &Flat {
-                    pattern: FlatPattern::Stripes,
-                    ratio,
-                    ..Flat::default()
-                },
-                Vec2::ONE,
-            );
+            let mesh = build(&Flat { pattern: FlatPattern::Stripes, ratio, ..Flat::default() }, Vec2::ONE);
             assert_closes_plane(&mesh);
-            assert!(
-                mesh.triangle_slot
-                    .iter()
-                    .all(|slot| *slot == if ratio == 0.0 { SECOND } else { FIRST })
-            );
+            assert!(mesh.triangle_slot.iter().all(|slot| *slot == if ratio == 0.0 { SECOND } else { FIRST }));
         }
     }
 }

@@ -27,15 +27,8 @@ impl Wave {
         let size = size.as_dvec2();
         let (sin, cos) = f64::from(rotation_deg).to_radians().sin_cos();
         let count = f64::from(count);
-        let (m, n) = (
-            (count * cos).round() as i64,
-            (count * sin * size.y / size.x).round() as i64,
-        );
-        Self {
-            m: if (m, n) == (0, 0) { 1 } else { m },
-            n,
-            size,
-        }
+        let (m, n) = ((count * cos).round() as i64, (count * sin * size.y / size.x).round() as i64);
+        Self { m: if (m, n) == (0, 0) { 1 } else { m }, n, size }
     }
 
     fn gradient(&self) -> DVec2 {
@@ -59,8 +52,7 @@ type ProfilePoint = (f64, f64, u16);
 pub fn build(spec: &Grooves, size: Vec2) -> TileMesh {
     let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
     let mut builder = MeshBuilder::new(size, &["bottom", "sides"]);
-    let turned =
-        (wave.rotation_deg() - f64::from(spec.rotation_deg) + 180.0).rem_euclid(360.0) - 180.0;
+    let turned = (wave.rotation_deg() - f64::from(spec.rotation_deg) + 180.0).rem_euclid(360.0) - 180.0;
     if turned.abs() > 0.05 || spec.rotation_deg != 0.0 {
         builder.note(format!(
             "grooves run at {:.2} degrees, {:.4} apart, so that the tile repeats (asked for: {} degrees)",
@@ -80,32 +72,19 @@ fn profile(spec: &Grooves, pitch: f64) -> Vec<ProfilePoint> {
         GrooveProfile::V => 0.0,
         _ => f64::from(spec.bottom_width),
     };
-    let slope_run = if spec.side_angle_deg > 89.99 {
-        0.0
-    } else {
-        depth / f64::from(spec.side_angle_deg).to_radians().tan()
-    };
+    let slope_run =
+        if spec.side_angle_deg > 89.99 { 0.0 } else { depth / f64::from(spec.side_angle_deg).to_radians().tan() };
     let run = match spec.profile {
-        GrooveProfile::V | GrooveProfile::Trapezoid => {
-            (slope_run / pitch).min(0.5 * (1.0 - bottom))
-        }
+        GrooveProfile::V | GrooveProfile::Trapezoid => (slope_run / pitch).min(0.5 * (1.0 - bottom)),
         GrooveProfile::U | GrooveProfile::Rectangular => 0.0,
     };
     let mut points = vec![(0.0, 0.0, SIDES)];
     if spec.profile == GrooveProfile::U {
         points.extend((0..=ARC_SEGMENTS).map(|k| {
             let angle = PI * k as f64 / ARC_SEGMENTS as f64;
-            let slot = if (ARC_SEGMENTS / 4..ARC_SEGMENTS * 3 / 4).contains(&k) {
-                BOTTOM
-            } else {
-                SIDES
-            };
+            let slot = if (ARC_SEGMENTS / 4..ARC_SEGMENTS * 3 / 4).contains(&k) { BOTTOM } else { SIDES };
             // sin π is not quite 0.
-            let z = if k == ARC_SEGMENTS {
-                0.0
-            } else {
-                -depth * angle.sin()
-            };
+            let z = if k == ARC_SEGMENTS { 0.0 } else { -depth * angle.sin() };
             (0.5 - 0.5 * bottom * angle.cos(), z, slot)
         }));
     } else {
@@ -137,27 +116,19 @@ fn extrude(builder: &mut MeshBuilder, wave: &Wave, profile: &[ProfilePoint]) {
     if across.perp_dot(along) < 0.0 {
         along = -along;
     }
-    let pieces = (along.length() / (0.25 * wave.size.min_element()))
-        .ceil()
-        .clamp(1.0, 4096.0);
+    let pieces = (along.length() / (0.25 * wave.size.min_element())).ceil().clamp(1.0, 4096.0);
     // Shifting by whole pieces keeps corners on corners and makes the parallelogram nearly a rectangle.
     let skew = (across.dot(along) / along.length_squared() * pieces).round() / pieces;
     let across = (across - skew * along) / grooves as f64;
     for groove in 0..grooves {
         for corners in profile.windows(2) {
             let ((phase, z, slot), (next_phase, next_z, _)) = (corners[0], corners[1]);
-            let at = |phase: f64, z: f64, piece: f64| {
-                ((groove as f64 + phase) * across + piece / pieces * along).extend(z)
-            };
+            let at =
+                |phase: f64, z: f64, piece: f64| ((groove as f64 + phase) * across + piece / pieces * along).extend(z);
             for piece in 0..pieces as usize {
                 let (from, to) = (piece as f64, piece as f64 + 1.0);
                 builder.polygon(
-                    &[
-                        at(phase, z, from),
-                        at(next_phase, next_z, from),
-                        at(next_phase, next_z, to),
-                        at(phase, z, to),
-                    ],
+                    &[at(phase, z, from), at(next_phase, next_z, from), at(next_phase, next_z, to), at(phase, z, to)],
                     slot,
                 );
             }
@@ -170,20 +141,9 @@ fn bezout(m: i64, n: i64) -> (i64, i64, i64) {
     let (mut old, mut new) = ((m, 1, 0), (n, 0, 1));
     while new.0 != 0 {
         let quotient = old.0 / new.0;
-        (old, new) = (
-            new,
-            (
-                old.0 - quotient * new.0,
-                old.1 - quotient * new.1,
-                old.2 - quotient * new.2,
-            ),
-        );
+        (old, new) = (new, (old.0 - quotient * new.0, old.1 - quotient * new.1, old.2 - quotient * new.2));
     }
-    if old.0 < 0 {
-        (-old.0, -old.1, -old.2)
-    } else {
-        old
-    }
+    if old.0 < 0 { (-old.0, -old.1, -old.2) } else { old }
 }
 
 #[cfg(test)]
@@ -192,20 +152,13 @@ mod tests {
     use crate::geometry::closure::assert_closes_plane;
 
     fn area(mesh: &TileMesh) -> f64 {
-        (0..mesh.triangles.len())
-            .map(|triangle| mesh.triangle_area(triangle))
-            .sum()
+        (0..mesh.triangles.len()).map(|triangle| mesh.triangle_area(triangle)).sum()
     }
 
     #[test]
     fn full_v_grooves_have_the_area_of_their_slopes() {
-        let spec = Grooves {
-            profile: GrooveProfile::V,
-            depth: 0.5,
-            side_angle_deg: 45.0,
-            count: 1,
-            ..Grooves::default()
-        };
+        let spec =
+            Grooves { profile: GrooveProfile::V, depth: 0.5, side_angle_deg: 45.0, count: 1, ..Grooves::default() };
         let mesh = build(&spec, Vec2::ONE);
         assert!((area(&mesh) - 2f64.sqrt()).abs() < 1e-6, "{}", area(&mesh));
         assert!(mesh.is_height_field());
@@ -214,12 +167,7 @@ mod tests {
 
     #[test]
     fn rectangular_grooves_add_two_walls_each() {
-        let spec = Grooves {
-            profile: GrooveProfile::Rectangular,
-            depth: 0.3,
-            count: 5,
-            ..Grooves::default()
-        };
+        let spec = Grooves { profile: GrooveProfile::Rectangular, depth: 0.3, count: 5, ..Grooves::default() };
         let mesh = build(&spec, Vec2::new(1.0, 2.0));
         assert!((area(&mesh) - (2.0 + 5.0 * 2.0 * 0.3 * 2.0)).abs() < 1e-5);
         assert_closes_plane(&mesh);
@@ -233,21 +181,8 @@ mod tests {
             (3, 90.0, Vec2::new(2.0, 1.0)),
             (5, 180.0, Vec2::ONE),
         ] {
-            for profile in [
-                GrooveProfile::V,
-                GrooveProfile::U,
-                GrooveProfile::Trapezoid,
-                GrooveProfile::Rectangular,
-            ] {
-                let mesh = build(
-                    &Grooves {
-                        count,
-                        rotation_deg,
-                        profile,
-                        ..Grooves::default()
-                    },
-                    size,
-                );
+            for profile in [GrooveProfile::V, GrooveProfile::U, GrooveProfile::Trapezoid, GrooveProfile::Rectangular] {
+                let mesh = build(&Grooves { count, rotation_deg, profile, ..Grooves::default() }, size);
                 assert_closes_plane(&mesh);
                 assert!(mesh.is_height_field(), "{profile:?} {rotation_deg}");
                 assert!(!mesh.notes.is_empty());
@@ -258,13 +193,7 @@ mod tests {
     #[test]
     fn a_u_groove_of_many_facets_nears_the_half_cylinder() {
         // Opening 0.8, depth 0.4: a half circle of radius 0.4, arc 0.4 π, land 0.2.
-        let spec = Grooves {
-            profile: GrooveProfile::U,
-            depth: 0.4,
-            bottom_width: 0.8,
-            count: 1,
-            ..Grooves::default()
-        };
+        let spec = Grooves { profile: GrooveProfile::U, depth: 0.4, bottom_width: 0.8, count: 1, ..Grooves::default() };
         let expected = 0.4 * PI + 0.2;
         assert!((area(&build(&spec, Vec2::ONE)) - expected).abs() < 2e-3 * expected);
     }

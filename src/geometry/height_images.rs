@@ -18,27 +18,16 @@ const SIDE: u32 = 128;
 type HeightFunction = Box<dyn Fn(Vec2) -> f32>;
 
 fn images() -> [(&'static str, HeightFunction); 4] {
-    [
-        ("brushed", brushed()),
-        ("hammered", hammered()),
-        ("leather", leather()),
-        ("ripples", ripples()),
-    ]
+    [("brushed", brushed()), ("hammered", hammered()), ("leather", leather()), ("ripples", ripples())]
 }
 
 /// Distances to the nearest and second nearest of random points, on the torus.
 fn nearest_two(points: &[Vec2], at: Vec2) -> (f32, f32) {
-    points
-        .iter()
-        .fold((f32::MAX, f32::MAX), |(first, second), point| {
-            let offset = at - *point;
-            let distance = (offset - offset.round()).length();
-            if distance < first {
-                (distance, first)
-            } else {
-                (first, second.min(distance))
-            }
-        })
+    points.iter().fold((f32::MAX, f32::MAX), |(first, second), point| {
+        let offset = at - *point;
+        let distance = (offset - offset.round()).length();
+        if distance < first { (distance, first) } else { (first, second.min(distance)) }
+    })
 }
 
 /// One random point in each cell of a lattice.
@@ -81,20 +70,10 @@ fn brushed() -> HeightFunction {
         .map(|_| {
             let across = random.random_range(3u8..=24);
             let along = random.random_range(-1i8..=1);
-            [
-                f32::from(across),
-                f32::from(along),
-                TAU * random.random::<f32>(),
-                1.0 / f32::from(across),
-            ]
+            [f32::from(across), f32::from(along), TAU * random.random::<f32>(), 1.0 / f32::from(across)]
         })
         .collect();
-    Box::new(move |at| {
-        waves
-            .iter()
-            .map(|w| w[3] * (TAU * (w[0] * at.x + w[1] * at.y) + w[2]).sin())
-            .sum()
-    })
+    Box::new(move |at| waves.iter().map(|w| w[3] * (TAU * (w[0] * at.x + w[1] * at.y) + w[2]).sin()).sum())
 }
 
 /// The image's 16-bit samples: the function at texel centres, stretched to the full range.
@@ -103,10 +82,7 @@ fn samples(height: &HeightFunction) -> Vec<u16> {
     let heights: Vec<f32> = (0..SIDE * SIDE).map(|k| height(at(k))).collect();
     let low = heights.iter().copied().fold(f32::MAX, f32::min);
     let high = heights.iter().copied().fold(f32::MIN, f32::max);
-    heights
-        .iter()
-        .map(|height| ((height - low) / (high - low) * 65535.0).round() as u16)
-        .collect()
+    heights.iter().map(|height| ((height - low) / (high - low) * 65535.0).round() as u16).collect()
 }
 
 fn folder() -> PathBuf {
@@ -118,18 +94,14 @@ fn folder() -> PathBuf {
 fn write_the_height_images() {
     for (name, height) in images() {
         let image = ImageBuffer::<Luma<u16>, _>::from_raw(SIDE, SIDE, samples(&height)).unwrap();
-        image
-            .save(folder().join(name).with_extension("png"))
-            .unwrap();
+        image.save(folder().join(name).with_extension("png")).unwrap();
     }
 }
 
 #[test]
 fn the_shipped_height_images_are_what_their_functions_make() {
     for (name, height) in images() {
-        let shipped =
-            image_file::read_heights(Path::new(""), Path::new(&format!("asset:{name}.png")))
-                .unwrap();
+        let shipped = image_file::read_heights(Path::new(""), Path::new(&format!("asset:{name}.png"))).unwrap();
         assert_eq!(shipped.size, glam::UVec2::splat(SIDE));
         for (shipped, made) in shipped.values.iter().zip(samples(&height)) {
             // Sines differ by a bit between platforms.

@@ -22,33 +22,18 @@ pub fn build(spec: &Heightfield, size: Vec2, base_dir: &Path) -> Result<TileMesh
             .into());
         }
     };
-    pixels
-        .values
-        .iter_mut()
-        .for_each(|height| *height *= spec.height_scale);
-    Ok(from_grid(
-        HeightGrid {
-            size: pixels.size,
-            heights: pixels.values,
-        },
-        size,
-    ))
+    pixels.values.iter_mut().for_each(|height| *height *= spec.height_scale);
+    Ok(from_grid(HeightGrid { size: pixels.size, heights: pixels.values }, size))
 }
 
 fn from_rows(rows: &[Vec<f32>]) -> Result<Pixels<f32>> {
     let width = rows.first().map_or(0, Vec::len);
     if width == 0 || rows.iter().any(|row| row.len() != width) {
-        return Err(InputError::new(
-            "tile.geometry.values",
-            "rows of different lengths or none",
-            "rows of one length",
-        )
-        .into());
+        return Err(
+            InputError::new("tile.geometry.values", "rows of different lengths or none", "rows of one length").into()
+        );
     }
-    Ok(Pixels {
-        size: UVec2::new(width as u32, rows.len() as u32),
-        values: rows.concat(),
-    })
+    Ok(Pixels { size: UVec2::new(width as u32, rows.len() as u32), values: rows.concat() })
 }
 
 /// Two triangles a cell, between samples; the last row and column reach over the tile's edge to the first.
@@ -66,12 +51,7 @@ pub fn from_grid(grid: HeightGrid, size: Vec2) -> TileMesh {
     let mut triangles = Vec::with_capacity(2 * width * height);
     for j in 0..height {
         for i in 0..width {
-            let [a, b, c, d] = [
-                index(i, j),
-                index(i + 1, j),
-                index(i + 1, j + 1),
-                index(i, j + 1),
-            ];
+            let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
             triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -89,17 +69,8 @@ pub fn from_grid(grid: HeightGrid, size: Vec2) -> TileMesh {
 
 /// A height-field from a function of tile coordinates: for tests and examples.
 pub fn from_function(samples: UVec2, size: Vec2, height: impl Fn(Vec2) -> f32) -> TileMesh {
-    let at = |k: u32| {
-        Vec2::new((k % samples.x) as f32 + 0.5, (k / samples.x) as f32 + 0.5) / samples.as_vec2()
-            * size
-    };
-    from_grid(
-        HeightGrid {
-            size: samples,
-            heights: (0..samples.x * samples.y).map(|k| height(at(k))).collect(),
-        },
-        size,
-    )
+    let at = |k: u32| Vec2::new((k % samples.x) as f32 + 0.5, (k / samples.x) as f32 + 0.5) / samples.as_vec2() * size;
+    from_grid(HeightGrid { size: samples, heights: (0..samples.x * samples.y).map(|k| height(at(k))).collect() }, size)
 }
 
 /// Places of the samples: `((i+½)/w, (j+½)/h)` of the tile.
@@ -127,19 +98,14 @@ mod tests {
         assert!(mesh.positions.contains(&Vec3::new(2.5, 3.5, 0.5)));
         let grid = mesh.height_grid.clone().unwrap();
         for index in 0..6 {
-            assert!(
-                mesh.positions
-                    .contains(&sample_position(&grid, index, mesh.size))
-            );
+            assert!(mesh.positions.contains(&sample_position(&grid, index, mesh.size)));
         }
     }
 
     #[test]
     fn any_grid_closes_the_plane_without_overhang() {
         for samples in [UVec2::new(1, 1), UVec2::new(2, 5), UVec2::new(33, 17)] {
-            let mesh = from_function(samples, Vec2::new(1.0, 0.7), |p| {
-                (p.x * 12.0).sin() * (p.y * 31.0).cos()
-            });
+            let mesh = from_function(samples, Vec2::new(1.0, 0.7), |p| (p.x * 12.0).sin() * (p.y * 31.0).cos());
             assert_closes_plane(&mesh);
             assert!(mesh.is_height_field());
             assert_eq!(mesh.triangles.len() as u32, 2 * samples.x * samples.y);

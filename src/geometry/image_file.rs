@@ -30,14 +30,7 @@ pub struct Pixels<T> {
 /// A file that is missing, no image, too large, or holds NaN or infinite values.
 pub fn read_heights(base_dir: &Path, path: &Path) -> Result<Pixels<f32>> {
     let pixels = read(base_dir, path)?;
-    Ok(Pixels {
-        size: pixels.size,
-        values: pixels
-            .values
-            .iter()
-            .map(|value| luminance(*value))
-            .collect(),
-    })
+    Ok(Pixels { size: pixels.size, values: pixels.values.iter().map(|value| luminance(*value)).collect() })
 }
 
 /// Reads linear colour weights.
@@ -47,53 +40,27 @@ pub fn read_heights(base_dir: &Path, path: &Path) -> Result<Pixels<f32>> {
 pub fn read_colors(base_dir: &Path, path: &Path) -> Result<Pixels<Vec3>> {
     let mut pixels = read(base_dir, path)?;
     if pixels.is_integer {
-        pixels
-            .values
-            .iter_mut()
-            .for_each(|value| *value = Vec3::from_array(value.to_array().map(linear_from_srgb)));
+        pixels.values.iter_mut().for_each(|value| *value = Vec3::from_array(value.to_array().map(linear_from_srgb)));
     }
-    if let Some(at) = pixels
-        .values
-        .iter()
-        .position(|value| value.min_element() < 0.0)
-    {
+    if let Some(at) = pixels.values.iter().position(|value| value.min_element() < 0.0) {
         let place = pixel_name(at, pixels.size);
-        return Err(
-            InputError::new(place, pixels.values[at], "colours that are not negative")
-                .in_file(path)
-                .into(),
-        );
+        return Err(InputError::new(place, pixels.values[at], "colours that are not negative").in_file(path).into());
     }
-    Ok(Pixels {
-        size: pixels.size,
-        values: pixels.values,
-    })
+    Ok(Pixels { size: pixels.size, values: pixels.values })
 }
 
 /// Rec. 709; exact for greys.
 fn luminance(color: Vec3) -> f32 {
-    if color.x == color.y && color.y == color.z {
-        color.x
-    } else {
-        color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-    }
+    if color.x == color.y && color.y == color.z { color.x } else { color.dot(Vec3::new(0.2126, 0.7152, 0.0722)) }
 }
 
 /// IEC 61966-2-1.
 fn linear_from_srgb(value: f32) -> f32 {
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 fn pixel_name(index: usize, size: UVec2) -> String {
-    format!(
-        "pixel ({}, {})",
-        index % size.x as usize,
-        index / size.x as usize
-    )
+    format!("pixel ({}, {})", index % size.x as usize, index / size.x as usize)
 }
 
 struct RawImage {
@@ -104,24 +71,15 @@ struct RawImage {
 
 fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
     let bytes = files::read(base_dir, path, LARGEST_FILE)?;
-    let complain = |found: String| {
-        InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path)
-    };
+    let complain = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
-    let image = if is_exr {
-        read_exr(&bytes, path)?
-    } else {
-        decode(&bytes).map_err(|error| complain(error.to_string()))?
-    };
+    let image =
+        if is_exr { read_exr(&bytes, path)? } else { decode(&bytes).map_err(|error| complain(error.to_string()))? };
     check_size(image.size, path)?;
     if let Some(at) = image.values.iter().position(|value| !value.is_finite()) {
-        return Err(InputError::new(
-            pixel_name(at, image.size),
-            image.values[at],
-            "finite values",
-        )
-        .in_file(path)
-        .into());
+        return Err(InputError::new(pixel_name(at, image.size), image.values[at], "finite values")
+            .in_file(path)
+            .into());
     }
     Ok(image)
 }
@@ -129,13 +87,8 @@ fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
 fn check_size(size: UVec2, path: &Path) -> Result<()> {
     let pixels = u64::from(size.x) * u64::from(size.y);
     if pixels == 0 || pixels > MOST_PIXELS || size.max_element() > LARGEST_SIDE {
-        let expected =
-            format!("at most {MOST_PIXELS} pixels and {LARGEST_SIDE} on a side, at least one");
-        return Err(
-            InputError::new("", format!("{} x {} pixels", size.x, size.y), expected)
-                .in_file(path)
-                .into(),
-        );
+        let expected = format!("at most {MOST_PIXELS} pixels and {LARGEST_SIDE} on a side, at least one");
+        return Err(InputError::new("", format!("{} x {} pixels", size.x, size.y), expected).in_file(path).into());
     }
     Ok(())
 }
@@ -148,38 +101,19 @@ fn decode(bytes: &[u8]) -> image::ImageResult<RawImage> {
     limits.max_alloc = Some(1 << 30);
     reader.limits(limits);
     let image = reader.decode()?;
-    let is_integer = !matches!(
-        image,
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
-    );
+    let is_integer = !matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
     let size = UVec2::new(image.width(), image.height());
-    let values = image
-        .into_rgb32f()
-        .pixels()
-        .map(|pixel| Vec3::from_array(pixel.0))
-        .collect();
-    Ok(RawImage {
-        size,
-        values,
-        is_integer,
-    })
+    let values = image.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
+    Ok(RawImage { size, values, is_integer })
 }
 
 /// R, G and B of an EXR file, or its Y, or its only channel.
 fn read_exr(bytes: &[u8], path: &Path) -> Result<RawImage> {
-    let complain = |found: String| {
-        InputError::new("", found, "an EXR file with channels R, G, B or Y").in_file(path)
-    };
+    let complain = |found: String| InputError::new("", found, "an EXR file with channels R, G, B or Y").in_file(path);
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(|error| complain(error.to_string()))?;
     for header in &meta.headers {
-        check_size(
-            UVec2::new(
-                header.layer_size.width() as u32,
-                header.layer_size.height() as u32,
-            ),
-            path,
-        )?;
+        check_size(UVec2::new(header.layer_size.width() as u32, header.layer_size.height() as u32), path)?;
     }
     let image = exr_file::read()
         .no_deep_data()
@@ -192,45 +126,23 @@ fn read_exr(bytes: &[u8], path: &Path) -> Result<RawImage> {
     let layer = image.layer_data;
     let size = UVec2::new(layer.size.width() as u32, layer.size.height() as u32);
     let channels = &layer.channel_data.list;
-    let find = |name: &str| {
-        channels
-            .iter()
-            .find(|channel| channel.name.eq_case_insensitive(name))
-    };
+    let find = |name: &str| channels.iter().find(|channel| channel.name.eq_case_insensitive(name));
     let chosen = match (find("R"), find("G"), find("B"), find("Y")) {
         (Some(r), Some(g), Some(b), _) => [r, g, b],
         (_, _, _, Some(y)) => [y, y, y],
         _ if channels.len() == 1 => [&channels[0]; 3],
         _ => {
-            let names: Vec<String> = channels
-                .iter()
-                .map(|channel| channel.name.to_string())
-                .collect();
+            let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
             return Err(complain(format!("channels {}", names.join(", "))).into());
         }
     };
     let count = size.x as usize * size.y as usize;
-    if let Some(short) = chosen
-        .iter()
-        .find(|channel| channel.sample_data.len() < count)
-    {
-        return Err(complain(format!(
-            "{} samples in channel {}",
-            short.sample_data.len(),
-            short.name
-        ))
-        .into());
+    if let Some(short) = chosen.iter().find(|channel| channel.sample_data.len() < count) {
+        return Err(complain(format!("{} samples in channel {}", short.sample_data.len(), short.name)).into());
     }
-    let value = |index: usize| {
-        Vec3::from_array(
-            chosen.map(|channel| channel.sample_data.value_by_flat_index(index).to_f32()),
-        )
-    };
-    Ok(RawImage {
-        size,
-        values: (0..count).map(value).collect(),
-        is_integer: false,
-    })
+    let value =
+        |index: usize| Vec3::from_array(chosen.map(|channel| channel.sample_data.value_by_flat_index(index).to_f32()));
+    Ok(RawImage { size, values: (0..count).map(value).collect(), is_integer: false })
 }
 
 #[cfg(test)]
@@ -241,9 +153,8 @@ mod tests {
     fn sixteen_bit_heights_are_linear_and_keep_their_bits() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("ramp.png");
-        let ramp = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_fn(4, 1, |x, _| {
-            image::Luma([x as u16 * 257 + 1])
-        });
+        let ramp =
+            image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_fn(4, 1, |x, _| image::Luma([x as u16 * 257 + 1]));
         ramp.save(&path).unwrap();
         let heights = read_heights(folder.path(), Path::new("ramp.png")).unwrap();
         assert_eq!(heights.size, UVec2::new(4, 1));
@@ -255,19 +166,10 @@ mod tests {
     #[test]
     fn eight_bit_colours_are_srgb() {
         let folder = tempfile::tempdir().unwrap();
-        image::RgbImage::from_pixel(1, 1, image::Rgb([188, 0, 255]))
-            .save(folder.path().join("c.png"))
-            .unwrap();
+        image::RgbImage::from_pixel(1, 1, image::Rgb([188, 0, 255])).save(folder.path().join("c.png")).unwrap();
         let colors = read_colors(folder.path(), Path::new("c.png")).unwrap();
         // 188/255 is half as much light as white (0.5029 by the standard's formula).
-        assert!(
-            (colors.values[0] - Vec3::new(0.5029, 0.0, 1.0))
-                .abs()
-                .max_element()
-                < 1e-4,
-            "{:?}",
-            colors.values
-        );
+        assert!((colors.values[0] - Vec3::new(0.5029, 0.0, 1.0)).abs().max_element() < 1e-4, "{:?}", colors.values);
     }
 
     #[test]
@@ -286,24 +188,15 @@ mod tests {
             (h, h, h)
         })
         .unwrap();
-        let error = read_heights(folder.path(), Path::new("h.exr"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("pixel (1, 0)") && error.contains("finite"),
-            "{error}"
-        );
+        let error = read_heights(folder.path(), Path::new("h.exr")).unwrap_err().to_string();
+        assert!(error.contains("pixel (1, 0)") && error.contains("finite"), "{error}");
     }
 
     #[test]
     fn what_is_no_image_or_missing_is_named() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("text.png"), "not an image").unwrap();
-        for (name, part) in [
-            ("text.png", "expected an image"),
-            ("none.png", "none.png"),
-            (".", "expected a file"),
-        ] {
+        for (name, part) in [("text.png", "expected an image"), ("none.png", "none.png"), (".", "expected a file")] {
             let error = read_heights(folder.path(), Path::new(name)).unwrap_err();
             assert!(error.to_string().contains(part), "{error}");
             assert_eq!(error.exit_code(), 2);

@@ -21,16 +21,7 @@ impl KdTree {
     pub fn nearest(&self, query: Vec3) -> Option<u32> {
         let mut best = (f32::INFINITY, u32::MAX);
         search(&self.nodes, query, 0, &mut best);
-        for step in [
-            (-1, 0),
-            (1, 0),
-            (0, -1),
-            (0, 1),
-            (-1, -1),
-            (-1, 1),
-            (1, -1),
-            (1, 1),
-        ] {
+        for step in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)] {
             let moved = query + (Vec2::new(step.0 as f32, step.1 as f32) * self.size).extend(0.0);
             // Points lie in the tile: a copy of the query is at least as far from them as from the tile.
             let nearest_in_tile = moved.truncate().clamp(Vec2::ZERO, self.size);
@@ -48,9 +39,7 @@ fn arrange(nodes: &mut [(Vec3, u32)], depth: usize) {
     }
     let axis = depth % 3;
     let middle = nodes.len() / 2;
-    nodes.select_nth_unstable_by(middle, |a, b| {
-        a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
-    });
+    nodes.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
     let (lower, upper) = nodes.split_at_mut(middle);
     arrange(lower, depth + 1);
     arrange(&mut upper[1..], depth + 1);
@@ -67,11 +56,7 @@ fn search(nodes: &[(Vec3, u32)], query: Vec3, depth: usize, best: &mut (f32, u32
     }
     let (lower, upper) = (&nodes[..middle], &nodes[middle + 1..]);
     let across = query[depth % 3] - point[depth % 3];
-    let (near, far) = if across < 0.0 {
-        (lower, upper)
-    } else {
-        (upper, lower)
-    };
+    let (near, far) = if across < 0.0 { (lower, upper) } else { (upper, lower) };
     search(near, query, depth + 1, best);
     if across * across <= best.0 {
         search(far, query, depth + 1, best);
@@ -90,11 +75,7 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let size = Vec2::new(1.0, 0.5);
         let mut point = || {
-            Vec3::new(
-                random.random::<f32>() * size.x,
-                random.random::<f32>() * size.y,
-                random.random::<f32>() * 0.3,
-            )
+            Vec3::new(random.random::<f32>() * size.x, random.random::<f32>() * size.y, random.random::<f32>() * 0.3)
         };
         let points: Vec<Vec3> = (0..200).map(|_| point()).collect();
         let tree = KdTree::new(&points, size);

@@ -15,30 +15,18 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
     let file = obj::parse(&bytes, &spec.path)?;
     let mut mesh = TileMesh {
         size,
-        triangles: file
-            .triangles
-            .iter()
-            .map(|triangle| triangle.map(|corner| corner.position))
-            .collect(),
+        triangles: file.triangles.iter().map(|triangle| triangle.map(|corner| corner.position)).collect(),
         triangle_slot: file.triangle_material,
         slots: file.materials,
         ..TileMesh::default()
     };
-    if file
-        .triangles
-        .iter()
-        .flatten()
-        .any(|corner| corner.normal.is_some())
-    {
+    if file.triangles.iter().flatten().any(|corner| corner.normal.is_some()) {
         // Triangles with a corner that has no normal are flat: their corners get the geometric one.
         let shading = |triangle: &[obj::ObjCorner; 3]| -> [Vec3; 3] {
             let [a, b, c] = triangle.map(|corner| file.positions[corner.position as usize]);
             let flat = (b - a).cross(c - a).try_normalize().unwrap_or_default();
-            let own = triangle.map(|corner| {
-                corner
-                    .normal
-                    .and_then(|normal| file.normals[normal as usize].try_normalize())
-            });
+            let own =
+                triangle.map(|corner| corner.normal.and_then(|normal| file.normals[normal as usize].try_normalize()));
             match own {
                 [Some(a), Some(b), Some(c)] => [a, b, c],
                 _ => [flat; 3],
@@ -66,28 +54,16 @@ mod tests {
     fn load(text: &str) -> Result<TileMesh> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("tile.obj"), text).unwrap();
-        build(
-            &MeshFile {
-                path: "tile.obj".into(),
-                color_path: None,
-            },
-            Vec2::ONE,
-            folder.path(),
-        )
+        build(&MeshFile { path: "tile.obj".into(), color_path: None }, Vec2::ONE, folder.path())
     }
 
     const PLANE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 
     #[test]
     fn a_plane_with_a_closed_solid_above_it_closes_the_plane() {
-        let tetrahedron =
-            "v .4 .4 .2\nv .6 .4 .2\nv .5 .6 .2\nv .5 .5 .5\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 7 5 8\n";
+        let tetrahedron = "v .4 .4 .2\nv .6 .4 .2\nv .5 .6 .2\nv .5 .5 .5\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 7 5 8\n";
         let mesh = load(&format!("{PLANE}{tetrahedron}")).unwrap();
-        assert!(
-            mesh.closes_plane && !mesh.is_height_field(),
-            "{:?}",
-            mesh.notes
-        );
+        assert!(mesh.closes_plane && !mesh.is_height_field(), "{:?}", mesh.notes);
         assert!(load(PLANE).unwrap().is_height_field());
     }
 
@@ -102,16 +78,10 @@ mod tests {
     fn normals_are_those_of_the_file_and_never_invented() {
         assert_eq!(load(PLANE).unwrap().corner_normals, None);
         let tilted = "vn 1 0 1\nusemtl a\nf 1//1 2//1 3//1\nf 1 3 4\n";
-        let normals = load(&format!("{PLANE}{tilted}"))
-            .unwrap()
-            .corner_normals
-            .unwrap();
+        let normals = load(&format!("{PLANE}{tilted}")).unwrap().corner_normals.unwrap();
         let slanted = Vec3::new(0.5f32.sqrt(), 0.0, 0.5f32.sqrt());
         let is = |expected: Vec3| {
-            normals
-                .iter()
-                .filter(|corners| corners.iter().all(|n| (*n - expected).length() < 1e-6))
-                .count()
+            normals.iter().filter(|corners| corners.iter().all(|n| (*n - expected).length() < 1e-6)).count()
         };
         assert_eq!((normals.len(), is(Vec3::Z), is(slanted)), (4, 3, 1));
     }

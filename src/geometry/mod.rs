@@ -42,31 +42,17 @@ pub fn build(tile: &Tile, base_dir: &Path) -> Result<TileMesh> {
         Geometry::Pyramids(spec) => (pyramids::build(spec, size), None),
         Geometry::Rods(spec) => (rods::build(spec, size), None),
         Geometry::Weave(spec) => (weave::build(spec, size), None),
-        Geometry::Heightfield(spec) => (
-            heightfield::build(spec, size, base_dir)?,
-            spec.color_path.as_deref(),
-        ),
+        Geometry::Heightfield(spec) => (heightfield::build(spec, size, base_dir)?, spec.color_path.as_deref()),
         Geometry::Flat(spec) => (flat::build(spec, size), spec.color_path.as_deref()),
-        Geometry::Mesh(spec) => (
-            mesh_file::build(spec, size, base_dir)?,
-            spec.color_path.as_deref(),
-        ),
+        Geometry::Mesh(spec) => (mesh_file::build(spec, size, base_dir)?, spec.color_path.as_deref()),
     };
     if let Some(path) = color_path {
         let image = image_file::read_colors(base_dir, path)?;
-        mesh.color = ColorField::Image {
-            size: image.size,
-            texels: Arc::new(image.values),
-        };
+        mesh.color = ColorField::Image { size: image.size, texels: Arc::new(image.values) };
     }
     if !mesh.positions.iter().all(|position| position.is_finite()) {
         let found = "a mesh with coordinates that are not finite";
-        return Err(InputError::new(
-            "tile.geometry",
-            found,
-            "parameters that give finite coordinates",
-        )
-        .into());
+        return Err(InputError::new("tile.geometry", found, "parameters that give finite coordinates").into());
     }
     Ok(mesh)
 }

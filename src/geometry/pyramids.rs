@@ -32,10 +32,7 @@ pub fn build(spec: &Pyramids, size: Vec2) -> TileMesh {
             for k in 0..corners {
                 let next = (k + 1) % corners;
                 let (foot, next_foot) = (at(pyramid.base[k], 0.0), at(pyramid.base[next], 0.0));
-                let (top, next_top) = (
-                    at(pyramid.top[k], pyramid.top_z),
-                    at(pyramid.top[next], pyramid.top_z),
-                );
+                let (top, next_top) = (at(pyramid.top[k], pyramid.top_z), at(pyramid.top[next], pyramid.top_z));
                 if spec.truncation > 0.0 {
                     builder.polygon(&[foot, next_foot, next_top, top], FACES);
                 } else {
@@ -43,11 +40,7 @@ pub fn build(spec: &Pyramids, size: Vec2) -> TileMesh {
                 }
             }
             if spec.truncation > 0.0 {
-                let top: Vec<_> = pyramid
-                    .top
-                    .iter()
-                    .map(|corner| at(*corner, pyramid.top_z))
-                    .collect();
+                let top: Vec<_> = pyramid.top.iter().map(|corner| at(*corner, pyramid.top_z)).collect();
                 builder.polygon(&top, FACES);
             }
         }
@@ -70,36 +63,20 @@ impl Lattice {
         let size = size.as_dvec2();
         let spacing = f64::from(spec.spacing);
         let shifted = spec.arrangement != Arrangement::Square;
-        let row_spacing = if spec.arrangement == Arrangement::Hex {
-            spacing * 0.75f64.sqrt()
-        } else {
-            spacing
-        };
+        let row_spacing = if spec.arrangement == Arrangement::Hex { spacing * 0.75f64.sqrt() } else { spacing };
         let columns = (size.x / spacing).round().clamp(1.0, MOST_CELLS);
         // Rows that are shifted by half come in pairs.
         let step = if shifted { 2.0 } else { 1.0 };
         let rows = ((size.y / row_spacing / step).round() * step).clamp(step, MOST_CELLS);
         let pitch = size / DVec2::new(columns, rows);
         let hexagonal = spec.arrangement == Arrangement::Hex && pitch.y > 0.55 * pitch.x;
-        Self {
-            columns: columns as usize,
-            rows: rows as usize,
-            pitch,
-            shifted,
-            hexagonal,
-        }
+        Self { columns: columns as usize, rows: rows as usize, pitch, shifted, hexagonal }
     }
 
     fn note(&self, spec: &Pyramids) -> Option<String> {
         let spacing = f64::from(spec.spacing);
-        let row_spacing = if spec.arrangement == Arrangement::Hex {
-            spacing * 0.75f64.sqrt()
-        } else {
-            spacing
-        };
-        let off = (self.pitch / DVec2::new(spacing, row_spacing) - 1.0)
-            .abs()
-            .max_element();
+        let row_spacing = if spec.arrangement == Arrangement::Hex { spacing * 0.75f64.sqrt() } else { spacing };
+        let off = (self.pitch / DVec2::new(spacing, row_spacing) - 1.0).abs().max_element();
         (off > 1e-3).then(|| {
             format!(
                 "pyramids stand {:.4} x {:.4} apart, so that whole cells fit the tile (asked for: {:.4} x {:.4})",
@@ -109,11 +86,7 @@ impl Lattice {
     }
 
     fn centre(&self, column: usize, row: usize) -> DVec2 {
-        let shift = if self.shifted && row % 2 == 1 {
-            1.0
-        } else {
-            0.5
-        };
+        let shift = if self.shifted && row % 2 == 1 { 1.0 } else { 0.5 };
         DVec2::new(column as f64 + shift, row as f64 + 0.5) * self.pitch
     }
 
@@ -157,9 +130,8 @@ impl Pyramid {
         let sides = f64::from(spec.sides);
         let turn = f64::from(spec.rotation_deg).to_radians();
         // A face looks along +x where the pyramid is not turned.
-        let unit: Vec<DVec2> = (0..spec.sides)
-            .map(|k| DVec2::from_angle(turn + (TAU * f64::from(k) - PI) / sides))
-            .collect();
+        let unit: Vec<DVec2> =
+            (0..spec.sides).map(|k| DVec2::from_angle(turn + (TAU * f64::from(k) - PI) / sides)).collect();
         let scale = f64::from(spec.base_size) * largest_scale(&unit, cell);
         let base: Vec<DVec2> = unit.iter().map(|corner| *corner * scale).collect();
         let ratio = f64::from(spec.face_ratio);
@@ -167,11 +139,7 @@ impl Pyramid {
         let tip = DVec2::from_angle(turn) * inradius * (1.0 - ratio) / (1.0 + ratio);
         let cut = f64::from(spec.truncation);
         let top = base.iter().map(|corner| tip.lerp(*corner, cut)).collect();
-        Self {
-            base,
-            top,
-            top_z: f64::from(spec.height) * (1.0 - cut),
-        }
+        Self { base, top, top_z: f64::from(spec.height) * (1.0 - cut) }
     }
 }
 
@@ -180,10 +148,7 @@ fn largest_scale(polygon: &[DVec2], cell: &[DVec2]) -> f64 {
     let scale = |k: usize| {
         let (from, to) = (cell[k], cell[(k + 1) % cell.len()]);
         let outward = -(to - from).perp();
-        let reach = polygon
-            .iter()
-            .map(|corner| corner.dot(outward))
-            .fold(0.0, f64::max);
+        let reach = polygon.iter().map(|corner| corner.dot(outward)).fold(0.0, f64::max);
         from.dot(outward) / reach
     };
     (0..cell.len()).map(scale).fold(f64::INFINITY, f64::min)
@@ -197,18 +162,12 @@ fn annulus(outer: &[DVec2], inner: &[DVec2]) -> Vec<[DVec2; 3]> {
         for k in 0..corners.len() {
             let edge = corners[(k + 1) % corners.len()] - corners[k];
             // Rounded, so that edges in line share their direction.
-            let direction =
-                (edge.to_angle().rem_euclid(TAU) * 1e9).round() as i64 % (TAU * 1e9) as i64;
+            let direction = (edge.to_angle().rem_euclid(TAU) * 1e9).round() as i64 % (TAU * 1e9) as i64;
             edges.push((direction, is_inner, k));
         }
     }
     edges.sort_unstable();
-    let first = |wanted: bool| {
-        edges
-            .iter()
-            .find(|(_, is_inner, _)| *is_inner == wanted)
-            .map_or(0, |edge| edge.2)
-    };
+    let first = |wanted: bool| edges.iter().find(|(_, is_inner, _)| *is_inner == wanted).map_or(0, |edge| edge.2);
     let (mut at_outer, mut at_inner) = (first(false), first(true));
     let mut triangles = Vec::with_capacity(edges.len());
     for (_, is_inner, _) in &edges {
@@ -223,10 +182,7 @@ fn annulus(outer: &[DVec2], inner: &[DVec2]) -> Vec<[DVec2; 3]> {
         }
     }
     // Where the outlines touch, the strip between them has no width.
-    let widest = outer
-        .iter()
-        .map(|corner| corner.length_squared())
-        .fold(0.0, f64::max);
+    let widest = outer.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max);
     triangles.retain(|[a, b, c]| (*b - *a).perp_dot(*c - *a) > 1e-9 * widest);
     triangles
 }
@@ -237,23 +193,14 @@ mod tests {
     use crate::geometry::closure::assert_closes_plane;
 
     fn slot_area(mesh: &TileMesh, slot: u16) -> f64 {
-        (0..mesh.triangles.len())
-            .filter(|&t| mesh.triangle_slot[t] == slot)
-            .map(|t| mesh.triangle_area(t))
-            .sum()
+        (0..mesh.triangles.len()).filter(|&t| mesh.triangle_slot[t] == slot).map(|t| mesh.triangle_area(t)).sum()
     }
 
     #[test]
     fn every_number_of_sides_and_arrangement_closes_the_plane_without_overhang() {
         for sides in 3..=8 {
-            for arrangement in [
-                Arrangement::Square,
-                Arrangement::Hex,
-                Arrangement::Staggered,
-            ] {
-                for (rotation_deg, truncation, face_ratio) in
-                    [(0.0, 0.0, 1.0), (17.0, 0.4, 3.0), (45.0, 0.0, 0.2)]
-                {
+            for arrangement in [Arrangement::Square, Arrangement::Hex, Arrangement::Staggered] {
+                for (rotation_deg, truncation, face_ratio) in [(0.0, 0.0, 1.0), (17.0, 0.4, 3.0), (45.0, 0.0, 0.2)] {
                     let spec = Pyramids {
                         sides,
                         arrangement,
@@ -273,10 +220,7 @@ mod tests {
 
     #[test]
     fn square_pyramids_fill_the_plane_and_have_the_closed_form_area() {
-        let spec = Pyramids {
-            height: 0.2,
-            ..Pyramids::default()
-        };
+        let spec = Pyramids { height: 0.2, ..Pyramids::default() };
         let mesh = build(&spec, Vec2::ONE);
         // No floor is left, nor triangles without area in its place.
         assert_eq!(mesh.triangles.len(), 4 * 16);
@@ -289,35 +233,17 @@ mod tests {
 
     #[test]
     fn hexagons_fill_a_tile_made_for_them() {
-        let spec = Pyramids {
-            sides: 6,
-            arrangement: Arrangement::Hex,
-            spacing: 0.5,
-            ..Pyramids::default()
-        };
+        let spec = Pyramids { sides: 6, arrangement: Arrangement::Hex, spacing: 0.5, ..Pyramids::default() };
         let mesh = build(&spec, Vec2::new(1.0, 3f32.sqrt()));
-        assert!(
-            slot_area(&mesh, FLOOR) < 1e-4,
-            "{}",
-            slot_area(&mesh, FLOOR)
-        );
+        assert!(slot_area(&mesh, FLOOR) < 1e-4, "{}", slot_area(&mesh, FLOOR));
         assert!(mesh.notes.is_empty(), "{:?}", mesh.notes);
     }
 
     #[test]
     fn face_ratio_sets_the_ratio_of_the_projected_faces() {
-        let mesh = build(
-            &Pyramids {
-                face_ratio: 3.0,
-                spacing: 1.0,
-                ..Pyramids::default()
-            },
-            Vec2::ONE,
-        );
+        let mesh = build(&Pyramids { face_ratio: 3.0, spacing: 1.0, ..Pyramids::default() }, Vec2::ONE);
         let projected = |sign: f32| -> f64 {
-            let towards = |t: &usize| {
-                mesh.triangle_slot[*t] == FACES && mesh.geometric_normal(*t).x * sign > 0.1
-            };
+            let towards = |t: &usize| mesh.triangle_slot[*t] == FACES && mesh.geometric_normal(*t).x * sign > 0.1;
             (0..mesh.triangles.len())
                 .filter(towards)
                 .map(|t| mesh.triangle_area(t) * f64::from(mesh.geometric_normal(t).z))

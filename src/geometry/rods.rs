@@ -19,24 +19,12 @@ const LARGEST_LEAN: f64 = 85.0;
 pub fn build(spec: &Rods, size: Vec2) -> TileMesh {
     let mut builder = MeshBuilder::new(size, &["rods", "floor"]);
     let size = size.as_dvec2();
-    let wanted = spec.density.map_or(f64::from(spec.count), |density| {
-        (f64::from(density) * size.x * size.y).round()
-    });
+    let wanted = spec.density.map_or(f64::from(spec.count), |density| (f64::from(density) * size.x * size.y).round());
     let count = wanted.clamp(1.0, MOST_RODS);
     if count != wanted {
-        builder.note(format!(
-            "{count} rods stand on the tile (asked for: {wanted})"
-        ));
+        builder.note(format!("{count} rods stand on the tile (asked for: {wanted})"));
     }
-    builder.polygon(
-        &[
-            DVec3::ZERO,
-            DVec3::X * size.x,
-            size.extend(0.0),
-            DVec3::Y * size.y,
-        ],
-        FLOOR,
-    );
+    builder.polygon(&[DVec3::ZERO, DVec3::X * size.x, size.extend(0.0), DVec3::Y * size.y], FLOOR);
     let count = count as usize;
     let segments = if count > 500 { 8 } else { 12 };
     let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
@@ -66,15 +54,10 @@ fn places(count: usize, size: DVec2, jitter: f64, random: &mut ChaCha8Rng) -> Ve
 
 /// The common axis, moved by an angle of up to `spread_deg`, evenly over the disc of angles.
 fn stray(spec: &Rods, random: &mut ChaCha8Rng) -> DVec3 {
-    let (lean, azimuth) = (
-        f64::from(spec.lean_deg).to_radians(),
-        f64::from(spec.lean_azimuth_deg).to_radians(),
-    );
+    let (lean, azimuth) = (f64::from(spec.lean_deg).to_radians(), f64::from(spec.lean_azimuth_deg).to_radians());
     let axis = from_angles(lean, azimuth);
-    let (angle, around) = (
-        f64::from(spec.spread_deg).to_radians() * random.random::<f64>().sqrt(),
-        TAU * random.random::<f64>(),
-    );
+    let (angle, around) =
+        (f64::from(spec.spread_deg).to_radians() * random.random::<f64>().sqrt(), TAU * random.random::<f64>());
     let (across, other) = axis.any_orthonormal_pair();
     let moved = axis * angle.cos() + (across * around.cos() + other * around.sin()) * angle.sin();
     let theta = moved.truncate().length().atan2(moved.z);
@@ -86,23 +69,12 @@ fn stray(spec: &Rods, random: &mut ChaCha8Rng) -> DVec3 {
 }
 
 fn from_angles(theta: f64, phi: f64) -> DVec3 {
-    DVec3::new(
-        theta.sin() * phi.cos(),
-        theta.sin() * phi.sin(),
-        theta.cos(),
-    )
+    DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
 }
 
 /// The mantle and tip of one rod. Its foot ends in the floor: each line of the mantle is drawn out along the axis down to
 /// z = 0, so that nothing of a leaning rod hovers and little is buried.
-fn rod(
-    builder: &mut MeshBuilder,
-    foot: DVec2,
-    axis: DVec3,
-    length: f64,
-    spec: &Rods,
-    segments: usize,
-) {
+fn rod(builder: &mut MeshBuilder, foot: DVec2, axis: DVec3, length: f64, spec: &Rods, segments: usize) {
     let foot = foot.extend(0.0);
     let (across, other) = axis.any_orthonormal_pair();
     let ring = |radius: f64, along: f64, k: usize| {
@@ -150,9 +122,7 @@ mod tests {
             ..Rods::default()
         };
         let mesh = build(&spec, Vec2::ONE);
-        let area: f64 = (2..mesh.triangles.len())
-            .map(|t| mesh.triangle_area(t))
-            .sum();
+        let area: f64 = (2..mesh.triangles.len()).map(|t| mesh.triangle_area(t)).sum();
         // A prism of 12 sides: perimeter 12 · 2 r sin(π/12), base 6 r² sin(π/6).
         let expected = 24.0 * 0.1 * (TAU / 24.0).sin() * 0.5 + 6.0 * 0.01 * 0.5;
         assert!((area - expected).abs() < 1e-5, "{area} {expected}");
@@ -160,12 +130,7 @@ mod tests {
 
     #[test]
     fn mantles_face_outwards_and_tips_upwards() {
-        let spec = Rods {
-            count: 9,
-            lean_deg: 30.0,
-            lean_azimuth_deg: 70.0,
-            ..Rods::default()
-        };
+        let spec = Rods { count: 9, lean_deg: 30.0, lean_azimuth_deg: 70.0, ..Rods::default() };
         let mesh = build(&spec, Vec2::ONE);
         // Floor 1, and every rod projects to its foot's outline: tip and mantle upwards less mantle downwards.
         let foot = 6.0 * f64::from(spec.radius).powi(2) * 0.5 / 30f64.to_radians().cos();
@@ -176,24 +141,13 @@ mod tests {
     #[test]
     fn the_same_seed_gives_the_same_rods_and_another_other_ones() {
         let spec = Rods::default();
-        assert_eq!(
-            build(&spec, Vec2::ONE).positions,
-            build(&spec, Vec2::ONE).positions
-        );
-        assert_ne!(
-            build(&spec, Vec2::ONE).positions,
-            build(&Rods { seed: 2, ..spec }, Vec2::ONE).positions
-        );
+        assert_eq!(build(&spec, Vec2::ONE).positions, build(&spec, Vec2::ONE).positions);
+        assert_ne!(build(&spec, Vec2::ONE).positions, build(&Rods { seed: 2, ..spec }, Vec2::ONE).positions);
     }
 
     #[test]
     fn density_counts_by_area_and_no_spread_makes_parallel_rods() {
-        let spec = Rods {
-            density: Some(50.0),
-            spread_deg: 0.0,
-            lean_deg: 40.0,
-            ..Rods::default()
-        };
+        let spec = Rods { density: Some(50.0), spread_deg: 0.0, lean_deg: 40.0, ..Rods::default() };
         let mesh = build(&spec, Vec2::new(2.0, 1.0));
         // A rod of 12 segments: 24 triangles of mantle, 10 of tip.
         assert_eq!(mesh.triangles.len(), 2 + 100 * 34);

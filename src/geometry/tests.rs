@@ -13,11 +13,7 @@ use super::*;
 use crate::scene::{Field, Geometry, GrooveProfile, Grooves, Pyramids, Rods, Shape, Tile, Weave};
 
 fn tile(geometry: Geometry) -> Tile {
-    Tile {
-        size: Vec2::new(1.0, 1.2),
-        unit: "mm".to_owned(),
-        geometry,
-    }
+    Tile { size: Vec2::new(1.0, 1.2), unit: "mm".to_owned(), geometry }
 }
 
 fn built(geometry: Geometry) -> TileMesh {
@@ -30,10 +26,7 @@ fn seen_from_above(mesh: &TileMesh, at: Vec2) -> Option<(f32, bool)> {
     for triangle in 0..mesh.triangles.len() {
         let [a, b, c] = mesh.corners(triangle);
         let (low, high) = (a.min(b).min(c).truncate(), a.max(b).max(c).truncate());
-        let (from, to) = (
-            ((low - at) / mesh.size).ceil(),
-            ((high - at) / mesh.size).floor(),
-        );
+        let (from, to) = (((low - at) / mesh.size).ceil(), ((high - at) / mesh.size).floor());
         for j in from.y as i32..=to.y as i32 {
             for i in from.x as i32..=to.x as i32 {
                 let p = at + Vec2::new(i as f32, j as f32) * mesh.size;
@@ -55,63 +48,30 @@ fn seen_from_above(mesh: &TileMesh, at: Vec2) -> Option<(f32, bool)> {
 #[test]
 fn a_ray_from_above_always_meets_a_side_that_reflects() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let rods = Rods {
-        count: 30,
-        lean_deg: 50.0,
-        lean_azimuth_deg: 200.0,
-        length: 1.5,
-        ..Rods::default()
-    };
+    let rods = Rods { count: 30, lean_deg: 50.0, lean_azimuth_deg: 200.0, length: 1.5, ..Rods::default() };
     for geometry in [
         Geometry::Rods(rods),
-        Geometry::Weave(Weave {
-            warp_width: 0.5,
-            weft_width: 0.7,
-            ..Weave::default()
-        }),
-        Geometry::Grooves(Grooves {
-            rotation_deg: 33.0,
-            profile: GrooveProfile::U,
-            ..Grooves::default()
-        }),
-        Geometry::Pyramids(Pyramids {
-            sides: 5,
-            ..Pyramids::default()
-        }),
+        Geometry::Weave(Weave { warp_width: 0.5, weft_width: 0.7, ..Weave::default() }),
+        Geometry::Grooves(Grooves { rotation_deg: 33.0, profile: GrooveProfile::U, ..Grooves::default() }),
+        Geometry::Pyramids(Pyramids { sides: 5, ..Pyramids::default() }),
     ] {
         let mesh = built(geometry);
         for _ in 0..400 {
             let at = Vec2::new(random.random(), random.random()) * mesh.size;
-            assert!(
-                matches!(seen_from_above(&mesh, at), Some((_, true))),
-                "{at}: {:?}",
-                seen_from_above(&mesh, at)
-            );
+            assert!(matches!(seen_from_above(&mesh, at), Some((_, true))), "{at}: {:?}", seen_from_above(&mesh, at));
         }
     }
 }
 
 #[test]
 fn facet_areas_sum_to_the_surface_and_every_array_is_as_long() {
-    for kind in Geometry::kinds()
-        .iter()
-        .filter(|kind| !matches!(kind.kind, "mesh" | "heightfield"))
-    {
+    for kind in Geometry::kinds().iter().filter(|kind| !matches!(kind.kind, "mesh" | "heightfield")) {
         let mesh = built(Geometry::with_defaults(kind.kind).unwrap());
-        let surface: f64 = (0..mesh.triangles.len())
-            .map(|t| mesh.triangle_area(t))
-            .sum();
-        for facets in [
-            Facets::sample(&mesh, 777, 3),
-            Facets::sample_wu2011(&mesh, 200, 3),
-        ] {
+        let surface: f64 = (0..mesh.triangles.len()).map(|t| mesh.triangle_area(t)).sum();
+        for facets in [Facets::sample(&mesh, 777, 3), Facets::sample_wu2011(&mesh, 200, 3)] {
             let n = facets.len();
             let sum: f64 = facets.areas.iter().map(|area| f64::from(*area)).sum();
-            assert!(
-                (sum / surface - 1.0).abs() < 1e-5,
-                "{}: {sum} of {surface}",
-                kind.kind
-            );
+            assert!((sum / surface - 1.0).abs() < 1e-5, "{}: {sum} of {surface}", kind.kind);
             assert!(
                 [
                     facets.normals.len(),
@@ -122,17 +82,9 @@ fn facet_areas_sum_to_the_surface_and_every_array_is_as_long() {
                 ] == [n; 5]
             );
             assert!(
-                facets
-                    .positions
-                    .iter()
-                    .all(|p| p.x >= 0.0 && p.x < mesh.size.x && p.y >= 0.0 && p.y < mesh.size.y)
+                facets.positions.iter().all(|p| p.x >= 0.0 && p.x < mesh.size.x && p.y >= 0.0 && p.y < mesh.size.y)
             );
-            assert!(
-                facets
-                    .normals
-                    .iter()
-                    .all(|normal| (normal.length() - 1.0).abs() < 1e-5)
-            );
+            assert!(facets.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-5));
         }
     }
 }
@@ -144,8 +96,7 @@ fn facets_lie_on_their_triangles() {
     for k in 0..facets.len() {
         let [a, _, _] = mesh.corners(facets.triangles[k] as usize);
         let offset = facets.positions[k] - a;
-        let wrapped = (offset.truncate() - mesh.size * (offset.truncate() / mesh.size).round())
-            .extend(offset.z);
+        let wrapped = (offset.truncate() - mesh.size * (offset.truncate() / mesh.size).round()).extend(offset.z);
         assert!(wrapped.dot(facets.geometric_normals[k]).abs() < 1e-4);
     }
 }
@@ -154,22 +105,12 @@ fn noise_tile() -> TileMesh {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let waves: Vec<[f32; 4]> = (0..12)
         .map(|_| {
-            let wave = |random: &mut ChaCha8Rng| {
-                std::f32::consts::TAU * f32::from(random.random_range(-4i8..=4))
-            };
-            [
-                wave(&mut random),
-                wave(&mut random),
-                random.random::<f32>() * 6.0,
-                0.02 + 0.02 * random.random::<f32>(),
-            ]
+            let wave = |random: &mut ChaCha8Rng| std::f32::consts::TAU * f32::from(random.random_range(-4i8..=4));
+            [wave(&mut random), wave(&mut random), random.random::<f32>() * 6.0, 0.02 + 0.02 * random.random::<f32>()]
         })
         .collect();
     heightfield::from_function(UVec2::splat(96), Vec2::ONE, |p| {
-        waves
-            .iter()
-            .map(|w| w[3] * (w[0] * p.x + w[1] * p.y + w[2]).sin())
-            .sum()
+        waves.iter().map(|w| w[3] * (w[0] * p.x + w[1] * p.y + w[2]).sin()).sum()
     })
 }
 
@@ -177,32 +118,20 @@ fn noise_tile() -> TileMesh {
 fn error_of(mesh: &TileMesh, sample: impl Fn(u64) -> Facets) -> f64 {
     let (theta, phi) = (1.2, 0.4);
     let o = crate::directions::from_angles(theta, phi);
-    let term =
-        |t: usize| f64::from(mesh.geometric_normal(t).dot(o).max(0.0)) * mesh.triangle_area(t);
+    let term = |t: usize| f64::from(mesh.geometric_normal(t).dot(o).max(0.0)) * mesh.triangle_area(t);
     let exact: f64 = (0..mesh.triangles.len()).map(term).sum();
-    let errors = (0..24)
-        .map(|pass| (unshadowed_projected_area(&sample(pass), theta, phi) / exact - 1.0).powi(2));
+    let errors = (0..24).map(|pass| (unshadowed_projected_area(&sample(pass), theta, phi) / exact - 1.0).powi(2));
     (errors.sum::<f64>() / 24.0).sqrt()
 }
 
 #[test]
 fn systematic_facets_beat_the_papers_random_ones() {
     // Measured on noise: 0.0064 against 0.0123.
-    let grooves = Grooves {
-        rotation_deg: 30.0,
-        profile: GrooveProfile::U,
-        ..Grooves::default()
-    };
-    for (mesh, factor) in [
-        (noise_tile(), 1.5),
-        (built(Geometry::Grooves(grooves)), 3.0),
-    ] {
+    let grooves = Grooves { rotation_deg: 30.0, profile: GrooveProfile::U, ..Grooves::default() };
+    for (mesh, factor) in [(noise_tile(), 1.5), (built(Geometry::Grooves(grooves)), 3.0)] {
         let systematic = error_of(&mesh, |pass| Facets::sample(&mesh, 1000, pass));
         let random = error_of(&mesh, |pass| Facets::sample_wu2011(&mesh, 1000, pass));
-        assert!(
-            systematic * factor < random,
-            "systematic {systematic:.5}, wu2011 {random:.5}"
-        );
+        assert!(systematic * factor < random, "systematic {systematic:.5}, wu2011 {random:.5}");
     }
 }
 
@@ -210,9 +139,7 @@ fn systematic_facets_beat_the_papers_random_ones() {
 fn r2_points_integrate_a_smooth_function_better_than_random_ones() {
     // One square of two triangles: the mean of sin(πx) sin(πy) over it is 4/π².
     let mesh = heightfield::from_function(UVec2::ONE, Vec2::ONE, |_| 0.0);
-    let f = |p: &Vec3| {
-        f64::from((p.x * std::f32::consts::PI).sin() * (p.y * std::f32::consts::PI).sin())
-    };
+    let f = |p: &Vec3| f64::from((p.x * std::f32::consts::PI).sin() * (p.y * std::f32::consts::PI).sin());
     let exact = 4.0 / std::f64::consts::PI.powi(2);
     let rms = |sample: &dyn Fn(u64) -> Facets| {
         let error = |pass| sample(pass).positions.iter().map(f).sum::<f64>() / 1000.0 - exact;
@@ -222,9 +149,7 @@ fn r2_points_integrate_a_smooth_function_better_than_random_ones() {
     let random = rms(&|pass| {
         let mut random = ChaCha8Rng::seed_from_u64(pass);
         Facets {
-            positions: (0..1000)
-                .map(|_| Vec3::new(random.random(), random.random(), 0.0))
-                .collect(),
+            positions: (0..1000).map(|_| Vec3::new(random.random(), random.random(), 0.0)).collect(),
             ..Facets::default()
         }
     });
@@ -236,24 +161,9 @@ fn facets_use_interpolated_normals_where_the_mesh_has_them() {
     let mut mesh = built(Geometry::Flat(crate::scene::Flat::default()));
     mesh.corner_normals = Some(vec![[Vec3::X, Vec3::X, Vec3::Z]; mesh.triangles.len()]);
     let facets = Facets::sample(&mesh, 64, 0);
-    assert!(
-        facets
-            .geometric_normals
-            .iter()
-            .all(|normal| *normal == Vec3::Z)
-    );
-    assert!(
-        facets
-            .normals
-            .iter()
-            .any(|normal| normal.x > 0.5 && normal.z > 0.1)
-    );
-    assert!(
-        facets
-            .normals
-            .iter()
-            .all(|normal| (normal.length() - 1.0).abs() < 1e-5)
-    );
+    assert!(facets.geometric_normals.iter().all(|normal| *normal == Vec3::Z));
+    assert!(facets.normals.iter().any(|normal| normal.x > 0.5 && normal.z > 0.1));
+    assert!(facets.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-5));
 }
 
 #[test]
@@ -267,10 +177,7 @@ fn triangles_without_area_or_with_nan_are_skipped_and_counted() {
     assert!((facets.areas.iter().sum::<f32>() - 1.2).abs() < 1e-5);
     mesh.triangles.drain(..2);
     mesh.triangle_slot.drain(..2);
-    for facets in [
-        Facets::sample(&mesh, 50, 0),
-        Facets::sample_wu2011(&mesh, 50, 0),
-    ] {
+    for facets in [Facets::sample(&mesh, 50, 0), Facets::sample_wu2011(&mesh, 50, 0)] {
         assert!(facets.is_empty());
     }
 }
@@ -278,18 +185,10 @@ fn triangles_without_area_or_with_nan_are_skipped_and_counted() {
 #[test]
 fn colour_images_weight_the_facets() {
     let folder = tempfile::tempdir().unwrap();
-    let image = image::RgbImage::from_fn(2, 1, |x, _| {
-        if x == 0 {
-            image::Rgb([255, 0, 0])
-        } else {
-            image::Rgb([0, 255, 0])
-        }
-    });
+    let image =
+        image::RgbImage::from_fn(2, 1, |x, _| if x == 0 { image::Rgb([255, 0, 0]) } else { image::Rgb([0, 255, 0]) });
     image.save(folder.path().join("c.png")).unwrap();
-    let spec = crate::scene::Flat {
-        color_path: Some("c.png".into()),
-        ..Default::default()
-    };
+    let spec = crate::scene::Flat { color_path: Some("c.png".into()), ..Default::default() };
     let mesh = build(&tile(Geometry::Flat(spec)), folder.path()).unwrap();
     let facets = Facets::sample(&mesh, 400, 0);
     let mean = facets.colors.iter().sum::<Vec3>() / 400.0;
@@ -297,30 +196,19 @@ fn colour_images_weight_the_facets() {
 }
 
 fn any_family() -> impl Strategy<Value = (Table, [f32; 2])> {
-    let kinds: Vec<_> = Geometry::kinds()
-        .into_iter()
-        .filter(|kind| kind.kind != "mesh")
-        .collect();
+    let kinds: Vec<_> = Geometry::kinds().into_iter().filter(|kind| kind.kind != "mesh").collect();
     let family = proptest::sample::select(kinds).prop_flat_map(|kind| {
         let name = kind.kind;
         let is_file = |field: &Field| matches!(field.shape, Shape::Path);
         let is_random = move |field: &Field| !is_file(field) && !matches!(field.key, "values");
         let fields: Vec<Field> = kind.fields.into_iter().filter(is_random).collect();
         let keys: Vec<&'static str> = fields.iter().map(|field| field.key).collect();
-        let values: Vec<_> = fields
-            .iter()
-            .map(|field| crate::scene::tests::value_of(field.shape))
-            .collect();
+        let values: Vec<_> = fields.iter().map(|field| crate::scene::tests::value_of(field.shape)).collect();
         values.prop_map(move |values| {
-            let mut table: Table = keys
-                .iter()
-                .map(|key| (*key).to_owned())
-                .zip(values)
-                .collect();
+            let mut table: Table = keys.iter().map(|key| (*key).to_owned()).zip(values).collect();
             table.insert("kind".to_owned(), Value::String(name.to_owned()));
             if name == "heightfield" {
-                let rows = [[0.0, 1.0, 0.5], [0.3, -1.0, 0.2]]
-                    .map(|row| Value::Array(row.map(Value::Float).to_vec()));
+                let rows = [[0.0, 1.0, 0.5], [0.3, -1.0, 0.2]].map(|row| Value::Array(row.map(Value::Float).to_vec()));
                 table.insert("values".to_owned(), Value::Array(rows.to_vec()));
             }
             if name == "rods" {
@@ -358,31 +246,16 @@ proptest! {
 fn every_shipped_scene_builds_and_each_slot_has_a_material() {
     for name in crate::scene::shipped::names() {
         let loaded = crate::scene::open(name, &[]).unwrap();
-        let mesh = build(&loaded.scene.tile, &loaded.base_dir)
-            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        let mesh = build(&loaded.scene.tile, &loaded.base_dir).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(mesh.closes_plane, "{name}");
         for slot in &mesh.slots {
-            loaded
-                .scene
-                .material_for_slot(slot)
-                .unwrap_or_else(|error| panic!("{name}: {error}"));
+            loaded.scene.material_for_slot(slot).unwrap_or_else(|error| panic!("{name}: {error}"));
         }
-        for material in loaded
-            .scene
-            .materials
-            .iter()
-            .filter(|material| !name.starts_with("table3") && material.name != "default")
+        for material in
+            loaded.scene.materials.iter().filter(|material| !name.starts_with("table3") && material.name != "default")
         {
-            assert!(
-                mesh.slots.contains(&material.name),
-                "{name}: no slot `{}`",
-                material.name
-            );
+            assert!(mesh.slots.contains(&material.name), "{name}: no slot `{}`", material.name);
         }
-        eprintln!(
-            "{name}: {} triangles {:?}",
-            mesh.triangles.len(),
-            mesh.notes
-        );
+        eprintln!("{name}: {} triangles {:?}", mesh.triangles.len(), mesh.notes);
     }
 }

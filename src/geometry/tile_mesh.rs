@@ -55,11 +55,7 @@ impl TileMesh {
     /// Unit geometric normal; zero for a triangle without area.
     pub fn geometric_normal(&self, triangle: usize) -> Vec3 {
         let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
-        (b - a)
-            .cross(c - a)
-            .try_normalize()
-            .unwrap_or_default()
-            .as_vec3()
+        (b - a).cross(c - a).try_normalize().unwrap_or_default().as_vec3()
     }
 
     pub fn triangle_area(&self, triangle: usize) -> f64 {
@@ -69,17 +65,9 @@ impl TileMesh {
 
     /// Lowest and highest z of all vertices; `(0, 0)` for an empty mesh.
     pub fn z_range(&self) -> (f32, f32) {
-        let range = self
-            .positions
-            .iter()
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), p| {
-                (lo.min(p.z), hi.max(p.z))
-            });
-        if range.0 <= range.1 {
-            range
-        } else {
-            (0.0, 0.0)
-        }
+        let range =
+            self.positions.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), p| (lo.min(p.z), hi.max(p.z)));
+        if range.0 <= range.1 { range } else { (0.0, 0.0) }
     }
 
     /// Is it a single-valued surface without overhang, vertical walls allowed? Then light and view come only from above.

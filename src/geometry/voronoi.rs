@@ -24,34 +24,15 @@ impl Facets {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         for _ in 0..count {
             let triangle = sampler.triangle_at(random.random());
-            facets.push(
-                mesh,
-                triangle,
-                fold(Vec2::new(random.random(), random.random())),
-                0.0,
-            );
+            facets.push(mesh, triangle, fold(Vec2::new(random.random(), random.random())), 0.0);
         }
-        let voters = sampler.sample(
-            mesh,
-            count * VOTES_PER_FACET,
-            SampleShift::from_seed(seed.wrapping_add(1)),
-        );
+        let voters = sampler.sample(mesh, count * VOTES_PER_FACET, SampleShift::from_seed(seed.wrapping_add(1)));
         let tree = KdTree::new(&facets.positions, mesh.size);
-        let nearest: Vec<Option<u32>> = voters
-            .positions
-            .par_iter()
-            .map(|position| tree.nearest(*position))
-            .collect();
+        let nearest: Vec<Option<u32>> = voters.positions.par_iter().map(|position| tree.nearest(*position)).collect();
         let mut votes = vec![0u32; count];
-        nearest
-            .into_iter()
-            .flatten()
-            .for_each(|facet| votes[facet as usize] += 1);
+        nearest.into_iter().flatten().for_each(|facet| votes[facet as usize] += 1);
         let area = sampler.area() / (count * VOTES_PER_FACET) as f64;
-        facets.areas = votes
-            .into_iter()
-            .map(|votes| (f64::from(votes) * area) as f32)
-            .collect();
+        facets.areas = votes.into_iter().map(|votes| (f64::from(votes) * area) as f32).collect();
         facets
     }
 }

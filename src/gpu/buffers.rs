@@ -15,51 +15,22 @@ const LEAST_BYTES: u64 = 256;
 
 impl Gpu {
     /// A buffer without contents (zeros), of `bytes` rounded up to a multiple of 4; never empty, as bindings cannot be.
-    pub fn buffer(
-        &self,
-        label: &str,
-        bytes: u64,
-        usage: wgpu::BufferUsages,
-    ) -> Result<wgpu::Buffer, GpuError> {
+    pub fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
         let size = bytes.max(LEAST_BYTES).next_multiple_of(4);
         let bound = usage.intersects(wgpu::BufferUsages::STORAGE);
-        let allowed = if bound {
-            self.limits.max_storage_buffer_binding_size
-        } else {
-            u64::MAX
-        }
-        .min(self.limits.max_buffer_size);
+        let allowed =
+            if bound { self.limits.max_storage_buffer_binding_size } else { u64::MAX }.min(self.limits.max_buffer_size);
         if size > allowed {
-            return Err(GpuError::TooLarge {
-                what: label.to_owned(),
-                needed: size,
-                allowed,
-            });
+            return Err(GpuError::TooLarge { what: label.to_owned(), needed: size, allowed });
         }
-        let description = wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: false,
-        };
-        self.checked(&format!("making room for {label}"), || {
-            Ok(self.device.create_buffer(&description))
-        })
+        let description = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        self.checked(&format!("making room for {label}"), || Ok(self.device.create_buffer(&description)))
     }
 
     /// A buffer that holds `data`; `COPY_DST` is added to the usage.
-    pub fn upload<T: Pod>(
-        &self,
-        label: &str,
-        data: &[T],
-        usage: wgpu::BufferUsages,
-    ) -> Result<wgpu::Buffer, GpuError> {
+    pub fn upload<T: Pod>(&self, label: &str, data: &[T], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
-        let buffer = self.buffer(
-            label,
-            bytes.len() as u64,
-            usage | wgpu::BufferUsages::COPY_DST,
-        )?;
+        let buffer = self.buffer(label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
         self.write(&buffer, data)?;
         Ok(buffer)
     }
@@ -67,8 +38,7 @@ impl Gpu {
     /// Overwrites the start of a buffer. A size that is not a multiple of 4 is refused.
     pub fn write<T: Pod>(&self, buffer: &wgpu::Buffer, data: &[T]) -> Result<(), GpuError> {
         self.checked("uploading", || {
-            self.queue
-                .write_buffer(buffer, 0, bytemuck::cast_slice(data));
+            self.queue.write_buffer(buffer, 0, bytemuck::cast_slice(data));
             Ok(())
         })
     }
@@ -78,9 +48,7 @@ impl Gpu {
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
         let staging = self.buffer("read-back", buffer.size(), usage)?;
         self.checked("reading back", || {
-            let mut encoder = self
-                .device
-                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
             self.queue.submit([encoder.finish()]);
             self.map(&staging)
@@ -89,24 +57,15 @@ impl Gpu {
 
     /// Waits for the device and copies a mappable buffer's contents out.
     pub fn map<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
-        let refused = |reason: String| GpuError::Refused {
-            during: "reading back".to_owned(),
-            reason,
-        };
+        let refused = |reason: String| GpuError::Refused { during: "reading back".to_owned(), reason };
         let (sender, receiver) = mpsc::channel();
         // The receiver outlives the wait below; after it, nobody is left to hear a late answer.
-        staging.map_async(wgpu::MapMode::Read, .., move |answer| {
-            drop(sender.send(answer))
-        });
-        let wait = wgpu::PollType::Wait {
-            submission_index: None,
-            timeout: Some(PATIENCE),
-        };
+        staging.map_async(wgpu::MapMode::Read, .., move |answer| drop(sender.send(answer)));
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
         self.device.poll(wait).map_err(|e| match e {
-            wgpu::PollError::Timeout => GpuError::Timeout {
-                during: "reading back".to_owned(),
-                seconds: PATIENCE.as_secs(),
-            },
+            wgpu::PollError::Timeout => {
+                GpuError::Timeout { during: "reading back".to_owned(), seconds: PATIENCE.as_secs() }
+            }
             other => refused(other.to_string()),
         })?;
         match receiver.try_recv() {
@@ -114,11 +73,8 @@ impl Gpu {
             Ok(Err(error)) => return Err(refused(error.to_string())),
             Err(error) => return Err(refused(error.to_string())),
         }
-        let view = staging
-            .get_mapped_range(..)
-            .map_err(|e| refused(e.to_string()))?;
-        let values =
-            bytemuck::pod_collect_to_vec(&view[..view.len() / size_of::<T>() * size_of::<T>()]);
+        let view = staging.get_mapped_range(..).map_err(|e| refused(e.to_string()))?;
+        let values = bytemuck::pod_collect_to_vec(&view[..view.len() / size_of::<T>() * size_of::<T>()]);
         drop(view);
         staging.unmap();
         Ok(values)
@@ -136,14 +92,9 @@ mod tests {
             Err(error) => return eprintln!("SKIPPED: {error}"),
         };
         let data: Vec<f32> = (0..1000).map(|k| k as f32 * 0.25).collect();
-        let buffer = gpu
-            .upload("numbers", &data, wgpu::BufferUsages::COPY_SRC)
-            .unwrap();
+        let buffer = gpu.upload("numbers", &data, wgpu::BufferUsages::COPY_SRC).unwrap();
         assert_eq!(gpu.read::<f32>(&buffer).unwrap(), data);
         let too_large = gpu.buffer("everything", u64::MAX / 2, wgpu::BufferUsages::STORAGE);
-        assert!(
-            matches!(too_large, Err(GpuError::TooLarge { .. })),
-            "{too_large:?}"
-        );
+        assert!(matches!(too_large, Err(GpuError::TooLarge { .. })), "{too_large:?}");
     }
 }

@@ -57,8 +57,8 @@ impl Gpu {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..wgpu::RequestAdapterOptions::default()
         };
-        let adapter = pollster::block_on(instance.request_adapter(&request))
-            .map_err(|e| GpuError::NoAdapter(e.to_string()))?;
+        let adapter =
+            pollster::block_on(instance.request_adapter(&request)).map_err(|e| GpuError::NoAdapter(e.to_string()))?;
         Self::from_adapter(&adapter)
     }
 
@@ -76,21 +76,14 @@ impl Gpu {
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&description)).map_err(|e| {
-                GpuError::NoDevice {
-                    adapter: info.name.clone(),
-                    reason: e.to_string(),
-                }
-            })?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&description))
+            .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), reason: e.to_string() })?;
 
         let faults = Arc::new(Mutex::new(Faults::default()));
         let heard = faults.clone();
         device.set_device_lost_callback(move |reason, message| {
             let mut heard = heard.lock().unwrap_or_else(PoisonError::into_inner);
-            heard
-                .lost
-                .get_or_insert_with(|| format!("{reason:?}: {message}"));
+            heard.lost.get_or_insert_with(|| format!("{reason:?}: {message}"));
         });
         let heard = faults.clone();
         device.on_uncaptured_error(Arc::new(move |error| {
@@ -102,49 +95,31 @@ impl Gpu {
             wgpu::DeviceType::Cpu => Tier::Software,
             _ => Tier::Hardware,
         };
-        Ok(Self {
-            device,
-            queue,
-            adapter: info,
-            limits,
-            tier,
-            faults,
-        })
+        Ok(Self { device, queue, adapter: info, limits, tier, faults })
     }
 
     /// The adapter and its driver on one line.
     pub fn description(&self) -> String {
         let info = &self.adapter;
-        format!(
-            "{} ({:?}, {} {})",
-            info.name, info.backend, info.driver, info.driver_info
-        )
+        format!("{} ({:?}, {} {})", info.name, info.backend, info.driver, info.driver_info)
     }
 
     /// Runs `work` (creating resources, submitting commands) and gives back the device's complaints as an error.
     /// `during` names the work for the message: "drawing shadow maps".
-    pub fn checked<T>(
-        &self,
-        during: &str,
-        work: impl FnOnce() -> Result<T, GpuError>,
-    ) -> Result<T, GpuError> {
+    pub fn checked<T>(&self, during: &str, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
         self.fault()?;
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let done = work();
-        let complaints =
-            [validation, memory, internal].map(|scope| pollster::block_on(scope.pop()));
+        let complaints = [validation, memory, internal].map(|scope| pollster::block_on(scope.pop()));
         // A lost device makes every call invalid: say that first. Lack of memory makes what follows invalid too.
         self.fault()?;
         let memory_first = |error: &wgpu::Error| !matches!(error, wgpu::Error::OutOfMemory { .. });
         if let Some(error) = complaints.into_iter().flatten().min_by_key(memory_first) {
             return Err(match error {
                 wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory(during.to_owned()),
-                other => GpuError::Refused {
-                    during: during.to_owned(),
-                    reason: other.to_string(),
-                },
+                other => GpuError::Refused { during: during.to_owned(), reason: other.to_string() },
             });
         }
         done
@@ -157,10 +132,7 @@ impl Gpu {
             return Err(GpuError::Lost(reason.clone()));
         }
         match heard.uncaptured.take() {
-            Some(reason) => Err(GpuError::Refused {
-                during: "an earlier submission".to_owned(),
-                reason,
-            }),
+            Some(reason) => Err(GpuError::Refused { during: "an earlier submission".to_owned(), reason }),
             None => Ok(()),
         }
     }
@@ -185,35 +157,21 @@ mod tests {
         assert!(Tier::None < Tier::Software && Tier::Software < Tier::Hardware);
         assert_eq!(Tier::of(None), Tier::None);
         let message = GpuError::NoAdapter("nothing".to_owned()).to_string();
-        assert!(
-            message.contains("mesa-vulkan-drivers") && message.contains("--backend cpu"),
-            "{message}"
-        );
+        assert!(message.contains("mesa-vulkan-drivers") && message.contains("--backend cpu"), "{message}");
     }
 
     #[test]
     fn an_invalid_request_is_an_error_and_the_device_lives_on() {
         let Some(gpu) = open() else { return };
         eprintln!("adapter: {}, tier {:?}", gpu.description(), gpu.tier);
-        let nonsense = wgpu::ShaderModuleDescriptor {
-            label: None,
-            source: wgpu::ShaderSource::Wgsl("fn main( {".into()),
-        };
-        let refused = gpu.checked("testing", || {
-            Ok(gpu.device.create_shader_module(nonsense.clone()))
-        });
-        assert!(
-            matches!(refused, Err(GpuError::Refused { .. })),
-            "{refused:?}"
-        );
+        let nonsense =
+            wgpu::ShaderModuleDescriptor { label: None, source: wgpu::ShaderSource::Wgsl("fn main( {".into()) };
+        let refused = gpu.checked("testing", || Ok(gpu.device.create_shader_module(nonsense.clone())));
+        assert!(matches!(refused, Err(GpuError::Refused { .. })), "{refused:?}");
         // The same outside an error scope: the default handler would panic here.
         let _module = gpu.device.create_shader_module(nonsense);
-        assert!(matches!(
-            gpu.checked("testing", || Ok(())),
-            Err(GpuError::Refused { .. })
-        ));
-        gpu.checked("testing", || Ok(()))
-            .expect("reported once, the device works");
+        assert!(matches!(gpu.checked("testing", || Ok(())), Err(GpuError::Refused { .. })));
+        gpu.checked("testing", || Ok(())).expect("reported once, the device works");
     }
 
     #[test]
@@ -221,9 +179,8 @@ mod tests {
         let Some(gpu) = open() else { return };
         gpu.device.destroy();
         let data = vec![1.0f32; 16];
-        let result = gpu
-            .upload("test data", &data, wgpu::BufferUsages::COPY_SRC)
-            .and_then(|buffer| gpu.read::<f32>(&buffer));
+        let result =
+            gpu.upload("test data", &data, wgpu::BufferUsages::COPY_SRC).and_then(|buffer| gpu.read::<f32>(&buffer));
         assert!(result.is_err());
     }
 }

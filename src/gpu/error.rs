@@ -11,22 +11,14 @@ pub enum GpuError {
         /// What was looked for, in wgpu's words.
         String,
     ),
-    #[error(
-        "the graphics adapter {adapter} gave no device: {reason}; update its driver, or use `--backend cpu`"
-    )]
+    #[error("the graphics adapter {adapter} gave no device: {reason}; update its driver, or use `--backend cpu`")]
     NoDevice { adapter: String, reason: String },
     #[error("the graphics device was lost ({0}); start again, or use `--backend cpu`")]
     Lost(String),
     #[error("out of graphics memory while {0}; lower the resolution, or use `--backend cpu`")]
     OutOfMemory(String),
-    #[error(
-        "the graphics adapter allows {allowed} bytes for {what}, but {needed} are needed; use `--backend cpu`"
-    )]
-    TooLarge {
-        what: String,
-        needed: u64,
-        allowed: u64,
-    },
+    #[error("the graphics adapter allows {allowed} bytes for {what}, but {needed} are needed; use `--backend cpu`")]
+    TooLarge { what: String, needed: u64, allowed: u64 },
     #[error("the graphics driver refused while {during}: {reason}")]
     Refused { during: String, reason: String },
     #[error("the graphics device did not answer within {seconds} s while {during}")]

@@ -10,11 +10,7 @@ pub const READ: wgpu::BindingType = buffer(wgpu::BufferBindingType::Storage { re
 pub const WRITE: wgpu::BindingType = buffer(wgpu::BufferBindingType::Storage { read_only: false });
 
 const fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
-    wgpu::BindingType::Buffer {
-        ty,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    }
+    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }
 
 impl Gpu {
@@ -29,9 +25,7 @@ impl Gpu {
             label: Some(name),
             source: wgpu::ShaderSource::Wgsl(swapped_source(name, swaps)?.into()),
         };
-        self.checked(&format!("compiling the shader {name}"), || {
-            Ok(self.device.create_shader_module(description))
-        })
+        self.checked(&format!("compiling the shader {name}"), || Ok(self.device.create_shader_module(description)))
     }
 
     /// The layout of one group of bindings, seen by `stages`.
@@ -43,20 +37,10 @@ impl Gpu {
     ) -> Result<wgpu::BindGroupLayout, GpuError> {
         let entries = bindings.iter().zip(0..);
         let entries: Vec<_> = entries
-            .map(|(&ty, binding)| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: stages,
-                ty,
-                count: None,
-            })
+            .map(|(&ty, binding)| wgpu::BindGroupLayoutEntry { binding, visibility: stages, ty, count: None })
             .collect();
-        let description = wgpu::BindGroupLayoutDescriptor {
-            label: Some(label),
-            entries: &entries,
-        };
-        self.checked(&format!("laying out {label}"), || {
-            Ok(self.device.create_bind_group_layout(&description))
-        })
+        let description = wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries };
+        self.checked(&format!("laying out {label}"), || Ok(self.device.create_bind_group_layout(&description)))
     }
 
     /// A group of bindings in the order of its layout.
@@ -67,36 +51,18 @@ impl Gpu {
         resources: &[wgpu::BindingResource],
     ) -> Result<wgpu::BindGroup, GpuError> {
         let entries = resources.iter().zip(0..);
-        let entries: Vec<_> = entries
-            .map(|(resource, binding)| wgpu::BindGroupEntry {
-                binding,
-                resource: resource.clone(),
-            })
-            .collect();
-        let description = wgpu::BindGroupDescriptor {
-            label: Some(label),
-            layout,
-            entries: &entries,
-        };
-        self.checked(&format!("binding {label}"), || {
-            Ok(self.device.create_bind_group(&description))
-        })
+        let entries: Vec<_> =
+            entries.map(|(resource, binding)| wgpu::BindGroupEntry { binding, resource: resource.clone() }).collect();
+        let description = wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries };
+        self.checked(&format!("binding {label}"), || Ok(self.device.create_bind_group(&description)))
     }
 
     /// The layout of pipelines that have these groups of bindings.
-    pub fn pipeline_layout(
-        &self,
-        groups: &[&wgpu::BindGroupLayout],
-    ) -> Result<wgpu::PipelineLayout, GpuError> {
+    pub fn pipeline_layout(&self, groups: &[&wgpu::BindGroupLayout]) -> Result<wgpu::PipelineLayout, GpuError> {
         let groups: Vec<_> = groups.iter().copied().map(Some).collect();
-        let description = wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &groups,
-            immediate_size: 0,
-        };
-        self.checked("laying out a pipeline", || {
-            Ok(self.device.create_pipeline_layout(&description))
-        })
+        let description =
+            wgpu::PipelineLayoutDescriptor { label: None, bind_group_layouts: &groups, immediate_size: 0 };
+        self.checked("laying out a pipeline", || Ok(self.device.create_pipeline_layout(&description)))
     }
 
     /// A compute pipeline of one entry point.

@@ -66,10 +66,8 @@ fn take_in(name: &str, swaps: Swaps<'_>, source: &mut String, taken: &mut Vec<St
         return Ok(());
     }
     taken.push(name.to_owned());
-    let (_, text) = SHADERS
-        .iter()
-        .find(|(known, _)| *known == name)
-        .ok_or_else(|| GpuError::UnknownShader(name.to_owned()))?;
+    let (_, text) =
+        SHADERS.iter().find(|(known, _)| *known == name).ok_or_else(|| GpuError::UnknownShader(name.to_owned()))?;
     for line in text.lines() {
         match line.strip_prefix(IMPORT) {
             Some(import) => take_in(import.trim(), swaps, source, taken)?,
@@ -91,9 +89,6 @@ mod tests {
         let source = shader_source("shadow_map").unwrap();
         assert_eq!(source.matches("struct View").count(), 1);
         assert!(!source.contains(IMPORT));
-        assert_eq!(
-            shader_source("nothing"),
-            Err(GpuError::UnknownShader("nothing".to_owned()))
-        );
+        assert_eq!(shader_source("nothing"), Err(GpuError::UnknownShader("nothing".to_owned())));
     }
 }

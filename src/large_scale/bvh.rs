@@ -16,31 +16,19 @@ pub(super) struct Bounds3 {
 }
 
 impl Bounds3 {
-    const EMPTY: Self = Self {
-        low: Vec3::INFINITY,
-        high: Vec3::NEG_INFINITY,
-    };
+    const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
     fn with_point(self, point: Vec3) -> Self {
-        Self {
-            low: self.low.min(point),
-            high: self.high.max(point),
-        }
+        Self { low: self.low.min(point), high: self.high.max(point) }
     }
 
     fn with(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     /// Whether a ray forwards from `origin` meets the box, by the slab test.
     fn is_entered(&self, origin: Vec3, inverse_direction: Vec3) -> bool {
-        let (t_low, t_high) = (
-            (self.low - origin) * inverse_direction,
-            (self.high - origin) * inverse_direction,
-        );
+        let (t_low, t_high) = ((self.low - origin) * inverse_direction, (self.high - origin) * inverse_direction);
         let enter = t_low.min(t_high).max_element().max(0.0);
         let leave = t_low.max(t_high).min_element();
         // Rounding must not lose boxes that are flat, and a NaN (a ray within a slab's plane) counts as a hit.
@@ -87,33 +75,16 @@ impl Bvh {
     pub fn new(mesh: &ObjectMesh) -> Self {
         let mut items: Vec<Item> = (0..mesh.triangles.len())
             .map(|triangle| {
-                let bounds = mesh
-                    .corners(triangle)
-                    .into_iter()
-                    .fold(Bounds3::EMPTY, Bounds3::with_point);
-                Item {
-                    bounds,
-                    center: 0.5 * bounds.low + 0.5 * bounds.high,
-                    triangle,
-                }
+                let bounds = mesh.corners(triangle).into_iter().fold(Bounds3::EMPTY, Bounds3::with_point);
+                Item { bounds, center: 0.5 * bounds.low + 0.5 * bounds.high, triangle }
             })
             .collect();
-        let mut nodes = vec![Node {
-            bounds: Bounds3::EMPTY,
-            first: 0,
-            count: 0,
-        }];
+        let mut nodes = vec![Node { bounds: Bounds3::EMPTY, first: 0, count: 0 }];
         let mut open = vec![(0usize, 0usize, items.len(), 0usize)];
         while let Some((node, begin, end, depth)) = open.pop() {
             let slice = &mut items[begin..end];
-            let bounds = slice
-                .iter()
-                .fold(Bounds3::EMPTY, |sum, item| sum.with(item.bounds));
-            nodes[node] = Node {
-                bounds,
-                first: begin as u32,
-                count: slice.len() as u32,
-            };
+            let bounds = slice.iter().fold(Bounds3::EMPTY, |sum, item| sum.with(item.bounds));
+            nodes[node] = Node { bounds, first: begin as u32, count: slice.len() as u32 };
             if slice.len() <= LEAF_TRIANGLES || depth >= MAX_DEPTH {
                 continue;
             }
@@ -121,27 +92,15 @@ impl Bvh {
             let child = nodes.len();
             nodes[node].first = child as u32;
             nodes[node].count = 0;
-            nodes.extend(
-                [Node {
-                    bounds,
-                    first: 0,
-                    count: 0,
-                }; 2],
-            );
+            nodes.extend([Node { bounds, first: 0, count: 0 }; 2]);
             open.push((child, begin, middle, depth + 1));
             open.push((child + 1, middle, end, depth + 1));
         }
         let blocker = |item: &Item| {
             let [a, b, c] = mesh.corners(item.triangle);
-            Blocker {
-                corner: a,
-                edges: [b - a, c - a],
-            }
+            Blocker { corner: a, edges: [b - a, c - a] }
         };
-        Self {
-            nodes,
-            blockers: items.iter().map(blocker).collect(),
-        }
+        Self { nodes, blockers: items.iter().map(blocker).collect() }
     }
 
     /// Whether a ray from `origin` along the unit `direction` meets any triangle, from either side.
@@ -155,19 +114,13 @@ impl Bvh {
             let node = &self.nodes[stack[depth] as usize];
             if node.count > 0 {
                 let range = node.first as usize..(node.first + node.count) as usize;
-                if self.blockers[range]
-                    .iter()
-                    .any(|blocker| blocker.is_hit(origin, direction))
-                {
+                if self.blockers[range].iter().any(|blocker| blocker.is_hit(origin, direction)) {
                     return true;
                 }
                 continue;
             }
             for child in [node.first, node.first + 1] {
-                if self.nodes[child as usize]
-                    .bounds
-                    .is_entered(origin, inverse)
-                {
+                if self.nodes[child as usize].bounds.is_entered(origin, inverse) {
                     stack[depth] = child;
                     depth += 1;
                 }
@@ -199,9 +152,7 @@ impl Blocker {
 
 /// Reorders the items around the cheapest cut and returns where it is, strictly inside.
 fn partition(items: &mut [Item]) -> usize {
-    let centers = items
-        .iter()
-        .fold(Bounds3::EMPTY, |sum, item| sum.with_point(item.center));
+    let centers = items.iter().fold(Bounds3::EMPTY, |sum, item| sum.with_point(item.center));
     let extent = centers.high - centers.low;
     let half = items.len() / 2;
     let Some((axis, cut)) = cheapest_cut(items, centers.low, extent) else {
@@ -211,11 +162,7 @@ fn partition(items: &mut [Item]) -> usize {
     // Stable, so that the order of triangles does not depend on the sort.
     items.sort_by_key(|item| bin_of(item) >= cut);
     let middle = items.partition_point(|item| bin_of(item) < cut);
-    if middle == 0 || middle == items.len() {
-        half
-    } else {
-        middle
-    }
+    if middle == 0 || middle == items.len() { half } else { middle }
 }
 
 fn bin(center: f32, low: f32, extent: f32) -> usize {
@@ -260,30 +207,17 @@ mod tests {
 
     #[test]
     fn the_hierarchy_agrees_with_testing_every_triangle() {
-        let object = crate::scene::Object {
-            kind: "teapot".to_owned(),
-            path: None,
-        };
+        let object = crate::scene::Object { kind: "teapot".to_owned(), path: None };
         let mesh = objects::build(&object, std::path::Path::new(".")).unwrap();
         let bvh = Bvh::new(&mesh);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
-        let mut point = |scale: f32| {
-            Vec3::from_array(std::array::from_fn(|_| {
-                scale * (2.0 * rng.random::<f32>() - 1.0)
-            }))
-        };
+        let mut point =
+            |scale: f32| Vec3::from_array(std::array::from_fn(|_| scale * (2.0 * rng.random::<f32>() - 1.0)));
         let mut blocked = 0;
         for k in 0..300 {
             let origin = point(2.0) + mesh.bounds.center;
-            let direction = if k % 10 == 0 {
-                Vec3::Y
-            } else {
-                point(1.0).try_normalize().unwrap()
-            };
-            let every = bvh
-                .blockers
-                .iter()
-                .any(|blocker| blocker.is_hit(origin, direction));
+            let direction = if k % 10 == 0 { Vec3::Y } else { point(1.0).try_normalize().unwrap() };
+            let every = bvh.blockers.iter().any(|blocker| blocker.is_hit(origin, direction));
             assert_eq!(bvh.is_blocked(origin, direction), every);
             blocked += usize::from(every);
         }
@@ -299,8 +233,7 @@ mod tests {
         };
         let bvh = Bvh::new(&mesh);
         assert!(
-            bvh.is_blocked(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z)
-                && !bvh.is_blocked(Vec3::new(0.2, 0.2, 1.0), Vec3::Z)
+            bvh.is_blocked(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z) && !bvh.is_blocked(Vec3::new(0.2, 0.2, 1.0), Vec3::Z)
         );
     }
 }

@@ -47,21 +47,15 @@ impl GBuffer {
             normals: vec![Vec3::ZERO; count],
             tangents: vec![Vec3::ZERO; count],
         };
-        let places = (
-            &mut buffer.triangles,
-            &mut buffer.positions,
-            &mut buffer.normals,
-            &mut buffer.tangents,
-        );
-        (samples.par_iter(), places.0, places.1, places.2, places.3)
-            .into_par_iter()
-            .with_min_len(1024)
-            .for_each(|(sample, triangle, position, normal, tangent)| {
+        let places = (&mut buffer.triangles, &mut buffer.positions, &mut buffer.normals, &mut buffer.tangents);
+        (samples.par_iter(), places.0, places.1, places.2, places.3).into_par_iter().with_min_len(1024).for_each(
+            |(sample, triangle, position, normal, tangent)| {
                 if sample.triangle != NOTHING {
                     *triangle = sample.triangle;
                     (*position, *normal, *tangent) = resolve(mesh, view, sample);
                 }
-            });
+            },
+        );
         buffer
     }
 }
@@ -77,11 +71,7 @@ fn resolve(mesh: &ObjectMesh, view: &CameraView, sample: &Sample) -> (Vec3, Vec3
     let position = mix(&mesh.positions);
     let [a, b, c] = mesh.corners(sample.triangle as usize);
     let outside = (b - a).cross(c - a);
-    let side = if outside.dot(view.eye - a) < 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
+    let side = if outside.dot(view.eye - a) < 0.0 { -1.0 } else { 1.0 };
     let flat = outside.try_normalize().unwrap_or(view.back);
     let normal = mix(&mesh.normals).try_normalize().unwrap_or(flat) * side;
     let viewer = (view.eye - position).try_normalize().unwrap_or(view.back);
@@ -95,20 +85,14 @@ pub fn bent_towards(normal: Vec3, viewer: Vec3) -> Vec3 {
     if cosine >= LEAST_COSINE {
         return normal;
     }
-    let across = (normal - viewer * cosine)
-        .try_normalize()
-        .unwrap_or_else(|| viewer.any_orthonormal_vector());
+    let across = (normal - viewer * cosine).try_normalize().unwrap_or_else(|| viewer.any_orthonormal_vector());
     viewer * LEAST_COSINE + across * (1.0 - LEAST_COSINE * LEAST_COSINE).sqrt()
 }
 
 /// The part of `tangent` perpendicular to the unit `normal`, of unit length; any perpendicular where there is none.
 pub fn perpendicular(tangent: Vec3, normal: Vec3) -> Vec3 {
     let across = tangent - normal * tangent.dot(normal);
-    if across.length_squared() > 1e-10 {
-        across.normalize_or(Vec3::X)
-    } else {
-        normal.any_orthonormal_vector()
-    }
+    if across.length_squared() > 1e-10 { across.normalize_or(Vec3::X) } else { normal.any_orthonormal_vector() }
 }
 
 #[cfg(test)]
@@ -118,14 +102,8 @@ mod tests {
     use crate::scene;
 
     fn view_of(kind: &str) -> (ObjectMesh, CameraView) {
-        let mesh = objects::build(
-            &scene::Object {
-                kind: kind.to_owned(),
-                path: None,
-            },
-            std::path::Path::new("."),
-        )
-        .unwrap();
+        let mesh =
+            objects::build(&scene::Object { kind: kind.to_owned(), path: None }, std::path::Path::new(".")).unwrap();
         let view = CameraView::new(&scene::Camera::default(), &mesh, [96, 96]).unwrap();
         (mesh, view)
     }
@@ -136,18 +114,14 @@ mod tests {
             let (mesh, view) = view_of(kind);
             let buffer = GBuffer::new(&mesh, &view, 2);
             assert_eq!((buffer.width, buffer.height), (192, 192));
-            let covered: Vec<_> = (0..buffer.triangles.len())
-                .filter(|&k| buffer.triangles[k] != NOTHING)
-                .collect();
+            let covered: Vec<_> = (0..buffer.triangles.len()).filter(|&k| buffer.triangles[k] != NOTHING).collect();
             assert!(covered.len() > 6000, "{kind}: {}", covered.len());
             for k in covered {
                 let (n, t) = (buffer.normals[k], buffer.tangents[k]);
                 let viewer = (view.eye - buffer.positions[k]).normalize();
                 assert!(n.dot(viewer) >= LEAST_COSINE - 1e-5, "{kind}");
                 assert!(
-                    (n.length() - 1.0).abs() < 1e-5
-                        && (t.length() - 1.0).abs() < 1e-5
-                        && n.dot(t).abs() < 1e-5,
+                    (n.length() - 1.0).abs() < 1e-5 && (t.length() - 1.0).abs() < 1e-5 && n.dot(t).abs() < 1e-5,
                     "{kind}"
                 );
             }
@@ -182,10 +156,7 @@ mod tests {
     fn any_number_of_threads_gives_the_same_bits() {
         let (mesh, view) = view_of("teapot");
         let with_threads = |n| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(n)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
             pool.install(|| GBuffer::new(&mesh, &view, 2))
         };
         assert_eq!(with_threads(1), with_threads(3));

@@ -78,12 +78,7 @@ impl GpuGBuffer {
         let draw = [Some(wgpu::Face::Back), None];
         let [culled, both] = draw.map(|cull| draw_pipeline(gpu, &module, &scene, cull));
         let resolve = gpu.compute_pipeline(&module, "resolve", &[&scene, &samples])?;
-        Ok(Self {
-            scene,
-            samples,
-            draw: [culled?, both?],
-            resolve,
-        })
+        Ok(Self { scene, samples, draw: [culled?, both?], resolve })
     }
 
     /// Rasterises the mesh with `samples_per_side²` samples a pixel, as [`GBuffer::new`] does.
@@ -96,37 +91,20 @@ impl GpuGBuffer {
     ) -> Result<GBuffer, GpuError> {
         use wgpu::BufferUsages as Usage;
         let [width, height] = view.size.map(|n| n.saturating_mul(samples_per_side));
-        let mut buffer = GBuffer {
-            width,
-            height,
-            ..GBuffer::default()
-        };
-        let (longer, most) = (
-            width.max(height) as u64,
-            u64::from(gpu.limits.max_texture_dimension_2d),
-        );
+        let mut buffer = GBuffer { width, height, ..GBuffer::default() };
+        let (longer, most) = (width.max(height) as u64, u64::from(gpu.limits.max_texture_dimension_2d));
         if longer > most {
-            return Err(GpuError::TooLarge {
-                what: "a side of the picture".to_owned(),
-                needed: longer,
-                allowed: most,
-            });
+            return Err(GpuError::TooLarge { what: "a side of the picture".to_owned(), needed: longer, allowed: most });
         }
         if width == 0 || height == 0 {
             return Ok(buffer);
         }
         let band_rows = (BAND_BYTES / (12 * width as u64)).clamp(1, height as u64) as usize;
         let vertices = mesh.positions.iter().zip(&mesh.normals).zip(&mesh.tangents);
-        let vertices: Vec<Vertex> = vertices
-            .map(|((&p, &n), &t)| Vertex::new(p, n, t))
-            .collect();
+        let vertices: Vec<Vertex> = vertices.map(|((&p, &n), &t)| Vertex::new(p, n, t)).collect();
         let vertices = gpu.upload("object vertices", &vertices, Usage::STORAGE)?;
         let indices = gpu.upload("object triangles", &mesh.triangles, Usage::STORAGE)?;
-        let camera = gpu.upload(
-            "camera",
-            &[Camera::new(view, width, height, 0, 0)],
-            Usage::UNIFORM,
-        )?;
+        let camera = gpu.upload("camera", &[Camera::new(view, width, height, 0, 0)], Usage::UNIFORM)?;
         let resources = [&camera, &vertices, &indices].map(|b| b.as_entire_binding());
         let scene = gpu.group("object", &self.scene, &resources)?;
 
@@ -134,21 +112,13 @@ impl GpuGBuffer {
             Ok(self.draw_triangles(gpu, &scene, mesh, [width as u32, height as u32]))
         })?;
         let band = Band::new(gpu, (band_rows * width) as u64)?;
-        let outputs = [
-            &band.triangles,
-            &band.positions,
-            &band.normals,
-            &band.tangents,
-        ];
+        let outputs = [&band.triangles, &band.positions, &band.normals, &band.tangents];
         let mut resources = vec![wgpu::BindingResource::TextureView(&shown)];
         resources.extend(outputs.map(|b| b.as_entire_binding()));
         let samples = gpu.group("G-buffer", &self.samples, &resources)?;
         for first_row in (0..height).step_by(band_rows) {
             let rows = band_rows.min(height - first_row);
-            gpu.write(
-                &camera,
-                &[Camera::new(view, width, height, first_row, rows)],
-            )?;
+            gpu.write(&camera, &[Camera::new(view, width, height, first_row, rows)])?;
             gpu.checked("resolving the G-buffer", || {
                 self.resolve_band(gpu, &scene, &samples, width as u32, rows as u32);
                 Ok(())
@@ -169,11 +139,7 @@ impl GpuGBuffer {
         let target = |format, usage| {
             let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("G-buffer"),
-                size: wgpu::Extent3d {
-                    width: size[0],
-                    height: size[1],
-                    depth_or_array_layers: 1,
-                },
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -185,24 +151,16 @@ impl GpuGBuffer {
         };
         let shown = target(IDS, wgpu::TextureUsages::TEXTURE_BINDING);
         let depth = target(DEPTH, wgpu::TextureUsages::empty());
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let color = wgpu::RenderPassColorAttachment {
             view: &shown,
             depth_slice: None,
             resolve_target: None,
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                store: wgpu::StoreOp::Store,
-            },
+            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
         };
         let depth = wgpu::RenderPassDepthStencilAttachment {
             view: &depth,
-            depth_ops: Some(wgpu::Operations {
-                load: wgpu::LoadOp::Clear(0.0),
-                store: wgpu::StoreOp::Discard,
-            }),
+            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Discard }),
             stencil_ops: None,
         };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -219,17 +177,8 @@ impl GpuGBuffer {
         shown
     }
 
-    fn resolve_band(
-        &self,
-        gpu: &Gpu,
-        scene: &wgpu::BindGroup,
-        samples: &wgpu::BindGroup,
-        width: u32,
-        rows: u32,
-    ) {
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    fn resolve_band(&self, gpu: &Gpu, scene: &wgpu::BindGroup, samples: &wgpu::BindGroup, width: u32, rows: u32) {
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&self.resolve);
         pass.set_bind_group(0, scene, &[]);
@@ -257,10 +206,7 @@ fn draw_pipeline(
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             buffers: &[],
         },
-        primitive: wgpu::PrimitiveState {
-            cull_mode,
-            ..wgpu::PrimitiveState::default()
-        },
+        primitive: wgpu::PrimitiveState { cull_mode, ..wgpu::PrimitiveState::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
             depth_write_enabled: Some(true),
@@ -278,9 +224,7 @@ fn draw_pipeline(
         multiview_mask: None,
         cache: None,
     };
-    gpu.checked("building the G-buffer pipeline", || {
-        Ok(gpu.device.create_render_pipeline(&description))
-    })
+    gpu.checked("building the G-buffer pipeline", || Ok(gpu.device.create_render_pipeline(&description)))
 }
 
 impl Camera {
@@ -303,14 +247,7 @@ impl Camera {
 
 impl Vertex {
     fn new(position: Vec3, normal: Vec3, tangent: Vec3) -> Self {
-        Self {
-            position,
-            pad_p: 0,
-            normal,
-            pad_n: 0,
-            tangent,
-            pad_t: 0,
-        }
+        Self { position, pad_p: 0, normal, pad_n: 0, tangent, pad_t: 0 }
     }
 }
 

@@ -69,17 +69,11 @@ impl GpuOccluder {
     pub fn new(gpu: &Gpu, occluder: &Occluder) -> Result<Self, GpuError> {
         let nodes = occluder.bvh.nodes.iter();
         let nodes: Vec<Node> = nodes
-            .map(|node| Node {
-                low: node.bounds.low,
-                first: node.first,
-                high: node.bounds.high,
-                count: node.count,
-            })
+            .map(|node| Node { low: node.bounds.low, first: node.first, high: node.bounds.high, count: node.count })
             .collect();
         let blockers = occluder.bvh.blockers.iter();
-        let blockers: Vec<[Padded; 3]> = blockers
-            .map(|b| [b.corner, b.edges[0], b.edges[1]].map(Padded::from))
-            .collect();
+        let blockers: Vec<[Padded; 3]> =
+            blockers.map(|b| [b.corner, b.edges[0], b.edges[1]].map(Padded::from)).collect();
         Ok(Self {
             nodes: gpu.upload("object hierarchy", &nodes, wgpu::BufferUsages::STORAGE)?,
             blockers: gpu.upload("object blockers", &blockers, wgpu::BufferUsages::STORAGE)?,
@@ -92,10 +86,7 @@ impl GpuLightRays {
         let module = gpu.module("light_rays")?;
         let bindings = [UNIFORM, READ, READ, READ, READ, WRITE];
         let layout = gpu.layout("light rays", wgpu::ShaderStages::COMPUTE, &bindings)?;
-        Ok(Self {
-            trace: gpu.compute_pipeline(&module, "trace", &[&layout])?,
-            layout,
-        })
+        Ok(Self { trace: gpu.compute_pipeline(&module, "trace", &[&layout])?, layout })
     }
 
     /// One bit per point and light, as [`Occluder::visible`] answers it but for rounding.
@@ -114,78 +105,27 @@ impl GpuLightRays {
             return Ok(visible);
         }
         let words = visible.words_per_point();
-        let batch = (BATCH_RAYS / lights.len())
-            .clamp(THREADS as usize, 1 << 21)
-            .min(points.len());
-        let origin = |point: usize| {
-            ray_origin(
-                mesh,
-                points.triangles[point] as usize,
-                points.positions[point],
-                eye,
-            )
-            .0
-        };
-        let rays: Vec<[Padded; 2]> = (0..points.len())
-            .into_par_iter()
-            .map(|k| [origin(k).into(), points.normals[k].into()])
-            .collect();
-        let light_data: Vec<[Padded; 2]> = lights
-            .iter()
-            .map(|light| {
-                [
-                    light.direction.into(),
-                    finite_inverse(light.direction).into(),
-                ]
-            })
-            .collect();
+        let batch = (BATCH_RAYS / lights.len()).clamp(THREADS as usize, 1 << 21).min(points.len());
+        let origin = |point: usize| ray_origin(mesh, points.triangles[point] as usize, points.positions[point], eye).0;
+        let rays: Vec<[Padded; 2]> =
+            (0..points.len()).into_par_iter().map(|k| [origin(k).into(), points.normals[k].into()]).collect();
+        let light_data: Vec<[Padded; 2]> =
+            lights.iter().map(|light| [light.direction.into(), finite_inverse(light.direction).into()]).collect();
 
-        let params = gpu.buffer(
-            "parameters",
-            size_of::<Params>() as u64,
-            Usage::UNIFORM | Usage::COPY_DST,
-        )?;
+        let params = gpu.buffer("parameters", size_of::<Params>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
         let bytes = (batch * size_of::<[Padded; 2]>()) as u64;
         let point_buffer = gpu.buffer("shading points", bytes, Usage::STORAGE | Usage::COPY_DST)?;
         let light_buffer = gpu.upload("lights", &light_data, Usage::STORAGE)?;
-        let bits = gpu.buffer(
-            "light visibility",
-            (4 * words * batch) as u64,
-            Usage::STORAGE | Usage::COPY_SRC,
-        )?;
-        let bound = [
-            &params,
-            &occluder.nodes,
-            &occluder.blockers,
-            &point_buffer,
-            &light_buffer,
-            &bits,
-        ];
-        let group = gpu.group(
-            "light rays",
-            &self.layout,
-            &bound.map(|buffer| buffer.as_entire_binding()),
-        )?;
-        for (rays, rows) in rays
-            .chunks(batch)
-            .zip(visible.words.chunks_mut(batch * words))
-        {
+        let bits = gpu.buffer("light visibility", (4 * words * batch) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
+        let bound = [&params, &occluder.nodes, &occluder.blockers, &point_buffer, &light_buffer, &bits];
+        let group = gpu.group("light rays", &self.layout, &bound.map(|buffer| buffer.as_entire_binding()))?;
+        for (rays, rows) in rays.chunks(batch).zip(visible.words.chunks_mut(batch * words)) {
             let counts = [rays.len(), lights.len(), words].map(|n| n as u32);
             let [point_count, light_count, words_per_point] = counts;
-            gpu.write(
-                &params,
-                &[Params {
-                    point_count,
-                    light_count,
-                    words_per_point,
-                    pad: 0,
-                }],
-            )?;
+            gpu.write(&params, &[Params { point_count, light_count, words_per_point, pad: 0 }])?;
             gpu.write(&point_buffer, rays)?;
             gpu.checked("tracing light rays", || {
-                let mut encoder = gpu
-                    .device
-                    .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
                 pass.set_pipeline(&self.trace);
                 pass.set_bind_group(0, &group, &[]);
@@ -203,7 +143,5 @@ impl GpuLightRays {
 
 /// `1 / direction` with very large numbers in place of infinities, which shaders need not support.
 fn finite_inverse(direction: Vec3) -> Vec3 {
-    direction
-        .recip()
-        .clamp(Vec3::splat(-1e30), Vec3::splat(1e30))
+    direction.recip().clamp(Vec3::splat(-1e30), Vec3::splat(1e30))
 }

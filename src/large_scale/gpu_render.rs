@@ -5,6 +5,7 @@
 
 use std::time::Instant;
 
+use super::CameraView;
 use super::gpu_gbuffer::GpuGBuffer;
 use super::gpu_light_rays::{GpuLightRays, GpuOccluder};
 use super::gpu_shading::{GpuMaterial, GpuShading};
@@ -12,7 +13,6 @@ use super::render::{RenderInput, Rendered, StageTimes, check_size};
 use super::shading;
 use super::shading_points::ShadingPoints;
 use super::shadow::Occluder;
-use super::CameraView;
 use crate::error::Result;
 use crate::filtering::EffectiveBrdf;
 use crate::gpu::{Gpu, GpuError};

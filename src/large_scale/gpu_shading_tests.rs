@@ -9,7 +9,7 @@ use super::gpu_shading::GpuShading;
 use super::shading::{self, Background};
 use super::shading_points::ShadingPoints;
 use super::shadow::Occluder;
-use super::{CameraView, GBuffer, Picture, lights, RenderInput, objects, render, render_gpu};
+use super::{CameraView, GBuffer, Picture, RenderInput, lights, objects, render, render_gpu};
 use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
 use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
 use crate::gpu::{Gpu, GpuError};
@@ -213,7 +213,10 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     facets.areas.push(1.0);
     facets.colors.push(Vec3::ONE);
     facets.slots.push(0);
-    let material = |color| SumMaterial { brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] }, color };
+    let material = |color| SumMaterial {
+        brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] },
+        color,
+    };
     let form = |color| EffectiveBrdf {
         form: Form::Direct(Direct {
             sum: FacetSum::new(&facets, &[0], &[material(color)]).into(),

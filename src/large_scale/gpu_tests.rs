@@ -14,67 +14,38 @@ use crate::gpu::Gpu;
 use crate::scene;
 
 fn open_gpu() -> Option<Gpu> {
-    Gpu::open()
-        .map_err(|error| eprintln!("SKIPPED: {error}"))
-        .ok()
+    Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
 }
 
 fn object(kind: &str) -> ObjectMesh {
-    objects::build(
-        &scene::Object {
-            kind: kind.to_owned(),
-            path: None,
-        },
-        Path::new("."),
-    )
-    .unwrap()
+    objects::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap()
 }
 
 fn view(mesh: &ObjectMesh, distance: f32) -> CameraView {
-    let camera = scene::Camera {
-        distance,
-        ..scene::Camera::default()
-    };
+    let camera = scene::Camera { distance, ..scene::Camera::default() };
     CameraView::new(&camera, mesh, [150, 130]).unwrap()
 }
 
 /// Whether another triangle shows next to a sample: there subpixel snapping may choose either.
 fn is_at_edge(buffer: &GBuffer, k: usize) -> bool {
     let (x, y) = (k % buffer.width, k / buffer.width);
-    let around = [
-        (x.wrapping_sub(1), y),
-        (x + 1, y),
-        (x, y.wrapping_sub(1)),
-        (x, y + 1),
-    ];
-    let inside = around
-        .into_iter()
-        .filter(|&(x, y)| x < buffer.width && y < buffer.height);
-    inside
-        .into_iter()
-        .any(|(x, y)| buffer.triangles[y * buffer.width + x] != buffer.triangles[k])
+    let around = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
+    let inside = around.into_iter().filter(|&(x, y)| x < buffer.width && y < buffer.height);
+    inside.into_iter().any(|(x, y)| buffer.triangles[y * buffer.width + x] != buffer.triangles[k])
 }
 
 #[test]
 fn both_routes_fill_the_same_g_buffer() {
     let Some(gpu) = open_gpu() else { return };
     let pipelines = GpuGBuffer::new(&gpu).unwrap();
-    for (kind, distance) in [
-        ("sphere", 0.0),
-        ("plate", 0.0),
-        ("cup", 0.0),
-        ("skirt", 0.0),
-        ("teapot", 0.0),
-        ("skirt", 0.3),
-    ] {
+    for (kind, distance) in
+        [("sphere", 0.0), ("plate", 0.0), ("cup", 0.0), ("skirt", 0.0), ("teapot", 0.0), ("skirt", 0.3)]
+    {
         let mesh = object(kind);
         let view = view(&mesh, distance);
         let cpu = GBuffer::new(&mesh, &view, 2);
         let device = pipelines.draw(&gpu, &mesh, &view, 2).unwrap();
-        assert_eq!(
-            (device.width, device.height, device.triangles.len()),
-            (cpu.width, cpu.height, cpu.triangles.len())
-        );
+        assert_eq!((device.width, device.height, device.triangles.len()), (cpu.width, cpu.height, cpu.triangles.len()));
         let (mut other_triangle, mut inside, mut covered) = (0, 0, 0);
         let (mut position, mut normal, mut tangent) = (Vec::new(), Vec::new(), Vec::new());
         for k in 0..cpu.triangles.len() {
@@ -90,10 +61,7 @@ fn both_routes_fill_the_same_g_buffer() {
         }
         let [position, normal, tangent] = [position, normal, tangent].map(|mut distances| {
             distances.sort_by(f32::total_cmp);
-            [
-                distances[distances.len() * 99 / 100],
-                distances[distances.len() - 1],
-            ]
+            [distances[distances.len() * 99 / 100], distances[distances.len() - 1]]
         });
         eprintln!(
             "{kind}: {covered} covered, {other_triangle} other triangle, {inside} not at an edge, position {position:?}, normal {normal:?}, tangent {tangent:?}"
@@ -104,15 +72,10 @@ fn both_routes_fill_the_same_g_buffer() {
         );
         // Largest in 99 % of the samples, then of all: triangles seen edge-on magnify the subpixel snapping, and normals
         // and tangents turn fast at the rim and at poles.
-        for (what, [most, worst], allowed) in [
-            ("position", position, [5e-4, 0.02]),
-            ("normal", normal, [1e-3, 0.05]),
-            ("tangent", tangent, [1e-3, 0.2]),
-        ] {
-            assert!(
-                most < allowed[0] && worst < allowed[1],
-                "{kind}: {what} {most} {worst}"
-            );
+        for (what, [most, worst], allowed) in
+            [("position", position, [5e-4, 0.02]), ("normal", normal, [1e-3, 0.05]), ("tangent", tangent, [1e-3, 0.2])]
+        {
+            assert!(most < allowed[0] && worst < allowed[1], "{kind}: {what} {most} {worst}");
         }
     }
 }
@@ -126,17 +89,9 @@ fn both_routes_see_the_same_lights() {
             let (y, phi) = (1.0 - 2.0 * (k as f32 + 0.5) / 45.0, 2.4 * k as f32);
             let across = (1.0 - y * y).sqrt();
             let direction = Vec3::new(across * phi.cos(), y, across * phi.sin());
-            DirectionalLight {
-                direction,
-                irradiance: Vec3::ONE,
-            }
+            DirectionalLight { direction, irradiance: Vec3::ONE }
         })
-        .chain(
-            [Vec3::X, Vec3::Y, Vec3::Z].map(|direction| DirectionalLight {
-                direction,
-                irradiance: Vec3::ONE,
-            }),
-        )
+        .chain([Vec3::X, Vec3::Y, Vec3::Z].map(|direction| DirectionalLight { direction, irradiance: Vec3::ONE }))
         .collect();
     for kind in ["cup", "skirt", "teapot"] {
         let mesh = object(kind);
@@ -145,32 +100,17 @@ fn both_routes_see_the_same_lights() {
         let occluder = Occluder::of(&mesh).unwrap();
         let cpu = occluder.visible(&mesh, &points, &lights, view.eye, None);
         let on_device = GpuOccluder::new(&gpu, &occluder).unwrap();
-        let device = rays
-            .visible(&gpu, &on_device, &mesh, &points, &lights, view.eye)
-            .unwrap();
-        let differ: u32 = cpu
-            .words
-            .iter()
-            .zip(&device.words)
-            .map(|(a, b)| (a ^ b).count_ones())
-            .sum();
+        let device = rays.visible(&gpu, &on_device, &mesh, &points, &lights, view.eye).unwrap();
+        let differ: u32 = cpu.words.iter().zip(&device.words).map(|(a, b)| (a ^ b).count_ones()).sum();
         let pairs = points.len() * lights.len();
         eprintln!("{kind}: {differ} of {pairs} rays differ");
         // Rays that graze an edge or the horizon within rounding.
-        assert!(
-            (differ as usize) < pairs / 5000,
-            "{kind}: {differ} of {pairs}"
-        );
+        assert!((differ as usize) < pairs / 5000, "{kind}: {differ} of {pairs}");
     }
     let mesh = object("cup");
     let none = ShadingPoints::default();
     let on_device = GpuOccluder::new(&gpu, &Occluder::of(&mesh).unwrap()).unwrap();
-    assert!(
-        rays.visible(&gpu, &on_device, &mesh, &none, &lights, Vec3::Z)
-            .unwrap()
-            .words
-            .is_empty()
-    );
+    assert!(rays.visible(&gpu, &on_device, &mesh, &none, &lights, Vec3::Z).unwrap().words.is_empty());
 }
 
 #[test]
@@ -178,16 +118,10 @@ fn both_routes_see_the_same_lights() {
 fn times_of_both_routes() {
     let Some(gpu) = open_gpu() else { return };
     println!("{}, tier {:?}", gpu.description(), gpu.tier);
-    let (draw, trace) = (
-        GpuGBuffer::new(&gpu).unwrap(),
-        GpuLightRays::new(&gpu).unwrap(),
-    );
+    let (draw, trace) = (GpuGBuffer::new(&gpu).unwrap(), GpuLightRays::new(&gpu).unwrap());
     let lights: Vec<_> = (0..32)
         .map(|k| Vec3::new((k as f32).cos(), 0.5, (k as f32).sin()).normalize())
-        .map(|direction| DirectionalLight {
-            direction,
-            irradiance: Vec3::ONE,
-        })
+        .map(|direction| DirectionalLight { direction, irradiance: Vec3::ONE })
         .collect();
     for kind in ["cup", "skirt", "teapot"] {
         let mesh = object(kind);
@@ -216,9 +150,7 @@ fn times_of_both_routes() {
             (
                 "32 lights, 1 point a pixel",
                 median(&|| drop(occluder.visible(&mesh, &points, &lights, view.eye, None))),
-                median(&|| {
-                    drop(trace.visible(&gpu, &on_device, &mesh, &points, &lights, view.eye))
-                }),
+                median(&|| drop(trace.visible(&gpu, &on_device, &mesh, &points, &lights, view.eye))),
             ),
         ];
         for (what, cpu, device) in rows {

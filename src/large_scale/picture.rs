@@ -19,29 +19,16 @@ pub struct Picture {
 impl Picture {
     /// Tone-mapped sRGB bytes, three a pixel.
     pub fn to_srgb(&self, tone_map: &ToneMap) -> Vec<u8> {
-        self.pixels
-            .iter()
-            .flat_map(|p| tone_map.apply(*p).to_array().map(srgb_byte))
-            .collect()
+        self.pixels.iter().flat_map(|p| tone_map.apply(*p).to_array().map(srgb_byte)).collect()
     }
 
     /// Writes by the file's ending: `.png` through the tone map, `.exr` linear. The old file stays whole if writing fails.
     pub fn write(&self, path: &Path, tone_map: &ToneMap) -> Result<()> {
-        let bytes = match path
-            .extension()
-            .and_then(|e| e.to_str())
-            .map(str::to_ascii_lowercase)
-            .as_deref()
-        {
+        let bytes = match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("png") => self.png_bytes(tone_map)?,
             Some("exr") => self.exr_bytes()?,
             _ => {
-                return Err(InputError::new(
-                    "output",
-                    path.display(),
-                    "a name that ends in .png or .exr",
-                )
-                .into());
+                return Err(InputError::new("output", path.display(), "a name that ends in .png or .exr").into());
             }
         };
         replace_file(path, &bytes)
@@ -49,10 +36,8 @@ impl Picture {
 
     fn png_bytes(&self, tone_map: &ToneMap) -> Result<Vec<u8>> {
         let too_large = |_| Error::failed("the picture is too large for PNG");
-        let (width, height) = (
-            u32::try_from(self.width).map_err(too_large)?,
-            u32::try_from(self.height).map_err(too_large)?,
-        );
+        let (width, height) =
+            (u32::try_from(self.width).map_err(too_large)?, u32::try_from(self.height).map_err(too_large)?);
         let mut bytes = Vec::new();
         let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
         image::ImageEncoder::write_image(
@@ -82,9 +67,8 @@ impl Picture {
 
 /// Writes beside `path` and renames, so that `path` holds either its old content or all of the new.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let unwritable = |error: std::io::Error| {
-        InputError::new("output", error, "a place that can be written").in_file(path)
-    };
+    let unwritable =
+        |error: std::io::Error| InputError::new("output", error, "a place that can be written").in_file(path);
     let temporary = temporary_beside(path);
     let written = std::fs::File::create_new(&temporary)
         .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
@@ -108,20 +92,10 @@ mod tests {
     use super::super::tone_map::ToneCurve;
     use super::*;
 
-    const PLAIN: ToneMap = ToneMap {
-        curve: ToneCurve::Plain,
-        gain: 1.0,
-    };
+    const PLAIN: ToneMap = ToneMap { curve: ToneCurve::Plain, gain: 1.0 };
 
     fn small() -> Picture {
-        Picture {
-            width: 2,
-            height: 1,
-            pixels: vec![
-                Vec3::new(0.0, 0.214_041_14, 1.0),
-                Vec3::new(7.5, -1.0, 1e-4),
-            ],
-        }
+        Picture { width: 2, height: 1, pixels: vec![Vec3::new(0.0, 0.214_041_14, 1.0), Vec3::new(7.5, -1.0, 1e-4)] }
     }
 
     #[test]
@@ -130,48 +104,25 @@ mod tests {
         let (png, exr) = (folder.path().join("a.png"), folder.path().join("a.exr"));
         small().write(&png, &PLAIN).unwrap();
         small().write(&exr, &PLAIN).unwrap();
-        assert_eq!(
-            image::open(&png).unwrap().into_rgb8().into_raw(),
-            [0, 128, 255, 255, 0, 0]
-        );
+        assert_eq!(image::open(&png).unwrap().into_rgb8().into_raw(), [0, 128, 255, 255, 0, 0]);
         let back = exr::prelude::read_first_rgba_layer_from_file(
             &exr,
             |size, _| vec![Vec3::ZERO; size.x() * size.y()],
-            |pixels: &mut Vec<Vec3>, at, (r, g, b, _): (f32, f32, f32, f32)| {
-                pixels[at.x()] = Vec3::new(r, g, b)
-            },
+            |pixels: &mut Vec<Vec3>, at, (r, g, b, _): (f32, f32, f32, f32)| pixels[at.x()] = Vec3::new(r, g, b),
         );
         assert_eq!(back.unwrap().layer_data.channel_data.pixels, small().pixels);
-        assert_eq!(
-            std::fs::read_dir(folder.path()).unwrap().count(),
-            2,
-            "no temporary files are left"
-        );
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no temporary files are left");
     }
 
     #[test]
     fn an_unwritable_place_is_an_input_error_and_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let nowhere = small()
-            .write(&folder.path().join("missing/a.png"), &PLAIN)
-            .unwrap_err();
+        let nowhere = small().write(&folder.path().join("missing/a.png"), &PLAIN).unwrap_err();
         assert_eq!(nowhere.exit_code(), 2);
         std::fs::create_dir(folder.path().join("taken.png")).unwrap();
         std::fs::write(folder.path().join("taken.png/file"), b"x").unwrap();
-        assert_eq!(
-            small()
-                .write(&folder.path().join("taken.png"), &PLAIN)
-                .unwrap_err()
-                .exit_code(),
-            2
-        );
-        assert_eq!(
-            small()
-                .write(&folder.path().join("a.gif"), &PLAIN)
-                .unwrap_err()
-                .exit_code(),
-            2
-        );
+        assert_eq!(small().write(&folder.path().join("taken.png"), &PLAIN).unwrap_err().exit_code(), 2);
+        assert_eq!(small().write(&folder.path().join("a.gif"), &PLAIN).unwrap_err().exit_code(), 2);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

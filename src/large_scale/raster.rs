@@ -35,11 +35,7 @@ pub struct Sample {
     pub inverse_depth: f32,
 }
 
-const EMPTY: Sample = Sample {
-    triangle: NOTHING,
-    barycentric: [0.0; 2],
-    inverse_depth: 0.0,
-};
+const EMPTY: Sample = Sample { triangle: NOTHING, barycentric: [0.0; 2], inverse_depth: 0.0 };
 
 /// A triangle (or a clipped piece of one) on the picture, wound so that its area is positive with y down.
 struct Projected {
@@ -63,32 +59,20 @@ pub fn rasterize(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usi
         }
     }
     let mut samples = vec![EMPTY; width * height];
-    samples
-        .par_chunks_mut(width.max(1) * BAND)
-        .zip(&bands)
-        .enumerate()
-        .for_each(|(band, (samples, pieces))| {
-            for &piece in pieces {
-                fill(&projected[piece as usize], samples, width, band * BAND);
-            }
-        });
+    samples.par_chunks_mut(width.max(1) * BAND).zip(&bands).enumerate().for_each(|(band, (samples, pieces))| {
+        for &piece in pieces {
+            fill(&projected[piece as usize], samples, width, band * BAND);
+        }
+    });
     samples
 }
 
 fn project(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) -> Vec<Projected> {
-    let in_view: Vec<Vec3> = mesh
-        .positions
-        .iter()
-        .map(|p| view.view_from_world(*p))
-        .collect();
-    let scale = DVec2::new(
-        width as f64 / view.size[0] as f64,
-        height as f64 / view.size[1] as f64,
-    ) * SUBSTEPS;
+    let in_view: Vec<Vec3> = mesh.positions.iter().map(|p| view.view_from_world(*p)).collect();
+    let scale = DVec2::new(width as f64 / view.size[0] as f64, height as f64 / view.size[1] as f64) * SUBSTEPS;
     let snap = |p: Vec3| {
         let at = view.pixel_from_view(p).as_dvec2() * scale;
-        at.to_array()
-            .map(|x| x.round().clamp(-LARGEST, LARGEST) as i64)
+        at.to_array().map(|x| x.round().clamp(-LARGEST, LARGEST) as i64)
     };
     let snapped: Vec<[i64; 2]> = in_view.iter().map(|p| snap(*p)).collect();
     let pieces_of = |(first, triangles): (usize, &[[u32; 3]])| {
@@ -97,41 +81,20 @@ fn project(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) ->
             let triangle_index = (first * CHUNK + k) as u32;
             let corners = triangle.map(|v| in_view[v as usize]);
             if corners.iter().all(|p| p.z >= view.near) {
-                let corners = [
-                    (corners[0], Vec3::X),
-                    (corners[1], Vec3::Y),
-                    (corners[2], Vec3::Z),
-                ];
+                let corners = [(corners[0], Vec3::X), (corners[1], Vec3::Y), (corners[2], Vec3::Z)];
                 let snapped = triangle.map(|v| snapped[v as usize]);
-                pieces.extend(place(
-                    triangle_index,
-                    corners,
-                    snapped,
-                    mesh.two_sided,
-                    height,
-                ));
+                pieces.extend(place(triangle_index, corners, snapped, mesh.two_sided, height));
                 continue;
             }
             let polygon = clip_near(corners, view.near);
             for fan in 2..polygon.len() {
                 let corners = [polygon[0], polygon[fan - 1], polygon[fan]];
-                pieces.extend(place(
-                    triangle_index,
-                    corners,
-                    corners.map(|(p, _)| snap(p)),
-                    mesh.two_sided,
-                    height,
-                ));
+                pieces.extend(place(triangle_index, corners, corners.map(|(p, _)| snap(p)), mesh.two_sided, height));
             }
         }
         pieces
     };
-    let chunks: Vec<Vec<Projected>> = mesh
-        .triangles
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(pieces_of)
-        .collect();
+    let chunks: Vec<Vec<Projected>> = mesh.triangles.par_chunks(CHUNK).enumerate().map(pieces_of).collect();
     chunks.into_iter().flatten().collect()
 }
 
@@ -168,11 +131,7 @@ fn place(
 
 /// The part of a triangle in front of the near plane as a convex polygon of (view position, barycentric coordinates).
 fn clip_near(corners: [Vec3; 3], near: f32) -> Vec<(Vec3, Vec3)> {
-    let all = [
-        (corners[0], Vec3::X),
-        (corners[1], Vec3::Y),
-        (corners[2], Vec3::Z),
-    ];
+    let all = [(corners[0], Vec3::X), (corners[1], Vec3::Y), (corners[2], Vec3::Z)];
     let inside = corners.map(|p| p.z >= near);
     let mut polygon = Vec::new();
     for k in 0..3 {
@@ -227,17 +186,12 @@ fn fill(piece: &Projected, samples: &mut [Sample], width: usize, first_row: usiz
 }
 
 fn shade_sample(piece: &Projected, values: [i64; 3], area: f64, sample: &mut Sample) {
-    let weights: [f32; 3] =
-        std::array::from_fn(|k| (values[k] as f64 / area) as f32 * piece.inverse_depths[k]);
+    let weights: [f32; 3] = std::array::from_fn(|k| (values[k] as f64 / area) as f32 * piece.inverse_depths[k]);
     let inverse_depth = weights[0] + weights[1] + weights[2];
     if inverse_depth > sample.inverse_depth {
         let sum: Vec3 = (0..3).map(|k| piece.barycentric[k] * weights[k]).sum();
         let barycentric = sum / inverse_depth;
-        *sample = Sample {
-            triangle: piece.triangle,
-            barycentric: [barycentric.y, barycentric.z],
-            inverse_depth,
-        };
+        *sample = Sample { triangle: piece.triangle, barycentric: [barycentric.y, barycentric.z], inverse_depth };
     }
 }
 
@@ -249,10 +203,7 @@ mod tests {
 
     /// A square [-1, 1]² in the plane z = 0, cut into `n x n` cells at awkward places, each two triangles.
     fn square(n: usize, two_sided: bool) -> ObjectMesh {
-        let mut mesh = ObjectMesh {
-            two_sided,
-            ..ObjectMesh::default()
-        };
+        let mut mesh = ObjectMesh { two_sided, ..ObjectMesh::default() };
         for j in 0..=n {
             for i in 0..=n {
                 let at = |k: usize| -1.0 + 2.0 * (k as f32 / n as f32).powf(1.3);
@@ -262,24 +213,15 @@ mod tests {
         let row = n as u32 + 1;
         for k in 0..(n * n) as u32 {
             let a = k / n as u32 * row + k % n as u32;
-            mesh.triangles
-                .extend([[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]);
+            mesh.triangles.extend([[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]);
         }
-        (mesh.normals, mesh.tangents) = (
-            vec![Vec3::Z; mesh.positions.len()],
-            vec![Vec3::X; mesh.positions.len()],
-        );
+        (mesh.normals, mesh.tangents) = (vec![Vec3::Z; mesh.positions.len()], vec![Vec3::X; mesh.positions.len()]);
         mesh.bounds = Bounds::of(&mesh.positions);
         mesh
     }
 
     fn facing(mesh: &ObjectMesh, azimuth_deg: f32, distance: f32, size: [usize; 2]) -> CameraView {
-        let camera = scene::Camera {
-            azimuth_deg,
-            elevation_deg: 0.0,
-            distance,
-            ..scene::Camera::default()
-        };
+        let camera = scene::Camera { azimuth_deg, elevation_deg: 0.0, distance, ..scene::Camera::default() };
         CameraView::new(&camera, mesh, size).unwrap()
     }
 
@@ -293,10 +235,7 @@ mod tests {
         for piece in &projected {
             let mut alone = vec![EMPTY; 64 * 64];
             fill(piece, &mut alone, 64, 0);
-            alone
-                .iter()
-                .zip(&mut hits)
-                .for_each(|(sample, hits)| *hits += usize::from(sample.triangle != NOTHING));
+            alone.iter().zip(&mut hits).for_each(|(sample, hits)| *hits += usize::from(sample.triangle != NOTHING));
         }
         assert!(hits.iter().all(|&h| h == 1), "{:?}", hits.iter().max());
     }
@@ -308,17 +247,10 @@ mod tests {
         let samples = rasterize(&mesh, &view, 300, 200);
         let outline = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
             .map(|[x, y]| view.pixel_from_view(view.view_from_world(Vec3::new(x, y, 0.0))));
-        let area: f32 = (0..4)
-            .map(|k| 0.5 * outline[k].perp_dot(outline[(k + 1) % 4]))
-            .sum::<f32>()
-            .abs();
+        let area: f32 = (0..4).map(|k| 0.5 * outline[k].perp_dot(outline[(k + 1) % 4])).sum::<f32>().abs();
         let covered = samples.iter().filter(|s| s.triangle != NOTHING).count() as f32;
         assert!((covered / area - 1.0).abs() < 0.01, "{covered} {area}");
-        for (k, sample) in samples
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| s.triangle != NOTHING)
-        {
+        for (k, sample) in samples.iter().enumerate().filter(|(_, s)| s.triangle != NOTHING) {
             let [a, b, c] = mesh.corners(sample.triangle as usize);
             let [v, w] = sample.barycentric;
             let in_view = view.view_from_world(a * (1.0 - v - w) + b * v + c * w);
@@ -342,18 +274,12 @@ mod tests {
     fn the_nearest_of_a_closed_object_faces_the_viewer_and_a_camera_inside_does_not_break() {
         let sphere = objects::build(&scene::Object::default(), std::path::Path::new(".")).unwrap();
         let view = facing(&sphere, 10.0, 3.0, [80, 80]);
-        for sample in rasterize(&sphere, &view, 80, 80)
-            .iter()
-            .filter(|s| s.triangle != NOTHING)
-        {
+        for sample in rasterize(&sphere, &view, 80, 80).iter().filter(|s| s.triangle != NOTHING) {
             assert!(1.0 / sample.inverse_depth < 3.0);
         }
         let mut open = sphere;
         open.two_sided = true;
         let inside = rasterize(&open, &facing(&open, 10.0, 0.3, [80, 80]), 80, 80);
-        assert!(
-            inside.iter().all(|s| s.triangle != NOTHING),
-            "from inside the sphere is all around"
-        );
+        assert!(inside.iter().all(|s| s.triangle != NOTHING), "from inside the sphere is all around");
     }
 }

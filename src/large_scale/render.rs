@@ -56,23 +56,11 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
     let points = ShadingPoints::new(&buffer, &view, input.samples_per_side);
     drop(buffer);
     let after_gbuffer = Instant::now();
-    let visible = input.occluder.map(|occluder| {
-        occluder.visible(
-            input.mesh,
-            &points,
-            input.lights,
-            view.eye,
-            input.shadow_cache,
-        )
-    });
+    let visible = input
+        .occluder
+        .map(|occluder| occluder.visible(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
     let after_shadows = Instant::now();
-    let radiance = shading::radiance(
-        &points,
-        input.lights,
-        visible.as_ref(),
-        view.eye,
-        input.reflectance,
-    );
+    let radiance = shading::radiance(&points, input.lights, visible.as_ref(), view.eye, input.reflectance);
     let picture = shading::gather(&points, &radiance, &view, input.background);
     let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
     let times = StageTimes {
@@ -80,23 +68,15 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
         shadows_ms: ms(after_gbuffer, after_shadows),
         shading_ms: ms(after_shadows, Instant::now()),
     };
-    Ok(Rendered {
-        picture,
-        times,
-        points: points.len(),
-    })
+    Ok(Rendered { picture, times, points: points.len() })
 }
 
 pub(super) fn check_size([width, height]: [usize; 2], samples_per_side: usize) -> Result<()> {
-    let samples = [width, height, samples_per_side, samples_per_side]
-        .into_iter()
-        .try_fold(1usize, usize::checked_mul);
+    let samples = [width, height, samples_per_side, samples_per_side].into_iter().try_fold(1usize, usize::checked_mul);
     match samples {
         Some(samples) if (1..=MAX_SAMPLES).contains(&samples) => Ok(()),
         _ => {
-            let found = format!(
-                "{width} x {height} pixels with {samples_per_side} x {samples_per_side} samples each"
-            );
+            let found = format!("{width} x {height} pixels with {samples_per_side} x {samples_per_side} samples each");
             Err(InputError::new("size", found, format!("1 to {MAX_SAMPLES} samples in all")).into())
         }
     }

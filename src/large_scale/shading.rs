@@ -20,39 +20,31 @@ pub fn radiance(
     reflectance: &dyn Reflectance,
 ) -> Vec<Vec3> {
     let mut radiance = vec![Vec3::ZERO; points.len()];
-    radiance
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .for_each(|(chunk, radiance)| {
-            let (mut directions, mut irradiances) = (
-                Vec::with_capacity(lights.len()),
-                Vec::with_capacity(lights.len()),
-            );
-            let mut values = vec![Vec3::ZERO; lights.len()];
-            for (k, radiance) in radiance.iter_mut().enumerate() {
-                let point = chunk * CHUNK + k;
-                let (z, x) = (points.normals[point], points.tangents[point]);
-                let y = z.cross(x);
-                let in_tangent = |d: Vec3| Vec3::new(d.dot(x), d.dot(y), d.dot(z));
-                directions.clear();
-                irradiances.clear();
-                for (k, light) in lights.iter().enumerate() {
-                    if visible.is_none_or(|visible| visible.sees(point, k))
-                        && light.direction.dot(z) > 0.0
-                    {
-                        directions.push(in_tangent(light.direction));
-                        irradiances.push(light.irradiance);
-                    }
+    radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {
+        let (mut directions, mut irradiances) = (Vec::with_capacity(lights.len()), Vec::with_capacity(lights.len()));
+        let mut values = vec![Vec3::ZERO; lights.len()];
+        for (k, radiance) in radiance.iter_mut().enumerate() {
+            let point = chunk * CHUNK + k;
+            let (z, x) = (points.normals[point], points.tangents[point]);
+            let y = z.cross(x);
+            let in_tangent = |d: Vec3| Vec3::new(d.dot(x), d.dot(y), d.dot(z));
+            directions.clear();
+            irradiances.clear();
+            for (k, light) in lights.iter().enumerate() {
+                if visible.is_none_or(|visible| visible.sees(point, k)) && light.direction.dot(z) > 0.0 {
+                    directions.push(in_tangent(light.direction));
+                    irradiances.push(light.irradiance);
                 }
-                if directions.is_empty() {
-                    continue;
-                }
-                let o = in_tangent((eye - points.positions[point]).try_normalize().unwrap_or(z));
-                let values = &mut values[..directions.len()];
-                reflectance.eval_lights(&directions, o, values);
-                *radiance = values.iter().zip(&irradiances).map(|(f, e)| *f * *e).sum();
             }
-        });
+            if directions.is_empty() {
+                continue;
+            }
+            let o = in_tangent((eye - points.positions[point]).try_normalize().unwrap_or(z));
+            let values = &mut values[..directions.len()];
+            reflectance.eval_lights(&directions, o, values);
+            *radiance = values.iter().zip(&irradiances).map(|(f, e)| *f * *e).sum();
+        }
+    });
     radiance
 }
 
@@ -83,12 +75,7 @@ impl Background {
 }
 
 /// The picture: points averaged within their pixels over the background, in linear radiance.
-pub fn gather(
-    points: &ShadingPoints,
-    radiance: &[Vec3],
-    view: &CameraView,
-    background: &Background,
-) -> Picture {
+pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &Background) -> Picture {
     let [width, height] = view.size;
     let mut coverage = vec![0f32; width * height];
     let mut pixels = vec![Vec3::ZERO; width * height];
@@ -101,9 +88,5 @@ pub fn gather(
             *pixel += background.at(k, view.size) * (1.0 - covered);
         }
     }
-    Picture {
-        width,
-        height,
-        pixels,
-    }
+    Picture { width, height, pixels }
 }

@@ -67,42 +67,18 @@ impl ShadingPoints {
         let share = 1.0 / samples.len() as f32;
         if samples.len() > 1 && are_alike(buffer, view, samples) {
             let mean = |values: &[Vec3]| samples.iter().map(|&k| values[k]).sum::<Vec3>() * share;
-            let normal = mean(&buffer.normals)
-                .try_normalize()
-                .unwrap_or(buffer.normals[first]);
+            let normal = mean(&buffer.normals).try_normalize().unwrap_or(buffer.normals[first]);
             let tangent = perpendicular(mean(&buffer.tangents), normal);
             // A place on the surface, not the mean: across a concave edge that lies inside the object, in the dark.
-            self.add(
-                pixel,
-                1.0,
-                buffer.positions[first],
-                normal,
-                tangent,
-                buffer.triangles[first],
-            );
+            self.add(pixel, 1.0, buffer.positions[first], normal, tangent, buffer.triangles[first]);
             return;
         }
         for &k in samples.iter().filter(|&&k| buffer.triangles[k] != NOTHING) {
-            self.add(
-                pixel,
-                share,
-                buffer.positions[k],
-                buffer.normals[k],
-                buffer.tangents[k],
-                buffer.triangles[k],
-            );
+            self.add(pixel, share, buffer.positions[k], buffer.normals[k], buffer.tangents[k], buffer.triangles[k]);
         }
     }
 
-    fn add(
-        &mut self,
-        pixel: u32,
-        weight: f32,
-        position: Vec3,
-        normal: Vec3,
-        tangent: Vec3,
-        triangle: u32,
-    ) {
+    fn add(&mut self, pixel: u32, weight: f32, position: Vec3, normal: Vec3, tangent: Vec3, triangle: u32) {
         self.pixels.push(pixel);
         self.weights.push(weight);
         self.positions.push(position);
@@ -129,11 +105,7 @@ fn are_alike(buffer: &GBuffer, view: &CameraView, samples: &[usize]) -> bool {
     if samples.iter().any(|&k| buffer.triangles[k] == NOTHING) {
         return false;
     }
-    let (position, normal, tangent) = (
-        buffer.positions[first],
-        buffer.normals[first],
-        buffer.tangents[first],
-    );
+    let (position, normal, tangent) = (buffer.positions[first], buffer.normals[first], buffer.tangents[first]);
     let step = view.pixel_extent() * (position - view.eye).length();
     samples[1..].iter().all(|&k| {
         buffer.normals[k].dot(normal) >= SAME_NORMAL

@@ -26,20 +26,12 @@ pub fn can_self_shadow(mesh: &ObjectMesh) -> bool {
     }
     let allowed = FLAT * mesh.bounds.radius;
     // Coordinates apart and in blocks, so that the inner loop is plain arithmetic on whole vectors.
-    let axes: [Vec<f32>; 3] =
-        std::array::from_fn(|axis| mesh.positions.iter().map(|p| p[axis]).collect());
+    let axes: [Vec<f32>; 3] = std::array::from_fn(|axis| mesh.positions.iter().map(|p| p[axis]).collect());
     (0..mesh.triangles.len()).into_par_iter().any(|triangle| {
         let [a, b, c] = mesh.corners(triangle);
-        let normal = (b - a)
-            .as_dvec3()
-            .cross((c - a).as_dvec3())
-            .normalize_or_zero()
-            .as_vec3();
+        let normal = (b - a).as_dvec3().cross((c - a).as_dvec3()).normalize_or_zero().as_vec3();
         let level = normal.dot(a);
-        let blocks = axes[0]
-            .chunks(BLOCK)
-            .zip(axes[1].chunks(BLOCK))
-            .zip(axes[2].chunks(BLOCK));
+        let blocks = axes[0].chunks(BLOCK).zip(axes[1].chunks(BLOCK)).zip(axes[2].chunks(BLOCK));
         blocks.into_iter().any(|((xs, ys), zs)| {
             let (mut low, mut high) = (level, level);
             for ((x, y), z) in xs.iter().zip(ys).zip(zs) {
@@ -64,10 +56,7 @@ impl Visible {
     /// No point sees any light.
     pub fn none(points: usize, lights: usize) -> Self {
         let words_per_point = lights.div_ceil(32).max(1);
-        Self {
-            words_per_point,
-            words: vec![0; points * words_per_point],
-        }
+        Self { words_per_point, words: vec![0; points * words_per_point] }
     }
 
     pub fn words_per_point(&self) -> usize {
@@ -88,9 +77,7 @@ pub struct Occluder {
 impl Occluder {
     /// `None` where the object cannot shadow itself, which then costs nothing.
     pub fn of(mesh: &ObjectMesh) -> Option<Self> {
-        can_self_shadow(mesh).then(|| Self {
-            bvh: Bvh::new(mesh),
-        })
+        can_self_shadow(mesh).then(|| Self { bvh: Bvh::new(mesh) })
     }
 
     /// Worth making where the camera moves about the same mesh and lights, and mostly already for one picture whose
@@ -111,25 +98,21 @@ impl Occluder {
     ) -> Visible {
         let mut visible = Visible::none(points.len(), lights.len());
         let words = visible.words_per_point();
-        visible
-            .words
-            .par_chunks_mut(words * 64)
-            .enumerate()
-            .for_each(|(chunk, bits)| {
-                for (k, bits) in bits.chunks_mut(words).enumerate() {
-                    let point = chunk * 64 + k;
-                    let normal = points.normals[point];
-                    let triangle = points.triangles[point] as usize;
-                    let (origin, back) = ray_origin(mesh, triangle, points.positions[point], eye);
-                    for (light, towards) in lights.iter().enumerate() {
-                        let seen = towards.direction.dot(normal) > 0.0
-                            && cache
-                                .and_then(|cache| cache.sees(triangle, back, light))
-                                .unwrap_or_else(|| !self.bvh.is_blocked(origin, towards.direction));
-                        bits[light / 32] |= u32::from(seen) << (light % 32);
-                    }
+        visible.words.par_chunks_mut(words * 64).enumerate().for_each(|(chunk, bits)| {
+            for (k, bits) in bits.chunks_mut(words).enumerate() {
+                let point = chunk * 64 + k;
+                let normal = points.normals[point];
+                let triangle = points.triangles[point] as usize;
+                let (origin, back) = ray_origin(mesh, triangle, points.positions[point], eye);
+                for (light, towards) in lights.iter().enumerate() {
+                    let seen = towards.direction.dot(normal) > 0.0
+                        && cache
+                            .and_then(|cache| cache.sees(triangle, back, light))
+                            .unwrap_or_else(|| !self.bvh.is_blocked(origin, towards.direction));
+                    bits[light / 32] |= u32::from(seen) << (light % 32);
                 }
-            });
+            }
+        });
         visible
     }
 }
@@ -150,10 +133,7 @@ pub(super) fn ray_origin(mesh: &ObjectMesh, triangle: usize, p: Vec3, eye: Vec3)
         let vertex_normal = mesh.normals[mesh.triangles[triangle][k] as usize] * facing;
         lift -= vertex_normal * (weight * (p - corner).dot(vertex_normal).min(0.0));
     }
-    (
-        p + lift + area.normalize_or_zero() * (facing * LIFT * mesh.bounds.radius),
-        back,
-    )
+    (p + lift + area.normalize_or_zero() * (facing * LIFT * mesh.bounds.radius), back)
 }
 
 #[cfg(test)]
@@ -163,36 +143,21 @@ mod tests {
     use crate::scene;
 
     fn object(kind: &str) -> ObjectMesh {
-        objects::build(
-            &scene::Object {
-                kind: kind.to_owned(),
-                path: None,
-            },
-            std::path::Path::new("."),
-        )
-        .unwrap()
+        objects::build(&scene::Object { kind: kind.to_owned(), path: None }, std::path::Path::new(".")).unwrap()
     }
 
     #[test]
     fn only_objects_with_dents_or_insides_can_shadow_themselves() {
-        let expected = [
-            ("sphere", false),
-            ("cylinder", false),
-            ("cup", true),
-            ("plate", true),
-            ("skirt", true),
-            ("teapot", true),
-        ];
+        let expected =
+            [("sphere", false), ("cylinder", false), ("cup", true), ("plate", true), ("skirt", true), ("teapot", true)];
         for (kind, shadows) in expected {
             assert_eq!(can_self_shadow(&object(kind)), shadows, "{kind}");
         }
         let mut dented = object("sphere");
         dented.positions[3000] *= 0.99;
         assert!(can_self_shadow(&dented));
-        let mut flat = ObjectMesh {
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE - Vec3::Z],
-            ..ObjectMesh::default()
-        };
+        let mut flat =
+            ObjectMesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE - Vec3::Z], ..ObjectMesh::default() };
         (flat.triangles, flat.two_sided) = (vec![[0, 1, 2], [1, 3, 2]], true);
         assert!(!can_self_shadow(&flat));
         flat.positions[3].z = 0.2;
@@ -219,15 +184,10 @@ mod tests {
     #[test]
     fn a_sphere_sees_every_light_above_its_smooth_horizon_even_when_coarse_and_not_skipped() {
         let mesh = object("sphere");
-        let occluder = Occluder {
-            bvh: Bvh::new(&mesh),
-        };
+        let occluder = Occluder { bvh: Bvh::new(&mesh) };
         let points = points_on(&mesh, 2000);
         let lights: Vec<_> = [Vec3::X, Vec3::Y, Vec3::new(0.6, -0.48, 0.64)]
-            .map(|direction| DirectionalLight {
-                direction,
-                irradiance: Vec3::ONE,
-            })
+            .map(|direction| DirectionalLight { direction, irradiance: Vec3::ONE })
             .to_vec();
         let visible = occluder.visible(&mesh, &points, &lights, Vec3::ZERO, None);
         for point in 0..points.len() {
@@ -257,26 +217,16 @@ mod tests {
             triangles: vec![triangle as u32],
             ..ShadingPoints::default()
         };
-        let light = |x: f32, y: f32| DirectionalLight {
-            direction: Vec3::new(x, y, 0.0).normalize(),
-            irradiance: Vec3::ONE,
-        };
+        let light =
+            |x: f32, y: f32| DirectionalLight { direction: Vec3::new(x, y, 0.0).normalize(), irradiance: Vec3::ONE };
         let visible = occluder.visible(
             &mesh,
             &points,
-            &[
-                light(0.0, 1.0),
-                light(1.0, 1.0),
-                light(0.2, 1.0),
-                light(0.0, -1.0),
-            ],
+            &[light(0.0, 1.0), light(1.0, 1.0), light(0.2, 1.0), light(0.0, -1.0)],
             Vec3::Y,
             None,
         );
-        assert_eq!(
-            [0, 1, 2, 3].map(|k| visible.sees(0, k)),
-            [true, false, true, false]
-        );
+        assert_eq!([0, 1, 2, 3].map(|k| visible.sees(0, k)), [true, false, true, false]);
     }
 
     #[test]
@@ -286,27 +236,17 @@ mod tests {
             let occluder = Occluder::of(&mesh).unwrap();
             let camera = scene::Camera::default();
             let view = crate::large_scale::CameraView::new(&camera, &mesh, [96, 96]).unwrap();
-            let points =
-                ShadingPoints::new(&crate::large_scale::GBuffer::new(&mesh, &view, 1), &view, 1);
-            let environment =
-                super::super::environment::load("studio", std::path::Path::new(".")).unwrap();
+            let points = ShadingPoints::new(&crate::large_scale::GBuffer::new(&mesh, &view, 1), &view, 1);
+            let environment = super::super::environment::load("studio", std::path::Path::new(".")).unwrap();
             let lights = super::super::environment::split(&environment.map, 40);
             let cache = occluder.cache(&mesh, &lights);
             let cast = occluder.visible(&mesh, &points, &lights, view.eye, None);
             let cached = occluder.visible(&mesh, &points, &lights, view.eye, Some(&cache));
-            let wrong: u32 = cast
-                .words
-                .iter()
-                .zip(&cached.words)
-                .map(|(a, b)| (a ^ b).count_ones())
-                .sum();
+            let wrong: u32 = cast.words.iter().zip(&cached.words).map(|(a, b)| (a ^ b).count_ones()).sum();
             let share = f64::from(wrong) / (points.len() * lights.len()) as f64;
             eprintln!("{kind}: {:.4} % of point-light pairs differ", 100.0 * share);
             assert!(share < 0.002, "{kind}: {share}");
-            assert_ne!(
-                cached.words,
-                Visible::none(points.len(), lights.len()).words
-            );
+            assert_ne!(cached.words, Visible::none(points.len(), lights.len()).words);
         }
     }
 }

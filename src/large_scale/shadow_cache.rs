@@ -30,12 +30,7 @@ struct Side {
 
 impl ShadowCache {
     /// Casts a ray from every vertex to every light above its horizon, from `lift` above the surface.
-    pub(super) fn new(
-        mesh: &ObjectMesh,
-        bvh: &Bvh,
-        lights: &[DirectionalLight],
-        lift: f32,
-    ) -> Self {
+    pub(super) fn new(mesh: &ObjectMesh, bvh: &Bvh, lights: &[DirectionalLight], lift: f32) -> Self {
         let words = lights.len().div_ceil(32).max(1);
         let facing: &[f32] = if mesh.two_sided { &[1.0, -1.0] } else { &[1.0] };
         let side = |&facing: &f32| {
@@ -47,45 +42,24 @@ impl ShadowCache {
                     let (mut lit, mut dark) = (vec![0u32; words], vec![0u32; words]);
                     let normal = normal(vertex);
                     let origin = mesh.positions[vertex] + normal * lift;
-                    for (k, light) in lights
-                        .iter()
-                        .enumerate()
-                        .filter(|(_, light)| light.direction.dot(normal) > 0.0)
-                    {
-                        let answers = if bvh.is_blocked(origin, light.direction) {
-                            &mut dark
-                        } else {
-                            &mut lit
-                        };
+                    for (k, light) in lights.iter().enumerate().filter(|(_, light)| light.direction.dot(normal) > 0.0) {
+                        let answers = if bvh.is_blocked(origin, light.direction) { &mut dark } else { &mut lit };
                         answers[k / 32] |= 1 << (k % 32);
                     }
                     (lit, dark)
                 })
                 .collect();
             let lit: Vec<u32> = vertices.iter().flat_map(|(lit, _)| lit).copied().collect();
-            let dark: Vec<u32> = vertices
-                .iter()
-                .flat_map(|(_, dark)| dark)
-                .copied()
-                .collect();
-            Side {
-                lit: agreed(mesh, &lit, words),
-                dark: agreed(mesh, &dark, words),
-            }
+            let dark: Vec<u32> = vertices.iter().flat_map(|(_, dark)| dark).copied().collect();
+            Side { lit: agreed(mesh, &lit, words), dark: agreed(mesh, &dark, words) }
         };
-        Self {
-            words_per_triangle: words,
-            sides: facing.iter().map(side).collect(),
-        }
+        Self { words_per_triangle: words, sides: facing.iter().map(side).collect() }
     }
 
     /// Whether points on this side of the triangle see the light; `None` where each must ask for itself.
     pub(super) fn sees(&self, triangle: usize, back: bool, light: usize) -> Option<bool> {
         let side = self.sides.get(usize::from(back))?;
-        let (word, bit) = (
-            triangle * self.words_per_triangle + light / 32,
-            1u32 << (light % 32),
-        );
+        let (word, bit) = (triangle * self.words_per_triangle + light / 32, 1u32 << (light % 32));
         if side.lit[word] & bit != 0 {
             Some(true)
         } else if side.dark[word] & bit != 0 {
@@ -99,9 +73,7 @@ impl ShadowCache {
 /// Per triangle, the bits that all vertices of the triangle and of its neighbours have; none for large triangles.
 fn agreed(mesh: &ObjectMesh, of_vertices: &[u32], words: usize) -> Vec<u32> {
     let shared = |bits: &[u32], triangle: &[u32; 3], word: usize| {
-        triangle.iter().fold(u32::MAX, |all, &vertex| {
-            all & bits[vertex as usize * words + word]
-        })
+        triangle.iter().fold(u32::MAX, |all, &vertex| all & bits[vertex as usize * words + word])
     };
     let mut around = vec![u32::MAX; of_vertices.len()];
     for triangle in &mesh.triangles {
@@ -117,13 +89,7 @@ fn agreed(mesh: &ObjectMesh, of_vertices: &[u32], words: usize) -> Vec<u32> {
         let [a, b, c]: [Vec3; 3] = mesh.corners(k);
         let small = a.distance(b).max(b.distance(c)).max(c.distance(a)) <= longest;
         let around = &around;
-        (0..words).map(move |word| {
-            if small {
-                shared(around, &mesh.triangles[k], word)
-            } else {
-                0
-            }
-        })
+        (0..words).map(move |word| if small { shared(around, &mesh.triangles[k], word) } else { 0 })
     };
     (0..mesh.triangles.len()).flat_map(of_triangle).collect()
 }

@@ -30,23 +30,13 @@ impl ToneMap {
             "filmic" => ToneCurve::Filmic,
             "plain" => ToneCurve::Plain,
             other => {
-                return Err(InputError::new(
-                    "camera.tone_map",
-                    format!("\"{other}\""),
-                    CURVES.join(" or "),
-                )
-                .into());
+                return Err(InputError::new("camera.tone_map", format!("\"{other}\""), CURVES.join(" or ")).into());
             }
         };
         if !camera.exposure_ev.is_finite() || camera.exposure_ev.abs() > 60.0 {
-            return Err(
-                InputError::new("camera.exposure_ev", camera.exposure_ev, "-60 to 60").into(),
-            );
+            return Err(InputError::new("camera.exposure_ev", camera.exposure_ev, "-60 to 60").into());
         }
-        Ok(Self {
-            curve,
-            gain: camera.exposure_ev.exp2(),
-        })
+        Ok(Self { curve, gain: camera.exposure_ev.exp2() })
     }
 
     /// Display-linear RGB in [0, 1]; a NaN becomes black.
@@ -73,11 +63,7 @@ fn within(x: f32, high: f32) -> f32 {
 
 /// The sRGB transfer function (IEC 61966-2-1) to 8 bits.
 pub fn srgb_byte(linear: f32) -> u8 {
-    let encoded = if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    };
+    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0 + 0.5) as u8
 }
 
@@ -90,40 +76,21 @@ mod tests {
         assert!((filmic(1e-4) / 1e-4 - 1.0).abs() < 1e-3);
         assert!((filmic(1.0) - 0.75).abs() < 1e-6);
         assert!((filmic(8.0) - 1.0).abs() < 1e-6 && filmic(1e9) == filmic(8.0));
-        let rising =
-            (0..8000).all(|k| filmic(k as f32 * 1e-3) <= filmic((k + 1) as f32 * 1e-3) + 1e-6);
+        let rising = (0..8000).all(|k| filmic(k as f32 * 1e-3) <= filmic((k + 1) as f32 * 1e-3) + 1e-6);
         assert!(rising);
     }
 
     #[test]
     fn srgb_bytes_match_the_standard_at_known_points() {
-        assert_eq!(
-            [0.0, 1.0, 0.214_041_14, 0.002].map(srgb_byte),
-            [0, 255, 128, 7]
-        );
+        assert_eq!([0.0, 1.0, 0.214_041_14, 0.002].map(srgb_byte), [0, 255, 128, 7]);
     }
 
     #[test]
     fn exposure_doubles_per_stop_and_bad_radiance_is_black() {
-        let camera = scene::Camera {
-            exposure_ev: 1.0,
-            tone_map: "plain".to_owned(),
-            ..scene::Camera::default()
-        };
+        let camera = scene::Camera { exposure_ev: 1.0, tone_map: "plain".to_owned(), ..scene::Camera::default() };
         let map = ToneMap::new(&camera).unwrap();
-        assert_eq!(
-            map.apply(Vec3::new(0.2, 0.7, f32::NAN)),
-            Vec3::new(0.4, 1.0, 0.0)
-        );
-        let camera = scene::Camera {
-            tone_map: "agx".to_owned(),
-            ..camera
-        };
-        assert!(
-            ToneMap::new(&camera)
-                .unwrap_err()
-                .to_string()
-                .contains("filmic or plain")
-        );
+        assert_eq!(map.apply(Vec3::new(0.2, 0.7, f32::NAN)), Vec3::new(0.4, 1.0, 0.0));
+        let camera = scene::Camera { tone_map: "agx".to_owned(), ..camera };
+        assert!(ToneMap::new(&camera).unwrap_err().to_string().contains("filmic or plain"));
     }
 }

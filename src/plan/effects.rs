@@ -130,7 +130,10 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             facets * settings.horizon_azimuths as f64 * costs.march_ns * 1e-6 / costs.threads,
         ),
         Route::HorizonScan => (
-            format!("no overhangs: horizons along {} azimuths, slicing {} triangles", settings.horizon_azimuths, found.triangles),
+            format!(
+                "no overhangs: horizons along {} azimuths, slicing {} triangles",
+                settings.horizon_azimuths, found.triangles
+            ),
             facets * settings.horizon_azimuths as f64 * costs.scan_ns * 1e-6 / costs.threads,
         ),
         Route::MapScan => (
@@ -158,9 +161,10 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     };
     note("visibility", route != Route::None, what, predicted);
 
-    let direct_query = (found.lobes as f64 * costs.lobe_ns + found.lookups as f64 * costs.lookup_ns + facets * costs.facet_fill_ns)
-        * 1e-6
-        / costs.threads;
+    let direct_query =
+        (found.lobes as f64 * costs.lobe_ns + found.lookups as f64 * costs.lookup_ns + facets * costs.facet_fill_ns)
+            * 1e-6
+            / costs.threads;
     let direct_ms = PICTURE_QUERIES * direct_query;
     let low_rank_ms = 800.0 + PICTURE_QUERIES * costs.factor_query_ns * 1e-6 / costs.threads;
     let allowed = !matches!(settings.preset, Preset::Reference | Preset::Wu2011);
@@ -169,15 +173,20 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         Method::LowRank => true,
         Method::Auto => allowed && low_rank_ms < direct_ms,
     };
-    let comparison =
-        format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored");
+    let comparison = format!(
+        "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
+    );
     note(
         "low_rank",
         try_low_rank,
         match settings.method {
             Method::Auto if try_low_rank => {
-                format!("{comparison}; kept if within {:.1} % and {:.0} dB of the direct sum", settings.tolerance * 100.0, settings.tolerance_db)
-            },
+                format!(
+                    "{comparison}; kept if within {:.1} % and {:.0} dB of the direct sum",
+                    settings.tolerance * 100.0,
+                    settings.tolerance_db
+                )
+            }
             Method::Auto => comparison,
             _ => "asked for by quality.method".to_owned(),
         },
@@ -241,9 +250,17 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         },
         0.0,
     );
-    note("lights", found.lights > 0, format!("{} directional lights, {} of them under the horizon of the world", found.lights, found.lights_below), 0.0);
+    note(
+        "lights",
+        found.lights > 0,
+        format!("{} directional lights, {} of them under the horizon of the world", found.lights, found.lights_below),
+        0.0,
+    );
     for (name, reason) in [
-        ("interreflection", "small-scale interreflection: not asked for; light that facets send to each other is left out, as in the paper"),
+        (
+            "interreflection",
+            "small-scale interreflection: not asked for; light that facets send to each other is left out, as in the paper",
+        ),
         ("transmission", "light through thin slabs (Dai et al. 2009): not asked for"),
         ("color_map_filtering", "filtered colour maps (Heitz et al. 2013): not asked for"),
     ] {

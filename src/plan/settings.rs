@@ -51,7 +51,8 @@ pub struct Settings {
     pub facets: usize,
     /// Azimuths of horizon maps.
     pub horizon_azimuths: usize,
-    /// Rings and azimuths of visibility maps, for overhangs.
+    /// Rings and azimuths of visibility maps, for overhangs. Azimuths count more than rings: on leaning rods with 8192
+    /// facets 32x64, 96x64, 64x128 and 64x256 leave 38.8, 38.6, 40.2 and 43.0 dB; 48x192 with 32,768 facets 46.0 dB.
     pub map_grid: PolarGrid,
     /// Texels a side of the shadow maps behind them.
     pub map_resolution: u32,
@@ -137,7 +138,7 @@ impl Settings {
             preset,
             facets: 8192,
             horizon_azimuths: 48,
-            map_grid: PolarGrid::new(32, 64),
+            map_grid: PolarGrid::new(32, 128),
             map_resolution: 256,
             penumbra: 0.02,
             method: Method::Auto,
@@ -177,7 +178,7 @@ impl Settings {
             Preset::Fine | Preset::Reference => Self {
                 facets: 32_768,
                 horizon_azimuths: 96,
-                map_grid: PolarGrid::new(56, 112),
+                map_grid: PolarGrid::new(48, 192),
                 map_resolution: 384,
                 penumbra: 0.01,
                 keep_m: 0.9999,

@@ -26,12 +26,7 @@ pub struct Problem {
 
 impl Problem {
     fn new(path: &[Step], found: impl Into<String>, expected: impl Into<String>) -> Self {
-        Self {
-            path: path.to_vec(),
-            found: found.into(),
-            expected: expected.into(),
-            hint: None,
-        }
+        Self { path: path.to_vec(), found: found.into(), expected: expected.into(), hint: None }
     }
 
     /// As an error; `line` is where in the file it stands, if it stands in a file.
@@ -71,9 +66,7 @@ pub fn path_text(path: &[Step]) -> String {
 /// The candidate that is most like `found`, if any is like enough to be meant.
 pub fn nearest<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let score = |candidate: &str| strsim::jaro_winkler(&found.to_lowercase(), candidate);
-    let best = candidates
-        .into_iter()
-        .max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    let best = candidates.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
     (score(best) > 0.7).then_some(best)
 }
 
@@ -86,21 +79,12 @@ pub fn check_table(table: &Table, fields: &[Field], path: &mut Vec<Step>) -> Res
     check_keys(table, fields, None, path)
 }
 
-fn check_keys(
-    table: &Table,
-    fields: &[Field],
-    tag: Option<&str>,
-    path: &mut Vec<Step>,
-) -> Result<(), Problem> {
+fn check_keys(table: &Table, fields: &[Field], tag: Option<&str>, path: &mut Vec<Step>) -> Result<(), Problem> {
     let known = || tag.into_iter().chain(fields.iter().map(|field| field.key));
     for key in table.keys() {
         if !known().any(|name| name == key) {
             path.push(Step::Key(key.clone()));
-            let mut problem = Problem::new(
-                path,
-                format!("unknown key `{key}`"),
-                format!("one of {}", list(known())),
-            );
+            let mut problem = Problem::new(path, format!("unknown key `{key}`"), format!("one of {}", list(known())));
             problem.hint = did_you_mean(key, known());
             return Err(problem);
         }
@@ -110,8 +94,7 @@ fn check_keys(
         match table.get(field.key) {
             Some(value) => check_value(value, &field.shape, path)?,
             None if field.required => {
-                let mut problem =
-                    Problem::new(path, "nothing", format!("`{}`: {}", field.key, field.doc));
+                let mut problem = Problem::new(path, "nothing", format!("`{}`: {}", field.key, field.doc));
                 if let Some(tag) = table.get("kind").and_then(Value::as_str) {
                     problem.hint = Some(format!("`{tag}` needs it"));
                 }
@@ -129,44 +112,20 @@ fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(),
         Shape::Number { min, max, .. } => check_number(value, min, max, path),
         Shape::Integer { min, max } => match value {
             Value::Integer(number) if (min..=max).contains(number) => Ok(()),
-            other => Err(Problem::new(
-                path,
-                show(other),
-                format!("a whole number from {min} to {max}"),
-            )),
+            other => Err(Problem::new(path, show(other), format!("a whole number from {min} to {max}"))),
         },
         Shape::Color { max } => match value {
-            Value::Array(values) if values.len() == 3 => check_entries(
-                values,
-                &Shape::Number {
-                    min: 0.0,
-                    max,
-                    soft_max: max,
-                },
-                path,
-            ),
+            Value::Array(values) if values.len() == 3 => {
+                check_entries(values, &Shape::Number { min: 0.0, max, soft_max: max }, path)
+            }
             Value::Integer(_) | Value::Float(_) => check_number(value, 0.0, max, path),
-            other => Err(Problem::new(
-                path,
-                show(other),
-                format!("a number or a triple [r, g, b] from 0 to {max}"),
-            )),
+            other => Err(Problem::new(path, show(other), format!("a number or a triple [r, g, b] from 0 to {max}"))),
         },
         Shape::Vector { length, min, max } => match value {
-            Value::Array(values) if values.len() == length => check_entries(
-                values,
-                &Shape::Number {
-                    min,
-                    max,
-                    soft_max: max,
-                },
-                path,
-            ),
-            other => Err(Problem::new(
-                path,
-                show(other),
-                format!("a list of {length} numbers"),
-            )),
+            Value::Array(values) if values.len() == length => {
+                check_entries(values, &Shape::Number { min, max, soft_max: max }, path)
+            }
+            other => Err(Problem::new(path, show(other), format!("a list of {length} numbers"))),
         },
         Shape::Text => check_text(value, "a text", path).map(drop),
         Shape::Path => match check_text(value, "a file name", path)? {
@@ -191,11 +150,7 @@ fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(),
             let kinds = kinds();
             let names = || kinds.iter().map(|kind| kind.kind);
             let Value::Table(table) = value else {
-                return Err(Problem::new(
-                    path,
-                    show(value),
-                    "a table { kind = ..., ... }",
-                ));
+                return Err(Problem::new(path, show(value), "a table { kind = ..., ... }"));
             };
             path.push(Step::Key("kind".to_owned()));
             let expected = format!("one of {}", list(names()));
@@ -212,14 +167,10 @@ fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(),
             check_keys(table, &kind.fields, Some("kind"), path)
         }
         Shape::List { of, min, max } => match value {
-            Value::Array(values) if (min..=max).contains(&values.len()) => {
-                check_entries(values, of, path)
+            Value::Array(values) if (min..=max).contains(&values.len()) => check_entries(values, of, path),
+            Value::Array(values) => {
+                Err(Problem::new(path, format!("{} entries", values.len()), format!("{min} to {max} entries")))
             }
-            Value::Array(values) => Err(Problem::new(
-                path,
-                format!("{} entries", values.len()),
-                format!("{min} to {max} entries"),
-            )),
             other => Err(Problem::new(path, show(other), "a list")),
         },
         Shape::AnyOf(shapes) => {
@@ -234,10 +185,7 @@ fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(),
 
 fn check_entries(values: &[Value], of: &Shape, path: &mut Vec<Step>) -> Result<(), Problem> {
     for (index, value) in values.iter().enumerate() {
-        let name = value
-            .get("name")
-            .and_then(Value::as_str)
-            .filter(|name| !name.is_empty());
+        let name = value.get("name").and_then(Value::as_str).filter(|name| !name.is_empty());
         path.push(Step::Entry(index, name.map(str::to_owned)));
         check_value(value, of, path)?;
         path.pop();
@@ -250,30 +198,16 @@ fn check_number(value: &Value, min: f64, max: f64, path: &[Step]) -> Result<(), 
         Value::Integer(number) => *number as f64,
         Value::Float(number) => *number,
         other => {
-            return Err(Problem::new(
-                path,
-                show(other),
-                format!("a number from {min} to {max}"),
-            ));
+            return Err(Problem::new(path, show(other), format!("a number from {min} to {max}")));
         }
     };
     // Scenes hold f32: a value that rounds to the end of the range is at the end of the range.
     let in_range = number as f32 >= min as f32 && number as f32 <= max as f32;
-    if in_range {
-        Ok(())
-    } else {
-        Err(Problem::new(
-            path,
-            show(value),
-            format!("a number from {min} to {max}"),
-        ))
-    }
+    if in_range { Ok(()) } else { Err(Problem::new(path, show(value), format!("a number from {min} to {max}"))) }
 }
 
 fn check_text<'a>(value: &'a Value, expected: &str, path: &[Step]) -> Result<&'a str, Problem> {
-    value
-        .as_str()
-        .ok_or_else(|| Problem::new(path, show(value), expected))
+    value.as_str().ok_or_else(|| Problem::new(path, show(value), expected))
 }
 
 fn takes_type(shape: &Shape, value: &Value) -> bool {

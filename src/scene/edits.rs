@@ -11,11 +11,7 @@ impl Scene {
     /// Moves the first numeric parameter of the geometry by 5 % and says which (`tile.geometry.depth`); `None` where
     /// the family has none. A value at the end of its range goes the other way.
     pub fn nudge_geometry(&mut self) -> Option<String> {
-        let (moved, key) = nudged(
-            &self.tile.geometry,
-            Geometry::kinds(),
-            self.tile.geometry.kind(),
-        )?;
+        let (moved, key) = nudged(&self.tile.geometry, Geometry::kinds(), self.tile.geometry.kind())?;
         self.tile.geometry = moved;
         Some(format!("tile.geometry.{key}"))
     }
@@ -54,16 +50,9 @@ where
         Shape::Integer { .. } => Some(2),
         _ => None,
     };
-    let mut fields: Vec<_> = kind
-        .fields
-        .iter()
-        .filter_map(|field| Some((rank(&field.shape)?, field)))
-        .collect();
+    let mut fields: Vec<_> = kind.fields.iter().filter_map(|field| Some((rank(&field.shape)?, field))).collect();
     fields.sort_by_key(|(rank, _)| *rank);
-    let field = fields
-        .into_iter()
-        .map(|(_, field)| field)
-        .find(|field| table.contains_key(field.key))?;
+    let field = fields.into_iter().map(|(_, field)| field).find(|field| table.contains_key(field.key))?;
     let value = table.get_mut(field.key)?;
     *value = match (&*value, field.shape) {
         (Value::Float(number), Shape::Number { min, max, soft_max }) => {
@@ -71,17 +60,11 @@ where
         }
         (Value::Integer(number), Shape::Integer { min, max }) => {
             let by = (number / 20).max(1);
-            Value::Integer(if number + by <= max {
-                number + by
-            } else {
-                (number - by).max(min)
-            })
+            Value::Integer(if number + by <= max { number + by } else { (number - by).max(min) })
         }
         (Value::Array(values), Shape::Color { max }) => {
-            let moved = values
-                .iter()
-                .filter_map(Value::as_float)
-                .map(|number| Value::Float(step(number, 0.0, max, 1.0)));
+            let moved =
+                values.iter().filter_map(Value::as_float).map(|number| Value::Float(step(number, 0.0, max, 1.0)));
             Value::Array(moved.collect())
         }
         _ => return None,
@@ -90,14 +73,6 @@ where
 }
 
 fn step(number: f64, min: f64, max: f64, span: f64) -> f64 {
-    let by = if number == 0.0 {
-        0.05 * span
-    } else {
-        0.05 * number
-    };
-    if (min..=max).contains(&(number + by)) {
-        number + by
-    } else {
-        (number - by).clamp(min, max)
-    }
+    let by = if number == 0.0 { 0.05 * span } else { 0.05 * number };
+    if (min..=max).contains(&(number + by)) { number + by } else { (number - by).clamp(min, max) }
 }

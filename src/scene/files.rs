@@ -18,8 +18,7 @@ pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8
             None => {
                 let names = shipped::ASSETS.iter().map(|(name, _)| *name);
                 let expected = format!("one of {}", names.clone().collect::<Vec<_>>().join(", "));
-                let error =
-                    InputError::new("", format!("no asset `{name}`"), expected).in_file(path);
+                let error = InputError::new("", format!("no asset `{name}`"), expected).in_file(path);
                 Err(match check::nearest(name, names) {
                     Some(name) => error.with_hint(format!("did you mean `asset:{name}`?")),
                     None => error,
@@ -29,23 +28,15 @@ pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8
         };
     }
     let full = resolve(base_dir, path);
-    let complain =
-        |found: String, expected: &str| InputError::new("", found, expected).in_file(&full);
-    let metadata = std::fs::metadata(&full)
-        .map_err(|error| complain(error.to_string(), "a file that can be read"))?;
+    let complain = |found: String, expected: &str| InputError::new("", found, expected).in_file(&full);
+    let metadata = std::fs::metadata(&full).map_err(|error| complain(error.to_string(), "a file that can be read"))?;
     if !metadata.is_file() {
         return Err(complain("a folder or device".to_owned(), "a file").into());
     }
     if metadata.len() > limit {
-        return Err(complain(
-            format!("{} bytes", metadata.len()),
-            &format!("at most {limit} bytes"),
-        )
-        .into());
+        return Err(complain(format!("{} bytes", metadata.len()), &format!("at most {limit} bytes")).into());
     }
-    std::fs::read(&full)
-        .map(Cow::Owned)
-        .map_err(|error| complain(error.to_string(), "a file that can be read").into())
+    std::fs::read(&full).map(Cow::Owned).map_err(|error| complain(error.to_string(), "a file that can be read").into())
 }
 
 /// Where a path named in a scene points to on disk.

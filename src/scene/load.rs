@@ -29,13 +29,9 @@ pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
         return load(path, overrides);
     }
     if let Some(source) = shipped::source(scene) {
-        let parsed = load_with_overrides(source, overrides)
-            .map_err(|error| error.in_file(format!("{scene} (shipped)")))?;
-        return Ok(LoadedScene {
-            scene: parsed,
-            base_dir: PathBuf::new(),
-            name: scene.to_owned(),
-        });
+        let parsed =
+            load_with_overrides(source, overrides).map_err(|error| error.in_file(format!("{scene} (shipped)")))?;
+        return Ok(LoadedScene { scene: parsed, base_dir: PathBuf::new(), name: scene.to_owned() });
     }
     let error = if path.is_dir() {
         InputError::new("", "a folder", "a scene file").in_file(path)
@@ -55,26 +51,15 @@ pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
 
 /// Loads a scene file.
 pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScene> {
-    let complain = |found: String| {
-        Error::from(InputError::new("", found, "a scene file (TOML, UTF-8)").in_file(path))
-    };
-    let length = std::fs::metadata(path)
-        .map_err(|error| complain(error.to_string()))?
-        .len();
+    let complain = |found: String| Error::from(InputError::new("", found, "a scene file (TOML, UTF-8)").in_file(path));
+    let length = std::fs::metadata(path).map_err(|error| complain(error.to_string()))?.len();
     if length > LARGEST_FILE {
         return Err(complain(format!("{length} bytes")));
     }
     let source = std::fs::read_to_string(path).map_err(|error| complain(error.to_string()))?;
     let scene = load_with_overrides(&source, overrides).map_err(|error| error.in_file(path))?;
-    let name = path
-        .file_stem()
-        .map(|stem| stem.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    Ok(LoadedScene {
-        scene,
-        base_dir: path.parent().unwrap_or(Path::new("")).to_owned(),
-        name,
-    })
+    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    Ok(LoadedScene { scene, base_dir: path.parent().unwrap_or(Path::new("")).to_owned(), name })
 }
 
 /// A scene from its text.
@@ -90,18 +75,10 @@ pub fn load_with_overrides(source: &str, overrides: &[String]) -> Result<Scene> 
     }
     let fail = |problem: Problem| {
         let field = check::path_text(&problem.path);
-        match overrides
-            .iter()
-            .rev()
-            .find(|text| overrides::touches(text, &problem.path))
-        {
+        match overrides.iter().rev().find(|text| overrides::touches(text, &problem.path)) {
             Some(text) => {
                 let mut error = problem.into_error(None);
-                error.place = if field.is_empty() {
-                    format!("--set {text}")
-                } else {
-                    format!("--set {text}: {field}")
-                };
+                error.place = if field.is_empty() { format!("--set {text}") } else { format!("--set {text}: {field}") };
                 Error::from(error)
             }
             None => {
@@ -113,30 +90,20 @@ pub fn load_with_overrides(source: &str, overrides: &[String]) -> Result<Scene> 
     check::check_table(&table, &Scene::fields(), &mut Vec::new()).map_err(fail)?;
     // The catalogue decides what is legal; what serde still refuses would be a gap in it.
     let scene: Scene = table.try_into().map_err(|error: toml::de::Error| {
-        Error::from(InputError::new(
-            "",
-            error.message(),
-            "a scene as DESIGN.md, Sec. 6 describes it",
-        ))
+        Error::from(InputError::new("", error.message(), "a scene as DESIGN.md, Sec. 6 describes it"))
     })?;
     scene.check_relations().map_err(fail)?;
     Ok(scene)
 }
 
 fn syntax_error(source: &str, error: &toml::de::Error) -> Error {
-    let place = error
-        .span()
-        .map(|span| format!("line {}", line_at(source, span.start)))
-        .unwrap_or_default();
+    let place = error.span().map(|span| format!("line {}", line_at(source, span.start))).unwrap_or_default();
     InputError::new(place, error.message().replace('\n', "; "), "TOML").into()
 }
 
 fn line_at(source: &str, offset: usize) -> usize {
     let offset = offset.min(source.len());
-    1 + source.as_bytes()[..offset]
-        .iter()
-        .filter(|&&byte| byte == b'\n')
-        .count()
+    1 + source.as_bytes()[..offset].iter().filter(|&&byte| byte == b'\n').count()
 }
 
 /// The line on which the deepest part of `path` that the text holds stands.
@@ -148,19 +115,13 @@ fn line_of(source: &str, path: &[Step]) -> Option<usize> {
     for step in path {
         let next = match step {
             Step::Key(key) => {
-                let found = table
-                    .or(value.and_then(DeValue::as_table))?
-                    .iter()
-                    .find(|(name, _)| name.get_ref() == key);
+                let found = table.or(value.and_then(DeValue::as_table))?.iter().find(|(name, _)| name.get_ref() == key);
                 let Some((name, next)) = found else { break };
                 offset = Some(name.span().start);
                 next
             }
             Step::Entry(index, _) => {
-                let Some(next) = value
-                    .and_then(DeValue::as_array)
-                    .and_then(|array| array.get(*index))
-                else {
+                let Some(next) = value.and_then(DeValue::as_array).and_then(|array| array.get(*index)) else {
                     break;
                 };
                 offset = Some(next.span().start);
@@ -176,14 +137,13 @@ fn line_of(source: &str, path: &[Step]) -> Option<usize> {
 impl Scene {
     /// The scene as the text of a scene file.
     pub fn to_toml(&self) -> Result<String> {
-        toml::to_string(self)
-            .map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))
+        toml::to_string(self).map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))
     }
 
     /// Checks a scene that was made or changed in memory: ranges, names, and that fields go together.
     pub fn validate(&self) -> Result<()> {
-        let table = Table::try_from(self)
-            .map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))?;
+        let table =
+            Table::try_from(self).map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))?;
         let fail = |problem: Problem| Error::from(problem.into_error(None));
         check::check_table(&table, &Self::fields(), &mut Vec::new()).map_err(fail)?;
         self.check_relations().map_err(fail)
@@ -194,9 +154,7 @@ impl Scene {
         self.validate()?;
         let text = self.to_toml()?;
         let complain = |error: std::io::Error| {
-            Error::from(
-                InputError::new("", error, "a place where a file can be written").in_file(path),
-            )
+            Error::from(InputError::new("", error, "a place where a file can be written").in_file(path))
         };
         let partial = path.with_extension("toml.partial");
         std::fs::write(&partial, text).map_err(complain)?;

@@ -31,34 +31,11 @@ const GAIN_LIMIT: f64 = 1000.0;
 
 impl Material {
     pub fn fields() -> Vec<Field> {
-        let brdf = Shape::AnyOf(&[
-            TERM,
-            Shape::List {
-                of: &TERM,
-                min: 1,
-                max: 16,
-            },
-        ]);
+        let brdf = Shape::AnyOf(&[TERM, Shape::List { of: &TERM, min: 1, max: 16 }]);
         vec![
-            Field::required(
-                "name",
-                Shape::Text,
-                "The mesh slot it is for; `default` is for all others.",
-            ),
-            Field::new(
-                "brdf",
-                "",
-                brdf,
-                None,
-                "One term or a list of terms that are added.",
-            ),
-            Field::new(
-                "color",
-                "",
-                Shape::Color { max: GAIN_LIMIT },
-                None,
-                "Multiplies the BRDF.",
-            ),
+            Field::required("name", Shape::Text, "The mesh slot it is for; `default` is for all others."),
+            Field::new("brdf", "", brdf, None, "One term or a list of terms that are added."),
+            Field::new("color", "", Shape::Color { max: GAIN_LIMIT }, None, "Multiplies the BRDF."),
         ]
     }
 }
@@ -148,24 +125,14 @@ impl TermSpec {
     pub fn kinds() -> Vec<Kind> {
         let color = |key, max, doc| Field::new(key, "", Shape::Color { max }, None, doc);
         let roughness = || {
-            Field::new(
-                "roughness",
-                "",
-                number(1e-3, 2.0),
-                Some(f64::from(default_roughness())),
-                "Width of the lobe.",
-            )
+            Field::new("roughness", "", number(1e-3, 2.0), Some(f64::from(default_roughness())), "Width of the lobe.")
         };
         let f0 = || color("f0", 1.0, "Reflectance at normal incidence (Schlick).");
         let specular = || color("specular", GAIN_LIMIT, "Strength of the lobe.");
         let exponent = Field::new(
             "exponent",
             "",
-            Shape::Number {
-                min: 0.0,
-                max: 1e5,
-                soft_max: 1000.0,
-            },
+            Shape::Number { min: 0.0, max: 1e5, soft_max: 1000.0 },
             Some(f64::from(blinn_phong_exponent())),
             "Sharpness of the lobe.",
         );
@@ -175,42 +142,14 @@ impl TermSpec {
             kind(
                 "lambertian",
                 "Ideally matte.",
-                vec![color(
-                    "albedo",
-                    GAIN_LIMIT,
-                    "Part of the light that leaves again.",
-                )],
+                vec![color("albedo", GAIN_LIMIT, "Part of the light that leaves again.")],
             ),
-            kind(
-                "blinn_phong",
-                "A cosine power of the half angle.",
-                vec![exponent, specular()],
-            ),
-            kind(
-                "cook_torrance",
-                "Beckmann facets between V-cavities.",
-                vec![roughness(), f0()],
-            ),
-            kind(
-                "ward",
-                "Ward's isotropic Gaussian lobe.",
-                vec![roughness(), specular()],
-            ),
-            kind(
-                "ggx",
-                "GGX facets with Smith's shadowing; roughness is not squared.",
-                vec![roughness(), f0()],
-            ),
-            kind(
-                "merl",
-                "A measured MERL table.",
-                vec![path("The .binary file.")],
-            ),
-            kind(
-                "rgl",
-                "A measured isotropic RGL material.",
-                vec![path("The .bsdf file.")],
-            ),
+            kind("blinn_phong", "A cosine power of the half angle.", vec![exponent, specular()]),
+            kind("cook_torrance", "Beckmann facets between V-cavities.", vec![roughness(), f0()]),
+            kind("ward", "Ward's isotropic Gaussian lobe.", vec![roughness(), specular()]),
+            kind("ggx", "GGX facets with Smith's shadowing; roughness is not squared.", vec![roughness(), f0()]),
+            kind("merl", "A measured MERL table.", vec![path("The .binary file.")]),
+            kind("rgl", "A measured isotropic RGL material.", vec![path("The .bsdf file.")]),
         ]
     }
 

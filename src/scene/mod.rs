@@ -30,8 +30,8 @@ pub use material::{BrdfSpec, Material, TermSpec};
 pub use quality::{BACKENDS, METHODS, NORMALS, PRESETS, Quality};
 pub use schema::{Field, Kind, Shape};
 pub use tile::{
-    Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile,
-    Grooves, Heightfield, MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
+    Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
+    MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
 };
 pub use view::{Camera, DirectionalSpec, Light, OBJECT_KINDS, Object, TONE_MAPS};
 
@@ -74,11 +74,7 @@ pub struct SlotMaterial<'a> {
 }
 
 /// What everything is made of in a scene without materials.
-static GREY: LazyLock<BrdfSpec> = LazyLock::new(|| {
-    BrdfSpec::One(TermSpec::Lambertian {
-        albedo: Vec3::splat(0.5),
-    })
-});
+static GREY: LazyLock<BrdfSpec> = LazyLock::new(|| BrdfSpec::One(TermSpec::Lambertian { albedo: Vec3::splat(0.5) }));
 
 const DEFAULT_MATERIAL: &str = "default";
 const MATERIAL: Shape = Shape::Table(Material::fields);
@@ -88,11 +84,7 @@ impl Scene {
     pub fn of(geometry: Geometry) -> Self {
         Self {
             version: 1,
-            tile: Tile {
-                size: glam::Vec2::ONE,
-                unit: "mm".to_owned(),
-                geometry,
-            },
+            tile: Tile { size: glam::Vec2::ONE, unit: "mm".to_owned(), geometry },
             materials: Vec::new(),
             object: Object::default(),
             light: Light::default(),
@@ -105,36 +97,12 @@ impl Scene {
     pub fn fields() -> Vec<Field> {
         let optional = |key, shape, doc| Field::new(key, "", shape, None, doc);
         vec![
-            optional(
-                "version",
-                Shape::Integer { min: 1, max: 1 },
-                "Version of the file format.",
-            ),
-            Field::required(
-                "tile",
-                Shape::Table(Tile::fields),
-                "The small-scale surface.",
-            ),
-            optional(
-                "material",
-                Shape::List {
-                    of: &MATERIAL,
-                    min: 0,
-                    max: 4096,
-                },
-                "Materials by slot name.",
-            ),
-            optional(
-                "object",
-                Shape::Table(Object::fields),
-                "The large-scale object.",
-            ),
+            optional("version", Shape::Integer { min: 1, max: 1 }, "Version of the file format."),
+            Field::required("tile", Shape::Table(Tile::fields), "The small-scale surface."),
+            optional("material", Shape::List { of: &MATERIAL, min: 0, max: 4096 }, "Materials by slot name."),
+            optional("object", Shape::Table(Object::fields), "The large-scale object."),
             optional("light", Shape::Table(Light::fields), "What lights it."),
-            optional(
-                "camera",
-                Shape::Table(Camera::fields),
-                "Where the picture is taken from.",
-            ),
+            optional("camera", Shape::Table(Camera::fields), "Where the picture is taken from."),
             optional("quality", Shape::Table(Quality::fields), "How accurately."),
         ]
     }
@@ -145,40 +113,23 @@ impl Scene {
     /// There are materials, but none of the slot's name and no `default`.
     pub fn material_for_slot(&self, slot: &str) -> Result<SlotMaterial<'_>> {
         if self.materials.is_empty() {
-            return Ok(SlotMaterial {
-                index: None,
-                name: DEFAULT_MATERIAL,
-                brdf: &GREY,
-                color: Vec3::ONE,
-            });
+            return Ok(SlotMaterial { index: None, name: DEFAULT_MATERIAL, brdf: &GREY, color: Vec3::ONE });
         }
-        let find = |name: &str| {
-            self.materials
-                .iter()
-                .position(|material| material.name == name)
-        };
-        let index = find(slot)
-            .or_else(|| find(DEFAULT_MATERIAL))
-            .ok_or_else(|| {
-                let names: Vec<String> = self
-                    .materials
-                    .iter()
-                    .map(|material| material.name.clone())
-                    .collect();
-                let error = InputError::new(
-                    "material",
-                    names.join(", "),
-                    format!("a material `{slot}` or `{DEFAULT_MATERIAL}`"),
-                );
-                match check::nearest(slot, names.iter().map(String::as_str)) {
-                    Some(name) => error.with_hint(format!("did you mean `{name}`?")),
-                    None => error,
-                }
-            })?;
+        let find = |name: &str| self.materials.iter().position(|material| material.name == name);
+        let index = find(slot).or_else(|| find(DEFAULT_MATERIAL)).ok_or_else(|| {
+            let names: Vec<String> = self.materials.iter().map(|material| material.name.clone()).collect();
+            let error =
+                InputError::new("material", names.join(", "), format!("a material `{slot}` or `{DEFAULT_MATERIAL}`"));
+            match check::nearest(slot, names.iter().map(String::as_str)) {
+                Some(name) => error.with_hint(format!("did you mean `{name}`?")),
+                None => error,
+            }
+        })?;
         let material = &self.materials[index];
-        let brdf = material.brdf.as_ref().or_else(|| {
-            find(DEFAULT_MATERIAL).and_then(|index| self.materials[index].brdf.as_ref())
-        });
+        let brdf = material
+            .brdf
+            .as_ref()
+            .or_else(|| find(DEFAULT_MATERIAL).and_then(|index| self.materials[index].brdf.as_ref()));
         let brdf = brdf.ok_or_else(|| {
             InputError::new(
                 format!("material.{}.brdf", material.name),
@@ -186,24 +137,14 @@ impl Scene {
                 "a BRDF here or in the material `default`",
             )
         })?;
-        Ok(SlotMaterial {
-            index: Some(index),
-            name: &material.name,
-            brdf,
-            color: material.color,
-        })
+        Ok(SlotMaterial { index: Some(index), name: &material.name, brdf, color: material.color })
     }
 
     /// Rules that tie fields to each other, which the catalogue cannot say.
     fn check_relations(&self) -> std::result::Result<(), Problem> {
         let key = |name: &str| Step::Key(name.to_owned());
         let problem = |path: Vec<Step>, found: &str, expected: &str| {
-            Err(Problem {
-                path,
-                found: found.to_owned(),
-                expected: expected.to_owned(),
-                hint: None,
-            })
+            Err(Problem { path, found: found.to_owned(), expected: expected.to_owned(), hint: None })
         };
         let geometry = |name: &str| vec![key("tile"), key("geometry"), key(name)];
         match &self.tile.geometry {
@@ -212,37 +153,20 @@ impl Scene {
             }
             Geometry::Heightfield(field) => match (&field.path, &field.values) {
                 (Some(_), Some(_)) => {
-                    return problem(
-                        geometry("values"),
-                        "both `path` and `values`",
-                        "one of them",
-                    );
+                    return problem(geometry("values"), "both `path` and `values`", "one of them");
                 }
                 (None, None) => {
-                    return problem(
-                        geometry("path"),
-                        "nothing",
-                        "`path` (an image) or `values` (rows of heights)",
-                    );
+                    return problem(geometry("path"), "nothing", "`path` (an image) or `values` (rows of heights)");
                 }
                 (None, Some(rows)) if rows.iter().any(|row| row.len() != rows[0].len()) => {
-                    return problem(
-                        geometry("values"),
-                        "rows of different lengths",
-                        "rows of one length",
-                    );
+                    return problem(geometry("values"), "rows of different lengths", "rows of one length");
                 }
                 _ => {}
             },
-            Geometry::Weave(Weave {
-                pattern: WeavePattern::Matrix(rows),
-                ..
-            }) if rows.iter().any(|row| row.len() != rows[0].len()) => {
-                return problem(
-                    geometry("pattern"),
-                    "rows of different lengths",
-                    "rows of one length",
-                );
+            Geometry::Weave(Weave { pattern: WeavePattern::Matrix(rows), .. })
+                if rows.iter().any(|row| row.len() != rows[0].len()) =>
+            {
+                return problem(geometry("pattern"), "rows of different lengths", "rows of one length");
             }
             _ => {}
         }
@@ -250,22 +174,11 @@ impl Scene {
         for (index, material) in self.materials.iter().enumerate() {
             let path = |field: &str| vec![key("material"), Step::Entry(index, None), key(field)];
             if !names.insert(material.name.as_str()) {
-                return problem(
-                    path("name"),
-                    &format!("`{}` a second time", material.name),
-                    "each name once",
-                );
+                return problem(path("name"), &format!("`{}` a second time", material.name), "each name once");
             }
-            let inherits = self
-                .materials
-                .iter()
-                .any(|other| other.name == DEFAULT_MATERIAL && other.brdf.is_some());
+            let inherits = self.materials.iter().any(|other| other.name == DEFAULT_MATERIAL && other.brdf.is_some());
             if material.brdf.is_none() && !inherits {
-                return problem(
-                    path("brdf"),
-                    "nothing",
-                    "a BRDF here or in the material `default`",
-                );
+                return problem(path("brdf"), "nothing", "a BRDF here or in the material `default`");
             }
         }
         if self.object.kind == "mesh" && self.object.path.is_none() {
@@ -273,17 +186,8 @@ impl Scene {
         }
         for (index, light) in self.light.directional.iter().enumerate() {
             if light.direction.try_normalize().is_none() {
-                let path = vec![
-                    key("light"),
-                    key("directional"),
-                    Step::Entry(index, None),
-                    key("direction"),
-                ];
-                return problem(
-                    path,
-                    "a vector without length",
-                    "a direction towards the light",
-                );
+                let path = vec![key("light"), key("directional"), Step::Entry(index, None), key("direction")];
+                return problem(path, "a vector without length", "a direction towards the light");
             }
         }
         Ok(())

@@ -33,20 +33,12 @@ pub fn touches(text: &str, path: &[Step]) -> bool {
     !path.is_empty()
         && keys.iter().zip(path).all(|(key, step)| match step {
             Step::Key(name) => name == key,
-            Step::Entry(index, name) => {
-                *key == "*" || key.parse() == Ok(*index) || name.as_deref() == Some(*key)
-            }
+            Step::Entry(index, name) => *key == "*" || key.parse() == Ok(*index) || name.as_deref() == Some(*key),
         })
 }
 
 fn split(text: &str) -> Result<(Vec<&str>, Value)> {
-    let complain = || {
-        InputError::new(
-            format!("--set {text}"),
-            format!("`{text}`"),
-            "key.path=value",
-        )
-    };
+    let complain = || InputError::new(format!("--set {text}"), format!("`{text}`"), "key.path=value");
     let (key, value) = text.split_once('=').ok_or_else(complain)?;
     let keys: Vec<&str> = key.trim().split('.').map(str::trim).collect();
     if keys.iter().any(|key| key.is_empty()) {
@@ -56,12 +48,8 @@ fn split(text: &str) -> Result<(Vec<&str>, Value)> {
 }
 
 fn parse_value(text: &str) -> Value {
-    let parsed = toml::from_str::<Table>(&format!("value = {text}"))
-        .ok()
-        .filter(|table| table.len() == 1);
-    parsed
-        .and_then(|mut table| table.remove("value"))
-        .unwrap_or_else(|| Value::String(text.to_owned()))
+    let parsed = toml::from_str::<Table>(&format!("value = {text}")).ok().filter(|table| table.len() == 1);
+    parsed.and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
 /// Files named on the command line are found from where the command runs, not only from the scene's folder.
@@ -77,9 +65,7 @@ fn absolutize(key: &str, value: &mut Value) {
                 *text = absolute.to_owned();
             }
         }
-        Value::Table(table) => table
-            .iter_mut()
-            .for_each(|(key, value)| absolutize(key, value)),
+        Value::Table(table) => table.iter_mut().for_each(|(key, value)| absolutize(key, value)),
         Value::Array(values) => values.iter_mut().for_each(|value| absolutize(key, value)),
         _ => {}
     }
@@ -88,11 +74,7 @@ fn absolutize(key: &str, value: &mut Value) {
 /// What was found, what was expected, and a hint.
 type Complaint = (String, String, Option<String>);
 
-fn set_in_table(
-    table: &mut Table,
-    keys: &[&str],
-    value: &Value,
-) -> std::result::Result<(), Complaint> {
+fn set_in_table(table: &mut Table, keys: &[&str], value: &Value) -> std::result::Result<(), Complaint> {
     let Some((&key, rest)) = keys.split_first() else {
         return Ok(());
     };
@@ -109,36 +91,22 @@ fn set_in_table(
         return set_brdf_file_or_kind(table, field, value);
     }
     let missing = || {
-        if key == "material" {
-            Value::Array(Vec::new())
-        } else {
-            Value::Table(Table::new())
-        }
+        if key == "material" { Value::Array(Vec::new()) } else { Value::Table(Table::new()) }
     };
     set_in_value(table.entry(key).or_insert_with(missing), rest, value)
 }
 
-fn set_in_value(
-    place: &mut Value,
-    keys: &[&str],
-    value: &Value,
-) -> std::result::Result<(), Complaint> {
+fn set_in_value(place: &mut Value, keys: &[&str], value: &Value) -> std::result::Result<(), Complaint> {
     match place {
         Value::Table(table) => set_in_table(table, keys, value),
         Value::Array(entries) => set_in_list(entries, keys, value),
-        other => Err((
-            format!("a {}", other.type_str()),
-            format!("a table that could hold `{}`", keys.join(".")),
-            None,
-        )),
+        other => {
+            Err((format!("a {}", other.type_str()), format!("a table that could hold `{}`", keys.join(".")), None))
+        }
     }
 }
 
-fn set_in_list(
-    entries: &mut Vec<Value>,
-    keys: &[&str],
-    value: &Value,
-) -> std::result::Result<(), Complaint> {
+fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::result::Result<(), Complaint> {
     let Some((&key, rest)) = keys.split_first() else {
         return Ok(());
     };
@@ -154,28 +122,17 @@ fn set_in_list(
     }
     let count = entries.len();
     if let Ok(index) = key.parse::<usize>() {
-        let expected = if count == 0 {
-            "a list with entries".to_owned()
-        } else {
-            format!("an index from 0 to {}", count - 1)
-        };
-        return set(entries
-            .get_mut(index)
-            .ok_or_else(|| (format!("index {index}"), expected, None))?);
+        let expected =
+            if count == 0 { "a list with entries".to_owned() } else { format!("an index from 0 to {}", count - 1) };
+        return set(entries.get_mut(index).ok_or_else(|| (format!("index {index}"), expected, None))?);
     }
     let name_of = |entry: &Value| entry.get("name").and_then(Value::as_str).map(str::to_owned);
-    if let Some(entry) = entries
-        .iter_mut()
-        .find(|entry| name_of(entry).as_deref() == Some(key))
-    {
+    if let Some(entry) = entries.iter_mut().find(|entry| name_of(entry).as_deref() == Some(key)) {
         return set(entry);
     }
     // A name close to one that is there is a slip; any other is a new material.
     let names: Vec<String> = entries.iter().filter_map(name_of).collect();
-    if let Some(name) = names
-        .iter()
-        .find(|name| strsim::damerau_levenshtein(name, key) <= 2)
-    {
+    if let Some(name) = names.iter().find(|name| strsim::damerau_levenshtein(name, key) <= 2) {
         return Err((
             format!("`{key}`"),
             format!("one of {}", names.join(", ")),
@@ -185,10 +142,7 @@ fn set_in_list(
     if !entries.iter().all(Value::is_table) {
         return Err((format!("`{key}`"), "an index".to_owned(), None));
     }
-    let mut entry = Value::Table(Table::from_iter([(
-        "name".to_owned(),
-        Value::String(key.to_owned()),
-    )]));
+    let mut entry = Value::Table(Table::from_iter([("name".to_owned(), Value::String(key.to_owned()))]));
     set(&mut entry)?;
     entries.push(entry);
     Ok(())
@@ -198,10 +152,7 @@ fn set_in_list(
 fn drop_keys_of_other_kinds(table: &mut Table, kind: &Value) {
     let find = |kinds: Vec<Kind>, name: &str| kinds.into_iter().find(|kind| kind.kind == name);
     for kinds in [Geometry::kinds, TermSpec::kinds] {
-        let old = table
-            .get("kind")
-            .and_then(Value::as_str)
-            .and_then(|name| find(kinds(), name));
+        let old = table.get("kind").and_then(Value::as_str).and_then(|name| find(kinds(), name));
         let new = kind.as_str().and_then(|name| find(kinds(), name));
         if let (Some(old), Some(new)) = (old, new) {
             table.retain(|key, _| {
@@ -213,14 +164,8 @@ fn drop_keys_of_other_kinds(table: &mut Table, kind: &Value) {
 }
 
 /// `brdf.kind` and `brdf.path` apply to a whole BRDF: a sum of terms becomes one term, an analytic one a measured one.
-fn set_brdf_file_or_kind(
-    material: &mut Table,
-    field: &str,
-    value: &Value,
-) -> std::result::Result<(), Complaint> {
-    let brdf = material
-        .entry("brdf")
-        .or_insert_with(|| Value::Table(Table::new()));
+fn set_brdf_file_or_kind(material: &mut Table, field: &str, value: &Value) -> std::result::Result<(), Complaint> {
+    let brdf = material.entry("brdf").or_insert_with(|| Value::Table(Table::new()));
     if !brdf.is_table() {
         *brdf = Value::Table(Table::new());
     }
@@ -228,14 +173,8 @@ fn set_brdf_file_or_kind(
         return Ok(());
     };
     if field == "path" {
-        let measured = matches!(
-            table.get("kind").and_then(Value::as_str),
-            Some("merl" | "rgl")
-        );
-        let ending = value
-            .as_str()
-            .and_then(|path| Path::new(path).extension())
-            .and_then(|ending| ending.to_str());
+        let measured = matches!(table.get("kind").and_then(Value::as_str), Some("merl" | "rgl"));
+        let ending = value.as_str().and_then(|path| Path::new(path).extension()).and_then(|ending| ending.to_str());
         let by_ending = match ending {
             Some("bsdf") => Some("rgl"),
             Some("binary") => Some("merl"),

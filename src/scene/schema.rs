@@ -16,38 +16,19 @@ pub struct Field {
 }
 
 impl Field {
-    pub fn new(
-        key: &'static str,
-        unit: &'static str,
-        shape: Shape,
-        default: Option<f64>,
-        doc: &'static str,
-    ) -> Self {
-        Self {
-            key,
-            unit,
-            shape,
-            default,
-            required: false,
-            doc: doc.trim_ascii(),
-        }
+    pub fn new(key: &'static str, unit: &'static str, shape: Shape, default: Option<f64>, doc: &'static str) -> Self {
+        Self { key, unit, shape, default, required: false, doc: doc.trim_ascii() }
     }
 
     pub fn required(key: &'static str, shape: Shape, doc: &'static str) -> Self {
-        Self {
-            required: true,
-            ..Self::new(key, "", shape, None, doc)
-        }
+        Self { required: true, ..Self::new(key, "", shape, None, doc) }
     }
 
     /// The key as a caption: `side_angle_deg` reads `Side angle`.
     pub fn label(&self) -> String {
         let words = self.key.trim_end_matches("_deg").replace('_', " ");
         let mut letters = words.chars();
-        letters
-            .next()
-            .map(|first| first.to_uppercase().chain(letters).collect())
-            .unwrap_or_default()
+        letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
     }
 }
 
@@ -99,20 +80,12 @@ pub struct Kind {
 
 /// A number in `min..=max`.
 pub const fn number(min: f64, max: f64) -> Shape {
-    Shape::Number {
-        min,
-        max,
-        soft_max: max,
-    }
+    Shape::Number { min, max, soft_max: max }
 }
 
 /// A length in tile units: any up to 1000, sliders end at `soft_max`.
 pub const fn length(min: f64, soft_max: f64) -> Shape {
-    Shape::Number {
-        min,
-        max: 1000.0,
-        soft_max,
-    }
+    Shape::Number { min, max: 1000.0, soft_max }
 }
 
 /// The default of a field as the catalogue shows it: numbers have one, other types do not.

@@ -23,11 +23,7 @@ fn only_the_tile_is_required_and_the_rest_has_the_documented_defaults() {
     let scene = parse(GROOVES).unwrap();
     assert_eq!(scene, Scene::of(Geometry::Grooves(Grooves::default())));
     assert_eq!(
-        (
-            scene.object.kind.as_str(),
-            scene.light.environment.as_str(),
-            scene.light.count
-        ),
+        (scene.object.kind.as_str(), scene.light.environment.as_str(), scene.light.count),
         ("sphere", "studio", 32)
     );
     assert_eq!(scene.quality.preset, "standard");
@@ -43,13 +39,8 @@ fn integers_stand_for_floats_and_scalars_for_colours() {
     assert_eq!(scene.tile.size, glam::Vec2::new(1.0, 2.0));
     assert_eq!(scene.materials[0].color, Vec3::ONE);
     let expected = [
-        TermSpec::Lambertian {
-            albedo: Vec3::splat(0.25),
-        },
-        TermSpec::Ggx {
-            roughness: 1.0,
-            f0: Vec3::new(1.0, 0.0, 0.5),
-        },
+        TermSpec::Lambertian { albedo: Vec3::splat(0.25) },
+        TermSpec::Ggx { roughness: 1.0, f0: Vec3::new(1.0, 0.0, 0.5) },
     ];
     assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms(), expected);
 }
@@ -82,18 +73,9 @@ preset = "standard"
 #[test]
 fn unknown_keys_are_named_in_full_with_line_and_suggestion_at_every_level() {
     for (text, parts) in [
-        (
-            "tiel = 1\n[tile]\ngeometry = { kind = \"flat\" }",
-            ["line 1", "tiel", "did you mean `tile`?"],
-        ),
-        (
-            "[tile]\nsise = [1, 1]\ngeometry = { kind = \"flat\" }",
-            ["line 2", "tile.sise", "`size`"],
-        ),
-        (
-            "[tile]\n\n[tile.geometry]\nkind = \"grooves\"\ndpeth = 1",
-            ["line 5", "tile.geometry.dpeth", "`depth`"],
-        ),
+        ("tiel = 1\n[tile]\ngeometry = { kind = \"flat\" }", ["line 1", "tiel", "did you mean `tile`?"]),
+        ("[tile]\nsise = [1, 1]\ngeometry = { kind = \"flat\" }", ["line 2", "tile.sise", "`size`"]),
+        ("[tile]\n\n[tile.geometry]\nkind = \"grooves\"\ndpeth = 1", ["line 5", "tile.geometry.dpeth", "`depth`"]),
         (
             "[tile]\ngeometry = { kind = \"flat\" }\n[[material]]\nname = \"a\"\nbrdf = { kind = \"ward\", rougness = 0.2 }",
             ["line 5", "material.a.brdf.rougness", "`roughness`"],
@@ -106,14 +88,8 @@ fn unknown_keys_are_named_in_full_with_line_and_suggestion_at_every_level() {
             "[tile]\ngeometry = { kind = \"flat\" }\n[light]\ndirectional = [{ direction = [0,1,0], irradiance = 1, colour = 1 }]",
             ["line 4", "light.directional.0.colour", "irradiance"],
         ),
-        (
-            "[tile]\ngeometry = { kind = \"grroves\" }",
-            ["line 2", "tile.geometry.kind", "did you mean `grooves`?"],
-        ),
-        (
-            "[tile]\ngeometry = { depth = 1 }",
-            ["line 2", "tile.geometry.kind", "one of grooves"],
-        ),
+        ("[tile]\ngeometry = { kind = \"grroves\" }", ["line 2", "tile.geometry.kind", "did you mean `grooves`?"]),
+        ("[tile]\ngeometry = { depth = 1 }", ["line 2", "tile.geometry.kind", "one of grooves"]),
         (
             "[tile]\ngeometry = { kind = \"flat\" }\n[quality]\npreset = \"standart\"",
             ["line 4", "quality.preset", "`standard`"],
@@ -121,10 +97,7 @@ fn unknown_keys_are_named_in_full_with_line_and_suggestion_at_every_level() {
     ] {
         let message = error(text);
         for part in parts {
-            assert!(
-                message.contains(part),
-                "{text:?}\n  {message}\n  lacks {part}"
-            );
+            assert!(message.contains(part), "{text:?}\n  {message}\n  lacks {part}");
         }
     }
 }
@@ -140,21 +113,15 @@ fn values_out_of_range_or_of_the_wrong_type_name_field_found_and_expected() {
         ("[1]", "a list", "a number"),
         ("true", "true", "a number"),
     ] {
-        let message = error(&format!(
-            "[tile.geometry]\nkind = \"grooves\"\ndepth = {value}\n"
-        ));
+        let message = error(&format!("[tile.geometry]\nkind = \"grooves\"\ndepth = {value}\n"));
         for part in ["line 3", "tile.geometry.depth", found, expected] {
             assert!(message.contains(part), "{value}: {message} lacks {part}");
         }
     }
     assert!(error("version = 2\n[tile]\ngeometry = { kind = \"flat\" }").contains("version"));
     assert!(error("[tile]\nsize = [0, 1]\ngeometry = { kind = \"flat\" }").contains("tile.size.0"));
-    assert!(
-        error("[tile]\nsize = 1\ngeometry = { kind = \"flat\" }").contains("a list of 2 numbers")
-    );
-    assert!(
-        error("[tile]\ngeometry = { kind = \"grooves\", count = 2.5 }").contains("a whole number")
-    );
+    assert!(error("[tile]\nsize = 1\ngeometry = { kind = \"flat\" }").contains("a list of 2 numbers"));
+    assert!(error("[tile]\ngeometry = { kind = \"grooves\", count = 2.5 }").contains("a whole number"));
     assert!(error("[tile\n").contains("line 1"));
     assert!(error("[tile]\ngeometry = 3").contains("tile.geometry"));
     assert!(error("tile = [1]").contains("tile"));
@@ -165,64 +132,36 @@ fn fields_that_belong_together_are_checked_together() {
     let with = |text: &str| error(&format!("{GROOVES}{text}"));
     assert!(with("[object]\nkind = \"mesh\"").contains("object.path"));
     assert!(
-        with("[light]\ndirectional = [{ direction = 0, irradiance = 1 }]")
-            .contains("light.directional.0.direction")
+        with("[light]\ndirectional = [{ direction = 0, irradiance = 1 }]").contains("light.directional.0.direction")
     );
-    assert!(
-        with("[light]\ndirectional = [{ direction = [0, 0, 0], irradiance = 1 }]")
-            .contains("without length")
-    );
+    assert!(with("[light]\ndirectional = [{ direction = [0, 0, 0], irradiance = 1 }]").contains("without length"));
     assert!(with("[[material]]\nname = \"a\"").contains("a BRDF"));
     let twice = "[[material]]\nname = \"a\"\nbrdf = { kind = \"ggx\" }\n".repeat(2);
     assert!(with(&twice).contains("a second time"));
     assert!(error("[tile]\ngeometry = { kind = \"mesh\" }").contains("an OBJ file"));
     assert!(error("[tile]\ngeometry = { kind = \"heightfield\" }").contains("`path`"));
-    assert!(
-        error("[tile]\ngeometry = { kind = \"heightfield\", values = [[1], [1, 2]] }")
-            .contains("one length")
-    );
-    assert!(
-        error("[tile]\ngeometry = { kind = \"weave\", pattern = [[1], [1, 0]] }")
-            .contains("one length")
-    );
-    assert!(
-        error("[tile]\ngeometry = { kind = \"weave\", pattern = [[2]] }").contains("pattern.0.0")
-    );
-    assert!(
-        error("[tile]\ngeometry = { kind = \"weave\", pattern = \"twil\" }").contains("`twill`")
-    );
+    assert!(error("[tile]\ngeometry = { kind = \"heightfield\", values = [[1], [1, 2]] }").contains("one length"));
+    assert!(error("[tile]\ngeometry = { kind = \"weave\", pattern = [[1], [1, 0]] }").contains("one length"));
+    assert!(error("[tile]\ngeometry = { kind = \"weave\", pattern = [[2]] }").contains("pattern.0.0"));
+    assert!(error("[tile]\ngeometry = { kind = \"weave\", pattern = \"twil\" }").contains("`twill`"));
 }
 
 #[test]
 fn slots_get_their_own_material_else_default_else_an_error() {
     let scene = parse(GROOVES).unwrap();
     let grey = scene.material_for_slot("bottom").unwrap();
-    assert_eq!(
-        (grey.index, grey.brdf.terms()),
-        (
-            None,
-            &[TermSpec::Lambertian {
-                albedo: Vec3::splat(0.5)
-            }][..]
-        )
-    );
+    assert_eq!((grey.index, grey.brdf.terms()), (None, &[TermSpec::Lambertian { albedo: Vec3::splat(0.5) }][..]));
 
     let bottom = "[[material]]\nname = \"bottom\"\ncolor = [0, 1, 0]\n";
     let default = "[[material]]\nname = \"default\"\nbrdf = { kind = \"ward\", roughness = 0.3, specular = 1 }\n";
     let scene = parse(&format!("{GROOVES}{bottom}{default}")).unwrap();
     let found = scene.material_for_slot("bottom").unwrap();
-    assert_eq!(
-        (found.index, found.color, found.brdf.terms()[0].kind()),
-        (Some(0), Vec3::Y, "ward")
-    );
+    assert_eq!((found.index, found.color, found.brdf.terms()[0].kind()), (Some(0), Vec3::Y, "ward"));
     assert_eq!(scene.material_for_slot("sides").unwrap().index, Some(1));
 
     let scene = parse(&format!("{GROOVES}{bottom}brdf = {{ kind = \"ggx\" }}\n")).unwrap();
     let message = scene.material_for_slot("botom").unwrap_err().to_string();
-    assert!(
-        message.contains("`botom` or `default`") && message.contains("did you mean `bottom`?"),
-        "{message}"
-    );
+    assert!(message.contains("`botom` or `default`") && message.contains("did you mean `bottom`?"), "{message}");
 }
 
 const TWO_COLOURS: &str = "[tile]\ngeometry = { kind = \"grooves\" }\n\
@@ -242,49 +181,28 @@ fn overrides_reach_by_index_name_and_star_and_make_missing_tables() {
         ],
     )
     .unwrap();
-    let Geometry::Grooves(grooves) = &scene.tile.geometry else {
-        panic!()
-    };
+    let Geometry::Grooves(grooves) = &scene.tile.geometry else { panic!() };
     assert_eq!(grooves.depth, 0.7);
     assert!(matches!(
         scene.materials[0].brdf.as_ref().unwrap().terms()[0],
         TermSpec::CookTorrance { roughness: 0.5, .. }
     ));
     assert_eq!(scene.materials[1].color, Vec3::Z);
-    assert_eq!(
-        (scene.camera.unwrap().fov_deg, scene.quality.preset.as_str()),
-        (50.0, "fine")
-    );
+    assert_eq!((scene.camera.unwrap().fov_deg, scene.quality.preset.as_str()), (50.0, "fine"));
     let scene = set(TWO_COLOURS, &["material.*.color=0.5"]).unwrap();
-    assert!(
-        scene
-            .materials
-            .iter()
-            .all(|material| material.color == Vec3::splat(0.5))
-    );
+    assert!(scene.materials.iter().all(|material| material.color == Vec3::splat(0.5)));
     let scene = set(GROOVES, &["material.default.brdf={kind=\"ward\"}"]).unwrap();
-    assert_eq!(
-        scene.material_for_slot("sides").unwrap().brdf.terms()[0].kind(),
-        "ward"
-    );
+    assert_eq!(scene.material_for_slot("sides").unwrap().brdf.terms()[0].kind(), "ward");
 }
 
 #[test]
 fn a_measured_paint_takes_the_place_of_an_analytic_stand_in_in_any_of_the_usual_ways() {
-    let expected = TermSpec::Merl {
-        path: "/paints/pearl.binary".into(),
-    };
+    let expected = TermSpec::Merl { path: "/paints/pearl.binary".into() };
     for overrides in [
         &["material.default.brdf.path=/paints/pearl.binary"][..],
         &["material.0.brdf={ kind = \"merl\", path = \"/paints/pearl.binary\" }"],
-        &[
-            "material.default.brdf.kind=merl",
-            "material.default.brdf.path=/paints/pearl.binary",
-        ],
-        &[
-            "material.default.brdf.path=/paints/pearl.binary",
-            "material.default.brdf.kind=merl",
-        ],
+        &["material.default.brdf.kind=merl", "material.default.brdf.path=/paints/pearl.binary"],
+        &["material.default.brdf.path=/paints/pearl.binary", "material.default.brdf.kind=merl"],
     ] {
         let sum = TWO_COLOURS.replace(
             "{ kind = \"cook_torrance\", roughness = 0.2, f0 = 0.9 }",
@@ -293,31 +211,19 @@ fn a_measured_paint_takes_the_place_of_an_analytic_stand_in_in_any_of_the_usual_
         for source in [TWO_COLOURS, &sum] {
             let scene = set(source, overrides).unwrap();
             for slot in ["bottom", "sides"] {
-                assert_eq!(
-                    scene.material_for_slot(slot).unwrap().brdf.terms(),
-                    std::slice::from_ref(&expected)
-                );
+                assert_eq!(scene.material_for_slot(slot).unwrap().brdf.terms(), std::slice::from_ref(&expected));
             }
         }
     }
     let scene = set(TWO_COLOURS, &["material.default.brdf.path=x.bsdf"]).unwrap();
-    assert_eq!(
-        scene.materials[0].brdf.as_ref().unwrap().terms()[0].kind(),
-        "rgl"
-    );
+    assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms()[0].kind(), "rgl");
 }
 
 #[test]
 fn a_new_geometry_kind_drops_the_old_kinds_keys() {
     let source = "[tile]\ngeometry = { kind = \"grooves\", depth = 0.3, count = 7 }\n";
     let scene = set(source, &["tile.geometry.kind=rods"]).unwrap();
-    assert_eq!(
-        scene.tile.geometry,
-        Geometry::Rods(Rods {
-            count: 7,
-            ..Rods::default()
-        })
-    );
+    assert_eq!(scene.tile.geometry, Geometry::Rods(Rods { count: 7, ..Rods::default() }));
 }
 
 #[test]
@@ -335,31 +241,17 @@ fn wrong_overrides_are_named() {
         ("tile=3", "a table"),
     ] {
         let message = set(TWO_COLOURS, &[text]).unwrap_err().to_string();
-        assert!(
-            message.contains("--set") && message.contains(part),
-            "{text}: {message}"
-        );
+        assert!(message.contains("--set") && message.contains(part), "{text}: {message}");
     }
 }
 
 #[test]
 fn files_named_on_the_command_line_are_found_from_the_working_directory() {
-    let scene = set(
-        TWO_COLOURS,
-        &["material.default.brdf={kind=\"merl\", path=\"Cargo.toml\"}"],
-    )
-    .unwrap();
-    let TermSpec::Merl { path } = &scene.materials[0].brdf.as_ref().unwrap().terms()[0] else {
-        panic!()
-    };
+    let scene = set(TWO_COLOURS, &["material.default.brdf={kind=\"merl\", path=\"Cargo.toml\"}"]).unwrap();
+    let TermSpec::Merl { path } = &scene.materials[0].brdf.as_ref().unwrap().terms()[0] else { panic!() };
     assert!(path.is_absolute());
     let scene = set(TWO_COLOURS, &["material.default.brdf.path=no/such.binary"]).unwrap();
-    assert_eq!(
-        scene.materials[0].brdf.as_ref().unwrap().terms()[0],
-        TermSpec::Merl {
-            path: "no/such.binary".into()
-        }
-    );
+    assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms()[0], TermSpec::Merl { path: "no/such.binary".into() });
 }
 
 #[test]
@@ -378,80 +270,42 @@ fn files_keep_their_folder_and_errors_name_the_file() {
     let scene = parse(TWO_COLOURS).unwrap();
     scene.save(&path).unwrap();
     let loaded = open(path.to_str().unwrap(), &[]).unwrap();
-    assert_eq!(
-        (
-            &loaded.scene,
-            loaded.base_dir.as_path(),
-            loaded.name.as_str()
-        ),
-        (&scene, folder.path(), "a")
-    );
+    assert_eq!((&loaded.scene, loaded.base_dir.as_path(), loaded.name.as_str()), (&scene, folder.path(), "a"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     std::fs::write(&path, "[tile]\nx = 1").unwrap();
-    assert!(
-        load(&path, &[])
-            .unwrap_err()
-            .to_string()
-            .contains("a.toml: line 2, tile.x")
-    );
+    assert!(load(&path, &[]).unwrap_err().to_string().contains("a.toml: line 2, tile.x"));
     std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
     assert!(load(&path, &[]).unwrap_err().to_string().contains("a.toml"));
-    assert!(
-        scene
-            .save(&folder.path().join("no/such/folder.toml"))
-            .is_err()
-    );
+    assert!(scene.save(&folder.path().join("no/such/folder.toml")).is_err());
 }
 
 #[test]
 fn scenes_changed_in_memory_are_held_to_the_same_ranges() {
     let mut scene = parse(TWO_COLOURS).unwrap();
     scene.validate().unwrap();
-    scene.tile.geometry = Geometry::Grooves(Grooves {
-        depth: f32::NAN,
-        ..Grooves::default()
-    });
+    scene.tile.geometry = Geometry::Grooves(Grooves { depth: f32::NAN, ..Grooves::default() });
     let message = scene.validate().unwrap_err().to_string();
-    assert!(
-        message.contains("tile.geometry.depth") && message.contains("nan"),
-        "{message}"
-    );
+    assert!(message.contains("tile.geometry.depth") && message.contains("nan"), "{message}");
 }
 
 #[test]
 fn edits_move_the_first_numeric_parameter_by_five_percent() {
     let mut scene = parse(TWO_COLOURS).unwrap();
-    assert_eq!(
-        scene.nudge_geometry().as_deref(),
-        Some("tile.geometry.depth")
-    );
-    let Geometry::Grooves(grooves) = &scene.tile.geometry else {
-        panic!()
-    };
+    assert_eq!(scene.nudge_geometry().as_deref(), Some("tile.geometry.depth"));
+    let Geometry::Grooves(grooves) = &scene.tile.geometry else { panic!() };
     assert!((grooves.depth / Grooves::default().depth - 1.05).abs() < 1e-6);
-    assert_eq!(
-        scene.nudge_brdf().as_deref(),
-        Some("material.default.brdf.roughness")
-    );
+    assert_eq!(scene.nudge_brdf().as_deref(), Some("material.default.brdf.roughness"));
     assert!(
         matches!(scene.materials[0].brdf.as_ref().unwrap().terms()[0], TermSpec::CookTorrance { roughness, .. } if (roughness - 0.21).abs() < 1e-6)
     );
-    assert_eq!(
-        scene.nudge_color().as_deref(),
-        Some("material.default.color")
-    );
+    assert_eq!(scene.nudge_color().as_deref(), Some("material.default.color"));
     scene.validate().unwrap();
     let mut measured = set(TWO_COLOURS, &["material.default.brdf.path=x.binary"]).unwrap();
     assert_eq!(measured.nudge_brdf(), None);
     for kind in Geometry::kinds() {
         let mut scene = Scene::of(Geometry::with_defaults(kind.kind).unwrap());
         let before = scene.clone();
-        assert_eq!(
-            scene.nudge_geometry().is_some(),
-            kind.kind != "mesh",
-            "{}",
-            kind.kind
-        );
+        assert_eq!(scene.nudge_geometry().is_some(), kind.kind != "mesh", "{}", kind.kind);
         assert_eq!(scene == before, kind.kind == "mesh");
     }
 }
@@ -460,20 +314,10 @@ fn edits_move_the_first_numeric_parameter_by_five_percent() {
 fn every_number_of_the_catalogue_has_a_default_in_its_range_and_a_doc() {
     for kind in Geometry::kinds().into_iter().chain(TermSpec::kinds()) {
         for field in kind.fields {
-            assert!(
-                !field.doc.is_empty() && !field.label().is_empty(),
-                "{}.{}",
-                kind.kind,
-                field.key
-            );
+            assert!(!field.doc.is_empty() && !field.label().is_empty(), "{}.{}", kind.kind, field.key);
             match (field.shape, field.default) {
                 (Shape::Number { min, max, soft_max }, default) => {
-                    assert!(
-                        min < soft_max && soft_max <= max,
-                        "{}.{}",
-                        kind.kind,
-                        field.key
-                    );
+                    assert!(min < soft_max && soft_max <= max, "{}.{}", kind.kind, field.key);
                     assert!(
                         default.is_none_or(|value| (min..=soft_max).contains(&value)),
                         "{}.{}",
@@ -496,15 +340,10 @@ fn the_catalogue_lists_exactly_the_keys_that_serde_takes() {
         let geometry = Geometry::with_defaults(kind.kind).unwrap();
         assert_eq!(geometry.kind(), kind.kind);
         let table = Table::try_from(&geometry).unwrap();
-        assert!(
-            table
-                .keys()
-                .all(|key| key == "kind" || kind.fields.iter().any(|field| field.key == key))
-        );
+        assert!(table.keys().all(|key| key == "kind" || kind.fields.iter().any(|field| field.key == key)));
     }
     for kind in TermSpec::kinds() {
-        let mut table =
-            Table::from_iter([("kind".to_owned(), Value::String(kind.kind.to_owned()))]);
+        let mut table = Table::from_iter([("kind".to_owned(), Value::String(kind.kind.to_owned()))]);
         for field in kind.fields.iter().filter(|field| field.required) {
             table.insert(field.key.to_owned(), Value::String("file".to_owned()));
         }
@@ -513,13 +352,7 @@ fn the_catalogue_lists_exactly_the_keys_that_serde_takes() {
         assert_eq!(written.len(), kind.fields.len() + 1);
         for field in &kind.fields {
             let value = written[field.key].as_float().map(|value| value as f32);
-            assert_eq!(
-                value,
-                field.default.map(|value| value as f32),
-                "{}.{}",
-                kind.kind,
-                field.key
-            );
+            assert_eq!(value, field.default.map(|value| value as f32), "{}.{}", kind.kind, field.key);
         }
     }
 }
@@ -533,23 +366,16 @@ pub(crate) fn value_of(shape: Shape) -> BoxedStrategy<Value> {
     };
     match shape {
         Shape::Number { min, soft_max, .. } => number(min, soft_max).prop_map(Value::Float).boxed(),
-        Shape::Integer { min, max } => (min..=max.min(min.saturating_add(64)))
-            .prop_map(Value::Integer)
+        Shape::Integer { min, max } => (min..=max.min(min.saturating_add(64))).prop_map(Value::Integer).boxed(),
+        Shape::Color { max } => proptest::collection::vec(number(0.0, max.min(2.0)).prop_map(Value::Float), 3)
+            .prop_map(Value::Array)
             .boxed(),
-        Shape::Color { max } => {
-            proptest::collection::vec(number(0.0, max.min(2.0)).prop_map(Value::Float), 3)
+        Shape::Vector { length, min, max } => {
+            proptest::collection::vec(number(min.max(0.1), max.min(4.0)).prop_map(Value::Float), length)
                 .prop_map(Value::Array)
                 .boxed()
         }
-        Shape::Vector { length, min, max } => proptest::collection::vec(
-            number(min.max(0.1), max.min(4.0)).prop_map(Value::Float),
-            length,
-        )
-        .prop_map(Value::Array)
-        .boxed(),
-        Shape::Choice(names) => proptest::sample::select(names)
-            .prop_map(|name| Value::String(name.to_owned()))
-            .boxed(),
+        Shape::Choice(names) => proptest::sample::select(names).prop_map(|name| Value::String(name.to_owned())).boxed(),
         Shape::Text | Shape::Path => "[a-z ./\\\\\"é]{1,9}".prop_map(Value::String).boxed(),
         Shape::AnyOf(shapes) => value_of(shapes[0]),
         Shape::Table(fields) => table_of(fields()).prop_map(Value::Table).boxed(),
@@ -563,9 +389,7 @@ pub(crate) fn value_of(shape: Shape) -> BoxedStrategy<Value> {
             })
             .boxed(),
         Shape::List { of, min, max } => {
-            proptest::collection::vec(value_of(*of), min..=max.min(min + 3))
-                .prop_map(Value::Array)
-                .boxed()
+            proptest::collection::vec(value_of(*of), min..=max.min(min + 3)).prop_map(Value::Array).boxed()
         }
     }
 }
@@ -574,18 +398,12 @@ fn table_of(fields: Vec<Field>) -> BoxedStrategy<Table> {
     let entries: Vec<_> = fields
         .into_iter()
         .map(|field| {
-            let present = if field.required {
-                Just(true).boxed()
-            } else {
-                any::<bool>().boxed()
-            };
+            let present = if field.required { Just(true).boxed() } else { any::<bool>().boxed() };
             (present, value_of(field.shape))
                 .prop_map(move |(present, value)| present.then(|| (field.key.to_owned(), value)))
         })
         .collect();
-    entries
-        .prop_map(|entries| entries.into_iter().flatten().collect())
-        .boxed()
+    entries.prop_map(|entries| entries.into_iter().flatten().collect()).boxed()
 }
 
 proptest! {

@@ -34,20 +34,12 @@ impl Tile {
             Field::new(
                 "size",
                 "tile units",
-                Shape::Vector {
-                    length: 2,
-                    min: 1e-3,
-                    max: 1e3,
-                },
+                Shape::Vector { length: 2, min: 1e-3, max: 1e3 },
                 None,
                 "Extent of the period in x and y.",
             ),
             Field::new("unit", "", Shape::Text, None, "Name of the length unit."),
-            Field::required(
-                "geometry",
-                Shape::Tagged(Geometry::kinds),
-                "The surface on the tile.",
-            ),
+            Field::required("geometry", Shape::Tagged(Geometry::kinds), "The surface on the tile."),
         ]
     }
 }
@@ -70,41 +62,13 @@ impl Geometry {
     pub fn kinds() -> Vec<Kind> {
         let kind = |kind, doc, fields| Kind { kind, doc, fields };
         vec![
-            kind(
-                "grooves",
-                "Parallel grooves; slots `bottom` and `sides`.",
-                Grooves::fields(),
-            ),
-            kind(
-                "pyramids",
-                "Pyramids on a floor; slots `faces` and `floor`.",
-                Pyramids::fields(),
-            ),
-            kind(
-                "rods",
-                "Rods that stand on a floor; slots `rods` and `floor`.",
-                Rods::fields(),
-            ),
-            kind(
-                "weave",
-                "Woven threads; slots `warp` (along y) and `weft` (along x).",
-                Weave::fields(),
-            ),
-            kind(
-                "heightfield",
-                "Heights from an image or a list; slot `default`.",
-                Heightfield::fields(),
-            ),
-            kind(
-                "flat",
-                "A plane, plain or in two slots `first` and `second`.",
-                Flat::fields(),
-            ),
-            kind(
-                "mesh",
-                "An OBJ file; `usemtl` names are the slots.",
-                MeshFile::fields(),
-            ),
+            kind("grooves", "Parallel grooves; slots `bottom` and `sides`.", Grooves::fields()),
+            kind("pyramids", "Pyramids on a floor; slots `faces` and `floor`.", Pyramids::fields()),
+            kind("rods", "Rods that stand on a floor; slots `rods` and `floor`.", Rods::fields()),
+            kind("weave", "Woven threads; slots `warp` (along y) and `weft` (along x).", Weave::fields()),
+            kind("heightfield", "Heights from an image or a list; slot `default`.", Heightfield::fields()),
+            kind("flat", "A plane, plain or in two slots `first` and `second`.", Flat::fields()),
+            kind("mesh", "An OBJ file; `usemtl` names are the slots.", MeshFile::fields()),
         ]
     }
 
@@ -282,19 +246,9 @@ scene_choice! {
 }
 
 const WEAVE_BIT: Shape = Shape::Integer { min: 0, max: 1 };
-const WEAVE_ROW: Shape = Shape::List {
-    of: &WEAVE_BIT,
-    min: 1,
-    max: 24,
-};
-const WEAVE_PATTERN: Shape = Shape::AnyOf(&[
-    Shape::Choice(FloatPattern::NAMES),
-    Shape::List {
-        of: &WEAVE_ROW,
-        min: 1,
-        max: 24,
-    },
-]);
+const WEAVE_ROW: Shape = Shape::List { of: &WEAVE_BIT, min: 1, max: 24 };
+const WEAVE_PATTERN: Shape =
+    Shape::AnyOf(&[Shape::Choice(FloatPattern::NAMES), Shape::List { of: &WEAVE_ROW, min: 1, max: 24 }]);
 
 scene_table! {
     /// Woven threads (Wu et al. 2011, Fig. 7): warp threads run along y, weft threads along x, and touch where they cross.
@@ -322,16 +276,8 @@ scene_table! {
     }
 }
 
-const HEIGHT: Shape = Shape::Number {
-    min: -1e6,
-    max: 1e6,
-    soft_max: 1.0,
-};
-const HEIGHT_ROW: Shape = Shape::List {
-    of: &HEIGHT,
-    min: 1,
-    max: 4096,
-};
+const HEIGHT: Shape = Shape::Number { min: -1e6, max: 1e6, soft_max: 1.0 };
+const HEIGHT_ROW: Shape = Shape::List { of: &HEIGHT, min: 1, max: 4096 };
 
 scene_table! {
     /// A height-field (Wu et al. 2011, Fig. 8) from an image or from values in the file. Image values are linear,

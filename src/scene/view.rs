@@ -9,9 +9,7 @@ use super::color;
 use super::schema::{Field, Shape, number, scene_table};
 
 /// Objects that `object.kind` names; `mesh` reads `object.path`.
-pub const OBJECT_KINDS: &[&str] = &[
-    "sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh",
-];
+pub const OBJECT_KINDS: &[&str] = &["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh"];
 
 /// Tone maps that `camera.tone_map` names.
 pub const TONE_MAPS: &[&str] = &["filmic", "plain"];
@@ -58,22 +56,10 @@ pub struct DirectionalSpec {
 
 impl DirectionalSpec {
     pub fn fields() -> Vec<Field> {
-        let direction = Shape::Vector {
-            length: 3,
-            min: -1e6,
-            max: 1e6,
-        };
+        let direction = Shape::Vector { length: 3, min: -1e6, max: 1e6 };
         vec![
-            Field::required(
-                "direction",
-                direction,
-                "Towards the light, y up; any length but zero.",
-            ),
-            Field::required(
-                "irradiance",
-                Shape::Color { max: 1e6 },
-                "Irradiance on a surface that faces the light.",
-            ),
+            Field::required("direction", direction, "Towards the light, y up; any length but zero."),
+            Field::required("irradiance", Shape::Color { max: 1e6 }, "Irradiance on a surface that faces the light."),
         ]
     }
 }

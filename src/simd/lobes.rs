@@ -86,7 +86,7 @@ impl Seen {
     }
 }
 
-/// The value of a lobe at one facet, `f_r (n·i)+ (n·o)+` without its tint.
+/// The value of a lobe at one facet, `f_r (n·i)+ (n·o)+` without its tint; swapping `i` and `o` changes no bit.
 ///
 /// A trait and not a closure: a closure cannot be made to inline, and one call a facet keeps the loop from vectorising
 /// (Blinn-Phong, whose power is long, ran twelve times slower that way).
@@ -116,7 +116,7 @@ impl Value for BlinnPhong {
     #[inline(always)]
     fn at(self, n: Seen) -> f32 {
         let log = (self.half_exponent * ln_one_minus(n.sin2.min(0.999_999))).min(0.0);
-        self.scale * exp_negative(log) * n.n_dot_i * n.n_dot_o
+        self.scale * exp_negative(log) * (n.n_dot_i * n.n_dot_o)
     }
 }
 
@@ -147,7 +147,9 @@ struct Ward {
 impl Value for Ward {
     #[inline(always)]
     fn at(self, n: Seen) -> f32 {
-        self.scale * exp_negative(-n.sin2 / (n.n_dot_h * n.n_dot_h) * self.inverse_alpha2) * (n.n_dot_i * n.n_dot_o).sqrt()
+        self.scale
+            * exp_negative(-n.sin2 / (n.n_dot_h * n.n_dot_h) * self.inverse_alpha2)
+            * (n.n_dot_i * n.n_dot_o).sqrt()
     }
 }
 
@@ -166,7 +168,7 @@ impl Value for Ggx {
         let smith_o = (self.alpha2 + rest * n.n_dot_i * n.n_dot_i).sqrt();
         let smith_i = (self.alpha2 + rest * n.n_dot_o * n.n_dot_o).sqrt();
         let smith = n.n_dot_o * smith_o + n.n_dot_i * smith_i;
-        self.scale * n.n_dot_i * n.n_dot_o / (t * t * smith.max(1e-20))
+        self.scale * (n.n_dot_i * n.n_dot_o) / (t * t * smith.max(1e-20))
     }
 }
 

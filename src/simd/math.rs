@@ -12,7 +12,8 @@ pub(crate) fn exp_negative(x: f32) -> f32 {
     let shifted = x * std::f32::consts::LOG2_E + MAGIC;
     let k = shifted - MAGIC;
     let f = (x - k * LN_2_HIGH) - k * LN_2_LOW;
-    let power = 1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0))))));
+    let power =
+        1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0))))));
     let exponent = (shifted.to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32).wrapping_add(127);
     let scale = f32::from_bits((exponent as u32) << 23);
     if x < -60.0 { 0.0 } else { power * scale }
@@ -30,7 +31,8 @@ pub(crate) fn ln_one_minus(s: f32) -> f32 {
     let m = f32::from_bits((y.to_bits() as i32).wrapping_sub(k << 23) as u32);
     let r = (m - 1.0) / (m + 1.0);
     let r2 = r * r;
-    let series = 2.0 * r * (1.0 + r2 * (1.0 / 3.0 + r2 * (1.0 / 5.0 + r2 * (1.0 / 7.0 + r2 * (1.0 / 9.0 + r2 * (1.0 / 11.0))))));
+    let series =
+        2.0 * r * (1.0 + r2 * (1.0 / 3.0 + r2 * (1.0 / 5.0 + r2 * (1.0 / 7.0 + r2 * (1.0 / 9.0 + r2 * (1.0 / 11.0))))));
     series + k as f32 * std::f32::consts::LN_2 + lost
 }
 

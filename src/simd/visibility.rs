@@ -56,11 +56,11 @@ multiversion! {
                 let (b_head, b_tail) = b.as_chunks::<WIDTH>();
                 for ((w, a), b) in w_head.iter().zip(a_head).zip(b_head) {
                     for l in 0..WIDTH {
-                        lanes[l] += w[l] * a[l] * b[l];
+                        lanes[l] += w[l] * (a[l] * b[l]);
                     }
                 }
                 for (((lane, w), a), b) in lanes.iter_mut().zip(w_tail).zip(a_tail).zip(b_tail) {
-                    *lane += w * a * b;
+                    *lane += w * (a * b);
                 }
                 total += f64::from(lanes.iter().sum::<f32>());
             }

@@ -125,27 +125,19 @@ impl GpuShadowMaps {
         let mut visibility = PackedVisibility::new(facets.len(), directions.len());
         let extent = extent(mesh);
         let views = directions.iter().enumerate();
-        let views = views
-            .filter_map(|(d, &w)| Some((d, ShadowView::new(mesh.size, extent, w, resolution)?)));
+        let views = views.filter_map(|(d, &w)| Some((d, ShadowView::new(mesh.size, extent, w, resolution)?)));
         let views: Vec<(usize, ShadowView)> = views.collect();
-        let Some(stride) = views
-            .iter()
-            .map(|(_, view)| view.texels() as u64)
-            .max()
-            .filter(|_| !facets.is_empty())
+        let Some(stride) = views.iter().map(|(_, view)| view.texels() as u64).max().filter(|_| !facets.is_empty())
         else {
             return Ok(visibility);
         };
         let corners = cut_large_triangles(mesh);
         let words = visibility.words_per_row();
         let most = BATCH_BYTES.min(gpu.limits.max_storage_buffer_binding_size);
-        let batch = (most / (8 * stride))
-            .min(most / (4 * words as u64))
-            .min(BATCH_TRIANGLES / corners.len().max(1) as u64);
+        let batch =
+            (most / (8 * stride)).min(most / (4 * words as u64)).min(BATCH_TRIANGLES / corners.len().max(1) as u64);
         let groups_per_side = gpu.limits.max_compute_workgroups_per_dimension;
-        let batch = batch
-            .clamp(1, u64::from(groups_per_side))
-            .min(views.len() as u64) as usize;
+        let batch = batch.clamp(1, u64::from(groups_per_side)).min(views.len() as u64) as usize;
 
         let (lowest, highest) = mesh.z_range();
         let params = Params {
@@ -165,8 +157,7 @@ impl GpuShadowMaps {
                 self.submit(gpu, &buffers, &params, batch.len() as u32);
                 Ok(())
             })?;
-            let rows: Vec<u32> =
-                gpu.checked("reading visibility back", || gpu.map(&buffers.staging))?;
+            let rows: Vec<u32> = gpu.checked("reading visibility back", || gpu.map(&buffers.staging))?;
             for ((d, _), row) in batch.iter().zip(rows.chunks_exact(words)) {
                 visibility.row_mut(*d).copy_from_slice(row);
             }
@@ -184,67 +175,32 @@ impl GpuShadowMaps {
         batch: usize,
     ) -> Result<Buffers, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let normals: Vec<[f32; 4]> = (0..mesh.triangles.len())
-            .map(|k| mesh.geometric_normal(k).extend(0.0).into())
-            .collect();
+        let normals: Vec<[f32; 4]> =
+            (0..mesh.triangles.len()).map(|k| mesh.geometric_normal(k).extend(0.0).into()).collect();
         let facets = facets.positions.iter().zip(&facets.geometric_normals);
-        let facets: Vec<Facet> = facets
-            .map(|(p, n)| Facet {
-                position: (*p).into(),
-                pad_p: 0,
-                normal: (*n).into(),
-                pad_n: 0,
-            })
-            .collect();
+        let facets: Vec<Facet> =
+            facets.map(|(p, n)| Facet { position: (*p).into(), pad_p: 0, normal: (*n).into(), pad_n: 0 }).collect();
         let map_bytes = 4 * u64::from(params.map_stride) * batch as u64;
         let row_bytes = 4 * u64::from(params.words_per_row) * batch as u64;
 
         let params = gpu.upload("parameters", &[params], Usage::UNIFORM)?;
-        let views = gpu.buffer(
-            "views",
-            (batch * size_of::<View>()) as u64,
-            Usage::STORAGE | Usage::COPY_DST,
-        )?;
+        let views = gpu.buffer("views", (batch * size_of::<View>()) as u64, Usage::STORAGE | Usage::COPY_DST)?;
         let corners = gpu.upload("triangles", corners, Usage::STORAGE)?;
         let normals = gpu.upload("triangle normals", &normals, Usage::STORAGE)?;
         let facets = gpu.upload("facets", &facets, Usage::STORAGE)?;
-        let heights = gpu.buffer(
-            "shadow maps (heights)",
-            map_bytes,
-            Usage::STORAGE | Usage::COPY_DST,
-        )?;
-        let triangles = gpu.buffer(
-            "shadow maps (triangles)",
-            map_bytes,
-            Usage::STORAGE | Usage::COPY_DST,
-        )?;
+        let heights = gpu.buffer("shadow maps (heights)", map_bytes, Usage::STORAGE | Usage::COPY_DST)?;
+        let triangles = gpu.buffer("shadow maps (triangles)", map_bytes, Usage::STORAGE | Usage::COPY_DST)?;
         let visible = gpu.buffer("visibility", row_bytes, Usage::STORAGE | Usage::COPY_SRC)?;
-        let staging = gpu.buffer(
-            "visibility read-back",
-            visible.size(),
-            Usage::COPY_DST | Usage::MAP_READ,
-        )?;
-        let bound = [
-            &params, &views, &corners, &normals, &facets, &heights, &triangles, &visible,
-        ];
+        let staging = gpu.buffer("visibility read-back", visible.size(), Usage::COPY_DST | Usage::MAP_READ)?;
+        let bound = [&params, &views, &corners, &normals, &facets, &heights, &triangles, &visible];
         let bound = bound.map(|buffer| buffer.as_entire_binding());
         let group = gpu.group("shadow maps", &self.layout, &bound)?;
-        Ok(Buffers {
-            heights,
-            triangles,
-            visible,
-            staging,
-            views,
-            group,
-        })
+        Ok(Buffers { heights, triangles, visible, staging, views, group })
     }
 
     fn submit(&self, gpu: &Gpu, buffers: &Buffers, params: &Params, directions: u32) {
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
-                label: Some("shadow maps"),
-            });
+        let mut encoder =
+            gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("shadow maps") });
         encoder.clear_buffer(&buffers.heights, 0, None);
         encoder.clear_buffer(&buffers.triangles, 0, None);
         let most = gpu.limits.max_compute_workgroups_per_dimension;
@@ -259,13 +215,7 @@ impl GpuShadowMaps {
             pass.set_bind_group(0, &buffers.group, &[]);
             pass.dispatch_workgroups(groups, directions, 1);
         }
-        encoder.copy_buffer_to_buffer(
-            &buffers.visible,
-            0,
-            &buffers.staging,
-            0,
-            buffers.visible.size(),
-        );
+        encoder.copy_buffer_to_buffer(&buffers.visible, 0, &buffers.staging, 0, buffers.visible.size());
         gpu.queue.submit([encoder.finish()]);
     }
 }
@@ -296,11 +246,7 @@ fn cut_large_triangles(mesh: &TileMesh) -> Vec<Corners> {
             open.clear();
         }
         while let Some([a, b, c]) = open.pop() {
-            let (ab, bc, ca) = (
-                a.distance_squared(b),
-                b.distance_squared(c),
-                c.distance_squared(a),
-            );
+            let (ab, bc, ca) = (a.distance_squared(b), b.distance_squared(c), c.distance_squared(a));
             if ab.max(bc).max(ca) > longest * longest && left_to_cut > 0 {
                 left_to_cut -= 1;
                 // Turned so that the longest edge comes first.
@@ -315,14 +261,7 @@ fn cut_large_triangles(mesh: &TileMesh) -> Vec<Corners> {
                 open.extend([[a, middle, c], [middle, b, c]]);
             } else {
                 let triangle = triangle as u32;
-                pieces.push(Corners {
-                    a: a.into(),
-                    triangle,
-                    b: b.into(),
-                    pad_b: 0,
-                    c: c.into(),
-                    pad_c: 0,
-                });
+                pieces.push(Corners { a: a.into(), triangle, b: b.into(), pad_b: 0, c: c.into(), pad_c: 0 });
             }
         }
     }

@@ -32,7 +32,9 @@ pub use soft_maps::SoftMaps;
 #[derive(Debug, Clone)]
 pub enum Visibility {
     /// A flat tile: every facet sees everything.
-    Unblocked { facets: usize },
+    Unblocked {
+        facets: usize,
+    },
     Horizons(Horizons),
     Maps(SoftMaps),
 }

@@ -10,11 +10,7 @@ pub struct PackedVisibility {
 
 impl PackedVisibility {
     pub fn new(facet_count: usize, direction_count: usize) -> Self {
-        Self {
-            facet_count,
-            direction_count,
-            words: vec![0; facet_count.div_ceil(32) * direction_count],
-        }
+        Self { facet_count, direction_count, words: vec![0; facet_count.div_ceil(32) * direction_count] }
     }
 
     pub fn words_per_row(&self) -> usize {

@@ -18,31 +18,23 @@ use crate::geometry::{Facets, TileMesh};
 ///
 /// A facet is seen where its geometric normal turns to the direction and nothing of the tiling lies before it; triangles
 /// block on both sides. Directions at or under the horizon see nothing. Deterministic for any number of threads.
-pub fn visibility_maps_cpu(
-    mesh: &TileMesh,
-    facets: &Facets,
-    directions: &[Vec3],
-    resolution: u32,
-) -> PackedVisibility {
+pub fn visibility_maps_cpu(mesh: &TileMesh, facets: &Facets, directions: &[Vec3], resolution: u32) -> PackedVisibility {
     let mut visibility = PackedVisibility::new(facets.len(), directions.len());
     if facets.is_empty() {
         return visibility;
     }
-    let normals: Vec<Vec3> = (0..mesh.triangles.len())
-        .map(|k| mesh.geometric_normal(k))
-        .collect();
+    let normals: Vec<Vec3> = (0..mesh.triangles.len()).map(|k| mesh.geometric_normal(k)).collect();
     let extent = extent(mesh);
     let words = visibility.words_per_row();
-    visibility
-        .words
-        .par_chunks_mut(words)
-        .zip(directions)
-        .for_each_init(ShadowMap::default, |map, (row, &direction)| {
+    visibility.words.par_chunks_mut(words).zip(directions).for_each_init(
+        ShadowMap::default,
+        |map, (row, &direction)| {
             if let Some(view) = ShadowView::new(mesh.size, extent, direction, resolution) {
                 map.draw(mesh, &view);
                 map.test(facets, &normals, &view, row);
             }
-        });
+        },
+    );
     visibility
 }
 
@@ -63,11 +55,7 @@ impl ShadowMap {
         self.texels.clear();
         self.texels.resize(view.texels(), 0);
         self.vertices.clear();
-        self.vertices.extend(
-            mesh.positions
-                .iter()
-                .map(|&p| view.texel(p).extend(p.z - self.lowest)),
-        );
+        self.vertices.extend(mesh.positions.iter().map(|&p| view.texel(p).extend(p.z - self.lowest)));
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             let corners = triangle.map(|vertex| self.vertices[vertex as usize]);
             draw_triangle(&mut self.texels, view.size, corners, index as u32 + 1);
@@ -76,12 +64,7 @@ impl ShadowMap {
 
     /// Sets the bits of the facets that the direction sees.
     fn test(&self, facets: &Facets, normals: &[Vec3], view: &ShadowView, row: &mut [u32]) {
-        for (s, (&p, &n)) in facets
-            .positions
-            .iter()
-            .zip(&facets.geometric_normals)
-            .enumerate()
-        {
+        for (s, (&p, &n)) in facets.positions.iter().zip(&facets.geometric_normals).enumerate() {
             if n.dot(view.direction) > 0.0 && self.blocked_weight(p, n, normals, view) < 0.5 {
                 row[s / 32] |= 1 << (s % 32);
             }
@@ -101,10 +84,7 @@ impl ShadowMap {
             let x = wrap(base.x as i32 + dx, columns);
             let y = wrap(base.y as i32 + dy, rows);
             let texel = self.texels[y * columns as usize + x];
-            let Some(&n_k) = (texel as u32)
-                .checked_sub(1)
-                .and_then(|k| normals.get(k as usize))
-            else {
+            let Some(&n_k) = (texel as u32).checked_sub(1).and_then(|k| normals.get(k as usize)) else {
                 continue;
             };
             // From p to the hit: a step on the base plane, then up along the direction.
@@ -115,10 +95,7 @@ impl ShadowMap {
             let facing = n_k.dot(view.direction) * per_height;
             let plane_before_p = (n_k.truncate().dot(across) + up * facing) * facing.signum();
             if before_facet > view.tolerance && plane_before_p > view.tolerance {
-                let (wx, wy) = (
-                    if dx == 1 { f.x } else { 1.0 - f.x },
-                    if dy == 1 { f.y } else { 1.0 - f.y },
-                );
+                let (wx, wy) = (if dx == 1 { f.x } else { 1.0 - f.x }, if dy == 1 { f.y } else { 1.0 - f.y });
                 weight += wx * wy;
             }
         }
@@ -156,10 +133,7 @@ fn draw_triangle(texels: &mut [u64], [columns, rows]: [u32; 2], corners: [Vec3; 
         let mut column = wrap(first, columns);
         let start = a.z + (y - a.y) * slope_y;
         for x in first..=right.floor() as i32 {
-            let z = (start + (x as f32 - a.x) * slope_x)
-                .max(z_lo)
-                .min(z_hi)
-                .abs();
+            let z = (start + (x as f32 - a.x) * slope_x).max(z_lo).min(z_hi).abs();
             let texel = &mut texels[row_start + column];
             *texel = (*texel).max(u64::from(z.to_bits()) << 32 | u64::from(tag));
             column += 1;
@@ -179,21 +153,9 @@ struct Edge {
 
 impl Edge {
     fn new(a: Vec3, b: Vec3) -> Self {
-        let (low, high) = if a.y <= b.y {
-            (a.truncate(), b.truncate())
-        } else {
-            (b.truncate(), a.truncate())
-        };
+        let (low, high) = if a.y <= b.y { (a.truncate(), b.truncate()) } else { (b.truncate(), a.truncate()) };
         let rise = high.y - low.y;
-        Self {
-            low,
-            high,
-            x_per_y: if rise > 0.0 {
-                (high.x - low.x) / rise
-            } else {
-                0.0
-            },
-        }
+        Self { low, high, x_per_y: if rise > 0.0 { (high.x - low.x) / rise } else { 0.0 } }
     }
 
     /// Widens a row's span to where the edge crosses it.

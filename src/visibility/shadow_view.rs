@@ -49,10 +49,7 @@ impl ShadowView {
     /// so that all maps hold about `resolution²` of them: what is visible shrinks with cos θ.
     pub fn new(tile_size: Vec2, extent: f32, direction: Vec3, resolution: u32) -> Option<Self> {
         let direction = direction.as_dvec3().try_normalize()?;
-        let usable = direction.z > 0.0
-            && tile_size.is_finite()
-            && tile_size.min_element() > 0.0
-            && extent.is_finite();
+        let usable = direction.z > 0.0 && tile_size.is_finite() && tile_size.min_element() > 0.0 && extent.is_finite();
         if !usable {
             return None;
         }
@@ -66,11 +63,7 @@ impl ShadowView {
         let (v, w) = reduced_basis(DVec2::new(tile.x, 0.0), DVec2::new(0.0, tile.y), seen);
 
         let spacing = (tile.x * tile.y * cos).sqrt() / f64::from(resolution.max(1));
-        let side = |v: DVec2| {
-            (seen(v).length() / spacing)
-                .round()
-                .clamp(MIN_SIDE, MAX_SIDE)
-        };
+        let side = |v: DVec2| (seen(v).length() / spacing).round().clamp(MIN_SIDE, MAX_SIDE);
         let (columns, rows) = (side(v), side(w));
         let plane_from_texel = DMat2::from_cols(v / columns, w / rows);
         let texel_from_plane = plane_from_texel.inverse();
@@ -79,17 +72,13 @@ impl ShadowView {
             r.extend(-r.dot(shear)).as_vec3()
         };
         let texel_from_tile = [row(0), row(1)];
-        let steps = [
-            plane_from_texel.x_axis.as_vec2(),
-            plane_from_texel.y_axis.as_vec2(),
-        ];
+        let steps = [plane_from_texel.x_axis.as_vec2(), plane_from_texel.y_axis.as_vec2()];
 
         // Besides: rounding of texel coordinates, in texels, times the longest step; and of heights, along the ray.
         let rounding = 4.0 * f32::EPSILON * extent;
         let texels = rounding * texel_from_tile[0].length().max(texel_from_tile[1].length());
-        let tolerance = texels * steps[0].length().max(steps[1].length())
-            + rounding / cos as f32
-            + (NEAR_TEXELS * spacing) as f32;
+        let tolerance =
+            texels * steps[0].length().max(steps[1].length()) + rounding / cos as f32 + (NEAR_TEXELS * spacing) as f32;
         let view = Self {
             direction: direction.as_vec3(),
             size: [columns as u32, rows as u32],
@@ -97,10 +86,7 @@ impl ShadowView {
             plane_from_texel: steps,
             tolerance,
         };
-        texel_from_tile
-            .iter()
-            .all(|row| row.is_finite())
-            .then_some(view)
+        texel_from_tile.iter().all(|row| row.is_finite()).then_some(view)
     }
 
     /// Number of texels in the map.
@@ -110,20 +96,13 @@ impl ShadowView {
 
     /// Texel coordinates of a point, not wrapped.
     pub fn texel(&self, p: Vec3) -> Vec2 {
-        Vec2::new(
-            self.texel_from_tile[0].dot(p),
-            self.texel_from_tile[1].dot(p),
-        )
+        Vec2::new(self.texel_from_tile[0].dot(p), self.texel_from_tile[1].dot(p))
     }
 }
 
 /// The largest coordinate of the mesh's vertices in magnitude, and of the tile.
 pub fn extent(mesh: &TileMesh) -> f32 {
-    mesh.positions
-        .iter()
-        .fold(mesh.size.abs().max_element(), |most, p| {
-            most.max(p.abs().max_element())
-        })
+    mesh.positions.iter().fold(mesh.size.abs().max_element(), |most, p| most.max(p.abs().max_element()))
 }
 
 /// Lagrange's reduction: the two shortest vectors that span the same lattice, lengths as `seen`.
@@ -148,26 +127,14 @@ mod tests {
 
     fn at(theta_deg: f32, phi_deg: f32) -> Vec3 {
         let (theta, phi) = (theta_deg.to_radians(), phi_deg.to_radians());
-        Vec3::new(
-            theta.sin() * phi.cos(),
-            theta.sin() * phi.sin(),
-            theta.cos(),
-        )
+        Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
     }
 
     fn views() -> impl Iterator<Item = ShadowView> {
-        [0.0, 30.0, 60.0, 85.0, 89.0, 89.9]
-            .into_iter()
-            .flat_map(|theta| {
-                (0..24).filter_map(move |k| {
-                    ShadowView::new(
-                        Vec2::new(1.0, 1.5),
-                        2.0,
-                        at(theta, 15.0 * k as f32 + 1.0),
-                        256,
-                    )
-                })
-            })
+        [0.0, 30.0, 60.0, 85.0, 89.0, 89.9].into_iter().flat_map(|theta| {
+            (0..24)
+                .filter_map(move |k| ShadowView::new(Vec2::new(1.0, 1.5), 2.0, at(theta, 15.0 * k as f32 + 1.0), 256))
+        })
     }
 
     #[test]
@@ -176,10 +143,7 @@ mod tests {
             for step in [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.5, 0.0)] {
                 let texel = view.texel(step);
                 let periods = texel / Vec2::new(view.size[0] as f32, view.size[1] as f32);
-                assert!(
-                    (periods - periods.round()).length() < 1e-4,
-                    "{view:?}: {periods}"
-                );
+                assert!((periods - periods.round()).length() < 1e-4, "{view:?}: {periods}");
             }
         }
     }
@@ -201,23 +165,14 @@ mod tests {
             // What a unit length across the view covers, in texels: bounded by the shape of the cell, not by tan θ.
             let across = view.texel_from_tile.map(|row| row.length());
             let spacing = (1.5 * view.direction.z).sqrt() / 256.0;
-            assert!(
-                across.iter().all(|length| length * spacing < 1.3),
-                "{view:?}"
-            );
+            assert!(across.iter().all(|length| length * spacing < 1.3), "{view:?}");
         }
     }
 
     #[test]
     fn directions_under_the_horizon_and_broken_ones_have_no_view() {
         let view = |direction| ShadowView::new(Vec2::ONE, 1.0, direction, 64);
-        for direction in [
-            Vec3::X,
-            Vec3::NEG_Z,
-            Vec3::ZERO,
-            Vec3::NAN,
-            Vec3::new(f32::INFINITY, 0.0, 1.0),
-        ] {
+        for direction in [Vec3::X, Vec3::NEG_Z, Vec3::ZERO, Vec3::NAN, Vec3::new(f32::INFINITY, 0.0, 1.0)] {
             assert!(view(direction).is_none(), "{direction}");
         }
         assert!(ShadowView::new(Vec2::ZERO, 1.0, Vec3::Z, 64).is_none());

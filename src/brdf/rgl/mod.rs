@@ -36,13 +36,9 @@ const CHECKED_PAIRS: usize = 10_000;
 
 /// Reads, evaluates and resamples an isotropic RGB file.
 pub(super) fn load(path: &Path) -> Result<HalfDifferenceTable> {
-    let brdf = TensorFile::read(path)
-        .and_then(|file| RglBrdf::from_fields(&file))
-        .map_err(|error| error.in_file(path))?;
-    let name = path.file_stem().map_or_else(
-        || path.display().to_string(),
-        |stem| stem.to_string_lossy().into_owned(),
-    );
+    let brdf =
+        TensorFile::read(path).and_then(|file| RglBrdf::from_fields(&file)).map_err(|error| error.in_file(path))?;
+    let name = path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned());
     Ok(brdf.resample(name))
 }
 
@@ -67,45 +63,28 @@ impl RglBrdf {
                 format!("{phi_count} azimuths"),
                 "an isotropic file (one azimuth)",
             )
-            .with_hint(
-                "anisotropic BRDFs turn with the tangent, which small-scale facets do not have",
-            ));
+            .with_hint("anisotropic BRDFs turn with the tangent, which small-scale facets do not have"));
         }
         if !file.has("rgb") && file.has("spectra") {
-            return Err(InputError::new("fields", "spectra", "rgb")
-                .with_hint("the same material's _rgb file loads"));
+            return Err(InputError::new("fields", "spectra", "rgb").with_hint("the same material's _rgb file loads"));
         }
         let ([theta_count], theta_i) = file.floats("theta_i")?;
         let increasing = theta_i.windows(2).all(|pair| pair[0] < pair[1]);
         if theta_count == 0 || !increasing {
-            return Err(InputError::new(
-                "field \"theta_i\"",
-                format!("{theta_i:?}"),
-                "increasing angles",
-            ));
+            return Err(InputError::new("field \"theta_i\"", format!("{theta_i:?}"), "increasing angles"));
         }
         let plane = |name: &str| {
             let ([height, width], values) = file.floats(name)?;
             Ok((Grid::new(name, width, height)?, values))
         };
         let slices = |name: &str, found: &[usize]| {
-            let expected =
-                format!("one slice for each of {phi_count} phi_i and {theta_count} theta_i");
-            let matches =
-                found[..2] == [phi_count, theta_count] && (found.len() < 3 || found[2] == 3);
-            let expected = if found.len() < 3 {
-                expected
-            } else {
-                expected + ", three channels"
-            };
+            let expected = format!("one slice for each of {phi_count} phi_i and {theta_count} theta_i");
+            let matches = found[..2] == [phi_count, theta_count] && (found.len() < 3 || found[2] == 3);
+            let expected = if found.len() < 3 { expected } else { expected + ", three channels" };
             if matches {
                 Ok(())
             } else {
-                Err(InputError::new(
-                    format!("field \"{name}\""),
-                    format!("{found:?}"),
-                    expected,
-                ))
+                Err(InputError::new(format!("field \"{name}\""), format!("{found:?}"), expected))
             }
         };
         let ([phis, thetas, height, width], mut vndf) = file.floats("vndf")?;
@@ -116,12 +95,7 @@ impl RglBrdf {
         slices("rgb", &[phis, thetas, channels])?;
         let rgb_grid = Grid::new("rgb", width, height)?;
         rgb.truncate(theta_count * 3 * rgb_grid.len());
-        let jacobian = file.has("jacobian")
-            && file
-                .floats::<1>("jacobian")?
-                .1
-                .first()
-                .is_some_and(|&flag| flag != 0.0);
+        let jacobian = file.has("jacobian") && file.floats::<1>("jacobian")?.1.first().is_some_and(|&flag| flag != 0.0);
         Ok(Self {
             theta_i,
             ndf: plane("ndf")?,
@@ -147,12 +121,7 @@ impl RglBrdf {
         let s = self.vndf.invert(slice, u_h);
         let (grid, rgb) = &self.rgb;
         let channel = |c: usize| {
-            slice.mix(|slice| {
-                grid.eval(
-                    &rgb[(slice * 3 + c) * grid.len()..(slice * 3 + c + 1) * grid.len()],
-                    s,
-                )
-            })
+            slice.mix(|slice| grid.eval(&rgb[(slice * 3 + c) * grid.len()..(slice * 3 + c + 1) * grid.len()], s))
         };
         let value = DVec3::new(channel(0), channel(1), channel(2)).max(DVec3::ZERO);
         if !self.jacobian {
@@ -160,19 +129,13 @@ impl RglBrdf {
         }
         let sigma = self.sigma.0.eval(&self.sigma.1, [u_of_theta(theta_i), 0.5]);
         let ndf = self.ndf.0.eval(&self.ndf.1, u_h);
-        if sigma > 0.0 {
-            value * (ndf / (4.0 * sigma)).max(0.0)
-        } else {
-            DVec3::ZERO
-        }
+        if sigma > 0.0 { value * (ndf / (4.0 * sigma)).max(0.0) } else { DVec3::ZERO }
     }
 
     /// `f(i,o)` and `f(o,i)`, both cosines in, each the mean with its mirror image.
     fn both_ways(&self, i: DVec3, o: DVec3) -> [DVec3; 2] {
         let mirrored = |v: DVec3| DVec3::new(v.x, -v.y, v.z);
-        let one_way = |i: DVec3, o: DVec3| {
-            0.5 * i.z * (self.eval(i, o) + self.eval(mirrored(i), mirrored(o)))
-        };
+        let one_way = |i: DVec3, o: DVec3| 0.5 * i.z * (self.eval(i, o) + self.eval(mirrored(i), mirrored(o)));
         [one_way(i, o), one_way(o, i)]
     }
 
@@ -199,8 +162,7 @@ impl RglBrdf {
                             there,
                             theta_h.sin() * theta_h.sqrt() * theta_d.sin() * theta_d.cos(),
                         );
-                        let f_r = 0.5 * (there + back)
-                            / (i.z.max(SMALLEST_COSINE) * o.z.max(SMALLEST_COSINE));
+                        let f_r = 0.5 * (there + back) / (i.z.max(SMALLEST_COSINE) * o.z.max(SMALLEST_COSINE));
                         f_r.min(DVec3::splat(1e15)).as_vec3().extend(1.0)
                     })
                     .collect();
@@ -226,10 +188,7 @@ impl RglBrdf {
     fn resampling_error(&self, table: &HalfDifferenceTable) -> f32 {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let mut random = || {
-            let (z, phi) = (
-                rng.random_range(0.087..1.0_f64),
-                rng.random_range(0.0..2.0 * PI),
-            );
+            let (z, phi) = (rng.random_range(0.087..1.0_f64), rng.random_range(0.0..2.0 * PI));
             let s = (1.0 - z * z).sqrt();
             DVec3::new(s * phi.cos(), s * phi.sin(), z)
         };
@@ -237,11 +196,7 @@ impl RglBrdf {
         for pair in 0..CHECKED_PAIRS {
             let (i, other) = (random(), random());
             let mirror = DVec3::new(-i.x, -i.y, i.z) + 0.1 * DVec3::new(other.x, other.y, 0.0);
-            let o = if pair % 2 == 0 {
-                mirror.try_normalize().unwrap_or(DVec3::Z)
-            } else {
-                other
-            };
+            let o = if pair % 2 == 0 { mirror.try_normalize().unwrap_or(DVec3::Z) } else { other };
             let [there, back] = self.both_ways(i, o);
             let exact = 0.5 * (there + back);
             let h = (i + o).try_normalize().unwrap_or(DVec3::Z);
@@ -252,11 +207,7 @@ impl RglBrdf {
                 sin2_theta_h: (h.x * h.x + h.y * h.y) as f32,
                 i_dot_h: i.dot(h) as f32,
             };
-            residual.add(
-                table.f_r(&angles).as_dvec3() * (i.z * o.z) - exact,
-                exact,
-                1.0,
-            );
+            residual.add(table.f_r(&angles).as_dvec3() * (i.z * o.z) - exact, exact, 1.0);
         }
         residual.relative()
     }
@@ -293,24 +244,14 @@ impl Residual {
     }
 
     fn relative(&self) -> f32 {
-        if self.power > 0.0 {
-            (self.difference / self.power).sqrt() as f32
-        } else {
-            0.0
-        }
+        if self.power > 0.0 { (self.difference / self.power).sqrt() as f32 } else { 0.0 }
     }
 }
 
 /// Stored triples with a negative channel.
 fn invalid_triples(rgb: &[f64], plane: usize) -> usize {
     let slices = rgb.chunks_exact(3 * plane);
-    slices
-        .map(|slice| {
-            (0..plane)
-                .filter(|&k| (0..3).any(|c| slice[c * plane + k] < 0.0))
-                .count()
-        })
-        .sum()
+    slices.map(|slice| (0..plane).filter(|&k| (0..3).any(|c| slice[c * plane + k] < 0.0)).count()).sum()
 }
 
 #[cfg(test)]

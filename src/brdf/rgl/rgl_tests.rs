@@ -13,23 +13,12 @@ struct FieldBytes {
 }
 
 fn floats(name: &'static str, shape: &[u64], values: impl IntoIterator<Item = f64>) -> FieldBytes {
-    let data = values
-        .into_iter()
-        .flat_map(|v| (v as f32).to_le_bytes())
-        .collect();
-    FieldBytes {
-        name,
-        kind: 10,
-        shape: shape.to_vec(),
-        data,
-    }
+    let data = values.into_iter().flat_map(|v| (v as f32).to_le_bytes()).collect();
+    FieldBytes { name, kind: 10, shape: shape.to_vec(), data }
 }
 
 fn file_of(fields: &[FieldBytes]) -> Vec<u8> {
-    let contents: usize = fields
-        .iter()
-        .map(|f| 2 + f.name.len() + 11 + 8 * f.shape.len())
-        .sum();
+    let contents: usize = fields.iter().map(|f| 2 + f.name.len() + 11 + 8 * f.shape.len()).sum();
     let mut bytes = b"tensor_file\0\x01\x00".to_vec();
     bytes.extend((fields.len() as u32).to_le_bytes());
     let mut offset = 18 + contents;
@@ -39,10 +28,7 @@ fn file_of(fields: &[FieldBytes]) -> Vec<u8> {
         bytes.extend((field.shape.len() as u16).to_le_bytes());
         bytes.push(field.kind);
         bytes.extend((offset as u64).to_le_bytes());
-        field
-            .shape
-            .iter()
-            .for_each(|n| bytes.extend(n.to_le_bytes()));
+        field.shape.iter().for_each(|n| bytes.extend(n.to_le_bytes()));
         offset += field.data.len();
     }
     fields.iter().for_each(|field| bytes.extend(&field.data));
@@ -52,9 +38,7 @@ fn file_of(fields: &[FieldBytes]) -> Vec<u8> {
 /// A Lambertian of albedo (0.8, 0.4, 0.2) in the format: no warp, `rgb = 4 · albedo/π · cosθ_o`.
 fn lambertian_fields() -> Vec<FieldBytes> {
     let (slices, n) = (14_u64, 40_u64);
-    let thetas: Vec<f64> = (0..slices)
-        .map(|k| k as f64 / (slices - 1) as f64 * FRAC_PI_2)
-        .collect();
+    let thetas: Vec<f64> = (0..slices).map(|k| k as f64 / (slices - 1) as f64 * FRAC_PI_2).collect();
     let mut rgb = Vec::new();
     for &theta_i in &thetas {
         for albedo in [0.8, 0.4, 0.2] {
@@ -62,8 +46,7 @@ fn lambertian_fields() -> Vec<FieldBytes> {
                 for x in 0..n {
                     let theta_m = (x as f64 / (n - 1) as f64).powi(2) * FRAC_PI_2;
                     let phi_m = (y as f64 / (n - 1) as f64) * 2.0 * PI - PI;
-                    let i_dot_m =
-                        theta_i.cos() * theta_m.cos() + theta_i.sin() * theta_m.sin() * phi_m.cos();
+                    let i_dot_m = theta_i.cos() * theta_m.cos() + theta_i.sin() * theta_m.sin() * phi_m.cos();
                     // Not clamped at the horizon, so that bilinear interpolation across it stays smooth.
                     rgb.push(4.0 * albedo / PI * (2.0 * i_dot_m * theta_m.cos() - theta_i.cos()));
                 }
@@ -77,12 +60,7 @@ fn lambertian_fields() -> Vec<FieldBytes> {
         floats("sigma", &[2, 2], [1.0; 4]),
         floats("vndf", &[1, slices, 3, 3], vec![1.0; (slices * 9) as usize]),
         floats("rgb", &[1, slices, 3, n, n], rgb),
-        FieldBytes {
-            name: "jacobian",
-            kind: 1,
-            shape: vec![1],
-            data: vec![1],
-        },
+        FieldBytes { name: "jacobian", kind: 1, shape: vec![1], data: vec![1] },
     ]
 }
 
@@ -97,26 +75,13 @@ fn a_lambertian_in_the_format_reads_back_as_one() {
     std::fs::write(&path, file_of(&lambertian_fields())).unwrap();
     let table = load(&path).unwrap();
     assert_eq!(table.name(), "grey");
-    assert!(
-        table.report().resampling_error < 5e-3,
-        "{:?}",
-        table.report()
-    );
-    assert!(
-        table.report().reciprocity_residual < 2e-2,
-        "{:?}",
-        table.report()
-    );
-    let brdf = Brdf {
-        terms: vec![Term::Measured(Arc::new(table))],
-    };
+    assert!(table.report().resampling_error < 5e-3, "{:?}", table.report());
+    assert!(table.report().reciprocity_residual < 2e-2, "{:?}", table.report());
+    let brdf = Brdf { terms: vec![Term::Measured(Arc::new(table))] };
     for degrees in [0.0_f32, 30.0, 60.0, 75.0] {
         let albedo = brdf.directional_albedo(degrees.to_radians(), 64);
         let expected = glam::Vec3::new(0.8, 0.4, 0.2);
-        assert!(
-            (albedo / expected - 1.0).abs().max_element() < 0.02,
-            "{degrees}: {albedo}"
-        );
+        assert!((albedo / expected - 1.0).abs().max_element() < 0.02, "{degrees}: {albedo}");
     }
 }
 
@@ -125,32 +90,18 @@ fn without_the_jacobian_flag_values_are_stored_whole() {
     let mut fields = lambertian_fields();
     fields[6].data = vec![0];
     let (i, o) = (DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 0.6, 0.8));
-    let (whole, divided) = (
-        parse(&fields).unwrap().eval(i, o),
-        parse(&lambertian_fields()).unwrap().eval(i, o),
-    );
+    let (whole, divided) = (parse(&fields).unwrap().eval(i, o), parse(&lambertian_fields()).unwrap().eval(i, o));
     assert!((whole / divided - 4.0).abs().max_element() < 1e-9);
 }
 
 #[test]
 fn half_and_difference_angles_become_the_vectors_that_have_them() {
-    for angles in [
-        [0.1, 0.2, 0.3],
-        [0.7, 0.5, 1.2],
-        [0.01, 1.2, 0.0],
-        [0.4, 0.9, 1.5],
-    ] {
+    for angles in [[0.1, 0.2, 0.3], [0.7, 0.5, 1.2], [0.01, 1.2, 0.0], [0.4, 0.9, 1.5]] {
         let (i, o) = directions(angles).unwrap();
         let h = (i + o).normalize();
         let (n_dot_i, n_dot_o) = cosines(angles);
-        assert!(
-            (i.length() - 1.0).abs() < 1e-12
-                && (i.z - n_dot_i).abs() < 1e-12
-                && (o.z - n_dot_o).abs() < 1e-12
-        );
-        assert!(
-            (h.z.acos() - angles[0]).abs() < 1e-9 && (i.dot(h).acos() - angles[1]).abs() < 1e-9
-        );
+        assert!((i.length() - 1.0).abs() < 1e-12 && (i.z - n_dot_i).abs() < 1e-12 && (o.z - n_dot_o).abs() < 1e-12);
+        assert!((h.z.acos() - angles[0]).abs() < 1e-9 && (i.dot(h).acos() - angles[1]).abs() < 1e-9);
     }
     assert!(directions([1.0, 1.2, 0.1]).is_none());
 }
@@ -160,10 +111,7 @@ fn anisotropic_and_spectral_files_are_refused_with_the_reason() {
     let mut fields = lambertian_fields();
     fields[0] = floats("phi_i", &[3], [-1.0, 0.0, 1.0]);
     let error = parse(&fields).err().unwrap().to_string();
-    assert!(
-        error.contains("3 azimuths") && error.contains("isotropic"),
-        "{error}"
-    );
+    assert!(error.contains("3 azimuths") && error.contains("isotropic"), "{error}");
     let mut fields = lambertian_fields();
     fields[5].name = "spectra";
     let error = parse(&fields).err().unwrap().to_string();
@@ -175,16 +123,12 @@ fn malformed_fields_are_refused_by_name() {
     type Harm = fn(&mut Vec<FieldBytes>);
     let cases: [(&str, Harm); 10] = [
         ("theta_i", |f| f[1].data[4..8].fill(0)),
-        ("theta_i", |f| {
-            f[1].data[0..4].copy_from_slice(&f32::NAN.to_le_bytes())
-        }),
+        ("theta_i", |f| f[1].data[0..4].copy_from_slice(&f32::NAN.to_le_bytes())),
         ("ndf", |f| f[2].shape = vec![1, 4]),
         ("sigma", |f| f[3].shape = vec![4]),
         ("vndf", |f| f[4].data.fill(0)),
         ("vndf", |f| f[4].shape = vec![14, 1, 3, 3]),
-        ("rgb", |f| {
-            f[5].data[100..104].copy_from_slice(&f32::INFINITY.to_le_bytes())
-        }),
+        ("rgb", |f| f[5].data[100..104].copy_from_slice(&f32::INFINITY.to_le_bytes())),
         ("rgb", |f| f[5].shape = vec![1, 14, 2, 60, 40]),
         ("rgb", |f| f[5].shape = vec![u64::MAX, 14, 3, 40, 40]),
         ("rgb", |f| f[5].kind = 7),
@@ -193,30 +137,17 @@ fn malformed_fields_are_refused_by_name() {
         let mut fields = lambertian_fields();
         harm(&mut fields);
         let error = parse(&fields).err().unwrap().to_string();
-        assert!(
-            error.contains(&format!("field \"{name}\"")),
-            "{name}: {error}"
-        );
+        assert!(error.contains(&format!("field \"{name}\"")), "{name}: {error}");
     }
     let mut fields = lambertian_fields();
     fields.remove(4);
-    assert!(
-        parse(&fields)
-            .err()
-            .unwrap()
-            .to_string()
-            .contains("a field named \"vndf\"")
-    );
+    assert!(parse(&fields).err().unwrap().to_string().contains("a field named \"vndf\""));
 }
 
 #[test]
 fn truncated_and_damaged_bytes_are_errors_not_panics() {
     let whole = file_of(&lambertian_fields());
-    let contents = 18
-        + lambertian_fields()
-            .iter()
-            .map(|f| 13 + f.name.len() + 8 * f.shape.len())
-            .sum::<usize>();
+    let contents = 18 + lambertian_fields().iter().map(|f| 13 + f.name.len() + 8 * f.shape.len()).sum::<usize>();
     for len in (0..contents).chain([whole.len() - 1]) {
         assert!(TensorFile::parse(whole[..len].to_vec()).is_err(), "{len}");
     }
@@ -234,38 +165,22 @@ fn truncated_and_damaged_bytes_are_errors_not_panics() {
     let path = directory.path().join("text.bsdf");
     std::fs::write(&path, "<xml>not a tensor file</xml>").unwrap();
     let error = load(&path).unwrap_err();
-    assert!(
-        error.exit_code() == 2 && error.to_string().contains("text.bsdf: header"),
-        "{error}"
-    );
+    assert!(error.exit_code() == 2 && error.to_string().contains("text.bsdf: header"), "{error}");
 }
 
 #[test]
 fn measured_files_reflect_less_than_they_receive_and_survive_resampling() {
-    let folder = std::env::var_os("BISCALE_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    for name in [
-        "chm_orange_rgb",
-        "irid_flake_paint1_rgb",
-        "vch_silk_blue_rgb",
-    ] {
+    let folder = std::env::var_os("BISCALE_DATA")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    for name in ["chm_orange_rgb", "irid_flake_paint1_rgb", "vch_silk_blue_rgb"] {
         let path = folder.join(name).with_extension("bsdf");
         if !path.exists() {
-            eprintln!(
-                "SKIPPED: {} is not there (BISCALE_DATA names its folder)",
-                path.display()
-            );
+            eprintln!("SKIPPED: {} is not there (BISCALE_DATA names its folder)", path.display());
             continue;
         }
         let start = std::time::Instant::now();
         let table = load(&path).unwrap();
-        eprintln!(
-            "{name} in {:.0} ms: {:?}",
-            start.elapsed().as_secs_f64() * 1e3,
-            table.report()
-        );
+        eprintln!("{name} in {:.0} ms: {:?}", start.elapsed().as_secs_f64() * 1e3, table.report());
         assert!(table.report().resampling_error < 0.015);
         assert!((0.1..1.0).contains(&table.report().max_albedo));
     }
@@ -274,25 +189,17 @@ fn measured_files_reflect_less_than_they_receive_and_survive_resampling() {
 #[test]
 fn the_silk_film_is_most_nearly_reciprocal_with_the_other_directions_cosine() {
     // The format's value is f_r cosθ_o: read as plain f_r, or as f_r cosθ_i, the smooth file is less reciprocal.
-    let folder = std::env::var_os("BISCALE_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
+    let folder = std::env::var_os("BISCALE_DATA")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     let path = folder.join("vch_silk_blue_rgb.bsdf");
     if !path.exists() {
-        eprintln!(
-            "SKIPPED: {} is not there (BISCALE_DATA names its folder)",
-            path.display()
-        );
+        eprintln!("SKIPPED: {} is not there (BISCALE_DATA names its folder)", path.display());
         return;
     }
     let brdf = RglBrdf::from_fields(&TensorFile::read(&path).unwrap()).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut random = || {
-        let (z, phi) = (
-            rng.random_range(0.2..1.0_f64),
-            rng.random_range(0.0..2.0 * PI),
-        );
+        let (z, phi) = (rng.random_range(0.2..1.0_f64), rng.random_range(0.0..2.0 * PI));
         let s = (1.0 - z * z).sqrt();
         DVec3::new(s * phi.cos(), s * phi.sin(), z)
     };
@@ -300,17 +207,11 @@ fn the_silk_film_is_most_nearly_reciprocal_with_the_other_directions_cosine() {
     for _ in 0..20_000 {
         let (i, o) = (random(), random());
         let (there, back) = (brdf.eval(i, o), brdf.eval(o, i));
-        for (residual, (weight_i, weight_o)) in
-            residuals
-                .iter_mut()
-                .zip([(i.z, o.z), (1.0, 1.0), (o.z, i.z)])
-        {
+        for (residual, (weight_i, weight_o)) in residuals.iter_mut().zip([(i.z, o.z), (1.0, 1.0), (o.z, i.z)]) {
             residual.add(there * weight_i - back * weight_o, there * weight_i, 1.0);
         }
     }
     let [with_cosine, plain, other] = residuals.map(|residual| residual.relative());
-    eprintln!(
-        "reciprocity of vch_silk_blue: f_r cosθ_o {with_cosine:.3}, f_r {plain:.3}, f_r cosθ_i {other:.3}"
-    );
+    eprintln!("reciprocity of vch_silk_blue: f_r cosθ_o {with_cosine:.3}, f_r {plain:.3}, f_r cosθ_i {other:.3}");
     assert!(with_cosine < 0.15 && with_cosine < plain && plain < other);
 }

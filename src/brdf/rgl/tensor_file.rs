@@ -36,33 +36,24 @@ const F64: u8 = 11;
 
 impl TensorFile {
     pub(super) fn read(path: &Path) -> Result<Self, InputError> {
-        let unreadable =
-            |error: std::io::Error| InputError::new("", error, "an RGL file that can be read");
+        let unreadable = |error: std::io::Error| InputError::new("", error, "an RGL file that can be read");
         let file = File::open(path).map_err(unreadable)?;
         let len = file.metadata().map_err(unreadable)?.len();
         if len > LARGEST_FILE {
             let expected = format!("at most {LARGEST_FILE} bytes");
-            return Err(InputError::new(
-                "file size",
-                format!("{len} bytes"),
-                expected,
-            ));
+            return Err(InputError::new("file size", format!("{len} bytes"), expected));
         }
         let mut bytes = Vec::with_capacity(len as usize);
-        file.take(LARGEST_FILE)
-            .read_to_end(&mut bytes)
-            .map_err(unreadable)?;
+        file.take(LARGEST_FILE).read_to_end(&mut bytes).map_err(unreadable)?;
         Self::parse(bytes)
     }
 
     pub(super) fn parse(bytes: Vec<u8>) -> Result<Self, InputError> {
-        let mut reader = Reader {
-            bytes: &bytes,
-            at: 0,
-        };
+        let mut reader = Reader { bytes: &bytes, at: 0 };
         if reader.take::<12>("header")? != *MAGIC {
-            return Err(InputError::new("header", "other bytes", "\"tensor_file\"")
-                .with_hint("is this an RGL .bsdf file?"));
+            return Err(
+                InputError::new("header", "other bytes", "\"tensor_file\"").with_hint("is this an RGL .bsdf file?")
+            );
         }
         let version = reader.take::<2>("version")?;
         if version != [1, 0] {
@@ -70,15 +61,9 @@ impl TensorFile {
         }
         let count = u32::from_le_bytes(reader.take("field count")?);
         if count > MOST_FIELDS {
-            return Err(InputError::new(
-                "field count",
-                count,
-                format!("at most {MOST_FIELDS}"),
-            ));
+            return Err(InputError::new("field count", count, format!("at most {MOST_FIELDS}")));
         }
-        let fields = (0..count)
-            .map(|_| reader.field())
-            .collect::<Result<Vec<_>, _>>()?;
+        let fields = (0..count).map(|_| reader.field()).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { bytes, fields })
     }
 
@@ -87,21 +72,10 @@ impl TensorFile {
     }
 
     fn field(&self, name: &str) -> Result<&Field, InputError> {
-        self.fields
-            .iter()
-            .find(|field| field.name == name)
-            .ok_or_else(|| {
-                let names: Vec<_> = self
-                    .fields
-                    .iter()
-                    .map(|field| field.name.as_str())
-                    .collect();
-                InputError::new(
-                    "fields",
-                    names.join(", "),
-                    format!("a field named \"{name}\""),
-                )
-            })
+        self.fields.iter().find(|field| field.name == name).ok_or_else(|| {
+            let names: Vec<_> = self.fields.iter().map(|field| field.name.as_str()).collect();
+            InputError::new("fields", names.join(", "), format!("a field named \"{name}\""))
+        })
     }
 
     /// The shape and the finite numbers of a field of `DIMENSIONS` dimensions.
@@ -112,48 +86,20 @@ impl TensorFile {
         let field = self.field(name)?;
         let place = || format!("field \"{name}\"");
         let shape: [usize; DIMENSIONS] = field.shape.as_slice().try_into().map_err(|_| {
-            InputError::new(
-                place(),
-                format!("shape {:?}", field.shape),
-                format!("{DIMENSIONS} dimensions"),
-            )
+            InputError::new(place(), format!("shape {:?}", field.shape), format!("{DIMENSIONS} dimensions"))
         })?;
         let bytes = &self.bytes[field.offset..];
         let count: usize = shape.iter().product();
         let values: Vec<f64> = match field.kind {
-            U8 => bytes
-                .iter()
-                .take(count)
-                .map(|&byte| f64::from(byte))
-                .collect(),
-            F32 => bytes
-                .as_chunks()
-                .0
-                .iter()
-                .take(count)
-                .map(|&b| f64::from(f32::from_le_bytes(b)))
-                .collect(),
-            F64 => bytes
-                .as_chunks()
-                .0
-                .iter()
-                .take(count)
-                .map(|&b| f64::from_le_bytes(b))
-                .collect(),
+            U8 => bytes.iter().take(count).map(|&byte| f64::from(byte)).collect(),
+            F32 => bytes.as_chunks().0.iter().take(count).map(|&b| f64::from(f32::from_le_bytes(b))).collect(),
+            F64 => bytes.as_chunks().0.iter().take(count).map(|&b| f64::from_le_bytes(b)).collect(),
             other => {
-                return Err(InputError::new(
-                    place(),
-                    format!("element type {other}"),
-                    "1 (u8), 10 (f32) or 11 (f64)",
-                ));
+                return Err(InputError::new(place(), format!("element type {other}"), "1 (u8), 10 (f32) or 11 (f64)"));
             }
         };
         match values.iter().position(|value| !value.is_finite()) {
-            Some(at) => Err(InputError::new(
-                format!("{}, element {at}", place()),
-                values[at],
-                "a finite number",
-            )),
+            Some(at) => Err(InputError::new(format!("{}, element {at}", place()), values[at], "a finite number")),
             None => Ok((shape, values)),
         }
     }
@@ -187,8 +133,7 @@ impl Reader<'_> {
     /// One entry of the table of contents; after it, the array is known to lie within the file.
     fn field(&mut self) -> Result<Field, InputError> {
         let name_len = u16::from_le_bytes(self.take("name length")?);
-        let name =
-            String::from_utf8_lossy(self.slice(usize::from(name_len), "field name")?).into_owned();
+        let name = String::from_utf8_lossy(self.slice(usize::from(name_len), "field name")?).into_owned();
         let place = format!("field \"{name}\"");
         let dimensions = u16::from_le_bytes(self.take(&place)?);
         if dimensions > MOST_DIMENSIONS {
@@ -200,9 +145,8 @@ impl Reader<'_> {
         }
         let [kind] = self.take(&place)?;
         let offset = u64::from_le_bytes(self.take(&place)?);
-        let shape: Vec<u64> = (0..dimensions)
-            .map(|_| self.take(&place).map(u64::from_le_bytes))
-            .collect::<Result<_, _>>()?;
+        let shape: Vec<u64> =
+            (0..dimensions).map(|_| self.take(&place).map(u64::from_le_bytes)).collect::<Result<_, _>>()?;
         // Types 1 to 11: u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64.
         let size = match kind {
             1 | 2 => 1,
@@ -210,11 +154,7 @@ impl Reader<'_> {
             5 | 6 | 10 => 4,
             7 | 8 | 11 => 8,
             other => {
-                return Err(InputError::new(
-                    place,
-                    format!("element type {other}"),
-                    "1 to 11",
-                ));
+                return Err(InputError::new(place, format!("element type {other}"), "1 to 11"));
             }
         };
         let end = shape
@@ -224,12 +164,7 @@ impl Reader<'_> {
         match end {
             Some(end) if end <= self.bytes.len() as u64 => {
                 let shape = shape.into_iter().map(|n| n as usize).collect();
-                Ok(Field {
-                    name,
-                    kind,
-                    offset: offset as usize,
-                    shape,
-                })
+                Ok(Field { name, kind, offset: offset as usize, shape })
             }
             _ => Err(InputError::new(
                 place,

@@ -22,11 +22,7 @@ impl Grid {
     pub(super) fn new(place: &str, width: usize, height: usize) -> Result<Self, InputError> {
         if width < 2 || height < 2 {
             let found = format!("a grid of {height} x {width}");
-            return Err(InputError::new(
-                format!("field \"{place}\""),
-                found,
-                "at least 2 x 2",
-            ));
+            return Err(InputError::new(format!("field \"{place}\""), found, "at least 2 x 2"));
         }
         Ok(Self { width, height })
     }
@@ -70,28 +66,16 @@ pub(super) struct Between {
 impl Between {
     /// Of strictly increasing `values`; constant beyond the ends.
     pub(super) fn find(values: &[f64], value: f64) -> Self {
-        let upper = values
-            .partition_point(|&v| v <= value)
-            .clamp(1, values.len().max(2) - 1);
+        let upper = values.partition_point(|&v| v <= value).clamp(1, values.len().max(2) - 1);
         match (values.get(upper - 1), values.get(upper)) {
-            (Some(&a), Some(&b)) => Self {
-                lower: upper - 1,
-                weight: ((value - a) / (b - a)).clamp(0.0, 1.0),
-            },
-            _ => Self {
-                lower: 0,
-                weight: 0.0,
-            },
+            (Some(&a), Some(&b)) => Self { lower: upper - 1, weight: ((value - a) / (b - a)).clamp(0.0, 1.0) },
+            _ => Self { lower: 0, weight: 0.0 },
         }
     }
 
     /// Interpolates what `of` gives for each slice.
     pub(super) fn mix(self, of: impl Fn(usize) -> f64) -> f64 {
-        if self.weight == 0.0 {
-            of(self.lower)
-        } else {
-            lerp(of(self.lower), of(self.lower + 1), self.weight)
-        }
+        if self.weight == 0.0 { of(self.lower) } else { lerp(of(self.lower), of(self.lower + 1), self.weight) }
     }
 }
 
@@ -111,18 +95,12 @@ impl Warp {
     pub(super) fn new(grid: Grid, mut density: Vec<f64>) -> Result<Self, InputError> {
         let mut along_row = vec![0.0; density.len()];
         let mut over_rows = Vec::with_capacity(density.len() / grid.width);
-        for (slice, (density, along_row)) in density
-            .chunks_exact_mut(grid.len())
-            .zip(along_row.chunks_exact_mut(grid.len()))
-            .enumerate()
+        for (slice, (density, along_row)) in
+            density.chunks_exact_mut(grid.len()).zip(along_row.chunks_exact_mut(grid.len())).enumerate()
         {
-            for (density, along_row) in density
-                .chunks_exact(grid.width)
-                .zip(along_row.chunks_exact_mut(grid.width))
-            {
+            for (density, along_row) in density.chunks_exact(grid.width).zip(along_row.chunks_exact_mut(grid.width)) {
                 for column in 1..grid.width {
-                    along_row[column] =
-                        along_row[column - 1] + 0.5 * (density[column - 1] + density[column]);
+                    along_row[column] = along_row[column - 1] + 0.5 * (density[column - 1] + density[column]);
                 }
             }
             let row_total = |row: usize| along_row[row * grid.width + grid.width - 1];
@@ -142,17 +120,9 @@ impl Warp {
             }
             over_rows.push(0.0);
             over_rows.extend(totals.iter().map(|sum| sum / total));
-            density
-                .iter_mut()
-                .chain(along_row)
-                .for_each(|value| *value /= total);
+            density.iter_mut().chain(along_row).for_each(|value| *value /= total);
         }
-        Ok(Self {
-            grid,
-            density,
-            along_row,
-            over_rows,
-        })
+        Ok(Self { grid, density, along_row, over_rows })
     }
 
     /// The uniform numbers that the warp of the interpolated slice would take to `at`.
@@ -167,23 +137,13 @@ impl Warp {
         let total = [row, row + 1].map(|row| mix(&self.along_row, row, width - 1));
         let below = slice.mix(|slice| self.over_rows[slice * height + row]);
         let partial = [row, row + 1].map(|row| {
-            let (a, b) = (
-                mix(&self.density, row, column),
-                mix(&self.density, row, column + 1),
-            );
+            let (a, b) = (mix(&self.density, row, column), mix(&self.density, row, column + 1));
             mix(&self.along_row, row, column) + part(a, b, x)
         });
         let row_total = lerp(total[0], total[1], y);
         // Where a whole row is 0, every number is as good.
-        let across = if row_total > 0.0 {
-            lerp(partial[0], partial[1], y) / row_total
-        } else {
-            at[0]
-        };
-        [
-            across.clamp(0.0, 1.0),
-            (below + part(total[0], total[1], y)).clamp(0.0, 1.0),
-        ]
+        let across = if row_total > 0.0 { lerp(partial[0], partial[1], y) / row_total } else { at[0] };
+        [across.clamp(0.0, 1.0), (below + part(total[0], total[1], y)).clamp(0.0, 1.0)]
     }
 }
 
@@ -191,28 +151,18 @@ impl Warp {
 mod tests {
     use super::*;
 
-    const GRID: Grid = Grid {
-        width: 5,
-        height: 4,
-    };
+    const GRID: Grid = Grid { width: 5, height: 4 };
 
     /// Two slices with zeros among their values.
     fn densities() -> Vec<f64> {
-        (0..2 * GRID.len())
-            .map(|k| ((k * 7) % 5) as f64 + if k >= GRID.len() { 1.0 } else { 0.0 })
-            .collect()
+        (0..2 * GRID.len()).map(|k| ((k * 7) % 5) as f64 + if k >= GRID.len() { 1.0 } else { 0.0 }).collect()
     }
 
     #[test]
     fn inversion_is_the_cumulative_integral_of_the_interpolated_density() {
         let warp = Warp::new(GRID, densities()).unwrap();
-        let slice = Between {
-            lower: 0,
-            weight: 0.3,
-        };
-        let density = |at: [f64; 2]| {
-            slice.mix(|s| GRID.eval(&warp.density[s * GRID.len()..(s + 1) * GRID.len()], at))
-        };
+        let slice = Between { lower: 0, weight: 0.3 };
+        let density = |at: [f64; 2]| slice.mix(|s| GRID.eval(&warp.density[s * GRID.len()..(s + 1) * GRID.len()], at));
         let n = 400;
         let at = [0.63, 0.41];
         let mid = |k: usize, end: f64| (k as f64 + 0.5) / n as f64 * end;
@@ -221,49 +171,29 @@ mod tests {
         let area = |end: f64| (0..n).map(|k| row(1.0, mid(k, end))).sum::<f64>() * end;
         let expected_y = area(at[1]) / area(1.0);
         let [x, y] = warp.invert(slice, at);
-        assert!(
-            (x - expected_x).abs() < 1e-4 && (y - expected_y).abs() < 1e-4,
-            "{x} {expected_x} {y} {expected_y}"
-        );
+        assert!((x - expected_x).abs() < 1e-4 && (y - expected_y).abs() < 1e-4, "{x} {expected_x} {y} {expected_y}");
     }
 
     #[test]
     fn a_constant_density_warps_nothing_and_corners_stay() {
         let flat = Warp::new(GRID, vec![3.0; GRID.len()]).unwrap();
-        let only = Between {
-            lower: 0,
-            weight: 0.0,
-        };
+        let only = Between { lower: 0, weight: 0.0 };
         for at in [[0.0, 0.0], [0.2, 0.9], [0.77, 0.5], [1.0, 1.0]] {
             let [x, y] = flat.invert(only, at);
             assert!((x - at[0]).abs() < 1e-12 && (y - at[1]).abs() < 1e-12);
         }
         let warp = Warp::new(GRID, densities()).unwrap();
-        let [x, y] = warp.invert(
-            Between {
-                lower: 0,
-                weight: 0.5,
-            },
-            [1.0, 1.0],
-        );
+        let [x, y] = warp.invert(Between { lower: 0, weight: 0.5 }, [1.0, 1.0]);
         assert!((x - 1.0).abs() < 1e-12 && (y - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn parameters_are_found_between_and_held_beyond_the_ends() {
         let values = [0.0, 1.0, 4.0];
-        for (value, lower, weight) in [
-            (-1.0, 0, 0.0),
-            (0.5, 0, 0.5),
-            (1.0, 1, 0.0),
-            (3.0, 1, 2.0 / 3.0),
-            (9.0, 1, 1.0),
-        ] {
+        for (value, lower, weight) in [(-1.0, 0, 0.0), (0.5, 0, 0.5), (1.0, 1, 0.0), (3.0, 1, 2.0 / 3.0), (9.0, 1, 1.0)]
+        {
             let found = Between::find(&values, value);
-            assert!(
-                found.lower == lower && (found.weight - weight).abs() < 1e-12,
-                "{value}"
-            );
+            assert!(found.lower == lower && (found.weight - weight).abs() < 1e-12, "{value}");
         }
         let alone = Between::find(&[0.5], 3.0);
         assert!(alone.lower == 0 && alone.weight == 0.0);

@@ -42,19 +42,11 @@ pub(super) struct Group {
 }
 
 /// The facets of each material.
-pub(super) fn group_facets(
-    facets: &Facets,
-    material_of_slot: &[usize],
-    materials: usize,
-) -> Result<Vec<Vec<usize>>> {
+pub(super) fn group_facets(facets: &Facets, material_of_slot: &[usize], materials: usize) -> Result<Vec<Vec<usize>>> {
     let mut groups = vec![Vec::new(); materials];
     for (s, &slot) in facets.slots.iter().enumerate() {
-        let group = material_of_slot
-            .get(usize::from(slot))
-            .and_then(|&material| groups.get_mut(material));
-        group
-            .ok_or_else(|| Error::failed(format_args!("slot {slot} has no material")))?
-            .push(s);
+        let group = material_of_slot.get(usize::from(slot)).and_then(|&material| groups.get_mut(material));
+        group.ok_or_else(|| Error::failed(format_args!("slot {slot} has no material")))?.push(s);
     }
     Ok(groups)
 }
@@ -69,47 +61,23 @@ impl Group {
     ) -> Result<(Self, MaterialReport)> {
         let (facets, directions) = (tile.facets, tile.directions);
         let visibility: Vec<f32> = (0..directions.len())
-            .flat_map(|node| {
-                members
-                    .iter()
-                    .map(move |&s| f32::from(u8::from(tile.visibility.is_visible(node, s))))
-            })
+            .flat_map(|node| members.iter().map(move |&s| f32::from(u8::from(tile.visibility.is_visible(node, s)))))
             .collect();
-        let nearest: Vec<usize> = members
-            .iter()
-            .map(|&s| factors.normals.nearest(facets.normals[s]))
-            .collect();
+        let nearest: Vec<usize> = members.iter().map(|&s| factors.normals.nearest(facets.normals[s])).collect();
         let binned = BinnedFacets::new(directions, &visibility, &nearest, &factors.normals);
         // Colour weights that all facets share are a multiplication; others take an N for each channel (Sec. 3.7).
-        let shared = members
-            .iter()
-            .all(|&s| facets.colors[s] == facets.colors[members[0]]);
-        let masks = if shared {
-            vec![facets.colors[members[0]].as_dvec3()]
-        } else {
-            DVec3::AXES.to_vec()
-        };
+        let shared = members.iter().all(|&s| facets.colors[s] == facets.colors[members[0]]);
+        let masks = if shared { vec![facets.colors[members[0]].as_dvec3()] } else { DVec3::AXES.to_vec() };
         let mut tables = Vec::new();
         let (mut n_rank, mut n_kept) = (0, 1.0_f64);
         for (c, mask) in masks.into_iter().enumerate() {
-            let weight =
-                |s: &usize| facets.areas[*s] * if shared { 1.0 } else { facets.colors[*s][c] };
+            let weight = |s: &usize| facets.areas[*s] * if shared { 1.0 } else { facets.colors[*s][c] };
             let weights: Vec<f32> = members.iter().map(weight).collect();
             let n = binned.factor(&weights, settings)?;
             (n_rank, n_kept) = (n_rank.max(n.rank), n_kept.min(n.kept));
             for m in &factors.channels {
-                let values = product(
-                    &n,
-                    directions,
-                    &binned.bins,
-                    m,
-                    &factors.directions,
-                    tile.base_area,
-                );
-                tables.push(PairTable {
-                    values,
-                    tint: m.tint(material.color) * mask,
-                });
+                let values = product(&n, directions, &binned.bins, m, &factors.directions, tile.base_area);
+                tables.push(PairTable { values, tint: m.tint(material.color) * mask });
             }
         }
         let report = MaterialReport {
@@ -119,23 +87,13 @@ impl Group {
             m_directions: factors.directions.len(),
             wanted_m_directions: factors.wanted_directions,
             m_rank: factors.rank(),
-            m_kept: factors
-                .channels
-                .iter()
-                .map(|channel| channel.kept)
-                .fold(1.0, f64::min),
+            m_kept: factors.channels.iter().map(|channel| channel.kept).fold(1.0, f64::min),
             m_bytes: factors.bytes(),
             m_seconds: factors.seconds,
             n_columns: binned.bins.len(),
             n_rank,
             n_kept,
         };
-        Ok((
-            Self {
-                map: Arc::clone(&factors.directions),
-                tables,
-            },
-            report,
-        ))
+        Ok((Self { map: Arc::clone(&factors.directions), tables }, report))
     }
 }

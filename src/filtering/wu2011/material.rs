@@ -67,13 +67,7 @@ impl MaterialFactors {
             })
             .collect::<Result<Vec<_>>>()?;
         let seconds = started.elapsed().as_secs_f64();
-        Ok(Self {
-            directions,
-            normals,
-            channels,
-            wanted_directions: wanted.directions,
-            seconds,
-        })
+        Ok(Self { directions, normals, channels, wanted_directions: wanted.directions, seconds })
     }
 
     /// Rows of M: unordered pairs of directions.
@@ -93,10 +87,7 @@ impl MaterialFactors {
 
     /// Bytes that are kept between edits of the geometry.
     pub fn bytes(&self) -> usize {
-        self.channels
-            .iter()
-            .map(|c| 4 * c.coefficients.len() + 8 * (c.vectors.len() + c.mean.len()))
-            .sum()
+        self.channels.iter().map(|c| 4 * c.coefficients.len() + 8 * (c.vectors.len() + c.mean.len())).sum()
     }
 }
 
@@ -105,22 +96,14 @@ impl ChannelFactors {
         let columns = rows.columns();
         let l = settings.projection_rows.max(MATERIAL_PROJECTION_ROWS);
         let sums = rows.project(l, settings.seed);
-        let Sums {
-            projected,
-            ones,
-            first,
-            second,
-            weight,
-        } = &sums;
+        let Sums { projected, ones, first, second, weight } = &sums;
         let mean: Vec<f64> = first.iter().map(|x| x / weight).collect();
         let d = &rows.column_weights;
         let q = DMatrix::from_fn(l, columns, |k, j| {
             (projected[k * columns + j] - ones[k] * mean[j]) * d[j] / (l as f64).sqrt()
         });
         let power_with_mean: f64 = (0..columns).map(|j| second[j] * d[j] * d[j]).sum();
-        let power: f64 = (0..columns)
-            .map(|j| (second[j] - weight * mean[j] * mean[j]) * d[j] * d[j])
-            .sum();
+        let power: f64 = (0..columns).map(|j| (second[j] - weight * mean[j] * mean[j]) * d[j] * d[j]).sum();
         let right = right_vectors(&q, settings.keep_m, power_with_mean)?;
         let rank = right.rank;
         let scaled = |divide: bool| -> Vec<f64> {
@@ -128,13 +111,7 @@ impl ChannelFactors {
                 .vectors
                 .iter()
                 .enumerate()
-                .map(|(k, &v)| {
-                    if divide {
-                        v / d[k / rank]
-                    } else {
-                        v * d[k / rank]
-                    }
-                })
+                .map(|(k, &v)| if divide { v / d[k / rank] } else { v * d[k / rank] })
                 .collect()
         };
         if rows.count() * rank > MAX_COEFFICIENTS {
@@ -149,23 +126,10 @@ impl ChannelFactors {
         let kept_power: f64 = coefficients
             .chunks(rank.max(1))
             .enumerate()
-            .map(|(row, c)| {
-                f64::from(rows.weight(row)) * c.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>()
-            })
+            .map(|(row, c)| f64::from(rows.weight(row)) * c.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>())
             .sum();
-        let kept = if power > 1e-10 * power_with_mean {
-            kept_power / power
-        } else {
-            1.0
-        };
-        Ok(Self {
-            color: rows.along,
-            mean,
-            vectors: scaled(true),
-            coefficients,
-            rank,
-            kept,
-        })
+        let kept = if power > 1e-10 * power_with_mean { kept_power / power } else { 1.0 };
+        Ok(Self { color: rows.along, mean, vectors: scaled(true), coefficients, rank, kept })
     }
 
     /// `f` of the scalar back in colour: the direction times the material's colour.

@@ -93,17 +93,10 @@ impl Wu2011 {
             .iter()
             .zip(&groups)
             .map(|(material, group)| {
-                (!group.is_empty())
-                    .then(|| MaterialFactors::new(material, settings).map(Arc::new))
-                    .transpose()
+                (!group.is_empty()).then(|| MaterialFactors::new(material, settings).map(Arc::new)).transpose()
             })
             .collect::<Result<_>>()?;
-        let tile = VisibleFacets {
-            facets,
-            visibility,
-            directions,
-            base_area,
-        };
+        let tile = VisibleFacets { facets, visibility, directions, base_area };
         Self::from_factors(&tile, material_of_slot, materials, &factors, settings)
     }
 
@@ -118,30 +111,16 @@ impl Wu2011 {
     ) -> Result<Self> {
         settings.check()?;
         let started = Instant::now();
-        let VisibleFacets {
-            facets,
-            visibility,
-            directions,
-            base_area,
-        } = *tile;
-        if visibility.facet_count != facets.len() || visibility.direction_count != directions.len()
-        {
-            return Err(Error::failed(
-                "the visibility is of other facets or directions",
-            ));
+        let VisibleFacets { facets, visibility, directions, base_area } = *tile;
+        if visibility.facet_count != facets.len() || visibility.direction_count != directions.len() {
+            return Err(Error::failed("the visibility is of other facets or directions"));
         }
         if !(base_area > 0.0 && base_area.is_finite()) {
             return Err(InputError::new("tile.size", base_area, "a tile with an area").into());
         }
-        let mut report = Wu2011Report {
-            n_rows: rows_of(directions.len()),
-            ..Default::default()
-        };
+        let mut report = Wu2011Report { n_rows: rows_of(directions.len()), ..Default::default() };
         let mut groups = Vec::new();
-        for (material, members) in group_facets(facets, material_of_slot, materials.len())?
-            .iter()
-            .enumerate()
-        {
+        for (material, members) in group_facets(facets, material_of_slot, materials.len())?.iter().enumerate() {
             if members.is_empty() {
                 continue;
             }
@@ -157,22 +136,13 @@ impl Wu2011 {
             .map(|node| {
                 let o = directions.directions()[node];
                 let seen = (0..facets.len()).filter(|&s| visibility.is_visible(node, s));
-                let sum: f64 = seen
-                    .map(|s| {
-                        f64::from(facets.normals[s].dot(o).max(0.0)) * f64::from(facets.areas[s])
-                    })
-                    .sum();
+                let sum: f64 =
+                    seen.map(|s| f64::from(facets.normals[s].dot(o).max(0.0)) * f64::from(facets.areas[s])).sum();
                 (sum / base_area) as f32
             })
             .collect();
         report.product_seconds = started.elapsed().as_secs_f64();
-        Ok(Self {
-            groups,
-            directions: directions.clone(),
-            projected_area,
-            base_area,
-            report,
-        })
+        Ok(Self { groups, directions: directions.clone(), projected_area, base_area, report })
     }
 
     /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
@@ -187,22 +157,13 @@ impl Wu2011 {
             if i.z > 0.0 {
                 for (group, view) in self.groups.iter().zip(&views) {
                     let light = group.map.taps(i);
-                    total += group
-                        .tables
-                        .iter()
-                        .map(|table| table.tint * table.eval(&light, view))
-                        .sum::<DVec3>();
+                    total += group.tables.iter().map(|table| table.tint * table.eval(&light, view)).sum::<DVec3>();
                 }
             }
             // Truncated factors may fall a little below zero; no BRDF does.
             out(k, total.max(DVec3::ZERO) * self.base_area);
         }
-        let relative: f32 = self
-            .directions
-            .taps(o)
-            .iter()
-            .map(|&(node, w)| w * self.projected_area[node])
-            .sum();
+        let relative: f32 = self.directions.taps(o).iter().map(|&(node, w)| w * self.projected_area[node]).sum();
         f64::from(relative) * self.base_area
     }
 

@@ -49,19 +49,14 @@ pub(super) fn product(
     // U_N interpolated in the light first: [light on M's map][view on N's map][c].
     let mut half = vec![0.0_f32; m_map.len() * nodes * n.rank];
     if n.rank > 0 {
-        half.par_chunks_mut(nodes * n.rank)
-            .zip(&taps)
-            .for_each(|(out, taps)| {
-                for &(node, w) in taps {
-                    // The table is symmetric in its two directions.
-                    for (out, u) in out
-                        .iter_mut()
-                        .zip(&n.table[node * nodes * n.rank..(node + 1) * nodes * n.rank])
-                    {
-                        *out += w * u;
-                    }
+        half.par_chunks_mut(nodes * n.rank).zip(&taps).for_each(|(out, taps)| {
+            for &(node, w) in taps {
+                // The table is symmetric in its two directions.
+                for (out, u) in out.iter_mut().zip(&n.table[node * nodes * n.rank..(node + 1) * nodes * n.rank]) {
+                    *out += w * u;
                 }
-            });
+            }
+        });
     }
     let rows: Vec<Vec<f32>> = (0..m_map.len())
         .into_par_iter()
@@ -71,10 +66,7 @@ pub(super) fn product(
                 left[0] = 1.0;
                 for &(node, w) in &taps[o] {
                     let at = (i * nodes + node) * n.rank;
-                    left[1..]
-                        .iter_mut()
-                        .zip(&half[at..at + n.rank])
-                        .for_each(|(out, u)| *out += w * u);
+                    left[1..].iter_mut().zip(&half[at..at + n.rank]).for_each(|(out, u)| *out += w * u);
                 }
             }
             let mut mixed = vec![0.0_f32; (o + 1) * rank];
@@ -85,12 +77,7 @@ pub(super) fn product(
                 .enumerate()
                 .map(|(i, mixed)| {
                     let at = (first + i) * m.rank;
-                    mixed[0]
-                        + mixed[1..]
-                            .iter()
-                            .zip(&m.coefficients[at..at + m.rank])
-                            .map(|(x, u)| x * u)
-                            .sum::<f32>()
+                    mixed[0] + mixed[1..].iter().zip(&m.coefficients[at..at + m.rank]).map(|(x, u)| x * u).sum::<f32>()
                 })
                 .collect()
         })
@@ -101,18 +88,10 @@ pub(super) fn product(
 /// `[mean_N, V_N]ᵀ [mean_M, V_M] / area` over the bins in use, row-major `(rank_N + 1) x (rank_M + 1)`.
 fn mixing(n: &NormalFactors, bins: &[usize], m: &ChannelFactors, area: f64) -> Vec<f32> {
     let of = |mean: f64, vectors: &[f64], rank: usize, row: usize, c: usize| {
-        if c == 0 {
-            mean
-        } else {
-            vectors[row * rank + c - 1]
-        }
+        if c == 0 { mean } else { vectors[row * rank + c - 1] }
     };
-    let left = DMatrix::from_fn(bins.len(), n.rank + 1, |j, c| {
-        of(n.mean[j], &n.vectors, n.rank, j, c)
-    });
-    let right = DMatrix::from_fn(bins.len(), m.rank + 1, |j, c| {
-        of(m.mean[bins[j]], &m.vectors, m.rank, bins[j], c)
-    });
+    let left = DMatrix::from_fn(bins.len(), n.rank + 1, |j, c| of(n.mean[j], &n.vectors, n.rank, j, c));
+    let right = DMatrix::from_fn(bins.len(), m.rank + 1, |j, c| of(m.mean[bins[j]], &m.vectors, m.rank, bins[j], c));
     let mixed = left.transpose() * right / area;
     mixed.transpose().iter().map(|&x| x as f32).collect()
 }

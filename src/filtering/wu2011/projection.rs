@@ -38,45 +38,21 @@ pub(super) struct RightVectors {
 /// matrix. Power below the rounding of f32 entries, relative to `scale` (the power before the mean was taken off), is none.
 pub(super) fn right_vectors(q: &DMatrix<f64>, keep: f64, scale: f64) -> Result<RightVectors> {
     let wide = q.nrows() < q.ncols();
-    let solved = eigen(if wide {
-        q * q.transpose()
-    } else {
-        q.transpose() * q
-    })?;
+    let solved = eigen(if wide { q * q.transpose() } else { q.transpose() * q })?;
     let floor = 1e-10 * scale.max(solved.values.first().copied().unwrap_or(0.0));
-    let sound = solved
-        .values
-        .iter()
-        .take_while(|&&value| value > floor)
-        .count();
+    let sound = solved.values.iter().take_while(|&&value| value > floor).count();
     let total: f64 = solved.values.iter().sum();
-    let rank = if sound == 0 {
-        0
-    } else {
-        rank_for(&solved.values[..sound], keep)
-    };
+    let rank = if sound == 0 { 0 } else { rank_for(&solved.values[..sound], keep) };
     let leading = solved.vectors.columns(0, rank).into_owned();
-    let mut right = if wide {
-        q.transpose() * leading
-    } else {
-        leading
-    };
+    let mut right = if wide { q.transpose() * leading } else { leading };
     if wide {
         for (mut column, value) in right.column_iter_mut().zip(&solved.values) {
             column /= value.sqrt();
         }
     }
     let vectors = right.transpose().as_slice().to_vec();
-    let kept = if total > 0.0 {
-        solved.values[..rank].iter().sum::<f64>() / total
-    } else {
-        1.0
-    };
-    Ok(RightVectors {
-        rank,
-        vectors,
-        kept,
-    })
+    let kept = if total > 0.0 { solved.values[..rank].iter().sum::<f64>() / total } else { 1.0 };
+    Ok(RightVectors { rank, vectors, kept })
 }
 
 #[cfg(test)]
@@ -90,10 +66,7 @@ mod tests {
         let mean = values.iter().sum::<f32>() / values.len() as f32;
         let variance = values.iter().map(|x| x * x).sum::<f32>() / values.len() as f32;
         // Four standard errors: 4/√n and 4 √(2/n).
-        assert!(
-            mean.abs() < 9e-3 && (variance - 1.0).abs() < 1.3e-2,
-            "{mean} {variance}"
-        );
+        assert!(mean.abs() < 9e-3 && (variance - 1.0).abs() < 1.3e-2, "{mean} {variance}");
         let mut again = vec![0.0; 11];
         fill_normal(3, 5, &mut again);
         assert_eq!(again[..10], values[..10]);
@@ -119,11 +92,6 @@ mod tests {
     fn nothing_but_rounding_has_rank_zero() {
         let q = DMatrix::from_element(3, 5, 1e-9);
         assert_eq!(right_vectors(&q, 0.98, 1.0).unwrap().rank, 0);
-        assert_eq!(
-            right_vectors(&DMatrix::zeros(3, 5), 0.98, 0.0)
-                .unwrap()
-                .rank,
-            0
-        );
+        assert_eq!(right_vectors(&DMatrix::zeros(3, 5), 0.98, 0.0).unwrap().rank, 0);
     }
 }

@@ -72,30 +72,15 @@ impl Sums {
 }
 
 impl<'a> Rows<'a> {
-    pub fn new(
-        brdf: &'a Brdf,
-        along: Vec3,
-        directions: &'a ParaboloidMap,
-        normals: &ParaboloidSphere,
-    ) -> Self {
-        let component = |pick: fn(Vec3) -> f32| {
-            (0..normals.len())
-                .map(|j| pick(normals.direction(j)))
-                .collect()
-        };
+    pub fn new(brdf: &'a Brdf, along: Vec3, directions: &'a ParaboloidMap, normals: &ParaboloidSphere) -> Self {
+        let component = |pick: fn(Vec3) -> f32| (0..normals.len()).map(|j| pick(normals.direction(j))).collect();
         Self {
-            lobes: brdf
-                .terms
-                .iter()
-                .filter_map(|term| analytic_lobe(term).map(|lobe| (lobe, term)))
-                .collect(),
+            lobes: brdf.terms.iter().filter_map(|term| analytic_lobe(term).map(|lobe| (lobe, term))).collect(),
             measured: brdf.terms.iter().filter_map(Term::measured).collect(),
             along,
             directions,
             normals: [component(|n| n.x), component(|n| n.y), component(|n| n.z)],
-            column_weights: (0..normals.len())
-                .map(|j| f64::from(normals.solid_angle(j)).sqrt())
-                .collect(),
+            column_weights: (0..normals.len()).map(|j| f64::from(normals.solid_angle(j)).sqrt()).collect(),
         }
     }
 
@@ -118,23 +103,13 @@ impl<'a> Rows<'a> {
     /// One row of M.
     fn write(&self, row: usize, scratch: &mut Scratch, out: &mut [f32]) {
         let (i, o) = pair_of_row(row);
-        let pair = PairVectors::new(
-            self.directions.directions()[i],
-            self.directions.directions()[o],
-        );
+        let pair = PairVectors::new(self.directions.directions()[i], self.directions.directions()[o]);
         scratch.values.resize(out.len(), 0.0);
         out.fill(0.0);
         for (lobe, term) in &self.lobes {
-            simd::lobe_values(
-                *lobe,
-                &pair,
-                self.normals.each_ref().map(Vec::as_slice),
-                &mut scratch.values,
-            );
+            simd::lobe_values(*lobe, &pair, self.normals.each_ref().map(Vec::as_slice), &mut scratch.values);
             let tint = term.tint(pair.i_dot_h).dot(self.along);
-            out.iter_mut()
-                .zip(&scratch.values)
-                .for_each(|(out, x)| *out += tint * x);
+            out.iter_mut().zip(&scratch.values).for_each(|(out, x)| *out += tint * x);
         }
         if self.measured.is_empty() {
             return;
@@ -172,10 +147,7 @@ impl<'a> Rows<'a> {
 
     /// Random projection onto `l` rows, and moments.
     pub fn project(&self, l: usize, seed: u64) -> Sums {
-        let parts: Vec<Sums> = (0..PARTS)
-            .into_par_iter()
-            .map(|part| self.project_part(part, l, seed))
-            .collect();
+        let parts: Vec<Sums> = (0..PARTS).into_par_iter().map(|part| self.project_part(part, l, seed)).collect();
         let mut total = Sums::zeros(l, self.columns());
         parts.iter().for_each(|part| total.add(part));
         total
@@ -205,10 +177,7 @@ impl<'a> Rows<'a> {
                 sums.weight += f64::from(w2);
             }
             gemm::multiply(l, rows, columns, random, values, &mut product);
-            sums.projected
-                .iter_mut()
-                .zip(&product)
-                .for_each(|(s, &x)| *s += f64::from(x));
+            sums.projected.iter_mut().zip(&product).for_each(|(s, &x)| *s += f64::from(x));
             for (j, s) in block_sums.iter().enumerate() {
                 sums.first[j] += f64::from(s[0]);
                 sums.second[j] += f64::from(s[1]);
@@ -239,9 +208,7 @@ impl<'a> Rows<'a> {
                     gemm::multiply(rows, columns, rank, values, &mixing, &mut out[start..]);
                 });
                 for row in out.chunks_mut(rank) {
-                    row.iter_mut()
-                        .zip(&offset)
-                        .for_each(|(u, o)| *u = (f64::from(*u) - o) as f32);
+                    row.iter_mut().zip(&offset).for_each(|(u, o)| *u = (f64::from(*u) - o) as f32);
                 }
                 out
             })

@@ -14,66 +14,18 @@ pub(super) struct Sampling {
 }
 
 /// Table 3: the largest sampling, which the paper clamps to itself, and the smallest, a Lambertian's.
-const FINEST: Sampling = Sampling {
-    directions: 1857,
-    half_normals: 3221,
-};
-const COARSEST: Sampling = Sampling {
-    directions: 132,
-    half_normals: 224,
-};
+const FINEST: Sampling = Sampling { directions: 1857, half_normals: 3221 };
+const COARSEST: Sampling = Sampling { directions: 132, half_normals: 224 };
 
 /// Table 3's measured materials. Rows are unordered pairs of directions: 49,141 = 313·314/2.
 const MEASURED: [(&str, Sampling); 7] = [
-    (
-        "pearl-paint",
-        Sampling {
-            directions: 313,
-            half_normals: 1021,
-        },
-    ),
-    (
-        "silver-paint",
-        Sampling {
-            directions: 568,
-            half_normals: 1884,
-        },
-    ),
-    (
-        "silver-metallic-paint2",
-        Sampling {
-            directions: 752,
-            half_normals: 3221,
-        },
-    ),
-    (
-        "gold-metallic-paint",
-        Sampling {
-            directions: 952,
-            half_normals: 3221,
-        },
-    ),
-    (
-        "blue-metallic-paint",
-        Sampling {
-            directions: 952,
-            half_normals: 3221,
-        },
-    ),
-    (
-        "special-walnut-224",
-        Sampling {
-            directions: 1367,
-            half_normals: 2125,
-        },
-    ),
-    (
-        "white-diffuse",
-        Sampling {
-            directions: 313,
-            half_normals: 313,
-        },
-    ),
+    ("pearl-paint", Sampling { directions: 313, half_normals: 1021 }),
+    ("silver-paint", Sampling { directions: 568, half_normals: 1884 }),
+    ("silver-metallic-paint2", Sampling { directions: 752, half_normals: 3221 }),
+    ("gold-metallic-paint", Sampling { directions: 952, half_normals: 3221 }),
+    ("blue-metallic-paint", Sampling { directions: 952, half_normals: 3221 }),
+    ("special-walnut-224", Sampling { directions: 1367, half_normals: 2125 }),
+    ("white-diffuse", Sampling { directions: 313, half_normals: 313 }),
 ];
 
 /// Entries of M, rows x columns, that stay within about ten seconds of two cores; measured tables cost ten times a lobe.
@@ -100,10 +52,7 @@ impl Sampling {
         // Counts go with the square of an image's side, entries with its sixth power.
         let shrink = (cap / entries).min(1.0).cbrt();
         let scaled = |count: usize| ((count as f64 * shrink) as usize).max(1);
-        Self {
-            directions: scaled(self.directions),
-            half_normals: scaled(self.half_normals),
-        }
+        Self { directions: scaled(self.directions), half_normals: scaled(self.half_normals) }
     }
 }
 
@@ -130,9 +79,7 @@ fn beckmann(m: f32) -> Sampling {
 }
 
 fn by_width(width: f32, directions: f32, half_normals: f32) -> Sampling {
-    let count = |scale: f32, low: usize, high: usize| {
-        ((scale / (width * width)).round() as usize).clamp(low, high)
-    };
+    let count = |scale: f32, low: usize, high: usize| ((scale / (width * width)).round() as usize).clamp(low, high);
     Sampling {
         directions: count(directions, COARSEST.directions, FINEST.directions),
         half_normals: count(half_normals, COARSEST.half_normals, FINEST.half_normals),
@@ -143,22 +90,13 @@ fn by_width(width: f32, directions: f32, half_normals: f32) -> Sampling {
 fn measured_width(table: &dyn Measured) -> f32 {
     let at = |theta: f32| {
         let (sin, cos) = theta.sin_cos();
-        let angles = LobeAngles {
-            n_dot_i: cos,
-            n_dot_o: cos,
-            n_dot_h: cos,
-            sin2_theta_h: sin * sin,
-            i_dot_h: 1.0,
-        };
+        let angles = LobeAngles { n_dot_i: cos, n_dot_o: cos, n_dot_h: cos, sin2_theta_h: sin * sin, i_dot_h: 1.0 };
         table.f_r(&angles).dot(Vec3::ONE)
     };
     const STEPS: usize = 400;
     let angle = |k: usize| 1.3 * (k as f32 / STEPS as f32).powi(2);
     let peak = at(angle(1));
-    (1..STEPS)
-        .map(angle)
-        .find(|&theta| at(theta) < peak / std::f32::consts::E)
-        .map_or(1.0, f32::tan)
+    (1..STEPS).map(angle).find(|&theta| at(theta) < peak / std::f32::consts::E).map_or(1.0, f32::tan)
 }
 
 #[cfg(test)]
@@ -173,46 +111,20 @@ mod tests {
     #[test]
     fn the_rule_goes_through_the_analytic_rows_of_table_3() {
         let near = |found: (usize, usize), paper: (usize, usize)| {
-            assert!(
-                found.0.abs_diff(paper.0) <= 2 && found.1.abs_diff(paper.1) <= 2,
-                "{found:?} {paper:?}"
-            );
+            assert!(found.0.abs_diff(paper.0) <= 2 && found.1.abs_diff(paper.1) <= 2, "{found:?} {paper:?}");
         };
         near(sampling(Term::Lambertian { albedo: Vec3::ONE }), (132, 224));
-        near(
-            sampling(Term::CookTorrance {
-                roughness: 0.5,
-                f0: Vec3::ONE,
-            }),
-            (303, 756),
-        );
-        near(
-            sampling(Term::CookTorrance {
-                roughness: 0.2,
-                f0: Vec3::ONE,
-            }),
-            (1857, 3221),
-        );
-        near(
-            sampling(Term::Ward {
-                roughness: 0.3,
-                specular: Vec3::ONE,
-            }),
-            (568, 1884),
-        );
+        near(sampling(Term::CookTorrance { roughness: 0.5, f0: Vec3::ONE }), (303, 756));
+        near(sampling(Term::CookTorrance { roughness: 0.2, f0: Vec3::ONE }), (1857, 3221));
+        near(sampling(Term::Ward { roughness: 0.3, specular: Vec3::ONE }), (568, 1884));
     }
 
     #[test]
     fn a_mirror_is_capped_and_a_diffuse_surface_is_not() {
         let brdf = |term| Brdf { terms: vec![term] };
-        let mirror = brdf(Term::Ggx {
-            roughness: 1e-3,
-            f0: Vec3::ONE,
-        });
+        let mirror = brdf(Term::Ggx { roughness: 1e-3, f0: Vec3::ONE });
         let capped = Sampling::of(&mirror).capped(&mirror);
-        assert!(
-            (capped.directions as f64).powi(2) * capped.half_normals as f64 <= MAX_ANALYTIC_ENTRIES
-        );
+        assert!((capped.directions as f64).powi(2) * capped.half_normals as f64 <= MAX_ANALYTIC_ENTRIES);
         assert!(capped.directions > 800);
         let chalk = brdf(Term::Lambertian { albedo: Vec3::ONE });
         assert_eq!(Sampling::of(&chalk).capped(&chalk), COARSEST);

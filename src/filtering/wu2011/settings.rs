@@ -20,14 +20,7 @@ pub struct Wu2011Settings {
 
 impl Default for Wu2011Settings {
     fn default() -> Self {
-        Self {
-            keep_m: 0.98,
-            keep_n: 0.995,
-            projection_rows: 50,
-            colors: 1,
-            m_directions: None,
-            seed: 0,
-        }
+        Self { keep_m: 0.98, keep_n: 0.995, projection_rows: 50, colors: 1, m_directions: None, seed: 0 }
     }
 }
 
@@ -36,9 +29,8 @@ impl Wu2011Settings {
     pub const VISIBILITY_DIRECTIONS: usize = 132;
 
     pub(super) fn check(&self) -> Result<()> {
-        let complaint = |place: &str, found: String, expected: &str| {
-            Err(InputError::new(place, found, expected).into())
-        };
+        let complaint =
+            |place: &str, found: String, expected: &str| Err(InputError::new(place, found, expected).into());
         let part = |kept: f64| kept > 0.0 && kept <= 1.0;
         if !part(self.keep_m) || !part(self.keep_n) {
             return complaint(
@@ -48,11 +40,7 @@ impl Wu2011Settings {
             );
         }
         if !(1..=1000).contains(&self.projection_rows) {
-            return complaint(
-                "quality.projection_rows",
-                self.projection_rows.to_string(),
-                "1 to 1000",
-            );
+            return complaint("quality.projection_rows", self.projection_rows.to_string(), "1 to 1000");
         }
         if !(1..=3).contains(&self.colors) {
             return complaint("quality.colors", self.colors.to_string(), "1 to 3");

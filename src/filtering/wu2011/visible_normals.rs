@@ -51,15 +51,9 @@ impl<'a> BinnedFacets<'a> {
         normals: &ParaboloidSphere,
     ) -> Self {
         let mut position: BTreeMap<usize, usize> = nearest.iter().map(|&bin| (bin, 0)).collect();
-        position
-            .values_mut()
-            .enumerate()
-            .for_each(|(k, at)| *at = k);
+        position.values_mut().enumerate().for_each(|(k, at)| *at = k);
         let bins: Vec<usize> = position.keys().copied().collect();
-        let bin_weights = bins
-            .iter()
-            .map(|&bin| f64::from(normals.solid_angle(bin)).sqrt().recip())
-            .collect();
+        let bin_weights = bins.iter().map(|&bin| f64::from(normals.solid_angle(bin)).sqrt().recip()).collect();
         Self {
             directions,
             visibility,
@@ -88,17 +82,12 @@ impl<'a> BinnedFacets<'a> {
         let nodes = self.directions.len();
         let random = self.weighted_random(l, settings.seed);
         let projected = self.project(&random, l);
-        let total: f64 = (0..nodes)
-            .map(|node| f64::from(self.directions.solid_angle(node)))
-            .sum();
+        let total: f64 = (0..nodes).map(|node| f64::from(self.directions.solid_angle(node))).sum();
         // Mean over all pairs, by solid angle: (Σ_i Ω_i V_i)² of each facet.
         let mean_visibility: Vec<f64> = (0..self.facets())
             .map(|s| {
                 let seen = |node: usize| {
-                    f64::from(
-                        self.directions.solid_angle(node)
-                            * self.visibility[node * self.facets() + s],
-                    )
+                    f64::from(self.directions.solid_angle(node) * self.visibility[node * self.facets() + s])
                 };
                 ((0..nodes).map(seen).sum::<f64>() / total).powi(2)
             })
@@ -109,10 +98,7 @@ impl<'a> BinnedFacets<'a> {
         let mut power_with_mean = 0.0;
         for k in 0..l {
             // Rᵀ D_r 1: what the row of ones projects to.
-            let ones: f64 = random[k * nodes * nodes..(k + 1) * nodes * nodes]
-                .iter()
-                .map(|&x| f64::from(x))
-                .sum();
+            let ones: f64 = random[k * nodes * nodes..(k + 1) * nodes * nodes].iter().map(|&x| f64::from(x)).sum();
             let row = self.binned(weights, |s| f64::from(projected[s * l + k]));
             for j in 0..bins {
                 q[(k, j)] = (row[j] - ones * mean[j]) * self.bin_weights[j] * scale;
@@ -139,24 +125,11 @@ impl<'a> BinnedFacets<'a> {
                 .collect();
             table = bvndf::pair_table(self.visibility, nodes, weights, &y, rank);
             for row in table.chunks_mut(rank) {
-                row.iter_mut()
-                    .zip(&offset)
-                    .for_each(|(u, o)| *u = (f64::from(*u) - o) as f32);
+                row.iter_mut().zip(&offset).for_each(|(u, o)| *u = (f64::from(*u) - o) as f32);
             }
         }
-        let vectors = right
-            .vectors
-            .iter()
-            .enumerate()
-            .map(|(k, v)| v / d[k / rank])
-            .collect();
-        Ok(NormalFactors {
-            mean,
-            vectors,
-            table,
-            rank,
-            kept: right.kept,
-        })
+        let vectors = right.vectors.iter().enumerate().map(|(k, v)| v / d[k / rank]).collect();
+        Ok(NormalFactors { mean, vectors, table, rank, kept: right.kept })
     }
 
     /// R with the rows' weights `√(Ω_i Ω_o)` (twice under the root for pairs that stand for two) on the triangle `i <= o` of
@@ -165,18 +138,15 @@ impl<'a> BinnedFacets<'a> {
         let nodes = self.directions.len();
         let rows = rows_of(nodes);
         let mut random = vec![0.0_f32; l * nodes * nodes];
-        random
-            .par_chunks_mut(nodes * nodes)
-            .enumerate()
-            .for_each(|(k, square)| {
-                let mut values = vec![0.0; rows];
-                fill_normal(seed, STREAM + k as u64, &mut values);
-                for (row, value) in values.into_iter().enumerate() {
-                    let (i, o) = pair_of_row(row);
-                    let both = self.directions.solid_angle(i) * self.directions.solid_angle(o);
-                    square[o * nodes + i] = value * if i == o { both } else { 2.0 * both }.sqrt();
-                }
-            });
+        random.par_chunks_mut(nodes * nodes).enumerate().for_each(|(k, square)| {
+            let mut values = vec![0.0; rows];
+            fill_normal(seed, STREAM + k as u64, &mut values);
+            for (row, value) in values.into_iter().enumerate() {
+                let (i, o) = pair_of_row(row);
+                let both = self.directions.solid_angle(i) * self.directions.solid_angle(o);
+                square[o * nodes + i] = value * if i == o { both } else { 2.0 * both }.sqrt();
+            }
+        });
         random
     }
 
@@ -184,40 +154,26 @@ impl<'a> BinnedFacets<'a> {
     fn project(&self, random: &[f32], l: usize) -> Vec<f32> {
         let (facets, nodes) = (self.facets(), self.directions.len());
         let mut projected = vec![0.0_f32; facets * l];
-        projected
-            .par_chunks_mut(FACETS * l)
-            .enumerate()
-            .for_each(|(block, out)| {
-                let count = out.len() / l;
-                let first = block * FACETS;
-                let seen: Vec<f32> = (0..nodes)
-                    .flat_map(|node| {
-                        self.visibility[node * facets + first..node * facets + first + count]
-                            .iter()
-                            .copied()
-                    })
-                    .collect();
-                let mut turned = vec![0.0_f32; nodes * count];
-                for k in 0..l {
-                    gemm::multiply(
-                        nodes,
-                        nodes,
-                        count,
-                        &random[k * nodes * nodes..],
-                        &seen,
-                        &mut turned,
-                    );
-                    let mut sums = vec![0.0_f32; count];
-                    for (t, v) in turned.chunks(count).zip(seen.chunks(count)) {
-                        for ((sum, t), v) in sums.iter_mut().zip(t).zip(v) {
-                            *sum += t * v;
-                        }
-                    }
-                    for (s, sum) in sums.into_iter().enumerate() {
-                        out[s * l + k] = sum;
+        projected.par_chunks_mut(FACETS * l).enumerate().for_each(|(block, out)| {
+            let count = out.len() / l;
+            let first = block * FACETS;
+            let seen: Vec<f32> = (0..nodes)
+                .flat_map(|node| self.visibility[node * facets + first..node * facets + first + count].iter().copied())
+                .collect();
+            let mut turned = vec![0.0_f32; nodes * count];
+            for k in 0..l {
+                gemm::multiply(nodes, nodes, count, &random[k * nodes * nodes..], &seen, &mut turned);
+                let mut sums = vec![0.0_f32; count];
+                for (t, v) in turned.chunks(count).zip(seen.chunks(count)) {
+                    for ((sum, t), v) in sums.iter_mut().zip(t).zip(v) {
+                        *sum += t * v;
                     }
                 }
-            });
+                for (s, sum) in sums.into_iter().enumerate() {
+                    out[s * l + k] = sum;
+                }
+            }
+        });
         projected
     }
 }

@@ -36,15 +36,10 @@ pub struct LatLongMap {
 impl LatLongMap {
     /// The map whose texel centres look up `radiance(direction)`.
     pub fn from_fn(width: usize, height: usize, radiance: impl Fn(DVec3) -> DVec3) -> Self {
-        let mut map = Self {
-            width,
-            height,
-            texels: Vec::with_capacity(width * height),
-        };
+        let mut map = Self { width, height, texels: Vec::with_capacity(width * height) };
         for row in 0..height {
             for column in 0..width {
-                map.texels
-                    .push(radiance(map.direction(column as f64 + 0.5, row as f64 + 0.5)).as_vec3());
+                map.texels.push(radiance(map.direction(column as f64 + 0.5, row as f64 + 0.5)).as_vec3());
             }
         }
         map
@@ -61,10 +56,7 @@ impl LatLongMap {
     pub fn texel_at(&self, direction: DVec3) -> (f64, f64) {
         let theta = direction.x.hypot(direction.z).atan2(direction.y);
         let phi = direction.x.atan2(-direction.z);
-        (
-            (phi / TAU + 0.5) * self.width as f64,
-            theta / PI * self.height as f64,
-        )
+        ((phi / TAU + 0.5) * self.width as f64, theta / PI * self.height as f64)
     }
 
     /// Solid angle of one texel of a row, exact \[sr\].
@@ -76,10 +68,7 @@ impl LatLongMap {
     /// `∫ L dω` over all directions, per channel.
     pub fn total(&self) -> DVec3 {
         let rows = self.texels.chunks_exact(self.width.max(1)).enumerate();
-        rows.map(|(row, texels)| {
-            texels.iter().map(|t| t.as_dvec3()).sum::<DVec3>() * self.solid_angle(row)
-        })
-        .sum()
+        rows.map(|(row, texels)| texels.iter().map(|t| t.as_dvec3()).sum::<DVec3>() * self.solid_angle(row)).sum()
     }
 }
 
@@ -90,24 +79,14 @@ pub fn luminance(rgb: DVec3) -> f64 {
 
 /// A built-in environment by name, or a `.hdr` / `.exr` file (relative to `base_dir`).
 pub fn load(name: &str, base_dir: &Path) -> Result<Environment> {
-    let built_in = |map| {
-        Ok(Environment {
-            map,
-            warnings: Vec::new(),
-        })
-    };
+    let built_in = |map| Ok(Environment { map, warnings: Vec::new() });
     match name {
         "studio" => built_in(procedural::studio()),
         "clear_sky" => built_in(procedural::clear_sky()),
         "overcast_sky" => built_in(procedural::overcast_sky()),
         "sun" => built_in(procedural::sun()),
         "none" => built_in(LatLongMap::default()),
-        path => match Path::new(path)
-            .extension()
-            .and_then(|e| e.to_str())
-            .map(str::to_ascii_lowercase)
-            .as_deref()
-        {
+        path => match Path::new(path).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("hdr") => files::load_hdr(&base_dir.join(path)),
             Some("exr") => files::load_exr(&base_dir.join(path)),
             _ => Err(unknown(name).into()),
@@ -120,9 +99,7 @@ fn unknown(name: &str) -> InputError {
     let error = InputError::new("light.environment", format!("\"{name}\""), expected);
     let distance = |known: &str| strsim::damerau_levenshtein(name, known);
     match BUILT_IN.iter().min_by_key(|known| distance(known)) {
-        Some(nearest) if distance(nearest) <= 3 => {
-            error.with_hint(format!("did you mean \"{nearest}\"?"))
-        }
+        Some(nearest) if distance(nearest) <= 3 => error.with_hint(format!("did you mean \"{nearest}\"?")),
         _ => error,
     }
 }
@@ -133,11 +110,7 @@ mod tests {
 
     #[test]
     fn texel_coordinates_and_directions_are_inverse() {
-        let map = LatLongMap {
-            width: 64,
-            height: 32,
-            texels: Vec::new(),
-        };
+        let map = LatLongMap { width: 64, height: 32, texels: Vec::new() };
         for (column, row) in [(0.5, 0.5), (13.2, 7.9), (63.5, 31.5), (32.0, 16.0)] {
             let (c, r) = map.texel_at(map.direction(column, row));
             assert!((c - column).abs() < 1e-9 && (r - row).abs() < 1e-9);

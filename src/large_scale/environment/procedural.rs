@@ -29,10 +29,8 @@ impl SoftBox {
         if depth <= 0.0 {
             return DVec3::ZERO;
         }
-        let edge =
-            |offset: f64, half: f64| smooth_step((1.0 - (offset / depth).abs() / half) / 0.1 + 0.5);
-        self.radiance
-            * (edge(direction.dot(right), self.half[0]) * edge(direction.dot(up), self.half[1]))
+        let edge = |offset: f64, half: f64| smooth_step((1.0 - (offset / depth).abs() / half) / 0.1 + 0.5);
+        self.radiance * (edge(direction.dot(right), self.half[0]) * edge(direction.dot(up), self.half[1]))
     }
 }
 
@@ -45,37 +43,15 @@ fn smooth_step(x: f64) -> f64 {
 /// behind, an overhead bank, in a grey room that is darker below.
 pub(super) fn studio() -> LatLongMap {
     let boxes = [
-        SoftBox {
-            towards: DVec3::new(-0.75, 0.75, 0.85),
-            half: [0.36, 0.36],
-            radiance: DVec3::new(5.9, 5.6, 5.2),
-        },
-        SoftBox {
-            towards: DVec3::new(0.95, 0.30, 0.45),
-            half: [0.13, 0.62],
-            radiance: DVec3::new(1.55, 1.7, 1.9),
-        },
-        SoftBox {
-            towards: DVec3::new(0.55, 0.55, -0.95),
-            half: [0.45, 0.16],
-            radiance: DVec3::new(4.2, 4.2, 4.2),
-        },
-        SoftBox {
-            towards: DVec3::new(-0.90, 0.10, -0.55),
-            half: [0.12, 0.55],
-            radiance: DVec3::new(1.8, 1.8, 1.95),
-        },
-        SoftBox {
-            towards: DVec3::new(0.0, 1.0, 0.12),
-            half: [0.60, 0.22],
-            radiance: DVec3::new(0.9, 0.9, 0.9),
-        },
+        SoftBox { towards: DVec3::new(-0.75, 0.75, 0.85), half: [0.36, 0.36], radiance: DVec3::new(5.9, 5.6, 5.2) },
+        SoftBox { towards: DVec3::new(0.95, 0.30, 0.45), half: [0.13, 0.62], radiance: DVec3::new(1.55, 1.7, 1.9) },
+        SoftBox { towards: DVec3::new(0.55, 0.55, -0.95), half: [0.45, 0.16], radiance: DVec3::new(4.2, 4.2, 4.2) },
+        SoftBox { towards: DVec3::new(-0.90, 0.10, -0.55), half: [0.12, 0.55], radiance: DVec3::new(1.8, 1.8, 1.95) },
+        SoftBox { towards: DVec3::new(0.0, 1.0, 0.12), half: [0.60, 0.22], radiance: DVec3::new(0.9, 0.9, 0.9) },
     ];
     LatLongMap::from_fn(WIDTH, HEIGHT, |direction| {
         let room = 0.03 + 0.06 * smooth_step(0.5 + 0.5 * direction.y);
-        boxes.iter().fold(DVec3::splat(room), |sum, soft_box| {
-            sum + soft_box.at(direction)
-        })
+        boxes.iter().fold(DVec3::splat(room), |sum, soft_box| sum + soft_box.at(direction))
     })
 }
 
@@ -111,10 +87,7 @@ pub(super) fn clear_sky() -> LatLongMap {
         let up = direction.y.max(0.0);
         let chi = direction.angle_between(sun);
         let relative = scattering(chi) * gradation(up) / at_zenith;
-        let colour = haze.lerp(
-            blue,
-            (1.0 - (1.0 - up).powi(3)).max(0.0) * smooth_step(chi / FRAC_PI_2 + 0.3),
-        );
+        let colour = haze.lerp(blue, (1.0 - (1.0 - up).powi(3)).max(0.0) * smooth_step(chi / FRAC_PI_2 + 0.3));
         let ground = DVec3::new(0.10, 0.095, 0.085);
         let sky = above_ground(direction, 0.0);
         colour * (0.12 * relative * sky) + ground * (1.0 - sky)
@@ -149,10 +122,7 @@ mod tests {
         texels
             .map(|(k, radiance)| {
                 let (row, column) = (k / map.width, k % map.width);
-                let cosine = map
-                    .direction(column as f64 + 0.5, row as f64 + 0.5)
-                    .dot(normal)
-                    .max(0.0);
+                let cosine = map.direction(column as f64 + 0.5, row as f64 + 0.5).dot(normal).max(0.0);
                 radiance.as_dvec3() * (cosine * map.solid_angle(row))
             })
             .sum()
@@ -174,17 +144,8 @@ mod tests {
 
     #[test]
     fn skies_have_sane_magnitudes_everywhere() {
-        for (name, map) in [
-            ("studio", studio()),
-            ("clear", clear_sky()),
-            ("overcast", overcast_sky()),
-        ] {
-            assert!(
-                map.texels
-                    .iter()
-                    .all(|t| t.is_finite() && t.min_element() > 0.0),
-                "{name}"
-            );
+        for (name, map) in [("studio", studio()), ("clear", clear_sky()), ("overcast", overcast_sky())] {
+            assert!(map.texels.iter().all(|t| t.is_finite() && t.min_element() > 0.0), "{name}");
             let front = luminance(irradiance(&map, DVec3::new(0.0, 0.6, 0.8)));
             eprintln!("{name}: irradiance on a surface tilted back {front:.3}");
             assert!((1.0..6.0).contains(&front), "{name}: {front}");

@@ -21,11 +21,7 @@ struct Moments {
 impl Moments {
     fn of(direction: DVec3, rgb: DVec3) -> Self {
         let energy = luminance(rgb);
-        Self {
-            energy,
-            direction: direction * energy,
-            rgb,
-        }
+        Self { energy, direction: direction * energy, rgb }
     }
 
     fn plus(self, other: Self) -> Self {
@@ -46,19 +42,12 @@ impl Moments {
 
     /// `Σ E |d - d̄|²`, as `|d| = 1`.
     fn spread(&self) -> f64 {
-        if self.energy > 0.0 {
-            (self.energy - self.direction.length_squared() / self.energy).max(0.0)
-        } else {
-            0.0
-        }
+        if self.energy > 0.0 { (self.energy - self.direction.length_squared() / self.energy).max(0.0) } else { 0.0 }
     }
 
     fn light(&self) -> DirectionalLight {
         let direction = self.direction.try_normalize().unwrap_or(DVec3::Y).as_vec3();
-        DirectionalLight {
-            direction,
-            irradiance: self.rgb.max(DVec3::ZERO).as_vec3(),
-        }
+        DirectionalLight { direction, irradiance: self.rgb.max(DVec3::ZERO).as_vec3() }
     }
 }
 
@@ -85,27 +74,16 @@ pub fn split(map: &LatLongMap, count: usize) -> Vec<DirectionalLight> {
     let mut lights = Vec::with_capacity(count);
     let taken = brightest_texels(map, total / count as f64, count);
     lights.extend(taken.iter().map(|&(_, moments)| moments.light()));
-    let sums = Sums::new(
-        map,
-        &taken.iter().map(|(texel, _)| *texel).collect::<Vec<_>>(),
-    );
-    let whole = Region {
-        columns: [0, map.width],
-        rows: [0, map.height],
-    };
+    let sums = Sums::new(map, &taken.iter().map(|(texel, _)| *texel).collect::<Vec<_>>());
+    let whole = Region { columns: [0, map.width], rows: [0, map.height] };
     if count == lights.len() || sums.over(whole).energy <= total * 1e-12 {
         return lights;
     }
     let mut regions = vec![sums.best_cut(whole)];
     while lights.len() + regions.len() < count {
         // The first of the largest: deterministic.
-        let Some(widest) = (0..regions.len()).reduce(|a, b| {
-            if regions[b].gain > regions[a].gain {
-                b
-            } else {
-                a
-            }
-        }) else {
+        let Some(widest) = (0..regions.len()).reduce(|a, b| if regions[b].gain > regions[a].gain { b } else { a })
+        else {
             break;
         };
         if regions[widest].gain <= total * 1e-12 {
@@ -116,10 +94,7 @@ pub fn split(map: &LatLongMap, count: usize) -> Vec<DirectionalLight> {
         regions.push(sums.best_cut(other));
     }
     lights.extend(
-        regions
-            .iter()
-            .map(|candidate| sums.over(candidate.region).light())
-            .filter(|l| l.irradiance != Vec3::ZERO),
+        regions.iter().map(|candidate| sums.over(candidate.region).light()).filter(|l| l.irradiance != Vec3::ZERO),
     );
     lights
 }
@@ -160,13 +135,9 @@ impl Sums {
                 let texel = row * map.width + column;
                 if !without.contains(&texel) {
                     let direction = map.direction(column as f64 + 0.5, row as f64 + 0.5);
-                    in_row = in_row.plus(Moments::of(
-                        direction,
-                        map.texels[texel].as_dvec3() * solid_angle,
-                    ));
+                    in_row = in_row.plus(Moments::of(direction, map.texels[texel].as_dvec3() * solid_angle));
                 }
-                table[(row + 1) * stride + column + 1] =
-                    table[row * stride + column + 1].plus(in_row);
+                table[(row + 1) * stride + column + 1] = table[row * stride + column + 1].plus(in_row);
             }
         }
         Self { stride, table }
@@ -176,51 +147,28 @@ impl Sums {
         let [left, right] = region.columns;
         let [top, bottom] = region.rows;
         let at = |row: usize, column: usize| self.table[row * self.stride + column];
-        at(bottom, right)
-            .minus(at(top, right))
-            .minus(at(bottom, left))
-            .plus(at(top, left))
+        at(bottom, right).minus(at(top, right)).minus(at(bottom, left)).plus(at(top, left))
     }
 
     fn best_cut(&self, region: Region) -> Candidate {
         let spread = self.over(region).spread();
-        let mut best = Candidate {
-            region,
-            gain: 0.0,
-            halves: [region; 2],
-        };
+        let mut best = Candidate { region, gain: 0.0, halves: [region; 2] };
         let mut consider = |one: Region, other: Region| {
             let gain = spread - self.over(one).spread() - self.over(other).spread();
             if gain > best.gain {
-                best = Candidate {
-                    region,
-                    gain,
-                    halves: [one, other],
-                };
+                best = Candidate { region, gain, halves: [one, other] };
             }
         };
         for cut in region.columns[0] + 1..region.columns[1] {
             consider(
-                Region {
-                    columns: [region.columns[0], cut],
-                    ..region
-                },
-                Region {
-                    columns: [cut, region.columns[1]],
-                    ..region
-                },
+                Region { columns: [region.columns[0], cut], ..region },
+                Region { columns: [cut, region.columns[1]], ..region },
             );
         }
         for cut in region.rows[0] + 1..region.rows[1] {
             consider(
-                Region {
-                    rows: [region.rows[0], cut],
-                    ..region
-                },
-                Region {
-                    rows: [cut, region.rows[1]],
-                    ..region
-                },
+                Region { rows: [region.rows[0], cut], ..region },
+                Region { rows: [cut, region.rows[1]], ..region },
             );
         }
         best
@@ -246,11 +194,7 @@ mod tests {
                 assert!(lights.len() <= count, "{name} {count}");
                 let relative = (sum(&lights) - map.total()).length() / map.total().length();
                 assert!(relative < 1e-6, "{name} {count}: {relative}");
-                assert!(
-                    lights
-                        .iter()
-                        .all(|l| (l.direction.length() - 1.0).abs() < 1e-5)
-                );
+                assert!(lights.iter().all(|l| (l.direction.length() - 1.0).abs() < 1e-5));
             }
         }
     }
@@ -262,10 +206,7 @@ mod tests {
         map.texels[row * 128 + column] = Vec3::new(9e4, 8e4, 6e4);
         let lights = split(&map, 16);
         let direction = map.direction(77.5, 20.5).as_vec3();
-        let own: Vec<_> = lights
-            .iter()
-            .filter(|l| l.direction.dot(direction) > 0.999_999)
-            .collect();
+        let own: Vec<_> = lights.iter().filter(|l| l.direction.dot(direction) > 0.999_999).collect();
         assert_eq!(own.len(), 1);
         let expected = DVec3::new(9e4, 8e4, 6e4) * map.solid_angle(row);
         assert!((own[0].irradiance.as_dvec3() - expected).length() / expected.length() < 1e-6);
@@ -297,10 +238,7 @@ mod tests {
                 let all = map.texels.iter().enumerate();
                 all.map(|(k, t)| {
                     let (row, column) = (k / map.width, k % map.width);
-                    let cosine = map
-                        .direction(column as f64 + 0.5, row as f64 + 0.5)
-                        .dot(*n)
-                        .max(0.0);
+                    let cosine = map.direction(column as f64 + 0.5, row as f64 + 0.5).dot(*n).max(0.0);
                     luminance(t.as_dvec3()) * cosine * map.solid_angle(row)
                 })
                 .sum()
@@ -311,23 +249,14 @@ mod tests {
             let of = |n: &DVec3| -> f64 {
                 lights
                     .iter()
-                    .map(|l| {
-                        luminance(l.irradiance.as_dvec3()) * l.direction.as_dvec3().dot(*n).max(0.0)
-                    })
+                    .map(|l| luminance(l.irradiance.as_dvec3()) * l.direction.as_dvec3().dot(*n).max(0.0))
                     .sum()
             };
-            let square: f64 = normals
-                .iter()
-                .zip(&exact)
-                .map(|(n, exact)| (of(n) - exact).powi(2))
-                .sum();
+            let square: f64 = normals.iter().zip(&exact).map(|(n, exact)| (of(n) - exact).powi(2)).sum();
             (square / exact.iter().map(|e| e * e).sum::<f64>()).sqrt()
         };
         let errors = [8, 32, 128].map(error);
         eprintln!("studio: relative irradiance error with 8, 32, 128 lights: {errors:?}");
-        assert!(
-            errors[0] < 0.15 && errors[1] < 0.05 && errors[2] < 0.02,
-            "{errors:?}"
-        );
+        assert!(errors[0] < 0.15 && errors[1] < 0.05 && errors[2] < 0.02, "{errors:?}");
     }
 }

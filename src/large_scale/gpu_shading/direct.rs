@@ -49,10 +49,13 @@ impl GpuShading {
     pub(super) fn direct_passes(&mut self, gpu: &Gpu, form: &Direct, shadowed: bool) -> Result<Vec<Pass>, GpuError> {
         let groups = form.sum.groups();
         if groups.iter().any(|group| !group.measured.is_empty() && group.color != Vec3::ZERO) {
-            return Err(GpuError::Unsupported("tables of measured BRDFs are summed over facets on the CPU only".to_owned()));
+            return Err(GpuError::Unsupported(
+                "tables of measured BRDFs are summed over facets on the CPU only".to_owned(),
+            ));
         }
         let facet_count = form.sum.facet_count();
-        let (blank, see) = (Sum { facet_count: facet_count as u32, ..Sum::default() }, visibility_file(&form.visibility));
+        let (blank, see) =
+            (Sum { facet_count: facet_count as u32, ..Sum::default() }, visibility_file(&form.visibility));
         let blank = with_visibility(blank, &form.visibility);
         let mut patches: Vec<Patch> = Vec::new();
         let mut shared = Shared {

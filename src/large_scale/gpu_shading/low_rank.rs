@@ -98,5 +98,14 @@ fn add_channel(channel: &Channel, u: &mut Vec<f32>, p: &mut Vec<f32>) -> Row {
         Tint::Term(term, color) => (base_tint(term), f32::from(u8::from(term.has_fresnel())), *color),
         Tint::Fixed(color) => (Vec3::ONE, 0.0, *color),
     };
-    Row { first_u, first_p, columns: columns as u32, is_table: u32::from(channel.p.is_none()), tint, follows, color, pad: 0 }
+    Row {
+        first_u,
+        first_p,
+        columns: columns as u32,
+        is_table: u32::from(channel.p.is_none()),
+        tint,
+        follows,
+        color,
+        pad: 0,
+    }
 }

@@ -104,7 +104,9 @@ impl GpuShading {
         let passes = match &brdf.form {
             Form::Direct(form) => self.direct_passes(gpu, form, shadowed)?,
             Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
-            Form::Wu2011(_) => return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned())),
+            Form::Wu2011(_) => {
+                return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
+            }
         };
         Ok(GpuMaterial { passes, least_area: (1e-12 * brdf.base_area) as f32, shadowed })
     }
@@ -131,9 +133,11 @@ impl GpuShading {
         if material.shadowed && visible.is_none() {
             return Err(GpuError::Unsupported("shadows without an occluder".to_owned()));
         }
-        let point_data: Vec<[Padded; 3]> =
-            (0..points.len()).map(|k| [points.positions[k], points.normals[k], points.tangents[k]].map(padded)).collect();
-        let light_data: Vec<[Padded; 2]> = lights.iter().map(|light| [light.direction, light.irradiance].map(padded)).collect();
+        let point_data: Vec<[Padded; 3]> = (0..points.len())
+            .map(|k| [points.positions[k], points.normals[k], points.tangents[k]].map(padded))
+            .collect();
+        let light_data: Vec<[Padded; 2]> =
+            lights.iter().map(|light| [light.direction, light.irradiance].map(padded)).collect();
         let params = gpu.buffer("parameters", size_of::<Params>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
         let radiance = gpu.buffer("radiance", (16 * points.len() * slices) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
@@ -195,7 +199,8 @@ impl GpuShading {
             Second::Facets => &self.facets,
             Second::Factors => &self.factors,
         };
-        let pipeline = gpu.compute_pipeline_with(&module, variant.entry_point, &[&self.points, layout], &variant.constants)?;
+        let pipeline =
+            gpu.compute_pipeline_with(&module, variant.entry_point, &[&self.points, layout], &variant.constants)?;
         self.compiled.push((variant, pipeline.clone()));
         Ok(pipeline)
     }
@@ -210,7 +215,8 @@ enum Second {
 
 impl GpuMaterial {
     fn points_of_a_batch(&self, lights: usize) -> usize {
-        let work: u64 = self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum();
+        let work: u64 =
+            self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum();
         let most = u64::from(MAX_GROUPS * THREADS);
         (BATCH_WORK / work.max(1)).clamp(u64::from(THREADS), most) as usize
     }

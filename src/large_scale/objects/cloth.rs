@@ -27,22 +27,16 @@ pub(super) fn pillow() -> ObjectMesh {
 fn panel(u: f64, v: f64) -> DVec3 {
     let (s, t) = ((2.0 * u - 1.0) * FRAC_PI_2, (2.0 * v - 1.0) * FRAC_PI_2);
     let (x, y) = (s.sin(), t.sin());
-    let puff = (s.cos().max(0.0) * t.cos().max(0.0)).powf(1.15)
-        * ((1.0 + 0.6 * x * x) * (1.0 + 0.6 * y * y));
+    let puff = (s.cos().max(0.0) * t.cos().max(0.0)).powf(1.15) * ((1.0 + 0.6 * x * x) * (1.0 + 0.6 * y * y));
     let pucker = |along: f64, across: f64, phase: f64| {
-        let waves = (9.0 * along + 1.3 * (3.0 * along + phase).sin() + phase).cos()
-            + 0.5 * (17.0 * along + 2.0 * phase).cos();
+        let waves =
+            (9.0 * along + 1.3 * (3.0 * along + phase).sin() + phase).cos() + 0.5 * (17.0 * along + 2.0 * phase).cos();
         waves * across.powi(4) * (1.0 - along.powi(4))
     };
     let side = |value: f64, a: f64, b: f64| if value < 0.0 { a } else { b };
     let puckers = pucker(y, x, side(x, 0.4, 2.1)) + pucker(x, y, side(y, 1.2, 3.3));
-    let drawn_in =
-        |along: f64, across: f64| across * (1.0 - 0.11 * (1.0 - along * along) * across * across);
-    DVec3::new(
-        drawn_in(y, x),
-        drawn_in(x, y),
-        0.44 * puff * (1.0 + 0.13 * puckers),
-    )
+    let drawn_in = |along: f64, across: f64| across * (1.0 - 0.11 * (1.0 - along * along) * across * across);
+    DVec3::new(drawn_in(y, x), drawn_in(x, y), 0.44 * puff * (1.0 + 0.13 * puckers))
 }
 
 /// Folds around the skirt.
@@ -62,12 +56,9 @@ fn drape(u: f64, v: f64) -> DVec3 {
     let fall = 1.0 - v;
     let below_band = ((fall - 0.05) / 0.95).max(0.0);
     // Whole numbers of waves around, so that the sheet closes; the sines vary the folds' spacing.
-    let phase = FOLDS * angle
-        + 0.75 * (2.0 * angle + 1.0).sin()
-        + 0.6 * (3.0 * angle + 2.2).sin()
-        + 0.35 * (5.0 * angle).cos();
-    let depth = (0.125 + 0.035 * (2.0 * angle + 0.7).cos() + 0.03 * (5.0 * angle + 1.0).sin())
-        * below_band.powf(1.25);
+    let phase =
+        FOLDS * angle + 0.75 * (2.0 * angle + 1.0).sin() + 0.6 * (3.0 * angle + 2.2).sin() + 0.35 * (5.0 * angle).cos();
+    let depth = (0.125 + 0.035 * (2.0 * angle + 0.7).cos() + 0.03 * (5.0 * angle + 1.0).sin()) * below_band.powf(1.25);
     let cone = 0.27 + 0.27 * below_band.powf(1.1) + 0.09 * smooth_step(below_band / 0.4);
     let radius = cone + depth * phase.cos();
     let bulge = 0.45 * below_band.powf(0.8) * phase.sin() / FOLDS;

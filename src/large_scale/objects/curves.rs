@@ -21,37 +21,23 @@ impl Spline {
         let total = knots[knots.len() - 1];
         knots.iter_mut().for_each(|knot| *knot /= total);
         let curvatures = natural_curvatures(&points, &knots);
-        Self {
-            points,
-            knots,
-            curvatures,
-        }
+        Self { points, knots, curvatures }
     }
 
     /// The point at `t`, and a little beyond [0, 1] along the end pieces.
     pub fn at(&self, t: f64) -> DVec3 {
         let last = self.points.len() - 2;
-        let piece = self
-            .knots
-            .partition_point(|knot| *knot <= t)
-            .saturating_sub(1)
-            .min(last);
+        let piece = self.knots.partition_point(|knot| *knot <= t).saturating_sub(1).min(last);
         let width = self.knots[piece + 1] - self.knots[piece];
-        let (a, b) = (
-            (self.knots[piece + 1] - t) / width,
-            (t - self.knots[piece]) / width,
-        );
-        let bend = (self.curvatures[piece] * (a * a * a - a)
-            + self.curvatures[piece + 1] * (b * b * b - b))
+        let (a, b) = ((self.knots[piece + 1] - t) / width, (t - self.knots[piece]) / width);
+        let bend = (self.curvatures[piece] * (a * a * a - a) + self.curvatures[piece + 1] * (b * b * b - b))
             * (width * width / 6.0);
         self.points[piece] * a + self.points[piece + 1] * b + bend
     }
 
     /// Unit tangent at `t`.
     pub fn tangent(&self, t: f64) -> DVec3 {
-        (self.at(t + 1e-5) - self.at(t - 1e-5))
-            .try_normalize()
-            .unwrap_or(DVec3::Y)
+        (self.at(t + 1e-5) - self.at(t - 1e-5)).try_normalize().unwrap_or(DVec3::Y)
     }
 }
 
@@ -75,16 +61,8 @@ fn natural_curvatures(points: &[DVec3], knots: &[f64]) -> Vec<DVec3> {
 }
 
 enum Piece {
-    Line {
-        from: DVec2,
-        to: DVec2,
-    },
-    Arc {
-        center: DVec2,
-        radius: f64,
-        start: f64,
-        sweep: f64,
-    },
+    Line { from: DVec2, to: DVec2 },
+    Arc { center: DVec2, radius: f64, start: f64, sweep: f64 },
 }
 
 impl Piece {
@@ -98,12 +76,9 @@ impl Piece {
     fn at(&self, fraction: f64) -> DVec2 {
         match self {
             Self::Line { from, to } => from.lerp(*to, fraction),
-            Self::Arc {
-                center,
-                radius,
-                start,
-                sweep,
-            } => *center + DVec2::from_angle(start + sweep * fraction) * *radius,
+            Self::Arc { center, radius, start, sweep } => {
+                *center + DVec2::from_angle(start + sweep * fraction) * *radius
+            }
         }
     }
 }
@@ -123,10 +98,8 @@ impl RoundedPolyline {
         let mut from = point(corners[0]);
         for three in corners.windows(3) {
             let corner = point(three[1]);
-            let (back, on) = (
-                (point(three[0]) - corner).normalize_or_zero(),
-                (point(three[2]) - corner).normalize_or_zero(),
-            );
+            let (back, on) =
+                ((point(three[0]) - corner).normalize_or_zero(), (point(three[2]) - corner).normalize_or_zero());
             let turn = (-back).angle_to(on);
             let radius = three[1].2;
             let cut = radius * (turn.abs() / 2.0).tan();
@@ -134,18 +107,10 @@ impl RoundedPolyline {
             pieces.push(Piece::Line { from, to: start });
             let inward = back.perp() * -turn.signum();
             let center = start + inward * radius;
-            pieces.push(Piece::Arc {
-                center,
-                radius,
-                start: (-inward).to_angle(),
-                sweep: turn,
-            });
+            pieces.push(Piece::Arc { center, radius, start: (-inward).to_angle(), sweep: turn });
             from = corner + on * cut;
         }
-        pieces.push(Piece::Line {
-            from,
-            to: point(corners[corners.len() - 1]),
-        });
+        pieces.push(Piece::Line { from, to: point(corners[corners.len() - 1]) });
         let total: f64 = pieces.iter().map(Piece::length).sum();
         let ends = pieces
             .iter()
@@ -158,10 +123,7 @@ impl RoundedPolyline {
     }
 
     pub fn at(&self, t: f64) -> DVec2 {
-        let k = self
-            .ends
-            .partition_point(|end| *end < t)
-            .min(self.pieces.len() - 1);
+        let k = self.ends.partition_point(|end| *end < t).min(self.pieces.len() - 1);
         let start = if k == 0 { 0.0 } else { self.ends[k - 1] };
         self.pieces[k].at((t - start) / (self.ends[k] - start))
     }
@@ -194,11 +156,7 @@ mod tests {
         }
         let line = Spline::through(&[[0.0, 0.0], [1.0, 1.0], [4.0, 4.0]]);
         assert!(line.at(0.5).distance(DVec3::new(2.0, 2.0, 0.0)) < 1e-12);
-        assert!(
-            line.tangent(0.3)
-                .distance(DVec3::new(0.5f64.sqrt(), 0.5f64.sqrt(), 0.0))
-                < 1e-9
-        );
+        assert!(line.tangent(0.3).distance(DVec3::new(0.5f64.sqrt(), 0.5f64.sqrt(), 0.0)) < 1e-9);
     }
 
     #[test]

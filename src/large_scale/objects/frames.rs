@@ -8,11 +8,7 @@ use glam::{DVec3, Vec2, Vec3};
 pub(super) fn perpendicular(along: DVec3, normal: DVec3) -> DVec3 {
     let along = along.try_normalize().unwrap_or_default();
     let across = along - normal * along.dot(normal);
-    if across.length_squared() > 1e-12 {
-        across.normalize_or_zero()
-    } else {
-        normal.any_orthonormal_vector()
-    }
+    if across.length_squared() > 1e-12 { across.normalize_or_zero() } else { normal.any_orthonormal_vector() }
 }
 
 /// Normals averaged over the triangles of each *place* (vertices split at a UV seam stay smooth), weighted by area.
@@ -26,15 +22,7 @@ pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<
             sums[places[k as usize] as usize] += area_vector;
         }
     }
-    places
-        .iter()
-        .map(|&place| {
-            sums[place as usize]
-                .try_normalize()
-                .unwrap_or(DVec3::Y)
-                .as_vec3()
-        })
-        .collect()
+    places.iter().map(|&place| sums[place as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3()).collect()
 }
 
 /// For each vertex, the first vertex at exactly the same place.
@@ -42,11 +30,7 @@ pub(super) fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first_at = HashMap::with_capacity(positions.len());
     // Adding zero makes -0 and 0 the same place.
     let key = |p: &Vec3| (*p + Vec3::ZERO).to_array().map(f32::to_bits);
-    positions
-        .iter()
-        .enumerate()
-        .map(|(k, p)| *first_at.entry(key(p)).or_insert(k as u32))
-        .collect()
+    positions.iter().enumerate().map(|(k, p)| *first_at.entry(key(p)).or_insert(k as u32)).collect()
 }
 
 /// Tangents along ∂P/∂u averaged over the triangles of each vertex (weighted by area), and the number of triangles
@@ -87,11 +71,7 @@ pub(super) fn tangents_from_uvs(
 /// vertical. For meshes without UVs.
 pub(super) fn around_vertical(normal: DVec3) -> DVec3 {
     let tangent = DVec3::Y.cross(normal);
-    if tangent.length_squared() > 1e-12 {
-        tangent.normalize_or_zero()
-    } else {
-        perpendicular(DVec3::X, normal)
-    }
+    if tangent.length_squared() > 1e-12 { tangent.normalize_or_zero() } else { perpendicular(DVec3::X, normal) }
 }
 
 #[cfg(test)]
@@ -101,20 +81,11 @@ mod tests {
     #[test]
     fn smoothed_normals_of_a_cube_corner_are_the_area_weighted_mean() {
         // Three faces of areas 1, 2, 2 (as triangles) meet at the origin.
-        let positions = [
-            Vec3::ZERO,
-            Vec3::X,
-            Vec3::Y,
-            Vec3::new(0.0, 0.0, 2.0),
-            Vec3::ZERO,
-        ];
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(0.0, 0.0, 2.0), Vec3::ZERO];
         let normals = smooth_normals(&positions, &[[0, 1, 2], [4, 2, 3], [0, 3, 1]]);
         let expected = Vec3::new(2.0, 2.0, 1.0) / 3.0;
         assert!((normals[0] - expected).length() < 1e-6);
-        assert_eq!(
-            normals[0], normals[4],
-            "split vertices share the normal of their place"
-        );
+        assert_eq!(normals[0], normals[4], "split vertices share the normal of their place");
     }
 
     #[test]
@@ -123,19 +94,11 @@ mod tests {
         let normals = [Vec3::Z; 3];
         let uvs = [Vec2::ZERO, Vec2::new(0.0, 1.0), Vec2::new(-1.0, 0.0)];
         let (tangents, mirrored) = tangents_from_uvs(&positions, &normals, &uvs, &[[0, 1, 2]]);
-        assert!(
-            (tangents[0] - Vec3::NEG_Y).length() < 1e-6,
-            "{}",
-            tangents[0]
-        );
+        assert!((tangents[0] - Vec3::NEG_Y).length() < 1e-6, "{}", tangents[0]);
         assert_eq!(mirrored, 0);
         let uvs = [Vec2::ZERO, Vec2::new(-1.0, 0.0), Vec2::new(0.0, 1.0)];
         let (tangents, mirrored) = tangents_from_uvs(&positions, &normals, &uvs, &[[0, 1, 2]]);
-        assert!(
-            (tangents[0] - Vec3::NEG_X).length() < 1e-6,
-            "{}",
-            tangents[0]
-        );
+        assert!((tangents[0] - Vec3::NEG_X).length() < 1e-6, "{}", tangents[0]);
         assert_eq!(mirrored, 1);
     }
 }

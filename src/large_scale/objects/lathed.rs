@@ -19,11 +19,7 @@ pub(super) fn lathe(profile: impl Fn(f64) -> DVec2) -> impl Fn(f64, f64) -> DVec
 
 /// Sweeps an ellipse along a curve of the xy plane. `course(v)` gives the place on the curve and the scale there;
 /// `half_axes` are those in the curve's plane and across it.
-pub(super) fn sweep(
-    path: &Spline,
-    half_axes: [f64; 2],
-    course: impl Fn(f64) -> DVec2,
-) -> impl Fn(f64, f64) -> DVec3 {
+pub(super) fn sweep(path: &Spline, half_axes: [f64; 2], course: impl Fn(f64) -> DVec2) -> impl Fn(f64, f64) -> DVec3 {
     move |u, v| {
         let DVec2 { x: place, y: scale } = course(v);
         let side = DVec3::Z.cross(path.tangent(place));
@@ -43,17 +39,8 @@ pub(super) fn sphere() -> ObjectMesh {
 /// An upright solid cylinder of radius 0.6 and height 1.6 with softened edges.
 pub(super) fn cylinder() -> ObjectMesh {
     let mut builder = MeshBuilder::default();
-    let profile = RoundedPolyline::new(&[
-        (0.0, -0.8, 0.0),
-        (0.6, -0.8, 0.025),
-        (0.6, 0.8, 0.025),
-        (0.0, 0.8, 0.0),
-    ]);
-    builder.add_patch(
-        &evenly(128),
-        &profile.parameters(0.2, 8),
-        lathe(|v| profile.at(v)),
-    );
+    let profile = RoundedPolyline::new(&[(0.0, -0.8, 0.0), (0.6, -0.8, 0.025), (0.6, 0.8, 0.025), (0.0, 0.8, 0.0)]);
+    builder.add_patch(&evenly(128), &profile.parameters(0.2, 8), lathe(|v| profile.at(v)));
     builder.finish(false)
 }
 
@@ -74,11 +61,7 @@ pub(super) fn plate() -> ObjectMesh {
         (0.58, 0.035, 0.20),
         (0.0, 0.030, 0.0),
     ]);
-    builder.add_patch(
-        &evenly(128),
-        &profile.parameters(0.2, 4),
-        lathe(|v| profile.at(v)),
-    );
+    builder.add_patch(&evenly(128), &profile.parameters(0.2, 4), lathe(|v| profile.at(v)));
     builder.lay_tangents_along(DVec3::X);
     builder.rotate(DQuat::from_rotation_x(56f64.to_radians()));
     builder.finish(false)
@@ -97,11 +80,7 @@ pub(super) fn cup() -> ObjectMesh {
         (0.39, 0.06, 0.09),
         (0.0, 0.06, 0.0),
     ]);
-    builder.add_patch(
-        &evenly(112),
-        &profile.parameters(0.25, 12),
-        lathe(|v| profile.at(v)),
-    );
+    builder.add_patch(&evenly(112), &profile.parameters(0.25, 12), lathe(|v| profile.at(v)));
     let path = Spline::through(&[
         [0.455, 0.82],
         [0.62, 0.86],
@@ -111,10 +90,6 @@ pub(super) fn cup() -> ObjectMesh {
         [0.61, 0.23],
         [0.43, 0.22],
     ]);
-    builder.add_patch(
-        &evenly(24),
-        &evenly(48),
-        sweep(&path, [0.040, 0.062], |v| DVec2::new(v, 1.0)),
-    );
+    builder.add_patch(&evenly(24), &evenly(48), sweep(&path, [0.040, 0.062], |v| DVec2::new(v, 1.0)));
     builder.finish(false)
 }

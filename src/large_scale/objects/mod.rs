@@ -16,9 +16,7 @@ use crate::error::{InputError, Result};
 use crate::scene;
 
 /// Names that `object.kind` takes.
-pub const KINDS: [&str; 8] = [
-    "sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh",
-];
+pub const KINDS: [&str; 8] = ["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh"];
 
 /// An object in its own world: y up, about two units in size (OBJ files are moved to the origin and scaled to radius 1).
 ///
@@ -49,10 +47,7 @@ pub struct Bounds {
 
 impl Default for Bounds {
     fn default() -> Self {
-        Self {
-            center: Vec3::ZERO,
-            radius: 1.0,
-        }
+        Self { center: Vec3::ZERO, radius: 1.0 }
     }
 }
 
@@ -62,18 +57,10 @@ impl Bounds {
         let Some(&first) = positions.first() else {
             return Self::default();
         };
-        let (low, high) = positions
-            .iter()
-            .fold((first, first), |(low, high), p| (low.min(*p), high.max(*p)));
+        let (low, high) = positions.iter().fold((first, first), |(low, high), p| (low.min(*p), high.max(*p)));
         let center = 0.5 * low + 0.5 * high;
-        let radius = positions
-            .iter()
-            .map(|p| p.distance(center))
-            .fold(0.0, f32::max);
-        Self {
-            center,
-            radius: radius.max(f32::MIN_POSITIVE),
-        }
+        let radius = positions.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
+        Self { center, radius: radius.max(f32::MIN_POSITIVE) }
     }
 }
 
@@ -102,26 +89,17 @@ pub fn build(object: &scene::Object, base_dir: &Path) -> Result<ObjectMesh> {
         "teapot" => Ok(teapot::teapot()),
         "mesh" => match &object.path {
             Some(path) => obj::load(&base_dir.join(path)),
-            None => Err(InputError::new(
-                "object.path",
-                "nothing",
-                "the path of an .obj file, as kind is \"mesh\"",
-            )
-            .into()),
+            None => {
+                Err(InputError::new("object.path", "nothing", "the path of an .obj file, as kind is \"mesh\"").into())
+            }
         },
         unknown => Err(unknown_kind(unknown).into()),
     }
 }
 
 fn unknown_kind(kind: &str) -> InputError {
-    let error = InputError::new(
-        "object.kind",
-        format!("\"{kind}\""),
-        format!("one of {}", KINDS.join(", ")),
-    );
-    let nearest = KINDS
-        .iter()
-        .min_by_key(|known| strsim::damerau_levenshtein(kind, known));
+    let error = InputError::new("object.kind", format!("\"{kind}\""), format!("one of {}", KINDS.join(", ")));
+    let nearest = KINDS.iter().min_by_key(|known| strsim::damerau_levenshtein(kind, known));
     match nearest {
         Some(known) if strsim::damerau_levenshtein(kind, known) <= 3 => {
             error.with_hint(format!("did you mean \"{known}\"?"))
@@ -135,14 +113,7 @@ mod tests {
     use super::*;
 
     fn of_kind(kind: &str) -> ObjectMesh {
-        build(
-            &scene::Object {
-                kind: kind.to_owned(),
-                path: None,
-            },
-            Path::new("."),
-        )
-        .unwrap()
+        build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap()
     }
 
     #[test]
@@ -151,20 +122,14 @@ mod tests {
             let mesh = of_kind(kind);
             assert!(mesh.triangles.len() > 500, "{kind}");
             for (n, t) in mesh.normals.iter().zip(&mesh.tangents) {
-                assert!(
-                    (n.length() - 1.0).abs() < 1e-5 && (t.length() - 1.0).abs() < 1e-5,
-                    "{kind}"
-                );
+                assert!((n.length() - 1.0).abs() < 1e-5 && (t.length() - 1.0).abs() < 1e-5, "{kind}");
                 assert!(n.dot(*t).abs() < 1e-5, "{kind}");
             }
             for (k, triangle) in mesh.triangles.iter().enumerate() {
                 let [a, b, c] = mesh.corners(k);
                 let geometric = (b - a).cross(c - a);
                 let shading: Vec3 = triangle.iter().map(|&v| mesh.normals[v as usize]).sum();
-                assert!(
-                    geometric.dot(shading) > 0.0,
-                    "{kind}: triangle {k} faces away from its normals"
-                );
+                assert!(geometric.dot(shading) > 0.0, "{kind}: triangle {k} faces away from its normals");
             }
         }
     }
@@ -176,10 +141,7 @@ mod tests {
             let mesh = of_kind(kind);
             let mut by_place = std::collections::HashMap::<[i64; 3], Vec<usize>>::new();
             for (k, p) in mesh.positions.iter().enumerate() {
-                by_place
-                    .entry(p.to_array().map(|x| (f64::from(x) * 1e5).round() as i64))
-                    .or_default()
-                    .push(k);
+                by_place.entry(p.to_array().map(|x| (f64::from(x) * 1e5).round() as i64)).or_default().push(k);
             }
             let seams: Vec<_> = by_place.values().filter(|group| group.len() == 2).collect();
             assert!(seams.len() > 20, "{kind}: {} seam vertices", seams.len());
@@ -202,40 +164,17 @@ mod tests {
                 .sum()
         };
         let sphere = volume(&of_kind("sphere"));
-        assert!(
-            (sphere / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.005,
-            "{sphere}"
-        );
+        assert!((sphere / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.005, "{sphere}");
         let cylinder = volume(&of_kind("cylinder"));
-        assert!(
-            (cylinder / (std::f64::consts::PI * 0.6 * 0.6 * 1.6) - 1.0).abs() < 0.02,
-            "{cylinder}"
-        );
+        assert!((cylinder / (std::f64::consts::PI * 0.6 * 0.6 * 1.6) - 1.0).abs() < 0.02, "{cylinder}");
     }
 
     #[test]
     fn an_unknown_kind_names_the_nearest() {
-        let error = build(
-            &scene::Object {
-                kind: "teapod".to_owned(),
-                path: None,
-            },
-            Path::new("."),
-        )
-        .unwrap_err();
+        let error = build(&scene::Object { kind: "teapod".to_owned(), path: None }, Path::new(".")).unwrap_err();
         assert_eq!(error.exit_code(), 2);
-        assert!(
-            error.to_string().contains("did you mean \"teapot\""),
-            "{error}"
-        );
-        let far = build(
-            &scene::Object {
-                kind: "xylophones".to_owned(),
-                path: None,
-            },
-            Path::new("."),
-        )
-        .unwrap_err();
+        assert!(error.to_string().contains("did you mean \"teapot\""), "{error}");
+        let far = build(&scene::Object { kind: "xylophones".to_owned(), path: None }, Path::new(".")).unwrap_err();
         assert!(!far.to_string().contains("did you mean"), "{far}");
     }
 }

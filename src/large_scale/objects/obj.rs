@@ -19,29 +19,19 @@ pub(super) fn load(path: &Path) -> Result<ObjectMesh> {
     let unreadable = |what: &dyn std::fmt::Display| {
         Error::from(InputError::new("object.path", what, "a readable OBJ file").in_file(path))
     };
-    let size = std::fs::metadata(path)
-        .map_err(|error| unreadable(&error))?
-        .len();
+    let size = std::fs::metadata(path).map_err(|error| unreadable(&error))?.len();
     if size > MAX_BYTES {
-        return Err(unreadable(&format!(
-            "{size} bytes (at most {MAX_BYTES} are read)"
-        )));
+        return Err(unreadable(&format!("{size} bytes (at most {MAX_BYTES} are read)")));
     }
     let bytes = std::fs::read(path).map_err(|error| unreadable(&error))?;
-    let text =
-        String::from_utf8(bytes).map_err(|_| unreadable(&"bytes that are not UTF-8 text"))?;
+    let text = String::from_utf8(bytes).map_err(|_| unreadable(&"bytes that are not UTF-8 text"))?;
     parse(&text).map_err(|error| error.in_file(path))
 }
 
 /// See [`load`].
 fn parse(text: &str) -> Result<ObjectMesh> {
     check_lines(text)?;
-    let options = tobj::LoadOptions {
-        single_index: true,
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-    };
+    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let no_materials = |_: &Path| Ok((Vec::new(), HashMap::new()));
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials)
         .map_err(|error| InputError::new("", error, "an OBJ file that tobj can read"))?;
@@ -65,25 +55,15 @@ fn check_lines(text: &str) -> Result<()> {
             "v" | "vt" | "vn" => {
                 let needed = if keyword == "vt" { 1 } else { 3 };
                 let values: Vec<&str> = words.collect();
-                let bad = values
-                    .iter()
-                    .find(|value| !value.parse::<f32>().is_ok_and(f32::is_finite));
+                let bad = values.iter().find(|value| !value.parse::<f32>().is_ok_and(f32::is_finite));
                 if let Some(bad) = bad {
-                    return Err(InputError::new(
-                        at(),
-                        format!("{bad} in a {keyword} line"),
-                        "finite numbers",
-                    )
-                    .into());
+                    return Err(InputError::new(at(), format!("{bad} in a {keyword} line"), "finite numbers").into());
                 }
                 if values.len() < needed {
                     let found = format!("{} numbers in a {keyword} line", values.len());
                     return Err(InputError::new(at(), found, format!("at least {needed}")).into());
                 }
-                counts[["v", "vt", "vn"]
-                    .iter()
-                    .position(|known| *known == keyword)
-                    .unwrap_or(0)] += 1;
+                counts[["v", "vt", "vn"].iter().position(|known| *known == keyword).unwrap_or(0)] += 1;
             }
             "f" => {
                 faces += 1;
@@ -93,12 +73,7 @@ fn check_lines(text: &str) -> Result<()> {
                     check_corner(corner, number, &counts, &mut largest)?;
                 }
                 if corners < 3 {
-                    return Err(InputError::new(
-                        at(),
-                        format!("a face of {corners} corners"),
-                        "at least 3",
-                    )
-                    .into());
+                    return Err(InputError::new(at(), format!("a face of {corners} corners"), "at least 3").into());
                 }
             }
             _ => {}
@@ -120,18 +95,9 @@ fn check_lines(text: &str) -> Result<()> {
     Ok(())
 }
 
-fn check_corner(
-    corner: &str,
-    line: usize,
-    counts: &[i64; 3],
-    largest: &mut [(i64, usize); 3],
-) -> Result<()> {
+fn check_corner(corner: &str, line: usize, counts: &[i64; 3], largest: &mut [(i64, usize); 3]) -> Result<()> {
     let malformed = |expected: &str| {
-        InputError::new(
-            format!("line {line}"),
-            format!("\"{corner}\" in a face"),
-            expected.to_owned(),
-        )
+        InputError::new(format!("line {line}"), format!("\"{corner}\" in a face"), expected.to_owned())
     };
     for (slot, part) in corner.split('/').enumerate() {
         if slot > 2 {
@@ -140,14 +106,9 @@ fn check_corner(
         if part.is_empty() && slot > 0 {
             continue;
         }
-        let index: i64 = part
-            .parse()
-            .map_err(|_| malformed("whole numbers as v, v/vt, v//vn or v/vt/vn"))?;
+        let index: i64 = part.parse().map_err(|_| malformed("whole numbers as v, v/vt, v//vn or v/vt/vn"))?;
         if index == 0 || index < -counts[slot] {
-            return Err(malformed(
-                "indices from 1, or negative ones that count back over lines above",
-            )
-            .into());
+            return Err(malformed("indices from 1, or negative ones that count back over lines above").into());
         }
         if index > largest[slot].0 {
             largest[slot] = (index, line);
@@ -168,26 +129,17 @@ struct RawMesh {
 impl RawMesh {
     fn append(&mut self, mesh: &tobj::Mesh) {
         let base = self.positions.len() as u32;
-        let triples = |values: &[f32]| {
-            values
-                .chunks_exact(3)
-                .map(Vec3::from_slice)
-                .collect::<Vec<_>>()
-        };
+        let triples = |values: &[f32]| values.chunks_exact(3).map(Vec3::from_slice).collect::<Vec<_>>();
         self.positions.extend(triples(&mesh.positions));
         // Vertices of one model may lack what others have; then the arrays do not line up and cannot be used.
         if mesh.normals.len() == mesh.positions.len() {
             self.normals.extend(triples(&mesh.normals));
         }
         if mesh.texcoords.len() / 2 == mesh.positions.len() / 3 {
-            self.uvs
-                .extend(mesh.texcoords.chunks_exact(2).map(Vec2::from_slice));
+            self.uvs.extend(mesh.texcoords.chunks_exact(2).map(Vec2::from_slice));
         }
-        self.triangles.extend(
-            mesh.indices
-                .chunks_exact(3)
-                .map(|corner| [corner[0] + base, corner[1] + base, corner[2] + base]),
-        );
+        self.triangles
+            .extend(mesh.indices.chunks_exact(3).map(|corner| [corner[0] + base, corner[1] + base, corner[2] + base]));
     }
 
     /// Moves the mesh to the origin and scales it to radius 1: no later stage need fear tiny or huge units.
@@ -200,9 +152,7 @@ impl RawMesh {
         let center = 0.5 * (low + high);
         let radius = wide().map(|p| p.distance(center)).fold(0.0, f64::max);
         if radius > 0.0 {
-            self.positions
-                .iter_mut()
-                .for_each(|p| *p = ((p.as_dvec3() - center) / radius).as_vec3());
+            self.positions.iter_mut().for_each(|p| *p = ((p.as_dvec3() - center) / radius).as_vec3());
         }
     }
 
@@ -214,34 +164,20 @@ impl RawMesh {
             let [a, b, c] = triangle.map(|k| self.positions[k as usize].as_dvec3());
             (b - a).cross(c - a)
         };
-        self.triangles
-            .retain(|triangle| area_vector(triangle).length_squared() > 0.0);
+        self.triangles.retain(|triangle| area_vector(triangle).length_squared() > 0.0);
         if self.triangles.is_empty() {
-            return Err(InputError::new(
-                "",
-                format!("{all} triangles, none with an area"),
-                "a surface",
-            )
-            .into());
+            return Err(InputError::new("", format!("{all} triangles, none with an area"), "a surface").into());
         }
         if self.triangles.len() < all {
-            warnings.push(format!(
-                "{} of {all} triangles have no area and are left out",
-                all - self.triangles.len()
-            ));
+            warnings.push(format!("{} of {all} triangles have no area and are left out", all - self.triangles.len()));
         }
         let places = frames::weld(&self.positions);
         let closed = is_closed(&places, &self.triangles);
         let mut inside_out = false;
         if closed && signed_volume(&self.positions, &self.triangles) < 0.0 {
             inside_out = true;
-            warnings.push(
-                "the mesh is closed but its triangles face inwards; they are turned around"
-                    .to_owned(),
-            );
-            self.triangles
-                .iter_mut()
-                .for_each(|triangle| triangle.swap(1, 2));
+            warnings.push("the mesh is closed but its triangles face inwards; they are turned around".to_owned());
+            self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let normals = self.normals(inside_out, &mut warnings);
         let tangents = self.tangents(&normals, &mut warnings);
@@ -265,39 +201,29 @@ impl RawMesh {
             return smooth();
         }
         let sign = if inside_out { -1.0 } else { 1.0 };
-        let unit: Vec<_> = self
-            .normals
-            .iter()
-            .map(|n| n.as_dvec3().try_normalize().map(|n| (n * sign).as_vec3()))
-            .collect();
+        let unit: Vec<_> =
+            self.normals.iter().map(|n| n.as_dvec3().try_normalize().map(|n| (n * sign).as_vec3())).collect();
         if unit.iter().all(Option::is_some) {
             return unit.into_iter().flatten().collect();
         }
         warnings.push("some normals have no length; smoothed ones take their place".to_owned());
-        unit.into_iter()
-            .zip(smooth())
-            .map(|(given, made)| given.unwrap_or(made))
-            .collect()
+        unit.into_iter().zip(smooth()).map(|(given, made)| given.unwrap_or(made)).collect()
     }
 
     fn tangents(&self, normals: &[Vec3], warnings: &mut Vec<String>) -> Vec<Vec3> {
         if self.uvs.len() != self.positions.len() {
-            let what = if self.uvs.is_empty() {
-                "the mesh has no UVs"
-            } else {
-                "only some faces have UVs"
-            };
-            warnings.push(format!("{what}: the tile lies with x horizontal, and turns about the points that face up or down"));
-            return normals
-                .iter()
-                .map(|n| frames::around_vertical(n.as_dvec3()).as_vec3())
-                .collect();
+            let what = if self.uvs.is_empty() { "the mesh has no UVs" } else { "only some faces have UVs" };
+            warnings.push(format!(
+                "{what}: the tile lies with x horizontal, and turns about the points that face up or down"
+            ));
+            return normals.iter().map(|n| frames::around_vertical(n.as_dvec3()).as_vec3()).collect();
         }
-        let (tangents, mirrored) =
-            frames::tangents_from_uvs(&self.positions, normals, &self.uvs, &self.triangles);
+        let (tangents, mirrored) = frames::tangents_from_uvs(&self.positions, normals, &self.uvs, &self.triangles);
         if mirrored > 0 {
             let all = self.triangles.len();
-            warnings.push(format!("{mirrored} of {all} triangles have mirrored UVs; the tile follows u but is not mirrored"));
+            warnings.push(format!(
+                "{mirrored} of {all} triangles have mirrored UVs; the tile follows u but is not mirrored"
+            ));
         }
         tangents
     }
@@ -314,9 +240,7 @@ fn is_closed(places: &[u32], triangles: &[[u32; 3]]) -> bool {
     }
     edges.sort_unstable();
     let same_edge = |a: &(u32, u32, bool), b: &(u32, u32, bool)| (a.0, a.1) == (b.0, b.1);
-    edges
-        .chunk_by(same_edge)
-        .all(|uses| uses.len() == 2 && uses[0].2 != uses[1].2)
+    edges.chunk_by(same_edge).all(|uses| uses.len() == 2 && uses[0].2 != uses[1].2)
 }
 
 /// Six times the enclosed volume.
@@ -333,31 +257,20 @@ fn signed_volume(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
 mod tests {
     use super::*;
 
-    const TETRAHEDRON: &str =
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
 
     #[test]
     fn a_tetrahedron_loads_closed_and_without_uvs_warns() {
         let mesh = parse(TETRAHEDRON).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.two_sided), (4, false));
-        assert!(
-            mesh.warnings.iter().any(|w| w.contains("no UVs")),
-            "{:?}",
-            mesh.warnings
-        );
+        assert!(mesh.warnings.iter().any(|w| w.contains("no UVs")), "{:?}", mesh.warnings);
         assert!(mesh.normals[0].dot(Vec3::splat(-1.0)) > 1.7);
     }
 
     #[test]
     fn an_open_mesh_is_two_sided_and_an_inside_out_one_is_turned() {
-        assert!(
-            parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n")
-                .unwrap()
-                .two_sided
-        );
-        let turned =
-            parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n")
-                .unwrap();
+        assert!(parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n").unwrap().two_sided);
+        let turned = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n").unwrap();
         assert!(turned.warnings.iter().any(|w| w.contains("inwards")));
         assert!(turned.normals[0].dot(Vec3::splat(-1.0)) > 1.7);
     }
@@ -377,13 +290,7 @@ mod tests {
             for (a, b) in original.positions.iter().zip(&scaled.positions) {
                 assert!(a.distance(*b) < 1e-6, "{unit}: {a} {b}");
             }
-            assert!(
-                original
-                    .normals
-                    .iter()
-                    .zip(&scaled.normals)
-                    .all(|(a, b)| a.distance(*b) < 1e-5)
-            );
+            assert!(original.normals.iter().zip(&scaled.normals).all(|(a, b)| a.distance(*b) < 1e-5));
         }
     }
 
@@ -392,16 +299,10 @@ mod tests {
         let cases = [
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
             ("v 0 0 0\nv nan 0 0\n", "line 2: found nan"),
-            (
-                "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
-                "line 4: found v index 4, expected 1 to 3",
-            ),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4: found v index 4, expected 1 to 3"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "line 4"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n", "line 4"),
-            (
-                "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/-1 2/-2 3/-9223372036854775808\n",
-                "line 4",
-            ),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/-1 2/-2 3/-9223372036854775808\n", "line 4"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/2 2/2 3/2\n", "vt index 2"),
             ("v 0 0 0\nv 1 0 0\nf 1 2\n", "at least 3"),
             ("v 0 0\n", "line 1"),
@@ -418,31 +319,17 @@ mod tests {
 
     #[test]
     fn real_meshes_load_with_unit_frames() {
-        let folder = std::env::var_os("BISCALE_DATA").map_or_else(
-            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-            std::path::PathBuf::from,
-        );
+        let folder = std::env::var_os("BISCALE_DATA")
+            .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), std::path::PathBuf::from);
         if !folder.join("spot.obj").exists() {
             eprintln!("SKIPPED: {} has no spot.obj", folder.display());
             return;
         }
-        for (name, triangles) in [
-            ("spot.obj", 5856),
-            ("teapot.obj", 6320),
-            ("stanford-bunny.obj", 69_451),
-        ] {
+        for (name, triangles) in [("spot.obj", 5856), ("teapot.obj", 6320), ("stanford-bunny.obj", 69_451)] {
             let mesh = load(&folder.join(name)).unwrap();
-            assert!(
-                mesh.triangles.len().abs_diff(triangles) <= triangles / 50,
-                "{name}: {}",
-                mesh.triangles.len()
-            );
+            assert!(mesh.triangles.len().abs_diff(triangles) <= triangles / 50, "{name}: {}", mesh.triangles.len());
             for (n, t) in mesh.normals.iter().zip(&mesh.tangents) {
-                assert!(
-                    (n.length() - 1.0).abs() < 1e-5
-                        && (t.length() - 1.0).abs() < 1e-5
-                        && n.dot(*t).abs() < 1e-5
-                );
+                assert!((n.length() - 1.0).abs() < 1e-5 && (t.length() - 1.0).abs() < 1e-5 && n.dot(*t).abs() < 1e-5);
             }
         }
     }

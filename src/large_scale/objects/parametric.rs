@@ -37,11 +37,7 @@ impl MeshBuilder {
             for &u in us {
                 let (mut along_u, mut normal) = frame(u, v);
                 if normal.length() < 1e-3 * along_u.length().max(1e-3) {
-                    let inside = if v - v_first < v_last - v {
-                        v + POLE_STEP
-                    } else {
-                        v - POLE_STEP
-                    };
+                    let inside = if v - v_first < v_last - v { v + POLE_STEP } else { v - POLE_STEP };
                     (along_u, normal) = frame(u, inside);
                 }
                 let normal = normal.try_normalize().unwrap_or(DVec3::Y);
@@ -84,12 +80,7 @@ impl MeshBuilder {
     }
 
     pub fn finish(self, two_sided: bool) -> ObjectMesh {
-        let narrow = |vectors: Vec<DVec3>| {
-            vectors
-                .into_iter()
-                .map(|v| v.as_vec3())
-                .collect::<Vec<Vec3>>()
-        };
+        let narrow = |vectors: Vec<DVec3>| vectors.into_iter().map(|v| v.as_vec3()).collect::<Vec<Vec3>>();
         let positions = narrow(self.positions);
         let bounds = Bounds::of(&positions);
         ObjectMesh {

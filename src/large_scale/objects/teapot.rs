@@ -54,14 +54,8 @@ pub(super) fn teapot() -> ObjectMesh {
     ]);
     builder.add_patch(&evenly(96), &evenly(56), lathe(|v| turned(&lid, v)));
 
-    let spout_path = Spline::through(&[
-        [0.68, 0.36],
-        [0.98, 0.44],
-        [1.20, 0.62],
-        [1.34, 0.85],
-        [1.50, 1.03],
-        [1.62, 1.10],
-    ]);
+    let spout_path =
+        Spline::through(&[[0.68, 0.36], [0.98, 0.44], [1.20, 0.62], [1.34, 0.85], [1.50, 1.03], [1.62, 1.10]]);
     // Place along the path and scale: down the outside, over the lip, and back into the dark.
     let spout_course = Spline::through(&[
         [0.0, 0.30],
@@ -79,11 +73,7 @@ pub(super) fn teapot() -> ObjectMesh {
         let p = spout_course.at(v);
         DVec2::new(p.x, p.y)
     };
-    builder.add_patch(
-        &evenly(36),
-        &evenly(64),
-        sweep(&spout_path, [1.0, 0.88], course),
-    );
+    builder.add_patch(&evenly(36), &evenly(64), sweep(&spout_path, [1.0, 0.88], course));
 
     let handle_path = Spline::through(&[
         [-0.70, 0.90],
@@ -97,11 +87,7 @@ pub(super) fn teapot() -> ObjectMesh {
         [-0.78, 0.22],
     ]);
     let thickness = |v: f64| DVec2::new(v, 1.0 + 0.25 * (2.0 * v - 1.0).powi(4));
-    builder.add_patch(
-        &evenly(24),
-        &evenly(56),
-        sweep(&handle_path, [0.055, 0.085], thickness),
-    );
+    builder.add_patch(&evenly(24), &evenly(56), sweep(&handle_path, [0.055, 0.085], thickness));
     builder.finish(false)
 }
 
@@ -114,22 +100,13 @@ mod tests {
         let mesh = teapot();
         let reach = |axis: fn(&glam::Vec3) -> f32| {
             let values = mesh.positions.iter().map(axis);
-            (
-                values.clone().fold(f32::INFINITY, f32::min),
-                values.fold(f32::NEG_INFINITY, f32::max),
-            )
+            (values.clone().fold(f32::INFINITY, f32::min), values.fold(f32::NEG_INFINITY, f32::max))
         };
         let (left, right) = reach(|p| p.x);
         let (back, front) = reach(|p| p.z);
         let (low, high) = reach(|p| p.y);
         assert!(right > 1.6 && left < -1.45, "{left} {right}");
-        assert!(
-            (front - 0.99).abs() < 0.02 && (front + back).abs() < 1e-4,
-            "{back} {front}"
-        );
-        assert!(
-            (-0.05..0.0).contains(&low) && (1.4..1.55).contains(&high),
-            "{low} {high}"
-        );
+        assert!((front - 0.99).abs() < 0.02 && (front + back).abs() < 1e-4, "{back} {front}");
+        assert!((-0.05..0.0).contains(&low) && (1.4..1.55).contains(&high), "{low} {high}");
     }
 }

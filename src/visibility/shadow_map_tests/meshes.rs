@@ -20,13 +20,9 @@ fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> TileMesh {
 fn height_field(n: u32, height: impl Fn(f32, f32) -> f32) -> TileMesh {
     let at = |k: u32| (k as f32 + 0.5) / n as f32;
     let positions = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j)));
-    let positions = positions
-        .map(|(i, j)| Vec3::new(at(i), at(j), height(at(i % n), at(j % n))))
-        .collect();
+    let positions = positions.map(|(i, j)| Vec3::new(at(i), at(j), height(at(i % n), at(j % n)))).collect();
     let triangles = (0..n).flat_map(|j| (0..n).map(move |i| j * (n + 1) + i));
-    let triangles = triangles
-        .flat_map(|k| [[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]])
-        .collect();
+    let triangles = triangles.flat_map(|k| [[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]]).collect();
     mesh(positions, triangles)
 }
 
@@ -50,11 +46,7 @@ pub fn v_grooves() -> TileMesh {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for k in 0..8u32 {
         let (x0, x1) = (k as f32 / 8.0, (k + 1) as f32 / 8.0);
-        let (z0, z1) = if k % 2 == 0 {
-            (0.0, 0.125)
-        } else {
-            (0.125, 0.0)
-        };
+        let (z0, z1) = if k % 2 == 0 { (0.0, 0.125) } else { (0.125, 0.0) };
         let base = positions.len() as u32;
         positions.extend([
             Vec3::new(x0, 0.0, z0),
@@ -85,11 +77,7 @@ pub fn rods() -> TileMesh {
         positions.push(top);
         for side in 0..12 {
             let (a, b) = (base + side, base + (side + 1) % 12);
-            triangles.extend([
-                [a, b, b + 12],
-                [a, b + 12, a + 12],
-                [a + 12, b + 12, base + 24],
-            ]);
+            triangles.extend([[a, b, b + 12], [a, b + 12, a + 12], [a + 12, b + 12, base + 24]]);
         }
     }
     mesh(positions, triangles)
@@ -98,8 +86,7 @@ pub fn rods() -> TileMesh {
 /// A square pillar with vertical walls on a floor.
 pub fn pillar() -> TileMesh {
     let ring = |half: f32, z: f32| {
-        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|(x, y)| Vec3::new(0.5 + half * x, 0.5 + half * y, z))
+        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(0.5 + half * x, 0.5 + half * y, z))
     };
     let positions = [ring(0.5, 0.0), ring(0.2, 0.0), ring(0.2, 0.3)].concat();
     let mut triangles = vec![[8, 9, 10], [8, 10, 11]];

@@ -19,22 +19,13 @@ impl<'a> RayCaster<'a> {
     pub fn new(mesh: &'a TileMesh, cells: i64) -> Self {
         let mut lists = vec![Vec::new(); (cells * cells) as usize];
         for k in 0..mesh.triangles.len() {
-            let corners = mesh
-                .corners(k)
-                .map(|p| p.truncate().as_dvec2() / mesh.size.as_dvec2() * cells as f64);
-            let lo = corners
-                .iter()
-                .fold(DVec2::INFINITY, |m, p| m.min(*p))
-                .floor();
-            let hi = corners
-                .iter()
-                .fold(DVec2::NEG_INFINITY, |m, p| m.max(*p))
-                .floor();
+            let corners = mesh.corners(k).map(|p| p.truncate().as_dvec2() / mesh.size.as_dvec2() * cells as f64);
+            let lo = corners.iter().fold(DVec2::INFINITY, |m, p| m.min(*p)).floor();
+            let hi = corners.iter().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p)).floor();
             for y in lo.y as i64 - 1..=hi.y as i64 + 1 {
                 for x in lo.x as i64 - 1..=hi.x as i64 + 1 {
                     let cell = y.rem_euclid(cells) * cells + x.rem_euclid(cells);
-                    lists[cell as usize]
-                        .push((k as u32, [-x.div_euclid(cells), -y.div_euclid(cells)]));
+                    lists[cell as usize].push((k as u32, [-x.div_euclid(cells), -y.div_euclid(cells)]));
                 }
             }
         }
@@ -54,13 +45,8 @@ impl<'a> RayCaster<'a> {
             let list = cy.rem_euclid(self.cells) * self.cells + cx.rem_euclid(self.cells);
             for &(k, copy) in &self.lists[list as usize] {
                 let shift = [tile[0] + copy[0], tile[1] + copy[1]];
-                let offset = (DVec2::new(shift[0] as f64, shift[1] as f64)
-                    * self.mesh.size.as_dvec2())
-                .extend(0.0);
-                let [a, b, c] = self
-                    .mesh
-                    .corners(k as usize)
-                    .map(|corner| corner.as_dvec3() + offset);
+                let offset = (DVec2::new(shift[0] as f64, shift[1] as f64) * self.mesh.size.as_dvec2()).extend(0.0);
+                let [a, b, c] = self.mesh.corners(k as usize).map(|corner| corner.as_dvec3() + offset);
                 if let Some(hit) = moller_trumbore(p, w, a, b, c) {
                     // The facet's own triangle, but not the copies of it further on, lies at distance 0 up to rounding.
                     let is_own = k == own && hit < 1e-5;
@@ -89,19 +75,15 @@ impl<'a> RayCaster<'a> {
     pub fn visibility(&self, facets: &Facets, directions: &[Vec3]) -> PackedVisibility {
         let mut visibility = PackedVisibility::new(facets.len(), directions.len());
         let words = visibility.words_per_row();
-        visibility
-            .words
-            .par_chunks_mut(words)
-            .zip(directions)
-            .for_each(|(row, &w)| {
-                for s in 0..facets.len() {
-                    if facets.geometric_normals[s].dot(w) > 0.0
-                        && !self.is_blocked(facets.positions[s], facets.triangles[s], w)
-                    {
-                        row[s / 32] |= 1 << (s % 32);
-                    }
+        visibility.words.par_chunks_mut(words).zip(directions).for_each(|(row, &w)| {
+            for s in 0..facets.len() {
+                if facets.geometric_normals[s].dot(w) > 0.0
+                    && !self.is_blocked(facets.positions[s], facets.triangles[s], w)
+                {
+                    row[s / 32] |= 1 << (s % 32);
                 }
-            });
+            }
+        });
         visibility
     }
 }

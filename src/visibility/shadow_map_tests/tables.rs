@@ -21,31 +21,19 @@ fn resolution_against_error() {
         ("pillar", meshes::pillar()),
     ] {
         let facets = sample(&mesh, 4000);
-        let exact = RayCaster::new(
-            &mesh,
-            if mesh.triangles.len() > 10_000 {
-                128
-            } else {
-                32
-            },
-        )
-        .visibility(&facets, &directions);
+        let exact = RayCaster::new(&mesh, if mesh.triangles.len() > 10_000 { 128 } else { 32 })
+            .visibility(&facets, &directions);
         for resolution in [128, 256, 512, 1024, 2048] {
             let start = Instant::now();
             let maps = visibility_maps_cpu(&mesh, &facets, &directions, resolution);
             let seconds = start.elapsed().as_secs_f64();
             let of = |keep: &dyn Fn(f32) -> bool| {
                 let (mut differ, mut all) = (0.0, 0.0);
-                for (d, &w) in directions
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, w)| keep(w.z.acos().to_degrees()))
-                {
+                for (d, &w) in directions.iter().enumerate().filter(|(_, w)| keep(w.z.acos().to_degrees())) {
                     for s in 0..facets.len() {
                         let weight = f64::from(facets.geometric_normals[s].dot(w).max(0.0));
                         all += weight;
-                        differ +=
-                            weight * f64::from(maps.is_visible(d, s) != exact.is_visible(d, s));
+                        differ += weight * f64::from(maps.is_visible(d, s) != exact.is_visible(d, s));
                     }
                 }
                 100.0 * differ / all
@@ -60,8 +48,8 @@ fn resolution_against_error() {
                 1e-6 * mesh.triangles.len() as f64 / per_direction
             );
         }
-        let worst = (0..directions.len())
-            .map(|d| (projected_area_ratio(&mesh, &facets, directions[d], d, &exact) - 1.0).abs());
+        let worst =
+            (0..directions.len()).map(|d| (projected_area_ratio(&mesh, &facets, directions[d], d, &exact) - 1.0).abs());
         println!(
             "{name}: exact a_v / (A cos θ) is off by at most {:.2} % with these facets",
             100.0 * worst.fold(0.0, f64::max)
@@ -76,11 +64,9 @@ fn speed_of_both_routes() {
     println!("{}, tier {:?}", gpu.description(), gpu.tier);
     let pipelines = GpuShadowMaps::new(&gpu).unwrap();
     let directions = polar_directions(9, 32, 85.0);
-    for (name, mesh) in [
-        ("egg-crate 128", meshes::egg_crate(128)),
-        ("rods", meshes::rods()),
-        ("V-grooves", meshes::v_grooves()),
-    ] {
+    for (name, mesh) in
+        [("egg-crate 128", meshes::egg_crate(128)), ("rods", meshes::rods()), ("V-grooves", meshes::v_grooves())]
+    {
         let facets = sample(&mesh, 8000);
         for resolution in [256, 512, 1024] {
             let time = |run: &dyn Fn() -> PackedVisibility| {
@@ -96,11 +82,7 @@ fn speed_of_both_routes() {
                 times[1]
             };
             let cpu = time(&|| visibility_maps_cpu(&mesh, &facets, &directions, resolution));
-            let device = time(&|| {
-                pipelines
-                    .visibility(&gpu, &mesh, &facets, &directions, resolution)
-                    .unwrap()
-            });
+            let device = time(&|| pipelines.visibility(&gpu, &mesh, &facets, &directions, resolution).unwrap());
             let triangles = 1e-6 * (mesh.triangles.len() * directions.len()) as f64;
             let pairs = 1e-6 * (facets.len() * directions.len()) as f64;
             for (route, seconds) in [("cpu", cpu), ("gpu", device)] {
