@@ -79,7 +79,9 @@ fn find_pair_taps(i: vec3f, h: vec3f) {
     );
     let a = step_on(angle_of(across, h.z) / HALF_PI, grids.pairs.x);
     let b = step_around(turn_of(h.xy), grids.pairs.y);
-    let c = step_on(angle_of(length(local.xy), local.z) / HALF_PI, grids.pairs.z);
+    // θ_d stands closer together near grazing, as in half_difference.rs.
+    let difference = clamp(angle_of(length(local.xy), local.z) / HALF_PI, 0.0, 1.0);
+    let c = step_on(1.0 - sqrt(1.0 - difference), grids.pairs.z);
     let d = step_around(2.0 * turn_of(local.xy), grids.pairs.w);
     for (var k = 0u; k < 16u; k++) {
         let bit = vec4u(k / 8u, k / 4u, k / 2u, k) & vec4u(1u);

@@ -167,16 +167,8 @@ impl Pipeline {
         if facets.skipped_triangles > 0 {
             notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
         }
-        if let Some(errors) = factored
-            && matches!(brdf.form, Form::Direct(_))
-        {
-            notes.push(format!(
-                "the factored form differs from the direct sum by {:.1} % ({:.0} dB), more than {:.1} % ({:.0} dB): summed directly",
-                errors.rel_l2 * 100.0,
-                errors.psnr_db,
-                settings.tolerance * 100.0,
-                settings.tolerance_db
-            ));
+        if let Some(errors) = factored {
+            plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
         }
         let outcome = Outcome { brdf, plan, settings: settings.clone(), times, factored, notes };
         self.last = Some((settings, outcome.clone()));

@@ -233,6 +233,7 @@ fn ray_casting_is_the_brute_force_over_explicit_copies() {
             if top * direction.truncate().length() / direction.z > reach as f32 - 1.0 {
                 continue;
             }
+            #[expect(clippy::needless_range_loop, reason = "several arrays are walked by one index")]
             for s in 0..facets.len() {
                 if facets.normals[s].dot(direction) <= 0.0 {
                     continue;

@@ -1,12 +1,13 @@
 //! A finished picture, and writing it: PNG (tone-mapped, sRGB, 8 bits) or OpenEXR (linear).
 
-use std::io::{Cursor, Write};
-use std::path::{Path, PathBuf};
+use std::io::Cursor;
+use std::path::Path;
 
 use glam::Vec3;
 
 use super::tone_map::{ToneMap, srgb_byte};
 use crate::error::{Error, InputError, Result};
+use crate::export::replace_file;
 
 /// Linear RGB radiance, row 0 at the top.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -63,28 +64,6 @@ impl Picture {
             .map_err(|error| Error::failed(format!("EXR: {error}")))?;
         Ok(bytes.into_inner())
     }
-}
-
-/// Writes beside `path` and renames, so that `path` holds either its old content or all of the new.
-pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let unwritable =
-        |error: std::io::Error| InputError::new("output", error, "a place that can be written").in_file(path);
-    let temporary = temporary_beside(path);
-    let written = std::fs::File::create_new(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        // It may not exist; the first error is the one that matters.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written.map_err(|error| unwritable(error).into())
-}
-
-fn temporary_beside(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.part", std::process::id()));
-    path.with_file_name(name)
 }
 
 #[cfg(test)]

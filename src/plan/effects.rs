@@ -105,6 +105,17 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Notes how far the factored form was from the direct sum, and whether it was kept.
+    pub fn factored(&mut self, kept: bool, rel_l2: f64) {
+        for effect in &mut self.effects {
+            if effect.name == "low_rank" {
+                effect.on = kept;
+                let verdict = if kept { "kept" } else { "given up, summed directly" };
+                effect.reason.push_str(&format!("; it is {:.1} % from it: {verdict}", rel_l2 * 100.0));
+            }
+        }
+    }
+
     /// Notes what a stage took beside what was predicted.
     pub fn measured(&mut self, name: &str, ms: f64) {
         for effect in &mut self.effects {
