@@ -24,36 +24,44 @@ use crate::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility, visibility
 pub type StageTimes = Vec<(&'static str, f64)>;
 
 /// A stage's last result and the key it was made from.
+///
+/// The key holds the versions of all upstream results it was made from. (A flag "upstream is new" will not do: whoever
+/// asks for the mesh or the materials alone, as the reference does, would swallow it.)
 #[derive(Debug)]
 struct Stage<K, T> {
     last: Option<(K, Arc<T>)>,
+    /// Counts the results made.
+    version: Version,
 }
+
+type Version = u64;
 
 impl<K, T> Default for Stage<K, T> {
     fn default() -> Self {
-        Self { last: None }
+        Self { last: None, version: 0 }
     }
 }
 
 impl<K: PartialEq, T> Stage<K, T> {
-    /// The last result if `key` is the same, else a new one, timed.
+    /// The last result if `key` is the same, else a new one, timed; with its version.
     fn get(
         &mut self,
         name: &'static str,
         key: K,
         times: &mut StageTimes,
         make: impl FnOnce() -> Result<T>,
-    ) -> Result<(Arc<T>, bool)> {
+    ) -> Result<(Arc<T>, Version)> {
         if let Some((last, value)) = &self.last
             && *last == key
         {
-            return Ok((value.clone(), false));
+            return Ok((value.clone(), self.version));
         }
         let start = Instant::now();
         let value = Arc::new(make()?);
         times.push((name, start.elapsed().as_secs_f64() * 1e3));
         self.last = Some((key, value.clone()));
-        Ok((value, true))
+        self.version += 1;
+        Ok((value, self.version))
     }
 }
 
@@ -67,9 +75,13 @@ struct Shape {
 
 /// The material of each slot of a mesh, by number, and the materials.
 type Assigned = (Vec<usize>, Vec<SumMaterial>);
+type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
-type FacetKey = (usize, u64);
-type VisibilityKey = (Route, usize, PolarGrid, u32, u32);
+/// Mesh, count, seed, and whether they are drawn as the paper does.
+type FacetKey = (Version, usize, u64, bool);
+type VisibilityKey = (Version, Route, usize, PolarGrid, u32, u32);
+/// Materials, facets (and so the mesh), visibility.
+type OutcomeKey = (Settings, [Version; 3]);
 
 /// What the stages made of a scene.
 #[derive(Debug, Clone)]
@@ -90,16 +102,16 @@ pub struct Pipeline {
     cache: MeasuredCache,
     gpu: Option<Gpu>,
     gpu_asked: bool,
-    /// Work of one slice of the present mesh.
-    scan_work: f64,
+    /// Work of one slice of the mesh, for a version of the facets.
+    scan_work: Option<(Version, f64)>,
     shape: Stage<(Tile, PathBuf), Shape>,
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     materials: Stage<MaterialKey, Assigned>,
-    /// M of each material, factored as the paper does.
-    paper_factors: Vec<Option<Arc<MaterialFactors>>>,
-    /// The last effective BRDF, if nothing upstream changed.
-    last: Option<(Settings, Outcome)>,
+    /// M of each material, factored as the paper does, for a version of the materials, a seed and a number of colours.
+    paper_factors: Stage<(Version, u64, usize), PaperFactors>,
+    /// The last effective BRDF.
+    last: Option<(OutcomeKey, Outcome)>,
 }
 
 /// Pairs that the factored form is checked on.
@@ -118,26 +130,22 @@ impl Pipeline {
         let scene = &loaded.scene;
         let settings = Settings::from_quality(&scene.quality);
         let mut times = StageTimes::new();
-        let (shape, shape_new) = self.shape(loaded, &mut times)?;
-        let (materials, materials_new) = self.materials(loaded, &shape.mesh, &mut times)?;
+        let (shape, shape_version) = self.shape(loaded, &mut times)?;
+        let (materials, materials_version) = self.materials(loaded, &shape.mesh, &mut times)?;
         let (material_of_slot, sum_materials) = (&materials.0, &materials.1);
 
-        if shape_new {
-            self.facets.last = None;
-        }
-        let facet_key = (settings.facets, settings.seed);
-        let (facets, facets_new) =
+        let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011);
+        let (facets, facets_version) =
             self.facets.get("facets", facet_key, &mut times, || Ok(sample(&shape.mesh, &settings)))?;
-        if facets_new {
-            self.visibility.last = None;
-        }
         let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
-        let found = self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_new);
+        let found =
+            self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
         let mut plan = decide(&found, &settings, &Costs::default());
         if settings.preset == Preset::Wu2011 {
-            return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_new);
+            return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_version);
         }
         let key = (
+            facets_version,
             plan.route,
             settings.horizon_azimuths,
             settings.map_grid,
@@ -145,13 +153,13 @@ impl Pipeline {
             settings.penumbra.to_bits(),
         );
         let gpu = self.gpu.as_ref();
-        let (visibility, visibility_new) = self
+        let (visibility, visibility_version) = self
             .visibility
             .get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
 
+        let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
         if let Some((last, outcome)) = &self.last
-            && *last == settings
-            && !(shape_new || materials_new || facets_new || visibility_new)
+            && *last == key
         {
             return Ok(Outcome { times, ..outcome.clone() });
         }
@@ -170,8 +178,8 @@ impl Pipeline {
         if let Some(errors) = factored {
             plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
         }
-        let outcome = Outcome { brdf, plan, settings: settings.clone(), times, factored, notes };
-        self.last = Some((settings, outcome.clone()));
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes };
+        self.last = Some((key, outcome.clone()));
         Ok(outcome)
     }
 
@@ -186,7 +194,7 @@ impl Pipeline {
         plan: Plan,
         settings: Settings,
         mut times: StageTimes,
-        materials_new: bool,
+        materials_version: Version,
     ) -> Result<Outcome> {
         let knobs =
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
@@ -196,18 +204,15 @@ impl Pipeline {
         let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
         let visibility = visibility_maps_cpu(&shape.mesh, facets, directions.directions(), settings.map_resolution);
         timed(&mut times, "visibility", start);
-        if materials_new || self.paper_factors.len() != materials.len() {
-            let start = Instant::now();
-            self.paper_factors = materials
-                .iter()
-                .map(|material| MaterialFactors::new(material, &knobs).map(|factors| Some(Arc::new(factors))))
-                .collect::<Result<_>>()?;
-            timed(&mut times, "basis", start);
-        }
+        let (factors, _) =
+            self.paper_factors.get("basis", (materials_version, knobs.seed, knobs.colors), &mut times, || {
+                let factor = |material| MaterialFactors::new(material, &knobs).map(|factors| Some(Arc::new(factors)));
+                materials.iter().map(factor).collect()
+            })?;
         let start = Instant::now();
         let base_area = f64::from(shape.mesh.base_area());
         let tile = VisibleFacets { facets, visibility: &visibility, directions: &directions, base_area };
-        let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &self.paper_factors, &knobs)?;
+        let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &factors, &knobs)?;
         timed(&mut times, "product", start);
         let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
         Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone() })
@@ -242,7 +247,7 @@ impl Pipeline {
         Ok(work(&Reference::new(&shape.mesh, &materials.0, &materials.1)))
     }
 
-    fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, bool)> {
+    fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, Version)> {
         let key = (loaded.scene.tile.clone(), loaded.base_dir.clone());
         self.shape.get("geometry", key, times, || {
             let mesh = geometry::build(&loaded.scene.tile, &loaded.base_dir)?;
@@ -258,7 +263,7 @@ impl Pipeline {
         loaded: &LoadedScene,
         mesh: &TileMesh,
         times: &mut StageTimes,
-    ) -> Result<(Arc<Assigned>, bool)> {
+    ) -> Result<(Arc<Assigned>, Version)> {
         let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
         let cache = &mut self.cache;
         self.materials.get("materials", key, times, || {
@@ -290,7 +295,7 @@ impl Pipeline {
         material_of_slot: &[usize],
         materials: &[SumMaterial],
         settings: &Settings,
-        facets_new: bool,
+        facets_version: Version,
     ) -> Findings {
         let needs_maps = !shape.flat && !shape.height_field;
         if needs_maps && settings.backend != Backend::Cpu && !self.gpu_asked {
@@ -302,6 +307,15 @@ impl Pipeline {
                 .gpu
                 .as_ref()
                 .is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.tier == crate::gpu::Tier::Hardware);
+        let scan_work = match self.scan_work {
+            Some((version, work)) if version == facets_version => work,
+            _ if needs_maps && !hardware_gpu => {
+                let work = SoftMaps::scan_work(&PeriodicGrid::new(&shape.mesh), facets);
+                self.scan_work = Some((facets_version, work));
+                work
+            }
+            _ => 0.0,
+        };
         let mut used: Vec<usize> = facets.slots.iter().map(|slot| material_of_slot[usize::from(*slot)]).collect();
         used.sort_unstable();
         used.dedup();
@@ -316,12 +330,7 @@ impl Pipeline {
             closes_plane: shape.mesh.closes_plane,
             hardware_gpu,
             triangles: shape.mesh.triangles.len(),
-            scan_work: if facets_new && needs_maps && !hardware_gpu {
-                self.scan_work = SoftMaps::scan_work(&PeriodicGrid::new(&shape.mesh), facets);
-                self.scan_work
-            } else {
-                self.scan_work
-            },
+            scan_work,
             area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>()
                 / f64::from(shape.mesh.base_area()),
             materials: used.len() - black_materials,

@@ -90,3 +90,24 @@ fn the_effective_brdf_is_linear_in_the_colour() {
         assert!((2.0 * one - two).abs().max_element() < 1e-6 * two.max_element(), "{method}: {one} {two}");
     }
 }
+
+/// The reference asks the same pipeline for mesh and materials; what comes after must not take them for known.
+#[test]
+fn asking_for_mesh_or_materials_alone_leaves_nothing_stale_behind() {
+    let directions = (Vec3::new(0.3, 0.1, 0.9).normalize(), Vec3::new(-0.5, 0.2, 0.6).normalize());
+    let mut pipeline = Pipeline::new();
+    pipeline.effective(&open(&[])).unwrap();
+    for overrides in [
+        "material.default.brdf.roughness=0.5",
+        "tile.geometry.depth=0.2",
+        "quality.preset=\"wu2011\"",
+        "tile.geometry.depth=0.3",
+    ] {
+        let scene = open(&[overrides]);
+        pipeline.sum_materials(&scene).unwrap();
+        pipeline.mesh(&scene).unwrap();
+        let one = pipeline.effective(&scene).unwrap().brdf.eval(directions.0, directions.1);
+        let other = Pipeline::new().effective(&scene).unwrap().brdf.eval(directions.0, directions.1);
+        assert_eq!(one, other, "{overrides}");
+    }
+}

@@ -233,13 +233,12 @@ fn ray_casting_is_the_brute_force_over_explicit_copies() {
             if top * direction.truncate().length() / direction.z > reach as f32 - 1.0 {
                 continue;
             }
-            #[expect(clippy::needless_range_loop, reason = "several arrays are walked by one index")]
-            for s in 0..facets.len() {
+            for (s, &origin) in origins.iter().enumerate() {
                 if facets.normals[s].dot(direction) <= 0.0 {
                     continue;
                 }
                 all += 1;
-                let blocked = brute_force(&mesh, origins[s], direction, facets.triangles[s], reach);
+                let blocked = brute_force(&mesh, origin, direction, facets.triangles[s], reach);
                 differ += usize::from(blocked == sees(&grid, &facets, s, direction));
             }
         }
