@@ -168,6 +168,10 @@ fn price_of_p(
 #[test]
 #[ignore = "prints a table of several minutes"]
 fn table_of_what_each_interpolation_costs() {
+    if std::env::var_os("BISCALE_TABLE").is_none() {
+        eprintln!("SKIPPED: a table of several minutes; set BISCALE_TABLE=1 to print it");
+        return;
+    }
     let pairs = mirror_biased_pairs(200, 7);
     for (name, geometry) in [("v-grooves", V_GROOVES), ("pyramids", PYRAMIDS), ("rods", RODS)] {
         let mesh = tile(geometry);

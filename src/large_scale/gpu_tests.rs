@@ -116,6 +116,10 @@ fn both_routes_see_the_same_lights() {
 #[test]
 #[ignore = "a table of times on both routes; run with --ignored --nocapture"]
 fn times_of_both_routes() {
+    if std::env::var_os("BISCALE_TABLE").is_none() {
+        eprintln!("SKIPPED: a table of several minutes; set BISCALE_TABLE=1 to print it");
+        return;
+    }
     let Some(gpu) = open_gpu() else { return };
     println!("{}, tier {:?}", gpu.description(), gpu.tier);
     let (draw, trace) = (GpuGBuffer::new(&gpu).unwrap(), GpuLightRays::new(&gpu).unwrap());

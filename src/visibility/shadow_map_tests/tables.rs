@@ -7,6 +7,10 @@ use super::*;
 #[test]
 #[ignore = "a table of error and time against resolution; run with --ignored --nocapture"]
 fn resolution_against_error() {
+    if std::env::var_os("BISCALE_TABLE").is_none() {
+        eprintln!("SKIPPED: a table of several minutes; set BISCALE_TABLE=1 to print it");
+        return;
+    }
     let directions = polar_directions(18, 24, 85.0);
     let bands = [(0.0, 60.0), (60.0, 80.0), (80.0, 85.0)];
     println!(
@@ -60,6 +64,10 @@ fn resolution_against_error() {
 #[test]
 #[ignore = "a table of speed on both routes; run with --ignored --nocapture"]
 fn speed_of_both_routes() {
+    if std::env::var_os("BISCALE_TABLE").is_none() {
+        eprintln!("SKIPPED: a table of several minutes; set BISCALE_TABLE=1 to print it");
+        return;
+    }
     let Some(gpu) = open_gpu() else { return };
     println!("{}, tier {:?}", gpu.description(), gpu.tier);
     let pipelines = GpuShadowMaps::new(&gpu).unwrap();
