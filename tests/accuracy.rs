@@ -155,7 +155,7 @@ fn standard_reaches_35_db_and_ten_percent_with_a_measured_paint() {
         return;
     };
     let pairs = mirror_biased_pairs(60, 78);
-    let settings = ReferenceSettings { facets: 4096, max_passes: 2, target: 2e-3, seed: 99 };
+    let settings = ReferenceSettings { facets: 8192, max_passes: 4, target: 2e-3, seed: 99 };
     for (tile, geometry) in tiles().into_iter().step_by(2) {
         let mut pipeline = Pipeline::new();
         let scene = open(&geometry, &merl_spec(&path), "standard");

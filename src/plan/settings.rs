@@ -137,9 +137,9 @@ impl Settings {
     pub fn of_preset(preset: Preset) -> Self {
         let standard = Self {
             preset,
-            facets: 8192,
+            facets: 12_288,
             horizon_azimuths: 48,
-            map_grid: PolarGrid::new(32, 128),
+            map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
             method: Method::Auto,
