@@ -182,7 +182,8 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     let try_low_rank = match settings.method {
         Method::Direct => false,
         Method::LowRank => true,
-        Method::Auto => allowed && low_rank_ms < direct_ms,
+        // A flat tile is its own BRDF: nothing to factor.
+        Method::Auto => allowed && !found.flat && low_rank_ms < direct_ms,
     };
     let comparison = format!(
         "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
