@@ -5,7 +5,11 @@
 //!                     │                                                     ├▶ EffectiveBrdf ─▶ picture | table | plots
 //!                     └────────────▶ small-scale Brdf ─▶ RotatedBasis ─────┘
 //! ```
-
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    rustdoc::private_intra_doc_links,
+    reason = "units stand in brackets: [sr], [rad]"
+)]
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "directions in tests are known not to be zero"))]
 
 pub mod accuracy;
