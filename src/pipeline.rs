@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use crate::accuracy::{Errors, Reference, compare, mirror_biased_pairs};
+use crate::accuracy::{Errors, Reference, mirror_biased_pairs, upper_errors};
 use crate::brdf::{Brdf, MeasuredCache, Term};
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
@@ -91,7 +91,7 @@ pub struct Outcome {
     pub settings: Settings,
     /// What ran this time.
     pub times: StageTimes,
-    /// The factored form against the direct sum, where it was tried.
+    /// What the factored form's error against the direct sum stays below, where it was tried.
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
 }
@@ -412,7 +412,7 @@ fn product(
     let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };
     let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
     let values = |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
-    let errors = compare(&values(&factored), &values(&direct));
+    let errors = upper_errors(&values(&factored), &values(&direct));
     let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
     let keep = settings.method == crate::plan::Method::LowRank || close;
     Ok((if keep { factored.form } else { direct.form }, Some(errors)))

@@ -4,6 +4,6 @@ mod metrics;
 mod pairs;
 mod reference;
 
-pub use metrics::{Errors, compare};
+pub use metrics::{Errors, compare, upper_errors};
 pub use pairs::{Pair, mirror_biased_pairs};
 pub use reference::{Estimate, Reference, ReferenceSettings};
