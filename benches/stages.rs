@@ -13,7 +13,7 @@ use biscale::filtering::{
 };
 use biscale::geometry::{self, Facets, TileMesh};
 use biscale::plan::{Preset, Settings};
-use biscale::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility};
+use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
 use glam::Vec3;
 
 const RUNS: usize = 7;
@@ -119,15 +119,16 @@ fn main() -> Result<(), biscale::Error> {
     bench.line("horizons, scan of the triangles", count * azimuths, "azimuth", || {
         Horizons::scan(&grid, &facets, azimuths, settings.penumbra)
     });
-    bench.line("maps, scan of the triangles (rods)", count * settings.map_grid.len(), "direction", || {
-        SoftMaps::scan(&rod_grid, &rod_facets, settings.map_grid)
+    let slices = settings.slice_azimuths;
+    bench.line("slices of the triangles (rods)", count * slices, "slice", || {
+        Slices::scan(&rod_grid, &rod_facets, slices, settings.penumbra)
     });
 
     let (i, o) = (from_angles(0.5, 0.3), from_angles(0.9, 2.0));
     let horizons = Arc::new(Visibility::Horizons(Horizons::scan(&grid, &facets, azimuths, settings.penumbra)));
-    let maps = Visibility::Maps(SoftMaps::scan(&rod_grid, &rod_facets, settings.map_grid));
+    let sliced = Visibility::Slices(Slices::scan(&rod_grid, &rod_facets, slices, settings.penumbra));
     let mut seen = vec![0.0; count];
-    for (name, visibility) in [("horizons", horizons.as_ref()), ("maps", &maps)] {
+    for (name, visibility) in [("horizons", horizons.as_ref()), ("slices", &sliced)] {
         // As many as were asked for, within the rounding of strata.
         seen.resize(visibility.facets(), 0.0);
         bench.line(&format!("visibility of a direction, {name}"), seen.len(), "facet", || {

@@ -18,7 +18,9 @@ use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
 use crate::plan::{Backend, Costs, Findings, Plan, Preset, Route, Settings, decide};
 use crate::scene::{LoadedScene, Material, Scene, Tile};
-use crate::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu};
+use crate::visibility::{
+    Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
+};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
 pub type StageTimes = Vec<(&'static str, f64)>;
@@ -79,7 +81,7 @@ type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
 /// Mesh, count, seed, and whether they are drawn as the paper does.
 type FacetKey = (Version, usize, u64, bool);
-type VisibilityKey = (Version, Route, usize, PolarGrid, u32, u32);
+type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
 
@@ -147,7 +149,7 @@ impl Pipeline {
         let key = (
             facets_version,
             plan.route,
-            settings.horizon_azimuths,
+            [settings.horizon_azimuths, settings.slice_azimuths],
             settings.map_grid,
             settings.map_resolution,
             settings.penumbra.to_bits(),
@@ -310,7 +312,7 @@ impl Pipeline {
         let scan_work = match self.scan_work {
             Some((version, work)) if version == facets_version => work,
             _ if needs_maps && !hardware_gpu => {
-                let work = SoftMaps::scan_work(&PeriodicGrid::new(&shape.mesh), facets);
+                let work = Slices::work(&PeriodicGrid::new(&shape.mesh), facets);
                 self.scan_work = Some((facets_version, work));
                 work
             }
@@ -373,7 +375,9 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
         (Route::HeightMarch | Route::HorizonScan, ..) => {
             Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(mesh), facets, azimuths, ramp))
         }
-        (Route::MapScan, ..) => Visibility::Maps(SoftMaps::scan(&PeriodicGrid::new(mesh), facets, settings.map_grid)),
+        (Route::Slices, ..) => {
+            Visibility::Slices(Slices::scan(&PeriodicGrid::new(mesh), facets, settings.slice_azimuths, ramp))
+        }
         (Route::GpuMaps | Route::CpuMaps, ..) => {
             let (grid, resolution) = (settings.map_grid, settings.map_resolution);
             // A GPU that fails is no reason to stop: the CPU's maps are the same.

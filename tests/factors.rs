@@ -9,7 +9,7 @@ use biscale::filtering::{
 };
 use biscale::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use biscale::scene;
-use biscale::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility};
+use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::path::Path;
@@ -27,7 +27,7 @@ fn sample(mesh: &TileMesh, count: usize) -> (Facets, Visibility) {
     let visibility = if mesh.is_height_field() {
         Visibility::Horizons(Horizons::scan(&grid, &facets, 48, 0.02))
     } else {
-        Visibility::Maps(SoftMaps::scan(&grid, &facets, PolarGrid::new(24, 48)))
+        Visibility::Slices(Slices::scan(&grid, &facets, 48, 0.02))
     };
     (facets, visibility)
 }

@@ -30,7 +30,7 @@ fn every_combination_of_effects_parses_and_validates() {
         for tint in ["tint_fixed", "tint_fresnel"] {
             check("shade_low_rank", &[("shadows_none", shadows), ("tint_fixed", tint)]);
         }
-        for see in ["visibility_unblocked", "visibility_horizons", "visibility_maps"] {
+        for see in ["visibility_unblocked", "visibility_horizons", "visibility_slices", "visibility_maps"] {
             check("projected_area", &[("visibility_unblocked", see)]);
             for lobe in ["lobe_lambertian", "lobe_blinn_phong", "lobe_cook_torrance", "lobe_ward", "lobe_ggx"] {
                 for weights in ["weights_area", "weights_rgb"] {

@@ -9,7 +9,7 @@ use biscale::directions::{PolarGrid, from_angles};
 use biscale::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
 use biscale::geometry::{FacetSampler, Facets, HeightGrid, SampleShift, TileMesh};
 use biscale::visibility::{
-    Horizons, PackedVisibility, PeriodicGrid, SoftMaps, Visibility, lifted_origins, ray_cast, sees, visibility_maps_cpu,
+    Horizons, PackedVisibility, PeriodicGrid, Slices, Visibility, lifted_origins, ray_cast, sees, visibility_maps_cpu,
 };
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -165,7 +165,7 @@ fn all_routes_agree_under_overhangs_up_to_85_degrees() {
     let facets = sample(&mesh, 1500);
     let grid = PeriodicGrid::new(&mesh);
     let nodes = PolarGrid::new(10, AZIMUTHS);
-    let soft = SoftMaps::scan(&grid, &facets, nodes);
+    let soft = Slices::scan(&grid, &facets, AZIMUTHS, 1e-6).maps(nodes.rings);
     let on_nodes: Vec<Vec3> = (0..9 * AZIMUTHS).map(|node| nodes.direction(node)).collect();
     let exact = ray_cast(&grid, &facets, &on_nodes);
     let scanned = disagreement(&facets, &on_nodes, &exact, |d, s| soft.packed.is_visible(d, s));
@@ -295,7 +295,7 @@ fn effective(mesh: &TileMesh, count: usize, term: Term, maps: bool) -> Effective
     facets.sort_for_sums();
     let grid = PeriodicGrid::new(mesh);
     let visibility = if maps {
-        Visibility::Maps(SoftMaps::scan(&grid, &facets, PolarGrid::new(16, 48)))
+        Visibility::Slices(Slices::scan(&grid, &facets, 48, 0.02))
     } else {
         Visibility::Horizons(Horizons::scan(&grid, &facets, 48, 0.02))
     };

@@ -38,6 +38,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("vectors", include_str!("../../shaders/vectors.wgsl")),
     ("visibility_horizons", include_str!("../../shaders/visibility_horizons.wgsl")),
     ("visibility_maps", include_str!("../../shaders/visibility_maps.wgsl")),
+    ("visibility_slices", include_str!("../../shaders/visibility_slices.wgsl")),
     ("visibility_unblocked", include_str!("../../shaders/visibility_unblocked.wgsl")),
     ("weights_area", include_str!("../../shaders/weights_area.wgsl")),
     ("weights_rgb", include_str!("../../shaders/weights_rgb.wgsl")),

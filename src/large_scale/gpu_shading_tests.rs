@@ -1,6 +1,7 @@
 //! The same picture on both routes, for each form of the effective BRDF and each kind of visibility.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -106,7 +107,7 @@ const LOBES: [&str; 5] = [
 #[test]
 fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
     let Some(gpu) = open_gpu() else { return };
-    let mut seen = [false; 3];
+    let mut seen = [false; 4];
     let [lambertian, phong, beckmann, _, ggx] = LOBES;
     for (geometry, kind, lobes) in [
         (FLAT, "sphere", vec![lambertian, beckmann]),
@@ -117,15 +118,22 @@ fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
         for brdf in lobes {
             let brdf_form = effective(&open(geometry, brdf, "direct"));
             let Form::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
+            if let Visibility::Slices(slices) = direct.visibility.as_ref() {
+                let maps = Visibility::Maps(slices.maps(12));
+                let form = Form::Direct(Direct { sum: direct.sum.clone(), visibility: Arc::new(maps) });
+                seen[3] = true;
+                assert_same(&format!("{geometry} {brdf}, maps"), &gpu, kind, &EffectiveBrdf { form, ..brdf_form });
+            }
             seen[match direct.visibility.as_ref() {
                 Visibility::Unblocked { .. } => 0,
                 Visibility::Horizons(_) => 1,
-                Visibility::Maps(_) => 2,
+                Visibility::Slices(_) => 2,
+                Visibility::Maps(_) => 3,
             }] = true;
             assert_same(&format!("{geometry} {brdf}"), &gpu, kind, &brdf_form);
         }
     }
-    assert_eq!(seen, [true; 3], "kinds of visibility met");
+    assert_eq!(seen, [true; 4], "kinds of visibility met");
 }
 
 #[test]

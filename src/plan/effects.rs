@@ -24,8 +24,8 @@ pub enum Route {
     HeightMarch,
     /// Slicing the mesh of a surface without overhangs.
     HorizonScan,
-    /// Slicing the mesh into maps of bits.
-    MapScan,
+    /// Slicing a mesh with overhangs: horizons, and what hangs above them.
+    Slices,
     /// Toroidal shadow maps on the CPU.
     CpuMaps,
     /// Toroidal shadow maps on a real GPU.
@@ -82,9 +82,9 @@ impl Default for Costs {
             lookup_ns: 30.0,
             facet_fill_ns: 0.3,
             march_ns: 1_000.0,
-            scan_ns: 4_000.0,
+            scan_ns: 1_000.0,
             factor_query_ns: 1_500.0,
-            slice_ns: 6.0,
+            slice_ns: 18.0,
             triangle_ns: 60.0,
             texel_ns: 10.0,
             threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),
@@ -147,11 +147,10 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             ),
             facets * settings.horizon_azimuths as f64 * costs.scan_ns * 1e-6 / costs.threads,
         ),
-        Route::MapScan => (
+        Route::Slices => (
             format!(
-                "surfaces overhang: yes/no maps of {} directions, slicing along {} azimuths (shadow maps: {:.0} ms)",
-                settings.map_grid.len(),
-                settings.map_grid.azimuths,
+                "surfaces overhang: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
+                settings.slice_azimuths,
                 maps_ms(found, settings, costs)
             ),
             scan_ms(found, settings, costs),
@@ -281,9 +280,9 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     Plan { route, try_low_rank, effects }
 }
 
-/// Slicing for maps: cells and triangles looked at, facet by facet.
+/// Slicing under overhangs: cells and triangles looked at, facet by facet.
 fn scan_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
-    let slices = settings.facets as f64 * settings.map_grid.azimuths as f64;
+    let slices = settings.facets as f64 * settings.slice_azimuths as f64;
     slices * found.scan_work * costs.slice_ns * 1e-6 / costs.threads
 }
 
@@ -304,7 +303,7 @@ fn route(found: &Findings, settings: &Settings, costs: &Costs) -> Route {
     } else if found.hardware_gpu {
         Route::GpuMaps
     } else if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) {
-        Route::MapScan
+        Route::Slices
     } else {
         Route::CpuMaps
     }

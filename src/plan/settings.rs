@@ -51,6 +51,8 @@ pub struct Settings {
     pub facets: usize,
     /// Azimuths of horizon maps.
     pub horizon_azimuths: usize,
+    /// Azimuths of slices under overhangs.
+    pub slice_azimuths: usize,
     /// Rings and azimuths of visibility maps, for overhangs. Azimuths count more than rings: on leaning rods with 8192
     /// facets 32x64, 96x64, 64x128 and 64x256 leave 38.8, 38.6, 40.2 and 43.0 dB; 48x192 with 32,768 facets 46.0 dB.
     pub map_grid: PolarGrid,
@@ -104,6 +106,7 @@ impl Settings {
         set(&mut settings.facets, quality.facets);
         if let Some(azimuths) = quality.azimuths {
             settings.horizon_azimuths = azimuths;
+            settings.slice_azimuths = azimuths;
             settings.map_grid = PolarGrid::new(settings.map_grid.rings, azimuths);
         }
         if let Some(rings) = quality.rings {
@@ -139,6 +142,7 @@ impl Settings {
             preset,
             facets: 12_288,
             horizon_azimuths: 48,
+            slice_azimuths: 96,
             map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
@@ -164,6 +168,7 @@ impl Settings {
             Preset::Draft => Self {
                 facets: 2048,
                 horizon_azimuths: 32,
+                slice_azimuths: 40,
                 map_grid: PolarGrid::new(20, 40),
                 map_resolution: 160,
                 keep_m: 0.999,
@@ -179,6 +184,7 @@ impl Settings {
             Preset::Fine | Preset::Reference => Self {
                 facets: 32_768,
                 horizon_azimuths: 96,
+                slice_azimuths: 192,
                 map_grid: PolarGrid::new(48, 192),
                 map_resolution: 384,
                 penumbra: 0.01,

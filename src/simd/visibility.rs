@@ -17,6 +17,27 @@ multiversion! {
     }
 }
 
+/// Horizons further apart than this [rad] belong to different things: nothing lies between them.
+const JUMP: f32 = 0.1;
+
+/// How fast one azimuth's view gives way to the next one's where they differ.
+pub const SWITCH: f32 = 6.0;
+
+multiversion! {
+    /// As [`ground_visibility`], but where two horizons belong to different things a facet keeps the nearer azimuth's, and
+    /// changes over at its own place (`switch`, in `[0, 1]` between the azimuths): a blend would halve what a thin thing hides
+    /// along `i` and `o` at once.
+    pub fn stepped_visibility(from: &[f32], to: &[f32], switch: &[f32], blend: f32, elevation: f32, sharpness: f32, out: &mut [f32]) {
+        for (((out, &from), &to), &switch) in out.iter_mut().zip(from).zip(to).zip(switch) {
+            let changed = ((blend - switch) * SWITCH + 0.5).clamp(0.0, 1.0);
+            let between = soft_step((elevation - (from + (to - from) * blend)) * sharpness);
+            let (before, after) = (soft_step((elevation - from) * sharpness), soft_step((elevation - to) * sharpness));
+            let either = before + (after - before) * changed;
+            *out = if (to - from).abs() > JUMP { either } else { between };
+        }
+    }
+}
+
 multiversion! {
     /// Bits of four rows, weighted and summed: facet `first + k` into `out[k]`.
     pub fn blend_bits(rows: [&[u32]; 4], weights: [f32; 4], first: usize, out: &mut [f32]) {

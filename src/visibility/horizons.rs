@@ -10,6 +10,7 @@ use super::PeriodicGrid;
 use super::height_march::HeightMarch;
 use super::ray_cast::lifted_origin;
 use super::scan::BlockedSlopes;
+use super::slicer::Slicer;
 use crate::directions::{from_angles, to_angles};
 use crate::geometry::{Facets, HeightGrid};
 use crate::simd;
@@ -31,16 +32,16 @@ impl Horizons {
     /// A horizon so low that the soft step never reaches above 0.
     const FREE: f32 = -0.02;
     /// A horizon so high that the soft step never reaches the zenith.
-    const BLOCKED: f32 = FRAC_PI_2 + 0.02;
+    pub(super) const BLOCKED: f32 = FRAC_PI_2 + 0.02;
 
     /// Slices the mesh along every azimuth, for every facet: exact in elevation.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
-        let diagonal = grid.tile_size.length();
+        let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
         Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
             let mut blocked = BlockedSlopes::default();
             for (facet, horizon) in row.iter_mut().enumerate() {
                 let origin = lifted_origin(facets, facet, diagonal);
-                grid.scan(origin, facets.normals[facet], along.truncate(), facets.triangles[facet], &mut blocked);
+                slicer.scan(origin, facets.normals[facet], along.truncate(), facets.triangles[facet], &mut blocked);
                 *horizon = blocked.highest();
             }
         })
@@ -58,18 +59,24 @@ impl Horizons {
 
     /// `fill` writes slopes (tangents) of the horizon along a plane direction; they become elevations here.
     fn fill_rows(facets: usize, azimuths: usize, ramp: f32, fill: impl Fn(Vec3, &mut [f32]) + Sync) -> Self {
-        let mut elevations = vec![0.0; facets * azimuths];
-        elevations.par_chunks_mut(facets.max(1)).enumerate().for_each(|(azimuth, row)| {
+        let mut slopes = vec![0.0; facets * azimuths];
+        slopes.par_chunks_mut(facets.max(1)).enumerate().for_each(|(azimuth, row)| {
             fill(from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32), row);
-            for slope in row {
-                *slope = if *slope <= 0.0 {
-                    Self::FREE
-                } else if *slope == f32::INFINITY {
-                    Self::BLOCKED
-                } else {
-                    slope.atan()
-                };
-            }
+        });
+        Self::from_slopes(facets, azimuths, ramp, slopes)
+    }
+
+    /// From slopes (tangents) of the horizons, `[azimuth][facet]`.
+    pub(super) fn from_slopes(facets: usize, azimuths: usize, ramp: f32, slopes: Vec<f32>) -> Self {
+        let mut elevations = slopes;
+        elevations.par_iter_mut().for_each(|slope| {
+            *slope = if *slope <= 0.0 {
+                Self::FREE
+            } else if *slope == f32::INFINITY {
+                Self::BLOCKED
+            } else {
+                slope.atan()
+            };
         });
         Self { azimuths, facets, ramp: ramp.clamp(1e-6, -2.0 * Self::FREE), elevations }
     }
@@ -96,13 +103,24 @@ impl Horizons {
         4 * self.elevations.len()
     }
 
+    /// Elevations [rad] of all facets along one azimuth.
+    pub(super) fn row(&self, azimuth: usize) -> &[f32] {
+        &self.elevations[azimuth * self.facets..][..self.facets]
+    }
+
+    /// The two azimuths around a direction's, and their weights.
+    pub(super) fn taps(&self, direction: Vec3) -> [(usize, f32); 2] {
+        let at = to_angles(direction).1 / TAU * self.azimuths as f32;
+        let from = at as usize % self.azimuths;
+        let blend = at - at.floor();
+        [(from, 1.0 - blend), ((from + 1) % self.azimuths, blend)]
+    }
+
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
-        let (theta, phi) = to_angles(direction);
-        let at = phi / TAU * self.azimuths as f32;
-        let from = at as usize % self.azimuths;
-        let to = (from + 1) % self.azimuths;
-        let row = |azimuth: usize| &self.elevations[azimuth * self.facets..][range.clone()];
-        simd::ground_visibility(row(from), row(to), at - at.floor(), FRAC_PI_2 - theta, 1.0 / self.ramp, out);
+        let [(from, _), (to, blend)] = self.taps(direction);
+        let row = |azimuth: usize| &self.row(azimuth)[range.clone()];
+        let elevation = FRAC_PI_2 - to_angles(direction).0;
+        simd::ground_visibility(row(from), row(to), blend, elevation, 1.0 / self.ramp, out);
     }
 }

@@ -1,7 +1,7 @@
 //! Which facets of the endlessly repeated tile does a direction see?
 //!
 //! [`Visibility`] is what the rest of the program reads: soft visibility of every facet along any direction, held as
-//! horizons where nothing overhangs and as maps of bits where something does.
+//! horizons where nothing overhangs, as slices or as maps of bits where something does.
 
 mod gpu_maps;
 mod height_march;
@@ -14,6 +14,8 @@ mod shadow_map;
 #[cfg(test)]
 mod shadow_map_tests;
 mod shadow_view;
+mod slicer;
+mod slices;
 mod soft_maps;
 
 use std::ops::Range;
@@ -26,6 +28,7 @@ pub use packed::PackedVisibility;
 pub use periodic_grid::PeriodicGrid;
 pub use ray_cast::{lifted_origins, ray_cast, sees};
 pub use shadow_map::visibility_maps_cpu;
+pub use slices::Slices;
 pub use soft_maps::SoftMaps;
 
 /// Visibility of all facets along any direction.
@@ -36,6 +39,7 @@ pub enum Visibility {
         facets: usize,
     },
     Horizons(Horizons),
+    Slices(Slices),
     Maps(SoftMaps),
 }
 
@@ -44,6 +48,7 @@ impl Visibility {
         match self {
             Self::Unblocked { facets } => *facets,
             Self::Horizons(horizons) => horizons.facets(),
+            Self::Slices(slices) => slices.facets(),
             Self::Maps(maps) => maps.packed.facet_count,
         }
     }
@@ -53,6 +58,7 @@ impl Visibility {
         match self {
             Self::Unblocked { .. } => 0,
             Self::Horizons(horizons) => horizons.bytes(),
+            Self::Slices(slices) => slices.bytes(),
             Self::Maps(maps) => 4 * maps.packed.words.len(),
         }
     }
@@ -68,6 +74,7 @@ impl Visibility {
         match self {
             Self::Unblocked { .. } => out.fill(1.0),
             Self::Horizons(horizons) => horizons.fill(direction, range, out),
+            Self::Slices(slices) => slices.fill(direction, range, out),
             Self::Maps(maps) => maps.fill(direction, range, out),
         }
     }

@@ -31,6 +31,10 @@ impl PackedVisibility {
         self.row(direction)[facet / 32] >> (facet % 32) & 1 == 1
     }
 
+    pub fn set_blocked(&mut self, direction: usize, facet: usize) {
+        self.row_mut(direction)[facet / 32] &= !(1 << (facet % 32));
+    }
+
     pub fn set_visible(&mut self, direction: usize, facet: usize) {
         self.row_mut(direction)[facet / 32] |= 1 << (facet % 32);
     }

@@ -8,7 +8,7 @@ use crate::brdf::Term;
 use crate::filtering::Direct;
 use crate::gpu::{Gpu, GpuError};
 use crate::simd::Lobe;
-use crate::visibility::{Horizons, SoftMaps, Visibility};
+use crate::visibility::{Horizons, Slices, SoftMaps, Visibility};
 
 /// `Sum` in `facets.wgsl`.
 #[repr(C)]
@@ -54,13 +54,13 @@ impl GpuShading {
             ));
         }
         let facet_count = form.sum.facet_count();
-        let (blank, see) =
-            (Sum { facet_count: facet_count as u32, ..Sum::default() }, visibility_file(&form.visibility));
-        let blank = with_visibility(blank, &form.visibility);
+        let visibility = form.visibility.as_ref();
+        let see = visibility_file(visibility);
+        let blank = with_visibility(Sum { facet_count: facet_count as u32, ..Sum::default() }, visibility);
         let mut patches: Vec<Patch> = Vec::new();
         let mut shared = Shared {
             facets: gpu.upload("facets", &facet_rows(form), wgpu::BufferUsages::STORAGE)?,
-            visibility: upload_visibility(gpu, &form.visibility)?,
+            visibility: upload_visibility(gpu, visibility)?,
             patches: gpu.upload::<u32>("patches", &[], wgpu::BufferUsages::STORAGE)?,
         };
         let mut planned = Vec::new();
@@ -148,6 +148,7 @@ fn visibility_file(visibility: &Visibility) -> &'static str {
     match visibility {
         Visibility::Unblocked { .. } => "visibility_unblocked",
         Visibility::Horizons(_) => "visibility_horizons",
+        Visibility::Slices(_) => "visibility_slices",
         Visibility::Maps(_) => "visibility_maps",
     }
 }
@@ -155,9 +156,8 @@ fn visibility_file(visibility: &Visibility) -> &'static str {
 fn with_visibility(sum: Sum, visibility: &Visibility) -> Sum {
     match visibility {
         Visibility::Unblocked { .. } => sum,
-        Visibility::Horizons(horizons) => {
-            Sum { azimuths: horizons.azimuths() as u32, sharpness: 1.0 / horizons.ramp(), ..sum }
-        }
+        Visibility::Horizons(horizons) => with_horizons(sum, horizons),
+        Visibility::Slices(slices) => with_horizons(sum, &slices.horizons),
         Visibility::Maps(maps) => Sum {
             azimuths: maps.grid.azimuths as u32,
             rings: maps.grid.rings as u32,
@@ -167,11 +167,16 @@ fn with_visibility(sum: Sum, visibility: &Visibility) -> Sum {
     }
 }
 
+fn with_horizons(sum: Sum, horizons: &Horizons) -> Sum {
+    Sum { azimuths: horizons.azimuths() as u32, sharpness: 1.0 / horizons.ramp(), ..sum }
+}
+
 /// Side by side what neighbouring points read of one facet: they look along neighbouring directions.
 fn upload_visibility(gpu: &Gpu, visibility: &Visibility) -> Result<wgpu::Buffer, GpuError> {
     let usage = wgpu::BufferUsages::STORAGE;
     match visibility {
         Visibility::Unblocked { .. } => gpu.upload::<u32>("visibility", &[], usage),
+        Visibility::Slices(slices) => gpu.upload("slices", &slices_by_facet(slices), usage),
         Visibility::Horizons(horizons) => gpu.upload("horizons", &horizons_by_facet(horizons), usage),
         Visibility::Maps(maps) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
     }
@@ -180,6 +185,15 @@ fn upload_visibility(gpu: &Gpu, visibility: &Visibility) -> Result<wgpu::Buffer,
 fn horizons_by_facet(horizons: &Horizons) -> Vec<f32> {
     let azimuths = horizons.azimuths();
     (0..horizons.facets() * azimuths).map(|k| horizons.elevation(k % azimuths, k / azimuths)).collect()
+}
+
+/// Horizons, starts of the hanging intervals, and the intervals (visibility_slices.wgsl).
+fn slices_by_facet(slices: &Slices) -> Vec<u32> {
+    let mut words: Vec<u32> = horizons_by_facet(&slices.horizons).into_iter().map(f32::to_bits).collect();
+    let (starts, intervals) = slices.hanging_by_facet();
+    words.extend(starts);
+    words.extend(intervals.iter().flat_map(|&(low, high)| [low.to_bits(), high.to_bits()]));
+    words
 }
 
 fn bits_by_facet(maps: &SoftMaps) -> Vec<u32> {

@@ -1,0 +1,159 @@
+//! Visibility under overhangs from vertical slices: a horizon for each azimuth, and what hangs above it.
+
+use std::f32::consts::{FRAC_PI_2, TAU};
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::ray_cast::lifted_origin;
+use super::scan::BlockedSlopes;
+use super::slicer::Slicer;
+use super::{Horizons, PackedVisibility, PeriodicGrid, SoftMaps};
+use crate::directions::{PolarGrid, from_angles, to_angles};
+use crate::geometry::Facets;
+use crate::simd;
+
+/// All blocked elevations of every facet along a number of azimuths, exact there.
+///
+/// Between azimuths the horizon itself is interpolated, which is smooth; whether something hangs above it is blended
+/// (yes/no from either side).
+#[derive(Debug, Clone)]
+pub struct Slices {
+    pub(crate) horizons: Horizons,
+    /// By azimuth, in the order of their facets.
+    floating: Vec<Vec<Floating>>,
+    /// Where between two azimuths a facet changes over from one's view to the other's.
+    switch: Vec<f32>,
+}
+
+/// A blocked interval of elevations [rad] above a facet's horizon.
+#[derive(Debug, Clone, Copy)]
+struct Floating {
+    facet: u32,
+    low: f32,
+    high: f32,
+}
+
+/// 2³² over the golden ratio.
+const GOLDEN: u32 = 2_654_435_769;
+
+impl Slices {
+    /// Cells and triangles that one slice looks at on average, from a few of them: what [`Slices::scan`] will cost.
+    pub fn work(grid: &PeriodicGrid, facets: &Facets) -> f64 {
+        const FACETS: usize = 48;
+        const AZIMUTHS: usize = 5;
+        let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
+        let mut blocked = BlockedSlopes::default();
+        for facet in (0..FACETS.min(facets.len())).map(|k| k * facets.len() / FACETS.min(facets.len())) {
+            for azimuth in 0..AZIMUTHS {
+                let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
+                let origin = lifted_origin(facets, facet, diagonal);
+                slicer.scan(origin, facets.normals[facet], along, facets.triangles[facet], &mut blocked);
+            }
+        }
+        blocked.work as f64 / (FACETS * AZIMUTHS) as f64
+    }
+
+    /// Slices the mesh along every azimuth, for every facet. Visibility ends in ramps of `ramp` radians.
+    pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
+        let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
+        let (rows, floating): (Vec<Vec<f32>>, Vec<Vec<Floating>>) = (0..azimuths)
+            .into_par_iter()
+            .map(|azimuth| {
+                let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
+                let mut blocked = BlockedSlopes::default();
+                let (mut row, mut above) = (Vec::with_capacity(facets.len()), Vec::new());
+                for facet in 0..facets.len() {
+                    let origin = lifted_origin(facets, facet, diagonal);
+                    slicer.scan(origin, facets.normals[facet], along, facets.triangles[facet], &mut blocked);
+                    row.push(blocked.ground);
+                    above.extend(blocked.floating_unfaced().map(|(low, high)| Floating {
+                        facet: facet as u32,
+                        low: low.atan(),
+                        high: if high == f32::INFINITY { Horizons::BLOCKED } else { high.atan() },
+                    }));
+                }
+                (row, above)
+            })
+            .unzip();
+        let horizons = Horizons::from_slopes(facets.len(), azimuths, ramp, rows.concat());
+        // The golden ratio's multiples fill [0, 1] evenly, for neighbours too.
+        let switch = (0..facets.len() as u32).map(|k| k.wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0).collect();
+        Self { horizons, floating, switch }
+    }
+
+    pub fn facets(&self) -> usize {
+        self.horizons.facets()
+    }
+
+    pub fn bytes(&self) -> usize {
+        let floating: usize = self.floating.iter().map(Vec::len).sum();
+        self.horizons.bytes() + floating * size_of::<Floating>()
+    }
+
+    /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
+    pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
+        let [(from, _), (to, blend)] = self.horizons.taps(direction);
+        let elevation = FRAC_PI_2 - to_angles(direction).0;
+        let sharpness = 1.0 / self.horizons.ramp();
+        let row = |azimuth: usize| &self.horizons.row(azimuth)[range.clone()];
+        let switch = &self.switch[range.clone()];
+        simd::stepped_visibility(row(from), row(to), switch, blend, elevation, sharpness, out);
+        let above = |edge: f32| ((elevation - edge) * sharpness + 0.5).clamp(0.0, 1.0);
+        for (azimuth, side) in [(from, 0.0), (to, 1.0)] {
+            for hanging in self.run(azimuth, &range) {
+                let at = hanging.facet as usize - range.start;
+                let changed = ((blend - switch[at]) * simd::SWITCH + 0.5).clamp(0.0, 1.0);
+                let weight = 1.0 - (side - changed).abs();
+                let covered = above(hanging.low) - above(hanging.high);
+                out[at] = (out[at] - weight * covered).max(0.0);
+            }
+        }
+    }
+
+    /// What hangs above a run of facets along one azimuth.
+    fn run(&self, azimuth: usize, range: &Range<usize>) -> &[Floating] {
+        let row = &self.floating[azimuth];
+        let place = |facet: usize| row.partition_point(|hanging| (hanging.facet as usize) < facet);
+        &row[place(range.start)..place(range.end)]
+    }
+
+    /// What hangs over each facet along each azimuth, the azimuths of a facet side by side: where the intervals
+    /// `(low, high)` [rad] of each begin (one more entry than facets x azimuths), and the intervals.
+    pub(crate) fn hanging_by_facet(&self) -> (Vec<u32>, Vec<(f32, f32)>) {
+        let (mut starts, mut intervals) = (vec![0], Vec::new());
+        for facet in 0..self.facets() {
+            for azimuth in 0..self.horizons.azimuths() {
+                let run = self.run(azimuth, &(facet..facet + 1));
+                intervals.extend(run.iter().map(|hanging| (hanging.low, hanging.high)));
+                starts.push(intervals.len() as u32);
+            }
+        }
+        (starts, intervals)
+    }
+
+    /// The same as yes/no maps of `rings` rings on the slices' own azimuths: exact at the nodes.
+    pub fn maps(&self, rings: usize) -> SoftMaps {
+        let (facets, azimuths) = (self.facets(), self.horizons.azimuths());
+        let grid = PolarGrid::new(rings, azimuths);
+        let mut packed = PackedVisibility::new(facets, grid.len());
+        for ring in 0..grid.ring_count() {
+            let elevation = FRAC_PI_2 - grid.theta(ring);
+            for azimuth in 0..azimuths {
+                let node = ring * azimuths + azimuth;
+                for facet in 0..facets {
+                    if elevation > self.horizons.elevation(azimuth, facet) {
+                        packed.set_visible(node, facet);
+                    }
+                }
+                for hanging in &self.floating[azimuth] {
+                    if hanging.low <= elevation && elevation <= hanging.high {
+                        packed.set_blocked(node, hanging.facet as usize);
+                    }
+                }
+            }
+        }
+        SoftMaps { grid, packed }
+    }
+}
