@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::accuracy::{Errors, Reference, mirror_biased_pairs, upper_errors};
 use crate::brdf::{Brdf, MeasuredCache, Term};
@@ -98,6 +99,16 @@ pub struct Outcome {
     pub notes: Vec<String>,
 }
 
+/// The last effective BRDF, and what a colour edit makes the next one from.
+#[derive(Debug)]
+struct Last {
+    key: OutcomeKey,
+    materials: Arc<Assigned>,
+    /// Kept or given up.
+    factors: Option<LowRank>,
+    outcome: Outcome,
+}
+
 /// All stages from scene to effective BRDF.
 #[derive(Debug, Default)]
 pub struct Pipeline {
@@ -112,8 +123,7 @@ pub struct Pipeline {
     materials: Stage<MaterialKey, Assigned>,
     /// M of each material, factored as the paper does, for a version of the materials, a seed and a number of colours.
     paper_factors: Stage<(Version, u64, usize), PaperFactors>,
-    /// The last effective BRDF.
-    last: Option<(OutcomeKey, Outcome)>,
+    last: Option<Last>,
 }
 
 /// Pairs that the factored form is checked on.
@@ -160,19 +170,30 @@ impl Pipeline {
             .get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
-        if let Some((last, outcome)) = &self.last
-            && *last == key
-        {
-            return Ok(Outcome { times, ..outcome.clone() });
+        let mut factors = None;
+        if let Some(last) = &self.last {
+            if last.key == key {
+                return Ok(Outcome { times, ..last.outcome.clone() });
+            }
+            // Colours alone: the factors stay, and are judged anew.
+            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] && same_lobes(&last.materials, &materials) {
+                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank);
+                factors = kept.map(|factors| factors.recolored(sum_materials));
+            }
         }
         let start = Instant::now();
-        let (form, factored) =
-            product(&plan, &facets, &visibility, sum, material_of_slot, sum_materials, &shape, &settings)?;
+        if plan.try_low_rank && factors.is_none() {
+            let knobs = settings.low_rank(!shape.height_field);
+            factors = Some(LowRank::build(&facets, &visibility, material_of_slot, sum_materials, &knobs)?);
+        }
+        let direct = Direct { sum: Arc::new(sum), visibility };
+        let base_area = f64::from(shape.mesh.base_area());
+        let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
         for (name, ms) in &times {
             plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
         }
-        let brdf = Arc::new(EffectiveBrdf { form, base_area: f64::from(shape.mesh.base_area()) });
+        let brdf = Arc::new(brdf);
         let mut notes = shape.mesh.notes.clone();
         if facets.skipped_triangles > 0 {
             notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
@@ -181,7 +202,7 @@ impl Pipeline {
             plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
         }
         let outcome = Outcome { brdf, plan, settings, times, factored, notes };
-        self.last = Some((key, outcome.clone()));
+        self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
 
@@ -393,33 +414,29 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
     })
 }
 
-/// The form that the plan asks for; a factored one only if it agrees with the direct sum.
-#[expect(clippy::too_many_arguments, reason = "the last stage reads all others")]
-fn product(
-    plan: &Plan,
-    facets: &Facets,
-    visibility: &Arc<Visibility>,
-    sum: FacetSum,
-    material_of_slot: &[usize],
-    materials: &[SumMaterial],
-    shape: &Shape,
+fn same_lobes((slots, materials): &Assigned, (other_slots, others): &Assigned) -> bool {
+    slots == other_slots
+        && materials.len() == others.len()
+        && materials.iter().zip(others).all(|(a, b)| a.same_lobes(b))
+}
+
+/// The factored form where there is one and it agrees with the direct sum, else the direct sum; and how far apart they are.
+fn choose(
+    direct: Direct,
+    factors: Option<LowRank>,
+    base_area: f64,
     settings: &Settings,
-) -> Result<(Form, Option<Errors>)> {
-    let direct = Form::Direct(Direct { sum: Arc::new(sum), visibility: visibility.clone() });
-    if !plan.try_low_rank {
-        return Ok((direct, None));
-    }
-    let factors =
-        LowRank::build(facets, visibility, material_of_slot, materials, &settings.low_rank(!shape.height_field))?;
-    let base_area = f64::from(shape.mesh.base_area());
-    let direct = EffectiveBrdf { form: direct, base_area };
+) -> (EffectiveBrdf, Option<Errors>) {
+    let direct = EffectiveBrdf { form: Form::Direct(direct), base_area };
+    let Some(factors) = factors else { return (direct, None) };
     let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };
     let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
-    let values = |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
+    let values =
+        |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
     let errors = upper_errors(&values(&factored), &values(&direct));
     let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
     let keep = settings.method == crate::plan::Method::LowRank || close;
-    Ok((if keep { factored.form } else { direct.form }, Some(errors)))
+    (if keep { factored } else { direct }, Some(errors))
 }
 
 impl Reflectance for Outcome {

@@ -66,6 +66,9 @@ fn what_an_edit_leaves_is_what_a_fresh_start_makes() {
         &["tile.geometry.depth=0.2"],
         &["tile.geometry.depth=0.2", "material.default.brdf.roughness=0.5"],
         &["quality.seed=9"],
+        &["quality.seed=9", "quality.method=\"low_rank\""],
+        &["quality.seed=9", "quality.method=\"low_rank\"", "material.default.brdf.f0=[0.9, 0.5, 0.1]"],
+        &["quality.seed=9", "quality.method=\"low_rank\"", "material.default.color=[0.2, 0.3, 0.4]"],
         &[],
     ] {
         let scene = open(overrides);

@@ -17,6 +17,20 @@ pub struct SumMaterial {
     pub color: Vec3,
 }
 
+impl SumMaterial {
+    /// Do two materials differ in nothing but colours and tints? Then what was factored for one serves the other.
+    pub fn same_lobes(&self, other: &Self) -> bool {
+        let same = |a: &Term, b: &Term| match (a, b) {
+            (Term::Measured(a), Term::Measured(b)) => std::sync::Arc::ptr_eq(a, b),
+            _ => analytic_lobe(a).is_some_and(|lobe| Some(lobe) == analytic_lobe(b)),
+        };
+        let (a, b) = (&self.brdf.terms, &other.brdf.terms);
+        (self.color == Vec3::ZERO) == (other.color == Vec3::ZERO)
+            && a.len() == b.len()
+            && a.iter().zip(b).all(|(a, b)| same(a, b))
+    }
+}
+
 /// Facets grouped by material, in arrays that the inner loops walk.
 #[derive(Debug, Clone)]
 pub struct FacetSum {

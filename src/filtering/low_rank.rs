@@ -12,7 +12,7 @@ use crate::brdf::{Brdf, ColorBasis, Term};
 use crate::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
 use crate::error::Result;
 use crate::geometry::Facets;
-use crate::simd;
+use crate::simd::{self, Lobe};
 use crate::visibility::Visibility;
 
 /// Resolution and truncation of the low-rank form.
@@ -41,6 +41,26 @@ pub enum Tint {
     Fixed(Vec3),
 }
 
+/// What a channel's tint is made of: a material and a term of it, by number, and a colour or colour direction that no edit
+/// of the material changes.
+#[derive(Debug, Clone, Copy)]
+struct Source {
+    material: usize,
+    term: usize,
+    along: Vec3,
+}
+
+impl Source {
+    fn tint(&self, materials: &[SumMaterial]) -> Tint {
+        let material = &materials[self.material];
+        let color = material.color * self.along;
+        match &material.brdf.terms[self.term] {
+            Term::Measured(_) => Tint::Fixed(color),
+            term => Tint::Term(term.clone(), color),
+        }
+    }
+}
+
 /// One scalar BRDF over one group of facets with one set of weights.
 #[derive(Debug, Clone)]
 pub struct Channel {
@@ -49,6 +69,7 @@ pub struct Channel {
     pub(crate) p: Option<Arc<Vec<f32>>>,
     pub(crate) columns: usize,
     pub tint: Tint,
+    source: Source,
     /// Rank of the basis that was used, and of N in its metric.
     pub ranks: (usize, usize),
 }
@@ -74,18 +95,19 @@ pub struct GroupFacets<'a> {
 
 impl Channel {
     /// A Lambertian lobe: one table of `Σ w V(i)(n·i)+ V(o)(n·o)+ / π`, smooth on its own.
-    pub fn lambertian(group: &GroupFacets<'_>, tint: Tint) -> Self {
+    fn lambertian(group: &GroupFacets<'_>, source: Source, tint: Tint) -> Self {
         let cosines = group.visibility.with_cosines(group.normals);
         let y = vec![std::f32::consts::FRAC_1_PI; group.weights.len()];
         let u = visibility_table(&cosines, group.weights, &y, 1);
-        Self { u: Arc::new(u), p: None, columns: 1, tint, ranks: (1, 1) }
+        Self { u: Arc::new(u), p: None, columns: 1, tint, source, ranks: (1, 1) }
     }
 
     /// Any lobe, through its rotated basis.
-    pub fn factored(
+    fn factored(
         group: &GroupFacets<'_>,
         basis: &RotatedBasis,
         settings: &LowRankSettings,
+        source: Source,
         tint: Tint,
     ) -> Result<Self> {
         let count = basis.features();
@@ -106,7 +128,7 @@ impl Channel {
         super::gemm::multiply_parallel(group.normals.len(), count, rank, &features, &leading, &mut y);
         let u = visibility_table(group.visibility, group.weights, &y, rank);
         let p = basis.left_table(&leading, rank);
-        Ok(Self { u: Arc::new(u), p: Some(Arc::new(p)), columns: rank, tint, ranks: (basis.rank, rank) })
+        Ok(Self { u: Arc::new(u), p: Some(Arc::new(p)), columns: rank, tint, source, ranks: (basis.rank, rank) })
     }
 
     pub fn bytes(&self) -> usize {
@@ -116,15 +138,15 @@ impl Channel {
 
 /// A run of facets with one material, and what stands before its terms.
 #[derive(Debug)]
-struct Group<'a> {
+struct Group {
     range: std::ops::Range<usize>,
-    material: &'a SumMaterial,
+    material: usize,
     /// Area times colour weight, and the colour that column stands for: one for equal colours, else three.
     columns: Vec<(Vec<f32>, Vec3)>,
 }
 
 /// Facets by slot, skipping black materials. Facets are sorted by slot.
-fn groups<'a>(facets: &Facets, material_of_slot: &[usize], materials: &'a [SumMaterial]) -> Vec<Group<'a>> {
+fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]) -> Vec<Group> {
     let mut groups = Vec::new();
     let mut start = 0;
     while start < facets.len() {
@@ -132,8 +154,8 @@ fn groups<'a>(facets: &Facets, material_of_slot: &[usize], materials: &'a [SumMa
         let end = start + facets.slots[start..].iter().take_while(|&&other| other == slot).count();
         let range = start..end;
         start = end;
-        let material = &materials[material_of_slot[usize::from(slot)]];
-        if material.color == Vec3::ZERO {
+        let material = material_of_slot[usize::from(slot)];
+        if materials[material].color == Vec3::ZERO {
             continue;
         }
         let colors = &facets.colors[range.clone()];
@@ -168,41 +190,20 @@ impl LowRank {
         for group in groups(facets, material_of_slot, materials) {
             let rows = all.part(group.range.clone());
             let normals = &facets.normals[group.range.clone()];
-            for term in &group.material.brdf.terms {
+            for (k, term) in materials[group.material].brdf.terms.iter().enumerate() {
+                let lobes = lobes_of(term, settings);
                 for (weights, column_color) in &group.columns {
-                    let color = group.material.color * *column_color;
                     let part = GroupFacets { visibility: &rows, normals, weights };
-                    match term {
-                        Term::Lambertian { .. } => {
-                            channels.push(Channel::lambertian(&part, Tint::Term(term.clone(), color)))
-                        }
-                        Term::Measured(table) => {
-                            let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
-                            for direction in &colors.directions
-                                [..settings.colors.unwrap_or_else(|| colors.count_for(settings.keep_color)).clamp(1, 3)]
-                            {
-                                let lobe = RotatedLobe::Measured { table: table.as_ref(), along: *direction };
-                                let basis = RotatedBasis::new(lobe, settings.basis, settings.keep_m)?;
-                                channels.push(Channel::factored(
-                                    &part,
-                                    &basis,
-                                    settings,
-                                    Tint::Fixed(*direction * color),
-                                )?);
+                    for (lobe, along) in &lobes {
+                        let source = Source { material: group.material, term: k, along: *along * *column_color };
+                        let tint = source.tint(materials);
+                        channels.push(match lobe {
+                            RotatedLobe::Analytic(Lobe::Lambertian) => Channel::lambertian(&part, source, tint),
+                            _ => {
+                                let basis = RotatedBasis::new(*lobe, settings.basis, settings.keep_m)?;
+                                Channel::factored(&part, &basis, settings, source, tint)?
                             }
-                        }
-                        analytic => {
-                            if let Some(lobe) = analytic_lobe(analytic) {
-                                let basis =
-                                    RotatedBasis::new(RotatedLobe::Analytic(lobe), settings.basis, settings.keep_m)?;
-                                channels.push(Channel::factored(
-                                    &part,
-                                    &basis,
-                                    settings,
-                                    Tint::Term(term.clone(), color),
-                                )?);
-                            }
-                        }
+                        });
                     }
                 }
             }
@@ -214,6 +215,18 @@ impl LowRank {
             projected_area: Arc::new(projected_area),
         })
     }
+}
+
+/// The scalar lobes of a term, and the colour direction of each: one for analytic terms, up to three for measured ones.
+fn lobes_of<'a>(term: &'a Term, settings: &LowRankSettings) -> Vec<(RotatedLobe<'a>, Vec3)> {
+    if let Some(lobe) = analytic_lobe(term) {
+        return vec![(RotatedLobe::Analytic(lobe), Vec3::ONE)];
+    }
+    let Term::Measured(table) = term else { return Vec::new() };
+    let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
+    let count = settings.colors.unwrap_or_else(|| colors.count_for(settings.keep_color)).clamp(1, 3);
+    let lobe = |along: Vec3| (RotatedLobe::Measured { table: table.as_ref(), along }, along);
+    colors.directions[..count].iter().map(|along| lobe(*along)).collect()
 }
 
 /// `a_v(o) / cos θ_o` at each node, in tile units squared.
@@ -233,6 +246,16 @@ fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32
 }
 
 impl LowRank {
+    /// The same factors under other colours. `materials` must have the lobes that these were built from
+    /// ([`SumMaterial::same_lobes`]).
+    pub fn recolored(&self, materials: &[SumMaterial]) -> Self {
+        let mut recolored = self.clone();
+        for channel in &mut recolored.channels {
+            channel.tint = channel.source.tint(materials);
+        }
+        recolored
+    }
+
     /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
     pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         if o.z <= 0.0 {
