@@ -23,6 +23,7 @@ pub mod gpu;
 pub mod large_scale;
 pub mod pipeline;
 pub mod plan;
+pub mod report;
 pub mod scene;
 pub mod simd;
 pub mod visibility;

@@ -29,6 +29,8 @@ enum Command {
     Basis(SceneArgs),
     /// Time the stages from an edit to the effective BRDF (or the picture).
     Profile(ProfileArgs),
+    /// Measure accuracy against time: every knob, the presets, and combinations, against the reference.
+    Report(ReportArgs),
     /// List the materials that ship with the program.
     Materials(MaterialsArgs),
 }
@@ -136,6 +138,31 @@ struct ProfileArgs {
 }
 
 #[derive(Debug, Args)]
+struct ReportArgs {
+    /// Scene files, or names of shipped materials.
+    #[arg(required = true)]
+    scenes: Vec<String>,
+    /// The folder for report.html, report.csv and report.json. A run that was broken off goes on from what is there.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Override any field of each scene: `--set material.default.brdf.roughness=0.3` (repeatable).
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
+    /// Minutes a scene; presets are always measured.
+    #[arg(long, default_value_t = 5.0, value_parser = commands::parse_minutes)]
+    minutes: f64,
+    /// Direction pairs that errors are taken over.
+    #[arg(long, default_value_t = 500, value_parser = commands::parse_count)]
+    pairs: usize,
+    /// Settings with all knobs turned at once.
+    #[arg(long, default_value_t = 40)]
+    combinations: usize,
+    /// No progress and no notes on standard error.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Args)]
 struct MaterialsArgs {
     /// Machine-readable output.
     #[arg(long)]
@@ -151,6 +178,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => commands::plan::run(&args),
         Command::Basis(args) => commands::basis::run(&args),
         Command::Profile(args) => commands::profile::run(&args),
+        Command::Report(args) => commands::report::run(&args),
         Command::Materials(args) => commands::materials::run(&args),
     };
     match result {

@@ -3,6 +3,7 @@
 mod metrics;
 mod pairs;
 mod reference;
+pub mod sweep;
 
 pub use metrics::{Errors, compare, upper_errors};
 pub use pairs::{Pair, mirror_biased_pairs};

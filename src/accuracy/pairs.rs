@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::directions::from_angles;
 
 /// A pair of unit directions in the small-scale frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pair {
     /// Towards the light.
     pub i: Vec3,

@@ -7,6 +7,7 @@ pub mod materials;
 pub mod plan;
 pub mod profile;
 pub mod render;
+pub mod report;
 
 use std::io::Write;
 
@@ -61,6 +62,18 @@ pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
     let number =
         |text: &str| text.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n)).ok_or_else(complain);
     Ok([number(a)?, number(b)?])
+}
+
+/// How many direction pairs.
+pub fn parse_count(text: &str) -> std::result::Result<usize, String> {
+    let count = text.parse::<usize>().ok().filter(|count| (16..=100_000).contains(count));
+    count.ok_or_else(|| format!("found `{text}`, expected a number from 16 to 100000"))
+}
+
+/// Minutes, a fraction too.
+pub fn parse_minutes(text: &str) -> std::result::Result<f64, String> {
+    let minutes = text.parse::<f64>().ok().filter(|minutes| (0.0..=1e4).contains(minutes));
+    minutes.ok_or_else(|| format!("found `{text}`, expected minutes from 0 to 10000"))
 }
 
 /// Prints JSON on standard output.

@@ -35,7 +35,7 @@ impl Picture {
         replace_file(path, &bytes)
     }
 
-    fn png_bytes(&self, tone_map: &ToneMap) -> Result<Vec<u8>> {
+    pub(crate) fn png_bytes(&self, tone_map: &ToneMap) -> Result<Vec<u8>> {
         let too_large = |_| Error::failed("the picture is too large for PNG");
         let (width, height) =
             (u32::try_from(self.width).map_err(too_large)?, u32::try_from(self.height).map_err(too_large)?);

@@ -67,6 +67,25 @@ pub fn parse(source: &str) -> Result<Scene> {
     load_with_overrides(source, &[])
 }
 
+impl Scene {
+    /// The scene with words `quality.key=value` applied to its settings.
+    ///
+    /// # Errors
+    /// Words that are none, or values that a setting cannot take.
+    pub fn with_quality(&self, words: &[String]) -> Result<Self> {
+        let complain = |found: String| Error::from(InputError::new("quality", found, "settings of the quality table"));
+        let quality = Table::try_from(&self.quality).map_err(|error| complain(error.to_string()))?;
+        let mut table = Table::new();
+        table.insert("quality".to_owned(), toml::Value::Table(quality));
+        for word in words {
+            overrides::apply(&mut table, word)?;
+        }
+        let quality = table.remove("quality").ok_or_else(|| complain(String::new()))?;
+        let quality = quality.try_into().map_err(|error: toml::de::Error| complain(error.message().to_owned()))?;
+        Ok(Self { quality, ..self.clone() })
+    }
+}
+
 /// A scene from its text, with overrides applied to the text's table before it is checked.
 pub fn load_with_overrides(source: &str, overrides: &[String]) -> Result<Scene> {
     let mut table: Table = toml::from_str(source).map_err(|error| syntax_error(source, &error))?;

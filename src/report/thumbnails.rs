@@ -1,0 +1,153 @@
+//! The scene's picture at each preset, and how far it is to the eye from the finest one.
+
+use std::fmt::Write as _;
+
+use glam::Vec3;
+
+use crate::error::Result;
+use crate::filtering::EffectiveBrdf;
+use crate::large_scale::shading::Background;
+use crate::large_scale::shadow::Occluder;
+use crate::large_scale::tone_map::{ToneMap, srgb_byte};
+use crate::large_scale::{Picture, RenderInput, lights, objects, render};
+use crate::scene::LoadedScene;
+
+/// Pixels a side, and lights.
+const SIZE: usize = 120;
+const LIGHTS: usize = 8;
+
+/// Renders a scene's object again and again with different materials.
+pub struct Studio {
+    mesh: objects::ObjectMesh,
+    occluder: Option<Occluder>,
+    lights: lights::Lights,
+    camera: crate::scene::Camera,
+    tone_map: ToneMap,
+}
+
+impl Studio {
+    /// # Errors
+    /// An object, an environment or a camera that cannot be used.
+    pub fn new(loaded: &LoadedScene) -> Result<Self> {
+        let mesh = objects::build(&loaded.scene.object, &loaded.base_dir)?;
+        let mut light = loaded.scene.light.clone();
+        light.count = light.count.min(LIGHTS);
+        let lights = lights::build(&light, &loaded.base_dir)?;
+        let camera = loaded.scene.camera.clone().unwrap_or_default();
+        let tone_map = ToneMap::new(&camera)?;
+        Ok(Self { occluder: Occluder::of(&mesh), mesh, lights, camera, tone_map })
+    }
+
+    /// # Errors
+    /// A camera that sees nothing it could be framed by.
+    pub fn picture(&self, brdf: &EffectiveBrdf) -> Result<Picture> {
+        let input = RenderInput {
+            mesh: &self.mesh,
+            occluder: self.occluder.as_ref(),
+            shadow_cache: None,
+            lights: &self.lights.directional,
+            camera: &self.camera,
+            reflectance: brdf,
+            size: [SIZE, SIZE],
+            samples_per_side: 1,
+            background: &Background::default(),
+        };
+        Ok(render(&input)?.picture)
+    }
+
+    /// As a PNG for a page.
+    ///
+    /// # Errors
+    /// None in practice: the picture is small.
+    pub fn png(&self, picture: &Picture) -> Result<String> {
+        data_url(picture, &self.tone_map)
+    }
+
+    /// CIE 1976 ΔE of each pixel as it is shown.
+    pub fn difference(&self, a: &Picture, b: &Picture) -> Vec<f32> {
+        let lab = |p: &Vec3| lab(self.tone_map.apply(*p));
+        a.pixels.iter().zip(&b.pixels).map(|(a, b)| lab(a).distance(lab(b))).collect()
+    }
+}
+
+/// A picture of ΔE: black is none, white [`FULL_SCALE`] or more.
+///
+/// # Errors
+/// None in practice: the picture is small.
+pub fn difference_png(delta_e: &[f32]) -> Result<String> {
+    let pixels = delta_e.iter().map(|delta| heat(delta / FULL_SCALE)).collect();
+    let plain = ToneMap { curve: crate::large_scale::tone_map::ToneCurve::Plain, gain: 1.0 };
+    data_url(&Picture { width: SIZE, height: SIZE, pixels }, &plain)
+}
+
+/// ΔE that the difference pictures show as white; about 2 is just seen side by side.
+pub const FULL_SCALE: f32 = 10.0;
+
+/// Black, purple, orange, white.
+fn heat(x: f32) -> Vec3 {
+    let x = x.clamp(0.0, 1.0);
+    Vec3::new(
+        (2.2 * x).min(1.0),
+        (1.6 * x - 0.45).clamp(0.0, 1.0),
+        if x < 0.4 { x } else { (2.5 * x - 1.5).max(0.4 - (x - 0.4)) }.clamp(0.0, 1.0),
+    )
+}
+
+/// CIE L*a*b* (D65) of display-linear Rec. 709.
+fn lab(rgb: Vec3) -> Vec3 {
+    let x = rgb.dot(Vec3::new(0.412_456, 0.357_576, 0.180_437)) / 0.950_47;
+    let y = rgb.dot(Vec3::new(0.212_673, 0.715_152, 0.072_175));
+    let z = rgb.dot(Vec3::new(0.019_334, 0.119_192, 0.950_304)) / 1.088_83;
+    let f = |t: f32| if t > 0.008_856 { t.cbrt() } else { 7.787 * t + 16.0 / 116.0 };
+    Vec3::new(116.0 * f(y) - 16.0, 500.0 * (f(x) - f(y)), 200.0 * (f(y) - f(z)))
+}
+
+fn data_url(picture: &Picture, tone_map: &ToneMap) -> Result<String> {
+    let bytes = picture.png_bytes(tone_map)?;
+    Ok(format!("data:image/png;base64,{}", base64(&bytes)))
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let word = chunk.iter().fold(0_u32, |word, byte| word << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
+        for k in 0..4 {
+            if k <= chunk.len() {
+                let _ = write!(text, "{}", LETTERS[(word >> (18 - 6 * k) & 63) as usize] as char);
+            } else {
+                text.push('=');
+            }
+        }
+    }
+    text
+}
+
+/// The scale of the difference pictures, as a strip.
+pub fn scale_strip() -> String {
+    let mut cells = String::new();
+    for k in 0..=10 {
+        let color = heat(k as f32 / 10.0).to_array().map(srgb_byte);
+        let _ = write!(cells, "<span style='background:rgb({},{},{})'></span>", color[0], color[1], color[2]);
+    }
+    format!("<span class='strip'>0 {cells} {FULL_SCALE} ΔE</span>")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_is_that_of_the_rfc() {
+        // RFC 4648, Sec. 10.
+        for (text, code) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+            assert_eq!(base64(text.as_bytes()), code);
+        }
+    }
+
+    #[test]
+    fn white_is_a_hundred_without_hue() {
+        let white = lab(Vec3::ONE);
+        assert!((white.x - 100.0).abs() < 1e-2 && white.y.abs() < 0.02 && white.z.abs() < 0.02, "{white}");
+    }
+}
