@@ -229,8 +229,16 @@ impl Pipeline {
         timed(&mut times, "visibility", start);
         let (factors, _) =
             self.paper_factors.get("basis", (materials_version, knobs.seed, knobs.colors), &mut times, || {
-                let factor = |material| MaterialFactors::new(material, &knobs).map(|factors| Some(Arc::new(factors)));
-                materials.iter().map(factor).collect()
+                let mut made: PaperFactors = Vec::with_capacity(materials.len());
+                for (k, material) in materials.iter().enumerate() {
+                    // Two colours of one BRDF share its factors.
+                    let known = (0..k).find(|&earlier| materials[earlier].same_brdf(material));
+                    made.push(match known {
+                        Some(earlier) => made[earlier].clone(),
+                        None => Some(Arc::new(MaterialFactors::new(material, &knobs)?)),
+                    });
+                }
+                Ok(made)
             })?;
         let start = Instant::now();
         let base_area = f64::from(shape.mesh.base_area());

@@ -18,6 +18,15 @@ pub struct SumMaterial {
 }
 
 impl SumMaterial {
+    /// Do two materials differ in nothing but their colour?
+    pub fn same_brdf(&self, other: &Self) -> bool {
+        // A tint is a line in (1 - i·h)⁵: two points tell it.
+        let tints = |material: &Self| -> Vec<[Vec3; 2]> {
+            material.brdf.terms.iter().map(|term| [0.0, 1.0].map(|i_dot_h| term.tint(i_dot_h))).collect()
+        };
+        self.same_lobes(other) && tints(self) == tints(other)
+    }
+
     /// Do two materials differ in nothing but colours and tints? Then what was factored for one serves the other.
     pub fn same_lobes(&self, other: &Self) -> bool {
         let same = |a: &Term, b: &Term| match (a, b) {
