@@ -54,7 +54,7 @@ const KNOBS: &[(&str, &[&str], &[&str])] = &[
     ("method", &["\"direct\"", "\"low_rank\""], &[]),
     ("keep_m", &["0.9", "0.98", "0.995", "0.9999"], &["quality.method=\"low_rank\""]),
     ("keep_n", &["0.9", "0.98", "0.995", "0.9999"], &["quality.method=\"low_rank\""]),
-    ("grid", &["[8, 16]", "[12, 24]", "[24, 48]"], &["quality.method=\"low_rank\""]),
+    ("grid", &["[8,16]", "[12,24]", "[24,48]"], &["quality.method=\"low_rank\""]),
     ("colors", &["1", "2", "3"], &["quality.method=\"low_rank\""]),
 ];
 
@@ -92,7 +92,7 @@ fn combination(k: usize) -> Candidate {
     } else {
         let rings = log(8.0, 24.0, at(3));
         set.push("quality.method=\"low_rank\"".to_owned());
-        set.push(format!("quality.grid=[{rings}, {}]", 2.0 * rings));
+        set.push(format!("quality.grid=[{rings},{}]", 2.0 * rings));
         set.push(format!("quality.keep_m={:.4}", kept(at(4))));
         set.push(format!("quality.keep_n={:.4}", kept(at(2).mul_add(2.0, -1.0))));
     }

@@ -27,7 +27,7 @@ impl Machine {
         Self {
             processor: processor_name(),
             threads: rayon::current_num_threads(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned() + if cfg!(debug_assertions) { " (debug)" } else { "" },
         }
     }
 }
