@@ -110,9 +110,12 @@ struct ExportArgs {
     /// The table to write; the ending chooses the format. `-` is standard output (CSV).
     #[arg(short, long)]
     output: PathBuf,
-    /// Steps of theta and phi for each direction.
-    #[arg(long, default_value = "16x64", value_parser = commands::parse_size)]
-    resolution: [usize; 2],
+    /// Steps of theta and phi for each direction; without it, what suits the format.
+    #[arg(long, value_name = "THETAxPHI", value_parser = commands::parse_size)]
+    resolution: Option<[usize; 2]>,
+    /// The same for the second direction alone (in .bsdf: samples along the two axes of each warp).
+    #[arg(long, value_name = "THETAxPHI", value_parser = commands::parse_size)]
+    resolution_o: Option<[usize; 2]>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -11,7 +11,7 @@ mod from_specs;
 mod half_difference;
 mod measured;
 mod merl;
-mod rgl;
+pub(crate) mod rgl;
 
 use std::sync::Arc;
 

@@ -29,8 +29,11 @@ const MAX_PAIRS: usize = 1 << 25;
 const MAX_AXIS: usize = 1024;
 
 impl ExportResolution {
-    /// The grid, if it is of a size that can be made.
-    pub(super) fn grid(&self) -> Result<Grid> {
+    /// Whether tables of this size can be made.
+    ///
+    /// # Errors
+    /// An axis or a number of pairs out of range.
+    pub fn check(&self) -> Result<()> {
         let counts = [self.theta_i, self.phi_i, self.theta_o, self.phi_o];
         for (name, count) in ["theta_i", "phi_i", "theta_o", "phi_o"].iter().zip(counts) {
             if !(1..=MAX_AXIS).contains(&count) {
@@ -45,7 +48,12 @@ impl ExportResolution {
             let found = format!("{} x {} x {} x {} = {pairs} pairs", counts[0], counts[1], counts[2], counts[3]);
             return Err(InputError::new("resolution", found, format!("at most {MAX_PAIRS} pairs")).into());
         }
-        Ok(Grid { light: Axes::new(self.theta_i, self.phi_i), view: Axes::new(self.theta_o, self.phi_o) })
+        Ok(())
+    }
+
+    /// The grid of a checked size.
+    pub(super) fn grid(&self) -> Grid {
+        Grid { light: Axes::new(self.theta_i, self.phi_i), view: Axes::new(self.theta_o, self.phi_o) }
     }
 }
 
