@@ -21,7 +21,7 @@ enum Command {
     Render(RenderArgs),
     /// Evaluate f̄ [1/sr] (the light's cosine included) at direction pairs of a CSV file.
     Eval(EvalArgs),
-    /// Write the effective BRDF as a table: .npz, .csv or .exr by the file's ending.
+    /// Write the effective BRDF as a table, by the file's ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
     Export(ExportArgs),
     /// List every effect: on or off, why, and what it costs.
     Plan(SceneArgs),
@@ -116,6 +116,15 @@ struct ExportArgs {
     /// The same for the second direction alone (in .bsdf: samples along the two axes of each warp).
     #[arg(long, value_name = "THETAxPHI", value_parser = commands::parse_size)]
     resolution_o: Option<[usize; 2]>,
+    /// What a Radiance .xml holds: 145 x 145 patches, or a tensor tree for what is sharp or anisotropic.
+    #[arg(long, value_enum, default_value_t = Radiance::Klems)]
+    radiance: Radiance,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Radiance {
+    Klems,
+    TensorTree,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

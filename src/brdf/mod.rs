@@ -10,7 +10,7 @@ mod fast_math;
 mod from_specs;
 mod half_difference;
 mod measured;
-mod merl;
+pub(crate) mod merl;
 pub(crate) mod rgl;
 
 use std::sync::Arc;

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use anyhow::Result;
-use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution};
+use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use biscale::pipeline::Pipeline;
 use serde::Serialize;
 
 use super::print_json;
-use crate::ExportArgs;
+use crate::{ExportArgs, Radiance};
 
 #[derive(Serialize)]
 struct Report {
@@ -22,6 +22,8 @@ struct Report {
     resampling_rel_l2: f64,
     /// Null where the table reads without error.
     resampling_psnr_db: f64,
+    /// Relative L2 between azimuths that an isotropic format has lost.
+    anisotropy_lost: Option<f64>,
     form: String,
     /// Directional-hemispherical: theta and phi in degrees, R, G, B.
     reflectance: Vec<[f32; 5]>,
@@ -47,7 +49,13 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         closes_plane: pipeline.mesh(&loaded)?.closes_plane,
         notes: outcome.notes.clone(),
     };
-    let options = ExportOptions { resolution: resolution(args) };
+    let options = ExportOptions {
+        resolution: resolution(args),
+        radiance: match args.radiance {
+            Radiance::Klems => RadianceBasis::Klems,
+            Radiance::TensorTree => RadianceBasis::TensorTree,
+        },
+    };
     let bar = bar(args.scene.quiet);
     let progress = |part: f32| bar.set_position((part * 1000.0) as u64);
     if streams {
@@ -69,6 +77,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             resampling_mean: reading.mean,
             resampling_rel_l2: reading.errors.rel_l2,
             resampling_psnr_db: reading.errors.psnr_db,
+            anisotropy_lost: report.anisotropy_lost,
             form: outcome.brdf.form.describe(),
             reflectance: report
                 .reflectances
@@ -87,6 +96,12 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             100.0 * reading.errors.rel_l2,
             reading.errors.psnr_db
         );
+        if let Some(lost) = report.anisotropy_lost {
+            eprintln!(
+                "the format is isotropic: {:.1} % (relative L2) between azimuths of the tile are lost",
+                100.0 * lost
+            );
+        }
         eprintln!("directional-hemispherical reflectance (R G B):");
         report.reflectances.lines().iter().for_each(|line| eprintln!("  {line}"));
         if let Some(note) = &report.note {

@@ -1,18 +1,23 @@
 //! The effective BRDF as a table that other programs load, one file here a format. Same inputs, same bytes.
 //!
 //! `.npz` (numpy), `.csv` and `.exr` hold everything there is on one grid ([`ExportMeta`] inside). The others are the
-//! formats of other programs, by their published layouts: RGL tensor files. Each has a note in plain words beside it.
+//! formats of other programs, by their published layouts: RGL tensor files (Mitsuba, pbrt), MERL, Radiance, UTIA, ASTM. Each
+//! has a note in plain words beside it.
 
+mod astm;
 mod csv;
 mod exr_atlas;
 mod grid;
+mod merl;
 mod meta;
 mod note;
 mod npz;
+mod radiance;
 mod replace;
 mod rgl;
 mod sampler;
 mod table;
+mod utia;
 mod zip;
 
 use std::ffi::OsString;
@@ -25,6 +30,7 @@ use crate::filtering::EffectiveBrdf;
 pub use grid::ExportResolution;
 pub use meta::ExportMeta;
 pub use note::Reflectances;
+pub use radiance::RadianceBasis;
 pub use replace::replace_file;
 pub use sampler::ReadingError;
 
@@ -36,6 +42,8 @@ use table::Table;
 pub struct ExportOptions {
     /// Sizes of the grids; each format has its own default. Formats whose grid is part of the layout do without.
     pub resolution: Option<ExportResolution>,
+    /// What a Radiance `.xml` holds.
+    pub radiance: RadianceBasis,
 }
 
 /// What was written, and how well the table stands for the function it was read from.
@@ -48,6 +56,8 @@ pub struct ExportReport {
     pub reading: ReadingError,
     /// The file of plain words beside the table; `None` where the table itself holds them.
     pub note: Option<PathBuf>,
+    /// Relative L2 between azimuths of the tile, where the format is isotropic and cannot tell them apart.
+    pub anisotropy_lost: Option<f64>,
     pub reflectances: Reflectances,
 }
 
@@ -74,6 +84,8 @@ struct Written {
     reading: ReadingError,
     /// Sentences on how its numbers are to be read.
     conventions: Vec<String>,
+    /// Relative L2 between azimuths, where the format cannot tell them apart.
+    anisotropy_lost: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,11 +94,23 @@ enum Format {
     Csv,
     Exr,
     Rgl,
+    Merl,
+    Radiance,
+    Utia,
+    Astm,
 }
 
 /// Endings and what is written for them.
-const FORMATS: &[(&str, Format)] =
-    &[("npz", Format::Npz), ("csv", Format::Csv), ("exr", Format::Exr), ("bsdf", Format::Rgl)];
+const FORMATS: &[(&str, Format)] = &[
+    ("npz", Format::Npz),
+    ("csv", Format::Csv),
+    ("exr", Format::Exr),
+    ("bsdf", Format::Rgl),
+    ("binary", Format::Merl),
+    ("xml", Format::Radiance),
+    ("bin", Format::Utia),
+    ("astm", Format::Astm),
+];
 
 impl Format {
     fn of(path: &Path) -> Result<Self> {
@@ -141,11 +165,22 @@ pub fn write(
             Format::Csv => on_grid(&job, &mut counted, csv::write)?,
             Format::Exr => on_grid(&job, &mut counted, exr_atlas::write)?,
             Format::Rgl => rgl::write(&job, &mut counted)?,
+            Format::Merl => merl::write(&job, &mut counted)?,
+            Format::Radiance => radiance::write(&job, &mut counted)?,
+            Format::Utia => utia::write(&job, &mut counted)?,
+            Format::Astm => astm::write(&job, &mut counted)?,
         };
         Ok((written, counted.bytes))
     })?;
     let reflectances = Reflectances::of(brdf);
-    let mut report = ExportReport { pairs: written.pairs, bytes, reading: written.reading, note: None, reflectances };
+    let mut report = ExportReport {
+        pairs: written.pairs,
+        bytes,
+        reading: written.reading,
+        note: None,
+        anisotropy_lost: written.anisotropy_lost,
+        reflectances,
+    };
     if !format.describes_itself() {
         let place = note_path(path);
         replace_file(&place, note::text(&job, path, &written, &report.reflectances).as_bytes())?;
@@ -171,7 +206,7 @@ fn on_grid(
     let table = Table::new(job.brdf, grid, job.progress);
     let reading = table.resampling(job.brdf);
     write(&table, &Description::new(job, reading.errors), out)?;
-    Ok(Written { pairs: table.grid.pairs(), reading, conventions: Vec::new() })
+    Ok(Written { pairs: table.grid.pairs(), reading, conventions: Vec::new(), anisotropy_lost: None })
 }
 
 /// [`write`] for `.csv` into an open stream, such as standard output. A reader that hangs up early is no failure.

@@ -268,7 +268,7 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     file.floats("rgb", &[phis, thetas, 3, samples.height, samples.width], &joined(|slice| &slice.rgb));
     file.bytes("jacobian", &[1]);
     file.write(out)?;
-    Ok(Written { pairs: thetas * phis * samples.len(), reading, conventions: conventions() })
+    Ok(Written { pairs: thetas * phis * samples.len(), reading, conventions: conventions(), anisotropy_lost: None })
 }
 
 fn conventions() -> Vec<String> {
