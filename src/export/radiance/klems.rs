@@ -99,15 +99,15 @@ pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
         }
         sums.into_iter().map(|sum| sum / (INCIDENT * INCIDENT * LEAVING * LEAVING) as f64).collect()
     });
-    let mut channels = [String::new(), String::new(), String::new()];
+    let mut channels = ["CIE-X", "Visible", "CIE-Z"].map(|name| (name, String::new()));
     for leaving in 0..PATCHES {
         for column in &columns {
             let value = xyz(column[leaving].as_vec3());
-            for (text, value) in channels.iter_mut().zip(value.to_array()) {
+            for ((_, text), value) in channels.iter_mut().zip(value.to_array()) {
                 let _ = write!(text, "{:.5e}\t", value.max(0.0));
             }
         }
-        channels.iter_mut().for_each(|text| text.push('\n'));
+        channels.iter_mut().for_each(|(_, text)| text.push('\n'));
     }
     let read = |i: Vec3, o: Vec3| {
         let column = &columns[Patch::of(source_of(o.as_dvec3()))];

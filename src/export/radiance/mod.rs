@@ -28,14 +28,11 @@ struct Content {
     definition: String,
     /// Names of the bases in a block of data.
     basis: &'static str,
-    /// The lit side: text of the values of X, Y and Z.
-    channels: [String; 3],
+    /// The lit side: names and values of its three channels.
+    channels: [(&'static str, String); 3],
     /// The other side, which reflects nothing.
     black: String,
 }
-
-/// Names of the three channels, in the order of [`xyz`].
-const CHANNELS: [&str; 3] = ["CIE-X", "Visible", "CIE-Z"];
 
 /// CIE X, Y, Z of linear RGB with Rec. 709 primaries, X and Z scaled so that a white surface stays neutral: Radiance's own
 /// white is that of equal energy.
@@ -71,7 +68,7 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     )?;
     writeln!(out, "<DeviceType>Other</DeviceType>\n</Material>")?;
     writeln!(out, "<DataDefinition>\n{}</DataDefinition>", content.definition)?;
-    for (name, values) in CHANNELS.iter().zip(&content.channels) {
+    for (name, values) in &content.channels {
         block(out, name, "Reflection Back", content.basis, values)?;
     }
     block(out, "Visible", "Reflection Front", content.basis, &content.black)?;
@@ -80,7 +77,7 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
         [
             "Radiance: +z of the file is our z; data are `Reflection Back` (WINDOW's name for the side towards the room), the other side is black.",
             "`BSDF` or `aBSDF` material: up vector along our y, so that x of the file is tile x.",
-            "Three blocks: CIE-X, Visible (Y), CIE-Z, in 1/sr, no cosine; X and Z are scaled so that white is neutral in Radiance.",
+            "Visible (Y) is in 1/sr, no cosine; X and Z are scaled so that white is neutral in Radiance.",
         ]
         .map(str::to_owned),
     );

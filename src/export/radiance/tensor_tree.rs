@@ -18,6 +18,8 @@ const SIDE: usize = 1 << LEVELS;
 const LEAVING: usize = 2;
 /// A branch ends where its values differ from their mean by less than this part of the mean of all.
 const TOLERANCE: f64 = 0.02;
+/// u' and v' of what has no colour.
+const EQUAL_ENERGY: [f32; 2] = [4.0 / 19.0, 9.0 / 19.0];
 
 /// The disk's point of a point of the unit square (Shirley and Chiu 1997).
 fn disk_of_square([x, y]: [f64; 2]) -> [f64; 2] {
@@ -140,14 +142,24 @@ pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
             .map(|value| xyz(value).max(Vec3::ZERO))
             .collect()
     });
-    let channels = std::array::from_fn(|channel| {
-        let values: Vec<f32> = rows.iter().flatten().map(|value| value[channel]).collect();
+    // Chromaticity in place of X and Z: that is what Radiance reads from trees.
+    let chromaticity = |value: &Vec3| {
+        let sum = value.x + 15.0 * value.y + 3.0 * value.z;
+        if sum > 0.0 { [4.0 * value.x / sum, 9.0 * value.y / sum] } else { EQUAL_ENERGY }
+    };
+    let tree = |of: &dyn Fn(&Vec3) -> f32| {
+        let values: Vec<f32> = rows.iter().flatten().map(of).collect();
         let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
         let mut text = String::new();
         Grid { values, tolerance: TOLERANCE * mean }.branch([0; 4], SIDE, &mut text);
         text.push('\n');
         text
-    });
+    };
+    let channels = [
+        ("CIE-u", tree(&|value| chromaticity(value)[0])),
+        ("Visible", tree(&|value| value.y)),
+        ("CIE-v", tree(&|value| chromaticity(value)[1])),
+    ];
     let read = |i: Vec3, o: Vec3| {
         let [x, y] = cell(f64::from(-o.x), f64::from(-o.y));
         let [a, b] = cell(f64::from(i.x), f64::from(i.y));
