@@ -23,6 +23,8 @@ enum Command {
     Eval(EvalArgs),
     /// Write the effective BRDF as a table, by the file's ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
     Export(ExportArgs),
+    /// Write the tile itself: .obj, .stl (closed, millimetres), .png (16-bit heights), .svg or .pdf (a pattern to fold).
+    Tile(TileArgs),
     /// List every effect: on or off, why, and what it costs.
     Plan(SceneArgs),
     /// Factor every material's rotated BRDF and list the sizes (Table 3 of Wu et al. 2011).
@@ -121,6 +123,27 @@ struct ExportArgs {
     radiance: Radiance,
 }
 
+#[derive(Debug, Args)]
+struct TileArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The file to write; the ending chooses what.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Periods in x and y.
+    #[arg(long, default_value = "1x1", value_parser = commands::parse_size)]
+    repeat: [usize; 2],
+    /// Enlarges what is made of matter (.stl, .svg, .pdf): 20 makes a tile unit of 1 mm 20 mm long.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f32,
+    /// Thickness under the lowest point of the .stl, in millimetres; without it a tenth of the longer side.
+    #[arg(long, value_name = "MM")]
+    base: Option<f32>,
+    /// Samples of a period's heights (.stl, .png).
+    #[arg(long, default_value = "256x256", value_parser = commands::parse_size)]
+    samples: [usize; 2],
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Radiance {
     Klems,
@@ -160,6 +183,7 @@ fn main() -> ExitCode {
         Command::Render(args) => commands::render::run(&args),
         Command::Eval(args) => commands::eval::run(&args),
         Command::Export(args) => commands::export::run(&args),
+        Command::Tile(args) => commands::tile::run(&args),
         Command::Plan(args) => commands::plan::run(&args),
         Command::Basis(args) => commands::basis::run(&args),
         Command::Profile(args) => commands::profile::run(&args),

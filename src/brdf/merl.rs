@@ -23,7 +23,7 @@ const FILE_BYTES: usize = HEADER_BYTES + 3 * 8 * PLANE;
 pub(crate) const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// Reads a file whole (35 MB) and keeps a third of it.
-pub(super) fn load(path: &Path) -> Result<HalfDifferenceTable> {
+pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let unreadable = |error: std::io::Error| InputError::new("", error, "a MERL file that can be read").in_file(path);
     let file = File::open(path).map_err(unreadable)?;
     let len = file.metadata().map_err(unreadable)?.len();

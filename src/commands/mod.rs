@@ -7,6 +7,7 @@ pub mod materials;
 pub mod plan;
 pub mod profile;
 pub mod render;
+pub mod tile;
 
 use std::io::Write;
 

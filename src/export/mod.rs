@@ -17,6 +17,7 @@ mod replace;
 mod rgl;
 mod sampler;
 mod table;
+pub mod tile;
 mod utia;
 mod zip;
 

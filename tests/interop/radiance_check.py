@@ -83,7 +83,7 @@ def main():
             expected = evaluate(scene, pairs, folder) @ [0.2126, 0.7152, 0.0722]
             ours = [our_total(scene, folder, *patch) for patch in PATCHES]
             for basis in ["klems", "tensor-tree"]:
-                path = Path(folder) / f"{scene}.xml"
+                path = Path(folder) / f"{scene}_{basis}.xml"
                 report, seconds = export(scene, path, "--radiance", basis)
                 told = radiance("checkBSDF", path)
                 kind = {"klems": "Klems_Full", "tensor-tree": "Anisotropic_Tensor_Tree"}[basis]

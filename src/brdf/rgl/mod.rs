@@ -41,7 +41,7 @@ const CHECKED_TURNS: usize = 500;
 const CHECKED_PAIRS: usize = 10_000;
 
 /// Reads, evaluates and resamples an isotropic file.
-pub(super) fn load(path: &Path) -> Result<HalfDifferenceTable> {
+pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let read = || {
         let table = RglTable::from_fields(&TensorFile::read(path)?)?;
         table.check_isotropic().map(|()| table)

@@ -48,7 +48,7 @@ pub(crate) struct RglTable {
 }
 
 impl RglTable {
-    pub(super) fn from_fields(file: &TensorFile) -> Result<Self, InputError> {
+    pub(crate) fn from_fields(file: &TensorFile) -> Result<Self, InputError> {
         if !file.has("rgb") && file.has("spectra") {
             return Err(InputError::new("fields", "spectra", "rgb").with_hint("the same material's _rgb file loads"));
         }
