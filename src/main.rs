@@ -23,6 +23,8 @@ enum Command {
     Eval(EvalArgs),
     /// Write the effective BRDF as a table, by the file's ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
     Export(ExportArgs),
+    /// Fit Lambertian + Cook-Torrance and a GGX base, say what they lose, and write glTF, MaterialX or a picture of it.
+    Fit(FitArgs),
     /// Write the tile itself: .obj, .stl (closed, millimetres), .png (16-bit heights), .svg or .pdf (a pattern to fold).
     Tile(TileArgs),
     /// List every effect: on or off, why, and what it costs.
@@ -124,6 +126,19 @@ struct ExportArgs {
 }
 
 #[derive(Debug, Args)]
+struct FitArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Files to write, by ending (repeatable): .gltf and .mtlx (the GGX base), .json (all numbers), .png or .exr (the object
+    /// in the effective BRDF, in the Cook-Torrance and in the GGX fit; under them the differences).
+    #[arg(short, long)]
+    output: Vec<PathBuf>,
+    /// Width and height of each of the pictures.
+    #[arg(long, default_value = "384x384", value_parser = commands::parse_size)]
+    size: [usize; 2],
+}
+
+#[derive(Debug, Args)]
 struct TileArgs {
     #[command(flatten)]
     scene: SceneArgs,
@@ -183,6 +198,7 @@ fn main() -> ExitCode {
         Command::Render(args) => commands::render::run(&args),
         Command::Eval(args) => commands::eval::run(&args),
         Command::Export(args) => commands::export::run(&args),
+        Command::Fit(args) => commands::fit::run(&args),
         Command::Tile(args) => commands::tile::run(&args),
         Command::Plan(args) => commands::plan::run(&args),
         Command::Basis(args) => commands::basis::run(&args),

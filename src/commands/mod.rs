@@ -3,6 +3,7 @@
 pub mod basis;
 pub mod eval;
 pub mod export;
+pub mod fit;
 pub mod materials;
 pub mod plan;
 pub mod profile;
