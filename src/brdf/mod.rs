@@ -11,7 +11,10 @@ mod from_specs;
 mod half_difference;
 mod measured;
 pub(crate) mod merl;
+pub(crate) mod npz;
 pub(crate) mod rgl;
+mod spherical;
+pub(crate) mod utia;
 
 use std::sync::Arc;
 

@@ -329,15 +329,20 @@ fn a_bsdf_reads_back_as_the_function_and_has_a_note_beside_it() {
 }
 
 #[test]
-fn a_flat_tile_comes_back_through_bsdf_and_binary_as_a_small_scale_brdf() {
+fn a_flat_tile_comes_back_as_a_small_scale_brdf_through_every_format_that_loads() {
     let folder = tempfile::tempdir().unwrap();
     let value = Vec3::new(1.0, 0.5, 0.25) * 0.8 * FRAC_1_PI;
-    for name in ["a.bsdf", "a.binary"] {
+    for name in ["a.bsdf", "a.binary", "a.bin", "a.npz"] {
         let path = folder.path().join(name);
         let size = ExportResolution { theta_i: 9, phi_i: 24, theta_o: 24, phi_o: 24 };
         let report = write(&flat(), &meta(), &sized(size), &path, &silent).unwrap();
         assert!(report.anisotropy_lost.unwrap_or(0.0) < 1e-4);
-        let table = if name.ends_with("bsdf") { crate::brdf::rgl::load(&path) } else { crate::brdf::merl::load(&path) };
+        let table = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("bsdf") => crate::brdf::rgl::load(&path),
+            Some("binary") => crate::brdf::merl::load(&path),
+            Some("bin") => crate::brdf::utia::load(&path),
+            _ => crate::brdf::npz::load(&path),
+        };
         let table = table.unwrap();
         for (theta_i, theta_o, phi) in [(0.1, 0.3, 2.0), (0.7, 0.2, 0.3), (1.0, 1.1, 3.0)] {
             let (i, o) = (from_angles(theta_i, 0.0), from_angles(theta_o, phi));

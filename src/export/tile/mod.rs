@@ -108,7 +108,7 @@ fn paper_color(scene: &Scene, slot: &str) -> Result<Vec3> {
         TermSpec::Lambertian { albedo } => *albedo,
         TermSpec::BlinnPhong { specular, .. } | TermSpec::Ward { specular, .. } => *specular,
         TermSpec::CookTorrance { f0, .. } | TermSpec::Ggx { f0, .. } => *f0,
-        TermSpec::Merl { .. } | TermSpec::Rgl { .. } => Vec3::splat(0.5),
+        TermSpec::Merl { .. } | TermSpec::Rgl { .. } | TermSpec::Utia { .. } | TermSpec::Npz { .. } => Vec3::splat(0.5),
     };
     let sum: Vec3 = BrdfSpec::terms(material.brdf).iter().map(of_term).sum();
     Ok((sum * material.color).clamp(Vec3::ZERO, Vec3::ONE))
