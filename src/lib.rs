@@ -18,6 +18,7 @@ pub mod directions;
 pub mod error;
 pub mod export;
 pub mod filtering;
+pub mod fit;
 pub mod geometry;
 pub mod gpu;
 pub mod large_scale;

@@ -21,8 +21,12 @@ enum Command {
     Render(RenderArgs),
     /// Evaluate f̄ [1/sr] (the light's cosine included) at direction pairs of a CSV file.
     Eval(EvalArgs),
-    /// Write the effective BRDF as a table: .npz, .csv or .exr by the file's ending.
+    /// Write the effective BRDF as a table, by the file's ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
     Export(ExportArgs),
+    /// Fit Lambertian + Cook-Torrance and a GGX base, say what they lose, and write glTF, MaterialX or a picture of it.
+    Fit(FitArgs),
+    /// Write the tile itself: .obj, .stl (closed, millimetres), .png (16-bit heights), .svg or .pdf (a pattern to fold).
+    Tile(TileArgs),
     /// List every effect: on or off, why, and what it costs.
     Plan(SceneArgs),
     /// Factor every material's rotated BRDF and list the sizes (Table 3 of Wu et al. 2011).
@@ -112,9 +116,55 @@ struct ExportArgs {
     /// The table to write; the ending chooses the format. `-` is standard output (CSV).
     #[arg(short, long)]
     output: PathBuf,
-    /// Steps of theta and phi for each direction.
-    #[arg(long, default_value = "16x64", value_parser = commands::parse_size)]
-    resolution: [usize; 2],
+    /// Steps of theta and phi for each direction; without it, what suits the format.
+    #[arg(long, value_name = "THETAxPHI", value_parser = commands::parse_size)]
+    resolution: Option<[usize; 2]>,
+    /// The same for the second direction alone (in .bsdf: samples along the two axes of each warp).
+    #[arg(long, value_name = "THETAxPHI", value_parser = commands::parse_size)]
+    resolution_o: Option<[usize; 2]>,
+    /// What a Radiance .xml holds: 145 x 145 patches, or a tensor tree for what is sharp or anisotropic.
+    #[arg(long, value_enum, default_value_t = Radiance::Klems)]
+    radiance: Radiance,
+}
+
+#[derive(Debug, Args)]
+struct FitArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Files to write, by ending (repeatable): .gltf and .mtlx (the GGX base), .json (all numbers), .png or .exr (the object
+    /// in the effective BRDF, in the Cook-Torrance and in the GGX fit; under them the differences).
+    #[arg(short, long)]
+    output: Vec<PathBuf>,
+    /// Width and height of each of the pictures.
+    #[arg(long, default_value = "384x384", value_parser = commands::parse_size)]
+    size: [usize; 2],
+}
+
+#[derive(Debug, Args)]
+struct TileArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The file to write; the ending chooses what.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Periods in x and y.
+    #[arg(long, default_value = "1x1", value_parser = commands::parse_size)]
+    repeat: [usize; 2],
+    /// Enlarges what is made of matter (.stl, .svg, .pdf): 20 makes a tile unit of 1 mm 20 mm long.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f32,
+    /// Thickness under the lowest point of the .stl, in millimetres; without it a tenth of the longer side.
+    #[arg(long, value_name = "MM")]
+    base: Option<f32>,
+    /// Samples of a period's heights (.stl, .png).
+    #[arg(long, default_value = "256x256", value_parser = commands::parse_size)]
+    samples: [usize; 2],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Radiance {
+    Klems,
+    TensorTree,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -175,6 +225,8 @@ fn main() -> ExitCode {
         Command::Render(args) => commands::render::run(&args),
         Command::Eval(args) => commands::eval::run(&args),
         Command::Export(args) => commands::export::run(&args),
+        Command::Fit(args) => commands::fit::run(&args),
+        Command::Tile(args) => commands::tile::run(&args),
         Command::Plan(args) => commands::plan::run(&args),
         Command::Basis(args) => commands::basis::run(&args),
         Command::Profile(args) => commands::profile::run(&args),

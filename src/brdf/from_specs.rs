@@ -45,6 +45,8 @@ fn term_from_spec(spec: &TermSpec, base_dir: &Path, cache: &mut MeasuredCache) -
         }
         TermSpec::Merl { path } => Term::Measured(cache.load(MeasuredKind::Merl, &base_dir.join(path))?),
         TermSpec::Rgl { path } => Term::Measured(cache.load(MeasuredKind::Rgl, &base_dir.join(path))?),
+        TermSpec::Utia { path } => Term::Measured(cache.load(MeasuredKind::Utia, &base_dir.join(path))?),
+        TermSpec::Npz { path } => Term::Measured(cache.load(MeasuredKind::Npz, &base_dir.join(path))?),
     })
 }
 

@@ -47,6 +47,8 @@ pub struct MeasuredReport {
 pub enum MeasuredKind {
     Merl,
     Rgl,
+    Utia,
+    Npz,
 }
 
 /// Measured tables already read, by kind and file as it was then. It belongs to the caller.
@@ -76,6 +78,8 @@ impl MeasuredCache {
         let table: Arc<dyn Measured> = match kind {
             MeasuredKind::Merl => Arc::new(super::merl::load(path)?),
             MeasuredKind::Rgl => Arc::new(super::rgl::load(path)?),
+            MeasuredKind::Utia => Arc::new(super::utia::load(path)?),
+            MeasuredKind::Npz => Arc::new(super::npz::load(path)?),
         };
         self.tables.insert(key, Arc::clone(&table));
         Ok(table)

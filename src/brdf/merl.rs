@@ -13,17 +13,17 @@ use super::half_difference::{HalfDifferenceTable, MERL_SHAPE, bin_angles, row_bi
 use super::measured::MeasuredReport;
 use crate::error::{InputError, Result};
 
-const BINS_H: usize = 90;
-const BINS_D: usize = 90;
-const BINS_PHI: usize = 180;
-const PLANE: usize = BINS_H * BINS_D * BINS_PHI;
+pub(crate) const BINS_H: usize = 90;
+pub(crate) const BINS_D: usize = 90;
+pub(crate) const BINS_PHI: usize = 180;
+pub(crate) const PLANE: usize = BINS_H * BINS_D * BINS_PHI;
 const HEADER_BYTES: usize = 12;
 const FILE_BYTES: usize = HEADER_BYTES + 3 * 8 * PLANE;
 /// From stored numbers to 1/sr.
-const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
+pub(crate) const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// Reads a file whole (35 MB) and keeps a third of it.
-pub(super) fn load(path: &Path) -> Result<HalfDifferenceTable> {
+pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let unreadable = |error: std::io::Error| InputError::new("", error, "a MERL file that can be read").in_file(path);
     let file = File::open(path).map_err(unreadable)?;
     let len = file.metadata().map_err(unreadable)?.len();
@@ -61,7 +61,7 @@ fn check_header(bytes: &[u8], len: u64) -> std::result::Result<(), InputError> {
 }
 
 /// The mean over the swap of light and view, and the mirror image: `φ_d` and `π - φ_d`, whichever are valid.
-fn table_from_planes(name: String, planes: &[u8]) -> HalfDifferenceTable {
+pub(crate) fn table_from_planes(name: String, planes: &[u8]) -> HalfDifferenceTable {
     let mut report = MeasuredReport { total: PLANE, ..MeasuredReport::default() };
     let mut samples = Vec::with_capacity(PLANE / 2);
     let (mut difference, mut power) = (0.0, 0.0);

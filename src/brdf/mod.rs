@@ -10,8 +10,11 @@ mod fast_math;
 mod from_specs;
 mod half_difference;
 mod measured;
-mod merl;
-mod rgl;
+pub(crate) mod merl;
+pub(crate) mod npz;
+pub(crate) mod rgl;
+mod spherical;
+pub(crate) mod utia;
 
 use std::sync::Arc;
 

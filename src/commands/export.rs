@@ -3,22 +3,30 @@
 use std::path::Path;
 
 use anyhow::Result;
-use biscale::export::{self, ExportMeta, ExportReport, ExportResolution};
+use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use biscale::pipeline::Pipeline;
 use serde::Serialize;
 
 use super::print_json;
-use crate::ExportArgs;
+use crate::{ExportArgs, Radiance};
 
 #[derive(Serialize)]
 struct Report {
     output: String,
+    /// The file of plain words beside it.
+    note: Option<String>,
     pairs: usize,
     bytes: u64,
+    /// Mean of `|read - eval|` over the mean of `eval`.
+    resampling_mean: f64,
     resampling_rel_l2: f64,
     /// Null where the table reads without error.
     resampling_psnr_db: f64,
+    /// Relative L2 between azimuths that an isotropic format has lost.
+    anisotropy_lost: Option<f64>,
     form: String,
+    /// Directional-hemispherical: theta and phi in degrees, R, G, B.
+    reflectance: Vec<[f32; 5]>,
 }
 
 pub fn run(args: &ExportArgs) -> Result<()> {
@@ -41,36 +49,73 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         closes_plane: pipeline.mesh(&loaded)?.closes_plane,
         notes: outcome.notes.clone(),
     };
-    let [theta, phi] = args.resolution;
-    let resolution = ExportResolution { theta_i: theta, phi_i: phi, theta_o: theta, phi_o: phi };
+    let options = ExportOptions {
+        resolution: resolution(args),
+        radiance: match args.radiance {
+            Radiance::Klems => RadianceBasis::Klems,
+            Radiance::TensorTree => RadianceBasis::TensorTree,
+        },
+    };
     let bar = bar(args.scene.quiet);
     let progress = |part: f32| bar.set_position((part * 1000.0) as u64);
-    let report = if streams {
-        export::write_csv(&outcome.brdf, &meta, &resolution, &mut std::io::stdout().lock(), &progress)
-    } else {
-        export::write(&outcome.brdf, &meta, &resolution, &args.output, &progress)
-    };
+    if streams {
+        // Standard output holds the table itself then.
+        export::write_csv(&outcome.brdf, &meta, &options, &mut std::io::stdout().lock(), &progress)?;
+        bar.finish_and_clear();
+        return Ok(());
+    }
+    let report = export::write(&outcome.brdf, &meta, &options, &args.output, &progress);
     bar.finish_and_clear();
-    let ExportReport { pairs, bytes, resampling } = report?;
-    // Standard output holds the table itself then.
-    if args.scene.json && !streams {
+    let report = report?;
+    let reading = report.reading;
+    if args.scene.json {
         return print_json(&Report {
             output: args.output.display().to_string(),
-            pairs,
-            bytes,
-            resampling_rel_l2: resampling.rel_l2,
-            resampling_psnr_db: resampling.psnr_db,
+            note: report.note.as_ref().map(|note| note.display().to_string()),
+            pairs: report.pairs,
+            bytes: report.bytes,
+            resampling_mean: reading.mean,
+            resampling_rel_l2: reading.errors.rel_l2,
+            resampling_psnr_db: reading.errors.psnr_db,
+            anisotropy_lost: report.anisotropy_lost,
             form: outcome.brdf.form.describe(),
+            reflectance: report
+                .reflectances
+                .of_direction
+                .iter()
+                .map(|([theta, phi], value)| [*theta, *phi, value.x, value.y, value.z])
+                .collect(),
         });
     }
     if !args.scene.quiet {
         eprintln!(
-            "{pairs} pairs, {bytes} bytes; read bilinearly they differ from eval by {:.1} % ({:.1} dB)",
-            100.0 * resampling.rel_l2,
-            resampling.psnr_db
+            "{} pairs, {} bytes; read back they differ from eval by {:.1} % in the mean, {:.1} % ({:.1} dB) in relative L2",
+            report.pairs,
+            report.bytes,
+            100.0 * reading.mean,
+            100.0 * reading.errors.rel_l2,
+            reading.errors.psnr_db
         );
+        if let Some(lost) = report.anisotropy_lost {
+            eprintln!(
+                "the format is isotropic: {:.1} % (relative L2) between azimuths of the tile are lost",
+                100.0 * lost
+            );
+        }
+        eprintln!("directional-hemispherical reflectance (R G B):");
+        report.reflectances.lines().iter().for_each(|line| eprintln!("  {line}"));
+        if let Some(note) = &report.note {
+            eprintln!("conventions and more in {}", note.display());
+        }
     }
     Ok(())
+}
+
+/// What was asked for: `--resolution` for both sides, `--resolution-o` for the other one.
+fn resolution(args: &ExportArgs) -> Option<ExportResolution> {
+    let [theta, phi] = args.resolution.or(args.resolution_o)?;
+    let [theta_o, phi_o] = args.resolution_o.unwrap_or([theta, phi]);
+    Some(ExportResolution { theta_i: theta, phi_i: phi, theta_o, phi_o })
 }
 
 /// A bar on a terminal, nothing in a pipe.

@@ -3,11 +3,13 @@
 pub mod basis;
 pub mod eval;
 pub mod export;
+pub mod fit;
 pub mod materials;
 pub mod plan;
 pub mod profile;
 pub mod render;
 pub mod report;
+pub mod tile;
 
 use std::io::Write;
 

@@ -29,8 +29,11 @@ const MAX_PAIRS: usize = 1 << 25;
 const MAX_AXIS: usize = 1024;
 
 impl ExportResolution {
-    /// The grid, if it is of a size that can be made.
-    pub(super) fn grid(&self) -> Result<Grid> {
+    /// Whether tables of this size can be made.
+    ///
+    /// # Errors
+    /// An axis or a number of pairs out of range.
+    pub fn check(&self) -> Result<()> {
         let counts = [self.theta_i, self.phi_i, self.theta_o, self.phi_o];
         for (name, count) in ["theta_i", "phi_i", "theta_o", "phi_o"].iter().zip(counts) {
             if !(1..=MAX_AXIS).contains(&count) {
@@ -45,7 +48,12 @@ impl ExportResolution {
             let found = format!("{} x {} x {} x {} = {pairs} pairs", counts[0], counts[1], counts[2], counts[3]);
             return Err(InputError::new("resolution", found, format!("at most {MAX_PAIRS} pairs")).into());
         }
-        Ok(Grid { light: Axes::new(self.theta_i, self.phi_i), view: Axes::new(self.theta_o, self.phi_o) })
+        Ok(())
+    }
+
+    /// The grid of a checked size.
+    pub(super) fn grid(&self) -> Grid {
+        Grid { light: Axes::new(self.theta_i, self.phi_i), view: Axes::new(self.theta_o, self.phi_o) }
     }
 }
 
@@ -64,6 +72,11 @@ impl Axes {
         }
     }
 
+    /// Elevations that are given (radians, increasing), azimuths from 0.
+    pub fn at(theta: Vec<f32>, azimuths: usize) -> Self {
+        Self { theta, ..Self::new(1, azimuths) }
+    }
+
     /// Number of directions.
     pub fn len(&self) -> usize {
         self.theta.len() * self.phi.len()
@@ -79,20 +92,25 @@ impl Axes {
     pub fn taps(&self, direction: Vec3) -> [(usize, f32); 4] {
         let (theta, phi) = to_angles(direction);
         let rings = self.theta.len();
-        let at = (theta / std::f32::consts::FRAC_PI_2) * rings as f32 - 0.5;
-        let base = at.floor();
-        let part = at - base;
+        let upper = self.theta.partition_point(|&ring| ring <= theta);
+        let first = self.theta[0];
         let mut taps = [(0, 0.0); 4];
-        for (step, weight) in [(0, 1.0 - part), (1, part)] {
-            let ring = base as i64 + step;
-            let (ring, turn) = if ring < 0 { (0, std::f32::consts::PI) } else { ((ring as usize).min(rings - 1), 0.0) };
+        // Below the first ring the opposite side of the same ring is as far beyond the pole.
+        let (lower, part) = match upper {
+            0 => (None, (theta + first) / (2.0 * first)),
+            _ if upper == rings => (Some(rings - 1), 0.0),
+            _ => (Some(upper - 1), (theta - self.theta[upper - 1]) / (self.theta[upper] - self.theta[upper - 1])),
+        };
+        let steps = [(lower, 1.0 - part), (Some(upper.min(rings - 1)), part)];
+        for (step, (ring, weight)) in steps.into_iter().enumerate() {
+            let (ring, turn) = ring.map_or((0, std::f32::consts::PI), |ring| (ring, 0.0));
             let azimuths = self.phi.len();
             let along = (phi + turn) / std::f32::consts::TAU * azimuths as f32;
-            let first = along.floor();
-            let blend = along - first;
-            let slot = 2 * step as usize;
-            taps[slot] = (ring * azimuths + first as usize % azimuths, weight * (1.0 - blend));
-            taps[slot + 1] = (ring * azimuths + (first as usize + 1) % azimuths, weight * blend);
+            let base = along.floor();
+            let blend = along - base;
+            let slot = 2 * step;
+            taps[slot] = (ring * azimuths + base as usize % azimuths, weight * (1.0 - blend));
+            taps[slot + 1] = (ring * azimuths + (base as usize + 1) % azimuths, weight * blend);
         }
         taps
     }
@@ -109,6 +127,18 @@ impl Grid {
     /// Number of pairs.
     pub fn pairs(&self) -> usize {
         self.light.len() * self.view.len()
+    }
+
+    /// `[theta_i, phi_i, theta_o, phi_o]` of an entry.
+    pub fn angles(&self, entry: usize) -> [f32; 4] {
+        let [_, phis_i, thetas_o, phis_o] = self.shape();
+        let (light, view) = (entry / (thetas_o * phis_o), entry % (thetas_o * phis_o));
+        [
+            self.light.theta[light / phis_i],
+            self.light.phi[light % phis_i],
+            self.view.theta[view / phis_o],
+            self.view.phi[view % phis_o],
+        ]
     }
 
     /// `[Nθ_i, Nφ_i, Nθ_o, Nφ_o]`.

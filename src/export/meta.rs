@@ -2,9 +2,14 @@
 
 use serde::Serialize;
 
-use super::table::Table;
+use super::Job;
 use crate::accuracy::Errors;
-use crate::filtering::EffectiveBrdf;
+
+/// Who writes the tables.
+pub const PROGRAM: &str = concat!("biscale ", env!("CARGO_PKG_VERSION"));
+/// The frame of all directions.
+pub const FRAME: &str = "z up (the large-scale normal), x and y along the tile; theta from +z, phi from +x towards +y, in \
+                         radians; i points to the light, o to the viewer";
 
 /// Where an exported table comes from.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -21,6 +26,17 @@ pub struct ExportMeta {
     pub closes_plane: bool,
     /// Notes on the way from scene to table (snapped parameters, health).
     pub notes: Vec<String>,
+}
+
+impl ExportMeta {
+    /// Whether the tile closes the plane, in words.
+    pub(super) fn plane(&self) -> &'static str {
+        if self.closes_plane {
+            "the tile closes the plane: a_v(o) / A is cos(theta_o) but for sampling"
+        } else {
+            "the tile leaves holes: a_v(o) / A is measured and may be less than cos(theta_o)"
+        }
+    }
 }
 
 /// Everything that is written beside the numbers. Nothing in it changes from run to run.
@@ -41,33 +57,25 @@ pub struct Description<'a> {
     pub resampling_rel_l2: f64,
     /// Peak signal to noise of the same [dB]; null where there is no difference.
     pub resampling_psnr_db: f64,
-    #[serde(skip)]
-    pub resampling: Errors,
 }
 
 impl<'a> Description<'a> {
-    pub fn new(meta: &'a ExportMeta, table: &Table, brdf: &EffectiveBrdf) -> Self {
-        let resampling = table.resampling(brdf);
+    pub fn new(job: &Job<'a>, resampling: Errors) -> Self {
+        let meta = job.meta;
         Self {
-            program: concat!("biscale ", env!("CARGO_PKG_VERSION")),
-            frame: "z up (the large-scale normal), x and y along the tile; theta from +z, phi from +x towards +y, in radians; \
-                    i points to the light, o to the viewer",
+            program: PROGRAM,
+            frame: FRAME,
             brdf: "effective BRDF f_bar(i,o) / cos(theta_i) in 1/sr, linear RGB with Rec. 709 primaries; f_bar includes the \
                    light's cosine (Wu et al. 2011, Eq. 7), this table does not",
             g: "G(i,o) = a_v(o) f_bar(i,o) / A in 1/sr, equal to G(o,i) up to the error of the method",
             projected_area: "a_v(o) / A, the visible projected area along o over the tile's base area",
             nodes: "theta_a = (a+1/2) (pi/2) / N_theta, phi_b = 2 pi b / N_phi; read bilinearly, wrapped in phi, across the \
                     pole to phi + pi, constant beyond the last theta",
-            plane: if meta.closes_plane {
-                "the tile closes the plane: a_v(o) / A is cos(theta_o) but for sampling"
-            } else {
-                "the tile leaves holes: a_v(o) / A is measured and may be less than cos(theta_o)"
-            },
+            plane: meta.plane(),
             meta,
-            base_area: brdf.base_area,
+            base_area: job.brdf.base_area,
             resampling_rel_l2: resampling.rel_l2,
             resampling_psnr_db: resampling.psnr_db,
-            resampling,
         }
     }
 

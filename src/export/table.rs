@@ -1,17 +1,10 @@
 //! The effective BRDF on the grid of a table, and reading it back bilinearly.
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::grid::Grid;
-use crate::accuracy::{Errors, compare, mirror_biased_pairs};
+use super::sampler::{ReadingError, in_parallel, reading_error};
 use crate::filtering::{EffectiveBrdf, Reflectance};
-
-/// Views between two calls of the progress function.
-const VIEWS_A_STEP: usize = 32;
-/// Pairs of the resampling error, and the seed that fixes them.
-const CHECKED_PAIRS: usize = 200;
-const CHECKED_SEED: u64 = 2011;
 
 /// What a file holds.
 #[derive(Debug, Clone)]
@@ -35,28 +28,20 @@ impl Table {
             projected_area: Vec::new(),
             grid,
         };
-        for (step, chunk) in views.chunks(VIEWS_A_STEP).enumerate() {
-            let first = step * VIEWS_A_STEP;
-            progress(first as f32 / views.len() as f32);
-            let columns: Vec<(Vec<Vec3>, f32)> = chunk
-                .par_iter()
-                .map(|&o| {
-                    let mut f_bar = vec![Vec3::ZERO; lights.len()];
-                    brdf.eval_lights(&lights, o, &mut f_bar);
-                    (f_bar, brdf.relative_projected_area(o))
-                })
-                .collect();
-            for (column, (f_bar, area)) in columns.iter().enumerate() {
-                for (light, &value) in f_bar.iter().enumerate() {
-                    let entry = light * views.len() + first + column;
-                    // Midpoints keep the cosine away from zero.
-                    table.brdf[entry] = value / lights[light].z;
-                    table.g[entry] = value * *area;
-                }
-                table.projected_area.push(*area);
+        let columns = in_parallel(views.len(), progress, |view| {
+            let mut f_bar = vec![Vec3::ZERO; lights.len()];
+            brdf.eval_lights(&lights, views[view], &mut f_bar);
+            (f_bar, brdf.relative_projected_area(views[view]))
+        });
+        for (view, (f_bar, area)) in columns.into_iter().enumerate() {
+            for (light, value) in f_bar.into_iter().enumerate() {
+                let entry = light * views.len() + view;
+                // Midpoints keep the cosine away from zero.
+                table.brdf[entry] = value / lights[light].z;
+                table.g[entry] = value * area;
             }
+            table.projected_area.push(area);
         }
-        progress(1.0);
         table
     }
 
@@ -73,11 +58,8 @@ impl Table {
         value * i.z
     }
 
-    /// What the grid costs: [`Table::f_bar`] against `eval` over a fixed set of pairs up to 85°.
-    pub fn resampling(&self, brdf: &EffectiveBrdf) -> Errors {
-        let pairs = mirror_biased_pairs(CHECKED_PAIRS, CHECKED_SEED);
-        let read: Vec<Vec3> = pairs.iter().map(|pair| self.f_bar(pair.i, pair.o)).collect();
-        let exact: Vec<Vec3> = pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect();
-        compare(&read, &exact)
+    /// What the grid costs: [`Table::f_bar`] against `eval`.
+    pub fn resampling(&self, brdf: &EffectiveBrdf) -> ReadingError {
+        reading_error(brdf, |i, o| self.f_bar(i, o))
     }
 }

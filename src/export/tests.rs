@@ -8,13 +8,23 @@ use std::sync::Arc;
 use glam::{UVec2, Vec2, Vec3};
 
 use super::*;
-use crate::brdf::{Brdf, Term};
-use crate::directions::from_angles;
+use crate::brdf::rgl::table::RglTable;
+use crate::brdf::rgl::tensor_file::TensorFile;
+use crate::brdf::{Brdf, LobeAngles, Measured, Term};
+use crate::directions::{from_angles, half_vector};
 use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
 use crate::geometry::{Facets, TileMesh, heightfield};
 use crate::visibility::{Horizons, Visibility};
 
 const SMALL: ExportResolution = ExportResolution { theta_i: 4, phi_i: 6, theta_o: 5, phi_o: 8 };
+
+fn sized(resolution: ExportResolution) -> ExportOptions {
+    ExportOptions { resolution: Some(resolution), ..ExportOptions::default() }
+}
+
+fn small() -> ExportOptions {
+    sized(SMALL)
+}
 
 fn silent(_: f32) {}
 
@@ -125,7 +135,7 @@ fn an_npz_holds_what_eval_says_at_every_pair() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.npz");
     let brdf = corrugated();
-    let report = write(&brdf, &meta(), &SMALL, &path, &silent).unwrap();
+    let report = write(&brdf, &meta(), &small(), &path, &silent).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     assert_eq!((report.pairs, report.bytes), (4 * 6 * 5 * 8, bytes.len() as u64));
     let members = read_npz(&bytes);
@@ -157,7 +167,7 @@ fn a_csv_has_a_header_and_a_row_a_pair() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.CSV");
     let brdf = corrugated();
-    write(&brdf, &meta(), &SMALL, &path, &silent).unwrap();
+    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines().skip_while(|line| line.starts_with('#'));
     assert_eq!(lines.next(), Some("theta_i,phi_i,theta_o,phi_o,r,g,b,g_r,g_g,g_b"));
@@ -171,7 +181,7 @@ fn a_csv_has_a_header_and_a_row_a_pair() {
     assert_eq!((rows, lines.next()), (4 * 6 * 5 * 8, None));
     assert!(text.contains("# scene: a \"quoted\" näme and a line\n"), "{text:.2000}");
     let mut streamed = Vec::new();
-    write_csv(&brdf, &meta(), &SMALL, &mut streamed, &silent).unwrap();
+    write_csv(&brdf, &meta(), &small(), &mut streamed, &silent).unwrap();
     assert_eq!(streamed, text.as_bytes());
 }
 
@@ -180,7 +190,7 @@ fn an_exr_is_an_atlas_of_both_quantities() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let brdf = corrugated();
-    write(&brdf, &meta(), &SMALL, &path, &silent).unwrap();
+    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
     let image = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
     let names: Vec<String> =
         image.layer_data.iter().map(|layer| layer.attributes.layer_name.as_ref().unwrap().to_string()).collect();
@@ -204,7 +214,7 @@ fn an_exr_is_an_atlas_of_both_quantities() {
 
 #[test]
 fn a_flat_lambertian_tile_is_albedo_over_pi_and_resamples_without_error() {
-    let grid = SMALL.grid().unwrap();
+    let grid = SMALL.grid();
     let brdf = flat();
     let table = Table::new(&brdf, grid, &silent);
     let value = Vec3::new(1.0, 0.5, 0.25) * 0.8 * FRAC_1_PI;
@@ -213,12 +223,12 @@ fn a_flat_lambertian_tile_is_albedo_over_pi_and_resamples_without_error() {
         let (light, view) = (table.grid.light.directions()[k / 40], table.grid.view.directions()[k % 40]);
         assert!(close(*g, value * light.z * view.z), "{g} {k}");
     }
-    assert!(table.resampling(&brdf).rel_l2 < 1e-5);
+    assert!(table.resampling(&brdf).errors.rel_l2 < 1e-5);
 }
 
 #[test]
 fn bilinear_reading_hits_the_nodes_and_is_continuous_across_pole_and_seam() {
-    let table = Table::new(&corrugated(), SMALL.grid().unwrap(), &silent);
+    let table = Table::new(&corrugated(), SMALL.grid(), &silent);
     let (lights, views) = (table.grid.light.directions(), table.grid.view.directions());
     for (k, value) in table.brdf.iter().enumerate() {
         let (i, o) = (lights[k / 40], views[k % 40]);
@@ -237,7 +247,7 @@ fn a_finer_grid_resamples_better_and_the_report_says_so() {
     let brdf = corrugated();
     let error = |rings| {
         let resolution = ExportResolution { theta_i: rings, phi_i: 2 * rings, theta_o: rings, phi_o: 2 * rings };
-        Table::new(&brdf, resolution.grid().unwrap(), &silent).resampling(&brdf).rel_l2
+        Table::new(&brdf, resolution.grid(), &silent).resampling(&brdf).errors.rel_l2
     };
     // Shadow edges are kinks, so halving the step halves the error; a smooth function would quarter it.
     let (coarse, fine) = (error(6), error(12));
@@ -251,7 +261,7 @@ fn files_are_the_same_bytes_again_with_any_number_of_threads() {
         let path = folder.path().join(name);
         let bytes = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| write(&corrugated(), &meta(), &SMALL, &path, &silent)).unwrap();
+            pool.install(|| write(&corrugated(), &meta(), &small(), &path, &silent)).unwrap();
             std::fs::read(&path).unwrap()
         };
         assert!(bytes(1) == bytes(3), "{name}");
@@ -261,7 +271,7 @@ fn files_are_the_same_bytes_again_with_any_number_of_threads() {
 #[test]
 fn progress_goes_from_nothing_to_all() {
     let told = std::cell::RefCell::new(Vec::new());
-    Table::new(&flat(), SMALL.grid().unwrap(), &|part| told.borrow_mut().push(part));
+    Table::new(&flat(), SMALL.grid(), &|part| told.borrow_mut().push(part));
     let told = told.into_inner();
     assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted());
 }
@@ -273,14 +283,12 @@ fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
     let old = folder.path().join("old.npz");
     std::fs::write(&old, b"old").unwrap();
     let attempt = |name: &str, resolution: &ExportResolution| {
-        let error = write(&flat(), &meta(), resolution, &folder.path().join(name), &silent).unwrap_err();
+        let error = write(&flat(), &meta(), &sized(*resolution), &folder.path().join(name), &silent).unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
         error.to_string()
     };
     for (name, says) in [
-        ("a.bsdf", "not write yet"),
-        ("a.xml", ".npz, .csv or .exr"),
-        ("a.binary", ".binary"),
+        ("a.jpg", ".binary, .xml"),
         ("a.jpg", "the ending .jpg"),
         ("a", "without an ending"),
         ("missing/a.npz", "missing/a.npz"),
@@ -296,6 +304,113 @@ fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
     assert!(check_ending(Path::new("a.npz")).is_ok() && check_ending(Path::new("a.npy")).is_err());
     assert_eq!(std::fs::read(&old).unwrap(), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no temporary files are left");
+}
+
+/// What Mitsuba and the others do with a file, as `src/brdf/rgl` has it.
+#[test]
+fn a_bsdf_reads_back_as_the_function_and_has_a_note_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.bsdf");
+    let brdf = corrugated();
+    let size = ExportResolution { theta_i: 9, phi_i: 24, theta_o: 24, phi_o: 24 };
+    let report = write(&brdf, &meta(), &sized(size), &path, &silent).unwrap();
+    let file = TensorFile::read(&path).unwrap();
+    assert!(file.has("luminance") && file.has("description") && !file.has("spectra"));
+    let table = RglTable::from_fields(&file).unwrap();
+    assert_eq!((table.phi_i.len(), table.theta_i.len(), table.jacobian), (25, 9, true));
+    let reading = sampler::reading_error(&brdf, |i, o| table.eval(o.as_dvec3(), i.as_dvec3()).as_vec3());
+    // Rounding to f32 is all that lies between the file and what was said of it.
+    assert!((reading.mean - report.reading.mean).abs() < 1e-4, "{reading:?} {:?}", report.reading);
+    assert!(reading.mean < 0.06, "{reading:?}");
+    let note = std::fs::read_to_string(report.note.unwrap()).unwrap();
+    assert!(note.contains("Scene: a \"quoted\" näme and a line") && note.contains("half vector"), "{note}");
+    let image = crate::brdf::rgl::load(&path).unwrap_err().to_string();
+    assert!(image.contains("24 azimuths") || image.contains("25 azimuths"), "{image}");
+}
+
+#[test]
+fn a_flat_tile_comes_back_as_a_small_scale_brdf_through_every_format_that_loads() {
+    let folder = tempfile::tempdir().unwrap();
+    let value = Vec3::new(1.0, 0.5, 0.25) * 0.8 * FRAC_1_PI;
+    for name in ["a.bsdf", "a.binary", "a.bin", "a.npz"] {
+        let path = folder.path().join(name);
+        let size = ExportResolution { theta_i: 9, phi_i: 24, theta_o: 24, phi_o: 24 };
+        let report = write(&flat(), &meta(), &sized(size), &path, &silent).unwrap();
+        assert!(report.anisotropy_lost.unwrap_or(0.0) < 1e-4);
+        let table = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("bsdf") => crate::brdf::rgl::load(&path),
+            Some("binary") => crate::brdf::merl::load(&path),
+            Some("bin") => crate::brdf::utia::load(&path),
+            _ => crate::brdf::npz::load(&path),
+        };
+        let table = table.unwrap();
+        for (theta_i, theta_o, phi) in [(0.1, 0.3, 2.0), (0.7, 0.2, 0.3), (1.0, 1.1, 3.0)] {
+            let (i, o) = (from_angles(theta_i, 0.0), from_angles(theta_o, phi));
+            let found = table.f_r(&LobeAngles::new(Vec3::Z, i, o, half_vector(i, o)));
+            assert!((found / value - 1.0).abs().max_element() < 0.03, "{name} {theta_i} {theta_o}: {found} {value}");
+        }
+    }
+}
+
+#[test]
+fn reflectances_of_a_flat_lambertian_are_its_albedo() {
+    let reflectances = Reflectances::of(&flat());
+    let albedo = Vec3::new(1.0, 0.5, 0.25) * 0.8;
+    assert_eq!(reflectances.of_direction.len(), 11);
+    assert!(reflectances.of_direction.iter().all(|(_, value)| (*value / albedo - 1.0).abs().max_element() < 1e-3));
+    assert!((reflectances.diffuse / albedo - 1.0).abs().max_element() < 1e-3);
+}
+
+#[test]
+fn utia_and_astm_hold_the_brdf_in_their_orders() {
+    let folder = tempfile::tempdir().unwrap();
+    let brdf = corrugated();
+    let path = folder.path().join("a.bin");
+    write(&brdf, &meta(), &ExportOptions::default(), &path, &silent).unwrap();
+    let numbers: Vec<f64> =
+        std::fs::read(&path).unwrap().as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+    assert_eq!(numbers.len(), 3 * 6 * 48 * 6 * 48);
+    let (ti, pi, to, po) = (2, 5, 4, 31);
+    let radians = |k: usize, step: f32| (k as f32 * step).to_radians();
+    let (i, o) = (from_angles(radians(ti, 15.0), radians(pi, 7.5)), from_angles(radians(to, 15.0), radians(po, 7.5)));
+    let expected = brdf.eval(i, o) / i.z;
+    for channel in 0..3 {
+        let at = (((channel * 6 + ti) * 48 + pi) * 6 + to) * 48 + po;
+        assert!((numbers[at] as f32 / expected[channel] - 1.0).abs() < 1e-3, "{} {expected}", numbers[at]);
+    }
+    let path = folder.path().join("a.astm");
+    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("NUM_POINTS 960\nVARS theta_i,phi_i,theta_s,phi_s,R,G,B\n"));
+    let rows = text.lines().skip_while(|line| !line.starts_with("VARS")).skip(1);
+    for (line, (angles, brdf, _)) in rows.zip(super::tests::expected(&brdf, &SMALL)) {
+        let row: Vec<f32> = line.split(',').map(|number| number.parse().unwrap()).collect();
+        assert!((0..4).all(|axis| (row[axis] - angles[axis]).abs() < 1e-6) && close(Vec3::from_slice(&row[4..]), brdf));
+    }
+}
+
+#[test]
+fn radiance_files_hold_every_value_and_balance_their_tags() {
+    let folder = tempfile::tempdir().unwrap();
+    for basis in [RadianceBasis::Klems, RadianceBasis::TensorTree] {
+        let path = folder.path().join("a.xml");
+        let options = ExportOptions { radiance: basis, ..ExportOptions::default() };
+        write(&flat(), &meta(), &options, &path, &silent).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let (opened, closed) = (text.matches('<').count(), text.matches("</").count());
+        assert_eq!(opened, 2 * closed + 1, "all but the declaration come in pairs");
+        let data: Vec<&str> =
+            text.split("<ScatteringData>").skip(1).filter_map(|rest| rest.split("</ScatteringData>").next()).collect();
+        assert_eq!(data.len(), 4);
+        // The luminance of a flat Lambertian is the same everywhere.
+        let luminance = 0.8 * FRAC_1_PI * (0.212_639 + 0.5 * 0.715_169 + 0.25 * 0.072_192);
+        let numbers: Vec<f32> = data[1]
+            .split(|c: char| c.is_whitespace() || "{}".contains(c))
+            .filter_map(|word| word.parse().ok())
+            .collect();
+        assert!(numbers.iter().all(|value| (value / luminance - 1.0).abs() < 1e-3), "{:?}", &numbers[..3]);
+        assert_eq!(numbers.len(), if basis == RadianceBasis::Klems { 145 * 145 } else { 1 });
+    }
 }
 
 #[test]
@@ -326,7 +441,7 @@ fn a_reader_that_hangs_up_is_no_failure() {
             Ok(())
         }
     }
-    assert!(write_csv(&flat(), &meta(), &SMALL, &mut Closed, &silent).is_ok());
+    assert!(write_csv(&flat(), &meta(), &small(), &mut Closed, &silent).is_ok());
 }
 
 #[test]
@@ -334,7 +449,7 @@ fn numpy_loads_an_npz() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.npz");
     let brdf = corrugated();
-    write(&brdf, &meta(), &SMALL, &path, &silent).unwrap();
+    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
     let script = "import sys, json\n\
         try: import numpy\n\
         except ImportError: sys.exit(77)\n\

@@ -49,6 +49,31 @@ impl Wave {
 /// A corner of the cross-section: phase within one period and height, and the slot of the segment that follows.
 type ProfilePoint = (f64, f64, u16);
 
+/// The cross-section of grooves, for what is made of it besides the mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrossSection {
+    /// Corners over one period, `(x, z)` in tile units, and the slot (`bottom`, `sides`) of the piece that follows.
+    pub points: Vec<(DVec2, u16)>,
+    /// Distance between grooves.
+    pub pitch: f64,
+    /// Grooves on the tile, across their run.
+    pub count: usize,
+    /// Length of each on the tile.
+    pub length: f64,
+}
+
+impl CrossSection {
+    /// Of the grooves as they fit the tile.
+    pub fn of(spec: &Grooves, size: Vec2) -> Self {
+        let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
+        let pitch = wave.pitch();
+        let points =
+            profile(spec, pitch).into_iter().map(|(phase, z, slot)| (DVec2::new(phase * pitch, z), slot)).collect();
+        let count = wave.m.unsigned_abs().max(wave.n.unsigned_abs()).max(1) as usize;
+        Self { points, pitch, count, length: wave.size.x * wave.size.y / (count as f64 * pitch) }
+    }
+}
+
 pub fn build(spec: &Grooves, size: Vec2) -> TileMesh {
     let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
     let mut builder = MeshBuilder::new(size, &["bottom", "sides"]);

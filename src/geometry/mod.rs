@@ -26,6 +26,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 pub use facets::{FacetSampler, Facets, SampleShift};
+pub use grooves::CrossSection;
+pub use pyramids::OnePyramid;
 pub use tile_mesh::{ColorField, HeightGrid, TileMesh};
 
 use crate::error::{InputError, Result};

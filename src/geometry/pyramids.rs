@@ -48,6 +48,29 @@ pub fn build(spec: &Pyramids, size: Vec2) -> TileMesh {
     builder.finish()
 }
 
+/// One pyramid and where its like stand, for what is made of it besides the mesh. Tile units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnePyramid {
+    /// Corners of the base and of the cut tip about the centre, counter-clockwise.
+    pub base: Vec<DVec2>,
+    pub top: Vec<DVec2>,
+    pub top_z: f64,
+    /// Whether the tip is cut.
+    pub has_top: bool,
+    pub centres: Vec<DVec2>,
+}
+
+impl OnePyramid {
+    /// Of the pyramids as they fit the tile.
+    pub fn of(spec: &Pyramids, size: Vec2) -> Self {
+        let lattice = Lattice::new(spec, size);
+        let Pyramid { base, top, top_z } = Pyramid::fitted(spec, &lattice.cell());
+        let places = (0..lattice.rows).flat_map(|row| (0..lattice.columns).map(move |column| (column, row)));
+        let centres = places.map(|(column, row)| lattice.centre(column, row)).collect();
+        Self { base, top, top_z, has_top: spec.truncation > 0.0, centres }
+    }
+}
+
 /// Where the pyramids stand.
 struct Lattice {
     columns: usize,

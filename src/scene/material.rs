@@ -102,6 +102,12 @@ pub enum TermSpec {
     Rgl {
         path: PathBuf,
     },
+    Utia {
+        path: PathBuf,
+    },
+    Npz {
+        path: PathBuf,
+    },
 }
 
 fn half_grey() -> Vec3 {
@@ -150,6 +156,8 @@ impl TermSpec {
             kind("ggx", "GGX facets with Smith's shadowing; roughness is not squared.", vec![roughness(), f0()]),
             kind("merl", "A measured MERL table.", vec![path("The .binary file.")]),
             kind("rgl", "A measured isotropic RGL material.", vec![path("The .bsdf file.")]),
+            kind("utia", "A measured UTIA material, averaged over azimuths.", vec![path("The .bin file.")]),
+            kind("npz", "An export of this program that is isotropic.", vec![path("The .npz file.")]),
         ]
     }
 
@@ -163,6 +171,8 @@ impl TermSpec {
             Self::Ggx { .. } => "ggx",
             Self::Merl { .. } => "merl",
             Self::Rgl { .. } => "rgl",
+            Self::Utia { .. } => "utia",
+            Self::Npz { .. } => "npz",
         }
     }
 }

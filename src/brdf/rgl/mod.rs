@@ -1,17 +1,18 @@
 //! RGL `.bsdf` files (Dupuy and Jakob 2018, "An adaptive parameterization for efficient material acquisition and
-//! rendering"), isotropic, RGB: evaluated by the published method, then resampled into the table that every measured
+//! rendering"), isotropic: evaluated by the published method, then resampled into the table that every measured
 //! BRDF is looked up in.
 //!
 //! With `u(θ, φ) = (√(2θ/π), (φ+π)/2π)`, `s` the inverse of the warp by the visible normals (`vndf` for this `θ_i`) at
 //! `u(h)`: `rgb(s) ndf(u(h)) / (4 sigma(u(i)))` is `f_r(i,o) cosθ_o`. Samples are on the vertices of each grid.
 
-mod tensor_file;
-mod warp;
+pub(crate) mod table;
+pub(crate) mod tensor_file;
+pub(crate) mod warp;
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 use std::path::Path;
 
-use glam::{DVec3, Vec4};
+use glam::{DQuat, DVec3, Vec4};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -20,8 +21,8 @@ use super::LobeAngles;
 use super::half_difference::{HalfDifferenceTable, bin_angles, cosines, row_bins};
 use super::measured::{Measured, MeasuredReport};
 use crate::error::{InputError, Result};
+use table::RglTable;
 use tensor_file::TensorFile;
-use warp::{Between, Grid, Warp};
 
 /// `f_r` is `f` divided by cosines no smaller than this: nothing is measured beyond, and the quotient would only carry
 /// noise from the horizon into the neighbouring bins.
@@ -31,111 +32,67 @@ const SMALLEST_COSINE: f64 = 0.01;
 /// 0.26 %, with 20 in `φ_d` 2.3 / 1.0 / 0.29 %, this 1.0 / 0.5 / 0.27 %.
 const SHAPE: [usize; 3] = [180, 90, 20];
 
+/// Relative L2 between azimuths up to which a file with many passes for isotropic: interpolation leaves some.
+const MOST_ANISOTROPY: f32 = 0.05;
+/// Pairs that are turned to measure it.
+const CHECKED_TURNS: usize = 500;
+
 /// Direction pairs that measure the resampling error.
 const CHECKED_PAIRS: usize = 10_000;
 
-/// Reads, evaluates and resamples an isotropic RGB file.
-pub(super) fn load(path: &Path) -> Result<HalfDifferenceTable> {
-    let brdf =
-        TensorFile::read(path).and_then(|file| RglBrdf::from_fields(&file)).map_err(|error| error.in_file(path))?;
+/// Reads, evaluates and resamples an isotropic file.
+pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
+    let read = || {
+        let table = RglTable::from_fields(&TensorFile::read(path)?)?;
+        table.check_isotropic().map(|()| table)
+    };
+    let brdf = read().map_err(|error| error.in_file(path))?;
     let name = path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned());
     Ok(brdf.resample(name))
 }
 
-/// The fields of a file, for exact evaluation.
-struct RglBrdf {
-    theta_i: Vec<f64>,
-    ndf: (Grid, Vec<f64>),
-    sigma: (Grid, Vec<f64>),
-    vndf: Warp,
-    /// `[θ_i][channel][y][x]`.
-    rgb: (Grid, Vec<f64>),
-    /// Whether values are stored divided by `ndf / (4 sigma)`.
-    jacobian: bool,
-}
-
-impl RglBrdf {
-    fn from_fields(file: &TensorFile) -> std::result::Result<Self, InputError> {
-        let ([phi_count], _) = file.floats("phi_i")?;
-        if phi_count > 2 {
-            return Err(InputError::new(
-                "field \"phi_i\"",
-                format!("{phi_count} azimuths"),
-                "an isotropic file (one azimuth)",
-            )
-            .with_hint("anisotropic BRDFs turn with the tangent, which small-scale facets do not have"));
+impl RglTable {
+    /// Whether turning the surface changes little; files with one or two azimuths say nothing of others.
+    ///
+    /// # Errors
+    /// The change, where it is more than interpolation explains.
+    fn check_isotropic(&self) -> std::result::Result<(), InputError> {
+        if self.is_isotropic() {
+            return Ok(());
         }
-        if !file.has("rgb") && file.has("spectra") {
-            return Err(InputError::new("fields", "spectra", "rgb").with_hint("the same material's _rgb file loads"));
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut residual = Residual::default();
+        for _ in 0..CHECKED_TURNS {
+            let mut direction = || from_square(rng.random(), rng.random());
+            let (i, o) = (direction(), direction());
+            let values: Vec<DVec3> = (0..8).map(|k| self.eval_turned(i, o, f64::from(k) / 8.0)).collect();
+            let mean = values.iter().sum::<DVec3>() / 8.0;
+            values.iter().for_each(|value| residual.add(*value - mean, mean, 1.0));
         }
-        let ([theta_count], theta_i) = file.floats("theta_i")?;
-        let increasing = theta_i.windows(2).all(|pair| pair[0] < pair[1]);
-        if theta_count == 0 || !increasing {
-            return Err(InputError::new("field \"theta_i\"", format!("{theta_i:?}"), "increasing angles"));
+        let change = residual.relative();
+        if change <= MOST_ANISOTROPY {
+            return Ok(());
         }
-        let plane = |name: &str| {
-            let ([height, width], values) = file.floats(name)?;
-            Ok((Grid::new(name, width, height)?, values))
-        };
-        let slices = |name: &str, found: &[usize]| {
-            let expected = format!("one slice for each of {phi_count} phi_i and {theta_count} theta_i");
-            let matches = found[..2] == [phi_count, theta_count] && (found.len() < 3 || found[2] == 3);
-            let expected = if found.len() < 3 { expected } else { expected + ", three channels" };
-            if matches {
-                Ok(())
-            } else {
-                Err(InputError::new(format!("field \"{name}\""), format!("{found:?}"), expected))
-            }
-        };
-        let ([phis, thetas, height, width], mut vndf) = file.floats("vndf")?;
-        slices("vndf", &[phis, thetas])?;
-        let vndf_grid = Grid::new("vndf", width, height)?;
-        vndf.truncate(theta_count * vndf_grid.len());
-        let ([phis, thetas, channels, height, width], mut rgb) = file.floats("rgb")?;
-        slices("rgb", &[phis, thetas, channels])?;
-        let rgb_grid = Grid::new("rgb", width, height)?;
-        rgb.truncate(theta_count * 3 * rgb_grid.len());
-        let jacobian = file.has("jacobian") && file.floats::<1>("jacobian")?.1.first().is_some_and(|&flag| flag != 0.0);
-        Ok(Self {
-            theta_i,
-            ndf: plane("ndf")?,
-            sigma: plane("sigma")?,
-            vndf: Warp::new(vndf_grid, vndf)?,
-            rgb: (rgb_grid, rgb),
-            jacobian,
-        })
+        let found = format!("{} azimuths, over which values change by {:.0} %", self.phi_i.len(), 100.0 * change);
+        Err(InputError::new("field \"phi_i\"", found, "an isotropic file (values that do not depend on the azimuth)")
+            .with_hint("anisotropic BRDFs turn with the tangent, which small-scale facets do not have"))
     }
 
-    /// `f_r(i,o) cosθ_o` as the file has it, not reciprocal; 0 where interpolation leaves it negative. Unit vectors
-    /// above the surface.
-    fn eval(&self, i: DVec3, o: DVec3) -> DVec3 {
-        let Some(h) = (i + o).try_normalize() else {
-            return DVec3::ZERO;
-        };
-        let elevation = |v: DVec3| v.x.hypot(v.y).atan2(v.z);
-        let u_of_theta = |theta: f64| (theta / FRAC_PI_2).sqrt();
-        let theta_i = elevation(i);
-        let turn = (h.y.atan2(h.x) - i.y.atan2(i.x) + PI) / (2.0 * PI);
-        let u_h = [u_of_theta(elevation(h)), turn - turn.floor()];
-        let slice = Between::find(&self.theta_i, theta_i);
-        let s = self.vndf.invert(slice, u_h);
-        let (grid, rgb) = &self.rgb;
-        let channel = |c: usize| {
-            slice.mix(|slice| grid.eval(&rgb[(slice * 3 + c) * grid.len()..(slice * 3 + c + 1) * grid.len()], s))
-        };
-        let value = DVec3::new(channel(0), channel(1), channel(2)).max(DVec3::ZERO);
-        if !self.jacobian {
-            return value;
-        }
-        let sigma = self.sigma.0.eval(&self.sigma.1, [u_of_theta(theta_i), 0.5]);
-        let ndf = self.ndf.0.eval(&self.ndf.1, u_h);
-        if sigma > 0.0 { value * (ndf / (4.0 * sigma)).max(0.0) } else { DVec3::ZERO }
+    /// [`RglTable::eval`] of a pair turned about the normal by a part of a full turn.
+    fn eval_turned(&self, i: DVec3, o: DVec3, turn: f64) -> DVec3 {
+        let rotation = DQuat::from_rotation_z(turn * 2.0 * PI);
+        self.eval(rotation * i, rotation * o)
     }
 
-    /// `f(i,o)` and `f(o,i)`, both cosines in, each the mean with its mirror image.
+    /// `f(i,o)` and `f(o,i)`, both cosines in, each the mean with its mirror image, and over azimuths where a file has many.
     fn both_ways(&self, i: DVec3, o: DVec3) -> [DVec3; 2] {
         let mirrored = |v: DVec3| DVec3::new(v.x, -v.y, v.z);
-        let one_way = |i: DVec3, o: DVec3| 0.5 * i.z * (self.eval(i, o) + self.eval(mirrored(i), mirrored(o)));
+        let turns = if self.is_isotropic() { 1 } else { 4 };
+        let all = |i: DVec3, o: DVec3| {
+            (0..turns).map(|k| self.eval_turned(i, o, f64::from(k) / f64::from(turns))).sum::<DVec3>()
+                / f64::from(turns)
+        };
+        let one_way = |i: DVec3, o: DVec3| 0.5 * i.z * (all(i, o) + all(mirrored(i), mirrored(o)));
         [one_way(i, o), one_way(o, i)]
     }
 
@@ -187,11 +144,7 @@ impl RglBrdf {
     /// Relative L2 of `f` at random pairs up to 85°, half of them near the mirror direction.
     fn resampling_error(&self, table: &HalfDifferenceTable) -> f32 {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
-        let mut random = || {
-            let (z, phi) = (rng.random_range(0.087..1.0_f64), rng.random_range(0.0..2.0 * PI));
-            let s = (1.0 - z * z).sqrt();
-            DVec3::new(s * phi.cos(), s * phi.sin(), z)
-        };
+        let mut random = || from_square(rng.random(), rng.random());
         let mut residual = Residual::default();
         for pair in 0..CHECKED_PAIRS {
             let (i, other) = (random(), random());
@@ -211,6 +164,13 @@ impl RglBrdf {
         }
         residual.relative()
     }
+}
+
+/// A direction up to 85° from two numbers in [0, 1), uniform in solid angle.
+fn from_square(a: f64, b: f64) -> DVec3 {
+    let (z, phi) = (0.087 + (1.0 - 0.087) * a, b * 2.0 * PI);
+    let s = (1.0 - z * z).sqrt();
+    DVec3::new(s * phi.cos(), s * phi.sin(), z)
 }
 
 /// Vectors with those half and difference angles, `h` in the xz plane; `None` unless both are above the surface.

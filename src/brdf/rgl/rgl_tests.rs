@@ -1,3 +1,4 @@
+use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -64,8 +65,8 @@ fn lambertian_fields() -> Vec<FieldBytes> {
     ]
 }
 
-fn parse(fields: &[FieldBytes]) -> std::result::Result<RglBrdf, InputError> {
-    RglBrdf::from_fields(&TensorFile::parse(file_of(fields))?)
+fn parse(fields: &[FieldBytes]) -> std::result::Result<RglTable, InputError> {
+    RglTable::from_fields(&TensorFile::parse(file_of(fields))?)
 }
 
 #[test]
@@ -108,9 +109,15 @@ fn half_and_difference_angles_become_the_vectors_that_have_them() {
 
 #[test]
 fn anisotropic_and_spectral_files_are_refused_with_the_reason() {
-    let mut fields = lambertian_fields();
-    fields[0] = floats("phi_i", &[3], [-1.0, 0.0, 1.0]);
-    let error = parse(&fields).err().unwrap().to_string();
+    let mut turned = lambertian_fields();
+    turned[0] = floats("phi_i", &[3], [-PI, 0.0, PI]);
+    for at in [4, 5] {
+        let once = turned[at].data.clone();
+        turned[at].shape[0] = 3;
+        turned[at].data = once.repeat(3);
+    }
+    // Half vectors of an anisotropic file do not turn with i: the same slices for all azimuths are no Lambertian.
+    let error = parse(&turned).unwrap().check_isotropic().unwrap_err().to_string();
     assert!(error.contains("3 azimuths") && error.contains("isotropic"), "{error}");
     let mut fields = lambertian_fields();
     fields[5].name = "spectra";
@@ -156,7 +163,7 @@ fn truncated_and_damaged_bytes_are_errors_not_panics() {
         for value in [0, 1, 0x7f, 0xff] {
             let mut bytes = whole.clone();
             bytes[at] = value;
-            if let Ok(Ok(brdf)) = TensorFile::parse(bytes).map(|file| RglBrdf::from_fields(&file)) {
+            if let Ok(Ok(brdf)) = TensorFile::parse(bytes).map(|file| RglTable::from_fields(&file)) {
                 assert!(brdf.eval(DVec3::Z, DVec3::new(0.6, 0.0, 0.8)).is_finite());
             }
         }
@@ -196,7 +203,7 @@ fn the_silk_film_is_most_nearly_reciprocal_with_the_other_directions_cosine() {
         eprintln!("SKIPPED: {} is not there (BISCALE_DATA names its folder)", path.display());
         return;
     }
-    let brdf = RglBrdf::from_fields(&TensorFile::read(&path).unwrap()).unwrap();
+    let brdf = RglTable::from_fields(&TensorFile::read(&path).unwrap()).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut random = || {
         let (z, phi) = (rng.random_range(0.2..1.0_f64), rng.random_range(0.0..2.0 * PI));

@@ -1,10 +1,10 @@
-//! The container of RGL `.bsdf` files: named arrays.
+//! The container of RGL `.bsdf` files, read and written: named arrays.
 //!
 //! `tensor_file\0`, two version bytes (1, 0), u32 field count; per field u16 name length, name, u16 dimensions, u8 type,
 //! u64 offset from the start of the file, u64 per dimension; then the arrays, last dimension fastest. Little-endian.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use crate::error::InputError;
@@ -17,7 +17,7 @@ const MOST_FIELDS: u32 = 256;
 const MOST_DIMENSIONS: u16 = 8;
 
 /// A file in memory, its table of contents checked against its size.
-pub(super) struct TensorFile {
+pub(crate) struct TensorFile {
     bytes: Vec<u8>,
     fields: Vec<Field>,
 }
@@ -35,7 +35,7 @@ const F32: u8 = 10;
 const F64: u8 = 11;
 
 impl TensorFile {
-    pub(super) fn read(path: &Path) -> Result<Self, InputError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, InputError> {
         let unreadable = |error: std::io::Error| InputError::new("", error, "an RGL file that can be read");
         let file = File::open(path).map_err(unreadable)?;
         let len = file.metadata().map_err(unreadable)?.len();
@@ -48,7 +48,7 @@ impl TensorFile {
         Self::parse(bytes)
     }
 
-    pub(super) fn parse(bytes: Vec<u8>) -> Result<Self, InputError> {
+    pub(crate) fn parse(bytes: Vec<u8>) -> Result<Self, InputError> {
         let mut reader = Reader { bytes: &bytes, at: 0 };
         if reader.take::<12>("header")? != *MAGIC {
             return Err(
@@ -67,7 +67,7 @@ impl TensorFile {
         Ok(Self { bytes, fields })
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.fields.iter().any(|field| field.name == name)
     }
 
@@ -79,7 +79,7 @@ impl TensorFile {
     }
 
     /// The shape and the finite numbers of a field of `DIMENSIONS` dimensions.
-    pub(super) fn floats<const DIMENSIONS: usize>(
+    pub(crate) fn floats<const DIMENSIONS: usize>(
         &self,
         name: &str,
     ) -> Result<([usize; DIMENSIONS], Vec<f64>), InputError> {
@@ -104,6 +104,55 @@ impl TensorFile {
         }
     }
 }
+
+/// Arrays on the way into a file.
+#[derive(Default)]
+pub(crate) struct TensorWriter {
+    fields: Vec<(&'static str, u8, Vec<usize>, Vec<u8>)>,
+}
+
+impl TensorWriter {
+    /// Adds an array of f32, last dimension fastest.
+    pub(crate) fn floats(&mut self, name: &'static str, shape: &[usize], values: &[f32]) {
+        debug_assert_eq!(values.len(), shape.iter().product::<usize>());
+        let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        self.fields.push((name, F32, shape.to_vec(), bytes));
+    }
+
+    /// Adds a list of bytes: text, or a flag.
+    pub(crate) fn bytes(&mut self, name: &'static str, bytes: &[u8]) {
+        self.fields.push((name, U8, vec![bytes.len()], bytes.to_vec()));
+    }
+
+    /// The table of contents, then the arrays, each at a multiple of 8 bytes.
+    pub(crate) fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let entry = |name: &str, shape: &[usize]| 2 + name.len() + 2 + 1 + 8 + 8 * shape.len();
+        let contents: usize = self.fields.iter().map(|(name, _, shape, _)| entry(name, shape)).sum();
+        let mut header = MAGIC.to_vec();
+        header.extend([1, 0]);
+        header.extend(u32::try_from(self.fields.len()).map_err(io::Error::other)?.to_le_bytes());
+        let mut offset = (header.len() + contents).next_multiple_of(ALIGNMENT);
+        for (name, kind, shape, bytes) in &self.fields {
+            header.extend((name.len() as u16).to_le_bytes());
+            header.extend(name.as_bytes());
+            header.extend((shape.len() as u16).to_le_bytes());
+            header.push(*kind);
+            header.extend((offset as u64).to_le_bytes());
+            shape.iter().for_each(|&n| header.extend((n as u64).to_le_bytes()));
+            offset = (offset + bytes.len()).next_multiple_of(ALIGNMENT);
+        }
+        header.resize(header.len().next_multiple_of(ALIGNMENT), 0);
+        out.write_all(&header)?;
+        for (_, _, _, bytes) in &self.fields {
+            out.write_all(bytes)?;
+            out.write_all(&[0; ALIGNMENT][..bytes.len().next_multiple_of(ALIGNMENT) - bytes.len()])?;
+        }
+        Ok(())
+    }
+}
+
+/// Where arrays start.
+const ALIGNMENT: usize = 8;
 
 struct Reader<'a> {
     bytes: &'a [u8],

@@ -1,10 +1,10 @@
-//! Functions on the unit square given at the vertices of a grid, bilinear between them, one per light elevation.
+//! Functions on the unit square given at the vertices of a grid, bilinear between them, one per direction of one side.
 
 use crate::error::InputError;
 
 /// A grid: `width` values along x (fastest), `height` along y, both at least 2.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     pub width: usize,
     pub height: usize,
 }
@@ -19,7 +19,7 @@ struct Cell {
 }
 
 impl Grid {
-    pub(super) fn new(place: &str, width: usize, height: usize) -> Result<Self, InputError> {
+    pub(crate) fn new(place: &str, width: usize, height: usize) -> Result<Self, InputError> {
         if width < 2 || height < 2 {
             let found = format!("a grid of {height} x {width}");
             return Err(InputError::new(format!("field \"{place}\""), found, "at least 2 x 2"));
@@ -27,7 +27,7 @@ impl Grid {
         Ok(Self { width, height })
     }
 
-    pub(super) fn len(self) -> usize {
+    pub(crate) fn len(self) -> usize {
         self.width * self.height
     }
 
@@ -42,7 +42,7 @@ impl Grid {
     }
 
     /// Bilinear interpolation of `values`.
-    pub(super) fn eval(self, values: &[f64], at: [f64; 2]) -> f64 {
+    pub(crate) fn eval(self, values: &[f64], at: [f64; 2]) -> f64 {
         let Cell { column, row, x, y } = self.cell(at);
         let along = |row: usize| {
             let first = row * self.width + column;
@@ -56,32 +56,58 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-/// A position between two slices of a parameter: the lower one, and the weight of the next.
+/// A position between two samples of a parameter: the lower one, and the weight of the next.
 #[derive(Clone, Copy)]
-pub(super) struct Between {
+pub(crate) struct Between {
     pub lower: usize,
     pub weight: f64,
 }
 
 impl Between {
     /// Of strictly increasing `values`; constant beyond the ends.
-    pub(super) fn find(values: &[f64], value: f64) -> Self {
+    pub(crate) fn find(values: &[f64], value: f64) -> Self {
         let upper = values.partition_point(|&v| v <= value).clamp(1, values.len().max(2) - 1);
         match (values.get(upper - 1), values.get(upper)) {
             (Some(&a), Some(&b)) => Self { lower: upper - 1, weight: ((value - a) / (b - a)).clamp(0.0, 1.0) },
             _ => Self { lower: 0, weight: 0.0 },
         }
     }
+}
+
+/// The slices of `(phi_i, theta_i)`, `theta_i` fastest, that a direction lies between, and their weights.
+#[derive(Clone, Copy)]
+pub(crate) struct Blend {
+    slices: [(usize, f64); 4],
+}
+
+impl Blend {
+    pub(crate) fn new(phi: Between, theta: Between, thetas: usize) -> Self {
+        let corner = |up: usize, right: usize| {
+            let weight = |at: Between, step: usize| if step == 1 { at.weight } else { 1.0 - at.weight };
+            let (weight_phi, weight_theta) = (weight(phi, up), weight(theta, right));
+            // A slice without weight may not exist: another stands in.
+            let step = |step: usize, weight: f64| if weight > 0.0 { step } else { 0 };
+            let slice = (phi.lower + step(up, weight_phi)) * thetas + theta.lower + step(right, weight_theta);
+            (slice, weight_phi * weight_theta)
+        };
+        Self { slices: [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)] }
+    }
+
+    /// One slice alone.
+    #[cfg(test)]
+    pub(crate) fn only(slice: usize) -> Self {
+        Self { slices: [(slice, 1.0), (slice, 0.0), (slice, 0.0), (slice, 0.0)] }
+    }
 
     /// Interpolates what `of` gives for each slice.
-    pub(super) fn mix(self, of: impl Fn(usize) -> f64) -> f64 {
-        if self.weight == 0.0 { of(self.lower) } else { lerp(of(self.lower), of(self.lower + 1), self.weight) }
+    pub(crate) fn mix(self, of: impl Fn(usize) -> f64) -> f64 {
+        self.slices.iter().map(|&(slice, weight)| if weight > 0.0 { weight * of(slice) } else { 0.0 }).sum()
     }
 }
 
 /// Densities per slice, and the map from their domain to uniform numbers (Dupuy and Jakob 2018, Sec. 4): first the
 /// marginal over y, then x given y. Integrals are in grid units, every slice scaled to a total of 1.
-pub(super) struct Warp {
+pub(crate) struct Warp {
     grid: Grid,
     density: Vec<f64>,
     /// Integral along a row up to each column; its last column is the row's total.
@@ -91,8 +117,13 @@ pub(super) struct Warp {
 }
 
 impl Warp {
+    /// A warp without slices.
+    pub(crate) fn empty(grid: Grid) -> Self {
+        Self { grid, density: Vec::new(), along_row: Vec::new(), over_rows: Vec::new() }
+    }
+
     /// `density`: slices of `grid`, one after the other, not negative, none all 0.
-    pub(super) fn new(grid: Grid, mut density: Vec<f64>) -> Result<Self, InputError> {
+    pub(crate) fn new(grid: Grid, mut density: Vec<f64>) -> Result<Self, InputError> {
         let mut along_row = vec![0.0; density.len()];
         let mut over_rows = Vec::with_capacity(density.len() / grid.width);
         for (slice, (density, along_row)) in
@@ -126,14 +157,12 @@ impl Warp {
     }
 
     /// The uniform numbers that the warp of the interpolated slice would take to `at`.
-    pub(super) fn invert(&self, slice: Between, at: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn invert(&self, slice: Blend, at: [f64; 2]) -> [f64; 2] {
         let Cell { column, row, x, y } = self.grid.cell(at);
         let Grid { width, height } = self.grid;
         let mix = |values: &[f64], row: usize, column: usize| {
             slice.mix(|slice| values[(slice * height + row) * width + column])
         };
-        // The integral of a linear function over the first part of its cell.
-        let part = |a: f64, b: f64, t: f64| t * (a + 0.5 * t * (b - a));
         let total = [row, row + 1].map(|row| mix(&self.along_row, row, width - 1));
         let below = slice.mix(|slice| self.over_rows[slice * height + row]);
         let partial = [row, row + 1].map(|row| {
@@ -145,6 +174,40 @@ impl Warp {
         let across = if row_total > 0.0 { lerp(partial[0], partial[1], y) / row_total } else { at[0] };
         [across.clamp(0.0, 1.0), (below + part(total[0], total[1], y)).clamp(0.0, 1.0)]
     }
+
+    /// Where the warp of one slice takes uniform numbers, and the density there per unit of the square.
+    pub(crate) fn sample(&self, slice: usize, [s, t]: [f64; 2]) -> ([f64; 2], f64) {
+        let Grid { width, height } = self.grid;
+        let at = |row: usize, column: usize| (slice * height + row) * width + column;
+        let over_rows = &self.over_rows[slice * height..][..height];
+        let row = over_rows.partition_point(|&sum| sum <= t).clamp(1, height - 1) - 1;
+        let total = [row, row + 1].map(|row| self.along_row[at(row, width - 1)]);
+        let y = part_inverse(total[0], total[1], t - over_rows[row]);
+        let wanted = s * lerp(total[0], total[1], y);
+        let along = |column: usize| lerp(self.along_row[at(row, column)], self.along_row[at(row + 1, column)], y);
+        let (mut low, mut high) = (0, width - 1);
+        while high - low > 1 {
+            let middle = (low + high) / 2;
+            if along(middle) <= wanted { low = middle } else { high = middle }
+        }
+        let density = |column: usize| lerp(self.density[at(row, column)], self.density[at(row + 1, column)], y);
+        let (a, b) = (density(low), density(low + 1));
+        let x = part_inverse(a, b, wanted - along(low));
+        let cells = ((width - 1) * (height - 1)) as f64;
+        let place = [(low as f64 + x) / (width - 1) as f64, (row as f64 + y) / (height - 1) as f64];
+        (place, lerp(a, b, x) * cells)
+    }
+}
+
+/// The integral of a linear function over the first part `t` of its cell.
+fn part(a: f64, b: f64, t: f64) -> f64 {
+    t * (a + 0.5 * t * (b - a))
+}
+
+/// The `t` whose [`part`] is `integral`: the root `2 c / (a + √(a² + 2 c (b-a)))`, stable where `a` is nearly `b`.
+fn part_inverse(a: f64, b: f64, integral: f64) -> f64 {
+    let below = a + (a * a + 2.0 * integral * (b - a)).max(0.0).sqrt();
+    if below > 0.0 { (2.0 * integral / below).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -152,6 +215,11 @@ mod tests {
     use super::*;
 
     const GRID: Grid = Grid { width: 5, height: 4 };
+
+    /// Between the two slices.
+    fn between(weight: f64) -> Blend {
+        Blend::new(Between { lower: 0, weight: 0.0 }, Between { lower: 0, weight }, 2)
+    }
 
     /// Two slices with zeros among their values.
     fn densities() -> Vec<f64> {
@@ -161,7 +229,7 @@ mod tests {
     #[test]
     fn inversion_is_the_cumulative_integral_of_the_interpolated_density() {
         let warp = Warp::new(GRID, densities()).unwrap();
-        let slice = Between { lower: 0, weight: 0.3 };
+        let slice = between(0.3);
         let density = |at: [f64; 2]| slice.mix(|s| GRID.eval(&warp.density[s * GRID.len()..(s + 1) * GRID.len()], at));
         let n = 400;
         let at = [0.63, 0.41];
@@ -177,14 +245,40 @@ mod tests {
     #[test]
     fn a_constant_density_warps_nothing_and_corners_stay() {
         let flat = Warp::new(GRID, vec![3.0; GRID.len()]).unwrap();
-        let only = Between { lower: 0, weight: 0.0 };
+        let only = Blend::only(0);
         for at in [[0.0, 0.0], [0.2, 0.9], [0.77, 0.5], [1.0, 1.0]] {
             let [x, y] = flat.invert(only, at);
             assert!((x - at[0]).abs() < 1e-12 && (y - at[1]).abs() < 1e-12);
         }
         let warp = Warp::new(GRID, densities()).unwrap();
-        let [x, y] = warp.invert(Between { lower: 0, weight: 0.5 }, [1.0, 1.0]);
+        let [x, y] = warp.invert(between(0.5), [1.0, 1.0]);
         assert!((x - 1.0).abs() < 1e-12 && (y - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn sampling_undoes_inversion_and_reports_the_density() {
+        let warp = Warp::new(GRID, densities()).unwrap();
+        for slice in [0, 1] {
+            let density =
+                |at: [f64; 2]| GRID.eval(&warp.density[slice * GRID.len()..(slice + 1) * GRID.len()], at) * 12.0;
+            for k in 0..200 {
+                let numbers = [(f64::from(k) * 0.618_034) % 1.0, (f64::from(k) + 0.5) / 200.0];
+                let (at, found) = warp.sample(slice, numbers);
+                let back = warp.invert(Blend::only(slice), at);
+                assert!(
+                    (back[0] - numbers[0]).abs() < 1e-9 && (back[1] - numbers[1]).abs() < 1e-9,
+                    "{numbers:?} {back:?}"
+                );
+                assert!((found - density(at)).abs() < 1e-9, "{found} {}", density(at));
+            }
+        }
+    }
+
+    #[test]
+    fn four_slices_are_weighted_bilinearly() {
+        let blend = Blend::new(Between { lower: 1, weight: 0.25 }, Between { lower: 0, weight: 0.5 }, 3);
+        let value = blend.mix(|slice| [0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 5.0, 11.0][slice]);
+        assert!((value - (0.75 * 2.0 + 0.25 * 8.0)).abs() < 1e-12);
     }
 
     #[test]

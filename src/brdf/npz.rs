@@ -1,0 +1,154 @@
+//! Our own `.npz` exports, where they are isotropic: arrays of f32 stored in a ZIP archive.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::half_difference::HalfDifferenceTable;
+use super::spherical::{SphericalTable, even_turn};
+use crate::error::{InputError, Result};
+
+/// The largest export has 2^25 pairs of two quantities.
+const LARGEST_FILE: u64 = 1 << 30;
+/// Relative L2 between azimuths up to which a table passes for isotropic.
+const MOST_ANISOTROPY: f64 = 0.05;
+
+pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
+    let name = path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned());
+    let read = || {
+        let unreadable = |error: std::io::Error| InputError::new("", error, "an .npz export that can be read");
+        let length = std::fs::metadata(path).map_err(unreadable)?.len();
+        if length > LARGEST_FILE {
+            return Err(InputError::new(
+                "file size",
+                format!("{length} bytes"),
+                format!("at most {LARGEST_FILE} bytes"),
+            ));
+        }
+        table(&std::fs::read(path).map_err(unreadable)?)
+    };
+    let table = read().map_err(|error| error.in_file(path))?;
+    Ok(table.resample(name))
+}
+
+type Arrays = HashMap<String, (Vec<usize>, Vec<f32>)>;
+
+fn table(bytes: &[u8]) -> std::result::Result<SphericalTable, InputError> {
+    let arrays = arrays(bytes)?;
+    let axis = |name: &str| -> std::result::Result<Vec<f64>, InputError> {
+        let (shape, values) = arrays.get(name).ok_or_else(|| missing(name))?;
+        let values: Vec<f64> = values.iter().map(|&value| f64::from(value)).collect();
+        if shape.len() != 1 || values.is_empty() || !values.windows(2).all(|pair| pair[0] < pair[1]) {
+            return Err(InputError::new(format!("array \"{name}\""), format!("shape {shape:?}"), "increasing angles"));
+        }
+        Ok(values)
+    };
+    let (theta_i, phi_i, theta_o, phi_o) = (axis("theta_i")?, axis("phi_i")?, axis("theta_o")?, axis("phi_o")?);
+    let (shape, brdf) = arrays.get("brdf").ok_or_else(|| missing("brdf"))?;
+    let expected = [theta_i.len(), phi_i.len(), theta_o.len(), phi_o.len(), 3];
+    if *shape != expected {
+        return Err(InputError::new(
+            "array \"brdf\"",
+            format!("shape {shape:?}"),
+            format!("{expected:?}, as the axes"),
+        ));
+    }
+    if phi_i.len() != phi_o.len() || !even_turn(&phi_i) || !even_turn(&phi_o) {
+        let found = format!("{} and {} azimuths", phi_i.len(), phi_o.len());
+        return Err(InputError::new("arrays \"phi_i\", \"phi_o\"", found, "the same even steps over a full turn"));
+    }
+    let (triples, _) = brdf.as_chunks::<3>();
+    let values: Vec<DVec3> = triples.iter().map(|rgb| glam::Vec3::from_array(*rgb).as_dvec3()).collect();
+    if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+        return Err(InputError::new(format!("array \"brdf\", pair {at}"), values[at], "finite numbers"));
+    }
+    let azimuths = phi_i.len();
+    let table = SphericalTable { theta_i, theta_o, azimuths, values };
+    let anisotropy = table.anisotropy();
+    if anisotropy > MOST_ANISOTROPY {
+        let found = format!("values that change by {:.0} % over {azimuths} azimuths", 100.0 * anisotropy);
+        return Err(InputError::new("array \"brdf\"", found, "an isotropic table")
+            .with_hint("anisotropic BRDFs turn with the tangent, which small-scale facets do not have"));
+    }
+    Ok(table)
+}
+
+fn missing(name: &str) -> InputError {
+    InputError::new("archive", format!("no array \"{name}\""), "an .npz that `biscale export` wrote")
+}
+
+/// The little-endian f32 members of an archive of stored members; others are passed over.
+fn arrays(bytes: &[u8]) -> std::result::Result<Arrays, InputError> {
+    let broken =
+        |at: usize| InputError::new(format!("byte {at}"), "something else", "a ZIP member that is stored as it is");
+    let half = |at: usize| bytes.get(at..at + 2).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]])));
+    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let mut arrays = Arrays::new();
+    let mut at = 0;
+    if !bytes.starts_with(b"PK\x03\x04") {
+        return Err(InputError::new("header", "other bytes", "a ZIP archive").with_hint("is this an .npz file?"));
+    }
+    while bytes.get(at..at + 4) == Some(b"PK\x03\x04") {
+        let whole = || Some((half(at + 8)?, word(at + 18)?, half(at + 26)?, half(at + 28)?));
+        let (method, size, name_length, extra) = whole().ok_or_else(|| broken(at))?;
+        let first = at + 30 + name_length + extra;
+        let (Some(name), Some(data)) =
+            (bytes.get(at + 30..at + 30 + name_length), bytes.get(first..first.saturating_add(size)))
+        else {
+            return Err(broken(at));
+        };
+        if method != 0 {
+            return Err(broken(at).with_hint("numpy.savez_compressed writes archives that are not read here"));
+        }
+        let name = String::from_utf8_lossy(name).trim_end_matches(".npy").to_owned();
+        if let Some(array) = npy(data) {
+            arrays.insert(name, array);
+        }
+        at = first + size;
+    }
+    Ok(arrays)
+}
+
+/// Shape and numbers of a C-ordered array of little-endian f32.
+fn npy(data: &[u8]) -> Option<(Vec<usize>, Vec<f32>)> {
+    if !data.starts_with(b"\x93NUMPY\x01") {
+        return None;
+    }
+    let length = usize::from(u16::from_le_bytes([*data.get(8)?, *data.get(9)?]));
+    let header = std::str::from_utf8(data.get(10..10 + length)?).ok()?;
+    if !header.contains("'<f4'") || header.contains("'fortran_order': True") {
+        return None;
+    }
+    let shape = header.split("'shape': (").nth(1)?.split(')').next()?;
+    let shape: Vec<usize> =
+        shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect::<Option<_>>()?;
+    let count = shape.iter().try_fold(1_usize, |product, &n| product.checked_mul(n))?;
+    let numbers = data.get(10 + length..)?.as_chunks().0;
+    (numbers.len() == count).then(|| (shape, numbers.iter().map(|&b| f32::from_le_bytes(b)).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_export_is_refused_without_a_panic() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let attempt = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            let error = load(&path).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            error.to_string()
+        };
+        assert!(attempt(b"not a zip").contains("header"));
+        assert!(attempt(b"PK\x03\x04").contains("byte 0"));
+        let mut member = b"PK\x03\x04".to_vec();
+        member.resize(30, 0xff);
+        assert!(attempt(&member).contains("byte 0"));
+        let mut empty = b"PK\x03\x04".to_vec();
+        empty.resize(30, 0);
+        assert!(attempt(&empty).contains("no array"));
+    }
+}

@@ -1,0 +1,126 @@
+//! The fields of an RGL file, evaluated by the published method.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::DVec3;
+
+use super::tensor_file::TensorFile;
+use super::warp::{Between, Blend, Grid, Warp};
+use crate::error::InputError;
+
+/// The coordinate of an elevation on the unit square, `√(2θ/π)`.
+pub(crate) fn u_of_theta(theta: f64) -> f64 {
+    (theta / FRAC_PI_2).sqrt()
+}
+
+/// The coordinate of an azimuth on the unit square, `(φ+π)/2π`, wrapped to [0, 1).
+pub(crate) fn u_of_phi(phi: f64) -> f64 {
+    let turn = (phi + PI) / TAU;
+    turn - turn.floor()
+}
+
+/// The unit vector at a place of the unit square.
+pub(crate) fn direction_of_u([x, y]: [f64; 2]) -> DVec3 {
+    let (theta, phi) = (x * x * FRAC_PI_2, y * TAU - PI);
+    DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
+}
+
+pub(crate) fn elevation(v: DVec3) -> f64 {
+    v.x.hypot(v.y).atan2(v.z)
+}
+
+/// The place of a unit vector on the unit square.
+pub(crate) fn u_of_direction(v: DVec3) -> [f64; 2] {
+    [u_of_theta(elevation(v)), u_of_phi(v.y.atan2(v.x))]
+}
+
+/// A file for exact evaluation. Slices run over `phi_i`, then `theta_i`.
+pub(crate) struct RglTable {
+    pub phi_i: Vec<f64>,
+    pub theta_i: Vec<f64>,
+    pub ndf: (Grid, Vec<f64>),
+    pub sigma: (Grid, Vec<f64>),
+    pub vndf: Warp,
+    /// `[slice][channel][y][x]`; three channels.
+    pub rgb: (Grid, Vec<f64>),
+    /// Whether values are stored divided by `ndf / (4 sigma)`.
+    pub jacobian: bool,
+}
+
+impl RglTable {
+    pub(crate) fn from_fields(file: &TensorFile) -> Result<Self, InputError> {
+        if !file.has("rgb") && file.has("spectra") {
+            return Err(InputError::new("fields", "spectra", "rgb").with_hint("the same material's _rgb file loads"));
+        }
+        let ([phi_count], phi_i) = file.floats("phi_i")?;
+        let ([theta_count], theta_i) = file.floats("theta_i")?;
+        for (name, angles) in [("phi_i", &phi_i), ("theta_i", &theta_i)] {
+            if angles.is_empty() || !angles.windows(2).all(|pair| pair[0] < pair[1]) {
+                return Err(InputError::new(format!("field \"{name}\""), format!("{angles:?}"), "increasing angles"));
+            }
+        }
+        let plane = |name: &str| {
+            let ([height, width], values) = file.floats(name)?;
+            Ok((Grid::new(name, width, height)?, values))
+        };
+        let slices = |name: &str, found: &[usize]| {
+            let expected = format!("one slice for each of {phi_count} phi_i and {theta_count} theta_i");
+            let matches = found[..2] == [phi_count, theta_count] && (found.len() < 3 || found[2] == 3);
+            let expected = if found.len() < 3 { expected } else { expected + ", three channels" };
+            if matches {
+                Ok(())
+            } else {
+                Err(InputError::new(format!("field \"{name}\""), format!("{found:?}"), expected))
+            }
+        };
+        let ([phis, thetas, height, width], vndf) = file.floats("vndf")?;
+        slices("vndf", &[phis, thetas])?;
+        let vndf_grid = Grid::new("vndf", width, height)?;
+        let ([phis, thetas, channels, height, width], rgb) = file.floats("rgb")?;
+        slices("rgb", &[phis, thetas, channels])?;
+        let rgb_grid = Grid::new("rgb", width, height)?;
+        let jacobian = file.has("jacobian") && file.floats::<1>("jacobian")?.1.first().is_some_and(|&flag| flag != 0.0);
+        Ok(Self {
+            phi_i,
+            theta_i,
+            ndf: plane("ndf")?,
+            sigma: plane("sigma")?,
+            vndf: Warp::new(vndf_grid, vndf)?,
+            rgb: (rgb_grid, rgb),
+            jacobian,
+        })
+    }
+
+    /// One or two azimuths stand for all.
+    pub(crate) fn is_isotropic(&self) -> bool {
+        self.phi_i.len() <= 2
+    }
+
+    /// `f_r(i,o) cosθ_o` as the file has it, not reciprocal; 0 where interpolation leaves it negative. Unit vectors
+    /// above the surface; `i` is the side that has the slices.
+    pub(crate) fn eval(&self, i: DVec3, o: DVec3) -> DVec3 {
+        let Some(h) = (i + o).try_normalize() else {
+            return DVec3::ZERO;
+        };
+        let (theta_i, phi_i) = (elevation(i), i.y.atan2(i.x));
+        let turn = if self.is_isotropic() { phi_i } else { 0.0 };
+        let u_h = [u_of_theta(elevation(h)), u_of_phi(h.y.atan2(h.x) - turn)];
+        let phi =
+            if self.is_isotropic() { Between { lower: 0, weight: 0.0 } } else { Between::find(&self.phi_i, phi_i) };
+        let slice = Blend::new(phi, Between::find(&self.theta_i, theta_i), self.theta_i.len());
+        let s = self.vndf.invert(slice, u_h);
+        let (grid, rgb) = &self.rgb;
+        let channel = |c: usize| {
+            slice.mix(|slice| grid.eval(&rgb[(slice * 3 + c) * grid.len()..(slice * 3 + c + 1) * grid.len()], s))
+        };
+        let value = DVec3::new(channel(0), channel(1), channel(2)).max(DVec3::ZERO);
+        if self.jacobian { value * self.jacobian(u_of_direction(i), u_h) } else { value }
+    }
+
+    /// `ndf(u_h) / (4 sigma(u_i))`, and 0 where sigma is not positive.
+    pub(crate) fn jacobian(&self, u_i: [f64; 2], u_h: [f64; 2]) -> f64 {
+        let sigma = self.sigma.0.eval(&self.sigma.1, u_i);
+        let ndf = self.ndf.0.eval(&self.ndf.1, u_h);
+        if sigma > 0.0 { (ndf / (4.0 * sigma)).max(0.0) } else { 0.0 }
+    }
+}

@@ -1,0 +1,182 @@
+//! Tables over `(theta_i, phi_i, theta_o, phi_o)` from files, made isotropic: UTIA's measurements and our own `.npz`.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{DVec3, Vec4};
+
+use super::half_difference::{HalfDifferenceTable, bin_angles, cosines, row_bins};
+use super::measured::MeasuredReport;
+
+/// Bins of the table that is looked up: such files are coarse, MERL's folded shape holds all they have.
+const SHAPE: [usize; 3] = [90, 45, 30];
+/// `f_r` is taken at elevations up to this: beyond, the last one stands.
+const HORIZON: f64 = 89.9 / 90.0 * FRAC_PI_2;
+
+/// `f_r` [1/sr]; azimuths run evenly from 0 over a full turn, the same number on both sides.
+pub(super) struct SphericalTable {
+    pub theta_i: Vec<f64>,
+    pub theta_o: Vec<f64>,
+    pub azimuths: usize,
+    /// `[theta_i][phi_i][theta_o][phi_o]`.
+    pub values: Vec<DVec3>,
+}
+
+/// The mean over azimuths: `[theta_i][theta_o][phi_o - phi_i]`.
+struct Mean<'a> {
+    table: &'a SphericalTable,
+    values: Vec<DVec3>,
+}
+
+impl SphericalTable {
+    fn at(&self, ti: usize, pi: usize, to: usize, po: usize) -> DVec3 {
+        self.values[((ti * self.azimuths + pi) * self.theta_o.len() + to) * self.azimuths + po]
+    }
+
+    fn mean(&self) -> Mean<'_> {
+        let n = self.azimuths;
+        let mut values = Vec::with_capacity(self.theta_i.len() * self.theta_o.len() * n);
+        for ti in 0..self.theta_i.len() {
+            for to in 0..self.theta_o.len() {
+                for difference in 0..n {
+                    let sum: DVec3 = (0..n).map(|pi| self.at(ti, pi, to, (pi + difference) % n)).sum();
+                    values.push(sum / n as f64);
+                }
+            }
+        }
+        Mean { table: self, values }
+    }
+
+    /// Relative L2 between azimuths, both cosines in.
+    pub(super) fn anisotropy(&self) -> f64 {
+        let mean = self.mean();
+        let (mut changed, mut power) = (0.0, 0.0);
+        for (ti, theta_i) in self.theta_i.iter().enumerate() {
+            for (to, theta_o) in self.theta_o.iter().enumerate() {
+                // Squared cosines and both solid angles; a ring at the pole counts a little.
+                let weight = (theta_i.cos() * theta_o.cos()).powi(2) * (theta_i.sin() + 0.05) * (theta_o.sin() + 0.05);
+                for pi in 0..self.azimuths {
+                    for po in 0..self.azimuths {
+                        let difference = (po + self.azimuths - pi) % self.azimuths;
+                        let expected = mean.values[(ti * self.theta_o.len() + to) * self.azimuths + difference];
+                        changed += weight * (self.at(ti, pi, to, po) - expected).length_squared();
+                        power += weight * expected.length_squared();
+                    }
+                }
+            }
+        }
+        if power > 0.0 { (changed / power).sqrt() } else { 0.0 }
+    }
+
+    /// The mean over azimuths, over the swap of light and viewer and over mirror images, as the table every measured BRDF
+    /// is looked up in.
+    pub(super) fn resample(&self, name: String) -> HalfDifferenceTable {
+        let mean = self.mean();
+        let (mut difference, mut power) = (0.0, 0.0);
+        let samples = (0..SHAPE[0] * SHAPE[1])
+            .flat_map(|row| (0..SHAPE[2]).map(move |phi| (row, phi)))
+            .map(|(row, phi)| {
+                let [h, d] = row_bins(SHAPE, row);
+                let [theta_h, theta_d, phi_d] = bin_angles(SHAPE, [h as f64, d as f64, phi as f64]);
+                let (n_dot_i, n_dot_o) = cosines([theta_h, theta_d, phi_d]);
+                if n_dot_i <= 0.0 || n_dot_o <= 0.0 {
+                    return Vec4::ZERO;
+                }
+                let (theta_i, theta_o) = (n_dot_i.min(1.0).acos(), n_dot_o.min(1.0).acos());
+                // From the angle between both directions.
+                let between = 2.0 * theta_d;
+                let sines = theta_i.sin() * theta_o.sin();
+                let turn = if sines > 1e-9 {
+                    ((between.cos() - n_dot_i * n_dot_o) / sines).clamp(-1.0, 1.0).acos()
+                } else {
+                    0.0
+                };
+                let there = 0.5 * (mean.at(theta_i, theta_o, turn) + mean.at(theta_i, theta_o, TAU - turn));
+                let back = 0.5 * (mean.at(theta_o, theta_i, turn) + mean.at(theta_o, theta_i, TAU - turn));
+                let weight = (n_dot_i * n_dot_o).powi(2);
+                difference += weight * (there - back).length_squared();
+                power += weight * there.length_squared();
+                (0.5 * (there + back)).max(DVec3::ZERO).as_vec3().extend(1.0)
+            })
+            .collect();
+        let report = MeasuredReport {
+            total: self.values.len(),
+            reciprocity_residual: if power > 0.0 { (difference / power).sqrt() as f32 } else { 0.0 },
+            invalid_samples: self.values.iter().filter(|value| value.min_element() < 0.0).count(),
+            ..MeasuredReport::default()
+        };
+        HalfDifferenceTable::new(name, SHAPE, samples, report)
+    }
+}
+
+impl Mean<'_> {
+    /// Bilinear in elevations, constant beyond the outer ones, linear and wrapped in azimuth.
+    fn at(&self, theta_i: f64, theta_o: f64, turn: f64) -> DVec3 {
+        let (i, o) =
+            (split(&self.table.theta_i, theta_i.min(HORIZON)), split(&self.table.theta_o, theta_o.min(HORIZON)));
+        let n = self.table.azimuths;
+        let along = turn.rem_euclid(TAU) / TAU * n as f64;
+        let (first, part) = (along.floor() as usize % n, along - along.floor());
+        let value = |ti: usize, to: usize| {
+            let row = (ti * self.table.theta_o.len() + to) * n;
+            self.values[row + first].lerp(self.values[row + (first + 1) % n], part)
+        };
+        let along_o = |ti: usize| value(ti, o.0).lerp(value(ti, o.1), o.2);
+        along_o(i.0).lerp(along_o(i.1), i.2)
+    }
+}
+
+/// The samples about a value of increasing ones, and the weight of the upper.
+fn split(values: &[f64], at: f64) -> (usize, usize, f64) {
+    let upper = values.partition_point(|&value| value <= at);
+    match upper {
+        0 => (0, 0, 0.0),
+        _ if upper == values.len() => (upper - 1, upper - 1, 0.0),
+        _ => (upper - 1, upper, (at - values[upper - 1]) / (values[upper] - values[upper - 1])),
+    }
+}
+
+/// Whether `angles` are `count` even steps from 0 over a full turn.
+pub(super) fn even_turn(angles: &[f64]) -> bool {
+    let step = TAU / angles.len().max(1) as f64;
+    angles.iter().enumerate().all(|(k, angle)| (angle - k as f64 * step).abs() < 1e-4 * PI)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{LobeAngles, Measured};
+    use crate::directions::{from_angles, half_vector};
+
+    fn table(of: impl Fn(f64, f64, f64, f64) -> f64) -> SphericalTable {
+        let theta: Vec<f64> = (0..7).map(|k| (f64::from(k) * 12.5).to_radians()).collect();
+        let azimuths = 24;
+        let phi = |k: usize| k as f64 / azimuths as f64 * TAU;
+        let mut values = Vec::new();
+        for &ti in &theta {
+            for pi in 0..azimuths {
+                for &to in &theta {
+                    values.extend((0..azimuths).map(|po| DVec3::new(1.0, 0.5, 0.0) * of(ti, phi(pi), to, phi(po))));
+                }
+            }
+        }
+        SphericalTable { theta_i: theta.clone(), theta_o: theta, azimuths, values }
+    }
+
+    #[test]
+    fn an_isotropic_reciprocal_table_comes_back_and_azimuths_that_differ_are_measured() {
+        let isotropic = table(|ti, pi, to, po| 1.0 + 0.3 * ti.sin() * to.sin() * (pi - po).cos());
+        assert!(isotropic.anisotropy() < 1e-9);
+        let found = isotropic.resample("test".to_owned());
+        for (ti, to, turn) in [(0.2_f32, 0.6_f32, 0.4_f32), (1.0, 0.3, 2.0), (0.7, 0.7, 3.0)] {
+            let (i, o) = (from_angles(ti, 0.0), from_angles(to, turn));
+            let value = found.f_r(&LobeAngles::new(glam::Vec3::Z, i, o, half_vector(i, o)));
+            let expected = 1.0 + 0.3 * ti.sin() * to.sin() * turn.cos();
+            assert!(
+                (value.x / expected - 1.0).abs() < 0.02 && (value.y * 2.0 - value.x).abs() < 1e-5,
+                "{value} {expected}"
+            );
+        }
+        let brushed = table(|_, pi, _, po| 1.0 + 0.5 * (2.0 * pi).cos() * (2.0 * po).cos());
+        assert!(brushed.anisotropy() > 0.1, "{}", brushed.anisotropy());
+    }
+}

@@ -1,0 +1,25 @@
+//! `biscale tile`: the tile itself, to print, to fold, or for other programs.
+
+use anyhow::Result;
+use biscale::export::tile::{self, TileOptions};
+use biscale::pipeline::Pipeline;
+use glam::UVec2;
+
+use super::print_json;
+use crate::TileArgs;
+
+pub fn run(args: &TileArgs) -> Result<()> {
+    let loaded = args.scene.open()?;
+    let mesh = Pipeline::new().mesh(&loaded)?;
+    let count = |[x, y]: [usize; 2]| UVec2::new(x as u32, y as u32);
+    let options =
+        TileOptions { repeat: count(args.repeat), scale: args.scale, base_mm: args.base, samples: count(args.samples) };
+    let notes = tile::write(&loaded.scene, &mesh, &options, &args.output)?;
+    if args.scene.json {
+        return print_json(&serde_json::json!({ "output": args.output.display().to_string(), "notes": notes }));
+    }
+    if !args.scene.quiet {
+        notes.iter().chain(&mesh.notes).for_each(|note| eprintln!("note: {note}"));
+    }
+    Ok(())
+}

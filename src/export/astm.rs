@@ -1,0 +1,31 @@
+//! ASTM E1392 text (`.astm`), as the Cornell measurements use it and libbsdf reads it: keywords, then a row a pair.
+
+use std::io::{self, Write};
+
+use super::table::Table;
+use super::{ExportResolution, Job, Written};
+
+/// 8 x 24 directions each: 37 thousand rows.
+const DEFAULT_RESOLUTION: ExportResolution = ExportResolution { theta_i: 8, phi_i: 24, theta_o: 8, phi_o: 24 };
+
+pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
+    let grid = job.options.resolution.unwrap_or(DEFAULT_RESOLUTION).grid();
+    let table = Table::new(job.brdf, grid, job.progress);
+    let summary = job.summary().replace(['\n', '\r'], " ");
+    writeln!(out, "TYPE BRDF")?;
+    writeln!(out, "COMMENT {summary}")?;
+    writeln!(out, "NUM_POINTS {}", table.grid.pairs())?;
+    writeln!(out, "VARS theta_i,phi_i,theta_s,phi_s,R,G,B")?;
+    for (entry, value) in table.brdf.iter().enumerate() {
+        let [theta_i, phi_i, theta_o, phi_o] = table.grid.angles(entry);
+        writeln!(out, "{theta_i:?},{phi_i:?},{theta_o:?},{phi_o:?},{:?},{:?},{:?}", value.x, value.y, value.z)?;
+    }
+    let conventions = [
+        "ASTM E1392 text: keywords, `VARS theta_i,phi_i,theta_s,phi_s,R,G,B`, then a row a pair; i the light, s the viewer.",
+        "Angles in radians; values are the BRDF in 1/sr, no cosine.",
+        "theta at the middles of equal steps from 0 to pi/2, phi at equal steps from 0.",
+    ];
+    let conventions = conventions.map(str::to_owned).to_vec();
+    let reading = table.resampling(job.brdf);
+    Ok(Written { pairs: table.grid.pairs(), reading, conventions, anisotropy_lost: None })
+}

@@ -1,0 +1,122 @@
+//! The note beside a table, in plain words, and the reflectances that architects ask for.
+
+use std::f32::consts::{FRAC_PI_2, TAU};
+use std::fmt::Write as _;
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::meta::{FRAME, PROGRAM};
+use super::{Job, Written};
+use crate::directions::from_angles;
+use crate::filtering::{EffectiveBrdf, Reflectance};
+
+/// Directional-hemispherical reflectances: the part of the light from one direction that leaves again, a channel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Reflectances {
+    /// `(theta_i, phi_i)` in degrees, and the reflectance.
+    pub of_direction: Vec<([f32; 2], Vec3)>,
+    /// The same under even light from everywhere (bi-hemispherical), from the directions above.
+    pub diffuse: Vec3,
+}
+
+/// Directions that reflectances are listed for, degrees.
+const ELEVATIONS: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
+const AZIMUTHS: [f32; 2] = [0.0, 90.0];
+/// Rings and azimuths of the other side: 1° and 3°.
+const RINGS: usize = 90;
+const STEPS: usize = 120;
+
+impl Reflectances {
+    /// By reciprocity the integral of `f̄(i, o)` over all `i` is what light from `o` gives away.
+    pub fn of(brdf: &EffectiveBrdf) -> Self {
+        let (lights, solid_angles) = hemisphere();
+        let of = |o: Vec3| -> Vec3 {
+            let mut values = vec![Vec3::ZERO; lights.len()];
+            brdf.eval_lights(&lights, o, &mut values);
+            let sum: DVec3 = values.iter().zip(&solid_angles).map(|(value, w)| value.as_dvec3() * *w).sum();
+            sum.as_vec3()
+        };
+        let directions: Vec<[f32; 2]> = ELEVATIONS
+            .iter()
+            .flat_map(|&theta| AZIMUTHS.iter().map(move |&phi| [theta, phi]))
+            .filter(|[theta, phi]| *theta > 0.0 || *phi == 0.0)
+            .collect();
+        let of_direction: Vec<_> = directions
+            .into_par_iter()
+            .map(|[theta, phi]| ([theta, phi], of(from_angles(theta.to_radians(), phi.to_radians()))))
+            .collect();
+        // Rings by their share of the projected hemisphere.
+        let weight = |theta: f32| (2.0 * theta.to_radians()).sin() / if theta == 0.0 { 1.0 } else { 2.0 };
+        let total: f32 = of_direction.iter().map(|([theta, _], _)| weight(*theta)).sum();
+        let diffuse = of_direction.iter().map(|([theta, _], value)| *value * weight(*theta)).sum::<Vec3>() / total;
+        Self { of_direction, diffuse }
+    }
+
+    /// A line a direction.
+    pub fn lines(&self) -> Vec<String> {
+        let line = |([theta, phi], value): &([f32; 2], Vec3)| {
+            format!("theta {theta:>2}°, phi {phi:>2}°: {:.4} {:.4} {:.4}", value.x, value.y, value.z)
+        };
+        self.of_direction.iter().map(line).collect()
+    }
+}
+
+/// Directions at the middles of cells, and the solid angle of each.
+pub(super) fn hemisphere() -> (Vec<Vec3>, Vec<f64>) {
+    let cells = (0..RINGS).flat_map(|ring| (0..STEPS).map(move |step| (ring, step)));
+    cells
+        .map(|(ring, step)| {
+            let edge = |k: usize| k as f32 / RINGS as f32 * FRAC_PI_2;
+            let theta = 0.5 * (edge(ring) + edge(ring + 1));
+            let phi = (step as f32 + 0.5) / STEPS as f32 * TAU;
+            let band = f64::from(edge(ring)).cos() - f64::from(edge(ring + 1)).cos();
+            (from_angles(theta, phi), band * f64::from(TAU) / STEPS as f64)
+        })
+        .unzip()
+}
+
+/// The note on a file.
+pub(super) fn text(job: &Job<'_>, path: &Path, written: &Written, reflectances: &Reflectances) -> String {
+    let meta = job.meta;
+    let mut text = String::new();
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut put = |line: &str| {
+        let _ = writeln!(text, "{}", line.replace(['\n', '\r'], " "));
+    };
+    put(&format!("{name}: the effective BRDF of the scene {}, written by {PROGRAM}", meta.scene));
+    put("");
+    put("How to read it");
+    written.conventions.iter().for_each(|line| put(&format!("- {line}")));
+    put(&format!("- Frame: {FRAME}."));
+    put(
+        "- x is the tangent (tile x, along u of a surface), y the bitangent (tile y, along v); put the same frame on the object.",
+    );
+    put("- Colours are linear RGB with Rec. 709 primaries. The BRDF is f_bar(i,o) / cos(theta_i) in 1/sr.");
+    put("");
+    put("Where it comes from");
+    put(&format!("- Scene: {}; quality: {}; seed {}.", meta.scene, meta.quality, meta.seed));
+    let [x, y] = meta.tile_size;
+    put(&format!("- Tile: {x} x {y} {}; {}.", meta.tile_unit, meta.plane()));
+    meta.notes.iter().for_each(|note| put(&format!("- {note}")));
+    put("");
+    put("How good it is");
+    let reading = &written.reading;
+    put(&format!(
+        "- Read back at directions up to 85 degrees, half of them near the mirror direction: mean error {:.2} %, relative L2 \
+         {:.2} %, {:.1} dB.",
+        100.0 * reading.mean,
+        100.0 * reading.errors.rel_l2,
+        reading.errors.psnr_db
+    ));
+    put(
+        "- That is against the program's own value at this quality; `biscale eval --quality reference` tells the rest.",
+    );
+    put("");
+    put("Directional-hemispherical reflectance (R G B): light from one direction, all that leaves again");
+    reflectances.lines().iter().for_each(|line| put(&format!("- {line}")));
+    let diffuse = reflectances.diffuse;
+    put(&format!("- even light from everywhere: about {:.3} {:.3} {:.3}", diffuse.x, diffuse.y, diffuse.z));
+    text
+}

@@ -1,0 +1,161 @@
+//! Klems' full basis: nine rings of patches of about equal projected solid angle, 145 in all.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+use glam::{DVec3, Vec3};
+
+use super::super::sampler::{in_parallel, reading_error};
+use super::super::{Job, Written};
+use super::{Content, rgb, xyz};
+use crate::filtering::Reflectance;
+
+/// Middle and upper bound of each ring in degrees, and its patches. The first patch of a ring is centred on azimuth 0.
+const RINGS: [(u32, u32, usize); 9] = [
+    (0, 5, 1),
+    (10, 15, 8),
+    (20, 25, 16),
+    (30, 35, 20),
+    (40, 45, 24),
+    (50, 55, 24),
+    (60, 65, 24),
+    (70, 75, 16),
+    (80, 90, 12),
+];
+const PATCHES: usize = 145;
+/// Directions along each side of a patch: of the incident light, and of what leaves.
+const INCIDENT: usize = 3;
+const LEAVING: usize = 5;
+
+/// A patch: bounds in radians.
+#[derive(Debug, Clone, Copy)]
+struct Patch {
+    theta: [f64; 2],
+    phi: [f64; 2],
+}
+
+impl Patch {
+    /// All of them, in the order of the format.
+    fn all() -> Vec<Self> {
+        let mut lower = 0;
+        let mut patches = Vec::with_capacity(PATCHES);
+        for (_, upper, count) in RINGS {
+            let theta = [lower, upper].map(|degrees: u32| f64::from(degrees).to_radians());
+            let edge = |k: f64| (k - 0.5) / count as f64 * TAU;
+            patches.extend((0..count).map(|k| Self { theta, phi: [edge(k as f64), edge(k as f64 + 1.0)] }));
+            lower = upper;
+        }
+        patches
+    }
+
+    /// `side²` directions of equal projected solid angle.
+    fn directions(&self, side: usize) -> Vec<DVec3> {
+        let [low, high] = self.theta.map(|theta| theta.sin().powi(2));
+        let along = |range: [f64; 2], k: usize| range[0] + (range[1] - range[0]) * (k as f64 + 0.5) / side as f64;
+        let cells = (0..side * side).map(|k| (k / side, k % side));
+        cells
+            .map(|(ring, step)| {
+                let (sine, phi) = (along([low, high], ring).sqrt(), along(self.phi, step));
+                DVec3::new(sine * phi.cos(), sine * phi.sin(), (1.0 - sine * sine).sqrt())
+            })
+            .collect()
+    }
+
+    /// The patch of a direction.
+    fn of(direction: DVec3) -> usize {
+        let theta = direction.x.hypot(direction.y).atan2(direction.z).to_degrees();
+        let mut first = 0;
+        for (_, upper, count) in RINGS {
+            if theta <= f64::from(upper) {
+                let turn = direction.y.atan2(direction.x) / TAU * count as f64 + 0.5;
+                return first + turn.floor().rem_euclid(count as f64) as usize;
+            }
+            first += count;
+        }
+        PATCHES - 1
+    }
+}
+
+/// Radiance numbers incident patches by where the light goes to, not by where it comes from.
+fn source_of(direction: DVec3) -> DVec3 {
+    DVec3::new(-direction.x, -direction.y, direction.z)
+}
+
+pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
+    let patches = Patch::all();
+    let leaving: Vec<Vec3> =
+        patches.iter().flat_map(|patch| patch.directions(LEAVING)).map(|direction| direction.as_vec3()).collect();
+    // Reciprocal, so that one incident direction sees all that leave at once.
+    let columns: Vec<Vec<DVec3>> = in_parallel(PATCHES, job.progress, |incident| {
+        let mut sums = vec![DVec3::ZERO; PATCHES];
+        for direction in patches[incident].directions(INCIDENT) {
+            let mut values = vec![Vec3::ZERO; leaving.len()];
+            job.brdf.eval_lights(&leaving, source_of(direction).as_vec3(), &mut values);
+            for (sum, (values, leaving)) in
+                sums.iter_mut().zip(values.chunks(LEAVING * LEAVING).zip(leaving.chunks(LEAVING * LEAVING)))
+            {
+                *sum += values.iter().zip(leaving).map(|(value, o)| value.as_dvec3() / f64::from(o.z)).sum::<DVec3>();
+            }
+        }
+        sums.into_iter().map(|sum| sum / (INCIDENT * INCIDENT * LEAVING * LEAVING) as f64).collect()
+    });
+    let mut channels = ["CIE-X", "Visible", "CIE-Z"].map(|name| (name, String::new()));
+    for leaving in 0..PATCHES {
+        for column in &columns {
+            let value = xyz(column[leaving].as_vec3());
+            for ((_, text), value) in channels.iter_mut().zip(value.to_array()) {
+                let _ = write!(text, "{:.5e}\t", value.max(0.0));
+            }
+        }
+        channels.iter_mut().for_each(|(_, text)| text.push('\n'));
+    }
+    let read = |i: Vec3, o: Vec3| {
+        let column = &columns[Patch::of(source_of(o.as_dvec3()))];
+        rgb(xyz(column[Patch::of(i.as_dvec3())].as_vec3())) * i.z
+    };
+    let conventions = vec![
+        "Klems full basis: 145 incident (columns) by 145 leaving (rows) patches, each the mean over its patch.".to_owned(),
+        "Incident patches are numbered by the direction that the light travels in, as WINDOW does: phi turned by 180 degrees.".to_owned(),
+        "Patches are 10 degrees wide: highlights narrower than that are spread over them; hemispherical totals stay.".to_owned(),
+    ];
+    let reading = reading_error(job.brdf, read);
+    let written = Written { pairs: PATCHES * PATCHES, reading, conventions, anisotropy_lost: None };
+    let zeros = format!("{}\n", "0\t".repeat(PATCHES)).repeat(PATCHES);
+    (Content { definition: definition(), basis: BASIS, channels, black: zeros }, written)
+}
+
+const BASIS: &str =
+    "<ColumnAngleBasis>LBNL/Klems Full</ColumnAngleBasis>\n<RowAngleBasis>LBNL/Klems Full</RowAngleBasis>";
+
+fn definition() -> String {
+    let mut text = "<IncidentDataStructure>Columns</IncidentDataStructure>\n<AngleBasis>\n<AngleBasisName>LBNL/Klems Full</AngleBasisName>\n".to_owned();
+    let mut lower = 0;
+    for (middle, upper, count) in RINGS {
+        let _ = writeln!(
+            text,
+            "<AngleBasisBlock>\n<Theta>{middle}</Theta>\n<nPhis>{count}</nPhis>\n<ThetaBounds>\n<LowerTheta>{lower}</LowerTheta>\n\
+             <UpperTheta>{upper}</UpperTheta>\n</ThetaBounds>\n</AngleBasisBlock>"
+        );
+        lower = upper;
+    }
+    text.push_str("</AngleBasis>\n");
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patches_hold_their_directions_and_fill_the_projected_hemisphere() {
+        let patches = Patch::all();
+        assert_eq!(patches.len(), PATCHES);
+        let mut total = 0.0;
+        for (k, patch) in patches.iter().enumerate() {
+            assert!(patch.directions(4).into_iter().all(|direction| Patch::of(direction) == k), "{k}");
+            let [low, high] = patch.theta.map(|theta| theta.sin().powi(2));
+            total += 0.5 * (high - low) * (patch.phi[1] - patch.phi[0]);
+        }
+        assert!((total - 0.5 * TAU).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,285 @@
+//! RGL tensor files (Dupuy and Jakob 2018), anisotropic: `.bsdf`, read by Mitsuba 3's `measured`, pbrt-v4 and brdf-loader.
+//!
+//! `i` of the format, the side with the slices, is our viewer; its value is the BRDF times the cosine of the other side,
+//! which is exactly `f̄`. Samples lie on half vectors, where lobes stand still, crowded by a warp where normals are.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::io::{self, Write};
+
+use glam::{DVec3, Vec3};
+
+use super::sampler::{ReadingError, in_parallel, reading_error};
+use super::{ExportResolution, Job, Written};
+use crate::brdf::LUMINANCE;
+use crate::brdf::rgl::table::{RglTable, direction_of_u, u_of_direction};
+use crate::brdf::rgl::tensor_file::TensorWriter;
+use crate::brdf::rgl::warp::{Grid, Warp};
+use crate::filtering::{EffectiveBrdf, Reflectance};
+
+/// The last elevation stands for 90°, where nothing is defined.
+const LAST_THETA: f64 = 89.9 / 90.0 * FRAC_PI_2;
+/// Where the projected area vanishes, sigma ends at this part of the base area.
+const SMALLEST_SIGMA: f64 = 1e-3;
+/// What is added to `ndf`, of its largest value: normals that no retro-reflection shows may still reflect.
+const NDF_FLOOR: f64 = 1e-3;
+/// What is added to the density of normals, times their cosine, of the largest: faint tails keep some samples.
+const EVERYWHERE: f64 = 0.05;
+/// Elevations and azimuths of the viewer, samples along both axes of a warp: 3, 17 and 51 MB.
+const RESOLUTIONS: [[usize; 4]; 3] = [[9, 24, 24, 24], [13, 48, 36, 36], [17, 64, 48, 48]];
+/// The first of them that reads with this mean error is taken.
+const GOOD_ENOUGH: f64 = 0.01;
+
+/// Sizes of the file's grids.
+#[derive(Debug, Clone, Copy)]
+struct Sizes {
+    /// Elevations of the viewer from 0 to 90°.
+    thetas: usize,
+    /// Azimuths of the viewer from -π to π, the seam twice.
+    phis: usize,
+    /// Of each slice: warp, luminance and colours.
+    samples: Grid,
+    /// Of the functions of one direction.
+    ndf: Grid,
+}
+
+impl Sizes {
+    fn new(resolution: &ExportResolution) -> Self {
+        let ExportResolution { theta_i, phi_i, theta_o, phi_o } = *resolution;
+        // Mitsuba loads square grids only.
+        let side = ((theta_o * phi_o) as f64).sqrt().round().max(2.0) as usize;
+        Self {
+            thetas: theta_i.max(2),
+            phis: phi_i.max(3) + 1,
+            samples: Grid { width: side, height: side },
+            ndf: Grid { width: 4 * side, height: 4 * side },
+        }
+    }
+
+    fn theta(&self, k: usize) -> f64 {
+        // Denser towards the horizon, where most happens.
+        let t = k as f64 / (self.thetas - 1) as f64;
+        t * (1.0 + 0.7 * (1.0 - t)) * FRAC_PI_2
+    }
+
+    fn phi(&self, k: usize) -> f64 {
+        k as f64 / (self.phis - 1) as f64 * TAU - PI
+    }
+
+    /// The direction of a slice's viewer, just above the horizon at least.
+    fn viewer(&self, slice: usize) -> DVec3 {
+        let theta = self.theta(slice % self.thetas).min(LAST_THETA);
+        let phi = self.phi(slice / self.thetas);
+        DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
+    }
+}
+
+/// Places of the vertices of a grid on the unit square, x fastest.
+fn vertices(grid: Grid) -> impl Iterator<Item = [f64; 2]> + Clone {
+    let at = |k: usize, n: usize| k as f64 / (n - 1) as f64;
+    (0..grid.height).flat_map(move |y| (0..grid.width).map(move |x| [at(x, grid.width), at(y, grid.height)]))
+}
+
+/// `dω_h / du`: how much solid angle of half vectors a unit of the square holds.
+fn solid_angle([x, _]: [f64; 2]) -> f64 {
+    2.0 * PI * PI * x * (x * x * FRAC_PI_2).sin()
+}
+
+/// One viewer's part of the file.
+struct Slice {
+    vndf: Vec<f32>,
+    luminance: Vec<f32>,
+    /// Three planes.
+    rgb: Vec<f32>,
+}
+
+/// `f̄` at the reflections of `viewer` about half vectors. Under the horizon it goes on as it is at the horizon: readers
+/// take 0 there, and interpolate across.
+fn reflect(brdf: &EffectiveBrdf, viewer: DVec3, halves: &[DVec3]) -> Vec<DVec3> {
+    let lights: Vec<_> = halves.iter().map(|&h| above_horizon(reflected(viewer, h)).as_vec3()).collect();
+    let mut values = vec![Vec3::ZERO; lights.len()];
+    brdf.eval_lights(&lights, viewer.as_vec3(), &mut values);
+    values.into_iter().map(|value| value.as_dvec3()).collect()
+}
+
+fn reflected(viewer: DVec3, half: DVec3) -> DVec3 {
+    2.0 * viewer.dot(half) * half - viewer
+}
+
+/// The direction itself, or the nearest one that is not under the horizon.
+fn above_horizon(direction: DVec3) -> DVec3 {
+    let lowest = LAST_THETA.cos();
+    if direction.z >= lowest {
+        return direction;
+    }
+    let flat = direction.with_z(0.0).try_normalize().unwrap_or(DVec3::X);
+    (flat * LAST_THETA.sin()).with_z(lowest)
+}
+
+fn luminance(value: DVec3) -> f64 {
+    value.dot(LUMINANCE.as_dvec3())
+}
+
+/// The density of half vectors on the unit square that this viewer's warp is made of, times an arbitrary constant: normals
+/// as they are seen, `D(m) (i·m)+`, and as much again as they are. With the first alone slices differ so much in what
+/// they show that reading between them costs twice the error; `luminance` makes up for the rest.
+fn visible_normals(viewer: DVec3, grid: Grid, ndf: &(Grid, Vec<f64>)) -> Vec<f64> {
+    let density = |at: [f64; 2]| {
+        let m = direction_of_u(at);
+        let normals = ndf.0.eval(&ndf.1, at) + EVERYWHERE * m.z;
+        normals * solid_angle(at) * (1.0 + viewer.dot(m).max(0.0)) + 1e-9
+    };
+    vertices(grid).map(density).collect()
+}
+
+/// `ndf` from retro-reflection, `4 G(m, m)` scaled to a largest value of 1, and `sigma`, the visible projected area.
+fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
+    let places: Vec<_> = vertices(sizes.ndf).collect();
+    let silent = |_: f32| {};
+    let both = in_parallel(places.len(), &silent, |k| {
+        let m = above_horizon(direction_of_u(places[k])).as_vec3();
+        let area = f64::from(brdf.relative_projected_area(m));
+        (luminance(brdf.eval(m, m).as_dvec3()) * area, area.max(SMALLEST_SIGMA))
+    });
+    let (retro, sigma): (Vec<f64>, Vec<f64>) = both.into_iter().unzip();
+    let largest = retro.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let ndf = retro.into_iter().map(|value| value / largest + NDF_FLOOR).collect();
+    RglTable {
+        phi_i: (0..sizes.phis).map(|k| sizes.phi(k)).collect(),
+        theta_i: (0..sizes.thetas).map(|k| sizes.theta(k)).collect(),
+        ndf: (sizes.ndf, as_stored(ndf)),
+        sigma: (sizes.ndf, as_stored(sigma)),
+        vndf: Warp::empty(sizes.samples),
+        rgb: (sizes.samples, Vec::new()),
+        jacobian: true,
+    }
+}
+
+/// Rounded to the f32 that a reader will have.
+fn as_stored(values: Vec<f64>) -> Vec<f64> {
+    values.into_iter().map(|value| f64::from(value as f32)).collect()
+}
+
+/// A table in memory as a reader has it, and its slices as they are stored.
+struct Tabulated {
+    sizes: Sizes,
+    table: RglTable,
+    slices: Vec<Slice>,
+    reading: ReadingError,
+}
+
+impl Tabulated {
+    fn new(job: &Job<'_>, resolution: &ExportResolution) -> io::Result<Self> {
+        let Job { brdf, progress, .. } = *job;
+        let sizes = Sizes::new(resolution);
+        let planes = planes(brdf, &sizes);
+        let count = sizes.phis * sizes.thetas;
+        let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice));
+        let slices: Vec<Slice> = slices.into_iter().collect::<io::Result<_>>()?;
+        let vndf = Warp::new(sizes.samples, widened(&slices, |slice| &slice.vndf)).map_err(io::Error::other)?;
+        let table = RglTable { vndf, rgb: (sizes.samples, widened(&slices, |slice| &slice.rgb)), ..planes };
+        let read = |i: Vec3, o: Vec3| table.eval(o.as_dvec3(), i.as_dvec3()).as_vec3();
+        let reading = reading_error(brdf, read);
+        Ok(Self { sizes, table, slices, reading })
+    }
+
+    /// Of the size asked for, else the smallest of a few that reads well.
+    fn chosen(job: &Job<'_>) -> io::Result<Self> {
+        if let Some(resolution) = &job.options.resolution {
+            return Self::new(job, resolution);
+        }
+        let mut last = None;
+        for [theta_i, phi_i, theta_o, phi_o] in RESOLUTIONS {
+            let tabulated = Self::new(job, &ExportResolution { theta_i, phi_i, theta_o, phi_o })?;
+            if tabulated.reading.mean <= GOOD_ENOUGH {
+                return Ok(tabulated);
+            }
+            last = Some(tabulated);
+        }
+        last.ok_or_else(|| io::Error::other("no resolution to choose from"))
+    }
+}
+
+fn widened(slices: &[Slice], of: impl Fn(&Slice) -> &Vec<f32>) -> Vec<f64> {
+    slices.iter().flat_map(|slice| of(slice).iter().map(|&value| f64::from(value))).collect()
+}
+
+fn one_slice(brdf: &EffectiveBrdf, planes: &RglTable, sizes: &Sizes, slice: usize) -> io::Result<Slice> {
+    let viewer = sizes.viewer(slice);
+    // The warp must be of the numbers that a reader will have.
+    let vndf = scaled(visible_normals(viewer, sizes.samples, &planes.ndf));
+    let density = vndf.iter().map(|&value| f64::from(value)).collect();
+    let warp = Warp::new(sizes.samples, density).map_err(io::Error::other)?;
+    let drawn: Vec<([f64; 2], f64)> = vertices(sizes.samples).map(|at| warp.sample(0, at)).collect();
+    let halves: Vec<_> = drawn.iter().map(|(at, _)| direction_of_u(*at)).collect();
+    let values = reflect(brdf, viewer, &halves);
+    // The last elevation stands for 90°: there G, which is bounded, is what is stored.
+    let (grid, sigmas) = &planes.sigma;
+    let sigma = if slice % sizes.thetas + 1 == sizes.thetas {
+        f64::from(brdf.relative_projected_area(viewer.as_vec3()))
+    } else {
+        grid.eval(sigmas, u_of_direction(viewer))
+    };
+    let mut rgb = vec![0.0; 3 * drawn.len()];
+    let mut weights = Vec::with_capacity(drawn.len());
+    for (k, ((at, density), value)) in drawn.iter().zip(&values).enumerate() {
+        let stored = *value * 4.0 * sigma / planes.ndf.0.eval(&planes.ndf.1, *at);
+        for c in 0..3 {
+            rgb[c * drawn.len() + k] = stored[c] as f32;
+        }
+        let jacobian = solid_angle(*at) * 4.0 * viewer.dot(halves[k]).max(0.0);
+        weights.push(if *density > 0.0 && reflected(viewer, halves[k]).z > 0.0 {
+            luminance(*value) * jacobian / density
+        } else {
+            0.0
+        });
+    }
+    Ok(Slice { vndf, luminance: scaled(floored(weights)), rgb })
+}
+
+/// No value less than a thousandth of the mean: what may be reflected may be sampled.
+fn floored(mut values: Vec<f64>) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let least = if mean > 0.0 { 1e-3 * mean } else { 1.0 };
+    values.iter_mut().for_each(|value| *value = value.max(least));
+    values
+}
+
+/// As f32 with a largest value of 1.
+fn scaled(values: Vec<f64>) -> Vec<f32> {
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    values.into_iter().map(|value| (value / largest) as f32).collect()
+}
+
+/// Writes the file of RGB values.
+pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
+    let Tabulated { sizes, table, slices, reading } = Tabulated::chosen(job)?;
+    let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<f32>>();
+    let Sizes { thetas, phis, samples, ndf } = sizes;
+    let joined = |of: fn(&Slice) -> &Vec<f32>| slices.iter().flat_map(of).copied().collect::<Vec<f32>>();
+    let per_slice = [phis, thetas, samples.height, samples.width];
+    let mut file = TensorWriter::default();
+    file.bytes("description", job.summary().as_bytes());
+    file.floats("phi_i", &[phis], &narrow(&table.phi_i));
+    file.floats("theta_i", &[thetas], &narrow(&table.theta_i));
+    file.floats("sigma", &[ndf.height, ndf.width], &narrow(&table.sigma.1));
+    file.floats("ndf", &[ndf.height, ndf.width], &narrow(&table.ndf.1));
+    file.floats("vndf", &per_slice, &joined(|slice| &slice.vndf));
+    file.floats("luminance", &per_slice, &joined(|slice| &slice.luminance));
+    file.floats("rgb", &[phis, thetas, 3, samples.height, samples.width], &joined(|slice| &slice.rgb));
+    file.bytes("jacobian", &[1]);
+    file.write(out)?;
+    Ok(Written { pairs: thetas * phis * samples.len(), reading, conventions: conventions(), anisotropy_lost: None })
+}
+
+fn conventions() -> Vec<String> {
+    [
+        "RGL tensor file (Dupuy and Jakob 2018), anisotropic, RGB: Mitsuba 3's `measured`, pbrt-v4's `measured`, RGL's brdf-loader.",
+        "Slices (phi_i, theta_i) are directions of the viewer, Mitsuba's wi; phi_i runs from -pi to pi, the seam twice.",
+        "A value, rgb(s) ndf(u_m) / (4 sigma(u_i)), is the BRDF times the cosine of the other direction, Mitsuba's wo: f_bar.",
+        "u = (sqrt(2 theta / pi), (phi + pi) / 2 pi); m is the half vector; s is u_m through the inverse of the warp by vndf.",
+        "sigma is the visible projected area over the tile's area; ndf is the luminance of G(m, m), of its largest, floored.",
+        "vndf is the density of normals as this viewer sees them, softened; luminance is what the warp by it leaves to sample.",
+    ]
+    .map(str::to_owned)
+    .to_vec()
+}

@@ -1,0 +1,47 @@
+//! What every format asks of the effective BRDF: many directions in parallel, with progress, and a check of what a reader
+//! of the finished table gets.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::accuracy::{Errors, compare, mirror_biased_pairs};
+use crate::filtering::EffectiveBrdf;
+
+/// Items between two calls of the progress function.
+const ITEMS_A_STEP: usize = 32;
+/// Pairs of the reading error, and the seed that fixes them.
+const CHECKED_PAIRS: usize = 400;
+const CHECKED_SEED: u64 = 2011;
+
+/// `work` of every index in parallel, in order; `progress` is told the part that is done.
+pub fn in_parallel<T: Send>(count: usize, progress: &dyn Fn(f32), work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut results = Vec::with_capacity(count);
+    while results.len() < count {
+        progress(results.len() as f32 / count as f32);
+        let end = (results.len() + ITEMS_A_STEP).min(count);
+        results.par_extend((results.len()..end).into_par_iter().map(&work));
+    }
+    progress(1.0);
+    results
+}
+
+/// How far what a reader gets is from the function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadingError {
+    /// `‖read - eval‖ / ‖eval‖` and PSNR on `f̄`, all channels.
+    pub errors: Errors,
+    /// Mean of `|read - eval|` over the mean of `eval`.
+    pub mean: f64,
+}
+
+/// Compares `read(i, o)`, an `f̄` as a program that loads the file gets it, with `eval`, over a fixed set of pairs up to 85°.
+pub fn reading_error(brdf: &EffectiveBrdf, read: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> ReadingError {
+    let pairs = mirror_biased_pairs(CHECKED_PAIRS, CHECKED_SEED);
+    let values: Vec<(Vec3, Vec3)> =
+        pairs.par_iter().map(|pair| (read(pair.i, pair.o), brdf.eval(pair.i, pair.o))).collect();
+    let (found, exact): (Vec<Vec3>, Vec<Vec3>) = values.into_iter().unzip();
+    let sum = |of: &dyn Fn(usize) -> Vec3| (0..exact.len()).map(|k| f64::from(of(k).element_sum())).sum::<f64>();
+    let total = sum(&|k| exact[k]);
+    let mean = if total > 0.0 { sum(&|k| (found[k] - exact[k]).abs()) / total } else { 0.0 };
+    ReadingError { errors: compare(&found, &exact), mean }
+}

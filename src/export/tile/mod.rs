@@ -1,0 +1,118 @@
+//! The tile itself: as a mesh (`.obj`), as a solid to print (`.stl`), as heights (`.png`), and as a pattern to cut, fold and
+//! glue (`.svg`, `.pdf`; Wu et al. 2011, Fig. 9).
+
+mod heights;
+mod mesh;
+mod page;
+mod pattern;
+mod solid;
+
+use std::path::Path;
+
+use glam::{UVec2, Vec3};
+
+use super::replace_file;
+use crate::error::{InputError, Result};
+use crate::geometry::TileMesh;
+use crate::scene::{BrdfSpec, Scene, TermSpec};
+
+/// What may be chosen about the files of a tile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TileOptions {
+    /// Periods in x and y.
+    pub repeat: UVec2,
+    /// Enlargement of what is made of matter: solid and pattern.
+    pub scale: f32,
+    /// Thickness of the solid under its lowest point, millimetres; `None`: a tenth of its longer side.
+    pub base_mm: Option<f32>,
+    /// Samples of a period's heights in x and y.
+    pub samples: UVec2,
+}
+
+impl Default for TileOptions {
+    fn default() -> Self {
+        Self { repeat: UVec2::ONE, scale: 1.0, base_mm: None, samples: UVec2::splat(256) }
+    }
+}
+
+/// Most periods, and most height samples of all of them together: a solid of 400 MB.
+const MOST_PERIODS: u32 = 10_000;
+const MOST_SAMPLES: u64 = 1 << 22;
+
+impl TileOptions {
+    fn check(&self) -> Result<()> {
+        let complain = |place: &str, found: String, expected: String| InputError::new(place, found, expected).into();
+        let periods = u64::from(self.repeat.x) * u64::from(self.repeat.y);
+        if periods == 0 || periods > u64::from(MOST_PERIODS) {
+            return Err(complain("repeat", self.repeat.to_string(), format!("1 to {MOST_PERIODS} periods")));
+        }
+        let samples = periods.saturating_mul(u64::from(self.samples.x)).saturating_mul(u64::from(self.samples.y));
+        if self.samples.min_element() < 2 || samples > MOST_SAMPLES {
+            return Err(complain("samples", self.samples.to_string(), format!("2 to {MOST_SAMPLES} in all")));
+        }
+        if !(self.scale > 0.0 && self.scale <= 1e6) {
+            return Err(complain("scale", self.scale.to_string(), "a positive number".to_owned()));
+        }
+        if self.base_mm.is_some_and(|base| !(base > 0.0 && base <= 1e4)) {
+            return Err(complain("base", format!("{:?}", self.base_mm), "a positive number of millimetres".to_owned()));
+        }
+        Ok(())
+    }
+}
+
+/// Writes the tile of a scene by the ending of `path`, and returns what to know about the file.
+///
+/// # Errors
+/// An unknown ending, an option out of range, a geometry without a pattern, a place that cannot be written.
+pub fn write(scene: &Scene, mesh: &TileMesh, options: &TileOptions, path: &Path) -> Result<Vec<String>> {
+    options.check()?;
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let (bytes, notes) = match ending.as_str() {
+        "obj" => mesh::obj(mesh, options),
+        "stl" => solid::stl(mesh, options, millimetres(&scene.tile.unit)?),
+        "png" => heights::png(mesh, options, &scene.tile.unit)?,
+        "svg" => {
+            pattern::sheet(scene, options, millimetres(&scene.tile.unit)?).map(|(page, notes)| (page.svg(), notes))?
+        }
+        "pdf" => {
+            pattern::sheet(scene, options, millimetres(&scene.tile.unit)?).map(|(page, notes)| (page.pdf(), notes))?
+        }
+        other => {
+            let found =
+                if other.is_empty() { "a name without an ending".to_owned() } else { format!("the ending .{other}") };
+            let expected = "a name that ends in .obj, .stl, .png, .svg or .pdf";
+            return Err(InputError::new("output", found, expected).in_file(path).into());
+        }
+    };
+    replace_file(path, &bytes)?;
+    Ok(notes)
+}
+
+/// Millimetres of a tile unit.
+fn millimetres(unit: &str) -> Result<f64> {
+    Ok(match unit.trim().to_lowercase().as_str() {
+        "mm" | "millimetre" | "millimeter" => 1.0,
+        "cm" | "centimetre" | "centimeter" => 10.0,
+        "m" | "metre" | "meter" => 1000.0,
+        "um" | "µm" | "μm" | "micron" | "micrometre" | "micrometer" => 1e-3,
+        "nm" => 1e-6,
+        "in" | "inch" => 25.4,
+        _ => return Err(InputError::new("tile.unit", unit, "mm, cm, m, µm, nm or inch, to know the size").into()),
+    })
+}
+
+/// A colour that stands for a slot's material on paper: what it reflects when seen from above, linear RGB.
+fn paper_color(scene: &Scene, slot: &str) -> Result<Vec3> {
+    let material = scene.material_for_slot(slot)?;
+    let of_term = |term: &TermSpec| match term {
+        TermSpec::Lambertian { albedo } => *albedo,
+        TermSpec::BlinnPhong { specular, .. } | TermSpec::Ward { specular, .. } => *specular,
+        TermSpec::CookTorrance { f0, .. } | TermSpec::Ggx { f0, .. } => *f0,
+        TermSpec::Merl { .. } | TermSpec::Rgl { .. } | TermSpec::Utia { .. } | TermSpec::Npz { .. } => Vec3::splat(0.5),
+    };
+    let sum: Vec3 = BrdfSpec::terms(material.brdf).iter().map(of_term).sum();
+    Ok((sum * material.color).clamp(Vec3::ZERO, Vec3::ONE))
+}
+
+#[cfg(test)]
+mod tests;

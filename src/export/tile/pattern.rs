@@ -1,0 +1,243 @@
+//! Patterns to cut, fold and glue: grooves as a strip of paper, pyramids as nets on a floor, planes as they are.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::page::{Line, Page};
+use super::{TileOptions, paper_color};
+use crate::error::{InputError, Result};
+use crate::geometry::{self, CrossSection, OnePyramid};
+use crate::scene::{Geometry, Scene};
+
+/// Width of a tab, millimetres, and how far its ends draw in.
+const TAB_MM: f64 = 6.0;
+/// Turns smaller than this are bent, not folded (cosine of 12°).
+const BEND_COSINE: f64 = 0.978;
+/// Nets on one sheet at most.
+const MOST_NETS: usize = 200;
+
+/// The sheet of a scene's tile, `unit_mm` millimetres a tile unit.
+pub fn sheet(scene: &Scene, options: &TileOptions, unit_mm: f64) -> Result<(Page, Vec<String>)> {
+    let scale = unit_mm * f64::from(options.scale);
+    let size = scene.tile.size;
+    match &scene.tile.geometry {
+        Geometry::Grooves(spec) => {
+            let section = CrossSection::of(spec, size);
+            let colors = [paper_color(scene, "bottom")?, paper_color(scene, "sides")?];
+            Ok(grooves(&section, options, scale, &colors))
+        }
+        Geometry::Pyramids(spec) => {
+            let one = OnePyramid::of(spec, size);
+            let colors = [paper_color(scene, "faces")?, paper_color(scene, "floor")?];
+            pyramids(&one, size.as_dvec2(), options, scale, &colors)
+        }
+        Geometry::Flat(_) => plane(scene, options, scale),
+        other => {
+            Err(InputError::new("tile.geometry.kind", other.kind(), "grooves, pyramids or flat, which unfold").into())
+        }
+    }
+}
+
+/// Mountains point at the reader, so that the printed side is the one that is seen.
+fn grooves(section: &CrossSection, options: &TileOptions, scale: f64, colors: &[Vec3; 2]) -> (Page, Vec<String>) {
+    let length = section.length * f64::from(options.repeat.y) * scale;
+    let periods = section.count * options.repeat.x as usize;
+    let mut page = Page::default();
+    let (mut x, mut before) = (0.0, None::<DVec2>);
+    for _ in 0..periods {
+        for pair in section.points.windows(2) {
+            let along = (pair[1].0 - pair[0].0) * scale;
+            let width = along.length();
+            if width < 1e-9 {
+                continue;
+            }
+            let corners =
+                [DVec2::new(x, 0.0), DVec2::new(x + width, 0.0), DVec2::new(x + width, length), DVec2::new(x, length)];
+            page.polygon(corners, Some(colors[usize::from(pair[0].1)]), Line::None);
+            if let Some(before) = before {
+                let direction = along / width;
+                if before.dot(direction) < BEND_COSINE {
+                    let line = if before.perp_dot(direction) > 0.0 { Line::Valley } else { Line::Mountain };
+                    page.segment(DVec2::new(x, 0.0), DVec2::new(x, length), line);
+                }
+            }
+            before = Some(along / width);
+            x += width;
+        }
+    }
+    let corner = |x: f64, y: f64| DVec2::new(x, y);
+    page.polygon([corner(0.0, 0.0), corner(x, 0.0), corner(x, length), corner(0.0, length)], None, Line::Cut);
+    tab(&mut page, corner(0.0, length), corner(0.0, 0.0));
+    tab(&mut page, corner(x, 0.0), corner(x, length));
+    // Marks for the ground: where each period starts once it is folded.
+    let pitch = section.pitch * scale;
+    let y = length + 2.0 * TAB_MM;
+    for k in 0..=periods {
+        page.segment(corner(k as f64 * pitch, y), corner(k as f64 * pitch, y + 8.0), Line::Cut);
+    }
+    page.segment(corner(0.0, y), corner(periods as f64 * pitch, y), Line::Cut);
+    page.text(corner(0.0, y + 14.0), format!("glue the folded strip along these marks: {pitch:.2} mm a groove"));
+    legend(&mut page, corner(0.0, y + 22.0));
+    let notes = vec![format!(
+        "{periods} grooves: a strip of {x:.2} x {length:.2} mm folds to {:.2} x {length:.2} mm",
+        periods as f64 * pitch
+    )];
+    (page, notes)
+}
+
+fn legend(page: &mut Page, at: DVec2) {
+    let lines = [
+        (Line::Cut, "cut"),
+        (Line::Mountain, "fold to a ridge"),
+        (Line::Valley, "fold to a valley"),
+        (Line::Mark, "glue here"),
+    ];
+    for (k, (line, words)) in lines.into_iter().enumerate() {
+        let at = at + DVec2::new(0.0, 5.0 * k as f64);
+        page.segment(at, at + DVec2::new(15.0, 0.0), line);
+        page.text(at + DVec2::new(18.0, 1.0), words);
+    }
+}
+
+/// A tab on the left of the way from `from` to `to` as seen on the sheet (y downwards): its fold, and its outline.
+fn tab(page: &mut Page, from: DVec2, to: DVec2) {
+    let along = to - from;
+    let Some(direction) = along.try_normalize() else { return };
+    let outward = DVec2::new(direction.y, -direction.x);
+    let width = TAB_MM.min(0.5 * along.length());
+    let inset = direction * (0.5 * width);
+    page.polygon([from, from + outward * width + inset, to + outward * width - inset, to], None, Line::Cut);
+    page.segment(from, to, Line::Mountain);
+}
+
+fn pyramids(
+    one: &OnePyramid,
+    size: DVec2,
+    options: &TileOptions,
+    scale: f64,
+    colors: &[Vec3; 2],
+) -> Result<(Page, Vec<String>)> {
+    let periods = options.repeat.as_dvec2();
+    let count = one.centres.len() * (options.repeat.x * options.repeat.y) as usize;
+    if count > MOST_NETS {
+        let found = format!("{count} pyramids");
+        return Err(InputError::new("repeat", found, format!("at most {MOST_NETS} on a sheet")).into());
+    }
+    let mut page = Page::default();
+    // The floor, with the outline of each base.
+    let extent = size * periods * scale;
+    let corner = |x: f64, y: f64| DVec2::new(x, y);
+    page.polygon([corner(0.0, 0.0), corner(extent.x, 0.0), extent, corner(0.0, extent.y)], Some(colors[1]), Line::Cut);
+    // y of the tile points up, that of the sheet down.
+    let place = |p: DVec2| corner(p.x * scale, extent.y - p.y * scale);
+    for y in 0..options.repeat.y {
+        for x in 0..options.repeat.x {
+            let shift = DVec2::new(f64::from(x), f64::from(y)) * size;
+            for centre in &one.centres {
+                page.polygon(one.base.iter().map(|p| place(*p + *centre + shift)), None, Line::Mark);
+            }
+        }
+    }
+    let net = Net::of(one, scale);
+    let (low, high) = net.bounds();
+    let cell = high - low + DVec2::splat(2.0 * TAB_MM + 3.0);
+    let columns = ((extent.x.max(180.0)) / cell.x).floor().max(1.0) as usize;
+    let top = extent.y + 2.0 * TAB_MM;
+    for k in 0..count {
+        let at = DVec2::new((k % columns) as f64 * cell.x + TAB_MM, top + (k / columns) as f64 * cell.y + TAB_MM) - low;
+        net.draw(&mut page, at, colors[0]);
+    }
+    let rows = count.div_ceil(columns);
+    legend(&mut page, corner(0.0, top + rows as f64 * cell.y + 8.0));
+    Ok((page, vec![format!("{count} nets and a floor of {:.2} x {:.2} mm with their places", extent.x, extent.y)]))
+}
+
+/// A pyramid laid out flat, y downwards: its side faces in a row that share edges, the cut tip on the first.
+struct Net {
+    faces: Vec<Vec<DVec2>>,
+    top: Vec<DVec2>,
+}
+
+impl Net {
+    fn of(one: &OnePyramid, scale: f64) -> Self {
+        let corners = one.base.len();
+        let foot = |k: usize| (one.base[k % corners] * scale).extend(0.0);
+        let tip = |k: usize| (one.top[k % corners] * scale).extend(one.top_z * scale);
+        let mut faces: Vec<Vec<DVec2>> = Vec::new();
+        for k in 0..corners {
+            let solid = [foot(k), foot(k + 1), tip(k + 1), tip(k)];
+            let flat = match faces.last() {
+                None => {
+                    unfold(&solid, [foot(k), foot(k + 1)], [DVec2::ZERO, DVec2::new((foot(1) - foot(0)).length(), 0.0)])
+                }
+                // The edge that this face shares with the last one, as it lies already.
+                Some(last) => unfold(&solid, [tip(k), foot(k)], [last[2], last[1]]),
+            };
+            faces.push(flat);
+        }
+        let solid: Vec<DVec3> = (0..corners).map(tip).collect();
+        let first = &faces[0];
+        let top = if one.has_top { unfold(&solid, [tip(0), tip(1)], [first[3], first[2]]) } else { Vec::new() };
+        // On the sheet y points down.
+        let flipped = |points: Vec<DVec2>| points.into_iter().map(|p| DVec2::new(p.x, -p.y)).collect();
+        Self { faces: faces.into_iter().map(flipped).collect(), top: flipped(top) }
+    }
+
+    fn bounds(&self) -> (DVec2, DVec2) {
+        let points = || self.faces.iter().flatten().chain(&self.top);
+        (points().copied().fold(DVec2::INFINITY, DVec2::min), points().copied().fold(DVec2::NEG_INFINITY, DVec2::max))
+    }
+
+    fn draw(&self, page: &mut Page, at: DVec2, color: Vec3) {
+        let moved = |points: &[DVec2]| points.iter().map(|p| *p + at).collect::<Vec<_>>();
+        for (k, face) in self.faces.iter().enumerate() {
+            let face = moved(face);
+            page.polygon(face.clone(), Some(color), Line::Cut);
+            tab(page, face[1], face[0]);
+            if k + 1 < self.faces.len() {
+                page.segment(face[1], face[2], Line::Mountain);
+            } else {
+                tab(page, face[2], face[1]);
+            }
+        }
+        if self.top.len() > 2 {
+            let top = moved(&self.top);
+            page.polygon(top.clone(), Some(color), Line::Cut);
+            page.segment(top[0], top[1], Line::Mountain);
+        }
+    }
+}
+
+/// A flat polygon of space laid on the sheet (y upwards) so that its `edge` lies on `onto`, its inside on the left.
+fn unfold(polygon: &[DVec3], edge: [DVec3; 2], onto: [DVec2; 2]) -> Vec<DVec2> {
+    let along = (edge[1] - edge[0]).normalize_or_zero();
+    let across = |p: DVec3| (p - edge[0]) - along * (p - edge[0]).dot(along);
+    let farthest =
+        polygon.iter().copied().map(across).fold(DVec3::ZERO, |a, b| if b.length() > a.length() { b } else { a });
+    let inside = farthest.normalize_or_zero();
+    let x = (onto[1] - onto[0]).normalize_or_zero();
+    let y = x.perp();
+    polygon.iter().map(|p| onto[0] + x * (*p - edge[0]).dot(along) + y * (*p - edge[0]).dot(inside)).collect()
+}
+
+fn plane(scene: &Scene, options: &TileOptions, scale: f64) -> Result<(Page, Vec<String>)> {
+    let mesh = geometry::build(&scene.tile, std::path::Path::new(""))?;
+    let colors: Vec<Vec3> = mesh.slots.iter().map(|slot| paper_color(scene, slot)).collect::<Result<_>>()?;
+    let size = mesh.size.as_dvec2();
+    let extent = size * options.repeat.as_dvec2() * scale;
+    let mut page = Page::default();
+    for y in 0..options.repeat.y {
+        for x in 0..options.repeat.x {
+            let shift = DVec2::new(f64::from(x), f64::from(y)) * size;
+            for triangle in 0..mesh.triangles.len() {
+                let place = |p: Vec3| {
+                    let at = (p.as_dvec3().truncate() + shift) * scale;
+                    DVec2::new(at.x, extent.y - at.y)
+                };
+                let color = colors[usize::from(mesh.triangle_slot[triangle])];
+                page.polygon(mesh.corners(triangle).map(place), Some(color), Line::None);
+            }
+        }
+    }
+    page.polygon([DVec2::ZERO, DVec2::new(extent.x, 0.0), extent, DVec2::new(0.0, extent.y)], None, Line::Cut);
+    Ok((page, vec![format!("a sheet of {:.2} x {:.2} mm", extent.x, extent.y)]))
+}

@@ -1,0 +1,48 @@
+//! A fitted GGX base as a MaterialX document with an OpenPBR surface.
+
+use glam::Vec3;
+
+use super::Fit;
+
+/// `specular_color` scales the f0 of the index of refraction, so the index is the one whose f0 is the fit's largest channel.
+pub fn materialx(fit: &Fit, name: &str) -> String {
+    let weight = |k: usize| fit.weights.get(k).copied().unwrap_or_default();
+    let (base, f0, fuzz) = (weight(0), weight(1).clamp(Vec3::ZERO, Vec3::splat(0.98)), weight(2));
+    let metal = f0.dot(crate::brdf::LUMINANCE) > base.dot(crate::brdf::LUMINANCE);
+    let largest = f0.max_element();
+    let root = largest.sqrt();
+    let (ior, tint) = if largest > 1e-6 { ((1.0 + root) / (1.0 - root), f0 / largest) } else { (1.0, Vec3::ONE) };
+    let [x, y] = fit.shape.roughness;
+    let (wide, narrow) = (x.max(y), x.min(y));
+    // OpenPBR: α_t = r² √(2 / (1 + (1-a)²)), α_b = (1-a) α_t.
+    let anisotropy = 1.0 - narrow / wide;
+    let roughness = (wide / (2.0 / (1.0 + (1.0 - anisotropy).powi(2))).sqrt()).sqrt();
+    let color = |color: Vec3| {
+        let color = color.clamp(Vec3::ZERO, Vec3::ONE);
+        format!("{:.6}, {:.6}, {:.6}", color.x, color.y, color.z)
+    };
+    let input = |name: &str, kind: &str, value: String| {
+        format!("    <input name=\"{name}\" type=\"{kind}\" value=\"{value}\" />\n")
+    };
+    let inputs = [
+        input("base_color", "color3", color(if metal { f0 } else { base })),
+        input("base_metalness", "float", if metal { "1" } else { "0" }.to_owned()),
+        input("specular_color", "color3", color(if metal { Vec3::ONE } else { tint })),
+        input("specular_ior", "float", format!("{ior:.6}")),
+        input("specular_roughness", "float", format!("{roughness:.6}")),
+        input("specular_roughness_anisotropy", "float", format!("{anisotropy:.6}")),
+        input("fuzz_weight", "float", format!("{:.6}", fuzz.max_element().clamp(0.0, 1.0))),
+        input(
+            "fuzz_color",
+            "color3",
+            color(if fuzz.max_element() > 0.0 { fuzz / fuzz.max_element() } else { Vec3::ONE }),
+        ),
+    ];
+    let identifier: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    format!(
+        "<?xml version=\"1.0\"?>\n<materialx version=\"1.39\" colorspace=\"lin_rec709\">\n  <open_pbr_surface name=\"{identifier}_surface\" \
+         type=\"surfaceshader\">\n{}  </open_pbr_surface>\n  <surfacematerial name=\"{identifier}\" type=\"material\">\n    <input \
+         name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"{identifier}_surface\" />\n  </surfacematerial>\n</materialx>\n",
+        inputs.concat()
+    )
+}

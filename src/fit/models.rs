@@ -1,0 +1,145 @@
+//! The models: Lambertian and Cook-Torrance, as in Fig. 7 of Wu et al. 2011, and a GGX base as glTF and OpenPBR have it.
+
+use std::f64::consts::PI;
+
+use glam::Vec3;
+
+use crate::brdf::{LobeAngles, Term, schlick_weight};
+use crate::directions::half_vector;
+
+/// What is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Model {
+    /// Lambertian plus Cook-Torrance (Beckmann, V-cavities, Schlick): weights are albedo and f0.
+    CookTorrance,
+    /// Lambertian plus anisotropic GGX (Smith, Schlick) plus sheen: weights are base colour, specular f0, sheen colour.
+    Ggx,
+}
+
+/// What does not enter linearly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// Width of the lobe along its own x and y: Beckmann's m, GGX's α.
+    pub roughness: [f32; 2],
+    /// Azimuth of the lobe's x from the tangent, radians.
+    pub rotation: f32,
+}
+
+/// Values at a pair, the light's cosine included.
+pub struct Lobes {
+    /// What the weights multiply.
+    pub weighted: Vec<f64>,
+    /// What no weight multiplies: Fresnel's white edge, `lobe (1-i·h)^5`.
+    pub fixed: f64,
+}
+
+/// Bounds of the roughness.
+const ROUGHNESS: [f32; 2] = [0.02, 1.5];
+/// Roughness of the sheen, which is not searched.
+const SHEEN_ROUGHNESS: f64 = 0.5;
+
+impl Model {
+    pub const ALL: [Self; 2] = [Self::CookTorrance, Self::Ggx];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CookTorrance => "lambertian_cook_torrance",
+            Self::Ggx => "ggx_base",
+        }
+    }
+
+    /// Names of the weights.
+    pub fn weight_names(self) -> &'static [&'static str] {
+        match self {
+            Self::CookTorrance => &["albedo", "f0"],
+            Self::Ggx => &["base_color", "specular_f0", "sheen_color"],
+        }
+    }
+
+    pub(super) fn lobes(self) -> usize {
+        self.weight_names().len()
+    }
+
+    /// Where searches start: the logarithm of the roughness; for GGX that of the anisotropy's square root and its azimuth.
+    pub(super) fn starts(self) -> Vec<Vec<f64>> {
+        match self {
+            Self::CookTorrance => [0.1_f64, 0.3, 0.7].iter().map(|m| vec![m.ln()]).collect(),
+            Self::Ggx => {
+                [(0.15_f64, 0.4), (0.15, -0.4), (0.5, 0.2)].iter().map(|(a, r)| vec![a.ln(), *r, 0.1]).collect()
+            }
+        }
+    }
+
+    pub(super) fn shape(self, parameters: &[f64]) -> Shape {
+        let bounded = |log: f64| (log.exp() as f32).clamp(ROUGHNESS[0], ROUGHNESS[1]);
+        match (self, parameters) {
+            (Self::Ggx, [log, ratio, turn]) => {
+                Shape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *turn as f32 }
+            }
+            _ => Shape { roughness: [bounded(parameters.first().copied().unwrap_or(-1.0)); 2], rotation: 0.0 },
+        }
+    }
+
+    /// Lobes at a pair above the horizon.
+    pub(super) fn evaluate(self, shape: &Shape, i: Vec3, o: Vec3) -> Lobes {
+        let h = half_vector(i, o);
+        let fresnel = f64::from(schlick_weight(i.dot(h)));
+        let matte = f64::from(i.z) / PI;
+        match self {
+            Self::CookTorrance => {
+                let angles = LobeAngles::new(Vec3::Z, i, o, h);
+                let term = Term::CookTorrance { roughness: shape.roughness[0], f0: Vec3::ONE };
+                // Both cosines in, the viewer's out again.
+                let lobe = f64::from(term.lobe_cos(&angles)) / f64::from(o.z);
+                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel)], fixed: lobe * fresnel }
+            }
+            Self::Ggx => {
+                let lobe = anisotropic_ggx(shape, i, o, h);
+                let sheen = sheen(i, o, h) * f64::from(i.z);
+                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel), sheen], fixed: lobe * fresnel }
+            }
+        }
+    }
+}
+
+/// `D G2 / (4 cosθ_o)` of anisotropic GGX with height-correlated Smith shadowing (Heitz 2014), the light's cosine included.
+fn anisotropic_ggx(shape: &Shape, i: Vec3, o: Vec3, h: Vec3) -> f64 {
+    let (sin, cos) = f64::from(shape.rotation).sin_cos();
+    let turned = |v: Vec3| {
+        let v = v.as_dvec3();
+        glam::DVec3::new(cos * v.x + sin * v.y, cos * v.y - sin * v.x, v.z)
+    };
+    let [alpha_x, alpha_y] = shape.roughness.map(f64::from);
+    let (i, o, h) = (turned(i), turned(o), turned(h));
+    let stretched = (h.x / alpha_x).powi(2) + (h.y / alpha_y).powi(2) + h.z * h.z;
+    let density = 1.0 / (PI * alpha_x * alpha_y * stretched * stretched);
+    let lambda = |v: glam::DVec3| ((v.x * alpha_x).powi(2) + (v.y * alpha_y).powi(2) + v.z * v.z).sqrt();
+    // G2 / (4 cosθ_i cosθ_o), times cosθ_i.
+    density * 0.5 * i.z / (o.z * lambda(i) + i.z * lambda(o))
+}
+
+/// The Charlie sheen (Estevez and Kulla 2017) as glTF's `KHR_materials_sheen` has it, with Neubelt's visibility.
+fn sheen(i: Vec3, o: Vec3, h: Vec3) -> f64 {
+    let inverse = 1.0 / SHEEN_ROUGHNESS;
+    let sine = f64::from((1.0 - h.z * h.z).max(0.0)).sqrt();
+    let density = (2.0 + inverse) * sine.powf(inverse) / (2.0 * PI);
+    let (n_i, n_o) = (f64::from(i.z), f64::from(o.z));
+    density / (4.0 * (n_i + n_o - n_i * n_o))
+}
+
+impl Shape {
+    /// glTF's and OpenPBR's roughness (the root of α) and anisotropy: α along the grain `α = r²`, glTF's
+    /// `α_t = mix(r², 1, anisotropy²)`; OpenPBR's `1 - α_b/α_t`.
+    pub fn perceptual(&self) -> (f32, f32) {
+        let [x, y] = self.roughness;
+        let (wide, narrow) = (x.max(y), x.min(y));
+        (narrow.sqrt(), ((wide - narrow) / (1.0 - narrow).max(1e-3)).clamp(0.0, 1.0).sqrt())
+    }
+
+    /// Azimuth of the wide direction of the lobe, radians.
+    pub fn wide_azimuth(&self) -> f32 {
+        let turn = if self.roughness[0] >= self.roughness[1] { 0.0 } else { std::f32::consts::FRAC_PI_2 };
+        self.rotation + turn
+    }
+}

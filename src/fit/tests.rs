@@ -1,0 +1,62 @@
+use std::sync::Arc;
+
+use glam::Vec2;
+
+use super::*;
+use crate::brdf::{Brdf, Term};
+use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
+use crate::geometry::{Facets, TileMesh};
+use crate::visibility::Visibility;
+
+/// A flat tile of some terms.
+fn flat(terms: Vec<Term>) -> EffectiveBrdf {
+    let mesh = TileMesh {
+        size: Vec2::ONE,
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        triangle_slot: vec![0, 0],
+        slots: vec!["surface".to_owned()],
+        closes_plane: true,
+        ..TileMesh::default()
+    };
+    let mut facets = Facets::sample(&mesh, 16, 1);
+    facets.sort_for_sums();
+    let visibility = Visibility::Unblocked { facets: facets.len() };
+    let sum = FacetSum::new(&facets, &[0], &[SumMaterial { brdf: Brdf { terms }, color: Vec3::ONE }]);
+    EffectiveBrdf {
+        form: Form::Direct(Direct { sum: Arc::new(sum), visibility: Arc::new(visibility) }),
+        base_area: 1.0,
+    }
+}
+
+#[test]
+fn a_flat_material_of_the_model_comes_back() {
+    let (albedo, f0) = (Vec3::new(0.3, 0.2, 0.1), Vec3::new(0.5, 0.6, 0.2));
+    let brdf = flat(vec![Term::Lambertian { albedo }, Term::CookTorrance { roughness: 0.35, f0 }]);
+    let found = fit(&brdf, Model::CookTorrance).unwrap();
+    assert!((found.shape.roughness[0] - 0.35).abs() < 2e-3, "{found:?}");
+    assert!((found.weights[0] - albedo).abs().max_element() < 5e-3, "{found:?}");
+    assert!((found.weights[1] - f0).abs().max_element() < 5e-3 && found.errors.rel_l2 < 1e-2, "{found:?}");
+    let brdf = flat(vec![Term::Lambertian { albedo }, Term::Ggx { roughness: 0.25, f0 }]);
+    let found = fit(&brdf, Model::Ggx).unwrap();
+    assert!(found.shape.roughness.iter().all(|alpha| (alpha - 0.25).abs() < 5e-3), "{found:?}");
+    assert!((found.weights[1] - f0).abs().max_element() < 1e-2 && found.errors.rel_l2 < 1e-2, "{found:?}");
+}
+
+#[test]
+fn materials_for_others_are_well_formed_and_hold_the_numbers() {
+    let brdf = flat(vec![
+        Term::Lambertian { albedo: Vec3::new(0.6, 0.3, 0.1) },
+        Term::Ggx { roughness: 0.3, f0: Vec3::splat(0.04) },
+    ]);
+    let found = fit(&brdf, Model::Ggx).unwrap();
+    let file: serde_json::Value = serde_json::from_str(&gltf(&found, "a \"name\"")).unwrap();
+    let material = &file["materials"][0];
+    assert_eq!(material["pbrMetallicRoughness"]["metallicFactor"], 0.0);
+    let red = material["pbrMetallicRoughness"]["baseColorFactor"][0].as_f64().unwrap();
+    let roughness = material["pbrMetallicRoughness"]["roughnessFactor"].as_f64().unwrap();
+    assert!((red - 0.6).abs() < 0.02 && (roughness - 0.3_f64.sqrt()).abs() < 0.03, "{file}");
+    let document = materialx(&found, "a \"name\"");
+    assert!(document.contains("open_pbr_surface name=\"a__name__surface\"") && document.contains("specular_roughness"));
+    assert_eq!(document.matches('<').count(), document.matches('>').count());
+}

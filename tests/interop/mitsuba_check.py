@@ -1,0 +1,203 @@
+"""Mitsuba 3 reads our RGL tables: `measured` loads them, its `eval` agrees with `biscale eval`, its `sample` and `pdf`
+pass its own chi-squared test, and a sphere that it renders looks as ours does. Also: our importer of RGL files against
+Mitsuba's `eval` of the same files.
+
+    python tests/interop/mitsuba_check.py [--pictures FOLDER] [SCENE:LIMIT ...]
+
+LIMIT is the largest mean error [%]. BISCALE names the program, BISCALE_DATA a folder of measured files, DRJIT_LIBLLVM_PATH
+an LLVM library of version 15 or later where the system's is older (the chi-squared test needs one that works).
+"""
+
+import argparse
+import os
+import tempfile
+import time
+from pathlib import Path
+
+from common import ROOT, Table, biscale, direction, evaluate, export, mean_error, random_pairs, skip
+
+try:
+    import mitsuba as mi
+    import numpy as np
+except ImportError as error:
+    skip(f"the Mitsuba checks need `pip install mitsuba numpy` ({error})")
+
+# Smooth: below 1 %. Glossy: below 3 %.
+SCENES = ["fig5a_isotropic:1", "fig4b_bicolor_cup:3", "fig7a_shot_silk:3", "default:3"]
+LIGHTS = [([0.3, 0.5, 0.8], [2.0, 1.6, 1.2]), ([-0.8, 0.4, 0.4], [0.3, 0.6, 1.2]), ([0.2, -0.6, 0.7], [0.5, 0.4, 0.3])]
+DISTANCE, FOV_DEG, SIZE = 5.0, 30.0, 256
+EYE = [DISTANCE * np.sin(np.radians(25)) * np.cos(np.radians(20)), DISTANCE * np.sin(np.radians(20)), DISTANCE * np.cos(np.radians(25)) * np.cos(np.radians(20))]
+MEASURED = ["chm_orange_rgb", "irid_flake_paint1_rgb", "vch_silk_blue_rgb"]
+# Directions of the viewer (theta, phi in degrees) of the chi-squared tests, and the level of all of them together.
+VIEWERS, LEVEL = [(5, 20), (35, 70), (60, 200), (75, 310)], 0.01
+
+
+def bsdf_values(path, pairs):
+    """`measured`'s eval with the viewer as its wi."""
+    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
+    interaction = mi.SurfaceInteraction3f()
+    out = np.empty((len(pairs), 3))
+    for k, (i, o) in enumerate(zip(direction(pairs[:, 0], pairs[:, 1]), direction(pairs[:, 2], pairs[:, 3]))):
+        interaction.wi = mi.Vector3f(*o)
+        out[k] = bsdf.eval(mi.BSDFContext(), interaction, mi.Vector3f(*i))
+    return out
+
+
+def sphere(path):
+    """The unit sphere with the pole upwards, lit and seen as the scene of `ours`."""
+    def lit_by(towards, irradiance):
+        return mi.load_dict({
+            "type": "scene",
+            "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
+            "sensor": {
+                "type": "perspective",
+                "fov": FOV_DEG,
+                "fov_axis": "smaller",
+                "to_world": mi.ScalarTransform4f().look_at(EYE, [0, 0, 0], [0, 1, 0]),
+                "film": {
+                    "type": "hdrfilm", "width": SIZE, "height": SIZE, "rfilter": {"type": "box"}, "pixel_format": "rgb"
+                },
+            },
+            # Mitsuba's pole is +z and its tangent runs eastwards, as ours does about +y.
+            "sphere": {
+                "type": "sphere",
+                "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], -90),
+                "material": {"type": "measured", "filename": str(path)},
+            },
+            "light": {
+                "type": "directional",
+                "direction": [-x for x in towards],
+                "irradiance": {"type": "rgb", "value": irradiance},
+            },
+        })
+
+    # One light at a time: with several, Mitsuba draws one a sample, and the picture is noisy.
+    pictures = [np.array(mi.render(lit_by(*light), spp=32))[:, :, :3] for light in LIGHTS]
+    return np.sum(pictures, axis=0)
+
+
+def ours(name, folder):
+    """The same sphere by `biscale render`."""
+    listed = ", ".join(f"{{ direction = {towards}, irradiance = {irradiance} }}" for towards, irradiance in LIGHTS)
+    picture = Path(folder) / "ours.exr"
+    biscale(
+        "render", name, "-o", picture, "--size", f"{SIZE}x{SIZE}", "--samples", 4, "--quiet",
+        "--set", "object.kind=\"sphere\"", "--set", "light.environment=\"none\"", "--set", f"light.directional=[{listed}]",
+        "--set", f"camera={{ azimuth_deg = 25, elevation_deg = 20, distance = {DISTANCE}, fov_deg = {FOV_DEG} }}",
+    )
+    return np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32))
+
+
+def inside():
+    """Pixels whose ray meets the sphere well inside its outline, where no background is."""
+    half = np.tan(np.radians(FOV_DEG) / 2)
+    x, y = np.meshgrid(*2 * [(np.arange(SIZE) + 0.5) / SIZE * 2 * half - half])
+    sine = np.hypot(x, y) / np.sqrt(1 + x * x + y * y)
+    return sine < 0.99 / DISTANCE
+
+
+def side_by_side(path, mitsuba_sees, we_see):
+    """Mitsuba's picture, ours, and ten times their difference."""
+    mask = inside()[..., None]
+    both = [mitsuba_sees * mask, we_see * mask, 10 * np.abs(mitsuba_sees - we_see) * mask]
+    mi.util.write_bitmap(str(path), mi.Bitmap(np.concatenate(both, axis=1).astype(np.float32)))
+
+
+def chi_squared(path, count):
+    """The smallest p-value over the viewers, and whether all pass at the level of `count` tests."""
+    from mitsuba import chi2
+
+    least = 1.0
+    for theta, phi in VIEWERS:
+        wi = direction(np.radians(theta), np.radians(phi)).tolist()
+        sample, pdf = chi2.BSDFAdapter("measured", f'<string name="filename" value="{path}"/>', wi=wi)
+        test = chi2.ChiSquareTest(
+            domain=chi2.SphericalDomain(), sample_func=sample, pdf_func=pdf, sample_dim=3, sample_count=1_000_000, ires=16
+        )
+        test.run(LEVEL)
+        least = min(least, float(np.ravel(test.p_value)[0]))
+    # Sidak: the level of each of many tests.
+    return least, least > 1 - (1 - LEVEL) ** (1 / count)
+
+
+def check_exports(arguments, folder):
+    table = Table("scene", "bytes", "written [s]", "loaded [s]", "mean error", "allowed", "chi2 least p", "sphere")
+    chi_works = llvm_works()
+    if not chi_works:
+        print("SKIPPED: the chi-squared test (Mitsuba's LLVM does not work here)")
+    for entry in arguments.scenes:
+        scene, limit = entry.split(":")
+        path = Path(folder) / f"{scene}.bsdf"
+        report, written = export(scene, path)
+        pairs = random_pairs(1000)
+        values = evaluate(scene, pairs, folder)
+        mi.set_variant("scalar_rgb")
+        start = time.time()
+        mi.load_dict({"type": "measured", "filename": str(path)})
+        loaded = time.time() - start
+        error = mean_error(bsdf_values(path, pairs), values)
+        mitsuba_sees, we_see = sphere(path), ours(scene, folder)
+        mask = inside()
+        picture = mean_error(mitsuba_sees[mask], we_see[mask])
+        if arguments.pictures:
+            arguments.pictures.mkdir(parents=True, exist_ok=True)
+            side_by_side(arguments.pictures / f"{scene}_mitsuba_ours_difference.png", mitsuba_sees, we_see)
+        p, passes = (1.0, True)
+        if chi_works:
+            mi.set_variant("llvm_ad_rgb")
+            p, passes = chi_squared(path, len(VIEWERS) * len(arguments.scenes))
+        table.check(
+            error < float(limit) / 100 and passes and picture < float(limit) / 100,
+            scene, report["bytes"], f"{written:.1f}", f"{loaded:.2f}", f"{100 * error:.2f} %", f"{limit} %",
+            f"{p:.3f}" if chi_works else "skipped", f"{100 * picture:.2f} %",
+        )
+    return table.passed
+
+
+def llvm_works():
+    """Whether the chi-squared test can run: a bad LLVM ends the process, so another one tries."""
+    import subprocess
+    import sys
+
+    trial = "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); import drjit as dr; print(dr.sin(mi.Float([1, 2])), mi.warp.square_to_uniform_hemisphere(mi.Point2f(mi.Float([.1, .2]), .5)), dr.minimum(dr.maximum(mi.Float([1,2]),0),1))"
+    return subprocess.run([sys.executable, "-c", trial], capture_output=True).returncode == 0
+
+
+def check_import(folder):
+    """A flat tile of a measured material: Mitsuba's eval of the file against ours, which is averaged to be reciprocal."""
+    data = Path(os.environ.get("BISCALE_DATA", ROOT.parent / "shared/data"))
+    table = Table("measured file", "mean error", "allowed", "file itself")
+    mi.set_variant("scalar_rgb")
+    for name in MEASURED:
+        path = data / f"{name}.bsdf"
+        if not path.exists():
+            print(f"SKIPPED: {path} is not there (BISCALE_DATA names its folder)")
+            continue
+        scene = Path(folder) / "flat.toml"
+        scene.write_text(f'[tile]\ngeometry = {{ kind = "flat" }}\n[[material]]\nname = "default"\nbrdf = {{ kind = "rgl", path = "{path}" }}\n')
+        pairs = random_pairs(1000, lowest_deg=75)
+        swapped = pairs[:, [2, 3, 0, 1]]
+        there, back = bsdf_values(path, pairs), bsdf_values(path, swapped)
+        cosines = np.cos(pairs[:, [0, 2]])
+        # Values hold the cosine of the light; the mean of both ways is what we keep.
+        mean = 0.5 * (np.maximum(there, 0) + np.maximum(back, 0) * (cosines[:, :1] / cosines[:, 1:]))
+        error = mean_error(evaluate(scene, pairs, folder), mean)
+        asymmetry = mean_error(there, mean)
+        table.check(error < 0.02, name, f"{100 * error:.2f} %", "2 %", f"{100 * asymmetry:.1f} % from reciprocal")
+    return table.passed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pictures", type=Path, help="where to put Mitsuba's sphere, ours, and ten times the difference")
+    parser.add_argument("scenes", nargs="*", default=SCENES, metavar="SCENE:LIMIT")
+    arguments = parser.parse_args()
+    print(f"Mitsuba {mi.__version__}")
+    with tempfile.TemporaryDirectory() as folder:
+        passed = check_import(folder)
+        passed &= check_exports(arguments, folder)
+    raise SystemExit(0 if passed else 1)
+
+
+if __name__ == "__main__":
+    main()
