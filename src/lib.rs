@@ -14,6 +14,7 @@
 
 pub mod accuracy;
 pub mod brdf;
+pub mod cancel;
 pub mod directions;
 pub mod error;
 pub mod export;
@@ -27,4 +28,5 @@ pub mod scene;
 pub mod simd;
 pub mod visibility;
 
+pub use cancel::Cancel;
 pub use error::{Error, InputError, Result};

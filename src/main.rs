@@ -1,5 +1,6 @@
 //! The `biscale` program: the command line in front of the library.
 
+mod app;
 mod commands;
 
 use std::path::PathBuf;
@@ -9,14 +10,21 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// What does a surface with tiny structures look like from far away?
 #[derive(Debug, Parser)]
-#[command(name = "biscale", version, about, arg_required_else_help = true)]
+#[command(name = "biscale", version, about, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
+    /// Opens the editor on this scene: a file, or the name of a shipped one.
+    scene: Option<String>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Open the editor (also without this word).
+    Edit {
+        /// A scene file, or the name of a shipped material.
+        scene: Option<String>,
+    },
     /// Shade the scene's object and write a picture (.png or linear .exr).
     Render(RenderArgs),
     /// Evaluate f̄ [1/sr] (the light's cosine included) at direction pairs of a CSV file.
@@ -144,7 +152,9 @@ struct MaterialsArgs {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let result = match cli.command {
+    let command = cli.command.unwrap_or(Command::Edit { scene: cli.scene });
+    let result = match command {
+        Command::Edit { scene } => app::run(scene.as_deref()),
         Command::Render(args) => commands::render::run(&args),
         Command::Eval(args) => commands::eval::run(&args),
         Command::Export(args) => commands::export::run(&args),

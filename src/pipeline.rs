@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use crate::accuracy::{Errors, Reference, mirror_biased_pairs, upper_errors};
 use crate::brdf::{Brdf, MeasuredCache, Term};
+use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
 use crate::filtering::{
@@ -17,7 +18,7 @@ use crate::filtering::{
 use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
 use crate::plan::{Backend, Costs, Findings, Plan, Preset, Route, Settings, decide};
-use crate::scene::{LoadedScene, Material, Scene, Tile};
+use crate::scene::{LoadedScene, Material, Painted, Scene, Tile};
 use crate::visibility::{Horizons, PeriodicGrid, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
@@ -49,6 +50,7 @@ impl<K: PartialEq, T> Stage<K, T> {
         name: &'static str,
         key: K,
         times: &mut StageTimes,
+        cancel: &Cancel,
         make: impl FnOnce() -> Result<T>,
     ) -> Result<(Arc<T>, Version)> {
         if let Some((last, value)) = &self.last
@@ -56,8 +58,11 @@ impl<K: PartialEq, T> Stage<K, T> {
         {
             return Ok((value.clone(), self.version));
         }
+        cancel.check()?;
         let start = Instant::now();
         let value = Arc::new(make()?);
+        // A stage that was told to stop may have made anything.
+        cancel.check()?;
         times.push((name, start.elapsed().as_secs_f64() * 1e3));
         self.last = Some((key, value.clone()));
         self.version += 1;
@@ -76,6 +81,7 @@ struct Shape {
 /// The material of each slot of a mesh, by number, and the materials.
 type Assigned = (Vec<usize>, Vec<SumMaterial>);
 type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
+type ShapeKey = (Tile, PathBuf, Painted);
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
 /// Mesh, count, seed, and whether they are drawn as the paper does.
 type FacetKey = (Version, usize, u64, bool);
@@ -100,11 +106,12 @@ pub struct Outcome {
 #[derive(Debug, Default)]
 pub struct Pipeline {
     cache: MeasuredCache,
+    cancel: Cancel,
     gpu: Option<Gpu>,
     gpu_asked: bool,
     /// Work of one slice of the mesh, for a version of the facets.
     scan_work: Option<(Version, f64)>,
-    shape: Stage<(Tile, PathBuf), Shape>,
+    shape: Stage<ShapeKey, Shape>,
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     materials: Stage<MaterialKey, Assigned>,
@@ -122,6 +129,12 @@ impl Pipeline {
         Self::default()
     }
 
+    /// What is asked of this pipeline from now on ends with [`crate::Error::Cancelled`] soon after `cancel` is set. Stages
+    /// that were finished before stay.
+    pub fn cancel_with(&mut self, cancel: Cancel) {
+        self.cancel = cancel;
+    }
+
     /// The effective BRDF of a scene at its own quality.
     ///
     /// # Errors
@@ -136,7 +149,7 @@ impl Pipeline {
 
         let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011);
         let (facets, facets_version) =
-            self.facets.get("facets", facet_key, &mut times, || Ok(sample(&shape.mesh, &settings)))?;
+            self.facets.get("facets", facet_key, &mut times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
         let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
         let found =
             self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
@@ -152,10 +165,10 @@ impl Pipeline {
             settings.map_resolution,
             settings.penumbra.to_bits(),
         );
-        let gpu = self.gpu.as_ref();
-        let (visibility, visibility_version) = self
-            .visibility
-            .get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
+        let (gpu, cancel) = (self.gpu.as_ref(), &self.cancel);
+        let (visibility, visibility_version) = self.visibility.get("visibility", key, &mut times, cancel, || {
+            see(plan.route, &shape.mesh, &facets, &settings, gpu, cancel)
+        })?;
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
         if let Some((last, outcome)) = &self.last
@@ -163,6 +176,7 @@ impl Pipeline {
         {
             return Ok(Outcome { times, ..outcome.clone() });
         }
+        self.cancel.check()?;
         let start = Instant::now();
         let (form, factored) =
             product(&plan, &facets, &visibility, sum, material_of_slot, sum_materials, &shape, &settings)?;
@@ -204,11 +218,16 @@ impl Pipeline {
         let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
         let visibility = visibility_maps_cpu(&shape.mesh, facets, directions.directions(), settings.map_resolution);
         timed(&mut times, "visibility", start);
-        let (factors, _) =
-            self.paper_factors.get("basis", (materials_version, knobs.seed, knobs.colors), &mut times, || {
+        let (factors, _) = self.paper_factors.get(
+            "basis",
+            (materials_version, knobs.seed, knobs.colors),
+            &mut times,
+            &self.cancel,
+            || {
                 let factor = |material| MaterialFactors::new(material, &knobs).map(|factors| Some(Arc::new(factors)));
                 materials.iter().map(factor).collect()
-            })?;
+            },
+        )?;
         let start = Instant::now();
         let base_area = f64::from(shape.mesh.base_area());
         let tile = VisibleFacets { facets, visibility: &visibility, directions: &directions, base_area };
@@ -248,9 +267,9 @@ impl Pipeline {
     }
 
     fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, Version)> {
-        let key = (loaded.scene.tile.clone(), loaded.base_dir.clone());
-        self.shape.get("geometry", key, times, || {
-            let mesh = geometry::build(&loaded.scene.tile, &loaded.base_dir)?;
+        let key = (loaded.scene.tile.clone(), loaded.base_dir.clone(), loaded.painted.clone());
+        self.shape.get("geometry", key, times, &self.cancel, || {
+            let mesh = geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted)?;
             let (low, high) = mesh.z_range();
             let flat = high - low <= 1e-7 * mesh.size.max_element();
             let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
@@ -266,7 +285,7 @@ impl Pipeline {
     ) -> Result<(Arc<Assigned>, Version)> {
         let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
         let cache = &mut self.cache;
-        self.materials.get("materials", key, times, || {
+        self.materials.get("materials", key, times, &self.cancel, || {
             let mut material_of_slot = Vec::with_capacity(mesh.slots.len());
             let mut materials: Vec<SumMaterial> = Vec::new();
             let mut made: Vec<Option<usize>> = Vec::new();
@@ -363,7 +382,15 @@ fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
     facets
 }
 
-fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu: Option<&Gpu>) -> Result<Visibility> {
+fn see(
+    route: Route,
+    mesh: &TileMesh,
+    facets: &Facets,
+    settings: &Settings,
+    gpu: Option<&Gpu>,
+    cancel: &Cancel,
+) -> Result<Visibility> {
+    let periodic = || PeriodicGrid::new(mesh).cancelled_by(cancel);
     let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
     Ok(match (route, &mesh.height_grid, gpu) {
         (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
@@ -371,9 +398,9 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
             Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp))
         }
         (Route::HeightMarch | Route::HorizonScan, ..) => {
-            Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(mesh), facets, azimuths, ramp))
+            Visibility::Horizons(Horizons::scan(&periodic(), facets, azimuths, ramp))
         }
-        (Route::MapScan, ..) => Visibility::Maps(SoftMaps::scan(&PeriodicGrid::new(mesh), facets, settings.map_grid)),
+        (Route::MapScan, ..) => Visibility::Maps(SoftMaps::scan(&periodic(), facets, settings.map_grid)),
         (Route::GpuMaps | Route::CpuMaps, ..) => {
             let (grid, resolution) = (settings.map_grid, settings.map_resolution);
             // A GPU that fails is no reason to stop: the CPU's maps are the same.

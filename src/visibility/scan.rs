@@ -84,7 +84,7 @@ impl PeriodicGrid {
     /// Fills `blocked` with what a facet does not see along the unit plane direction `along`; `own` is ignored.
     pub(super) fn scan(&self, origin: Vec3, normal: Vec3, along: Vec2, own: u32, blocked: &mut BlockedSlopes) {
         blocked.start_from_facing(normal, along);
-        if blocked.ground == f32::INFINITY {
+        if blocked.ground == f32::INFINITY || self.cancel.is_set() {
             return;
         }
         let clearance = self.top - origin.z;

@@ -1,0 +1,22 @@
+//! The desktop editor. It knows the library; the library does not know it.
+//!
+//! ```text
+//! panels, views ─▶ Document ─▶ workers (draft ─▶ refined) ─▶ views
+//! ```
+//! The interface never waits: workers answer over channels and wake it.
+
+mod actions;
+mod dialogs;
+mod document;
+mod editor;
+mod menu;
+mod messages;
+mod panels;
+mod perform;
+mod status;
+mod theme;
+mod views;
+mod window;
+mod worker;
+
+pub use window::run;

@@ -1,0 +1,3 @@
+//! The views on both scales.
+
+pub mod object;
