@@ -15,6 +15,7 @@
 pub mod accuracy;
 pub mod brdf;
 pub mod cancel;
+pub mod close_up;
 pub mod directions;
 pub mod error;
 pub mod export;

@@ -51,8 +51,7 @@ impl Messages {
                 ui.horizontal(|ui| {
                     ui.label(RichText::new("●").color(color));
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        if ui.add(egui::Button::new("✖").fill(Color32::TRANSPARENT)).on_hover_text("Close").clicked()
-                        {
+                        if ui.add(egui::Button::new("×").fill(Color32::TRANSPARENT)).on_hover_text("Close").clicked() {
                             closed = Some(at);
                         }
                         ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {

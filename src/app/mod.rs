@@ -11,6 +11,8 @@ mod document;
 mod editor;
 mod menu;
 mod messages;
+mod paint;
+mod painting;
 mod panels;
 mod perform;
 mod status;

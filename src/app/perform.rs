@@ -1,9 +1,10 @@
 //! What actions do, and what dialogs answer.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use biscale::Result;
 use biscale::scene::{BrdfSpec, Geometry, Material};
-use biscale::{Error, Result};
 use eframe::egui::{Context, Theme};
 
 use super::actions::Action;
@@ -13,6 +14,7 @@ use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
 use super::views::object;
+use super::worker::{ExportAnswer, ExportJob, What};
 
 impl Editor {
     /// Does it, or asks first.
@@ -92,7 +94,8 @@ impl Editor {
             Action::Help => self.dialog = Some(Dialog::Help),
             Action::About => self.dialog = Some(Dialog::About),
             Action::Gallery => self.settings.gallery = !self.settings.gallery,
-            Action::Exchange | Action::Paint => {}
+            Action::Exchange => self.exchanged = !self.exchanged,
+            Action::Paint => self.tile.set_painting(!self.tile.painting),
         }
     }
 
@@ -101,7 +104,7 @@ impl Editor {
         ctx.set_zoom_factor(self.settings.zoom);
     }
 
-    fn browse(&mut self, purpose: Purpose, name: &str) {
+    pub(super) fn browse(&mut self, purpose: Purpose, name: &str) {
         let folder = self.document.base_dir.clone();
         self.dialog = Some(Dialog::Files(FileDialog::new(purpose, &folder, name)));
     }
@@ -129,7 +132,7 @@ impl Editor {
     }
 
     /// After changes that did not come from the panels.
-    fn scene_changed(&mut self) {
+    pub(super) fn scene_changed(&mut self) {
         self.slots = materials::slots_of(&self.document.scene().tile.geometry);
     }
 
@@ -279,7 +282,24 @@ impl Editor {
                     }
                 }
             }
-            Dialog::Table { .. } | Dialog::Picture { .. } => false,
+            Dialog::Table { path, theta, phi } => match dialogs::export::table_ui(ctx, path, theta, phi) {
+                None => true,
+                Some(answer) => {
+                    if answer == dialogs::export::Answer::Export {
+                        self.export(path.clone(), What::Table { theta: *theta, phi: *phi });
+                    }
+                    false
+                }
+            },
+            Dialog::Picture { path, width, height } => match dialogs::export::picture_ui(ctx, path, width, height) {
+                None => true,
+                Some(answer) => {
+                    if answer == dialogs::export::Answer::Export {
+                        self.export(path.clone(), What::Picture { size: [*width, *height] });
+                    }
+                    false
+                }
+            },
         };
         if stays && self.dialog.is_none() {
             self.dialog = Some(dialog);
@@ -315,7 +335,19 @@ impl Editor {
                 scene.object.path = Some(near);
             }
             Purpose::Environment => scene.light.environment = near.to_string_lossy().into_owned(),
-            Purpose::SaveHeights | Purpose::SaveColors | Purpose::ExportTable | Purpose::ExportPicture => return,
+            Purpose::SaveHeights => return self.save_image(&path, false),
+            Purpose::SaveColors => return self.save_image(&path, true),
+            Purpose::ExportTable => {
+                match biscale::export::check_ending(&path) {
+                    Ok(()) => self.dialog = Some(Dialog::Table { path, theta: 16, phi: 64 }),
+                    Err(error) => self.messages.put(Level::Trouble, "export", error.to_string()),
+                }
+                return;
+            }
+            Purpose::ExportPicture => {
+                self.dialog = Some(Dialog::Picture { path, width: 1024, height: 1024 });
+                return;
+            }
         }
         self.try_edit(scene);
     }
@@ -370,9 +402,30 @@ impl Editor {
         }
     }
 
-    /// What the library said, for a message.
-    #[allow(dead_code, reason = "used by the export dialogs")]
-    pub(super) fn complain(&mut self, source: &'static str, error: &Error) {
-        self.messages.put(Level::Trouble, source, error.to_string());
+    fn export(&mut self, path: PathBuf, what: What) {
+        if let Some(worker) = &self.exports {
+            self.messages.clear("export");
+            self.exporting = Some((0.0, "Starting"));
+            worker.ask(ExportJob { loaded: Arc::new(self.document.loaded()), path, what });
+        }
+    }
+
+    pub(super) fn take_export(&mut self, answer: ExportAnswer) {
+        match answer {
+            ExportAnswer::Progress(part, what) => {
+                if let Some(exporting) = &mut self.exporting {
+                    *exporting = (part, what);
+                }
+            }
+            ExportAnswer::Done(text) => {
+                self.exporting = None;
+                self.messages.put(Level::Note, "export", text);
+            }
+            ExportAnswer::Failed(text) => {
+                self.exporting = None;
+                self.messages.put(Level::Trouble, "export", format!("Not exported: {text}"));
+            }
+            ExportAnswer::Cancelled => self.exporting = None,
+        }
     }
 }

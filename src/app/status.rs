@@ -28,6 +28,16 @@ impl Editor {
                     ui.label("Following");
                 }
             }
+            if let Some((part, what)) = self.exporting {
+                ui.separator();
+                ui.add(egui::ProgressBar::new(part).desired_width(140.0).text(what));
+                if ui.small_button("Cancel").clicked()
+                    && let Some(worker) = &self.exports
+                {
+                    worker.cancel();
+                    self.exporting = None;
+                }
+            }
             ui.separator();
             let stages: Vec<String> = made.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect();
             let tip = format!("{}\n\n{}", stages.join("\n"), effects(made));

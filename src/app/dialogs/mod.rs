@@ -1,5 +1,6 @@
 //! Windows over the editor: files, questions, help.
 
+pub mod export;
 mod files;
 mod help;
 

@@ -14,8 +14,9 @@ use biscale::scene::{self, Geometry, LoadedScene, Painted, Pixels, Scene};
 use glam::Vec3;
 
 use files::Stamp;
+pub use files::{write_colors, write_heights};
 pub use history::{Change, Patch};
-pub use recovery::{Recovered, RecoveryFile};
+pub use recovery::{Recovered, RecoveryFile, Snapshot};
 pub use settings::Settings;
 
 use history::{History, State};
@@ -151,7 +152,7 @@ impl Document {
     }
 
     /// Heights that are painted on stand where the scene's image stood; the geometry becomes a height-field.
-    pub fn paint_heights(&mut self, name: &str, heights: Pixels<f32>) {
+    pub fn paint_heights(&mut self, name: &str, heights: Pixels<f32>, height_scale: Option<f32>) {
         let mut changes = Vec::new();
         let mut scene = (*self.state.scene).clone();
         let file = PathBuf::from(format!("{}_heights.exr", self.name));
@@ -166,6 +167,7 @@ impl Document {
             }
         };
         (place.path, place.values) = (Some(file), None);
+        place.height_scale = height_scale.unwrap_or(place.height_scale);
         if scene != *self.state.scene {
             let after = Arc::new(scene);
             let before = std::mem::replace(&mut self.state.scene, after.clone());

@@ -36,7 +36,7 @@ pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, around: &mut Arou
         let keep = caption_row(ui, field, around, |ui, around| {
             value_ui(ui, &mut value, &field.shape, field, around);
             let droppable = is_optional && matches!(field.shape, Shape::Path) && !field.required && table.len() > 2;
-            !(droppable && ui.small_button("✖").on_hover_text("Use none").clicked())
+            !(droppable && ui.small_button("×").on_hover_text("Use none").clicked())
         });
         if keep {
             table.insert(field.key.to_owned(), value);

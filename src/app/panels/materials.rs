@@ -136,7 +136,7 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
             let caption = if at == 0 { "BRDF" } else { "+ BRDF" };
             let chosen = fields::row(ui, caption, doc, |ui| {
                 let chosen = fields::kind_ui(ui, "BRDF", term.kind(), &kinds);
-                if count > 1 && ui.small_button("✖").on_hover_text("Remove this term of the sum").clicked() {
+                if count > 1 && ui.small_button("×").on_hover_text("Remove this term of the sum").clicked() {
                     removed = Some(at);
                 }
                 chosen

@@ -37,7 +37,13 @@ pub struct ObjectView {
 }
 
 impl ObjectView {
+    /// Shows a picture, unless what is shown is newer or better.
     pub fn take(&mut self, ctx: &egui::Context, made: Box<Made>) {
+        let rank = |made: &Made| (made.version, made.grade);
+        if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
+            return;
+        }
+        self.since = None;
         let options = TextureOptions::LINEAR;
         match &mut self.texture {
             Some(texture) => texture.set(made.image.clone(), options),

@@ -1,7 +1,7 @@
 //! The object's picture: a draft at once, then the scene's own quality while the hand rests.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use biscale::filtering::EffectiveBrdf;
@@ -22,7 +22,7 @@ const DRAFT_MS: f64 = 60.0;
 /// A picture on the way to the full one.
 const STEP_MS: f64 = 350.0;
 /// Most pixels of a picture; a larger view shows it enlarged.
-const MOST_PIXELS: f64 = 900.0 * 900.0;
+const MOST_PIXELS: f64 = 768.0 * 768.0;
 /// How long the hand must rest before refinement begins.
 const REST: Duration = Duration::from_millis(120);
 
@@ -38,7 +38,7 @@ pub struct PictureJob {
 }
 
 /// How far a picture is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Grade {
     Draft,
     /// On the way from draft to final.
@@ -81,103 +81,118 @@ pub enum PictureAnswer {
 /// What an effective BRDF depends on.
 type SmallScale = (Tile, Vec<Material>, Quality, PathBuf, Painted);
 
-/// Keeps the stages of both qualities and what stays between pictures.
+/// What both workers know: the last BRDF at a scene's own quality, and the last full picture.
 #[derive(Default)]
+pub struct Shared {
+    best: Mutex<Option<(SmallScale, Outcome)>>,
+    last: Mutex<Option<Finished>>,
+}
+
+/// A full picture and what it shows.
+type Finished = (Box<LoadedScene>, [usize; 2], Made);
+
+/// Keeps stages and what stays between pictures. One drafts, on a thread that is never kept long; another refines.
 pub struct Photographer {
-    draft: Pipeline,
-    refined: Pipeline,
+    shared: Arc<Shared>,
+    pipeline: Pipeline,
     studio: Studio,
-    /// The last result at the scene's own quality.
-    best: Option<(SmallScale, Outcome)>,
     /// Milliseconds a pixel, of the draft's and of the refined BRDF.
-    cost: [Cost; 2],
-    /// The last full picture, for edits that only tone it.
-    last: Option<(Box<LoadedScene>, [usize; 2], Made)>,
+    cost: [f64; 2],
 }
 
-struct Cost(f64);
-
-impl Default for Cost {
-    fn default() -> Self {
-        Self(4e-3)
-    }
-}
+/// What a pixel is taken to cost before any was measured [ms].
+const FIRST_COST: f64 = 2e-2;
 
 impl Photographer {
-    /// Does a job, step by step, until it is done or newer work is there.
-    pub fn work(&mut self, job: PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
-        match self.steps(&job, desk, answer) {
-            Ok(()) | Err(Error::Cancelled) => {}
-            Err(error) => answer(PictureAnswer::Failed(job.version, error.to_string())),
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared, pipeline: Pipeline::new(), studio: Studio::default(), cost: [FIRST_COST; 2] }
+    }
+
+    /// A picture at once: with the refined BRDF where it is known, else with a draft.
+    pub fn draft(&mut self, job: &PictureJob, answer: &dyn Fn(PictureAnswer)) {
+        let done = self.toned(job).and_then(|toned| match toned {
+            Some(made) => Ok(made),
+            None => self.drafted(job),
+        });
+        tell(job, done.map(|made| answer(PictureAnswer::Made(Box::new(made)))), answer);
+    }
+
+    fn drafted(&mut self, job: &PictureJob) -> Result<Made> {
+        self.studio.prepare(&job.loaded)?;
+        let (outcome, which) = match self.known(&job.loaded) {
+            Some(outcome) => (Outcome { times: Vec::new(), ..outcome }, 1),
+            None => (self.pipeline.effective(&as_draft(&job.loaded))?, 0),
+        };
+        let size = self.affordable(job.size, which, DRAFT_MS);
+        self.shoot(job, &outcome, which, size, 1, &Cancel::default())
+    }
+
+    /// The scene's own quality, once the hand rests; given up when newer work is there.
+    pub fn refine(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
+        if desk.is_newest_after(REST) {
+            tell(job, self.refined(job, desk, answer), answer);
         }
     }
 
-    fn steps(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) -> Result<()> {
-        if let Some(made) = self.toned(job)? {
-            answer(PictureAnswer::Made(Box::new(made)));
+    fn refined(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) -> Result<()> {
+        if self.is_toned(job) {
             return Ok(());
         }
-        self.draft.cancel_with(Cancel::default());
-        self.refined.cancel_with(desk.cancel.clone());
-        self.studio.prepare(&job.loaded)?;
-        let key = small_scale(&job.loaded);
-        let known = self.best.as_ref().filter(|(last, _)| *last == key).map(|(_, outcome)| outcome.clone());
-        // A draft is never cancelled: while the hand moves, the picture must follow.
-        let (first, which) = match known {
-            Some(outcome) => (Outcome { times: Vec::new(), ..outcome }, 1),
-            None => (self.draft.effective(&as_draft(&job.loaded))?, 0),
+        let mut outcome = match self.known(&job.loaded) {
+            Some(outcome) => Outcome { times: Vec::new(), ..outcome },
+            None => {
+                answer(PictureAnswer::Doing(job.version, "Refining the material"));
+                self.pipeline.cancel_with(desk.cancel.clone());
+                self.pipeline.effective(&job.loaded)?
+            }
         };
-        let size = self.affordable(job.size, which, DRAFT_MS);
-        let made = self.shoot(job, &first, which, size, 1, &Cancel::default())?;
+        *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
+        answer(PictureAnswer::Doing(job.version, "Refining the picture"));
+        self.studio.prepare(&job.loaded)?;
         let full = fitting(job.size);
-        let is_preset_draft = job.loaded.scene.quality.preset == "draft";
-        answer(PictureAnswer::Made(Box::new(made)));
-        if !desk.is_newest_after(REST) {
-            return Ok(());
-        }
-        answer(PictureAnswer::Doing(job.version, "Refining the material"));
-        let outcome =
-            if which == 1 || is_preset_draft && job.loaded.scene.quality == as_draft(&job.loaded).scene.quality {
-                first
-            } else {
-                self.refined.effective(&job.loaded)?
-            };
-        self.best = Some((key, outcome.clone()));
         let step = self.affordable(job.size, 1, STEP_MS);
-        let mut outcome = outcome;
         if step[0] * step[1] * 3 < full[0] * full[1] * 2 {
             let mut made = self.shoot(job, &outcome, 1, step, 1, desk.cancel)?;
             made.grade = Grade::Refining;
             outcome.times = Vec::new();
             answer(PictureAnswer::Made(Box::new(made)));
         }
-        answer(PictureAnswer::Doing(job.version, "Refining the picture"));
         let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
         made.grade = Grade::Final;
-        self.last = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
+        *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
         answer(PictureAnswer::Made(Box::new(made)));
         Ok(())
     }
 
+    fn known(&self, loaded: &LoadedScene) -> Option<Outcome> {
+        let best = lock(&self.shared.best);
+        best.as_ref().filter(|(key, _)| *key == small_scale(loaded)).map(|(_, outcome)| outcome.clone())
+    }
+
+    /// Whether the last full picture shows this but for its tones.
+    fn is_toned(&self, job: &PictureJob) -> bool {
+        lock(&self.shared.last).as_ref().is_some_and(|(last, size, _)| {
+            let (mut like_last, before) = ((*job.loaded).clone(), camera(last));
+            let now = camera(&job.loaded);
+            like_last.scene.camera.clone_from(&last.scene.camera);
+            like_last.name.clone_from(&last.name);
+            let tones = Camera { exposure_ev: before.exposure_ev, tone_map: before.tone_map.clone(), ..now };
+            tones == before && like_last == **last && *size == job.size
+        })
+    }
+
     /// The last full picture in other tones, where nothing else changed.
     fn toned(&mut self, job: &PictureJob) -> Result<Option<Made>> {
-        let Some((last, size, made)) = &mut self.last else { return Ok(None) };
-        let mut like_last = (*job.loaded).clone();
-        let camera = camera(&job.loaded);
-        let before = last.scene.camera.clone().unwrap_or_default();
-        like_last.scene.camera =
-            Some(Camera { exposure_ev: before.exposure_ev, tone_map: before.tone_map.clone(), ..camera.clone() });
-        let same_view = like_last.scene.camera.as_ref() == Some(&before);
-        like_last.scene.camera = last.scene.camera.clone();
-        like_last.name.clone_from(&last.name);
-        if !same_view || like_last != **last || *size != job.size {
+        if !self.is_toned(job) {
             return Ok(None);
         }
         let start = Instant::now();
-        made.image = Arc::new(color_image(&made.picture, &ToneMap::new(&camera)?));
+        let Some((last, _, made)) = &mut *lock(&self.shared.last) else { return Ok(None) };
+        made.image = Arc::new(color_image(&made.picture, &ToneMap::new(&camera(&job.loaded))?));
         made.version = job.version;
         made.stages = vec![("tone", ms(start))];
         made.latency_ms = ms(job.asked);
+        last.scene.camera.clone_from(&job.loaded.scene.camera);
         Ok(Some(made.clone()))
     }
 
@@ -200,7 +215,7 @@ impl Photographer {
         let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
         if samples_per_side == 1 {
             let measured = spent / (size[0] * size[1]) as f64;
-            self.cost[which].0 = if measured > 0.0 { measured } else { self.cost[which].0 };
+            self.cost[which] = measured;
         }
         let large = [("g-buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)];
         let start = Instant::now();
@@ -230,7 +245,7 @@ impl Photographer {
     fn affordable(&self, size: [usize; 2], which: usize, budget_ms: f64) -> [usize; 2] {
         let full = fitting(size);
         let pixels = (full[0] * full[1]) as f64;
-        let scale = (budget_ms / self.cost[which].0 / pixels).sqrt();
+        let scale = (budget_ms / self.cost[which] / pixels).sqrt();
         // Few sizes, so that the picture does not breathe while the hand moves.
         let parts = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
         let part = parts.into_iter().find(|part| 1.0 / part <= scale).unwrap_or(8.0);
@@ -243,6 +258,18 @@ fn fitting(size: [usize; 2]) -> [usize; 2] {
     let size = size.map(|side| side.clamp(24, 8192));
     let scale = (MOST_PIXELS / (size[0] * size[1]) as f64).sqrt().min(1.0);
     size.map(|side| ((side as f64 * scale) as usize).max(24))
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Says why there is no picture; work that was given up is none to speak of.
+fn tell(job: &PictureJob, done: Result<()>, answer: &dyn Fn(PictureAnswer)) {
+    match done {
+        Ok(()) | Err(Error::Cancelled) => {}
+        Err(error) => answer(PictureAnswer::Failed(job.version, error.to_string())),
+    }
 }
 
 fn camera(loaded: &LoadedScene) -> Camera {

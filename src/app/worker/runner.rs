@@ -50,11 +50,12 @@ pub struct Worker<J> {
 }
 
 impl<J: Send + 'static> Worker<J> {
-    /// `start` makes what the work keeps between jobs (anew after a panic); `work` does a job; `panicked` is told.
-    pub fn spawn<S: 'static>(
+    /// `threads`: what it computes on, 0 for all cores. `start` makes what the work keeps between jobs (anew after a panic); `work` does a job; `panicked` is told.
+    pub fn spawn<S: Send + 'static>(
         name: &str,
+        threads: usize,
         start: impl Fn() -> S + Send + 'static,
-        work: impl Fn(&mut S, J, &Desk<J>) + Send + 'static,
+        work: impl Fn(&mut S, J, &Desk<J>) + Send + Sync + 'static,
         panicked: impl Fn(String) + Send + 'static,
     ) -> std::io::Result<Self> {
         let state = State { job: None, running: None, closed: false };
@@ -62,9 +63,15 @@ impl<J: Send + 'static> Worker<J> {
         let inside = mailbox.clone();
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
             let mut kept = start();
+            // A pool of its own: what others compute does not stand in its way.
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok();
             while let Some((job, cancel)) = next(&inside) {
                 let desk = Desk { cancel: &cancel, mailbox: &inside };
-                if let Err(panic) = catch_unwind(AssertUnwindSafe(|| work(&mut kept, job, &desk))) {
+                let work = || match &pool {
+                    Some(pool) => pool.install(|| work(&mut kept, job, &desk)),
+                    None => work(&mut kept, job, &desk),
+                };
+                if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
                     panicked(message(panic.as_ref()));
                     kept = start();
                 }
