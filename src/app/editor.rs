@@ -21,8 +21,8 @@ use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
 use super::views::tile::{self, Hand, TileState};
 use super::worker::{
-    ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, PictureAnswer, PictureJob, Pictures, Thumbnail, ThumbnailJob,
-    TileAnswer, TileJob, Worker, spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
+    ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer, PictureJob, Pictures, Thumbnail,
+    ThumbnailJob, TileAnswer, TileJob, Worker, spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
 };
 
 /// Least time between recovery files.
@@ -217,9 +217,8 @@ impl Editor {
 
     /// Thumbnails are made while nothing else is to be done.
     fn fill_gallery(&mut self) {
-        let idle = self.object.made.as_ref().is_some_and(|made| made.grade == Grade::Final)
-            && self.exporting.is_none()
-            && self.object.since.is_none();
+        let rests = |made: &Made| made.grade >= Grade::Refining && made.version == self.document.version();
+        let idle = self.object.made.as_deref().is_some_and(rests) && self.exporting.is_none();
         let Some(worker) = &self.thumbnails else { return };
         if idle && self.settings.gallery {
             if let Some(job) = self.gallery.job() {

@@ -29,7 +29,7 @@ impl Editor {
             });
             ui.menu_button("Help", |ui| items(ui, &[Action::Help, Action::About], &mut chosen));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let dirty = if self.document.is_dirty() { "● " } else { "" };
+                let dirty = if self.document.is_dirty() { "• " } else { "" };
                 ui.label(RichText::new(format!("{dirty}{}", self.document.name)).strong());
             });
         });

@@ -1,6 +1,6 @@
 //! What went wrong and what to do, above the views until it is read or mended.
 
-use eframe::egui::{self, Color32, Frame, RichText, Ui};
+use eframe::egui::{self, Color32, Frame, Ui};
 
 use super::theme;
 
@@ -49,7 +49,8 @@ impl Messages {
             let frame = Frame::new().fill(color.gamma_multiply(0.22)).inner_margin(egui::Margin::symmetric(10, 5));
             frame.show(ui, |ui| {
                 ui.horizontal(|ui| {
-                    ui.label(RichText::new("●").color(color));
+                    let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(10.0), egui::Sense::hover());
+                    ui.painter().circle_filled(dot.center(), 4.0, color);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                         if ui.add(egui::Button::new("×").fill(Color32::TRANSPARENT)).on_hover_text("Close").clicked() {
                             closed = Some(at);

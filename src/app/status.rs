@@ -16,7 +16,8 @@ impl Editor {
             let waits = self.object.asked.is_some_and(|(version, _)| version != made.version);
             match (waits, made.grade, self.object.doing) {
                 (false, Grade::Final, _) => {
-                    ui.label(RichText::new("✔").color(egui::Color32::from_rgb(110, 180, 110)));
+                    let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(12.0), egui::Sense::hover());
+                    ui.painter().circle_filled(dot.center(), 4.0, egui::Color32::from_rgb(96, 176, 96));
                     ui.label(format!("Final, {} quality", made.preset));
                 }
                 (_, _, Some(doing)) => {
@@ -49,11 +50,15 @@ impl Editor {
                 ui.add(egui::Label::new(RichText::new(&made.device).weak()).truncate())
                     .on_hover_text("Where the picture is shaded");
                 if !made.notes.is_empty() {
-                    ui.label(format!("ℹ {}", made.notes.len())).on_hover_text(made.notes.join("\n"));
+                    ui.label(notes(made.notes.len())).on_hover_text(made.notes.join("\n"));
                 }
             });
         });
     }
+}
+
+fn notes(count: usize) -> String {
+    if count == 1 { "1 note".to_owned() } else { format!("{count} notes") }
 }
 
 fn time(ms: f64) -> String {
@@ -67,7 +72,7 @@ fn time(ms: f64) -> String {
 /// Every effect, on or off, and why.
 fn effects(made: &super::worker::Made) -> String {
     let line = |effect: &biscale::plan::Effect| {
-        format!("{} {}: {}", if effect.on { "●" } else { "○" }, effect.name, effect.reason)
+        format!("{}  {}: {}", if effect.on { "on" } else { "off" }, effect.name, effect.reason)
     };
     made.effects.iter().map(line).collect::<Vec<_>>().join("\n")
 }

@@ -135,7 +135,7 @@ impl FileDialog {
     fn body(&mut self, ui: &mut Ui) -> Option<Option<PathBuf>> {
         let mut go_to = None;
         ui.horizontal(|ui| {
-            if ui.button("⬆").on_hover_text("The folder above").clicked() {
+            if ui.button("Up").on_hover_text("The folder above").clicked() {
                 go_to = self.folder.parent().map(Path::to_owned);
             }
             if ui.button("Home").clicked() {
@@ -149,7 +149,7 @@ impl FileDialog {
                 ui,
                 |ui| {
                     for (name, is_folder) in &self.entries {
-                        let text = if *is_folder { format!("🗀  {name}") } else { format!("      {name}") };
+                        let text = if *is_folder { format!("{name}/") } else { name.clone() };
                         let response = ui.selectable_label(!is_folder && *name == self.typed, text);
                         if response.clicked() {
                             if *is_folder {

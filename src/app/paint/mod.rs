@@ -62,10 +62,9 @@ pub fn relief_of(tile: &biscale::close_up::CloseUp) -> (Pixels<f32>, f32) {
     let size = UVec2::splat(NEW_SIDE);
     let (low, high) = tile.mesh.z_range();
     let range = high - low;
-    if range <= 1e-6 * tile.mesh.size.max_element() {
-        return (plane(), 0.1 * tile.mesh.size.min_element());
-    }
-    let heights = tile.heights(size);
-    let values = heights.iter().map(|z| ((z - low) / range).clamp(0.0, 1.0)).collect();
-    (Pixels { size, values }, range)
+    // Room above and below to paint, also where the surface is shallow.
+    let scale = (1.6 * range).max(0.15 * tile.mesh.size.min_element());
+    let middle = 0.5 * (low + high);
+    let values = tile.heights(size).iter().map(|z| (0.5 + (z - middle) / scale).clamp(0.0, 1.0)).collect();
+    (Pixels { size, values }, scale)
 }

@@ -67,7 +67,20 @@ pub fn caption_row<R>(
     around: &mut Around,
     control: impl FnOnce(&mut Ui, &mut Around) -> R,
 ) -> R {
-    row(ui, &field.label(), &tooltip(field, around), |ui| control(ui, around))
+    row(ui, &caption(field), &tooltip(field, around), |ui| control(ui, around))
+}
+
+/// The field's name as a person would say it.
+fn caption(field: &Field) -> String {
+    match field.key {
+        "path" => "File".to_owned(),
+        "color_path" => "Colours".to_owned(),
+        "f0" => "Reflectance".to_owned(),
+        "fov_deg" => "Field of view".to_owned(),
+        "exposure_ev" => "Exposure".to_owned(),
+        "count" if field.doc.contains("lights") => "Lights".to_owned(),
+        _ => field.label(),
+    }
 }
 
 /// A row of any caption and control.
@@ -130,9 +143,9 @@ fn value_ui(ui: &mut Ui, value: &mut Value, shape: &Shape, field: &Field, around
         Shape::Integer { min, max } => integer_ui(ui, value, min, max),
         Shape::Color { max } => color_ui(ui, value, max),
         Shape::Vector { min, max, .. } => vector_ui(ui, value, min, max),
-        Shape::Text => text_ui(ui, value),
+        Shape::Text => text_ui(ui, value, 40.0),
         Shape::Path => {
-            text_ui(ui, value);
+            text_ui(ui, value, 66.0);
             if ui.button("…").on_hover_text("Choose a file").clicked() {
                 around.browse = Some(field.key);
             }
@@ -160,7 +173,7 @@ fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f6
     let soft_min = if min < -1e3 { -soft_max } else { min };
     let range = soft_min..=soft_max.max(now);
     let log = is_logarithmic(soft_min, soft_max) && soft_max > 2.0;
-    ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - ui.spacing().item_spacing.x).max(40.0);
+    ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);
     let slider = Slider::new(&mut now, range).show_value(false).clamping(SliderClamping::Never).logarithmic(log);
     ui.add(slider);
     let speed = (soft_max - soft_min).min(100.0) / 400.0;
@@ -175,7 +188,7 @@ fn integer_ui(ui: &mut Ui, value: &mut Value, min: i64, max: i64) {
     let Some(mut now) = value.as_integer() else { return };
     let before = now;
     if max - min <= 5000 {
-        ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - ui.spacing().item_spacing.x).max(40.0);
+        ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);
         let slider = Slider::new(&mut now, min..=max).show_value(false).logarithmic(min >= 0 && max > 200);
         ui.add(slider);
     }
@@ -223,11 +236,12 @@ fn vector_ui(ui: &mut Ui, value: &mut Value, min: f64, max: f64) {
 }
 
 /// Text is taken over when it is finished, so that no half-typed path is ever looked for.
-fn text_ui(ui: &mut Ui, value: &mut Value) {
+/// `beside` is kept free for what follows in the row.
+fn text_ui(ui: &mut Ui, value: &mut Value, beside: f32) {
     let Some(text) = value.as_str() else { return };
     let id = ui.next_auto_id().with("draft");
     let mut draft = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_else(|| text.to_owned());
-    let width = (ui.available_width() - 34.0).max(60.0);
+    let width = (ui.available_width() - beside - 10.0).max(60.0);
     let response = ui.add(egui::TextEdit::singleline(&mut draft).desired_width(width));
     if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, draft));

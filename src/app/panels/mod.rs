@@ -24,6 +24,8 @@ pub struct Asked {
 pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, slots: &[String]) -> Asked {
     let mut around = Around { unit: scene.tile.unit.clone(), ..Around::default() };
     let mut material = None;
+    // Whatever a row asks for, the panel keeps the width it was given.
+    ui.set_max_width(ui.available_width());
     section(ui, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut around));
     section(ui, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut around));
     section(ui, "Object", true, |ui| look::object_ui(ui, scene, &mut around));

@@ -20,7 +20,8 @@ pub enum BrushAsked {
 pub fn ui(ui: &mut Ui, brush: &mut Brush) -> Option<BrushAsked> {
     let mut asked = None;
     ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 5.0;
         for tool in Tool::ALL {
             if ui.selectable_label(brush.tool == tool, tool.name()).on_hover_text(tool.tip()).clicked() {
                 brush.tool = tool;

@@ -19,8 +19,8 @@ use super::tone::color_image;
 
 /// A first picture should be there after this many milliseconds.
 const DRAFT_MS: f64 = 60.0;
-/// A picture on the way to the full one.
-const STEP_MS: f64 = 350.0;
+/// Pictures on the way to the full one.
+const STEPS_MS: [f64; 2] = [300.0, 2000.0];
 /// Most pixels of a picture; a larger view shows it enlarged.
 const MOST_PIXELS: f64 = 768.0 * 768.0;
 /// How long the hand must rest before refinement begins.
@@ -150,12 +150,18 @@ impl Photographer {
         answer(PictureAnswer::Doing(job.version, "Refining the picture"));
         self.studio.prepare(&job.loaded)?;
         let full = fitting(job.size);
-        let step = self.affordable(job.size, 1, STEP_MS);
-        if step[0] * step[1] * 3 < full[0] * full[1] * 2 {
-            let mut made = self.shoot(job, &outcome, 1, step, 1, desk.cancel)?;
-            made.grade = Grade::Refining;
-            outcome.times = Vec::new();
-            answer(PictureAnswer::Made(Box::new(made)));
+        let mut shown = 0;
+        for budget in STEPS_MS {
+            let step = self.affordable(job.size, 1, budget);
+            let pixels = step[0] * step[1];
+            // Steps that gain little are left out.
+            if pixels >= 2 * shown && pixels * 3 < full[0] * full[1] * 2 {
+                let mut made = self.shoot(job, &outcome, 1, step, 1, desk.cancel)?;
+                made.grade = Grade::Refining;
+                outcome.times = Vec::new();
+                shown = pixels;
+                answer(PictureAnswer::Made(Box::new(made)));
+            }
         }
         let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
         made.grade = Grade::Final;
