@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Instant;
 
+use biscale::large_scale::CameraView;
 use biscale::scene::{LoadedScene, Material, Scene};
 use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
 
@@ -14,12 +15,13 @@ use super::document::{Document, Recovered, RecoveryFile, Settings, Snapshot};
 use super::messages::{Level, Messages};
 use super::paint::Stroke;
 use super::panels::{self, materials};
+use super::pick;
 use super::theme;
 use super::views::brushes;
 use super::views::gallery::Gallery;
 use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
-use super::views::tile::{self, Hand, TileState};
+use super::views::tile::{self, Hand, TileState, Which};
 use super::worker::{
     ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer, PictureJob, Pictures, Thumbnail,
     ThumbnailJob, TileAnswer, TileJob, Worker, spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
@@ -74,6 +76,7 @@ pub struct Editor {
     /// Pixels of the object view.
     size: [usize; 2],
     hand: Option<Hand>,
+    from_view: Option<Action>,
     pub(super) copied: Option<Material>,
 }
 
@@ -134,6 +137,7 @@ impl Editor {
             loaded: None,
             size: [64, 64],
             hand: None,
+            from_view: None,
         }
     }
 
@@ -192,6 +196,9 @@ impl Editor {
         });
         self.take_scene(scene);
         self.take_asked(&ctx, asked);
+        if let Some(action) = self.from_view.take() {
+            self.perform(&ctx, action);
+        }
         self.take_hand();
         self.brush_keys(&ctx);
         for action in action.into_iter().chain(from_menu).chain(from_gallery) {
@@ -262,7 +269,27 @@ impl Editor {
     }
 
     fn object_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
+        egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+            self.from_view = self.object.toolbar(ui, scene);
+        });
         self.size = self.object.ui(ui, scene);
+        self.pick();
+    }
+
+    /// What the pointer is over tells the lobe view and the tile.
+    fn pick(&mut self) {
+        let (Some(at), Some(made)) = (self.object.pointed, &self.object.made) else { return };
+        let Some((mesh, lights)) = &made.set else { return };
+        let size = [made.picture.width, made.picture.height];
+        let Ok(view) = CameraView::new(&made.camera, mesh, size) else { return };
+        let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
+        if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
+            self.lobe.viewer = Some(picked.viewer);
+            self.lobe.light = picked.light.unwrap_or(self.lobe.light);
+            let value = made.brdf.eval(self.lobe.light, picked.viewer).max_element();
+            self.tile.picked = Some((picked.viewer, 4.0 * value));
+            self.tile.show = Which::Contribution;
+        }
     }
 
     /// The tile with its toolbar; `below` is kept free.

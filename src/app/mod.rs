@@ -15,6 +15,7 @@ mod paint;
 mod painting;
 mod panels;
 mod perform;
+mod pick;
 mod status;
 mod theme;
 mod views;

@@ -14,6 +14,7 @@ use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
 use super::views::object;
+use super::views::tile::Which;
 use super::worker::{ExportAnswer, ExportJob, What};
 
 impl Editor {
@@ -94,6 +95,15 @@ impl Editor {
             Action::Help => self.dialog = Some(Dialog::Help),
             Action::About => self.dialog = Some(Dialog::About),
             Action::Gallery => self.settings.gallery = !self.settings.gallery,
+            Action::Pick => {
+                self.object.picking = !self.object.picking;
+                if !self.object.picking {
+                    (self.lobe.viewer, self.tile.picked) = (None, None);
+                    if self.tile.show == Which::Contribution {
+                        self.tile.show = Which::Clay;
+                    }
+                }
+            }
             Action::Exchange => self.exchanged = !self.exchanged,
             Action::Paint => self.tile.set_painting(!self.tile.painting),
         }

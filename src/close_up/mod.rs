@@ -54,6 +54,8 @@ pub enum Look {
     Materials(Vec<DirectionalLight>),
     /// Normals as colours: x, y, z from -1..1 to 0..1.
     Normals,
+    /// What a facet adds to `f̄(i, o)`, dark to bright; `scale` [1/sr] is bright.
+    Contribution { i: Vec3, o: Vec3, scale: f32 },
     /// Green where a facet sees the direction, red where something is in the way, grey where it is turned away.
     Visibility(Vec3),
 }

@@ -78,6 +78,19 @@ impl CloseUp {
                 };
                 lights.iter().map(shade).sum::<Vec3>() * material.color * weight
             }
+            Look::Contribution { i, o, scale } => {
+                let grey = Vec3::splat(0.05 + 0.1 * normal.z.max(0.0));
+                let Some((_, material)) = palette.material(slot) else { return grey };
+                if normal.dot(*i) <= 0.0 || normal.dot(*o) <= 0.0 {
+                    return grey;
+                }
+                if !self.sees(hit, geometric, *i) || !self.sees(hit, geometric, *o) {
+                    return grey;
+                }
+                let value = material.brdf.f(normal, *i, *o) * material.color * weight;
+                let heat = (value.dot(crate::brdf::LUMINANCE) / scale.max(1e-9)).sqrt().min(1.0);
+                grey + Vec3::new(heat, 0.55 * heat * heat, 0.2 * heat.powi(4))
+            }
             Look::Normals => (normal + 1.0) * 0.5,
             Look::Visibility(to) => {
                 let tone = if geometric.dot(*to) <= 0.0 {

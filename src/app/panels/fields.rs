@@ -35,7 +35,7 @@ pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, around: &mut Arou
     if let Some(mut value) = value {
         let keep = caption_row(ui, field, around, |ui, around| {
             value_ui(ui, &mut value, &field.shape, field, around);
-            let droppable = is_optional && matches!(field.shape, Shape::Path) && !field.required && table.len() > 2;
+            let droppable = is_optional && field.key == "color_path";
             !(droppable && ui.small_button("×").on_hover_text("Use none").clicked())
         });
         if keep {
@@ -170,7 +170,7 @@ fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f6
     let Some(before) = number(value) else { return };
     // What f32 made of a short decimal reads short again.
     let mut now = tidy(before);
-    let soft_min = if min < -1e3 { -soft_max } else { min };
+    let soft_min = if min < -10.0 * soft_max { -soft_max } else { min };
     let range = soft_min..=soft_max.max(now);
     let log = is_logarithmic(soft_min, soft_max) && soft_max > 2.0;
     ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::scene::{Camera, Scene};
+use biscale::scene::{Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2,
     vec2,
 };
 
+use crate::app::actions::Action;
+use crate::app::panels::fields::words;
 use crate::app::worker::{Grade, Made};
 
 /// A picture kept for comparison.
@@ -32,7 +34,9 @@ pub struct ObjectView {
     pub wipe: f32,
     /// When the picture that is awaited was asked for.
     pub since: Option<Instant>,
-    /// What the pointer is over, for the pick.
+    /// Whether the pointer picks.
+    pub picking: bool,
+    /// What the pointer is over, in parts of the view, while it picks.
     pub pointed: Option<egui::Vec2>,
 }
 
@@ -82,11 +86,51 @@ impl ObjectView {
         if !on_wipe {
             turn(ui, &response, scene, area, self.made.as_ref().map_or(4.0, |made| made.distance));
         }
+        let picks = self.picking && !response.dragged();
         self.pointed = response
             .hover_pos()
+            .filter(|_| picks)
             .map(|at| ((at - area.min) / area.size()).clamp(egui::Vec2::ZERO, egui::Vec2::splat(1.0)));
         let pixels = area.size() * ui.pixels_per_point();
         [pixels.x.round() as usize, pixels.y.round() as usize]
+    }
+
+    /// What is looked at and how, above the view.
+    pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene) -> Option<Action> {
+        let mut action = None;
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            egui::ComboBox::from_id_salt("object here").selected_text(words(&scene.object.kind)).width(90.0).show_ui(
+                ui,
+                |ui| {
+                    for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
+                        if ui.selectable_label(scene.object.kind == *kind, words(kind)).clicked() {
+                            (*kind).clone_into(&mut scene.object.kind);
+                            scene.object.path = None;
+                        }
+                    }
+                },
+            );
+            let camera = scene.camera.clone().unwrap_or_default();
+            let mut exposure = camera.exposure_ev;
+            let drag =
+                egui::DragValue::new(&mut exposure).range(-10.0..=10.0).speed(0.03).suffix(" EV").max_decimals(2);
+            let response = ui.add(drag).on_hover_text("Exposure: drag sideways");
+            if response.changed() && exposure.is_finite() {
+                scene.camera = Some(Camera { exposure_ev: exposure, ..camera });
+            }
+            ui.separator();
+            for (which, name, tip, on) in [
+                (Action::Frame, "Frame", "Show the whole object (F)", false),
+                (Action::Snapshot, "A/B", "Keep this picture and compare with what follows (B)", self.kept.is_some()),
+                (Action::Pick, "Pick", "Point at the object: its f̄, and what the facets add to it (I)", self.picking),
+            ] {
+                if ui.selectable_label(on, name).on_hover_text(tip).clicked() {
+                    action = Some(which);
+                }
+            }
+        });
+        action
     }
 
     fn is_on_wipe(&self, area: Rect, at: Pos2) -> bool {

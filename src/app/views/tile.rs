@@ -33,6 +33,8 @@ pub struct TileState {
     asked: Option<(TileView, Show, bool)>,
     inputs: Option<Inputs>,
     size: [usize; 2],
+    /// The picked viewer, and the f̄ that is shown bright.
+    pub picked: Option<(Vec3, f32)>,
     /// Before painting turned the view straight down.
     before_paint: Option<(f32, f32, f32, Vec2)>,
 }
@@ -44,6 +46,8 @@ pub enum Which {
     Materials,
     Normals,
     Visibility,
+    /// What was picked on the object.
+    Contribution,
 }
 
 /// What the hand does in paint mode, in parts of the tile.
@@ -70,6 +74,7 @@ impl Default for TileState {
             asked: None,
             inputs: None,
             size: [0, 0],
+            picked: None,
             before_paint: None,
         }
     }
@@ -87,6 +92,10 @@ impl TileState {
             Which::Materials => Show::Materials,
             Which::Normals => Show::Normals,
             Which::Visibility => Show::Visibility(direction),
+            Which::Contribution => match self.picked {
+                Some((viewer, scale)) => Show::Contribution(direction, viewer, scale),
+                None => Show::Visibility(direction),
+            },
         };
         let lit = (self.show == Which::Materials).then(|| (scene.light.clone(), scene.camera.clone()));
         let inputs = (scene.tile.clone(), scene.materials.clone(), loaded.painted.clone(), lit);
@@ -231,6 +240,12 @@ impl TileState {
         let mut painting = None;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
+            if self.picked.is_some() {
+                let tip = "What each place adds to f̄ at the point that was picked on the object";
+                if ui.selectable_label(self.show == Which::Contribution, "Picked").on_hover_text(tip).clicked() {
+                    self.show = Which::Contribution;
+                }
+            }
             for (which, name, tip) in [
                 (Which::Clay, "Clay", "Matte, under one lamp: the shape is read best"),
                 (Which::Materials, "Real", "The materials under the scene's light"),

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use biscale::filtering::EffectiveBrdf;
-use biscale::large_scale::Picture;
 use biscale::large_scale::tone_map::ToneMap;
+use biscale::large_scale::{DirectionalLight, ObjectMesh, Picture};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::plan::Effect;
 use biscale::scene::{Camera, LoadedScene, Material, Painted, Quality, Tile};
@@ -59,6 +59,9 @@ pub struct Made {
     /// From the edit to here.
     pub latency_ms: f64,
     pub device: String,
+    /// The object and its lights.
+    pub set: Option<(Arc<ObjectMesh>, Arc<Vec<DirectionalLight>>)>,
+    pub camera: Camera,
     /// From the camera to the object, in radii.
     pub distance: f32,
     pub notes: Vec<String>,
@@ -240,6 +243,8 @@ impl Photographer {
             stages,
             latency_ms: ms(job.asked),
             device: self.studio.device(),
+            set: self.studio.set(),
+            camera: camera.clone(),
             distance: self.studio.distance(&camera, size),
             notes,
             effects: outcome.plan.effects.clone(),

@@ -11,7 +11,9 @@ use biscale::large_scale::lights::{self, Lights};
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::shadow::Occluder;
 use biscale::large_scale::shadow_cache::ShadowCache;
-use biscale::large_scale::{CameraView, GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render};
+use biscale::large_scale::{
+    CameraView, DirectionalLight, GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render,
+};
 use biscale::scene::{self, Camera, LoadedScene};
 use biscale::{Cancel, Error, Result};
 use glam::Vec3;
@@ -29,7 +31,7 @@ pub struct Studio {
 
 struct Object {
     key: (scene::Object, PathBuf),
-    mesh: ObjectMesh,
+    mesh: Arc<ObjectMesh>,
     occluder: Option<Occluder>,
 }
 
@@ -65,7 +67,7 @@ impl Studio {
     pub fn prepare(&mut self, loaded: &LoadedScene) -> Result<()> {
         let key = (loaded.scene.object.clone(), loaded.base_dir.clone());
         if self.object.as_ref().is_none_or(|object| object.key != key) {
-            let mesh = objects::build(&key.0, &key.1)?;
+            let mesh = Arc::new(objects::build(&key.0, &key.1)?);
             let occluder = Occluder::of(&mesh);
             self.object = Some(Object { key, mesh, occluder });
             self.shadows = None;
@@ -94,6 +96,12 @@ impl Studio {
     pub fn warnings(&self) -> Vec<String> {
         let of_object = self.object.iter().flat_map(|object| &object.mesh.warnings);
         of_object.chain(self.lights.iter().flat_map(|(_, lights)| &lights.warnings)).cloned().collect()
+    }
+
+    /// The object and its lights, for whoever asks what is where.
+    pub fn set(&self) -> Option<(Arc<ObjectMesh>, Arc<Vec<DirectionalLight>>)> {
+        let lights = self.lights.as_ref().map(|(_, lights)| Arc::new(lights.directional.clone()))?;
+        Some((self.object.as_ref()?.mesh.clone(), lights))
     }
 
     /// How far the camera is from the object, in radii, automatic framing resolved.

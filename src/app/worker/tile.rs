@@ -30,6 +30,8 @@ pub enum Show {
     Clay,
     Materials,
     Normals,
+    /// What facets add to f̄ of a light and a viewer; the last is bright.
+    Contribution(Vec3, Vec3, f32),
     /// Which facets see this direction.
     Visibility(Vec3),
 }
@@ -141,6 +143,7 @@ impl Macro {
         let plain = ToneMap { curve: ToneCurve::Plain, gain: 1.0 };
         Ok(match &job.show {
             Show::Clay => (Look::Clay, plain),
+            Show::Contribution(i, o, scale) => (Look::Contribution { i: *i, o: *o, scale: *scale }, plain),
             Show::Normals => (Look::Normals, plain),
             Show::Visibility(to) => (Look::Visibility(*to), plain),
             Show::Materials => {
