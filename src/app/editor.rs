@@ -187,6 +187,7 @@ impl Editor {
         let side = Panel::right("side").default_size(self.settings.side_width).size_range(240.0..=900.0);
         side.show(ui, |ui| self.side_ui(ui, &mut scene));
         CentralPanel::no_frame().show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 0.0;
             self.messages.ui(ui);
             if self.exchanged {
                 self.tile_ui(ui, &scene, 0.0);
@@ -269,7 +270,9 @@ impl Editor {
     }
 
     fn object_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
-        egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+        let fill = ui.visuals().panel_fill;
+        egui::Frame::new().fill(fill).inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+            ui.take_available_width();
             self.from_view = self.object.toolbar(ui, scene);
         });
         self.size = self.object.ui(ui, scene);
@@ -428,6 +431,8 @@ impl Editor {
         })
     }
 
+    /// As from a menu.
+    #[cfg(test)]
     pub fn action(&mut self, ctx: &Context, action: Action) {
         self.perform(ctx, action);
     }

@@ -17,6 +17,8 @@ mod panels;
 mod perform;
 mod pick;
 mod status;
+#[cfg(test)]
+mod tests;
 mod theme;
 mod views;
 mod window;

@@ -175,7 +175,7 @@ impl Editor {
         }
     }
 
-    fn paste_material(&mut self, slot: &str) {
+    pub(super) fn paste_material(&mut self, slot: &str) {
         let Some(copied) = self.copied.clone() else {
             self.messages.put(Level::Note, "paste", "No material has been copied yet: use Copy at a material first.");
             return;

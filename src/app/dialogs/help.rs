@@ -7,12 +7,12 @@ use crate::app::actions;
 const TASKS: [(&str, &str); 6] = [
     (
         "Make a blue velvet",
-        "In the gallery click \"fig6a velvet spread\". In the panel, Materials, open \"Rods\" and turn its colour to blue; \
-         Surface has the spread, the lean and the density of the fibres.",
+        "In the gallery click \"Velvet spread\". In the panel, Materials, turn the colour of \"Default\" to blue, and that of \
+         \"Floor\" to a darker one; Surface has the spread, the lean and the number of the fibres.",
     ),
     (
         "Paint a relief",
-        "Press P. The first stroke turns the tile into a height-field. Brushes, size and strength are under the tile; \
+        "Press P. The first stroke turns any surface into a relief of its shape. Brushes, size and strength are under the tile; \
          [ and ] change the size. The relief is saved beside the scene as an image.",
     ),
     (
@@ -34,25 +34,31 @@ const TASKS: [(&str, &str); 6] = [
 /// The window; whether it stays open.
 pub fn help_ui(ctx: &Context) -> bool {
     let mut open = true;
-    egui::Window::new("Help").open(&mut open).default_width(520.0).collapsible(false).show(ctx, |ui| {
-        ScrollArea::vertical().max_height(520.0).show(ui, |ui| {
-            for (task, steps) in TASKS {
-                ui.label(RichText::new(task).strong());
-                ui.label(steps);
-                ui.add_space(6.0);
-            }
-            ui.separator();
-            ui.label(RichText::new("Shortcuts").strong());
-            Grid::new("shortcuts").num_columns(2).striped(true).spacing([24.0, 4.0]).show(ui, |ui| {
-                for entry in actions::ENTRIES {
-                    if let Some(keys) = &entry.keys {
-                        ui.label(entry.name);
-                        ui.monospace(ctx.format_shortcut(keys));
-                        ui.end_row();
-                    }
+    egui::Window::new("Help")
+        .open(&mut open)
+        .default_width(520.0)
+        .pivot(egui::Align2::CENTER_CENTER)
+        .default_pos(ctx.content_rect().center())
+        .collapsible(false)
+        .show(ctx, |ui| {
+            ScrollArea::vertical().max_height(560.0).min_scrolled_height(460.0).show(ui, |ui| {
+                for (task, steps) in TASKS {
+                    ui.label(RichText::new(task).strong());
+                    ui.label(steps);
+                    ui.add_space(6.0);
                 }
+                ui.separator();
+                ui.label(RichText::new("Shortcuts").strong());
+                Grid::new("shortcuts").num_columns(2).striped(true).spacing([24.0, 4.0]).show(ui, |ui| {
+                    for entry in actions::ENTRIES {
+                        if let Some(keys) = &entry.keys {
+                            ui.label(entry.name);
+                            ui.monospace(ctx.format_shortcut(keys));
+                            ui.end_row();
+                        }
+                    }
+                });
             });
         });
-    });
     open
 }

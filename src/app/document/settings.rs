@@ -31,7 +31,7 @@ impl Default for Settings {
             window: [1440.0, 900.0],
             recent: Vec::new(),
             gallery: true,
-            parameters_width: 330.0,
+            parameters_width: 348.0,
             side_width: 372.0,
             welcomed: false,
         }

@@ -7,8 +7,8 @@ use toml::{Table, Value};
 use super::matrix;
 
 /// Width of captions beside controls.
-const CAPTION: f32 = 112.0;
-const NUMBER: f32 = 74.0;
+const CAPTION: f32 = 104.0;
+const NUMBER: f32 = 76.0;
 
 /// What panels know of the document around the table they edit.
 #[derive(Debug, Clone, Default)]
@@ -83,20 +83,23 @@ fn caption(field: &Field) -> String {
     }
 }
 
-/// A row of any caption and control.
+/// A row of any caption and control. It is as wide as the panel, whatever the control asks for: panels never grow by
+/// themselves.
 pub fn row<R>(ui: &mut Ui, caption: &str, tip: &str, control: impl FnOnce(&mut Ui) -> R) -> R {
-    ui.horizontal(|ui| {
-        let height = ui.spacing().interact_size.y;
-        let label = ui
-            .allocate_ui_with_layout(egui::vec2(CAPTION, height), Layout::left_to_right(Align::Center), |ui| {
-                ui.set_min_width(CAPTION);
-                ui.add(egui::Label::new(caption).truncate())
-            })
-            .inner;
-        let label = if tip.is_empty() { label } else { label.on_hover_text(tip) };
-        ui.label_inputs_by(label.id, control)
-    })
-    .inner
+    let height = ui.spacing().interact_size.y;
+    let place = egui::Rect::from_min_size(ui.cursor().min, egui::vec2(ui.available_width(), height));
+    let builder = egui::UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center));
+    let mut line = ui.new_child(builder);
+    let captioned =
+        line.allocate_ui_with_layout(egui::vec2(CAPTION, height), Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(CAPTION);
+            ui.add(egui::Label::new(caption).truncate())
+        });
+    let label = if tip.is_empty() { captioned.inner } else { captioned.inner.on_hover_text(tip) };
+    let result = line.label_inputs_by(label.id, control);
+    let used = line.min_rect().height().max(height);
+    ui.allocate_rect(egui::Rect::from_min_size(place.min, egui::vec2(place.width(), used)), egui::Sense::hover());
+    result
 }
 
 fn tooltip(field: &Field, around: &Around) -> String {
@@ -176,11 +179,22 @@ fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f6
     ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);
     let slider = Slider::new(&mut now, range).show_value(false).clamping(SliderClamping::Never).logarithmic(log);
     ui.add(slider);
-    let speed = (soft_max - soft_min).min(100.0) / 400.0;
-    let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(4).suffix(suffix);
+    let (speed, digits) = ((soft_max - soft_min).min(100.0) / 400.0, decimals(now));
+    let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(digits).suffix(suffix);
     ui.add_sized([NUMBER, ui.spacing().interact_size.y], drag);
     if now.is_finite() && now != tidy(before) {
         *value = Value::Float(now.clamp(min, max));
+    }
+}
+
+/// Three digits that say something.
+fn decimals(value: f64) -> usize {
+    match value.abs() {
+        v if v >= 100.0 => 0,
+        v if v >= 10.0 => 1,
+        v if v >= 1.0 || v == 0.0 => 2,
+        v if v >= 0.1 => 3,
+        _ => 4,
     }
 }
 
@@ -211,9 +225,10 @@ fn color_ui(ui: &mut Ui, value: &mut Value, max: f64) {
     if ui.color_edit_button_rgb(&mut shown).on_hover_text("Linear RGB").changed() {
         rgb = shown.map(|channel| channel * gain);
     }
+    let width = ((ui.available_width() - 14.0) / 3.0).clamp(30.0, 48.0);
     for channel in &mut rgb {
         let drag = DragValue::new(channel).range(0.0..=max as f32).speed(0.005).max_decimals(3);
-        ui.add_sized([46.0, ui.spacing().interact_size.y], drag);
+        ui.add_sized([width, ui.spacing().interact_size.y], drag);
     }
     if rgb != before && rgb.iter().all(|channel| channel.is_finite()) {
         *value = Value::Array(rgb.map(|channel| Value::Float(f64::from(channel))).to_vec());
@@ -298,7 +313,7 @@ fn starting_value(shape: &Shape) -> Option<Value> {
 pub fn kind_ui(ui: &mut Ui, label: &str, now: &str, kinds: &[Kind]) -> Option<&'static str> {
     let mut chosen = None;
     let combo = egui::ComboBox::from_id_salt(("kind", label)).selected_text(words(now)).height(400.0);
-    combo.width(ui.available_width().min(200.0)).show_ui(ui, |ui| {
+    combo.width((ui.available_width() - 30.0).min(200.0)).show_ui(ui, |ui| {
         for kind in kinds {
             if ui.selectable_label(kind.kind == now, words(kind.kind)).on_hover_text(kind.doc).clicked()
                 && kind.kind != now

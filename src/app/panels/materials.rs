@@ -61,17 +61,14 @@ pub fn grey() -> Material {
 /// A slot that looks like the default.
 fn inherited_ui(ui: &mut Ui, scene: &mut Scene, slot: &str) -> Option<Request> {
     let mut request = None;
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(fields::words(slot)).strong());
+    fields::row(ui, &fields::words(slot), "This part of the surface wears the default material.", |ui| {
         ui.weak("as default");
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            if ui.button("Customize").on_hover_text("Give this part of the surface a material of its own").clicked() {
-                scene.materials.push(Material { name: slot.to_owned(), brdf: None, color: Vec3::ONE });
-            }
-            if ui.button("Paste").on_hover_text("Use the copied material here").clicked() {
-                request = Some(Request::Paste { slot: slot.to_owned() });
-            }
-        });
+        if ui.button("Paste").on_hover_text("Use the copied material here").clicked() {
+            request = Some(Request::Paste { slot: slot.to_owned() });
+        }
+        if ui.button("Customize").on_hover_text("Give this part of the surface a material of its own").clicked() {
+            scene.materials.push(Material { name: slot.to_owned(), brdf: None, color: Vec3::ONE });
+        }
     });
     request
 }

@@ -74,7 +74,7 @@ impl LobeState {
                 (Some(value), Some(viewer)) => {
                     let (theta, phi) = to_angles(viewer);
                     format!(
-                        "f̄ {:.3} {:.3} {:.3} /sr towards {:.0}° / {:.0}°",
+                        "{:.3} {:.3} {:.3} /sr towards {:.0}° / {:.0}°",
                         value.x,
                         value.y,
                         value.z,
@@ -155,7 +155,8 @@ impl LobeState {
             FontId::proportional(9.0),
             text,
         );
-        response.on_hover_text("f̄ by the viewer's angle in the plane of light and normal, red, green and blue");
+        response
+            .on_hover_text("Reflection by the viewer's angle in the plane of light and normal, in red, green and blue");
     }
 }
 

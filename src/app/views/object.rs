@@ -123,7 +123,12 @@ impl ObjectView {
             for (which, name, tip, on) in [
                 (Action::Frame, "Frame", "Show the whole object (F)", false),
                 (Action::Snapshot, "A/B", "Keep this picture and compare with what follows (B)", self.kept.is_some()),
-                (Action::Pick, "Pick", "Point at the object: its f̄, and what the facets add to it (I)", self.picking),
+                (
+                    Action::Pick,
+                    "Pick",
+                    "Point at the object: how it reflects there, and what the facets add to it (I)",
+                    self.picking,
+                ),
             ] {
                 if ui.selectable_label(on, name).on_hover_text(tip).clicked() {
                     action = Some(which);

@@ -239,9 +239,10 @@ impl TileState {
     pub fn toolbar(&mut self, ui: &mut Ui) -> Option<bool> {
         let mut painting = None;
         ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.spacing_mut().item_spacing.x = 2.0;
+            ui.spacing_mut().button_padding.x = 5.0;
             if self.picked.is_some() {
-                let tip = "What each place adds to f̄ at the point that was picked on the object";
+                let tip = "What each place adds to the reflection at the point that was picked on the object";
                 if ui.selectable_label(self.show == Which::Contribution, "Picked").on_hover_text(tip).clicked() {
                     self.show = Which::Contribution;
                 }
