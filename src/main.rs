@@ -6,6 +6,7 @@ mod commands;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::Context as _;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// What does a surface with tiny structures look like from far away?
@@ -152,16 +153,11 @@ struct MaterialsArgs {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let command = cli.command.unwrap_or(Command::Edit { scene: cli.scene });
-    let result = match command {
-        Command::Edit { scene } => app::run(scene.as_deref()),
-        Command::Render(args) => commands::render::run(&args),
-        Command::Eval(args) => commands::eval::run(&args),
-        Command::Export(args) => commands::export::run(&args),
-        Command::Plan(args) => commands::plan::run(&args),
-        Command::Basis(args) => commands::basis::run(&args),
-        Command::Profile(args) => commands::profile::run(&args),
-        Command::Materials(args) => commands::materials::run(&args),
+    let result = match cli.command {
+        None => {
+            app::run(cli.scene.as_deref()).context("taken as a scene to edit, as no command was given (see --help)")
+        }
+        Some(command) => run(command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -173,5 +169,18 @@ fn main() -> ExitCode {
             eprintln!("biscale: {error:#}");
             ExitCode::from(error.downcast_ref::<biscale::Error>().map_or(1, biscale::Error::exit_code))
         }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<()> {
+    match command {
+        Command::Edit { scene } => app::run(scene.as_deref()),
+        Command::Render(args) => commands::render::run(&args),
+        Command::Eval(args) => commands::eval::run(&args),
+        Command::Export(args) => commands::export::run(&args),
+        Command::Plan(args) => commands::plan::run(&args),
+        Command::Basis(args) => commands::basis::run(&args),
+        Command::Profile(args) => commands::profile::run(&args),
+        Command::Materials(args) => commands::materials::run(&args),
     }
 }

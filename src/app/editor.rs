@@ -58,7 +58,7 @@ pub struct Editor {
     pub title: String,
     /// The window may go.
     pub leaving: bool,
-    pictures: Option<Pictures>,
+    pub(super) pictures: Option<Pictures>,
     tiles: Option<Worker<TileJob>>,
     lobes: Option<Worker<LobeJob>>,
     thumbnails: Option<Worker<ThumbnailJob>>,
@@ -151,6 +151,13 @@ impl Editor {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             self.perform(&ctx, Action::Quit);
         }
+        let came_back = ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
+        if came_back && self.dialog.is_none() && self.document.changed_on_disk() {
+            self.dialog = Some(Dialog::ChangedOnDisk { saving: false });
+        }
+        if let Some(rect) = ctx.input(|input| input.viewport().inner_rect) {
+            self.settings.window = rect.size().into();
+        }
         self.frame(ui);
         let dirty = if self.document.is_dirty() { "*" } else { "" };
         let title = format!("{}{dirty} - biscale", self.document.name);
@@ -185,7 +192,9 @@ impl Editor {
             .inner
             .inner;
         let side = Panel::right("side").default_size(self.settings.side_width).size_range(240.0..=900.0);
-        side.show(ui, |ui| self.side_ui(ui, &mut scene));
+        let side = side.show(ui, |ui| self.side_ui(ui, &mut scene)).response.rect.width();
+        // A width that a narrow window forced is not one to remember.
+        self.settings.side_width = side.clamp(240.0, 900.0);
         CentralPanel::no_frame().show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
             self.messages.ui(ui);
@@ -366,7 +375,7 @@ impl Editor {
                 worker.ask(job);
             }
         }
-        if let (Some(worker), Some(job)) = (&self.tiles, self.tile.job(&loaded, version, self.lobe.light)) {
+        if let (Some(worker), Some(job)) = (&self.tiles, self.tile.job(&loaded, self.lobe.light)) {
             worker.ask(job);
         }
         if !self.tile.painting
@@ -385,7 +394,7 @@ impl Editor {
                     self.slots.clone_from(&made.tile.mesh.slots);
                     self.tile.take(ctx, made);
                 }
-                Answer::Tile(TileAnswer::Failed(_, text)) => self.messages.put(Level::Trouble, "tile", text),
+                Answer::Tile(TileAnswer::Failed(text)) => self.messages.put(Level::Trouble, "tile", text),
                 Answer::Lobe(made) => self.lobe.take(ctx, made),
                 Answer::Thumbnail(made) => self.gallery.take(ctx, made),
                 Answer::Export(answer) => self.take_export(answer),
@@ -409,6 +418,7 @@ impl Editor {
                 self.object.doing = Some(what);
             }
             PictureAnswer::Doing(..) => {}
+            PictureAnswer::Failed(version, _) if version < self.document.version() => {}
             PictureAnswer::Failed(_, text) => {
                 self.object.doing = None;
                 self.object.since = None;

@@ -23,8 +23,7 @@ impl Editor {
                 }
                 if let Some(stroke) = &mut self.stroke {
                     stroke.move_to(&self.tile.brush, at, pressure);
-                    let (heights, colors) = stroke.images();
-                    self.document.show_stroke(heights, colors);
+                    self.document.show_stroke(stroke.images());
                 }
             }
             Hand::Lifted => self.end_stroke(),

@@ -43,9 +43,8 @@ impl Editor {
                 }
             }
             Action::Save => match self.document.path.clone() {
-                Some(path) if self.document.changed_on_disk() => {
-                    let _ = path;
-                    self.dialog = Some(Dialog::ChangedOnDisk);
+                Some(_) if self.document.changed_on_disk() => {
+                    self.dialog = Some(Dialog::ChangedOnDisk { saving: true });
                 }
                 Some(path) => self.save(&path),
                 None => self.perform_now(ctx, Action::SaveAs),
@@ -82,6 +81,13 @@ impl Editor {
                 if self.object.kept.take().is_none() {
                     let (scene, name) = (self.document.scene().clone(), self.document.name.clone());
                     self.object.keep(ctx, &scene, &name);
+                }
+            }
+            Action::BackToA => {
+                if let Some(kept) = &self.object.kept {
+                    let scene = (*kept.scene).clone();
+                    self.document.edit_as("Back to A", scene);
+                    self.scene_changed();
                 }
             }
             Action::Theme => {
@@ -211,9 +217,8 @@ impl Editor {
             Some(materials::Request::Paste { slot }) => self.paste_material(&slot),
             None => {}
         }
-        match asked.complaint {
-            Some(text) => self.messages.put(Level::Trouble, "edit", text),
-            None => {}
+        if let Some(text) = asked.complaint {
+            self.messages.put(Level::Trouble, "edit", text);
         }
     }
 
@@ -278,13 +283,14 @@ impl Editor {
                     }
                 }
             }
-            Dialog::ChangedOnDisk => {
+            Dialog::ChangedOnDisk { saving } => {
                 let text = format!("\"{}\" was changed by another program.", self.document.name);
-                match dialogs::question(ctx, "The file has changed", &text, &["Keep mine", "Reload", "Cancel"]) {
+                match dialogs::question(ctx, "The file has changed", &text, &["Keep mine", "Reload", "Later"]) {
                     None => true,
                     Some(answer) => {
                         match (answer, self.document.path.clone()) {
-                            (0, Some(path)) => self.save(&path),
+                            (0, Some(path)) if *saving => self.save(&path),
+                            (0, _) => self.document.accept_disk(),
                             (1, Some(path)) => self.open(&path.to_string_lossy()),
                             _ => {}
                         }

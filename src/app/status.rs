@@ -6,9 +6,17 @@ use super::editor::Editor;
 use super::worker::Grade;
 
 impl Editor {
+    fn stop_refining(&mut self) {
+        if let Some(pictures) = &self.pictures {
+            pictures.stop();
+        }
+        self.object.doing = None;
+        self.object.stopped = Some(self.document.version());
+    }
+
     pub(super) fn status_ui(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            let Some(made) = &self.object.made else {
+            let Some(made) = self.object.made.clone() else {
                 ui.spinner();
                 ui.label("Computing the first picture");
                 return;
@@ -23,6 +31,13 @@ impl Editor {
                 (_, _, Some(doing)) => {
                     ui.add(egui::Spinner::new().size(13.0));
                     ui.label(doing);
+                    let stop = ui.small_button("Stop").on_hover_text("What is shown is good enough");
+                    if stop.clicked() {
+                        self.stop_refining();
+                    }
+                }
+                _ if self.object.stopped == Some(made.version) => {
+                    ui.label("Stopped before the final picture");
                 }
                 _ => {
                     ui.add(egui::Spinner::new().size(13.0));
@@ -41,7 +56,7 @@ impl Editor {
             }
             ui.separator();
             let stages: Vec<String> = made.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect();
-            let tip = format!("{}\n\n{}", stages.join("\n"), effects(made));
+            let tip = format!("{}\n\n{}", stages.join("\n"), effects(&made));
             let text = format!("{} after the edit", time(made.latency_ms));
             ui.label(text).on_hover_text(&tip);
             ui.separator();

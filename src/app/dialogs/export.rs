@@ -14,7 +14,7 @@ pub enum Answer {
 fn footer(ui: &mut egui::Ui, answer: &mut Option<Answer>) {
     ui.add_space(8.0);
     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-        if ui.button("Export").clicked() {
+        if ui.button("Export").clicked() || ui.input(|input| input.key_pressed(egui::Key::Enter)) {
             *answer = Some(Answer::Export);
         }
         if ui.button("Cancel").clicked() {

@@ -24,8 +24,10 @@ pub enum Dialog {
     About,
     /// What a crash left behind.
     Recover(Vec<Recovered>),
-    /// The file was written by someone else.
-    ChangedOnDisk,
+    /// The file was written by someone else; noticed while saving, or on coming back to the window.
+    ChangedOnDisk {
+        saving: bool,
+    },
     /// Table export: where to, and how fine.
     Table {
         path: PathBuf,

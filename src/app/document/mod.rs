@@ -113,8 +113,30 @@ impl Document {
     pub fn edit_as(&mut self, name: &str, scene: Scene) {
         let after = Arc::new(scene);
         let before = std::mem::replace(&mut self.state.scene, after.clone());
-        self.history.push(name, vec![Change::Scene { before, after }]);
+        let mut changes = self.dropped_images(&before, &after);
+        changes.insert(0, Change::Scene { before, after });
+        self.history.push(name, changes);
         self.version += 1;
+    }
+
+    /// Painted images go where the person chose another file in their place.
+    fn dropped_images(&mut self, before: &Scene, after: &Scene) -> Vec<Change> {
+        let mut changes = Vec::new();
+        let painted = &mut self.state.painted;
+        if let (Geometry::Heightfield(old), Geometry::Heightfield(new)) = (&before.tile.geometry, &after.tile.geometry)
+            && (&old.path, &old.values) != (&new.path, &new.values)
+            && let Some(image) = painted.heights.take()
+        {
+            changes.push(Change::HeightImage { before: Some(image), after: None });
+        }
+        let (mut old, mut new) = (before.tile.geometry.clone(), after.tile.geometry.clone());
+        if let (Some(old), Some(new)) = (color_path(&mut old), color_path(&mut new))
+            && old != new
+            && let Some(image) = painted.colors.take()
+        {
+            changes.push(Change::ColorImage { before: Some(image), after: None });
+        }
+        changes
     }
 
     /// The hand rests: what follows is an entry of its own. (Views turned one after the other stay one.)
@@ -199,13 +221,8 @@ impl Document {
     }
 
     /// Shows a stroke while it is drawn; [`Document::end_stroke`] makes it an entry.
-    pub fn show_stroke(&mut self, heights: Option<Arc<Pixels<f32>>>, colors: Option<Arc<Pixels<Vec3>>>) {
-        if heights.is_some() {
-            self.state.painted.heights = heights;
-        }
-        if colors.is_some() {
-            self.state.painted.colors = colors;
-        }
+    pub fn show_stroke(&mut self, painted: Painted) {
+        self.state.painted = painted;
         self.version += 1;
     }
 

@@ -74,8 +74,8 @@ impl Stroke {
     }
 
     /// The images as the stroke left them.
-    pub fn images(&self) -> (Option<Arc<Pixels<f32>>>, Option<Arc<Pixels<Vec3>>>) {
-        (self.heights.clone(), self.colors.clone())
+    pub fn images(&self) -> Painted {
+        Painted { heights: self.heights.clone(), colors: self.colors.clone() }
     }
 }
 

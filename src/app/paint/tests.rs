@@ -15,7 +15,7 @@ fn flat() -> Painted {
 fn stroke(brush: &Brush, painted: &Painted, way: &[Vec2]) -> Pixels<f32> {
     let mut stroke = Stroke::begin(painted);
     way.iter().for_each(|at| stroke.move_to(brush, *at, 1.0));
-    (*stroke.images().0.unwrap()).clone()
+    (*stroke.images().heights.unwrap()).clone()
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_colour_stroke_moves_towards_the_colour_and_leaves_heights() {
         Brush { tool: Tool::Color, strength: 1.0, color: Vec3::X, radius: 0.3, falloff: 0.0, ..Brush::default() };
     let mut stroke = Stroke::begin(&painted);
     stroke.move_to(&brush, Vec2::splat(0.5), 1.0);
-    let (heights, colors) = stroke.images();
+    let Painted { heights, colors } = stroke.images();
     assert_eq!(heights, painted.heights);
     assert_eq!(colors.unwrap().values[8 * 4 + 4], Vec3::X);
 }

@@ -19,8 +19,7 @@ fn stroke(document: &mut Document, tool: Tool) {
     let brush = Brush { tool, radius: 0.1, ..Brush::default() };
     for k in 0..10 {
         stroke.move_to(&brush, Vec2::splat(0.2 + 0.05 * k as f32), 1.0);
-        let (heights, colors) = stroke.images();
-        document.show_stroke(heights, colors);
+        document.show_stroke(stroke.images());
     }
     document.end_stroke("Paint", &stroke.before);
 }
@@ -121,6 +120,21 @@ fn files_that_a_scene_names_are_found_after_it_is_saved_elsewhere() {
     let opened = Document::open(new.path().join("b.toml").to_str().unwrap()).unwrap();
     let loaded = opened.loaded();
     biscale::geometry::build(&loaded.scene.tile, &loaded.base_dir).unwrap();
+}
+
+#[test]
+fn choosing_another_image_drops_the_painted_one_and_undo_brings_it_back() {
+    let mut document = quick();
+    stroke(&mut document, Tool::Raise);
+    let painted = document.painted().clone();
+    let mut scene = (**document.scene()).clone();
+    if let Geometry::Heightfield(field) = &mut scene.tile.geometry {
+        field.path = Some("asset:ripples.png".into());
+    }
+    document.edit(scene);
+    assert!(document.painted().heights.is_none());
+    document.undo();
+    assert_eq!(*document.painted(), painted);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod documents;
 mod interface;
+mod latency;
 mod soak;
 
 use std::time::{Duration, Instant};

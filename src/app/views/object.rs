@@ -29,6 +29,8 @@ pub struct ObjectView {
     pub asked: Option<(u64, [usize; 2])>,
     /// What the worker is at, for the status line.
     pub doing: Option<&'static str>,
+    /// The version whose refinement was given up.
+    pub stopped: Option<u64>,
     pub kept: Option<Kept>,
     /// Where the wipe stands, 0 left to 1 right.
     pub wipe: f32,
@@ -133,6 +135,9 @@ impl ObjectView {
                 if ui.selectable_label(on, name).on_hover_text(tip).clicked() {
                     action = Some(which);
                 }
+            }
+            if self.kept.is_some() && ui.button("Back to A").on_hover_text("Undo all edits since A, as one").clicked() {
+                action = Some(Action::BackToA);
             }
         });
         action

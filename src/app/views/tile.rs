@@ -82,7 +82,7 @@ impl Default for TileState {
 
 impl TileState {
     /// The job for what is to be shown, where it is not what was asked for last. `direction` is the chosen one.
-    pub fn job(&mut self, loaded: &Arc<LoadedScene>, version: u64, direction: Vec3) -> Option<TileJob> {
+    pub fn job(&mut self, loaded: &Arc<LoadedScene>, direction: Vec3) -> Option<TileJob> {
         if self.size[0] == 0 {
             return None;
         }
@@ -106,7 +106,7 @@ impl TileState {
         self.inputs = Some(inputs);
         let (view, show, facets) = wanted.clone();
         self.asked = Some(wanted);
-        Some(TileJob { version, loaded: loaded.clone(), view, show, facets })
+        Some(TileJob { loaded: loaded.clone(), view, show, facets })
     }
 
     fn view(&self, tile: Vec2) -> TileView {
@@ -275,11 +275,11 @@ impl TileState {
 /// How hard a pen presses; a mouse presses fully.
 fn pressure(ui: &Ui) -> f32 {
     ui.input(|input| {
-        let forces = input.events.iter().filter_map(|event| match event {
+        let mut forces = input.events.iter().filter_map(|event| match event {
             egui::Event::Touch { force, .. } => *force,
             _ => None,
         });
-        forces.last().unwrap_or(1.0)
+        forces.next_back().unwrap_or(1.0)
     })
 }
 

@@ -24,7 +24,7 @@ pub use tile::{Show, TileAnswer, TileJob, TileMade};
 pub fn spawn_tile(answer: impl Fn(TileAnswer) + Clone + Send + Sync + 'static) -> Option<Worker<TileJob>> {
     let told = answer.clone();
     let work = move |kept: &mut tile::Macro, job, desk: &runner::Desk<TileJob>| kept.work(job, desk, &answer);
-    let panicked = move |text: String| told(TileAnswer::Failed(0, format!("a fault in the program ({text})")));
+    let panicked = move |text: String| told(TileAnswer::Failed(format!("a fault in the program ({text})")));
     Worker::spawn("tile", 0, tile::Macro::default, work, panicked).ok()
 }
 
@@ -62,6 +62,11 @@ impl Pictures {
     pub fn ask(&self, job: PictureJob) {
         self.refine.ask(job.clone());
         self.draft.ask(job);
+    }
+
+    /// What is shown is good enough: no refinement.
+    pub fn stop(&self) {
+        self.refine.cancel();
     }
 }
 

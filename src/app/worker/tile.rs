@@ -39,7 +39,6 @@ pub enum Show {
 /// A picture to make.
 #[derive(Debug, Clone)]
 pub struct TileJob {
-    pub version: u64,
     pub loaded: Arc<LoadedScene>,
     pub view: TileView,
     pub show: Show,
@@ -49,17 +48,14 @@ pub struct TileJob {
 /// A picture of the tile and what the interface asks of the tile itself.
 #[derive(Debug, Clone)]
 pub struct TileMade {
-    pub version: u64,
-    pub view: TileView,
     pub image: Arc<ColorImage>,
     pub tile: Arc<CloseUp>,
     pub facets: Option<Arc<Facets>>,
-    pub ms: f64,
 }
 
 pub enum TileAnswer {
     Made(Box<TileMade>),
-    Failed(u64, String),
+    Failed(String),
 }
 
 type Key = (Tile, std::path::PathBuf, Painted);
@@ -79,7 +75,7 @@ impl Macro {
     pub fn work(&mut self, job: TileJob, desk: &Desk<TileJob>, answer: &dyn Fn(TileAnswer)) {
         match self.steps(&job, desk, answer) {
             Ok(()) | Err(Error::Cancelled) => {}
-            Err(error) => answer(TileAnswer::Failed(job.version, error.to_string())),
+            Err(error) => answer(TileAnswer::Failed(error.to_string())),
         }
     }
 
@@ -103,14 +99,7 @@ impl Macro {
             self.cost = ms / (view.size[0] * view.size[1]) as f64;
             let image = Arc::new(color_image(&picture, &tone_map));
             let (tile, facets) = (tile.clone(), facets.clone());
-            answer(TileAnswer::Made(Box::new(TileMade {
-                version: job.version,
-                view: job.view,
-                image,
-                tile,
-                facets,
-                ms,
-            })));
+            answer(TileAnswer::Made(Box::new(TileMade { image, tile, facets })));
         }
         Ok(())
     }
