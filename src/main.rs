@@ -6,7 +6,6 @@ mod commands;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context as _;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// What does a surface with tiny structures look like from far away?
@@ -154,9 +153,10 @@ struct MaterialsArgs {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
-        None => {
-            app::run(cli.scene.as_deref()).context("taken as a scene to edit, as no command was given (see --help)")
-        }
+        None => app::run(cli.scene.as_deref()).map_err(|error| match error.downcast_ref::<biscale::Error>() {
+            Some(_) => error.context("taken as a scene to edit, as no command was given (see --help)"),
+            None => error,
+        }),
         Some(command) => run(command),
     };
     match result {

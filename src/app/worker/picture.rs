@@ -21,6 +21,8 @@ use super::tone::color_image;
 const DRAFT_MS: f64 = 60.0;
 /// Pictures on the way to the full one.
 const STEPS_MS: [f64; 2] = [300.0, 2000.0];
+/// The last one; where the view's own size would take longer, it is smaller (an exported picture never is).
+const FINAL_MS: f64 = 8000.0;
 /// Most pixels of a picture; a larger view shows it enlarged.
 const MOST_PIXELS: f64 = 768.0 * 768.0;
 /// How long the hand must rest before refinement begins.
@@ -152,11 +154,11 @@ impl Photographer {
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
         answer(PictureAnswer::Doing(job.version, "Refining the picture"));
         self.studio.prepare(&job.loaded)?;
-        let full = fitting(job.size);
         let mut shown = 0;
         for budget in STEPS_MS {
             let step = self.affordable(job.size, 1, budget);
             let pixels = step[0] * step[1];
+            let full = self.affordable(job.size, 1, FINAL_MS);
             // Steps that gain little are left out.
             if pixels >= 2 * shown && pixels * 3 < full[0] * full[1] * 2 {
                 let mut made = self.shoot(job, &outcome, 1, step, 1, desk.cancel)?;
@@ -166,6 +168,7 @@ impl Photographer {
                 answer(PictureAnswer::Made(Box::new(made)));
             }
         }
+        let full = self.affordable(job.size, 1, FINAL_MS);
         let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
         made.grade = Grade::Final;
         *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
