@@ -10,6 +10,9 @@ pub enum Error {
     Input(Box<InputError>),
     #[error("{0}")]
     Failed(String),
+    /// The caller asked for it ([`crate::Cancel`]).
+    #[error("cancelled")]
+    Cancelled,
 }
 
 pub type Result<T> = std::result::Result<T, Error>;
@@ -87,7 +90,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Input(_) => 2,
-            Self::Failed(_) => 1,
+            Self::Failed(_) | Self::Cancelled => 1,
         }
     }
 }

@@ -14,6 +14,8 @@
 
 pub mod accuracy;
 pub mod brdf;
+pub mod cancel;
+pub mod close_up;
 pub mod directions;
 pub mod error;
 pub mod export;
@@ -29,4 +31,5 @@ pub mod scene;
 pub mod simd;
 pub mod visibility;
 
+pub use cancel::Cancel;
 pub use error::{Error, InputError, Result};

@@ -1,5 +1,6 @@
 //! The `biscale` program: the command line in front of the library.
 
+mod app;
 mod commands;
 
 use std::path::PathBuf;
@@ -9,14 +10,21 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// What does a surface with tiny structures look like from far away?
 #[derive(Debug, Parser)]
-#[command(name = "biscale", version, about, arg_required_else_help = true)]
+#[command(name = "biscale", version, about, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
+    /// Opens the editor on this scene: a file, or the name of a shipped one.
+    scene: Option<String>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Open the editor (also without this word).
+    Edit {
+        /// A scene file, or the name of a shipped material.
+        scene: Option<String>,
+    },
     /// Shade the scene's object and write a picture (.png or linear .exr).
     Render(RenderArgs),
     /// Evaluate f̄ [1/sr] (the light's cosine included) at direction pairs of a CSV file.
@@ -222,16 +230,11 @@ struct MaterialsArgs {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
-        Command::Render(args) => commands::render::run(&args),
-        Command::Eval(args) => commands::eval::run(&args),
-        Command::Export(args) => commands::export::run(&args),
-        Command::Fit(args) => commands::fit::run(&args),
-        Command::Tile(args) => commands::tile::run(&args),
-        Command::Plan(args) => commands::plan::run(&args),
-        Command::Basis(args) => commands::basis::run(&args),
-        Command::Profile(args) => commands::profile::run(&args),
-        Command::Report(args) => commands::report::run(&args),
-        Command::Materials(args) => commands::materials::run(&args),
+        None => app::run(cli.scene.as_deref()).map_err(|error| match error.downcast_ref::<biscale::Error>() {
+            Some(_) => error.context("taken as a scene to edit, as no command was given (see --help)"),
+            None => error,
+        }),
+        Some(command) => run(command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -243,5 +246,21 @@ fn main() -> ExitCode {
             eprintln!("biscale: {error:#}");
             ExitCode::from(error.downcast_ref::<biscale::Error>().map_or(1, biscale::Error::exit_code))
         }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<()> {
+    match command {
+        Command::Edit { scene } => app::run(scene.as_deref()),
+        Command::Render(args) => commands::render::run(&args),
+        Command::Eval(args) => commands::eval::run(&args),
+        Command::Export(args) => commands::export::run(&args),
+        Command::Fit(args) => commands::fit::run(&args),
+        Command::Tile(args) => commands::tile::run(&args),
+        Command::Plan(args) => commands::plan::run(&args),
+        Command::Basis(args) => commands::basis::run(&args),
+        Command::Profile(args) => commands::profile::run(&args),
+        Command::Report(args) => commands::report::run(&args),
+        Command::Materials(args) => commands::materials::run(&args),
     }
 }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::accuracy::{Errors, Reference, mirror_biased_pairs, upper_errors};
 use crate::brdf::{Brdf, MeasuredCache, Term};
+use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
 use crate::filtering::{
@@ -18,7 +19,7 @@ use crate::filtering::{
 use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
 use crate::plan::{Backend, Costs, Findings, Plan, Preset, Route, Settings, decide};
-use crate::scene::{LoadedScene, Material, Scene, Tile};
+use crate::scene::{LoadedScene, Material, Painted, Scene, Tile};
 use crate::visibility::{
     Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
 };
@@ -52,6 +53,7 @@ impl<K: PartialEq, T> Stage<K, T> {
         name: &'static str,
         key: K,
         times: &mut StageTimes,
+        cancel: &Cancel,
         make: impl FnOnce() -> Result<T>,
     ) -> Result<(Arc<T>, Version)> {
         if let Some((last, value)) = &self.last
@@ -59,8 +61,11 @@ impl<K: PartialEq, T> Stage<K, T> {
         {
             return Ok((value.clone(), self.version));
         }
+        cancel.check()?;
         let start = Instant::now();
         let value = Arc::new(make()?);
+        // A stage that was told to stop may have made anything.
+        cancel.check()?;
         times.push((name, start.elapsed().as_secs_f64() * 1e3));
         self.last = Some((key, value.clone()));
         self.version += 1;
@@ -79,6 +84,7 @@ struct Shape {
 /// The material of each slot of a mesh, by number, and the materials.
 type Assigned = (Vec<usize>, Vec<SumMaterial>);
 type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
+type ShapeKey = (Tile, PathBuf, Painted);
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
 /// Mesh, count, seed, and whether they are drawn as the paper does.
 type FacetKey = (Version, usize, u64, bool);
@@ -113,11 +119,12 @@ struct Last {
 #[derive(Debug, Default)]
 pub struct Pipeline {
     cache: MeasuredCache,
+    cancel: Cancel,
     gpu: Option<Gpu>,
     gpu_asked: bool,
     /// Work of one slice of the mesh, for a version of the facets.
     scan_work: Option<(Version, f64)>,
-    shape: Stage<(Tile, PathBuf), Shape>,
+    shape: Stage<ShapeKey, Shape>,
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     materials: Stage<MaterialKey, Assigned>,
@@ -134,6 +141,12 @@ impl Pipeline {
         Self::default()
     }
 
+    /// What is asked of this pipeline from now on ends with [`crate::Error::Cancelled`] soon after `cancel` is set. Stages
+    /// that were finished before stay.
+    pub fn cancel_with(&mut self, cancel: Cancel) {
+        self.cancel = cancel;
+    }
+
     /// The effective BRDF of a scene at its own quality.
     ///
     /// # Errors
@@ -148,7 +161,7 @@ impl Pipeline {
 
         let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011);
         let (facets, facets_version) =
-            self.facets.get("facets", facet_key, &mut times, || Ok(sample(&shape.mesh, &settings)))?;
+            self.facets.get("facets", facet_key, &mut times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
         let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
         let found =
             self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
@@ -164,10 +177,10 @@ impl Pipeline {
             settings.map_resolution,
             settings.penumbra.to_bits(),
         );
-        let gpu = self.gpu.as_ref();
-        let (visibility, visibility_version) = self
-            .visibility
-            .get("visibility", key, &mut times, || see(plan.route, &shape.mesh, &facets, &settings, gpu))?;
+        let (gpu, cancel) = (self.gpu.as_ref(), &self.cancel);
+        let (visibility, visibility_version) = self.visibility.get("visibility", key, &mut times, cancel, || {
+            see(plan.route, &shape.mesh, &facets, &settings, gpu, cancel)
+        })?;
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
         let mut factors = None;
@@ -181,6 +194,7 @@ impl Pipeline {
                 factors = kept.map(|factors| factors.recolored(sum_materials));
             }
         }
+        self.cancel.check()?;
         let start = Instant::now();
         if plan.try_low_rank && factors.is_none() {
             let knobs = settings.low_rank(!shape.height_field);
@@ -227,8 +241,12 @@ impl Pipeline {
         let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
         let visibility = visibility_maps_cpu(&shape.mesh, facets, directions.directions(), settings.map_resolution);
         timed(&mut times, "visibility", start);
-        let (factors, _) =
-            self.paper_factors.get("basis", (materials_version, knobs.seed, knobs.colors), &mut times, || {
+        let (factors, _) = self.paper_factors.get(
+            "basis",
+            (materials_version, knobs.seed, knobs.colors),
+            &mut times,
+            &self.cancel,
+            || {
                 let mut made: PaperFactors = Vec::with_capacity(materials.len());
                 for (k, material) in materials.iter().enumerate() {
                     // Two colours of one BRDF share its factors.
@@ -239,7 +257,8 @@ impl Pipeline {
                     });
                 }
                 Ok(made)
-            })?;
+            },
+        )?;
         let start = Instant::now();
         let base_area = f64::from(shape.mesh.base_area());
         let tile = VisibleFacets { facets, visibility: &visibility, directions: &directions, base_area };
@@ -279,9 +298,9 @@ impl Pipeline {
     }
 
     fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, Version)> {
-        let key = (loaded.scene.tile.clone(), loaded.base_dir.clone());
-        self.shape.get("geometry", key, times, || {
-            let mesh = geometry::build(&loaded.scene.tile, &loaded.base_dir)?;
+        let key = (loaded.scene.tile.clone(), loaded.base_dir.clone(), loaded.painted.clone());
+        self.shape.get("geometry", key, times, &self.cancel, || {
+            let mesh = geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted)?;
             let (low, high) = mesh.z_range();
             let flat = high - low <= 1e-7 * mesh.size.max_element();
             let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
@@ -297,7 +316,7 @@ impl Pipeline {
     ) -> Result<(Arc<Assigned>, Version)> {
         let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
         let cache = &mut self.cache;
-        self.materials.get("materials", key, times, || {
+        self.materials.get("materials", key, times, &self.cancel, || {
             let mut material_of_slot = Vec::with_capacity(mesh.slots.len());
             let mut materials: Vec<SumMaterial> = Vec::new();
             let mut made: Vec<Option<usize>> = Vec::new();
@@ -394,7 +413,15 @@ fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
     facets
 }
 
-fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu: Option<&Gpu>) -> Result<Visibility> {
+fn see(
+    route: Route,
+    mesh: &TileMesh,
+    facets: &Facets,
+    settings: &Settings,
+    gpu: Option<&Gpu>,
+    cancel: &Cancel,
+) -> Result<Visibility> {
+    let periodic = || PeriodicGrid::new(mesh).cancelled_by(cancel);
     let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
     Ok(match (route, &mesh.height_grid, gpu) {
         (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
@@ -402,10 +429,10 @@ fn see(route: Route, mesh: &TileMesh, facets: &Facets, settings: &Settings, gpu:
             Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp))
         }
         (Route::HeightMarch | Route::HorizonScan, ..) => {
-            Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(mesh), facets, azimuths, ramp))
+            Visibility::Horizons(Horizons::scan(&periodic(), facets, azimuths, ramp))
         }
         (Route::Slices, ..) => {
-            Visibility::Slices(Slices::scan(&PeriodicGrid::new(mesh), facets, settings.slice_azimuths, ramp))
+            Visibility::Slices(Slices::scan(&periodic(), facets, settings.slice_azimuths, ramp))
         }
         (Route::GpuMaps | Route::CpuMaps, ..) => {
             let (grid, resolution) = (settings.map_grid, settings.map_resolution);

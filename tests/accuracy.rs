@@ -62,7 +62,12 @@ fn open(geometry: &str, brdf: &str, preset: &str) -> LoadedScene {
     let source = format!(
         "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\npreset = \"{preset}\"\nbackend = \"cpu\"\n"
     );
-    LoadedScene { scene: scene::parse(&source).unwrap(), base_dir: PathBuf::new(), name: "test".to_owned() }
+    LoadedScene {
+        scene: scene::parse(&source).unwrap(),
+        base_dir: PathBuf::new(),
+        name: "test".to_owned(),
+        painted: scene::Painted::default(),
+    }
 }
 
 fn evaluate(brdf: &EffectiveBrdf, pairs: &[Pair]) -> Vec<Vec3> {

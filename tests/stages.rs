@@ -24,6 +24,7 @@ backend = "cpu"
         scene: scene::load_with_overrides(source, &overrides).unwrap(),
         base_dir: PathBuf::new(),
         name: "test".to_owned(),
+        painted: scene::Painted::default(),
     }
 }
 

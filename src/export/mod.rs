@@ -133,6 +133,16 @@ impl Format {
     }
 }
 
+/// The endings that [`write`] knows.
+pub fn endings() -> impl Iterator<Item = &'static str> {
+    FORMATS.iter().map(|(ending, _)| *ending)
+}
+
+/// Whether steps of theta and phi may be chosen for a file of this name; other formats bring their own grid.
+pub fn grid_is_free(path: &Path) -> bool {
+    Format::of(path).is_ok_and(|format| format.describes_itself() || format == Format::Astm)
+}
+
 /// Whether [`write`] knows the ending of `path`: to be asked before any long work.
 ///
 /// # Errors

@@ -26,6 +26,12 @@ pub fn build(spec: &Heightfield, size: Vec2, base_dir: &Path) -> Result<TileMesh
     Ok(from_grid(HeightGrid { size: pixels.size, heights: pixels.values }, size))
 }
 
+/// As [`build`], from heights in memory.
+pub fn build_painted(spec: &Heightfield, size: Vec2, painted: &Pixels<f32>) -> TileMesh {
+    let heights = painted.values.iter().map(|height| height * spec.height_scale).collect();
+    from_grid(HeightGrid { size: painted.size, heights }, size)
+}
+
 fn from_rows(rows: &[Vec<f32>]) -> Result<Pixels<f32>> {
     let width = rows.first().map_or(0, Vec::len);
     if width == 0 || rows.iter().any(|row| row.len() != width) {

@@ -9,20 +9,13 @@ use glam::{UVec2, Vec3};
 use image::{DynamicImage, ImageReader, Limits};
 
 use crate::error::{InputError, Result};
+pub use crate::scene::Pixels;
 use crate::scene::files;
 
 const LARGEST_FILE: u64 = 256 << 20;
 /// Pixels along a side, and in all.
 const LARGEST_SIDE: u32 = 4096;
 const MOST_PIXELS: u64 = 1 << 22;
-
-/// An image as numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pixels<T> {
-    pub size: UVec2,
-    /// Row by row, row 0 first in the file.
-    pub values: Vec<T>,
-}
 
 /// Reads heights: the value of a grey image (0 to 1 for integer formats), the luminance of a coloured one.
 ///

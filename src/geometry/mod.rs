@@ -31,24 +31,41 @@ pub use pyramids::OnePyramid;
 pub use tile_mesh::{ColorField, HeightGrid, TileMesh};
 
 use crate::error::{InputError, Result};
-use crate::scene::{Geometry, Tile};
+use crate::scene::{Geometry, Painted, Tile};
 
 /// The mesh of a tile; `base_dir` is the scene file's folder, where relative paths start.
 ///
 /// # Errors
 /// A file that is missing or not what it should be.
 pub fn build(tile: &Tile, base_dir: &Path) -> Result<TileMesh> {
+    build_painted(tile, base_dir, &Painted::default())
+}
+
+/// As [`build`], with images in memory in place of the files that the geometry names.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_painted(tile: &Tile, base_dir: &Path, painted: &Painted) -> Result<TileMesh> {
     let size = tile.size;
     let (mut mesh, color_path) = match &tile.geometry {
         Geometry::Grooves(spec) => (grooves::build(spec, size), None),
         Geometry::Pyramids(spec) => (pyramids::build(spec, size), None),
         Geometry::Rods(spec) => (rods::build(spec, size), None),
         Geometry::Weave(spec) => (weave::build(spec, size), None),
-        Geometry::Heightfield(spec) => (heightfield::build(spec, size, base_dir)?, spec.color_path.as_deref()),
+        Geometry::Heightfield(spec) => {
+            let mesh = match &painted.heights {
+                Some(heights) => heightfield::build_painted(spec, size, heights),
+                None => heightfield::build(spec, size, base_dir)?,
+            };
+            (mesh, spec.color_path.as_deref())
+        }
         Geometry::Flat(spec) => (flat::build(spec, size), spec.color_path.as_deref()),
         Geometry::Mesh(spec) => (mesh_file::build(spec, size, base_dir)?, spec.color_path.as_deref()),
     };
-    if let Some(path) = color_path {
+    let takes_colors = matches!(&tile.geometry, Geometry::Heightfield(_) | Geometry::Flat(_) | Geometry::Mesh(_));
+    if let (true, Some(image)) = (takes_colors, &painted.colors) {
+        mesh.color = ColorField::Image { size: image.size, texels: Arc::new(image.values.clone()) };
+    } else if let Some(path) = color_path {
         let image = image_file::read_colors(base_dir, path)?;
         mesh.color = ColorField::Image { size: image.size, texels: Arc::new(image.values) };
     }

@@ -45,7 +45,8 @@ impl CameraView {
         } else {
             framing_distance(mesh, sin_elevation, cos_elevation, tan_half_fov / MARGIN)
         };
-        Ok(Self { eye: mesh.bounds.center + back * distance, right, up, back, tan_half_fov, near: NEAR * radius, size })
+        let center = mesh.bounds.center + (right * camera.pan.x + up * camera.pan.y) * radius;
+        Ok(Self { eye: center + back * distance, right, up, back, tan_half_fov, near: NEAR * radius, size })
     }
 
     /// Coordinates of a world point along right, up and forwards from the eye.
@@ -92,6 +93,9 @@ fn check(camera: &scene::Camera) -> Result<()> {
     }
     if !camera.elevation_deg.is_finite() {
         return complain("elevation_deg", camera.elevation_deg, "a finite angle in degrees");
+    }
+    if !camera.pan.is_finite() {
+        return Err(InputError::new("camera.pan", camera.pan, "finite numbers").into());
     }
     if !(camera.distance == 0.0 || (0.01..=1e4).contains(&camera.distance)) {
         return complain("distance", camera.distance, "0 (automatic), or 0.01 to 10000 radii of the object");

@@ -41,7 +41,12 @@ fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
         "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\ncolor = [0.9, 0.7, 0.5]\n\
          [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 300\n"
     );
-    LoadedScene { scene: scene::parse(&text).unwrap(), base_dir: ".".into(), name: String::new() }
+    LoadedScene {
+        scene: scene::parse(&text).unwrap(),
+        base_dir: ".".into(),
+        name: String::new(),
+        painted: scene::Painted::default(),
+    }
 }
 
 fn effective(loaded: &LoadedScene) -> EffectiveBrdf {

@@ -6,7 +6,7 @@ use toml::Table;
 use toml::de::{DeTable, DeValue};
 
 use super::check::{self, Problem, Step};
-use super::{Scene, overrides, shipped};
+use super::{Painted, Scene, overrides, shipped};
 use crate::error::{Error, InputError, Result};
 
 /// A scene with the folder that its relative paths start from.
@@ -17,6 +17,8 @@ pub struct LoadedScene {
     pub base_dir: PathBuf,
     /// The file's stem or the shipped name, for titles.
     pub name: String,
+    /// Images that an editor holds in place of files.
+    pub painted: Painted,
 }
 
 /// A scene file is text written by people: more than this is something else.
@@ -31,7 +33,12 @@ pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
     if let Some(source) = shipped::source(scene) {
         let parsed =
             load_with_overrides(source, overrides).map_err(|error| error.in_file(format!("{scene} (shipped)")))?;
-        return Ok(LoadedScene { scene: parsed, base_dir: PathBuf::new(), name: scene.to_owned() });
+        return Ok(LoadedScene {
+            scene: parsed,
+            base_dir: PathBuf::new(),
+            name: scene.to_owned(),
+            painted: Painted::default(),
+        });
     }
     let error = if path.is_dir() {
         InputError::new("", "a folder", "a scene file").in_file(path)
@@ -59,7 +66,8 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScene> {
     let source = std::fs::read_to_string(path).map_err(|error| complain(error.to_string()))?;
     let scene = load_with_overrides(&source, overrides).map_err(|error| error.in_file(path))?;
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(LoadedScene { scene, base_dir: path.parent().unwrap_or(Path::new("")).to_owned(), name })
+    let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
+    Ok(LoadedScene { scene, base_dir, name, painted: Painted::default() })
 }
 
 /// A scene from its text.

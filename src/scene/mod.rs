@@ -10,6 +10,7 @@ pub mod files;
 mod load;
 mod material;
 mod overrides;
+mod painted;
 mod quality;
 mod schema;
 pub mod shipped;
@@ -27,6 +28,7 @@ use serde::{Deserialize, Serialize};
 
 pub use load::{LoadedScene, load, load_with_overrides, open, parse};
 pub use material::{BrdfSpec, Material, TermSpec};
+pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, METHODS, NORMALS, PRESETS, Quality};
 pub use schema::{Field, Kind, Shape};
 pub use tile::{

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::color;
@@ -73,6 +73,8 @@ scene_table! {
         elevation_deg: f32 = 20.0, number(-90.0, 90.0), "degrees";
         /// Distance in radii of the object's bounding sphere; 0 frames the object.
         distance: f32 = 0.0, Shape::Number { min: 0.0, max: 1e4, soft_max: 20.0 }, "radii";
+        /// Moves what is looked at across the picture: to the right and up.
+        pan: Vec2 = Vec2::ZERO, Shape::Vector { length: 2, min: -100.0, max: 100.0 }, "radii";
         /// Vertical field of view.
         fov_deg: f32 = 30.0, number(1.0, 150.0), "degrees";
         /// Exposure in stops.

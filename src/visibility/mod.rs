@@ -6,6 +6,7 @@
 mod gpu_maps;
 mod height_march;
 mod horizons;
+mod nearest;
 mod packed;
 mod periodic_grid;
 mod ray_cast;
@@ -24,6 +25,7 @@ use glam::Vec3;
 
 pub use gpu_maps::{GpuShadowMaps, visibility_maps_gpu};
 pub use horizons::Horizons;
+pub use nearest::Hit;
 pub use packed::PackedVisibility;
 pub use periodic_grid::PeriodicGrid;
 pub use ray_cast::{lifted_origins, ray_cast, sees};

@@ -103,7 +103,7 @@ impl Slicer<'_> {
     pub(super) fn scan(&self, origin: Vec3, normal: Vec3, along: Vec2, own: u32, blocked: &mut BlockedSlopes) {
         let grid = self.grid;
         blocked.start_from_facing(normal, along);
-        if blocked.ground == f32::INFINITY {
+        if blocked.ground == f32::INFINITY || grid.cancel.is_set() {
             return;
         }
         let clearance = grid.top - origin.z;

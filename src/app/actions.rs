@@ -1,0 +1,109 @@
+//! Everything that menus and keys can ask for, with names and shortcuts in one table.
+
+use std::path::PathBuf;
+
+use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
+
+/// One thing to do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Action {
+    New,
+    Open,
+    OpenFile(PathBuf),
+    OpenShipped(String),
+    Reload,
+    Save,
+    SaveAs,
+    ExportTable,
+    ExportPicture,
+    Quit,
+    Undo,
+    Redo,
+    CopyMaterial,
+    PasteMaterial,
+    Frame,
+    Exchange,
+    Paint,
+    Gallery,
+    Snapshot,
+    BackToA,
+    Pick,
+    Theme,
+    ZoomIn,
+    ZoomOut,
+    ZoomReset,
+    Help,
+    About,
+}
+
+/// An action as people see it.
+pub struct Entry {
+    pub action: Action,
+    pub name: &'static str,
+    pub keys: Option<KeyboardShortcut>,
+}
+
+const fn entry(action: Action, name: &'static str, keys: Option<KeyboardShortcut>) -> Entry {
+    Entry { action, name, keys }
+}
+
+const fn command(key: Key) -> Option<KeyboardShortcut> {
+    Some(KeyboardShortcut::new(Modifiers::COMMAND, key))
+}
+
+const fn shifted(key: Key) -> Option<KeyboardShortcut> {
+    Some(KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), key))
+}
+
+const fn plain(key: Key) -> Option<KeyboardShortcut> {
+    Some(KeyboardShortcut::new(Modifiers::NONE, key))
+}
+
+/// The table that menus, keys and the help window read.
+pub const ENTRIES: &[Entry] = &[
+    entry(Action::New, "New", command(Key::N)),
+    entry(Action::Open, "Open…", command(Key::O)),
+    entry(Action::Reload, "Reload from disk", None),
+    entry(Action::Save, "Save", command(Key::S)),
+    entry(Action::SaveAs, "Save as…", shifted(Key::S)),
+    entry(Action::ExportTable, "Export BRDF table…", command(Key::E)),
+    entry(Action::ExportPicture, "Export picture…", shifted(Key::E)),
+    entry(Action::Quit, "Quit", command(Key::Q)),
+    entry(Action::Undo, "Undo", command(Key::Z)),
+    entry(Action::Redo, "Redo", shifted(Key::Z)),
+    entry(Action::CopyMaterial, "Copy material", shifted(Key::C)),
+    entry(Action::PasteMaterial, "Paste material", shifted(Key::V)),
+    entry(Action::Frame, "Frame the object", plain(Key::F)),
+    entry(Action::Exchange, "Exchange the two views", plain(Key::X)),
+    entry(Action::Paint, "Paint on the tile", plain(Key::P)),
+    entry(Action::Gallery, "Gallery", plain(Key::G)),
+    entry(Action::Snapshot, "Compare with now (A/B)", plain(Key::B)),
+    entry(Action::BackToA, "Back to A", None),
+    entry(Action::Pick, "Pick on the object", plain(Key::I)),
+    entry(Action::Theme, "Light or dark", None),
+    entry(Action::ZoomIn, "Larger interface", command(Key::Plus)),
+    entry(Action::ZoomOut, "Smaller interface", command(Key::Minus)),
+    entry(Action::ZoomReset, "Usual interface size", command(Key::Num0)),
+    entry(Action::Help, "Help and shortcuts", plain(Key::F1)),
+    entry(Action::About, "About biscale", None),
+];
+
+pub fn of(action: &Action) -> Option<&'static Entry> {
+    ENTRIES.iter().find(|entry| entry.action == *action)
+}
+
+/// The action whose keys were pressed. Longer shortcuts first: Shift+Ctrl+S is not Ctrl+S. Plain keys are letters while a
+/// text is typed.
+pub fn pressed(ctx: &Context) -> Option<Action> {
+    let typing = ctx.text_edit_focused();
+    let mut entries: Vec<&Entry> = ENTRIES.iter().filter(|entry| entry.keys.is_some()).collect();
+    entries.sort_by_key(|entry| std::cmp::Reverse(entry.keys.map(|keys| keys.modifiers.shift)));
+    let hit = |entry: &&&Entry| {
+        entry.keys.is_some_and(|keys| {
+            let is_plain = keys.modifiers == Modifiers::NONE;
+            let edits_text = matches!(entry.action, Action::Undo | Action::Redo);
+            !(typing && (is_plain || edits_text)) && ctx.input_mut(|input| input.consume_shortcut(&keys))
+        })
+    };
+    entries.iter().find(hit).map(|entry| entry.action.clone())
+}

@@ -1,0 +1,244 @@
+//! A file dialog of our own: a typed path and a list beside it. It needs no portal and works the same everywhere.
+
+use std::path::{Path, PathBuf};
+
+use eframe::egui::{self, Key, RichText, ScrollArea, Ui};
+
+/// What a file is chosen for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Purpose {
+    OpenScene,
+    SaveScene,
+    /// A measured BRDF for a term of a material.
+    Measured {
+        material: usize,
+        term: usize,
+    },
+    Heights,
+    Colors,
+    TileMesh,
+    ObjectMesh,
+    Environment,
+    SaveHeights,
+    SaveColors,
+    ExportTable,
+    ExportPicture,
+}
+
+impl Purpose {
+    fn title(&self) -> &'static str {
+        match self {
+            Self::OpenScene => "Open a scene",
+            Self::SaveScene => "Save the scene",
+            Self::Measured { .. } => "Open a measured BRDF",
+            Self::Heights => "Open an image of heights",
+            Self::Colors => "Open an image of colours",
+            Self::TileMesh => "Open a mesh for the tile",
+            Self::ObjectMesh => "Open an object",
+            Self::Environment => "Open an environment",
+            Self::SaveHeights => "Save the heights",
+            Self::SaveColors => "Save the colours",
+            Self::ExportTable => "Export the BRDF table",
+            Self::ExportPicture => "Export the picture",
+        }
+    }
+
+    pub fn endings(&self) -> &'static [&'static str] {
+        match self {
+            Self::OpenScene | Self::SaveScene => &["toml"],
+            Self::Measured { .. } => &["binary", "bsdf", "bin", "npz"],
+            Self::Heights | Self::Colors => &["png", "jpg", "jpeg", "tif", "tiff", "hdr", "exr"],
+            Self::TileMesh | Self::ObjectMesh => &["obj"],
+            Self::Environment => &["hdr", "exr"],
+            Self::SaveHeights | Self::SaveColors | Self::ExportPicture => &["png", "exr"],
+            Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm"],
+        }
+    }
+
+    fn saves(&self) -> bool {
+        matches!(self, Self::SaveScene | Self::SaveHeights | Self::SaveColors | Self::ExportTable | Self::ExportPicture)
+    }
+}
+
+/// An open dialog.
+#[derive(Debug)]
+pub struct FileDialog {
+    pub purpose: Purpose,
+    folder: PathBuf,
+    /// What stands in the text field: a name in the folder or any path.
+    pub typed: String,
+    /// Folders, then files, of `folder`.
+    entries: Vec<(String, bool)>,
+    all: bool,
+    trouble: Option<String>,
+    /// The file that would be written over, asked about once.
+    over: Option<PathBuf>,
+    fresh: bool,
+}
+
+impl FileDialog {
+    pub fn new(purpose: Purpose, folder: &Path, name: &str) -> Self {
+        let here = std::env::current_dir().unwrap_or_default();
+        let folder = if folder.as_os_str().is_empty() { here } else { std::path::absolute(folder).unwrap_or(here) };
+        let mut dialog = Self {
+            purpose,
+            folder,
+            typed: name.to_owned(),
+            entries: Vec::new(),
+            all: false,
+            trouble: None,
+            over: None,
+            fresh: true,
+        };
+        dialog.list();
+        dialog
+    }
+
+    fn list(&mut self) {
+        self.trouble = None;
+        self.entries.clear();
+        let listing = match std::fs::read_dir(&self.folder) {
+            Ok(listing) => listing,
+            Err(error) => {
+                self.trouble = Some(format!("{}: {error}", self.folder.display()));
+                return;
+            }
+        };
+        let endings = self.purpose.endings();
+        for entry in listing.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let is_folder = entry.path().is_dir();
+            let fits = Path::new(&name).extension().and_then(|ending| ending.to_str());
+            let fits = fits.is_some_and(|ending| endings.contains(&ending.to_ascii_lowercase().as_str()));
+            if !name.starts_with('.') && (is_folder || fits || self.all) {
+                self.entries.push((name, is_folder));
+            }
+        }
+        self.entries.sort_by_key(|(name, is_folder)| (!is_folder, name.to_lowercase()));
+    }
+
+    /// Shows it. `Some(Some(path))` is a choice, `Some(None)` is leaving without one.
+    pub fn ui(&mut self, ctx: &egui::Context) -> Option<Option<PathBuf>> {
+        let mut result = None;
+        let modal = egui::Modal::new(egui::Id::unique("files")).show(ctx, |ui| {
+            ui.set_width(560.0);
+            ui.heading(self.purpose.title());
+            ui.add_space(4.0);
+            result = self.body(ui);
+        });
+        if modal.should_close() && result.is_none() {
+            result = Some(None);
+        }
+        result
+    }
+
+    fn body(&mut self, ui: &mut Ui) -> Option<Option<PathBuf>> {
+        let mut go_to = None;
+        ui.horizontal(|ui| {
+            if ui.button("Up").on_hover_text("The folder above").clicked() {
+                go_to = self.folder.parent().map(Path::to_owned);
+            }
+            if ui.button("Home").clicked() {
+                go_to = std::env::var_os("HOME").or_else(|| std::env::var_os("USERPROFILE")).map(PathBuf::from);
+            }
+            ui.add(egui::Label::new(RichText::new(self.folder.display().to_string()).weak()).truncate());
+        });
+        let mut chosen = false;
+        egui::Frame::canvas(ui.style()).inner_margin(4).show(ui, |ui| {
+            ScrollArea::vertical().max_height(280.0).min_scrolled_height(280.0).auto_shrink([false, false]).show(
+                ui,
+                |ui| {
+                    for (name, is_folder) in &self.entries {
+                        let text = if *is_folder { format!("{name}/") } else { name.clone() };
+                        let response = ui.selectable_label(!is_folder && *name == self.typed, text);
+                        if response.clicked() {
+                            if *is_folder {
+                                go_to = Some(self.folder.join(name));
+                            } else {
+                                self.typed.clone_from(name);
+                            }
+                        }
+                        chosen |= response.double_clicked() && !is_folder;
+                    }
+                    if self.entries.is_empty() {
+                        let kinds = self.purpose.endings().join(", .");
+                        ui.weak(format!("No .{kinds} here."));
+                    }
+                },
+            );
+        });
+        if let Some(folder) = go_to {
+            self.folder = folder;
+            self.list();
+        }
+        let field = ui.horizontal(|ui| {
+            let label = ui.label(if self.purpose.saves() { "Name or path" } else { "Path" });
+            let width = ui.available_width();
+            ui.add(egui::TextEdit::singleline(&mut self.typed).desired_width(width)).labelled_by(label.id)
+        });
+        if self.fresh {
+            field.inner.request_focus();
+            self.fresh = false;
+        }
+        if field.inner.changed() {
+            self.over = None;
+        }
+        chosen |= field.inner.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        if let Some(trouble) = &self.trouble {
+            ui.colored_label(super::super::theme::WARNING, trouble);
+        }
+        let mut left = false;
+        ui.horizontal(|ui| {
+            if ui.checkbox(&mut self.all, "All files").changed() {
+                self.list();
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let word = match (&self.over, self.purpose.saves()) {
+                    (Some(_), _) => "Replace it",
+                    (None, true) => "Save",
+                    (None, false) => "Open",
+                };
+                chosen |= ui.button(word).clicked();
+                left = ui.button("Cancel").clicked();
+            });
+        });
+        if left {
+            return Some(None);
+        }
+        if chosen { self.choose().map(Some) } else { None }
+    }
+
+    /// What is typed as a path, if it can be used; a folder is entered.
+    fn choose(&mut self) -> Option<PathBuf> {
+        let typed = self.typed.trim();
+        if typed.is_empty() {
+            self.trouble = Some("Type a name, or choose one from the list.".to_owned());
+            return None;
+        }
+        let mut path = self.folder.join(typed);
+        if path.is_dir() {
+            self.folder = path;
+            self.typed.clear();
+            self.list();
+            return None;
+        }
+        if !self.purpose.saves() {
+            if path.is_file() {
+                return Some(path);
+            }
+            self.trouble = Some(format!("{}: there is no such file.", path.display()));
+            return None;
+        }
+        if path.extension().is_none()
+            && let Some(ending) = self.purpose.endings().first()
+        {
+            path.set_extension(ending);
+        }
+        if path.exists() && self.over.as_ref() != Some(&path) {
+            self.trouble = Some(format!("{} exists.", path.display()));
+            self.over = Some(path);
+            return None;
+        }
+        Some(path)
+    }
+}

@@ -1,0 +1,449 @@
+//! The editor: what is open, the views, the workers, and one frame of it all.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
+
+use biscale::large_scale::CameraView;
+use biscale::scene::{LoadedScene, Material, Scene};
+use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
+
+use super::actions::{self, Action};
+use super::dialogs::Dialog;
+use super::document::{Document, Recovered, RecoveryFile, Settings, Snapshot};
+use super::messages::{Level, Messages};
+use super::paint::Stroke;
+use super::panels::{self, materials};
+use super::pick;
+use super::theme;
+use super::views::brushes;
+use super::views::gallery::Gallery;
+use super::views::lobe::LobeState;
+use super::views::object::ObjectView;
+use super::views::tile::{self, Hand, TileState, Which};
+use super::worker::{
+    ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer, PictureJob, Pictures, Thumbnail,
+    ThumbnailJob, TileAnswer, TileJob, Worker, spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
+};
+
+/// Least time between recovery files.
+const AUTOSAVE_SECS: f64 = 5.0;
+
+/// What workers send.
+enum Answer {
+    Picture(PictureAnswer),
+    Tile(TileAnswer),
+    Lobe(Box<LobeMade>),
+    Thumbnail(Thumbnail),
+    Export(ExportAnswer),
+    NotAutosaved(String),
+}
+
+/// Everything but the window.
+pub struct Editor {
+    pub document: Document,
+    pub settings: Settings,
+    /// Where settings and recovery files are; none in tests.
+    pub folder: Option<PathBuf>,
+    pub recovery: Option<RecoveryFile>,
+    pub messages: Messages,
+    pub dialog: Option<Dialog>,
+    pub object: ObjectView,
+    pub tile: TileState,
+    pub lobe: LobeState,
+    /// The tile is in the large view.
+    pub exchanged: bool,
+    pub(super) stroke: Option<Stroke>,
+    pub title: String,
+    /// The window may go.
+    pub leaving: bool,
+    pub(super) pictures: Option<Pictures>,
+    tiles: Option<Worker<TileJob>>,
+    lobes: Option<Worker<LobeJob>>,
+    thumbnails: Option<Worker<ThumbnailJob>>,
+    pub(super) exports: Option<Worker<ExportJob>>,
+    /// The part of an export that is done, and what is being done.
+    pub(super) exporting: Option<(f32, &'static str)>,
+    autosaver: Option<Worker<Snapshot>>,
+    /// The version that was kept last, and when the next may be.
+    autosaved: (u64, f64),
+    gallery: Gallery,
+    answers: Receiver<Answer>,
+    pub(super) slots: Vec<String>,
+    /// What workers are given, for a version of the document.
+    loaded: Option<(u64, Arc<LoadedScene>)>,
+    /// Pixels of the object view.
+    size: [usize; 2],
+    hand: Option<Hand>,
+    from_view: Option<Action>,
+    pub(super) copied: Option<Material>,
+}
+
+impl Editor {
+    /// `folder`: where settings are kept; without one nothing is remembered.
+    pub fn new(ctx: &Context, document: Document, folder: Option<PathBuf>) -> Self {
+        let settings = Settings::load(folder.as_deref());
+        theme::install(ctx);
+        ctx.set_theme(if settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
+        ctx.set_zoom_factor(settings.zoom);
+        let mut messages = Messages::default();
+        let (to_us, answers) = channel();
+        let wake = ctx.clone();
+        let send = move |answer| {
+            // Nobody listens any more only when the editor is gone.
+            let _ = to_us.send(answer);
+            wake.request_repaint();
+        };
+        let (to_tile, to_lobe, to_gallery, to_export, to_save) =
+            (send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
+        let pictures = Pictures::spawn(move |answer| send(Answer::Picture(answer)));
+        let tiles = spawn_tile(move |answer| to_tile(Answer::Tile(answer)));
+        let thumbnails = spawn_thumbnail(move |made| to_gallery(Answer::Thumbnail(made)));
+        let exports = spawn_export(move |answer| to_export(Answer::Export(answer)));
+        let autosaver = spawn_autosave(move |text| to_save(Answer::NotAutosaved(text)));
+        let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
+        if pictures.is_none() {
+            messages.put(Level::Trouble, "worker", "The system gave no thread to compute on: nothing will be drawn.");
+        }
+        let recovered = folder.as_deref().map(Recovered::find).unwrap_or_default();
+        let dialog = (!recovered.is_empty()).then_some(Dialog::Recover(recovered));
+        Self {
+            recovery: folder.as_deref().map(RecoveryFile::new),
+            slots: materials::slots_of(&document.scene().tile.geometry),
+            document,
+            settings,
+            folder,
+            messages,
+            dialog,
+            object: ObjectView::default(),
+            tile: TileState::default(),
+            lobe: LobeState::default(),
+            exchanged: false,
+            stroke: None,
+            title: String::new(),
+            leaving: false,
+            pictures,
+            tiles,
+            lobes,
+            thumbnails,
+            exports,
+            exporting: None,
+            autosaver,
+            autosaved: (1, 0.0),
+            gallery: Gallery::default(),
+            answers,
+            copied: None,
+            loaded: None,
+            size: [64, 64],
+            hand: None,
+            from_view: None,
+        }
+    }
+
+    /// One frame in a window: title, files dropped, the way out.
+    pub fn window_frame(&mut self, ui: &mut Ui) {
+        let ctx = ui.ctx().clone();
+        for file in ctx.input(|input| input.raw.dropped_files.clone()) {
+            self.dropped(&ctx, file.path().to_owned());
+        }
+        if ctx.input(|input| input.viewport().close_requested()) && !self.leaving {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            self.perform(&ctx, Action::Quit);
+        }
+        let came_back = ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
+        if came_back && self.dialog.is_none() && self.document.changed_on_disk() {
+            self.dialog = Some(Dialog::ChangedOnDisk { saving: false });
+        }
+        if let Some(rect) = ctx.input(|input| input.viewport().inner_rect) {
+            self.settings.window = rect.size().into();
+        }
+        self.frame(ui);
+        let dirty = if self.document.is_dirty() { "*" } else { "" };
+        let title = format!("{}{dirty} - biscale", self.document.name);
+        if title != self.title {
+            self.title.clone_from(&title);
+            ctx.send_viewport_cmd(ViewportCommand::Title(title));
+        }
+        if self.leaving {
+            self.close();
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+    }
+
+    /// One frame.
+    pub fn frame(&mut self, ui: &mut Ui) {
+        let ctx = ui.ctx().clone();
+        self.take_answers(&ctx);
+        let action = actions::pressed(&ctx);
+        let from_menu = Panel::top("menu").show(ui, |ui| self.menu_ui(ui)).inner;
+        Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
+        let from_gallery = self.gallery_ui(ui);
+        let mut scene = (**self.document.scene()).clone();
+        let asked = Panel::right("parameters")
+            .default_size(self.settings.parameters_width)
+            .size_range(260.0..=620.0)
+            .show(ui, |ui| {
+                let painted = self.document.painted().clone();
+                ScrollArea::vertical()
+                    .auto_shrink([false, false])
+                    .show(ui, |ui| panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots))
+            })
+            .inner
+            .inner;
+        let side = Panel::right("side").default_size(self.settings.side_width).size_range(240.0..=900.0);
+        let side = side.show(ui, |ui| self.side_ui(ui, &mut scene)).response.rect.width();
+        // A width that a narrow window forced is not one to remember.
+        self.settings.side_width = side.clamp(240.0, 900.0);
+        CentralPanel::no_frame().show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 0.0;
+            self.messages.ui(ui);
+            if self.exchanged {
+                self.tile_ui(ui, &scene, 0.0);
+            } else {
+                self.object_ui(ui, &mut scene);
+            }
+        });
+        self.take_scene(scene);
+        self.take_asked(&ctx, asked);
+        if let Some(action) = self.from_view.take() {
+            self.perform(&ctx, action);
+        }
+        self.take_hand();
+        self.brush_keys(&ctx);
+        for action in action.into_iter().chain(from_menu).chain(from_gallery) {
+            self.perform(&ctx, action);
+        }
+        self.dialogs(&ctx);
+        if !ctx.input(|input| input.pointer.any_down()) && !ctx.text_edit_focused() {
+            self.document.rest();
+        }
+        self.request();
+        self.keep_recovery(&ctx);
+        self.fill_gallery();
+    }
+
+    fn gallery_ui(&mut self, ui: &mut Ui) -> Option<Action> {
+        if !self.settings.gallery {
+            return None;
+        }
+        let panel = Panel::left("gallery").default_size(132.0).size_range(118.0..=480.0);
+        let chosen = panel.show(ui, |ui| self.gallery.ui(ui, &self.document.name)).inner;
+        chosen.map(|name| Action::OpenShipped(name.to_owned()))
+    }
+
+    /// Thumbnails are made while nothing else is to be done.
+    fn fill_gallery(&mut self) {
+        let rests = |made: &Made| made.grade >= Grade::Refining && made.version == self.document.version();
+        let idle = self.object.made.as_deref().is_some_and(rests) && self.exporting.is_none();
+        let Some(worker) = &self.thumbnails else { return };
+        if idle && self.settings.gallery {
+            if let Some(job) = self.gallery.job() {
+                worker.ask(job);
+            }
+        } else if self.gallery.is_waiting() {
+            worker.cancel();
+            self.gallery.interrupted();
+        }
+    }
+
+    /// Unsaved work goes to the recovery file some seconds after it was done.
+    fn keep_recovery(&mut self, ctx: &Context) {
+        let Some(recovery) = &self.recovery else { return };
+        let (version, now) = (self.document.version(), ctx.time());
+        if !self.document.is_dirty() || version == self.autosaved.0 {
+            return;
+        }
+        if now < self.autosaved.1 {
+            ctx.request_repaint_after_secs((self.autosaved.1 - now) as f32 + 0.05);
+            return;
+        }
+        if ctx.input(|input| input.pointer.any_down()) {
+            return;
+        }
+        if let (Some(worker), Ok(snapshot)) = (&self.autosaver, recovery.prepare(&self.document)) {
+            worker.ask(snapshot);
+        }
+        self.autosaved = (version, now + AUTOSAVE_SECS);
+    }
+
+    /// Before the window goes: nothing is left to recover.
+    pub fn close(&mut self) {
+        if let Some(worker) = self.autosaver.take() {
+            worker.finish();
+        }
+        if let Some(recovery) = self.recovery.take() {
+            recovery.clear();
+        }
+        self.settings.save(self.folder.as_deref());
+    }
+
+    fn object_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
+        let fill = ui.visuals().panel_fill;
+        egui::Frame::new().fill(fill).inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+            ui.take_available_width();
+            self.from_view = self.object.toolbar(ui, scene);
+        });
+        self.size = self.object.ui(ui, scene);
+        self.pick();
+    }
+
+    /// What the pointer is over tells the lobe view and the tile.
+    fn pick(&mut self) {
+        let (Some(at), Some(made)) = (self.object.pointed, &self.object.made) else { return };
+        let Some((mesh, lights)) = &made.set else { return };
+        let size = [made.picture.width, made.picture.height];
+        let Ok(view) = CameraView::new(&made.camera, mesh, size) else { return };
+        let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
+        if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
+            self.lobe.viewer = Some(picked.viewer);
+            self.lobe.light = picked.light.unwrap_or(self.lobe.light);
+            let value = made.brdf.eval(self.lobe.light, picked.viewer).max_element();
+            self.tile.picked = Some((picked.viewer, 4.0 * value));
+            self.tile.show = Which::Contribution;
+        }
+    }
+
+    /// The tile with its toolbar; `below` is kept free.
+    fn tile_ui(&mut self, ui: &mut Ui, scene: &Scene, below: f32) {
+        ui.add_space(3.0);
+        if let Some(on) = self.tile.toolbar(ui) {
+            self.tile.set_painting(on);
+        }
+        let size = if below > 0.0 { tile::fitting(ui, below) } else { ui.available_size() };
+        self.hand = self.tile.ui(ui, scene.tile.size, size);
+    }
+
+    /// The smaller view, and under it the brush or the lobe.
+    fn side_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
+        if self.exchanged {
+            let size = tile::fitting(ui, 300.0);
+            ui.allocate_ui(size, |ui| self.object_ui(ui, scene));
+        } else {
+            let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + 90.0 };
+            self.tile_ui(ui, scene, below);
+        }
+        ui.add_space(6.0);
+        if self.tile.painting {
+            ScrollArea::vertical().show(ui, |ui| {
+                if let Some(asked) = brushes::ui(ui, &mut self.tile.brush) {
+                    self.brush_asked(asked);
+                }
+            });
+        } else {
+            self.lobe.ui(ui);
+        }
+    }
+
+    /// Strokes come after the panels: what they edit is the scene as it is then.
+    fn take_hand(&mut self) {
+        match self.hand.take() {
+            Some(hand) => self.paint(hand),
+            None if self.stroke.is_some() && !self.tile.painting => self.end_stroke(),
+            None => {}
+        }
+    }
+
+    /// The scene as the panels and views left it, if it can be.
+    fn take_scene(&mut self, scene: Scene) {
+        if scene == **self.document.scene() {
+            return;
+        }
+        match scene.validate() {
+            Ok(()) => {
+                self.messages.clear("edit");
+                self.slots = materials::slots_of(&scene.tile.geometry);
+                self.document.edit(scene);
+            }
+            Err(error) => self.messages.put(Level::Trouble, "edit", format!("Not taken over: {error}")),
+        }
+    }
+
+    /// Asks the workers for what is shown, once for every state and size.
+    fn request(&mut self) {
+        let version = self.document.version();
+        if self.loaded.as_ref().is_none_or(|(last, _)| *last != version) {
+            self.loaded = Some((version, Arc::new(self.document.loaded())));
+        }
+        let Some((_, loaded)) = self.loaded.clone() else { return };
+        let wanted = (version, self.size);
+        if self.object.asked != Some(wanted) {
+            self.object.asked = Some(wanted);
+            self.object.since.get_or_insert_with(Instant::now);
+            if let Some(worker) = &self.pictures {
+                let job = PictureJob { version, loaded: loaded.clone(), size: self.size, asked: Instant::now() };
+                worker.ask(job);
+            }
+        }
+        if let (Some(worker), Some(job)) = (&self.tiles, self.tile.job(&loaded, self.lobe.light)) {
+            worker.ask(job);
+        }
+        if !self.tile.painting
+            && let (Some(worker), Some(made)) = (&self.lobes, &self.object.made)
+            && let Some(job) = self.lobe.job(&made.brdf)
+        {
+            worker.ask(job);
+        }
+    }
+
+    fn take_answers(&mut self, ctx: &Context) {
+        while let Ok(answer) = self.answers.try_recv() {
+            match answer {
+                Answer::Tile(TileAnswer::Made(made)) => {
+                    self.messages.clear("tile");
+                    self.slots.clone_from(&made.tile.mesh.slots);
+                    self.tile.take(ctx, made);
+                }
+                Answer::Tile(TileAnswer::Failed(text)) => self.messages.put(Level::Trouble, "tile", text),
+                Answer::Lobe(made) => self.lobe.take(ctx, made),
+                Answer::Thumbnail(made) => self.gallery.take(ctx, made),
+                Answer::Export(answer) => self.take_export(answer),
+                Answer::NotAutosaved(text) => {
+                    let text = format!("No recovery file could be written ({text}). Save your work yourself.");
+                    self.messages.put(Level::Trouble, "autosave", text);
+                }
+                Answer::Picture(answer) => self.take_picture(ctx, answer),
+            }
+        }
+    }
+
+    fn take_picture(&mut self, ctx: &Context, answer: PictureAnswer) {
+        match answer {
+            PictureAnswer::Made(made) => {
+                self.messages.clear("picture");
+                self.object.since = None;
+                self.object.take(ctx, made);
+            }
+            PictureAnswer::Doing(version, what) if version == self.document.version() => {
+                self.object.doing = Some(what);
+            }
+            PictureAnswer::Doing(..) => {}
+            PictureAnswer::Failed(version, _) if version < self.document.version() => {}
+            PictureAnswer::Failed(_, text) => {
+                self.object.doing = None;
+                self.object.since = None;
+                self.messages.put(Level::Trouble, "picture", text);
+            }
+            PictureAnswer::Fault(text) => {
+                self.object.doing = None;
+                self.object.since = None;
+                let text = format!("A fault in the program while computing ({text}). Your document is kept; edit on.");
+                self.messages.put(Level::Trouble, "picture", text);
+            }
+        }
+    }
+
+    /// Whether anything is being computed.
+    #[cfg(test)]
+    pub fn is_busy(&self) -> bool {
+        self.object.made.as_ref().is_none_or(|made| {
+            made.grade != Grade::Final || Some(made.version) != self.object.asked.map(|(version, _)| version)
+        })
+    }
+
+    /// As from a menu.
+    #[cfg(test)]
+    pub fn action(&mut self, ctx: &Context, action: Action) {
+        self.perform(ctx, action);
+    }
+}

@@ -1,0 +1,27 @@
+//! The desktop editor. It knows the library; the library does not know it.
+//!
+//! ```text
+//! panels, views ─▶ Document ─▶ workers (draft ─▶ refined) ─▶ views
+//! ```
+//! The interface never waits: workers answer over channels and wake it.
+
+mod actions;
+mod dialogs;
+mod document;
+mod editor;
+mod menu;
+mod messages;
+mod paint;
+mod painting;
+mod panels;
+mod perform;
+mod pick;
+mod status;
+#[cfg(test)]
+mod tests;
+mod theme;
+mod views;
+mod window;
+mod worker;
+
+pub use window::run;

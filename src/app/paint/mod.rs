@@ -1,0 +1,70 @@
+//! Painting on images that wrap: brushes for heights and for colours. Plain data in and out.
+
+mod brush;
+mod stroke;
+#[cfg(test)]
+mod tests;
+
+pub use brush::{Brush, Tool};
+pub use stroke::Stroke;
+
+use biscale::geometry::image_file;
+use biscale::scene::{Geometry, LoadedScene, Pixels};
+use glam::{UVec2, Vec3};
+
+/// Samples a side of a new image (Wu et al. 2011, Sec. 5: 128).
+const NEW_SIDE: u32 = 128;
+
+/// The heights that painting begins from: those of the scene, or a plane in the middle of the range.
+///
+/// # Errors
+/// The scene's image cannot be read.
+pub fn heights_of(loaded: &LoadedScene) -> biscale::Result<Pixels<f32>> {
+    if let Some(painted) = &loaded.painted.heights
+        && matches!(loaded.scene.tile.geometry, Geometry::Heightfield(_))
+    {
+        return Ok((**painted).clone());
+    }
+    match &loaded.scene.tile.geometry {
+        Geometry::Heightfield(field) => match (&field.path, &field.values) {
+            (Some(path), _) => image_file::read_heights(&loaded.base_dir, path),
+            (None, Some(rows)) if !rows.is_empty() => {
+                let size = UVec2::new(rows[0].len() as u32, rows.len() as u32);
+                Ok(Pixels { size, values: rows.concat() })
+            }
+            _ => Ok(plane()),
+        },
+        _ => Ok(plane()),
+    }
+}
+
+fn plane() -> Pixels<f32> {
+    Pixels { size: UVec2::splat(NEW_SIDE), values: vec![0.5; (NEW_SIDE * NEW_SIDE) as usize] }
+}
+
+/// The colours that painting begins from: those of the scene, or white.
+///
+/// # Errors
+/// The scene's image cannot be read.
+pub fn colors_of(loaded: &LoadedScene) -> biscale::Result<Pixels<Vec3>> {
+    if let Some(painted) = &loaded.painted.colors {
+        return Ok((**painted).clone());
+    }
+    let mut geometry = loaded.scene.tile.geometry.clone();
+    match super::document::color_path(&mut geometry) {
+        Some(Some(path)) => image_file::read_colors(&loaded.base_dir, path),
+        _ => Ok(Pixels { size: UVec2::splat(NEW_SIDE), values: vec![Vec3::ONE; (NEW_SIDE * NEW_SIDE) as usize] }),
+    }
+}
+
+/// Any surface as heights from 0 to 1, seen from above, and the height of 1.
+pub fn relief_of(tile: &biscale::close_up::CloseUp) -> (Pixels<f32>, f32) {
+    let size = UVec2::splat(NEW_SIDE);
+    let (low, high) = tile.mesh.z_range();
+    let range = high - low;
+    // Room above and below to paint, also where the surface is shallow.
+    let scale = (1.6 * range).max(0.15 * tile.mesh.size.min_element());
+    let middle = 0.5 * (low + high);
+    let values = tile.heights(size).iter().map(|z| (0.5 + (z - middle) / scale).clamp(0.0, 1.0)).collect();
+    (Pixels { size, values }, scale)
+}

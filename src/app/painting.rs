@@ -1,0 +1,154 @@
+//! From the hand to strokes of the document.
+
+use std::path::Path;
+
+use biscale::scene::{Geometry, Pixels};
+use eframe::egui::{Context, Key};
+use glam::UVec2;
+
+use super::document::{color_path, write_colors, write_heights};
+use super::editor::Editor;
+use super::messages::Level;
+use super::paint::{self, Stroke, Tool};
+use super::views::brushes::BrushAsked;
+use super::views::tile::Hand;
+
+impl Editor {
+    /// Takes what the hand did on the tile.
+    pub(super) fn paint(&mut self, hand: Hand) {
+        match hand {
+            Hand::Press(at, pressure) => {
+                if self.stroke.is_none() && !self.begin_stroke() {
+                    return;
+                }
+                if let Some(stroke) = &mut self.stroke {
+                    stroke.move_to(&self.tile.brush, at, pressure);
+                    self.document.show_stroke(stroke.images());
+                }
+            }
+            Hand::Lifted => self.end_stroke(),
+        }
+    }
+
+    pub(super) fn end_stroke(&mut self) {
+        if let Some(stroke) = self.stroke.take() {
+            let name = match self.tile.brush.tool {
+                Tool::Color => "Paint colour".to_owned(),
+                tool => format!("Paint: {}", tool.name().to_lowercase()),
+            };
+            self.document.end_stroke(&name, &stroke.before);
+        }
+    }
+
+    /// Makes sure that there is an image to paint on; whether a stroke has begun.
+    fn begin_stroke(&mut self) -> bool {
+        let ready = if self.tile.brush.tool == Tool::Color { self.have_colors() } else { self.have_heights() };
+        if ready {
+            self.messages.clear("paint");
+            self.stroke = Some(Stroke::begin(self.document.painted()));
+        }
+        ready
+    }
+
+    fn have_heights(&mut self) -> bool {
+        let is_field = matches!(self.document.scene().tile.geometry, Geometry::Heightfield(_));
+        if is_field && self.document.painted().heights.is_some() {
+            return true;
+        }
+        if is_field {
+            match paint::heights_of(&self.document.loaded()) {
+                Ok(heights) => self.document.paint_heights("Begin to paint", heights, None),
+                Err(error) => {
+                    self.messages.put(Level::Trouble, "paint", error.to_string());
+                    return false;
+                }
+            }
+            return true;
+        }
+        // Any other surface becomes a relief of its own shape.
+        let Some(made) = &self.tile.made else { return false };
+        let kind = self.document.scene().tile.geometry.kind();
+        let (heights, scale) = paint::relief_of(&made.tile);
+        self.document.paint_heights("Turn into a relief", heights, Some(scale));
+        let text = format!("The {kind} are now a relief to paint on. Undo brings their parameters back.");
+        self.messages.put(Level::Note, "relief", text);
+        self.scene_changed();
+        true
+    }
+
+    fn have_colors(&mut self) -> bool {
+        let mut geometry = self.document.scene().tile.geometry.clone();
+        if color_path(&mut geometry).is_none() {
+            let text = "Colours are painted on height-fields, flat tiles and meshes. Any height brush turns this surface \
+                        into a height-field first; or give its parts colours under Materials.";
+            self.messages.put(Level::Note, "paint", text);
+            return false;
+        }
+        if self.document.painted().colors.is_none() {
+            match paint::colors_of(&self.document.loaded()) {
+                Ok(colors) => self.document.paint_colors("Begin to paint colours", Some(colors)),
+                Err(error) => {
+                    self.messages.put(Level::Trouble, "paint", error.to_string());
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// [ and ] change the brush.
+    pub(super) fn brush_keys(&mut self, ctx: &Context) {
+        if self.tile.painting && !ctx.text_edit_focused() {
+            let (smaller, larger) =
+                ctx.input(|input| (input.key_pressed(Key::OpenBracket), input.key_pressed(Key::CloseBracket)));
+            let factor = if smaller {
+                1.0 / 1.25
+            } else if larger {
+                1.25
+            } else {
+                1.0
+            };
+            self.tile.brush.radius = (self.tile.brush.radius * factor).clamp(0.005, 0.5);
+        }
+    }
+
+    pub(super) fn brush_asked(&mut self, asked: BrushAsked) {
+        use super::dialogs::Purpose;
+        match asked {
+            BrushAsked::OpenHeights => self.browse(Purpose::Heights, ""),
+            BrushAsked::SaveHeights => self.browse(Purpose::SaveHeights, "heights.png"),
+            BrushAsked::OpenColors => self.browse(Purpose::Colors, ""),
+            BrushAsked::SaveColors => self.browse(Purpose::SaveColors, "colors.png"),
+            BrushAsked::Flatten => {
+                let size = self.document.painted().heights.as_ref().map_or(UVec2::splat(128), |image| image.size);
+                let plane = Pixels { size, values: vec![0.5; (size.x * size.y) as usize] };
+                self.document.paint_heights("Flatten all", plane, None);
+                self.scene_changed();
+            }
+            BrushAsked::ClearColors => self.document.paint_colors("No colours", None),
+        }
+    }
+
+    /// Writes the painted images where they are asked for.
+    pub(super) fn save_image(&mut self, path: &Path, colors: bool) {
+        let loaded = self.document.loaded();
+        let written = if colors {
+            paint::colors_of(&loaded).and_then(|image| write_colors(&image, path))
+        } else {
+            paint::heights_of(&loaded).and_then(|image| write_heights(&image, path))
+        };
+        match written {
+            Ok(()) => self.messages.put(Level::Note, "save", format!("Saved {}.", path.display())),
+            Err(error) => self.messages.put(Level::Trouble, "save", error.to_string()),
+        }
+    }
+
+    /// A stroke along a way, as a hand would draw it: for tests and the driver.
+    #[cfg(test)]
+    pub fn draw(&mut self, way: &[glam::Vec2]) {
+        for at in way {
+            self.paint(Hand::Press(*at, 1.0));
+        }
+        self.paint(Hand::Lifted);
+    }
+}

@@ -1,0 +1,90 @@
+//! The small-scale surface: family, parameters, extent.
+
+use std::path::{Path, PathBuf};
+
+use biscale::scene::{Geometry, Heightfield, Painted, Scene, Tile};
+use eframe::egui::Ui;
+use toml::{Table, Value};
+
+use super::fields::{self, Around};
+
+/// Heights that a height-field begins with.
+const FIRST_HEIGHTS: &str = "asset:leather.png";
+
+/// Controls of the tile; `name` is the document's, for files that will be painted.
+pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, around: &mut Around) {
+    around.unit.clone_from(&scene.tile.unit);
+    let kinds = Geometry::kinds();
+    let now = scene.tile.geometry.kind();
+    let doc = kinds.iter().find(|kind| kind.kind == now).map_or("", |kind| kind.doc);
+    let chosen = fields::row(ui, "Surface", doc, |ui| fields::kind_ui(ui, "surface", now, &kinds));
+    if let Some(kind) = chosen {
+        match starting(kind, painted, name) {
+            Some(geometry) => scene.tile.geometry = geometry,
+            // A mesh begins with its file.
+            None => around.browse = Some("mesh"),
+        }
+    }
+    if let Some(kind) = kinds.iter().find(|kind| kind.kind == scene.tile.geometry.kind())
+        && let Ok(mut table) = Table::try_from(&scene.tile.geometry)
+    {
+        let before = table.clone();
+        fields::table_ui(ui, &mut table, &kind.fields, &[], around);
+        if table != before
+            && let Ok(geometry) = table.try_into::<Geometry>()
+        {
+            scene.tile.geometry = geometry;
+        }
+    }
+    tile_ui(ui, &mut scene.tile, around);
+}
+
+/// The family with parameters that show something at once.
+fn starting(kind: &str, painted: &Painted, name: &str) -> Option<Geometry> {
+    match kind {
+        "mesh" => None,
+        "heightfield" => {
+            let painted = painted.heights.as_ref().map(|_| PathBuf::from(format!("{name}_heights.exr")));
+            let path = Some(painted.unwrap_or_else(|| PathBuf::from(FIRST_HEIGHTS)));
+            Some(Geometry::Heightfield(Heightfield { height_scale: 0.1, path, ..Default::default() }))
+        }
+        kind => Geometry::with_defaults(kind),
+    }
+}
+
+/// The family that a dropped or chosen file is for: an OBJ mesh, or an image of heights.
+pub fn of_file(path: &Path, scene: &Scene) -> Option<Geometry> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    match ending.as_str() {
+        "obj" => {
+            let color_path = None;
+            Some(Geometry::Mesh(biscale::scene::MeshFile { path: path.to_owned(), color_path }))
+        }
+        "png" | "tif" | "tiff" | "jpg" | "jpeg" => {
+            let height_scale = match &scene.tile.geometry {
+                Geometry::Heightfield(field) => field.height_scale,
+                _ => 0.1,
+            };
+            let path = Some(path.to_owned());
+            Some(Geometry::Heightfield(Heightfield { height_scale, path, ..Default::default() }))
+        }
+        _ => None,
+    }
+}
+
+fn tile_ui(ui: &mut Ui, tile: &mut Tile, around: &mut Around) {
+    let Ok(mut table) = Table::try_from(&*tile) else { return };
+    let geometry = table.remove("geometry").unwrap_or(Value::Boolean(false));
+    let before = table.clone();
+    let fields: Vec<_> = Tile::fields().into_iter().filter(|field| field.key != "geometry").collect();
+    ui.add_space(4.0);
+    fields::table_ui(ui, &mut table, &fields, &[], around);
+    if table != before {
+        table.insert("geometry".to_owned(), geometry);
+        if let Ok(changed) = table.try_into::<Tile>()
+            && changed.size.min_element() >= 1e-3
+        {
+            *tile = changed;
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! What is under the cursor on the object: the surface point, the viewer and the strongest light in its tangent frame.
+
+use biscale::large_scale::gbuffer::{bent_towards, perpendicular};
+use biscale::large_scale::{CameraView, DirectionalLight, ObjectMesh};
+use glam::{Vec2, Vec3};
+
+/// A point of the object as its material sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Picked {
+    /// To the viewer, tangent frame.
+    pub viewer: Vec3,
+    /// To the light that gives the point most, tangent frame.
+    pub light: Option<Vec3>,
+}
+
+/// The point at pixel coordinates of a view.
+pub fn pick(mesh: &ObjectMesh, lights: &[DirectionalLight], view: &CameraView, at: Vec2) -> Option<Picked> {
+    let half = Vec2::new(view.size[0] as f32, view.size[1] as f32) / 2.0;
+    let ndc = (at - half) / half * view.tan_half_fov;
+    let towards = (view.right * ndc.x - view.up * ndc.y - view.back).try_normalize()?;
+    let mut nearest: Option<(f32, usize, [f32; 2])> = None;
+    for triangle in 0..mesh.triangles.len() {
+        if let Some((t, weights)) = meet(view.eye, towards, mesh.corners(triangle), mesh.two_sided)
+            && nearest.is_none_or(|(best, ..)| t < best)
+        {
+            nearest = Some((t, triangle, weights));
+        }
+    }
+    let (_, triangle, [v, w]) = nearest?;
+    let mix = |values: &[Vec3]| {
+        let [a, b, c] = mesh.triangles[triangle].map(|k| values[k as usize]);
+        a * (1.0 - v - w) + b * v + c * w
+    };
+    let [a, b, c] = mesh.corners(triangle);
+    let side = if (b - a).cross(c - a).dot(towards) > 0.0 { -1.0 } else { 1.0 };
+    let normal = bent_towards(mix(&mesh.normals).try_normalize()? * side, -towards);
+    let tangent = perpendicular(mix(&mesh.tangents), normal);
+    let across = normal.cross(tangent);
+    let local = |d: Vec3| Vec3::new(d.dot(tangent), d.dot(across), d.dot(normal));
+    let gives = |light: &DirectionalLight| light.irradiance.element_sum() * light.direction.dot(normal);
+    let light = lights
+        .iter()
+        .filter(|light| light.direction.dot(normal) > 0.0)
+        .max_by(|a, b| gives(a).total_cmp(&gives(b)))
+        .map(|light| local(light.direction));
+    Some(Picked { viewer: local(-towards), light })
+}
+
+fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3], two_sided: bool) -> Option<(f32, [f32; 2])> {
+    let (ab, ac) = (b - a, c - a);
+    let p = to.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant.abs() < 1e-14 || !two_sided && determinant < 0.0 {
+        return None;
+    }
+    let offset = origin - a;
+    let v = offset.dot(p) / determinant;
+    let q = offset.cross(ab);
+    let w = to.dot(q) / determinant;
+    let t = ac.dot(q) / determinant;
+    (v >= 0.0 && w >= 0.0 && v + w <= 1.0 && t > 0.0).then_some((t, [v, w]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use biscale::large_scale::objects;
+    use biscale::scene;
+
+    #[test]
+    fn the_middle_of_a_sphere_is_seen_along_its_normal_and_the_corner_shows_nothing() {
+        let object = scene::Object { kind: "sphere".to_owned(), path: None };
+        let mesh = objects::build(&object, std::path::Path::new("")).unwrap();
+        let view = CameraView::new(&scene::Camera::default(), &mesh, [200, 100]).unwrap();
+        let light = DirectionalLight { direction: view.back, irradiance: Vec3::ONE };
+        let picked = pick(&mesh, &[light], &view, Vec2::new(100.0, 50.0)).unwrap();
+        assert!(picked.viewer.z > 0.999 && picked.light.unwrap().z > 0.999, "{picked:?}");
+        assert_eq!(pick(&mesh, &[light], &view, Vec2::new(1.0, 1.0)), None);
+        // Near the silhouette the viewer is far from the normal, in the tangent frame's own units.
+        let edge = pick(&mesh, &[], &view, Vec2::new(140.0, 50.0)).unwrap();
+        assert!(edge.viewer.z < 0.75 && (edge.viewer.length() - 1.0).abs() < 1e-4 && edge.light.is_none(), "{edge:?}");
+    }
+}

@@ -1,0 +1,93 @@
+//! The status line: what was recomputed, how long it took, on what, and what is still being done.
+
+use eframe::egui::{self, RichText, Ui};
+
+use super::editor::Editor;
+use super::worker::Grade;
+
+impl Editor {
+    fn stop_refining(&mut self) {
+        if let Some(pictures) = &self.pictures {
+            pictures.stop();
+        }
+        self.object.doing = None;
+        self.object.stopped = Some(self.document.version());
+    }
+
+    pub(super) fn status_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            let Some(made) = self.object.made.clone() else {
+                ui.spinner();
+                ui.label("Computing the first picture");
+                return;
+            };
+            let waits = self.object.asked.is_some_and(|(version, _)| version != made.version);
+            match (waits, made.grade, self.object.doing) {
+                (false, Grade::Final, _) => {
+                    let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(12.0), egui::Sense::hover());
+                    ui.painter().circle_filled(dot.center(), 4.0, egui::Color32::from_rgb(96, 176, 96));
+                    ui.label(format!("Final, {} quality", made.preset));
+                }
+                (_, _, Some(doing)) => {
+                    ui.add(egui::Spinner::new().size(13.0));
+                    ui.label(doing);
+                    let stop = ui.small_button("Stop").on_hover_text("What is shown is good enough");
+                    if stop.clicked() {
+                        self.stop_refining();
+                    }
+                }
+                _ if self.object.stopped == Some(made.version) => {
+                    ui.label("Stopped before the final picture");
+                }
+                _ => {
+                    ui.add(egui::Spinner::new().size(13.0));
+                    ui.label("Following");
+                }
+            }
+            if let Some((part, what)) = self.exporting {
+                ui.separator();
+                ui.add(egui::ProgressBar::new(part).desired_width(140.0).text(what));
+                if ui.small_button("Cancel").clicked()
+                    && let Some(worker) = &self.exports
+                {
+                    worker.cancel();
+                    self.exporting = None;
+                }
+            }
+            ui.separator();
+            let stages: Vec<String> = made.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect();
+            let tip = format!("{}\n\n{}", stages.join("\n"), effects(&made));
+            let text = format!("{} after the edit", time(made.latency_ms));
+            ui.label(text).on_hover_text(&tip);
+            ui.separator();
+            ui.add(egui::Label::new(RichText::new(stages.join(" · ")).weak()).truncate()).on_hover_text(tip);
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.add(egui::Label::new(RichText::new(&made.device).weak()).truncate())
+                    .on_hover_text("Where the picture is shaded");
+                if !made.notes.is_empty() {
+                    ui.label(notes(made.notes.len())).on_hover_text(made.notes.join("\n"));
+                }
+            });
+        });
+    }
+}
+
+fn notes(count: usize) -> String {
+    if count == 1 { "1 note".to_owned() } else { format!("{count} notes") }
+}
+
+fn time(ms: f64) -> String {
+    match ms {
+        ms if ms < 10.0 => format!("{ms:.1} ms"),
+        ms if ms < 1000.0 => format!("{ms:.0} ms"),
+        ms => format!("{:.1} s", ms / 1e3),
+    }
+}
+
+/// Every effect, on or off, and why.
+fn effects(made: &super::worker::Made) -> String {
+    let line = |effect: &biscale::plan::Effect| {
+        format!("{}  {}: {}", if effect.on { "on" } else { "off" }, effect.name, effect.reason)
+    };
+    made.effects.iter().map(line).collect::<Vec<_>>().join("\n")
+}

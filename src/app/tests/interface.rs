@@ -1,0 +1,215 @@
+//! The interface through its accessible nodes, as a person with a keyboard or a screen reader uses it.
+
+use biscale::scene::{BrdfSpec, Geometry, TermSpec};
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use glam::Vec2;
+
+use super::{editor, harness, quick, settle};
+use crate::app::actions::{Action, ENTRIES};
+use crate::app::dialogs::Dialog;
+use crate::app::document::Document;
+use crate::app::views::tile::Which;
+
+#[test]
+fn a_scene_opens_with_its_picture_and_both_views_are_named() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    for name in ["Object view", "Tile view", "Lobe view"] {
+        assert!(harness.query_by_label(name).is_some(), "{name}");
+    }
+    assert!(editor(&mut harness).messages.texts().is_empty());
+    let made = editor(&mut harness).object.made.as_ref().unwrap();
+    assert!(made.picture.pixels.iter().all(|p| p.is_finite()) && made.picture.width > 100);
+}
+
+#[test]
+fn every_family_is_shown_edited_undone_and_redone() {
+    let mut harness = harness(quick());
+    for kind in ["pyramids", "rods", "weave", "flat", "grooves"] {
+        let mut scene = (**editor(&mut harness).document.scene()).clone();
+        scene.tile.geometry = Geometry::with_defaults(kind).unwrap();
+        editor(&mut harness).document.edit(scene);
+        harness.run_steps(2);
+        assert!(editor(&mut harness).messages.texts().is_empty(), "{kind}");
+    }
+    let end = editor(&mut harness).document.scene().clone();
+    for _ in 0..5 {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+        harness.run_steps(1);
+    }
+    assert_eq!(editor(&mut harness).document.scene(), quick().scene());
+    for _ in 0..5 {
+        harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+        harness.run_steps(1);
+    }
+    assert_eq!(*editor(&mut harness).document.scene(), end);
+}
+
+#[test]
+fn a_slider_moved_by_a_person_moves_the_scene_and_undo_says_what() {
+    let mut harness = harness(quick());
+    let slider = harness.get_all_by_role(eframe::egui::Role::Slider).next().unwrap();
+    slider.set_value_accesskit(0.5);
+    harness.run_steps(2);
+    let Geometry::Grooves(grooves) = &editor(&mut harness).document.scene().tile.geometry else { panic!() };
+    assert!((grooves.depth - 0.5).abs() < 1e-6, "{grooves:?}");
+    assert_eq!(editor(&mut harness).document.undo_name(), Some("Depth"));
+}
+
+#[test]
+fn a_stroke_turns_grooves_into_a_relief_and_undo_brings_them_back() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    // The tile's own picture comes from another thread.
+    for _ in 0..500 {
+        if editor(&mut harness).tile.made.is_some() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        harness.step();
+    }
+    let editor = editor(&mut harness);
+    editor.tile.set_painting(true);
+    editor.draw(&[Vec2::splat(0.3), Vec2::splat(0.6)]);
+    assert!(matches!(editor.document.scene().tile.geometry, Geometry::Heightfield(_)));
+    assert!(editor.messages.texts().iter().any(|text| text.contains("relief")));
+    let painted = editor.document.painted().heights.clone().unwrap();
+    assert_eq!(editor.document.undo().as_deref(), Some("Paint: raise"));
+    assert_ne!(*editor.document.painted().heights.clone().unwrap(), *painted);
+    assert_eq!(editor.document.undo().as_deref(), Some("Turn into a relief"));
+    assert_eq!(editor.document.scene(), quick().scene());
+    editor.document.redo();
+    editor.document.redo();
+    assert_eq!(*editor.document.painted().heights.clone().unwrap(), *painted);
+}
+
+#[test]
+fn a_measured_file_that_is_not_one_is_a_message_and_the_document_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("not.binary");
+    std::fs::write(&path, "nothing").unwrap();
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).dropped(&ctx, path.clone());
+    for _ in 0..300 {
+        harness.step();
+        if !editor(&mut harness).messages.texts().is_empty() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let texts = editor(&mut harness).messages.texts().join("; ");
+    assert!(texts.contains("not.binary"), "{texts}");
+    let scene = editor(&mut harness).document.scene().clone();
+    let Some(BrdfSpec::One(TermSpec::Merl { .. })) = scene.materials[0].brdf else { panic!() };
+    editor(&mut harness).action(&ctx, Action::Undo);
+    settle(&mut harness);
+    assert!(!editor(&mut harness).messages.texts().iter().any(|text| text.contains("not.binary")));
+}
+
+#[test]
+fn unsaved_changes_stand_before_quitting_and_are_not_lost_by_cancel() {
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.light.count = 5;
+    editor(&mut harness).document.edit(scene);
+    editor(&mut harness).action(&ctx, Action::Quit);
+    harness.run_steps(2);
+    assert!(matches!(editor(&mut harness).dialog, Some(Dialog::Unsaved(_))));
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(3);
+    assert!(editor(&mut harness).dialog.is_none() && !editor(&mut harness).leaving);
+    assert!(editor(&mut harness).document.is_dirty());
+    editor(&mut harness).action(&ctx, Action::Quit);
+    harness.run_steps(2);
+    harness.get_by_label("Discard").click();
+    harness.run_steps(3);
+    assert!(editor(&mut harness).leaving);
+}
+
+#[test]
+fn save_and_open_through_actions_give_the_same_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("saved.toml");
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.object.kind = "cup".to_owned();
+    editor(&mut harness).document.edit(scene.clone());
+    editor(&mut harness).document.save_as(&path).unwrap();
+    editor(&mut harness).action(&ctx, Action::New);
+    assert_ne!(**editor(&mut harness).document.scene(), scene);
+    editor(&mut harness).action(&ctx, Action::OpenFile(path.clone()));
+    assert_eq!(**editor(&mut harness).document.scene(), scene);
+    assert_eq!(editor(&mut harness).settings.recent, [path]);
+    assert_eq!(
+        Document::open(editor(&mut harness).settings.recent[0].to_str().unwrap()).unwrap().scene().object.kind,
+        "cup"
+    );
+}
+
+#[test]
+fn a_scene_that_does_not_parse_is_a_message_and_what_is_open_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("broken.toml");
+    std::fs::write(&path, "[tile]\ngeometry = { kind = \"groves\" }\n").unwrap();
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).action(&ctx, Action::OpenFile(path));
+    let texts = editor(&mut harness).messages.texts().join("; ");
+    assert!(texts.contains("line 2") && texts.contains("grooves"), "{texts}");
+    assert_eq!(editor(&mut harness).document.name, "quick");
+}
+
+#[test]
+fn a_material_is_copied_and_pasted_to_another_slot() {
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).action(&ctx, Action::PasteMaterial);
+    assert!(editor(&mut harness).messages.texts()[0].contains("No material has been copied"));
+    editor(&mut harness).action(&ctx, Action::CopyMaterial);
+    editor(&mut harness).paste_material("sides");
+    let scene = editor(&mut harness).document.scene().clone();
+    assert_eq!(scene.materials[1].name, "sides");
+    assert_eq!(scene.materials[1].brdf, scene.materials[0].brdf);
+}
+
+#[test]
+fn picking_fills_the_lobe_view_and_letting_go_restores_the_tile() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).action(&ctx, Action::Pick);
+    let place = harness.get_by_label("Object view").rect().center();
+    harness.hover_at(place);
+    harness.run_steps(3);
+    assert!(editor(&mut harness).lobe.viewer.is_some());
+    assert!(editor(&mut harness).tile.show == Which::Contribution);
+    editor(&mut harness).action(&ctx, Action::Pick);
+    assert!(editor(&mut harness).lobe.viewer.is_none() && editor(&mut harness).tile.show == Which::Clay);
+}
+
+#[test]
+fn nothing_is_repainted_when_nothing_changes() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    for _ in 0..200 {
+        harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        if harness.ctx.cumulative_frame_nr() > 0 && !harness.ctx.has_requested_repaint() {
+            break;
+        }
+    }
+    harness.step();
+    assert!(!harness.ctx.has_requested_repaint(), "{:?}", harness.ctx.repaint_causes());
+}
+
+#[test]
+fn no_two_actions_share_their_keys() {
+    let keys: Vec<_> = ENTRIES.iter().filter_map(|entry| entry.keys).collect();
+    for (at, key) in keys.iter().enumerate() {
+        assert!(!keys[..at].contains(key), "{key:?}");
+    }
+}

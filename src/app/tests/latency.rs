@@ -1,0 +1,53 @@
+//! How long a slider takes to a new picture: numbers for the README, asked for by name.
+
+use std::time::{Duration, Instant};
+
+use super::{editor, harness};
+use crate::app::document::Document;
+use crate::app::worker::Grade;
+
+/// Milliseconds to the first and to the final picture.
+fn after_an_edit(name: &str) -> (f64, f64, f64) {
+    let mut harness = harness(Document::open(name).unwrap());
+    super::settle(&mut harness);
+    let mut times = Vec::new();
+    for _ in 0..3 {
+        let mut scene = (**editor(&mut harness).document.scene()).clone();
+        scene.nudge_geometry().unwrap();
+        let start = Instant::now();
+        editor(&mut harness).document.edit(scene);
+        let version = editor(&mut harness).document.version();
+        let mut seen = [None; 3];
+        while seen[2].is_none() {
+            harness.step();
+            if let Some(made) = editor(&mut harness).object.made.as_ref().filter(|made| made.version == version) {
+                let at = match made.grade {
+                    Grade::Draft => 0,
+                    Grade::Refining => 1,
+                    Grade::Final => 2,
+                };
+                seen[at].get_or_insert(start.elapsed().as_secs_f64() * 1e3);
+            }
+            assert!(start.elapsed() < Duration::from_secs(300), "{name}");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        times.push(seen);
+    }
+    let median = |at: usize| {
+        let mut found: Vec<f64> = times.iter().filter_map(|seen| seen[at]).collect();
+        found.sort_by(f64::total_cmp);
+        found.get(found.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    (median(0), median(1), median(2))
+}
+
+#[test]
+#[ignore = "prints numbers: cargo test --bin biscale latency -- --ignored --nocapture"]
+fn latency_from_a_slider_on_the_scenes_of_table_4() {
+    println!("scene            draft  refined (coarse)  final   [ms, median of 3 geometry edits]");
+    for name in ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"] {
+        let (draft, coarse, last) = after_an_edit(name);
+        println!("{name:<16} {draft:>5.0} {coarse:>12.0} {last:>12.0}");
+        assert!(draft.is_finite());
+    }
+}

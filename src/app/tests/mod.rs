@@ -1,0 +1,76 @@
+//! The interface without a window: every frame runs as in one, and the workers really work.
+
+mod documents;
+mod interface;
+mod latency;
+mod soak;
+
+use std::time::{Duration, Instant};
+
+use biscale::scene::{self, Painted};
+use eframe::egui;
+use egui_kittest::Harness;
+
+use super::document::Document;
+use super::editor::Editor;
+
+/// A scene that is quick to compute.
+const QUICK: &str = r#"
+[tile]
+geometry = { kind = "grooves", count = 2 }
+[[material]]
+name = "default"
+brdf = { kind = "cook_torrance", roughness = 0.4, f0 = 0.8 }
+[light]
+count = 4
+[quality]
+preset = "draft"
+facets = 128
+azimuths = 8
+rings = 4
+backend = "cpu"
+method = "direct"
+"#;
+
+fn quick() -> Document {
+    let scene = scene::parse(QUICK).unwrap();
+    let painted = Painted::default();
+    Document::new(scene::LoadedScene { scene, base_dir: "".into(), name: "quick".into(), painted }, None)
+}
+
+/// An editor on a document, in a window of this size.
+fn harness(document: Document) -> Harness<'static, Option<Editor>> {
+    let mut document = Some(document);
+    let mut harness = Harness::builder().with_size([1400.0, 1000.0]).allow_missing_glyphs().build_ui_state(
+        move |ui: &mut egui::Ui, editor: &mut Option<Editor>| {
+            let ctx = ui.ctx().clone();
+            let editor = editor.get_or_insert_with(|| {
+                let mut editor = Editor::new(&ctx, document.take().unwrap(), None);
+                // Thumbnails are not what is tested.
+                editor.settings.gallery = false;
+                editor
+            });
+            editor.frame(ui);
+        },
+        None,
+    );
+    harness.run_steps(3);
+    harness
+}
+
+fn editor<'a>(harness: &'a mut Harness<'static, Option<Editor>>) -> &'a mut Editor {
+    harness.state_mut().as_mut().unwrap()
+}
+
+/// Frames until the full picture of what is open is there.
+fn settle(harness: &mut Harness<'static, Option<Editor>>) {
+    let start = Instant::now();
+    loop {
+        harness.step();
+        if !editor(harness).is_busy() {
+            return;
+        }
+        assert!(start.elapsed() < Duration::from_secs(120), "no picture");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}

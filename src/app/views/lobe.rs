@@ -1,0 +1,172 @@
+//! f̄ for one light: all viewers as a disc, and a cut through light and normal as a polar plot.
+
+use std::sync::Arc;
+
+use biscale::directions::{from_angles, to_angles};
+use biscale::filtering::EffectiveBrdf;
+use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, TextureHandle, Ui, pos2, vec2};
+use glam::Vec3;
+
+use crate::app::worker::{LobeJob, LobeMade, logarithmic};
+
+/// What the view holds between frames.
+pub struct LobeState {
+    /// To the light, tile frame.
+    pub light: Vec3,
+    pub viewer: Option<Vec3>,
+    pub log: bool,
+    texture: Option<TextureHandle>,
+    made: Option<Box<LobeMade>>,
+    asked: Option<(*const EffectiveBrdf, Vec3, Option<Vec3>, bool)>,
+}
+
+impl Default for LobeState {
+    fn default() -> Self {
+        Self {
+            light: from_angles(40f32.to_radians(), std::f32::consts::PI),
+            viewer: None,
+            log: false,
+            texture: None,
+            made: None,
+            asked: None,
+        }
+    }
+}
+
+impl LobeState {
+    /// The job for what is to be shown, where it is not what was asked for last.
+    pub fn job(&mut self, brdf: &Arc<EffectiveBrdf>) -> Option<LobeJob> {
+        let wanted = (Arc::as_ptr(brdf), self.light, self.viewer, self.log);
+        if self.asked == Some(wanted) {
+            return None;
+        }
+        self.asked = Some(wanted);
+        Some(LobeJob { brdf: brdf.clone(), light: self.light, viewer: self.viewer, log: self.log })
+    }
+
+    pub fn take(&mut self, ctx: &egui::Context, made: Box<LobeMade>) {
+        let options = egui::TextureOptions::LINEAR;
+        match &mut self.texture {
+            Some(texture) => texture.set(made.image.clone(), options),
+            None => self.texture = Some(ctx.load_texture("lobe", made.image.clone(), options)),
+        }
+        self.made = Some(made);
+    }
+
+    pub fn ui(&mut self, ui: &mut Ui) {
+        let (theta, phi) = to_angles(self.light);
+        ui.horizontal(|ui| {
+            ui.strong("Reflection");
+            ui.weak(format!("light {:.0}° / {:.0}°", theta.to_degrees(), phi.to_degrees()))
+                .on_hover_text("Angle from the normal, and azimuth");
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.toggle_value(&mut self.log, "Log").on_hover_text("Three decades instead of linear brightness");
+            });
+        });
+        let width = ui.available_width();
+        let side = (0.5 * (width - 8.0)).min(ui.available_height() - 24.0).max(60.0);
+        ui.horizontal(|ui| {
+            self.disc_ui(ui, side);
+            self.polar_ui(ui, vec2(width - side - 8.0, side));
+        });
+        if let Some(made) = &self.made {
+            let caption = match (made.value, self.viewer) {
+                (Some(value), Some(viewer)) => {
+                    let (theta, phi) = to_angles(viewer);
+                    format!(
+                        "{:.3} {:.3} {:.3} /sr towards {:.0}° / {:.0}°",
+                        value.x,
+                        value.y,
+                        value.z,
+                        theta.to_degrees(),
+                        phi.to_degrees()
+                    )
+                }
+                _ => format!("peak {:.3} /sr; drag the light on the disc", made.most),
+            };
+            ui.small(caption);
+        }
+    }
+
+    /// The hemisphere of viewers; the light is dragged on it.
+    fn disc_ui(&mut self, ui: &mut Ui, side: f32) {
+        let (area, response) = ui.allocate_exact_size(vec2(side, side), Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Lobe view"));
+        let (center, radius) = (area.center(), 0.5 * side - 1.0);
+        ui.painter().circle_filled(center, radius, Color32::from_gray(12));
+        if let Some(texture) = &self.texture {
+            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            ui.painter().image(
+                texture.id(),
+                Rect::from_center_size(center, vec2(2.0, 2.0) * radius),
+                uv,
+                Color32::WHITE,
+            );
+        }
+        ui.painter().circle_stroke(center, radius, Stroke::new(1.0, Color32::from_gray(110)));
+        let on_disc = |direction: Vec3| center + vec2(direction.x, -direction.y) * radius;
+        if let Some(viewer) = self.viewer {
+            ui.painter().circle_stroke(on_disc(viewer), 5.0, Stroke::new(1.5, Color32::from_rgb(110, 190, 255)));
+        }
+        sun(ui, on_disc(self.light));
+        if let Some(at) = response.interact_pointer_pos() {
+            let offset = glam::Vec2::new(at.x - center.x, center.y - at.y) / radius;
+            let inside = offset.clamp_length_max(0.995);
+            self.light = inside.extend((1.0 - inside.length_squared()).max(0.0).sqrt());
+        }
+        response.on_hover_text("Every viewer above the surface, seen from above. Drag the light.");
+    }
+
+    fn polar_ui(&self, ui: &mut Ui, size: egui::Vec2) {
+        let (area, response) = ui.allocate_exact_size(size, Sense::hover());
+        let painter = ui.painter().with_clip_rect(area);
+        let radius = (0.5 * area.width() - 6.0).min(area.height() - 22.0).max(10.0);
+        let origin = pos2(area.center().x, area.center().y + 0.5 * radius);
+        let grid = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
+        for part in [0.5, 1.0] {
+            let arc: Vec<Pos2> = (0..=48).map(|k| on_arc(origin, radius * part, k as f32 * 3.75 - 90.0)).collect();
+            painter.add(egui::Shape::line(arc, grid));
+        }
+        for angle in [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0] {
+            painter.line_segment([origin, on_arc(origin, radius, angle)], grid);
+        }
+        let Some(made) = &self.made else { return };
+        let shown = |value: Vec3| if self.log { logarithmic(value / made.most) } else { value / made.most };
+        let dark = ui.visuals().dark_mode;
+        let colors = if dark {
+            [Color32::from_rgb(255, 96, 88), Color32::from_rgb(96, 214, 112), Color32::from_rgb(104, 152, 255)]
+        } else {
+            [Color32::from_rgb(200, 40, 32), Color32::from_rgb(24, 140, 48), Color32::from_rgb(40, 80, 220)]
+        };
+        for (channel, color) in colors.into_iter().enumerate() {
+            let at = |(k, value): (usize, &Vec3)| on_arc(origin, radius * shown(*value)[channel], k as f32 - 90.0);
+            let line: Vec<Pos2> = made.cut.iter().enumerate().map(at).collect();
+            painter.add(egui::Shape::line(line, Stroke::new(1.6, color)));
+        }
+        let light = to_angles(made.light).0.to_degrees();
+        let tip = on_arc(origin, radius, -light);
+        painter.line_segment([origin, tip], Stroke::new(1.0, Color32::from_rgb(255, 205, 90)));
+        sun(ui, tip);
+        let text = ui.visuals().weak_text_color();
+        painter.text(
+            origin + vec2(0.0, 11.0),
+            Align2::CENTER_CENTER,
+            "plane of light and normal",
+            FontId::proportional(9.0),
+            text,
+        );
+        response
+            .on_hover_text("Reflection by the viewer's angle in the plane of light and normal, in red, green and blue");
+    }
+}
+
+/// A place on an arc about `origin`; 0° is up, positive to the right.
+fn on_arc(origin: Pos2, radius: f32, degrees: f32) -> Pos2 {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    origin + vec2(sin, -cos) * radius
+}
+
+fn sun(ui: &Ui, at: Pos2) {
+    ui.painter().circle_filled(at, 4.5, Color32::from_rgb(255, 205, 90));
+    ui.painter().circle_stroke(at, 4.5, Stroke::new(1.0, Color32::from_black_alpha(160)));
+}

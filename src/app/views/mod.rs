@@ -1,0 +1,7 @@
+//! The views on both scales.
+
+pub mod brushes;
+pub mod gallery;
+pub mod lobe;
+pub mod object;
+pub mod tile;

@@ -1,0 +1,231 @@
+//! The large view: the object, shaded by the effective BRDF. Drag turns it, the wheel comes closer.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use biscale::scene::{Camera, OBJECT_KINDS, Scene};
+use eframe::egui::{
+    self, Color32, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2,
+    vec2,
+};
+
+use crate::app::actions::Action;
+use crate::app::panels::fields::words;
+use crate::app::worker::{Grade, Made};
+
+/// A picture kept for comparison.
+pub struct Kept {
+    pub texture: TextureHandle,
+    pub scene: Arc<Scene>,
+    pub name: String,
+}
+
+/// What the view holds between frames.
+#[derive(Default)]
+pub struct ObjectView {
+    texture: Option<TextureHandle>,
+    pub made: Option<Box<Made>>,
+    /// Version and size of the picture that was asked for last.
+    pub asked: Option<(u64, [usize; 2])>,
+    /// What the worker is at, for the status line.
+    pub doing: Option<&'static str>,
+    /// The version whose refinement was given up.
+    pub stopped: Option<u64>,
+    pub kept: Option<Kept>,
+    /// Where the wipe stands, 0 left to 1 right.
+    pub wipe: f32,
+    /// When the picture that is awaited was asked for.
+    pub since: Option<Instant>,
+    /// Whether the pointer picks.
+    pub picking: bool,
+    /// What the pointer is over, in parts of the view, while it picks.
+    pub pointed: Option<egui::Vec2>,
+}
+
+impl ObjectView {
+    /// Shows a picture, unless what is shown is newer or better.
+    pub fn take(&mut self, ctx: &egui::Context, made: Box<Made>) {
+        let rank = |made: &Made| (made.version, made.grade);
+        if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
+            return;
+        }
+        self.since = None;
+        let options = TextureOptions::LINEAR;
+        match &mut self.texture {
+            Some(texture) => texture.set(made.image.clone(), options),
+            None => self.texture = Some(ctx.load_texture("object", made.image.clone(), options)),
+        }
+        if made.grade == Grade::Final {
+            self.doing = None;
+        }
+        self.made = Some(made);
+    }
+
+    /// Keeps what is shown now beside what comes.
+    pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) {
+        if let Some(made) = &self.made {
+            let texture = ctx.load_texture("kept", made.image.clone(), TextureOptions::LINEAR);
+            self.kept = Some(Kept { texture, scene: scene.clone(), name: name.to_owned() });
+            self.wipe = 0.5;
+        }
+    }
+
+    /// Shows the picture and moves the scene's camera and light by what the hand does. Returns the pixels it covers.
+    pub fn ui(&mut self, ui: &mut Ui, scene: &mut Scene) -> [usize; 2] {
+        let size = ui.available_size().max(vec2(64.0, 64.0));
+        let (area, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Object view"));
+        ui.painter().rect_filled(area, 0.0, Color32::from_gray(22));
+        if let Some(texture) = &self.texture {
+            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            ui.painter().image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
+        } else {
+            ui.put(Rect::from_center_size(area.center(), vec2(40.0, 40.0)), egui::Spinner::new());
+        }
+        self.wipe_ui(ui, area);
+        let on_wipe =
+            self.kept.is_some() && response.interact_pointer_pos().is_some_and(|at| self.is_on_wipe(area, at));
+        if !on_wipe {
+            turn(ui, &response, scene, area, self.made.as_ref().map_or(4.0, |made| made.distance));
+        }
+        let picks = self.picking && !response.dragged();
+        self.pointed = response
+            .hover_pos()
+            .filter(|_| picks)
+            .map(|at| ((at - area.min) / area.size()).clamp(egui::Vec2::ZERO, egui::Vec2::splat(1.0)));
+        let pixels = area.size() * ui.pixels_per_point();
+        [pixels.x.round() as usize, pixels.y.round() as usize]
+    }
+
+    /// What is looked at and how, above the view.
+    pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene) -> Option<Action> {
+        let mut action = None;
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            egui::ComboBox::from_id_salt("object here").selected_text(words(&scene.object.kind)).width(90.0).show_ui(
+                ui,
+                |ui| {
+                    for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
+                        if ui.selectable_label(scene.object.kind == *kind, words(kind)).clicked() {
+                            (*kind).clone_into(&mut scene.object.kind);
+                            scene.object.path = None;
+                        }
+                    }
+                },
+            );
+            let camera = scene.camera.clone().unwrap_or_default();
+            let mut exposure = camera.exposure_ev;
+            let drag =
+                egui::DragValue::new(&mut exposure).range(-10.0..=10.0).speed(0.03).suffix(" EV").max_decimals(2);
+            let response = ui.add(drag).on_hover_text("Exposure: drag sideways");
+            if response.changed() && exposure.is_finite() {
+                scene.camera = Some(Camera { exposure_ev: exposure, ..camera });
+            }
+            ui.separator();
+            for (which, name, tip, on) in [
+                (Action::Frame, "Frame", "Show the whole object (F)", false),
+                (Action::Snapshot, "A/B", "Keep this picture and compare with what follows (B)", self.kept.is_some()),
+                (
+                    Action::Pick,
+                    "Pick",
+                    "Point at the object: how it reflects there, and what the facets add to it (I)",
+                    self.picking,
+                ),
+            ] {
+                if ui.selectable_label(on, name).on_hover_text(tip).clicked() {
+                    action = Some(which);
+                }
+            }
+            if self.kept.is_some() && ui.button("Back to A").on_hover_text("Undo all edits since A, as one").clicked() {
+                action = Some(Action::BackToA);
+            }
+        });
+        action
+    }
+
+    fn is_on_wipe(&self, area: Rect, at: Pos2) -> bool {
+        (at.x - (area.left() + self.wipe * area.width())).abs() < 12.0
+    }
+
+    /// What was kept, left of a line that can be moved.
+    fn wipe_ui(&mut self, ui: &mut Ui, area: Rect) {
+        let Some(kept) = &self.kept else { return };
+        let x = area.left() + self.wipe * area.width();
+        let left = Rect::from_min_max(area.min, pos2(x, area.bottom()));
+        let shown = covered(area, kept.texture.size_vec2());
+        let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        ui.painter().with_clip_rect(left).image(kept.texture.id(), shown, uv, Color32::WHITE);
+        ui.painter().vline(x, area.y_range(), egui::Stroke::new(1.5, Color32::from_white_alpha(200)));
+        ui.painter().circle_filled(pos2(x, area.center().y), 7.0, Color32::from_white_alpha(220));
+        let font = egui::FontId::proportional(12.0);
+        let white = Color32::from_white_alpha(210);
+        let at = pos2(x - 8.0, area.top() + 8.0);
+        ui.painter().text(at, egui::Align2::RIGHT_TOP, format!("A  {}", kept.name), font.clone(), white);
+        ui.painter().text(pos2(x + 8.0, area.top() + 8.0), egui::Align2::LEFT_TOP, "B  now", font, white);
+        let grip = Rect::from_min_max(pos2(x - 8.0, area.top()), pos2(x + 8.0, area.bottom()));
+        let response =
+            ui.interact(grip, ui.scope_id().with("wipe"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
+        if response.dragged() {
+            self.wipe = (self.wipe + response.drag_delta().x / area.width()).clamp(0.0, 1.0);
+        }
+    }
+}
+
+/// The rectangle that covers `area` with a picture of another shape, centred: a resized view keeps the object's shape.
+fn covered(area: Rect, picture: egui::Vec2) -> Rect {
+    let scale = (area.width() / picture.x.max(1.0)).max(area.height() / picture.y.max(1.0));
+    let rect = Rect::from_center_size(area.center(), picture * scale);
+    if (rect.width() - area.width()).abs() < 4.0 && (rect.height() - area.height()).abs() < 4.0 { area } else { rect }
+}
+
+/// Drag turns, the middle button moves, shift-drag or the right button turns the light, the wheel comes closer.
+fn turn(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f32) {
+    let delta = response.drag_delta();
+    let shift = ui.input(|input| input.modifiers.shift);
+    let light = response.dragged_by(PointerButton::Secondary) || response.dragged_by(PointerButton::Primary) && shift;
+    if light && delta.x != 0.0 {
+        scene.light.rotation_deg = wrapped(scene.light.rotation_deg + delta.x * 0.5);
+    } else if response.dragged_by(PointerButton::Middle) && delta != egui::Vec2::ZERO {
+        let camera = scene.camera.get_or_insert_default();
+        // What is under the hand stays under it: the view spans this many radii.
+        let span = 2.0 * distance * (0.5 * camera.fov_deg).to_radians().tan();
+        camera.pan += glam::Vec2::new(-delta.x, delta.y) * span / area.width().min(area.height());
+    } else if response.dragged_by(PointerButton::Primary) && delta != egui::Vec2::ZERO {
+        let camera = scene.camera.get_or_insert_default();
+        camera.azimuth_deg = wrapped(camera.azimuth_deg - delta.x * 0.4);
+        camera.elevation_deg = (camera.elevation_deg + delta.y * 0.3).clamp(-89.0, 89.0);
+    }
+    if response.hovered() {
+        let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
+        let factor = (-scroll * 0.002).exp() / pinch;
+        if factor != 1.0 {
+            closer(scene, factor, distance);
+        }
+    }
+    if response.double_clicked() {
+        frame(scene);
+    }
+    if response.dragged() {
+        ui.ctx().set_cursor_icon(if light { CursorIcon::ResizeHorizontal } else { CursorIcon::Grabbing });
+    }
+}
+
+/// Frames the object, from where it is looked at.
+pub fn frame(scene: &mut Scene) {
+    if let Some(camera) = &mut scene.camera {
+        camera.distance = 0.0;
+        camera.pan = glam::Vec2::ZERO;
+        camera.fov_deg = Camera::default().fov_deg;
+    }
+}
+
+/// Moves the camera's distance by a factor, from where automatic framing had put it.
+fn closer(scene: &mut Scene, factor: f32, distance: f32) {
+    let camera = scene.camera.get_or_insert_default();
+    let from = if camera.distance > 0.0 { camera.distance } else { distance };
+    camera.distance = (from * factor).clamp(1.02, 60.0);
+}
+
+fn wrapped(degrees: f32) -> f32 {
+    (degrees + 180.0).rem_euclid(360.0) - 180.0
+}

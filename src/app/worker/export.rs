@@ -1,0 +1,125 @@
+//! Exports in the background: at the scene's own quality, with progress, and they can be given up.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution};
+use biscale::large_scale::tone_map::ToneMap;
+use biscale::pipeline::Pipeline;
+use biscale::scene::LoadedScene;
+use biscale::{Cancel, Error, Result};
+
+use super::runner::Desk;
+use super::studio::{Shot, Studio};
+
+#[derive(Debug, Clone)]
+pub struct ExportJob {
+    pub loaded: Arc<LoadedScene>,
+    pub path: PathBuf,
+    pub what: What,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub enum What {
+    Table { theta: usize, phi: usize },
+    Picture { size: [usize; 2] },
+}
+
+pub enum ExportAnswer {
+    /// The part that is done, 0 to 1, and what is being done.
+    Progress(f32, &'static str),
+    Done(String),
+    Failed(String),
+    Cancelled,
+}
+
+pub fn work(job: &ExportJob, desk: &Desk<ExportJob>, answer: &(dyn Fn(ExportAnswer) + Sync)) {
+    answer(match export(job, desk.cancel, answer) {
+        Ok(text) => ExportAnswer::Done(text),
+        Err(Error::Cancelled) => ExportAnswer::Cancelled,
+        Err(error) => ExportAnswer::Failed(error.to_string()),
+    });
+}
+
+fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Sync)) -> Result<String> {
+    answer(ExportAnswer::Progress(0.0, "Computing the material"));
+    let mut pipeline = Pipeline::new();
+    pipeline.cancel_with(cancel.clone());
+    let outcome = pipeline.effective(&job.loaded)?;
+    match job.what {
+        What::Table { theta, phi } => {
+            let tile = &job.loaded.scene.tile;
+            let meta = ExportMeta {
+                scene: job.loaded.name.clone(),
+                quality: format!("{}; {}", outcome.settings.preset.name(), outcome.brdf.form.describe()),
+                seed: outcome.settings.seed,
+                tile_size: tile.size.to_array(),
+                tile_unit: tile.unit.clone(),
+                closes_plane: pipeline.mesh(&job.loaded)?.closes_plane,
+                notes: outcome.notes.clone(),
+            };
+            let steps = ExportResolution { theta_i: theta, phi_i: phi, theta_o: theta, phi_o: phi };
+            let progress = |part: f32| answer(ExportAnswer::Progress(part, "Tabulating"));
+            // Beside its place first: one that is given up replaces nothing.
+            let beside = beside(&job.path);
+            let resolution = export::grid_is_free(&job.path).then_some(steps);
+            let options = ExportOptions { resolution, ..ExportOptions::default() };
+            let written = export::write(&outcome.brdf, &meta, &options, &beside, &progress);
+            let note = written.as_ref().ok().and_then(|report| report.note.clone());
+            let report = cancel.check().and(written).and_then(|report| {
+                std::fs::rename(&beside, &job.path).map_err(Error::failed)?;
+                if let Some(note) = &note {
+                    std::fs::rename(note, in_place(note)).map_err(Error::failed)?;
+                }
+                Ok(report)
+            });
+            let report = report.inspect_err(|_| {
+                // Not there is as good as gone.
+                for left in [Some(&beside), note.as_ref()].into_iter().flatten() {
+                    let _ = std::fs::remove_file(left);
+                }
+            })?;
+            Ok(format!(
+                "Wrote {}: {} pairs; read back it is within {:.1} % of the material.",
+                job.path.display(),
+                report.pairs,
+                100.0 * report.reading.errors.rel_l2
+            ))
+        }
+        What::Picture { size } => {
+            answer(ExportAnswer::Progress(0.3, "Rendering"));
+            picture(&job.loaded, &outcome.brdf, size, &job.path, cancel)?;
+            Ok(format!("Wrote {}.", job.path.display()))
+        }
+    }
+}
+
+fn picture(
+    loaded: &LoadedScene,
+    brdf: &Arc<biscale::filtering::EffectiveBrdf>,
+    size: [usize; 2],
+    path: &Path,
+    cancel: &Cancel,
+) -> Result<()> {
+    let camera = loaded.scene.camera.clone().unwrap_or_default();
+    let mut studio = Studio::default();
+    studio.prepare(loaded)?;
+    let backend = loaded.scene.quality.backend.as_str();
+    let shot = Shot { camera: &camera, brdf, size, samples_per_side: 3, settle: true, backend };
+    let rendered = studio.shoot(&shot, cancel)?;
+    rendered.picture.write(path, &ToneMap::new(&camera)?)
+}
+
+/// A name beside `path` with the same ending.
+fn beside(path: &Path) -> PathBuf {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    path.with_file_name(format!("{BESIDE}{name}"))
+}
+
+const BESIDE: &str = ".exporting-";
+
+/// Where a file that was written beside its place belongs.
+fn in_place(path: &Path) -> PathBuf {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    path.with_file_name(name.strip_prefix(BESIDE).unwrap_or(&name))
+}

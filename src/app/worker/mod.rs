@@ -1,0 +1,98 @@
+//! Work behind the interface: one thread for the object's picture, one for the tile and its plots, one for thumbnails.
+
+mod export;
+mod lobe;
+mod picture;
+mod runner;
+mod studio;
+mod thumbnail;
+mod tile;
+mod tone;
+
+use std::sync::Arc;
+
+use super::document::Snapshot;
+
+pub use export::{ExportAnswer, ExportJob, What};
+pub use lobe::{LobeJob, LobeMade, logarithmic};
+pub use picture::{Grade, Made, PictureAnswer, PictureJob};
+pub use runner::Worker;
+pub use thumbnail::{Thumbnail, ThumbnailJob};
+pub use tile::{Show, TileAnswer, TileJob, TileMade};
+
+/// The thread that draws the tile.
+pub fn spawn_tile(answer: impl Fn(TileAnswer) + Clone + Send + Sync + 'static) -> Option<Worker<TileJob>> {
+    let told = answer.clone();
+    let work = move |kept: &mut tile::Macro, job, desk: &runner::Desk<TileJob>| kept.work(job, desk, &answer);
+    let panicked = move |text: String| told(TileAnswer::Failed(format!("a fault in the program ({text})")));
+    Worker::spawn("tile", 0, tile::Macro::default, work, panicked).ok()
+}
+
+/// The thread that plots lobes. Its faults show as a plot that does not follow; the picture's worker reports the cause.
+pub fn spawn_lobe(answer: impl Fn(LobeMade) + Clone + Send + Sync + 'static) -> Option<Worker<LobeJob>> {
+    let work = move |_: &mut (), job: LobeJob, desk: &runner::Desk<LobeJob>| lobe::work(&job, desk, &answer);
+    Worker::spawn("lobe", 0, || (), work, |_| {}).ok()
+}
+
+/// The threads that make pictures: one drafts, one refines. Each gets every job.
+pub struct Pictures {
+    draft: Worker<PictureJob>,
+    refine: Worker<PictureJob>,
+}
+
+impl Pictures {
+    /// `None` where the system gives no threads.
+    pub fn spawn(answer: impl Fn(PictureAnswer) + Clone + Send + Sync + 'static) -> Option<Self> {
+        let shared = Arc::new(picture::Shared::default());
+        let start = move || picture::Photographer::new(shared.clone());
+        let (draft, refine, told, told_too) = (answer.clone(), answer.clone(), answer.clone(), answer);
+        let draft_work = move |kept: &mut picture::Photographer, job: PictureJob, _: &runner::Desk<PictureJob>| {
+            kept.draft(&job, &draft);
+        };
+        let refine_work = move |kept: &mut picture::Photographer, job: PictureJob, desk: &runner::Desk<PictureJob>| {
+            kept.refine(&job, desk, &refine);
+        };
+        let draft =
+            Worker::spawn("draft", 0, start.clone(), draft_work, move |text| told(PictureAnswer::Fault(text))).ok()?;
+        let refine =
+            Worker::spawn("refine", 0, start, refine_work, move |text| told_too(PictureAnswer::Fault(text))).ok()?;
+        Some(Self { draft, refine })
+    }
+
+    pub fn ask(&self, job: PictureJob) {
+        self.refine.ask(job.clone());
+        self.draft.ask(job);
+    }
+
+    /// What is shown is good enough: no refinement.
+    pub fn stop(&self) {
+        self.refine.cancel();
+    }
+}
+
+/// The thread that makes thumbnails. One that fails stays a grey square.
+pub fn spawn_thumbnail(answer: impl Fn(Thumbnail) + Clone + Send + Sync + 'static) -> Option<Worker<ThumbnailJob>> {
+    let work = move |kept: &mut studio::Studio, job: ThumbnailJob, desk: &runner::Desk<ThumbnailJob>| {
+        thumbnail::work(kept, &job, desk, &answer);
+    };
+    Worker::spawn("thumbnails", 1, studio::Studio::default, work, |_| {}).ok()
+}
+
+/// The thread that exports.
+pub fn spawn_export(answer: impl Fn(ExportAnswer) + Clone + Send + Sync + 'static) -> Option<Worker<ExportJob>> {
+    let told = answer.clone();
+    let work = move |_: &mut (), job: ExportJob, desk: &runner::Desk<ExportJob>| export::work(&job, desk, &answer);
+    let panicked = move |text: String| told(ExportAnswer::Failed(format!("a fault in the program ({text})")));
+    Worker::spawn("export", 0, || (), work, panicked).ok()
+}
+
+/// The thread that writes recovery files.
+pub fn spawn_autosave(failed: impl Fn(String) + Clone + Send + Sync + 'static) -> Option<Worker<Snapshot>> {
+    let told = failed.clone();
+    let work = move |_: &mut (), snapshot: Snapshot, _: &runner::Desk<Snapshot>| {
+        if let Err(error) = snapshot.write() {
+            failed(error.to_string());
+        }
+    };
+    Worker::spawn("autosave", 1, || (), work, told).ok()
+}

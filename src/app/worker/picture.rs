@@ -1,0 +1,314 @@
+//! The object's picture: a draft at once, then the scene's own quality while the hand rests.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use biscale::filtering::EffectiveBrdf;
+use biscale::large_scale::tone_map::ToneMap;
+use biscale::large_scale::{DirectionalLight, ObjectMesh, Picture};
+use biscale::pipeline::{Outcome, Pipeline};
+use biscale::plan::Effect;
+use biscale::scene::{Camera, LoadedScene, Material, Painted, Quality, Tile};
+use biscale::{Cancel, Error, Result};
+use eframe::egui::ColorImage;
+
+use super::runner::Desk;
+use super::studio::{Shot, Studio};
+use super::tone::color_image;
+
+/// A first picture should be there after this many milliseconds.
+const DRAFT_MS: f64 = 60.0;
+/// Pictures on the way to the full one.
+const STEPS_MS: [f64; 2] = [300.0, 2000.0];
+/// The last one; where the view's own size would take longer, it is smaller (an exported picture never is).
+const FINAL_MS: f64 = 8000.0;
+/// Most pixels of a picture; a larger view shows it enlarged.
+const MOST_PIXELS: f64 = 768.0 * 768.0;
+/// How long the hand must rest before refinement begins.
+const REST: Duration = Duration::from_millis(120);
+
+/// A picture to make.
+#[derive(Debug, Clone)]
+pub struct PictureJob {
+    /// The document's version, handed back with every answer.
+    pub version: u64,
+    pub loaded: Arc<LoadedScene>,
+    /// Pixels of the view.
+    pub size: [usize; 2],
+    pub asked: Instant,
+}
+
+/// How far a picture is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Grade {
+    Draft,
+    /// On the way from draft to final.
+    Refining,
+    Final,
+}
+
+/// A picture and how it came about.
+#[derive(Debug, Clone)]
+pub struct Made {
+    pub version: u64,
+    pub grade: Grade,
+    pub picture: Arc<Picture>,
+    pub image: Arc<ColorImage>,
+    pub brdf: Arc<EffectiveBrdf>,
+    /// Milliseconds of what ran for it.
+    pub stages: Vec<(&'static str, f64)>,
+    /// From the edit to here.
+    pub latency_ms: f64,
+    pub device: String,
+    /// The object and its lights.
+    pub set: Option<(Arc<ObjectMesh>, Arc<Vec<DirectionalLight>>)>,
+    pub camera: Camera,
+    /// From the camera to the object, in radii.
+    pub distance: f32,
+    pub notes: Vec<String>,
+    pub effects: Vec<Effect>,
+    /// What the preset that made it is called.
+    pub preset: &'static str,
+}
+
+/// What comes back.
+#[derive(Debug, Clone)]
+pub enum PictureAnswer {
+    Made(Box<Made>),
+    /// What is being done, for the status line.
+    Doing(u64, &'static str),
+    Failed(u64, String),
+    /// The worker met a fault and went on anew.
+    Fault(String),
+}
+
+/// What an effective BRDF depends on.
+type SmallScale = (Tile, Vec<Material>, Quality, PathBuf, Painted);
+
+/// What both workers know: the last BRDF at a scene's own quality, and the last full picture.
+#[derive(Default)]
+pub struct Shared {
+    best: Mutex<Option<(SmallScale, Outcome)>>,
+    last: Mutex<Option<Finished>>,
+}
+
+/// A full picture and what it shows.
+type Finished = (Box<LoadedScene>, [usize; 2], Made);
+
+/// Keeps stages and what stays between pictures. One drafts, on a thread that is never kept long; another refines.
+pub struct Photographer {
+    shared: Arc<Shared>,
+    pipeline: Pipeline,
+    studio: Studio,
+    /// Milliseconds a pixel, of the draft's and of the refined BRDF.
+    cost: [f64; 2],
+}
+
+/// What a pixel is taken to cost before any was measured [ms].
+const FIRST_COST: f64 = 2e-2;
+
+impl Photographer {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared, pipeline: Pipeline::new(), studio: Studio::default(), cost: [FIRST_COST; 2] }
+    }
+
+    /// A picture at once: with the refined BRDF where it is known, else with a draft.
+    pub fn draft(&mut self, job: &PictureJob, answer: &dyn Fn(PictureAnswer)) {
+        let done = self.toned(job).and_then(|toned| match toned {
+            Some(made) => Ok(made),
+            None => self.drafted(job),
+        });
+        tell(job, done.map(|made| answer(PictureAnswer::Made(Box::new(made)))), answer);
+    }
+
+    fn drafted(&mut self, job: &PictureJob) -> Result<Made> {
+        self.studio.prepare(&job.loaded)?;
+        let (outcome, which) = match self.known(&job.loaded) {
+            Some(outcome) => (Outcome { times: Vec::new(), ..outcome }, 1),
+            None => (self.pipeline.effective(&as_draft(&job.loaded))?, 0),
+        };
+        let size = self.affordable(job.size, which, DRAFT_MS);
+        self.shoot(job, &outcome, which, size, 1, &Cancel::default())
+    }
+
+    /// The scene's own quality, once the hand rests; given up when newer work is there.
+    pub fn refine(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
+        if desk.is_newest_after(REST) {
+            tell(job, self.refined(job, desk, answer), answer);
+        }
+    }
+
+    fn refined(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) -> Result<()> {
+        if self.is_toned(job) {
+            return Ok(());
+        }
+        let mut outcome = match self.known(&job.loaded) {
+            Some(outcome) => Outcome { times: Vec::new(), ..outcome },
+            None => {
+                answer(PictureAnswer::Doing(job.version, "Refining the material"));
+                self.pipeline.cancel_with(desk.cancel.clone());
+                self.pipeline.effective(&job.loaded)?
+            }
+        };
+        *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
+        answer(PictureAnswer::Doing(job.version, "Refining the picture"));
+        self.studio.prepare(&job.loaded)?;
+        let mut shown = 0;
+        for budget in STEPS_MS {
+            let step = self.affordable(job.size, 1, budget);
+            let pixels = step[0] * step[1];
+            let full = self.affordable(job.size, 1, FINAL_MS);
+            // Steps that gain little are left out.
+            if pixels >= 2 * shown && pixels * 3 < full[0] * full[1] * 2 {
+                let mut made = self.shoot(job, &outcome, 1, step, 1, desk.cancel)?;
+                made.grade = Grade::Refining;
+                outcome.times = Vec::new();
+                shown = pixels;
+                answer(PictureAnswer::Made(Box::new(made)));
+            }
+        }
+        let full = self.affordable(job.size, 1, FINAL_MS);
+        let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
+        made.grade = Grade::Final;
+        *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
+        answer(PictureAnswer::Made(Box::new(made)));
+        Ok(())
+    }
+
+    fn known(&self, loaded: &LoadedScene) -> Option<Outcome> {
+        let best = lock(&self.shared.best);
+        best.as_ref().filter(|(key, _)| *key == small_scale(loaded)).map(|(_, outcome)| outcome.clone())
+    }
+
+    /// Whether the last full picture shows this but for its tones.
+    fn is_toned(&self, job: &PictureJob) -> bool {
+        lock(&self.shared.last).as_ref().is_some_and(|(last, size, _)| {
+            let (mut like_last, before) = ((*job.loaded).clone(), camera(last));
+            let now = camera(&job.loaded);
+            like_last.scene.camera.clone_from(&last.scene.camera);
+            like_last.name.clone_from(&last.name);
+            let tones = Camera { exposure_ev: before.exposure_ev, tone_map: before.tone_map.clone(), ..now };
+            tones == before && like_last == **last && *size == job.size
+        })
+    }
+
+    /// The last full picture in other tones, where nothing else changed.
+    fn toned(&mut self, job: &PictureJob) -> Result<Option<Made>> {
+        if !self.is_toned(job) {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let Some((last, _, made)) = &mut *lock(&self.shared.last) else { return Ok(None) };
+        made.image = Arc::new(color_image(&made.picture, &ToneMap::new(&camera(&job.loaded))?));
+        made.version = job.version;
+        made.stages = vec![("tone", ms(start))];
+        made.latency_ms = ms(job.asked);
+        last.scene.camera.clone_from(&job.loaded.scene.camera);
+        Ok(Some(made.clone()))
+    }
+
+    fn shoot(
+        &mut self,
+        job: &PictureJob,
+        outcome: &Outcome,
+        which: usize,
+        size: [usize; 2],
+        samples_per_side: usize,
+        cancel: &Cancel,
+    ) -> Result<Made> {
+        let camera = camera(&job.loaded);
+        let tone_map = ToneMap::new(&camera)?;
+        let backend = job.loaded.scene.quality.backend.as_str();
+        let settle = samples_per_side > 1;
+        let shot = Shot { camera: &camera, brdf: &outcome.brdf, size, samples_per_side, settle, backend };
+        let rendered = self.studio.shoot(&shot, cancel)?;
+        let times = rendered.times;
+        let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
+        if samples_per_side == 1 {
+            let measured = spent / (size[0] * size[1]) as f64;
+            self.cost[which] = measured;
+        }
+        let large = [("g-buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)];
+        let start = Instant::now();
+        let image = Arc::new(color_image(&rendered.picture, &tone_map));
+        let mut stages = outcome.times.clone();
+        stages.extend(large.into_iter().filter(|(_, ms)| *ms > 0.005));
+        stages.push(("tone", ms(start)));
+        let mut notes = outcome.notes.clone();
+        notes.extend(self.studio.warnings());
+        Ok(Made {
+            version: job.version,
+            grade: Grade::Draft,
+            picture: Arc::new(rendered.picture),
+            image,
+            brdf: outcome.brdf.clone(),
+            stages,
+            latency_ms: ms(job.asked),
+            device: self.studio.device(),
+            set: self.studio.set(),
+            camera: camera.clone(),
+            distance: self.studio.distance(&camera, size),
+            notes,
+            effects: outcome.plan.effects.clone(),
+            preset: outcome.settings.preset.name(),
+        })
+    }
+
+    /// The largest size, the view's shape kept, that `budget_ms` is likely to pay for.
+    fn affordable(&self, size: [usize; 2], which: usize, budget_ms: f64) -> [usize; 2] {
+        let full = fitting(size);
+        let pixels = (full[0] * full[1]) as f64;
+        let scale = (budget_ms / self.cost[which] / pixels).sqrt();
+        // Few sizes, so that the picture does not breathe while the hand moves.
+        let parts = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
+        let part = parts.into_iter().find(|part| 1.0 / part <= scale).unwrap_or(8.0);
+        full.map(|side| ((side as f64 / part).round() as usize).max(24))
+    }
+}
+
+/// The view's size, cut to what is ever rendered.
+fn fitting(size: [usize; 2]) -> [usize; 2] {
+    let size = size.map(|side| side.clamp(24, 8192));
+    let scale = (MOST_PIXELS / (size[0] * size[1]) as f64).sqrt().min(1.0);
+    size.map(|side| ((side as f64 * scale) as usize).max(24))
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Says why there is no picture; work that was given up is none to speak of.
+fn tell(job: &PictureJob, done: Result<()>, answer: &dyn Fn(PictureAnswer)) {
+    match done {
+        Ok(()) | Err(Error::Cancelled) => {}
+        Err(error) => answer(PictureAnswer::Failed(job.version, error.to_string())),
+    }
+}
+
+fn camera(loaded: &LoadedScene) -> Camera {
+    loaded.scene.camera.clone().unwrap_or_default()
+}
+
+fn small_scale(loaded: &LoadedScene) -> SmallScale {
+    let scene = &loaded.scene;
+    let parts = (scene.tile.clone(), scene.materials.clone(), scene.quality.clone());
+    (parts.0, parts.1, parts.2, loaded.base_dir.clone(), loaded.painted.clone())
+}
+
+/// The same scene at the draft preset, without knobs that were turned by hand.
+fn as_draft(loaded: &LoadedScene) -> LoadedScene {
+    let mut draft = loaded.clone();
+    let quality = &loaded.scene.quality;
+    draft.scene.quality = Quality {
+        preset: "draft".to_owned(),
+        seed: quality.seed,
+        backend: quality.backend.clone(),
+        ..Quality::default()
+    };
+    draft
+}
+
+fn ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,220 @@
+//! What stays between pictures: the object, its lights and shadows, the device. Each is made anew only when its input
+//! changed.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use biscale::filtering::{EffectiveBrdf, Reflectance};
+use biscale::gpu::{Gpu, Tier};
+use biscale::large_scale::environment::{self, Environment};
+use biscale::large_scale::lights::{self, Lights};
+use biscale::large_scale::shading::Background;
+use biscale::large_scale::shadow::Occluder;
+use biscale::large_scale::shadow_cache::ShadowCache;
+use biscale::large_scale::{
+    CameraView, DirectionalLight, GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render,
+};
+use biscale::scene::{self, Camera, LoadedScene};
+use biscale::{Cancel, Error, Result};
+use glam::Vec3;
+
+/// The large scale of a scene, ready to be shaded.
+#[derive(Default)]
+pub struct Studio {
+    object: Option<Object>,
+    environment: Option<((String, PathBuf), Environment)>,
+    lights: Option<((scene::Light, PathBuf), Lights)>,
+    /// For the object and the lights above.
+    shadows: Option<ShadowCache>,
+    gpu: Device,
+}
+
+struct Object {
+    key: (scene::Object, PathBuf),
+    mesh: Arc<ObjectMesh>,
+    occluder: Option<Occluder>,
+}
+
+#[derive(Default)]
+enum Device {
+    #[default]
+    NotAsked,
+    /// Why pictures are made on the CPU.
+    None(String),
+    Open(Box<OnDevice>),
+}
+
+struct OnDevice {
+    gpu: Gpu,
+    /// For the object above, with the BRDF that it shades with.
+    renderer: Option<(GpuRenderer, Arc<EffectiveBrdf>)>,
+}
+
+/// How a picture is made.
+pub struct Shot<'a> {
+    pub camera: &'a Camera,
+    pub brdf: &'a Arc<EffectiveBrdf>,
+    pub size: [usize; 2],
+    pub samples_per_side: usize,
+    /// Whether a shadow cache may be made: it takes longer than a draft and pays when the camera moves on.
+    pub settle: bool,
+    /// `auto`, `gpu` or `cpu`.
+    pub backend: &'a str,
+}
+
+impl Studio {
+    /// Takes the scene's object and lights over where they changed.
+    pub fn prepare(&mut self, loaded: &LoadedScene) -> Result<()> {
+        let key = (loaded.scene.object.clone(), loaded.base_dir.clone());
+        if self.object.as_ref().is_none_or(|object| object.key != key) {
+            let mesh = Arc::new(objects::build(&key.0, &key.1)?);
+            let occluder = Occluder::of(&mesh);
+            self.object = Some(Object { key, mesh, occluder });
+            self.shadows = None;
+            if let Device::Open(device) = &mut self.gpu {
+                device.renderer = None;
+            }
+        }
+        let key = (loaded.scene.light.environment.clone(), loaded.base_dir.clone());
+        if self.environment.as_ref().is_none_or(|(last, _)| *last != key) {
+            let environment = environment::load(&key.0, &key.1)?;
+            self.environment = Some((key, environment));
+            self.lights = None;
+        }
+        let key = (loaded.scene.light.clone(), loaded.base_dir.clone());
+        if self.lights.as_ref().is_none_or(|(last, _)| *last != key)
+            && let Some((_, environment)) = &self.environment
+        {
+            let lights = lights::of_environment(&key.0, environment.clone());
+            self.lights = Some((key, lights));
+            self.shadows = None;
+        }
+        Ok(())
+    }
+
+    /// Notes about the object and the lights that a person should read.
+    pub fn warnings(&self) -> Vec<String> {
+        let of_object = self.object.iter().flat_map(|object| &object.mesh.warnings);
+        of_object.chain(self.lights.iter().flat_map(|(_, lights)| &lights.warnings)).cloned().collect()
+    }
+
+    /// The object and its lights, for whoever asks what is where.
+    pub fn set(&self) -> Option<(Arc<ObjectMesh>, Arc<Vec<DirectionalLight>>)> {
+        let lights = self.lights.as_ref().map(|(_, lights)| Arc::new(lights.directional.clone()))?;
+        Some((self.object.as_ref()?.mesh.clone(), lights))
+    }
+
+    /// How far the camera is from the object, in radii, automatic framing resolved.
+    pub fn distance(&self, camera: &Camera, size: [usize; 2]) -> f32 {
+        let of = |object: &Object| {
+            let view = CameraView::new(camera, &object.mesh, size).ok()?;
+            Some((view.eye - object.mesh.bounds.center).dot(view.back) / object.mesh.bounds.radius)
+        };
+        self.object.as_ref().and_then(of).unwrap_or(4.0)
+    }
+
+    /// One picture of what was prepared.
+    ///
+    /// # Errors
+    /// A camera that cannot be, or [`Error::Cancelled`].
+    pub fn shoot(&mut self, shot: &Shot, cancel: &Cancel) -> Result<Rendered> {
+        let (Some(object), Some((_, lights))) = (&self.object, &self.lights) else {
+            return Err(Error::failed("nothing was prepared"));
+        };
+        let directional = &lights.directional;
+        if shot.settle
+            && self.shadows.is_none()
+            && let Some(occluder) = &object.occluder
+            && !directional.is_empty()
+        {
+            self.shadows = Some(occluder.cache(&object.mesh, directional));
+            cancel.check()?;
+        }
+        let occluder = object.occluder.as_ref().filter(|_| !directional.is_empty());
+        let reflectance = Cancellable { brdf: shot.brdf, cancel };
+        let input = RenderInput {
+            mesh: &object.mesh,
+            occluder,
+            shadow_cache: self.shadows.as_ref(),
+            lights: directional,
+            camera: shot.camera,
+            reflectance: &reflectance,
+            size: shot.size,
+            samples_per_side: shot.samples_per_side,
+            background: &Background::default(),
+        };
+        if let Some(rendered) = self.gpu.shoot(&input, shot) {
+            return Ok(rendered);
+        }
+        let rendered = render(&input)?;
+        cancel.check()?;
+        Ok(rendered)
+    }
+
+    /// Where pictures are made, in words.
+    pub fn device(&self) -> String {
+        match &self.gpu {
+            Device::NotAsked => "CPU".to_owned(),
+            Device::None(why) => format!("CPU ({why})"),
+            Device::Open(device) if device.renderer.is_some() => device.gpu.description(),
+            Device::Open(device) => format!("CPU, beside {}", device.gpu.description()),
+        }
+    }
+}
+
+impl Device {
+    /// A picture on the device; `None` where the CPU is to make it. What fails here fails for good.
+    fn shoot(&mut self, input: &RenderInput, shot: &Shot) -> Option<Rendered> {
+        if shot.backend == "cpu" {
+            *self = Self::NotAsked;
+            return None;
+        }
+        if matches!(self, Self::NotAsked) {
+            *self = match Gpu::open() {
+                Ok(gpu) => Self::Open(Box::new(OnDevice { gpu, renderer: None })),
+                Err(_) => Self::None("no graphics adapter".to_owned()),
+            };
+        }
+        let Self::Open(device) = self else { return None };
+        if device.gpu.tier != Tier::Hardware && shot.backend != "gpu" {
+            return None;
+        }
+        let made = match &mut device.renderer {
+            Some((_, last)) if Arc::ptr_eq(last, shot.brdf) => Ok(()),
+            Some((renderer, last)) => renderer.set_brdf(&device.gpu, shot.brdf).map(|()| *last = shot.brdf.clone()),
+            none => GpuRenderer::new(&device.gpu, input.occluder, shot.brdf)
+                .map(|renderer| *none = Some((renderer, shot.brdf.clone()))),
+        };
+        let rendered = match (made, &device.renderer) {
+            (Ok(()), Some((renderer, _))) => renderer.render(&device.gpu, input),
+            (Err(biscale::gpu::GpuError::Unsupported(_)), _) => {
+                device.renderer = None;
+                return None;
+            }
+            (Err(error), _) => Err(error.into()),
+            (Ok(()), None) => return None,
+        };
+        match rendered {
+            Ok(rendered) => Some(rendered),
+            Err(Error::Input(_)) => None,
+            Err(error) => {
+                *self = Self::None(error.to_string());
+                None
+            }
+        }
+    }
+}
+
+/// Answers nothing once it is cancelled, so that the picture ends soon; it is thrown away then.
+struct Cancellable<'a> {
+    brdf: &'a EffectiveBrdf,
+    cancel: &'a Cancel,
+}
+
+impl Reflectance for Cancellable<'_> {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        if !self.cancel.is_set() {
+            self.brdf.eval_lights(lights, o, out);
+        }
+    }
+}

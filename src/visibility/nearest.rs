@@ -1,0 +1,76 @@
+//! What a ray from above meets first in the infinite tiling: how the tile itself is looked at.
+
+use glam::Vec3;
+
+use super::PeriodicGrid;
+use super::periodic_grid::CellWalk;
+
+/// Where a ray met the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    pub triangle: u32,
+    /// Not wrapped into the first tile.
+    pub position: Vec3,
+    /// Weights of the triangle's second and third corner.
+    pub barycentric: [f32; 2],
+}
+
+impl PeriodicGrid {
+    /// Highest z of the tile.
+    pub fn top(&self) -> f32 {
+        self.top
+    }
+
+    /// The first triangle along the downward direction `to` from `origin`; `None` where nothing is down to `bottom`.
+    pub fn nearest(&self, origin: Vec3, to: Vec3, bottom: f32) -> Option<Hit> {
+        if to.z >= 0.0 {
+            return None;
+        }
+        // Nothing is above the top: start there.
+        let start = ((self.top - origin.z) / to.z).max(0.0);
+        let origin = origin + to * start;
+        let reach = (bottom - origin.z) / to.z;
+        let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
+        let mut best: Option<(f32, Hit)> = None;
+        while walk.entered <= reach {
+            let (cell, tile) = walk.cell();
+            if self.z_max[cell] >= origin.z + reach * to.z {
+                for &entry in self.entries(cell) {
+                    let corners = self.copy_corners(entry, tile);
+                    if let Some((t, v, w)) = meet(origin, to, corners)
+                        && best.is_none_or(|(nearest, _)| t < nearest)
+                    {
+                        let hit = Hit { triangle: entry.triangle, position: origin + to * t, barycentric: [v, w] };
+                        best = Some((t, hit));
+                    }
+                }
+            }
+            if to.truncate().length_squared() < 1e-16 {
+                break;
+            }
+            walk.advance();
+            if best.is_some_and(|(nearest, _)| nearest <= walk.entered) {
+                break;
+            }
+        }
+        best.map(|(_, hit)| hit)
+    }
+}
+
+/// Distance along the ray and the weights of the second and third corner (Möller and Trumbore 1997), both sides.
+fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)> {
+    let (ab, ac) = (b - a, c - a);
+    let p = to.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant.abs() < 1e-14 {
+        return None;
+    }
+    let offset = origin - a;
+    let v = offset.dot(p) / determinant;
+    let q = offset.cross(ab);
+    let w = to.dot(q) / determinant;
+    let t = ac.dot(q) / determinant;
+    // A hair of overlap, so that no ray slips between neighbours.
+    let inside = v >= -1e-5 && w >= -1e-5 && v + w <= 1.0 + 1e-5;
+    (inside && t >= -1e-6).then_some((t, v, w))
+}
