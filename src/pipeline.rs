@@ -431,9 +431,7 @@ fn see(
         (Route::HeightMarch | Route::HorizonScan, ..) => {
             Visibility::Horizons(Horizons::scan(&periodic(), facets, azimuths, ramp))
         }
-        (Route::Slices, ..) => {
-            Visibility::Slices(Slices::scan(&periodic(), facets, settings.slice_azimuths, ramp))
-        }
+        (Route::Slices, ..) => Visibility::Slices(Slices::scan(&periodic(), facets, settings.slice_azimuths, ramp)),
         (Route::GpuMaps | Route::CpuMaps, ..) => {
             let (grid, resolution) = (settings.map_grid, settings.map_resolution);
             // A GPU that fails is no reason to stop: the CPU's maps are the same.

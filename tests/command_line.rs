@@ -453,3 +453,29 @@ fn wrong_usage_exits_with_two_and_says_how_to_do_it() {
     assert!(version.starts_with("biscale "), "{version}");
     assert!(desk.files().is_empty());
 }
+
+#[test]
+fn a_report_holds_every_preset_and_goes_on_from_where_it_was() {
+    let desk = Desk::new();
+    desk.write("tile.toml", "[tile]\ngeometry = { kind = \"flat\" }\n");
+    let run = || -> Value {
+        let budget = ["--minutes", "0", "--pairs", "16", "--combinations", "1", "--quiet"];
+        desk.text(&[&["report", "tile.toml", "-o", "out"], &budget[..]].concat());
+        serde_json::from_slice(&std::fs::read(desk.path("out/report.json")).unwrap()).unwrap()
+    };
+    let report = run();
+    let points = report["points"].as_array().unwrap();
+    for preset in ["draft", "standard", "fine", "wu2011", "reference"] {
+        let point = points.iter().find(|point| point["preset"] == preset).unwrap_or_else(|| panic!("no {preset}"));
+        assert_eq!(point["scene"], "tile");
+        assert!(point["ms"].as_f64().unwrap() > 0.0 && point["settings"].as_str().unwrap().contains(preset));
+        // A grey Lambertian tile is its own BRDF; the paper's tables come close.
+        let (rel_l2, psnr_db) = (point["rel_l2"].as_f64().unwrap(), point["psnr_db"].as_f64().unwrap());
+        assert!(if preset == "wu2011" { rel_l2 < 0.3 } else { rel_l2 < 1e-3 && psnr_db > 50.0 }, "{point}");
+    }
+    assert!(report["scenes"][0]["left_out"].as_u64().unwrap() > 10, "there was no time for knobs");
+    let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("data:image/png;base64,") && !page.contains("http"));
+    assert_eq!(std::fs::read_to_string(desk.path("out/report.csv")).unwrap().lines().count(), points.len() + 1);
+    assert_eq!(run()["points"], report["points"], "what was measured is not measured again");
+}

@@ -148,7 +148,7 @@ impl Truth {
         })?;
         let f_bar: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar).collect();
         let off: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar + estimate.standard_error).collect();
-        let own_db = compare(&off, &f_bar).psnr_db;
+        let own_db = compare(&off, &f_bar).psnr_db.min(MOST_DB);
         Ok(Self { pairs, f_bar, own, own_db, passes, seconds: start.elapsed().as_secs_f64(), first_albedo: count })
     }
 
@@ -231,6 +231,9 @@ pub fn with_settings(loaded: &LoadedScene, candidate: &Candidate) -> Result<Load
     Ok(scene)
 }
 
+/// No difference at all, as a number that JSON can hold [dB].
+const MOST_DB: f64 = 300.0;
+
 /// Most runs that a time is the median of, and the seconds after which there are no more.
 const RUNS: usize = 5;
 const ENOUGH_SECONDS: f64 = 1.5;
@@ -277,7 +280,7 @@ pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Re
         ms,
         query_us: query_us(&outcome, truth),
         rel_l2: errors.rel_l2,
-        psnr_db: errors.psnr_db,
+        psnr_db: errors.psnr_db.min(MOST_DB),
         albedo_error: truth.albedo_error(&values),
         rel_l2_by_angle: truth.by_angle(&values),
         stages: times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),
