@@ -158,7 +158,7 @@ impl Settings {
             tolerance: 0.04,
             tolerance_db: 41.0,
             reference_facets: 16_384,
-            reference_passes: 16,
+            reference_passes: 32,
             backend: Backend::Auto,
             seed: 1,
         };
