@@ -24,8 +24,8 @@ const SMALLEST_SIGMA: f64 = 1e-3;
 const NDF_FLOOR: f64 = 1e-3;
 /// What is added to the density of normals, times their cosine, of the largest: faint tails keep some samples.
 const EVERYWHERE: f64 = 0.05;
-/// Elevations and azimuths of the viewer, samples along both axes of a warp: 3, 17 and 51 MB.
-const RESOLUTIONS: [[usize; 4]; 3] = [[9, 24, 24, 24], [13, 48, 36, 36], [17, 64, 48, 48]];
+/// Elevations and azimuths of the viewer, samples along both axes of a warp: 3, 20 and 77 MB.
+const RESOLUTIONS: [[usize; 4]; 3] = [[9, 24, 24, 24], [13, 48, 36, 36], [19, 72, 48, 48]];
 /// The first of them that reads with this mean error is taken.
 const GOOD_ENOUGH: f64 = 0.01;
 
@@ -36,8 +36,10 @@ struct Sizes {
     thetas: usize,
     /// Azimuths of the viewer from -π to π, the seam twice.
     phis: usize,
-    /// Of each slice: warp, luminance and colours.
+    /// Of each slice: luminance and colours.
     samples: Grid,
+    /// Of each slice: the warp, which may be finer along the azimuth.
+    vndf: Grid,
     /// Of the functions of one direction.
     ndf: Grid,
 }
@@ -51,6 +53,7 @@ impl Sizes {
             thetas: theta_i.max(2),
             phis: phi_i.max(3) + 1,
             samples: Grid { width: side, height: side },
+            vndf: Grid { width: side, height: 2 * side },
             ndf: Grid { width: 4 * side, height: 4 * side },
         }
     }
@@ -58,7 +61,7 @@ impl Sizes {
     fn theta(&self, k: usize) -> f64 {
         // Denser towards the horizon, where most happens.
         let t = k as f64 / (self.thetas - 1) as f64;
-        t * (1.0 + 0.7 * (1.0 - t)) * FRAC_PI_2
+        t * (1.0 + 0.9 * (1.0 - t)) * FRAC_PI_2
     }
 
     fn phi(&self, k: usize) -> f64 {
@@ -148,7 +151,7 @@ fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
         theta_i: (0..sizes.thetas).map(|k| sizes.theta(k)).collect(),
         ndf: (sizes.ndf, as_stored(ndf)),
         sigma: (sizes.ndf, as_stored(sigma)),
-        vndf: Warp::empty(sizes.samples),
+        vndf: Warp::empty(sizes.vndf),
         rgb: (sizes.samples, Vec::new()),
         jacobian: true,
     }
@@ -175,7 +178,7 @@ impl Tabulated {
         let count = sizes.phis * sizes.thetas;
         let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice));
         let slices: Vec<Slice> = slices.into_iter().collect::<io::Result<_>>()?;
-        let vndf = Warp::new(sizes.samples, widened(&slices, |slice| &slice.vndf)).map_err(io::Error::other)?;
+        let vndf = Warp::new(sizes.vndf, widened(&slices, |slice| &slice.vndf)).map_err(io::Error::other)?;
         let table = RglTable { vndf, rgb: (sizes.samples, widened(&slices, |slice| &slice.rgb)), ..planes };
         let read = |i: Vec3, o: Vec3| table.eval(o.as_dvec3(), i.as_dvec3()).as_vec3();
         let reading = reading_error(brdf, read);
@@ -206,9 +209,9 @@ fn widened(slices: &[Slice], of: impl Fn(&Slice) -> &Vec<f32>) -> Vec<f64> {
 fn one_slice(brdf: &EffectiveBrdf, planes: &RglTable, sizes: &Sizes, slice: usize) -> io::Result<Slice> {
     let viewer = sizes.viewer(slice);
     // The warp must be of the numbers that a reader will have.
-    let vndf = scaled(visible_normals(viewer, sizes.samples, &planes.ndf));
+    let vndf = scaled(visible_normals(viewer, sizes.vndf, &planes.ndf));
     let density = vndf.iter().map(|&value| f64::from(value)).collect();
-    let warp = Warp::new(sizes.samples, density).map_err(io::Error::other)?;
+    let warp = Warp::new(sizes.vndf, density).map_err(io::Error::other)?;
     let drawn: Vec<([f64; 2], f64)> = vertices(sizes.samples).map(|at| warp.sample(0, at)).collect();
     let halves: Vec<_> = drawn.iter().map(|(at, _)| direction_of_u(*at)).collect();
     let values = reflect(brdf, viewer, &halves);
@@ -254,7 +257,7 @@ fn scaled(values: Vec<f64>) -> Vec<f32> {
 pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     let Tabulated { sizes, table, slices, reading } = Tabulated::chosen(job)?;
     let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<f32>>();
-    let Sizes { thetas, phis, samples, ndf } = sizes;
+    let Sizes { thetas, phis, samples, vndf, ndf } = sizes;
     let joined = |of: fn(&Slice) -> &Vec<f32>| slices.iter().flat_map(of).copied().collect::<Vec<f32>>();
     let per_slice = [phis, thetas, samples.height, samples.width];
     let mut file = TensorWriter::default();
@@ -263,7 +266,7 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     file.floats("theta_i", &[thetas], &narrow(&table.theta_i));
     file.floats("sigma", &[ndf.height, ndf.width], &narrow(&table.sigma.1));
     file.floats("ndf", &[ndf.height, ndf.width], &narrow(&table.ndf.1));
-    file.floats("vndf", &per_slice, &joined(|slice| &slice.vndf));
+    file.floats("vndf", &[phis, thetas, vndf.height, vndf.width], &joined(|slice| &slice.vndf));
     file.floats("luminance", &per_slice, &joined(|slice| &slice.luminance));
     file.floats("rgb", &[phis, thetas, 3, samples.height, samples.width], &joined(|slice| &slice.rgb));
     file.bytes("jacobian", &[1]);

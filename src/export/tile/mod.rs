@@ -46,10 +46,6 @@ impl TileOptions {
         if periods == 0 || periods > u64::from(MOST_PERIODS) {
             return Err(complain("repeat", self.repeat.to_string(), format!("1 to {MOST_PERIODS} periods")));
         }
-        let samples = periods.saturating_mul(u64::from(self.samples.x)).saturating_mul(u64::from(self.samples.y));
-        if self.samples.min_element() < 2 || samples > MOST_SAMPLES {
-            return Err(complain("samples", self.samples.to_string(), format!("2 to {MOST_SAMPLES} in all")));
-        }
         if !(self.scale > 0.0 && self.scale <= 1e6) {
             return Err(complain("scale", self.scale.to_string(), "a positive number".to_owned()));
         }
@@ -60,6 +56,16 @@ impl TileOptions {
     }
 }
 
+/// Whether the heights that a solid or a picture takes are of a number that can be held.
+fn check_samples(options: &TileOptions) -> Result<()> {
+    let all = options.repeat.as_u64vec2() * options.samples.as_u64vec2();
+    if options.samples.min_element() < 2 || all.x.saturating_mul(all.y) > MOST_SAMPLES {
+        let expected = format!("2 to {MOST_SAMPLES} in all periods together");
+        return Err(InputError::new("samples", options.samples, expected).into());
+    }
+    Ok(())
+}
+
 /// Writes the tile of a scene by the ending of `path`, and returns what to know about the file.
 ///
 /// # Errors
@@ -67,6 +73,9 @@ impl TileOptions {
 pub fn write(scene: &Scene, mesh: &TileMesh, options: &TileOptions, path: &Path) -> Result<Vec<String>> {
     options.check()?;
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    if matches!(ending.as_str(), "stl" | "png") {
+        check_samples(options)?;
+    }
     let (bytes, notes) = match ending.as_str() {
         "obj" => mesh::obj(mesh, options),
         "stl" => solid::stl(mesh, options, millimetres(&scene.tile.unit)?),

@@ -191,18 +191,25 @@ impl Net {
         let moved = |points: &[DVec2]| points.iter().map(|p| *p + at).collect::<Vec<_>>();
         for (k, face) in self.faces.iter().enumerate() {
             let face = moved(face);
-            page.polygon(face.clone(), Some(color), Line::Cut);
+            page.polygon(face.iter().copied(), Some(color), Line::None);
             tab(page, face[1], face[0]);
+            if k == 0 {
+                page.segment(face[3], face[0], Line::Cut);
+            }
             if k + 1 < self.faces.len() {
                 page.segment(face[1], face[2], Line::Mountain);
             } else {
                 tab(page, face[2], face[1]);
             }
+            let with_tip = k == 0 && !self.top.is_empty();
+            page.segment(face[2], face[3], if with_tip { Line::Mountain } else { Line::Cut });
         }
-        if self.top.len() > 2 {
+        if !self.top.is_empty() {
             let top = moved(&self.top);
-            page.polygon(top.clone(), Some(color), Line::Cut);
-            page.segment(top[0], top[1], Line::Mountain);
+            page.polygon(top.iter().copied(), Some(color), Line::None);
+            for k in 1..top.len() {
+                page.segment(top[k], top[(k + 1) % top.len()], Line::Cut);
+            }
         }
     }
 }
