@@ -129,7 +129,7 @@ impl Editor {
         Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
         let from_gallery = self.gallery_ui(ui);
         let mut scene = (**self.document.scene()).clone();
-        let asked = Panel::right("parameters")
+        let parameters = Panel::right("parameters")
             .default_size(self.settings.parameters_width)
             .size_range(260.0..=620.0)
             .show(ui, |ui| {
@@ -137,13 +137,12 @@ impl Editor {
                 ScrollArea::vertical()
                     .auto_shrink([false, false])
                     .show(ui, |ui| panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots))
-            })
-            .inner
-            .inner;
+            });
+        self.settings.parameters_width = parameters.response.rect.width();
+        let asked = parameters.inner.inner;
         let side = Panel::right("side").default_size(self.settings.side_width).size_range(240.0..=900.0);
         let side = side.show(ui, |ui| self.side_ui(ui, &mut scene)).response.rect.width();
-        // A width that a narrow window forced is not one to remember.
-        self.settings.side_width = side.clamp(240.0, 900.0);
+        self.settings.side_width = side;
         CentralPanel::no_frame().show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
             self.messages.ui(ui);
@@ -176,8 +175,10 @@ impl Editor {
         if !self.settings.gallery {
             return None;
         }
-        let panel = Panel::left("gallery").default_size(132.0).size_range(118.0..=480.0);
-        let chosen = panel.show(ui, |ui| self.gallery.ui(ui, &self.document.name)).inner;
+        let panel = Panel::left("gallery").default_size(self.settings.gallery_width).size_range(118.0..=480.0);
+        let shown = panel.show(ui, |ui| self.gallery.ui(ui, &self.document.name));
+        self.settings.gallery_width = shown.response.rect.width();
+        let chosen = shown.inner;
         chosen.map(|name| Action::OpenShipped(name.to_owned()))
     }
 
