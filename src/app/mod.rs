@@ -6,9 +6,12 @@
 //! The interface never waits: workers answer over channels and wake it.
 
 mod actions;
+mod answers;
+mod background;
 mod dialogs;
 mod document;
 mod editor;
+mod incoming;
 mod menu;
 mod messages;
 mod paint;

@@ -1,21 +1,18 @@
-//! What actions do, and what dialogs answer.
+//! What actions do.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
-use biscale::Result;
-use biscale::scene::{BrdfSpec, Geometry, Material};
+use biscale::scene::Material;
 use eframe::egui::{Context, Theme};
 
 use super::actions::Action;
-use super::dialogs::{self, Dialog, FileDialog, Purpose};
+use super::dialogs::{Dialog, FileDialog, Purpose};
 use super::document::Document;
 use super::editor::Editor;
 use super::messages::Level;
-use super::panels::{self, materials, surface};
+use super::panels::materials;
 use super::views::object;
 use super::views::tile::Which;
-use super::worker::{ExportAnswer, ExportJob, What};
 
 impl Editor {
     /// Does it, or asks first.
@@ -115,7 +112,7 @@ impl Editor {
         }
     }
 
-    fn zoom(&mut self, ctx: &Context, factor: f32) {
+    pub(super) fn zoom(&mut self, ctx: &Context, factor: f32) {
         self.settings.zoom = if factor == 0.0 { 1.0 } else { (self.settings.zoom * factor).clamp(0.5, 3.0) };
         ctx.set_zoom_factor(self.settings.zoom);
     }
@@ -126,7 +123,7 @@ impl Editor {
     }
 
     /// Opens a file or a shipped scene; on failure what is open stays.
-    fn open(&mut self, what: &str) {
+    pub(super) fn open(&mut self, what: &str) {
         match Document::open(what) {
             Ok(document) => self.take_document(document),
             Err(error) => self.messages.put(Level::Trouble, "open", error.to_string()),
@@ -152,7 +149,7 @@ impl Editor {
         self.slots = materials::slots_of(&self.document.scene().tile.geometry);
     }
 
-    fn save(&mut self, path: &Path) {
+    pub(super) fn save(&mut self, path: &Path) {
         match self.document.save_as(path) {
             Ok(()) => {
                 self.messages.clear("save");
@@ -170,7 +167,7 @@ impl Editor {
         }
     }
 
-    fn copy_material(&mut self, ctx: &Context, index: usize) {
+    pub(super) fn copy_material(&mut self, ctx: &Context, index: usize) {
         let scene = self.document.scene();
         let Some(material) = scene.materials.get(index) else { return };
         let found = scene.material_for_slot(&material.name);
@@ -194,254 +191,5 @@ impl Editor {
             None => scene.materials.push(pasted),
         }
         self.document.edit_as("Paste a material", scene);
-    }
-
-    /// What the panel asked for.
-    pub(super) fn take_asked(&mut self, ctx: &Context, asked: panels::Asked) {
-        if let Some(key) = asked.browse {
-            let purpose = match key {
-                "mesh" => Purpose::TileMesh,
-                "object" => Purpose::ObjectMesh,
-                "environment" => Purpose::Environment,
-                "color_path" => Purpose::Colors,
-                _ if matches!(self.document.scene().tile.geometry, Geometry::Mesh(_)) => Purpose::TileMesh,
-                _ => Purpose::Heights,
-            };
-            self.browse(purpose, "");
-        }
-        match asked.material {
-            Some(materials::Request::Browse { material, term }) => {
-                self.browse(Purpose::Measured { material, term }, "")
-            }
-            Some(materials::Request::Copy { material }) => self.copy_material(ctx, material),
-            Some(materials::Request::Paste { slot }) => self.paste_material(&slot),
-            None => {}
-        }
-        if let Some(text) = asked.complaint {
-            self.messages.put(Level::Trouble, "edit", text);
-        }
-    }
-
-    /// The dialog that is open, and what it answers.
-    pub(super) fn dialogs(&mut self, ctx: &Context) {
-        let Some(mut dialog) = self.dialog.take() else { return };
-        let stays = match &mut dialog {
-            Dialog::Files(files) => match files.ui(ctx) {
-                None => true,
-                Some(path) => {
-                    let purpose = files.purpose.clone();
-                    if let Some(path) = path {
-                        self.chosen(ctx, purpose, path);
-                    }
-                    false
-                }
-            },
-            Dialog::Unsaved(action) => {
-                let text = format!("\"{}\" has changes that are not saved.", self.document.name);
-                match dialogs::question(ctx, "Unsaved changes", &text, &["Save", "Discard", "Cancel"]) {
-                    None => true,
-                    Some(answer) => {
-                        let action = action.clone();
-                        if answer == 0 {
-                            self.perform_now(ctx, Action::Save);
-                            if !self.document.is_dirty() {
-                                self.perform_now(ctx, action);
-                            }
-                        } else if answer == 1 {
-                            self.perform_now(ctx, action);
-                        }
-                        false
-                    }
-                }
-            }
-            Dialog::Help => dialogs::help_ui(ctx),
-            Dialog::About => {
-                let text = format!(
-                    "Version {}. The effective BRDF of tiny structures, after Wu, Dorsey and Rushmeier 2011. MIT or Apache-2.0.",
-                    env!("CARGO_PKG_VERSION")
-                );
-                dialogs::question(ctx, "biscale", &text, &["Close"]).is_none()
-            }
-            Dialog::Recover(found) => {
-                let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();
-                let text = format!("The editor ended without saving: {}.", names.join(", "));
-                match dialogs::question(ctx, "Unsaved work was found", &text, &["Recover", "Throw away", "Later"]) {
-                    None => true,
-                    Some(answer) => {
-                        match (answer, found.first()) {
-                            (0, Some(first)) => match first.restore() {
-                                Ok(document) => {
-                                    self.take_document(document);
-                                    first.discard();
-                                }
-                                Err(error) => self.messages.put(Level::Trouble, "open", error.to_string()),
-                            },
-                            (1, _) => found.iter().for_each(super::document::Recovered::discard),
-                            _ => {}
-                        }
-                        false
-                    }
-                }
-            }
-            Dialog::ChangedOnDisk { saving } => {
-                let text = format!("\"{}\" was changed by another program.", self.document.name);
-                match dialogs::question(ctx, "The file has changed", &text, &["Keep mine", "Reload", "Later"]) {
-                    None => true,
-                    Some(answer) => {
-                        match (answer, self.document.path.clone()) {
-                            (0, Some(path)) if *saving => self.save(&path),
-                            (0, _) => self.document.accept_disk(),
-                            (1, Some(path)) => self.open(&path.to_string_lossy()),
-                            _ => {}
-                        }
-                        false
-                    }
-                }
-            }
-            Dialog::Table { path, theta, phi } => match dialogs::export::table_ui(ctx, path, theta, phi) {
-                None => true,
-                Some(answer) => {
-                    if answer == dialogs::export::Answer::Export {
-                        self.export(path.clone(), What::Table { theta: *theta, phi: *phi });
-                    }
-                    false
-                }
-            },
-            Dialog::Picture { path, width, height } => match dialogs::export::picture_ui(ctx, path, width, height) {
-                None => true,
-                Some(answer) => {
-                    if answer == dialogs::export::Answer::Export {
-                        self.export(path.clone(), What::Picture { size: [*width, *height] });
-                    }
-                    false
-                }
-            },
-        };
-        if stays && self.dialog.is_none() {
-            self.dialog = Some(dialog);
-        }
-    }
-
-    /// A file was chosen.
-    fn chosen(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
-        let mut scene = (**self.document.scene()).clone();
-        let near = self.near(&path);
-        match purpose {
-            Purpose::OpenScene => return self.perform_now(ctx, Action::OpenFile(path)),
-            Purpose::SaveScene => return self.save(&path),
-            Purpose::Measured { material, term } => match materials::measured(&near) {
-                Some(measured) => materials::set_term(&mut scene, material, term, measured),
-                None => return self.unknown_file(&path),
-            },
-            Purpose::Heights => match surface::of_file(&near, &scene) {
-                Some(geometry) => scene.tile.geometry = geometry,
-                None => return self.unknown_file(&path),
-            },
-            Purpose::TileMesh => match surface::of_file(&near, &scene) {
-                Some(geometry) => scene.tile.geometry = geometry,
-                None => return self.unknown_file(&path),
-            },
-            Purpose::Colors => {
-                if let Some(place) = super::document::color_path(&mut scene.tile.geometry) {
-                    *place = Some(near);
-                }
-            }
-            Purpose::ObjectMesh => {
-                "mesh".clone_into(&mut scene.object.kind);
-                scene.object.path = Some(near);
-            }
-            Purpose::Environment => scene.light.environment = near.to_string_lossy().into_owned(),
-            Purpose::SaveHeights => return self.save_image(&path, false),
-            Purpose::SaveColors => return self.save_image(&path, true),
-            Purpose::ExportTable => {
-                match biscale::export::check_ending(&path) {
-                    Ok(()) => self.dialog = Some(Dialog::Table { path, theta: 16, phi: 64 }),
-                    Err(error) => self.messages.put(Level::Trouble, "export", error.to_string()),
-                }
-                return;
-            }
-            Purpose::ExportPicture => {
-                self.dialog = Some(Dialog::Picture { path, width: 1024, height: 1024 });
-                return;
-            }
-        }
-        self.try_edit(scene);
-    }
-
-    fn try_edit(&mut self, scene: biscale::scene::Scene) {
-        let checked: Result<()> = scene.validate();
-        match checked {
-            Ok(()) => self.document.edit(scene),
-            Err(error) => self.messages.put(Level::Trouble, "edit", error.to_string()),
-        }
-        self.scene_changed();
-    }
-
-    /// The path as the scene should name it: relative where the file lies under the scene's folder.
-    fn near(&self, path: &Path) -> PathBuf {
-        let base = &self.document.base_dir;
-        match path.strip_prefix(base) {
-            Ok(inside) if !base.as_os_str().is_empty() => inside.to_owned(),
-            _ => path.to_owned(),
-        }
-    }
-
-    fn unknown_file(&mut self, path: &Path) {
-        let text = format!(
-            "{}: found a file of another kind; scenes end in .toml, measured BRDFs in .binary or .bsdf, meshes in .obj, \
-             skies in .hdr or .exr, heights in .png.",
-            path.display()
-        );
-        self.messages.put(Level::Trouble, "open", text);
-    }
-
-    /// A file dropped on the window goes where its ending says.
-    pub(super) fn dropped(&mut self, ctx: &Context, path: PathBuf) {
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-        match ending.as_str() {
-            "toml" => self.perform(ctx, Action::OpenFile(path)),
-            "binary" | "bsdf" | "bin" | "npz" => {
-                let mut scene = (**self.document.scene()).clone();
-                if scene.materials.is_empty() {
-                    scene.materials.push(materials::grey());
-                }
-                let near = self.near(&path);
-                if let (Some(term), Some(first)) = (materials::measured(&near), scene.materials.first_mut()) {
-                    first.brdf = Some(BrdfSpec::One(term));
-                }
-                self.try_edit(scene);
-            }
-            "obj" => self.chosen(ctx, Purpose::TileMesh, path),
-            "hdr" | "exr" => self.chosen(ctx, Purpose::Environment, path),
-            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.chosen(ctx, Purpose::Heights, path),
-            _ => self.unknown_file(&path),
-        }
-    }
-
-    fn export(&mut self, path: PathBuf, what: What) {
-        if let Some(worker) = &self.exports {
-            self.messages.clear("export");
-            self.exporting = Some((0.0, "Starting"));
-            worker.ask(ExportJob { loaded: Arc::new(self.document.loaded()), path, what });
-        }
-    }
-
-    pub(super) fn take_export(&mut self, answer: ExportAnswer) {
-        match answer {
-            ExportAnswer::Progress(part, what) => {
-                if let Some(exporting) = &mut self.exporting {
-                    *exporting = (part, what);
-                }
-            }
-            ExportAnswer::Done(text) => {
-                self.exporting = None;
-                self.messages.put(Level::Note, "export", text);
-            }
-            ExportAnswer::Failed(text) => {
-                self.exporting = None;
-                self.messages.put(Level::Trouble, "export", format!("Not exported: {text}"));
-            }
-            ExportAnswer::Cancelled => self.exporting = None,
-        }
     }
 }

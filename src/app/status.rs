@@ -7,7 +7,7 @@ use super::worker::Grade;
 
 impl Editor {
     fn stop_refining(&mut self) {
-        if let Some(pictures) = &self.pictures {
+        if let Some(pictures) = &self.background.pictures {
             pictures.stop();
         }
         self.object.doing = None;
@@ -48,7 +48,7 @@ impl Editor {
                 ui.separator();
                 ui.add(egui::ProgressBar::new(part).desired_width(140.0).text(what));
                 if ui.small_button("Cancel").clicked()
-                    && let Some(worker) = &self.exports
+                    && let Some(worker) = &self.background.exports
                 {
                     worker.cancel();
                     self.exporting = None;

@@ -4,6 +4,7 @@
 //! `Σ_k E_k f_r (n·i_k)+ V(i_k)`, and weighted with the projected areas that is `Σ_k E_k f̄(i_k, o)` (Wu et al. 2011, Eq. 4
 //! and 5).
 
+pub mod on_object;
 mod shade;
 #[cfg(test)]
 mod tests;

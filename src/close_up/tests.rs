@@ -88,3 +88,49 @@ fn a_cancelled_picture_is_an_error_and_clay_takes_the_hue() {
     let picture = tile.picture(&from_above(16), &Look::Clay, wearing, Vec3::ZERO, &cancel);
     assert!(matches!(picture, Err(Error::Cancelled)));
 }
+
+#[test]
+fn coming_closer_the_tiles_show_and_the_picture_keeps_its_brightness() {
+    use crate::large_scale::shading::Background;
+    use crate::large_scale::{RenderInput, objects, render};
+    let source = "[tile]\ngeometry = { kind = \"pyramids\", height = 0.2, spacing = 0.5 }\n\
+        [[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.5, f0 = 0.8 }\n\
+        [quality]\nbackend = \"cpu\"\nmethod = \"direct\"\npenumbra_deg = 0.1\n";
+    let scene = scene::parse(source).unwrap();
+    let painted = scene::Painted::default();
+    let loaded = scene::LoadedScene { scene, base_dir: "".into(), name: "test".into(), painted };
+    let mut pipeline = Pipeline::new();
+    let brdf = pipeline.effective(&loaded).unwrap().brdf;
+    let (material_of_slot, materials) = pipeline.sum_materials(&loaded).unwrap();
+    let wearing = Wearing { material_of_slot: &material_of_slot, materials: &materials };
+    let tile = CloseUp::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
+    let object = scene::Object { kind: "sphere".to_owned(), path: None };
+    let mesh = objects::build(&object, std::path::Path::new("")).unwrap();
+    let light = |x, y, z| DirectionalLight { direction: Vec3::new(x, y, z).normalize(), irradiance: Vec3::splat(2.0) };
+    let lights = [light(0.5, 0.9, 0.8), light(-0.8, 0.3, 0.7)];
+    for (fov_deg, changes) in [(30.0, false), (1.2, true)] {
+        let camera = scene::Camera { fov_deg, distance: 4.0, ..scene::Camera::default() };
+        let input = RenderInput {
+            mesh: &mesh,
+            occluder: None,
+            shadow_cache: None,
+            lights: &lights,
+            camera: &camera,
+            reflectance: &*brdf,
+            size: [240, 240],
+            samples_per_side: 1,
+            background: &Background::default(),
+        };
+        let far = render(&input).unwrap().picture;
+        let mut near = far.clone();
+        tile.blend_into(&mut near, &input, wearing, &Cancel::default()).unwrap();
+        assert_eq!(near != far, changes, "{fov_deg}");
+        let mean = |picture: &Picture| picture.pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / 57600.0;
+        assert!((mean(&near) / mean(&far) - 1.0).abs() < 0.05, "{} {}", mean(&near), mean(&far));
+        let spread = |picture: &Picture| {
+            let m = mean(picture);
+            picture.pixels.iter().map(|p| (f64::from(p.x) - m).powi(2)).sum::<f64>()
+        };
+        assert!(!changes || spread(&near) > 4.0 * spread(&far), "the tiles' own contrast shows");
+    }
+}

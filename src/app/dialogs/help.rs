@@ -26,7 +26,8 @@ const TASKS: [(&str, &str); 6] = [
     ("Compare two versions", "Press B to keep what you see as A, edit on, and drag the line between A and now."),
     (
         "Look around",
-        "Drag turns the object, the middle button moves it, the wheel comes closer, a double click frames it. Shift-drag or \
+        "Drag turns the object, the middle button moves it, the wheel comes closer, until the tiles \
+         themselves show; a double click frames it. Shift-drag or \
          the right button turns the light.",
     ),
 ];

@@ -17,6 +17,7 @@ pub struct Settings {
     pub window: [f32; 2],
     pub recent: Vec<PathBuf>,
     pub gallery: bool,
+    pub gallery_width: f32,
     pub parameters_width: f32,
     pub side_width: f32,
     /// Whether the first-steps card has been closed.
@@ -31,6 +32,7 @@ impl Default for Settings {
             window: [1440.0, 900.0],
             recent: Vec::new(),
             gallery: true,
+            gallery_width: 132.0,
             parameters_width: 348.0,
             side_width: 372.0,
             welcomed: false,

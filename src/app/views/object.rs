@@ -13,6 +13,11 @@ use crate::app::actions::Action;
 use crate::app::panels::fields::words;
 use crate::app::worker::{Grade, Made};
 
+/// The camera comes no nearer than this many radii; the lens does the rest.
+const NEAREST: f32 = 2.2;
+/// A lens narrower than this widens before the camera moves away.
+const NARROW: f32 = 14.0;
+
 /// A picture kept for comparison.
 pub struct Kept {
     pub texture: TextureHandle,
@@ -192,8 +197,9 @@ fn turn(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f
         camera.pan += glam::Vec2::new(-delta.x, delta.y) * span / area.width().min(area.height());
     } else if response.dragged_by(PointerButton::Primary) && delta != egui::Vec2::ZERO {
         let camera = scene.camera.get_or_insert_default();
-        camera.azimuth_deg = wrapped(camera.azimuth_deg - delta.x * 0.4);
-        camera.elevation_deg = (camera.elevation_deg + delta.y * 0.3).clamp(-89.0, 89.0);
+        let speed = (camera.fov_deg / 30.0).min(1.0);
+        camera.azimuth_deg = wrapped(camera.azimuth_deg - delta.x * 0.4 * speed);
+        camera.elevation_deg = (camera.elevation_deg + delta.y * 0.3 * speed).clamp(-89.0, 89.0);
     }
     if response.hovered() {
         let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
@@ -219,11 +225,18 @@ pub fn frame(scene: &mut Scene) {
     }
 }
 
-/// Moves the camera's distance by a factor, from where automatic framing had put it.
+/// Comes closer by a factor, from where automatic framing had put the camera; near the object the lens narrows instead,
+/// until single tiles show.
 fn closer(scene: &mut Scene, factor: f32, distance: f32) {
     let camera = scene.camera.get_or_insert_default();
     let from = if camera.distance > 0.0 { camera.distance } else { distance };
-    camera.distance = (from * factor).clamp(1.02, 60.0);
+    let narrows = factor < 1.0 && from * factor < NEAREST || factor > 1.0 && camera.fov_deg < NARROW;
+    if narrows {
+        camera.fov_deg = (camera.fov_deg * factor).clamp(1.0, Camera::default().fov_deg.max(camera.fov_deg));
+        camera.distance = from;
+    } else {
+        camera.distance = (from * factor).clamp(NEAREST.min(from), 60.0);
+    }
 }
 
 fn wrapped(degrees: f32) -> f32 {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use biscale::close_up::CloseUp;
 use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution};
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::Pipeline;
@@ -10,7 +11,7 @@ use biscale::scene::LoadedScene;
 use biscale::{Cancel, Error, Result};
 
 use super::runner::Desk;
-use super::studio::{Shot, Studio};
+use super::studio::{Close, Shot, Studio};
 
 #[derive(Debug, Clone)]
 pub struct ExportJob {
@@ -88,7 +89,9 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
         }
         What::Picture { size } => {
             answer(ExportAnswer::Progress(0.3, "Rendering"));
-            picture(&job.loaded, &outcome.brdf, size, &job.path, cancel)?;
+            let tile = CloseUp::new(Arc::new(pipeline.mesh(&job.loaded)?));
+            let close = (tile, pipeline.sum_materials(&job.loaded)?);
+            picture(&job.loaded, &outcome.brdf, size, &job.path, &close, cancel)?;
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
@@ -99,6 +102,7 @@ fn picture(
     brdf: &Arc<biscale::filtering::EffectiveBrdf>,
     size: [usize; 2],
     path: &Path,
+    close: &Close,
     cancel: &Cancel,
 ) -> Result<()> {
     let camera = loaded.scene.camera.clone().unwrap_or_default();
@@ -106,7 +110,7 @@ fn picture(
     studio.prepare(loaded)?;
     let backend = loaded.scene.quality.backend.as_str();
     let shot = Shot { camera: &camera, brdf, size, samples_per_side: 3, settle: true, backend };
-    let rendered = studio.shoot(&shot, cancel)?;
+    let rendered = studio.shoot(&shot, Some(close), cancel)?;
     rendered.picture.write(path, &ToneMap::new(&camera)?)
 }
 

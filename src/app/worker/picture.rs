@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use biscale::close_up::CloseUp;
 use biscale::filtering::EffectiveBrdf;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::large_scale::{DirectionalLight, ObjectMesh, Picture};
@@ -14,7 +15,7 @@ use biscale::{Cancel, Error, Result};
 use eframe::egui::ColorImage;
 
 use super::runner::Desk;
-use super::studio::{Shot, Studio};
+use super::studio::{Close, Shot, Studio};
 use super::tone::color_image;
 
 /// A first picture should be there after this many milliseconds.
@@ -101,6 +102,8 @@ pub struct Photographer {
     shared: Arc<Shared>,
     pipeline: Pipeline,
     studio: Studio,
+    /// The tile, while pictures are so close that it shows.
+    close: Option<(SmallScale, Close)>,
     /// Milliseconds a pixel, of the draft's and of the refined BRDF.
     cost: [f64; 2],
 }
@@ -110,7 +113,7 @@ const FIRST_COST: f64 = 2e-2;
 
 impl Photographer {
     pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, pipeline: Pipeline::new(), studio: Studio::default(), cost: [FIRST_COST; 2] }
+        Self { shared, pipeline: Pipeline::new(), studio: Studio::default(), close: None, cost: [FIRST_COST; 2] }
     }
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.
@@ -222,7 +225,13 @@ impl Photographer {
         let backend = job.loaded.scene.quality.backend.as_str();
         let settle = samples_per_side > 1;
         let shot = Shot { camera: &camera, brdf: &outcome.brdf, size, samples_per_side, settle, backend };
-        let rendered = self.studio.shoot(&shot, cancel)?;
+        if self.studio.is_close(&camera, size) {
+            self.come_close(&job.loaded)?;
+        } else {
+            self.close = None;
+        }
+        let close = self.close.as_ref().map(|(_, close)| close);
+        let rendered = self.studio.shoot(&shot, close, cancel)?;
         let times = rendered.times;
         let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
         if samples_per_side == 1 {
@@ -253,6 +262,16 @@ impl Photographer {
             effects: outcome.plan.effects.clone(),
             preset: outcome.settings.preset.name(),
         })
+    }
+
+    /// Makes the tile ready to be seen itself.
+    fn come_close(&mut self, loaded: &LoadedScene) -> Result<()> {
+        let key = small_scale(loaded);
+        if self.close.as_ref().is_none_or(|(last, _)| *last != key) {
+            let tile = CloseUp::new(Arc::new(self.pipeline.mesh(loaded)?));
+            self.close = Some((key, (tile, self.pipeline.sum_materials(loaded)?)));
+        }
+        Ok(())
     }
 
     /// The largest size, the view's shape kept, that `budget_ms` is likely to pay for.

@@ -3,8 +3,10 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
-use biscale::filtering::{EffectiveBrdf, Reflectance};
+use biscale::close_up::{CloseUp, Wearing, on_object};
+use biscale::filtering::{EffectiveBrdf, Reflectance, SumMaterial};
 use biscale::gpu::{Gpu, Tier};
 use biscale::large_scale::environment::{self, Environment};
 use biscale::large_scale::lights::{self, Lights};
@@ -49,6 +51,9 @@ struct OnDevice {
     /// For the object above, with the BRDF that it shades with.
     renderer: Option<(GpuRenderer, Arc<EffectiveBrdf>)>,
 }
+
+/// A tile with the materials of its slots, for pictures so close that it shows.
+pub type Close = (CloseUp, (Vec<usize>, Vec<SumMaterial>));
 
 /// How a picture is made.
 pub struct Shot<'a> {
@@ -117,7 +122,7 @@ impl Studio {
     ///
     /// # Errors
     /// A camera that cannot be, or [`Error::Cancelled`].
-    pub fn shoot(&mut self, shot: &Shot, cancel: &Cancel) -> Result<Rendered> {
+    pub fn shoot(&mut self, shot: &Shot, close: Option<&Close>, cancel: &Cancel) -> Result<Rendered> {
         let (Some(object), Some((_, lights))) = (&self.object, &self.lights) else {
             return Err(Error::failed("nothing was prepared"));
         };
@@ -143,12 +148,26 @@ impl Studio {
             samples_per_side: shot.samples_per_side,
             background: &Background::default(),
         };
-        if let Some(rendered) = self.gpu.shoot(&input, shot) {
-            return Ok(rendered);
-        }
-        let rendered = render(&input)?;
+        let mut rendered = match self.gpu.shoot(&input, shot) {
+            Some(rendered) => rendered,
+            None => render(&input)?,
+        };
         cancel.check()?;
+        if let Some((tile, assigned)) = close {
+            let start = Instant::now();
+            let wearing = Wearing { material_of_slot: &assigned.0, materials: &assigned.1 };
+            tile.blend_into(&mut rendered.picture, &input, wearing, cancel)?;
+            rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
+        }
         Ok(rendered)
+    }
+
+    /// Whether a picture is so close that the tiles themselves show.
+    pub fn is_close(&self, camera: &Camera, size: [usize; 2]) -> bool {
+        let of = |object: &Object| {
+            CameraView::new(camera, &object.mesh, size).is_ok_and(|view| on_object::shows(&view, &object.mesh))
+        };
+        self.object.as_ref().is_some_and(of)
     }
 
     /// Where pictures are made, in words.

@@ -54,6 +54,6 @@ fn render(studio: &mut Studio, name: &str, desk: &Desk<ThumbnailJob>) -> Result<
         settle: false,
         backend: "cpu",
     };
-    let rendered = studio.shoot(&shot, desk.cancel)?;
+    let rendered = studio.shoot(&shot, None, desk.cancel)?;
     Ok(color_image(&rendered.picture, &ToneMap::new(&camera)?))
 }

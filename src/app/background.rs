@@ -1,0 +1,195 @@
+//! What is asked of the workers and what comes back.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
+
+use biscale::scene::LoadedScene;
+use eframe::egui::Context;
+
+use super::document::Snapshot;
+use super::editor::Editor;
+use super::messages::Level;
+use super::worker::{
+    ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer, PictureJob, Pictures, Thumbnail,
+    ThumbnailJob, TileAnswer, TileJob, Worker, spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
+};
+
+/// Least time between recovery files.
+const AUTOSAVE_SECS: f64 = 5.0;
+
+/// What workers send.
+enum Answer {
+    Picture(PictureAnswer),
+    Tile(TileAnswer),
+    Lobe(Box<LobeMade>),
+    Thumbnail(Thumbnail),
+    Export(ExportAnswer),
+    NotAutosaved(String),
+}
+
+/// The workers, each absent where the system gave no thread, and what was asked of them last.
+pub struct Background {
+    pub pictures: Option<Pictures>,
+    tiles: Option<Worker<TileJob>>,
+    lobes: Option<Worker<LobeJob>>,
+    thumbnails: Option<Worker<ThumbnailJob>>,
+    pub exports: Option<Worker<ExportJob>>,
+    autosaver: Option<Worker<Snapshot>>,
+    /// The version that was kept last, and when the next may be.
+    autosaved: (u64, f64),
+    answers: Receiver<Answer>,
+    /// What workers are given, for a version of the document.
+    loaded: Option<(u64, Arc<LoadedScene>)>,
+}
+
+impl Background {
+    pub fn new(ctx: &Context) -> Self {
+        let (to_us, answers) = channel();
+        let wake = ctx.clone();
+        let send = move |answer| {
+            // Nobody listens any more only when the editor is gone.
+            let _ = to_us.send(answer);
+            wake.request_repaint();
+        };
+        let (to_tile, to_lobe, to_gallery, to_export, to_save) =
+            (send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
+        let pictures = Pictures::spawn(move |answer| send(Answer::Picture(answer)));
+        let tiles = spawn_tile(move |answer| to_tile(Answer::Tile(answer)));
+        let thumbnails = spawn_thumbnail(move |made| to_gallery(Answer::Thumbnail(made)));
+        let exports = spawn_export(move |answer| to_export(Answer::Export(answer)));
+        let autosaver = spawn_autosave(move |text| to_save(Answer::NotAutosaved(text)));
+        let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
+        Self { pictures, tiles, lobes, thumbnails, exports, autosaver, autosaved: (1, 0.0), answers, loaded: None }
+    }
+}
+
+impl Editor {
+    /// Thumbnails are made while nothing else is to be done.
+    pub(super) fn fill_gallery(&mut self) {
+        let rests = |made: &Made| made.grade >= Grade::Refining && made.version == self.document.version();
+        let idle = self.object.made.as_deref().is_some_and(rests) && self.exporting.is_none();
+        let Some(worker) = &self.background.thumbnails else { return };
+        if idle && self.settings.gallery {
+            if let Some(job) = self.gallery.job() {
+                worker.ask(job);
+            }
+        } else if self.gallery.is_waiting() {
+            worker.cancel();
+            self.gallery.interrupted();
+        }
+    }
+
+    /// Unsaved work goes to the recovery file some seconds after it was done.
+    pub(super) fn keep_recovery(&mut self, ctx: &Context) {
+        let Some(recovery) = &self.recovery else { return };
+        let (version, now) = (self.document.version(), ctx.time());
+        if !self.document.is_dirty() || version == self.background.autosaved.0 {
+            return;
+        }
+        if now < self.background.autosaved.1 {
+            ctx.request_repaint_after_secs((self.background.autosaved.1 - now) as f32 + 0.05);
+            return;
+        }
+        if ctx.input(|input| input.pointer.any_down()) {
+            return;
+        }
+        if let (Some(worker), Ok(snapshot)) = (&self.background.autosaver, recovery.prepare(&self.document)) {
+            worker.ask(snapshot);
+        }
+        self.background.autosaved = (version, now + AUTOSAVE_SECS);
+    }
+
+    /// Before the window goes: nothing is left to recover.
+    pub fn close(&mut self) {
+        if let Some(worker) = self.background.autosaver.take() {
+            worker.finish();
+        }
+        if let Some(recovery) = self.recovery.take() {
+            recovery.clear();
+        }
+        self.settings.save(self.folder.as_deref());
+    }
+
+    /// Asks the workers for what is shown, once for every state and size.
+    pub(super) fn request(&mut self) {
+        let version = self.document.version();
+        if self.background.loaded.as_ref().is_none_or(|(last, _)| *last != version) {
+            self.background.loaded = Some((version, Arc::new(self.document.loaded())));
+        }
+        let Some((_, loaded)) = self.background.loaded.clone() else { return };
+        let wanted = (version, self.size);
+        if self.object.asked != Some(wanted) {
+            self.object.asked = Some(wanted);
+            self.object.since.get_or_insert_with(Instant::now);
+            if let Some(worker) = &self.background.pictures {
+                let job = PictureJob { version, loaded: loaded.clone(), size: self.size, asked: Instant::now() };
+                worker.ask(job);
+            }
+        }
+        if let (Some(worker), Some(job)) = (&self.background.tiles, self.tile.job(&loaded, self.lobe.light)) {
+            worker.ask(job);
+        }
+        if !self.tile.painting
+            && let (Some(worker), Some(made)) = (&self.background.lobes, &self.object.made)
+            && let Some(job) = self.lobe.job(&made.brdf)
+        {
+            worker.ask(job);
+        }
+    }
+
+    pub(super) fn take_answers(&mut self, ctx: &Context) {
+        while let Ok(answer) = self.background.answers.try_recv() {
+            match answer {
+                Answer::Tile(TileAnswer::Made(made)) => {
+                    self.messages.clear("tile");
+                    self.slots.clone_from(&made.tile.mesh.slots);
+                    self.tile.take(ctx, made);
+                }
+                Answer::Tile(TileAnswer::Failed(text)) => self.messages.put(Level::Trouble, "tile", text),
+                Answer::Lobe(made) => self.lobe.take(ctx, made),
+                Answer::Thumbnail(made) => self.gallery.take(ctx, made),
+                Answer::Export(answer) => self.take_export(answer),
+                Answer::NotAutosaved(text) => {
+                    let text = format!("No recovery file could be written ({text}). Save your work yourself.");
+                    self.messages.put(Level::Trouble, "autosave", text);
+                }
+                Answer::Picture(answer) => self.take_picture(ctx, answer),
+            }
+        }
+    }
+
+    pub(super) fn take_picture(&mut self, ctx: &Context, answer: PictureAnswer) {
+        match answer {
+            PictureAnswer::Made(made) => {
+                self.messages.clear("picture");
+                self.object.since = None;
+                self.object.take(ctx, made);
+            }
+            PictureAnswer::Doing(version, what) if version == self.document.version() => {
+                self.object.doing = Some(what);
+            }
+            PictureAnswer::Doing(..) => {}
+            PictureAnswer::Failed(version, _) if version < self.document.version() => {}
+            PictureAnswer::Failed(_, text) => {
+                self.object.doing = None;
+                self.object.since = None;
+                self.messages.put(Level::Trouble, "picture", text);
+            }
+            PictureAnswer::Fault(text) => {
+                self.object.doing = None;
+                self.object.since = None;
+                let text = format!("A fault in the program while computing ({text}). Your document is kept; edit on.");
+                self.messages.put(Level::Trouble, "picture", text);
+            }
+        }
+    }
+
+    /// Whether anything is being computed.
+    #[cfg(test)]
+    pub fn is_busy(&self) -> bool {
+        self.object.made.as_ref().is_none_or(|made| {
+            made.grade != Grade::Final || Some(made.version) != self.object.asked.map(|(version, _)| version)
+        })
+    }
+}

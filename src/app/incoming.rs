@@ -1,0 +1,166 @@
+//! What comes in and goes out: files that were chosen or dropped, what the panels asked for, exports.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use biscale::Result;
+use biscale::scene::{BrdfSpec, Geometry};
+use eframe::egui::Context;
+
+use super::actions::Action;
+use super::dialogs::{Dialog, Purpose};
+use super::editor::Editor;
+use super::messages::Level;
+use super::panels::{self, materials, surface};
+use super::worker::{ExportAnswer, ExportJob, What};
+
+impl Editor {
+    /// What the panel asked for.
+    pub(super) fn take_asked(&mut self, ctx: &Context, asked: panels::Asked) {
+        if let Some(key) = asked.browse {
+            let purpose = match key {
+                "mesh" => Purpose::TileMesh,
+                "object" => Purpose::ObjectMesh,
+                "environment" => Purpose::Environment,
+                "color_path" => Purpose::Colors,
+                _ if matches!(self.document.scene().tile.geometry, Geometry::Mesh(_)) => Purpose::TileMesh,
+                _ => Purpose::Heights,
+            };
+            self.browse(purpose, "");
+        }
+        match asked.material {
+            Some(materials::Request::Browse { material, term }) => {
+                self.browse(Purpose::Measured { material, term }, "")
+            }
+            Some(materials::Request::Copy { material }) => self.copy_material(ctx, material),
+            Some(materials::Request::Paste { slot }) => self.paste_material(&slot),
+            None => {}
+        }
+        if let Some(text) = asked.complaint {
+            self.messages.put(Level::Trouble, "edit", text);
+        }
+    }
+
+    /// A file was chosen.
+    pub(super) fn chosen(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
+        let mut scene = (**self.document.scene()).clone();
+        let near = self.near(&path);
+        match purpose {
+            Purpose::OpenScene => return self.perform_now(ctx, Action::OpenFile(path)),
+            Purpose::SaveScene => return self.save(&path),
+            Purpose::Measured { material, term } => match materials::measured(&near) {
+                Some(measured) => materials::set_term(&mut scene, material, term, measured),
+                None => return self.unknown_file(&path),
+            },
+            Purpose::Heights => match surface::of_file(&near, &scene) {
+                Some(geometry) => scene.tile.geometry = geometry,
+                None => return self.unknown_file(&path),
+            },
+            Purpose::TileMesh => match surface::of_file(&near, &scene) {
+                Some(geometry) => scene.tile.geometry = geometry,
+                None => return self.unknown_file(&path),
+            },
+            Purpose::Colors => {
+                if let Some(place) = super::document::color_path(&mut scene.tile.geometry) {
+                    *place = Some(near);
+                }
+            }
+            Purpose::ObjectMesh => {
+                "mesh".clone_into(&mut scene.object.kind);
+                scene.object.path = Some(near);
+            }
+            Purpose::Environment => scene.light.environment = near.to_string_lossy().into_owned(),
+            Purpose::SaveHeights => return self.save_image(&path, false),
+            Purpose::SaveColors => return self.save_image(&path, true),
+            Purpose::ExportTable => {
+                match biscale::export::check_ending(&path) {
+                    Ok(()) => self.dialog = Some(Dialog::Table { path, theta: 16, phi: 64 }),
+                    Err(error) => self.messages.put(Level::Trouble, "export", error.to_string()),
+                }
+                return;
+            }
+            Purpose::ExportPicture => {
+                self.dialog = Some(Dialog::Picture { path, width: 1024, height: 1024 });
+                return;
+            }
+        }
+        self.try_edit(scene);
+    }
+
+    pub(super) fn try_edit(&mut self, scene: biscale::scene::Scene) {
+        let checked: Result<()> = scene.validate();
+        match checked {
+            Ok(()) => self.document.edit(scene),
+            Err(error) => self.messages.put(Level::Trouble, "edit", error.to_string()),
+        }
+        self.scene_changed();
+    }
+
+    /// The path as the scene should name it: relative where the file lies under the scene's folder.
+    pub(super) fn near(&self, path: &Path) -> PathBuf {
+        let base = &self.document.base_dir;
+        match path.strip_prefix(base) {
+            Ok(inside) if !base.as_os_str().is_empty() => inside.to_owned(),
+            _ => path.to_owned(),
+        }
+    }
+
+    pub(super) fn unknown_file(&mut self, path: &Path) {
+        let text = format!(
+            "{}: found a file of another kind; scenes end in .toml, measured BRDFs in .binary or .bsdf, meshes in .obj, \
+             skies in .hdr or .exr, heights in .png.",
+            path.display()
+        );
+        self.messages.put(Level::Trouble, "open", text);
+    }
+
+    /// A file dropped on the window goes where its ending says.
+    pub(super) fn dropped(&mut self, ctx: &Context, path: PathBuf) {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+        match ending.as_str() {
+            "toml" => self.perform(ctx, Action::OpenFile(path)),
+            "binary" | "bsdf" | "bin" | "npz" => {
+                let mut scene = (**self.document.scene()).clone();
+                if scene.materials.is_empty() {
+                    scene.materials.push(materials::grey());
+                }
+                let near = self.near(&path);
+                if let (Some(term), Some(first)) = (materials::measured(&near), scene.materials.first_mut()) {
+                    first.brdf = Some(BrdfSpec::One(term));
+                }
+                self.try_edit(scene);
+            }
+            "obj" => self.chosen(ctx, Purpose::TileMesh, path),
+            "hdr" | "exr" => self.chosen(ctx, Purpose::Environment, path),
+            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.chosen(ctx, Purpose::Heights, path),
+            _ => self.unknown_file(&path),
+        }
+    }
+
+    pub(super) fn export(&mut self, path: PathBuf, what: What) {
+        if let Some(worker) = &self.background.exports {
+            self.messages.clear("export");
+            self.exporting = Some((0.0, "Starting"));
+            worker.ask(ExportJob { loaded: Arc::new(self.document.loaded()), path, what });
+        }
+    }
+
+    pub(super) fn take_export(&mut self, answer: ExportAnswer) {
+        match answer {
+            ExportAnswer::Progress(part, what) => {
+                if let Some(exporting) = &mut self.exporting {
+                    *exporting = (part, what);
+                }
+            }
+            ExportAnswer::Done(text) => {
+                self.exporting = None;
+                self.messages.put(Level::Note, "export", text);
+            }
+            ExportAnswer::Failed(text) => {
+                self.exporting = None;
+                self.messages.put(Level::Trouble, "export", format!("Not exported: {text}"));
+            }
+            ExportAnswer::Cancelled => self.exporting = None,
+        }
+    }
+}
