@@ -13,6 +13,7 @@ mod measured;
 pub(crate) mod merl;
 pub(crate) mod npz;
 pub(crate) mod rgl;
+pub(crate) mod spectrum;
 mod spherical;
 pub(crate) mod utia;
 

@@ -95,6 +95,8 @@ enum Format {
     Csv,
     Exr,
     Rgl,
+    /// With spectra in place of RGB.
+    RglSpectral,
     Merl,
     Radiance,
     Utia,
@@ -115,6 +117,10 @@ const FORMATS: &[(&str, Format)] = &[
 
 impl Format {
     fn of(path: &Path) -> Result<Self> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        if name.ends_with("_spec.bsdf") {
+            return Ok(Self::RglSpectral);
+        }
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
         let known = ending.as_deref().and_then(|ending| FORMATS.iter().find(|(known, _)| *known == ending));
         if let Some((_, format)) = known {
@@ -175,7 +181,8 @@ pub fn write(
             Format::Npz => on_grid(&job, &mut counted, npz::write)?,
             Format::Csv => on_grid(&job, &mut counted, csv::write)?,
             Format::Exr => on_grid(&job, &mut counted, exr_atlas::write)?,
-            Format::Rgl => rgl::write(&job, &mut counted)?,
+            Format::Rgl => rgl::write(&job, &mut counted, rgl::Colors::Rgb)?,
+            Format::RglSpectral => rgl::write(&job, &mut counted, rgl::Colors::Spectra)?,
             Format::Merl => merl::write(&job, &mut counted)?,
             Format::Radiance => radiance::write(&job, &mut counted)?,
             Format::Utia => utia::write(&job, &mut counted)?,

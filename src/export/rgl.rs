@@ -14,6 +14,7 @@ use crate::brdf::LUMINANCE;
 use crate::brdf::rgl::table::{RglTable, direction_of_u, u_of_direction};
 use crate::brdf::rgl::tensor_file::TensorWriter;
 use crate::brdf::rgl::warp::{Grid, Warp};
+use crate::brdf::spectrum::{WRITTEN_NM, spectra_of_primaries};
 use crate::filtering::{EffectiveBrdf, Reflectance};
 
 /// The last elevation stands for 90°, where nothing is defined.
@@ -186,12 +187,12 @@ impl Tabulated {
     }
 
     /// Of the size asked for, else the smallest of a few that reads well.
-    fn chosen(job: &Job<'_>) -> io::Result<Self> {
+    fn chosen(job: &Job<'_>, resolutions: &[[usize; 4]]) -> io::Result<Self> {
         if let Some(resolution) = &job.options.resolution {
             return Self::new(job, resolution);
         }
         let mut last = None;
-        for [theta_i, phi_i, theta_o, phi_o] in RESOLUTIONS {
+        for [theta_i, phi_i, theta_o, phi_o] in resolutions.iter().copied() {
             let tabulated = Self::new(job, &ExportResolution { theta_i, phi_i, theta_o, phi_o })?;
             if tabulated.reading.mean <= GOOD_ENOUGH {
                 return Ok(tabulated);
@@ -253,9 +254,19 @@ fn scaled(values: Vec<f64>) -> Vec<f32> {
     values.into_iter().map(|value| (value / largest) as f32).collect()
 }
 
-/// Writes the file of RGB values.
-pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
-    let Tabulated { sizes, table, slices, reading } = Tabulated::chosen(job)?;
+/// What a file holds; one may not hold both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Colors {
+    Rgb,
+    /// For spectral renderers: smooth spectra that look like the RGB values in daylight.
+    Spectra,
+}
+
+/// Writes a file.
+pub fn write(job: &Job<'_>, out: &mut dyn Write, colors: Colors) -> io::Result<Written> {
+    // Spectra take five times the room: the largest size is left to those who ask for it.
+    let sizes = if colors == Colors::Rgb { &RESOLUTIONS[..] } else { &RESOLUTIONS[..2] };
+    let Tabulated { sizes, table, slices, reading } = Tabulated::chosen(job, sizes)?;
     let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<f32>>();
     let Sizes { thetas, phis, samples, vndf, ndf } = sizes;
     let joined = |of: fn(&Slice) -> &Vec<f32>| slices.iter().flat_map(of).copied().collect::<Vec<f32>>();
@@ -268,21 +279,56 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     file.floats("ndf", &[ndf.height, ndf.width], &narrow(&table.ndf.1));
     file.floats("vndf", &[phis, thetas, vndf.height, vndf.width], &joined(|slice| &slice.vndf));
     file.floats("luminance", &per_slice, &joined(|slice| &slice.luminance));
-    file.floats("rgb", &[phis, thetas, 3, samples.height, samples.width], &joined(|slice| &slice.rgb));
+    match colors {
+        Colors::Rgb => {
+            file.floats("rgb", &[phis, thetas, 3, samples.height, samples.width], &joined(|slice| &slice.rgb));
+        }
+        Colors::Spectra => {
+            file.floats("wavelengths", &[WRITTEN_NM.len()], &narrow(&WRITTEN_NM));
+            let shape = [phis, thetas, WRITTEN_NM.len(), samples.height, samples.width];
+            file.floats("spectra", &shape, &spectra(&slices, samples.len()));
+        }
+    }
     file.bytes("jacobian", &[1]);
     file.write(out)?;
-    Ok(Written { pairs: thetas * phis * samples.len(), reading, conventions: conventions(), anisotropy_lost: None })
+    Ok(Written {
+        pairs: thetas * phis * samples.len(),
+        reading,
+        conventions: conventions(colors),
+        anisotropy_lost: None,
+    })
 }
 
-fn conventions() -> Vec<String> {
-    [
-        "RGL tensor file (Dupuy and Jakob 2018), anisotropic, RGB: Mitsuba 3's `measured`, pbrt-v4's `measured`, RGL's brdf-loader.",
+/// `[slice][wavelength][place]` of slices of RGB planes.
+fn spectra(slices: &[Slice], plane: usize) -> Vec<f32> {
+    let primaries = spectra_of_primaries();
+    let mut values = Vec::with_capacity(slices.len() * primaries.len() * plane);
+    for slice in slices {
+        for primary in &primaries {
+            values.extend((0..plane).map(|at| {
+                let rgb = DVec3::from_array(std::array::from_fn(|c| f64::from(slice.rgb[c * plane + at])));
+                primary.dot(rgb).max(0.0) as f32
+            }));
+        }
+    }
+    values
+}
+
+fn conventions(colors: Colors) -> Vec<String> {
+    let what = match colors {
+        Colors::Rgb => "Field rgb: linear RGB, Rec. 709 primaries; for RGB variants of Mitsuba (pbrt upsamples).",
+        Colors::Spectra => {
+            "Fields spectra, wavelengths (nm): smooth spectra that look like our RGB in daylight (D65); for spectral variants."
+        }
+    };
+    let lines = [
+        what,
+        "RGL tensor file (Dupuy and Jakob 2018), anisotropic: Mitsuba 3's `measured`, pbrt-v4's `measured`, RGL's brdf-loader.",
         "Slices (phi_i, theta_i) are directions of the viewer, Mitsuba's wi; phi_i runs from -pi to pi, the seam twice.",
         "A value, rgb(s) ndf(u_m) / (4 sigma(u_i)), is the BRDF times the cosine of the other direction, Mitsuba's wo: f_bar.",
         "u = (sqrt(2 theta / pi), (phi + pi) / 2 pi); m is the half vector; s is u_m through the inverse of the warp by vndf.",
         "sigma is the visible projected area over the tile's area; ndf is the luminance of G(m, m), of its largest, floored.",
         "vndf is the density of normals as this viewer sees them, softened; luminance is what the warp by it leaves to sample.",
-    ]
-    .map(str::to_owned)
-    .to_vec()
+    ];
+    lines.map(str::to_owned).to_vec()
 }

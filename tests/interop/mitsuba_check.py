@@ -159,6 +159,33 @@ def check_exports(arguments, folder):
     return table.passed
 
 
+def check_spectral(folder):
+    """A spectral file in a spectral variant: its colour in daylight, by Mitsuba's own observer and illuminant, is ours."""
+    scene, count = "fig5a_isotropic", 60
+    path = Path(folder) / f"{scene}_spec.bsdf"
+    report, written = export(scene, path)
+    pairs = random_pairs(count, lowest_deg=75)
+    mi.set_variant("scalar_spectral")
+    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
+    daylight = mi.load_dict({"type": "d65"})
+    interaction = mi.SurfaceInteraction3f()
+    wavelengths = np.arange(380, 780, 5.0)
+    found, white = np.zeros((count, 3)), np.zeros(3)
+    for chunk in wavelengths.reshape(-1, 4):
+        interaction.wavelengths = chunk.tolist()
+        power = np.array(daylight.eval(interaction))[:, None] * np.array([np.ravel(mi.cie1931_xyz(nm)) for nm in chunk])
+        white += power.sum(0)
+        for k, (i, o) in enumerate(zip(direction(pairs[:, 0], pairs[:, 1]), direction(pairs[:, 2], pairs[:, 3]))):
+            interaction.wi = mi.Vector3f(*o)
+            found[k] += np.array(bsdf.eval(mi.BSDFContext(), interaction, mi.Vector3f(*i))) @ power
+    srgb = np.array([[3.2409699, -1.5373832, -0.4986108], [-0.9692436, 1.8759675, 0.0415551], [0.0556301, -0.203977, 1.0569715]])
+    found = found @ srgb.T / (srgb @ white)
+    error = mean_error(found, evaluate(scene, pairs, folder))
+    table = Table("spectral file", "bytes", "written [s]", "mean error", "allowed")
+    table.check(error < 0.02, f"{scene}_spec", report["bytes"], f"{written:.1f}", f"{100 * error:.2f} %", "2 %")
+    return table.passed
+
+
 def llvm_works():
     """Whether the chi-squared test can run: a bad LLVM ends the process, so another one tries."""
     import subprocess
@@ -200,6 +227,7 @@ def main():
     print(f"Mitsuba {mi.__version__}")
     with tempfile.TemporaryDirectory() as folder:
         passed = check_import(folder)
+        passed &= check_spectral(folder)
         passed &= check_exports(arguments, folder)
     raise SystemExit(0 if passed else 1)
 

@@ -108,7 +108,7 @@ fn half_and_difference_angles_become_the_vectors_that_have_them() {
 }
 
 #[test]
-fn anisotropic_and_spectral_files_are_refused_with_the_reason() {
+fn anisotropic_files_are_refused_with_the_reason() {
     let mut turned = lambertian_fields();
     turned[0] = floats("phi_i", &[3], [-PI, 0.0, PI]);
     for at in [4, 5] {
@@ -119,10 +119,21 @@ fn anisotropic_and_spectral_files_are_refused_with_the_reason() {
     // Half vectors of an anisotropic file do not turn with i: the same slices for all azimuths are no Lambertian.
     let error = parse(&turned).unwrap().check_isotropic().unwrap_err().to_string();
     assert!(error.contains("3 azimuths") && error.contains("isotropic"), "{error}");
+}
+
+#[test]
+fn spectra_become_the_colour_that_the_eye_sees_in_daylight() {
+    // A reflectance of 0.5 at every wavelength is grey.
     let mut fields = lambertian_fields();
-    fields[5].name = "spectra";
+    let planes: Vec<u8> = fields[5].data.chunks(4 * 1600).step_by(3).flat_map(|plane| plane.repeat(5)).collect();
+    fields[5] = FieldBytes { name: "spectra", kind: 10, shape: vec![1, 14, 5, 40, 40], data: planes };
+    fields.push(floats("wavelengths", &[5], [400.0, 480.0, 560.0, 640.0, 720.0]));
+    let (i, o) = (DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 0.6, 0.8));
+    let (found, red) = (parse(&fields).unwrap().eval(i, o), parse(&lambertian_fields()).unwrap().eval(i, o).x);
+    assert!((found / red - 1.0).abs().max_element() < 1e-6, "{found} {red}");
+    fields[7].shape = vec![1];
     let error = parse(&fields).err().unwrap().to_string();
-    assert!(error.contains("found spectra, expected rgb"), "{error}");
+    assert!(error.contains("wavelengths"), "{error}");
 }
 
 #[test]

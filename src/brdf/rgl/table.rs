@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::tensor_file::TensorFile;
 use super::warp::{Between, Blend, Grid, Warp};
+use crate::brdf::spectrum::rgb_weights;
 use crate::error::InputError;
 
 /// The coordinate of an elevation on the unit square, `√(2θ/π)`.
@@ -47,11 +48,40 @@ pub(crate) struct RglTable {
     pub jacobian: bool,
 }
 
+/// The name, shape and numbers of the colours: `rgb`, or `spectra` seen in daylight by the standard observer.
+fn colors(file: &TensorFile) -> Result<(&'static str, [usize; 5], Vec<f64>), InputError> {
+    if file.has("rgb") || !file.has("spectra") {
+        let (shape, values) = file.floats("rgb")?;
+        return Ok(("rgb", shape, values));
+    }
+    let ([count], wavelengths) = file.floats("wavelengths")?;
+    if count < 2 || !wavelengths.windows(2).all(|pair| pair[0] < pair[1]) {
+        return Err(InputError::new(
+            "field \"wavelengths\"",
+            format!("{count} numbers"),
+            "increasing wavelengths, at least two",
+        ));
+    }
+    let ([phis, thetas, channels, height, width], spectra) = file.floats::<5>("spectra")?;
+    if channels != count {
+        let expected = format!("{count} channels, as wavelengths");
+        return Err(InputError::new("field \"spectra\"", format!("{channels} channels"), expected));
+    }
+    let weights = rgb_weights(&wavelengths);
+    let plane = height * width;
+    let mut rgb = Vec::with_capacity(phis * thetas * 3 * plane);
+    for slice in spectra.chunks_exact((channels * plane).max(1)) {
+        for channel in 0..3 {
+            rgb.extend((0..plane).map(|at| {
+                weights.iter().enumerate().map(|(k, weight)| weight[channel] * slice[k * plane + at]).sum::<f64>()
+            }));
+        }
+    }
+    Ok(("spectra", [phis, thetas, 3, height, width], rgb))
+}
+
 impl RglTable {
     pub(crate) fn from_fields(file: &TensorFile) -> Result<Self, InputError> {
-        if !file.has("rgb") && file.has("spectra") {
-            return Err(InputError::new("fields", "spectra", "rgb").with_hint("the same material's _rgb file loads"));
-        }
         let ([phi_count], phi_i) = file.floats("phi_i")?;
         let ([theta_count], theta_i) = file.floats("theta_i")?;
         for (name, angles) in [("phi_i", &phi_i), ("theta_i", &theta_i)] {
@@ -76,9 +106,9 @@ impl RglTable {
         let ([phis, thetas, height, width], vndf) = file.floats("vndf")?;
         slices("vndf", &[phis, thetas])?;
         let vndf_grid = Grid::new("vndf", width, height)?;
-        let ([phis, thetas, channels, height, width], rgb) = file.floats("rgb")?;
-        slices("rgb", &[phis, thetas, channels])?;
-        let rgb_grid = Grid::new("rgb", width, height)?;
+        let (channels, [phis, thetas, count, height, width], rgb) = colors(file)?;
+        slices(channels, &[phis, thetas, count])?;
+        let rgb_grid = Grid::new(channels, width, height)?;
         let jacobian = file.has("jacobian") && file.floats::<1>("jacobian")?.1.first().is_some_and(|&flag| flag != 0.0);
         Ok(Self {
             phi_i,
