@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use biscale::scene::LoadedScene;
 use eframe::egui::Context;
@@ -62,6 +62,16 @@ impl Background {
         let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
         Self { pictures, tiles, lobes, thumbnails, exports, autosaver, autosaved: (1, 0.0), answers, loaded: None }
     }
+
+    /// Ends all threads: none may still use a graphics driver while the process takes it down.
+    pub fn finish(self) {
+        let longest = Duration::from_secs(4);
+        self.pictures.into_iter().for_each(|workers| workers.finish(longest));
+        self.tiles.into_iter().for_each(|worker| worker.finish(longest));
+        self.lobes.into_iter().for_each(|worker| worker.finish(longest));
+        self.thumbnails.into_iter().for_each(|worker| worker.finish(longest));
+        self.exports.into_iter().for_each(|worker| worker.finish(longest));
+    }
 }
 
 impl Editor {
@@ -103,7 +113,7 @@ impl Editor {
     /// Before the window goes: nothing is left to recover.
     pub fn close(&mut self) {
         if let Some(worker) = self.background.autosaver.take() {
-            worker.finish();
+            worker.finish(Duration::from_secs(4));
         }
         if let Some(recovery) = self.recovery.take() {
             recovery.clear();

@@ -90,6 +90,11 @@ impl Editor {
         }
     }
 
+    /// After the window is gone.
+    pub fn finish(self) {
+        self.background.finish();
+    }
+
     /// One frame in a window: title, files dropped, the way out.
     pub fn window_frame(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();

@@ -55,6 +55,9 @@ pub fn run(scene: Option<&str>) -> Result<()> {
         }
         // A lost device takes the window with it, not the document.
         if !lost.load(Ordering::Relaxed) {
+            if let Some(editor) = kept.borrow_mut().take() {
+                editor.finish();
+            }
             return Ok(());
         }
     }

@@ -49,7 +49,8 @@ impl Gallery {
         ui.add_space(2.0);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             let columns = ((ui.available_width() + 6.0) / 118.0).floor().max(1.0);
-            let side = (ui.available_width() - (columns - 1.0) * 6.0) / columns;
+            // A little less: a row that is too wide by rounding would wrap.
+            let side = ((ui.available_width() - (columns - 1.0) * 6.0) / columns).floor() - 1.0;
             ui.horizontal_wrapped(|ui| {
                 for name in shipped::names() {
                     if self.item(ui, name, side, name == current) {

@@ -10,6 +10,7 @@ mod tile;
 mod tone;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::document::Snapshot;
 
@@ -62,6 +63,11 @@ impl Pictures {
     pub fn ask(&self, job: PictureJob) {
         self.refine.ask(job.clone());
         self.draft.ask(job);
+    }
+
+    pub fn finish(self, longest: Duration) {
+        self.draft.finish(longest);
+        self.refine.finish(longest);
     }
 
     /// What is shown is good enough: no refinement.

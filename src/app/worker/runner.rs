@@ -4,7 +4,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use biscale::Cancel;
 
@@ -91,10 +91,15 @@ impl<J: Send + 'static> Worker<J> {
         self.mailbox.changed.notify_all();
     }
 
-    /// Waits for the thread to end what it does. What waits is given up.
-    pub fn finish(mut self) {
+    /// Gives up all work and waits for the thread to end, no longer than this.
+    pub fn finish(mut self, longest: Duration) {
         self.close();
-        if let Some(thread) = self.thread.take() {
+        let Some(thread) = self.thread.take() else { return };
+        let start = Instant::now();
+        while !thread.is_finished() && start.elapsed() < longest {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        if thread.is_finished() {
             // A panic inside was reported already.
             let _ = thread.join();
         }

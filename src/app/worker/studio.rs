@@ -43,6 +43,8 @@ enum Device {
     NotAsked,
     /// Why pictures are made on the CPU.
     None(String),
+    /// The adapter that is software, used only where it is asked for.
+    Slower(String),
     Open(Box<OnDevice>),
 }
 
@@ -174,6 +176,7 @@ impl Studio {
     pub fn device(&self) -> String {
         match &self.gpu {
             Device::NotAsked => "CPU".to_owned(),
+            Device::Slower(name) => format!("CPU ({name} would be slower)"),
             Device::None(why) => format!("CPU ({why})"),
             Device::Open(device) if device.renderer.is_some() => device.gpu.description(),
             Device::Open(device) => format!("CPU, beside {}", device.gpu.description()),
@@ -188,16 +191,15 @@ impl Device {
             *self = Self::NotAsked;
             return None;
         }
-        if matches!(self, Self::NotAsked) {
+        if matches!(self, Self::NotAsked) || matches!(self, Self::Slower(_)) && shot.backend == "gpu" {
             *self = match Gpu::open() {
+                // The processor in disguise is slower than our own routes: it is not kept open.
+                Ok(gpu) if gpu.tier != Tier::Hardware && shot.backend != "gpu" => Self::Slower(gpu.adapter.name),
                 Ok(gpu) => Self::Open(Box::new(OnDevice { gpu, renderer: None })),
                 Err(_) => Self::None("no graphics adapter".to_owned()),
             };
         }
         let Self::Open(device) = self else { return None };
-        if device.gpu.tier != Tier::Hardware && shot.backend != "gpu" {
-            return None;
-        }
         let made = match &mut device.renderer {
             Some((_, last)) if Arc::ptr_eq(last, shot.brdf) => Ok(()),
             Some((renderer, last)) => renderer.set_brdf(&device.gpu, shot.brdf).map(|()| *last = shot.brdf.clone()),
