@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 pub use load::{LoadedScene, load, load_with_overrides, open, parse};
 pub use material::{BrdfSpec, Material, TermSpec};
 pub use painted::{Painted, Pixels};
-pub use quality::{BACKENDS, METHODS, NORMALS, PRESETS, Quality};
+pub use quality::{BACKENDS, METHODS, PRESETS, Quality};
 pub use schema::{Field, Kind, Shape};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,

@@ -4,8 +4,7 @@ use super::schema::{Shape, number, scene_table};
 
 pub const PRESETS: &[&str] = &["draft", "standard", "fine", "reference", "wu2011"];
 pub const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
-pub const METHODS: &[&str] = &["auto", "direct", "low_rank", "table"];
-pub const NORMALS: &[&str] = &["exact", "binned"];
+pub const METHODS: &[&str] = &["auto", "direct", "low_rank"];
 
 const GRID_SIDE: Shape = Shape::Integer { min: 2, max: 512 };
 
@@ -27,7 +26,7 @@ scene_table! {
         /// Elevation rings at which visibility is computed.
         #[serde(skip_serializing_if = "Option::is_none")]
         rings: Option<usize> = None, Shape::Integer { min: 2, max: 512 }, "";
-        /// How the product is computed: auto, direct, low_rank or table.
+        /// How the product is computed: auto, direct or low_rank.
         #[serde(skip_serializing_if = "Option::is_none")]
         method: Option<String> = None, Shape::Choice(METHODS), "";
         /// Part of the BRDF matrix' power that is kept.
@@ -48,8 +47,5 @@ scene_table! {
         /// Angle over which visibility fades at a horizon.
         #[serde(skip_serializing_if = "Option::is_none")]
         penumbra_deg: Option<f32> = None, number(0.0, 45.0), "degrees";
-        /// Facet normals as they are, or the nearest of a grid: exact or binned.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        normals: Option<String> = None, Shape::Choice(NORMALS), "";
     }
 }
