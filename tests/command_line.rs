@@ -475,7 +475,10 @@ fn a_report_holds_every_preset_and_goes_on_from_where_it_was() {
     }
     assert!(report["scenes"][0]["left_out"].as_u64().unwrap() > 10, "there was no time for knobs");
     let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
-    assert!(page.contains("<svg") && page.contains("data:image/png;base64,") && !page.contains("http"));
+    assert!(page.contains("<svg") && page.contains("data:image/png;base64,") && !page.contains("http://"));
     assert_eq!(std::fs::read_to_string(desk.path("out/report.csv")).unwrap().lines().count(), points.len() + 1);
-    assert_eq!(run()["points"], report["points"], "what was measured is not measured again");
+    let times = |report: &Value| -> Vec<Value> {
+        report["points"].as_array().unwrap().iter().map(|point| point["ms"].clone()).collect()
+    };
+    assert_eq!(times(&run()), times(&report), "what was measured is not measured again");
 }
