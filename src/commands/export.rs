@@ -39,16 +39,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let mut pipeline = Pipeline::new();
     let outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
-    let tile = &loaded.scene.tile;
-    let meta = ExportMeta {
-        scene: loaded.name.clone(),
-        quality: format!("{}; {}", outcome.settings.preset.name(), outcome.brdf.form.describe()),
-        seed: outcome.settings.seed,
-        tile_size: tile.size.to_array(),
-        tile_unit: tile.unit.clone(),
-        closes_plane: pipeline.mesh(&loaded)?.closes_plane,
-        notes: outcome.notes.clone(),
-    };
+    let meta = ExportMeta::of(&loaded, &outcome, pipeline.mesh(&loaded)?.closes_plane);
     let options = ExportOptions {
         resolution: resolution(args),
         radiance: match args.radiance {
@@ -57,7 +48,10 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         },
     };
     let bar = bar(args.scene.quiet);
-    let progress = |part: f32| bar.set_position((part * 1000.0) as u64);
+    let progress = |part: f32| {
+        bar.set_position((part * 1000.0) as u64);
+        true
+    };
     if streams {
         // Standard output holds the table itself then.
         export::write_csv(&outcome.brdf, &meta, &options, &mut std::io::stdout().lock(), &progress)?;

@@ -10,7 +10,7 @@ const DEFAULT_RESOLUTION: ExportResolution = ExportResolution { theta_i: 8, phi_
 
 pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     let grid = job.options.resolution.unwrap_or(DEFAULT_RESOLUTION).grid();
-    let table = Table::new(job.brdf, grid, job.progress);
+    let table = Table::new(job.brdf, grid, job.progress)?;
     let summary = job.summary().replace(['\n', '\r'], " ");
     writeln!(out, "TYPE BRDF")?;
     writeln!(out, "COMMENT {summary}")?;

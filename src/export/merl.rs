@@ -100,7 +100,7 @@ fn row(brdf: &EffectiveBrdf, h: usize) -> (Vec<Option<DVec3>>, Turning) {
 
 /// Writes the file; what it cannot hold is measured and said.
 pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
-    let rows = in_parallel(BINS_H, job.progress, |h| row(job.brdf, h));
+    let rows = in_parallel(BINS_H, job.progress, |h| row(job.brdf, h))?;
     let mut turning = Turning::default();
     let mut planes = Vec::with_capacity(3 * 8 * PLANE);
     for (channel, scale) in SCALES.iter().enumerate() {

@@ -4,6 +4,8 @@ use serde::Serialize;
 
 use super::Job;
 use crate::accuracy::Errors;
+use crate::pipeline::Outcome;
+use crate::scene::LoadedScene;
 
 /// Who writes the tables.
 pub const PROGRAM: &str = concat!("biscale ", env!("CARGO_PKG_VERSION"));
@@ -29,6 +31,20 @@ pub struct ExportMeta {
 }
 
 impl ExportMeta {
+    /// Of a scene that was just computed. `closes_plane`: whether its tile does.
+    pub fn of(loaded: &LoadedScene, outcome: &Outcome, closes_plane: bool) -> Self {
+        let tile = &loaded.scene.tile;
+        Self {
+            scene: loaded.name.clone(),
+            quality: format!("{}; {}", outcome.settings.preset.name(), outcome.brdf.form.describe()),
+            seed: outcome.settings.seed,
+            tile_size: tile.size.to_array(),
+            tile_unit: tile.unit.clone(),
+            closes_plane,
+            notes: outcome.notes.clone(),
+        }
+    }
+
     /// Whether the tile closes the plane, in words.
     pub(super) fn plane(&self) -> &'static str {
         if self.closes_plane {

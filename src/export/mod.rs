@@ -33,7 +33,7 @@ pub use meta::ExportMeta;
 pub use note::Reflectances;
 pub use radiance::RadianceBasis;
 pub use replace::replace_file;
-pub use sampler::ReadingError;
+pub use sampler::{Progress, ReadingError};
 
 use meta::Description;
 use table::Table;
@@ -68,7 +68,7 @@ struct Job<'a> {
     brdf: &'a EffectiveBrdf,
     meta: &'a ExportMeta,
     options: &'a ExportOptions,
-    progress: &'a dyn Fn(f32),
+    progress: &'a Progress<'a>,
 }
 
 impl Job<'_> {
@@ -158,16 +158,15 @@ pub fn check_ending(path: &Path) -> Result<()> {
 }
 
 /// Tabulates `brdf` and writes it by the ending of `path`, and a note in plain words beside it (`NAME.ENDING.txt`).
-/// `progress` is told the part that is done, 0 to 1.
 ///
 /// # Errors
-/// An unknown ending, a resolution out of range, a place that cannot be written. An old file stays whole then.
+/// [`Error::Cancelled`] when `progress` says so, an unknown ending, a resolution out of range, a place that cannot be written. An old file stays whole then.
 pub fn write(
     brdf: &EffectiveBrdf,
     meta: &ExportMeta,
     options: &ExportOptions,
     path: &Path,
-    progress: &dyn Fn(f32),
+    progress: &Progress<'_>,
 ) -> Result<ExportReport> {
     let format = Format::of(path)?;
     if let Some(resolution) = &options.resolution {
@@ -221,7 +220,7 @@ fn on_grid(
     write: impl Fn(&Table, &Description<'_>, &mut dyn Write) -> io::Result<()>,
 ) -> io::Result<Written> {
     let grid = job.options.resolution.unwrap_or_default().grid();
-    let table = Table::new(job.brdf, grid, job.progress);
+    let table = Table::new(job.brdf, grid, job.progress)?;
     let reading = table.resampling(job.brdf);
     write(&table, &Description::new(job, reading.errors), out)?;
     Ok(Written { pairs: table.grid.pairs(), reading, conventions: Vec::new(), anisotropy_lost: None })
@@ -236,7 +235,7 @@ pub fn write_csv(
     meta: &ExportMeta,
     options: &ExportOptions,
     out: &mut dyn Write,
-    progress: &dyn Fn(f32),
+    progress: &Progress<'_>,
 ) -> Result<()> {
     if let Some(resolution) = &options.resolution {
         resolution.check()?;

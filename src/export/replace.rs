@@ -17,8 +17,11 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// Opens a file beside `path`, lets `content` fill it, and renames it to `path`.
 pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T> {
-    let unwritable = |error: io::Error| -> Error {
-        InputError::new("output", error, "a place that can be written").in_file(path).into()
+    // What `content` says in our own words stays so.
+    let unwritable = |error: io::Error| {
+        error.downcast::<Error>().unwrap_or_else(|error| {
+            InputError::new("output", error, "a place that can be written").in_file(path).into()
+        })
     };
     // Through a link, the file it leads to is replaced, not the link.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());

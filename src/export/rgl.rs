@@ -7,6 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::io::{self, Write};
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::sampler::{ReadingError, in_parallel, reading_error};
 use super::{ExportResolution, Job, Written};
@@ -138,13 +139,12 @@ fn visible_normals(viewer: DVec3, grid: Grid, ndf: &(Grid, Vec<f64>)) -> Vec<f64
 /// `ndf` from retro-reflection, `4 G(m, m)` scaled to a largest value of 1, and `sigma`, the visible projected area.
 fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
     let places: Vec<_> = vertices(sizes.ndf).collect();
-    let silent = |_: f32| {};
-    let both = in_parallel(places.len(), &silent, |k| {
-        let m = above_horizon(direction_of_u(places[k])).as_vec3();
+    let at = |place: &[f64; 2]| {
+        let m = above_horizon(direction_of_u(*place)).as_vec3();
         let area = f64::from(brdf.relative_projected_area(m));
         (luminance(brdf.eval(m, m).as_dvec3()) * area, area.max(SMALLEST_SIGMA))
-    });
-    let (retro, sigma): (Vec<f64>, Vec<f64>) = both.into_iter().unzip();
+    };
+    let (retro, sigma): (Vec<f64>, Vec<f64>) = places.par_iter().map(at).unzip();
     let largest = retro.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let ndf = retro.into_iter().map(|value| value / largest + NDF_FLOOR).collect();
     RglTable {
@@ -177,7 +177,7 @@ impl Tabulated {
         let sizes = Sizes::new(resolution);
         let planes = planes(brdf, &sizes);
         let count = sizes.phis * sizes.thetas;
-        let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice));
+        let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice))?;
         let slices: Vec<Slice> = slices.into_iter().collect::<io::Result<_>>()?;
         let vndf = Warp::new(sizes.vndf, widened(&slices, |slice| &slice.vndf)).map_err(io::Error::other)?;
         let table = RglTable { vndf, rgb: (sizes.samples, widened(&slices, |slice| &slice.rgb)), ..planes };

@@ -1,11 +1,17 @@
 //! What every format asks of the effective BRDF: many directions in parallel, with progress, and a check of what a reader
 //! of the finished table gets.
 
+use std::io;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::accuracy::{Errors, compare, mirror_biased_pairs};
+use crate::error::Error;
 use crate::filtering::EffectiveBrdf;
+
+/// Is told the part that is done, 0 to 1, and returns whether to go on.
+pub type Progress<'a> = dyn Fn(f32) -> bool + 'a;
 
 /// Items between two calls of the progress function.
 const ITEMS_A_STEP: usize = 32;
@@ -13,16 +19,27 @@ const ITEMS_A_STEP: usize = 32;
 const CHECKED_PAIRS: usize = 400;
 const CHECKED_SEED: u64 = 2011;
 
-/// `work` of every index in parallel, in order; `progress` is told the part that is done.
-pub fn in_parallel<T: Send>(count: usize, progress: &dyn Fn(f32), work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+/// `work` of every index in parallel, in order.
+///
+/// # Errors
+/// [`Error::Cancelled`], inside, when `progress` says so.
+pub fn in_parallel<T: Send>(
+    count: usize,
+    progress: &Progress<'_>,
+    work: impl Fn(usize) -> T + Sync,
+) -> io::Result<Vec<T>> {
     let mut results = Vec::with_capacity(count);
     while results.len() < count {
-        progress(results.len() as f32 / count as f32);
+        go_on(progress, results.len() as f32 / count as f32)?;
         let end = (results.len() + ITEMS_A_STEP).min(count);
         results.par_extend((results.len()..end).into_par_iter().map(&work));
     }
-    progress(1.0);
-    results
+    go_on(progress, 1.0)?;
+    Ok(results)
+}
+
+fn go_on(progress: &Progress<'_>, part: f32) -> io::Result<()> {
+    if progress(part) { Ok(()) } else { Err(io::Error::other(Error::Cancelled)) }
 }
 
 /// How far what a reader gets is from the function.

@@ -1,9 +1,11 @@
 //! The effective BRDF on the grid of a table, and reading it back bilinearly.
 
+use std::io;
+
 use glam::Vec3;
 
 use super::grid::Grid;
-use super::sampler::{ReadingError, in_parallel, reading_error};
+use super::sampler::{Progress, ReadingError, in_parallel, reading_error};
 use crate::filtering::{EffectiveBrdf, Reflectance};
 
 /// What a file holds.
@@ -20,7 +22,10 @@ pub struct Table {
 
 impl Table {
     /// Evaluates all pairs: all lights of a view at once, views in parallel.
-    pub fn new(brdf: &EffectiveBrdf, grid: Grid, progress: &dyn Fn(f32)) -> Self {
+    ///
+    /// # Errors
+    /// As [`in_parallel`].
+    pub fn new(brdf: &EffectiveBrdf, grid: Grid, progress: &Progress<'_>) -> io::Result<Self> {
         let (lights, views) = (grid.light.directions(), grid.view.directions());
         let mut table = Self {
             brdf: vec![Vec3::ZERO; grid.pairs()],
@@ -32,7 +37,7 @@ impl Table {
             let mut f_bar = vec![Vec3::ZERO; lights.len()];
             brdf.eval_lights(&lights, views[view], &mut f_bar);
             (f_bar, brdf.relative_projected_area(views[view]))
-        });
+        })?;
         for (view, (f_bar, area)) in columns.into_iter().enumerate() {
             for (light, value) in f_bar.into_iter().enumerate() {
                 let entry = light * views.len() + view;
@@ -42,7 +47,7 @@ impl Table {
             }
             table.projected_area.push(area);
         }
-        table
+        Ok(table)
     }
 
     /// `f̄(i, o)` as a program that loads the file would read it: the BRDF bilinearly in all four angles, times `cos θ_i`.

@@ -26,7 +26,9 @@ fn small() -> ExportOptions {
     sized(SMALL)
 }
 
-fn silent(_: f32) {}
+fn silent(_: f32) -> bool {
+    true
+}
 
 fn brdf_of(mesh: &TileMesh, term: Term) -> EffectiveBrdf {
     let mut facets = Facets::sample(mesh, 300, 1);
@@ -216,7 +218,7 @@ fn an_exr_is_an_atlas_of_both_quantities() {
 fn a_flat_lambertian_tile_is_albedo_over_pi_and_resamples_without_error() {
     let grid = SMALL.grid();
     let brdf = flat();
-    let table = Table::new(&brdf, grid, &silent);
+    let table = Table::new(&brdf, grid, &silent).unwrap();
     let value = Vec3::new(1.0, 0.5, 0.25) * 0.8 * FRAC_1_PI;
     for (k, (brdf, g)) in table.brdf.iter().zip(&table.g).enumerate() {
         assert!(close(*brdf, value));
@@ -228,7 +230,7 @@ fn a_flat_lambertian_tile_is_albedo_over_pi_and_resamples_without_error() {
 
 #[test]
 fn bilinear_reading_hits_the_nodes_and_is_continuous_across_pole_and_seam() {
-    let table = Table::new(&corrugated(), SMALL.grid(), &silent);
+    let table = Table::new(&corrugated(), SMALL.grid(), &silent).unwrap();
     let (lights, views) = (table.grid.light.directions(), table.grid.view.directions());
     for (k, value) in table.brdf.iter().enumerate() {
         let (i, o) = (lights[k / 40], views[k % 40]);
@@ -247,7 +249,7 @@ fn a_finer_grid_resamples_better_and_the_report_says_so() {
     let brdf = corrugated();
     let error = |rings| {
         let resolution = ExportResolution { theta_i: rings, phi_i: 2 * rings, theta_o: rings, phi_o: 2 * rings };
-        Table::new(&brdf, resolution.grid(), &silent).resampling(&brdf).errors.rel_l2
+        Table::new(&brdf, resolution.grid(), &silent).unwrap().resampling(&brdf).errors.rel_l2
     };
     // Shadow edges are kinks, so halving the step halves the error; a smooth function would quarter it.
     let (coarse, fine) = (error(6), error(12));
@@ -271,9 +273,26 @@ fn files_are_the_same_bytes_again_with_any_number_of_threads() {
 #[test]
 fn progress_goes_from_nothing_to_all() {
     let told = std::cell::RefCell::new(Vec::new());
-    Table::new(&flat(), SMALL.grid(), &|part| told.borrow_mut().push(part));
+    let tell = |part| {
+        told.borrow_mut().push(part);
+        true
+    };
+    Table::new(&flat(), SMALL.grid(), &tell).unwrap();
     let told = told.into_inner();
     assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted());
+}
+
+#[test]
+fn a_table_that_is_given_up_replaces_nothing_and_leaves_nothing_beside() {
+    let folder = tempfile::tempdir().unwrap();
+    for (ending, _) in FORMATS {
+        let path = folder.path().join(format!("table.{ending}"));
+        std::fs::write(&path, "old").unwrap();
+        let error = write(&flat(), &meta(), &ExportOptions::default(), &path, &|_| false).unwrap_err();
+        assert!(matches!(error, Error::Cancelled), "{ending}: {error}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"old", "{ending}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), FORMATS.len());
 }
 
 #[test]

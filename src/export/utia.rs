@@ -17,7 +17,7 @@ const AZIMUTHS: usize = 48;
 /// Planes of R, G, B; in each `[theta_i][phi_i][theta_o][phi_o]`, f64.
 pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     let axes = Axes::at((0..ELEVATIONS).map(|k| (k as f32 * STEP_DEG).to_radians()).collect(), AZIMUTHS);
-    let table = Table::new(job.brdf, Grid { light: axes.clone(), view: axes }, job.progress);
+    let table = Table::new(job.brdf, Grid { light: axes.clone(), view: axes }, job.progress)?;
     for channel in 0..3 {
         let plane: Vec<u8> = table.brdf.iter().flat_map(|value| f64::from(value[channel]).to_le_bytes()).collect();
         out.write_all(&plane)?;

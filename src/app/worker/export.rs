@@ -49,37 +49,15 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
     let outcome = pipeline.effective(&job.loaded)?;
     match job.what {
         What::Table { theta, phi } => {
-            let tile = &job.loaded.scene.tile;
-            let meta = ExportMeta {
-                scene: job.loaded.name.clone(),
-                quality: format!("{}; {}", outcome.settings.preset.name(), outcome.brdf.form.describe()),
-                seed: outcome.settings.seed,
-                tile_size: tile.size.to_array(),
-                tile_unit: tile.unit.clone(),
-                closes_plane: pipeline.mesh(&job.loaded)?.closes_plane,
-                notes: outcome.notes.clone(),
-            };
+            let meta = ExportMeta::of(&job.loaded, &outcome, pipeline.mesh(&job.loaded)?.closes_plane);
             let steps = ExportResolution { theta_i: theta, phi_i: phi, theta_o: theta, phi_o: phi };
-            let progress = |part: f32| answer(ExportAnswer::Progress(part, "Tabulating"));
-            // Beside its place first: one that is given up replaces nothing.
-            let beside = beside(&job.path);
             let resolution = export::grid_is_free(&job.path).then_some(steps);
             let options = ExportOptions { resolution, ..ExportOptions::default() };
-            let written = export::write(&outcome.brdf, &meta, &options, &beside, &progress);
-            let note = written.as_ref().ok().and_then(|report| report.note.clone());
-            let report = cancel.check().and(written).and_then(|report| {
-                std::fs::rename(&beside, &job.path).map_err(Error::failed)?;
-                if let Some(note) = &note {
-                    std::fs::rename(note, in_place(note)).map_err(Error::failed)?;
-                }
-                Ok(report)
-            });
-            let report = report.inspect_err(|_| {
-                // Not there is as good as gone.
-                for left in [Some(&beside), note.as_ref()].into_iter().flatten() {
-                    let _ = std::fs::remove_file(left);
-                }
-            })?;
+            let progress = |part: f32| {
+                answer(ExportAnswer::Progress(part, "Tabulating"));
+                !cancel.is_set()
+            };
+            let report = export::write(&outcome.brdf, &meta, &options, &job.path, &progress)?;
             Ok(format!(
                 "Wrote {}: {} pairs; read back it is within {:.1} % of the material.",
                 job.path.display(),
@@ -112,18 +90,4 @@ fn picture(
     let shot = Shot { camera: &camera, brdf, size, samples_per_side: 3, settle: true, backend };
     let rendered = studio.shoot(&shot, Some(close), cancel)?;
     rendered.picture.write(path, &ToneMap::new(&camera)?)
-}
-
-/// A name beside `path` with the same ending.
-fn beside(path: &Path) -> PathBuf {
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    path.with_file_name(format!("{BESIDE}{name}"))
-}
-
-const BESIDE: &str = ".exporting-";
-
-/// Where a file that was written beside its place belongs.
-fn in_place(path: &Path) -> PathBuf {
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    path.with_file_name(name.strip_prefix(BESIDE).unwrap_or(&name))
 }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
+use std::io;
 
 use glam::{DVec3, Vec3};
 
@@ -81,7 +82,7 @@ fn source_of(direction: DVec3) -> DVec3 {
     DVec3::new(-direction.x, -direction.y, direction.z)
 }
 
-pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
+pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
     let patches = Patch::all();
     let leaving: Vec<Vec3> =
         patches.iter().flat_map(|patch| patch.directions(LEAVING)).map(|direction| direction.as_vec3()).collect();
@@ -98,7 +99,7 @@ pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
             }
         }
         sums.into_iter().map(|sum| sum / (INCIDENT * INCIDENT * LEAVING * LEAVING) as f64).collect()
-    });
+    })?;
     let mut channels = ["CIE-X", "Visible", "CIE-Z"].map(|name| (name, String::new()));
     for leaving in 0..PATCHES {
         for column in &columns {
@@ -121,7 +122,7 @@ pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
     let reading = reading_error(job.brdf, read);
     let written = Written { pairs: PATCHES * PATCHES, reading, conventions, anisotropy_lost: None };
     let zeros = format!("{}\n", "0\t".repeat(PATCHES)).repeat(PATCHES);
-    (Content { definition: definition(), basis: BASIS, channels, black: zeros }, written)
+    Ok((Content { definition: definition(), basis: BASIS, channels, black: zeros }, written))
 }
 
 const BASIS: &str =

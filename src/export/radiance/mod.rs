@@ -53,8 +53,8 @@ fn rgb(xyz: Vec3) -> Vec3 {
 
 pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
     let (content, mut written) = match job.options.radiance {
-        RadianceBasis::Klems => klems::tabulate(job),
-        RadianceBasis::TensorTree => tensor_tree::tabulate(job),
+        RadianceBasis::Klems => klems::tabulate(job)?,
+        RadianceBasis::TensorTree => tensor_tree::tabulate(job)?,
     };
     let [x, y] = job.meta.tile_size;
     writeln!(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>")?;

@@ -3,6 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::fmt::Write as _;
+use std::io;
 
 use glam::{DVec3, Vec3};
 
@@ -120,7 +121,7 @@ impl Grid {
     }
 }
 
-pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
+pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
     let centre = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
     let fine = SIDE * LEAVING;
     let leaving: Vec<Vec3> = (0..SIDE * SIDE)
@@ -141,7 +142,7 @@ pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
             .map(|(values, o)| values.iter().zip(o).map(|(v, o)| *v / o.z).sum::<Vec3>() / (LEAVING * LEAVING) as f32)
             .map(|value| xyz(value).max(Vec3::ZERO))
             .collect()
-    });
+    })?;
     // Chromaticity in place of X and Z: that is what Radiance reads from trees.
     let chromaticity = |value: &Vec3| {
         let sum = value.x + 15.0 * value.y + 3.0 * value.z;
@@ -175,7 +176,7 @@ pub fn tabulate(job: &Job<'_>) -> (Content, Written) {
     let reading = reading_error(job.brdf, read);
     let written = Written { pairs: SIDE.pow(4), reading, conventions, anisotropy_lost: None };
     let definition = "<IncidentDataStructure>TensorTree4</IncidentDataStructure>\n".to_owned();
-    (Content { definition, basis: BASIS, channels, black: "{0}\n".to_owned() }, written)
+    Ok((Content { definition, basis: BASIS, channels, black: "{0}\n".to_owned() }, written))
 }
 
 const BASIS: &str = "<AngleBasis>LBNL/Shirley-Chiu</AngleBasis>";
