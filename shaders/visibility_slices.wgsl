@@ -1,24 +1,10 @@
 // Soft visibility above horizons and between what hangs over them: the twin of Slices::fill (src/visibility/slices.rs).
 
-//!import angles
-//!import facets
+//!import azimuth_sight
 
 // The azimuths of a facet side by side: horizons [rad]; where the hanging intervals of each begin, and where all end;
 // the intervals' low and high ends [rad].
 @group(1) @binding(2) var<storage, read> slices: array<u32>;
-
-struct Sight {
-    lower: u32,
-    upper: u32,
-    blend: f32,
-    elevation: f32,
-}
-
-fn sight_along(d: vec3f) -> Sight {
-    let at = turn_of(d.xy) * f32(sum.azimuths);
-    let lower = u32(at) % sum.azimuths;
-    return Sight(lower, (lower + 1u) % sum.azimuths, at - floor(at), angle_of(d.z, length(d.xy)));
-}
 
 fn above(elevation: f32, edge: u32) -> f32 {
     return clamp((elevation - bitcast<f32>(slices[edge])) * sum.sharpness + 0.5, 0.0, 1.0);

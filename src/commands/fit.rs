@@ -8,14 +8,13 @@ use biscale::filtering::Reflectance;
 use biscale::fit::{self, Fit, Model};
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::tone_map::ToneMap;
-use biscale::large_scale::{Picture, RenderInput, render};
+use biscale::large_scale::{Picture, Stage, render};
 use biscale::pipeline::Pipeline;
 use biscale::{Error, InputError};
 use glam::Vec3;
 use serde::Serialize;
 
 use super::print_json;
-use super::render::Stage;
 use crate::FitArgs;
 
 #[derive(Serialize)]
@@ -117,20 +116,10 @@ fn kind(path: &Path) -> Result<Kind, Error> {
 
 /// The object in each material, left to right, and under the fits their differences from the first.
 fn side_by_side(stage: &Stage, materials: &[&dyn Reflectance], size: [usize; 2]) -> Result<Picture> {
+    let background = Background::Uniform(Vec3::ZERO);
     let mut pictures = Vec::new();
     for &reflectance in materials {
-        let input = RenderInput {
-            mesh: &stage.mesh,
-            occluder: stage.occluder.as_ref(),
-            shadow_cache: None,
-            lights: &stage.lights.directional,
-            camera: &stage.camera,
-            reflectance,
-            size,
-            samples_per_side: 2,
-            background: &Background::Uniform(Vec3::ZERO),
-        };
-        pictures.push(render(&input)?.picture);
+        pictures.push(render(&stage.input(reflectance, size, 2, &background))?.picture);
     }
     let [width, height] = size;
     let mut sheet = Picture {

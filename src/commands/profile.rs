@@ -5,12 +5,13 @@ use std::io::Write;
 use std::time::Instant;
 
 use anyhow::Result;
+use biscale::large_scale::Stage;
 use biscale::pipeline::Pipeline;
 use biscale::{Error, InputError};
 use serde::Serialize;
 
 use super::print_json;
-use super::render::Stage;
+use super::render::Route;
 use crate::{Edit, ProfileArgs};
 
 #[derive(Serialize)]
@@ -39,7 +40,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let form = outcome.brdf.form.describe();
     let camera = if args.edit == Some(Edit::Camera) {
         let stage = Stage::new(&loaded)?;
-        let route = stage.route(&outcome)?;
+        let route = Route::of(&stage, &outcome)?;
         Some((stage, route))
     } else {
         None
@@ -49,7 +50,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
         let start = Instant::now();
         let times = match (&camera, args.edit) {
             (Some((stage, route)), _) => {
-                let times = stage.render(route, &outcome.brdf, [384, 384], 1)?.times;
+                let times = route.render(stage, &outcome.brdf, [384, 384], 1)?.times;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
             }
             (None, Some(_)) => {

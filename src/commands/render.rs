@@ -4,38 +4,20 @@ use anyhow::Result;
 use biscale::Error;
 use biscale::filtering::EffectiveBrdf;
 use biscale::gpu::{Gpu, GpuError, Tier};
-use biscale::large_scale::lights::{self, Lights};
 use biscale::large_scale::shading::Background;
-use biscale::large_scale::shadow::Occluder;
 use biscale::large_scale::tone_map::ToneMap;
-use biscale::large_scale::{GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render};
+use biscale::large_scale::{GpuRenderer, Rendered, Stage, render};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::plan::Backend;
-use biscale::scene::{Camera, LoadedScene};
 use serde::Serialize;
 
 use super::print_json;
 use crate::RenderArgs;
 
-/// What stays while the camera turns.
-pub struct Stage {
-    pub mesh: ObjectMesh,
-    pub occluder: Option<Occluder>,
-    pub lights: Lights,
-    pub camera: Camera,
-}
-
-impl Stage {
-    pub fn new(loaded: &LoadedScene) -> Result<Self> {
-        let mesh = objects::build(&loaded.scene.object, &loaded.base_dir)?;
-        let lights = lights::build(&loaded.scene.light, &loaded.base_dir)?;
-        let occluder = if lights.directional.is_empty() { None } else { Occluder::of(&mesh) };
-        Ok(Self { mesh, occluder, lights, camera: loaded.scene.camera.clone().unwrap_or_default() })
-    }
-
+impl Route {
     /// The route that the scene's back end asks for: `gpu` any adapter or an error that says why not, `cpu` none, `auto` a
     /// graphics processor that is more than the CPU in disguise, where it can shade this BRDF.
-    pub fn route(&self, outcome: &Outcome) -> Result<Route> {
+    pub fn of(stage: &Stage, outcome: &Outcome) -> Result<Self> {
         let backend = outcome.settings.backend;
         if backend == Backend::Cpu {
             return Ok(Route::Cpu { refused: None });
@@ -46,39 +28,39 @@ impl Stage {
             Err(error) if required => return Err(Error::from(error).into()),
             _ => return Ok(Route::Cpu { refused: None }),
         };
-        match GpuRenderer::new(&gpu, self.occluder.as_ref(), &outcome.brdf) {
+        match GpuRenderer::new(&gpu, stage.occluder.as_ref(), &outcome.brdf) {
             Ok(renderer) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, required }))),
             Err(error) if required => Err(Error::from(error).into()),
             Err(error) => Ok(Route::Cpu { refused: Some(error) }),
         }
     }
 
+    /// The stage's object in a material.
     pub fn render(
         &self,
-        route: &Route,
+        stage: &Stage,
         brdf: &EffectiveBrdf,
         size: [usize; 2],
         samples_per_side: usize,
     ) -> Result<Rendered> {
-        let input = RenderInput {
-            mesh: &self.mesh,
-            occluder: self.occluder.as_ref(),
-            shadow_cache: None,
-            lights: &self.lights.directional,
-            camera: &self.camera,
-            reflectance: brdf,
-            size,
-            samples_per_side,
-            background: &Background::default(),
-        };
-        Ok(match route {
-            Route::Cpu { .. } => render(&input)?,
-            Route::Gpu(device) => match device.renderer.render(&device.gpu, &input) {
+        let background = Background::default();
+        let input = stage.input(brdf, size, samples_per_side, &background);
+        Ok(match self {
+            Self::Cpu { .. } => render(&input)?,
+            Self::Gpu(device) => match device.renderer.render(&device.gpu, &input) {
                 // What the device fails at the CPU still does, unless the device was asked for.
                 Err(Error::Failed(_)) if !device.required => render(&input)?,
                 rendered => rendered?,
             },
         })
+    }
+
+    /// `cpu`, or the adapter.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Cpu { .. } => "cpu".to_owned(),
+            Self::Gpu(device) => device.gpu.description(),
+        }
     }
 }
 
@@ -97,16 +79,6 @@ pub struct OnDevice {
     renderer: GpuRenderer,
     /// Whether the person asked for it.
     required: bool,
-}
-
-impl Route {
-    /// `cpu`, or the adapter.
-    pub fn describe(&self) -> String {
-        match self {
-            Self::Cpu { .. } => "cpu".to_owned(),
-            Self::Gpu(device) => device.gpu.description(),
-        }
-    }
 }
 
 #[derive(Serialize)]
@@ -132,11 +104,11 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         }
     }
     args.scene.notes(&outcome);
-    let route = stage.route(&outcome)?;
+    let route = Route::of(&stage, &outcome)?;
     if let (Route::Cpu { refused: Some(error) }, false) = (&route, args.scene.quiet) {
         eprintln!("note: shaded on the CPU: {error}");
     }
-    let rendered = stage.render(&route, &outcome.brdf, args.size, usize::from(args.samples))?;
+    let rendered = route.render(&stage, &outcome.brdf, args.size, usize::from(args.samples))?;
     rendered.picture.write(&args.output, &tone_map)?;
     if args.scene.json {
         let times = rendered.times;

@@ -11,6 +11,7 @@ use super::GpuError;
 /// Every file in `shaders/`, by name without the ending.
 pub const SHADERS: &[(&str, &str)] = &[
     ("angles", include_str!("../../shaders/angles.wgsl")),
+    ("azimuth_sight", include_str!("../../shaders/azimuth_sight.wgsl")),
     ("exp_negative", include_str!("../../shaders/exp_negative.wgsl")),
     ("facets", include_str!("../../shaders/facets.wgsl")),
     ("gbuffer", include_str!("../../shaders/gbuffer.wgsl")),

@@ -29,6 +29,7 @@ pub mod shading;
 pub mod shading_points;
 pub mod shadow;
 pub mod shadow_cache;
+pub mod stage;
 pub mod tone_map;
 
 pub use camera::CameraView;
@@ -38,3 +39,4 @@ pub use lights::DirectionalLight;
 pub use objects::ObjectMesh;
 pub use picture::Picture;
 pub use render::{RenderInput, Rendered, render};
+pub use stage::Stage;

@@ -7,9 +7,8 @@ use glam::Vec3;
 use crate::error::Result;
 use crate::filtering::EffectiveBrdf;
 use crate::large_scale::shading::Background;
-use crate::large_scale::shadow::Occluder;
 use crate::large_scale::tone_map::{ToneMap, srgb_byte};
-use crate::large_scale::{Picture, RenderInput, lights, objects, render};
+use crate::large_scale::{Picture, Stage, render};
 use crate::scene::LoadedScene;
 
 /// Pixels a side, and lights.
@@ -18,10 +17,7 @@ const LIGHTS: usize = 8;
 
 /// Renders a scene's object again and again with different materials.
 pub struct Studio {
-    mesh: objects::ObjectMesh,
-    occluder: Option<Occluder>,
-    lights: lights::Lights,
-    camera: crate::scene::Camera,
+    stage: Stage,
     tone_map: ToneMap,
 }
 
@@ -29,30 +25,17 @@ impl Studio {
     /// # Errors
     /// An object, an environment or a camera that cannot be used.
     pub fn new(loaded: &LoadedScene) -> Result<Self> {
-        let mesh = objects::build(&loaded.scene.object, &loaded.base_dir)?;
-        let mut light = loaded.scene.light.clone();
-        light.count = light.count.min(LIGHTS);
-        let lights = lights::build(&light, &loaded.base_dir)?;
-        let camera = loaded.scene.camera.clone().unwrap_or_default();
-        let tone_map = ToneMap::new(&camera)?;
-        Ok(Self { occluder: Occluder::of(&mesh), mesh, lights, camera, tone_map })
+        let mut few = loaded.clone();
+        few.scene.light.count = few.scene.light.count.min(LIGHTS);
+        let stage = Stage::new(&few)?;
+        let tone_map = ToneMap::new(&stage.camera)?;
+        Ok(Self { stage, tone_map })
     }
 
     /// # Errors
     /// A camera that sees nothing it could be framed by.
     pub fn picture(&self, brdf: &EffectiveBrdf) -> Result<Picture> {
-        let input = RenderInput {
-            mesh: &self.mesh,
-            occluder: self.occluder.as_ref(),
-            shadow_cache: None,
-            lights: &self.lights.directional,
-            camera: &self.camera,
-            reflectance: brdf,
-            size: [SIZE, SIZE],
-            samples_per_side: 1,
-            background: &Background::default(),
-        };
-        Ok(render(&input)?.picture)
+        Ok(render(&self.stage.input(brdf, [SIZE, SIZE], 1, &Background::default()))?.picture)
     }
 
     /// As a PNG for a page.
