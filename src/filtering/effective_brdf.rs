@@ -1,8 +1,11 @@
 //! The effective BRDF: one `eval`, whatever form holds it.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
 use super::{Direct, LowRank, Reflectance, Wu2011};
+use crate::interreflection::InterreflectionTable;
 
 /// How `G` is held.
 #[derive(Debug, Clone)]
@@ -13,6 +16,8 @@ pub enum Form {
     LowRank(LowRank),
     /// The paper's own tables.
     Wu2011(Wu2011),
+    /// Any of these, and the light between facets added.
+    Interreflecting(Box<Form>, Arc<InterreflectionTable>),
 }
 
 impl Form {
@@ -23,6 +28,9 @@ impl Form {
                 Some(count) => format!("exact lobes of {count} normals over {} facets", direct.sum.facet_count()),
                 None => format!("direct sum over {} facets", direct.sum.facet_count()),
             },
+            Self::Interreflecting(form, table) => {
+                format!("{}, and {} bytes of light between facets", form.describe(), table.bytes())
+            }
             Self::Wu2011(tables) => format!("the paper's tables, {} bytes", tables.bytes()),
             Self::LowRank(factors) => format!(
                 "factors: ranks {} on {} directions",
@@ -62,8 +70,22 @@ impl EffectiveBrdf {
     }
 
     /// `a_v(o)`, and `a_v f̄` of each light into `out`.
-    fn sums(&self, lights: &[Vec3], o: Vec3, out: impl FnMut(usize, DVec3)) -> f64 {
-        match &self.form {
+    fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        if let Form::Interreflecting(form, table) = &self.form {
+            let mut direct = vec![DVec3::ZERO; lights.len()];
+            let area = form.sums(lights, o, |k, sum| direct[k] = sum);
+            table.add(lights, o, |k, g| out(k, direct[k] + g * self.base_area));
+            return area;
+        }
+        self.form.sums(lights, o, out)
+    }
+}
+
+impl Form {
+    fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        match self {
+            // Light between facets is added once, by the BRDF.
+            Self::Interreflecting(form, _) => form.sums(lights, o, &mut out as &mut dyn FnMut(usize, DVec3)),
             Form::Direct(direct) => direct.sums(lights, o, out),
             Form::LowRank(factors) => factors.sums(lights, o, out),
             Form::Wu2011(tables) => tables.sums(lights, o, out),
