@@ -2,6 +2,7 @@
 
 mod findings;
 mod make;
+mod pictures;
 mod stage;
 
 use std::path::PathBuf;
@@ -11,6 +12,8 @@ use std::time::Instant;
 use glam::Vec3;
 
 use self::make::{choose, same_lobes, sample, see};
+pub use self::pictures::Pictured;
+use self::pictures::Pictures;
 use self::stage::{Stage, Version};
 use crate::accuracy::{Errors, Reference};
 use crate::brdf::{Brdf, MeasuredCache};
@@ -60,6 +63,23 @@ pub struct Outcome {
     /// What the factored form's error against the direct sum stays below, where it was tried.
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
+    pictures: Arc<Pictures>,
+}
+
+impl Outcome {
+    /// The same, as whoever did not have to wait for it sees it.
+    pub fn without_times(self) -> Self {
+        Self { times: StageTimes::new(), ..self }
+    }
+
+    /// What pictures read instead of [`Outcome::brdf`]: a table of it where that pays and is close enough. The first call
+    /// makes it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Cancelled`].
+    pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
+        self.pictures.get(cancel)
+    }
 }
 
 /// The last effective BRDF, and what a colour edit makes the next one from.
@@ -137,14 +157,16 @@ impl Pipeline {
         })?;
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
-        let mut factors = None;
+        let (mut factors, mut earlier) = (None, None);
         if let Some(last) = &self.last {
             if last.key == key {
                 return Ok(Outcome { times, ..last.outcome.clone() });
             }
-            // Colours alone: the factors stay, and are judged anew.
-            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] && same_lobes(&last.materials, &materials) {
-                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank);
+            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] {
+                let same_lobes = same_lobes(&last.materials, &materials);
+                earlier = last.outcome.pictures.latest(same_lobes);
+                // Colours alone: the factors stay, and are judged anew.
+                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank && same_lobes);
                 factors = kept.map(|factors| factors.recolored(sum_materials));
             }
         }
@@ -169,7 +191,8 @@ impl Pipeline {
         if let Some(errors) = factored {
             plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
         }
-        let outcome = Outcome { brdf, plan, settings, times, factored, notes };
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, plan.try_picture_table, earlier));
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
@@ -219,7 +242,8 @@ impl Pipeline {
         let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &factors, &knobs)?;
         timed(&mut times, "product", start);
         let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
-        Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone() })
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, false, None));
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone(), pictures })
     }
 
     /// The tile's mesh.
