@@ -35,8 +35,8 @@ pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
                 .into());
         }
     }
-    let temporary = Temporary(beside(&target));
-    let mut file = BufWriter::new(File::create_new(&temporary.0).map_err(unwritable)?);
+    let (temporary, file) = open_beside(&target).map_err(unwritable)?;
+    let mut file = BufWriter::new(file);
     let value = content(&mut file).map_err(unwritable)?;
     file.into_inner().map_err(|error| unwritable(error.into_error()))?.sync_all().map_err(unwritable)?;
     fs::rename(&temporary.0, &target).map_err(unwritable)?;
@@ -53,9 +53,19 @@ impl Drop for Temporary {
     }
 }
 
-fn beside(path: &Path) -> PathBuf {
-    let mut name = OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.part", std::process::id()));
-    path.with_file_name(name)
+/// A new file beside `path`. Its name may be taken: by another thread, or by a process of the same number that was killed
+/// (in a container all have the same).
+fn open_beside(path: &Path) -> io::Result<(Temporary, File)> {
+    const MOST_TRIES: u32 = 1000;
+    let mut attempt = 0;
+    loop {
+        let mut name = OsString::from(".");
+        name.push(path.file_name().unwrap_or_default());
+        name.push(format!(".{}-{attempt}.part", std::process::id()));
+        let temporary = path.with_file_name(name);
+        match File::create_new(&temporary) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < MOST_TRIES => attempt += 1,
+            opened => return opened.map(|file| (Temporary(temporary), file)),
+        }
+    }
 }

@@ -234,6 +234,9 @@ fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32
     let component = |pick: fn(&Vec3) -> f32| -> Vec<f32> { facets.normals.iter().map(pick).collect() };
     let (x, y, z) = (component(|n| n.x), component(|n| n.y), component(|n| n.z));
     let grid = visibility.grid;
+    if facets.is_empty() {
+        return vec![0.0; grid.len()];
+    }
     visibility
         .rows
         .chunks(facets.len().max(1))

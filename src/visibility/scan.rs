@@ -98,6 +98,10 @@ pub(super) const FACING_MARGIN: f32 = 0.3;
 /// The lowest elevation that is resolved: a walk ends where what is left could block no more than this slope.
 const LOWEST_SLOPE: f32 = 0.005;
 
+/// Cells that a walk looks at: on tiles a hundred times as high as they are long a walk that nothing stops would take
+/// millions. What lies beyond blocks only directions low over the horizon (3.5° for pyramids of 100 tiles) and is left out.
+const MOST_CELLS: usize = 8192;
+
 impl Slicer<'_> {
     /// Fills `blocked` with what a facet does not see along the unit plane direction `along`; `own` is ignored.
     pub(super) fn scan(&self, origin: Vec3, normal: Vec3, along: Vec2, own: u32, blocked: &mut BlockedSlopes) {
@@ -111,8 +115,15 @@ impl Slicer<'_> {
             return;
         }
         let mut walk = CellWalk::new(grid, origin.truncate(), along);
+        let period = grid.period_along(along);
+        let mut cells = 0;
         // What a cell at distance r can block at most: clearance / r.
         while blocked.open_below(clearance / walk.entered) > blocked.ground.max(LOWEST_SLOPE) {
+            // Along an axis all comes back after one tile, only further away: what did not rise above the ground never will.
+            if cells >= MOST_CELLS || walk.entered > period && blocked.floating_unfaced().next().is_none() {
+                return;
+            }
+            cells += 1;
             let (cell, tile) = walk.cell();
             blocked.work += 1;
             let floor = origin.z + walk.entered * blocked.ground;
