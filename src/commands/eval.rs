@@ -16,6 +16,9 @@ use rayon::prelude::*;
 
 use crate::EvalArgs;
 
+/// Longer lists are no lists of pairs.
+const LARGEST_FILE: u64 = 1 << 30;
+
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
 
 /// One line of the file.
@@ -111,9 +114,9 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
     let complain = |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
     let mut text = String::new();
     let got = if path == Path::new("-") {
-        std::io::stdin().lock().read_to_string(&mut text)
+        std::io::stdin().lock().take(LARGEST_FILE).read_to_string(&mut text)
     } else {
-        std::fs::File::open(path).and_then(|mut file| file.read_to_string(&mut text))
+        std::fs::File::open(path).and_then(|file| file.take(LARGEST_FILE).read_to_string(&mut text))
     };
     got.map_err(|error| complain(String::new(), error.to_string(), "a CSV file that can be read"))?;
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));

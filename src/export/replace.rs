@@ -15,7 +15,7 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
     replacing(path, |out| out.write_all(bytes))
 }
 
-/// Opens a file beside `path`, lets `content` fill it, and renames it to `path`.
+/// Opens a file beside `path`, lets `content` fill it, and renames it to `path`. Devices and pipes are written to.
 pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T> {
     // What `content` says in our own words stays so.
     let unwritable = |error: io::Error| {
@@ -33,6 +33,13 @@ pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
             return Err(InputError::new("output", "a file that is read-only", "a place that can be written")
                 .in_file(path)
                 .into());
+        }
+        if !there.is_file() {
+            // A device or a pipe holds nothing to keep; a file in its place would be another thing.
+            let mut device = BufWriter::new(File::options().write(true).open(&target).map_err(unwritable)?);
+            let value = content(&mut device).map_err(unwritable)?;
+            device.flush().map_err(unwritable)?;
+            return Ok(value);
         }
     }
     let (temporary, file) = open_beside(&target).map_err(unwritable)?;

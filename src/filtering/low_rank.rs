@@ -293,7 +293,8 @@ impl LowRank {
                 total += (tint * value).as_dvec3();
             }
             // Truncated factors may fall a little below zero; no BRDF does.
-            out(k, total.max(DVec3::ZERO));
+            let taper = PolarGrid::horizon_taper(i.z) * PolarGrid::horizon_taper(o.z);
+            out(k, total.max(DVec3::ZERO) * f64::from(taper));
         }
         f64::from(relative * o.z)
     }
