@@ -14,6 +14,23 @@ use serde::Serialize;
 use super::print_json;
 use crate::RenderArgs;
 
+/// Where pictures are made.
+pub enum Route {
+    /// `refused`: why the graphics processor, which is there, does not.
+    Cpu {
+        refused: Option<GpuError>,
+    },
+    Gpu(Box<OnDevice>),
+}
+
+/// A device and what it holds of the scene.
+pub struct OnDevice {
+    gpu: Gpu,
+    renderer: GpuRenderer,
+    /// Whether the person asked for it.
+    required: bool,
+}
+
 impl Route {
     /// The route that the scene's back end asks for: `gpu` any adapter or an error that says why not, `cpu` none, `auto` a
     /// graphics processor that is more than the CPU in disguise, where it can shade this BRDF.
@@ -62,23 +79,6 @@ impl Route {
             Self::Gpu(device) => device.gpu.description(),
         }
     }
-}
-
-/// Where pictures are made.
-pub enum Route {
-    /// `refused`: why the graphics processor, which is there, does not.
-    Cpu {
-        refused: Option<GpuError>,
-    },
-    Gpu(Box<OnDevice>),
-}
-
-/// A device and what it holds of the scene.
-pub struct OnDevice {
-    gpu: Gpu,
-    renderer: GpuRenderer,
-    /// Whether the person asked for it.
-    required: bool,
 }
 
 #[derive(Serialize)]

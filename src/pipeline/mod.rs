@@ -1,14 +1,19 @@
 //! The stages in order, each with its last result and the input that made it: an edit recomputes what lies downstream.
 
+mod findings;
+mod make;
+mod stage;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
-use crate::accuracy::{Errors, Reference, mirror_biased_pairs, upper_errors};
-use crate::brdf::{Brdf, MeasuredCache, Term};
+use self::make::{choose, same_lobes, sample, see};
+use self::stage::{Stage, Version};
+use crate::accuracy::{Errors, Reference};
+use crate::brdf::{Brdf, MeasuredCache};
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
@@ -16,62 +21,14 @@ use crate::filtering::{
     Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, Reflectance, SumMaterial, VisibleFacets, Wu2011,
     Wu2011Settings,
 };
-use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use crate::geometry::{self, Facets, TileMesh};
 use crate::gpu::Gpu;
-use crate::plan::{Backend, Costs, Findings, Plan, Preset, Route, Settings, decide};
-use crate::scene::{LoadedScene, Material, Painted, Scene, Tile};
-use crate::visibility::{
-    Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
-};
+use crate::plan::{Costs, Plan, Preset, Route, Settings, decide};
+use crate::scene::{LoadedScene, Material, Painted, Tile};
+use crate::visibility::{Visibility, visibility_maps_cpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
 pub type StageTimes = Vec<(&'static str, f64)>;
-
-/// A stage's last result and the key it was made from.
-///
-/// The key holds the versions of all upstream results it was made from. (A flag "upstream is new" will not do: whoever
-/// asks for the mesh or the materials alone, as the reference does, would swallow it.)
-#[derive(Debug)]
-struct Stage<K, T> {
-    last: Option<(K, Arc<T>)>,
-    /// Counts the results made.
-    version: Version,
-}
-
-type Version = u64;
-
-impl<K, T> Default for Stage<K, T> {
-    fn default() -> Self {
-        Self { last: None, version: 0 }
-    }
-}
-
-impl<K: PartialEq, T> Stage<K, T> {
-    /// The last result if `key` is the same, else a new one, timed; with its version.
-    fn get(
-        &mut self,
-        name: &'static str,
-        key: K,
-        times: &mut StageTimes,
-        cancel: &Cancel,
-        make: impl FnOnce() -> Result<T>,
-    ) -> Result<(Arc<T>, Version)> {
-        if let Some((last, value)) = &self.last
-            && *last == key
-        {
-            return Ok((value.clone(), self.version));
-        }
-        cancel.check()?;
-        let start = Instant::now();
-        let value = Arc::new(make()?);
-        // A stage that was told to stop may have made anything.
-        cancel.check()?;
-        times.push((name, start.elapsed().as_secs_f64() * 1e3));
-        self.last = Some((key, value.clone()));
-        self.version += 1;
-        Ok((value, self.version))
-    }
-}
 
 /// A geometry that is drawn on: the mesh and its parts that later stages ask for.
 #[derive(Debug)]
@@ -132,9 +89,6 @@ pub struct Pipeline {
     paper_factors: Stage<(Version, u64, usize), PaperFactors>,
     last: Option<Last>,
 }
-
-/// Pairs that the factored form is checked on.
-const CHECK_PAIRS: usize = 256;
 
 impl Pipeline {
     pub fn new() -> Self {
@@ -334,142 +288,11 @@ impl Pipeline {
             Ok((material_of_slot, materials))
         })
     }
-
-    #[expect(clippy::too_many_arguments, reason = "one place that gathers all there is to know")]
-    fn findings(
-        &mut self,
-        scene: &Scene,
-        shape: &Shape,
-        facets: &Facets,
-        sum: &FacetSum,
-        material_of_slot: &[usize],
-        materials: &[SumMaterial],
-        settings: &Settings,
-        facets_version: Version,
-    ) -> Findings {
-        let needs_maps = !shape.flat && !shape.height_field;
-        if needs_maps && settings.backend != Backend::Cpu && !self.gpu_asked {
-            self.gpu_asked = true;
-            self.gpu = Gpu::open().ok();
-        }
-        let hardware_gpu = settings.backend != Backend::Cpu
-            && self
-                .gpu
-                .as_ref()
-                .is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.tier == crate::gpu::Tier::Hardware);
-        let scan_work = match self.scan_work {
-            Some((version, work)) if version == facets_version => work,
-            _ if needs_maps && !hardware_gpu => {
-                let work = Slices::work(&PeriodicGrid::new(&shape.mesh), facets);
-                self.scan_work = Some((facets_version, work));
-                work
-            }
-            _ => 0.0,
-        };
-        let mut used: Vec<usize> = facets.slots.iter().map(|slot| material_of_slot[usize::from(*slot)]).collect();
-        used.sort_unstable();
-        used.dedup();
-        let is_black = |index: &&usize| materials[**index].color == Vec3::ZERO;
-        let black_materials = used.iter().filter(is_black).count();
-        let is_lambertian =
-            |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
-        Findings {
-            flat: shape.flat,
-            height_samples: shape.mesh.height_grid.is_some(),
-            height_field: shape.height_field,
-            closes_plane: shape.mesh.closes_plane,
-            hardware_gpu,
-            triangles: shape.mesh.triangles.len(),
-            scan_work,
-            area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>()
-                / f64::from(shape.mesh.base_area()),
-            materials: used.len() - black_materials,
-            black_materials,
-            colors_vary: sum.colors_vary(),
-            lobes: sum.lobe_count(),
-            lookups: sum.measured_count(),
-            only_lambertian: used.iter().all(is_lambertian),
-            distinct_normals: sum.patch_count(),
-            object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
-            lights: scene.light.count + scene.light.directional.len(),
-            lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
-        }
-    }
 }
 
 /// Without a surface that faces down, what blocks a point blocks everything below it too: one horizon tells all.
 fn nothing_faces_down(mesh: &TileMesh) -> bool {
     (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
-}
-
-/// Facets of a tile, in the order that sums want.
-fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
-    let mut facets = if settings.preset == Preset::Wu2011 {
-        Facets::sample_wu2011(mesh, settings.facets, settings.seed)
-    } else {
-        FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
-    };
-    facets.sort_for_sums();
-    facets
-}
-
-fn see(
-    route: Route,
-    mesh: &TileMesh,
-    facets: &Facets,
-    settings: &Settings,
-    gpu: Option<&Gpu>,
-    cancel: &Cancel,
-) -> Result<Visibility> {
-    let periodic = || PeriodicGrid::new(mesh).cancelled_by(cancel);
-    let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
-    Ok(match (route, &mesh.height_grid, gpu) {
-        (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
-        (Route::HeightMarch, Some(heights), _) => {
-            Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp))
-        }
-        (Route::HeightMarch | Route::HorizonScan, ..) => {
-            Visibility::Horizons(Horizons::scan(&periodic(), facets, azimuths, ramp))
-        }
-        (Route::Slices, ..) => Visibility::Slices(Slices::scan(&periodic(), facets, settings.slice_azimuths, ramp)),
-        (Route::GpuMaps | Route::CpuMaps, ..) => {
-            let (grid, resolution) = (settings.map_grid, settings.map_resolution);
-            // A GPU that fails is no reason to stop: the CPU's maps are the same.
-            let packed = match (route, gpu) {
-                (Route::GpuMaps, Some(gpu)) => {
-                    visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution).ok()
-                }
-                _ => None,
-            };
-            let packed = packed.unwrap_or_else(|| visibility_maps_cpu(mesh, facets, &grid.directions(), resolution));
-            Visibility::Maps(SoftMaps { grid, packed })
-        }
-    })
-}
-
-fn same_lobes((slots, materials): &Assigned, (other_slots, others): &Assigned) -> bool {
-    slots == other_slots
-        && materials.len() == others.len()
-        && materials.iter().zip(others).all(|(a, b)| a.same_lobes(b))
-}
-
-/// The factored form where there is one and it agrees with the direct sum, else the direct sum; and how far apart they are.
-fn choose(
-    direct: Direct,
-    factors: Option<LowRank>,
-    base_area: f64,
-    settings: &Settings,
-) -> (EffectiveBrdf, Option<Errors>) {
-    let direct = EffectiveBrdf { form: Form::Direct(direct), base_area };
-    let Some(factors) = factors else { return (direct, None) };
-    let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };
-    let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
-    let values =
-        |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
-    let errors = upper_errors(&values(&factored), &values(&direct));
-    let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
-    let keep = settings.method == crate::plan::Method::LowRank || close;
-    (if keep { factored } else { direct }, Some(errors))
 }
 
 impl Reflectance for Outcome {
