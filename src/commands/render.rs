@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use biscale::Error;
+use biscale::accuracy::Health;
 use biscale::filtering::EffectiveBrdf;
 use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::shading::Background;
@@ -82,7 +83,7 @@ impl Route {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct Report<'a> {
     picture: String,
     width: usize,
     height: usize,
@@ -91,6 +92,7 @@ struct Report {
     /// Where it was shaded: `cpu`, or the adapter.
     device: String,
     stages: serde_json::Map<String, serde_json::Value>,
+    health: &'a Health,
 }
 
 pub fn run(args: &RenderArgs) -> Result<()> {
@@ -123,6 +125,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             points: rendered.points,
             device: route.describe(),
             stages,
+            health: outcome.health(),
         });
     }
     Ok(())

@@ -5,14 +5,15 @@ mod make;
 mod stage;
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use glam::Vec3;
 
-use self::make::{choose, same_lobes, sample, see};
+use self::make::{choose, names, same_lobes, sample, see};
 use self::stage::{Stage, Version};
-use crate::accuracy::{Errors, Reference};
+use crate::accuracy::health::{Evidence, Limits, Sight};
+use crate::accuracy::{Errors, Health, Reference};
 use crate::brdf::{Brdf, MeasuredCache};
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
@@ -60,6 +61,23 @@ pub struct Outcome {
     /// What the factored form's error against the direct sum stays below, where it was tried.
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
+    /// What the health is measured from.
+    pub evidence: Evidence,
+    /// The health, once it was asked for: see [`Outcome::health`].
+    pub examined: Arc<OnceLock<Health>>,
+}
+
+impl Outcome {
+    /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
+    pub fn health(&self) -> &Health {
+        let limits = limits(&self.settings);
+        self.examined.get_or_init(|| Health::of(&self.brdf, &self.evidence, self.factored, limits))
+    }
+}
+
+/// What an examination needs to know of the settings.
+fn limits(settings: &Settings) -> Limits {
+    Limits { max_rank: settings.max_rank, tolerance: settings.tolerance }
 }
 
 /// The last effective BRDF, and what a colour edit makes the next one from.
@@ -121,7 +139,8 @@ impl Pipeline {
             self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
         let mut plan = decide(&found, &settings, &Costs::default());
         if settings.preset == Preset::Wu2011 {
-            return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_version);
+            let names = names(scene, &shape.mesh, &materials)?;
+            return self.wu2011(&shape, &facets, &materials, names, plan, settings, times, materials_version);
         }
         let key = (
             facets_version,
@@ -154,6 +173,13 @@ impl Pipeline {
             let knobs = settings.low_rank(!shape.height_field);
             factors = Some(LowRank::build(&facets, &visibility, material_of_slot, sum_materials, &knobs)?);
         }
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Soft(visibility.clone()),
+            materials: materials.clone(),
+            names: names(scene, &shape.mesh, &materials)?,
+            closes_plane: shape.mesh.closes_plane,
+        };
         let direct = Direct { sum: Arc::new(sum), visibility };
         let base_area = f64::from(shape.mesh.base_area());
         let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
@@ -169,7 +195,8 @@ impl Pipeline {
         if let Some(errors) = factored {
             plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
         }
-        let outcome = Outcome { brdf, plan, settings, times, factored, notes };
+        let examined = Arc::default();
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
@@ -179,14 +206,15 @@ impl Pipeline {
     fn wu2011(
         &mut self,
         shape: &Shape,
-        facets: &Facets,
-        material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        facets: &Arc<Facets>,
+        assigned: &Arc<Assigned>,
+        names: Vec<String>,
         plan: Plan,
         settings: Settings,
         mut times: StageTimes,
         materials_version: Version,
     ) -> Result<Outcome> {
+        let (material_of_slot, materials) = (&assigned.0, &assigned.1);
         let knobs =
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
         let timed =
@@ -219,7 +247,15 @@ impl Pipeline {
         let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &factors, &knobs)?;
         timed(&mut times, "product", start);
         let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
-        Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone() })
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Packed(Arc::new(visibility)),
+            materials: assigned.clone(),
+            names,
+            closes_plane: shape.mesh.closes_plane,
+        };
+        let notes = shape.mesh.notes.clone();
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined: Arc::default() })
     }
 
     /// The tile's mesh.
@@ -238,6 +274,19 @@ impl Pipeline {
         let mut times = StageTimes::new();
         let shape = self.shape(loaded, &mut times)?.0;
         Ok(self.materials(loaded, &shape.mesh, &mut times)?.0.as_ref().clone())
+    }
+
+    /// The health of what the reference sum is made from: mesh and materials.
+    ///
+    /// # Errors
+    /// As [`Pipeline::sum_materials`].
+    pub fn input_health(&mut self, loaded: &LoadedScene) -> Result<Health> {
+        let mut times = StageTimes::new();
+        let shape = self.shape(loaded, &mut times)?.0;
+        let materials = self.materials(loaded, &shape.mesh, &mut times)?.0;
+        let names = names(&loaded.scene, &shape.mesh, &materials)?;
+        let settings = Settings::from_quality(&loaded.scene.quality);
+        Ok(Health::of_input(&shape.mesh, &materials.1, &names, limits(&settings)))
     }
 
     /// Hands a reference evaluator of the scene to `work`.

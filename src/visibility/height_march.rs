@@ -13,9 +13,9 @@ pub(super) struct HeightMarch<'a> {
     top: f32,
 }
 
-/// Edges of one family that a walk crosses: what lies beyond blocks only directions low over the horizon, and only of
-/// height-fields that are many tiles high.
-const MOST_LINES: usize = 8192;
+/// Edges of one family that any walk may cross, besides those of sixteen tiles: what lies beyond blocks only directions low
+/// over the horizon, and only of height-fields that are many tiles high.
+const LEAST_LINES: usize = 8192;
 
 impl<'a> HeightMarch<'a> {
     pub fn new(heights: &'a HeightGrid, tile_size: Vec2) -> Self {
@@ -45,7 +45,7 @@ impl<'a> HeightMarch<'a> {
         let most = match (along_x, along_y) {
             (true, _) => columns as usize + 1,
             (_, true) => rows as usize + 1,
-            _ => MOST_LINES,
+            _ => LEAST_LINES + 16 * (columns + rows) as usize,
         };
         self.cross([at.x, speed.x], along_y, most, [from.z, clearance], &mut slope, |line, r| {
             let y = at.y + speed.y * r;
