@@ -14,6 +14,7 @@ pub mod tile;
 use std::io::Write;
 
 use anyhow::Result;
+use biscale::accuracy::Health;
 use biscale::pipeline::Outcome;
 use biscale::scene::{self, LoadedScene};
 
@@ -52,6 +53,16 @@ impl SceneArgs {
         if !self.quiet {
             for note in &outcome.notes {
                 eprintln!("note: {note}");
+            }
+        }
+        self.warn(outcome.health());
+    }
+
+    /// Says what is weak about a result, and what would mend it.
+    pub fn warn(&self, health: &Health) {
+        if !self.quiet {
+            for warning in &health.warnings {
+                eprintln!("warning: {warning}");
             }
         }
     }

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use anyhow::Result;
+use biscale::accuracy::Health;
 use biscale::pipeline::Pipeline;
 use serde::Serialize;
 
@@ -13,13 +14,14 @@ use crate::SceneArgs;
 struct Report<'a> {
     effects: &'a [biscale::plan::Effect],
     notes: &'a [String],
+    health: &'a Health,
 }
 
 pub fn run(args: &SceneArgs) -> Result<()> {
     let loaded = args.open()?;
     let outcome = Pipeline::new().effective(&loaded)?;
     if args.json {
-        return print_json(&Report { effects: &outcome.plan.effects, notes: &outcome.notes });
+        return print_json(&Report { effects: &outcome.plan.effects, notes: &outcome.notes, health: outcome.health() });
     }
     let mut out = std::io::stdout().lock();
     writeln!(out, "{:<20} {:<4} {:>12} {:>12}  reason", "effect", "", "predicted", "measured")?;

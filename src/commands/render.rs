@@ -1,6 +1,7 @@
 //! `biscale render`: the object of a scene, shaded.
 
 use anyhow::Result;
+use biscale::accuracy::Health;
 use biscale::filtering::EffectiveBrdf;
 use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::shading::Background;
@@ -90,7 +91,7 @@ impl Route {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct Report<'a> {
     picture: String,
     width: usize,
     height: usize,
@@ -101,6 +102,7 @@ struct Report {
     /// The form of the effective BRDF that was read.
     reads: String,
     stages: serde_json::Map<String, serde_json::Value>,
+    health: &'a Health,
 }
 
 pub fn run(args: &RenderArgs) -> Result<()> {
@@ -140,6 +142,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             device: route.describe(),
             reads: pictured.brdf.form.describe(),
             stages,
+            health: outcome.health(),
         });
     }
     Ok(())

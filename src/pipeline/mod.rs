@@ -6,16 +6,17 @@ mod pictures;
 mod stage;
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use glam::Vec3;
 
-use self::make::{choose, same_lobes, sample, see};
+use self::make::{choose, names, same_lobes, sample, see};
 pub use self::pictures::Pictured;
 use self::pictures::Pictures;
 use self::stage::{Stage, Version};
-use crate::accuracy::{Errors, Reference};
+use crate::accuracy::health::{Evidence, Limits, Sight};
+use crate::accuracy::{Errors, Health, Reference};
 use crate::brdf::{Brdf, MeasuredCache};
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
@@ -63,6 +64,10 @@ pub struct Outcome {
     /// What the factored form's error against the direct sum stays below, where it was tried.
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
+    /// What the health is measured from.
+    pub evidence: Evidence,
+    /// The health, once it was asked for: see [`Outcome::health`].
+    pub examined: Arc<OnceLock<Health>>,
     pictures: Arc<Pictures>,
 }
 
@@ -80,6 +85,17 @@ impl Outcome {
     pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
         self.pictures.get(cancel)
     }
+
+    /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
+    pub fn health(&self) -> &Health {
+        let limits = limits(&self.settings);
+        self.examined.get_or_init(|| Health::of(&self.brdf, &self.evidence, self.factored, limits))
+    }
+}
+
+/// What an examination needs to know of the settings.
+fn limits(settings: &Settings) -> Limits {
+    Limits { max_rank: settings.max_rank, tolerance: settings.tolerance }
 }
 
 /// The last effective BRDF, and what a colour edit makes the next one from.
@@ -141,7 +157,8 @@ impl Pipeline {
             self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
         let mut plan = decide(&found, &settings, &Costs::default());
         if settings.preset == Preset::Wu2011 {
-            return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_version);
+            let names = names(scene, &shape.mesh, &materials)?;
+            return self.wu2011(&shape, &facets, &materials, names, plan, settings, times, materials_version);
         }
         let key = (
             facets_version,
@@ -176,6 +193,13 @@ impl Pipeline {
             let knobs = settings.low_rank(!shape.height_field);
             factors = Some(LowRank::build(&facets, &visibility, material_of_slot, sum_materials, &knobs)?);
         }
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Soft(visibility.clone()),
+            materials: materials.clone(),
+            names: names(scene, &shape.mesh, &materials)?,
+            closes_plane: shape.mesh.closes_plane,
+        };
         let direct = Direct { sum: Arc::new(sum), visibility };
         let base_area = f64::from(shape.mesh.base_area());
         let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
@@ -191,8 +215,9 @@ impl Pipeline {
         if let Some(errors) = factored {
             plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
         }
+        let examined = Arc::default();
         let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, plan.try_picture_table, earlier));
-        let outcome = Outcome { brdf, plan, settings, times, factored, notes, pictures };
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
@@ -202,14 +227,15 @@ impl Pipeline {
     fn wu2011(
         &mut self,
         shape: &Shape,
-        facets: &Facets,
-        material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        facets: &Arc<Facets>,
+        assigned: &Arc<Assigned>,
+        names: Vec<String>,
         plan: Plan,
         settings: Settings,
         mut times: StageTimes,
         materials_version: Version,
     ) -> Result<Outcome> {
+        let (material_of_slot, materials) = (&assigned.0, &assigned.1);
         let knobs =
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
         let timed =
@@ -242,8 +268,17 @@ impl Pipeline {
         let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &factors, &knobs)?;
         timed(&mut times, "product", start);
         let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Packed(Arc::new(visibility)),
+            materials: assigned.clone(),
+            names,
+            closes_plane: shape.mesh.closes_plane,
+        };
+        let notes = shape.mesh.notes.clone();
         let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, false, None));
-        Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone(), pictures })
+        let examined = Arc::default();
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
     }
 
     /// The tile's mesh.
@@ -262,6 +297,19 @@ impl Pipeline {
         let mut times = StageTimes::new();
         let shape = self.shape(loaded, &mut times)?.0;
         Ok(self.materials(loaded, &shape.mesh, &mut times)?.0.as_ref().clone())
+    }
+
+    /// The health of what the reference sum is made from: mesh and materials.
+    ///
+    /// # Errors
+    /// As [`Pipeline::sum_materials`].
+    pub fn input_health(&mut self, loaded: &LoadedScene) -> Result<Health> {
+        let mut times = StageTimes::new();
+        let shape = self.shape(loaded, &mut times)?.0;
+        let materials = self.materials(loaded, &shape.mesh, &mut times)?.0;
+        let names = names(&loaded.scene, &shape.mesh, &materials)?;
+        let settings = Settings::from_quality(&loaded.scene.quality);
+        Ok(Health::of_input(&shape.mesh, &materials.1, &names, limits(&settings)))
     }
 
     /// Hands a reference evaluator of the scene to `work`.

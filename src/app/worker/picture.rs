@@ -68,6 +68,8 @@ pub struct Made {
     /// From the camera to the object, in radii.
     pub distance: f32,
     pub notes: Vec<String>,
+    /// What is weak about the material, known once the picture is final.
+    pub warnings: Vec<String>,
     pub effects: Vec<Effect>,
     /// What the preset that made it is called.
     pub preset: &'static str,
@@ -174,6 +176,7 @@ impl Photographer {
         let full = self.affordable(job.size, 1, FINAL_MS);
         let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
         made.grade = Grade::Final;
+        made.warnings.clone_from(&outcome.health().warnings);
         *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
         answer(PictureAnswer::Made(Box::new(made)));
         Ok(())
@@ -264,6 +267,7 @@ impl Photographer {
             camera: camera.clone(),
             distance: self.studio.distance(&camera, size),
             notes,
+            warnings: Vec::new(),
             effects: outcome.plan.effects.clone(),
             preset: outcome.settings.preset.name(),
         })
