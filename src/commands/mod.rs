@@ -15,6 +15,7 @@ use std::io::Write;
 
 use anyhow::Result;
 use biscale::Cancel;
+use biscale::accuracy::Health;
 use biscale::accuracy::choose::{Goal, choose};
 use biscale::pipeline::Outcome;
 use biscale::scene::{self, Effects, LoadedScene, Switch};
@@ -77,6 +78,16 @@ impl SceneArgs {
         if !self.quiet {
             for note in &outcome.notes {
                 eprintln!("note: {note}");
+            }
+        }
+        self.warn(outcome.health());
+    }
+
+    /// Says what is weak about a result, and what would mend it.
+    pub fn warn(&self, health: &Health) {
+        if !self.quiet {
+            for warning in &health.warnings {
+                eprintln!("warning: {warning}");
             }
         }
     }

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use anyhow::Result;
+use biscale::accuracy::Health;
 use biscale::large_scale::Stage;
 use biscale::pipeline::Pipeline;
 use biscale::report::{EffectCost, measure_effects};
@@ -22,6 +23,7 @@ struct Report<'a> {
     /// Lights that were left out.
     dropped_lights: usize,
     notes: &'a [String],
+    health: &'a Health,
 }
 
 pub fn run(args: &PlanArgs) -> Result<()> {
@@ -47,6 +49,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
             runs: pipeline.runs().into_iter().collect(),
             dropped_lights,
             notes: &outcome.notes,
+            health: outcome.health(),
         });
     }
     let mut out = std::io::stdout().lock();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::{Direct, LowRank, Reflectance, Wu2011};
+use super::{Direct, LowRank, PairTable, Reflectance, Wu2011};
 use crate::interreflection::InterreflectionTable;
 
 /// How `G` is held.
@@ -14,6 +14,8 @@ pub enum Form {
     Direct(Direct),
     /// Visibility factors on an (i,o) grid times lobe factors on an (h,d) grid.
     LowRank(LowRank),
+    /// A table of the sum over half and difference coordinates, for pictures.
+    Table(PairTable),
     /// The paper's own tables.
     Wu2011(Wu2011),
     /// Any of these, and the light between facets added.
@@ -30,6 +32,9 @@ impl Form {
             },
             Self::Interreflecting(form, table) => {
                 format!("{}, and {} bytes of light between facets", form.describe(), table.bytes())
+            }
+            Self::Table(table) => {
+                format!("a table of {} pairs of directions, {} bytes", table.grid.nodes(), table.bytes())
             }
             Self::Wu2011(tables) => format!("the paper's tables, {} bytes", tables.bytes()),
             Self::LowRank(factors) => format!(
@@ -69,6 +74,11 @@ impl EffectiveBrdf {
         (self.sums(&[], o, |_, _| {}) / self.base_area) as f32
     }
 
+    /// With light between facets added.
+    pub fn interreflecting(self, table: Arc<InterreflectionTable>) -> Self {
+        Self { form: Form::Interreflecting(Box::new(self.form), table), ..self }
+    }
+
     /// `a_v(o)`, and `a_v f̄` of each light into `out`.
     fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         if let Form::Interreflecting(form, table) = &self.form {
@@ -82,12 +92,13 @@ impl EffectiveBrdf {
 }
 
 impl Form {
-    fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+    /// `a_v(o)`, and `a_v f̄` of each light into `out`; what facets send to each other is added by [`EffectiveBrdf`].
+    pub(crate) fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         match self {
-            // Light between facets is added once, by the BRDF.
             Self::Interreflecting(form, _) => form.sums(lights, o, &mut out as &mut dyn FnMut(usize, DVec3)),
             Form::Direct(direct) => direct.sums(lights, o, out),
             Form::LowRank(factors) => factors.sums(lights, o, out),
+            Form::Table(table) => table.sums(lights, o, out),
             Form::Wu2011(tables) => tables.sums(lights, o, out),
         }
     }

@@ -32,14 +32,10 @@ impl Pipeline {
     }
 
     /// What facets send to each other; rays are cast anew only for other facets.
-    #[expect(clippy::too_many_arguments, reason = "all that light between facets depends on")]
     pub(super) fn between_facets(
         &mut self,
         shape: &Shape,
-        facets: &Facets,
-        visibility: &Visibility,
-        materials: &[SumMaterial],
-        material_of_slot: &[usize],
+        (facets, visibility, materials, material_of_slot): (&Facets, &Visibility, &[SumMaterial], &[usize]),
         settings: &Settings,
         mirrors: [bool; 2],
         (facets_version, key): (Version, OutcomeKey),

@@ -11,7 +11,7 @@ use crate::filtering::{Direct, EffectiveBrdf, Form, LowRank, mean_colors};
 use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
 use crate::plan::{Method, Preset, Route, Settings};
-use crate::scene::Switch;
+use crate::scene::{Scene, Switch};
 use crate::visibility::{
     Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
 };
@@ -103,4 +103,13 @@ pub(super) fn choose(
     let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
     let keep = settings.method == Method::LowRank || close;
     (if keep { factored } else { direct }, Some(errors))
+}
+
+/// What each assigned material is called.
+pub(super) fn names(scene: &Scene, mesh: &TileMesh, (material_of_slot, materials): &Assigned) -> Result<Vec<String>> {
+    let mut names = vec![String::new(); materials.len()];
+    for (slot, &material) in mesh.slots.iter().zip(material_of_slot) {
+        scene.material_for_slot(slot)?.name.clone_into(&mut names[material]);
+    }
+    Ok(names)
 }

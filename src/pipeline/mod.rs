@@ -3,17 +3,21 @@
 mod findings;
 mod interreflection;
 mod make;
+mod pictures;
 mod stage;
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use glam::Vec3;
 
-use self::make::{choose, grouped, same_lobes, sample, see};
+use self::make::{choose, grouped, names, same_lobes, sample, see};
+pub use self::pictures::Pictured;
+use self::pictures::Pictures;
 use self::stage::{Stage, Version};
-use crate::accuracy::{Errors, Reference};
+use crate::accuracy::health::{Evidence, Limits, Sight};
+use crate::accuracy::{Errors, Health, Reference};
 use crate::brdf::{Brdf, MeasuredCache};
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
@@ -64,6 +68,38 @@ pub struct Outcome {
     /// What the factored form's error against the direct sum stays below, where it was tried.
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
+    /// What the health is measured from.
+    pub evidence: Evidence,
+    /// The health, once it was asked for: see [`Outcome::health`].
+    pub examined: Arc<OnceLock<Health>>,
+    pictures: Arc<Pictures>,
+}
+
+impl Outcome {
+    /// The same, as whoever did not have to wait for it sees it.
+    pub fn without_times(self) -> Self {
+        Self { times: StageTimes::new(), ..self }
+    }
+
+    /// What pictures read instead of [`Outcome::brdf`]: a table of it where that pays and is close enough. The first call
+    /// makes it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Cancelled`].
+    pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
+        self.pictures.get(cancel)
+    }
+
+    /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
+    pub fn health(&self) -> &Health {
+        let limits = limits(&self.settings);
+        self.examined.get_or_init(|| Health::of(&self.brdf, &self.evidence, self.factored, limits))
+    }
+}
+
+/// What an examination needs to know of the settings.
+fn limits(settings: &Settings) -> Limits {
+    Limits { max_rank: settings.max_rank, tolerance: settings.tolerance }
 }
 
 /// The last effective BRDF, and what a colour edit makes the next one from.
@@ -134,16 +170,9 @@ impl Pipeline {
         let found = Findings { mirrors, ..found };
         let mut plan = decide(&found, &settings, &Costs::default());
         if settings.preset == Preset::Wu2011 {
-            return self.wu2011(
-                &shape,
-                &facets,
-                material_of_slot,
-                sum_materials,
-                plan,
-                settings,
-                times,
-                materials_version,
-            );
+            let names = names(scene, &shape.mesh, &materials)?;
+            let assigned = Arc::new((material_of_slot.clone(), materials.1.clone()));
+            return self.wu2011(&shape, &facets, &assigned, names, plan, settings, times, materials_version);
         }
         let key = (
             facets_version,
@@ -163,14 +192,16 @@ impl Pipeline {
         };
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
-        let mut factors = None;
+        let (mut factors, mut earlier) = (None, None);
         if let Some(last) = &self.last {
             if last.key == key {
                 return Ok(Outcome { times, ..last.outcome.clone() });
             }
-            // Colours alone: the factors stay, and are judged anew.
-            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] && same_lobes(&last.materials, &materials) {
-                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank);
+            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] {
+                let same_lobes = same_lobes(&last.materials, &materials);
+                earlier = last.outcome.pictures.latest(same_lobes);
+                // Colours alone: the factors stay, and are judged anew.
+                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank && same_lobes);
                 factors = kept.map(|factors| factors.recolored(sum_materials));
             }
         }
@@ -180,30 +211,33 @@ impl Pipeline {
             let knobs = settings.low_rank(!shape.height_field);
             factors = Some(LowRank::build(&facets, &visibility, material_of_slot, sum_materials, &knobs)?);
         }
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Soft(visibility.clone()),
+            materials: materials.clone(),
+            names: names(scene, &shape.mesh, &materials)?,
+            closes_plane: shape.mesh.closes_plane,
+        };
         let direct = Direct { sum: Arc::new(sum), visibility: visibility.clone() };
         let base_area = f64::from(shape.mesh.base_area());
-        let (mut brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
+        let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
         let is_factored = matches!(brdf.form, Form::LowRank(_));
-        if plan.interreflection {
+        let between = if plan.interreflection {
             let found = (facets_version, key.clone());
-            let table = self.between_facets(
-                &shape,
-                &facets,
-                &visibility,
-                &materials.1,
-                material_of_slot,
-                &settings,
-                plan.mirrors,
-                found,
-                &mut times,
-            )?;
-            brdf.form = Form::Interreflecting(Box::new(brdf.form), table);
-        }
+            let of = (&*facets, &*visibility, &materials.1[..], &material_of_slot[..]);
+            Some(self.between_facets(&shape, of, &settings, plan.mirrors, found, &mut times)?)
+        } else {
+            None
+        };
         for (name, ms) in &times {
             plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
         }
-        let brdf = Arc::new(brdf);
+        let exact = Arc::new(brdf);
+        let brdf = match &between {
+            Some(table) => Arc::new((*exact).clone().interreflecting(table.clone())),
+            None => exact.clone(),
+        };
         let mut notes = shape.mesh.notes.clone();
         if facets.skipped_triangles > 0 {
             notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
@@ -211,7 +245,10 @@ impl Pipeline {
         if let Some(errors) = factored {
             plan.factored(is_factored, errors.rel_l2);
         }
-        let outcome = Outcome { brdf, plan, settings, times, factored, notes };
+        let examined = Arc::default();
+        let pictures = Pictures::new(exact, &settings, plan.try_picture_table, earlier).with(between);
+        let pictures = Arc::new(pictures);
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
@@ -221,14 +258,15 @@ impl Pipeline {
     fn wu2011(
         &mut self,
         shape: &Shape,
-        facets: &Facets,
-        material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        facets: &Arc<Facets>,
+        assigned: &Arc<Assigned>,
+        names: Vec<String>,
         plan: Plan,
         settings: Settings,
         mut times: StageTimes,
         materials_version: Version,
     ) -> Result<Outcome> {
+        let (material_of_slot, materials) = (&assigned.0, &assigned.1);
         let knobs =
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
         let timed =
@@ -261,7 +299,17 @@ impl Pipeline {
         let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &factors, &knobs)?;
         timed(&mut times, "product", start);
         let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
-        Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone() })
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Packed(Arc::new(visibility)),
+            materials: assigned.clone(),
+            names,
+            closes_plane: shape.mesh.closes_plane,
+        };
+        let notes = shape.mesh.notes.clone();
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, false, None));
+        let examined = Arc::default();
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
     }
 
     /// How often each stage ran: a stage that the plan drops stays at 0.
@@ -294,6 +342,19 @@ impl Pipeline {
         let mut times = StageTimes::new();
         let shape = self.shape(loaded, &mut times)?.0;
         Ok(self.materials(loaded, &shape.mesh, &mut times)?.0.as_ref().clone())
+    }
+
+    /// The health of what the reference sum is made from: mesh and materials.
+    ///
+    /// # Errors
+    /// As [`Pipeline::sum_materials`].
+    pub fn input_health(&mut self, loaded: &LoadedScene) -> Result<Health> {
+        let mut times = StageTimes::new();
+        let shape = self.shape(loaded, &mut times)?.0;
+        let materials = self.materials(loaded, &shape.mesh, &mut times)?.0;
+        let names = names(&loaded.scene, &shape.mesh, &materials)?;
+        let settings = Settings::from_quality(&loaded.scene.quality);
+        Ok(Health::of_input(&shape.mesh, &materials.1, &names, limits(&settings)))
     }
 
     /// Hands a reference evaluator of the scene to `work`.

@@ -32,12 +32,17 @@ impl PeriodicGrid {
         let reach = (bottom - origin.z) / to.z;
         let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
         let mut best: Option<(f32, Hit)> = None;
-        while walk.entered <= reach {
+        let nearest_allowed = -1e-6 * self.tile_size.max_element();
+        for _ in 0..MOST_CELLS {
+            if walk.entered > reach {
+                break;
+            }
             let (cell, tile) = walk.cell();
             if self.z_max[cell] >= origin.z + reach * to.z {
                 for &entry in self.entries(cell) {
                     let corners = self.copy_corners(entry, tile);
                     if let Some((t, v, w)) = meet(origin, to, corners)
+                        && t >= nearest_allowed
                         && best.is_none_or(|(nearest, _)| t < nearest)
                     {
                         let hit = Hit { triangle: entry.triangle, position: origin + to * t, barycentric: [v, w] };
@@ -97,13 +102,16 @@ impl PeriodicGrid {
 
 /// Rays that travel farther without leaving the tiling are given up.
 const FARTHEST_TILES: f32 = 64.0;
+/// Cells that a ray walks through at most.
+const MOST_CELLS: usize = 1 << 16;
 
 /// Distance along the ray and the weights of the second and third corner (Möller and Trumbore 1997), both sides.
 fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)> {
     let (ab, ac) = (b - a, c - a);
     let p = to.cross(ac);
     let determinant = ab.dot(p);
-    if determinant.abs() < 1e-14 {
+    // Seen along its plane, whatever the unit of length.
+    if determinant.abs() <= 1e-8 * ab.length() * ac.length() {
         return None;
     }
     let offset = origin - a;
@@ -113,5 +121,5 @@ fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)>
     let t = ac.dot(q) / determinant;
     // A hair of overlap, so that no ray slips between neighbours.
     let inside = v >= -1e-5 && w >= -1e-5 && v + w <= 1.0 + 1e-5;
-    (inside && t >= -1e-6).then_some((t, v, w))
+    inside.then_some((t, v, w))
 }

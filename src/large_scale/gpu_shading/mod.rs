@@ -107,6 +107,9 @@ impl GpuShading {
             Form::Interreflecting(..) => {
                 return Err(GpuError::Unsupported("light between facets is added on the CPU only".to_owned()));
             }
+            Form::Table(_) => {
+                return Err(GpuError::Unsupported("tables for pictures are read on the CPU only".to_owned()));
+            }
             Form::Wu2011(_) => {
                 return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
             }
