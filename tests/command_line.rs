@@ -512,7 +512,7 @@ fn a_target_is_answered_with_settings_that_repeat_it() {
 #[test]
 fn an_effect_is_forced_on_and_off_and_the_plan_shows_it() {
     let desk = Desk::new();
-    desk.write("grooves.toml", &GROOVES.replace("depth = 0.1", "depth = 0.4"));
+    desk.write("grooves.toml", GROOVES.replace("depth = 0.1", "depth = 0.4"));
     desk.write("pairs.csv", PAIRS);
     let effect = |extra: &[&str], name: &str| -> Value {
         let plan = desk.json(&[&["plan", "grooves.toml", "--json", "--quiet"], extra].concat());

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use anyhow::Result;
+use biscale::Cancel;
 use biscale::accuracy::Health;
 use biscale::large_scale::Stage;
 use biscale::pipeline::Pipeline;
@@ -33,7 +34,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     let dropped_lights = Stage::new(&loaded)?.dropped_lights;
     let measured = if args.measure {
         let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
-        let costs = measure_effects(&loaded, |name| {
+        let costs = measure_effects(&loaded, &Cancel::default(), |name| {
             bar.set_message(format!("with and without {name}"));
             bar.tick();
         })?;

@@ -189,6 +189,7 @@ pub(super) fn mark(effects: &mut [Effect], found: &Findings, settings: &Settings
     for effect in effects {
         let (switch, bound) = match effect.name {
             "visibility" => (forced.visibility, Some(if found.flat { ROUNDING } else { settings.tolerance })),
+            "picture_table" => (forced.picture_table, None),
             "exact_lobes" => (forced.exact_lobes, Some(SAME_NORMALS)),
             "color_weights" => (forced.color_weights, Some(ROUNDING)),
             "material_groups" => (forced.material_groups, Some(ROUNDING)),

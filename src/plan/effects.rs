@@ -214,7 +214,8 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     };
     let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
     let tabulating_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * direct_query);
-    let try_picture_table = !found.flat && tabulating_ms.is_some_and(|ms| ms + table_ms < direct_ms);
+    let pays = !found.flat && tabulating_ms.is_some_and(|ms| ms + table_ms < direct_ms);
+    let try_picture_table = decisions::is_on(settings.effects.picture_table, pays);
     let comparison = format!(
         "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
     );

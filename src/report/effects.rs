@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::Studio;
 use crate::accuracy::{compare, mirror_biased_pairs};
+use crate::cancel::Cancel;
 use crate::error::Result;
 use crate::large_scale::Picture;
 use crate::pipeline::Pipeline;
@@ -30,9 +31,10 @@ pub struct EffectCost {
 }
 
 /// The switches of a scene, by name.
-pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 9] {
+pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 10] {
     [
         ("visibility", &mut effects.visibility),
+        ("picture_table", &mut effects.picture_table),
         ("exact_lobes", &mut effects.exact_lobes),
         ("color_weights", &mut effects.color_weights),
         ("material_groups", &mut effects.material_groups),
@@ -59,7 +61,11 @@ const PAIRS: usize = 128;
 ///
 /// # Errors
 /// As [`Pipeline::effective`], and an object or environment that cannot be used.
-pub fn measure_effects(loaded: &LoadedScene, mut progress: impl FnMut(&str)) -> Result<Vec<EffectCost>> {
+pub fn measure_effects(
+    loaded: &LoadedScene,
+    cancel: &Cancel,
+    mut progress: impl FnMut(&str),
+) -> Result<Vec<EffectCost>> {
     let mut all = Vec::new();
     for k in 0..switches(&mut Effects::default()).len() {
         let forced = |switch: Switch| {
@@ -74,9 +80,9 @@ pub fn measure_effects(loaded: &LoadedScene, mut progress: impl FnMut(&str)) -> 
         };
         let (name, on) = forced(Switch::On);
         progress(name);
-        let on = run(&on)?;
-        let auto = run(&forced(Switch::Auto).1)?;
-        let off = run(&forced(Switch::Off).1)?;
+        let on = run(&on, cancel)?;
+        let auto = run(&forced(Switch::Auto).1, cancel)?;
+        let off = run(&forced(Switch::Off).1, cancel)?;
         let mut delta_e = on.studio.difference(&on.picture, &off.picture);
         delta_e.sort_by(f32::total_cmp);
         all.push(EffectCost {
@@ -92,19 +98,20 @@ pub fn measure_effects(loaded: &LoadedScene, mut progress: impl FnMut(&str)) -> 
     Ok(all)
 }
 
-fn run(loaded: &LoadedScene) -> Result<Run> {
+fn run(loaded: &LoadedScene, cancel: &Cancel) -> Result<Run> {
     let studio = Studio::new(loaded)?;
     let pairs = mirror_biased_pairs(PAIRS, 20_110_801);
     let (mut pipeline, mut scene) = (Pipeline::new(), loaded.clone());
+    pipeline.cancel_with(cancel.clone());
     let mut outcome = pipeline.effective(&scene)?;
-    let mut picture = studio.picture(&outcome.brdf)?;
+    let mut picture = studio.picture(&outcome.for_pictures(cancel)?.brdf)?;
     let mut times = Vec::new();
     for run in (0..RUNS).rev() {
         // Other facets each time: all that an edit of the geometry asks for. The last are the scene's own.
         scene.scene.quality.seed = loaded.scene.quality.seed ^ run;
         let start = Instant::now();
         outcome = pipeline.effective(&scene)?;
-        picture = studio.picture(&outcome.brdf)?;
+        picture = studio.picture(&outcome.for_pictures(cancel)?.brdf)?;
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     times.sort_by(f64::total_cmp);

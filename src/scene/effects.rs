@@ -25,6 +25,8 @@ scene_table! {
         exact_lobes: Switch = Switch::Auto, SWITCH, "";
         /// Colours that differ between the facets of one material; off takes their mean.
         color_weights: Switch = Switch::Auto, SWITCH, "";
+        /// Pictures read a table of the sum over facets, where it is close enough.
+        picture_table: Switch = Switch::Auto, SWITCH, "";
         /// Several materials; off gives all facets the one that covers most.
         material_groups: Switch = Switch::Auto, SWITCH, "";
         /// Black materials are summed like any other.

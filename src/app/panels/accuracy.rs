@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use biscale::accuracy::ladder;
 use biscale::plan::{Effect, Settings};
+use biscale::report::EffectCost;
 use biscale::scene::{LoadedScene, Quality, Scene};
 use eframe::egui::{
     self, Align2, Color32, Context, FontId, Sense, Slider, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
@@ -19,7 +20,11 @@ pub struct AccuracyState {
     pub open: bool,
     /// The reference goes on refining.
     pub comparing: bool,
-    asked: Option<(u64, bool)>,
+    /// Each effect is to be forced on and off.
+    pub measuring: bool,
+    /// What that gave, for a version of the document.
+    pub costs: Option<(u64, Vec<EffectCost>)>,
+    asked: Option<(u64, bool, bool)>,
     rungs: Vec<Point>,
     present: Option<(u64, Point)>,
     difference: Option<(u64, TextureHandle, f32)>,
@@ -30,18 +35,20 @@ pub struct AccuracyState {
 impl AccuracyState {
     /// The job for a version of the document whose picture is finished, where it is not what was asked for last.
     pub fn job(&mut self, version: u64, loaded: &Arc<LoadedScene>) -> Option<AccuracyJob> {
-        let wanted = (version, self.comparing);
-        if !self.open || self.asked == Some(wanted) {
+        let wanted = (version, self.comparing, self.measuring);
+        if !(self.open || self.measuring) || self.asked == Some(wanted) {
             return None;
         }
         self.asked = Some(wanted);
         self.trouble = None;
-        Some(AccuracyJob { version, loaded: loaded.clone(), compare: self.comparing })
+        let (chart, compare, effects) = (self.open, self.comparing, self.measuring);
+        Some(AccuracyJob { version, loaded: loaded.clone(), chart, compare, effects })
     }
 
     /// Whether work that was asked for is under way for another state than this one.
     pub fn is_late(&mut self, version: u64) -> bool {
-        let late = self.doing.is_some() && (!self.open || self.asked.is_some_and(|(asked, _)| asked != version));
+        let late = self.doing.is_some()
+            && (!(self.open || self.measuring) || self.asked.is_some_and(|(asked, ..)| asked != version));
         if late {
             self.doing = None;
             self.asked = None;
@@ -58,12 +65,20 @@ impl AccuracyState {
                 let texture = ctx.load_texture("difference", image, TextureOptions::NEAREST);
                 self.difference = Some((version, texture, mean));
             }
+            AccuracyAnswer::Effects(version, costs) => {
+                self.measuring = false;
+                // What was asked for is done: the rest of it goes on.
+                self.asked = self.asked.map(|(version, comparing, _)| (version, comparing, false));
+                self.costs = Some((version, costs));
+            }
             AccuracyAnswer::Done(version) => {
-                if self.asked.is_some_and(|(asked, _)| asked == version) {
+                if self.asked.is_some_and(|(asked, ..)| asked == version) {
                     self.doing = None;
                 }
             }
-            AccuracyAnswer::Failed(text) => (self.doing, self.trouble) = (None, Some(text)),
+            AccuracyAnswer::Failed(text) => {
+                (self.doing, self.trouble, self.measuring) = (None, Some(text), false);
+            }
         }
     }
 

@@ -47,7 +47,7 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, slots: 
     section(ui, "Quality", false, |ui| look::quality_ui(ui, &mut scene.quality, &mut around));
     shown.accuracy.open = false;
     section(ui, "Accuracy", false, |ui| accuracy::ui(ui, scene, shown.accuracy, shown.effects, shown.version));
-    section(ui, "Effects", false, |ui| effects::ui(ui, scene, shown.effects));
+    section(ui, "Effects", false, |ui| effects::ui(ui, scene, shown.effects, shown.accuracy, shown.version));
     Asked { browse: around.browse, material, complaint: around.complaint }
 }
 

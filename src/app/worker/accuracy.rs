@@ -8,7 +8,7 @@ use biscale::accuracy::ladder;
 use biscale::accuracy::progressive::{Compared, ProgressiveReference};
 use biscale::accuracy::sweep::with_settings;
 use biscale::pipeline::Pipeline;
-use biscale::report::{Studio, heat};
+use biscale::report::{EffectCost, Studio, heat, measure_effects};
 use biscale::scene::{LoadedScene, Quality};
 use biscale::{Error, Result};
 use eframe::egui::ColorImage;
@@ -20,8 +20,12 @@ use super::runner::Desk;
 pub struct AccuracyJob {
     pub version: u64,
     pub loaded: Arc<LoadedScene>,
+    /// Measure the present settings and the rungs.
+    pub chart: bool,
     /// Go on refining the reference, and make the difference picture.
     pub compare: bool,
+    /// Force each effect on and off.
+    pub effects: bool,
 }
 
 /// A rung of the ladder on this machine.
@@ -42,6 +46,8 @@ pub enum AccuracyAnswer {
     Present(u64, Point),
     /// ΔE between the present picture and a far finer one, as a picture, and its mean.
     Difference(u64, Arc<ColorImage>, f32),
+    /// What each effect costs and changes.
+    Effects(u64, Vec<EffectCost>),
     Done(u64),
     Failed(String),
 }
@@ -78,6 +84,14 @@ impl Accuracy {
             *self = Self { key: Some(Box::new(key)), ..Self::default() };
         }
         self.pipeline.cancel_with(desk.cancel.clone());
+        if job.effects {
+            answer(AccuracyAnswer::Doing("Each effect on and off"));
+            let costs = measure_effects(&job.loaded, desk.cancel, |_| {})?;
+            answer(AccuracyAnswer::Effects(job.version, costs));
+        }
+        if !job.chart {
+            return Ok(());
+        }
         answer(AccuracyAnswer::Doing("Reference"));
         let mut reference = self.reference.take().unwrap_or_else(|| ProgressiveReference::new(PAIRS));
         while reference.batches < BATCHES[0] {
