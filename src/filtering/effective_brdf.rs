@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{Direct, LowRank, Reflectance, Wu2011};
+use super::{Direct, LowRank, PairTable, Reflectance, Wu2011};
 
 /// How `G` is held.
 #[derive(Debug, Clone)]
@@ -11,6 +11,8 @@ pub enum Form {
     Direct(Direct),
     /// Visibility factors on an (i,o) grid times lobe factors on an (h,d) grid.
     LowRank(LowRank),
+    /// A table of the sum over half and difference coordinates, for pictures.
+    Table(PairTable),
     /// The paper's own tables.
     Wu2011(Wu2011),
 }
@@ -23,6 +25,9 @@ impl Form {
                 Some(count) => format!("exact lobes of {count} normals over {} facets", direct.sum.facet_count()),
                 None => format!("direct sum over {} facets", direct.sum.facet_count()),
             },
+            Self::Table(table) => {
+                format!("a table of {} pairs of directions, {} bytes", table.grid.nodes(), table.bytes())
+            }
             Self::Wu2011(tables) => format!("the paper's tables, {} bytes", tables.bytes()),
             Self::LowRank(factors) => format!(
                 "factors: ranks {} on {} directions",
@@ -66,6 +71,7 @@ impl EffectiveBrdf {
         match &self.form {
             Form::Direct(direct) => direct.sums(lights, o, out),
             Form::LowRank(factors) => factors.sums(lights, o, out),
+            Form::Table(table) => table.sums(lights, o, out),
             Form::Wu2011(tables) => tables.sums(lights, o, out),
         }
     }

@@ -7,6 +7,7 @@ mod facet_sum;
 mod gemm;
 mod gram;
 mod low_rank;
+mod pair_table;
 mod rotated_basis;
 mod wu2011;
 
@@ -17,6 +18,7 @@ pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint};
+pub use pair_table::PairTable;
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 

@@ -2,6 +2,7 @@
 
 mod findings;
 mod make;
+mod pictures;
 mod stage;
 
 use std::path::PathBuf;
@@ -11,6 +12,8 @@ use std::time::Instant;
 use glam::Vec3;
 
 use self::make::{choose, names, same_lobes, sample, see};
+pub use self::pictures::Pictured;
+use self::pictures::Pictures;
 use self::stage::{Stage, Version};
 use crate::accuracy::health::{Evidence, Limits, Sight};
 use crate::accuracy::{Errors, Health, Reference};
@@ -65,9 +68,24 @@ pub struct Outcome {
     pub evidence: Evidence,
     /// The health, once it was asked for: see [`Outcome::health`].
     pub examined: Arc<OnceLock<Health>>,
+    pictures: Arc<Pictures>,
 }
 
 impl Outcome {
+    /// The same, as whoever did not have to wait for it sees it.
+    pub fn without_times(self) -> Self {
+        Self { times: StageTimes::new(), ..self }
+    }
+
+    /// What pictures read instead of [`Outcome::brdf`]: a table of it where that pays and is close enough. The first call
+    /// makes it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Cancelled`].
+    pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
+        self.pictures.get(cancel)
+    }
+
     /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
     pub fn health(&self) -> &Health {
         let limits = limits(&self.settings);
@@ -156,14 +174,16 @@ impl Pipeline {
         })?;
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
-        let mut factors = None;
+        let (mut factors, mut earlier) = (None, None);
         if let Some(last) = &self.last {
             if last.key == key {
                 return Ok(Outcome { times, ..last.outcome.clone() });
             }
-            // Colours alone: the factors stay, and are judged anew.
-            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] && same_lobes(&last.materials, &materials) {
-                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank);
+            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] {
+                let same_lobes = same_lobes(&last.materials, &materials);
+                earlier = last.outcome.pictures.latest(same_lobes);
+                // Colours alone: the factors stay, and are judged anew.
+                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank && same_lobes);
                 factors = kept.map(|factors| factors.recolored(sum_materials));
             }
         }
@@ -196,7 +216,8 @@ impl Pipeline {
             plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
         }
         let examined = Arc::default();
-        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined };
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, plan.try_picture_table, earlier));
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
@@ -255,7 +276,9 @@ impl Pipeline {
             closes_plane: shape.mesh.closes_plane,
         };
         let notes = shape.mesh.notes.clone();
-        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined: Arc::default() })
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, false, None));
+        let examined = Arc::default();
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
     }
 
     /// The tile's mesh.

@@ -69,6 +69,7 @@ pub struct Costs {
     pub march_ns: f64,
     pub scan_ns: f64,
     pub factor_query_ns: f64,
+    pub table_query_ns: f64,
     pub slice_ns: f64,
     pub triangle_ns: f64,
     pub texel_ns: f64,
@@ -84,6 +85,7 @@ impl Default for Costs {
             march_ns: 1_000.0,
             scan_ns: 1_000.0,
             factor_query_ns: 1_500.0,
+            table_query_ns: 120.0,
             slice_ns: 18.0,
             triangle_ns: 60.0,
             texel_ns: 10.0,
@@ -101,6 +103,8 @@ pub struct Plan {
     pub route: Route,
     /// Try the factored form first; it must pass its check against the direct sum.
     pub try_low_rank: bool,
+    /// Try a table for pictures first; it must pass its check against the BRDF.
+    pub try_picture_table: bool,
     pub effects: Vec<Effect>,
 }
 
@@ -181,10 +185,14 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     let try_low_rank = match settings.method {
         Method::Direct => false,
         Method::LowRank => true,
-        // A flat tile is its own BRDF: nothing to factor. Few normals have sharp edges between them, which factors only
-        // reach at the lobes' own grid: tried on grooves and pyramids, they were given up every time.
-        Method::Auto => allowed && !found.flat && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
+        // Sums of analytic lobes are quick enough for single pairs and export, and pictures read a table of them: factors
+        // pay where every term is a look-up. Few normals have sharp edges between them, which factors reach at the lobes'
+        // own grid at best (docs/accuracy.txt: 2.6 % on a V-groove).
+        Method::Auto => allowed && found.lookups > 0 && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
     };
+    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
+    let tabulating_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * direct_query);
+    let try_picture_table = !found.flat && tabulating_ms.is_some_and(|ms| ms + table_ms < direct_ms);
     let comparison = format!(
         "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
     );
@@ -203,6 +211,21 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             _ => "asked for by quality.method".to_owned(),
         },
         if try_low_rank { 800.0 } else { 0.0 },
+    );
+    note(
+        "picture_table",
+        try_picture_table,
+        match tabulating_ms {
+            _ if found.flat => "a flat tile is its own BRDF".to_owned(),
+            None => "pictures evaluate the BRDF itself at this quality".to_owned(),
+            Some(ms) => format!(
+                "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {table_ms:.0} ms \
+                 from a table that takes {ms:.0} ms, once; kept if within {:.0} % and {:.0} dB of the sum",
+                settings.picture_tolerance.0 * 100.0,
+                settings.picture_tolerance.1
+            ),
+        },
+        if try_picture_table { tabulating_ms.unwrap_or(0.0) } else { 0.0 },
     );
     note(
         "exact_lobes",
@@ -278,7 +301,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     ] {
         note(name, false, reason.to_owned(), 0.0);
     }
-    Plan { route, try_low_rank, effects }
+    Plan { route, try_low_rank, try_picture_table, effects }
 }
 
 /// Slicing under overhangs: cells and triangles looked at, facet by facet.

@@ -130,7 +130,7 @@ impl Photographer {
     fn drafted(&mut self, job: &PictureJob) -> Result<Made> {
         self.studio.prepare(&job.loaded)?;
         let (outcome, which) = match self.known(&job.loaded) {
-            Some(outcome) => (Outcome { times: Vec::new(), ..outcome }, 1),
+            Some(outcome) => (outcome.without_times(), 1),
             None => (self.pipeline.effective(&as_draft(&job.loaded))?, 0),
         };
         let size = self.affordable(job.size, which, DRAFT_MS);
@@ -149,7 +149,7 @@ impl Photographer {
             return Ok(());
         }
         let mut outcome = match self.known(&job.loaded) {
-            Some(outcome) => Outcome { times: Vec::new(), ..outcome },
+            Some(outcome) => outcome.without_times(),
             None => {
                 answer(PictureAnswer::Doing(job.version, "Refining the material"));
                 self.pipeline.cancel_with(desk.cancel.clone());
@@ -227,21 +227,26 @@ impl Photographer {
         let tone_map = ToneMap::new(&camera)?;
         let backend = job.loaded.scene.quality.backend.as_str();
         let settle = samples_per_side > 1;
-        let shot = Shot { camera: &camera, brdf: &outcome.brdf, size, samples_per_side, settle, backend };
+        let shot = Shot { camera: &camera, outcome, size, samples_per_side, settle, backend };
         if self.studio.is_close(&camera, size) {
             self.come_close(&job.loaded)?;
         } else {
             self.close = None;
         }
         let close = self.close.as_ref().map(|(_, close)| close);
-        let rendered = self.studio.shoot(&shot, close, cancel)?;
+        let (rendered, table_ms) = self.studio.shoot(&shot, close, cancel)?;
         let times = rendered.times;
         let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
         if samples_per_side == 1 {
             let measured = spent / (size[0] * size[1]) as f64;
             self.cost[which] = measured;
         }
-        let large = [("g-buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)];
+        let large = [
+            ("picture table", table_ms),
+            ("g-buffer", times.gbuffer_ms),
+            ("shadows", times.shadows_ms),
+            ("shading", times.shading_ms),
+        ];
         let start = Instant::now();
         let image = Arc::new(color_image(&rendered.picture, &tone_map));
         let mut stages = outcome.times.clone();

@@ -16,6 +16,7 @@ use biscale::large_scale::shadow_cache::ShadowCache;
 use biscale::large_scale::{
     CameraView, DirectionalLight, GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render,
 };
+use biscale::pipeline::Outcome;
 use biscale::scene::{self, Camera, LoadedScene};
 use biscale::{Cancel, Error, Result};
 use glam::Vec3;
@@ -60,7 +61,7 @@ pub type Close = (CloseUp, (Vec<usize>, Vec<SumMaterial>));
 /// How a picture is made.
 pub struct Shot<'a> {
     pub camera: &'a Camera,
-    pub brdf: &'a Arc<EffectiveBrdf>,
+    pub outcome: &'a Outcome,
     pub size: [usize; 2],
     pub samples_per_side: usize,
     /// Whether a shadow cache may be made: it takes longer than a draft and pays when the camera moves on.
@@ -120,11 +121,11 @@ impl Studio {
         self.object.as_ref().and_then(of).unwrap_or(4.0)
     }
 
-    /// One picture of what was prepared.
+    /// One picture of what was prepared, and the milliseconds that the table it reads took.
     ///
     /// # Errors
     /// A camera that cannot be, or [`Error::Cancelled`].
-    pub fn shoot(&mut self, shot: &Shot, close: Option<&Close>, cancel: &Cancel) -> Result<Rendered> {
+    pub fn shoot(&mut self, shot: &Shot, close: Option<&Close>, cancel: &Cancel) -> Result<(Rendered, f64)> {
         let (Some(object), Some((_, lights))) = (&self.object, &self.lights) else {
             return Err(Error::failed("nothing was prepared"));
         };
@@ -138,7 +139,8 @@ impl Studio {
             cancel.check()?;
         }
         let occluder = object.occluder.as_ref().filter(|_| !directional.is_empty());
-        let reflectance = Cancellable { brdf: shot.brdf, cancel };
+        let reflectance = Cancellable { brdf: &shot.outcome.brdf, cancel };
+        let mut table_ms = 0.0;
         let input = RenderInput {
             mesh: &object.mesh,
             occluder,
@@ -152,7 +154,12 @@ impl Studio {
         };
         let mut rendered = match self.gpu.shoot(&input, shot) {
             Some(rendered) => rendered,
-            None => render(&input)?,
+            None => {
+                let pictured = shot.outcome.for_pictures(cancel)?;
+                table_ms = pictured.ms;
+                let reflectance = Cancellable { brdf: &pictured.brdf, cancel };
+                render(&RenderInput { reflectance: &reflectance, ..input })?
+            }
         };
         cancel.check()?;
         if let Some((tile, assigned)) = close {
@@ -161,7 +168,7 @@ impl Studio {
             tile.blend_into(&mut rendered.picture, &input, wearing, cancel)?;
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
         }
-        Ok(rendered)
+        Ok((rendered, table_ms))
     }
 
     /// Whether a picture is so close that the tiles themselves show.
@@ -200,11 +207,12 @@ impl Device {
             };
         }
         let Self::Open(device) = self else { return None };
+        let brdf = &shot.outcome.brdf;
         let made = match &mut device.renderer {
-            Some((_, last)) if Arc::ptr_eq(last, shot.brdf) => Ok(()),
-            Some((renderer, last)) => renderer.set_brdf(&device.gpu, shot.brdf).map(|()| *last = shot.brdf.clone()),
-            none => GpuRenderer::new(&device.gpu, input.occluder, shot.brdf)
-                .map(|renderer| *none = Some((renderer, shot.brdf.clone()))),
+            Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
+            Some((renderer, last)) => renderer.set_brdf(&device.gpu, brdf).map(|()| *last = brdf.clone()),
+            none => GpuRenderer::new(&device.gpu, input.occluder, brdf)
+                .map(|renderer| *none = Some((renderer, brdf.clone()))),
         };
         let rendered = match (made, &device.renderer) {
             (Ok(()), Some((renderer, _))) => renderer.render(&device.gpu, input),
