@@ -130,6 +130,11 @@ impl PairTable {
         serves.then(|| Self { weights, ..self.clone() })
     }
 
+    /// Whether two tables differ in their weights only.
+    pub fn shares_values_with(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.values, &other.values)
+    }
+
     pub fn bytes(&self) -> usize {
         16 * self.values.len() + 4 * self.areas.1.len()
     }
