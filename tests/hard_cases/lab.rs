@@ -51,7 +51,7 @@ pub fn open(case: &Case, method: &str, folder: &Path) -> LoadedScene {
 /// Exactly 0 and 90°, 89.9°, between the last ring and the horizon, beside the pole, on the seam.
 pub fn nasty_directions() -> Vec<Vec3> {
     let thetas = [0.0_f32, 1e-7, 1e-3, 0.7, 1.2, 89.9_f32.to_radians(), 89.999_9_f32.to_radians()];
-    let phis = [0.0_f32, -0.0, 1e-7, -1e-7, 1.0, std::f32::consts::PI, -std::f32::consts::PI, 6.283_185];
+    let phis = [0.0_f32, -0.0, 1e-7, -1e-7, 1.0, std::f32::consts::PI, -std::f32::consts::PI, std::f32::consts::TAU];
     let mut all: Vec<Vec3> = thetas.iter().flat_map(|&t| phis.iter().map(move |&p| from_angles(t, p))).collect();
     all.extend([Vec3::Z, Vec3::new(1.0, 0.0, 1e-12), Vec3::new(0.0, -1.0, f32::MIN_POSITIVE)]);
     all.dedup();
@@ -82,13 +82,19 @@ pub fn examine(case: &Case, m_directions: Option<usize>) -> Vec<Row> {
     let start = std::time::Instant::now();
     let pairs = pairs();
     let made = evaluators::all(case, folder.path(), m_directions);
+    let built = start.elapsed().as_secs_f64();
     let direct: Vec<Vec3> = pairs.iter().map(|p| made[0].brdf.eval(p.i, p.o)).collect();
     let mut rows: Vec<Row> = made.iter().map(|evaluator| measured(case, evaluator, &pairs, &direct)).collect();
     let evaluated = start.elapsed().as_secs_f64();
     rows.push(reference(case, folder.path(), &pairs, &made[0]));
     let all = start.elapsed().as_secs_f64();
     if all > 3.0 {
-        eprintln!("{}, {}: {all:.1} s, {:.1} of them the reference", case.family, case.name, all - evaluated);
+        eprintln!(
+            "{}, {}: {all:.1} s, {built:.1} to build, {:.1} of them the reference",
+            case.family,
+            case.name,
+            all - evaluated
+        );
     }
     rows
 }
@@ -108,7 +114,7 @@ fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Vec3])
             let bounded = f64::from(value.max_element() * o.z);
             if i.z.min(o.z) < 1.7e-4 { near = near.max(bounded) } else { elsewhere = elsewhere.max(bounded) }
         }
-        unsound += usize::from(!(brdf.relative_projected_area(o) >= 0.0));
+        unsound += usize::from(!(0.0..).contains(&brdf.relative_projected_area(o)));
         for under in below() {
             under_horizon +=
                 usize::from(brdf.eval(under, o) != Vec3::ZERO) + usize::from(brdf.eval(o, under) != Vec3::ZERO);
