@@ -25,6 +25,7 @@ pub mod filtering;
 pub mod fit;
 pub mod geometry;
 pub mod gpu;
+pub mod interreflection;
 pub mod large_scale;
 pub mod pipeline;
 pub mod plan;

@@ -1,8 +1,12 @@
 //! What is right: the reference sum with its own error, metrics, and the direction pairs they are taken over.
 
+pub mod choose;
 pub mod health;
+pub mod ladder;
 mod metrics;
 mod pairs;
+mod paths;
+pub mod progressive;
 mod reference;
 pub mod sweep;
 

@@ -46,6 +46,8 @@ pub struct FacetSum {
     normals: [Vec<f32>; 3],
     areas: Vec<f32>,
     groups: Vec<Group>,
+    /// Black materials are summed too.
+    keep_black: bool,
 }
 
 /// A run of facets with one material.
@@ -82,6 +84,7 @@ impl FacetSum {
             normals: [component(|n| n.x), component(|n| n.y), component(|n| n.z)],
             areas: facets.areas.clone(),
             groups: Vec::new(),
+            keep_black: false,
         };
         let mut start = 0;
         while start < facets.len() {
@@ -118,6 +121,27 @@ impl FacetSum {
         self.areas.len()
     }
 
+    pub(super) fn keep_black(&mut self, keep: bool) {
+        self.keep_black = keep;
+    }
+
+    pub(super) fn one_lobe_a_facet(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.patches = None);
+    }
+
+    /// One lobe a normal, however many there are.
+    pub(super) fn group_by_normal(&mut self, facets: &Facets) {
+        for group in &mut self.groups {
+            group.patches = Some(patches(facets, group.range.clone()));
+        }
+    }
+
+    pub(super) fn sum_each_channel(&mut self, facets: &Facets) {
+        for group in &mut self.groups {
+            group.rgb_areas = Some(rgb_areas(facets, group.range.clone()));
+        }
+    }
+
     /// Visible projected area `a_v(d)` for the visibility `v` along `d` (Eq. 10).
     pub fn projected_area(&self, v: &[f32], d: Vec3) -> f64 {
         simd::projected_area(self.normals(0..self.areas.len()), &self.areas, v, d)
@@ -128,7 +152,7 @@ impl FacetSum {
         let pair = PairVectors::new(i, o);
         let mut total = DVec3::ZERO;
         for group in &self.groups {
-            let black = group.color == Vec3::ZERO;
+            let black = group.color == Vec3::ZERO && !self.keep_black;
             if !black {
                 total += group.color.as_dvec3() * self.group_sum(group, &pair, v_i, v_o);
             }
@@ -307,19 +331,8 @@ impl Group {
     fn new(facets: &Facets, range: Range<usize>) -> Self {
         let colors = &facets.colors[range.clone()];
         let uniform = colors.iter().all(|&color| color == Vec3::ONE);
-        let rgb_areas = (!uniform).then(|| {
-            std::array::from_fn(|c| {
-                colors.iter().zip(&facets.areas[range.clone()]).map(|(color, area)| color[c] * area).collect()
-            })
-        });
-        let mut patches: Vec<Patch> = Vec::new();
-        for s in range.clone() {
-            let normal = facets.normals[s];
-            match patches.last_mut() {
-                Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
-                _ => patches.push(Patch { range: s..s + 1, normal }),
-            }
-        }
+        let rgb_areas = (!uniform).then(|| rgb_areas(facets, range.clone()));
+        let patches = patches(facets, range.clone());
         let few = patches.len() * FACETS_A_PATCH <= range.len();
         Self {
             range,
@@ -330,6 +343,25 @@ impl Group {
             patches: few.then_some(patches),
         }
     }
+}
+
+/// Areas times colour weights.
+fn rgb_areas(facets: &Facets, range: Range<usize>) -> [Vec<f32>; 3] {
+    let pairs = || facets.colors[range.clone()].iter().zip(&facets.areas[range.clone()]);
+    std::array::from_fn(|c| pairs().map(|(color, area)| color[c] * area).collect())
+}
+
+/// Runs of facets with one normal.
+fn patches(facets: &Facets, range: Range<usize>) -> Vec<Patch> {
+    let mut patches: Vec<Patch> = Vec::new();
+    for s in range {
+        let normal = facets.normals[s];
+        match patches.last_mut() {
+            Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
+            _ => patches.push(Patch { range: s..s + 1, normal }),
+        }
+    }
+    patches
 }
 
 /// The inner-loop form of an analytic term; `None` for a measured one.

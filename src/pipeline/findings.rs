@@ -8,6 +8,7 @@ use crate::brdf::Term;
 use crate::filtering::{FacetSum, SumMaterial};
 use crate::geometry::Facets;
 use crate::gpu::Gpu;
+use crate::interreflection::mean_albedo;
 use crate::plan::{Backend, Findings, Settings};
 use crate::scene::Scene;
 use crate::visibility::{PeriodicGrid, Slices};
@@ -53,6 +54,10 @@ impl Pipeline {
             |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
         Findings {
             flat: shape.flat,
+            mirrors: None,
+            steepest: shape.steepest,
+            albedo: used.iter().map(|&k| albedo(&materials[k])).fold(0.0, f64::max),
+            grey: used.iter().all(|&k| crate::interreflection::is_grey(&materials[k])) && !sum.colors_vary(),
             height_samples: shape.mesh.height_grid.is_some(),
             height_field: shape.height_field,
             closes_plane: shape.mesh.closes_plane,
@@ -73,4 +78,9 @@ impl Pipeline {
             lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
         }
     }
+}
+
+/// The largest part of uniform light that a material reflects in any channel.
+fn albedo(material: &SumMaterial) -> f64 {
+    f64::from((mean_albedo(&material.brdf, 3, 12) * material.color).max_element()).min(1.0)
 }

@@ -7,11 +7,11 @@ use super::Assigned;
 use crate::accuracy::{Errors, mirror_biased_pairs, upper_errors};
 use crate::cancel::Cancel;
 use crate::error::Result;
-use crate::filtering::{Direct, EffectiveBrdf, Form, LowRank};
+use crate::filtering::{Direct, EffectiveBrdf, Form, LowRank, mean_colors};
 use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
 use crate::plan::{Method, Preset, Route, Settings};
-use crate::scene::Scene;
+use crate::scene::{Scene, Switch};
 use crate::visibility::{
     Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
 };
@@ -27,7 +27,23 @@ pub(super) fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
         FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
     };
     facets.sort_for_sums();
+    if settings.effects.color_weights == Switch::Off {
+        mean_colors(&mut facets);
+    }
     facets
+}
+
+/// The material of each slot; where materials are forced into one, that of the largest area.
+pub(super) fn grouped(material_of_slot: &[usize], facets: &Facets, settings: &Settings) -> Vec<usize> {
+    if settings.effects.material_groups != Switch::Off {
+        return material_of_slot.to_vec();
+    }
+    let mut areas = vec![0.0_f64; material_of_slot.len()];
+    for (slot, area) in facets.slots.iter().zip(&facets.areas) {
+        areas[usize::from(*slot)] += f64::from(*area);
+    }
+    let largest = (0..areas.len()).max_by(|a, b| areas[*a].total_cmp(&areas[*b])).unwrap_or(0);
+    material_of_slot.iter().map(|_| material_of_slot[largest]).collect()
 }
 
 pub(super) fn see(

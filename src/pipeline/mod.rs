@@ -1,6 +1,7 @@
 //! The stages in order, each with its last result and the input that made it: an edit recomputes what lies downstream.
 
 mod findings;
+mod interreflection;
 mod make;
 mod pictures;
 mod stage;
@@ -11,7 +12,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use self::make::{choose, names, same_lobes, sample, see};
+use self::make::{choose, grouped, names, same_lobes, sample, see};
 pub use self::pictures::Pictured;
 use self::pictures::Pictures;
 use self::stage::{Stage, Version};
@@ -27,8 +28,9 @@ use crate::filtering::{
 };
 use crate::geometry::{self, Facets, TileMesh};
 use crate::gpu::Gpu;
-use crate::plan::{Costs, Plan, Preset, Route, Settings, decide};
-use crate::scene::{LoadedScene, Material, Painted, Tile};
+use crate::interreflection::{InterreflectionTable, Transport};
+use crate::plan::{Costs, Findings, Plan, Preset, Route, Settings, decide};
+use crate::scene::{LoadedScene, Material, Painted, Switch, Tile};
 use crate::visibility::{Visibility, visibility_maps_cpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
@@ -40,6 +42,8 @@ struct Shape {
     mesh: TileMesh,
     flat: bool,
     height_field: bool,
+    /// The largest angle between a surface normal and z [rad].
+    steepest: f32,
 }
 
 /// The material of each slot of a mesh, by number, and the materials.
@@ -47,8 +51,8 @@ type Assigned = (Vec<usize>, Vec<SumMaterial>);
 type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
 type ShapeKey = (Tile, PathBuf, Painted);
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
-/// Mesh, count, seed, and whether they are drawn as the paper does.
-type FacetKey = (Version, usize, u64, bool);
+/// Mesh, count, seed, whether they are drawn as the paper does, and whether their colours count.
+type FacetKey = (Version, usize, u64, bool, Switch);
 type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
@@ -121,6 +125,11 @@ pub struct Pipeline {
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     materials: Stage<MaterialKey, Assigned>,
+    /// Rays between facets: facets, elements, rays of each.
+    transport: Stage<(Version, usize, usize), Transport>,
+    interreflection: Stage<OutcomeKey, InterreflectionTable>,
+    /// Planes that mirror the mesh.
+    mirrors: Stage<Version, [bool; 2]>,
     /// M of each material, factored as the paper does, for a version of the materials, a seed and a number of colours.
     paper_factors: Stage<(Version, u64, usize), PaperFactors>,
     last: Option<Last>,
@@ -143,22 +152,27 @@ impl Pipeline {
     /// A file the scene names cannot be used, or a factorization fails.
     pub fn effective(&mut self, loaded: &LoadedScene) -> Result<Outcome> {
         let scene = &loaded.scene;
-        let settings = Settings::from_quality(&scene.quality);
+        let settings = Settings::of(scene);
         let mut times = StageTimes::new();
         let (shape, shape_version) = self.shape(loaded, &mut times)?;
         let (materials, materials_version) = self.materials(loaded, &shape.mesh, &mut times)?;
-        let (material_of_slot, sum_materials) = (&materials.0, &materials.1);
-
-        let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011);
+        let sum_materials = &materials.1;
+        let colors = settings.effects.color_weights;
+        let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011, colors);
         let (facets, facets_version) =
             self.facets.get("facets", facet_key, &mut times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
-        let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
+        let material_of_slot = &grouped(&materials.0, &facets, &settings);
+        let mut sum = FacetSum::new(&facets, material_of_slot, sum_materials);
+        sum.force(&facets, &settings.effects);
         let found =
             self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
+        let mirrors = self.mirror_planes(&shape, shape_version, &settings, &mut times)?;
+        let found = Findings { mirrors, ..found };
         let mut plan = decide(&found, &settings, &Costs::default());
         if settings.preset == Preset::Wu2011 {
             let names = names(scene, &shape.mesh, &materials)?;
-            return self.wu2011(&shape, &facets, &materials, names, plan, settings, times, materials_version);
+            let assigned = Arc::new((material_of_slot.clone(), materials.1.clone()));
+            return self.wu2011(&shape, &facets, &assigned, names, plan, settings, times, materials_version);
         }
         let key = (
             facets_version,
@@ -169,9 +183,13 @@ impl Pipeline {
             settings.penumbra.to_bits(),
         );
         let (gpu, cancel) = (self.gpu.as_ref(), &self.cancel);
-        let (visibility, visibility_version) = self.visibility.get("visibility", key, &mut times, cancel, || {
-            see(plan.route, &shape.mesh, &facets, &settings, gpu, cancel)
-        })?;
+        let (visibility, visibility_version) = match plan.route {
+            // Nothing is computed, and nothing kept.
+            Route::None => (Arc::new(Visibility::Unblocked { facets: facets.len() }), 0),
+            route => self.visibility.get("visibility", key, &mut times, cancel, || {
+                see(route, &shape.mesh, &facets, &settings, gpu, cancel)
+            })?,
+        };
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
         let (mut factors, mut earlier) = (None, None);
@@ -200,23 +218,36 @@ impl Pipeline {
             names: names(scene, &shape.mesh, &materials)?,
             closes_plane: shape.mesh.closes_plane,
         };
-        let direct = Direct { sum: Arc::new(sum), visibility };
+        let direct = Direct { sum: Arc::new(sum), visibility: visibility.clone() };
         let base_area = f64::from(shape.mesh.base_area());
         let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
+        let is_factored = matches!(brdf.form, Form::LowRank(_));
+        let between = if plan.interreflection {
+            let found = (facets_version, key.clone());
+            let of = (&*facets, &*visibility, &materials.1[..], &material_of_slot[..]);
+            Some(self.between_facets(&shape, of, &settings, plan.mirrors, found, &mut times)?)
+        } else {
+            None
+        };
         for (name, ms) in &times {
             plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
         }
-        let brdf = Arc::new(brdf);
+        let exact = Arc::new(brdf);
+        let brdf = match &between {
+            Some(table) => Arc::new((*exact).clone().interreflecting(table.clone())),
+            None => exact.clone(),
+        };
         let mut notes = shape.mesh.notes.clone();
         if facets.skipped_triangles > 0 {
             notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
         }
         if let Some(errors) = factored {
-            plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
+            plan.factored(is_factored, errors.rel_l2);
         }
         let examined = Arc::default();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, plan.try_picture_table, earlier));
+        let pictures = Pictures::new(exact, &settings, plan.try_picture_table, earlier).with(between);
+        let pictures = Arc::new(pictures);
         let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
@@ -281,6 +312,20 @@ impl Pipeline {
         Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
     }
 
+    /// How often each stage ran: a stage that the plan drops stays at 0.
+    pub fn runs(&self) -> Vec<(&'static str, u64)> {
+        vec![
+            ("geometry", self.shape.runs()),
+            ("facets", self.facets.runs()),
+            ("materials", self.materials.runs()),
+            ("visibility", self.visibility.runs()),
+            ("mirrors", self.mirrors.runs()),
+            ("transport", self.transport.runs()),
+            ("interreflection", self.interreflection.runs()),
+            ("basis", self.paper_factors.runs()),
+        ]
+    }
+
     /// The tile's mesh.
     ///
     /// # Errors
@@ -320,7 +365,9 @@ impl Pipeline {
         let mut times = StageTimes::new();
         let shape = self.shape(loaded, &mut times)?.0;
         let materials = self.materials(loaded, &shape.mesh, &mut times)?.0;
-        Ok(work(&Reference::new(&shape.mesh, &materials.0, &materials.1)))
+        let effects = &loaded.scene.effects;
+        let bounces = if effects.interreflection == Switch::On { effects.bounces } else { 0 };
+        Ok(work(&Reference::new(&shape.mesh, &materials.0, &materials.1).with_bounces(bounces)))
     }
 
     fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, Version)> {
@@ -330,7 +377,8 @@ impl Pipeline {
             let (low, high) = mesh.z_range();
             let flat = high - low <= 1e-7 * mesh.size.max_element();
             let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
-            Ok(Shape { mesh, flat, height_field })
+            let steepest = steepest(&mesh);
+            Ok(Shape { mesh, flat, height_field, steepest })
         })
     }
 
@@ -365,6 +413,13 @@ impl Pipeline {
 /// Without a surface that faces down, what blocks a point blocks everything below it too: one horizon tells all.
 fn nothing_faces_down(mesh: &TileMesh) -> bool {
     (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
+}
+
+/// The largest angle between a normal and z [rad].
+fn steepest(mesh: &TileMesh) -> f32 {
+    let cosine = |triangle| mesh.geometric_normal(triangle);
+    let normals = (0..mesh.triangles.len()).map(cosine).filter(|normal| *normal != Vec3::ZERO);
+    normals.map(|normal| normal.z).fold(1.0, f32::min).clamp(-1.0, 1.0).acos()
 }
 
 impl Reflectance for Outcome {

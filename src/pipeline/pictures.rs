@@ -11,6 +11,7 @@ use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
 use crate::error::Result;
 use crate::filtering::{EffectiveBrdf, Form, PairTable};
+use crate::interreflection::InterreflectionTable;
 use crate::plan::Settings;
 
 /// Pairs that the table is checked on.
@@ -39,6 +40,10 @@ pub(super) struct Pictures {
     seed: u64,
     earlier: Mutex<Option<Earlier>>,
     made: Mutex<Option<Pictured>>,
+    /// Light between facets, which has a table of its own: added to what is made.
+    between: Option<Arc<InterreflectionTable>>,
+    /// What was made with it.
+    whole: Mutex<Option<Arc<EffectiveBrdf>>>,
 }
 
 impl Pictures {
@@ -51,7 +56,14 @@ impl Pictures {
             seed: settings.seed,
             earlier: Mutex::new(earlier),
             made: Mutex::new(None),
+            between: None,
+            whole: Mutex::new(None),
         }
+    }
+
+    /// With light between facets, which `exact` leaves out.
+    pub(super) fn with(self, between: Option<Arc<InterreflectionTable>>) -> Self {
+        Self { between, ..self }
     }
 
     /// What the next edit may reuse.
@@ -64,6 +76,14 @@ impl Pictures {
 
     /// The table, made now if it was not yet.
     pub(super) fn get(&self, cancel: &Cancel) -> Result<Pictured> {
+        let made = self.get_direct(cancel)?;
+        let Some(table) = &self.between else { return Ok(made) };
+        let mut whole = lock(&self.whole);
+        let brdf = whole.get_or_insert_with(|| Arc::new((*made.brdf).clone().interreflecting(table.clone())));
+        Ok(Pictured { brdf: brdf.clone(), ..made })
+    }
+
+    fn get_direct(&self, cancel: &Cancel) -> Result<Pictured> {
         let mut made = lock(&self.made);
         if let Some(made) = &*made {
             return Ok(Pictured { ms: 0.0, ..made.clone() });
@@ -108,12 +128,7 @@ impl Pictures {
     }
 
     fn tabulate(&self, grid: UpperPairs, cancel: &Cancel) -> Result<Option<PairTable>> {
-        let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| match &self.exact.form {
-            Form::Direct(direct) => direct.sums(lights, o, |k, sum| out[k] = sum),
-            Form::LowRank(factors) => factors.sums(lights, o, |k, sum| out[k] = sum),
-            Form::Table(table) => table.sums(lights, o, |k, sum| out[k] = sum),
-            Form::Wu2011(tables) => tables.sums(lights, o, |k, sum| out[k] = sum),
-        };
+        let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| self.exact.form.sums(lights, o, |k, sum| out[k] = sum);
         match &self.exact.form {
             Form::Direct(direct) => PairTable::build(direct, grid, cancel),
             _ => PairTable::resample(sums, grid, cancel).map(Some),

@@ -27,6 +27,13 @@ impl<K, T> Default for Stage<K, T> {
     }
 }
 
+impl<K, T> Stage<K, T> {
+    /// How often the stage ran.
+    pub(super) fn runs(&self) -> u64 {
+        self.version
+    }
+}
+
 impl<K: PartialEq, T> Stage<K, T> {
     /// The last result if `key` is the same, else a new one, timed; with its version.
     pub(super) fn get(

@@ -2,7 +2,8 @@
 
 use crate::directions::{HalfDifferenceGrid, PolarGrid, UpperPairs};
 use crate::filtering::{BasisGrid, LowRankSettings};
-use crate::scene::Quality;
+use crate::interreflection::InterreflectionSettings;
+use crate::scene::{Effects, Quality, Scene};
 
 /// Named settings of the `[quality]` table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +85,8 @@ pub struct Settings {
     pub reference_passes: usize,
     pub backend: Backend,
     pub seed: u64,
+    /// What a person forces on or off.
+    pub effects: Effects,
 }
 
 const fn upper_pairs(rings: usize, azimuths: usize, turn: usize, difference: usize) -> UpperPairs {
@@ -91,6 +94,11 @@ const fn upper_pairs(rings: usize, azimuths: usize, turn: usize, difference: usi
 }
 
 impl Settings {
+    /// Everything a scene asks for.
+    pub fn of(scene: &Scene) -> Self {
+        Self { effects: scene.effects.clone(), ..Self::from_quality(&scene.quality) }
+    }
+
     /// The preset's knobs, overridden by those given.
     pub fn from_quality(quality: &Quality) -> Self {
         let preset = match quality.preset.as_str() {
@@ -175,6 +183,7 @@ impl Settings {
             reference_passes: 32,
             backend: Backend::Auto,
             seed: 1,
+            effects: Effects::default(),
         };
         match preset {
             Preset::Standard => standard,
@@ -217,6 +226,17 @@ impl Settings {
                 ..standard
             },
         }
+    }
+
+    /// How finely facets exchange light.
+    pub fn interreflection(&self) -> InterreflectionSettings {
+        let (elements, rays, grid) = match self.preset {
+            Preset::Draft => (1024, 16, PolarGrid::new(6, 16)),
+            Preset::Standard | Preset::Wu2011 => (4096, 16, PolarGrid::new(8, 24)),
+            Preset::Fine | Preset::Reference => (8192, 32, PolarGrid::new(12, 36)),
+        };
+        let elements = elements.min(self.facets);
+        InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
     }
 
     /// What the factored form needs to know.

@@ -60,8 +60,48 @@ impl PeriodicGrid {
         }
         best.map(|(_, hit)| hit)
     }
+
+    /// The first triangle along any direction `to` from a point on the surface, `own` left aside where the point lies on it;
+    /// `bottom` is the lowest z of the tile. `None` where the ray leaves the tiling, or is all but level and far away.
+    pub fn first_hit(&self, origin: Vec3, to: Vec3, own: u32, bottom: f32) -> Option<Hit> {
+        let speed = to.truncate().length();
+        let end = if to.z > 0.0 { self.top } else { bottom };
+        let slab = if to.z == 0.0 { f32::INFINITY } else { ((end - origin.z) / to.z).max(0.0) };
+        let far = if speed > 1e-8 { FARTHEST_TILES * self.tile_size.max_element() / speed } else { f32::INFINITY };
+        // A floor lies exactly at the bottom.
+        let reach = slab.min(far) * (1.0 + 1e-4) + 1e-5 * self.tile_size.max_element();
+        let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
+        let mut best: Option<(f32, Hit)> = None;
+        while walk.entered <= reach {
+            let (cell, tile) = walk.cell();
+            let lowest = if to.z > 0.0 { origin.z + walk.entered * to.z } else { f32::NEG_INFINITY };
+            if self.z_max[cell] >= lowest {
+                for &entry in self.entries(cell) {
+                    let corners = self.copy_corners(entry, tile);
+                    if let Some((t, v, w)) = meet(origin, to, corners)
+                        && t > 0.0
+                        && best.is_none_or(|(nearest, _)| t < nearest)
+                        && !(entry.triangle == own && self.lies_on(origin, corners))
+                    {
+                        let hit = Hit { triangle: entry.triangle, position: origin + to * t, barycentric: [v, w] };
+                        best = Some((t, hit));
+                    }
+                }
+            }
+            if speed < 1e-8 {
+                break;
+            }
+            walk.advance();
+            if best.is_some_and(|(nearest, _)| nearest <= walk.entered) {
+                break;
+            }
+        }
+        best.map(|(_, hit)| hit)
+    }
 }
 
+/// Rays that travel farther without leaving the tiling are given up.
+const FARTHEST_TILES: f32 = 64.0;
 /// Cells that a ray walks through at most.
 const MOST_CELLS: usize = 1 << 16;
 

@@ -10,7 +10,7 @@ use biscale::large_scale::tone_map::ToneMap;
 use biscale::large_scale::{DirectionalLight, ObjectMesh, Picture};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::plan::Effect;
-use biscale::scene::{Camera, LoadedScene, Material, Painted, Quality, Tile};
+use biscale::scene::{Camera, Effects, LoadedScene, Material, Painted, Quality, Tile};
 use biscale::{Cancel, Error, Result};
 use eframe::egui::ColorImage;
 
@@ -87,7 +87,7 @@ pub enum PictureAnswer {
 }
 
 /// What an effective BRDF depends on.
-type SmallScale = (Tile, Vec<Material>, Quality, PathBuf, Painted);
+type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
 
 /// What both workers know: the last BRDF at a scene's own quality, and the last full picture.
 #[derive(Default)]
@@ -320,8 +320,8 @@ fn camera(loaded: &LoadedScene) -> Camera {
 
 fn small_scale(loaded: &LoadedScene) -> SmallScale {
     let scene = &loaded.scene;
-    let parts = (scene.tile.clone(), scene.materials.clone(), scene.quality.clone());
-    (parts.0, parts.1, parts.2, loaded.base_dir.clone(), loaded.painted.clone())
+    let parts = (scene.tile.clone(), scene.materials.clone(), scene.quality.clone(), scene.effects.clone());
+    (parts.0, parts.1, parts.2, parts.3, loaded.base_dir.clone(), loaded.painted.clone())
 }
 
 /// The same scene at the draft preset, without knobs that were turned by hand.

@@ -9,6 +9,7 @@ use biscale::close_up::{CloseUp, Wearing, on_object};
 use biscale::filtering::{EffectiveBrdf, Reflectance, SumMaterial};
 use biscale::gpu::{Gpu, Tier};
 use biscale::large_scale::environment::{self, Environment};
+use biscale::large_scale::light_choice::worth_shading;
 use biscale::large_scale::lights::{self, Lights};
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::shadow::Occluder;
@@ -17,7 +18,7 @@ use biscale::large_scale::{
     CameraView, DirectionalLight, GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render,
 };
 use biscale::pipeline::Outcome;
-use biscale::scene::{self, Camera, LoadedScene};
+use biscale::scene::{self, Camera, LoadedScene, Switch};
 use biscale::{Cancel, Error, Result};
 use glam::Vec3;
 
@@ -26,14 +27,15 @@ use glam::Vec3;
 pub struct Studio {
     object: Option<Object>,
     environment: Option<((String, PathBuf), Environment)>,
-    lights: Option<((scene::Light, PathBuf), Lights)>,
+    lights: Option<((scene::Light, PathBuf, Switch), Lights)>,
     /// For the object and the lights above.
     shadows: Option<ShadowCache>,
     gpu: Device,
 }
 
 struct Object {
-    key: (scene::Object, PathBuf),
+    /// With whether its shadows are forced.
+    key: (scene::Object, PathBuf, Switch),
     mesh: Arc<ObjectMesh>,
     occluder: Option<Occluder>,
 }
@@ -73,11 +75,17 @@ pub struct Shot<'a> {
 impl Studio {
     /// Takes the scene's object and lights over where they changed.
     pub fn prepare(&mut self, loaded: &LoadedScene) -> Result<()> {
-        let key = (loaded.scene.object.clone(), loaded.base_dir.clone());
+        let shadow = loaded.scene.effects.self_shadow;
+        let key = (loaded.scene.object.clone(), loaded.base_dir.clone(), shadow);
         if self.object.as_ref().is_none_or(|object| object.key != key) {
             let mesh = Arc::new(objects::build(&key.0, &key.1)?);
-            let occluder = Occluder::of(&mesh);
+            let occluder = match key.2 {
+                Switch::Off => None,
+                Switch::On => Some(Occluder::always(&mesh)),
+                Switch::Auto => Occluder::of(&mesh),
+            };
             self.object = Some(Object { key, mesh, occluder });
+            self.lights = None;
             self.shadows = None;
             if let Device::Open(device) = &mut self.gpu {
                 device.renderer = None;
@@ -89,11 +97,14 @@ impl Studio {
             self.environment = Some((key, environment));
             self.lights = None;
         }
-        let key = (loaded.scene.light.clone(), loaded.base_dir.clone());
+        let key = (loaded.scene.light.clone(), loaded.base_dir.clone(), loaded.scene.effects.faint_lights);
         if self.lights.as_ref().is_none_or(|(last, _)| *last != key)
             && let Some((_, environment)) = &self.environment
         {
-            let lights = lights::of_environment(&key.0, environment.clone());
+            let mut lights = lights::of_environment(&key.0, environment.clone());
+            if let (true, Some(object)) = (key.2 != Switch::On, &self.object) {
+                lights.directional = worth_shading(&object.mesh, &lights.directional);
+            }
             self.lights = Some((key, lights));
             self.shadows = None;
         }
