@@ -58,7 +58,7 @@ fn no_case_sends_back_more_light_than_its_material() {
 fn a_flat_white_tile_is_a_furnace_that_returns_everything() {
     for row in ROWS.iter().filter(|row| ["flat", "height 0"].contains(&row.case) && row.family.ends_with("white")) {
         if let Some([albedo, _]) = row.albedo {
-            let most = if row.evaluator == "wu2011" { 0.1 } else { 0.01 };
+            let most = if row.evaluator == "wu2011" { 0.1 } else { 0.02 };
             assert!((albedo - 1.0).abs() < most, "{}: {albedo}", name(row));
         }
     }
