@@ -96,3 +96,28 @@ fn headers_that_ask_for_more_than_there_is_are_refused() {
     tensor.resize(128, 0);
     assert_eq!(read("a.bsdf", &tensor).unwrap_err().exit_code(), 2);
 }
+
+/// A UTIA sample of 1.4e306 became an infinite f32 (found by the target `utia`).
+#[test]
+fn samples_that_no_f32_holds_are_refused() {
+    use biscale::brdf::{Brdf, MeasuredCache};
+    use biscale::scene::{BrdfSpec, TermSpec};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.bin");
+    let mut bytes: Vec<u8> = (0..3 * 288 * 288).flat_map(|_| 0.1_f64.to_le_bytes()).collect();
+    bytes[1_806_592..1_806_600].copy_from_slice(&1.4e306_f64.to_le_bytes());
+    std::fs::write(&path, bytes).unwrap();
+    let term = BrdfSpec::One(TermSpec::Utia { path });
+    let error = Brdf::from_specs(&term, Path::new(""), &mut MeasuredCache::default()).unwrap_err();
+    assert!(error.exit_code() == 2 && error.to_string().contains("number 225824"), "{error}");
+}
+
+/// Turned grooves on a tile of 1 by 10^6 were 350,000 grooves (found by the target `pipeline`: 52 s).
+#[test]
+fn turned_grooves_on_a_long_tile_are_not_a_million() {
+    let text =
+        "[tile]\nsize = [1.0, 1e6]\ngeometry = { kind = \"grooves\", profile = \"v\", count = 2, rotation_deg = 10 }\n";
+    let mesh = geometry::build(&scene::parse(text).unwrap().tile, Path::new("")).unwrap();
+    assert!(mesh.triangles.len() < 100_000 && mesh.closes_plane, "{}", mesh.triangles.len());
+    assert!(mesh.notes.iter().any(|note| note.contains("grooves run at")), "{:?}", mesh.notes);
+}

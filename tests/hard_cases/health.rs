@@ -28,7 +28,7 @@ fn sound_scenes_are_without_warnings() {
         let health = health(tile, brdf, "");
         assert!(health.warnings.is_empty(), "{tile} {brdf}: {:?}", health.warnings);
         assert_eq!((health.result.unsound_values, health.surface.triangles_left_out), (0, 0));
-        assert!(health.result.projected_area_error.is_some_and(|error| error < 0.1) && !health.surface.has_holes);
+        assert!(health.result.projected_area_error.is_some_and(|error| error < 0.15) && !health.surface.has_holes);
         let albedo = health.result.largest_albedo.or(Some(0.5)).unwrap();
         assert!(albedo > 0.05 && albedo <= 1.0, "{albedo}");
     }
@@ -37,11 +37,11 @@ fn sound_scenes_are_without_warnings() {
 #[test]
 fn each_kind_of_trouble_has_words_that_name_a_remedy() {
     let narrow = r#"{ kind = "cook_torrance", roughness = 0.003, f0 = 0.9 }"#;
-    let bumps = r#"{ kind = "grooves", profile = "u", count = 2, depth = 0.2 }"#;
+    let threads = r#"{ kind = "weave" }"#;
     for (tile, brdf, quality, words, remedy) in [
         (PYRAMIDS, r#"{ kind = "lambertian", albedo = 3 }"#, "", "3.000 times the light", "albedo"),
-        (bumps, narrow, "method = \"direct\"", "facets at a time", "quality.facets"),
-        (bumps, narrow, "method = \"low_rank\"", "narrower than its table", "roughness"),
+        (threads, narrow, "facets = 512\nmethod = \"direct\"", "facets at a time", "quality.facets"),
+        (threads, narrow, "facets = 512\nmethod = \"low_rank\"", "narrower than its table", "roughness"),
         (r#"{ kind = "pyramids", height = 100 }"#, MATTE, "", "facets are in sight", "less deep"),
         (r#"{ kind = "rods", count = 8, radius = 3, length = 1 }"#, MATTE, "facets = 64", "in sight", "quality.facets"),
         (PYRAMIDS, MATTE, "facets = 16", "in sight", "quality.facets"),
