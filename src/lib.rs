@@ -15,6 +15,8 @@
 pub mod accuracy;
 pub mod brdf;
 pub mod cancel;
+#[cfg(test)]
+mod chi_square;
 pub mod close_up;
 pub mod directions;
 pub mod error;

@@ -24,6 +24,8 @@ struct Report {
     psnr_db: f64,
     roughness: [f32; 2],
     rotation_rad: f32,
+    /// Fresnel's factor of the lobe at grazing angles.
+    edge: f32,
     /// Linear RGB of each weight.
     weights: serde_json::Map<String, serde_json::Value>,
     seconds: f64,
@@ -88,6 +90,7 @@ fn report(fit: &Fit, seconds: f64) -> Report {
         psnr_db: fit.errors.psnr_db,
         roughness: fit.shape.roughness,
         rotation_rad: fit.shape.rotation,
+        edge: fit.shape.edge,
         weights: names.map(|(name, weight)| ((*name).to_owned(), serde_json::json!(weight.to_array()))).collect(),
         seconds,
     }

@@ -26,10 +26,16 @@ const SMALLEST_SIGMA: f64 = 1e-3;
 const NDF_FLOOR: f64 = 1e-3;
 /// What is added to the density of normals, times their cosine, of the largest: faint tails keep some samples.
 const EVERYWHERE: f64 = 0.05;
+/// What is added to the solid angle of a unit of the square, steradians: about the pole lie the half vectors of grazing
+/// reflections, whose lobes are steep.
+const POLE: f64 = 0.3;
+/// How much of a warp depends on what its viewer sees of each normal. Readers blend the warps of neighbouring slices, so the
+/// more these differ the worse: mean errors of V-grooves with Cook-Torrance 0.2 are 2.1, 1.8 and 1.8 % at 1, 0.3 and 0.
+const VISIBLE: f64 = 0.3;
 /// Elevations and azimuths of the viewer, samples along both axes of a warp: 3, 20 and 77 MB.
 const RESOLUTIONS: [[usize; 4]; 3] = [[9, 24, 24, 24], [13, 48, 36, 36], [19, 72, 48, 48]];
-/// The first of them that reads with this mean error is taken.
-const GOOD_ENOUGH: f64 = 0.01;
+/// The first of them that reads with this mean error is taken: below 1 % at other pairs, too.
+const GOOD_ENOUGH: f64 = 0.008;
 
 /// Sizes of the file's grids.
 #[derive(Debug, Clone, Copy)]
@@ -124,19 +130,20 @@ fn luminance(value: DVec3) -> f64 {
     value.dot(LUMINANCE.as_dvec3())
 }
 
-/// The density of half vectors on the unit square that this viewer's warp is made of, times an arbitrary constant: normals
-/// as they are seen, `D(m) (i·m)+`, and as much again as they are. With the first alone slices differ so much in what
-/// they show that reading between them costs twice the error; `luminance` makes up for the rest.
+/// The density of half vectors on the unit square that this viewer's warp is made of, times an arbitrary constant: the root
+/// of the normals that `ndf` holds, as they are and as they are seen. `luminance` makes up for the rest when sampling.
 fn visible_normals(viewer: DVec3, grid: Grid, ndf: &(Grid, Vec<f64>)) -> Vec<f64> {
     let density = |at: [f64; 2]| {
         let m = direction_of_u(at);
         let normals = ndf.0.eval(&ndf.1, at) + EVERYWHERE * m.z;
-        normals * solid_angle(at) * (1.0 + viewer.dot(m).max(0.0)) + 1e-9
+        normals * (solid_angle(at) + POLE) * (1.0 + VISIBLE * viewer.dot(m).max(0.0))
     };
     vertices(grid).map(density).collect()
 }
 
-/// `ndf` from retro-reflection, `4 G(m, m)` scaled to a largest value of 1, and `sigma`, the visible projected area.
+/// `ndf` from retro-reflection, the root of `G(m, m)` scaled to a largest value of 1, and `sigma`, the visible projected area.
+/// The root spreads samples over the slopes of lobes, where reading between them errs: with `G` itself the relative L2 of
+/// V-grooves with Cook-Torrance 0.2 is 5.2 % in place of 2.8 %.
 fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
     let places: Vec<_> = vertices(sizes.ndf).collect();
     let at = |place: &[f64; 2]| {
@@ -146,7 +153,7 @@ fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
     };
     let (retro, sigma): (Vec<f64>, Vec<f64>) = places.par_iter().map(at).unzip();
     let largest = retro.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let ndf = retro.into_iter().map(|value| value / largest + NDF_FLOOR).collect();
+    let ndf = retro.into_iter().map(|value| (value / largest).max(0.0).sqrt() + NDF_FLOOR).collect();
     RglTable {
         phi_i: (0..sizes.phis).map(|k| sizes.phi(k)).collect(),
         theta_i: (0..sizes.thetas).map(|k| sizes.theta(k)).collect(),
@@ -191,9 +198,15 @@ impl Tabulated {
         if let Some(resolution) = &job.options.resolution {
             return Self::new(job, resolution);
         }
-        let mut last = None;
-        for [theta_i, phi_i, theta_o, phi_o] in resolutions.iter().copied() {
-            let tabulated = Self::new(job, &ExportResolution { theta_i, phi_i, theta_o, phi_o })?;
+        let cost = |sizes: &[usize; 4]| sizes.iter().product::<usize>() as f32;
+        let all: f32 = resolutions.iter().map(cost).sum();
+        let (mut before, mut last) = (0.0, None);
+        for sizes in resolutions {
+            let [theta_i, phi_i, theta_o, phi_o] = *sizes;
+            let progress = |part: f32| (job.progress)((before + part * cost(sizes)) / all);
+            let step = Job { progress: &progress, ..*job };
+            let tabulated = Self::new(&step, &ExportResolution { theta_i, phi_i, theta_o, phi_o })?;
+            before += cost(sizes);
             if tabulated.reading.mean <= GOOD_ENOUGH {
                 return Ok(tabulated);
             }
@@ -327,8 +340,8 @@ fn conventions(colors: Colors) -> Vec<String> {
         "Slices (phi_i, theta_i) are directions of the viewer, Mitsuba's wi; phi_i runs from -pi to pi, the seam twice.",
         "A value, rgb(s) ndf(u_m) / (4 sigma(u_i)), is the BRDF times the cosine of the other direction, Mitsuba's wo: f_bar.",
         "u = (sqrt(2 theta / pi), (phi + pi) / 2 pi); m is the half vector; s is u_m through the inverse of the warp by vndf.",
-        "sigma is the visible projected area over the tile's area; ndf is the luminance of G(m, m), of its largest, floored.",
-        "vndf is the density of normals as this viewer sees them, softened; luminance is what the warp by it leaves to sample.",
+        "sigma is the visible projected area over the tile's area; ndf is the root of the luminance of G(m, m), of its largest, floored.",
+        "vndf is that density of normals, in part as this viewer sees them; luminance is what the warp by it leaves to sample.",
     ];
     lines.map(str::to_owned).to_vec()
 }

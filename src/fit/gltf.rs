@@ -10,7 +10,7 @@ const DIELECTRIC_F0: f32 = 0.04;
 
 /// A glTF file with nothing but the material: a metal where the lobe carries more than the matte part.
 ///
-/// A metal keeps no matte part and a dielectric at most `f0 = 1` through `specularColorFactor`; `extras` hold all numbers.
+/// A metal keeps no matte part, its edge is white, and sheen takes from the base what it reflects; `extras` hold all numbers.
 pub fn gltf(fit: &Fit, name: &str) -> String {
     let weight = |k: usize| fit.weights.get(k).copied().unwrap_or_default();
     let (base, f0, sheen) = (weight(0), weight(1), weight(2));
@@ -20,10 +20,12 @@ pub fn gltf(fit: &Fit, name: &str) -> String {
     let (roughness, anisotropy) = fit.shape.perceptual();
     let mut extensions = serde_json::Map::new();
     if !metal {
-        let factor = (f0 / DIELECTRIC_F0).max(Vec3::ZERO);
+        // `specularFactor` scales the edge and f0, `specularColorFactor` f0 alone.
+        let strength = fit.shape.edge.max(f0.max_element()).clamp(0.0, 1.0);
+        let factor = if strength > 0.0 { (f0 / (DIELECTRIC_F0 * strength)).max(Vec3::ZERO) } else { Vec3::ONE };
         extensions.insert(
             "KHR_materials_specular".into(),
-            json!({ "specularFactor": 1.0, "specularColorFactor": factor.to_array() }),
+            json!({ "specularFactor": strength, "specularColorFactor": factor.to_array() }),
         );
     }
     if anisotropy > 0.0 {
@@ -45,9 +47,8 @@ pub fn gltf(fit: &Fit, name: &str) -> String {
         .zip(&fit.weights)
         .map(|(name, weight)| ((*name).into(), json!(weight.to_array())))
         .collect();
-    let file = json!({
+    let mut file = json!({
         "asset": { "version": "2.0", "generator": concat!("biscale ", env!("CARGO_PKG_VERSION")) },
-        "extensionsUsed": used,
         "materials": [{
             "name": name,
             "pbrMetallicRoughness": {
@@ -56,8 +57,12 @@ pub fn gltf(fit: &Fit, name: &str) -> String {
                 "roughnessFactor": roughness,
             },
             "extensions": extensions,
-            "extras": { "fit": weights, "alpha": fit.shape.roughness, "rotation": fit.shape.rotation, "rel_l2": fit.errors.rel_l2 },
+            "extras": { "fit": weights, "alpha": fit.shape.roughness, "rotation": fit.shape.rotation, "edge": fit.shape.edge, "rel_l2": fit.errors.rel_l2 },
         }],
     });
+    // An empty list is against the schema.
+    if !used.is_empty() {
+        file["extensionsUsed"] = json!(used);
+    }
     format!("{file:#}\n")
 }

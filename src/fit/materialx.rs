@@ -4,14 +4,20 @@ use glam::Vec3;
 
 use super::Fit;
 
-/// `specular_color` scales the f0 of the index of refraction, so the index is the one whose f0 is the fit's largest channel.
+/// No index of refraction is larger than that of this f0.
+const LARGEST_F0: f32 = 0.98;
+
+/// `specular_color` scales a dielectric's whole Fresnel factor: it is the edge, and the index of refraction is the one whose f0
+/// is the fit's largest channel under it. A metal's edge is white.
 pub fn materialx(fit: &Fit, name: &str) -> String {
     let weight = |k: usize| fit.weights.get(k).copied().unwrap_or_default();
-    let (base, f0, fuzz) = (weight(0), weight(1).clamp(Vec3::ZERO, Vec3::splat(0.98)), weight(2));
+    let (base, f0, fuzz) = (weight(0), weight(1).clamp(Vec3::ZERO, Vec3::splat(LARGEST_F0)), weight(2));
     let metal = f0.dot(crate::brdf::LUMINANCE) > base.dot(crate::brdf::LUMINANCE);
     let largest = f0.max_element();
-    let root = largest.sqrt();
-    let (ior, tint) = if largest > 1e-6 { ((1.0 + root) / (1.0 - root), f0 / largest) } else { (1.0, Vec3::ONE) };
+    let edge = fit.shape.edge.max(largest / LARGEST_F0).min(1.0);
+    let root = if edge > 0.0 { (largest / edge).min(LARGEST_F0).sqrt() } else { 0.0 };
+    let ior = (1.0 + root) / (1.0 - root);
+    let tint = edge * if largest > 1e-6 { f0 / largest } else { Vec3::ONE };
     let [x, y] = fit.shape.roughness;
     let (wide, narrow) = (x.max(y), x.min(y));
     // OpenPBR: α_t = r² √(2 / (1 + (1-a)²)), α_b = (1-a) α_t.
@@ -31,6 +37,7 @@ pub fn materialx(fit: &Fit, name: &str) -> String {
         input("specular_ior", "float", format!("{ior:.6}")),
         input("specular_roughness", "float", format!("{roughness:.6}")),
         input("specular_roughness_anisotropy", "float", format!("{anisotropy:.6}")),
+        if anisotropy > 0.0 { tangent_input() } else { String::new() },
         input("fuzz_weight", "float", format!("{:.6}", fuzz.max_element().clamp(0.0, 1.0))),
         input(
             "fuzz_color",
@@ -39,10 +46,26 @@ pub fn materialx(fit: &Fit, name: &str) -> String {
         ),
     ];
     let identifier: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let nodes = if anisotropy > 0.0 { tangent_nodes(fit.shape.wide_azimuth().to_degrees()) } else { String::new() };
     format!(
-        "<?xml version=\"1.0\"?>\n<materialx version=\"1.39\" colorspace=\"lin_rec709\">\n  <open_pbr_surface name=\"{identifier}_surface\" \
+        "<?xml version=\"1.0\"?>\n<materialx version=\"1.39\" colorspace=\"lin_rec709\">\n{nodes}  <open_pbr_surface name=\"{identifier}_surface\" \
          type=\"surfaceshader\">\n{}  </open_pbr_surface>\n  <surfacematerial name=\"{identifier}\" type=\"material\">\n    <input \
          name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"{identifier}_surface\" />\n  </surfacematerial>\n</materialx>\n",
         inputs.concat()
+    )
+}
+
+fn tangent_input() -> String {
+    "    <input name=\"geometry_tangent\" type=\"vector3\" nodename=\"lobe_tangent\" />\n".to_owned()
+}
+
+/// The tangent along which the lobe is wide: that of the surface, turned about the normal.
+fn tangent_nodes(degrees: f32) -> String {
+    format!(
+        "  <tangent name=\"surface_tangent\" type=\"vector3\">\n    <input name=\"space\" type=\"string\" value=\"world\" />\n  </tangent>\n  \
+         <normal name=\"surface_normal\" type=\"vector3\">\n    <input name=\"space\" type=\"string\" value=\"world\" />\n  </normal>\n  \
+         <rotate3d name=\"lobe_tangent\" type=\"vector3\">\n    <input name=\"in\" type=\"vector3\" nodename=\"surface_tangent\" />\n    \
+         <input name=\"amount\" type=\"float\" value=\"{degrees:.4}\" />\n    <input name=\"axis\" type=\"vector3\" \
+         nodename=\"surface_normal\" />\n  </rotate3d>\n"
     )
 }

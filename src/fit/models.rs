@@ -23,18 +23,20 @@ pub struct Shape {
     pub roughness: [f32; 2],
     /// Azimuth of the lobe's x from the tangent, radians.
     pub rotation: f32,
+    /// What the lobe's Fresnel factor rises to at grazing angles: 1 for a smooth interface, 0 where there is none.
+    pub edge: f32,
 }
 
 /// Values at a pair, the light's cosine included.
 pub struct Lobes {
     /// What the weights multiply.
     pub weighted: Vec<f64>,
-    /// What no weight multiplies: Fresnel's white edge, `lobe (1-i·h)^5`.
+    /// What no weight multiplies: Fresnel's white edge, `edge lobe (1-i·h)^5`.
     pub fixed: f64,
 }
 
-/// Bounds of the roughness.
-const ROUGHNESS: [f32; 2] = [0.02, 1.5];
+/// Bounds of the roughness: glTF and OpenPBR know none above 1.
+const ROUGHNESS: [f32; 2] = [0.02, 1.0];
 /// Roughness of the sheen, which is not searched.
 const SHEEN_ROUGHNESS: f64 = 0.5;
 
@@ -61,23 +63,28 @@ impl Model {
         self.weight_names().len()
     }
 
-    /// Where searches start: the logarithm of the roughness; for GGX that of the anisotropy's square root and its azimuth.
+    /// Where searches start: the edge and the logarithm of the roughness; for GGX that of the anisotropy's square root and its
+    /// azimuth.
     pub(super) fn starts(self) -> Vec<Vec<f64>> {
         match self {
-            Self::CookTorrance => [0.1_f64, 0.3, 0.7].iter().map(|m| vec![m.ln()]).collect(),
+            Self::CookTorrance => [0.1_f64, 0.3, 0.7].iter().map(|m| vec![0.5, m.ln()]).collect(),
             Self::Ggx => {
-                [(0.15_f64, 0.4), (0.15, -0.4), (0.5, 0.2)].iter().map(|(a, r)| vec![a.ln(), *r, 0.1]).collect()
+                [(0.15_f64, 0.4), (0.15, -0.4), (0.5, 0.2)].iter().map(|(a, r)| vec![0.5, a.ln(), *r, 0.1]).collect()
             }
         }
     }
 
     pub(super) fn shape(self, parameters: &[f64]) -> Shape {
         let bounded = |log: f64| (log.exp() as f32).clamp(ROUGHNESS[0], ROUGHNESS[1]);
+        let edge = parameters.first().map_or(1.0, |edge| edge.clamp(0.0, 1.0) as f32);
         match (self, parameters) {
-            (Self::Ggx, [log, ratio, turn]) => {
-                Shape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *turn as f32 }
+            (Self::Ggx, [_, log, ratio, turn]) => {
+                Shape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *turn as f32, edge }
             }
-            _ => Shape { roughness: [bounded(parameters.first().copied().unwrap_or(-1.0)); 2], rotation: 0.0 },
+            _ => {
+                let roughness = bounded(parameters.get(1).copied().unwrap_or(-1.0));
+                Shape { roughness: [roughness; 2], rotation: 0.0, edge }
+            }
         }
     }
 
@@ -85,6 +92,7 @@ impl Model {
     pub(super) fn evaluate(self, shape: &Shape, i: Vec3, o: Vec3) -> Lobes {
         let h = half_vector(i, o);
         let fresnel = f64::from(schlick_weight(i.dot(h)));
+        let edge = f64::from(shape.edge) * fresnel;
         let matte = f64::from(i.z) / PI;
         match self {
             Self::CookTorrance => {
@@ -92,12 +100,12 @@ impl Model {
                 let term = Term::CookTorrance { roughness: shape.roughness[0], f0: Vec3::ONE };
                 // Both cosines in, the viewer's out again.
                 let lobe = f64::from(term.lobe_cos(&angles)) / f64::from(o.z);
-                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel)], fixed: lobe * fresnel }
+                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel)], fixed: lobe * edge }
             }
             Self::Ggx => {
                 let lobe = anisotropic_ggx(shape, i, o, h);
                 let sheen = sheen(i, o, h) * f64::from(i.z);
-                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel), sheen], fixed: lobe * fresnel }
+                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel), sheen], fixed: lobe * edge }
             }
         }
     }

@@ -8,15 +8,13 @@ use std::io;
 use glam::{DVec3, Vec3};
 
 use super::super::sampler::{in_parallel, reading_error};
-use super::super::{Job, Written};
+use super::super::{ExportResolution, Job, Written};
 use super::{Content, rgb, xyz};
-use crate::filtering::Reflectance;
+use crate::filtering::{EffectiveBrdf, Reflectance};
 
-/// Cells along a side: 2 to the power of this.
-const LEVELS: u32 = 5;
-const SIDE: usize = 1 << LEVELS;
-/// Directions along a side of a leaving cell.
-const LEAVING: usize = 2;
+/// Cells along a side, where no resolution is asked for, and the fewest and most: powers of 2.
+const SIDE: usize = 32;
+const SIDES: [usize; 2] = [8, 64];
 /// A branch ends where its values differ from their mean by less than this part of the mean of all.
 const TOLERANCE: f64 = 0.02;
 /// u' and v' of what has no colour.
@@ -61,20 +59,58 @@ fn direction(square: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, (1.0 - x * x - y * y).max(1e-6).sqrt())
 }
 
-/// Cells of a direction along x and y.
-fn cell(x: f64, y: f64) -> [usize; 2] {
-    square_of_disk([x, y]).map(|at| ((at * SIDE as f64) as usize).min(SIDE - 1))
+/// Cells along a side for what was asked for: about as many directions.
+fn side_of(resolution: Option<ExportResolution>) -> usize {
+    let Some(resolution) = resolution else { return SIDE };
+    let side = ((resolution.theta_i * resolution.phi_i) as f64).sqrt();
+    let [fewest, most] = SIDES;
+    (1_usize << side.log2().round().max(0.0) as u32).clamp(fewest, most)
+}
+
+/// The cell of a direction, x slower.
+fn cell(side: usize, x: f64, y: f64) -> usize {
+    let [x, y] = square_of_disk([x, y]).map(|at| ((at * side as f64) as usize).min(side - 1));
+    x * side + y
+}
+
+/// The middle of part `part` (of `parts`²) of a cell, as a direction.
+fn part_of_cell(side: usize, cell: usize, part: usize, parts: usize) -> DVec3 {
+    let at = |k: usize, part: usize| ((k * parts + part) as f64 + 0.5) / (side * parts) as f64;
+    direction([at(cell / side, part / parts), at(cell % side, part % parts)])
+}
+
+/// Means over the cells that light of one incident cell leaves into, CIE X, Y and Z. Totals are as good as these are means:
+/// near the horizon a cell is 10° high.
+fn one_incident(brdf: &EffectiveBrdf, side: usize, incident: usize) -> Vec<Vec3> {
+    // Each part of the incident cell with another part of each leaving one: all are met, at a quarter of the pairs.
+    let parts = if side > SIDE { 1 } else { 2 };
+    let mut sums = vec![Vec3::ZERO; side * side];
+    let mut values = sums.clone();
+    for part in 0..parts * parts {
+        // Incident directions are those that the light travels in.
+        let travels = part_of_cell(side, incident, part, parts).as_vec3();
+        let source = Vec3::new(-travels.x, -travels.y, travels.z);
+        let turned = |cell: usize| (part + 2 * (cell / side) + cell % side + 3 * incident) % (parts * parts);
+        let leaving: Vec<Vec3> =
+            (0..side * side).map(|cell| part_of_cell(side, cell, turned(cell), parts).as_vec3()).collect();
+        brdf.eval_lights(&leaving, source, &mut values);
+        for ((sum, value), o) in sums.iter_mut().zip(&values).zip(&leaving) {
+            *sum += *value / o.z;
+        }
+    }
+    sums.into_iter().map(|sum| xyz(sum / (parts * parts) as f32).max(Vec3::ZERO)).collect()
 }
 
 /// Values of a channel, `[incident x][incident y][leaving x][leaving y]`.
 struct Grid {
+    side: usize,
     values: Vec<f32>,
     tolerance: f64,
 }
 
 impl Grid {
     fn at(&self, index: [usize; 4]) -> f32 {
-        self.values[index.iter().fold(0, |at, k| at * SIDE + k)]
+        self.values[index.iter().fold(0, |at, k| at * self.side + k)]
     }
 
     /// Writes the branch at `corner` of `side` cells a dimension, and returns its mean where it is flat.
@@ -122,27 +158,9 @@ impl Grid {
 }
 
 pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
-    let centre = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
-    let fine = SIDE * LEAVING;
-    let leaving: Vec<Vec3> = (0..SIDE * SIDE)
-        .flat_map(|cell| (0..LEAVING * LEAVING).map(move |part| (cell, part)))
-        .map(|(cell, part)| {
-            let x = centre(cell / SIDE * LEAVING + part / LEAVING, fine);
-            direction([x, centre(cell % SIDE * LEAVING + part % LEAVING, fine)]).as_vec3()
-        })
-        .collect();
-    let rows: Vec<Vec<Vec3>> = in_parallel(SIDE * SIDE, job.progress, |incident| {
-        // Incident directions are those that the light travels in.
-        let travels = direction([centre(incident / SIDE, SIDE), centre(incident % SIDE, SIDE)]);
-        let source = Vec3::new(-travels.x as f32, -travels.y as f32, travels.z as f32);
-        let mut values = vec![Vec3::ZERO; leaving.len()];
-        job.brdf.eval_lights(&leaving, source, &mut values);
-        let parts = values.chunks(LEAVING * LEAVING).zip(leaving.chunks(LEAVING * LEAVING));
-        parts
-            .map(|(values, o)| values.iter().zip(o).map(|(v, o)| *v / o.z).sum::<Vec3>() / (LEAVING * LEAVING) as f32)
-            .map(|value| xyz(value).max(Vec3::ZERO))
-            .collect()
-    })?;
+    let side = side_of(job.options.resolution);
+    let brdf = job.brdf;
+    let rows: Vec<Vec<Vec3>> = in_parallel(side * side, job.progress, |incident| one_incident(brdf, side, incident))?;
     // Chromaticity in place of X and Z: that is what Radiance reads from trees.
     let chromaticity = |value: &Vec3| {
         let sum = value.x + 15.0 * value.y + 3.0 * value.z;
@@ -152,7 +170,7 @@ pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
         let values: Vec<f32> = rows.iter().flatten().map(of).collect();
         let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
         let mut text = String::new();
-        Grid { values, tolerance: TOLERANCE * mean }.branch([0; 4], SIDE, &mut text);
+        Grid { side, values, tolerance: TOLERANCE * mean }.branch([0; 4], side, &mut text);
         text.push('\n');
         text
     };
@@ -162,19 +180,18 @@ pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
         ("CIE-v", tree(&|value| chromaticity(value)[1])),
     ];
     let read = |i: Vec3, o: Vec3| {
-        let [x, y] = cell(f64::from(-o.x), f64::from(-o.y));
-        let [a, b] = cell(f64::from(i.x), f64::from(i.y));
-        rgb(rows[x * SIDE + y][a * SIDE + b]) * i.z
+        let row = &rows[cell(side, f64::from(-o.x), f64::from(-o.y))];
+        rgb(row[cell(side, f64::from(i.x), f64::from(i.y))]) * i.z
     };
     let conventions = vec![
         format!(
-            "Tensor tree of rank 4, {SIDE} cells a dimension: incident x and y, leaving x and y on Shirley and Chiu's square."
+            "Tensor tree of rank 4, {side} cells a dimension: incident x and y, leaving x and y on Shirley and Chiu's square."
         ),
         "Incident directions are those that the light travels in (its x and y), as Radiance has them.".to_owned(),
         format!("Branches whose values differ from their mean by less than {TOLERANCE} of the mean of all end in one."),
     ];
     let reading = reading_error(job.brdf, read);
-    let written = Written { pairs: SIDE.pow(4), reading, conventions, anisotropy_lost: None };
+    let written = Written { pairs: side.pow(4), reading, conventions, anisotropy_lost: None };
     let definition = "<IncidentDataStructure>TensorTree4</IncidentDataStructure>\n".to_owned();
     Ok((Content { definition, basis: BASIS, channels, black: "{0}\n".to_owned() }, written))
 }
@@ -197,11 +214,25 @@ mod tests {
     }
 
     #[test]
+    fn cells_are_powers_of_two_near_what_is_asked_for_and_hold_their_parts() {
+        let asked = |theta: usize, phi: usize| {
+            side_of(Some(ExportResolution { theta_i: theta, phi_i: phi, theta_o: 1, phi_o: 1 }))
+        };
+        assert_eq!([side_of(None), asked(16, 64), asked(64, 64), asked(1, 1), asked(500, 500)], [32, 32, 64, 8, 64]);
+        for k in 0..8 * 8 {
+            assert!((0..4).all(|part| {
+                let d = part_of_cell(8, k, part, 2);
+                cell(8, d.x, d.y) == k
+            }));
+        }
+    }
+
+    #[test]
     fn a_flat_tree_is_one_number_and_one_odd_cell_opens_its_branch_alone() {
         let mut values = vec![1.0; SIDE.pow(4)];
         let text = |values: &Vec<f32>| {
             let mut text = String::new();
-            Grid { values: values.clone(), tolerance: 0.01 }.branch([0; 4], SIDE, &mut text);
+            Grid { side: SIDE, values: values.clone(), tolerance: 0.01 }.branch([0; 4], SIDE, &mut text);
             text
         };
         assert_eq!(text(&values), "{1.0000e0}");
