@@ -92,7 +92,7 @@ const REFERENCE_LEAD_DB: f64 = 8.0;
 /// A rung that shows how bright a scene is.
 const TYPICAL: f64 = 6.0;
 /// Rungs are told apart this finely.
-const STEP: f64 = 0.25;
+const STEP: f64 = 0.125;
 
 /// Chooses settings for `goal`; `progress` hears what is being done.
 ///
