@@ -314,10 +314,7 @@ impl FacetSum {
     }
 
     fn patch_sum(&self, group: &Group, patch: &Patch, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
-        let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
-        if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
-            return DVec3::ZERO;
-        }
+        let Some(value) = patch_value(group, patch, pair) else { return DVec3::ZERO };
         let range = patch.range.clone();
         let seen = match &group.rgb_areas {
             None => DVec3::splat(simd::masked_sum([&self.areas[range.clone()]], &v_i[range.clone()], &v_o[range])[0]),
@@ -327,15 +324,67 @@ impl FacetSum {
                 DVec3::from_array(simd::masked_sum([r, g, b], &v_i[range.clone()], &v_o[range]))
             }
         };
-        let mut value = Vec3::ZERO;
-        for (_, term) in &group.lobes {
-            value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
-        }
-        for table in &group.measured {
-            value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
-        }
         seen * value.as_dvec3()
     }
+
+    /// Whether every group has few normals and one colour: then [`FacetSum::sum_of_areas`] serves.
+    pub(crate) fn has_few_normals(&self) -> bool {
+        let few = |group: &Group| group.patches.is_some() && group.rgb_areas.is_none();
+        self.groups.iter().all(|group| group.color == Vec3::ZERO || few(group))
+    }
+
+    /// [`FacetSum::sum`] where facets of few normals are the whole tile: `seen` tells how much of a run of facets, whose areas
+    /// it is handed, `i` and `o` both see.
+    pub(crate) fn sum_of_areas(&self, i: Vec3, o: Vec3, seen: impl Fn(Range<usize>, &[f32]) -> f64) -> DVec3 {
+        let pair = PairVectors::new(i, o);
+        let mut total = DVec3::ZERO;
+        for group in self.groups.iter().filter(|group| group.color != Vec3::ZERO) {
+            let mut sum = DVec3::ZERO;
+            for patch in group.patches.iter().flatten() {
+                if let Some(value) = patch_value(group, patch, &pair) {
+                    sum += DVec3::splat(seen(patch.range.clone(), &self.areas[patch.range.clone()])) * value.as_dvec3();
+                }
+            }
+            total += group.color.as_dvec3() * sum;
+        }
+        total
+    }
+}
+
+impl FacetSum {
+    /// Other facets of the same materials.
+    pub(super) fn over(&self, normals: [Vec<f32>; 3], areas: Vec<f32>, groups: Vec<Group>) -> Self {
+        Self { normals, areas, groups, ..self.clone() }
+    }
+}
+
+impl Group {
+    /// The same materials over other facets; `None` where they have colours of their own, or normals that matter.
+    pub(super) fn over(&self, range: Range<usize>, patches: Vec<Patch>) -> Option<Self> {
+        let black = self.color == Vec3::ZERO;
+        (black || self.rgb_areas.is_none() && self.patches.is_some()).then(|| Self {
+            range,
+            rgb_areas: None,
+            patches: self.patches.is_some().then_some(patches),
+            ..self.clone()
+        })
+    }
+}
+
+/// What facets of one normal reflect; `None` where it faces away.
+fn patch_value(group: &Group, patch: &Patch, pair: &PairVectors) -> Option<Vec3> {
+    let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
+    if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
+        return None;
+    }
+    let mut value = Vec3::ZERO;
+    for (_, term) in &group.lobes {
+        value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
+    }
+    for table in &group.measured {
+        value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
+    }
+    Some(value)
 }
 
 impl Group {
