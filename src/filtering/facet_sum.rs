@@ -17,7 +17,18 @@ pub struct SumMaterial {
     pub color: Vec3,
 }
 
+/// A term that reflects nothing, whatever the angles.
+fn is_zero(term: &Term) -> bool {
+    // A tint is a line in (1 - i·h)⁵.
+    !matches!(term, Term::Measured(_)) && term.tint(0.0) == Vec3::ZERO && term.tint(1.0) == Vec3::ZERO
+}
+
 impl SumMaterial {
+    /// Does it reflect nothing?
+    pub fn is_black(&self) -> bool {
+        self.color == Vec3::ZERO || self.brdf.terms.iter().all(is_zero)
+    }
+
     /// Do two materials differ in nothing but their colour?
     pub fn same_brdf(&self, other: &Self) -> bool {
         // A tint is a line in (1 - i·h)⁵: two points tell it.
@@ -34,9 +45,7 @@ impl SumMaterial {
             _ => analytic_lobe(a).is_some_and(|lobe| Some(lobe) == analytic_lobe(b)),
         };
         let (a, b) = (&self.brdf.terms, &other.brdf.terms);
-        (self.color == Vec3::ZERO) == (other.color == Vec3::ZERO)
-            && a.len() == b.len()
-            && a.iter().zip(b).all(|(a, b)| same(a, b))
+        self.is_black() == other.is_black() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b))
     }
 }
 
@@ -55,6 +64,7 @@ pub struct FacetSum {
 pub(crate) struct Group {
     pub(crate) range: Range<usize>,
     pub(crate) color: Vec3,
+    is_black: bool,
     pub(crate) lobes: Vec<(Lobe, Term)>,
     pub(crate) measured: Vec<std::sync::Arc<dyn Measured>>,
     /// Areas times colour weights, where those differ between the facets of the group.
@@ -102,6 +112,7 @@ impl FacetSum {
         for group in &mut self.groups {
             let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
             group.color = material.color;
+            group.is_black = material.is_black();
             group.lobes = material
                 .brdf
                 .terms
@@ -152,7 +163,7 @@ impl FacetSum {
         let pair = PairVectors::new(i, o);
         let mut total = DVec3::ZERO;
         for group in &self.groups {
-            let black = group.color == Vec3::ZERO && !self.keep_black;
+            let black = !self.keep_black && group.is_black;
             if !black {
                 total += group.color.as_dvec3() * self.group_sum(group, &pair, v_i, v_o);
             }
@@ -386,6 +397,7 @@ impl Group {
         Self {
             range,
             color: Vec3::ONE,
+            is_black: false,
             lobes: Vec::new(),
             measured: Vec::new(),
             rgb_areas,
