@@ -5,6 +5,11 @@
 // Where the last ring stands, 89.9°.
 const HORIZON: f32 = 1.56905099754262;
 
+// The twin of PolarGrid::horizon_taper.
+fn horizon_taper(z: f32) -> f32 {
+    return min(z * 572.9581, 1.0);
+}
+
 struct Taps {
     nodes: vec4u,
     weights: vec4f,

@@ -163,7 +163,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
             value += tinted * channel.color * channel_value(channel);
         }
         // Truncated factors may fall a little below zero; no BRDF does.
-        total += lights[k].irradiance * max(value, vec3f(0.0));
+        total += lights[k].irradiance * max(value, vec3f(0.0)) * (horizon_taper(i.z) * horizon_taper(o.z));
     }
     add_radiance(point, id.y, total / area);
 }

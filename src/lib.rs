@@ -15,6 +15,8 @@
 pub mod accuracy;
 pub mod brdf;
 pub mod cancel;
+#[cfg(test)]
+mod chi_square;
 pub mod close_up;
 pub mod directions;
 pub mod error;
@@ -23,6 +25,7 @@ pub mod filtering;
 pub mod fit;
 pub mod geometry;
 pub mod gpu;
+pub mod interreflection;
 pub mod large_scale;
 pub mod pipeline;
 pub mod plan;

@@ -36,7 +36,7 @@ enum Command {
     /// Write the tile itself: .obj, .stl (closed, millimetres), .png (16-bit heights), .svg or .pdf (a pattern to fold).
     Tile(TileArgs),
     /// List every effect: on or off, why, and what it costs.
-    Plan(SceneArgs),
+    Plan(PlanArgs),
     /// Factor every material's rotated BRDF and list the sizes (Table 3 of Wu et al. 2011).
     Basis(SceneArgs),
     /// Time the stages from an edit to the effective BRDF (or the picture).
@@ -73,6 +73,15 @@ struct SceneArgs {
     /// Preset of accuracy and cost.
     #[arg(long)]
     quality: Option<Quality>,
+    /// Force an effect of the plan on or off: `--effect interreflection=on` (repeatable).
+    #[arg(long = "effect", value_name = "NAME=on|off|auto", value_parser = commands::parse_effect)]
+    effects: Vec<String>,
+    /// Choose the cheapest settings whose PSNR against a reference of the scene reaches so many decibels.
+    #[arg(long, value_name = "X", value_parser = commands::parse_positive)]
+    target_db: Option<f64>,
+    /// Choose the best settings within so many milliseconds from an edit of the geometry to the effective BRDF.
+    #[arg(long, value_name = "Y", value_parser = commands::parse_positive, conflicts_with = "target_db")]
+    budget_ms: Option<f64>,
     /// Where to compute.
     #[arg(long)]
     backend: Option<Backend>,
@@ -85,6 +94,15 @@ struct SceneArgs {
     /// No notes on standard error.
     #[arg(long)]
     quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct PlanArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Also force each effect on and off: milliseconds, and what it changes in f̄ and in the picture.
+    #[arg(long)]
+    measure: bool,
 }
 
 #[derive(Debug, Args)]

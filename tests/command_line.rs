@@ -446,6 +446,10 @@ fn wrong_usage_exits_with_two_and_says_how_to_do_it() {
         &["plan", "default", "--quality", "best"],
         &["plan", "default", "--seed", "-1"],
         &["profile", "default", "--repeat", "0"],
+        &["plan", "default", "--target-db", "much"],
+        &["plan", "default", "--target-db", "40", "--budget-ms", "100"],
+        &["plan", "default", "--effect", "interreflection"],
+        &["plan", "default", "--effect", "fluorescence=on"],
     ] {
         desk.refused(arguments, &["--help"]);
     }
@@ -481,4 +485,52 @@ fn a_report_holds_every_preset_and_goes_on_from_where_it_was() {
         report["points"].as_array().unwrap().iter().map(|point| point["ms"].clone()).collect()
     };
     assert_eq!(times(&run()), times(&report), "what was measured is not measured again");
+}
+
+#[test]
+fn a_target_is_answered_with_settings_that_repeat_it() {
+    let desk = Desk::new();
+    desk.write("grooves.toml", GROOVES);
+    desk.write("pairs.csv", PAIRS);
+    let eval = |extra: &[&str]| {
+        let output = desk.run(&[&["eval", "grooves.toml", "--pairs", "pairs.csv", "-o", "-"], extra].concat());
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{said}");
+        (String::from_utf8(output.stdout).unwrap(), said)
+    };
+    let (values, said) = eval(&["--target-db", "35"]);
+    assert!(said.contains("asked 35.0 dB, got "), "{said}");
+    let words = said.split(": ").last().unwrap().trim();
+    let words: Vec<&str> = words.split_whitespace().collect();
+    assert_eq!(words[0], "--quality", "{said}");
+    let (again, _) = eval(&words);
+    assert_eq!(values, again, "{words:?}");
+    let (_, said) = eval(&["--budget-ms", "100000"]);
+    assert!(said.contains("asked 100000.0 ms, got "), "{said}");
+}
+
+#[test]
+fn an_effect_is_forced_on_and_off_and_the_plan_shows_it() {
+    let desk = Desk::new();
+    desk.write("grooves.toml", GROOVES.replace("depth = 0.1", "depth = 0.4"));
+    desk.write("pairs.csv", PAIRS);
+    let effect = |extra: &[&str], name: &str| -> Value {
+        let plan = desk.json(&[&["plan", "grooves.toml", "--json", "--quiet"], extra].concat());
+        plan["effects"].as_array().unwrap().iter().find(|e| e["name"] == name).unwrap().clone()
+    };
+    assert_eq!(effect(&[], "interreflection")["on"], false);
+    let on = effect(&["--effect", "interreflection=on"], "interreflection");
+    assert!(on["on"] == true && on["forced"] == true && on["measured_ms"].as_f64().unwrap() > 0.0, "{on}");
+    assert_eq!(effect(&["--effect", "visibility=off"], "visibility")["on"], false);
+    assert_eq!(effect(&["--effect", "low_rank=on"], "low_rank")["on"], true);
+    let sum = |extra: &[&str]| -> f64 {
+        let text = desk.text(&[&["eval", "grooves.toml", "--pairs", "pairs.csv", "-o", "-"], extra].concat());
+        rows(&text).iter().map(|row| row[4]).sum()
+    };
+    assert!(sum(&["--effect", "interreflection=on"]) > 1.01 * sum(&[]), "light between facets is added");
+    let measured = desk.json(&["plan", "grooves.toml", "--json", "--quiet", "--measure", "--quality", "draft"]);
+    let costs = measured["measured"].as_array().unwrap();
+    let cost = costs.iter().find(|cost| cost["name"] == "interreflection").unwrap();
+    assert!(cost["on_ms"].as_f64().unwrap() > cost["off_ms"].as_f64().unwrap(), "{cost}");
+    assert!(cost["rel_l2"].as_f64().unwrap() > 0.005 && cost["mean_delta_e"].as_f64().unwrap() > 0.0, "{cost}");
 }

@@ -1,10 +1,16 @@
 //! What is right: the reference sum with its own error, metrics, and the direction pairs they are taken over.
 
+pub mod choose;
+pub mod health;
+pub mod ladder;
 mod metrics;
 mod pairs;
+mod paths;
+pub mod progressive;
 mod reference;
 pub mod sweep;
 
+pub use health::Health;
 pub use metrics::{Errors, compare, upper_errors};
 pub use pairs::{Pair, mirror_biased_pairs};
 pub use reference::{Estimate, Reference, ReferenceSettings};

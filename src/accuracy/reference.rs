@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Pair;
+use super::paths::Paths;
 use crate::filtering::{FacetSum, SumMaterial};
 use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 use crate::visibility::{PeriodicGrid, lifted_origins};
@@ -43,6 +44,8 @@ pub struct Reference<'a> {
     grid: PeriodicGrid,
     material_of_slot: Vec<usize>,
     materials: Vec<SumMaterial>,
+    /// Reflections between facets that paths follow; 0 for the paper's definition.
+    bounces: usize,
 }
 
 /// Sums over the passes of one pair: of `S = Σ ΔA V V f` and `a_v`, and of their second moments.
@@ -76,7 +79,13 @@ impl<'a> Reference<'a> {
             grid: PeriodicGrid::new(mesh),
             material_of_slot: material_of_slot.to_vec(),
             materials: materials.to_vec(),
+            bounces: 0,
         }
+    }
+
+    /// Follows light from facet to facet too.
+    pub fn with_bounces(self, bounces: usize) -> Self {
+        Self { bounces, ..self }
     }
 
     /// Estimates `f̄` at each pair. `progress(passes done, relative L2 of the standard errors)` after each pass; it
@@ -98,10 +107,16 @@ impl<'a> Reference<'a> {
             facets.sort_for_sums();
             let sum = FacetSum::new(&facets, &self.material_of_slot, &self.materials);
             let origins = lifted_origins(&facets, self.mesh.size);
-            moments.par_iter_mut().zip(pairs).for_each_init(
+            let paths = (self.bounces > 0)
+                .then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, &self.materials, self.bounces));
+            moments.par_iter_mut().zip(pairs).enumerate().for_each_init(
                 || (vec![0.0_f32; facets.len()], vec![0.0_f32; facets.len()]),
-                |(v_i, v_o), (moments, pair)| {
-                    let (s, a) = self.one_pass(&facets, &sum, &origins, *pair, v_i, v_o);
+                |(v_i, v_o), (at, (moments, pair))| {
+                    let (mut s, a) = self.one_pass(&facets, &sum, &origins, *pair, v_i, v_o);
+                    if let Some(paths) = &paths {
+                        let seed = settings.seed ^ (pass as u64) << 40 ^ (at as u64) << 8;
+                        s += paths.trace(&facets, &origins, v_o, *pair, seed);
+                    }
                     moments.s += s;
                     moments.a += a;
                     moments.ss += s * s;

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, Pair, ReferenceSettings, compare, mirror_biased_pairs};
+use super::{Errors, Pair, ReferenceSettings, compare, ladder, mirror_biased_pairs};
 use crate::directions::from_angles;
 use crate::error::Result;
 use crate::filtering::Reflectance;
@@ -21,6 +21,8 @@ pub enum Family {
     Preset,
     /// One knob alone, the others as `standard` has them.
     Knob(String),
+    /// The line from faster to finer that `--target-db` and `--budget-ms` walk along.
+    Ladder,
     /// All knobs at once, spread evenly over their ranges.
     Combination,
 }
@@ -58,8 +60,8 @@ const KNOBS: &[(&str, &[&str], &[&str])] = &[
     ("colors", &["1", "2", "3"], &["quality.method=\"low_rank\""]),
 ];
 
-/// Presets, each knob alone, and `combinations` that fill the space of all knobs evenly, in the order in which they tell most.
-pub fn candidates(measured_colors: bool, combinations: usize) -> Vec<Candidate> {
+/// Presets, each knob alone, the ladder, and `combinations` that fill the space of all knobs evenly, in the order in which they tell most.
+pub fn candidates(measured_colors: bool, overhangs: bool, combinations: usize) -> Vec<Candidate> {
     let mut all: Vec<Candidate> = ["draft", "standard", "fine", "wu2011"]
         .into_iter()
         .map(|preset| Candidate::new(Family::Preset, preset, Vec::new()))
@@ -73,6 +75,7 @@ pub fn candidates(measured_colors: bool, combinations: usize) -> Vec<Candidate> 
             all.push(Candidate::new(Family::Knob((*key).to_owned()), "standard", set));
         }
     }
+    all.extend((1..=5).map(|k| ladder::rung(2.0 * f64::from(k), overhangs)));
     all.extend((0..combinations).map(combination));
     all
 }
@@ -381,7 +384,7 @@ mod tests {
             assert!(facets.iter().filter(|n| (from..to).contains(*n)).count() >= 4, "{octave}: {facets:?}");
         }
         let loaded = crate::scene::open("default", &[]).unwrap();
-        for candidate in candidates(true, 40) {
+        for candidate in candidates(true, false, 40) {
             with_settings(&loaded, &candidate).unwrap();
         }
     }

@@ -11,8 +11,9 @@ use super::document::Snapshot;
 use super::editor::Editor;
 use super::messages::Level;
 use super::worker::{
-    ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer, PictureJob, Pictures, Thumbnail,
-    ThumbnailJob, TileAnswer, TileJob, Worker, spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
+    AccuracyAnswer, AccuracyJob, ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer, PictureJob,
+    Pictures, Thumbnail, ThumbnailJob, TileAnswer, TileJob, Worker, spawn_accuracy, spawn_autosave, spawn_export,
+    spawn_lobe, spawn_thumbnail, spawn_tile,
 };
 
 /// Least time between recovery files.
@@ -25,6 +26,7 @@ enum Answer {
     Lobe(Box<LobeMade>),
     Thumbnail(Thumbnail),
     Export(ExportAnswer),
+    Accuracy(AccuracyAnswer),
     NotAutosaved(String),
 }
 
@@ -35,6 +37,7 @@ pub struct Background {
     lobes: Option<Worker<LobeJob>>,
     thumbnails: Option<Worker<ThumbnailJob>>,
     pub exports: Option<Worker<ExportJob>>,
+    accuracy: Option<Worker<AccuracyJob>>,
     autosaver: Option<Worker<Snapshot>>,
     /// The version that was kept last, and when the next may be.
     autosaved: (u64, f64),
@@ -52,15 +55,27 @@ impl Background {
             let _ = to_us.send(answer);
             wake.request_repaint();
         };
-        let (to_tile, to_lobe, to_gallery, to_export, to_save) =
-            (send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
+        let (to_tile, to_lobe, to_gallery, to_export, to_save, to_chart) =
+            (send.clone(), send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
+        let accuracy = spawn_accuracy(move |answer| to_chart(Answer::Accuracy(answer)));
         let pictures = Pictures::spawn(move |answer| send(Answer::Picture(answer)));
         let tiles = spawn_tile(move |answer| to_tile(Answer::Tile(answer)));
         let thumbnails = spawn_thumbnail(move |made| to_gallery(Answer::Thumbnail(made)));
         let exports = spawn_export(move |answer| to_export(Answer::Export(answer)));
         let autosaver = spawn_autosave(move |text| to_save(Answer::NotAutosaved(text)));
         let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
-        Self { pictures, tiles, lobes, thumbnails, exports, autosaver, autosaved: (1, 0.0), answers, loaded: None }
+        Self {
+            pictures,
+            tiles,
+            lobes,
+            thumbnails,
+            exports,
+            accuracy,
+            autosaver,
+            autosaved: (1, 0.0),
+            answers,
+            loaded: None,
+        }
     }
 
     /// Ends all threads: none may still use a graphics driver while the process takes it down.
@@ -71,6 +86,7 @@ impl Background {
         self.lobes.into_iter().for_each(|worker| worker.finish(longest));
         self.thumbnails.into_iter().for_each(|worker| worker.finish(longest));
         self.exports.into_iter().for_each(|worker| worker.finish(longest));
+        self.accuracy.into_iter().for_each(|worker| worker.finish(longest));
     }
 }
 
@@ -87,6 +103,22 @@ impl Editor {
         } else if self.gallery.is_waiting() {
             worker.cancel();
             self.gallery.interrupted();
+        }
+    }
+
+    /// Accuracy is measured once the picture is finished, while its panel is open.
+    pub(super) fn measure_accuracy(&mut self) {
+        let version = self.document.version();
+        let Some(worker) = &self.background.accuracy else { return };
+        if self.accuracy.is_late(version) {
+            worker.cancel();
+        }
+        let finished = |made: &Made| made.grade == Grade::Final && made.version == version;
+        let idle = self.object.made.as_deref().is_some_and(finished) && self.exporting.is_none();
+        if let (true, Some((_, loaded))) = (idle, &self.background.loaded)
+            && let Some(job) = self.accuracy.job(version, loaded)
+        {
+            worker.ask(job);
         }
     }
 
@@ -159,6 +191,7 @@ impl Editor {
                 Answer::Tile(TileAnswer::Failed(text)) => self.messages.put(Level::Trouble, "tile", text),
                 Answer::Lobe(made) => self.lobe.take(ctx, made),
                 Answer::Thumbnail(made) => self.gallery.take(ctx, made),
+                Answer::Accuracy(answer) => self.accuracy.take(ctx, answer),
                 Answer::Export(answer) => self.take_export(answer),
                 Answer::NotAutosaved(text) => {
                     let text = format!("No recovery file could be written ({text}). Save your work yourself.");

@@ -33,6 +33,7 @@ pub struct Editor {
     pub object: ObjectView,
     pub tile: TileState,
     pub lobe: LobeState,
+    pub accuracy: panels::AccuracyState,
     /// The tile is in the large view.
     pub exchanged: bool,
     pub(super) stroke: Option<Stroke>,
@@ -76,6 +77,7 @@ impl Editor {
             object: ObjectView::default(),
             tile: TileState::default(),
             lobe: LobeState::default(),
+            accuracy: panels::AccuracyState::default(),
             exchanged: false,
             stroke: None,
             title: String::new(),
@@ -139,9 +141,12 @@ impl Editor {
             .size_range(260.0..=620.0)
             .show(ui, |ui| {
                 let painted = self.document.painted().clone();
-                ScrollArea::vertical()
-                    .auto_shrink([false, false])
-                    .show(ui, |ui| panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots))
+                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                    let effects = self.object.made.as_ref().map_or(&[][..], |made| &made.effects);
+                    let version = self.document.version();
+                    let shown = panels::Shown { accuracy: &mut self.accuracy, effects, version };
+                    panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots, shown)
+                })
             });
         self.settings.parameters_width = parameters.response.rect.width();
         let asked = parameters.inner.inner;
@@ -174,6 +179,7 @@ impl Editor {
         self.request();
         self.keep_recovery(&ctx);
         self.fill_gallery();
+        self.measure_accuracy();
     }
 
     fn gallery_ui(&mut self, ui: &mut Ui) -> Option<Action> {

@@ -3,6 +3,7 @@
 use eframe::egui::{self, RichText, Ui};
 
 use super::editor::Editor;
+use super::theme;
 use super::worker::Grade;
 
 impl Editor {
@@ -65,15 +66,19 @@ impl Editor {
                 ui.add(egui::Label::new(RichText::new(&made.device).weak()).truncate())
                     .on_hover_text("Where the picture is shaded");
                 if !made.notes.is_empty() {
-                    ui.label(notes(made.notes.len())).on_hover_text(made.notes.join("\n"));
+                    ui.label(count(made.notes.len(), "note")).on_hover_text(made.notes.join("\n"));
+                }
+                if !made.warnings.is_empty() {
+                    let text = RichText::new(count(made.warnings.len(), "warning")).color(theme::WARNING).strong();
+                    ui.label(text).on_hover_text(made.warnings.join("\n\n"));
                 }
             });
         });
     }
 }
 
-fn notes(count: usize) -> String {
-    if count == 1 { "1 note".to_owned() } else { format!("{count} notes") }
+fn count(number: usize, what: &str) -> String {
+    if number == 1 { format!("1 {what}") } else { format!("{number} {what}s") }
 }
 
 fn time(ms: f64) -> String {

@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 
 use anyhow::Result;
-use biscale::accuracy::{Pair, ReferenceSettings};
+use biscale::accuracy::{Health, Pair, ReferenceSettings};
 use biscale::directions::from_angles;
 use biscale::filtering::Reflectance;
 use biscale::pipeline::Pipeline;
@@ -13,8 +13,13 @@ use biscale::plan::{Preset, Settings};
 use biscale::{Error, InputError};
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::Serialize;
 
+use super::print_json;
 use crate::EvalArgs;
+
+/// Longer lists are no lists of pairs.
+const LARGEST_FILE: u64 = 1 << 30;
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
 
@@ -29,6 +34,8 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
     let settings = Settings::from_quality(&loaded.scene.quality);
     let mut pipeline = Pipeline::new();
+    let health;
+    let mut form = "reference sum".to_owned();
     let (values, errors) = if settings.preset == Preset::Reference {
         let reference = ReferenceSettings {
             facets: settings.reference_facets,
@@ -45,10 +52,14 @@ pub fn run(args: &EvalArgs) -> Result<()> {
             })
         })?;
         bar.finish_and_clear();
+        health = pipeline.input_health(&loaded)?;
+        args.scene.warn(&health);
         estimates.iter().map(|estimate| (estimate.f_bar, estimate.standard_error)).unzip()
     } else {
         let outcome = pipeline.effective(&loaded)?;
         args.scene.notes(&outcome);
+        health = outcome.health().clone();
+        form = outcome.brdf.form.describe();
         let values: Vec<Vec3> = pairs
             .par_iter()
             .map(|pair| {
@@ -74,7 +85,20 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         return Ok(());
     }
     biscale::export::replace_file(&args.output, text.as_bytes())?;
+    if args.scene.json {
+        let output = args.output.display().to_string();
+        return print_json(&Report { output, pairs: values.len(), form, health });
+    }
     Ok(())
+}
+
+/// What `--json` prints where standard output does not hold the values themselves.
+#[derive(Serialize)]
+struct Report {
+    output: String,
+    pairs: usize,
+    form: String,
+    health: Health,
 }
 
 /// A bar on a terminal, nothing in a pipe.
@@ -111,9 +135,9 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
     let complain = |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
     let mut text = String::new();
     let got = if path == Path::new("-") {
-        std::io::stdin().lock().read_to_string(&mut text)
+        std::io::stdin().lock().take(LARGEST_FILE).read_to_string(&mut text)
     } else {
-        std::fs::File::open(path).and_then(|mut file| file.read_to_string(&mut text))
+        std::fs::File::open(path).and_then(|file| file.take(LARGEST_FILE).read_to_string(&mut text))
     };
     got.map_err(|error| complain(String::new(), error.to_string(), "a CSV file that can be read"))?;
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
+use biscale::accuracy::Health;
 use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use biscale::pipeline::Pipeline;
 use serde::Serialize;
@@ -11,7 +12,7 @@ use super::print_json;
 use crate::{ExportArgs, Radiance};
 
 #[derive(Serialize)]
-struct Report {
+struct Report<'a> {
     output: String,
     /// The file of plain words beside it.
     note: Option<String>,
@@ -27,6 +28,7 @@ struct Report {
     form: String,
     /// Directional-hemispherical: theta and phi in degrees, R, G, B.
     reflectance: Vec<[f32; 5]>,
+    health: &'a Health,
 }
 
 pub fn run(args: &ExportArgs) -> Result<()> {
@@ -73,6 +75,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             resampling_psnr_db: reading.errors.psnr_db,
             anisotropy_lost: report.anisotropy_lost,
             form: outcome.brdf.form.describe(),
+            health: outcome.health(),
             reflectance: report
                 .reflectances
                 .of_direction

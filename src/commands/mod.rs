@@ -14,8 +14,12 @@ pub mod tile;
 use std::io::Write;
 
 use anyhow::Result;
+use biscale::Cancel;
+use biscale::accuracy::Health;
+use biscale::accuracy::choose::{Goal, choose};
 use biscale::pipeline::Outcome;
-use biscale::scene::{self, LoadedScene};
+use biscale::scene::{self, Effects, LoadedScene, Switch};
+use indicatif::ProgressBar;
 
 use crate::{Backend, Quality, SceneArgs};
 
@@ -44,7 +48,29 @@ impl SceneArgs {
         if let Some(seed) = self.seed {
             set.push(format!("quality.seed={seed}"));
         }
-        Ok(scene::open(&self.scene, &set)?)
+        set.extend(self.effects.iter().cloned());
+        let loaded = scene::open(&self.scene, &set)?;
+        match self.goal() {
+            Some(goal) => self.choose(&loaded, goal),
+            None => Ok(loaded),
+        }
+    }
+
+    fn goal(&self) -> Option<Goal> {
+        self.target_db.map(Goal::Decibels).or(self.budget_ms.map(Goal::Milliseconds))
+    }
+
+    /// The scene with settings that were chosen for a goal. What was asked and got is always said: without it nobody could
+    /// repeat the settings.
+    fn choose(&self, loaded: &LoadedScene, goal: Goal) -> Result<LoadedScene> {
+        let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+        let chosen = choose(loaded, goal, &Cancel::default(), |doing| {
+            bar.set_message(doing.to_owned());
+            bar.tick();
+        })?;
+        bar.finish_and_clear();
+        eprintln!("{}", chosen.sentence());
+        Ok(chosen.scene)
     }
 
     /// Says what a person should know about how the result was made.
@@ -52,6 +78,16 @@ impl SceneArgs {
         if !self.quiet {
             for note in &outcome.notes {
                 eprintln!("note: {note}");
+            }
+        }
+        self.warn(outcome.health());
+    }
+
+    /// Says what is weak about a result, and what would mend it.
+    pub fn warn(&self, health: &Health) {
+        if !self.quiet {
+            for warning in &health.warnings {
+                eprintln!("warning: {warning}");
             }
         }
     }
@@ -76,6 +112,35 @@ pub fn parse_count(text: &str) -> std::result::Result<usize, String> {
 pub fn parse_minutes(text: &str) -> std::result::Result<f64, String> {
     let minutes = text.parse::<f64>().ok().filter(|minutes| (0.0..=1e4).contains(minutes));
     minutes.ok_or_else(|| format!("found `{text}`, expected minutes from 0 to 10000"))
+}
+
+/// `NAME=on|off|auto` as the override it is. Factors are an effect of the plan too, and a knob of their own.
+pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
+    let complain = || format!("found `{text}`, expected NAME=on, NAME=off or NAME=auto");
+    let (name, value) = text.split_once('=').ok_or_else(complain)?;
+    let (name, value) = (name.trim(), value.trim());
+    if !Switch::NAMES.contains(&value) {
+        return Err(complain());
+    }
+    let known: Vec<&str> = Effects::fields().iter().map(|field| field.key).filter(|key| *key != "bounces").collect();
+    match name {
+        "low_rank" => {
+            let method = match value {
+                "on" => "low_rank",
+                "off" => "direct",
+                _ => "auto",
+            };
+            Ok(format!("quality.method={method}"))
+        }
+        name if known.contains(&name) => Ok(format!("effects.{name}={value}")),
+        name => Err(format!("found the effect `{name}`, expected one of low_rank, {}", known.join(", "))),
+    }
+}
+
+/// A number above zero.
+pub fn parse_positive(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| format!("found `{text}`, expected a number above 0"))
 }
 
 /// Prints JSON on standard output.

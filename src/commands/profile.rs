@@ -37,11 +37,14 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let mut pipeline = Pipeline::new();
     let mut outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
-    let form = outcome.brdf.form.describe();
+    let mut form = outcome.brdf.form.describe();
     let camera = if args.edit == Some(Edit::Camera) {
         let stage = Stage::new(&loaded)?;
         let route = Route::of(&stage, &outcome)?;
-        Some((stage, route))
+        // A camera edit keeps what pictures read.
+        let pictured = route.reads(&outcome)?;
+        form = pictured.brdf.form.describe();
+        Some((stage, route, pictured))
     } else {
         None
     };
@@ -49,8 +52,8 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     for run in 0..=args.repeat {
         let start = Instant::now();
         let times = match (&camera, args.edit) {
-            (Some((stage, route)), _) => {
-                let times = route.render(stage, &outcome.brdf, [384, 384], 1)?.times;
+            (Some((stage, route, pictured)), _) => {
+                let times = route.render(stage, &pictured.brdf, [384, 384], 1)?.times;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
             }
             (None, Some(_)) => {

@@ -1,18 +1,36 @@
 //! `biscale render`: the object of a scene, shaded.
 
 use anyhow::Result;
-use biscale::Error;
+use biscale::accuracy::Health;
 use biscale::filtering::EffectiveBrdf;
 use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::large_scale::{GpuRenderer, Rendered, Stage, render};
-use biscale::pipeline::{Outcome, Pipeline};
+use biscale::pipeline::{Outcome, Pictured, Pipeline};
 use biscale::plan::Backend;
+use biscale::{Cancel, Error};
 use serde::Serialize;
 
 use super::print_json;
 use crate::RenderArgs;
+
+/// Where pictures are made.
+pub enum Route {
+    /// `refused`: why the graphics processor, which is there, does not.
+    Cpu {
+        refused: Option<GpuError>,
+    },
+    Gpu(Box<OnDevice>),
+}
+
+/// A device and what it holds of the scene.
+pub struct OnDevice {
+    gpu: Gpu,
+    renderer: GpuRenderer,
+    /// Whether the person asked for it.
+    required: bool,
+}
 
 impl Route {
     /// The route that the scene's back end asks for: `gpu` any adapter or an error that says why not, `cpu` none, `auto` a
@@ -55,6 +73,14 @@ impl Route {
         })
     }
 
+    /// The form of a material that this route reads: the CPU a table where it is close enough, a device the sums.
+    pub fn reads(&self, outcome: &Outcome) -> Result<Pictured> {
+        Ok(match self {
+            Self::Cpu { .. } => outcome.for_pictures(&Cancel::default())?,
+            Self::Gpu(_) => Pictured { brdf: outcome.brdf.clone(), errors: None, ms: 0.0 },
+        })
+    }
+
     /// `cpu`, or the adapter.
     pub fn describe(&self) -> String {
         match self {
@@ -64,25 +90,8 @@ impl Route {
     }
 }
 
-/// Where pictures are made.
-pub enum Route {
-    /// `refused`: why the graphics processor, which is there, does not.
-    Cpu {
-        refused: Option<GpuError>,
-    },
-    Gpu(Box<OnDevice>),
-}
-
-/// A device and what it holds of the scene.
-pub struct OnDevice {
-    gpu: Gpu,
-    renderer: GpuRenderer,
-    /// Whether the person asked for it.
-    required: bool,
-}
-
 #[derive(Serialize)]
-struct Report {
+struct Report<'a> {
     picture: String,
     width: usize,
     height: usize,
@@ -90,7 +99,10 @@ struct Report {
     points: usize,
     /// Where it was shaded: `cpu`, or the adapter.
     device: String,
+    /// The form of the effective BRDF that was read.
+    reads: String,
     stages: serde_json::Map<String, serde_json::Value>,
+    health: &'a Health,
 }
 
 pub fn run(args: &RenderArgs) -> Result<()> {
@@ -108,11 +120,17 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     if let (Route::Cpu { refused: Some(error) }, false) = (&route, args.scene.quiet) {
         eprintln!("note: shaded on the CPU: {error}");
     }
-    let rendered = route.render(&stage, &outcome.brdf, args.size, usize::from(args.samples))?;
+    let pictured = route.reads(&outcome)?;
+    let rendered = route.render(&stage, &pictured.brdf, args.size, usize::from(args.samples))?;
     rendered.picture.write(&args.output, &tone_map)?;
     if args.scene.json {
         let times = rendered.times;
-        let large = [("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)];
+        let large = [
+            ("picture_table", pictured.ms),
+            ("g_buffer", times.gbuffer_ms),
+            ("shadows", times.shadows_ms),
+            ("shading", times.shading_ms),
+        ];
         let stages =
             outcome.times.iter().copied().chain(large).map(|(name, ms)| (name.to_owned(), ms.into())).collect();
         return print_json(&Report {
@@ -122,7 +140,9 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             lights: stage.lights.directional.len(),
             points: rendered.points,
             device: route.describe(),
+            reads: pictured.brdf.form.describe(),
             stages,
+            health: outcome.health(),
         });
     }
     Ok(())

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use biscale::accuracy::ReferenceSettings;
 use biscale::accuracy::sweep::{Candidate, Family, Point, Truth, candidates, measure, reference_point, with_settings};
+use biscale::accuracy::{ReferenceSettings, ladder};
 use biscale::export::replace_file;
 use biscale::filtering::EffectiveBrdf;
 use biscale::pipeline::Pipeline;
@@ -99,7 +99,7 @@ fn one_scene(args: &ReportArgs, loaded: &LoadedScene, progress: &mut Progress) -
         Some(known) => known,
         None => SceneProgress { key, truth: truth(args, loaded, budget, &bar)?, points: Vec::new() },
     };
-    let list = in_order(candidates(has_measured(loaded), args.combinations));
+    let list = in_order(candidates(has_measured(loaded), overhangs(loaded), args.combinations));
     bar.set_length(list.len() as u64);
     let mut left_out = 0;
     for (k, candidate) in list.iter().enumerate() {
@@ -165,6 +165,12 @@ fn in_order(all: Vec<Candidate>) -> Vec<Candidate> {
         }
         presets.extend(next);
     }
+}
+
+/// Whether one horizon an azimuth does not tell what a facet sees.
+fn overhangs(loaded: &LoadedScene) -> bool {
+    let settings = with_settings(loaded, &ladder::rung(0.0, false));
+    settings.and_then(|scene| Pipeline::new().effective(&scene)).is_ok_and(|outcome| outcome.plan.overhangs())
 }
 
 fn has_measured(loaded: &LoadedScene) -> bool {

@@ -20,6 +20,9 @@ pub struct PolarGrid {
     pub azimuths: usize,
 }
 
+/// `1 / cos 89.9°`.
+const INVERSE_HORIZON_COSINE: f32 = 572.9581;
+
 impl PolarGrid {
     /// Where the last ring stands: a bidirectional quantity need not vanish at the horizon.
     pub const HORIZON_DEG: f32 = 89.9;
@@ -57,6 +60,13 @@ impl PolarGrid {
 
     pub fn directions(&self) -> Vec<Vec3> {
         (0..self.len()).map(|node| self.direction(node)).collect()
+    }
+
+    /// What multiplies a bidirectional quantity read from the grid towards a direction of this height: between the last ring
+    /// and the horizon it falls to zero with the cosine. Held as it is at the last ring, divided by a projected area that
+    /// goes to zero, it would grow without bound.
+    pub fn horizon_taper(z: f32) -> f32 {
+        (z * INVERSE_HORIZON_COSINE).min(1.0)
     }
 
     /// Solid angle [sr] that a node stands for; the horizon ring has none of its own.
@@ -116,6 +126,13 @@ mod tests {
             assert!((taps.iter().map(|tap| tap.1).sum::<f32>() - 1.0).abs() < 1e-5);
             assert!(taps.iter().all(|tap| tap.1 >= 0.0 && tap.0 < grid.len()));
         }
+    }
+
+    #[test]
+    fn the_taper_begins_at_the_last_ring() {
+        let lowest = from_angles(PolarGrid::HORIZON_DEG.to_radians(), 0.3).z;
+        assert!((PolarGrid::horizon_taper(lowest) - 1.0).abs() < 1e-4);
+        assert_eq!((PolarGrid::horizon_taper(0.5), PolarGrid::horizon_taper(0.0)), (1.0, 0.0));
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
     replacing(path, |out| out.write_all(bytes))
 }
 
-/// Opens a file beside `path`, lets `content` fill it, and renames it to `path`.
+/// Opens a file beside `path`, lets `content` fill it, and renames it to `path`. Devices and pipes are written to.
 pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T> {
     // What `content` says in our own words stays so.
     let unwritable = |error: io::Error| {
@@ -34,9 +34,16 @@ pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
                 .in_file(path)
                 .into());
         }
+        if !there.is_file() {
+            // A device or a pipe holds nothing to keep; a file in its place would be another thing.
+            let mut device = BufWriter::new(File::options().write(true).open(&target).map_err(unwritable)?);
+            let value = content(&mut device).map_err(unwritable)?;
+            device.flush().map_err(unwritable)?;
+            return Ok(value);
+        }
     }
-    let temporary = Temporary(beside(&target));
-    let mut file = BufWriter::new(File::create_new(&temporary.0).map_err(unwritable)?);
+    let (temporary, file) = open_beside(&target).map_err(unwritable)?;
+    let mut file = BufWriter::new(file);
     let value = content(&mut file).map_err(unwritable)?;
     file.into_inner().map_err(|error| unwritable(error.into_error()))?.sync_all().map_err(unwritable)?;
     fs::rename(&temporary.0, &target).map_err(unwritable)?;
@@ -53,9 +60,19 @@ impl Drop for Temporary {
     }
 }
 
-fn beside(path: &Path) -> PathBuf {
-    let mut name = OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.part", std::process::id()));
-    path.with_file_name(name)
+/// A new file beside `path`. Its name may be taken: by another thread, or by a process of the same number that was killed
+/// (in a container all have the same).
+fn open_beside(path: &Path) -> io::Result<(Temporary, File)> {
+    const MOST_TRIES: u32 = 1000;
+    let mut attempt = 0;
+    loop {
+        let mut name = OsString::from(".");
+        name.push(path.file_name().unwrap_or_default());
+        name.push(format!(".{}-{attempt}.part", std::process::id()));
+        let temporary = path.with_file_name(name);
+        match File::create_new(&temporary) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < MOST_TRIES => attempt += 1,
+            opened => return opened.map(|file| (Temporary(temporary), file)),
+        }
+    }
 }

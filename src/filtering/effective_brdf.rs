@@ -1,8 +1,11 @@
 //! The effective BRDF: one `eval`, whatever form holds it.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
-use super::{Direct, LowRank, Reflectance, Wu2011};
+use super::{Direct, LowRank, PairTable, Reflectance, Wu2011};
+use crate::interreflection::InterreflectionTable;
 
 /// How `G` is held.
 #[derive(Debug, Clone)]
@@ -11,8 +14,12 @@ pub enum Form {
     Direct(Direct),
     /// Visibility factors on an (i,o) grid times lobe factors on an (h,d) grid.
     LowRank(LowRank),
+    /// A table of the sum over half and difference coordinates, for pictures.
+    Table(PairTable),
     /// The paper's own tables.
     Wu2011(Wu2011),
+    /// Any of these, and the light between facets added.
+    Interreflecting(Box<Form>, Arc<InterreflectionTable>),
 }
 
 impl Form {
@@ -23,6 +30,12 @@ impl Form {
                 Some(count) => format!("exact lobes of {count} normals over {} facets", direct.sum.facet_count()),
                 None => format!("direct sum over {} facets", direct.sum.facet_count()),
             },
+            Self::Interreflecting(form, table) => {
+                format!("{}, and {} bytes of light between facets", form.describe(), table.bytes())
+            }
+            Self::Table(table) => {
+                format!("a table of {} pairs of directions, {} bytes", table.grid.nodes(), table.bytes())
+            }
             Self::Wu2011(tables) => format!("the paper's tables, {} bytes", tables.bytes()),
             Self::LowRank(factors) => format!(
                 "factors: ranks {} on {} directions",
@@ -61,11 +74,31 @@ impl EffectiveBrdf {
         (self.sums(&[], o, |_, _| {}) / self.base_area) as f32
     }
 
+    /// With light between facets added.
+    pub fn interreflecting(self, table: Arc<InterreflectionTable>) -> Self {
+        Self { form: Form::Interreflecting(Box::new(self.form), table), ..self }
+    }
+
     /// `a_v(o)`, and `a_v f̄` of each light into `out`.
-    fn sums(&self, lights: &[Vec3], o: Vec3, out: impl FnMut(usize, DVec3)) -> f64 {
-        match &self.form {
+    fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        if let Form::Interreflecting(form, table) = &self.form {
+            let mut direct = vec![DVec3::ZERO; lights.len()];
+            let area = form.sums(lights, o, |k, sum| direct[k] = sum);
+            table.add(lights, o, |k, g| out(k, direct[k] + g * self.base_area));
+            return area;
+        }
+        self.form.sums(lights, o, out)
+    }
+}
+
+impl Form {
+    /// `a_v(o)`, and `a_v f̄` of each light into `out`; what facets send to each other is added by [`EffectiveBrdf`].
+    pub(crate) fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        match self {
+            Self::Interreflecting(form, _) => form.sums(lights, o, &mut out as &mut dyn FnMut(usize, DVec3)),
             Form::Direct(direct) => direct.sums(lights, o, out),
             Form::LowRank(factors) => factors.sums(lights, o, out),
+            Form::Table(table) => table.sums(lights, o, out),
             Form::Wu2011(tables) => tables.sums(lights, o, out),
         }
     }

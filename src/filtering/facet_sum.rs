@@ -46,6 +46,8 @@ pub struct FacetSum {
     normals: [Vec<f32>; 3],
     areas: Vec<f32>,
     groups: Vec<Group>,
+    /// Black materials are summed too.
+    keep_black: bool,
 }
 
 /// A run of facets with one material.
@@ -82,6 +84,7 @@ impl FacetSum {
             normals: [component(|n| n.x), component(|n| n.y), component(|n| n.z)],
             areas: facets.areas.clone(),
             groups: Vec::new(),
+            keep_black: false,
         };
         let mut start = 0;
         while start < facets.len() {
@@ -118,6 +121,27 @@ impl FacetSum {
         self.areas.len()
     }
 
+    pub(super) fn keep_black(&mut self, keep: bool) {
+        self.keep_black = keep;
+    }
+
+    pub(super) fn one_lobe_a_facet(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.patches = None);
+    }
+
+    /// One lobe a normal, however many there are.
+    pub(super) fn group_by_normal(&mut self, facets: &Facets) {
+        for group in &mut self.groups {
+            group.patches = Some(patches(facets, group.range.clone()));
+        }
+    }
+
+    pub(super) fn sum_each_channel(&mut self, facets: &Facets) {
+        for group in &mut self.groups {
+            group.rgb_areas = Some(rgb_areas(facets, group.range.clone()));
+        }
+    }
+
     /// Visible projected area `a_v(d)` for the visibility `v` along `d` (Eq. 10).
     pub fn projected_area(&self, v: &[f32], d: Vec3) -> f64 {
         simd::projected_area(self.normals(0..self.areas.len()), &self.areas, v, d)
@@ -128,7 +152,7 @@ impl FacetSum {
         let pair = PairVectors::new(i, o);
         let mut total = DVec3::ZERO;
         for group in &self.groups {
-            let black = group.color == Vec3::ZERO;
+            let black = group.color == Vec3::ZERO && !self.keep_black;
             if !black {
                 total += group.color.as_dvec3() * self.group_sum(group, &pair, v_i, v_o);
             }
@@ -170,6 +194,73 @@ impl FacetSum {
     /// Normal and area of a facet.
     pub(crate) fn facet(&self, s: usize) -> (Vec3, f32) {
         (Vec3::new(self.normals[0][s], self.normals[1][s], self.normals[2][s]), self.areas[s])
+    }
+
+    /// Areas of a group's facets, times their colour weights in one channel where those differ.
+    fn weights<'a>(&'a self, group: &'a Group, channel: Option<usize>) -> &'a [f32] {
+        match (&group.rgb_areas, channel) {
+            (Some(rgb), Some(channel)) => &rgb[channel],
+            _ => &self.areas[group.range.clone()],
+        }
+    }
+
+    /// One lobe of one group, without its tint and the group's colour; visibilities are those of all facets.
+    pub(crate) fn lobe_sum(
+        &self,
+        group: usize,
+        lobe: usize,
+        channel: Option<usize>,
+        pair: &PairVectors,
+        v_i: &[f32],
+        v_o: &[f32],
+    ) -> f64 {
+        let group = &self.groups[group];
+        let range = group.range.clone();
+        let weights = self.weights(group, channel);
+        let (v_i, v_o) = (&v_i[range.clone()], &v_o[range.clone()]);
+        simd::lobe_sums(group.lobes[lobe].0, pair, self.normals(range), [weights], v_i, v_o)[0]
+    }
+
+    /// The area of the facets of one normal that `i` and `o` both see.
+    pub(crate) fn visible_area(
+        &self,
+        group: usize,
+        patch: usize,
+        channel: Option<usize>,
+        v_i: &[f32],
+        v_o: &[f32],
+    ) -> f64 {
+        let group = &self.groups[group];
+        let Some(patch) = group.patches.as_ref().map(|patches| &patches[patch]) else { return 0.0 };
+        let range = patch.range.clone();
+        let weights = &self.weights(group, channel)[range.start - group.range.start..range.end - group.range.start];
+        simd::masked_sum([weights], &v_i[range.clone()], &v_o[range])[0]
+    }
+
+    /// One colour of one measured BRDF of one group.
+    #[expect(clippy::too_many_arguments, reason = "what to sum, and where")]
+    pub(crate) fn measured_sum(
+        &self,
+        group: usize,
+        table: usize,
+        channel: Option<usize>,
+        color: usize,
+        pair: &PairVectors,
+        v_i: &[f32],
+        v_o: &[f32],
+    ) -> f64 {
+        let group = &self.groups[group];
+        let (range, weights) = (group.range.clone(), self.weights(group, channel));
+        let mut total = 0.0;
+        for (s, weight) in range.zip(weights) {
+            let seen = v_i[s] * v_o[s];
+            let angles = LobeAngles::new(self.facet(s).0, pair.i, pair.o, pair.h);
+            if seen > 0.0 && angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
+                let value = group.measured[table].f_r(&angles)[color];
+                total += f64::from(value * weight * (angles.n_dot_i * angles.n_dot_o * seen));
+            }
+        }
+        total
     }
 
     fn normals(&self, range: Range<usize>) -> [&[f32]; 3] {
@@ -240,19 +331,8 @@ impl Group {
     fn new(facets: &Facets, range: Range<usize>) -> Self {
         let colors = &facets.colors[range.clone()];
         let uniform = colors.iter().all(|&color| color == Vec3::ONE);
-        let rgb_areas = (!uniform).then(|| {
-            std::array::from_fn(|c| {
-                colors.iter().zip(&facets.areas[range.clone()]).map(|(color, area)| color[c] * area).collect()
-            })
-        });
-        let mut patches: Vec<Patch> = Vec::new();
-        for s in range.clone() {
-            let normal = facets.normals[s];
-            match patches.last_mut() {
-                Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
-                _ => patches.push(Patch { range: s..s + 1, normal }),
-            }
-        }
+        let rgb_areas = (!uniform).then(|| rgb_areas(facets, range.clone()));
+        let patches = patches(facets, range.clone());
         let few = patches.len() * FACETS_A_PATCH <= range.len();
         Self {
             range,
@@ -263,6 +343,25 @@ impl Group {
             patches: few.then_some(patches),
         }
     }
+}
+
+/// Areas times colour weights.
+fn rgb_areas(facets: &Facets, range: Range<usize>) -> [Vec<f32>; 3] {
+    let pairs = || facets.colors[range.clone()].iter().zip(&facets.areas[range.clone()]);
+    std::array::from_fn(|c| pairs().map(|(color, area)| color[c] * area).collect())
+}
+
+/// Runs of facets with one normal.
+fn patches(facets: &Facets, range: Range<usize>) -> Vec<Patch> {
+    let mut patches: Vec<Patch> = Vec::new();
+    for s in range {
+        let normal = facets.normals[s];
+        match patches.last_mut() {
+            Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
+            _ => patches.push(Patch { range: s..s + 1, normal }),
+        }
+    }
+    patches
 }
 
 /// The inner-loop form of an analytic term; `None` for a measured one.

@@ -56,6 +56,76 @@ mod tests {
         assert_eq!(rank_for(&solved.values, 0.999), 1);
     }
 
+    /// LAPACK's ratios of a symmetric factorization (its test DCHKST; DESIGN.md, Sec. 9): what is lost in rebuilding the
+    /// matrix, and how far the vectors are from orthonormal, both in units of rounding.
+    fn ratios(gram: &DMatrix<f64>, solved: &Eigen) -> [f64; 2] {
+        let n = gram.nrows();
+        if n == 0 {
+            return [0.0; 2];
+        }
+        let rounding = n as f64 * f64::EPSILON;
+        let rebuilt =
+            &solved.vectors * DMatrix::from_diagonal(&solved.values.clone().into()) * solved.vectors.transpose();
+        let norm = gram.norm();
+        let lost = if norm > 0.0 { (rebuilt - gram).norm() / (norm * rounding) } else { 0.0 };
+        [lost, (solved.vectors.transpose() * &solved.vectors - DMatrix::identity(n, n)).norm() / rounding]
+    }
+
+    /// Numbers in [-1, 1] without structure.
+    fn noise(rows: usize, columns: usize) -> DMatrix<f64> {
+        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        DMatrix::from_fn(rows, columns, |_, _| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        })
+    }
+
+    /// `U diag(values) V^T` with orthonormal U and V.
+    fn with_values(rows: usize, columns: usize, values: &[f64]) -> DMatrix<f64> {
+        let basis = |n: usize| noise(n, n).qr().q();
+        let (u, v) = (basis(rows), basis(columns));
+        let s =
+            DMatrix::from_fn(rows, columns, |r, c| if r == c { values.get(r).copied().unwrap_or(0.0) } else { 0.0 });
+        u * s * v.transpose()
+    }
+
+    #[test]
+    fn the_factorization_stays_within_lapacks_ratios_on_hard_matrices_of_any_scale() {
+        let clustered: Vec<f64> =
+            (0..24).map(|k| if k < 12 { 1.0 } else { 1e-6 } * (1.0 + 1e-14 * f64::from(k))).collect();
+        let graded: Vec<f64> = (0..24).map(|k| 10_f64.powi(-k)).collect();
+        let mut one_huge = vec![1.0; 24];
+        one_huge[0] = 1e8;
+        let kinds: Vec<(&str, DMatrix<f64>)> = vec![
+            ("all ones", DMatrix::from_element(40, 24, 1.0)),
+            ("rank 0", DMatrix::zeros(40, 24)),
+            ("rank 1", noise(40, 1) * noise(1, 24)),
+            ("equal values", with_values(40, 24, &[1.0; 24])),
+            ("clustered values", with_values(40, 24, &clustered)),
+            ("values of 24 orders", with_values(40, 24, &graded)),
+            ("one huge value", with_values(40, 24, &one_huge)),
+            ("noise, more rows", noise(300, 24)),
+            ("noise, more columns", noise(24, 300)),
+            ("one entry", DMatrix::from_element(1, 1, 3.0)),
+            ("no rows", DMatrix::zeros(0, 7)),
+            ("no columns", DMatrix::zeros(7, 0)),
+        ];
+        for (name, matrix) in &kinds {
+            for scale in [1e-30, 1e-15, 1.0, 1e15, 1e30] {
+                let scaled = matrix * scale;
+                for gram in [scaled.transpose() * &scaled, &scaled * scaled.transpose()] {
+                    let solved = eigen(gram.clone()).unwrap();
+                    let [lost, skew] = ratios(&gram, &solved);
+                    assert!(lost < 50.0 && skew < 50.0, "{name} times {scale:e}: {lost:.1}, {skew:.1}");
+                    assert!(solved.values.windows(2).all(|pair| pair[0] >= pair[1] && pair[1] >= 0.0), "{name}");
+                    assert!((1..=gram.nrows().max(1)).contains(&rank_for(&solved.values, 0.98)), "{name}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn clustered_and_huge_values_are_rebuilt_to_rounding() {
         for scale in [1e-30, 1.0, 1e30] {

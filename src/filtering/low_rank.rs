@@ -234,6 +234,9 @@ fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32
     let component = |pick: fn(&Vec3) -> f32| -> Vec<f32> { facets.normals.iter().map(pick).collect() };
     let (x, y, z) = (component(|n| n.x), component(|n| n.y), component(|n| n.z));
     let grid = visibility.grid;
+    if facets.is_empty() {
+        return vec![0.0; grid.len()];
+    }
     visibility
         .rows
         .chunks(facets.len().max(1))
@@ -290,7 +293,8 @@ impl LowRank {
                 total += (tint * value).as_dvec3();
             }
             // Truncated factors may fall a little below zero; no BRDF does.
-            out(k, total.max(DVec3::ZERO));
+            let taper = PolarGrid::horizon_taper(i.z) * PolarGrid::horizon_taper(o.z);
+            out(k, total.max(DVec3::ZERO) * f64::from(taper));
         }
         f64::from(relative * o.z)
     }

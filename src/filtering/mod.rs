@@ -4,9 +4,11 @@ mod bvndf;
 mod direct;
 mod effective_brdf;
 mod facet_sum;
-mod gemm;
+mod forced;
+pub(crate) mod gemm;
 mod gram;
 mod low_rank;
+mod pair_table;
 mod rotated_basis;
 mod wu2011;
 
@@ -16,7 +18,9 @@ pub use bvndf::VisibilityRows;
 pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
+pub use forced::mean_colors;
 pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint};
+pub use pair_table::PairTable;
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 

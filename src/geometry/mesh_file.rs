@@ -24,7 +24,7 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         // Triangles with a corner that has no normal are flat: their corners get the geometric one.
         let shading = |triangle: &[obj::ObjCorner; 3]| -> [Vec3; 3] {
             let [a, b, c] = triangle.map(|corner| file.positions[corner.position as usize]);
-            let flat = (b - a).cross(c - a).try_normalize().unwrap_or_default();
+            let flat = (b - a).as_dvec3().cross((c - a).as_dvec3()).try_normalize().unwrap_or_default().as_vec3();
             let own =
                 triangle.map(|corner| corner.normal.and_then(|normal| file.normals[normal as usize].try_normalize()));
             match own {
@@ -35,6 +35,7 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         mesh.corner_normals = Some(file.triangles.iter().map(shading).collect());
     }
     mesh.positions = file.positions;
+    super::check_extent(&mesh).map_err(|error| error.in_file(&spec.path))?;
     mesh.closes_plane = closure::is_closed_sheet(&mesh);
     if !mesh.closes_plane {
         mesh.notes.push(format!(

@@ -20,6 +20,7 @@ pub mod gpu_shading;
 mod gpu_shading_tests;
 #[cfg(test)]
 mod gpu_tests;
+pub mod light_choice;
 pub mod lights;
 pub mod objects;
 pub mod picture;
@@ -35,6 +36,7 @@ pub mod tone_map;
 pub use camera::CameraView;
 pub use gbuffer::GBuffer;
 pub use gpu_render::{GpuRenderer, render_gpu};
+pub use light_choice::FAINT_PART;
 pub use lights::DirectionalLight;
 pub use objects::ObjectMesh;
 pub use picture::Picture;

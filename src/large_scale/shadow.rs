@@ -80,6 +80,11 @@ impl Occluder {
         can_self_shadow(mesh).then(|| Self { bvh: Bvh::new(mesh) })
     }
 
+    /// One for any object, convex or not.
+    pub fn always(mesh: &ObjectMesh) -> Self {
+        Self { bvh: Bvh::new(mesh) }
+    }
+
     /// Worth making where the camera moves about the same mesh and lights, and mostly already for one picture whose
     /// shading points outnumber the mesh's vertices (measured: plate 385 ms with, 1140 without; bunny 1470 and 1025).
     pub fn cache(&self, mesh: &ObjectMesh, lights: &[DirectionalLight]) -> ShadowCache {

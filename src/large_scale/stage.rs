@@ -1,12 +1,13 @@
 //! What stays between pictures of a scene: the object, its lights and the camera.
 
+use super::light_choice::worth_shading;
 use super::lights::{self, Lights};
 use super::shading::Background;
 use super::shadow::Occluder;
 use super::{ObjectMesh, RenderInput, objects};
 use crate::error::Result;
 use crate::filtering::Reflectance;
-use crate::scene::{Camera, LoadedScene};
+use crate::scene::{Camera, LoadedScene, Switch};
 
 /// The large scale of a scene, ready for any material.
 pub struct Stage {
@@ -14,6 +15,8 @@ pub struct Stage {
     /// `None` where nothing can be shadowed.
     pub occluder: Option<Occluder>,
     pub lights: Lights,
+    /// Lights left out: nothing faces them, or they are too faint to be seen.
+    pub dropped_lights: usize,
     pub camera: Camera,
 }
 
@@ -22,9 +25,20 @@ impl Stage {
     /// An object or an environment that cannot be used.
     pub fn new(loaded: &LoadedScene) -> Result<Self> {
         let mesh = objects::build(&loaded.scene.object, &loaded.base_dir)?;
-        let lights = lights::build(&loaded.scene.light, &loaded.base_dir)?;
-        let occluder = if lights.directional.is_empty() { None } else { Occluder::of(&mesh) };
-        Ok(Self { mesh, occluder, lights, camera: loaded.scene.camera.clone().unwrap_or_default() })
+        let mut lights = lights::build(&loaded.scene.light, &loaded.base_dir)?;
+        let effects = &loaded.scene.effects;
+        let all = lights.directional.len();
+        if effects.faint_lights != Switch::On {
+            lights.directional = worth_shading(&mesh, &lights.directional);
+        }
+        let dropped_lights = all - lights.directional.len();
+        let occluder = match effects.self_shadow {
+            Switch::Off => None,
+            _ if lights.directional.is_empty() => None,
+            Switch::On => Some(Occluder::always(&mesh)),
+            Switch::Auto => Occluder::of(&mesh),
+        };
+        Ok(Self { mesh, occluder, lights, dropped_lights, camera: loaded.scene.camera.clone().unwrap_or_default() })
     }
 
     /// All that a picture of the object in one material depends on, `size` in pixels.

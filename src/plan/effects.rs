@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Method, Preset, Settings};
+use super::{Method, Preset, Settings, decisions};
 
 /// One effect of the plan, as `biscale plan --json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -13,6 +13,11 @@ pub struct Effect {
     pub predicted_ms: f64,
     /// `None` until the stage has run.
     pub measured_ms: Option<f64>,
+    /// Did a person force it?
+    pub forced: bool,
+    /// Where it is off by itself: the relative L2 of `f̄` that turning it on changes at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<f64>,
 }
 
 /// How visibility is computed.
@@ -36,6 +41,14 @@ pub enum Route {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Findings {
     pub flat: bool,
+    /// The largest angle between a surface normal and z [rad].
+    pub steepest: f32,
+    /// The largest part of uniform light that a material reflects.
+    pub albedo: f64,
+    /// Do all materials reflect all channels alike?
+    pub grey: bool,
+    /// Planes x = const and y = const that mirror the tile; `None` where nobody looked.
+    pub mirrors: Option<[bool; 2]>,
     pub height_samples: bool,
     pub height_field: bool,
     pub closes_plane: bool,
@@ -69,6 +82,7 @@ pub struct Costs {
     pub march_ns: f64,
     pub scan_ns: f64,
     pub factor_query_ns: f64,
+    pub table_query_ns: f64,
     pub slice_ns: f64,
     pub triangle_ns: f64,
     pub texel_ns: f64,
@@ -84,6 +98,7 @@ impl Default for Costs {
             march_ns: 1_000.0,
             scan_ns: 1_000.0,
             factor_query_ns: 1_500.0,
+            table_query_ns: 120.0,
             slice_ns: 18.0,
             triangle_ns: 60.0,
             texel_ns: 10.0,
@@ -101,10 +116,21 @@ pub struct Plan {
     pub route: Route,
     /// Try the factored form first; it must pass its check against the direct sum.
     pub try_low_rank: bool,
+    /// Add light that facets send to each other.
+    pub interreflection: bool,
+    /// Mirror planes that spare the other half of the directions.
+    pub mirrors: [bool; 2],
+    /// Try a table for pictures first; it must pass its check against the BRDF.
+    pub try_picture_table: bool,
     pub effects: Vec<Effect>,
 }
 
 impl Plan {
+    /// Does the route look for more than one horizon an azimuth?
+    pub fn overhangs(&self) -> bool {
+        matches!(self.route, Route::Slices | Route::CpuMaps | Route::GpuMaps)
+    }
+
     /// Notes how far the factored form was from the direct sum, and whether it was kept.
     pub fn factored(&mut self, kept: bool, rel_l2: f64) {
         for effect in &mut self.effects {
@@ -130,12 +156,12 @@ impl Plan {
 pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     let mut effects = Vec::new();
     let mut note = |name, on, reason: String, predicted_ms: f64| {
-        effects.push(Effect { name, on, reason, predicted_ms, measured_ms: None });
+        effects.push(Effect { name, on, reason, predicted_ms, measured_ms: None, forced: false, bound: None });
     };
     let facets = settings.facets as f64;
     let route = route(found, settings, costs);
     let (what, predicted) = match route {
-        Route::None => ("the tile is flat: every facet sees every direction".to_owned(), 0.0),
+        Route::None => (decisions::no_visibility(found, settings), 0.0),
         Route::HeightMarch => (
             format!("a height-field: horizons along {} azimuths, walking its samples", settings.horizon_azimuths),
             facets * settings.horizon_azimuths as f64 * costs.march_ns * 1e-6 / costs.threads,
@@ -181,10 +207,15 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     let try_low_rank = match settings.method {
         Method::Direct => false,
         Method::LowRank => true,
-        // A flat tile is its own BRDF: nothing to factor. Few normals have sharp edges between them, which factors only
-        // reach at the lobes' own grid: tried on grooves and pyramids, they were given up every time.
-        Method::Auto => allowed && !found.flat && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
+        // Sums of analytic lobes are quick enough for single pairs and export, and pictures read a table of them: factors
+        // pay where every term is a look-up. Few normals have sharp edges between them, which factors reach at the lobes'
+        // own grid at best (docs/accuracy.txt: 2.6 % on a V-groove).
+        Method::Auto => allowed && found.lookups > 0 && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
     };
+    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
+    let tabulating_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * direct_query);
+    let pays = !found.flat && tabulating_ms.is_some_and(|ms| ms + table_ms < direct_ms);
+    let try_picture_table = decisions::is_on(settings.effects.picture_table, pays);
     let comparison = format!(
         "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
     );
@@ -204,9 +235,25 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         },
         if try_low_rank { 800.0 } else { 0.0 },
     );
+    let forced = &settings.effects;
+    note(
+        "picture_table",
+        try_picture_table,
+        match tabulating_ms {
+            _ if found.flat => "a flat tile is its own BRDF".to_owned(),
+            None => "pictures evaluate the BRDF itself at this quality".to_owned(),
+            Some(ms) => format!(
+                "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {table_ms:.0} ms \
+                 from a table that takes {ms:.0} ms, once; kept if within {:.0} % and {:.0} dB of the sum",
+                settings.picture_tolerance.0 * 100.0,
+                settings.picture_tolerance.1
+            ),
+        },
+        if try_picture_table { tabulating_ms.unwrap_or(0.0) } else { 0.0 },
+    );
     note(
         "exact_lobes",
-        found.distinct_normals.is_some(),
+        decisions::is_on(forced.exact_lobes, found.distinct_normals.is_some()),
         match found.distinct_normals {
             Some(count) => format!("{count} distinct normals: one exact lobe each, whatever the number of facets"),
             None => "normals differ from facet to facet".to_owned(),
@@ -215,7 +262,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     );
     note(
         "color_weights",
-        found.colors_vary,
+        decisions::is_on(forced.color_weights, found.colors_vary),
         if found.colors_vary {
             "colour weights differ between facets of one material: three sums, one a channel".to_owned()
         } else {
@@ -225,7 +272,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     );
     note(
         "material_groups",
-        found.materials > 1,
+        decisions::is_on(forced.material_groups, found.materials > 1),
         match (found.materials, found.black_materials) {
             (n, 0) if n > 1 => format!("{n} materials, each summed over its own facets"),
             (n, black) if n > 1 => format!("{n} materials, each summed over its own facets; {black} black and skipped"),
@@ -252,7 +299,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     );
     note(
         "self_shadow",
-        found.object_self_shadows && found.lights > 0,
+        decisions::is_on(forced.self_shadow, found.object_self_shadows && found.lights > 0),
         if !found.object_self_shadows {
             "the object is convex: it cannot shadow itself".to_owned()
         } else if found.lights == 0 {
@@ -262,23 +309,17 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         },
         0.0,
     );
-    note(
-        "lights",
-        found.lights > 0,
-        format!("{} directional lights, {} of them under the horizon of the world", found.lights, found.lights_below),
-        0.0,
-    );
+    let interreflection = decisions::interreflection(found, settings, costs, &mut note);
+    decisions::of_the_scene(found, settings, &mut note);
     for (name, reason) in [
-        (
-            "interreflection",
-            "small-scale interreflection: not asked for; light that facets send to each other is left out, as in the paper",
-        ),
         ("transmission", "light through thin slabs (Dai et al. 2009): not asked for"),
         ("color_map_filtering", "filtered colour maps (Heitz et al. 2013): not asked for"),
     ] {
         note(name, false, reason.to_owned(), 0.0);
     }
-    Plan { route, try_low_rank, effects }
+    decisions::mark(&mut effects, found, settings);
+    let mirrors = decisions::mirrors(found, settings);
+    Plan { route, try_low_rank, try_picture_table, interreflection, mirrors, effects }
 }
 
 /// Slicing under overhangs: cells and triangles looked at, facet by facet.
@@ -295,7 +336,7 @@ fn maps_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
 }
 
 fn route(found: &Findings, settings: &Settings, costs: &Costs) -> Route {
-    if found.flat {
+    if !decisions::is_on(settings.effects.visibility, !found.flat && !decisions::is_shallow(found, settings)) {
         Route::None
     } else if found.height_samples {
         Route::HeightMarch

@@ -1,8 +1,9 @@
 //! Presets and knobs: how accurately everything is computed, as typed settings.
 
-use crate::directions::{HalfDifferenceGrid, PolarGrid};
+use crate::directions::{HalfDifferenceGrid, PolarGrid, UpperPairs};
 use crate::filtering::{BasisGrid, LowRankSettings};
-use crate::scene::Quality;
+use crate::interreflection::InterreflectionSettings;
+use crate::scene::{Effects, Quality, Scene};
 
 /// Named settings of the `[quality]` table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,13 +76,29 @@ pub struct Settings {
     /// And the PSNR [dB] that it must reach against it: where `f̄` is broad, a small relative error is still a low PSNR.
     /// Some 5 dB above what the preset promises: the direct sum has errors of its own.
     pub tolerance_db: f64,
+    /// Grids of the table that pictures read, from coarse to fine; the first that is close enough is taken. None: pictures
+    /// evaluate the BRDF itself.
+    pub picture_grids: Vec<UpperPairs>,
+    /// Relative L2 and PSNR [dB] that the table must keep to against the BRDF it is of.
+    pub picture_tolerance: (f64, f64),
     pub reference_facets: usize,
     pub reference_passes: usize,
     pub backend: Backend,
     pub seed: u64,
+    /// What a person forces on or off.
+    pub effects: Effects,
+}
+
+const fn upper_pairs(rings: usize, azimuths: usize, turn: usize, difference: usize) -> UpperPairs {
+    UpperPairs { rings, azimuths, turn, difference }
 }
 
 impl Settings {
+    /// Everything a scene asks for.
+    pub fn of(scene: &Scene) -> Self {
+        Self { effects: scene.effects.clone(), ..Self::from_quality(&scene.quality) }
+    }
+
     /// The preset's knobs, overridden by those given.
     pub fn from_quality(quality: &Quality) -> Self {
         let preset = match quality.preset.as_str() {
@@ -133,6 +150,9 @@ impl Settings {
         if let Some(samples) = quality.reference_samples {
             settings.reference_passes = samples.div_ceil(settings.reference_facets).max(2);
         }
+        if quality.pictures.as_deref() == Some("exact") {
+            settings.picture_grids.clear();
+        }
         settings.colors = quality.colors.or(settings.colors);
         settings
     }
@@ -157,10 +177,13 @@ impl Settings {
             keep_color: 0.999,
             tolerance: 0.04,
             tolerance_db: 41.0,
+            picture_grids: vec![upper_pairs(24, 48, 8, 12), upper_pairs(32, 64, 12, 16)],
+            picture_tolerance: (0.08, 38.0),
             reference_facets: 16_384,
             reference_passes: 32,
             backend: Backend::Auto,
             seed: 1,
+            effects: Effects::default(),
         };
         match preset {
             Preset::Standard => standard,
@@ -179,6 +202,8 @@ impl Settings {
                 normal_rings: 48,
                 tolerance: 0.12,
                 tolerance_db: 28.0,
+                picture_grids: vec![upper_pairs(16, 24, 6, 8)],
+                picture_tolerance: (0.35, 30.0),
                 ..standard
             },
             Preset::Fine | Preset::Reference => Self {
@@ -196,9 +221,22 @@ impl Settings {
                 normal_rings: 64,
                 tolerance: 0.015,
                 tolerance_db: 48.0,
+                picture_grids: if preset == Preset::Fine { vec![upper_pairs(32, 64, 12, 16)] } else { Vec::new() },
+                picture_tolerance: (0.03, 46.0),
                 ..standard
             },
         }
+    }
+
+    /// How finely facets exchange light.
+    pub fn interreflection(&self) -> InterreflectionSettings {
+        let (elements, rays, grid) = match self.preset {
+            Preset::Draft => (1024, 16, PolarGrid::new(6, 16)),
+            Preset::Standard | Preset::Wu2011 => (4096, 16, PolarGrid::new(8, 24)),
+            Preset::Fine | Preset::Reference => (8192, 32, PolarGrid::new(12, 36)),
+        };
+        let elements = elements.min(self.facets);
+        InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
     }
 
     /// What the factored form needs to know.

@@ -87,6 +87,7 @@ pub fn family_name(point: &Point) -> String {
     match &point.family {
         Family::Preset => "preset".to_owned(),
         Family::Knob(name) => format!("knob {name}"),
+        Family::Ladder => "ladder".to_owned(),
         Family::Combination => "combination".to_owned(),
     }
 }
@@ -120,7 +121,11 @@ fn error_against_time(scene: &SceneReport) -> String {
     let front: Vec<(f64, f64)> = pareto(&ours).into_iter().map(|k| (ours[k].ms, percent(ours[k]))).collect();
     chart.line(&front, COLORS[4], false);
     for point in scene.points.iter().filter(|point| point.family != Family::Preset) {
-        let color = if point.family == Family::Combination { COLORS[7] } else { COLORS[0] };
+        let color = match point.family {
+            Family::Combination => COLORS[7],
+            Family::Ladder => COLORS[2],
+            _ => COLORS[0],
+        };
         chart.dot(point.ms, percent(point), 3.5, color, &title(point));
     }
     for point in scene.points.iter().filter(|point| point.family == Family::Preset) {
@@ -128,7 +133,7 @@ fn error_against_time(scene: &SceneReport) -> String {
         chart.words(point.ms, percent(point), COLORS[5], &point.preset);
     }
     format!(
-        "{}<p class='soft'>Blue: one knob turned. Grey: all knobs at once. Line: what nothing beats in both time and error.</p>",
+        "{}<p class='soft'>Blue: one knob turned. Green: from faster to finer, as --target-db and --budget-ms choose. Grey: all knobs at once. Line: what nothing beats in both time and error.</p>",
         chart.finish()
     )
 }

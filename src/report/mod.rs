@@ -1,6 +1,7 @@
 //! Accuracy against time as a page that explains itself (`report.html`), a table (`report.csv`) and data (`report.json`).
 
 mod conclusions;
+mod effects;
 mod html;
 mod svg;
 mod thumbnails;
@@ -9,7 +10,8 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-pub use thumbnails::{Studio, difference_png};
+pub use effects::{EffectCost, measure_effects, switches};
+pub use thumbnails::{Studio, difference_png, heat};
 
 use crate::accuracy::sweep::Point;
 

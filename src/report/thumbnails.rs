@@ -58,7 +58,7 @@ impl Studio {
 /// # Errors
 /// None in practice: the picture is small.
 pub fn difference_png(delta_e: &[f32]) -> Result<String> {
-    let pixels = delta_e.iter().map(|delta| heat(delta / FULL_SCALE)).collect();
+    let pixels = delta_e.iter().map(|delta| heat(*delta)).collect();
     let plain = ToneMap { curve: crate::large_scale::tone_map::ToneCurve::Plain, gain: 1.0 };
     data_url(&Picture { width: SIZE, height: SIZE, pixels }, &plain)
 }
@@ -66,9 +66,9 @@ pub fn difference_png(delta_e: &[f32]) -> Result<String> {
 /// ΔE that the difference pictures show as white; about 2 is just seen side by side.
 pub const FULL_SCALE: f32 = 10.0;
 
-/// Black, purple, orange, white.
-fn heat(x: f32) -> Vec3 {
-    let x = x.clamp(0.0, 1.0);
+/// A colour for a ΔE: black, purple, orange, and white for [`FULL_SCALE`] or more.
+pub fn heat(delta_e: f32) -> Vec3 {
+    let x = (delta_e / FULL_SCALE).clamp(0.0, 1.0);
     Vec3::new(
         (2.2 * x).min(1.0),
         (1.6 * x - 0.45).clamp(0.0, 1.0),
@@ -110,7 +110,7 @@ fn base64(bytes: &[u8]) -> String {
 pub fn scale_strip() -> String {
     let mut cells = String::new();
     for k in 0..=10 {
-        let color = heat(k as f32 / 10.0).to_array().map(srgb_byte);
+        let color = heat(k as f32 / 10.0 * FULL_SCALE).to_array().map(srgb_byte);
         let _ = write!(cells, "<span style='background:rgb({},{},{})'></span>", color[0], color[1], color[2]);
     }
     format!("<span class='strip'>0 {cells} {FULL_SCALE} ΔE</span>")

@@ -1,5 +1,6 @@
 //! From a file, a shipped name or a text to a checked [`Scene`], and back.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use toml::Table;
@@ -63,7 +64,10 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScene> {
     if length > LARGEST_FILE {
         return Err(complain(format!("{length} bytes")));
     }
-    let source = std::fs::read_to_string(path).map_err(|error| complain(error.to_string()))?;
+    let mut source = String::new();
+    // A pipe does not say how long it is.
+    let file = std::fs::File::open(path).map_err(|error| complain(error.to_string()))?;
+    file.take(LARGEST_FILE).read_to_string(&mut source).map_err(|error| complain(error.to_string()))?;
     let scene = load_with_overrides(&source, overrides).map_err(|error| error.in_file(path))?;
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
@@ -174,21 +178,5 @@ impl Scene {
         let fail = |problem: Problem| Error::from(problem.into_error(None));
         check::check_table(&table, &Self::fields(), &mut Vec::new()).map_err(fail)?;
         self.check_relations().map_err(fail)
-    }
-
-    /// Writes the scene file; the file is replaced only when the whole text is on disk.
-    pub fn save(&self, path: &Path) -> Result<()> {
-        self.validate()?;
-        let text = self.to_toml()?;
-        let complain = |error: std::io::Error| {
-            Error::from(InputError::new("", error, "a place where a file can be written").in_file(path))
-        };
-        let partial = path.with_extension("toml.partial");
-        std::fs::write(&partial, text).map_err(complain)?;
-        std::fs::rename(&partial, path).map_err(|error| {
-            // The new text could not take its place: leave nothing behind.
-            let _ = std::fs::remove_file(&partial);
-            complain(error)
-        })
     }
 }

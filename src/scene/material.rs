@@ -131,14 +131,14 @@ impl TermSpec {
     pub fn kinds() -> Vec<Kind> {
         let color = |key, max, doc| Field::new(key, "", Shape::Color { max }, None, doc);
         let roughness = || {
-            Field::new("roughness", "", number(1e-3, 2.0), Some(f64::from(default_roughness())), "Width of the lobe.")
+            Field::new("roughness", "", number(1e-4, 2.0), Some(f64::from(default_roughness())), "Width of the lobe.")
         };
         let f0 = || color("f0", 1.0, "Reflectance at normal incidence (Schlick).");
         let specular = || color("specular", GAIN_LIMIT, "Strength of the lobe.");
         let exponent = Field::new(
             "exponent",
             "",
-            Shape::Number { min: 0.0, max: 1e5, soft_max: 1000.0 },
+            Shape::Number { min: 0.0, max: 1e6, soft_max: 1000.0 },
             Some(f64::from(blinn_phong_exponent())),
             "Sharpness of the lobe.",
         );

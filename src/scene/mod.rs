@@ -6,6 +6,7 @@
 mod check;
 mod color;
 mod edits;
+mod effects;
 pub mod files;
 mod load;
 mod material;
@@ -26,6 +27,7 @@ use std::sync::LazyLock;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+pub use effects::{Effects, Switch};
 pub use load::{LoadedScene, load, load_with_overrides, open, parse};
 pub use material::{BrdfSpec, Material, TermSpec};
 pub use painted::{Painted, Pixels};
@@ -58,6 +60,8 @@ pub struct Scene {
     pub camera: Option<Camera>,
     #[serde(default)]
     pub quality: Quality,
+    #[serde(default, skip_serializing_if = "Effects::is_default")]
+    pub effects: Effects,
 }
 
 fn one() -> u32 {
@@ -92,6 +96,7 @@ impl Scene {
             light: Light::default(),
             camera: None,
             quality: Quality::default(),
+            effects: Effects::default(),
         }
     }
 
@@ -106,6 +111,7 @@ impl Scene {
             optional("light", Shape::Table(Light::fields), "What lights it."),
             optional("camera", Shape::Table(Camera::fields), "Where the picture is taken from."),
             optional("quality", Shape::Table(Quality::fields), "How accurately."),
+            optional("effects", Shape::Table(Effects::fields), "Which effects are computed."),
         ]
     }
 

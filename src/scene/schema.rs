@@ -83,9 +83,9 @@ pub const fn number(min: f64, max: f64) -> Shape {
     Shape::Number { min, max, soft_max: max }
 }
 
-/// A length in tile units: any up to 1000, sliders end at `soft_max`.
+/// A length in tile units: any up to a hundred of the largest tiles, sliders end at `soft_max`.
 pub const fn length(min: f64, soft_max: f64) -> Shape {
-    Shape::Number { min, max: 1000.0, soft_max }
+    Shape::Number { min, max: 1e8, soft_max }
 }
 
 /// The default of a field as the catalogue shows it: numbers have one, other types do not.

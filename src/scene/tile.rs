@@ -34,7 +34,7 @@ impl Tile {
             Field::new(
                 "size",
                 "tile units",
-                Shape::Vector { length: 2, min: 1e-3, max: 1e3 },
+                Shape::Vector { length: 2, min: 1e-6, max: 1e6 },
                 None,
                 "Extent of the period in x and y.",
             ),
@@ -157,7 +157,7 @@ scene_table! {
         /// Ratio of the runs of the faces towards +x and towards -x: moves the tip off the centre.
         face_ratio: f32 = 1.0, number(0.1, 10.0), "";
         /// Distance between neighbours, rounded so that whole cells fit the tile.
-        spacing: f32 = 0.25, length(1e-3, 1.0), "tile units";
+        spacing: f32 = 0.25, length(1e-9, 1.0), "tile units";
         /// Sides of the base.
         sides: u32 = 4, Shape::Integer { min: 3, max: 8 }, "";
         /// How they stand.
@@ -171,9 +171,9 @@ scene_table! {
     /// Tapered rods on a floor (the velvets of Wu et al. 2011, Fig. 6). They may lean over the tile's edge.
     Rods {
         /// Radius at the floor.
-        radius: f32 = 0.02, length(1e-4, 0.2), "tile units";
+        radius: f32 = 0.02, length(1e-9, 0.2), "tile units";
         /// Length along the axis.
-        length: f32 = 0.35, length(1e-3, 1.0), "tile units";
+        length: f32 = 0.35, length(1e-9, 1.0), "tile units";
         /// How much thinner the tip is than the foot: 0 a cylinder, 1 a point.
         taper: f32 = 0.3, number(0.0, 1.0), "";
         /// Angle between the common axis and +z.
@@ -258,9 +258,9 @@ scene_table! {
         /// Width of the weft threads as a part of their distance.
         weft_width: f32 = 0.9, number(0.05, 1.0), "of the spacing";
         /// Thickness of the warp threads.
-        warp_height: f32 = 0.08, length(1e-4, 0.5), "tile units";
+        warp_height: f32 = 0.08, length(1e-9, 0.5), "tile units";
         /// Thickness of the weft threads.
-        weft_height: f32 = 0.08, length(1e-4, 0.5), "tile units";
+        weft_height: f32 = 0.08, length(1e-9, 0.5), "tile units";
         /// Who bends: 0 only the weft, 1 only the warp.
         crimp: f32 = 0.5, number(0.0, 1.0), "";
         /// Warp threads on the tile, rounded to whole repeats of the pattern.
@@ -284,7 +284,7 @@ scene_table! {
     /// 0 to 1 for integer formats. Sample (column i, row j) sits at ((i+½)/w, (j+½)/h) of the tile, row 0 at y = 0.
     Heightfield {
         /// Height of the value 1.
-        height_scale: f32 = 1.0, Shape::Number { min: -1000.0, max: 1000.0, soft_max: 1.0 }, "tile units";
+        height_scale: f32 = 1.0, Shape::Number { min: -1e8, max: 1e8, soft_max: 1.0 }, "tile units";
         /// An image of heights: PNG of 8 or 16 bits, TIFF, HDR or EXR.
         #[serde(skip_serializing_if = "Option::is_none")]
         path: Option<PathBuf> = None, Shape::Path, "";

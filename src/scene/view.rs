@@ -59,7 +59,7 @@ impl DirectionalSpec {
         let direction = Shape::Vector { length: 3, min: -1e6, max: 1e6 };
         vec![
             Field::required("direction", direction, "Towards the light, y up; any length but zero."),
-            Field::required("irradiance", Shape::Color { max: 1e6 }, "Irradiance on a surface that faces the light."),
+            Field::required("irradiance", Shape::Color { max: 1e9 }, "Irradiance on a surface that faces the light."),
         ]
     }
 }

@@ -13,6 +13,10 @@ pub(super) struct HeightMarch<'a> {
     top: f32,
 }
 
+/// Edges of one family that any walk may cross, besides those of sixteen tiles: what lies beyond blocks only directions low
+/// over the horizon, and only of height-fields that are many tiles high.
+const LEAST_LINES: usize = 8192;
+
 impl<'a> HeightMarch<'a> {
     pub fn new(heights: &'a HeightGrid, tile_size: Vec2) -> Self {
         let top = heights.heights.iter().fold(f32::NEG_INFINITY, |top, &z| top.max(z));
@@ -35,19 +39,29 @@ impl<'a> HeightMarch<'a> {
         let at = from.truncate() * self.samples_from_tile - 0.5;
         let speed = along * self.samples_from_tile;
         // Edges x = k, where heights lie between rows; y = k, between columns; x - y = k, along the diagonals.
-        self.cross(at.x, speed.x, from.z, clearance, &mut slope, |line, r| {
+        let [columns, rows] = [self.heights.size.x, self.heights.size.y];
+        let (along_x, along_y) = (along.y.abs() < 1e-6, along.x.abs() < 1e-6);
+        // Along an axis all comes back after one tile, only further away.
+        let most = match (along_x, along_y) {
+            (true, _) => columns as usize + 1,
+            (_, true) => rows as usize + 1,
+            _ => LEAST_LINES + 16 * (columns + rows) as usize,
+        };
+        self.cross([at.x, speed.x], along_y, most, [from.z, clearance], &mut slope, |line, r| {
             let y = at.y + speed.y * r;
             let low = y.floor();
             let (a, b) = (self.sample(line, low as i32), self.sample(line, low as i32 + 1));
             a + (b - a) * (y - low)
         });
-        self.cross(at.y, speed.y, from.z, clearance, &mut slope, |line, r| {
+        self.cross([at.y, speed.y], along_x, most, [from.z, clearance], &mut slope, |line, r| {
             let x = at.x + speed.x * r;
             let low = x.floor();
             let (a, b) = (self.sample(low as i32, line), self.sample(low as i32 + 1, line));
             a + (b - a) * (x - low)
         });
-        self.cross(at.x - at.y, speed.x - speed.y, from.z, clearance, &mut slope, |line, r| {
+        let turning = speed.x - speed.y;
+        let parallel = turning.abs() < 1e-6 * self.samples_from_tile.max_element();
+        self.cross([at.x - at.y, turning], parallel, most, [from.z, clearance], &mut slope, |line, r| {
             let x = at.x + speed.x * r;
             let low = x.floor();
             let (i, j) = (low as i32, low as i32 - line);
@@ -57,17 +71,29 @@ impl<'a> HeightMarch<'a> {
         slope
     }
 
-    /// Visits the crossings of one family of edges at increasing distance `r`, until nothing further can rise higher.
-    fn cross(&self, at: f32, speed: f32, z: f32, clearance: f32, slope: &mut f32, height: impl Fn(i32, f32) -> f32) {
+    /// Visits the crossings of one family of edges at increasing distance `r`, `most` of them, until nothing further can rise
+    /// higher. `parallel`: the walk follows these edges and crosses none.
+    fn cross(
+        &self,
+        [at, speed]: [f32; 2],
+        parallel: bool,
+        most: usize,
+        [z, clearance]: [f32; 2],
+        slope: &mut f32,
+        height: impl Fn(i32, f32) -> f32,
+    ) {
         /// Nothing below this slope is resolved.
         const LOWEST: f32 = 0.005;
-        if speed.abs() < 1e-9 {
+        if parallel || speed == 0.0 {
             return;
         }
         let step = 1.0 / speed.abs();
         let (mut line, turn) = if speed > 0.0 { (at.floor() as i32 + 1, 1) } else { (at.ceil() as i32 - 1, -1) };
         let mut r = (line as f32 - at) / speed;
-        while r * slope.max(LOWEST) < clearance {
+        for _ in 0..most {
+            if r * slope.max(LOWEST) >= clearance {
+                return;
+            }
             // At its own edge a point sees itself.
             if r > 1e-6 * step {
                 let rise = height(line, r) - z;

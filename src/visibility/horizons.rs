@@ -26,6 +26,8 @@ pub struct Horizons {
     ramp: f32,
     /// `[azimuth][facet]`; [`Horizons::FREE`] where nothing blocks, [`Horizons::BLOCKED`] where all is.
     elevations: Vec<f32>,
+    /// Walks that ended before all was known.
+    pub(super) cut_short: usize,
 }
 
 impl Horizons {
@@ -44,6 +46,7 @@ impl Horizons {
                 slicer.scan(origin, facets.normals[facet], along.truncate(), facets.triangles[facet], &mut blocked);
                 *horizon = blocked.highest();
             }
+            blocked.cut_short
         })
     }
 
@@ -54,16 +57,18 @@ impl Horizons {
             for ((position, normal), horizon) in facets.positions.iter().zip(&facets.normals).zip(row) {
                 *horizon = march.highest_slope(*position, *normal, along.truncate());
             }
+            0
         })
     }
 
-    /// `fill` writes slopes (tangents) of the horizon along a plane direction; they become elevations here.
-    fn fill_rows(facets: usize, azimuths: usize, ramp: f32, fill: impl Fn(Vec3, &mut [f32]) + Sync) -> Self {
+    /// `fill` writes slopes (tangents) of the horizon along a plane direction, which become elevations here, and tells how
+    /// many walks it cut short.
+    fn fill_rows(facets: usize, azimuths: usize, ramp: f32, fill: impl Fn(Vec3, &mut [f32]) -> usize + Sync) -> Self {
         let mut slopes = vec![0.0; facets * azimuths];
-        slopes.par_chunks_mut(facets.max(1)).enumerate().for_each(|(azimuth, row)| {
-            fill(from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32), row);
-        });
-        Self::from_slopes(facets, azimuths, ramp, slopes)
+        let rows = slopes.par_chunks_mut(facets.max(1)).enumerate();
+        let cut_short =
+            rows.map(|(azimuth, row)| fill(from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32), row)).sum();
+        Self { cut_short, ..Self::from_slopes(facets, azimuths, ramp, slopes) }
     }
 
     /// From slopes (tangents) of the horizons, `[azimuth][facet]`.
@@ -78,7 +83,7 @@ impl Horizons {
                 slope.atan()
             };
         });
-        Self { azimuths, facets, ramp: ramp.clamp(1e-6, -2.0 * Self::FREE), elevations }
+        Self { azimuths, facets, ramp: ramp.clamp(1e-6, -2.0 * Self::FREE), elevations, cut_short: 0 }
     }
 
     pub fn facets(&self) -> usize {
@@ -97,6 +102,11 @@ impl Horizons {
     /// Elevation [rad] below which all is blocked along one azimuth.
     pub(crate) fn elevation(&self, azimuth: usize, facet: usize) -> f32 {
         self.elevations[azimuth * self.facets + facet]
+    }
+
+    /// Part of the walks that ended before all was known: something may block directions low over the horizon, unseen.
+    pub fn cut_short(&self) -> f64 {
+        self.cut_short as f64 / self.elevations.len().max(1) as f64
     }
 
     pub fn bytes(&self) -> usize {

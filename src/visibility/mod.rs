@@ -55,6 +55,15 @@ impl Visibility {
         }
     }
 
+    /// Part of the walks over the tile that ended before all was known ([`Horizons::cut_short`]).
+    pub fn cut_short(&self) -> f64 {
+        match self {
+            Self::Horizons(horizons) => horizons.cut_short(),
+            Self::Slices(slices) => slices.horizons.cut_short(),
+            Self::Unblocked { .. } | Self::Maps(_) => 0.0,
+        }
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         match self {

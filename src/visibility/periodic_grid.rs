@@ -88,6 +88,13 @@ impl PeriodicGrid {
         grid
     }
 
+    /// Distance after which a walk along the unit plane direction `along` meets the same again; without end unless it follows
+    /// an axis.
+    pub(super) fn period_along(&self, along: Vec2) -> f32 {
+        let axis = |across: f32, side: f32| if across.abs() < 1e-6 { 1.001 * side } else { f32::INFINITY };
+        axis(along.y, self.tile_size.x).min(axis(along.x, self.tile_size.y))
+    }
+
     pub(super) fn entries(&self, cell: usize) -> &[CellEntry] {
         &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }

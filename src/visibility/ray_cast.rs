@@ -20,10 +20,9 @@ impl PeriodicGrid {
         if clearance <= 0.0 {
             return false;
         }
-        // Straight up: one cell holds all there is to meet.
         let reach = clearance / rise;
         let mut walk = CellWalk::new(self, origin.truncate(), plane);
-        loop {
+        for _ in 0..LEAST_CELLS + 16 * (self.cells.x + self.cells.y) {
             if walk.entered > reach {
                 return false;
             }
@@ -36,13 +35,19 @@ impl PeriodicGrid {
                     }
                 }
             }
+            // Straight up: one cell holds all there is to meet.
             if speed < 1e-12 {
                 return false;
             }
             walk.advance();
         }
+        false
     }
 }
+
+/// Cells that a ray walks through, besides those of sixteen tiles, before it counts as free: one that all but follows the
+/// horizon would never end.
+const LEAST_CELLS: i32 = 16_384;
 
 impl PeriodicGrid {
     /// Is this copy of a facet's triangle the one it lies on? Other copies block it like any other surface.

@@ -16,6 +16,8 @@ pub(super) struct BlockedSlopes {
     overhead: f32,
     /// Cells and triangles looked at since this was made.
     pub work: u64,
+    /// Walks that ended before all was known, since this was made.
+    pub cut_short: usize,
 }
 
 impl BlockedSlopes {
@@ -98,6 +100,11 @@ pub(super) const FACING_MARGIN: f32 = 0.3;
 /// The lowest elevation that is resolved: a walk ends where what is left could block no more than this slope.
 const LOWEST_SLOPE: f32 = 0.005;
 
+/// Cells and blocks of triangles that any walk may look at, besides the cells of sixteen tiles: on tiles a hundred times as
+/// high as they are long a walk that nothing stops would take millions. What lies beyond blocks only directions low over
+/// the horizon (2° for pyramids of 100 tiles) and is left out; [`BlockedSlopes::cut_short`] counts such walks.
+const LEAST_LOOKS: usize = 16_384;
+
 impl Slicer<'_> {
     /// Fills `blocked` with what a facet does not see along the unit plane direction `along`; `own` is ignored.
     pub(super) fn scan(&self, origin: Vec3, normal: Vec3, along: Vec2, own: u32, blocked: &mut BlockedSlopes) {
@@ -111,9 +118,21 @@ impl Slicer<'_> {
             return;
         }
         let mut walk = CellWalk::new(grid, origin.truncate(), along);
+        let period = grid.period_along(along);
+        let mut looks = LEAST_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize;
         // What a cell at distance r can block at most: clearance / r.
         while blocked.open_below(clearance / walk.entered) > blocked.ground.max(LOWEST_SLOPE) {
+            // Along an axis all comes back after one tile, only further away: what did not rise above the ground never will.
+            if walk.entered > period && blocked.floating_unfaced().next().is_none() {
+                return;
+            }
             let (cell, tile) = walk.cell();
+            let costs = 1 + self.blocks_in(cell);
+            if looks < costs {
+                blocked.cut_short += 1;
+                return;
+            }
+            looks -= costs;
             blocked.work += 1;
             let floor = origin.z + walk.entered * blocked.ground;
             if grid.z_max[cell] > floor {

@@ -37,6 +37,11 @@ impl<'a> Slicer<'a> {
         Self { grid, starts, blocks }
     }
 
+    /// Blocks of triangles that a cell holds.
+    pub fn blocks_in(&self, cell: usize) -> usize {
+        (self.starts[cell + 1] - self.starts[cell]) as usize
+    }
+
     /// Calls `visit` with each entry of a cell that the half-plane from `origin` (seen from the cell's own tile copy) along
     /// `along` cuts, and with the slopes `(low, high)` it covers; triangles no higher than `floor` are left out.
     #[inline]

@@ -58,7 +58,7 @@ impl Slices {
     /// Slices the mesh along every azimuth, for every facet. Visibility ends in ramps of `ramp` radians.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
-        let (rows, floating): (Vec<Vec<f32>>, Vec<Vec<Floating>>) = (0..azimuths)
+        let scanned: Vec<(Vec<f32>, Vec<Floating>, usize)> = (0..azimuths)
             .into_par_iter()
             .map(|azimuth| {
                 let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
@@ -74,10 +74,17 @@ impl Slices {
                         high: if high == f32::INFINITY { Horizons::BLOCKED } else { high.atan() },
                     }));
                 }
-                (row, above)
+                (row, above, blocked.cut_short)
             })
-            .unzip();
-        let horizons = Horizons::from_slopes(facets.len(), azimuths, ramp, rows.concat());
+            .collect();
+        let (mut rows, mut floating, mut cut_short) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
+        for (row, above, short) in scanned {
+            rows.extend(row);
+            floating.push(above);
+            cut_short += short;
+        }
+        let mut horizons = Horizons::from_slopes(facets.len(), azimuths, ramp, rows);
+        horizons.cut_short = cut_short;
         // The golden ratio's multiples fill [0, 1] evenly, for neighbours too.
         let switch = (0..facets.len() as u32).map(|k| k.wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0).collect();
         Self { horizons, floating, switch }

@@ -1,14 +1,18 @@
 //! The parameter panel: sections over one scene, generated from the catalogue.
 
+pub mod accuracy;
+mod effects;
 pub mod fields;
 pub mod look;
 pub mod materials;
 mod matrix;
 pub mod surface;
 
+use biscale::plan::Effect;
 use biscale::scene::{Painted, Scene};
 use eframe::egui::{self, RichText, Ui};
 
+pub use accuracy::AccuracyState;
 pub use fields::Around;
 
 /// What the panel asks for.
@@ -20,8 +24,17 @@ pub struct Asked {
     pub complaint: Option<String>,
 }
 
+/// What is shown now, for the sections that measure it.
+pub struct Shown<'a> {
+    pub accuracy: &'a mut AccuracyState,
+    /// The plan of the picture.
+    pub effects: &'a [Effect],
+    /// Version of the document.
+    pub version: u64,
+}
+
 /// All sections. `scene` is left as the person wants it.
-pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, slots: &[String]) -> Asked {
+pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, slots: &[String], shown: Shown<'_>) -> Asked {
     let mut around = Around { unit: scene.tile.unit.clone(), ..Around::default() };
     let mut material = None;
     // Whatever a row asks for, the panel keeps the width it was given.
@@ -32,6 +45,9 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, slots: 
     section(ui, "Light", true, |ui| look::light_ui(ui, &mut scene.light, &mut around));
     section(ui, "Camera", false, |ui| look::camera_ui(ui, scene, &mut around));
     section(ui, "Quality", false, |ui| look::quality_ui(ui, &mut scene.quality, &mut around));
+    shown.accuracy.open = false;
+    section(ui, "Accuracy", false, |ui| accuracy::ui(ui, scene, shown.accuracy, shown.effects, shown.version));
+    section(ui, "Effects", false, |ui| effects::ui(ui, scene, shown.effects, shown.accuracy, shown.version));
     Asked { browse: around.browse, material, complaint: around.complaint }
 }
 

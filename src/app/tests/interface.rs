@@ -213,3 +213,59 @@ fn no_two_actions_share_their_keys() {
         assert!(!keys[..at].contains(key), "{key:?}");
     }
 }
+
+#[test]
+fn the_accuracy_panel_measures_the_scene_and_its_slider_walks_from_faster_to_finer() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    assert!(harness.query_by_label("Accuracy chart").is_none(), "nothing is measured unasked");
+    harness.get_by_label("Accuracy").click();
+    harness.run_steps(4);
+    let wait = |harness: &mut egui_kittest::Harness<'static, Option<crate::app::editor::Editor>>| {
+        let start = std::time::Instant::now();
+        loop {
+            harness.step();
+            let editor = editor(harness);
+            if !editor.is_busy() && editor.accuracy.is_measured(editor.document.version()) {
+                return;
+            }
+            assert!(start.elapsed().as_secs() < 120, "not measured");
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    };
+    wait(&mut harness);
+    assert!(harness.query_by_label("Accuracy chart").is_some());
+    let slider = harness.get_all_by_role(eframe::egui::Role::Slider).last().unwrap();
+    slider.set_value_accesskit(5.0);
+    harness.run_steps(2);
+    let quality = editor(&mut harness).document.scene().quality.clone();
+    assert_eq!(quality.facets, Some(512), "{quality:?}");
+    assert!(quality.azimuths.is_some());
+    wait(&mut harness);
+    assert!(editor(&mut harness).messages.texts().is_empty());
+}
+
+#[test]
+fn the_effects_panel_forces_an_effect_and_the_picture_follows() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let before = editor(&mut harness).object.made.as_ref().unwrap().picture.pixels.clone();
+    harness.set_size(eframe::egui::vec2(1400.0, 2600.0));
+    harness.run_steps(2);
+    settle(&mut harness);
+    harness.get_by_label("Effects").click();
+    harness.run_steps(4);
+    assert!(harness.query_by_label("Visibility").is_some() && harness.query_by_label("Interreflection").is_some());
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.effects.visibility = biscale::scene::Switch::Off;
+    editor(&mut harness).document.edit(scene);
+    harness.run_steps(1);
+    settle(&mut harness);
+    let made = editor(&mut harness).object.made.clone().unwrap();
+    let effect = made.effects.iter().find(|effect| effect.name == "visibility").unwrap();
+    assert!(effect.forced && !effect.on);
+    assert_ne!(made.picture.pixels, before);
+    harness.get_by_label("As planned").click();
+    harness.run_steps(2);
+    assert!(editor(&mut harness).document.scene().effects.is_default());
+}

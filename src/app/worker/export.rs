@@ -6,7 +6,7 @@ use std::sync::Arc;
 use biscale::close_up::CloseUp;
 use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution};
 use biscale::large_scale::tone_map::ToneMap;
-use biscale::pipeline::Pipeline;
+use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::LoadedScene;
 use biscale::{Cancel, Error, Result};
 
@@ -69,7 +69,7 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
             answer(ExportAnswer::Progress(0.3, "Rendering"));
             let tile = CloseUp::new(Arc::new(pipeline.mesh(&job.loaded)?));
             let close = (tile, pipeline.sum_materials(&job.loaded)?);
-            picture(&job.loaded, &outcome.brdf, size, &job.path, &close, cancel)?;
+            picture(&job.loaded, &outcome, size, &job.path, &close, cancel)?;
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
@@ -77,7 +77,7 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
 
 fn picture(
     loaded: &LoadedScene,
-    brdf: &Arc<biscale::filtering::EffectiveBrdf>,
+    outcome: &Outcome,
     size: [usize; 2],
     path: &Path,
     close: &Close,
@@ -87,7 +87,7 @@ fn picture(
     let mut studio = Studio::default();
     studio.prepare(loaded)?;
     let backend = loaded.scene.quality.backend.as_str();
-    let shot = Shot { camera: &camera, brdf, size, samples_per_side: 3, settle: true, backend };
-    let rendered = studio.shoot(&shot, Some(close), cancel)?;
+    let shot = Shot { camera: &camera, outcome, size, samples_per_side: 3, settle: true, backend };
+    let (rendered, _) = studio.shoot(&shot, Some(close), cancel)?;
     rendered.picture.write(path, &ToneMap::new(&camera)?)
 }

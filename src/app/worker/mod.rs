@@ -1,5 +1,6 @@
 //! Work behind the interface: one thread for the object's picture, one for the tile and its plots, one for thumbnails.
 
+mod accuracy;
 mod export;
 mod lobe;
 mod picture;
@@ -14,6 +15,7 @@ use std::time::Duration;
 
 use super::document::Snapshot;
 
+pub use accuracy::{AccuracyAnswer, AccuracyJob, Point};
 pub use export::{ExportAnswer, ExportJob, What};
 pub use lobe::{LobeJob, LobeMade, logarithmic};
 pub use picture::{Grade, Made, PictureAnswer, PictureJob};
@@ -82,6 +84,16 @@ pub fn spawn_thumbnail(answer: impl Fn(Thumbnail) + Clone + Send + Sync + 'stati
         thumbnail::work(kept, &job, desk, &answer);
     };
     Worker::spawn("thumbnails", 1, studio::Studio::default, work, |_| {}).ok()
+}
+
+/// The thread that measures accuracy against time.
+pub fn spawn_accuracy(answer: impl Fn(AccuracyAnswer) + Clone + Send + Sync + 'static) -> Option<Worker<AccuracyJob>> {
+    let told = answer.clone();
+    let work = move |kept: &mut accuracy::Accuracy, job: AccuracyJob, desk: &runner::Desk<AccuracyJob>| {
+        kept.work(&job, desk, &answer);
+    };
+    let panicked = move |text: String| told(AccuracyAnswer::Failed(format!("a fault in the program ({text})")));
+    Worker::spawn("accuracy", 0, accuracy::Accuracy::default, work, panicked).ok()
 }
 
 /// The thread that exports.

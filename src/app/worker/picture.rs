@@ -10,7 +10,7 @@ use biscale::large_scale::tone_map::ToneMap;
 use biscale::large_scale::{DirectionalLight, ObjectMesh, Picture};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::plan::Effect;
-use biscale::scene::{Camera, LoadedScene, Material, Painted, Quality, Tile};
+use biscale::scene::{Camera, Effects, LoadedScene, Material, Painted, Quality, Tile};
 use biscale::{Cancel, Error, Result};
 use eframe::egui::ColorImage;
 
@@ -68,6 +68,8 @@ pub struct Made {
     /// From the camera to the object, in radii.
     pub distance: f32,
     pub notes: Vec<String>,
+    /// What is weak about the material, known once the picture is final.
+    pub warnings: Vec<String>,
     pub effects: Vec<Effect>,
     /// What the preset that made it is called.
     pub preset: &'static str,
@@ -85,7 +87,7 @@ pub enum PictureAnswer {
 }
 
 /// What an effective BRDF depends on.
-type SmallScale = (Tile, Vec<Material>, Quality, PathBuf, Painted);
+type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
 
 /// What both workers know: the last BRDF at a scene's own quality, and the last full picture.
 #[derive(Default)]
@@ -128,7 +130,7 @@ impl Photographer {
     fn drafted(&mut self, job: &PictureJob) -> Result<Made> {
         self.studio.prepare(&job.loaded)?;
         let (outcome, which) = match self.known(&job.loaded) {
-            Some(outcome) => (Outcome { times: Vec::new(), ..outcome }, 1),
+            Some(outcome) => (outcome.without_times(), 1),
             None => (self.pipeline.effective(&as_draft(&job.loaded))?, 0),
         };
         let size = self.affordable(job.size, which, DRAFT_MS);
@@ -147,7 +149,7 @@ impl Photographer {
             return Ok(());
         }
         let mut outcome = match self.known(&job.loaded) {
-            Some(outcome) => Outcome { times: Vec::new(), ..outcome },
+            Some(outcome) => outcome.without_times(),
             None => {
                 answer(PictureAnswer::Doing(job.version, "Refining the material"));
                 self.pipeline.cancel_with(desk.cancel.clone());
@@ -174,6 +176,7 @@ impl Photographer {
         let full = self.affordable(job.size, 1, FINAL_MS);
         let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
         made.grade = Grade::Final;
+        made.warnings.clone_from(&outcome.health().warnings);
         *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
         answer(PictureAnswer::Made(Box::new(made)));
         Ok(())
@@ -224,21 +227,26 @@ impl Photographer {
         let tone_map = ToneMap::new(&camera)?;
         let backend = job.loaded.scene.quality.backend.as_str();
         let settle = samples_per_side > 1;
-        let shot = Shot { camera: &camera, brdf: &outcome.brdf, size, samples_per_side, settle, backend };
+        let shot = Shot { camera: &camera, outcome, size, samples_per_side, settle, backend };
         if self.studio.is_close(&camera, size) {
             self.come_close(&job.loaded)?;
         } else {
             self.close = None;
         }
         let close = self.close.as_ref().map(|(_, close)| close);
-        let rendered = self.studio.shoot(&shot, close, cancel)?;
+        let (rendered, table_ms) = self.studio.shoot(&shot, close, cancel)?;
         let times = rendered.times;
         let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
         if samples_per_side == 1 {
             let measured = spent / (size[0] * size[1]) as f64;
             self.cost[which] = measured;
         }
-        let large = [("g-buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)];
+        let large = [
+            ("picture table", table_ms),
+            ("g-buffer", times.gbuffer_ms),
+            ("shadows", times.shadows_ms),
+            ("shading", times.shading_ms),
+        ];
         let start = Instant::now();
         let image = Arc::new(color_image(&rendered.picture, &tone_map));
         let mut stages = outcome.times.clone();
@@ -259,6 +267,7 @@ impl Photographer {
             camera: camera.clone(),
             distance: self.studio.distance(&camera, size),
             notes,
+            warnings: Vec::new(),
             effects: outcome.plan.effects.clone(),
             preset: outcome.settings.preset.name(),
         })
@@ -311,8 +320,8 @@ fn camera(loaded: &LoadedScene) -> Camera {
 
 fn small_scale(loaded: &LoadedScene) -> SmallScale {
     let scene = &loaded.scene;
-    let parts = (scene.tile.clone(), scene.materials.clone(), scene.quality.clone());
-    (parts.0, parts.1, parts.2, loaded.base_dir.clone(), loaded.painted.clone())
+    let parts = (scene.tile.clone(), scene.materials.clone(), scene.quality.clone(), scene.effects.clone());
+    (parts.0, parts.1, parts.2, parts.3, loaded.base_dir.clone(), loaded.painted.clone())
 }
 
 /// The same scene at the draft preset, without knobs that were turned by hand.

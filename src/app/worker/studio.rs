@@ -9,6 +9,7 @@ use biscale::close_up::{CloseUp, Wearing, on_object};
 use biscale::filtering::{EffectiveBrdf, Reflectance, SumMaterial};
 use biscale::gpu::{Gpu, Tier};
 use biscale::large_scale::environment::{self, Environment};
+use biscale::large_scale::light_choice::worth_shading;
 use biscale::large_scale::lights::{self, Lights};
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::shadow::Occluder;
@@ -16,7 +17,8 @@ use biscale::large_scale::shadow_cache::ShadowCache;
 use biscale::large_scale::{
     CameraView, DirectionalLight, GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render,
 };
-use biscale::scene::{self, Camera, LoadedScene};
+use biscale::pipeline::Outcome;
+use biscale::scene::{self, Camera, LoadedScene, Switch};
 use biscale::{Cancel, Error, Result};
 use glam::Vec3;
 
@@ -25,14 +27,15 @@ use glam::Vec3;
 pub struct Studio {
     object: Option<Object>,
     environment: Option<((String, PathBuf), Environment)>,
-    lights: Option<((scene::Light, PathBuf), Lights)>,
+    lights: Option<((scene::Light, PathBuf, Switch), Lights)>,
     /// For the object and the lights above.
     shadows: Option<ShadowCache>,
     gpu: Device,
 }
 
 struct Object {
-    key: (scene::Object, PathBuf),
+    /// With whether its shadows are forced.
+    key: (scene::Object, PathBuf, Switch),
     mesh: Arc<ObjectMesh>,
     occluder: Option<Occluder>,
 }
@@ -60,7 +63,7 @@ pub type Close = (CloseUp, (Vec<usize>, Vec<SumMaterial>));
 /// How a picture is made.
 pub struct Shot<'a> {
     pub camera: &'a Camera,
-    pub brdf: &'a Arc<EffectiveBrdf>,
+    pub outcome: &'a Outcome,
     pub size: [usize; 2],
     pub samples_per_side: usize,
     /// Whether a shadow cache may be made: it takes longer than a draft and pays when the camera moves on.
@@ -72,11 +75,17 @@ pub struct Shot<'a> {
 impl Studio {
     /// Takes the scene's object and lights over where they changed.
     pub fn prepare(&mut self, loaded: &LoadedScene) -> Result<()> {
-        let key = (loaded.scene.object.clone(), loaded.base_dir.clone());
+        let shadow = loaded.scene.effects.self_shadow;
+        let key = (loaded.scene.object.clone(), loaded.base_dir.clone(), shadow);
         if self.object.as_ref().is_none_or(|object| object.key != key) {
             let mesh = Arc::new(objects::build(&key.0, &key.1)?);
-            let occluder = Occluder::of(&mesh);
+            let occluder = match key.2 {
+                Switch::Off => None,
+                Switch::On => Some(Occluder::always(&mesh)),
+                Switch::Auto => Occluder::of(&mesh),
+            };
             self.object = Some(Object { key, mesh, occluder });
+            self.lights = None;
             self.shadows = None;
             if let Device::Open(device) = &mut self.gpu {
                 device.renderer = None;
@@ -88,11 +97,14 @@ impl Studio {
             self.environment = Some((key, environment));
             self.lights = None;
         }
-        let key = (loaded.scene.light.clone(), loaded.base_dir.clone());
+        let key = (loaded.scene.light.clone(), loaded.base_dir.clone(), loaded.scene.effects.faint_lights);
         if self.lights.as_ref().is_none_or(|(last, _)| *last != key)
             && let Some((_, environment)) = &self.environment
         {
-            let lights = lights::of_environment(&key.0, environment.clone());
+            let mut lights = lights::of_environment(&key.0, environment.clone());
+            if let (true, Some(object)) = (key.2 != Switch::On, &self.object) {
+                lights.directional = worth_shading(&object.mesh, &lights.directional);
+            }
             self.lights = Some((key, lights));
             self.shadows = None;
         }
@@ -120,11 +132,11 @@ impl Studio {
         self.object.as_ref().and_then(of).unwrap_or(4.0)
     }
 
-    /// One picture of what was prepared.
+    /// One picture of what was prepared, and the milliseconds that the table it reads took.
     ///
     /// # Errors
     /// A camera that cannot be, or [`Error::Cancelled`].
-    pub fn shoot(&mut self, shot: &Shot, close: Option<&Close>, cancel: &Cancel) -> Result<Rendered> {
+    pub fn shoot(&mut self, shot: &Shot, close: Option<&Close>, cancel: &Cancel) -> Result<(Rendered, f64)> {
         let (Some(object), Some((_, lights))) = (&self.object, &self.lights) else {
             return Err(Error::failed("nothing was prepared"));
         };
@@ -138,7 +150,8 @@ impl Studio {
             cancel.check()?;
         }
         let occluder = object.occluder.as_ref().filter(|_| !directional.is_empty());
-        let reflectance = Cancellable { brdf: shot.brdf, cancel };
+        let reflectance = Cancellable { brdf: &shot.outcome.brdf, cancel };
+        let mut table_ms = 0.0;
         let input = RenderInput {
             mesh: &object.mesh,
             occluder,
@@ -152,7 +165,12 @@ impl Studio {
         };
         let mut rendered = match self.gpu.shoot(&input, shot) {
             Some(rendered) => rendered,
-            None => render(&input)?,
+            None => {
+                let pictured = shot.outcome.for_pictures(cancel)?;
+                table_ms = pictured.ms;
+                let reflectance = Cancellable { brdf: &pictured.brdf, cancel };
+                render(&RenderInput { reflectance: &reflectance, ..input })?
+            }
         };
         cancel.check()?;
         if let Some((tile, assigned)) = close {
@@ -161,7 +179,7 @@ impl Studio {
             tile.blend_into(&mut rendered.picture, &input, wearing, cancel)?;
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
         }
-        Ok(rendered)
+        Ok((rendered, table_ms))
     }
 
     /// Whether a picture is so close that the tiles themselves show.
@@ -200,11 +218,12 @@ impl Device {
             };
         }
         let Self::Open(device) = self else { return None };
+        let brdf = &shot.outcome.brdf;
         let made = match &mut device.renderer {
-            Some((_, last)) if Arc::ptr_eq(last, shot.brdf) => Ok(()),
-            Some((renderer, last)) => renderer.set_brdf(&device.gpu, shot.brdf).map(|()| *last = shot.brdf.clone()),
-            none => GpuRenderer::new(&device.gpu, input.occluder, shot.brdf)
-                .map(|renderer| *none = Some((renderer, shot.brdf.clone()))),
+            Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
+            Some((renderer, last)) => renderer.set_brdf(&device.gpu, brdf).map(|()| *last = brdf.clone()),
+            none => GpuRenderer::new(&device.gpu, input.occluder, brdf)
+                .map(|renderer| *none = Some((renderer, brdf.clone()))),
         };
         let rendered = match (made, &device.renderer) {
             (Ok(()), Some((renderer, _))) => renderer.render(&device.gpu, input),

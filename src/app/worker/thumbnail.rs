@@ -48,12 +48,12 @@ fn render(studio: &mut Studio, name: &str, desk: &Desk<ThumbnailJob>) -> Result<
     let camera = loaded.scene.camera.clone().unwrap_or_default();
     let shot = Shot {
         camera: &camera,
-        brdf: &outcome.brdf,
+        outcome: &outcome,
         size: [SIDE, SIDE],
         samples_per_side: 2,
         settle: false,
         backend: "cpu",
     };
-    let rendered = studio.shoot(&shot, None, desk.cancel)?;
+    let (rendered, _) = studio.shoot(&shot, None, desk.cancel)?;
     Ok(color_image(&rendered.picture, &ToneMap::new(&camera)?))
 }

@@ -167,6 +167,11 @@ impl Wu2011 {
         f64::from(relative) * self.base_area
     }
 
+    /// Directions that values are read from.
+    pub fn direction_count(&self) -> usize {
+        self.directions.len()
+    }
+
     /// Bytes of the tables that a query reads.
     pub fn bytes(&self) -> usize {
         let tables = self.groups.iter().flat_map(|group| &group.tables);

@@ -75,6 +75,24 @@ mod tests {
     }
 
     #[test]
+    fn normal_values_pass_the_chi_squared_test() {
+        let mut values = vec![0.0; 1_000_000];
+        fill_normal(9, 1, &mut values);
+        // Eleven bins of half a deviation; their chances from Abramowitz and Stegun, Table 26.1.
+        let below = [0.006_209_7, 0.022_750_1, 0.066_807_2, 0.158_655_3, 0.308_537_5, 0.5];
+        let cumulative: Vec<f64> = below.into_iter().chain(below[..5].iter().rev().map(|p| 1.0 - p)).collect();
+        let mut expected: Vec<f64> = cumulative.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        expected.insert(0, cumulative[0]);
+        expected.push(1.0 - cumulative[10]);
+        let mut counts = vec![0.0; expected.len()];
+        for value in values {
+            counts[((f64::from(value) + 3.0) / 0.5).floor().clamp(0.0, 11.0) as usize] += 1.0;
+        }
+        let p = crate::chi_square::p_value(&counts, &expected);
+        assert!(p > 0.01, "{p}");
+    }
+
+    #[test]
     fn vectors_are_orthonormal_and_rebuild_a_matrix_of_low_rank_either_way_round() {
         for (l, n) in [(12, 40), (40, 12)] {
             let q = DMatrix::from_fn(l, n, |r, c| {

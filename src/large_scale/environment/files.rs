@@ -15,6 +15,8 @@ use crate::error::{Error, InputError, Result};
 const MAX_TEXELS: u64 = 1 << 26;
 /// Maps are averaged down to at most this width; lights need no more.
 const KEPT_WIDTH: usize = 1024;
+/// No light is brighter (the sun's disc is 2·10⁹ W/(sr m²)); sums over a map and a picture stay far inside an f32.
+const LARGEST_RADIANCE: f32 = 1e18;
 
 fn broken(path: &Path, what: impl Display, expected: &str) -> Error {
     InputError::new("light.environment", what, expected).in_file(path).into()
@@ -61,7 +63,8 @@ pub(super) fn load_exr(path: &Path) -> Result<Environment> {
 fn cleaned(mut map: LatLongMap) -> Environment {
     let mut bad = 0usize;
     for texel in &mut map.texels {
-        let clean = texel.map(|value| if value.is_finite() && value >= 0.0 { value } else { 0.0 });
+        // A comparison that NaN fails.
+        let clean = texel.map(|value| if (0.0..=LARGEST_RADIANCE).contains(&value) { value } else { 0.0 });
         // A NaN is unequal to itself, so this counts it too.
         bad += usize::from(clean != *texel);
         *texel = clean;
@@ -70,7 +73,7 @@ fn cleaned(mut map: LatLongMap) -> Environment {
     if bad > 0 {
         let all = map.texels.len();
         warnings.push(format!(
-            "{bad} of the environment's {all} texels are negative, infinite or NaN and count as black there"
+            "{bad} of the environment's {all} texels are negative, NaN, or above {LARGEST_RADIANCE:e} and count as black there"
         ));
     }
     Environment { map: reduced(map), warnings }
@@ -78,21 +81,24 @@ fn cleaned(mut map: LatLongMap) -> Environment {
 
 /// Averages blocks of texels, weighted by solid angle, so that the total stays the same.
 fn reduced(map: LatLongMap) -> LatLongMap {
-    let block = map.width.div_ceil(KEPT_WIDTH);
-    if block <= 1 || !map.width.is_multiple_of(block) || !map.height.is_multiple_of(block) {
+    // Sides that do not divide are cut into blocks that differ by a texel; each keeps its energy.
+    let block = map.width.div_ceil(KEPT_WIDTH).max(map.height.div_ceil(KEPT_WIDTH));
+    if block <= 1 {
         return map;
     }
-    let mut small = LatLongMap { width: map.width / block, height: map.height / block, texels: Vec::new() };
-    for row in 0..small.height {
-        for column in 0..small.width {
-            let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-            for fine_row in row * block..(row + 1) * block {
-                let texels = &map.texels[fine_row * map.width + column * block..][..block];
-                let solid_angle = map.solid_angle(fine_row);
-                sum += texels.iter().map(|t| t.as_dvec3()).sum::<DVec3>() * solid_angle;
-                weight += solid_angle * block as f64;
+    let [width, height] = [map.width, map.height].map(|side| side.div_ceil(block));
+    let mut small = LatLongMap { width, height, texels: Vec::with_capacity(width * height) };
+    for row in 0..height {
+        let fine_rows = row * map.height / height..(row + 1) * map.height / height;
+        for column in 0..width {
+            let fine_columns = column * map.width / width..(column + 1) * map.width / width;
+            let mut sum = DVec3::ZERO;
+            for fine_row in fine_rows.clone() {
+                let texels = &map.texels[fine_row * map.width..][fine_columns.clone()];
+                let part: DVec3 = texels.iter().map(|t| t.as_dvec3()).sum();
+                sum += part * map.solid_angle(fine_row);
             }
-            small.texels.push((sum / weight).as_vec3());
+            small.texels.push((sum / small.solid_angle(row)).as_vec3());
         }
     }
     small
@@ -157,6 +163,10 @@ mod tests {
         let total = map.total();
         let small = reduced(map);
         assert_eq!((small.width, small.height), (1024, 32));
+        assert!((small.total() - total).length() < 1e-5);
+        let odd = LatLongMap::from_fn(2053, 67, |d| DVec3::new(d.y + 1.0, d.x + 1.0, 1.0));
+        let (total, small) = (odd.total(), reduced(odd));
+        assert_eq!((small.width, small.height), (685, 23));
         assert!((small.total() - total).length() < 1e-5);
     }
 }

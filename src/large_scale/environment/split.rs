@@ -127,13 +127,15 @@ struct Sums {
 impl Sums {
     fn new(map: &LatLongMap, without: &[usize]) -> Self {
         let stride = map.width + 1;
+        let mut left_out = vec![false; map.texels.len()];
+        without.iter().for_each(|&texel| left_out[texel] = true);
         let mut table = vec![Moments::default(); stride * (map.height + 1)];
         for row in 0..map.height {
             let solid_angle = map.solid_angle(row);
             let mut in_row = Moments::default();
             for column in 0..map.width {
                 let texel = row * map.width + column;
-                if !without.contains(&texel) {
+                if !left_out[texel] {
                     let direction = map.direction(column as f64 + 0.5, row as f64 + 0.5);
                     in_row = in_row.plus(Moments::of(direction, map.texels[texel].as_dvec3() * solid_angle));
                 }

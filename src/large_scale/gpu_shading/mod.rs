@@ -104,6 +104,12 @@ impl GpuShading {
         let passes = match &brdf.form {
             Form::Direct(form) => self.direct_passes(gpu, form, shadowed)?,
             Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
+            Form::Interreflecting(..) => {
+                return Err(GpuError::Unsupported("light between facets is added on the CPU only".to_owned()));
+            }
+            Form::Table(_) => {
+                return Err(GpuError::Unsupported("tables for pictures are read on the CPU only".to_owned()));
+            }
             Form::Wu2011(_) => {
                 return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
             }

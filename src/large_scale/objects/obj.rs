@@ -19,7 +19,11 @@ pub(super) fn load(path: &Path) -> Result<ObjectMesh> {
     let unreadable = |what: &dyn std::fmt::Display| {
         Error::from(InputError::new("object.path", what, "a readable OBJ file").in_file(path))
     };
-    let size = std::fs::metadata(path).map_err(|error| unreadable(&error))?.len();
+    let there = std::fs::metadata(path).map_err(|error| unreadable(&error))?;
+    if !there.is_file() {
+        return Err(unreadable(&"a folder or device"));
+    }
+    let size = there.len();
     if size > MAX_BYTES {
         return Err(unreadable(&format!("{size} bytes (at most {MAX_BYTES} are read)")));
     }

@@ -1,14 +1,24 @@
 //! The stages in order, each with its last result and the input that made it: an edit recomputes what lies downstream.
 
+mod findings;
+mod interreflection;
+mod make;
+mod pictures;
+mod stage;
+
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
-use crate::accuracy::{Errors, Reference, mirror_biased_pairs, upper_errors};
-use crate::brdf::{Brdf, MeasuredCache, Term};
+use self::make::{choose, grouped, names, same_lobes, sample, see};
+pub use self::pictures::Pictured;
+use self::pictures::Pictures;
+use self::stage::{Stage, Version};
+use crate::accuracy::health::{Evidence, Limits, Sight};
+use crate::accuracy::{Errors, Health, Reference};
+use crate::brdf::{Brdf, MeasuredCache};
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
@@ -16,62 +26,15 @@ use crate::filtering::{
     Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, Reflectance, SumMaterial, VisibleFacets, Wu2011,
     Wu2011Settings,
 };
-use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use crate::geometry::{self, Facets, TileMesh};
 use crate::gpu::Gpu;
-use crate::plan::{Backend, Costs, Findings, Plan, Preset, Route, Settings, decide};
-use crate::scene::{LoadedScene, Material, Painted, Scene, Tile};
-use crate::visibility::{
-    Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
-};
+use crate::interreflection::{InterreflectionTable, Transport};
+use crate::plan::{Costs, Findings, Plan, Preset, Route, Settings, decide};
+use crate::scene::{LoadedScene, Material, Painted, Switch, Tile};
+use crate::visibility::{Visibility, visibility_maps_cpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
 pub type StageTimes = Vec<(&'static str, f64)>;
-
-/// A stage's last result and the key it was made from.
-///
-/// The key holds the versions of all upstream results it was made from. (A flag "upstream is new" will not do: whoever
-/// asks for the mesh or the materials alone, as the reference does, would swallow it.)
-#[derive(Debug)]
-struct Stage<K, T> {
-    last: Option<(K, Arc<T>)>,
-    /// Counts the results made.
-    version: Version,
-}
-
-type Version = u64;
-
-impl<K, T> Default for Stage<K, T> {
-    fn default() -> Self {
-        Self { last: None, version: 0 }
-    }
-}
-
-impl<K: PartialEq, T> Stage<K, T> {
-    /// The last result if `key` is the same, else a new one, timed; with its version.
-    fn get(
-        &mut self,
-        name: &'static str,
-        key: K,
-        times: &mut StageTimes,
-        cancel: &Cancel,
-        make: impl FnOnce() -> Result<T>,
-    ) -> Result<(Arc<T>, Version)> {
-        if let Some((last, value)) = &self.last
-            && *last == key
-        {
-            return Ok((value.clone(), self.version));
-        }
-        cancel.check()?;
-        let start = Instant::now();
-        let value = Arc::new(make()?);
-        // A stage that was told to stop may have made anything.
-        cancel.check()?;
-        times.push((name, start.elapsed().as_secs_f64() * 1e3));
-        self.last = Some((key, value.clone()));
-        self.version += 1;
-        Ok((value, self.version))
-    }
-}
 
 /// A geometry that is drawn on: the mesh and its parts that later stages ask for.
 #[derive(Debug)]
@@ -79,6 +42,8 @@ struct Shape {
     mesh: TileMesh,
     flat: bool,
     height_field: bool,
+    /// The largest angle between a surface normal and z [rad].
+    steepest: f32,
 }
 
 /// The material of each slot of a mesh, by number, and the materials.
@@ -86,8 +51,8 @@ type Assigned = (Vec<usize>, Vec<SumMaterial>);
 type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
 type ShapeKey = (Tile, PathBuf, Painted);
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
-/// Mesh, count, seed, and whether they are drawn as the paper does.
-type FacetKey = (Version, usize, u64, bool);
+/// Mesh, count, seed, whether they are drawn as the paper does, and whether their colours count.
+type FacetKey = (Version, usize, u64, bool, Switch);
 type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
@@ -103,6 +68,38 @@ pub struct Outcome {
     /// What the factored form's error against the direct sum stays below, where it was tried.
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
+    /// What the health is measured from.
+    pub evidence: Evidence,
+    /// The health, once it was asked for: see [`Outcome::health`].
+    pub examined: Arc<OnceLock<Health>>,
+    pictures: Arc<Pictures>,
+}
+
+impl Outcome {
+    /// The same, as whoever did not have to wait for it sees it.
+    pub fn without_times(self) -> Self {
+        Self { times: StageTimes::new(), ..self }
+    }
+
+    /// What pictures read instead of [`Outcome::brdf`]: a table of it where that pays and is close enough. The first call
+    /// makes it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Cancelled`].
+    pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
+        self.pictures.get(cancel)
+    }
+
+    /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
+    pub fn health(&self) -> &Health {
+        let limits = limits(&self.settings);
+        self.examined.get_or_init(|| Health::of(&self.brdf, &self.evidence, self.factored, limits))
+    }
+}
+
+/// What an examination needs to know of the settings.
+fn limits(settings: &Settings) -> Limits {
+    Limits { max_rank: settings.max_rank, tolerance: settings.tolerance }
 }
 
 /// The last effective BRDF, and what a colour edit makes the next one from.
@@ -128,13 +125,15 @@ pub struct Pipeline {
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     materials: Stage<MaterialKey, Assigned>,
+    /// Rays between facets: facets, elements, rays of each.
+    transport: Stage<(Version, usize, usize), Transport>,
+    interreflection: Stage<OutcomeKey, InterreflectionTable>,
+    /// Planes that mirror the mesh.
+    mirrors: Stage<Version, [bool; 2]>,
     /// M of each material, factored as the paper does, for a version of the materials, a seed and a number of colours.
     paper_factors: Stage<(Version, u64, usize), PaperFactors>,
     last: Option<Last>,
 }
-
-/// Pairs that the factored form is checked on.
-const CHECK_PAIRS: usize = 256;
 
 impl Pipeline {
     pub fn new() -> Self {
@@ -153,21 +152,27 @@ impl Pipeline {
     /// A file the scene names cannot be used, or a factorization fails.
     pub fn effective(&mut self, loaded: &LoadedScene) -> Result<Outcome> {
         let scene = &loaded.scene;
-        let settings = Settings::from_quality(&scene.quality);
+        let settings = Settings::of(scene);
         let mut times = StageTimes::new();
         let (shape, shape_version) = self.shape(loaded, &mut times)?;
         let (materials, materials_version) = self.materials(loaded, &shape.mesh, &mut times)?;
-        let (material_of_slot, sum_materials) = (&materials.0, &materials.1);
-
-        let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011);
+        let sum_materials = &materials.1;
+        let colors = settings.effects.color_weights;
+        let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011, colors);
         let (facets, facets_version) =
             self.facets.get("facets", facet_key, &mut times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
-        let sum = FacetSum::new(&facets, material_of_slot, sum_materials);
+        let material_of_slot = &grouped(&materials.0, &facets, &settings);
+        let mut sum = FacetSum::new(&facets, material_of_slot, sum_materials);
+        sum.force(&facets, &settings.effects);
         let found =
             self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
+        let mirrors = self.mirror_planes(&shape, shape_version, &settings, &mut times)?;
+        let found = Findings { mirrors, ..found };
         let mut plan = decide(&found, &settings, &Costs::default());
         if settings.preset == Preset::Wu2011 {
-            return self.wu2011(&shape, &facets, &materials.0, &materials.1, plan, settings, times, materials_version);
+            let names = names(scene, &shape.mesh, &materials)?;
+            let assigned = Arc::new((material_of_slot.clone(), materials.1.clone()));
+            return self.wu2011(&shape, &facets, &assigned, names, plan, settings, times, materials_version);
         }
         let key = (
             facets_version,
@@ -178,19 +183,25 @@ impl Pipeline {
             settings.penumbra.to_bits(),
         );
         let (gpu, cancel) = (self.gpu.as_ref(), &self.cancel);
-        let (visibility, visibility_version) = self.visibility.get("visibility", key, &mut times, cancel, || {
-            see(plan.route, &shape.mesh, &facets, &settings, gpu, cancel)
-        })?;
+        let (visibility, visibility_version) = match plan.route {
+            // Nothing is computed, and nothing kept.
+            Route::None => (Arc::new(Visibility::Unblocked { facets: facets.len() }), 0),
+            route => self.visibility.get("visibility", key, &mut times, cancel, || {
+                see(route, &shape.mesh, &facets, &settings, gpu, cancel)
+            })?,
+        };
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
-        let mut factors = None;
+        let (mut factors, mut earlier) = (None, None);
         if let Some(last) = &self.last {
             if last.key == key {
                 return Ok(Outcome { times, ..last.outcome.clone() });
             }
-            // Colours alone: the factors stay, and are judged anew.
-            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] && same_lobes(&last.materials, &materials) {
-                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank);
+            if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] {
+                let same_lobes = same_lobes(&last.materials, &materials);
+                earlier = last.outcome.pictures.latest(same_lobes);
+                // Colours alone: the factors stay, and are judged anew.
+                let kept = last.factors.as_ref().filter(|_| plan.try_low_rank && same_lobes);
                 factors = kept.map(|factors| factors.recolored(sum_materials));
             }
         }
@@ -200,22 +211,44 @@ impl Pipeline {
             let knobs = settings.low_rank(!shape.height_field);
             factors = Some(LowRank::build(&facets, &visibility, material_of_slot, sum_materials, &knobs)?);
         }
-        let direct = Direct { sum: Arc::new(sum), visibility };
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Soft(visibility.clone()),
+            materials: materials.clone(),
+            names: names(scene, &shape.mesh, &materials)?,
+            closes_plane: shape.mesh.closes_plane,
+        };
+        let direct = Direct { sum: Arc::new(sum), visibility: visibility.clone() };
         let base_area = f64::from(shape.mesh.base_area());
         let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
+        let is_factored = matches!(brdf.form, Form::LowRank(_));
+        let between = if plan.interreflection {
+            let found = (facets_version, key.clone());
+            let of = (&*facets, &*visibility, &materials.1[..], &material_of_slot[..]);
+            Some(self.between_facets(&shape, of, &settings, plan.mirrors, found, &mut times)?)
+        } else {
+            None
+        };
         for (name, ms) in &times {
             plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
         }
-        let brdf = Arc::new(brdf);
+        let exact = Arc::new(brdf);
+        let brdf = match &between {
+            Some(table) => Arc::new((*exact).clone().interreflecting(table.clone())),
+            None => exact.clone(),
+        };
         let mut notes = shape.mesh.notes.clone();
         if facets.skipped_triangles > 0 {
             notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
         }
         if let Some(errors) = factored {
-            plan.factored(matches!(brdf.form, Form::LowRank(_)), errors.rel_l2);
+            plan.factored(is_factored, errors.rel_l2);
         }
-        let outcome = Outcome { brdf, plan, settings, times, factored, notes };
+        let examined = Arc::default();
+        let pictures = Pictures::new(exact, &settings, plan.try_picture_table, earlier).with(between);
+        let pictures = Arc::new(pictures);
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
@@ -225,14 +258,15 @@ impl Pipeline {
     fn wu2011(
         &mut self,
         shape: &Shape,
-        facets: &Facets,
-        material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        facets: &Arc<Facets>,
+        assigned: &Arc<Assigned>,
+        names: Vec<String>,
         plan: Plan,
         settings: Settings,
         mut times: StageTimes,
         materials_version: Version,
     ) -> Result<Outcome> {
+        let (material_of_slot, materials) = (&assigned.0, &assigned.1);
         let knobs =
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
         let timed =
@@ -265,7 +299,31 @@ impl Pipeline {
         let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &factors, &knobs)?;
         timed(&mut times, "product", start);
         let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
-        Ok(Outcome { brdf, plan, settings, times, factored: None, notes: shape.mesh.notes.clone() })
+        let evidence = Evidence {
+            facets: facets.clone(),
+            sight: Sight::Packed(Arc::new(visibility)),
+            materials: assigned.clone(),
+            names,
+            closes_plane: shape.mesh.closes_plane,
+        };
+        let notes = shape.mesh.notes.clone();
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, false, None));
+        let examined = Arc::default();
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
+    }
+
+    /// How often each stage ran: a stage that the plan drops stays at 0.
+    pub fn runs(&self) -> Vec<(&'static str, u64)> {
+        vec![
+            ("geometry", self.shape.runs()),
+            ("facets", self.facets.runs()),
+            ("materials", self.materials.runs()),
+            ("visibility", self.visibility.runs()),
+            ("mirrors", self.mirrors.runs()),
+            ("transport", self.transport.runs()),
+            ("interreflection", self.interreflection.runs()),
+            ("basis", self.paper_factors.runs()),
+        ]
     }
 
     /// The tile's mesh.
@@ -286,6 +344,19 @@ impl Pipeline {
         Ok(self.materials(loaded, &shape.mesh, &mut times)?.0.as_ref().clone())
     }
 
+    /// The health of what the reference sum is made from: mesh and materials.
+    ///
+    /// # Errors
+    /// As [`Pipeline::sum_materials`].
+    pub fn input_health(&mut self, loaded: &LoadedScene) -> Result<Health> {
+        let mut times = StageTimes::new();
+        let shape = self.shape(loaded, &mut times)?.0;
+        let materials = self.materials(loaded, &shape.mesh, &mut times)?.0;
+        let names = names(&loaded.scene, &shape.mesh, &materials)?;
+        let settings = Settings::from_quality(&loaded.scene.quality);
+        Ok(Health::of_input(&shape.mesh, &materials.1, &names, limits(&settings)))
+    }
+
     /// Hands a reference evaluator of the scene to `work`.
     ///
     /// # Errors
@@ -294,7 +365,9 @@ impl Pipeline {
         let mut times = StageTimes::new();
         let shape = self.shape(loaded, &mut times)?.0;
         let materials = self.materials(loaded, &shape.mesh, &mut times)?.0;
-        Ok(work(&Reference::new(&shape.mesh, &materials.0, &materials.1)))
+        let effects = &loaded.scene.effects;
+        let bounces = if effects.interreflection == Switch::On { effects.bounces } else { 0 };
+        Ok(work(&Reference::new(&shape.mesh, &materials.0, &materials.1).with_bounces(bounces)))
     }
 
     fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, Version)> {
@@ -304,7 +377,8 @@ impl Pipeline {
             let (low, high) = mesh.z_range();
             let flat = high - low <= 1e-7 * mesh.size.max_element();
             let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
-            Ok(Shape { mesh, flat, height_field })
+            let steepest = steepest(&mesh);
+            Ok(Shape { mesh, flat, height_field, steepest })
         })
     }
 
@@ -334,67 +408,6 @@ impl Pipeline {
             Ok((material_of_slot, materials))
         })
     }
-
-    #[expect(clippy::too_many_arguments, reason = "one place that gathers all there is to know")]
-    fn findings(
-        &mut self,
-        scene: &Scene,
-        shape: &Shape,
-        facets: &Facets,
-        sum: &FacetSum,
-        material_of_slot: &[usize],
-        materials: &[SumMaterial],
-        settings: &Settings,
-        facets_version: Version,
-    ) -> Findings {
-        let needs_maps = !shape.flat && !shape.height_field;
-        if needs_maps && settings.backend != Backend::Cpu && !self.gpu_asked {
-            self.gpu_asked = true;
-            self.gpu = Gpu::open().ok();
-        }
-        let hardware_gpu = settings.backend != Backend::Cpu
-            && self
-                .gpu
-                .as_ref()
-                .is_some_and(|gpu| settings.backend == Backend::Gpu || gpu.tier == crate::gpu::Tier::Hardware);
-        let scan_work = match self.scan_work {
-            Some((version, work)) if version == facets_version => work,
-            _ if needs_maps && !hardware_gpu => {
-                let work = Slices::work(&PeriodicGrid::new(&shape.mesh), facets);
-                self.scan_work = Some((facets_version, work));
-                work
-            }
-            _ => 0.0,
-        };
-        let mut used: Vec<usize> = facets.slots.iter().map(|slot| material_of_slot[usize::from(*slot)]).collect();
-        used.sort_unstable();
-        used.dedup();
-        let is_black = |index: &&usize| materials[**index].color == Vec3::ZERO;
-        let black_materials = used.iter().filter(is_black).count();
-        let is_lambertian =
-            |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
-        Findings {
-            flat: shape.flat,
-            height_samples: shape.mesh.height_grid.is_some(),
-            height_field: shape.height_field,
-            closes_plane: shape.mesh.closes_plane,
-            hardware_gpu,
-            triangles: shape.mesh.triangles.len(),
-            scan_work,
-            area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>()
-                / f64::from(shape.mesh.base_area()),
-            materials: used.len() - black_materials,
-            black_materials,
-            colors_vary: sum.colors_vary(),
-            lobes: sum.lobe_count(),
-            lookups: sum.measured_count(),
-            only_lambertian: used.iter().all(is_lambertian),
-            distinct_normals: sum.patch_count(),
-            object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
-            lights: scene.light.count + scene.light.directional.len(),
-            lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
-        }
-    }
 }
 
 /// Without a surface that faces down, what blocks a point blocks everything below it too: one horizon tells all.
@@ -402,74 +415,11 @@ fn nothing_faces_down(mesh: &TileMesh) -> bool {
     (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
 }
 
-/// Facets of a tile, in the order that sums want.
-fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
-    let mut facets = if settings.preset == Preset::Wu2011 {
-        Facets::sample_wu2011(mesh, settings.facets, settings.seed)
-    } else {
-        FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
-    };
-    facets.sort_for_sums();
-    facets
-}
-
-fn see(
-    route: Route,
-    mesh: &TileMesh,
-    facets: &Facets,
-    settings: &Settings,
-    gpu: Option<&Gpu>,
-    cancel: &Cancel,
-) -> Result<Visibility> {
-    let periodic = || PeriodicGrid::new(mesh).cancelled_by(cancel);
-    let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
-    Ok(match (route, &mesh.height_grid, gpu) {
-        (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
-        (Route::HeightMarch, Some(heights), _) => {
-            Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp))
-        }
-        (Route::HeightMarch | Route::HorizonScan, ..) => {
-            Visibility::Horizons(Horizons::scan(&periodic(), facets, azimuths, ramp))
-        }
-        (Route::Slices, ..) => Visibility::Slices(Slices::scan(&periodic(), facets, settings.slice_azimuths, ramp)),
-        (Route::GpuMaps | Route::CpuMaps, ..) => {
-            let (grid, resolution) = (settings.map_grid, settings.map_resolution);
-            // A GPU that fails is no reason to stop: the CPU's maps are the same.
-            let packed = match (route, gpu) {
-                (Route::GpuMaps, Some(gpu)) => {
-                    visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution).ok()
-                }
-                _ => None,
-            };
-            let packed = packed.unwrap_or_else(|| visibility_maps_cpu(mesh, facets, &grid.directions(), resolution));
-            Visibility::Maps(SoftMaps { grid, packed })
-        }
-    })
-}
-
-fn same_lobes((slots, materials): &Assigned, (other_slots, others): &Assigned) -> bool {
-    slots == other_slots
-        && materials.len() == others.len()
-        && materials.iter().zip(others).all(|(a, b)| a.same_lobes(b))
-}
-
-/// The factored form where there is one and it agrees with the direct sum, else the direct sum; and how far apart they are.
-fn choose(
-    direct: Direct,
-    factors: Option<LowRank>,
-    base_area: f64,
-    settings: &Settings,
-) -> (EffectiveBrdf, Option<Errors>) {
-    let direct = EffectiveBrdf { form: Form::Direct(direct), base_area };
-    let Some(factors) = factors else { return (direct, None) };
-    let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };
-    let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
-    let values =
-        |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
-    let errors = upper_errors(&values(&factored), &values(&direct));
-    let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
-    let keep = settings.method == crate::plan::Method::LowRank || close;
-    (if keep { factored } else { direct }, Some(errors))
+/// The largest angle between a normal and z [rad].
+fn steepest(mesh: &TileMesh) -> f32 {
+    let cosine = |triangle| mesh.geometric_normal(triangle);
+    let normals = (0..mesh.triangles.len()).map(cosine).filter(|normal| *normal != Vec3::ZERO);
+    normals.map(|normal| normal.z).fold(1.0, f32::min).clamp(-1.0, 1.0).acos()
 }
 
 impl Reflectance for Outcome {

@@ -1,0 +1,170 @@
+//! Accuracy against time of the scene at hand: rungs from faster to finer and the present settings, held against a reference
+//! that refines in the background.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use biscale::accuracy::ladder;
+use biscale::accuracy::progressive::{Compared, ProgressiveReference};
+use biscale::accuracy::sweep::with_settings;
+use biscale::pipeline::Pipeline;
+use biscale::report::{EffectCost, Studio, heat, measure_effects};
+use biscale::scene::{LoadedScene, Quality};
+use biscale::{Error, Result};
+use eframe::egui::ColorImage;
+
+use super::runner::Desk;
+
+/// A scene to measure.
+#[derive(Debug, Clone)]
+pub struct AccuracyJob {
+    pub version: u64,
+    pub loaded: Arc<LoadedScene>,
+    /// Measure the present settings and the rungs.
+    pub chart: bool,
+    /// Go on refining the reference, and make the difference picture.
+    pub compare: bool,
+    /// Force each effect on and off.
+    pub effects: bool,
+}
+
+/// A rung of the ladder on this machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    pub facets: usize,
+    pub ms: f64,
+    pub compared: Compared,
+}
+
+/// What comes back.
+#[derive(Debug, Clone)]
+pub enum AccuracyAnswer {
+    Doing(&'static str),
+    /// All rungs measured so far.
+    Rungs(Vec<Point>),
+    /// The present settings of a version of the document.
+    Present(u64, Point),
+    /// ΔE between the present picture and a far finer one, as a picture, and its mean.
+    Difference(u64, Arc<ColorImage>, f32),
+    /// What each effect costs and changes.
+    Effects(u64, Vec<EffectCost>),
+    Done(u64),
+    Failed(String),
+}
+
+/// Rungs of the chart.
+const RUNGS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
+/// The rung that difference pictures are taken against.
+const FINEST: f64 = 12.0;
+const PAIRS: usize = 96;
+/// Batches of the reference: for the chart, and when it is asked for.
+const BATCHES: [usize; 2] = [2, 24];
+
+/// What stays between jobs: the reference and the rungs belong to a scene, whatever its settings.
+#[derive(Default)]
+pub struct Accuracy {
+    key: Option<Box<LoadedScene>>,
+    pipeline: Pipeline,
+    reference: Option<ProgressiveReference>,
+    rungs: Vec<(f64, Point)>,
+}
+
+impl Accuracy {
+    pub fn work(&mut self, job: &AccuracyJob, desk: &Desk<AccuracyJob>, answer: &dyn Fn(AccuracyAnswer)) {
+        match self.measure(job, desk, answer) {
+            Ok(()) => answer(AccuracyAnswer::Done(job.version)),
+            Err(Error::Cancelled) => {}
+            Err(error) => answer(AccuracyAnswer::Failed(error.to_string())),
+        }
+    }
+
+    fn measure(&mut self, job: &AccuracyJob, desk: &Desk<AccuracyJob>, answer: &dyn Fn(AccuracyAnswer)) -> Result<()> {
+        let key = without_settings(&job.loaded);
+        if self.key.as_deref() != Some(&key) {
+            *self = Self { key: Some(Box::new(key)), ..Self::default() };
+        }
+        self.pipeline.cancel_with(desk.cancel.clone());
+        if job.effects {
+            answer(AccuracyAnswer::Doing("Each effect on and off"));
+            let costs = measure_effects(&job.loaded, desk.cancel, |_| {})?;
+            answer(AccuracyAnswer::Effects(job.version, costs));
+        }
+        if !job.chart {
+            return Ok(());
+        }
+        answer(AccuracyAnswer::Doing("Reference"));
+        let mut reference = self.reference.take().unwrap_or_else(|| ProgressiveReference::new(PAIRS));
+        while reference.batches < BATCHES[0] {
+            reference.refine(&mut self.pipeline, &job.loaded)?;
+            desk.cancel.check()?;
+        }
+        self.reference = Some(reference.clone());
+        let outcome = self.pipeline.effective(&job.loaded)?;
+        let mut present = self.point(&job.loaded, &reference)?;
+        answer(AccuracyAnswer::Present(job.version, present));
+        let overhangs = outcome.plan.effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
+        for rung in RUNGS {
+            if self.rungs.iter().any(|(known, _)| *known == rung) {
+                continue;
+            }
+            desk.cancel.check()?;
+            answer(AccuracyAnswer::Doing("Faster and finer settings"));
+            let scene = with_settings(&job.loaded, &ladder::rung(rung, overhangs))?;
+            let point = self.point(&scene, &reference)?;
+            self.rungs.push((rung, point));
+            answer(AccuracyAnswer::Rungs(self.rungs.iter().map(|(_, point)| *point).collect()));
+        }
+        answer(AccuracyAnswer::Rungs(self.rungs.iter().map(|(_, point)| *point).collect()));
+        if !job.compare {
+            return Ok(());
+        }
+        answer(AccuracyAnswer::Doing("Difference picture"));
+        let fine = with_settings(&job.loaded, &ladder::rung(FINEST, overhangs))?;
+        let studio = Studio::new(&job.loaded)?;
+        let now = studio.picture(&outcome.brdf)?;
+        desk.cancel.check()?;
+        let finest = studio.picture(&self.pipeline.effective(&fine)?.brdf)?;
+        let delta_e = studio.difference(&now, &finest);
+        let mean = delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32;
+        answer(AccuracyAnswer::Difference(job.version, Arc::new(picture(now.width, now.height, &delta_e)), mean));
+        answer(AccuracyAnswer::Doing("Refining the reference"));
+        while reference.batches < BATCHES[1] {
+            desk.cancel.check()?;
+            reference.refine(&mut self.pipeline, &job.loaded)?;
+            self.reference = Some(reference.clone());
+            present.compared = reference.compare(&outcome.brdf);
+            answer(AccuracyAnswer::Present(job.version, present));
+        }
+        Ok(())
+    }
+
+    /// Errors of a scene at its settings, and the time of an edit that asks for other facets.
+    fn point(&mut self, scene: &LoadedScene, reference: &ProgressiveReference) -> Result<Point> {
+        let mut moved = scene.clone();
+        moved.scene.quality.seed ^= 1;
+        self.pipeline.effective(&moved)?;
+        let start = Instant::now();
+        let outcome = self.pipeline.effective(scene)?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(Point { facets: outcome.settings.facets, ms, compared: reference.compare(&outcome.brdf) })
+    }
+}
+
+/// What the reference and the rungs depend on: all but settings and camera.
+fn without_settings(loaded: &LoadedScene) -> LoadedScene {
+    let mut key = loaded.clone();
+    key.scene.quality = Quality { seed: key.scene.quality.seed, ..Quality::default() };
+    key.scene.camera = None;
+    key.scene.object = Default::default();
+    key.scene.light = Default::default();
+    key.name.clear();
+    key
+}
+
+fn picture(width: usize, height: usize, delta_e: &[f32]) -> ColorImage {
+    let color = |delta: &f32| {
+        let [r, g, b] = heat(*delta).to_array().map(biscale::large_scale::tone_map::srgb_byte);
+        eframe::egui::Color32::from_rgb(r, g, b)
+    };
+    ColorImage::new([width, height], delta_e.iter().map(color).collect())
+}

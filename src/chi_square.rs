@@ -1,0 +1,82 @@
+//! Pearson's χ² test, for tests of sampling: included by tests of the library and beside it.
+
+/// The chance that counts of a right routine stray from `expected` (parts of the whole) this far or farther. Cells that
+/// expect fewer than five are pooled.
+pub fn p_value(counts: &[f64], expected: &[f64]) -> f64 {
+    let total: f64 = counts.iter().sum();
+    let parts: f64 = expected.iter().sum();
+    let (mut statistic, mut cells) = (0.0, 0);
+    let (mut pooled, mut pool) = (0.0, 0.0);
+    let mut add = |count: f64, mean: f64| {
+        statistic += (count - mean).powi(2) / mean;
+        cells += 1;
+    };
+    for (count, part) in counts.iter().zip(expected) {
+        let mean = part / parts * total;
+        if mean < 5.0 {
+            pooled += count;
+            pool += mean;
+        } else {
+            add(*count, mean);
+        }
+    }
+    if pool > 0.0 {
+        add(pooled, pool);
+    }
+    upper_gamma(0.5 * f64::from(cells - 1), 0.5 * statistic)
+}
+
+/// The regularised upper incomplete gamma function `Q(a, x)`: by its series below `a + 1`, by Lentz' continued fraction
+/// above (Press et al., Numerical Recipes, Sec. 6.2).
+fn upper_gamma(a: f64, x: f64) -> f64 {
+    if x <= 0.0 || a <= 0.0 {
+        return 1.0;
+    }
+    let scale = (a * x.ln() - x - ln_gamma(a)).exp();
+    if x < a + 1.0 {
+        let (mut term, mut sum, mut n) = (1.0 / a, 1.0 / a, a);
+        while term > sum * 1e-15 {
+            n += 1.0;
+            term *= x / n;
+            sum += term;
+        }
+        return 1.0 - sum * scale;
+    }
+    let mut b = x + 1.0 - a;
+    let (mut c, mut d) = (1e300, 1.0 / b);
+    let mut h = d;
+    for n in 1..10_000 {
+        let an = -f64::from(n) * (f64::from(n) - a);
+        b += 2.0;
+        d = 1.0 / (an * d + b);
+        c = b + an / c;
+        h *= d * c;
+        if (d * c - 1.0).abs() < 1e-15 {
+            break;
+        }
+    }
+    h * scale
+}
+
+/// Stirling's series, shifted to where it is exact to 1e-14.
+fn ln_gamma(x: f64) -> f64 {
+    let (mut x, mut shift) = (x, 0.0);
+    while x < 12.0 {
+        shift -= x.ln();
+        x += 1.0;
+    }
+    let r = 1.0 / (x * x);
+    let series = (1.0 / 12.0 - r * (1.0 / 360.0 - r * (1.0 / 1260.0 - r / 1680.0))) / x;
+    shift + (x - 0.5) * x.ln() - x + 0.5 * std::f64::consts::TAU.ln() + series
+}
+
+#[test]
+fn p_values_are_those_of_the_tables() {
+    // The 5 % and 1 % points of χ² with 1, 10 and 100 degrees of freedom.
+    for (degrees, five, one) in
+        [(1.0, 3.841_459, 6.634_897), (10.0, 18.307_038, 23.209_251), (100.0, 124.342_113, 135.806_723)]
+    {
+        assert!((upper_gamma(0.5 * degrees, 0.5 * five) - 0.05).abs() < 1e-6, "{degrees}");
+        assert!((upper_gamma(0.5 * degrees, 0.5 * one) - 0.01).abs() < 1e-6, "{degrees}");
+    }
+}

@@ -1,0 +1,177 @@
+//! A grid over the pairs of directions of the upper hemisphere, and over no others: half and difference coordinates
+//! (Rusinkiewicz 1998) whose difference angle ends where light or view sets.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Mat3, Vec3};
+
+/// A grid over `(θ_h, φ_h, φ_d, θ_d)`; `d` is the light in the frame of `h` (z to `h`, x along increasing θ).
+///
+/// - θ_h stands on `√(1 - cos θ_h)` in `[0, 1]`: the hemisphere in equal areas.
+/// - φ_d has period π: swapping light and view changes nothing.
+/// - θ_d ends at `θ_max`, `tan θ_max = 1 / (tan θ_h |cos φ_d|)`, where one of the two touches the horizon. It stands on
+///   `u = √((1 - cos θ_d) / (1 - cos θ_max))` in `[0, 1]`: no node is wasted under the horizon, no query is interpolated
+///   across it, and what falls to zero there does so on a node.
+///
+/// Node index is `((θ_h · azimuths + φ_h) · turn + φ_d) · difference + θ_d`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct UpperPairs {
+    /// Rings of θ_h, both ends included.
+    pub rings: usize,
+    /// Azimuths φ_h.
+    pub azimuths: usize,
+    /// Steps of φ_d over half a turn; even, so that a node stands on the kink of `θ_max` at a right angle.
+    pub turn: usize,
+    /// Steps of θ_d, both ends included.
+    pub difference: usize,
+}
+
+/// Directions of nodes stay this far [sine] above the horizon.
+const LOWEST: f32 = 2e-3;
+
+/// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²`: there shadows and cosines change fastest. On hammered
+/// metal, a GGX of 0.2, eight steps leave 38.6 dB with k = 1, 37 dB with k = 0 and 41 to 42 dB in between.
+const CROWDING: f32 = 0.75;
+
+impl UpperPairs {
+    pub fn nodes(&self) -> usize {
+        self.half_vectors() * self.turn * self.difference
+    }
+
+    /// Half vectors; the nodes of each are contiguous.
+    pub fn half_vectors(&self) -> usize {
+        self.rings * self.azimuths
+    }
+
+    /// `(i, o)` of a node.
+    pub fn pair(&self, node: usize) -> (Vec3, Vec3) {
+        let (step, rest) = (node % self.difference, node / self.difference);
+        let (turn, rest) = (rest % self.turn, rest / self.turn);
+        let (azimuth, ring) = (rest % self.azimuths, rest / self.azimuths);
+        let s = ring as f32 / (self.rings - 1) as f32;
+        let cos_theta_h = (1.0 - s * s).max(LOWEST);
+        let sin_theta_h = (1.0 - cos_theta_h * cos_theta_h).max(0.0).sqrt();
+        let (sin_phi, cos_phi) = (TAU * azimuth as f32 / self.azimuths as f32).sin_cos();
+        let frame = Mat3::from_cols(
+            Vec3::new(cos_theta_h * cos_phi, cos_theta_h * sin_phi, -sin_theta_h),
+            Vec3::new(-sin_phi, cos_phi, 0.0),
+            Vec3::new(sin_theta_h * cos_phi, sin_theta_h * sin_phi, cos_theta_h),
+        );
+        let (sin_turn, cos_turn) = (PI * turn as f32 / self.turn as f32).sin_cos();
+        let x = step as f32 / (self.difference - 1) as f32;
+        let u = x * (1.0 + CROWDING - CROWDING * x);
+        // 1 - cos θ_max = m² / (r (r + n)), which loses nothing where θ_max is small.
+        let (n, m) = (sin_theta_h * cos_turn.abs(), cos_theta_h);
+        let r = n.hypot(m);
+        let versine = (u * u * m * m / (r * (r + n))).min(1.0 - LOWEST);
+        let sin_theta_d = (versine * (2.0 - versine)).sqrt();
+        let across = Vec3::new(sin_theta_d * cos_turn, sin_theta_d * sin_turn, 0.0);
+        let along = Vec3::Z * (1.0 - versine);
+        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(LOWEST)).normalize();
+        (lifted(frame * (along + across)), lifted(frame * (along - across)))
+    }
+
+    /// Places of the pairs (light `k`, `o`) on the axes of the grid, in steps; all directions above the horizon.
+    pub fn places(&self, lights: [&[f32]; 3], o: Vec3, out: &mut Places) {
+        crate::simd::pair_places(lights, o, CROWDING, &mut out.columns);
+        let scales = [(self.rings - 1) as f32, self.azimuths as f32, self.turn as f32, (self.difference - 1) as f32];
+        let n = lights[0].len().min(Places::MOST);
+        for (column, scale) in out.columns.iter_mut().zip(scales) {
+            for at in &mut column[..n] {
+                *at *= scale;
+            }
+        }
+    }
+}
+
+/// Where pairs stand on the four axes of a grid, in its steps; and `i·h`.
+#[derive(Debug, Clone)]
+pub struct Places {
+    columns: [[f32; Places::MOST]; 5],
+}
+
+impl Default for Places {
+    fn default() -> Self {
+        Self { columns: [[0.0; Self::MOST]; 5] }
+    }
+}
+
+impl Places {
+    /// Most pairs at a time.
+    pub const MOST: usize = crate::simd::LANES;
+
+    /// θ_h, φ_h, φ_d, θ_d of pair `k`, in steps.
+    pub fn at(&self, k: usize) -> [f32; 4] {
+        std::array::from_fn(|axis| self.columns[axis][k])
+    }
+
+    pub fn i_dot_h(&self, k: usize) -> f32 {
+        self.columns[4][k]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 6, difference: 7 };
+
+    fn places(i: Vec3, o: Vec3) -> ([f32; 4], f32) {
+        let mut places = Places::default();
+        GRID.places([&[i.x], &[i.y], &[i.z]], o, &mut places);
+        (places.at(0), places.i_dot_h(0))
+    }
+
+    #[test]
+    fn every_node_lies_above_the_horizon_and_inside_nodes_are_found_where_they_are() {
+        for node in 0..GRID.nodes() {
+            let (i, o) = GRID.pair(node);
+            assert!(i.z > 1e-3 && o.z > 1e-3, "{node}: {i} {o}");
+            assert!(i.is_normalized() && o.is_normalized());
+            let (step, rest) = (node % GRID.difference, node / GRID.difference);
+            let (turn, rest) = (rest % GRID.turn, rest / GRID.turn);
+            let (azimuth, ring) = (rest % GRID.azimuths, rest / GRID.azimuths);
+            // At the pole, where i = o, and at the lifted horizon coordinates are not unique or are moved.
+            if ring == 0 || ring + 1 == GRID.rings || step == 0 || step + 1 == GRID.difference {
+                continue;
+            }
+            let (at, i_dot_h) = places(i, o);
+            let near = |a: f32, b: usize, period: usize| {
+                let d = (a - b as f32).abs();
+                d.min((period as f32 - d).abs()) < 2e-3
+            };
+            assert!((at[0] - ring as f32).abs() < 2e-3, "{node}: {at:?}");
+            assert!(near(at[1], azimuth, GRID.azimuths) && near(at[2], turn, GRID.turn), "{node}: {at:?}");
+            assert!((at[3] - step as f32).abs() < 4e-3, "{node}: {at:?} {step}");
+            assert!((i_dot_h - i.dot((i + o).normalize())).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn every_pair_has_a_place_on_the_grid_and_its_mirror_image_the_same() {
+        for k in 0..4000_u32 {
+            let angle =
+                |j: u32| (k.wrapping_mul(2_654_435_761).wrapping_add(j.wrapping_mul(97_571)) % 9973) as f32 / 9973.0;
+            let i = crate::directions::from_angles(angle(1) * 1.57, angle(2) * TAU);
+            let o = crate::directions::from_angles(angle(3) * 1.57, angle(4) * TAU);
+            let (at, _) = places(i, o);
+            let last = [8.0, 12.0, 6.0, 6.0];
+            assert!(at.iter().zip(last).all(|(at, last)| (0.0..=last).contains(at)), "{i} {o}: {at:?}");
+            let (swapped, _) = places(o, i);
+            for axis in 0..4 {
+                let d = (at[axis] - swapped[axis]).abs();
+                let wrapped = if axis == 2 { d.min(6.0 - d) } else { d };
+                assert!(wrapped < 1e-2, "{i} {o}: {at:?} {swapped:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_at_the_poles_and_at_the_very_horizon_have_finite_places() {
+        let flat = Vec3::new(1.0, 0.0, 1e-30).normalize();
+        for (i, o) in [(Vec3::Z, Vec3::Z), (flat, flat), (flat, Vec3::new(-1.0, 0.0, 1e-30)), (Vec3::Z, flat)] {
+            let (at, i_dot_h) = places(i, o);
+            assert!(at.iter().all(|at| at.is_finite()) && i_dot_h.is_finite(), "{i} {o}: {at:?}");
+        }
+    }
+}

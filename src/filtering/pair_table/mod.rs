@@ -1,0 +1,213 @@
+//! A table of the sum for pictures, which ask millions of times: what depends on the facets is tabulated once over half and
+//! difference coordinates, what is known exactly at the query stays out of it.
+//!
+//! `a_v f̄ = Σ_c w_c(i,o) T_c(i,o)`: a column `T_c` is the sum of one lobe over one group of facets, without its tint; or,
+//! where few normals occur, the visible area of the facets of one normal, whose lobe is then a part of the exact weight
+//! `w_c` (DESIGN.md, Sec. 4, "Interpolate only what is smooth"). Colours are in the weights: editing them keeps the table.
+
+mod columns;
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3, Vec4};
+use rayon::prelude::*;
+
+use self::columns::{Column, Weight};
+use super::Direct;
+use super::facet_sum::FacetSum;
+use crate::cancel::Cancel;
+use crate::directions::{Places, PolarGrid, UpperPairs};
+use crate::error::Result;
+use crate::simd::PairVectors;
+
+/// Columns of a table over pairs of directions, and what multiplies them.
+#[derive(Debug, Clone)]
+pub struct PairTable {
+    pub grid: UpperPairs,
+    weights: Vec<Weight>,
+    /// Whether the columns are those of a sum over facets, else the colours of another form.
+    of_sum: bool,
+    /// Fours of columns a node.
+    fours: usize,
+    /// `[θ_h][φ_h][φ_d][θ_d][four]`. There is one step of θ_d more at either end than the grid has, so that a cubic has its
+    /// four nodes everywhere: the mirror image of the second before the first, a straight line after the last.
+    values: Arc<Vec<Vec4>>,
+    /// `a_v(o) / cos θ_o` on the nodes of a polar grid.
+    areas: Arc<(PolarGrid, Vec<f32>)>,
+}
+
+/// Nodes of the projected area.
+const AREA_GRID: [usize; 2] = [30, 72];
+
+impl PairTable {
+    /// Sums over facets at every node. `None` where the sum has too many parts for a table to pay.
+    ///
+    /// # Errors
+    /// [`crate::Error::Cancelled`].
+    pub fn build(direct: &Direct, grid: UpperPairs, cancel: &Cancel) -> Result<Option<Self>> {
+        let Some(columns) = Column::of(&direct.sum) else { return Ok(None) };
+        let facets = direct.sum.facet_count();
+        let seen = |d: Vec3| {
+            let mut visible = vec![0.0; facets];
+            direct.visibility.fill(d, 0..facets, &mut visible);
+            visible
+        };
+        let weights = columns.iter().map(|column| column.weight(&direct.sum)).collect();
+        let area = |o: Vec3| direct.sums(&[], o, |_, _| {});
+        let table = Self::tabulate(grid, weights, true, area, cancel, |i, o, sums| {
+            let (v_i, v_o, pair) = (seen(i), seen(o), PairVectors::new(i, o));
+            for (column, sum) in columns.iter().zip(sums) {
+                *sum = column.sum(&direct.sum, &pair, &v_i, &v_o) as f32;
+            }
+        });
+        table.map(Some)
+    }
+
+    /// A table of another form's values, colours and all.
+    ///
+    /// # Errors
+    /// [`crate::Error::Cancelled`].
+    pub fn resample(
+        sums: impl Fn(&[Vec3], Vec3, &mut [DVec3]) -> f64 + Sync,
+        grid: UpperPairs,
+        cancel: &Cancel,
+    ) -> Result<Self> {
+        let weights = Vec3::AXES.map(Weight::Fixed).to_vec();
+        Self::tabulate(
+            grid,
+            weights,
+            false,
+            |o| sums(&[], o, &mut []),
+            cancel,
+            |i, o, out| {
+                let mut sum = [DVec3::ZERO];
+                sums(&[i], o, &mut sum);
+                out[..3].copy_from_slice(&sum[0].as_vec3().to_array());
+            },
+        )
+    }
+
+    /// `fill` writes the columns of a pair, `area` tells `a_v(o)`.
+    fn tabulate(
+        grid: UpperPairs,
+        weights: Vec<Weight>,
+        of_sum: bool,
+        area: impl Fn(Vec3) -> f64 + Sync,
+        cancel: &Cancel,
+        fill: impl Fn(Vec3, Vec3, &mut [f32]) + Sync,
+    ) -> Result<Self> {
+        let (fours, stored) = (weights.len().div_ceil(4), grid.difference + 2);
+        let mut values = vec![Vec4::ZERO; grid.half_vectors() * grid.turn * stored * fours];
+        let half_vectors = values.par_chunks_mut(grid.turn * stored * fours).enumerate();
+        half_vectors.try_for_each(|(half_vector, nodes)| {
+            cancel.check()?;
+            let mut sums = vec![0.0; 4 * fours];
+            for (turn, row) in nodes.chunks_mut(stored * fours).enumerate() {
+                for step in 0..grid.difference {
+                    let (i, o) = grid.pair((half_vector * grid.turn + turn) * grid.difference + step);
+                    fill(i, o, &mut sums[..weights.len()]);
+                    for (node, sums) in row[(step + 1) * fours..].iter_mut().zip(sums.as_chunks::<4>().0) {
+                        *node = Vec4::from_array(*sums);
+                    }
+                }
+                for four in 0..fours {
+                    let at = |step: usize| step * fours + four;
+                    row[at(0)] = row[at(2)];
+                    row[at(grid.difference + 1)] = 2.0 * row[at(grid.difference)] - row[at(grid.difference - 1)];
+                }
+            }
+            Ok::<_, crate::Error>(())
+        })?;
+        let directions = PolarGrid::new(AREA_GRID[0], AREA_GRID[1]);
+        let areas = directions.directions().into_par_iter().map(|o| (area(o) / f64::from(o.z)) as f32).collect();
+        Ok(Self { grid, weights, of_sum, fours, values: Arc::new(values), areas: Arc::new((directions, areas)) })
+    }
+
+    /// The same table for another sum over the same facets seen alike, whose lobes may differ where `same_lobes` is not
+    /// told; `None` where the table does not serve it.
+    pub fn reused(&self, sum: &FacetSum, same_lobes: bool) -> Option<Self> {
+        let weights: Vec<Weight> = Column::of(sum)?.iter().map(|column| column.weight(sum)).collect();
+        let areas_only = |weights: &[Weight]| weights.iter().all(Weight::is_lobe);
+        let serves = self.of_sum
+            && weights.len() == self.weights.len()
+            && (same_lobes || areas_only(&weights) && areas_only(&self.weights));
+        serves.then(|| Self { weights, ..self.clone() })
+    }
+
+    pub fn bytes(&self) -> usize {
+        16 * self.values.len() + 4 * self.areas.1.len()
+    }
+
+    /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
+    pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        if o.z <= 0.0 {
+            (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
+            return 0.0;
+        }
+        let relative: f32 = self.areas.0.taps(o).iter().map(|&(node, w)| w * self.areas.1[node]).sum();
+        let mut places = Places::default();
+        let mut components = [[0.0_f32; Places::MOST]; 3];
+        for (part, lights) in lights.chunks(Places::MOST).enumerate() {
+            for (k, light) in lights.iter().enumerate() {
+                for axis in 0..3 {
+                    components[axis][k] = light[axis];
+                }
+            }
+            let [x, y, z] = components.each_ref().map(|column| &column[..lights.len()]);
+            self.grid.places([x, y, z], o, &mut places);
+            for (k, &i) in lights.iter().enumerate() {
+                let sum = if i.z > 0.0 { self.at(i, o, places.at(k), places.i_dot_h(k)) } else { Vec3::ZERO };
+                out(part * Places::MOST + k, sum.as_dvec3());
+            }
+        }
+        f64::from(relative * o.z)
+    }
+
+    /// `Σ_c w_c T_c`: linear between half vectors and in φ_d, cubic in θ_d.
+    fn at(&self, i: Vec3, o: Vec3, [ring, azimuth, turn, step]: [f32; 4], i_dot_h: f32) -> Vec3 {
+        let grid = &self.grid;
+        let stored = grid.difference + 2;
+        let low = (step as usize).min(grid.difference - 2);
+        let cubic = catmull_rom(step - low as f32);
+        let between = |at: f32, count: usize| {
+            let low = (at as usize).min(count - 1);
+            ([low, if low + 1 == count { 0 } else { low + 1 }], at - low as f32)
+        };
+        let low_ring = (ring as usize).min(grid.rings - 2);
+        let rings = [low_ring, low_ring + 1];
+        let ring_blend = ring - low_ring as f32;
+        let (azimuths, azimuth_blend) = between(azimuth, grid.azimuths);
+        let (turns, turn_blend) = between(turn, grid.turn);
+        let corners: [(usize, f32); 8] = std::array::from_fn(|k| {
+            let [a, b, d] = [k >> 2 & 1, k >> 1 & 1, k & 1];
+            let pick = |bit: usize, blend: f32| if bit == 1 { blend } else { 1.0 - blend };
+            let row = (rings[a] * grid.azimuths + azimuths[b]) * grid.turn + turns[d];
+            let weight = pick(a, ring_blend) * pick(b, azimuth_blend) * pick(d, turn_blend);
+            ((row * stored + low) * self.fours, weight)
+        });
+        let pair = PairVectors { i, o, h: (i + o) / (2.0 * i_dot_h).max(1e-20), i_dot_h };
+        let mut total = Vec3::ZERO;
+        for four in 0..self.fours {
+            let mut sums = Vec4::ZERO;
+            for (start, weight) in corners {
+                let nodes = &self.values[start + four..start + four + 3 * self.fours + 1];
+                let along = nodes[0] * cubic[0]
+                    + nodes[self.fours] * cubic[1]
+                    + nodes[2 * self.fours] * cubic[2]
+                    + nodes[3 * self.fours] * cubic[3];
+                sums += along * weight;
+            }
+            // A cubic may swing below zero; no sum does.
+            let sums = sums.max(Vec4::ZERO).to_array();
+            for (weight, sum) in self.weights[4 * four..].iter().zip(sums) {
+                total += weight.at(&pair) * sum;
+            }
+        }
+        total
+    }
+}
+
+fn catmull_rom(t: f32) -> [f32; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [0.5 * (2.0 * t2 - t - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
+}

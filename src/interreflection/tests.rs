@@ -1,0 +1,186 @@
+use std::f64::consts::PI;
+use std::path::PathBuf;
+
+use glam::{DVec3, Vec3};
+
+use super::predicted_share;
+use crate::accuracy::{Pair, ReferenceSettings, mirror_biased_pairs};
+use crate::directions::{PolarGrid, from_angles};
+use crate::filtering::EffectiveBrdf;
+use crate::pipeline::Pipeline;
+use crate::scene::{self, LoadedScene, Painted};
+
+const DEEP: &str =
+    r#"{ kind = "grooves", profile = "trapezoid", count = 2, depth = 0.5, side_angle_deg = 80, rotation_deg = 0 }"#;
+const WHITE: &str = r#"{ kind = "lambertian", albedo = 1.0 }"#;
+
+fn open(geometry: &str, brdf: &str, effects: &str) -> LoadedScene {
+    let source = format!(
+        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\nfacets = 4096\nmethod = \"direct\"\nbackend = \"cpu\"\n[effects]\n{effects}\n"
+    );
+    LoadedScene {
+        scene: scene::parse(&source).unwrap(),
+        base_dir: PathBuf::new(),
+        name: "test".to_owned(),
+        painted: Painted::default(),
+    }
+}
+
+fn effective(geometry: &str, brdf: &str, effects: &str) -> EffectiveBrdf {
+    let outcome = Pipeline::new().effective(&open(geometry, brdf, effects)).unwrap();
+    (*outcome.brdf).clone()
+}
+
+/// `∫ f̄(i, o) dω_i`: what a tile under uniform light of radiance one sends to the viewer.
+fn furnace(brdf: &EffectiveBrdf, o: Vec3) -> f64 {
+    let grid = PolarGrid::new(24, 48);
+    let add = |node: usize| f64::from(grid.solid_angle(node) * brdf.eval(grid.direction(node), o).x);
+    (0..grid.len()).map(add).sum()
+}
+
+#[test]
+fn a_white_cavity_returns_what_it_receives_as_bounces_grow() {
+    let views = [from_angles(0.2, 0.3), from_angles(0.9, 1.2), from_angles(1.2, 0.1)];
+    let with = |effects: &str| {
+        let brdf = effective(DEEP, WHITE, effects);
+        views.map(|o| furnace(&brdf, o))
+    };
+    let direct = with("");
+    let mut last = direct;
+    for bounces in [1, 2, 8] {
+        let now = with(&format!("interreflection = \"on\"\nbounces = {bounces}"));
+        for (more, less) in now.iter().zip(last) {
+            assert!(*more > less, "{bounces}: {now:?} after {last:?}");
+        }
+        last = now;
+    }
+    let all = with("interreflection = \"on\"\nbounces = 64");
+    eprintln!("furnace: direct {direct:.3?}, eight bounces {last:.3?}, all {all:.3?}");
+    for (some, all) in direct.iter().zip(all) {
+        assert!(*some < 0.8, "the cavity hides much: {some}");
+        assert!((all - 1.0).abs() < 0.03, "{all}");
+    }
+}
+
+#[test]
+fn a_path_traced_white_cavity_returns_one_within_its_error_bars() {
+    // Lights uniform over the hemisphere: the mean of 2π f̄ is the integral.
+    let o = from_angles(0.6, 0.5);
+    let pairs: Vec<Pair> = (0..192)
+        .map(|k| {
+            let cosine = (k as f32 + 0.5) / 192.0;
+            Pair { i: from_angles(cosine.acos(), k as f32 * 2.399_963_2), o }
+        })
+        .collect();
+    let total = |bounces: usize| {
+        let effects = format!("interreflection = \"on\"\nbounces = {bounces}");
+        let settings = ReferenceSettings { facets: 256, max_passes: 6, target: 1e-6, seed: 5 };
+        let estimates = Pipeline::new()
+            .with_reference(&open(DEEP, WHITE, &effects), |reference| {
+                reference.estimate(&pairs, &settings, |_, _| true)
+            })
+            .unwrap();
+        let sum = |pick: fn(&crate::accuracy::Estimate) -> f64| estimates.iter().map(pick).sum::<f64>();
+        let mean = sum(|one| f64::from(one.f_bar.x)) / pairs.len() as f64 * 2.0 * PI;
+        let variance = sum(|one| f64::from(one.standard_error.x).powi(2)) / (pairs.len() as f64).powi(2);
+        (mean, variance.sqrt() * 2.0 * PI)
+    };
+    let (few, _) = total(1);
+    let (all, error) = total(40);
+    eprintln!("path traced: one bounce {few:.3}, forty {all:.3} ± {error:.3}");
+    assert!(few < 0.95 && all > few);
+    // Lights at fixed angles are a quadrature of their own: half a percent for it.
+    assert!((all - 1.0).abs() < 4.0 * error + 5e-3, "{all} ± {error}");
+}
+
+#[test]
+fn matrices_agree_with_path_tracing_for_matte_and_glossy_facets() {
+    let pairs = mirror_biased_pairs(48, 9);
+    let colored = r#"{ kind = "lambertian", albedo = [0.9, 0.5, 0.2] }"#;
+    let glossy = r#"{ kind = "cook_torrance", roughness = 0.4, f0 = [0.9, 0.6, 0.3] }"#;
+    // Four normals: kinks between the table's nodes, the hardest case for it.
+    let pyramids = r#"{ kind = "pyramids", height = 0.5 }"#;
+    for (geometry, brdf, bounces) in [(DEEP, colored, 3), (DEEP, glossy, 1), (pyramids, colored, 1)] {
+        let scene = open(geometry, brdf, &format!("interreflection = \"on\"\nbounces = {bounces}"));
+        let plain = effective(geometry, brdf, "");
+        let outcome = Pipeline::new().effective(&scene).unwrap();
+        let settings = ReferenceSettings { facets: 1024, max_passes: 8, target: 1e-6, seed: 3 };
+        let right = Pipeline::new()
+            .with_reference(&scene, |reference| reference.estimate(&pairs, &settings, |_, _| true))
+            .unwrap();
+        let (mut off, mut noise, mut added, mut norm) = (0.0, 0.0, 0.0, 0.0);
+        for (pair, right) in pairs.iter().zip(&right) {
+            let got = outcome.brdf.eval(pair.i, pair.o).as_dvec3();
+            off += (got - right.f_bar.as_dvec3()).length_squared();
+            noise += right.standard_error.as_dvec3().length_squared();
+            added += (got - plain.eval(pair.i, pair.o).as_dvec3()).length_squared();
+            norm += right.f_bar.as_dvec3().length_squared();
+        }
+        let [off, noise, added] = [off, noise, added].map(|sum: f64| (sum / norm).sqrt());
+        eprintln!("{brdf}, {bounces} bounces: off {off:.4}, noise {noise:.4}, what bounces add {added:.4}");
+        assert!(added > 0.02, "a case without interreflection tells nothing: {added}");
+        assert!(
+            (off * off - noise * noise).max(0.0).sqrt() < 0.02 + 0.13 * added,
+            "{brdf}: {off} of {added}, noise {noise}"
+        );
+    }
+}
+
+#[test]
+fn mirror_planes_spare_work_and_change_little() {
+    let knobs = "interreflection = \"on\"\nbounces = 2";
+    let mirrored = Pipeline::new().effective(&open(DEEP, WHITE, knobs)).unwrap();
+    assert_eq!(mirrored.plan.mirrors, [true, true]);
+    let all = effective(DEEP, WHITE, &format!("{knobs}\nmirror_symmetry = \"off\""));
+    let (mut off, mut norm) = (0.0, 0.0);
+    for pair in mirror_biased_pairs(60, 4) {
+        let (a, b) = (mirrored.brdf.eval(pair.i, pair.o).as_dvec3(), all.eval(pair.i, pair.o).as_dvec3());
+        off += (a - b).length_squared();
+        norm += b.length_squared();
+    }
+    assert!((off / norm).sqrt() < 0.02, "{}", (off / norm).sqrt());
+}
+
+#[test]
+fn light_between_facets_is_reciprocal_and_never_negative() {
+    let brdf = effective(DEEP, WHITE, "interreflection = \"on\"");
+    for pair in mirror_biased_pairs(60, 4) {
+        let (a, b) = (brdf.g(pair.i, pair.o), brdf.g(pair.o, pair.i));
+        assert!((a - b).abs().max_element() <= 1e-5 * a.max_element() && a.min_element() >= 0.0, "{a} {b}");
+    }
+}
+
+#[test]
+fn stages_of_light_between_facets_run_only_where_it_was_asked_for_and_there_is_any() {
+    let runs = |geometry: &str, effects: &str| {
+        let mut pipeline = Pipeline::new();
+        let outcome = pipeline.effective(&open(geometry, WHITE, effects)).unwrap();
+        let count = |wanted: &str| pipeline.runs().iter().find(|(name, _)| *name == wanted).unwrap().1;
+        assert_eq!(count("transport") > 0, outcome.plan.interreflection);
+        [count("transport"), count("interreflection"), count("visibility")]
+    };
+    assert_eq!(runs(DEEP, ""), [0, 0, 1]);
+    assert_eq!(runs(DEEP, "interreflection = \"off\""), [0, 0, 1]);
+    assert_eq!(runs(DEEP, "interreflection = \"on\""), [1, 1, 1]);
+    assert_eq!(runs(r#"{ kind = "flat" }"#, "interreflection = \"on\""), [0, 0, 0]);
+}
+
+#[test]
+fn an_edit_of_colour_casts_no_ray_again() {
+    let mut pipeline = Pipeline::new();
+    let mut loaded = open(DEEP, WHITE, "interreflection = \"on\"");
+    pipeline.effective(&loaded).unwrap();
+    loaded.scene.materials[0].color = Vec3::new(0.5, 0.25, 0.125);
+    let outcome = pipeline.effective(&loaded).unwrap();
+    let names: Vec<&str> = outcome.times.iter().map(|(name, _)| *name).collect();
+    assert!(names.contains(&"interreflection") && !names.contains(&"transport"), "{names:?}");
+    let sum = outcome.brdf.eval(Vec3::Z, from_angles(0.5, 0.3)).as_dvec3();
+    assert!(sum.cmpgt(DVec3::ZERO).all() && sum.x > sum.y && sum.y > sum.z);
+}
+
+#[test]
+fn the_predicted_share_is_that_of_a_geometric_series() {
+    assert_eq!(predicted_share(0.5, 0.0), 0.0);
+    assert!((predicted_share(0.8, 0.5) - 0.4 / 0.6).abs() < 1e-12);
+    assert!(predicted_share(1.0, 1.0).is_finite());
+}

@@ -1,0 +1,104 @@
+//! What each point of the surface sees of the others.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use crate::cancel::Cancel;
+use crate::directions::from_angles;
+use crate::error::Result;
+use crate::geometry::kd_tree::KdTree;
+use crate::geometry::{Facets, TileMesh};
+use crate::visibility::{PeriodicGrid, lifted_origins};
+
+/// No element is met: the ray leaves the tile or ends on a side that does not reflect.
+pub const NOTHING: u32 = u32::MAX;
+
+/// Elements, a part of the facets, and rays between them.
+#[derive(Debug, Clone)]
+pub struct Transport {
+    /// The facet that each element is.
+    pub facets: Vec<u32>,
+    /// Area each stands for.
+    pub areas: Vec<f32>,
+    /// Rays an element; all of equal weight: their density is that of the cosine.
+    pub rays: usize,
+    /// Direction of ray `element * rays + k`, away from the element.
+    pub directions: Vec<Vec3>,
+    /// The element that each ray meets, or [`NOTHING`].
+    pub hits: Vec<u32>,
+}
+
+impl Transport {
+    /// Casts `rays` from about `elements` of the facets.
+    ///
+    /// # Errors
+    /// It was cancelled.
+    pub fn new(mesh: &TileMesh, facets: &Facets, elements: usize, rays: usize, cancel: &Cancel) -> Result<Self> {
+        let stride = facets.len().div_ceil(elements.max(1)).max(1);
+        // Facets are sorted by normal: every n-th is as even a sample as all of them.
+        let chosen: Vec<u32> = (stride / 2..facets.len()).step_by(stride).map(|s| s as u32).collect();
+        let total: f64 = facets.areas.iter().map(|area| f64::from(*area)).sum();
+        let area = (total / chosen.len().max(1) as f64) as f32;
+        let grid = PeriodicGrid::new(mesh);
+        let bottom = mesh.z_range().0;
+        let origins = lifted_origins(facets, mesh.size);
+        // Both sides of a thin sheet, and both walls of a crease, are apart once points stand off their surface.
+        let off = area.max(0.0).sqrt();
+        let tree = {
+            let place = |&s: &u32| {
+                let s = s as usize;
+                wrap(facets.positions[s] + facets.geometric_normals[s] * off, mesh.size)
+            };
+            KdTree::new(&chosen.iter().map(place).collect::<Vec<_>>(), mesh.size)
+        };
+        let normals: Vec<Vec3> = (0..mesh.triangles.len()).map(|t| mesh.geometric_normal(t)).collect();
+        let mut directions = vec![Vec3::Z; chosen.len() * rays];
+        let mut hits = vec![NOTHING; chosen.len() * rays];
+        directions.par_chunks_mut(rays).zip(hits.par_chunks_mut(rays)).zip(&chosen).enumerate().for_each(
+            |(element, ((directions, hits), &facet))| {
+                if cancel.is_set() {
+                    return;
+                }
+                let s = facet as usize;
+                let (normal, geometric) = (facets.normals[s], facets.geometric_normals[s]);
+                for (k, (direction, hit)) in directions.iter_mut().zip(hits).enumerate() {
+                    *direction = cosine_direction(normal, k, rays, element);
+                    if direction.dot(geometric) <= 0.0 {
+                        continue;
+                    }
+                    let Some(met) = grid.first_hit(origins[s], *direction, facets.triangles[s], bottom) else {
+                        continue;
+                    };
+                    let facing = normals[met.triangle as usize];
+                    if facing.dot(*direction) < 0.0 {
+                        *hit = tree.nearest(wrap(met.position + facing * off, mesh.size)).unwrap_or(NOTHING);
+                    }
+                }
+            },
+        );
+        cancel.check()?;
+        let areas = vec![area; chosen.len()];
+        Ok(Self { facets: chosen, areas, rays, directions, hits })
+    }
+
+    /// The part of all rays that meets an element: how much of each other the surface's points see.
+    pub fn met(&self) -> f64 {
+        self.hits.iter().filter(|hit| **hit != NOTHING).count() as f64 / self.hits.len().max(1) as f64
+    }
+}
+
+/// The k-th of `rays` cosine-weighted directions about `normal`, turned and shifted from element to element.
+fn cosine_direction(normal: Vec3, k: usize, rays: usize, element: usize) -> Vec3 {
+    // The R2 sequence shifts the sets, the golden angle turns within one.
+    let shift = |step: f64| ((element as f64 + 0.5) * step).fract();
+    let height = ((k as f64 + shift(0.754_877_666_246_692_8)) / rays as f64).min(1.0 - 1e-6);
+    let turn = (k as f64 * 0.618_033_988_749_895 + shift(0.569_840_290_998_053_3)).fract();
+    let local = from_angles((height.sqrt().asin()) as f32, turn as f32 * std::f32::consts::TAU);
+    let (x, y) = normal.any_orthonormal_pair();
+    (x * local.x + y * local.y + normal * local.z).normalize_or(normal)
+}
+
+fn wrap(position: Vec3, size: Vec2) -> Vec3 {
+    let wrapped = position.truncate() - size * (position.truncate() / size).floor();
+    wrapped.clamp(Vec2::ZERO, size).extend(position.z)
+}

@@ -1,0 +1,115 @@
+//! What single stages make, as plain functions of their input.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::Assigned;
+use crate::accuracy::{Errors, mirror_biased_pairs, upper_errors};
+use crate::cancel::Cancel;
+use crate::error::Result;
+use crate::filtering::{Direct, EffectiveBrdf, Form, LowRank, mean_colors};
+use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
+use crate::gpu::Gpu;
+use crate::plan::{Method, Preset, Route, Settings};
+use crate::scene::{Scene, Switch};
+use crate::visibility::{
+    Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
+};
+
+/// Pairs that the factored form is checked on.
+const CHECK_PAIRS: usize = 256;
+
+/// Facets of a tile, in the order that sums want.
+pub(super) fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
+    let mut facets = if settings.preset == Preset::Wu2011 {
+        Facets::sample_wu2011(mesh, settings.facets, settings.seed)
+    } else {
+        FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
+    };
+    facets.sort_for_sums();
+    if settings.effects.color_weights == Switch::Off {
+        mean_colors(&mut facets);
+    }
+    facets
+}
+
+/// The material of each slot; where materials are forced into one, that of the largest area.
+pub(super) fn grouped(material_of_slot: &[usize], facets: &Facets, settings: &Settings) -> Vec<usize> {
+    if settings.effects.material_groups != Switch::Off {
+        return material_of_slot.to_vec();
+    }
+    let mut areas = vec![0.0_f64; material_of_slot.len()];
+    for (slot, area) in facets.slots.iter().zip(&facets.areas) {
+        areas[usize::from(*slot)] += f64::from(*area);
+    }
+    let largest = (0..areas.len()).max_by(|a, b| areas[*a].total_cmp(&areas[*b])).unwrap_or(0);
+    material_of_slot.iter().map(|_| material_of_slot[largest]).collect()
+}
+
+pub(super) fn see(
+    route: Route,
+    mesh: &TileMesh,
+    facets: &Facets,
+    settings: &Settings,
+    gpu: Option<&Gpu>,
+    cancel: &Cancel,
+) -> Result<Visibility> {
+    let periodic = || PeriodicGrid::new(mesh).cancelled_by(cancel);
+    let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
+    Ok(match (route, &mesh.height_grid, gpu) {
+        (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
+        (Route::HeightMarch, Some(heights), _) => {
+            Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp))
+        }
+        (Route::HeightMarch | Route::HorizonScan, ..) => {
+            Visibility::Horizons(Horizons::scan(&periodic(), facets, azimuths, ramp))
+        }
+        (Route::Slices, ..) => Visibility::Slices(Slices::scan(&periodic(), facets, settings.slice_azimuths, ramp)),
+        (Route::GpuMaps | Route::CpuMaps, ..) => {
+            let (grid, resolution) = (settings.map_grid, settings.map_resolution);
+            // A GPU that fails is no reason to stop: the CPU's maps are the same.
+            let packed = match (route, gpu) {
+                (Route::GpuMaps, Some(gpu)) => {
+                    visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution).ok()
+                }
+                _ => None,
+            };
+            let packed = packed.unwrap_or_else(|| visibility_maps_cpu(mesh, facets, &grid.directions(), resolution));
+            Visibility::Maps(SoftMaps { grid, packed })
+        }
+    })
+}
+
+pub(super) fn same_lobes((slots, materials): &Assigned, (other_slots, others): &Assigned) -> bool {
+    slots == other_slots
+        && materials.len() == others.len()
+        && materials.iter().zip(others).all(|(a, b)| a.same_lobes(b))
+}
+
+/// The factored form where there is one and it agrees with the direct sum, else the direct sum; and how far apart they are.
+pub(super) fn choose(
+    direct: Direct,
+    factors: Option<LowRank>,
+    base_area: f64,
+    settings: &Settings,
+) -> (EffectiveBrdf, Option<Errors>) {
+    let direct = EffectiveBrdf { form: Form::Direct(direct), base_area };
+    let Some(factors) = factors else { return (direct, None) };
+    let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };
+    let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
+    let values =
+        |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
+    let errors = upper_errors(&values(&factored), &values(&direct));
+    let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
+    let keep = settings.method == Method::LowRank || close;
+    (if keep { factored } else { direct }, Some(errors))
+}
+
+/// What each assigned material is called.
+pub(super) fn names(scene: &Scene, mesh: &TileMesh, (material_of_slot, materials): &Assigned) -> Result<Vec<String>> {
+    let mut names = vec![String::new(); materials.len()];
+    for (slot, &material) in mesh.slots.iter().zip(material_of_slot) {
+        scene.material_for_slot(slot)?.name.clone_into(&mut names[material]);
+    }
+    Ok(names)
+}

@@ -1,0 +1,150 @@
+//! What pictures read: a table of the effective BRDF where it is close enough, made when the first picture asks.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::accuracy::{Errors, mirror_biased_pairs, upper_errors};
+use crate::cancel::Cancel;
+use crate::directions::UpperPairs;
+use crate::error::Result;
+use crate::filtering::{EffectiveBrdf, Form, PairTable};
+use crate::interreflection::InterreflectionTable;
+use crate::plan::Settings;
+
+/// Pairs that the table is checked on.
+const CHECK_PAIRS: usize = 512;
+
+/// The effective BRDF as pictures read it.
+#[derive(Debug, Clone)]
+pub struct Pictured {
+    /// A table, or the BRDF itself.
+    pub brdf: Arc<EffectiveBrdf>,
+    /// What the table's error against the BRDF stays below; absent where the BRDF itself is read and none was tried.
+    pub errors: Option<Errors>,
+    /// Milliseconds that this call spent on it.
+    pub ms: f64,
+}
+
+/// A BRDF that pictures read before, over the same facets; and whether its lobes are the same too.
+pub(super) type Earlier = (Arc<EffectiveBrdf>, bool);
+
+/// Makes the table of one effective BRDF, once.
+#[derive(Debug)]
+pub(super) struct Pictures {
+    exact: Arc<EffectiveBrdf>,
+    grids: Vec<UpperPairs>,
+    tolerance: (f64, f64),
+    seed: u64,
+    earlier: Mutex<Option<Earlier>>,
+    made: Mutex<Option<Pictured>>,
+    /// Light between facets, which has a table of its own: added to what is made.
+    between: Option<Arc<InterreflectionTable>>,
+    /// What was made with it.
+    whole: Mutex<Option<Arc<EffectiveBrdf>>>,
+}
+
+impl Pictures {
+    /// `wanted`: whether the plan expects a table to pay.
+    pub(super) fn new(exact: Arc<EffectiveBrdf>, settings: &Settings, wanted: bool, earlier: Option<Earlier>) -> Self {
+        Self {
+            exact,
+            grids: if wanted { settings.picture_grids.clone() } else { Vec::new() },
+            tolerance: settings.picture_tolerance,
+            seed: settings.seed,
+            earlier: Mutex::new(earlier),
+            made: Mutex::new(None),
+            between: None,
+            whole: Mutex::new(None),
+        }
+    }
+
+    /// With light between facets, which `exact` leaves out.
+    pub(super) fn with(self, between: Option<Arc<InterreflectionTable>>) -> Self {
+        Self { between, ..self }
+    }
+
+    /// What the next edit may reuse.
+    pub(super) fn latest(&self, same_lobes: bool) -> Option<Earlier> {
+        if let Some(made) = &*lock(&self.made) {
+            return Some((made.brdf.clone(), same_lobes));
+        }
+        lock(&self.earlier).as_ref().map(|(brdf, same)| (brdf.clone(), *same && same_lobes))
+    }
+
+    /// The table, made now if it was not yet.
+    pub(super) fn get(&self, cancel: &Cancel) -> Result<Pictured> {
+        let made = self.get_direct(cancel)?;
+        let Some(table) = &self.between else { return Ok(made) };
+        let mut whole = lock(&self.whole);
+        let brdf = whole.get_or_insert_with(|| Arc::new((*made.brdf).clone().interreflecting(table.clone())));
+        Ok(Pictured { brdf: brdf.clone(), ..made })
+    }
+
+    fn get_direct(&self, cancel: &Cancel) -> Result<Pictured> {
+        let mut made = lock(&self.made);
+        if let Some(made) = &*made {
+            return Ok(Pictured { ms: 0.0, ..made.clone() });
+        }
+        let start = Instant::now();
+        let (brdf, errors) = self.make(cancel)?;
+        let pictured = Pictured { brdf, errors, ms: start.elapsed().as_secs_f64() * 1e3 };
+        *made = Some(pictured.clone());
+        Ok(pictured)
+    }
+
+    fn make(&self, cancel: &Cancel) -> Result<(Arc<EffectiveBrdf>, Option<Errors>)> {
+        let mut least = None;
+        if self.grids.is_empty() {
+            return Ok((self.exact.clone(), least));
+        }
+        let pairs = mirror_biased_pairs(CHECK_PAIRS, self.seed ^ 0x7ab1e);
+        let values =
+            |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
+        let exact = values(&self.exact);
+        let reused = self.reused();
+        let first = reused
+            .as_ref()
+            .map_or(0, |table| self.grids.iter().position(|grid| *grid == table.grid).unwrap_or(self.grids.len() - 1));
+        let mut reused = reused;
+        for grid in &self.grids[first..] {
+            let table = match reused.take() {
+                Some(table) => table,
+                None => match self.tabulate(*grid, cancel)? {
+                    Some(table) => table,
+                    None => break,
+                },
+            };
+            let brdf = EffectiveBrdf { form: Form::Table(table), base_area: self.exact.base_area };
+            let errors = upper_errors(&values(&brdf), &exact);
+            if errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1 {
+                return Ok((Arc::new(brdf), Some(errors)));
+            }
+            least = Some(errors);
+        }
+        Ok((self.exact.clone(), least))
+    }
+
+    fn tabulate(&self, grid: UpperPairs, cancel: &Cancel) -> Result<Option<PairTable>> {
+        let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| self.exact.form.sums(lights, o, |k, sum| out[k] = sum);
+        match &self.exact.form {
+            Form::Direct(direct) => PairTable::build(direct, grid, cancel),
+            _ => PairTable::resample(sums, grid, cancel).map(Some),
+        }
+    }
+
+    /// The earlier table, where it serves.
+    fn reused(&self) -> Option<PairTable> {
+        let (earlier, same_lobes) = lock(&self.earlier).take()?;
+        match (&earlier.form, &self.exact.form) {
+            (Form::Table(table), Form::Direct(direct)) => table.reused(&direct.sum, same_lobes),
+            _ => None,
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,176 @@
+use std::path::PathBuf;
+
+use glam::Vec3;
+
+use super::{Costs, Findings, Preset, Route, Settings, decide};
+use crate::accuracy::{compare, mirror_biased_pairs};
+use crate::pipeline::{Outcome, Pipeline};
+use crate::scene::{self, LoadedScene, Painted};
+
+const GEOMETRIES: [&str; 8] = [
+    r#"{ kind = "flat" }"#,
+    r#"{ kind = "flat", pattern = "stripes" }"#,
+    r#"{ kind = "grooves", profile = "v", count = 3, depth = 0.01, side_angle_deg = 5, rotation_deg = 0 }"#,
+    r#"{ kind = "heightfield", values = [[0.0, 0.01, 0.0, 0.005], [0.01, 0.02, 0.005, 0.0], [0.0, 0.01, 0.015, 0.0], [0.0, 0.0, 0.01, 0.0]] }"#,
+    r#"{ kind = "heightfield", values = [[0.0, 0.2, 0.0, 0.1], [0.2, 0.4, 0.1, 0.0], [0.0, 0.2, 0.3, 0.0], [0.0, 0.0, 0.2, 0.0]] }"#,
+    r#"{ kind = "pyramids", height = 0.3 }"#,
+    r#"{ kind = "grooves", profile = "trapezoid", count = 4, depth = 0.2 }"#,
+    r#"{ kind = "rods", count = 6, radius = 0.06, length = 0.2 }"#,
+];
+
+const BRDFS: [&str; 5] = [
+    r#"{ kind = "lambertian", albedo = [0.7, 0.5, 0.3] }"#,
+    r#"{ kind = "cook_torrance", roughness = 0.3, f0 = 0.9 }"#,
+    r#"{ kind = "ward", roughness = 0.3, specular = 0.5 }"#,
+    r#"{ kind = "blinn_phong", exponent = 40, specular = 0.5 }"#,
+    r#"[{ kind = "lambertian", albedo = 0.0 }, { kind = "ggx", roughness = 0.4, f0 = [0.9, 0.5, 0.2] }]"#,
+];
+
+fn open(geometry: &str, brdf: &str, effects: &str) -> LoadedScene {
+    let source = format!(
+        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\npreset = \"draft\"\nfacets = 1024\nmethod = \"direct\"\nbackend = \"cpu\"\n[effects]\n{effects}\n"
+    );
+    LoadedScene {
+        scene: scene::parse(&source).unwrap(),
+        base_dir: PathBuf::new(),
+        name: "test".to_owned(),
+        painted: Painted::default(),
+    }
+}
+
+fn values(outcome: &Outcome) -> Vec<Vec3> {
+    mirror_biased_pairs(64, 11).iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect()
+}
+
+#[test]
+fn forcing_a_dropped_effect_on_changes_forty_scenes_by_less_than_the_bound() {
+    let (mut forced, mut dropped_visibility) = (0, 0);
+    for geometry in GEOMETRIES {
+        for brdf in BRDFS {
+            let outcome = Pipeline::new().effective(&open(geometry, brdf, "")).unwrap();
+            let plain = values(&outcome);
+            for effect in &outcome.plan.effects {
+                let Some(bound) = effect.bound else { continue };
+                assert!(!effect.on && !effect.forced, "{effect:?}");
+                let on =
+                    Pipeline::new().effective(&open(geometry, brdf, &format!("{} = \"on\"", effect.name))).unwrap();
+                let now = on.plan.effects.iter().find(|other| other.name == effect.name).unwrap();
+                assert!(now.forced, "{now:?}");
+                let errors = compare(&values(&on), &plain);
+                assert!(errors.rel_l2 <= bound, "{geometry} {brdf} {}: {errors:?} of {bound}", effect.name);
+                forced += 1;
+                dropped_visibility += usize::from(effect.name == "visibility");
+            }
+        }
+    }
+    eprintln!("{forced} effects forced, {dropped_visibility} of them visibility");
+    assert!(forced >= 40 && dropped_visibility >= 15);
+}
+
+#[test]
+fn a_dropped_visibility_runs_no_stage_and_takes_no_memory() {
+    let visibility = |geometry: &str, effects: &str| {
+        let mut pipeline = Pipeline::new();
+        let outcome = pipeline.effective(&open(geometry, BRDFS[0], effects)).unwrap();
+        let runs = pipeline.runs().iter().find(|(name, _)| *name == "visibility").unwrap().1;
+        let crate::filtering::Form::Direct(direct) = &outcome.brdf.form else { panic!("summed directly") };
+        assert!(outcome.times.iter().any(|(name, _)| *name == "visibility") == (runs > 0));
+        (runs, direct.visibility.bytes() > 0)
+    };
+    for geometry in &GEOMETRIES[..3] {
+        assert_eq!(visibility(geometry, ""), (0, false), "{geometry}");
+        assert_eq!(visibility(geometry, "visibility = \"on\"").0, 1, "{geometry}");
+    }
+    assert_eq!(visibility(GEOMETRIES[5], ""), (1, true));
+    assert_eq!(visibility(GEOMETRIES[5], "visibility = \"off\""), (0, false));
+}
+
+#[test]
+fn forcing_effects_off_acts() {
+    let value = |geometry: &str, brdf: &str, effects: &str| {
+        values(&Pipeline::new().effective(&open(geometry, brdf, effects)).unwrap())
+    };
+    let deep = GEOMETRIES[6];
+    let hidden = compare(&value(deep, BRDFS[0], "visibility = \"off\""), &value(deep, BRDFS[0], ""));
+    assert!(hidden.rel_l2 > 0.05, "{hidden:?}");
+    // The same sums, taken otherwise.
+    let lobes = compare(&value(deep, BRDFS[1], "exact_lobes = \"off\""), &value(deep, BRDFS[1], ""));
+    assert!(lobes.rel_l2 < 1e-4, "{lobes:?}");
+    let two = "[[material]]\nname = \"default\"\nbrdf = { kind = \"lambertian\", albedo = 0.8 }\n[[material]]\nname = \"bottom\"\ncolor = [1.0, 0.0, 0.0]\n";
+    let source = format!("[tile]\ngeometry = {deep}\n{two}");
+    let loaded = |effects: &str| LoadedScene {
+        scene: scene::parse(&format!("{source}[effects]\n{effects}\n")).unwrap(),
+        base_dir: PathBuf::new(),
+        name: "test".to_owned(),
+        painted: Painted::default(),
+    };
+    let (i, o) = (Vec3::Z, Vec3::Z);
+    let both = Pipeline::new().effective(&loaded("")).unwrap().brdf.eval(i, o);
+    let one = Pipeline::new().effective(&loaded("material_groups = \"off\"")).unwrap().brdf.eval(i, o);
+    assert!(both.x > 1.2 * both.y && (one.x - one.y).abs() < 1e-6 || one.y == 0.0, "{both} {one}");
+}
+
+fn findings() -> Findings {
+    Findings {
+        flat: false,
+        steepest: 0.05,
+        albedo: 0.8,
+        grey: true,
+        mirrors: None,
+        height_samples: false,
+        height_field: true,
+        closes_plane: true,
+        hardware_gpu: false,
+        triangles: 64,
+        scan_work: 10.0,
+        area_ratio: 1.2,
+        materials: 1,
+        black_materials: 0,
+        colors_vary: false,
+        lobes: 1000,
+        lookups: 0,
+        only_lambertian: false,
+        distinct_normals: None,
+        object_self_shadows: true,
+        lights: 4,
+        lights_below: 0,
+    }
+}
+
+#[test]
+fn the_plan_is_monotone_in_the_tolerance() {
+    for degrees in [0.5_f32, 2.0, 4.0, 8.0, 15.0, 40.0] {
+        let found = Findings { steepest: degrees.to_radians(), ..findings() };
+        let mut last: Option<Vec<&str>> = None;
+        for tolerance in [1e-4, 1e-3, 0.01, 0.04, 0.12, 0.5] {
+            let settings = Settings { tolerance, ..Settings::of_preset(Preset::Standard) };
+            let plan = decide(&found, &settings, &Costs::default());
+            let on: Vec<&str> = plan.effects.iter().filter(|effect| effect.on).map(|effect| effect.name).collect();
+            if let Some(last) = &last {
+                assert!(on.iter().all(|name| last.contains(name)), "{degrees}°, {tolerance}: {on:?} after {last:?}");
+            }
+            last = Some(on);
+        }
+    }
+}
+
+#[test]
+fn a_loose_tolerance_drops_the_visibility_of_a_shallow_tile_and_says_why() {
+    let plan = |tolerance| {
+        let settings = Settings { tolerance, ..Settings::of_preset(Preset::Standard) };
+        decide(&findings(), &settings, &Costs::default())
+    };
+    assert_eq!(plan(0.04).route, Route::None);
+    let effect = plan(0.04).effects[0].clone();
+    assert!(!effect.on && effect.reason.contains("shallow") && effect.bound.is_some(), "{effect:?}");
+    assert_eq!(plan(0.001).route, Route::HorizonScan);
+}
+
+#[test]
+fn interreflection_is_estimated_but_never_on_by_itself() {
+    let found = Findings { area_ratio: 3.0, ..findings() };
+    let plan = decide(&found, &Settings::of_preset(Preset::Standard), &Costs::default());
+    let effect = plan.effects.iter().find(|effect| effect.name == "interreflection").unwrap();
+    assert!(!plan.interreflection && !effect.on);
+    assert!(effect.reason.contains("--effect interreflection=on"), "{}", effect.reason);
+}

@@ -1,0 +1,57 @@
+//! The evaluators: everything that turns a scene into an effective BRDF, on the CPU at draft.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use biscale::accuracy::Health;
+use biscale::accuracy::health::{Evidence, Limits, Sight};
+use biscale::directions::ParaboloidMap;
+use biscale::filtering::{EffectiveBrdf, Form, Wu2011, Wu2011Settings};
+use biscale::geometry::Facets;
+use biscale::pipeline::Pipeline;
+use biscale::visibility::visibility_maps_cpu;
+
+use crate::cases::Case;
+use crate::lab::open;
+
+pub struct Evaluator {
+    pub name: &'static str,
+    pub brdf: Arc<EffectiveBrdf>,
+    pub health: Health,
+}
+
+/// Direct first. `m_directions` of the paper's basis (`None`: as many as the paper, half a minute for a narrow lobe).
+pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evaluator> {
+    let mut pipeline = Pipeline::new();
+    let mut made = Vec::new();
+    for (name, method) in [("direct", "direct"), ("low rank", "low_rank")] {
+        let outcome = pipeline
+            .effective(&open(case, method, folder))
+            .unwrap_or_else(|error| panic!("{}, {name}: {error}", case.name));
+        made.push(Evaluator { name, brdf: outcome.brdf.clone(), health: outcome.health().clone() });
+    }
+    let loaded = open(case, "direct", folder);
+    let mesh = pipeline.mesh(&loaded).unwrap();
+    let assigned = pipeline.sum_materials(&loaded).unwrap();
+    let mut facets = Facets::sample_wu2011(&mesh, 1500, 1);
+    facets.sort_for_sums();
+    let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
+    let visibility = visibility_maps_cpu(&mesh, &facets, directions.directions(), 128);
+    let settings = Wu2011Settings { m_directions, ..Wu2011Settings::default() };
+    let base_area = f64::from(mesh.base_area());
+    let tables = Wu2011::build(&facets, &visibility, &directions, base_area, &assigned.0, &assigned.1, &settings)
+        .unwrap_or_else(|error| panic!("{}, wu2011: {error}", case.name));
+    let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
+    let evidence = Evidence {
+        facets: Arc::new(facets),
+        sight: Sight::Packed(Arc::new(visibility)),
+        names: vec!["default".to_owned(); assigned.1.len()],
+        materials: Arc::new(assigned),
+        closes_plane: mesh.closes_plane,
+    };
+    let mut health = Health::of(&brdf, &evidence, None, Limits { max_rank: 64, tolerance: 0.12 });
+    // The paper's maps are yes or no on 137 directions: their area is 10 to 30 % off towards the horizon, as it says itself.
+    health.result.projected_area_error = None;
+    made.push(Evaluator { name: "wu2011", brdf, health });
+    made
+}

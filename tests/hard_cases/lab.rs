@@ -1,0 +1,203 @@
+//! Examines a case with every evaluator, once, whatever number of tests ask.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use biscale::accuracy::{Pair, Reference, ReferenceSettings, compare, mirror_biased_pairs};
+use biscale::directions::from_angles;
+use biscale::filtering::{EffectiveBrdf, Reflectance};
+use biscale::pipeline::Pipeline;
+use biscale::scene::{self, LoadedScene, Painted};
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::cases::{Case, brdfs, geometries};
+use crate::evaluators::{self, Evaluator};
+
+/// What was found of one case with one evaluator. Deviations are zero where the invariant holds exactly.
+#[derive(Debug, Clone)]
+pub struct Row {
+    pub family: &'static str,
+    pub case: &'static str,
+    pub evaluator: &'static str,
+    /// Values that are not finite, or negative.
+    pub unsound: usize,
+    /// Values above 0 with light or viewer at or under the horizon.
+    pub under_horizon: usize,
+    /// The largest `f̄ cos θ_o` within a hundredth of a degree of the horizon, over the largest elsewhere.
+    pub explosion: f64,
+    pub reciprocity: f64,
+    /// Deviation of `a_v / (A cos θ)` from 1 and its bound; `None` for a tile with holes or made-up normals.
+    pub area: Option<[f64; 2]>,
+    /// Largest directional albedo of the result and its bound; `None` where lobes are too narrow to integrate.
+    pub albedo: Option<[f64; 2]>,
+    /// Relative L2 against the direct sum (for the reference: standard errors over values).
+    pub against_direct: f64,
+}
+
+pub fn open(case: &Case, method: &str, folder: &Path) -> LoadedScene {
+    if let Some(mesh) = &case.mesh {
+        std::fs::write(folder.join("tile.obj"), mesh).unwrap();
+    }
+    let text = format!(
+        "[tile]\n{}\n[[material]]\nname = \"default\"\nbrdf = {}\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \
+         \"{method}\"\n",
+        case.tile, case.brdf
+    );
+    let scene = scene::parse(&text).unwrap_or_else(|error| panic!("{}: {error}", case.name));
+    LoadedScene { scene, base_dir: folder.to_owned(), name: case.name.to_owned(), painted: Painted::default() }
+}
+
+/// Exactly 0 and 90°, 89.9°, between the last ring and the horizon, beside the pole, on the seam.
+pub fn nasty_directions() -> Vec<Vec3> {
+    let thetas = [0.0_f32, 1e-7, 1e-3, 0.7, 1.2, 89.9_f32.to_radians(), 89.999_9_f32.to_radians()];
+    let phis = [0.0_f32, -0.0, 1e-7, -1e-7, 1.0, std::f32::consts::PI, -std::f32::consts::PI, 6.283_185];
+    let mut all: Vec<Vec3> = thetas.iter().flat_map(|&t| phis.iter().map(move |&p| from_angles(t, p))).collect();
+    all.extend([Vec3::Z, Vec3::new(1.0, 0.0, 1e-12), Vec3::new(0.0, -1.0, f32::MIN_POSITIVE)]);
+    all.dedup();
+    all
+}
+
+fn below() -> [Vec3; 4] {
+    [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z, from_angles(1.7, 0.4)]
+}
+
+pub fn pairs() -> Vec<Pair> {
+    let mut pairs = mirror_biased_pairs(160, 5);
+    // i = o, and mirrored pairs.
+    for k in 0..24 {
+        let i = from_angles(k as f32 / 24.0 * 1.56, k as f32 * 0.9);
+        pairs.extend([Pair { i, o: i }, Pair { i, o: Vec3::new(-i.x, -i.y, i.z) }]);
+    }
+    pairs
+}
+
+pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
+    [geometries(), brdfs()].concat().par_iter().flat_map_iter(|case| examine(case, Some(60))).collect()
+});
+
+/// All evaluators on a case; `m_directions` of the paper's basis (`None`: as many as the paper).
+pub fn examine(case: &Case, m_directions: Option<usize>) -> Vec<Row> {
+    let folder = tempfile::tempdir().unwrap();
+    let start = std::time::Instant::now();
+    let pairs = pairs();
+    let made = evaluators::all(case, folder.path(), m_directions);
+    let direct: Vec<Vec3> = pairs.iter().map(|p| made[0].brdf.eval(p.i, p.o)).collect();
+    let mut rows: Vec<Row> = made.iter().map(|evaluator| measured(case, evaluator, &pairs, &direct)).collect();
+    let evaluated = start.elapsed().as_secs_f64();
+    rows.push(reference(case, folder.path(), &pairs, &made[0]));
+    let all = start.elapsed().as_secs_f64();
+    if all > 3.0 {
+        eprintln!("{}, {}: {all:.1} s, {:.1} of them the reference", case.family, case.name, all - evaluated);
+    }
+    rows
+}
+
+fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Vec3]) -> Row {
+    let brdf: &EffectiveBrdf = &evaluator.brdf;
+    let (mut unsound, mut under_horizon) = (0, 0);
+    let is_sound = |v: Vec3| v.is_finite() && v.min_element() >= 0.0;
+    let directions = nasty_directions();
+    // f̄ cos θ_o is G but for a_v, and bounded.
+    let (mut near, mut elsewhere) = (0.0_f64, 0.0_f64);
+    for &o in &directions {
+        let mut values = vec![Vec3::ZERO; directions.len()];
+        brdf.eval_lights(&directions, o, &mut values);
+        for (&i, &value) in directions.iter().zip(&values) {
+            unsound += usize::from(!is_sound(value)) + usize::from(!is_sound(brdf.g(i, o)));
+            let bounded = f64::from(value.max_element() * o.z);
+            if i.z.min(o.z) < 1.7e-4 { near = near.max(bounded) } else { elsewhere = elsewhere.max(bounded) }
+        }
+        unsound += usize::from(!(brdf.relative_projected_area(o) >= 0.0));
+        for under in below() {
+            under_horizon +=
+                usize::from(brdf.eval(under, o) != Vec3::ZERO) + usize::from(brdf.eval(o, under) != Vec3::ZERO);
+        }
+    }
+    let values: Vec<Vec3> = pairs.iter().map(|p| brdf.eval(p.i, p.o)).collect();
+    unsound += values.iter().filter(|value| !is_sound(**value)).count();
+    let (mut difference, mut largest) = (0.0_f64, 0.0_f64);
+    for p in pairs {
+        let [there, back] = [brdf.g(p.i, p.o), brdf.g(p.o, p.i)];
+        difference = difference.max(f64::from((there - back).abs().max_element()));
+        largest = largest.max(f64::from(there.max_element()));
+        elsewhere = elsewhere.max(f64::from((brdf.eval(p.i, p.o) * p.o.z).max_element()));
+    }
+    let health = &evaluator.health;
+    let seen = health.surface.fewest_facets_seen.max(1) as f64;
+    // A systematic sample of what is in sight; what maps and soft horizons leave besides.
+    let area = health.result.projected_area_error.map(|error| [error, 0.05 + 3.0 / seen.sqrt()]);
+    let error = compare(&values, direct).rel_l2;
+    let error = if error.is_finite() { error } else { 0.0 };
+    let materials = health.materials.iter().map(|m| f64::from(m.largest_albedo)).fold(1.0, f64::max);
+    let albedo = health.result.largest_albedo.map(|albedo| [f64::from(albedo), materials * 1.03 * (1.0 + error)]);
+    Row {
+        family: case.family,
+        case: case.name,
+        evaluator: evaluator.name,
+        unsound: unsound + health.result.unsound_values,
+        under_horizon,
+        explosion: if near > 0.0 { near / elsewhere.max(1e-30) } else { 0.0 },
+        reciprocity: if difference > 0.0 { difference / largest } else { 0.0 },
+        area,
+        albedo,
+        against_direct: error,
+    }
+}
+
+/// The reference has values and standard errors, no G: what it says is held to its own error.
+fn reference(case: &Case, folder: &Path, pairs: &[Pair], direct: &Evaluator) -> Row {
+    let settings = ReferenceSettings { facets: 256, max_passes: 4, target: 0.0, seed: 3 };
+    let mut all: Vec<Pair> = pairs.iter().step_by(4).copied().collect();
+    let ordinary = all.len();
+    all.extend(all.clone().iter().map(|p| Pair { i: p.o, o: p.i }));
+    let swapped = all.len();
+    let nasty = nasty_directions();
+    all.extend(nasty.iter().zip(nasty.iter().rev()).step_by(4).map(|(&i, &o)| Pair { i, o }));
+    let above = all.len();
+    all.extend(below().map(|i| Pair { i, o: Vec3::Z }));
+    all.extend(below().map(|o| Pair { i: Vec3::Z, o }));
+    let estimate = |reference: &Reference<'_>| reference.estimate(&all, &settings, |_, _| true);
+    let found = Pipeline::new().with_reference(&open(case, "direct", folder), estimate).unwrap();
+    let is_sound = |v: Vec3| v.is_finite() && v.min_element() >= 0.0;
+    let unsound = found.iter().filter(|e| !is_sound(e.f_bar) || !is_sound(e.standard_error)).count();
+    let under_horizon = found[above..].iter().filter(|e| e.f_bar != Vec3::ZERO).count();
+    // Where the tile closes, f̄ cos θ_o is reciprocal: the difference in units of its standard error, a hundredth of it.
+    let mut reciprocity = 0.0_f64;
+    if direct.health.result.projected_area_error.is_some() {
+        let scale = found[..ordinary].iter().map(|e| e.f_bar.max_element()).fold(0.0, f32::max);
+        for k in 0..ordinary {
+            let (there, back, p) = (found[k], found[ordinary + k], pairs[4 * k]);
+            let difference = (there.f_bar * p.o.z - back.f_bar * p.i.z).abs().max_element();
+            let error = (there.standard_error * p.o.z).hypot_sum(back.standard_error * p.i.z) + 0.02 * scale;
+            reciprocity = reciprocity.max(f64::from(difference / error.max(1e-20)));
+        }
+    }
+    let squares = |pick: fn(&biscale::accuracy::Estimate) -> Vec3| -> f64 {
+        found[..swapped].iter().map(|e| pick(e).as_dvec3().length_squared()).sum()
+    };
+    let (errors, values) = (squares(|e| e.standard_error), squares(|e| e.f_bar));
+    Row {
+        family: case.family,
+        case: case.name,
+        evaluator: "reference",
+        unsound,
+        under_horizon,
+        explosion: 0.0,
+        reciprocity: reciprocity * 1e-8,
+        area: None,
+        albedo: None,
+        against_direct: if values > 0.0 { (errors / values).sqrt() } else { 0.0 },
+    }
+}
+
+trait HypotSum {
+    fn hypot_sum(self, other: Self) -> f32;
+}
+
+impl HypotSum for Vec3 {
+    /// Root of the sum of squares of the largest channels.
+    fn hypot_sum(self, other: Self) -> f32 {
+        self.max_element().hypot(other.max_element())
+    }
+}

@@ -1,0 +1,64 @@
+//! One case of each family on the graphics processor (lavapipe where there is none): finite, and what the CPU makes.
+
+use biscale::gpu::Gpu;
+use biscale::large_scale::shading::Background;
+use biscale::large_scale::{GpuRenderer, Stage, render};
+use biscale::pipeline::Pipeline;
+
+use crate::cases::{Case, brdfs, geometries};
+use crate::lab::open;
+
+/// The hardest of each family that a picture shows.
+const CHOSEN: [&str; 8] = [
+    "flat",
+    "cliffs of 100 tiles",
+    "tile of 1e-6",
+    "overhang",
+    "tile with holes",
+    "Cook-Torrance 0.01",
+    "grazing Fresnel",
+    "Blinn-Phong 1e3",
+];
+
+#[test]
+fn one_case_of_each_family_is_the_same_picture_on_the_graphics_processor() {
+    let gpu = match Gpu::open() {
+        Ok(gpu) => gpu,
+        Err(error) => return eprintln!("SKIPPED: {error}"),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let all: Vec<Case> = [geometries(), brdfs()].concat();
+    for name in CHOSEN {
+        let case = all.iter().find(|case| case.name == name).unwrap();
+        for method in ["direct", "low_rank"] {
+            let mut loaded = open(case, method, folder.path());
+            loaded.scene.light.count = 8;
+            loaded.scene.quality.facets = Some(400);
+            let outcome = Pipeline::new().effective(&loaded).unwrap();
+            let stage = Stage::new(&loaded).unwrap();
+            let background = Background::default();
+            let input = stage.input(&*outcome.brdf, [40, 40], 1, &background);
+            let cpu = render(&input).unwrap().picture.pixels;
+            let renderer = match GpuRenderer::new(&gpu, stage.occluder.as_ref(), &outcome.brdf) {
+                Ok(renderer) => renderer,
+                Err(error) => {
+                    eprintln!("SKIPPED: {name}, {method}: {error}");
+                    continue;
+                }
+            };
+            let device = renderer.render(&gpu, &input).unwrap().picture.pixels;
+            let bad = device.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);
+            assert_eq!(bad, None, "{name}, {method}: {:?}", bad.map(|at| device[at]));
+            // Edges may show another triangle, and narrow lobes multiply the G-buffer's last bits (gpu_shading_tests.rs).
+            let scale = cpu.iter().map(|pixel| pixel.max_element()).sum::<f32>() / cpu.len() as f32;
+            let mut apart: Vec<f32> = cpu
+                .iter()
+                .zip(&device)
+                .map(|(a, b)| (*a - *b).abs().max_element() / (a.max_element() + scale).max(1e-20))
+                .collect();
+            apart.sort_by(f32::total_cmp);
+            let most = apart[apart.len() * 9 / 10];
+            assert!(most < 0.05, "{name}, {method}: nine in ten pixels are within {most}");
+        }
+    }
+}

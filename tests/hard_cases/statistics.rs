@@ -1,0 +1,145 @@
+//! Statistics as pbrt and mitsuba hold theirs to: χ² of every sampling routine at 0.01 with Šidák's correction, energy.
+
+use std::f64::consts::{PI, TAU};
+
+use biscale::accuracy::mirror_biased_pairs;
+use biscale::brdf::{Brdf, Term};
+use biscale::directions::from_angles;
+use biscale::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use biscale::scene;
+use glam::Vec3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+#[path = "../../src/chi_square.rs"]
+mod chi_square;
+
+use chi_square::p_value;
+
+/// Šidák: `tests` tests at this level together reject a right routine once in a hundred times.
+fn level(tests: usize) -> f64 {
+    1.0 - (1.0 - 0.01_f64).powf(1.0 / tests as f64)
+}
+
+fn tile(geometry: &str) -> TileMesh {
+    let scene = scene::parse(&format!("[tile]\ngeometry = {geometry}\n")).unwrap();
+    geometry::build(&scene.tile, std::path::Path::new("")).unwrap()
+}
+
+/// Parts of the area that each triangle has, each triangle cut in four by which corner a point is nearest to (and none).
+fn cells(mesh: &TileMesh) -> Vec<f64> {
+    let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.triangle_area(t)).sum();
+    (0..mesh.triangles.len()).flat_map(|t| [0.25 * mesh.triangle_area(t) / area; 4]).collect()
+}
+
+/// Which cell each facet fell into.
+fn counts(mesh: &TileMesh, facets: &Facets) -> Vec<f64> {
+    let mut counts = vec![0.0; 4 * mesh.triangles.len()];
+    for s in 0..facets.len() {
+        let triangle = facets.triangles[s] as usize;
+        let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
+        // Copies over the tile's edge come back in: the nearest of them is the facet.
+        let near = |p: glam::DVec3| {
+            let size = mesh.size.as_dvec2();
+            let step = ((a + b + c) / 3.0 - p).truncate() / size;
+            p + (step.round() * size).extend(0.0)
+        };
+        let p = near(facets.positions[s].as_dvec3());
+        let whole = (b - a).cross(c - a);
+        let share = |u: glam::DVec3, v: glam::DVec3| (u - p).cross(v - p).dot(whole) / whole.length_squared();
+        let weights = [share(b, c), share(c, a), share(a, b)];
+        // The middle triangle, or one of the three at the corners: four equal areas.
+        let cell = weights.iter().position(|&w| w > 0.5).unwrap_or(3);
+        counts[4 * triangle + cell] += 1.0;
+    }
+    counts
+}
+
+#[test]
+fn every_sampling_routine_passes_the_chi_squared_test() {
+    let mut p_values: Vec<(String, f64)> = Vec::new();
+    let shapes = [
+        ("pyramids", r#"{ kind = "pyramids", spacing = 0.5, truncation = 0.3 }"#),
+        ("trapezoids", r#"{ kind = "grooves", count = 2, bottom_width = 0.3 }"#),
+    ];
+    for (name, geometry) in shapes {
+        let mesh = tile(geometry);
+        let expected = cells(&mesh);
+        // The paper's random facets.
+        let random = counts(&mesh, &Facets::sample_wu2011(&mesh, 20_000, 7));
+        p_values.push((format!("random facets on {name}"), p_value(&random, &expected)));
+        // One facet a shift: over shifts a systematic facet falls anywhere with equal chance.
+        let sampler = FacetSampler::new(&mesh);
+        let mut all = vec![0.0; expected.len()];
+        for seed in 0..1_000 {
+            let facets = sampler.sample(&mesh, 997, SampleShift::from_seed(seed));
+            all.iter_mut().zip(counts(&mesh, &facets)).for_each(|(all, one)| *all += one);
+        }
+        p_values.push((format!("systematic facets on {name}, 997,000"), p_value(&all, &expected)));
+    }
+    // Directions of test pairs: uniform in solid angle down to 85°; of every second pair the viewer too.
+    let pairs = mirror_biased_pairs(1_000_000, 12);
+    let lowest = 85.0_f64.to_radians().cos();
+    let binned = |directions: &mut dyn Iterator<Item = Vec3>| {
+        let mut counts = vec![0.0; 20 * 40];
+        for d in directions {
+            let ring = ((f64::from(d.z) - lowest) / (1.0 - lowest) * 20.0).clamp(0.0, 19.0) as usize;
+            let turn = (f64::from(d.y).atan2(f64::from(d.x)) / TAU + 1.0).fract() * 40.0;
+            counts[ring * 40 + (turn as usize).min(39)] += 1.0;
+        }
+        counts
+    };
+    let even = vec![1.0 / 800.0; 800];
+    p_values.push(("lights of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.i)), &even)));
+    p_values.push(("viewers of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.o)), &even)));
+    for (what, p) in &p_values {
+        eprintln!("p = {p:.4}  {what}");
+        assert!(*p > level(p_values.len()), "{what}: p = {p}, below {}", level(p_values.len()));
+    }
+}
+
+#[test]
+fn the_chi_squared_test_itself_rejects_a_skew_of_two_percent() {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut fair = vec![0.0; 64];
+    let mut skew = vec![0.0; 64];
+    for _ in 0..1_000_000 {
+        let u: f64 = random.random();
+        fair[(u * 64.0) as usize] += 1.0;
+        skew[(u.powf(1.02) * 64.0) as usize] += 1.0;
+    }
+    let even = vec![1.0 / 64.0; 64];
+    assert!(p_value(&fair, &even) > 0.01 && p_value(&skew, &even) < 1e-6);
+}
+
+/// pbrt's test of energy, with error bars: uniform directions over the hemisphere.
+#[test]
+fn conserving_brdfs_send_back_no_more_than_they_get_and_the_quadrature_agrees() {
+    let mut random = ChaCha8Rng::seed_from_u64(77);
+    for term in [
+        Term::Lambertian { albedo: Vec3::ONE },
+        Term::CookTorrance { roughness: 0.2, f0: Vec3::ONE },
+        Term::CookTorrance { roughness: 1.0, f0: Vec3::ONE },
+        Term::Ggx { roughness: 0.2, f0: Vec3::ONE },
+        Term::Ggx { roughness: 1.0, f0: Vec3::ONE },
+    ] {
+        let brdf = Brdf { terms: vec![term.clone()] };
+        for theta in [0.0_f32, 0.7, 1.3, 1.5] {
+            let i = from_angles(theta, 0.4);
+            let (mut sum, mut squares) = (0.0, 0.0);
+            const COUNT: usize = 200_000;
+            for _ in 0..COUNT {
+                let o = from_angles(random.random::<f32>().acos(), std::f32::consts::TAU * random.random::<f32>());
+                let value = f64::from(brdf.f(Vec3::Z, i, o).x / i.z) * 2.0 * PI;
+                sum += value;
+                squares += value * value;
+            }
+            let n = COUNT as f64;
+            let mean = sum / n;
+            let error = ((squares / n - mean * mean) / n).sqrt();
+            assert!(mean - 4.0 * error < 1.01, "{term:?} {theta}: {mean} ± {error}");
+            let quadrature = f64::from(brdf.directional_albedo(theta, 96).x);
+            assert!((mean - quadrature).abs() < 5.0 * error + 2e-3, "{term:?} {theta}: {mean} ± {error}, {quadrature}");
+        }
+    }
+}

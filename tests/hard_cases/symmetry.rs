@@ -1,0 +1,145 @@
+//! Turning or mirroring the tile and the directions together changes nothing, and neither does the unit of length.
+
+use std::sync::Arc;
+
+use biscale::accuracy::mirror_biased_pairs;
+use biscale::brdf::{Brdf, Term};
+use biscale::filtering::{Direct, EffectiveBrdf, FacetSum, Form, LowRank, SumMaterial};
+use biscale::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use biscale::plan::{Preset, Settings};
+use biscale::scene;
+use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
+use glam::{Mat3, Vec2, Vec3};
+use rayon::prelude::*;
+
+/// A motion that maps the lattice of a tile to that of another.
+struct Motion {
+    name: &'static str,
+    matrix: Mat3,
+}
+
+fn motions() -> [Motion; 4] {
+    let rows = |x: Vec3, y: Vec3| Mat3::from_cols(x, y, Vec3::Z);
+    [
+        Motion { name: "a quarter turn", matrix: rows(Vec3::Y, Vec3::NEG_X) },
+        Motion { name: "half a turn", matrix: rows(Vec3::NEG_X, Vec3::NEG_Y) },
+        Motion { name: "the mirror image in x", matrix: rows(Vec3::NEG_X, Vec3::Y) },
+        Motion { name: "the mirror image in the diagonal", matrix: rows(Vec3::Y, Vec3::X) },
+    ]
+}
+
+fn tile(geometry: &str) -> TileMesh {
+    let scene = scene::parse(&format!("[tile]\nsize = [1.0, 0.75]\ngeometry = {geometry}\n")).unwrap();
+    geometry::build(&scene.tile, std::path::Path::new("")).unwrap()
+}
+
+const TILES: [(&str, &str); 4] = [
+    ("pyramids", r#"{ kind = "pyramids", face_ratio = 1.4, height = 0.2 }"#),
+    ("grooves", r#"{ kind = "grooves", profile = "u", count = 3, depth = 0.2, rotation_deg = 30 }"#),
+    ("rods", r#"{ kind = "rods", count = 12, radius = 0.04, length = 0.2, lean_deg = 30 }"#),
+    ("threads", r#"{ kind = "weave", warp_count = 2, weft_count = 2 }"#),
+];
+
+/// A mesh and its facets, moved: the same facets, so that only visibility and sums can differ.
+fn moved(mesh: &TileMesh, facets: &Facets, matrix: Mat3) -> (TileMesh, Facets) {
+    let mut mesh = mesh.clone();
+    mesh.size = (matrix * mesh.size.extend(0.0)).truncate().abs();
+    mesh.positions.iter_mut().for_each(|p| *p = matrix * *p);
+    if matrix.determinant() < 0.0 {
+        mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    }
+    mesh.height_grid = None;
+    let mut facets = facets.clone();
+    let wrap = |p: Vec3| Vec3::new(p.x.rem_euclid(mesh.size.x), p.y.rem_euclid(mesh.size.y), p.z);
+    facets.positions.iter_mut().for_each(|p| *p = wrap(matrix * *p));
+    facets.normals.iter_mut().chain(&mut facets.geometric_normals).for_each(|n| *n = matrix * *n);
+    (mesh, facets)
+}
+
+fn sight(mesh: &TileMesh, facets: &Facets) -> Visibility {
+    let grid = PeriodicGrid::new(mesh);
+    if mesh.is_height_field() {
+        Visibility::Horizons(Horizons::scan(&grid, facets, 32, 0.02))
+    } else {
+        Visibility::Slices(Slices::scan(&grid, facets, 32, 0.02))
+    }
+}
+
+fn material() -> SumMaterial {
+    let glossy = Term::CookTorrance { roughness: 0.35, f0: Vec3::new(0.9, 0.5, 0.1) };
+    SumMaterial { brdf: Brdf { terms: vec![glossy, Term::Lambertian { albedo: Vec3::splat(0.2) }] }, color: Vec3::ONE }
+}
+
+fn evaluators(mesh: &TileMesh, facets: &Facets) -> [(&'static str, EffectiveBrdf); 2] {
+    let (slots, materials) = (vec![0; mesh.slots.len()], [material()]);
+    let visibility = Arc::new(sight(mesh, facets));
+    let base_area = f64::from(mesh.base_area());
+    let settings = Settings::of_preset(Preset::Draft).low_rank(!mesh.is_height_field());
+    let factors = LowRank::build(facets, &visibility, &slots, &materials, &settings).unwrap();
+    let sum = Arc::new(FacetSum::new(facets, &slots, &materials));
+    [
+        ("direct", EffectiveBrdf { form: Form::Direct(Direct { sum, visibility }), base_area }),
+        ("low rank", EffectiveBrdf { form: Form::LowRank(factors), base_area }),
+    ]
+}
+
+#[test]
+fn turning_or_mirroring_tile_and_directions_together_changes_nothing_but_rounding() {
+    let pairs = mirror_biased_pairs(120, 8);
+    for (name, geometry) in TILES {
+        let mesh = tile(geometry);
+        let mut facets = FacetSampler::new(&mesh).sample(&mesh, 512, SampleShift::from_seed(1));
+        facets.sort_for_sums();
+        let here = evaluators(&mesh, &facets);
+        for motion in motions() {
+            let (mesh, facets) = moved(&mesh, &facets, motion.matrix);
+            let there = evaluators(&mesh, &facets);
+            for ((evaluator, here), (_, there)) in here.iter().zip(&there) {
+                let largest = pairs.iter().map(|p| here.g(p.i, p.o).max_element()).fold(0.0, f32::max);
+                let mut apart: Vec<f32> = pairs
+                    .par_iter()
+                    .map(|p| (here.g(p.i, p.o) - there.g(motion.matrix * p.i, motion.matrix * p.o)).abs().max_element())
+                    .collect();
+                apart.sort_by(f32::total_cmp);
+                // Grid steps turn onto grid steps: exact but for rounding, which at a silhouette may flip a facet's view (one
+                // of 512). The factored form's random projection is another one: its truncation shows.
+                let (typical, worst) = (apart[apart.len() / 2] / largest, apart[apart.len() - 1] / largest);
+                let limits = if *evaluator == "direct" { [1e-5, 2e-2] } else { [1e-2, 0.1] };
+                let what =
+                    format!("{name}, {evaluator}, {}: {typical:.1e} typically, {worst:.1e} at worst", motion.name);
+                assert!(typical < limits[0] && worst < limits[1], "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_unit_of_length_changes_nothing() {
+    let directions = mirror_biased_pairs(60, 2);
+    for geometry in [
+        r#"{ kind = "heightfield", values = [[0, 0.3, 0.1], [0.5, 0.9, 0.4], [0.2, 0.6, 1.0]], height_scale = SCALE }"#,
+        r#"{ kind = "grooves", depth = SCALE }"#,
+        r#"{ kind = "rods", radius = 0.1SCALE, length = SCALE, count = 6 }"#,
+    ] {
+        let value = |unit: f64| -> Vec<Vec3> {
+            let scaled =
+                geometry.replace("0.1SCALE", &format!("{}", 0.03 * unit)).replace("SCALE", &format!("{}", 0.25 * unit));
+            let text = format!("[tile]\nsize = [{unit}, {unit}]\ngeometry = {scaled}\n");
+            let scene = scene::parse(&text).unwrap();
+            let mesh = geometry::build(&scene.tile, std::path::Path::new("")).unwrap();
+            let mut facets = FacetSampler::new(&mesh).sample(&mesh, 256, SampleShift::from_seed(1));
+            facets.sort_for_sums();
+            assert_eq!(mesh.size, Vec2::splat(unit as f32));
+            let made = evaluators(&mesh, &facets);
+            directions.iter().flat_map(|p| made.iter().map(|(_, brdf)| brdf.eval(p.i, p.o))).collect()
+        };
+        // Powers of two: not a bit may differ, where nothing holds lengths against numbers of its own.
+        let one = value(1.0);
+        let scale = one.iter().map(|v| v.max_element()).fold(0.0, f32::max);
+        for unit in [f64::exp2(-18.0), f64::exp2(18.0)] {
+            let other = value(unit);
+            let apart = one.iter().zip(&other).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+            assert!(apart < 1e-4 * scale, "{geometry} of {unit}: {apart} of {scale}");
+        }
+    }
+}
