@@ -64,6 +64,7 @@ fn an_npz_holds_what_eval_says_at_every_pair() {
     let described: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(described["scene"], meta().scene.as_str());
     assert_eq!(described["base_area"], 2.0);
+    assert_eq!(described["reflectance"].as_array().unwrap().len(), 11);
     assert_eq!(members["seed"].1, 7_u64.to_ne_bytes());
 }
 
