@@ -541,7 +541,8 @@ fn a_target_is_answered_with_settings_that_repeat_it() {
     };
     let (values, said) = eval(&["--target-db", "35"]);
     assert!(said.contains("asked 35.0 dB, got "), "{said}");
-    let words = said.split(": ").last().unwrap().trim();
+    let line = said.lines().find(|line| line.starts_with("asked")).unwrap();
+    let words = line.split(": ").last().unwrap().trim();
     let words: Vec<&str> = words.split_whitespace().collect();
     assert_eq!(words[0], "--quality", "{said}");
     let (again, _) = eval(&words);

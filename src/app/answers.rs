@@ -31,9 +31,9 @@ impl Editor {
             Dialog::About => about(ctx),
             Dialog::Recover(found) => self.recover(ctx, found),
             Dialog::ChangedOnDisk { saving } => self.changed_on_disk(ctx, *saving),
-            Dialog::Table { path, theta, phi } => {
-                let answer = export::table_ui(ctx, path, theta, phi);
-                self.exported(answer, path, What::Table { theta: *theta, phi: *phi })
+            Dialog::Table { path, choice } => {
+                let answer = export::table_ui(ctx, path, choice);
+                self.exported(answer, path, What::Table(*choice))
             }
             Dialog::Picture { path, width, height } => {
                 let answer = export::picture_ui(ctx, path, width, height);

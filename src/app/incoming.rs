@@ -12,7 +12,7 @@ use super::dialogs::{Dialog, Purpose};
 use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
-use super::worker::{ExportAnswer, ExportJob, What};
+use super::worker::{ExportAnswer, ExportJob, TableChoice, What};
 
 impl Editor {
     /// What the panel asked for.
@@ -74,7 +74,7 @@ impl Editor {
             Purpose::SaveColors => return self.save_image(&path, true),
             Purpose::ExportTable => {
                 match biscale::export::check_ending(&path) {
-                    Ok(()) => self.dialog = Some(Dialog::Table { path, theta: 16, phi: 64 }),
+                    Ok(()) => self.dialog = Some(Dialog::Table { path, choice: TableChoice::default() }),
                     Err(error) => self.messages.put(Level::Trouble, "export", error.to_string()),
                 }
                 return;

@@ -89,12 +89,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             anisotropy_lost: report.anisotropy_lost,
             form: outcome.brdf.form.describe(),
             health: &health,
-            reflectance: report
-                .reflectances
-                .of_direction
-                .iter()
-                .map(|([theta, phi], value)| [*theta, *phi, value.x, value.y, value.z])
-                .collect(),
+            reflectance: report.reflectances.rows(),
         });
     }
     if !args.scene.quiet {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::Job;
+use super::{Job, Reflectances};
 use crate::accuracy::Errors;
 use crate::pipeline::Outcome;
 use crate::scene::LoadedScene;
@@ -73,6 +73,8 @@ pub struct Description<'a> {
     pub resampling_rel_l2: f64,
     /// Peak signal to noise of the same [dB]; null where there is no difference.
     pub resampling_psnr_db: f64,
+    /// Directional-hemispherical reflectances: `theta_i`, `phi_i` in degrees, R, G, B.
+    pub reflectance: Vec<[f32; 5]>,
 }
 
 impl<'a> Description<'a> {
@@ -92,6 +94,7 @@ impl<'a> Description<'a> {
             base_area: job.brdf.base_area,
             resampling_rel_l2: resampling.rel_l2,
             resampling_psnr_db: resampling.psnr_db,
+            reflectance: Reflectances::of(job.brdf).rows(),
         }
     }
 

@@ -54,6 +54,11 @@ impl Reflectances {
         Self { of_direction, diffuse }
     }
 
+    /// `theta_i`, `phi_i` in degrees, R, G, B of each direction.
+    pub fn rows(&self) -> Vec<[f32; 5]> {
+        self.of_direction.iter().map(|([theta, phi], value)| [*theta, *phi, value.x, value.y, value.z]).collect()
+    }
+
     /// A line a direction.
     pub fn lines(&self) -> Vec<String> {
         let line = |([theta, phi], value): &([f32; 2], Vec3)| {

@@ -1,24 +1,17 @@
+use std::path::Path;
 use std::sync::Arc;
-
-use glam::Vec2;
 
 use super::*;
 use crate::brdf::{Brdf, Term};
 use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
-use crate::geometry::{Facets, TileMesh};
+use crate::geometry::{self, Facets};
+use crate::scene::{Flat, Geometry, Scene};
 use crate::visibility::Visibility;
 
 /// A flat tile of some terms.
 fn flat(terms: Vec<Term>) -> EffectiveBrdf {
-    let mesh = TileMesh {
-        size: Vec2::ONE,
-        positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        triangle_slot: vec![0, 0],
-        slots: vec!["surface".to_owned()],
-        closes_plane: true,
-        ..TileMesh::default()
-    };
+    let tile = Scene::of(Geometry::Flat(Flat::default())).tile;
+    let mesh = geometry::build(&tile, Path::new("")).unwrap();
     let mut facets = Facets::sample(&mesh, 16, 1);
     facets.sort_for_sums();
     let visibility = Visibility::Unblocked { facets: facets.len() };
@@ -41,6 +34,35 @@ fn a_flat_material_of_the_model_comes_back() {
     let found = fit(&brdf, Model::Ggx).unwrap();
     assert!(found.shape.roughness.iter().all(|alpha| (alpha - 0.25).abs() < 5e-3), "{found:?}");
     assert!((found.weights[1] - f0).abs().max_element() < 1e-2 && found.errors.rel_l2 < 1e-2, "{found:?}");
+}
+
+#[test]
+fn a_matte_tile_has_no_edge_and_what_is_written_stays_in_the_ranges_of_the_formats() {
+    let brdf = flat(vec![Term::Lambertian { albedo: Vec3::splat(0.7) }]);
+    for model in Model::ALL {
+        let found = fit(&brdf, model).unwrap();
+        assert!(found.errors.rel_l2 < 1e-2 && (found.weights[0] - 0.7).abs().max_element() < 0.02, "{found:?}");
+    }
+    let rough = Fit {
+        model: Model::Ggx,
+        shape: Shape { roughness: [1.0, 0.5], rotation: 0.0, edge: 0.0 },
+        weights: vec![Vec3::splat(0.5), Vec3::new(0.3, 0.2, 0.0), Vec3::splat(2.0)],
+        errors: Errors { rel_l2: 0.1, psnr_db: 30.0 },
+    };
+    let file: serde_json::Value = serde_json::from_str(&gltf(&rough, "rough")).unwrap();
+    let material = &file["materials"][0];
+    assert!(material["pbrMetallicRoughness"]["roughnessFactor"].as_f64().unwrap() <= 1.0);
+    let specular = &material["extensions"]["KHR_materials_specular"];
+    // f0 is 0.04 times both factors.
+    let strength = specular["specularFactor"].as_f64().unwrap();
+    let f0 = 0.04 * strength * specular["specularColorFactor"][0].as_f64().unwrap();
+    assert!((0.0..=1.0).contains(&strength) && (f0 - 0.3).abs() < 1e-5, "{specular}");
+    let document = materialx(&rough, "rough");
+    assert!(document.contains("geometry_tangent") && document.contains("rotate3d"), "{document}");
+    let metal =
+        Fit { shape: Shape { roughness: [0.3; 2], ..rough.shape }, weights: vec![Vec3::ZERO, Vec3::ONE], ..rough };
+    let file: serde_json::Value = serde_json::from_str(&gltf(&metal, "metal")).unwrap();
+    assert!(file.get("extensionsUsed").is_none(), "an empty list is against the schema");
 }
 
 #[test]

@@ -89,7 +89,7 @@ def check_glossy(folder):
     theirs = np.array([lit(folder, grooves, light, view) for light, view in zip(lights, views)])
     took = time.time() - start
     difference = mean_error(theirs, ours)
-    table.check(difference < 0.03, f"f_bar of {PAIRS} pairs", f"{took:.1f}", f"{seconds:.1f}", f"{100 * difference:.1f} %", "3 %")
+    table.check(difference < 0.02, f"f_bar of {PAIRS} pairs", f"{took:.1f}", f"{seconds:.1f}", f"{100 * difference:.1f} %", "2 %")
     return table.passed
 
 

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
+use biscale::export::RadianceBasis;
 use eframe::egui::{self, Context, DragValue, Grid};
+
+use crate::app::worker::TableChoice;
 
 /// What a dialog answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +27,8 @@ fn footer(ui: &mut egui::Ui, answer: &mut Option<Answer>) {
 }
 
 /// Steps of a table.
-pub fn table_ui(ctx: &Context, path: &Path, theta: &mut usize, phi: &mut usize) -> Option<Answer> {
+pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<Answer> {
+    let TableChoice { theta, phi, radiance } = choice;
     let mut answer = None;
     let modal = egui::Modal::new(egui::Id::unique("export table")).show(ctx, |ui| {
         ui.set_width(420.0);
@@ -44,6 +48,10 @@ pub fn table_ui(ctx: &Context, path: &Path, theta: &mut usize, phi: &mut usize) 
             ui.label(format!("{millions:.1} million pairs of directions, about {megabytes:.0} MB as .npz"));
         } else {
             ui.label("This format brings its own grid of directions. A note in plain words is written beside it.");
+        }
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
+            ui.radio_value(radiance, RadianceBasis::Klems, "Klems' 145 x 145 patches");
+            ui.radio_value(radiance, RadianceBasis::TensorTree, "Tensor tree, for what is sharp or anisotropic");
         }
         ui.weak("At the scene's quality, not the draft's. Glossy materials ask for more steps.");
         footer(ui, &mut answer);

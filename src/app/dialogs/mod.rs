@@ -13,6 +13,7 @@ pub use help::help_ui;
 
 use super::actions::Action;
 use super::document::Recovered;
+use super::worker::TableChoice;
 
 /// The one that is open.
 #[derive(Debug)]
@@ -31,8 +32,7 @@ pub enum Dialog {
     /// Table export: where to, and how fine.
     Table {
         path: PathBuf,
-        theta: usize,
-        phi: usize,
+        choice: TableChoice,
     },
     Picture {
         path: PathBuf,

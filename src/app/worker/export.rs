@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use biscale::close_up::CloseUp;
-use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution};
+use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::LoadedScene;
@@ -20,9 +20,25 @@ pub struct ExportJob {
     pub what: What,
 }
 
+/// What the dialog asks about a table.
+#[derive(Debug, Clone, Copy)]
+pub struct TableChoice {
+    /// Steps from the normal to the horizon, and around, for files whose grid is free.
+    pub theta: usize,
+    pub phi: usize,
+    /// What a Radiance file holds.
+    pub radiance: RadianceBasis,
+}
+
+impl Default for TableChoice {
+    fn default() -> Self {
+        Self { theta: 16, phi: 64, radiance: RadianceBasis::Klems }
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 pub enum What {
-    Table { theta: usize, phi: usize },
+    Table(TableChoice),
     Picture { size: [usize; 2] },
 }
 
@@ -48,11 +64,11 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
     pipeline.cancel_with(cancel.clone());
     let outcome = pipeline.effective(&job.loaded)?;
     match job.what {
-        What::Table { theta, phi } => {
+        What::Table(TableChoice { theta, phi, radiance }) => {
             let meta = ExportMeta::of(&job.loaded, &outcome, pipeline.mesh(&job.loaded)?.closes_plane);
             let steps = ExportResolution { theta_i: theta, phi_i: phi, theta_o: theta, phi_o: phi };
             let resolution = export::grid_is_free(&job.path).then_some(steps);
-            let options = ExportOptions { resolution, ..ExportOptions::default() };
+            let options = ExportOptions { resolution, radiance };
             let progress = |part: f32| {
                 answer(ExportAnswer::Progress(part, "Tabulating"));
                 !cancel.is_set()

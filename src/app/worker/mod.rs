@@ -16,7 +16,7 @@ use std::time::Duration;
 use super::document::Snapshot;
 
 pub use accuracy::{AccuracyAnswer, AccuracyJob, Point};
-pub use export::{ExportAnswer, ExportJob, What};
+pub use export::{ExportAnswer, ExportJob, TableChoice, What};
 pub use lobe::{LobeJob, LobeMade, logarithmic};
 pub use picture::{Grade, Made, PictureAnswer, PictureJob};
 pub use runner::Worker;

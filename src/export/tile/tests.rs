@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 
 use super::heights::Heights;
 use super::*;
@@ -125,6 +125,5 @@ fn a_pattern_keeps_the_area_of_what_it_unfolds() {
         };
         let expected = (slots + under) * f64::from(scale * scale);
         assert!((printed / expected - 1.0).abs() < 1e-4, "{printed} {expected}");
-        let _ = Vec2::ZERO;
     }
 }

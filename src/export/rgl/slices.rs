@@ -1,21 +1,15 @@
-//! RGL tensor files (Dupuy and Jakob 2018), anisotropic: `.bsdf`, read by Mitsuba 3's `measured`, pbrt-v4 and brdf-loader.
-//!
-//! `i` of the format, the side with the slices, is our viewer; its value is the BRDF times the cosine of the other side,
-//! which is exactly `f̄`. Samples lie on half vectors, where lobes stand still, crowded by a warp where normals are.
+//! What stands in a table for each direction of the viewer.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::io::{self, Write};
+use std::io;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::sampler::{ReadingError, in_parallel, reading_error};
-use super::{ExportResolution, Job, Written};
+use super::super::ExportResolution;
 use crate::brdf::LUMINANCE;
 use crate::brdf::rgl::table::{RglTable, direction_of_u, u_of_direction};
-use crate::brdf::rgl::tensor_file::TensorWriter;
 use crate::brdf::rgl::warp::{Grid, Warp};
-use crate::brdf::spectrum::{WRITTEN_NM, spectra_of_primaries};
 use crate::filtering::{EffectiveBrdf, Reflectance};
 
 /// The last elevation stands for 90°, where nothing is defined.
@@ -32,28 +26,28 @@ const POLE: f64 = 0.3;
 /// How much of a warp depends on what its viewer sees of each normal. Readers blend the warps of neighbouring slices, so the
 /// more these differ the worse: mean errors of V-grooves with Cook-Torrance 0.2 are 2.1, 1.8 and 1.8 % at 1, 0.3 and 0.
 const VISIBLE: f64 = 0.3;
-/// Elevations and azimuths of the viewer, samples along both axes of a warp: 3, 20 and 77 MB.
-const RESOLUTIONS: [[usize; 4]; 3] = [[9, 24, 24, 24], [13, 48, 36, 36], [19, 72, 48, 48]];
-/// The first of them that reads with this mean error is taken: below 1 % at other pairs, too.
-const GOOD_ENOUGH: f64 = 0.008;
+/// How many samples more there are for a grazing viewer where light grazes, too, and up to which cosine of the light: f̄ is
+/// largest there, and facets turn away within a few degrees.
+const GRAZING: f64 = 3.0;
+const GRAZING_COSINE: f64 = 0.15;
 
 /// Sizes of the file's grids.
 #[derive(Debug, Clone, Copy)]
-struct Sizes {
+pub(super) struct Sizes {
     /// Elevations of the viewer from 0 to 90°.
-    thetas: usize,
+    pub(super) thetas: usize,
     /// Azimuths of the viewer from -π to π, the seam twice.
-    phis: usize,
+    pub(super) phis: usize,
     /// Of each slice: luminance and colours.
-    samples: Grid,
+    pub(super) samples: Grid,
     /// Of each slice: the warp, which may be finer along the azimuth.
-    vndf: Grid,
+    pub(super) vndf: Grid,
     /// Of the functions of one direction.
-    ndf: Grid,
+    pub(super) ndf: Grid,
 }
 
 impl Sizes {
-    fn new(resolution: &ExportResolution) -> Self {
+    pub(super) fn new(resolution: &ExportResolution) -> Self {
         let ExportResolution { theta_i, phi_i, theta_o, phi_o } = *resolution;
         // Mitsuba loads square grids only.
         let side = ((theta_o * phi_o) as f64).sqrt().round().max(2.0) as usize;
@@ -96,11 +90,11 @@ fn solid_angle([x, _]: [f64; 2]) -> f64 {
 }
 
 /// One viewer's part of the file.
-struct Slice {
-    vndf: Vec<f32>,
-    luminance: Vec<f32>,
+pub(super) struct Slice {
+    pub(super) vndf: Vec<f32>,
+    pub(super) luminance: Vec<f32>,
     /// Three planes.
-    rgb: Vec<f32>,
+    pub(super) rgb: Vec<f32>,
 }
 
 /// `f̄` at the reflections of `viewer` about half vectors. Under the horizon it goes on as it is at the horizon: readers
@@ -133,10 +127,13 @@ fn luminance(value: DVec3) -> f64 {
 /// The density of half vectors on the unit square that this viewer's warp is made of, times an arbitrary constant: the root
 /// of the normals that `ndf` holds, as they are and as they are seen. `luminance` makes up for the rest when sampling.
 fn visible_normals(viewer: DVec3, grid: Grid, ndf: &(Grid, Vec<f64>)) -> Vec<f64> {
+    let grazing = GRAZING * (1.0 - viewer.z).powi(5);
     let density = |at: [f64; 2]| {
         let m = direction_of_u(at);
         let normals = ndf.0.eval(&ndf.1, at) + EVERYWHERE * m.z;
-        normals * (solid_angle(at) + POLE) * (1.0 + VISIBLE * viewer.dot(m).max(0.0))
+        let height = reflected(viewer, m).z / GRAZING_COSINE;
+        let seen = (1.0 + VISIBLE * viewer.dot(m).max(0.0)) * (1.0 + grazing * (-height * height).exp());
+        normals * (solid_angle(at) + POLE) * seen
     };
     vertices(grid).map(density).collect()
 }
@@ -144,7 +141,7 @@ fn visible_normals(viewer: DVec3, grid: Grid, ndf: &(Grid, Vec<f64>)) -> Vec<f64
 /// `ndf` from retro-reflection, the root of `G(m, m)` scaled to a largest value of 1, and `sigma`, the visible projected area.
 /// The root spreads samples over the slopes of lobes, where reading between them errs: with `G` itself the relative L2 of
 /// V-grooves with Cook-Torrance 0.2 is 5.2 % in place of 2.8 %.
-fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
+pub(super) fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
     let places: Vec<_> = vertices(sizes.ndf).collect();
     let at = |place: &[f64; 2]| {
         let m = above_horizon(direction_of_u(*place)).as_vec3();
@@ -170,57 +167,7 @@ fn as_stored(values: Vec<f64>) -> Vec<f64> {
     values.into_iter().map(|value| f64::from(value as f32)).collect()
 }
 
-/// A table in memory as a reader has it, and its slices as they are stored.
-struct Tabulated {
-    sizes: Sizes,
-    table: RglTable,
-    slices: Vec<Slice>,
-    reading: ReadingError,
-}
-
-impl Tabulated {
-    fn new(job: &Job<'_>, resolution: &ExportResolution) -> io::Result<Self> {
-        let Job { brdf, progress, .. } = *job;
-        let sizes = Sizes::new(resolution);
-        let planes = planes(brdf, &sizes);
-        let count = sizes.phis * sizes.thetas;
-        let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice))?;
-        let slices: Vec<Slice> = slices.into_iter().collect::<io::Result<_>>()?;
-        let vndf = Warp::new(sizes.vndf, widened(&slices, |slice| &slice.vndf)).map_err(io::Error::other)?;
-        let table = RglTable { vndf, rgb: (sizes.samples, widened(&slices, |slice| &slice.rgb)), ..planes };
-        let read = |i: Vec3, o: Vec3| table.eval(o.as_dvec3(), i.as_dvec3()).as_vec3();
-        let reading = reading_error(brdf, read);
-        Ok(Self { sizes, table, slices, reading })
-    }
-
-    /// Of the size asked for, else the smallest of a few that reads well.
-    fn chosen(job: &Job<'_>, resolutions: &[[usize; 4]]) -> io::Result<Self> {
-        if let Some(resolution) = &job.options.resolution {
-            return Self::new(job, resolution);
-        }
-        let cost = |sizes: &[usize; 4]| sizes.iter().product::<usize>() as f32;
-        let all: f32 = resolutions.iter().map(cost).sum();
-        let (mut before, mut last) = (0.0, None);
-        for sizes in resolutions {
-            let [theta_i, phi_i, theta_o, phi_o] = *sizes;
-            let progress = |part: f32| (job.progress)((before + part * cost(sizes)) / all);
-            let step = Job { progress: &progress, ..*job };
-            let tabulated = Self::new(&step, &ExportResolution { theta_i, phi_i, theta_o, phi_o })?;
-            before += cost(sizes);
-            if tabulated.reading.mean <= GOOD_ENOUGH {
-                return Ok(tabulated);
-            }
-            last = Some(tabulated);
-        }
-        last.ok_or_else(|| io::Error::other("no resolution to choose from"))
-    }
-}
-
-fn widened(slices: &[Slice], of: impl Fn(&Slice) -> &Vec<f32>) -> Vec<f64> {
-    slices.iter().flat_map(|slice| of(slice).iter().map(|&value| f64::from(value))).collect()
-}
-
-fn one_slice(brdf: &EffectiveBrdf, planes: &RglTable, sizes: &Sizes, slice: usize) -> io::Result<Slice> {
+pub(super) fn one_slice(brdf: &EffectiveBrdf, planes: &RglTable, sizes: &Sizes, slice: usize) -> io::Result<Slice> {
     let viewer = sizes.viewer(slice);
     // The warp must be of the numbers that a reader will have.
     let vndf = scaled(visible_normals(viewer, sizes.vndf, &planes.ndf));
@@ -265,83 +212,4 @@ fn floored(mut values: Vec<f64>) -> Vec<f64> {
 fn scaled(values: Vec<f64>) -> Vec<f32> {
     let largest = values.iter().copied().fold(0.0, f64::max);
     values.into_iter().map(|value| (value / largest) as f32).collect()
-}
-
-/// What a file holds; one may not hold both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Colors {
-    Rgb,
-    /// For spectral renderers: smooth spectra that look like the RGB values in daylight.
-    Spectra,
-}
-
-/// Writes a file.
-pub fn write(job: &Job<'_>, out: &mut dyn Write, colors: Colors) -> io::Result<Written> {
-    // Spectra take five times the room: the largest size is left to those who ask for it.
-    let sizes = if colors == Colors::Rgb { &RESOLUTIONS[..] } else { &RESOLUTIONS[..2] };
-    let Tabulated { sizes, table, slices, reading } = Tabulated::chosen(job, sizes)?;
-    let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<f32>>();
-    let Sizes { thetas, phis, samples, vndf, ndf } = sizes;
-    let joined = |of: fn(&Slice) -> &Vec<f32>| slices.iter().flat_map(of).copied().collect::<Vec<f32>>();
-    let per_slice = [phis, thetas, samples.height, samples.width];
-    let mut file = TensorWriter::default();
-    file.bytes("description", job.summary().as_bytes());
-    file.floats("phi_i", &[phis], &narrow(&table.phi_i));
-    file.floats("theta_i", &[thetas], &narrow(&table.theta_i));
-    file.floats("sigma", &[ndf.height, ndf.width], &narrow(&table.sigma.1));
-    file.floats("ndf", &[ndf.height, ndf.width], &narrow(&table.ndf.1));
-    file.floats("vndf", &[phis, thetas, vndf.height, vndf.width], &joined(|slice| &slice.vndf));
-    file.floats("luminance", &per_slice, &joined(|slice| &slice.luminance));
-    match colors {
-        Colors::Rgb => {
-            file.floats("rgb", &[phis, thetas, 3, samples.height, samples.width], &joined(|slice| &slice.rgb));
-        }
-        Colors::Spectra => {
-            file.floats("wavelengths", &[WRITTEN_NM.len()], &narrow(&WRITTEN_NM));
-            let shape = [phis, thetas, WRITTEN_NM.len(), samples.height, samples.width];
-            file.floats("spectra", &shape, &spectra(&slices, samples.len()));
-        }
-    }
-    file.bytes("jacobian", &[1]);
-    file.write(out)?;
-    Ok(Written {
-        pairs: thetas * phis * samples.len(),
-        reading,
-        conventions: conventions(colors),
-        anisotropy_lost: None,
-    })
-}
-
-/// `[slice][wavelength][place]` of slices of RGB planes.
-fn spectra(slices: &[Slice], plane: usize) -> Vec<f32> {
-    let primaries = spectra_of_primaries();
-    let mut values = Vec::with_capacity(slices.len() * primaries.len() * plane);
-    for slice in slices {
-        for primary in &primaries {
-            values.extend((0..plane).map(|at| {
-                let rgb = DVec3::from_array(std::array::from_fn(|c| f64::from(slice.rgb[c * plane + at])));
-                primary.dot(rgb).max(0.0) as f32
-            }));
-        }
-    }
-    values
-}
-
-fn conventions(colors: Colors) -> Vec<String> {
-    let what = match colors {
-        Colors::Rgb => "Field rgb: linear RGB, Rec. 709 primaries; for RGB variants of Mitsuba (pbrt upsamples).",
-        Colors::Spectra => {
-            "Fields spectra, wavelengths (nm): smooth spectra that look like our RGB in daylight (D65); for spectral variants."
-        }
-    };
-    let lines = [
-        what,
-        "RGL tensor file (Dupuy and Jakob 2018), anisotropic: Mitsuba 3's `measured`, pbrt-v4's `measured`, RGL's brdf-loader.",
-        "Slices (phi_i, theta_i) are directions of the viewer, Mitsuba's wi; phi_i runs from -pi to pi, the seam twice.",
-        "A value, rgb(s) ndf(u_m) / (4 sigma(u_i)), is the BRDF times the cosine of the other direction, Mitsuba's wo: f_bar.",
-        "u = (sqrt(2 theta / pi), (phi + pi) / 2 pi); m is the half vector; s is u_m through the inverse of the warp by vndf.",
-        "sigma is the visible projected area over the tile's area; ndf is the root of the luminance of G(m, m), of its largest, floored.",
-        "vndf is that density of normals, in part as this viewer sees them; luminance is what the warp by it leaves to sample.",
-    ];
-    lines.map(str::to_owned).to_vec()
 }

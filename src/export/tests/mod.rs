@@ -1,0 +1,199 @@
+//! Files read back against the function they were written from: what all formats share here, each kind in its file.
+
+mod formats;
+mod grids;
+
+use std::f32::consts::{FRAC_PI_2, PI};
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{UVec2, Vec2, Vec3};
+
+use super::*;
+use crate::brdf::{Brdf, Term};
+use crate::directions::from_angles;
+use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
+use crate::geometry::{self, Facets, TileMesh, heightfield};
+use crate::scene::{Flat, Geometry, Scene};
+use crate::visibility::{Horizons, Visibility};
+
+const SMALL: ExportResolution = ExportResolution { theta_i: 4, phi_i: 6, theta_o: 5, phi_o: 8 };
+
+fn sized(resolution: ExportResolution) -> ExportOptions {
+    ExportOptions { resolution: Some(resolution), ..ExportOptions::default() }
+}
+
+fn small() -> ExportOptions {
+    sized(SMALL)
+}
+
+fn silent(_: f32) -> bool {
+    true
+}
+
+fn brdf_of(mesh: &TileMesh, term: Term) -> EffectiveBrdf {
+    let mut facets = Facets::sample(mesh, 300, 1);
+    facets.sort_for_sums();
+    let visibility = match &mesh.height_grid {
+        Some(heights) => Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, 16, 0.02)),
+        None => Visibility::Unblocked { facets: facets.len() },
+    };
+    let materials = [SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::new(1.0, 0.5, 0.25) }];
+    let sum = FacetSum::new(&facets, &[0], &materials);
+    let form = Form::Direct(Direct { sum: Arc::new(sum), visibility: Arc::new(visibility) });
+    EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
+}
+
+/// A corrugated tile: anisotropic, so that mixed-up axes show.
+fn corrugated() -> EffectiveBrdf {
+    let wave =
+        |at: Vec2| 0.15 * (std::f32::consts::TAU * at.x).sin() + 0.05 * (std::f32::consts::TAU * (at.x + at.y)).cos();
+    let mesh = heightfield::from_function(UVec2::splat(16), Vec2::new(1.0, 2.0), wave);
+    brdf_of(&mesh, Term::CookTorrance { roughness: 0.5, f0: Vec3::new(0.9, 0.6, 0.3) })
+}
+
+/// A flat Lambertian tile, albedo 0.8: `f̄ / cos θ_i` is albedo times colour over π everywhere.
+fn flat() -> EffectiveBrdf {
+    let tile = Scene::of(Geometry::Flat(Flat::default())).tile;
+    brdf_of(&geometry::build(&tile, Path::new("")).unwrap(), Term::Lambertian { albedo: Vec3::splat(0.8) })
+}
+
+fn meta() -> ExportMeta {
+    ExportMeta {
+        scene: "a \"quoted\" näme\nand a line".to_owned(),
+        quality: "standard".to_owned(),
+        seed: 7,
+        tile_size: [1.0, 2.0],
+        tile_unit: "mm".to_owned(),
+        closes_plane: true,
+        notes: vec!["grooves: 7.3 became 7".to_owned()],
+    }
+}
+
+/// Every pair of the small grid with `(f̄/cos θ_i, G)` straight from the function, viewer fastest.
+fn expected(brdf: &EffectiveBrdf, resolution: &ExportResolution) -> Vec<([f32; 4], Vec3, Vec3)> {
+    let theta = |a: usize, n: usize| (a as f32 + 0.5) * FRAC_PI_2 / n as f32;
+    let phi = |b: usize, n: usize| 2.0 * PI * b as f32 / n as f32;
+    let mut rows = Vec::new();
+    for ti in 0..resolution.theta_i {
+        for pi in 0..resolution.phi_i {
+            for to in 0..resolution.theta_o {
+                for po in 0..resolution.phi_o {
+                    let angles = [
+                        theta(ti, resolution.theta_i),
+                        phi(pi, resolution.phi_i),
+                        theta(to, resolution.theta_o),
+                        phi(po, resolution.phi_o),
+                    ];
+                    let (i, o) = (from_angles(angles[0], angles[1]), from_angles(angles[2], angles[3]));
+                    rows.push((angles, brdf.eval(i, o) / i.z, brdf.g(i, o)));
+                }
+            }
+        }
+    }
+    rows
+}
+
+fn close(a: Vec3, b: Vec3) -> bool {
+    (a - b).length() <= 2e-4 * b.length() + 1e-6
+}
+
+#[test]
+fn files_are_the_same_bytes_again_with_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.npz", "a.csv", "a.exr"] {
+        let path = folder.path().join(name);
+        let bytes = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| write(&corrugated(), &meta(), &small(), &path, &silent)).unwrap();
+            std::fs::read(&path).unwrap()
+        };
+        assert!(bytes(1) == bytes(3), "{name}");
+    }
+}
+
+#[test]
+fn progress_goes_from_nothing_to_all() {
+    let told = std::cell::RefCell::new(Vec::new());
+    let tell = |part| {
+        told.borrow_mut().push(part);
+        true
+    };
+    Table::new(&flat(), SMALL.grid(), &tell).unwrap();
+    let told = told.into_inner();
+    assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted());
+}
+
+#[test]
+fn a_table_that_is_given_up_replaces_nothing_and_leaves_nothing_beside() {
+    let folder = tempfile::tempdir().unwrap();
+    for (ending, _) in FORMATS {
+        let path = folder.path().join(format!("table.{ending}"));
+        std::fs::write(&path, "old").unwrap();
+        let error = write(&flat(), &meta(), &ExportOptions::default(), &path, &|_| false).unwrap_err();
+        assert!(matches!(error, Error::Cancelled), "{ending}: {error}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"old", "{ending}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), FORMATS.len());
+}
+
+#[test]
+fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("folder.npz")).unwrap();
+    let old = folder.path().join("old.npz");
+    std::fs::write(&old, b"old").unwrap();
+    let attempt = |name: &str, resolution: &ExportResolution| {
+        let error = write(&flat(), &meta(), &sized(*resolution), &folder.path().join(name), &silent).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{error}");
+        error.to_string()
+    };
+    for (name, says) in [
+        ("a.jpg", ".binary, .xml"),
+        ("a.jpg", "the ending .jpg"),
+        ("a", "without an ending"),
+        ("missing/a.npz", "missing/a.npz"),
+        ("folder.npz", "a folder"),
+    ] {
+        let error = attempt(name, &SMALL);
+        assert!(error.contains(says) && error.contains(name), "{error}");
+    }
+    assert!(attempt("old.npz", &ExportResolution { theta_o: 0, ..SMALL }).contains("theta_o"));
+    assert!(attempt("old.npz", &ExportResolution { phi_i: usize::MAX, ..SMALL }).contains("phi_i"));
+    let huge = ExportResolution { theta_i: 1024, phi_i: 1024, theta_o: 1024, phi_o: 1024 };
+    assert!(attempt("old.npz", &huge).contains("pairs"));
+    assert!(check_ending(Path::new("a.npz")).is_ok() && check_ending(Path::new("a.npy")).is_err());
+    assert_eq!(std::fs::read(&old).unwrap(), b"old");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no temporary files are left");
+}
+
+#[test]
+fn a_failure_while_writing_leaves_the_old_file_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let old = folder.path().join("old.npz");
+    std::fs::write(&old, b"old").unwrap();
+    let full = replace::replacing(&old, |out| {
+        out.write_all(b"half of the new")?;
+        Err::<(), _>(io::Error::other("disk full"))
+    });
+    let error = full.unwrap_err();
+    assert!(error.exit_code() == 2 && error.to_string().contains("old.npz: output: found disk full"), "{error}");
+    assert_eq!(std::fs::read(&old).unwrap(), b"old");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    replace_file(&old, b"new").unwrap();
+    assert_eq!(std::fs::read(&old).unwrap(), b"new");
+}
+
+#[test]
+fn a_reader_that_hangs_up_is_no_failure() {
+    struct Closed;
+    impl Write for Closed {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(io::ErrorKind::BrokenPipe.into())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    assert!(write_csv(&flat(), &meta(), &small(), &mut Closed, &silent).is_ok());
+}
