@@ -180,7 +180,9 @@ mod mutate;
 fn mutated_recoveries(seed: u64, done: impl Fn(usize) -> bool) -> [usize; 2] {
     let folder = tempfile::tempdir().unwrap();
     let document = quick();
-    RecoveryFile::new(folder.path()).prepare(&document).unwrap().write().unwrap();
+    // Removed when it goes.
+    let recovery = RecoveryFile::new(folder.path());
+    recovery.prepare(&document).unwrap().write().unwrap();
     let here = folder.path().join(format!("recovery-{}.toml", std::process::id()));
     let whole = std::fs::read(here).unwrap();
     let other = folder.path().join("recovery-4194399.toml");
