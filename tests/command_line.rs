@@ -488,6 +488,47 @@ fn a_report_holds_every_preset_and_goes_on_from_where_it_was() {
 }
 
 #[test]
+fn every_result_says_how_sound_it_is_in_json_and_on_standard_error() {
+    let desk = Desk::new();
+    desk.write(
+        "gain.toml",
+        GROOVES.replace("kind = \"cook_torrance\", roughness = 0.3, f0 = 0.9", "kind = \"lambertian\", albedo = 2"),
+    );
+    desk.write("pairs.csv", PAIRS);
+    for arguments in [
+        &["plan", "gain.toml"][..],
+        &["eval", "gain.toml", "--pairs", "pairs.csv", "-o", "out.csv"],
+        &[
+            "eval",
+            "gain.toml",
+            "--pairs",
+            "pairs.csv",
+            "-o",
+            "out.csv",
+            "--quality",
+            "reference",
+            "--set",
+            "quality.reference_samples=16",
+        ],
+        &["render", "gain.toml", "-o", "out.png", "--size", "16x16"],
+        &["export", "gain.toml", "-o", "out.npz", "--resolution", "4x8"],
+    ] {
+        let told = desk.run(&[arguments, &["--json"]].concat());
+        assert!(told.status.success(), "{arguments:?}");
+        let said = String::from_utf8_lossy(&told.stderr);
+        assert!(
+            said.lines().any(|line| line.starts_with("warning: ") && line.contains("2.000 times the light")),
+            "{said}"
+        );
+        let json: Value = serde_json::from_slice(&told.stdout).unwrap();
+        let warnings = json["health"]["warnings"].as_array().unwrap();
+        assert!(warnings.iter().any(|warning| warning.as_str().unwrap().contains("`default`")), "{json}");
+        let quiet = desk.run(&[arguments, &["--quiet"]].concat());
+        assert!(!String::from_utf8_lossy(&quiet.stderr).contains("warning"), "{arguments:?}");
+    }
+}
+
+#[test]
 fn a_target_is_answered_with_settings_that_repeat_it() {
     let desk = Desk::new();
     desk.write("grooves.toml", GROOVES);
@@ -500,7 +541,8 @@ fn a_target_is_answered_with_settings_that_repeat_it() {
     };
     let (values, said) = eval(&["--target-db", "35"]);
     assert!(said.contains("asked 35.0 dB, got "), "{said}");
-    let words = said.split(": ").last().unwrap().trim();
+    let line = said.lines().find(|line| line.starts_with("asked")).unwrap();
+    let words = line.split(": ").last().unwrap().trim();
     let words: Vec<&str> = words.split_whitespace().collect();
     assert_eq!(words[0], "--quality", "{said}");
     let (again, _) = eval(&words);

@@ -92,7 +92,7 @@ const REFERENCE_LEAD_DB: f64 = 8.0;
 /// A rung that shows how bright a scene is.
 const TYPICAL: f64 = 6.0;
 /// Rungs are told apart this finely.
-const STEP: f64 = 0.25;
+const STEP: f64 = 0.125;
 
 /// Chooses settings for `goal`; `progress` hears what is being done.
 ///
@@ -265,7 +265,7 @@ impl<'a> Search<'a> {
         // Aim a little below: a time is never the same twice.
         let aim = 0.93 * ms;
         let (mut low, mut high) = (try_at(self, 0.0, progress)?, None::<Tried>);
-        let mut rung = 5.0_f64;
+        let (mut rung, mut again) = (5.0_f64, false);
         for _ in 0..MAX_TRIES {
             if low.ms > ms || ladder::FINEST - low.rung < STEP {
                 break;
@@ -286,6 +286,11 @@ impl<'a> Search<'a> {
                     let at = low.rung + (aim / low.ms).ln() / slope.max(1e-3);
                     let margin = 0.15 * (high.rung - low.rung);
                     at.clamp(low.rung + margin, high.rung - margin)
+                }
+                // Times that do not fit together: other work was in the way. Once more from here.
+                Some(_) if !again && low.ms < 0.8 * ms => {
+                    (again, high) = (true, None);
+                    (low.rung + 0.3).min(ladder::FINEST)
                 }
                 Some(_) => break,
                 // Never more than eight times the work of the last at once, and at least a quarter more.

@@ -12,5 +12,5 @@ pub mod sweep;
 
 pub use health::Health;
 pub use metrics::{Errors, compare, upper_errors};
-pub use pairs::{Pair, mirror_biased_pairs};
+pub use pairs::{Pair, mirror_biased_pairs, picture_pairs};
 pub use reference::{Estimate, Reference, ReferenceSettings};

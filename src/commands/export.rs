@@ -11,6 +11,9 @@ use serde::Serialize;
 use super::print_json;
 use crate::{ExportArgs, Radiance};
 
+/// Relative L2 of reading a table back at which hardly anything of its lobes is right.
+const MOST_LOST: f64 = 0.5;
+
 #[derive(Serialize)]
 struct Report<'a> {
     output: String,
@@ -64,6 +67,16 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     bar.finish_and_clear();
     let report = report?;
     let reading = report.reading;
+    let mut health = outcome.health().clone();
+    if !(0.0..=MOST_LOST).contains(&reading.errors.rel_l2) {
+        let warning = "the table misses most of the highlights: raise --resolution, or the roughness, or choose a format that follows \
+                       lobes (.bsdf, --radiance tensor-tree)"
+            .to_owned();
+        if !args.scene.quiet {
+            eprintln!("warning: {warning}");
+        }
+        health.warnings.push(warning);
+    }
     if args.scene.json {
         return print_json(&Report {
             output: args.output.display().to_string(),
@@ -75,7 +88,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             resampling_psnr_db: reading.errors.psnr_db,
             anisotropy_lost: report.anisotropy_lost,
             form: outcome.brdf.form.describe(),
-            health: outcome.health(),
+            health: &health,
             reflectance: report.reflectances.rows(),
         });
     }

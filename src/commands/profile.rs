@@ -39,9 +39,10 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     args.scene.notes(&outcome);
     let mut form = outcome.brdf.form.describe();
     let camera = if args.edit == Some(Edit::Camera) {
-        let stage = Stage::new(&loaded)?;
+        let mut stage = Stage::new(&loaded)?;
         let route = Route::of(&stage, &outcome)?;
-        // A camera edit keeps what pictures read.
+        // A camera edit keeps what pictures read, and the shadows of the object.
+        stage.settle();
         let pictured = route.reads(&outcome)?;
         form = pictured.brdf.form.describe();
         Some((stage, route, pictured))

@@ -26,6 +26,18 @@ thread_local! {
 }
 
 impl Direct {
+    /// Hands the visibilities along `i` and `o` of all facets to `work`.
+    pub(crate) fn with_seen<T>(&self, i: Vec3, o: Vec3, work: impl FnOnce(&[f32], &[f32]) -> T) -> T {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let facets = self.sum.facet_count();
+            scratch.v_i.resize(facets, 0.0);
+            scratch.v_o.resize(facets, 0.0);
+            self.visibility.fill(i, 0..facets, &mut scratch.v_i);
+            self.visibility.fill(o, 0..facets, &mut scratch.v_o);
+            work(&scratch.v_i, &scratch.v_o)
+        })
+    }
+
     /// `a_v(o)` and, for each light, `Σ ΔA V V f = a_v f̄` into `out`.
     pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         SCRATCH.with_borrow_mut(|scratch| {
@@ -34,6 +46,15 @@ impl Direct {
             scratch.v_o.resize(facets, 0.0);
             self.visibility.fill(o, 0..facets, &mut scratch.v_o);
             let area = self.sum.projected_area(&scratch.v_o, o);
+            if let (Visibility::Horizons(horizons), true) = (&*self.visibility, self.sum.has_few_normals()) {
+                // Little work a facet: visibility along the light need not be written down first.
+                for (k, &i) in lights.iter().enumerate() {
+                    let lit = i.z > 0.0 && o.z > 0.0 && area > 0.0;
+                    let seen = horizons.seen_along(i, &scratch.v_o);
+                    out(k, if lit { self.sum.sum_of_areas(i, o, seen) } else { DVec3::ZERO });
+                }
+                return area;
+            }
             for (k, &i) in lights.iter().enumerate() {
                 if i.z > 0.0 && o.z > 0.0 && area > 0.0 {
                     self.visibility.fill(i, 0..facets, &mut scratch.v_i);

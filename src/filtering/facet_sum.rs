@@ -17,7 +17,18 @@ pub struct SumMaterial {
     pub color: Vec3,
 }
 
+/// A term that reflects nothing, whatever the angles.
+fn is_zero(term: &Term) -> bool {
+    // A tint is a line in (1 - i·h)⁵.
+    !matches!(term, Term::Measured(_)) && term.tint(0.0) == Vec3::ZERO && term.tint(1.0) == Vec3::ZERO
+}
+
 impl SumMaterial {
+    /// Does it reflect nothing?
+    pub fn is_black(&self) -> bool {
+        self.color == Vec3::ZERO || self.brdf.terms.iter().all(is_zero)
+    }
+
     /// Do two materials differ in nothing but their colour?
     pub fn same_brdf(&self, other: &Self) -> bool {
         // A tint is a line in (1 - i·h)⁵: two points tell it.
@@ -34,9 +45,7 @@ impl SumMaterial {
             _ => analytic_lobe(a).is_some_and(|lobe| Some(lobe) == analytic_lobe(b)),
         };
         let (a, b) = (&self.brdf.terms, &other.brdf.terms);
-        (self.color == Vec3::ZERO) == (other.color == Vec3::ZERO)
-            && a.len() == b.len()
-            && a.iter().zip(b).all(|(a, b)| same(a, b))
+        self.is_black() == other.is_black() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b))
     }
 }
 
@@ -55,6 +64,7 @@ pub struct FacetSum {
 pub(crate) struct Group {
     pub(crate) range: Range<usize>,
     pub(crate) color: Vec3,
+    is_black: bool,
     pub(crate) lobes: Vec<(Lobe, Term)>,
     pub(crate) measured: Vec<std::sync::Arc<dyn Measured>>,
     /// Areas times colour weights, where those differ between the facets of the group.
@@ -102,6 +112,7 @@ impl FacetSum {
         for group in &mut self.groups {
             let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
             group.color = material.color;
+            group.is_black = material.is_black();
             group.lobes = material
                 .brdf
                 .terms
@@ -152,7 +163,7 @@ impl FacetSum {
         let pair = PairVectors::new(i, o);
         let mut total = DVec3::ZERO;
         for group in &self.groups {
-            let black = group.color == Vec3::ZERO && !self.keep_black;
+            let black = !self.keep_black && group.is_black;
             if !black {
                 total += group.color.as_dvec3() * self.group_sum(group, &pair, v_i, v_o);
             }
@@ -303,10 +314,7 @@ impl FacetSum {
     }
 
     fn patch_sum(&self, group: &Group, patch: &Patch, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
-        let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
-        if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
-            return DVec3::ZERO;
-        }
+        let Some(value) = patch_value(group, patch, pair) else { return DVec3::ZERO };
         let range = patch.range.clone();
         let seen = match &group.rgb_areas {
             None => DVec3::splat(simd::masked_sum([&self.areas[range.clone()]], &v_i[range.clone()], &v_o[range])[0]),
@@ -316,15 +324,67 @@ impl FacetSum {
                 DVec3::from_array(simd::masked_sum([r, g, b], &v_i[range.clone()], &v_o[range]))
             }
         };
-        let mut value = Vec3::ZERO;
-        for (_, term) in &group.lobes {
-            value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
-        }
-        for table in &group.measured {
-            value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
-        }
         seen * value.as_dvec3()
     }
+
+    /// Whether every group has few normals and one colour: then [`FacetSum::sum_of_areas`] serves.
+    pub(crate) fn has_few_normals(&self) -> bool {
+        let few = |group: &Group| group.patches.is_some() && group.rgb_areas.is_none();
+        self.groups.iter().all(|group| group.color == Vec3::ZERO || few(group))
+    }
+
+    /// [`FacetSum::sum`] where facets of few normals are the whole tile: `seen` tells how much of a run of facets, whose areas
+    /// it is handed, `i` and `o` both see.
+    pub(crate) fn sum_of_areas(&self, i: Vec3, o: Vec3, seen: impl Fn(Range<usize>, &[f32]) -> f64) -> DVec3 {
+        let pair = PairVectors::new(i, o);
+        let mut total = DVec3::ZERO;
+        for group in self.groups.iter().filter(|group| group.color != Vec3::ZERO) {
+            let mut sum = DVec3::ZERO;
+            for patch in group.patches.iter().flatten() {
+                if let Some(value) = patch_value(group, patch, &pair) {
+                    sum += DVec3::splat(seen(patch.range.clone(), &self.areas[patch.range.clone()])) * value.as_dvec3();
+                }
+            }
+            total += group.color.as_dvec3() * sum;
+        }
+        total
+    }
+}
+
+impl FacetSum {
+    /// Other facets of the same materials.
+    pub(super) fn over(&self, normals: [Vec<f32>; 3], areas: Vec<f32>, groups: Vec<Group>) -> Self {
+        Self { normals, areas, groups, ..self.clone() }
+    }
+}
+
+impl Group {
+    /// The same materials over other facets; `None` where they have colours of their own, or normals that matter.
+    pub(super) fn over(&self, range: Range<usize>, patches: Vec<Patch>) -> Option<Self> {
+        let black = self.color == Vec3::ZERO;
+        (black || self.rgb_areas.is_none() && self.patches.is_some()).then(|| Self {
+            range,
+            rgb_areas: None,
+            patches: self.patches.is_some().then_some(patches),
+            ..self.clone()
+        })
+    }
+}
+
+/// What facets of one normal reflect; `None` where it faces away.
+fn patch_value(group: &Group, patch: &Patch, pair: &PairVectors) -> Option<Vec3> {
+    let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
+    if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
+        return None;
+    }
+    let mut value = Vec3::ZERO;
+    for (_, term) in &group.lobes {
+        value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
+    }
+    for table in &group.measured {
+        value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
+    }
+    Some(value)
 }
 
 impl Group {
@@ -337,6 +397,7 @@ impl Group {
         Self {
             range,
             color: Vec3::ONE,
+            is_black: false,
             lobes: Vec::new(),
             measured: Vec::new(),
             rgb_areas,

@@ -197,11 +197,14 @@ impl LowRank {
                     for (lobe, along) in &lobes {
                         let source = Source { material: group.material, term: k, along: *along * *column_color };
                         let tint = source.tint(materials);
-                        channels.push(match lobe {
-                            RotatedLobe::Analytic(Lobe::Lambertian) => Channel::lambertian(&part, source, tint),
+                        channels.extend(match lobe {
+                            RotatedLobe::Analytic(Lobe::Lambertian) => Some(Channel::lambertian(&part, source, tint)),
                             _ => {
                                 let basis = RotatedBasis::new(*lobe, settings.basis, settings.keep_m)?;
-                                Channel::factored(&part, &basis, settings, source, tint)?
+                                // A lobe that is 0 at every node has no features.
+                                (basis.features() > 0)
+                                    .then(|| Channel::factored(&part, &basis, settings, source, tint))
+                                    .transpose()?
                             }
                         });
                     }

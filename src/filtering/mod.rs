@@ -10,6 +10,7 @@ mod gram;
 mod low_rank;
 mod pair_table;
 mod rotated_basis;
+mod thinned;
 mod wu2011;
 
 use glam::Vec3;

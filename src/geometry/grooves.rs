@@ -21,13 +21,18 @@ struct Wave {
     size: DVec2,
 }
 
+/// Grooves that cross one side of a tile at most.
+const MOST_WAVES: f64 = 2048.0;
+
 impl Wave {
     /// The wave nearest to `count` grooves across the tile, turned by `rotation_deg` from running along y.
     fn snapped(count: u32, rotation_deg: f32, size: Vec2) -> Self {
         let size = size.as_dvec2();
         let (sin, cos) = f64::from(rotation_deg).to_radians().sin_cos();
         let count = f64::from(count);
-        let (m, n) = ((count * cos).round() as i64, (count * sin * size.y / size.x).round() as i64);
+        // Tiles a million times as long as wide would get a million grooves: those turn less.
+        let most = |waves: f64| waves.round().clamp(-MOST_WAVES, MOST_WAVES) as i64;
+        let (m, n) = (most(count * cos), most(count * sin * size.y / size.x));
         Self { m: if (m, n) == (0, 0) { 1 } else { m }, n, size }
     }
 

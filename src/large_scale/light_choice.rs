@@ -36,3 +36,26 @@ pub fn worth_shading(mesh: &ObjectMesh, lights: &[DirectionalLight]) -> Vec<Dire
 fn faces(mesh: &ObjectMesh, light: Vec3) -> bool {
     mesh.normals.iter().any(|normal| normal.dot(light) > 0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::large_scale::objects;
+
+    fn light(direction: Vec3, irradiance: f32) -> DirectionalLight {
+        DirectionalLight { direction, irradiance: Vec3::splat(irradiance) }
+    }
+
+    #[test]
+    fn lights_that_nothing_faces_and_the_faintest_are_left_out() {
+        let sphere = objects::build(&crate::scene::Object::default(), std::path::Path::new("")).unwrap();
+        let lights = [light(Vec3::Y, 10.0), light(Vec3::NEG_Y, 10.0), light(Vec3::X, 0.006), light(Vec3::Z, 0.02)];
+        // A sphere faces all; 0.006 of 20 is below a thousandth, 0.026 is not.
+        assert_eq!(worth_shading(&sphere, &lights), [lights[0], lights[1], lights[3]]);
+        let roof = ObjectMesh { normals: vec![Vec3::Y; sphere.normals.len()], two_sided: false, ..sphere.clone() };
+        assert_eq!(worth_shading(&roof, &lights[..2]), [lights[0]]);
+        let sheet = ObjectMesh { two_sided: true, ..roof };
+        assert_eq!(worth_shading(&sheet, &lights[..2]).len(), 2);
+        assert!(worth_shading(&sphere, &[]).is_empty());
+    }
+}

@@ -4,6 +4,7 @@ use super::light_choice::worth_shading;
 use super::lights::{self, Lights};
 use super::shading::Background;
 use super::shadow::Occluder;
+use super::shadow_cache::ShadowCache;
 use super::{ObjectMesh, RenderInput, objects};
 use crate::error::Result;
 use crate::filtering::Reflectance;
@@ -18,6 +19,7 @@ pub struct Stage {
     /// Lights left out: nothing faces them, or they are too faint to be seen.
     pub dropped_lights: usize,
     pub camera: Camera,
+    shadows: Option<ShadowCache>,
 }
 
 impl Stage {
@@ -38,7 +40,20 @@ impl Stage {
             Switch::On => Some(Occluder::always(&mesh)),
             Switch::Auto => Occluder::of(&mesh),
         };
-        Ok(Self { mesh, occluder, lights, dropped_lights, camera: loaded.scene.camera.clone().unwrap_or_default() })
+        Ok(Self {
+            mesh,
+            occluder,
+            lights,
+            dropped_lights,
+            camera: loaded.scene.camera.clone().unwrap_or_default(),
+            shadows: None,
+        })
+    }
+
+    /// Makes the shadow cache: pays where the camera moves on, or where a picture has more points than the object vertices.
+    pub fn settle(&mut self) {
+        let cache = |occluder: &Occluder| occluder.cache(&self.mesh, &self.lights.directional);
+        self.shadows = self.occluder.as_ref().map(cache);
     }
 
     /// All that a picture of the object in one material depends on, `size` in pixels.
@@ -52,7 +67,7 @@ impl Stage {
         RenderInput {
             mesh: &self.mesh,
             occluder: self.occluder.as_ref(),
-            shadow_cache: None,
+            shadow_cache: self.shadows.as_ref(),
             lights: &self.lights.directional,
             camera: &self.camera,
             reflectance,

@@ -1,7 +1,5 @@
 //! What a scene is like: all that the plan's decisions rest on.
 
-use glam::Vec3;
-
 use super::stage::Version;
 use super::{Pipeline, Shape};
 use crate::brdf::Term;
@@ -48,7 +46,7 @@ impl Pipeline {
         let mut used: Vec<usize> = facets.slots.iter().map(|slot| material_of_slot[usize::from(*slot)]).collect();
         used.sort_unstable();
         used.dedup();
-        let is_black = |index: &&usize| materials[**index].color == Vec3::ZERO;
+        let is_black = |index: &&usize| materials[**index].is_black();
         let black_materials = used.iter().filter(is_black).count();
         let is_lambertian =
             |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));

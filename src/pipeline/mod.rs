@@ -152,9 +152,9 @@ impl Pipeline {
     /// A file the scene names cannot be used, or a factorization fails.
     pub fn effective(&mut self, loaded: &LoadedScene) -> Result<Outcome> {
         let scene = &loaded.scene;
-        let settings = Settings::of(scene);
         let mut times = StageTimes::new();
         let (shape, shape_version) = self.shape(loaded, &mut times)?;
+        let settings = Settings::of(scene).for_shape(shape.height_field);
         let (materials, materials_version) = self.materials(loaded, &shape.mesh, &mut times)?;
         let sum_materials = &materials.1;
         let colors = settings.effects.color_weights;

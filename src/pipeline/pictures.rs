@@ -1,4 +1,5 @@
-//! What pictures read: a table of the effective BRDF where it is close enough, made when the first picture asks.
+//! What pictures read: a table of the effective BRDF, or a sum over fewer facets where normals are few, if it is close enough;
+//! made when the first picture asks.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -6,7 +7,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::accuracy::{Errors, mirror_biased_pairs, upper_errors};
+use crate::accuracy::{Errors, picture_pairs, upper_errors};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
 use crate::error::Result;
@@ -16,6 +17,13 @@ use crate::plan::Settings;
 
 /// Pairs that the table is checked on.
 const CHECK_PAIRS: usize = 512;
+
+/// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
+/// recurrence that placed the facets stays spread out.
+const THINNED: [usize; 2] = [10, 3];
+
+/// A table this many times too far off is not helped by the next finer grid, which has half its step.
+const HOPELESS: f64 = 2.5;
 
 /// The effective BRDF as pictures read it.
 #[derive(Debug, Clone)]
@@ -100,15 +108,26 @@ impl Pictures {
         if self.grids.is_empty() {
             return Ok((self.exact.clone(), least));
         }
-        let pairs = mirror_biased_pairs(CHECK_PAIRS, self.seed ^ 0x7ab1e);
+        let pairs = picture_pairs(CHECK_PAIRS, self.seed ^ 0x7ab1e);
         let values =
             |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
         let exact = values(&self.exact);
-        let reused = self.reused();
-        let first = reused
-            .as_ref()
-            .map_or(0, |table| self.grids.iter().position(|grid| *grid == table.grid).unwrap_or(self.grids.len() - 1));
-        let mut reused = reused;
+        let (mut reused, failed) = self.reused();
+        if let Form::Direct(direct) = &self.exact.form {
+            for step in THINNED {
+                let Some(thinned) = direct.thinned(step) else { break };
+                let brdf = EffectiveBrdf { form: Form::Direct(thinned), base_area: self.exact.base_area };
+                let errors = upper_errors(&values(&brdf), &exact);
+                if self.is_close(errors) {
+                    return Ok((Arc::new(brdf), Some(errors)));
+                }
+            }
+        }
+        if failed {
+            return Ok((self.exact.clone(), least));
+        }
+        let known = reused.as_ref().map(|table| table.grid);
+        let first = self.grids.iter().position(|grid| Some(*grid) == known).unwrap_or(0);
         for grid in &self.grids[first..] {
             let table = match reused.take() {
                 Some(table) => table,
@@ -119,12 +138,19 @@ impl Pictures {
             };
             let brdf = EffectiveBrdf { form: Form::Table(table), base_area: self.exact.base_area };
             let errors = upper_errors(&values(&brdf), &exact);
-            if errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1 {
+            if self.is_close(errors) {
                 return Ok((Arc::new(brdf), Some(errors)));
             }
             least = Some(errors);
+            if errors.rel_l2 > HOPELESS * self.tolerance.0 {
+                break;
+            }
         }
         Ok((self.exact.clone(), least))
+    }
+
+    fn is_close(&self, errors: Errors) -> bool {
+        errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1
     }
 
     fn tabulate(&self, grid: UpperPairs, cancel: &Cancel) -> Result<Option<PairTable>> {
@@ -135,12 +161,13 @@ impl Pictures {
         }
     }
 
-    /// The earlier table, where it serves.
-    fn reused(&self) -> Option<PairTable> {
-        let (earlier, same_lobes) = lock(&self.earlier).take()?;
+    /// The earlier table, where it serves; and whether none was close enough to the same lobes before.
+    fn reused(&self) -> (Option<PairTable>, bool) {
+        let Some((earlier, same_lobes)) = lock(&self.earlier).take() else { return (None, false) };
         match (&earlier.form, &self.exact.form) {
-            (Form::Table(table), Form::Direct(direct)) => table.reused(&direct.sum, same_lobes),
-            _ => None,
+            (Form::Table(table), Form::Direct(direct)) => (table.reused(&direct.sum, same_lobes), false),
+            (Form::Table(_), _) => (None, false),
+            _ => (None, same_lobes),
         }
     }
 }

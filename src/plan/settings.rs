@@ -50,6 +50,9 @@ pub struct Settings {
     pub preset: Preset,
     /// Facets that stand for the surface.
     pub facets: usize,
+    /// The same where nothing overhangs: no facet hides under others, and half as many are as good (hammered plate: 61.6 dB
+    /// with 6,144, leaning rods 36 dB, and 41 with 12,288).
+    pub height_field_facets: usize,
     /// Azimuths of horizon maps.
     pub horizon_azimuths: usize,
     /// Azimuths of slices under overhangs.
@@ -121,6 +124,7 @@ impl Settings {
             }
         };
         set(&mut settings.facets, quality.facets);
+        set(&mut settings.height_field_facets, quality.facets);
         if let Some(azimuths) = quality.azimuths {
             settings.horizon_azimuths = azimuths;
             settings.slice_azimuths = azimuths;
@@ -161,8 +165,9 @@ impl Settings {
         let standard = Self {
             preset,
             facets: 12_288,
+            height_field_facets: 6144,
             horizon_azimuths: 48,
-            slice_azimuths: 96,
+            slice_azimuths: 64,
             map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
@@ -187,11 +192,12 @@ impl Settings {
         };
         match preset {
             Preset::Standard => standard,
-            Preset::Wu2011 => Self { facets: 12_000, map_resolution: 512, ..standard },
+            Preset::Wu2011 => Self { facets: 12_000, height_field_facets: 12_000, map_resolution: 512, ..standard },
             Preset::Draft => Self {
                 facets: 2048,
-                horizon_azimuths: 32,
-                slice_azimuths: 40,
+                height_field_facets: 2048,
+                horizon_azimuths: 24,
+                slice_azimuths: 32,
                 map_grid: PolarGrid::new(20, 40),
                 map_resolution: 160,
                 keep_m: 0.999,
@@ -203,11 +209,12 @@ impl Settings {
                 tolerance: 0.12,
                 tolerance_db: 28.0,
                 picture_grids: vec![upper_pairs(16, 24, 6, 8)],
-                picture_tolerance: (0.35, 30.0),
+                picture_tolerance: (0.3, 30.0),
                 ..standard
             },
             Preset::Fine | Preset::Reference => Self {
                 facets: 32_768,
+                height_field_facets: 32_768,
                 horizon_azimuths: 96,
                 slice_azimuths: 192,
                 map_grid: PolarGrid::new(48, 192),
@@ -237,6 +244,12 @@ impl Settings {
         };
         let elements = elements.min(self.facets);
         InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
+    }
+
+    /// The settings for a tile without overhangs, or with.
+    pub fn for_shape(self, height_field: bool) -> Self {
+        let facets = if height_field { self.height_field_facets } else { self.facets };
+        Self { facets, ..self }
     }
 
     /// What the factored form needs to know.

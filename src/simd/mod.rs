@@ -13,7 +13,9 @@ mod visibility;
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, lobe_sums, lobe_values};
 pub use pairs::pair_places;
-pub use visibility::{SWITCH, blend_bits, ground_visibility, masked_sum, projected_area, stepped_visibility};
+pub use visibility::{
+    SWITCH, blend_bits, ground_masked_sum, ground_visibility, masked_sum, projected_area, stepped_visibility,
+};
 
 /// Compiles a function for the baseline, AVX2 and AVX-512, and picks at run time.
 macro_rules! multiversion {

@@ -91,6 +91,34 @@ multiversion! {
 }
 
 multiversion! {
+    /// [`masked_sum`] of one weight with `b` from [`ground_visibility`], to the same bits: no row is written on the way.
+    pub fn ground_masked_sum(weights: &[f32], a: &[f32], from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32) -> f64 {
+        const WIDTH: usize = 16;
+        let mut total = 0.0;
+        for start in (0..weights.len()).step_by(BLOCK) {
+            let end = (start + BLOCK).min(weights.len());
+            let (w, a, from, to) = (&weights[start..end], &a[start..end], &from[start..end], &to[start..end]);
+            let mut lanes = [0.0_f32; WIDTH];
+            let (w_head, w_tail) = w.as_chunks::<WIDTH>();
+            let (a_head, a_tail) = a.as_chunks::<WIDTH>();
+            let (from_head, from_tail) = from.as_chunks::<WIDTH>();
+            let (to_head, to_tail) = to.as_chunks::<WIDTH>();
+            for (((w, a), from), to) in w_head.iter().zip(a_head).zip(from_head).zip(to_head) {
+                for l in 0..WIDTH {
+                    let seen = soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
+                    lanes[l] += w[l] * (a[l] * seen);
+                }
+            }
+            for ((((lane, w), a), from), to) in lanes.iter_mut().zip(w_tail).zip(a_tail).zip(from_tail).zip(to_tail) {
+                *lane += w * (a * soft_step((elevation - (from + (to - from) * blend)) * sharpness));
+            }
+            total += f64::from(lanes.iter().sum::<f32>());
+        }
+        total
+    }
+}
+
+multiversion! {
     /// `Σ w v (n·d)+`: the visible projected area along `d` (Wu et al. 2011, Eq. 10), f64 between blocks.
     pub fn projected_area(normals: [&[f32]; 3], weights: &[f32], v: &[f32], d: glam::Vec3) -> f64 {
         let mut total = 0.0;

@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::PackedVisibility;
-use super::shadow_view::{ShadowView, extent};
+use super::shadow_view::{ShadowView, affordable, extent};
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
@@ -125,6 +125,7 @@ impl GpuShadowMaps {
         let mut visibility = PackedVisibility::new(facets.len(), directions.len());
         let extent = extent(mesh);
         let views = directions.iter().enumerate();
+        let resolution = affordable(mesh, resolution);
         let views = views.filter_map(|(d, &w)| Some((d, ShadowView::new(mesh.size, extent, w, resolution)?)));
         let views: Vec<(usize, ShadowView)> = views.collect();
         let Some(stride) = views.iter().map(|(_, view)| view.texels() as u64).max().filter(|_| !facets.is_empty())

@@ -126,6 +126,25 @@ impl Horizons {
         [(from, 1.0 - blend), ((from + 1) % self.azimuths, blend)]
     }
 
+    /// The horizons of some of the facets, in their order.
+    pub fn picked(&self, facets: &[usize]) -> Self {
+        let rows = (0..self.azimuths).map(|azimuth| self.row(azimuth));
+        let elevations = rows.flat_map(|row| facets.iter().map(|&facet| row[facet])).collect();
+        Self { facets: facets.len(), elevations, ..self.clone() }
+    }
+
+    /// `Σ w v(direction) v_o` over a run of facets with weights `w`, where `v_o` are visibilities of all facets along another
+    /// direction: [`Horizons::fill`] and [`simd::masked_sum`] at once, to the same bits.
+    pub fn seen_along<'a>(&'a self, direction: Vec3, v_o: &'a [f32]) -> impl Fn(Range<usize>, &[f32]) -> f64 + 'a {
+        let [(from, _), (to, blend)] = self.taps(direction);
+        let (from, to) = (self.row(from), self.row(to));
+        let elevation = FRAC_PI_2 - to_angles(direction).0;
+        move |range, weights| {
+            let (from, to, v_o) = (&from[range.clone()], &to[range.clone()], &v_o[range]);
+            simd::ground_masked_sum(weights, v_o, from, to, blend, elevation, 1.0 / self.ramp)
+        }
+    }
+
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
         let [(from, _), (to, blend)] = self.taps(direction);

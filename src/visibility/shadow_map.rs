@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::PackedVisibility;
-use super::shadow_view::{ShadowView, extent};
+use super::shadow_view::{ShadowView, affordable, extent};
 use crate::geometry::{Facets, TileMesh};
 
 /// Which facets each direction sees, from toroidal shadow maps of `resolution` texels along a square tile's side.
@@ -23,6 +23,7 @@ pub fn visibility_maps_cpu(mesh: &TileMesh, facets: &Facets, directions: &[Vec3]
     if facets.is_empty() {
         return visibility;
     }
+    let resolution = affordable(mesh, resolution);
     let normals: Vec<Vec3> = (0..mesh.triangles.len()).map(|k| mesh.geometric_normal(k)).collect();
     let extent = extent(mesh);
     let words = visibility.words_per_row();

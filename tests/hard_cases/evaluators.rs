@@ -1,12 +1,14 @@
 //! The evaluators: everything that turns a scene into an effective BRDF, on the CPU at draft.
 
+use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex};
 
+use biscale::Cancel;
 use biscale::accuracy::Health;
 use biscale::accuracy::health::{Evidence, Limits, Sight};
 use biscale::directions::ParaboloidMap;
-use biscale::filtering::{EffectiveBrdf, Form, Wu2011, Wu2011Settings};
+use biscale::filtering::{EffectiveBrdf, Form, MaterialFactors, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings};
 use biscale::geometry::Facets;
 use biscale::pipeline::Pipeline;
 use biscale::visibility::visibility_maps_cpu;
@@ -28,7 +30,13 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
         let outcome = pipeline
             .effective(&open(case, method, folder))
             .unwrap_or_else(|error| panic!("{}, {name}: {error}", case.name));
-        made.push(Evaluator { name, brdf: outcome.brdf.clone(), health: outcome.health().clone() });
+        let health = outcome.health().clone();
+        made.push(Evaluator { name, brdf: outcome.brdf.clone(), health: health.clone() });
+        if method == "direct" {
+            // What pictures read; the direct sum itself where a table would not do.
+            let pictured = outcome.for_pictures(&Cancel::default()).unwrap();
+            made.push(Evaluator { name: "table", brdf: pictured.brdf, health });
+        }
     }
     let loaded = open(case, "direct", folder);
     let mesh = pipeline.mesh(&loaded).unwrap();
@@ -39,7 +47,9 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
     let visibility = visibility_maps_cpu(&mesh, &facets, directions.directions(), 128);
     let settings = Wu2011Settings { m_directions, ..Wu2011Settings::default() };
     let base_area = f64::from(mesh.base_area());
-    let tables = Wu2011::build(&facets, &visibility, &directions, base_area, &assigned.0, &assigned.1, &settings)
+    let tile = VisibleFacets { facets: &facets, visibility: &visibility, directions: &directions, base_area };
+    let factors: Vec<_> = assigned.1.iter().map(|material| factors(case, material, &settings)).collect();
+    let tables = Wu2011::from_factors(&tile, &assigned.0, &assigned.1, &factors, &settings)
         .unwrap_or_else(|error| panic!("{}, wu2011: {error}", case.name));
     let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
     let evidence = Evidence {
@@ -54,4 +64,18 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
     health.result.projected_area_error = None;
     made.push(Evaluator { name: "wu2011", brdf, health });
     made
+}
+
+/// M of a BRDF, for all the cases that have it.
+fn factors(case: &Case, material: &SumMaterial, settings: &Wu2011Settings) -> Option<Arc<MaterialFactors>> {
+    type Known = Mutex<HashMap<(String, Option<usize>), Arc<MaterialFactors>>>;
+    static KNOWN: LazyLock<Known> = LazyLock::new(Mutex::default);
+    let key = (case.brdf.clone(), settings.m_directions);
+    if let Some(known) = KNOWN.lock().unwrap().get(&key) {
+        return Some(known.clone());
+    }
+    let made = MaterialFactors::new(material, settings).unwrap_or_else(|error| panic!("{}, M: {error}", case.name));
+    let made = Arc::new(made);
+    KNOWN.lock().unwrap().insert(key, made.clone());
+    Some(made)
 }

@@ -30,7 +30,8 @@ fn merl(path: &Path, spoil: impl Fn(usize) -> Option<f64>) {
 #[test]
 fn measured_brdfs_with_bad_samples_give_sound_values_and_say_what_was_left_out() {
     let every = |step: usize, value: f64| move |k: usize| k.is_multiple_of(step).then_some(value);
-    let cases: [(&str, &dyn Fn(usize) -> Option<f64>, f64, &str); 7] = [
+    type Spoil<'a> = &'a dyn Fn(usize) -> Option<f64>;
+    let cases: [(&str, Spoil<'_>, f64, &str); 7] = [
         ("negative", &every(3, -1.0), 0.33, "33 % of the samples"),
         ("NaN", &every(2, f64::NAN), 0.5, "50 % of the samples"),
         ("infinite", &every(50, f64::INFINITY), 0.02, ""),

@@ -51,7 +51,7 @@ pub fn open(case: &Case, method: &str, folder: &Path) -> LoadedScene {
 /// Exactly 0 and 90°, 89.9°, between the last ring and the horizon, beside the pole, on the seam.
 pub fn nasty_directions() -> Vec<Vec3> {
     let thetas = [0.0_f32, 1e-7, 1e-3, 0.7, 1.2, 89.9_f32.to_radians(), 89.999_9_f32.to_radians()];
-    let phis = [0.0_f32, -0.0, 1e-7, -1e-7, 1.0, std::f32::consts::PI, -std::f32::consts::PI, 6.283_185];
+    let phis = [0.0_f32, -0.0, 1e-7, -1e-7, 1.0, std::f32::consts::PI, -std::f32::consts::PI, std::f32::consts::TAU];
     let mut all: Vec<Vec3> = thetas.iter().flat_map(|&t| phis.iter().map(move |&p| from_angles(t, p))).collect();
     all.extend([Vec3::Z, Vec3::new(1.0, 0.0, 1e-12), Vec3::new(0.0, -1.0, f32::MIN_POSITIVE)]);
     all.dedup();
@@ -72,8 +72,13 @@ pub fn pairs() -> Vec<Pair> {
     pairs
 }
 
+/// White tiles that the ordinary suite looks at; the table has them all.
+const WHITE: [&str; 6] = ["flat", "height 0", "cliffs", "overhang", "tile with holes", "slivers"];
+
 pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    [geometries(), brdfs()].concat().par_iter().flat_map_iter(|case| examine(case, Some(60))).collect()
+    let quick = |case: &Case| case.family != "geometry, white" || WHITE.contains(&case.name);
+    let cases: Vec<Case> = [geometries(), brdfs()].concat().into_iter().filter(quick).collect();
+    cases.par_iter().with_max_len(1).flat_map_iter(|case| examine(case, Some(60))).collect()
 });
 
 /// All evaluators on a case; `m_directions` of the paper's basis (`None`: as many as the paper).
@@ -82,13 +87,19 @@ pub fn examine(case: &Case, m_directions: Option<usize>) -> Vec<Row> {
     let start = std::time::Instant::now();
     let pairs = pairs();
     let made = evaluators::all(case, folder.path(), m_directions);
+    let built = start.elapsed().as_secs_f64();
     let direct: Vec<Vec3> = pairs.iter().map(|p| made[0].brdf.eval(p.i, p.o)).collect();
     let mut rows: Vec<Row> = made.iter().map(|evaluator| measured(case, evaluator, &pairs, &direct)).collect();
     let evaluated = start.elapsed().as_secs_f64();
     rows.push(reference(case, folder.path(), &pairs, &made[0]));
     let all = start.elapsed().as_secs_f64();
     if all > 3.0 {
-        eprintln!("{}, {}: {all:.1} s, {:.1} of them the reference", case.family, case.name, all - evaluated);
+        eprintln!(
+            "{}, {}: {all:.1} s, {built:.1} to build, {:.1} of them the reference",
+            case.family,
+            case.name,
+            all - evaluated
+        );
     }
     rows
 }
@@ -108,7 +119,7 @@ fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Vec3])
             let bounded = f64::from(value.max_element() * o.z);
             if i.z.min(o.z) < 1.7e-4 { near = near.max(bounded) } else { elsewhere = elsewhere.max(bounded) }
         }
-        unsound += usize::from(!(brdf.relative_projected_area(o) >= 0.0));
+        unsound += usize::from(!(0.0..).contains(&brdf.relative_projected_area(o)));
         for under in below() {
             under_horizon +=
                 usize::from(brdf.eval(under, o) != Vec3::ZERO) + usize::from(brdf.eval(o, under) != Vec3::ZERO);
@@ -145,10 +156,13 @@ fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Vec3])
     }
 }
 
+/// Of the pairs, the reference looks at one in so many.
+const EVERY: usize = 12;
+
 /// The reference has values and standard errors, no G: what it says is held to its own error.
 fn reference(case: &Case, folder: &Path, pairs: &[Pair], direct: &Evaluator) -> Row {
-    let settings = ReferenceSettings { facets: 256, max_passes: 4, target: 0.0, seed: 3 };
-    let mut all: Vec<Pair> = pairs.iter().step_by(4).copied().collect();
+    let settings = ReferenceSettings { facets: 128, max_passes: 4, target: 0.0, seed: 3 };
+    let mut all: Vec<Pair> = pairs.iter().step_by(EVERY).copied().collect();
     let ordinary = all.len();
     all.extend(all.clone().iter().map(|p| Pair { i: p.o, o: p.i }));
     let swapped = all.len();
@@ -167,7 +181,7 @@ fn reference(case: &Case, folder: &Path, pairs: &[Pair], direct: &Evaluator) -> 
     if direct.health.result.projected_area_error.is_some() {
         let scale = found[..ordinary].iter().map(|e| e.f_bar.max_element()).fold(0.0, f32::max);
         for k in 0..ordinary {
-            let (there, back, p) = (found[k], found[ordinary + k], pairs[4 * k]);
+            let (there, back, p) = (found[k], found[ordinary + k], pairs[EVERY * k]);
             let difference = (there.f_bar * p.o.z - back.f_bar * p.i.z).abs().max_element();
             let error = (there.standard_error * p.o.z).hypot_sum(back.standard_error * p.i.z) + 0.02 * scale;
             reciprocity = reciprocity.max(f64::from(difference / error.max(1e-20)));

@@ -27,7 +27,7 @@ fn stage(folder: &Path, text: &str) -> biscale::Result<Stage> {
 }
 
 fn picture(stage: &Stage) -> Vec<Vec3> {
-    let background = Background::default();
+    let background = Background::Uniform(Vec3::ZERO);
     let rendered = render(&stage.input(&White, [48, 40], 2, &background)).unwrap();
     let pixels = rendered.picture.pixels;
     let bad = pixels.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);

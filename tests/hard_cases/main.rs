@@ -14,6 +14,7 @@ mod cases;
 mod continuity;
 mod evaluators;
 mod files;
+mod health;
 mod invariants;
 mod lab;
 mod large_scale;

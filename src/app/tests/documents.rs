@@ -4,6 +4,8 @@ use std::path::Path;
 
 use biscale::scene::{Geometry, Pixels};
 use glam::{UVec2, Vec2, Vec3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 use super::quick;
 use crate::app::document::{Document, Recovered, RecoveryFile, Settings};
@@ -169,6 +171,46 @@ fn what_a_crash_left_behind_is_found_and_restored_once() {
     assert!(restored.is_dirty());
     found[0].discard();
     assert!(Recovered::find(folder.path()).is_empty());
+}
+
+#[path = "../../../tests/fuzz/mutate.rs"]
+mod mutate;
+
+/// Mutated recovery files: restored to a scene that is valid, or refused; how many of each.
+fn mutated_recoveries(seed: u64, done: impl Fn(usize) -> bool) -> [usize; 2] {
+    let folder = tempfile::tempdir().unwrap();
+    let document = quick();
+    RecoveryFile::new(folder.path()).prepare(&document).unwrap().write().unwrap();
+    let here = folder.path().join(format!("recovery-{}.toml", std::process::id()));
+    let whole = std::fs::read(here).unwrap();
+    let other = folder.path().join("recovery-4194399.toml");
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut counts = [0; 2];
+    while !done(counts[0] + counts[1]) {
+        std::fs::write(&other, mutate::mutated(&whole, &whole, true, &mut random)).unwrap();
+        let restored = Recovered::find(folder.path()).first().map(Recovered::restore);
+        let taken = matches!(&restored, Some(Ok(_)));
+        if let Some(Ok(document)) = restored {
+            document.scene().validate().unwrap();
+        }
+        counts[usize::from(!taken)] += 1;
+    }
+    counts
+}
+
+#[test]
+fn mutated_recovery_files_are_restored_or_refused_never_a_panic() {
+    let [taken, refused] = mutated_recoveries(1, |count| count >= 300);
+    assert!(taken > 0 && refused > 0, "{taken} {refused}");
+}
+
+#[test]
+#[ignore = "half a minute; BISCALE_FUZZ_SECONDS=300 for five"]
+fn mutated_recovery_files_for_as_long_as_asked() {
+    let seconds = std::env::var("BISCALE_FUZZ_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(30.0);
+    let start = std::time::Instant::now();
+    let [taken, refused] = mutated_recoveries(77, |_| start.elapsed().as_secs_f64() >= seconds);
+    println!("recovery       {:>9} executions in {seconds:>4} s, {taken:>8} accepted, no crash", taken + refused);
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Many random edits: no crash, no growth of memory, and the same picture as from nothing.
 
+use std::time::Instant;
+
 use biscale::pipeline::Pipeline;
 use biscale::scene::{Geometry, OBJECT_KINDS, Scene, TermSpec};
 use glam::{Vec2, Vec3};
@@ -9,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::paint::Tool;
+use crate::app::worker::What;
 
 /// Changes something.
 fn edit(scene: &mut Scene, random: &mut impl Rng) {
@@ -35,13 +38,21 @@ fn edit(scene: &mut Scene, random: &mut impl Rng) {
     }
 }
 
+/// `edits` of them, and on for as many minutes as `BISCALE_SOAK_MINUTES` says.
 fn soak(edits: usize, seed: u64) {
+    let minutes: f64 = std::env::var("BISCALE_SOAK_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(0.0);
+    let start = Instant::now();
+    let goes_on = |step: usize| step < edits || edits > 100 && start.elapsed().as_secs_f64() < 60.0 * minutes;
+    let folder = tempfile::tempdir().unwrap();
+    let (saved, table) = (folder.path().join("a.toml"), folder.path().join("t.csv"));
+    let (mut steps, mut opens, mut exports) = (0, 0, 0);
     let mut harness = harness(quick());
     let ctx = harness.ctx.clone();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut early = None;
-    for step in 0..edits {
-        match random.random_range(0..12u32) {
+    while goes_on(steps) {
+        steps += 1;
+        match random.random_range(0..14u32) {
             0 => editor(&mut harness).action(&ctx, Action::Undo),
             1 => editor(&mut harness).action(&ctx, Action::Redo),
             2 => {
@@ -52,6 +63,15 @@ fn soak(edits: usize, seed: u64) {
                 editor.draw(&[at, at + 0.2]);
                 editor.tile.set_painting(false);
             }
+            3 => editor(&mut harness).save(&saved),
+            4 if saved.exists() => {
+                editor(&mut harness).open(&saved.to_string_lossy());
+                opens += 1;
+            }
+            5 if editor(&mut harness).exporting.is_none() => {
+                editor(&mut harness).export(table.clone(), What::Table { theta: 2, phi: 4 });
+                exports += 1;
+            }
             _ => {
                 let mut scene = (**editor(&mut harness).document.scene()).clone();
                 edit(&mut scene, &mut random);
@@ -59,7 +79,14 @@ fn soak(edits: usize, seed: u64) {
             }
         }
         harness.step();
-        if step == edits / 4 {
+        // What is on disk is whole at any time.
+        if let Ok(text) = std::fs::read_to_string(&table) {
+            assert_eq!(text.lines().filter(|line| !line.starts_with('#')).count(), 1 + 64, "{text}");
+        }
+        if let Ok(text) = std::fs::read_to_string(&saved) {
+            biscale::scene::parse(&text).unwrap();
+        }
+        if steps == edits / 4 {
             early = memory();
         }
     }
@@ -67,7 +94,12 @@ fn soak(edits: usize, seed: u64) {
     if let (Some(early), Some(late)) = (early, memory()) {
         // What the first quarter needed may double once caches of all families are filled; a leak is more than that.
         assert!(late < 2 * early + (64 << 20), "{early} bytes after a quarter, {late} at the end");
-        eprintln!("resident: {} MB after a quarter, {} MB at the end", early >> 20, late >> 20);
+        eprintln!(
+            "{steps} steps, {opens} opens, {exports} exports in {:.0} s; resident: {} MB after a quarter, {} MB at the end",
+            start.elapsed().as_secs_f64(),
+            early >> 20,
+            late >> 20
+        );
     }
     let texts = editor(&mut harness).messages.texts().join("; ");
     assert!(!texts.contains("fault"), "{texts}");

@@ -151,3 +151,39 @@ impl<J> Drop for Worker<J> {
         self.close();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[test]
+    fn a_worker_that_panics_says_so_and_does_the_next_job_with_a_fresh_state() {
+        let (to_us, answers) = mpsc::channel();
+        let told = to_us.clone();
+        let worker = Worker::spawn(
+            "test",
+            1,
+            || 0_u32,
+            move |kept: &mut u32, job: u32, _: &Desk<u32>| {
+                *kept += 1;
+                assert!(job != 7, "job seven fails");
+                let _ = to_us.send(format!("job {job}, {kept} since the start"));
+            },
+            move |text| drop(told.send(format!("fault: {text}"))),
+        )
+        .unwrap();
+        let ask = |job: u32| {
+            worker.ask(job);
+            answers.recv_timeout(Duration::from_secs(20)).unwrap()
+        };
+        assert_eq!(ask(1), "job 1, 1 since the start");
+        assert_eq!(ask(2), "job 2, 2 since the start");
+        assert!(ask(7).starts_with("fault: job seven fails"));
+        // What the panic left half done is gone.
+        assert_eq!(ask(3), "job 3, 1 since the start");
+        // A panic inside of the worker's own threads is one too.
+        worker.finish(Duration::from_secs(4));
+    }
+}

@@ -46,19 +46,15 @@ impl PairTable {
     /// [`crate::Error::Cancelled`].
     pub fn build(direct: &Direct, grid: UpperPairs, cancel: &Cancel) -> Result<Option<Self>> {
         let Some(columns) = Column::of(&direct.sum) else { return Ok(None) };
-        let facets = direct.sum.facet_count();
-        let seen = |d: Vec3| {
-            let mut visible = vec![0.0; facets];
-            direct.visibility.fill(d, 0..facets, &mut visible);
-            visible
-        };
         let weights = columns.iter().map(|column| column.weight(&direct.sum)).collect();
         let area = |o: Vec3| direct.sums(&[], o, |_, _| {});
         let table = Self::tabulate(grid, weights, true, area, cancel, |i, o, sums| {
-            let (v_i, v_o, pair) = (seen(i), seen(o), PairVectors::new(i, o));
-            for (column, sum) in columns.iter().zip(sums) {
-                *sum = column.sum(&direct.sum, &pair, &v_i, &v_o) as f32;
-            }
+            let pair = PairVectors::new(i, o);
+            direct.with_seen(i, o, |v_i, v_o| {
+                for (column, sum) in columns.iter().zip(sums) {
+                    *sum = column.sum(&direct.sum, &pair, v_i, v_o) as f32;
+                }
+            });
         });
         table.map(Some)
     }
@@ -132,6 +128,11 @@ impl PairTable {
             && weights.len() == self.weights.len()
             && (same_lobes || areas_only(&weights) && areas_only(&self.weights));
         serves.then(|| Self { weights, ..self.clone() })
+    }
+
+    /// Whether two tables differ in their weights only.
+    pub fn shares_values_with(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.values, &other.values)
     }
 
     pub fn bytes(&self) -> usize {

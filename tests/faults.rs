@@ -1,0 +1,246 @@
+//! What goes wrong around the program: it is killed, the disk is full, the folder is read-only, the device is lost. Files on
+//! disk are whole, old or new; a message says what to do; work goes on.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use biscale::export::replace_file;
+use biscale::gpu::Gpu;
+use biscale::large_scale::shading::Background;
+use biscale::large_scale::{GpuRenderer, Stage, render};
+use biscale::pipeline::Pipeline;
+use biscale::scene::{self, LoadedScene, Painted};
+
+const SCENE: &str = r#"
+[tile]
+geometry = { kind = "grooves", count = 2 }
+[[material]]
+name = "default"
+brdf = { kind = "cook_torrance", roughness = 0.4, f0 = 0.8 }
+[light]
+count = 4
+[quality]
+preset = "draft"
+facets = 256
+backend = "cpu"
+method = "direct"
+"#;
+
+fn program(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_biscale"));
+    command.args(arguments).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+/// Names in a folder but for what a killed program may leave beside its file.
+fn names(folder: &Path) -> Vec<String> {
+    let all = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = all.filter(|name| !name.ends_with(".part")).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_program_killed_in_the_middle_of_an_export_leaves_the_old_table_or_a_whole_new_one() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.toml"), SCENE).unwrap();
+    let export = ["export", "a.toml", "-o", "t.npz", "--resolution", "16x32", "--quiet"];
+    let target = folder.path().join("t.npz");
+    let start = Instant::now();
+    assert!(program(folder.path(), &export).status().unwrap().success());
+    let whole = start.elapsed();
+    let new = std::fs::read(&target).unwrap();
+    let old = b"the old table".to_vec();
+    let mut survived = 0;
+    // At twenty moments from the first to past the last.
+    for moment in 0..20 {
+        std::fs::write(&target, &old).unwrap();
+        let mut child = program(folder.path(), &export).spawn().unwrap();
+        std::thread::sleep(whole.mul_f64(f64::from(moment) / 18.0));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let left = std::fs::read(&target).unwrap();
+        assert!(left == old || left == new, "{} bytes that are neither", left.len());
+        survived += usize::from(left == old);
+    }
+    assert!(survived > 0, "no kill came early enough to test anything");
+    // What was left beside does not stand in the way of the next run.
+    std::fs::write(&target, &old).unwrap();
+    assert!(program(folder.path(), &export).status().unwrap().success());
+    assert_eq!(std::fs::read(&target).unwrap(), new);
+}
+
+#[test]
+fn a_partial_file_of_an_earlier_process_of_the_same_number_does_not_stop_a_save() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    for attempt in 0..3 {
+        let stale = folder.path().join(format!(".a.toml.{}-{attempt}.part", std::process::id()));
+        std::fs::write(stale, "half of some").unwrap();
+    }
+    replace_file(&path, SCENE.as_bytes()).unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), SCENE);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_a_message_and_the_device_stays_what_it_is() {
+    use std::os::unix::fs::FileTypeExt;
+    let full = Path::new("/dev/full");
+    if !full.exists() {
+        return eprintln!("SKIPPED: no /dev/full");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.toml"), SCENE).unwrap();
+    std::fs::write(folder.path().join("p.csv"), "theta_i,phi_i,theta_o,phi_o\n0,0,0,0\n").unwrap();
+    for arguments in [
+        &["eval", "a.toml", "--pairs", "p.csv", "-o", "/dev/full"][..],
+        &["eval", "a.toml", "--pairs", "p.csv", "-o", "-"],
+        &["plan", "a.toml", "--json"],
+        &["export", "a.toml", "-o", "-", "--resolution", "4x8"],
+    ] {
+        let output = program(folder.path(), arguments)
+            .stdout(std::fs::OpenOptions::new().write(true).open(full).unwrap())
+            .stderr(Stdio::piped())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && said.contains("space"), "{arguments:?}: {said}");
+        assert!(!said.contains("panicked"), "{said}");
+        assert!(
+            full.metadata().unwrap().file_type().is_char_device(),
+            "{arguments:?} put a file in the device's place"
+        );
+    }
+    let error = replace_file(full, b"something").unwrap_err();
+    assert!(error.to_string().contains("/dev/full") && error.to_string().contains("space"), "{error}");
+}
+
+/// A file system of a megabyte, where the system lets us make one.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_disk_that_fills_in_the_middle_of_a_write_keeps_the_old_file_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let mounted = Command::new("mount")
+        .args(["-t", "tmpfs", "-o", "size=256k", "tmpfs"])
+        .arg(folder.path())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success());
+    if !mounted {
+        return eprintln!("SKIPPED: no right to mount a small file system");
+    }
+    let path = folder.path().join("a.exr");
+    replace_file(&path, &[7; 100_000]).unwrap();
+    let failed = replace_file(&path, &[9; 1_000_000]);
+    let (kept, beside) = (std::fs::read(&path), names(folder.path()));
+    let parts = std::fs::read_dir(folder.path()).unwrap().count();
+    let again = replace_file(&path, &[8; 50_000]);
+    Command::new("umount").arg(folder.path()).status().unwrap();
+    assert!(failed.is_err_and(|error| error.to_string().contains("a.exr")));
+    assert_eq!(kept.unwrap(), [7; 100_000]);
+    assert_eq!((beside, parts), (vec!["a.exr".to_owned()], 1), "nothing is left behind");
+    again.unwrap();
+}
+
+#[test]
+#[cfg(unix)]
+fn a_read_only_folder_is_a_message_that_names_it() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    std::fs::write(&path, "old").unwrap();
+    let set = |mode: u32| std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(mode)).unwrap();
+    set(0o555);
+    let result = replace_file(&path, b"new");
+    let as_root = std::fs::write(folder.path().join("probe"), "").is_ok();
+    set(0o755);
+    if as_root {
+        return eprintln!("SKIPPED: this user writes to read-only folders");
+    }
+    assert!(result.unwrap_err().to_string().contains("a.csv"));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pipe_is_written_to_and_stays_a_pipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe");
+    if !Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()) {
+        return eprintln!("SKIPPED: no mkfifo");
+    }
+    let reader = {
+        let pipe = pipe.clone();
+        std::thread::spawn(move || std::fs::read(pipe).unwrap())
+    };
+    replace_file(&pipe, b"through").unwrap();
+    assert_eq!(reader.join().unwrap(), b"through");
+    assert!(!pipe.metadata().unwrap().is_file());
+}
+
+fn loaded() -> LoadedScene {
+    let scene = scene::parse(SCENE).unwrap();
+    LoadedScene { scene, base_dir: "".into(), name: "a".to_owned(), painted: Painted::default() }
+}
+
+#[test]
+fn a_device_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_goes_on() {
+    let gpu = match Gpu::open() {
+        Ok(gpu) => gpu,
+        Err(error) => return eprintln!("SKIPPED: {error}"),
+    };
+    let loaded = loaded();
+    let outcome = Pipeline::new().effective(&loaded).unwrap();
+    let stage = Stage::new(&loaded).unwrap();
+    let background = Background::default();
+    let input = stage.input(&*outcome.brdf, [96, 96], 2, &background);
+    let renderer = GpuRenderer::new(&gpu, stage.occluder.as_ref(), &outcome.brdf).unwrap();
+    renderer.render(&gpu, &input).unwrap();
+    // From another thread, while frames are drawn.
+    let device = gpu.device.clone();
+    let destroyer = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(30));
+        device.destroy();
+    });
+    let start = Instant::now();
+    let mut failed = None;
+    while failed.is_none() && start.elapsed() < Duration::from_secs(60) {
+        match renderer.render(&gpu, &input) {
+            Ok(rendered) => assert!(rendered.picture.pixels.iter().all(|pixel| pixel.is_finite())),
+            Err(error) => failed = Some(error),
+        }
+    }
+    destroyer.join().unwrap();
+    let error = failed.expect("the device was destroyed and frames went on").to_string();
+    assert!(!error.is_empty());
+    eprintln!("the device was lost: {error}");
+    // The same pipeline and stage still make the picture.
+    assert!(render(&input).unwrap().picture.pixels.iter().any(|pixel| pixel.max_element() > 0.0));
+}
+
+#[test]
+fn two_programs_may_write_the_same_file_and_one_of_them_wins_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.toml"), SCENE).unwrap();
+    let export = |seed: &str| {
+        let arguments = ["export", "a.toml", "-o", "t.csv", "--resolution", "6x12", "--quiet", "--seed", seed];
+        program(folder.path(), &arguments).spawn().unwrap()
+    };
+    let mut expected = Vec::new();
+    for seed in ["1", "2"] {
+        assert!(export(seed).wait().unwrap().success());
+        expected.push(std::fs::read(folder.path().join("t.csv")).unwrap());
+    }
+    for _ in 0..4 {
+        let mut both = [export("1"), export("2")];
+        for child in &mut both {
+            assert!(child.wait().unwrap().success());
+        }
+        let left = std::fs::read(folder.path().join("t.csv")).unwrap();
+        assert!(expected.contains(&left), "{} bytes that are neither's", left.len());
+    }
+    assert_eq!(names(folder.path()), ["a.toml", "t.csv"]);
+}

@@ -1,0 +1,53 @@
+//! Trouble is named, with what would mend it; where there is none, nothing is said.
+
+use biscale::accuracy::Health;
+use biscale::pipeline::Pipeline;
+use biscale::scene::{self, LoadedScene, Painted};
+
+fn health(tile: &str, brdf: &str, quality: &str) -> Health {
+    let text = format!(
+        "[tile]\ngeometry = {tile}\n[[material]]\nname = \"paint\"\nbrdf = {brdf}\n[[material]]\nname = \"default\"\nbrdf = \
+         {brdf}\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\n{quality}\n"
+    );
+    let scene = scene::parse(&text).unwrap();
+    let loaded = LoadedScene { scene, base_dir: "".into(), name: String::new(), painted: Painted::default() };
+    Pipeline::new().effective(&loaded).unwrap().health().clone()
+}
+
+const MATTE: &str = r#"{ kind = "lambertian", albedo = 0.7 }"#;
+const PYRAMIDS: &str = r#"{ kind = "pyramids" }"#;
+
+#[test]
+fn sound_scenes_are_without_warnings() {
+    for (tile, brdf) in [
+        (PYRAMIDS, MATTE),
+        (PYRAMIDS, r#"{ kind = "cook_torrance", roughness = 0.2, f0 = 0.9 }"#),
+        (r#"{ kind = "flat" }"#, r#"{ kind = "ggx", roughness = 0.1, f0 = 0.9 }"#),
+        (r#"{ kind = "grooves" }"#, r#"{ kind = "ward", roughness = 0.3, specular = 0.5 }"#),
+    ] {
+        let health = health(tile, brdf, "");
+        assert!(health.warnings.is_empty(), "{tile} {brdf}: {:?}", health.warnings);
+        assert_eq!((health.result.unsound_values, health.surface.triangles_left_out), (0, 0));
+        assert!(health.result.projected_area_error.is_some_and(|error| error < 0.15) && !health.surface.has_holes);
+        let albedo = health.result.largest_albedo.or(Some(0.5)).unwrap();
+        assert!(albedo > 0.05 && albedo <= 1.0, "{albedo}");
+    }
+}
+
+#[test]
+fn each_kind_of_trouble_has_words_that_name_a_remedy() {
+    let narrow = r#"{ kind = "cook_torrance", roughness = 0.003, f0 = 0.9 }"#;
+    let threads = r#"{ kind = "weave" }"#;
+    for (tile, brdf, quality, words, remedy) in [
+        (PYRAMIDS, r#"{ kind = "lambertian", albedo = 3 }"#, "", "3.000 times the light", "albedo"),
+        (threads, narrow, "facets = 512\nmethod = \"direct\"", "facets at a time", "quality.facets"),
+        (threads, narrow, "facets = 512\nmethod = \"low_rank\"", "narrower than its table", "roughness"),
+        (r#"{ kind = "pyramids", height = 100 }"#, MATTE, "", "facets are in sight", "less deep"),
+        (r#"{ kind = "rods", count = 8, radius = 3, length = 1 }"#, MATTE, "facets = 64", "in sight", "quality.facets"),
+        (PYRAMIDS, MATTE, "facets = 16", "in sight", "quality.facets"),
+    ] {
+        let warnings = health(tile, brdf, quality).warnings;
+        let found = warnings.iter().any(|text| text.contains(words) && text.contains(remedy));
+        assert!(found, "{tile} {brdf} {quality}: {warnings:?}");
+    }
+}
