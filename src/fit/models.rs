@@ -63,20 +63,20 @@ impl Model {
         self.weight_names().len()
     }
 
-    /// Where searches start: the edge and the logarithm of the roughness; for GGX that of the anisotropy's square root and its
-    /// azimuth.
+    /// Where searches start, with little edge and with much: the angle whose squared sine is the edge, the logarithm of the
+    /// roughness; for GGX that of the anisotropy's square root and its azimuth.
     pub(super) fn starts(self) -> Vec<Vec<f64>> {
-        match self {
-            Self::CookTorrance => [0.1_f64, 0.3, 0.7].iter().map(|m| vec![0.5, m.ln()]).collect(),
-            Self::Ggx => {
-                [(0.15_f64, 0.4), (0.15, -0.4), (0.5, 0.2)].iter().map(|(a, r)| vec![0.5, a.ln(), *r, 0.1]).collect()
-            }
-        }
+        let shapes: &[&[f64]] = match self {
+            Self::CookTorrance => &[&[-2.3], &[-1.2], &[-0.4]],
+            Self::Ggx => &[&[-1.9, 0.4, 0.1], &[-1.9, -0.4, 0.1], &[-0.7, 0.2, 0.1]],
+        };
+        let edges = [0.2, 1.1];
+        edges.iter().flat_map(|&edge| shapes.iter().map(move |shape| [&[edge], *shape].concat())).collect()
     }
 
     pub(super) fn shape(self, parameters: &[f64]) -> Shape {
         let bounded = |log: f64| (log.exp() as f32).clamp(ROUGHNESS[0], ROUGHNESS[1]);
-        let edge = parameters.first().map_or(1.0, |edge| edge.clamp(0.0, 1.0) as f32);
+        let edge = parameters.first().map_or(1.0, |angle| angle.sin().powi(2) as f32);
         match (self, parameters) {
             (Self::Ggx, [_, log, ratio, turn]) => {
                 Shape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *turn as f32, edge }

@@ -124,7 +124,7 @@ def chi_squared(path, count):
 
 
 def check_exports(arguments, folder):
-    table = Table("scene", "bytes", "written [s]", "loaded [s]", "mean error", "allowed", "chi2 least p", "sphere")
+    table = Table("scene", "bytes", "written [CPU s]", "loaded [s]", "mean error", "allowed", "chi2 least p", "sphere")
     chi_works, rows = llvm_works(), []
     if not chi_works:
         print("SKIPPED: the chi-squared test (Mitsuba's LLVM does not work here)")
@@ -182,7 +182,7 @@ def check_spectral(folder):
     srgb = np.array([[3.2409699, -1.5373832, -0.4986108], [-0.9692436, 1.8759675, 0.0415551], [0.0556301, -0.203977, 1.0569715]])
     found = found @ srgb.T / (srgb @ white)
     error = mean_error(found, evaluate(scene, pairs, folder))
-    table = Table("spectral file", "bytes", "written [s]", "mean error", "allowed")
+    table = Table("spectral file", "bytes", "written [CPU s]", "mean error", "allowed")
     table.check(error < 0.02, f"{scene}_spec", report["bytes"], f"{written:.1f}", f"{100 * error:.2f} %", "2 %")
     return table.passed
 

@@ -97,7 +97,7 @@ def values(bsdf, pairs):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", default=["fig1e_lambertian", "fig5a_isotropic", "default"])
-    table = Table("scene", "basis", "bytes", "written [s]", "loaded [s]", "accepted", "worst total", "allowed", "Klems patches", "values apart")
+    table = Table("scene", "basis", "bytes", "written [CPU s]", "loaded [s]", "accepted", "worst total", "allowed", "Klems patches", "values apart")
     with tempfile.TemporaryDirectory() as folder:
         for scene in parser.parse_args().scenes:
             # Values between patches differ by the width of the patches; that they agree at all shows which angle is which.
