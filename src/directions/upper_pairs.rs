@@ -67,7 +67,7 @@ impl UpperPairs {
         let sin_theta_d = (versine * (2.0 - versine)).sqrt();
         let across = Vec3::new(sin_theta_d * cos_turn, sin_theta_d * sin_turn, 0.0);
         let along = Vec3::Z * (1.0 - versine);
-        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(LOWEST)).normalize();
+        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(LOWEST)).normalize_or(Vec3::Z);
         (lifted(frame * (along + across)), lifted(frame * (along - across)))
     }
 

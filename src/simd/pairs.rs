@@ -14,7 +14,7 @@ fn upper_angle(y: f32, x: f32) -> f32 {
     let t = shorter / longer.max(1e-30);
     let s = t * t;
     let high = s * (-0.075_289_64 + s * (0.042_909_614 + s * (-0.016_165_737 + s * 0.002_866_225_7)));
-    let low = t * (1.0 + s * (-0.333_331_45 + s * (0.199_935_51 + s * (-0.142_088_99 + s * (0.106_562_64 + high)))));
+    let low = t * (1.0 + s * (-0.333_331_45 + s * (0.199_935_51 + s * (-0.142_089 + s * (0.106_562_64 + high)))));
     let octant = if y > x.abs() { FRAC_PI_2 - low } else { low };
     if x < 0.0 { PI - octant } else { octant }
 }
