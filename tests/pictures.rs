@@ -1,4 +1,5 @@
 //! What pictures read instead of the effective BRDF: close to it, kept under colour edits, never below zero.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
 use biscale::Cancel;
 use biscale::accuracy::{compare, picture_pairs};
