@@ -45,6 +45,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
         None
     };
     if args.scene.json {
+        args.scene.warn(outcome.health());
         return print_json(&Report {
             effects: &outcome.plan.effects,
             measured: measured.as_deref(),

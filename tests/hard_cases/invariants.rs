@@ -84,10 +84,14 @@ fn the_table_of_all_cases_and_evaluators() {
     );
     let mut worst: BTreeMap<&str, [f64; 4]> = BTreeMap::new();
     let fine = std::env::var_os("BISCALE_WU2011_FULL").is_none().then_some(60);
-    let cases = [geometries(), brdfs()].concat();
-    let examined: Vec<Vec<Row>> = cases.par_iter().with_max_len(1).map(|case| examine(case, fine)).collect();
-    for rows in examined {
-        for row in rows {
+    let mut cases = [geometries(), brdfs()].concat();
+    if let Ok(part) = std::env::var("BISCALE_CASES") {
+        cases.retain(|case| case.name.contains(&part) || case.family.contains(&part));
+    }
+    for some in cases.chunks(4) {
+        // A few side by side, in order.
+        let examined: Vec<Vec<Row>> = some.par_iter().with_max_len(1).map(|case| examine(case, fine)).collect();
+        for row in examined.into_iter().flatten() {
             let pair = |pair: Option<[f64; 2]>| pair.map_or("-".to_owned(), |[a, b]| format!("{a:.3} ({b:.3})"));
             println!(
                 "{:<18} {:<24} {:<10} {:>8} {:>8} {:>9.2} {:>9.1e}  {:>15} {:>15} {:>8.1}%",
