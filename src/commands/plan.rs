@@ -31,7 +31,6 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     let loaded = args.scene.open()?;
     let mut pipeline = Pipeline::new();
     let outcome = pipeline.effective(&loaded)?;
-    args.scene.warn(outcome.health());
     let dropped_lights = Stage::new(&loaded)?.dropped_lights;
     let measured = if args.measure {
         let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
