@@ -29,7 +29,7 @@ fn sound_scenes_are_without_warnings() {
         assert!(health.warnings.is_empty(), "{tile} {brdf}: {:?}", health.warnings);
         assert_eq!((health.result.unsound_values, health.surface.triangles_left_out), (0, 0));
         assert!(health.result.projected_area_error.is_some_and(|error| error < 0.15) && !health.surface.has_holes);
-        let albedo = health.result.largest_albedo.or(Some(0.5)).unwrap();
+        let albedo = health.result.largest_albedo.unwrap_or(0.5);
         assert!(albedo > 0.05 && albedo <= 1.0, "{albedo}");
     }
 }
