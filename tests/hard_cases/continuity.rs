@@ -73,7 +73,7 @@ fn no_slider_of_a_brdf_jumps() {
             let worst = probe(
                 &mut pipeline,
                 &format!("{} {}", kind.kind, field.key),
-                min.max(0.02),
+                min.max(0.1),
                 soft_max,
                 |value| {
                     format!(

@@ -35,10 +35,16 @@ fn nothing_explodes_in_the_last_hundredth_of_a_degree() {
 
 /// G of the forms that are built so; the reference in standard errors, see `lab::reference`.
 const RECIPROCITY: f64 = 1e-6;
+/// Of the factored form: half vectors of (i,o) and (o,i) differ in their last bits, and lobes multiply that.
+const FACTORED: f64 = 2e-5;
 
 #[test]
 fn light_and_viewer_swap_in_every_case_and_evaluator() {
-    let limit = |row: &Row| if row.evaluator == "reference" { 6e-8 } else { RECIPROCITY };
+    let limit = |row: &Row| match row.evaluator {
+        "reference" => 6e-8,
+        "low rank" => FACTORED,
+        _ => RECIPROCITY,
+    };
     assert_none(
         ROWS.iter().filter(|r| r.reciprocity > limit(r)).map(|r| format!("{}: {:.1e}", name(r), r.reciprocity)),
     );

@@ -72,15 +72,11 @@ pub fn pairs() -> Vec<Pair> {
     pairs
 }
 
-/// White tiles that the ordinary suite looks at; the table has them all.
-const WHITE: [&str; 6] = ["flat", "height 0", "cliffs", "overhang", "tile with holes", "slivers"];
-
-/// Half a minute each: the table alone has them.
-const LONGEST: [&str; 2] = ["height of 100 tiles", "cliffs of 100 tiles"];
+/// Cases of the ordinary suite, seconds each; the table has them all (`BISCALE_CASES=part of a name` picks some).
+const QUICK: [&str; 7] = ["flat", "height 0", "one triangle", "overhang", "tile with holes", "tile of 1e-6", "black"];
 
 pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    let quick =
-        |case: &Case| !LONGEST.contains(&case.name) && (case.family != "geometry, white" || WHITE.contains(&case.name));
+    let quick = |case: &Case| QUICK.contains(&case.name);
     let cases: Vec<Case> = [geometries(), brdfs()].concat().into_iter().filter(quick).collect();
     cases.par_iter().with_max_len(1).flat_map_iter(|case| examine(case, Some(60))).collect()
 });
@@ -145,7 +141,9 @@ fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Vec3])
     let error = compare(&values, direct).rel_l2;
     let error = if error.is_finite() { error } else { 0.0 };
     let materials = health.materials.iter().map(|m| f64::from(m.largest_albedo)).fold(1.0, f64::max);
-    let albedo = health.result.largest_albedo.map(|albedo| [f64::from(albedo), materials * 1.03 * (1.0 + error)]);
+    // Holes: G and the projected area are interpolated apart, and neither vanishes with the other.
+    let allowed = if health.surface.has_holes { 4.0 * error } else { error };
+    let albedo = health.result.largest_albedo.map(|albedo| [f64::from(albedo), materials * 1.03 * (1.0 + allowed)]);
     Row {
         family: case.family,
         case: case.name,
