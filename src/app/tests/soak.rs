@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::paint::Tool;
-use crate::app::worker::What;
+use crate::app::worker::{TableChoice, What};
 
 /// Changes something.
 fn edit(scene: &mut Scene, random: &mut impl Rng) {
@@ -69,7 +69,8 @@ fn soak(edits: usize, seed: u64) {
                 opens += 1;
             }
             5 if editor(&mut harness).exporting.is_none() => {
-                editor(&mut harness).export(table.clone(), What::Table { theta: 2, phi: 4 });
+                editor(&mut harness)
+                    .export(table.clone(), What::Table(TableChoice { theta: 2, phi: 4, ..TableChoice::default() }));
                 exports += 1;
             }
             _ => {
