@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use crate::brdf::{Brdf, LobeAngles, Measured, Term};
+use super::facet_groups::{Group, Patch, patch_value, patches, rgb_areas};
+use crate::brdf::{Brdf, LobeAngles, Term};
 use crate::geometry::Facets;
 use crate::simd::{self, Lobe, PairVectors};
 
@@ -58,33 +59,6 @@ pub struct FacetSum {
     /// Black materials are summed too.
     keep_black: bool,
 }
-
-/// A run of facets with one material.
-#[derive(Debug, Clone)]
-pub(crate) struct Group {
-    pub(crate) range: Range<usize>,
-    pub(crate) color: Vec3,
-    is_black: bool,
-    pub(crate) lobes: Vec<(Lobe, Term)>,
-    pub(crate) measured: Vec<std::sync::Arc<dyn Measured>>,
-    /// Areas times colour weights, where those differ between the facets of the group.
-    pub(crate) rgb_areas: Option<[Vec<f32>; 3]>,
-    /// Runs of facets with one normal, where there are few of them.
-    pub(crate) patches: Option<Vec<Patch>>,
-}
-
-/// A run of facets with one normal.
-#[derive(Debug, Clone)]
-pub(crate) struct Patch {
-    pub(crate) range: Range<usize>,
-    pub(crate) normal: Vec3,
-}
-
-/// A run must be this long on average for one lobe a run to pay.
-const FACETS_A_PATCH: usize = 8;
-
-/// Normals closer than this are one: rounding of coordinates, not shape.
-const SAME_NORMAL: f32 = 2e-5;
 
 impl FacetSum {
     /// Facets must be sorted by slot ([`Facets::sort_for_sums`]); `material_of_slot[slot]` indexes `materials`.
@@ -207,74 +181,11 @@ impl FacetSum {
         (Vec3::new(self.normals[0][s], self.normals[1][s], self.normals[2][s]), self.areas[s])
     }
 
-    /// Areas of a group's facets, times their colour weights in one channel where those differ.
-    fn weights<'a>(&'a self, group: &'a Group, channel: Option<usize>) -> &'a [f32] {
-        match (&group.rgb_areas, channel) {
-            (Some(rgb), Some(channel)) => &rgb[channel],
-            _ => &self.areas[group.range.clone()],
-        }
+    pub(super) fn areas(&self, range: Range<usize>) -> &[f32] {
+        &self.areas[range]
     }
 
-    /// One lobe of one group, without its tint and the group's colour; visibilities are those of all facets.
-    pub(crate) fn lobe_sum(
-        &self,
-        group: usize,
-        lobe: usize,
-        channel: Option<usize>,
-        pair: &PairVectors,
-        v_i: &[f32],
-        v_o: &[f32],
-    ) -> f64 {
-        let group = &self.groups[group];
-        let range = group.range.clone();
-        let weights = self.weights(group, channel);
-        let (v_i, v_o) = (&v_i[range.clone()], &v_o[range.clone()]);
-        simd::lobe_sums(group.lobes[lobe].0, pair, self.normals(range), [weights], v_i, v_o)[0]
-    }
-
-    /// The area of the facets of one normal that `i` and `o` both see.
-    pub(crate) fn visible_area(
-        &self,
-        group: usize,
-        patch: usize,
-        channel: Option<usize>,
-        v_i: &[f32],
-        v_o: &[f32],
-    ) -> f64 {
-        let group = &self.groups[group];
-        let Some(patch) = group.patches.as_ref().map(|patches| &patches[patch]) else { return 0.0 };
-        let range = patch.range.clone();
-        let weights = &self.weights(group, channel)[range.start - group.range.start..range.end - group.range.start];
-        simd::masked_sum([weights], &v_i[range.clone()], &v_o[range])[0]
-    }
-
-    /// One colour of one measured BRDF of one group.
-    #[expect(clippy::too_many_arguments, reason = "what to sum, and where")]
-    pub(crate) fn measured_sum(
-        &self,
-        group: usize,
-        table: usize,
-        channel: Option<usize>,
-        color: usize,
-        pair: &PairVectors,
-        v_i: &[f32],
-        v_o: &[f32],
-    ) -> f64 {
-        let group = &self.groups[group];
-        let (range, weights) = (group.range.clone(), self.weights(group, channel));
-        let mut total = 0.0;
-        for (s, weight) in range.zip(weights) {
-            let seen = v_i[s] * v_o[s];
-            let angles = LobeAngles::new(self.facet(s).0, pair.i, pair.o, pair.h);
-            if seen > 0.0 && angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
-                let value = group.measured[table].f_r(&angles)[color];
-                total += f64::from(value * weight * (angles.n_dot_i * angles.n_dot_o * seen));
-            }
-        }
-        total
-    }
-
-    fn normals(&self, range: Range<usize>) -> [&[f32]; 3] {
+    pub(super) fn normals(&self, range: Range<usize>) -> [&[f32]; 3] {
         [&self.normals[0][range.clone()], &self.normals[1][range.clone()], &self.normals[2][range]]
     }
 
@@ -330,7 +241,7 @@ impl FacetSum {
     /// Whether every group has few normals and one colour: then [`FacetSum::sum_of_areas`] serves.
     pub(crate) fn has_few_normals(&self) -> bool {
         let few = |group: &Group| group.patches.is_some() && group.rgb_areas.is_none();
-        self.groups.iter().all(|group| group.color == Vec3::ZERO || few(group))
+        self.groups.iter().all(|group| group.is_black || few(group))
     }
 
     /// [`FacetSum::sum`] where facets of few normals are the whole tile: `seen` tells how much of a run of facets, whose areas
@@ -338,7 +249,7 @@ impl FacetSum {
     pub(crate) fn sum_of_areas(&self, i: Vec3, o: Vec3, seen: impl Fn(Range<usize>, &[f32]) -> f64) -> DVec3 {
         let pair = PairVectors::new(i, o);
         let mut total = DVec3::ZERO;
-        for group in self.groups.iter().filter(|group| group.color != Vec3::ZERO) {
+        for group in self.groups.iter().filter(|group| !group.is_black) {
             let mut sum = DVec3::ZERO;
             for patch in group.patches.iter().flatten() {
                 if let Some(value) = patch_value(group, patch, &pair) {
@@ -349,80 +260,11 @@ impl FacetSum {
         }
         total
     }
-}
 
-impl FacetSum {
     /// Other facets of the same materials.
     pub(super) fn over(&self, normals: [Vec<f32>; 3], areas: Vec<f32>, groups: Vec<Group>) -> Self {
         Self { normals, areas, groups, ..self.clone() }
     }
-}
-
-impl Group {
-    /// The same materials over other facets; `None` where they have colours of their own, or normals that matter.
-    pub(super) fn over(&self, range: Range<usize>, patches: Vec<Patch>) -> Option<Self> {
-        let black = self.color == Vec3::ZERO;
-        (black || self.rgb_areas.is_none() && self.patches.is_some()).then(|| Self {
-            range,
-            rgb_areas: None,
-            patches: self.patches.is_some().then_some(patches),
-            ..self.clone()
-        })
-    }
-}
-
-/// What facets of one normal reflect; `None` where it faces away.
-fn patch_value(group: &Group, patch: &Patch, pair: &PairVectors) -> Option<Vec3> {
-    let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
-    if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
-        return None;
-    }
-    let mut value = Vec3::ZERO;
-    for (_, term) in &group.lobes {
-        value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
-    }
-    for table in &group.measured {
-        value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
-    }
-    Some(value)
-}
-
-impl Group {
-    fn new(facets: &Facets, range: Range<usize>) -> Self {
-        let colors = &facets.colors[range.clone()];
-        let uniform = colors.iter().all(|&color| color == Vec3::ONE);
-        let rgb_areas = (!uniform).then(|| rgb_areas(facets, range.clone()));
-        let patches = patches(facets, range.clone());
-        let few = patches.len() * FACETS_A_PATCH <= range.len();
-        Self {
-            range,
-            color: Vec3::ONE,
-            is_black: false,
-            lobes: Vec::new(),
-            measured: Vec::new(),
-            rgb_areas,
-            patches: few.then_some(patches),
-        }
-    }
-}
-
-/// Areas times colour weights.
-fn rgb_areas(facets: &Facets, range: Range<usize>) -> [Vec<f32>; 3] {
-    let pairs = || facets.colors[range.clone()].iter().zip(&facets.areas[range.clone()]);
-    std::array::from_fn(|c| pairs().map(|(color, area)| color[c] * area).collect())
-}
-
-/// Runs of facets with one normal.
-fn patches(facets: &Facets, range: Range<usize>) -> Vec<Patch> {
-    let mut patches: Vec<Patch> = Vec::new();
-    for s in range {
-        let normal = facets.normals[s];
-        match patches.last_mut() {
-            Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
-            _ => patches.push(Patch { range: s..s + 1, normal }),
-        }
-    }
-    patches
 }
 
 /// The inner-loop form of an analytic term; `None` for a measured one.

@@ -3,6 +3,7 @@
 mod bvndf;
 mod direct;
 mod effective_brdf;
+mod facet_groups;
 mod facet_sum;
 mod forced;
 pub(crate) mod gemm;

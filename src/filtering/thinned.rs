@@ -4,7 +4,8 @@
 use std::sync::Arc;
 
 use super::Direct;
-use super::facet_sum::{FacetSum, Patch};
+use super::facet_groups::Patch;
+use super::facet_sum::FacetSum;
 use crate::visibility::Visibility;
 
 /// Facets that a normal keeps at least.

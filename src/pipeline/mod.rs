@@ -1,32 +1,33 @@
 //! The stages in order, each with its last result and the input that made it: an edit recomputes what lies downstream.
 
 mod findings;
+mod inputs;
 mod interreflection;
 mod make;
+mod outcome;
 mod pictures;
 mod stage;
 
 use std::path::PathBuf;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Instant;
 
-use glam::Vec3;
-
 use self::make::{choose, grouped, names, same_lobes, sample, see};
+pub use self::outcome::Outcome;
+use self::outcome::limits;
 pub use self::pictures::Pictured;
 use self::pictures::Pictures;
 use self::stage::{Stage, Version};
-use crate::accuracy::health::{Evidence, Limits, Sight};
-use crate::accuracy::{Errors, Health, Reference};
-use crate::brdf::{Brdf, MeasuredCache};
+use crate::accuracy::health::{Evidence, Sight};
+use crate::accuracy::{Health, Reference};
+use crate::brdf::MeasuredCache;
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
 use crate::filtering::{
-    Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, Reflectance, SumMaterial, VisibleFacets, Wu2011,
-    Wu2011Settings,
+    Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings,
 };
-use crate::geometry::{self, Facets, TileMesh};
+use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
 use crate::interreflection::{InterreflectionTable, Transport};
 use crate::plan::{Costs, Findings, Plan, Preset, Route, Settings, decide};
@@ -56,51 +57,6 @@ type FacetKey = (Version, usize, u64, bool, Switch);
 type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
-
-/// What the stages made of a scene.
-#[derive(Debug, Clone)]
-pub struct Outcome {
-    pub brdf: Arc<EffectiveBrdf>,
-    pub plan: Plan,
-    pub settings: Settings,
-    /// What ran this time.
-    pub times: StageTimes,
-    /// What the factored form's error against the direct sum stays below, where it was tried.
-    pub factored: Option<Errors>,
-    pub notes: Vec<String>,
-    /// What the health is measured from.
-    pub evidence: Evidence,
-    /// The health, once it was asked for: see [`Outcome::health`].
-    pub examined: Arc<OnceLock<Health>>,
-    pictures: Arc<Pictures>,
-}
-
-impl Outcome {
-    /// The same, as whoever did not have to wait for it sees it.
-    pub fn without_times(self) -> Self {
-        Self { times: StageTimes::new(), ..self }
-    }
-
-    /// What pictures read instead of [`Outcome::brdf`]: a table of it where that pays and is close enough. The first call
-    /// makes it.
-    ///
-    /// # Errors
-    /// [`crate::Error::Cancelled`].
-    pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
-        self.pictures.get(cancel)
-    }
-
-    /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
-    pub fn health(&self) -> &Health {
-        let limits = limits(&self.settings);
-        self.examined.get_or_init(|| Health::of(&self.brdf, &self.evidence, self.factored, limits))
-    }
-}
-
-/// What an examination needs to know of the settings.
-fn limits(settings: &Settings) -> Limits {
-    Limits { max_rank: settings.max_rank, tolerance: settings.tolerance }
-}
 
 /// The last effective BRDF, and what a colour edit makes the next one from.
 #[derive(Debug)]
@@ -368,62 +324,5 @@ impl Pipeline {
         let effects = &loaded.scene.effects;
         let bounces = if effects.interreflection == Switch::On { effects.bounces } else { 0 };
         Ok(work(&Reference::new(&shape.mesh, &materials.0, &materials.1).with_bounces(bounces)))
-    }
-
-    fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, Version)> {
-        let key = (loaded.scene.tile.clone(), loaded.base_dir.clone(), loaded.painted.clone());
-        self.shape.get("geometry", key, times, &self.cancel, || {
-            let mesh = geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted)?;
-            let (low, high) = mesh.z_range();
-            let flat = high - low <= 1e-7 * mesh.size.max_element();
-            let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
-            let steepest = steepest(&mesh);
-            Ok(Shape { mesh, flat, height_field, steepest })
-        })
-    }
-
-    fn materials(
-        &mut self,
-        loaded: &LoadedScene,
-        mesh: &TileMesh,
-        times: &mut StageTimes,
-    ) -> Result<(Arc<Assigned>, Version)> {
-        let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
-        let cache = &mut self.cache;
-        self.materials.get("materials", key, times, &self.cancel, || {
-            let mut material_of_slot = Vec::with_capacity(mesh.slots.len());
-            let mut materials: Vec<SumMaterial> = Vec::new();
-            let mut made: Vec<Option<usize>> = Vec::new();
-            for slot in &mesh.slots {
-                let found = loaded.scene.material_for_slot(slot)?;
-                if let Some(at) = made.iter().position(|index| *index == found.index) {
-                    material_of_slot.push(at);
-                    continue;
-                }
-                let brdf = Brdf::from_specs(found.brdf, &loaded.base_dir, cache)?;
-                materials.push(SumMaterial { brdf, color: found.color });
-                made.push(found.index);
-                material_of_slot.push(materials.len() - 1);
-            }
-            Ok((material_of_slot, materials))
-        })
-    }
-}
-
-/// Without a surface that faces down, what blocks a point blocks everything below it too: one horizon tells all.
-fn nothing_faces_down(mesh: &TileMesh) -> bool {
-    (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
-}
-
-/// The largest angle between a normal and z [rad].
-fn steepest(mesh: &TileMesh) -> f32 {
-    let cosine = |triangle| mesh.geometric_normal(triangle);
-    let normals = (0..mesh.triangles.len()).map(cosine).filter(|normal| *normal != Vec3::ZERO);
-    normals.map(|normal| normal.z).fold(1.0, f32::min).clamp(-1.0, 1.0).acos()
-}
-
-impl Reflectance for Outcome {
-    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
-        self.brdf.eval_lights(lights, o, out);
     }
 }

@@ -38,7 +38,7 @@ impl Column {
     pub(super) fn of(sum: &FacetSum) -> Option<Vec<Self>> {
         let mut columns = Vec::new();
         for (group, facets) in sum.groups().iter().enumerate() {
-            if facets.color == Vec3::ZERO {
+            if facets.is_black {
                 continue;
             }
             let channels: &[Option<usize>] =

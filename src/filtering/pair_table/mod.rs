@@ -6,6 +6,7 @@
 //! `w_c` (DESIGN.md, Sec. 4, "Interpolate only what is smooth"). Colours are in the weights: editing them keeps the table.
 
 mod columns;
+mod facet_columns;
 
 use std::sync::Arc;
 
