@@ -31,7 +31,7 @@ pub struct InputError {
 
 impl InputError {
     pub fn new(place: impl Into<String>, found: impl fmt::Display, expected: impl fmt::Display) -> Self {
-        Self { place: place.into(), found: found.to_string(), expected: expected.to_string(), ..Self::default() }
+        Self { place: place.into(), found: brief(found.to_string()), expected: expected.to_string(), ..Self::default() }
     }
 
     pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {
@@ -43,6 +43,17 @@ impl InputError {
         self.hint = Some(hint.into());
         self
     }
+}
+
+/// Characters of what was found that are said: decoders may list all they met.
+const MOST_SAID: usize = 400;
+
+fn brief(mut text: String) -> String {
+    if let Some((end, _)) = text.char_indices().nth(MOST_SAID) {
+        text.truncate(end);
+        text.push('…');
+    }
+    text
 }
 
 impl fmt::Display for InputError {
@@ -92,5 +103,17 @@ impl Error {
             Self::Input(_) => 2,
             Self::Failed(_) | Self::Cancelled => 1,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_found_is_said_briefly() {
+        let error = InputError::new("file.tif", "1, ".repeat(100_000), "an image");
+        assert!(error.to_string().chars().count() < 600);
+        assert!(InputError::new("a", "short", "b").to_string().contains("short"));
     }
 }
