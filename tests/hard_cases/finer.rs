@@ -108,7 +108,7 @@ fn one_case_of_each_family_is_the_same_on_the_graphics_processor_at_finer_qualit
             let mut loaded = open(&case, "direct", folder.path());
             loaded.scene.quality.preset = preset.to_owned();
             loaded.scene.light.count = 4;
-            same_picture(&gpu, &loaded, 24, &format!("{}, {preset}", case.name));
+            same_picture(&gpu, &loaded, 12, &format!("{}, {preset}", case.name));
         }
     }
 }
