@@ -43,13 +43,15 @@ pub struct Editor {
     pub(super) background: Background,
     /// The part of an export that is done, and what is being done.
     pub(super) exporting: Option<(f32, &'static str)>,
-    pub(super) gallery: Gallery,
+    pub gallery: Gallery,
     pub(super) slots: Vec<String>,
     /// Pixels of the object view.
     pub(super) size: [usize; 2],
     hand: Option<Hand>,
     from_view: Option<Action>,
     pub(super) copied: Option<Material>,
+    /// Why pictures are not made on the device any more, as it was said.
+    pub(super) device_trouble: Option<String>,
 }
 
 impl Editor {
@@ -86,10 +88,29 @@ impl Editor {
             exporting: None,
             gallery: Gallery::default(),
             copied: None,
+            device_trouble: None,
             size: [64, 64],
             hand: None,
             from_view: None,
         }
+    }
+
+    /// Goes on in another window, with all its pictures to be made anew.
+    pub fn move_to(&mut self, ctx: &Context) {
+        theme::install(ctx);
+        ctx.set_theme(if self.settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
+        ctx.set_zoom_factor(self.settings.zoom);
+        std::mem::replace(&mut self.background, Background::new(ctx)).finish();
+        self.object.move_to(ctx);
+        self.tile.move_to();
+        self.lobe.move_to();
+        self.gallery = Gallery::default();
+        self.accuracy = panels::AccuracyState::default();
+        self.exporting = None;
+        self.title.clear();
+        let text = "The graphics device of the window was lost, so a new window was opened. Your document is as it was; \
+                    if this happens again, save, and update the graphics driver.";
+        self.messages.put(Level::Trouble, "window", text);
     }
 
     /// After the window is gone.
@@ -241,7 +262,7 @@ impl Editor {
         ui.add_space(6.0);
         if self.tile.painting {
             ScrollArea::vertical().show(ui, |ui| {
-                if let Some(asked) = brushes::ui(ui, &mut self.tile.brush) {
+                if let Some(asked) = brushes::ui(ui, &mut self.tile.brush, scene) {
                     self.brush_asked(asked);
                 }
             });

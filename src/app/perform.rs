@@ -118,7 +118,10 @@ impl Editor {
     }
 
     pub(super) fn browse(&mut self, purpose: Purpose, name: &str) {
-        let folder = self.document.base_dir.clone();
+        // What belongs to a scene is saved beside it; what is opened lies where the last file was.
+        let own = Some(self.document.base_dir.clone()).filter(|folder| !folder.as_os_str().is_empty());
+        let last = self.settings.files.clone().filter(|folder| folder.is_dir());
+        let folder = if purpose.saves() { own.or(last) } else { last.or(own) }.unwrap_or_default();
         self.dialog = Some(Dialog::Files(FileDialog::new(purpose, &folder, name)));
     }
 

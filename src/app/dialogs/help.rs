@@ -61,5 +61,5 @@ pub fn help_ui(ctx: &Context) -> bool {
                 });
             });
         });
-    open
+    open && !ctx.input(|input| input.key_pressed(egui::Key::Escape))
 }

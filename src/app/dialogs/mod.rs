@@ -2,6 +2,7 @@
 
 pub mod export;
 mod files;
+mod formats;
 mod help;
 
 use std::path::PathBuf;

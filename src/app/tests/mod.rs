@@ -3,6 +3,8 @@
 mod documents;
 mod interface;
 mod latency;
+mod newcomer;
+mod painting;
 mod soak;
 
 use std::time::{Duration, Instant};

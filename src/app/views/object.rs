@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use biscale::scene::{Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
-    self, Color32, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2,
-    vec2,
+    self, Color32, ColorImage, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions,
+    Ui, pos2, vec2,
 };
 
 use crate::app::actions::Action;
@@ -15,11 +15,14 @@ use crate::app::worker::{Grade, Made};
 
 /// The camera comes no nearer than this many radii; the lens does the rest.
 const NEAREST: f32 = 2.2;
+/// What takes longer than this says so [s].
+const SLOW: f32 = 0.33;
 /// A lens narrower than this widens before the camera moves away.
 const NARROW: f32 = 14.0;
 
 /// A picture kept for comparison.
 pub struct Kept {
+    image: Arc<ColorImage>,
     pub texture: TextureHandle,
     pub scene: Arc<Scene>,
     pub name: String,
@@ -66,11 +69,23 @@ impl ObjectView {
         self.made = Some(made);
     }
 
+    /// Textures belong to a window; in another one they are made anew.
+    pub fn move_to(&mut self, ctx: &egui::Context) {
+        (self.texture, self.asked, self.since) = (None, None, None);
+        if let Some(kept) = &mut self.kept {
+            kept.texture = ctx.load_texture("kept", kept.image.clone(), TextureOptions::LINEAR);
+        }
+        if let Some(made) = &self.made {
+            self.texture = Some(ctx.load_texture("object", made.image.clone(), TextureOptions::LINEAR));
+        }
+    }
+
     /// Keeps what is shown now beside what comes.
     pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) {
         if let Some(made) = &self.made {
             let texture = ctx.load_texture("kept", made.image.clone(), TextureOptions::LINEAR);
-            self.kept = Some(Kept { texture, scene: scene.clone(), name: name.to_owned() });
+            let image = made.image.clone();
+            self.kept = Some(Kept { image, texture, scene: scene.clone(), name: name.to_owned() });
             self.wipe = 0.5;
         }
     }
@@ -83,10 +98,12 @@ impl ObjectView {
         ui.painter().rect_filled(area, 0.0, Color32::from_gray(22));
         if let Some(texture) = &self.texture {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            ui.painter().image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
+            let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
+            painter.image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
         } else {
             ui.put(Rect::from_center_size(area.center(), vec2(40.0, 40.0)), egui::Spinner::new());
         }
+        self.waiting_ui(ui, area);
         self.wipe_ui(ui, area);
         let on_wipe =
             self.kept.is_some() && response.interact_pointer_pos().is_some_and(|at| self.is_on_wipe(area, at));
@@ -100,6 +117,22 @@ impl ObjectView {
             .map(|at| ((at - area.min) / area.size()).clamp(egui::Vec2::ZERO, egui::Vec2::splat(1.0)));
         let pixels = area.size() * ui.pixels_per_point();
         [pixels.x.round() as usize, pixels.y.round() as usize]
+    }
+
+    /// Says that the first picture of an edit is still being computed, once that takes long.
+    fn waiting_ui(&self, ui: &mut Ui, area: Rect) {
+        let Some(since) = self.since.filter(|_| self.texture.is_some()) else { return };
+        let left = SLOW - since.elapsed().as_secs_f32();
+        if left > 0.0 {
+            ui.ctx().request_repaint_after_secs(left);
+            return;
+        }
+        let place = Rect::from_min_size(area.left_bottom() + vec2(10.0, -34.0), vec2(170.0, 26.0));
+        ui.painter().rect_filled(place, 5.0, Color32::from_black_alpha(150));
+        ui.put(Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0)), egui::Spinner::new());
+        let text = format!("Computing, {:.0} s", since.elapsed().as_secs_f32());
+        let font = egui::FontId::proportional(12.0);
+        ui.painter().text(place.left_center() + vec2(28.0, 0.0), egui::Align2::LEFT_CENTER, text, font, Color32::WHITE);
     }
 
     /// What is looked at and how, above the view.

@@ -128,6 +128,11 @@ impl TileState {
         self.made = Some(made);
     }
 
+    /// Textures belong to a window; in another one they are made anew.
+    pub fn move_to(&mut self) {
+        (self.texture, self.asked, self.inputs) = (None, None, None);
+    }
+
     /// Turns paint mode on or off; painting looks straight down.
     pub fn set_painting(&mut self, on: bool) {
         if on == self.painting {
