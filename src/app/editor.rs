@@ -19,7 +19,13 @@ use super::views::brushes;
 use super::views::gallery::Gallery;
 use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
-use super::views::tile::{self, Hand, TileState, Which};
+use super::views::hand::Hand;
+use super::views::tile::{self, TileState, Which};
+
+/// What a person reads at the first start, until it is closed.
+const WELCOME: &str = "welcome";
+const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (left) and change its surface and materials \
+                            (right). F1 has the first steps of usual tasks, and all shortcuts.";
 
 /// Everything but the window.
 pub struct Editor {
@@ -47,7 +53,8 @@ pub struct Editor {
     pub(super) slots: Vec<String>,
     /// Pixels of the object view.
     pub(super) size: [usize; 2],
-    hand: Option<Hand>,
+    /// What the hand did on the tile in this frame.
+    hand: Vec<Hand>,
     from_view: Option<Action>,
     pub(super) copied: Option<Material>,
     /// Why pictures are not made on the device any more, as it was said.
@@ -65,6 +72,9 @@ impl Editor {
         let background = Background::new(ctx);
         if background.pictures.is_none() {
             messages.put(Level::Trouble, "worker", "The system gave no thread to compute on: nothing will be drawn.");
+        }
+        if !settings.welcomed && folder.is_some() {
+            messages.put(Level::Note, WELCOME, WELCOME_TEXT);
         }
         let recovered = folder.as_deref().map(Recovered::find).unwrap_or_default();
         let dialog = (!recovered.is_empty()).then_some(Dialog::Recover(recovered));
@@ -90,7 +100,7 @@ impl Editor {
             copied: None,
             device_trouble: None,
             size: [64, 64],
-            hand: None,
+            hand: Vec::new(),
             from_view: None,
         }
     }
@@ -176,7 +186,10 @@ impl Editor {
         self.settings.side_width = side;
         CentralPanel::no_frame().show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
-            self.messages.ui(ui);
+            if self.messages.ui(ui) == Some(WELCOME) {
+                self.settings.welcomed = true;
+                self.settings.save(self.folder.as_deref());
+            }
             if self.exchanged {
                 self.tile_ui(ui, &scene, 0.0);
             } else {
@@ -190,6 +203,7 @@ impl Editor {
         }
         self.take_hand();
         self.brush_keys(&ctx);
+        self.take_pasted(&ctx);
         for action in action.into_iter().chain(from_menu).chain(from_gallery) {
             self.perform(&ctx, action);
         }
@@ -273,10 +287,11 @@ impl Editor {
 
     /// Strokes come after the panels: what they edit is the scene as it is then.
     fn take_hand(&mut self) {
-        match self.hand.take() {
-            Some(hand) => self.paint(hand),
-            None if self.stroke.is_some() && !self.tile.painting => self.end_stroke(),
-            None => {}
+        for hand in std::mem::take(&mut self.hand) {
+            self.paint(hand);
+        }
+        if !self.tile.painting {
+            self.end_stroke();
         }
     }
 

@@ -39,7 +39,8 @@ impl Messages {
         self.list.iter().map(|message| message.text.as_str()).collect()
     }
 
-    pub fn ui(&mut self, ui: &mut Ui) {
+    /// Shows them; the source of one that was closed.
+    pub fn ui(&mut self, ui: &mut Ui) -> Option<&'static str> {
         let mut closed = None;
         for (at, message) in self.list.iter().enumerate() {
             let color = match message.level {
@@ -62,8 +63,6 @@ impl Messages {
                 });
             });
         }
-        if let Some(at) = closed {
-            self.list.remove(at);
-        }
+        closed.map(|at| self.list.remove(at).source)
     }
 }

@@ -13,7 +13,7 @@ use super::messages::Level;
 use super::paint::{self, Stroke, Tool};
 use super::panels::materials;
 use super::views::brushes::{BrushAsked, Layer};
-use super::views::tile::Hand;
+use super::views::hand::Hand;
 
 impl Editor {
     /// Takes what the hand did on the tile.

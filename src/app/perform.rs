@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use biscale::scene::Material;
-use eframe::egui::{Context, Theme};
+use eframe::egui::{Context, Event, Theme};
 
 use super::actions::Action;
 use super::dialogs::{Dialog, FileDialog, Purpose};
@@ -174,7 +174,9 @@ impl Editor {
         let scene = self.document.scene();
         let Some(material) = scene.materials.get(index) else { return };
         let found = scene.material_for_slot(&material.name);
-        let full = Material { brdf: found.ok().map(|found| found.brdf.clone()), ..material.clone() };
+        let mut full = Material { brdf: found.ok().map(|found| found.brdf.clone()), ..material.clone() };
+        // Another scene, elsewhere, is to find the files too.
+        super::document::make_absolute(&mut full, &self.document.base_dir);
         if let Ok(text) = toml::to_string(&full) {
             self.copied = Some(full);
             ctx.copy_text(text);
@@ -193,6 +195,32 @@ impl Editor {
             Some(place) => *place = pasted,
             None => scene.materials.push(pasted),
         }
-        self.document.edit_as("Paste a material", scene);
+        match scene.validate() {
+            Ok(()) => self.document.edit_as("Paste a material", scene),
+            Err(error) => self.messages.put(Level::Trouble, "paste", format!("Not pasted: {error}")),
+        }
+    }
+
+    /// Text that comes from the clipboard while no text is typed: a material, of this editor or another.
+    pub(super) fn take_pasted(&mut self, ctx: &Context) {
+        if self.dialog.is_some() || ctx.text_edit_focused() {
+            return;
+        }
+        let texts = ctx.input(|input| {
+            let pasted = |event: &Event| if let Event::Paste(text) = event { Some(text.clone()) } else { None };
+            input.events.iter().filter_map(pasted).collect::<Vec<_>>()
+        });
+        for text in texts {
+            match toml::from_str::<Material>(&text) {
+                Ok(material) => {
+                    self.copied = Some(material);
+                    self.paste_material("default");
+                }
+                Err(_) => {
+                    let text = "The clipboard holds no material: use Copy at a material, here or in another editor.";
+                    self.messages.put(Level::Note, "paste", text);
+                }
+            }
+        }
     }
 }

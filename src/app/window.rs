@@ -48,7 +48,15 @@ pub fn run(scene: Option<&str>) -> Result<()> {
             Ok(Ok(())) => return Err(given_up(&kept, "it closed by itself")),
             Ok(Err(error)) if kept.borrow().is_none() => return Err(anyhow!("{NO_WINDOW} ({error})")),
             Ok(Err(error)) => return Err(given_up(&kept, &error.to_string())),
-            Err(_) => return Err(given_up(&kept, "a fault in the program")),
+            Err(_) => {
+                let told = given_up(&kept, "a fault in the program");
+                // What a panic left of this process' windows is no ground for another one.
+                if opened_at.elapsed() > SHORTEST && start_again().is_ok() {
+                    eprintln!("biscale: {told}; a new editor is started");
+                    return Ok(());
+                }
+                return Err(told);
+            }
         }
     }
 }
@@ -67,7 +75,7 @@ fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<Document>) -> eframe:
     };
     let (kept, lost) = (kept.clone(), lost.clone());
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
-        watch_device(creation, &lost);
+        let device = watch_device(creation, &lost);
         let mut editor = kept.borrow_mut();
         match (editor.as_mut(), first) {
             (Some(editor), _) => editor.move_to(&creation.egui_ctx),
@@ -75,9 +83,14 @@ fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<Document>) -> eframe:
             (None, None) => {}
         }
         drop(editor);
-        Ok(Box::new(Window { editor: kept, lost }))
+        Ok(Box::new(Window { editor: kept, lost, device }))
     });
     eframe::run_native("biscale", options, create)
+}
+
+/// Starts the program anew; it offers what the recovery file holds.
+fn start_again() -> std::io::Result<()> {
+    std::process::Command::new(std::env::current_exe()?).arg("edit").spawn().map(drop)
 }
 
 /// No window can be had any more: the document goes to the recovery file, which the next start offers.
@@ -98,31 +111,30 @@ fn given_up(kept: &Kept, why: &str) -> anyhow::Error {
 }
 
 /// Errors of the window's own device are heard; the default handler would end the program.
-fn watch_device(creation: &eframe::CreationContext, lost: &Arc<AtomicBool>) {
-    if let Some(state) = &creation.wgpu_render_state {
-        let (lost, ctx) = (lost.clone(), creation.egui_ctx.clone());
-        state.device.set_device_lost_callback(move |_, _| {
-            lost.store(true, Ordering::Relaxed);
-            ctx.request_repaint();
-        });
-        state
-            .device
-            .on_uncaptured_error(Arc::new(|error| eprintln!("biscale: the window's device complains: {error}")));
-        #[cfg(debug_assertions)]
-        lose_for_tests(&state.device);
-    }
+fn watch_device(creation: &eframe::CreationContext, lost: &Arc<AtomicBool>) -> Option<wgpu::Device> {
+    let device = creation.wgpu_render_state.as_ref()?.device.clone();
+    let (lost, ctx) = (lost.clone(), creation.egui_ctx.clone());
+    device.set_device_lost_callback(move |_, _| {
+        lost.store(true, Ordering::Relaxed);
+        ctx.request_repaint();
+    });
+    device.on_uncaptured_error(Arc::new(|error| eprintln!("biscale: the window's device complains: {error}")));
+    #[cfg(debug_assertions)]
+    lose_for_tests(&device, &creation.egui_ctx);
+    Some(device)
 }
 
 /// `BISCALE_LOSE_DEVICE=5` in a debug build: the device is lost after so many seconds, once.
 #[cfg(debug_assertions)]
-fn lose_for_tests(device: &wgpu::Device) {
+fn lose_for_tests(device: &wgpu::Device, ctx: &egui::Context) {
     static ONCE: AtomicBool = AtomicBool::new(true);
     let seconds = std::env::var("BISCALE_LOSE_DEVICE").ok().and_then(|text| text.parse().ok());
     if let (Some(seconds), true) = (seconds, ONCE.swap(false, Ordering::Relaxed)) {
-        let device = device.clone();
+        let (device, ctx) = (device.clone(), ctx.clone());
         std::thread::spawn(move || {
             std::thread::sleep(Duration::from_secs(seconds));
             device.destroy();
+            ctx.request_repaint();
         });
     }
 }
@@ -131,6 +143,7 @@ fn lose_for_tests(device: &wgpu::Device) {
 struct Window {
     editor: Kept,
     lost: Arc<AtomicBool>,
+    device: Option<wgpu::Device>,
 }
 
 impl eframe::App for Window {
@@ -138,8 +151,12 @@ impl eframe::App for Window {
         let mut editor = self.editor.borrow_mut();
         let Some(editor) = editor.as_mut() else { return };
         let ctx = ui.ctx().clone();
+        // A device that is gone says so when it is asked.
+        if let Some(device) = &self.device {
+            let _ = device.poll(wgpu::PollType::Poll);
+        }
         if self.lost.load(Ordering::Relaxed) {
-            // Nothing is drawn on a device that is gone.
+            // Nothing is drawn on a device that is gone: that would panic.
             ctx.send_viewport_cmd(ViewportCommand::Close);
             return;
         }

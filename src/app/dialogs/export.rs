@@ -37,11 +37,11 @@ pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<
         ui.add_space(6.0);
         if biscale::export::grid_is_free(path) {
             Grid::new("table").num_columns(2).show(ui, |ui| {
-                ui.label("Steps from the normal to the horizon");
-                ui.add(DragValue::new(theta).range(2..=180));
+                let label = ui.label("Steps from the normal to the horizon");
+                ui.add(DragValue::new(theta).range(2..=180)).labelled_by(label.id);
                 ui.end_row();
-                ui.label("Steps around");
-                ui.add(DragValue::new(phi).range(4..=720));
+                let label = ui.label("Steps around");
+                ui.add(DragValue::new(phi).range(4..=720)).labelled_by(label.id);
                 ui.end_row();
             });
             let (millions, megabytes) = (pairs(*theta, *phi) / 1e6, pairs(*theta, *phi) * 24.0 / 1e6);
@@ -76,9 +76,9 @@ pub fn picture_ui(ctx: &Context, path: &Path, width: &mut usize, height: &mut us
         ui.add_space(6.0);
         ui.horizontal(|ui| {
             ui.label("Pixels");
-            ui.add(DragValue::new(width).range(16..=4096));
+            ui.name_inputs("Width", |ui| ui.add(DragValue::new(width).range(16..=4096)));
             ui.label("×");
-            ui.add(DragValue::new(height).range(16..=4096));
+            ui.name_inputs("Height", |ui| ui.add(DragValue::new(height).range(16..=4096)));
         });
         ui.weak(".png is as you see it; .exr holds linear radiance.");
         footer(ui, &mut answer);

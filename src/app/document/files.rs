@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use biscale::scene::{BrdfSpec, Geometry, Pixels, Scene, TermSpec};
+use biscale::scene::{BrdfSpec, Geometry, Material, Pixels, Scene, TermSpec};
 use biscale::{InputError, Result, export};
 use glam::Vec3;
 
@@ -191,6 +191,24 @@ pub fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
     }
     found.extend(&mut scene.object.path);
     found
+}
+
+/// The measured files of a material.
+fn measured_paths(material: &mut Material) -> impl Iterator<Item = &mut PathBuf> {
+    material.brdf.iter_mut().flat_map(BrdfSpec::terms_mut).filter_map(|term| match term {
+        TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => Some(path),
+        _ => None,
+    })
+}
+
+/// Names a material's files so that any scene finds them.
+pub fn make_absolute(material: &mut Material, base_dir: &Path) {
+    for path in measured_paths(material) {
+        let there = base_dir.join(&*path);
+        if there.is_file() {
+            *path = std::path::absolute(&there).unwrap_or(there);
+        }
+    }
 }
 
 /// Relative paths that led somewhere from `old` lead there from `new`.

@@ -14,7 +14,7 @@ use biscale::Result;
 use biscale::scene::{self, LoadedScene, Painted, Scene};
 
 use files::Stamp;
-pub use files::{write_colors, write_heights, write_slots};
+pub use files::{make_absolute, write_colors, write_heights, write_slots};
 pub use history::{Change, Patch};
 pub use recovery::{Recovered, RecoveryFile, Snapshot};
 pub use settings::Settings;

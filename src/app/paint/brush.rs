@@ -22,6 +22,11 @@ impl Tool {
     pub const ALL: [Self; 8] =
         [Self::Raise, Self::Lower, Self::Smooth, Self::Flatten, Self::Noise, Self::Stamp, Self::Color, Self::Material];
 
+    /// Whether it changes what the surface wears, not its shape.
+    pub fn prints(self) -> bool {
+        matches!(self, Self::Color | Self::Material)
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             Self::Raise => "Raise",

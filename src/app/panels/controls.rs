@@ -1,24 +1,37 @@
 //! One control for every shape that a value of the catalogue has.
 
+use std::cell::Cell;
+
 use biscale::scene::{Field, Kind, Shape};
 use eframe::egui::{self, DragValue, Slider, SliderClamping, Ui};
 use toml::Value;
 
-use super::fields::{Around, suffix, words};
+use super::fields::{Around, caption, suffix, words};
 use super::matrix;
+
+/// Notes in `wrong` when what is typed is no finite number; the value stays what it was then.
+fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
+    drag.custom_parser(move |text| {
+        let plain: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
+        let value: f64 = plain.replace('\u{2212}', "-").parse().ok()?;
+        wrong.set(wrong.get() || !value.is_finite());
+        value.is_finite().then_some(value)
+    })
+}
 
 /// Width of numbers beside sliders.
 const NUMBER: f32 = 76.0;
 
 /// A control for a value of a shape.
 pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &Shape, field: &Field, around: &mut Around) {
+    let wrong = Cell::new(false);
     match *shape {
         Shape::Number { min, max, soft_max } => {
-            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, around));
+            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, around), &wrong);
         }
-        Shape::Integer { min, max } => integer_ui(ui, value, min, max),
-        Shape::Color { max } => color_ui(ui, value, max),
-        Shape::Vector { min, max, .. } => vector_ui(ui, value, min, max),
+        Shape::Integer { min, max } => integer_ui(ui, value, (min, max), &wrong),
+        Shape::Color { max } => color_ui(ui, value, max, &wrong),
+        Shape::Vector { min, max, .. } => vector_ui(ui, value, (min, max), &wrong),
         Shape::Text => text_ui(ui, value, 40.0, str::to_owned),
         Shape::Path => {
             text_ui(ui, value, 66.0, file_name);
@@ -35,6 +48,10 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &Shape, field: &Fi
         }
         Shape::Table(_) | Shape::Tagged(_) => {}
     }
+    if wrong.get() {
+        let name = caption(field);
+        around.complaint = Some(format!("{name} keeps its value: what was typed is not a number. Type one like 0.25."));
+    }
 }
 
 /// Sliders of ranges that span decades move by factors.
@@ -42,7 +59,13 @@ fn is_logarithmic(min: f64, soft_max: f64) -> bool {
     min >= 0.0 && soft_max / min.max(1e-4) > 500.0
 }
 
-fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f64), suffix: &str) {
+fn number_ui(
+    ui: &mut Ui,
+    value: &mut Value,
+    (min, max, soft_max): (f64, f64, f64),
+    suffix: &str,
+    wrong: &Cell<bool>,
+) {
     let Some(before) = number(value) else { return };
     // What f32 made of a short decimal reads short again.
     let mut now = tidy(before);
@@ -54,7 +77,7 @@ fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f6
     ui.add(slider);
     let (speed, digits) = ((soft_max - soft_min).min(100.0) / 400.0, decimals(now));
     let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(digits).suffix(suffix);
-    ui.add_sized([NUMBER, ui.spacing().interact_size.y], drag);
+    ui.add_sized([NUMBER, ui.spacing().interact_size.y], finite(drag, wrong));
     if now.is_finite() && now != tidy(before) {
         *value = Value::Float(now.clamp(min, max));
     }
@@ -71,7 +94,7 @@ fn decimals(value: f64) -> usize {
     }
 }
 
-fn integer_ui(ui: &mut Ui, value: &mut Value, min: i64, max: i64) {
+fn integer_ui(ui: &mut Ui, value: &mut Value, (min, max): (i64, i64), wrong: &Cell<bool>) {
     let Some(mut now) = value.as_integer() else { return };
     let before = now;
     if max - min <= 5000 {
@@ -79,13 +102,14 @@ fn integer_ui(ui: &mut Ui, value: &mut Value, min: i64, max: i64) {
         let slider = Slider::new(&mut now, min..=max).show_value(false).logarithmic(min >= 0 && max > 200);
         ui.add(slider);
     }
-    ui.add_sized([NUMBER, ui.spacing().interact_size.y], DragValue::new(&mut now).range(min..=max).speed(0.2));
+    let drag = DragValue::new(&mut now).range(min..=max).speed(0.2);
+    ui.add_sized([NUMBER, ui.spacing().interact_size.y], finite(drag, wrong));
     if now != before {
         *value = Value::Integer(now);
     }
 }
 
-fn color_ui(ui: &mut Ui, value: &mut Value, max: f64) {
+fn color_ui(ui: &mut Ui, value: &mut Value, max: f64, wrong: &Cell<bool>) {
     let Some(list) = value.as_array() else { return };
     let mut rgb = [0.0f32; 3];
     for (channel, value) in rgb.iter_mut().zip(list) {
@@ -101,22 +125,20 @@ fn color_ui(ui: &mut Ui, value: &mut Value, max: f64) {
     let width = ((ui.available_width() - 14.0) / 3.0).clamp(30.0, 48.0);
     for channel in &mut rgb {
         let drag = DragValue::new(channel).range(0.0..=max as f32).speed(0.005).max_decimals(3);
-        ui.add_sized([width, ui.spacing().interact_size.y], drag);
+        ui.add_sized([width, ui.spacing().interact_size.y], finite(drag, wrong));
     }
     if rgb != before && rgb.iter().all(|channel| channel.is_finite()) {
         *value = Value::Array(rgb.map(|channel| Value::Float(f64::from(channel))).to_vec());
     }
 }
 
-fn vector_ui(ui: &mut Ui, value: &mut Value, min: f64, max: f64) {
+fn vector_ui(ui: &mut Ui, value: &mut Value, (min, max): (f64, f64), wrong: &Cell<bool>) {
     let Value::Array(list) = value else { return };
     for entry in list {
         let Some(before) = number(entry) else { continue };
         let mut now = tidy(before);
-        ui.add_sized(
-            [58.0, ui.spacing().interact_size.y],
-            DragValue::new(&mut now).range(min..=max).speed(0.01).max_decimals(3),
-        );
+        let drag = DragValue::new(&mut now).range(min..=max).speed(0.01).max_decimals(3);
+        ui.add_sized([58.0, ui.spacing().interact_size.y], finite(drag, wrong));
         if now.is_finite() && now != tidy(before) {
             *entry = Value::Float(now);
         }

@@ -70,7 +70,7 @@ pub fn caption_row<R>(
 }
 
 /// The field's name as a person would say it.
-fn caption(field: &Field) -> String {
+pub(super) fn caption(field: &Field) -> String {
     match field.key {
         "path" => "File".to_owned(),
         "color_path" => "Colour image".to_owned(),

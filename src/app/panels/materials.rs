@@ -121,7 +121,7 @@ fn own_ui(
     let mut request = None;
     egui::CollapsingHeader::new(RichText::new(title).strong()).id_salt("material").default_open(true).show(ui, |ui| {
         let material = &mut scene.materials[index];
-        color_ui(ui, material);
+        color_ui(ui, material, around);
         request = match &mut material.brdf {
             Some(brdf) => brdf_ui(ui, brdf, index, around),
             None => {
@@ -143,11 +143,11 @@ fn own_ui(
     request
 }
 
-fn color_ui(ui: &mut Ui, material: &mut Material) {
+fn color_ui(ui: &mut Ui, material: &mut Material, around: &mut Around) {
     let Some(field) = Material::fields().into_iter().find(|field| field.key == "color") else { return };
     if let Ok(mut table) = Table::try_from(&*material) {
         let before = table.clone();
-        fields::field_ui(ui, &mut table, &field, &mut Around::default());
+        fields::field_ui(ui, &mut table, &field, around);
         if table != before
             && let Ok(changed) = table.try_into::<Material>()
         {
@@ -186,6 +186,7 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
                 let before = table.clone();
                 let mut inside = Around { unit: around.unit.clone(), ..Around::default() };
                 fields::table_ui(ui, &mut table, &kind.fields, &[], &mut inside);
+                around.complaint = around.complaint.take().or(inside.complaint);
                 if inside.browse.is_some() {
                     request = Some(Request::Browse { material, term: at });
                 }

@@ -1,14 +1,15 @@
 //! What a person meets in the first hour: the gallery, a measured paint, an export, a device that is lost.
 
-use biscale::scene::{BrdfSpec, TermSpec};
-use eframe::egui::{Key, Modifiers};
+use biscale::scene::{BrdfSpec, Geometry, TermSpec};
+use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::dialogs::Dialog;
-use crate::app::worker::LOSE_DEVICE;
+use crate::app::paint::Tool;
+use crate::app::worker::{LOSE_DEVICE, TableChoice};
 
 #[test]
 fn the_gallery_is_searched_by_words_and_says_when_nothing_is_found() {
@@ -128,4 +129,102 @@ fn an_editor_that_moves_to_another_window_keeps_its_document_and_makes_its_pictu
     assert!(editor.document.undo_name().is_some() && editor.object.kept.is_some());
     assert!(editor.messages.texts().iter().any(|text| text.contains("new window")));
     assert_eq!(editor.object.made.as_ref().unwrap().version, editor.document.version());
+}
+
+#[test]
+fn every_control_of_every_panel_and_dialog_has_a_name() {
+    let mut harness = harness(quick());
+    harness.set_size(egui::vec2(1500.0, 3600.0));
+    editor(&mut harness).settings.gallery = true;
+    settle(&mut harness);
+    for section in ["Camera", "Quality", "Effects", "Accuracy"] {
+        harness.get_by_label(section).click();
+        harness.run_steps(4);
+    }
+    harness.check_accessibility();
+    for kind in ["pyramids", "rods", "weave", "flat", "heightfield"] {
+        let mut scene = (**editor(&mut harness).document.scene()).clone();
+        scene.tile.geometry = Geometry::with_defaults(kind).unwrap();
+        if let Geometry::Heightfield(field) = &mut scene.tile.geometry {
+            field.path = Some("asset:ripples.png".into());
+        }
+        editor(&mut harness).document.edit(scene);
+        harness.run_steps(3);
+        harness.check_accessibility();
+    }
+    editor(&mut harness).tile.set_painting(true);
+    for tool in Tool::ALL {
+        editor(&mut harness).tile.brush.tool = tool;
+        harness.run_steps(2);
+        harness.check_accessibility();
+    }
+    let ctx = harness.ctx.clone();
+    for action in [Action::Help, Action::About, Action::Open, Action::ExportTable, Action::ExportPicture, Action::Quit] {
+        editor(&mut harness).action(&ctx, action);
+        harness.run_steps(3);
+        assert!(editor(&mut harness).dialog.is_some());
+        harness.check_accessibility();
+        editor(&mut harness).dialog = None;
+    }
+    for path in ["a.npz", "a.xml"] {
+        let choice = TableChoice::default();
+        editor(&mut harness).dialog = Some(Dialog::Table { path: path.into(), choice });
+        harness.run_steps(3);
+        harness.check_accessibility();
+    }
+    editor(&mut harness).dialog = Some(Dialog::Picture { path: "a.png".into(), width: 64, height: 64 });
+    harness.run_steps(3);
+    harness.check_accessibility();
+}
+
+#[test]
+fn what_is_typed_and_is_no_number_is_a_message_and_the_value_stays() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let before = editor(&mut harness).document.scene().clone();
+    for text in ["nan", "inf"] {
+        let field = harness.get_all_by_role(egui::Role::SpinButton).nth(1).unwrap();
+        field.click();
+        harness.run_steps(2);
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        harness.event(egui::Event::Text(text.to_owned()));
+        harness.run_steps(2);
+        harness.key_press(Key::Enter);
+        harness.run_steps(2);
+        let texts = editor(&mut harness).messages.texts().join("; ");
+        assert!(texts.contains("not a number"), "{text}: {texts}");
+        assert_eq!(*editor(&mut harness).document.scene(), before);
+    }
+}
+
+#[test]
+fn a_place_that_cannot_be_written_says_so_and_the_document_stays_unsaved() {
+    let mut harness = harness(quick());
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.light.count = 3;
+    let editor = editor(&mut harness);
+    editor.document.edit(scene);
+    editor.save(std::path::Path::new("/nonexistent/folder/a.toml"));
+    let texts = editor.messages.texts().join("; ");
+    assert!(texts.contains("Not saved") && texts.contains("nonexistent") && texts.contains("still here"), "{texts}");
+    assert!(editor.document.is_dirty());
+}
+
+#[test]
+fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not() {
+    let mut harness = harness(quick());
+    let text = "name = \"gold\"\ncolor = [1.0, 0.5, 0.1]\n[brdf]\nkind = \"ggx\"\nroughness = 0.1\nf0 = [0.9, 0.7, 0.3]\n";
+    harness.event(egui::Event::Paste(text.to_owned()));
+    harness.run_steps(2);
+    let material = editor(&mut harness).document.scene().materials[0].clone();
+    assert_eq!((material.name.as_str(), material.color), ("default", Vec3::new(1.0, 0.5, 0.1)));
+    assert_eq!(editor(&mut harness).document.undo_name(), Some("Paste a material"));
+    let before = editor(&mut harness).document.scene().clone();
+    for text in ["hello", "name = \"x\"\ncolor = [nan, 0.0, 0.0]\n"] {
+        harness.event(egui::Event::Paste(text.to_owned()));
+        harness.run_steps(2);
+        assert_eq!(*editor(&mut harness).document.scene(), before, "{text}");
+        let texts = editor(&mut harness).messages.texts().join("; ");
+        assert!(texts.contains("clipboard holds no material") || texts.contains("Not pasted"), "{texts}");
+    }
 }

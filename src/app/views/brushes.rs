@@ -41,11 +41,13 @@ pub fn ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) -> Option<BrushAsked> {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 5.0;
-        for tool in Tool::ALL {
-            if ui.selectable_label(brush.tool == tool, tool.name()).on_hover_text(tool.tip()).clicked() {
-                brush.tool = tool;
-            }
-        }
+        let shape = Tool::ALL.iter().filter(|tool| !tool.prints());
+        shape.for_each(|tool| tool_ui(ui, brush, *tool));
+    });
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 5.0;
+        Tool::ALL.iter().filter(|tool| tool.prints()).for_each(|tool| tool_ui(ui, brush, *tool));
     });
     shape_ui(ui, brush);
     match brush.tool {
@@ -57,6 +59,12 @@ pub fn ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) -> Option<BrushAsked> {
     let asked = files_ui(ui, brush.tool);
     ui.small("Right drag turns the tile, the wheel comes closer.");
     asked
+}
+
+fn tool_ui(ui: &mut Ui, brush: &mut Brush, tool: Tool) {
+    if ui.selectable_label(brush.tool == tool, tool.name()).on_hover_text(tool.tip()).clicked() {
+        brush.tool = tool;
+    }
 }
 
 /// Size, strength, edge.

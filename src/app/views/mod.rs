@@ -2,6 +2,7 @@
 
 pub mod brushes;
 pub mod gallery;
+pub mod hand;
 pub mod lobe;
 pub mod object;
 pub mod tile;

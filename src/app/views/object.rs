@@ -53,7 +53,8 @@ pub struct ObjectView {
 impl ObjectView {
     /// Shows a picture, unless what is shown is newer or better.
     pub fn take(&mut self, ctx: &egui::Context, made: Box<Made>) {
-        let rank = |made: &Made| (made.version, made.grade);
+        // Of two pictures of one version a draft in the view's present shape is better than a full one in another.
+        let rank = |made: &Made| (made.version, self.has_shape(made), made.grade);
         if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
             return;
         }
@@ -67,6 +68,15 @@ impl ObjectView {
             self.doing = None;
         }
         self.made = Some(made);
+    }
+
+    /// Whether a picture has the shape that was asked for last.
+    fn has_shape(&self, made: &Made) -> bool {
+        let ratio = |width: usize, height: usize| width as f32 / height.max(1) as f32;
+        self.asked.is_none_or(|(_, [width, height])| {
+            let (has, wanted) = (ratio(made.picture.width, made.picture.height), ratio(width, height));
+            (has / wanted - 1.0).abs() < 0.03
+        })
     }
 
     /// Textures belong to a window; in another one they are made anew.
@@ -140,25 +150,8 @@ impl ObjectView {
         let mut action = None;
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            egui::ComboBox::from_id_salt("object here").selected_text(words(&scene.object.kind)).width(90.0).show_ui(
-                ui,
-                |ui| {
-                    for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
-                        if ui.selectable_label(scene.object.kind == *kind, words(kind)).clicked() {
-                            (*kind).clone_into(&mut scene.object.kind);
-                            scene.object.path = None;
-                        }
-                    }
-                },
-            );
-            let camera = scene.camera.clone().unwrap_or_default();
-            let mut exposure = camera.exposure_ev;
-            let drag =
-                egui::DragValue::new(&mut exposure).range(-10.0..=10.0).speed(0.03).suffix(" EV").max_decimals(2);
-            let response = ui.add(drag).on_hover_text("Exposure: drag sideways");
-            if response.changed() && exposure.is_finite() {
-                scene.camera = Some(Camera { exposure_ev: exposure, ..camera });
-            }
+            ui.name_inputs("Object", |ui| object_ui(ui, scene));
+            ui.name_inputs("Exposure", |ui| exposure_ui(ui, scene));
             ui.separator();
             for (which, name, tip, on) in [
                 (Action::Frame, "Frame", "Show the whole object (F)", false),
@@ -206,6 +199,28 @@ impl ObjectView {
         if response.dragged() {
             self.wipe = (self.wipe + response.drag_delta().x / area.width()).clamp(0.0, 1.0);
         }
+    }
+}
+
+fn object_ui(ui: &mut Ui, scene: &mut Scene) {
+    let combo = egui::ComboBox::from_id_salt("object here").selected_text(words(&scene.object.kind)).width(90.0);
+    combo.show_ui(ui, |ui| {
+        for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
+            if ui.selectable_label(scene.object.kind == *kind, words(kind)).clicked() {
+                (*kind).clone_into(&mut scene.object.kind);
+                scene.object.path = None;
+            }
+        }
+    });
+}
+
+fn exposure_ui(ui: &mut Ui, scene: &mut Scene) {
+    let camera = scene.camera.clone().unwrap_or_default();
+    let mut exposure = camera.exposure_ev;
+    let drag = egui::DragValue::new(&mut exposure).range(-10.0..=10.0).speed(0.03).suffix(" EV").max_decimals(2);
+    let response = ui.add(drag).on_hover_text("Exposure: drag sideways");
+    if response.changed() && exposure.is_finite() {
+        scene.camera = Some(Camera { exposure_ev: exposure, ..camera });
     }
 }
 
