@@ -17,9 +17,9 @@ use super::pick;
 use super::theme;
 use super::views::brushes;
 use super::views::gallery::Gallery;
+use super::views::hand::Hand;
 use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
-use super::views::hand::Hand;
 use super::views::tile::{self, TileState, Which};
 
 /// What a person reads at the first start, until it is closed.

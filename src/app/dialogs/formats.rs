@@ -11,9 +11,9 @@ const TABLES: [(&str, &str, &str); 9] = [
     (".exr", "Image atlas", "shaders and viewers, an image a light"),
     (".bsdf", "RGL tensor", "Mitsuba 3 (plugin `measured`), pbrt"),
     ("_spec.bsdf", "RGL tensor with spectra", "Mitsuba 3 in spectral mode"),
-    (".binary", "MERL", "most renderers; isotropic"),
+    (".binary", "MERL", "programs that read MERL files; isotropic"),
     (".xml", "Radiance", "Radiance, EnergyPlus, daylight programs"),
-    (".bin", "UTIA", "Mitsuba's and others' UTIA readers; anisotropic"),
+    (".bin", "UTIA", "programs that read UTIA files; anisotropic"),
     (".astm", "ASTM E1392", "archives of measurements"),
 ];
 

@@ -196,7 +196,9 @@ pub fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
 /// The measured files of a material.
 fn measured_paths(material: &mut Material) -> impl Iterator<Item = &mut PathBuf> {
     material.brdf.iter_mut().flat_map(BrdfSpec::terms_mut).filter_map(|term| match term {
-        TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => Some(path),
+        TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => {
+            Some(path)
+        }
         _ => None,
     })
 }

@@ -59,13 +59,7 @@ fn is_logarithmic(min: f64, soft_max: f64) -> bool {
     min >= 0.0 && soft_max / min.max(1e-4) > 500.0
 }
 
-fn number_ui(
-    ui: &mut Ui,
-    value: &mut Value,
-    (min, max, soft_max): (f64, f64, f64),
-    suffix: &str,
-    wrong: &Cell<bool>,
-) {
+fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f64), suffix: &str, wrong: &Cell<bool>) {
     let Some(before) = number(value) else { return };
     // What f32 made of a short decimal reads short again.
     let mut now = tidy(before);

@@ -9,7 +9,7 @@ use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::dialogs::Dialog;
 use crate::app::paint::Tool;
-use crate::app::worker::{LOSE_DEVICE, TableChoice};
+use crate::app::worker::{LOSE_DEVICE, TableChoice, What};
 
 #[test]
 fn the_gallery_is_searched_by_words_and_says_when_nothing_is_found() {
@@ -159,7 +159,8 @@ fn every_control_of_every_panel_and_dialog_has_a_name() {
         harness.check_accessibility();
     }
     let ctx = harness.ctx.clone();
-    for action in [Action::Help, Action::About, Action::Open, Action::ExportTable, Action::ExportPicture, Action::Quit] {
+    for action in [Action::Help, Action::About, Action::Open, Action::ExportTable, Action::ExportPicture, Action::Quit]
+    {
         editor(&mut harness).action(&ctx, action);
         harness.run_steps(3);
         assert!(editor(&mut harness).dialog.is_some());
@@ -213,7 +214,8 @@ fn a_place_that_cannot_be_written_says_so_and_the_document_stays_unsaved() {
 #[test]
 fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not() {
     let mut harness = harness(quick());
-    let text = "name = \"gold\"\ncolor = [1.0, 0.5, 0.1]\n[brdf]\nkind = \"ggx\"\nroughness = 0.1\nf0 = [0.9, 0.7, 0.3]\n";
+    let text =
+        "name = \"gold\"\ncolor = [1.0, 0.5, 0.1]\n[brdf]\nkind = \"ggx\"\nroughness = 0.1\nf0 = [0.9, 0.7, 0.3]\n";
     harness.event(egui::Event::Paste(text.to_owned()));
     harness.run_steps(2);
     let material = editor(&mut harness).document.scene().materials[0].clone();
@@ -227,4 +229,45 @@ fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not
         let texts = editor(&mut harness).messages.texts().join("; ");
         assert!(texts.contains("clipboard holds no material") || texts.contains("Not pasted"), "{texts}");
     }
+}
+
+#[test]
+fn an_export_takes_the_size_that_was_chosen_shows_its_progress_and_can_be_given_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.bsdf");
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    editor(&mut harness).dialog = Some(Dialog::Table { path: path.clone(), choice: TableChoice::default() });
+    harness.run_steps(3);
+    harness.get_by_label_contains("Small: 9 x 24").click();
+    harness.run_steps(2);
+    harness.get_by_label("Export").click();
+    harness.run_steps(2);
+    assert!(editor(&mut harness).exporting.is_some() && harness.query_by_label("Cancel").is_some());
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(2);
+    assert!(editor(&mut harness).exporting.is_none());
+    let mut choice = TableChoice { theta: 2, phi: 4, ..TableChoice::default() };
+    choice.rgl = Some([3, 4, 4, 4]);
+    editor(&mut harness).export(path.clone(), What::Table(choice));
+    let start = std::time::Instant::now();
+    while !path.exists() {
+        harness.step();
+        assert!(start.elapsed().as_secs() < 60, "{:?}", editor(&mut harness).messages.texts());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    // Three elevations, four azimuths and the first again, of 4 x 4 samples: far below the small size.
+    assert!(std::fs::metadata(&path).unwrap().len() < 20_000);
+}
+
+#[test]
+fn a_table_that_is_too_large_is_refused_before_any_work() {
+    let mut harness = harness(quick());
+    let choice = TableChoice { theta: 180, phi: 720, ..TableChoice::default() };
+    editor(&mut harness).dialog = Some(Dialog::Table { path: "large.npz".into(), choice });
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("at most").is_some());
+    harness.key_press(Key::Enter);
+    harness.run_steps(2);
+    assert!(editor(&mut harness).dialog.is_some() && editor(&mut harness).exporting.is_none());
 }

@@ -26,13 +26,31 @@ pub struct TableChoice {
     /// Steps from the normal to the horizon, and around, for files whose grid is free.
     pub theta: usize,
     pub phi: usize,
+    /// Of an RGL file: elevations and azimuths of slices, samples along both sides of one; by itself where absent.
+    pub rgl: Option<[usize; 4]>,
     /// What a Radiance file holds.
     pub radiance: RadianceBasis,
+    /// Cells along a side of a tensor tree.
+    pub tree: usize,
+}
+
+impl TableChoice {
+    /// The grid that a file of this name gets; absent where the format has its own.
+    pub fn resolution(&self, path: &Path) -> Option<ExportResolution> {
+        let of = |[theta_i, phi_i, theta_o, phi_o]: [usize; 4]| ExportResolution { theta_i, phi_i, theta_o, phi_o };
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+        match ending.as_str() {
+            _ if export::grid_is_free(path) => Some(of([self.theta, self.phi, self.theta, self.phi])),
+            "bsdf" => self.rgl.map(of),
+            "xml" if self.radiance == RadianceBasis::TensorTree => Some(of([self.tree; 4])),
+            _ => None,
+        }
+    }
 }
 
 impl Default for TableChoice {
     fn default() -> Self {
-        Self { theta: 16, phi: 64, radiance: RadianceBasis::Klems }
+        Self { theta: 16, phi: 64, rgl: None, radiance: RadianceBasis::Klems, tree: 32 }
     }
 }
 
@@ -64,11 +82,9 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
     pipeline.cancel_with(cancel.clone());
     let outcome = pipeline.effective(&job.loaded)?;
     match job.what {
-        What::Table(TableChoice { theta, phi, radiance }) => {
+        What::Table(choice) => {
             let meta = ExportMeta::of(&job.loaded, &outcome, pipeline.mesh(&job.loaded)?.closes_plane);
-            let steps = ExportResolution { theta_i: theta, phi_i: phi, theta_o: theta, phi_o: phi };
-            let resolution = export::grid_is_free(&job.path).then_some(steps);
-            let options = ExportOptions { resolution, radiance };
+            let options = ExportOptions { resolution: choice.resolution(&job.path), radiance: choice.radiance };
             let progress = |part: f32| {
                 answer(ExportAnswer::Progress(part, "Tabulating"));
                 !cancel.is_set()
