@@ -126,7 +126,7 @@ impl Editor {
     pub(super) fn keep_recovery(&mut self, ctx: &Context) {
         let Some(recovery) = &self.recovery else { return };
         let (version, now) = (self.document.version(), ctx.time());
-        if !self.document.is_dirty() || version == self.background.autosaved.0 {
+        if !self.document.has_work() || version == self.background.autosaved.0 {
             return;
         }
         if now < self.background.autosaved.1 {
@@ -148,7 +148,7 @@ impl Editor {
     /// A place that cannot be written.
     pub fn keep_now(&self) -> biscale::Result<()> {
         match &self.recovery {
-            Some(recovery) if self.document.is_dirty() => recovery.prepare(&self.document)?.write(),
+            Some(recovery) if self.document.has_work() => recovery.prepare(&self.document)?.write(),
             _ => Ok(()),
         }
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use biscale::Result;
+use biscale::export::tile::TileOptions;
 use biscale::scene::{BrdfSpec, Geometry};
 use eframe::egui::Context;
 
@@ -75,6 +76,14 @@ impl Editor {
             }
             Purpose::Environment => scene.light.environment = near.to_string_lossy().into_owned(),
             Purpose::SavePaint(layer) => return self.save_image(&path, layer),
+            Purpose::ExportTable if path.extension().is_some_and(|ending| ending == "gltf" || ending == "mtlx") => {
+                self.dialog = Some(Dialog::Fit { path });
+                return;
+            }
+            Purpose::ExportTile => {
+                self.dialog = Some(Dialog::Tile { path, options: TileOptions::default() });
+                return;
+            }
             Purpose::ExportTable => {
                 match biscale::export::check_ending(&path) {
                     Ok(()) => self.dialog = Some(Dialog::Table { path, choice: TableChoice::default() }),

@@ -47,7 +47,9 @@ impl Messages {
                 Level::Note => theme::ACCENT,
                 Level::Trouble => theme::WARNING,
             };
-            let frame = Frame::new().fill(color.gamma_multiply(0.22)).inner_margin(egui::Margin::symmetric(10, 5));
+            let frame = Frame::new()
+                .fill(ui.visuals().panel_fill.lerp_to_gamma(color, 0.22))
+                .inner_margin(egui::Margin::symmetric(10, 5));
             frame.show(ui, |ui| {
                 ui.horizontal(|ui| {
                     let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(10.0), egui::Sense::hover());

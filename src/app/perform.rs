@@ -21,7 +21,7 @@ impl Editor {
             action,
             Action::New | Action::Open | Action::OpenFile(_) | Action::OpenShipped(_) | Action::Reload | Action::Quit
         );
-        if discards && self.document.is_dirty() {
+        if discards && self.document.has_work() {
             self.dialog = Some(Dialog::Unsaved(action));
             return;
         }
@@ -53,6 +53,10 @@ impl Editor {
             Action::ExportTable => {
                 let name = format!("{}.npz", self.document.name);
                 self.browse(Purpose::ExportTable, &name);
+            }
+            Action::ExportTile => {
+                let name = format!("{}.obj", self.document.name);
+                self.browse(Purpose::ExportTile, &name);
             }
             Action::ExportPicture => {
                 let name = format!("{}.png", self.document.name);

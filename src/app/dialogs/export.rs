@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use biscale::export::RadianceBasis;
+use biscale::export::tile::TileOptions;
 use eframe::egui::{self, Context, DragValue, Grid, Ui};
 
 use crate::app::theme;
@@ -30,13 +31,8 @@ fn footer(ui: &mut Ui, can: bool, answer: &mut Option<Answer>) {
 
 /// How fine a table is.
 pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<Answer> {
-    let mut answer = None;
-    let modal = egui::Modal::new(egui::Id::unique("export table")).show(ctx, |ui| {
-        ui.set_width(440.0);
-        ui.heading("Export the BRDF table");
-        ui.label(path.display().to_string());
-        ui.add_space(6.0);
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    asked(ctx, "Export the BRDF as a table", path, |ui| {
         match ending.as_str() {
             _ if biscale::export::grid_is_free(path) => grid_ui(ui, choice),
             "bsdf" => rgl_ui(ui, choice),
@@ -47,16 +43,12 @@ pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<
         if let Err(error) = &checked {
             ui.colored_label(theme::WARNING, error.to_string());
         }
-        if ending != "npz" {
+        if !matches!(ending.as_str(), "npz" | "csv" | "exr") {
             ui.weak("A note in plain words is written beside it: what the numbers are, and how well it reads.");
         }
         ui.weak("At the scene's quality, not the draft's. Progress and Cancel are in the status line.");
-        footer(ui, checked.is_ok(), &mut answer);
-    });
-    if modal.should_close() && answer.is_none() {
-        answer = Some(Answer::Cancel);
-    }
-    answer
+        checked.is_ok()
+    })
 }
 
 /// Steps of a grid that is free.
@@ -106,12 +98,7 @@ fn radiance_ui(ui: &mut Ui, choice: &mut TableChoice) {
 
 /// Size of a picture.
 pub fn picture_ui(ctx: &Context, path: &Path, width: &mut usize, height: &mut usize) -> Option<Answer> {
-    let mut answer = None;
-    let modal = egui::Modal::new(egui::Id::unique("export picture")).show(ctx, |ui| {
-        ui.set_width(420.0);
-        ui.heading("Export the picture");
-        ui.label(path.display().to_string());
-        ui.add_space(6.0);
+    asked(ctx, "Export the picture", path, |ui| {
         ui.horizontal(|ui| {
             ui.label("Pixels");
             ui.name_inputs("Width", |ui| ui.add(DragValue::new(width).range(16..=4096)));
@@ -119,7 +106,63 @@ pub fn picture_ui(ctx: &Context, path: &Path, width: &mut usize, height: &mut us
             ui.name_inputs("Height", |ui| ui.add(DragValue::new(height).range(16..=4096)));
         });
         ui.weak(".png is as you see it; .exr holds linear radiance.");
-        footer(ui, true, &mut answer);
+        true
+    })
+}
+
+/// What a fit is.
+pub fn fit_ui(ctx: &Context, path: &Path) -> Option<Answer> {
+    asked(ctx, "Export a few parameters", path, |ui| {
+        ui.label(
+            "A rough metal or plastic with a matte part is fitted to the material; what it loses is said afterwards.",
+        );
+        ui.weak("For all of the material export a table.");
+        true
+    })
+}
+
+/// How much of the tile, and how large.
+pub fn tile_ui(ctx: &Context, path: &Path, options: &mut TileOptions) -> Option<Answer> {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    asked(ctx, "Export the tile", path, |ui| {
+        let [mut across, mut along] = options.repeat.to_array();
+        ui.horizontal(|ui| {
+            ui.label("Tiles");
+            ui.name_inputs("Tiles across", |ui| ui.add(DragValue::new(&mut across).range(1..=64)));
+            ui.label("×");
+            ui.name_inputs("Tiles along", |ui| ui.add(DragValue::new(&mut along).range(1..=64)));
+        });
+        options.repeat = glam::UVec2::new(across, along);
+        if matches!(ending.as_str(), "stl" | "svg" | "pdf") {
+            ui.horizontal(|ui| {
+                let label = ui.label("Enlarged by");
+                let drag = DragValue::new(&mut options.scale).range(0.01..=10_000.0).speed(0.2).max_decimals(2);
+                ui.add(drag).labelled_by(label.id);
+                ui.weak("a tile of 1 mm by 40 is 4 cm");
+            });
+        }
+        if matches!(ending.as_str(), "stl" | "png") {
+            let mut side = options.samples.x;
+            ui.horizontal(|ui| {
+                let label = ui.label("Samples along a tile");
+                ui.add(DragValue::new(&mut side).range(2..=2048)).labelled_by(label.id);
+            });
+            options.samples = glam::UVec2::splat(side);
+        }
+        options.scale.is_finite()
+    })
+}
+
+/// A dialog about a file to be written; `body` says whether it can be.
+fn asked(ctx: &Context, title: &str, path: &Path, body: impl FnOnce(&mut Ui) -> bool) -> Option<Answer> {
+    let mut answer = None;
+    let modal = egui::Modal::new(egui::Id::unique(title)).show(ctx, |ui| {
+        ui.set_width(440.0);
+        ui.heading(title);
+        ui.label(path.display().to_string());
+        ui.add_space(6.0);
+        let can = body(ui);
+        footer(ui, can, &mut answer);
     });
     if modal.should_close() && answer.is_none() {
         answer = Some(Answer::Cancel);

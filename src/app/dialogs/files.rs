@@ -23,6 +23,7 @@ pub enum Purpose {
     Environment,
     SavePaint(Layer),
     ExportTable,
+    ExportTile,
     ExportPicture,
 }
 
@@ -41,7 +42,8 @@ impl Purpose {
             Self::SavePaint(Layer::Heights) => "Save the heights",
             Self::SavePaint(Layer::Colors) => "Save the colours",
             Self::SavePaint(Layer::Slots) => "Save the painted materials",
-            Self::ExportTable => "Export the BRDF table",
+            Self::ExportTable => "Export the material",
+            Self::ExportTile => "Export the tile",
             Self::ExportPicture => "Export the picture",
         }
     }
@@ -55,12 +57,14 @@ impl Purpose {
             Self::Environment => &["hdr", "exr"],
             Self::SavePaint(Layer::Slots) => &["png"],
             Self::SavePaint(_) | Self::ExportPicture => &["png", "exr"],
-            Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm"],
+            Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm", "gltf", "mtlx"],
+            Self::ExportTile => &["obj", "stl", "png", "svg", "pdf"],
         }
     }
 
     pub fn saves(&self) -> bool {
-        matches!(self, Self::SaveScene | Self::SavePaint(_) | Self::ExportTable | Self::ExportPicture)
+        let exports = matches!(self, Self::ExportTable | Self::ExportTile | Self::ExportPicture);
+        exports || matches!(self, Self::SaveScene | Self::SavePaint(_))
     }
 }
 
@@ -181,8 +185,8 @@ impl FileDialog {
             let width = ui.available_width();
             ui.add(egui::TextEdit::singleline(&mut self.typed).desired_width(width)).labelled_by(label.id)
         });
-        if self.purpose == Purpose::ExportTable {
-            super::formats::ui(ui, &mut self.typed);
+        if let Some(formats) = super::formats::of(&self.purpose) {
+            super::formats::ui(ui, formats, &mut self.typed);
         }
         if self.fresh {
             field.inner.request_focus();

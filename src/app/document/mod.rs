@@ -37,6 +37,8 @@ pub struct Document {
     pub name: String,
     /// The state that is on disk.
     saved: Option<u64>,
+    /// What was there at first.
+    opened: State,
     /// The file as it was last read or written.
     stamp: Option<Stamp>,
     version: u64,
@@ -49,16 +51,8 @@ impl Document {
         let stamp = path.as_deref().and_then(Stamp::of);
         let history = History::new(HISTORY_BYTES);
         let saved = Some(history.state());
-        Self {
-            state: State { scene: Arc::new(scene), painted },
-            history,
-            base_dir,
-            path,
-            name,
-            saved,
-            stamp,
-            version: 1,
-        }
+        let state = State { scene: Arc::new(scene), painted };
+        Self { opened: state.clone(), state, history, base_dir, path, name, saved, stamp, version: 1 }
     }
 
     /// Opens a scene file, or a shipped scene by name (which has no file of its own).
@@ -98,6 +92,18 @@ impl Document {
 
     pub fn is_dirty(&self) -> bool {
         self.saved != Some(self.history.state())
+    }
+
+    /// Whether something would be missed. Who only turned a shipped scene and its light has nothing to save.
+    pub fn has_work(&self) -> bool {
+        self.is_dirty() && (self.path.is_some() || self.saved.is_none() || !self.is_as_opened_but_for_the_view())
+    }
+
+    fn is_as_opened_but_for_the_view(&self) -> bool {
+        let mut turned = (*self.opened.scene).clone();
+        turned.camera.clone_from(&self.state.scene.camera);
+        turned.light.rotation_deg = self.state.scene.light.rotation_deg;
+        turned == *self.state.scene && self.opened.painted == self.state.painted
     }
 
     /// Takes the scene as the person left it, under the name of what differs. Edits of one control are one entry until

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use biscale::scene::{Geometry, Heightfield, Painted, Scene, Tile};
+use biscale::scene::{Field, Geometry, Heightfield, Painted, Scene, Tile};
 use eframe::egui::Ui;
 use toml::{Table, Value};
 
@@ -74,7 +74,13 @@ fn tile_ui(ui: &mut Ui, tile: &mut Tile, around: &mut Around) {
     let Ok(mut table) = Table::try_from(&*tile) else { return };
     let geometry = table.remove("geometry").unwrap_or(Value::Boolean(false));
     let before = table.clone();
-    let fields: Vec<_> = Tile::fields().into_iter().filter(|field| field.key != "geometry").collect();
+    // Images are opened where they are painted; here stand those that there are.
+    let is_shown = |field: &Field| match field.key {
+        "geometry" => false,
+        "color_path" | "slot_path" => table.contains_key(field.key),
+        _ => true,
+    };
+    let fields: Vec<_> = Tile::fields().into_iter().filter(is_shown).collect();
     ui.add_space(4.0);
     fields::table_ui(ui, &mut table, &fields, &[], around);
     if table != before {

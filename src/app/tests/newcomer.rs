@@ -1,5 +1,6 @@
 //! What a person meets in the first hour: the gallery, a measured paint, an export, a device that is lost.
 
+use biscale::export::tile::TileOptions;
 use biscale::scene::{BrdfSpec, Geometry, TermSpec};
 use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
@@ -7,7 +8,7 @@ use glam::Vec3;
 
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
-use crate::app::dialogs::Dialog;
+use crate::app::dialogs::{Dialog, Purpose};
 use crate::app::paint::Tool;
 use crate::app::worker::{LOSE_DEVICE, TableChoice, What};
 
@@ -159,8 +160,15 @@ fn every_control_of_every_panel_and_dialog_has_a_name() {
         harness.check_accessibility();
     }
     let ctx = harness.ctx.clone();
-    for action in [Action::Help, Action::About, Action::Open, Action::ExportTable, Action::ExportPicture, Action::Quit]
-    {
+    for action in [
+        Action::Help,
+        Action::About,
+        Action::Open,
+        Action::ExportTable,
+        Action::ExportTile,
+        Action::ExportPicture,
+        Action::Quit,
+    ] {
         editor(&mut harness).action(&ctx, action);
         harness.run_steps(3);
         assert!(editor(&mut harness).dialog.is_some());
@@ -170,6 +178,14 @@ fn every_control_of_every_panel_and_dialog_has_a_name() {
     for path in ["a.npz", "a.xml"] {
         let choice = TableChoice::default();
         editor(&mut harness).dialog = Some(Dialog::Table { path: path.into(), choice });
+        harness.run_steps(3);
+        harness.check_accessibility();
+    }
+    editor(&mut harness).dialog = Some(Dialog::Fit { path: "a.gltf".into() });
+    harness.run_steps(3);
+    harness.check_accessibility();
+    for path in ["a.obj", "a.stl"] {
+        editor(&mut harness).dialog = Some(Dialog::Tile { path: path.into(), options: TileOptions::default() });
         harness.run_steps(3);
         harness.check_accessibility();
     }
@@ -261,6 +277,30 @@ fn an_export_takes_the_size_that_was_chosen_shows_its_progress_and_can_be_given_
 }
 
 #[test]
+fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let ctx = harness.ctx.clone();
+    for ending in ["obj", "stl", "png", "svg", "pdf", "gltf", "mtlx"] {
+        let path = folder.path().join(format!("a.{ending}"));
+        let purpose = if ending.len() > 3 { Purpose::ExportTable } else { Purpose::ExportTile };
+        editor(&mut harness).chosen(&ctx, purpose, path.clone());
+        harness.run_steps(2);
+        harness.get_by_label("Export").click();
+        let start = std::time::Instant::now();
+        harness.run_steps(2);
+        while editor(&mut harness).exporting.is_some() {
+            harness.step();
+            assert!(start.elapsed().as_secs() < 60, "{ending}");
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        let texts = editor(&mut harness).messages.texts().join("; ");
+        assert!(texts.contains("Wrote") && std::fs::metadata(&path).unwrap().len() > 100, "{ending}: {texts}");
+    }
+}
+
+#[test]
 fn a_table_that_is_too_large_is_refused_before_any_work() {
     let mut harness = harness(quick());
     let choice = TableChoice { theta: 180, phi: 720, ..TableChoice::default() };
@@ -270,4 +310,23 @@ fn a_table_that_is_too_large_is_refused_before_any_work() {
     harness.key_press(Key::Enter);
     harness.run_steps(2);
     assert!(editor(&mut harness).dialog.is_some() && editor(&mut harness).exporting.is_none());
+}
+
+#[test]
+fn who_only_turned_a_shipped_scene_is_not_asked_to_save_it() {
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.camera.get_or_insert_default().azimuth_deg = 77.0;
+    scene.light.rotation_deg = 12.0;
+    let editor = editor(&mut harness);
+    editor.document.edit(scene.clone());
+    assert!(editor.document.is_dirty() && !editor.document.has_work());
+    editor.action(&ctx, Action::New);
+    assert!(editor.dialog.is_none() && editor.document.name == "default");
+    let mut scene = (**editor.document.scene()).clone();
+    scene.light.count = 3;
+    editor.document.edit(scene);
+    editor.action(&ctx, Action::New);
+    assert!(matches!(editor.dialog, Some(Dialog::Unsaved(_))));
 }

@@ -23,6 +23,8 @@ const NARROW: f32 = 14.0;
 /// A picture kept for comparison.
 pub struct Kept {
     image: Arc<ColorImage>,
+    /// Of the document.
+    version: u64,
     pub texture: TextureHandle,
     pub scene: Arc<Scene>,
     pub name: String,
@@ -67,6 +69,13 @@ impl ObjectView {
         if made.grade == Grade::Final {
             self.doing = None;
         }
+        // A was kept before it was finished: it gets the finished picture.
+        if let Some(kept) = &mut self.kept
+            && kept.version == made.version
+        {
+            kept.image = made.image.clone();
+            kept.texture.set(made.image.clone(), options);
+        }
         self.made = Some(made);
     }
 
@@ -95,7 +104,8 @@ impl ObjectView {
         if let Some(made) = &self.made {
             let texture = ctx.load_texture("kept", made.image.clone(), TextureOptions::LINEAR);
             let image = made.image.clone();
-            self.kept = Some(Kept { image, texture, scene: scene.clone(), name: name.to_owned() });
+            self.kept =
+                Some(Kept { image, version: made.version, texture, scene: scene.clone(), name: name.to_owned() });
             self.wipe = 0.5;
         }
     }
@@ -139,7 +149,10 @@ impl ObjectView {
         }
         let place = Rect::from_min_size(area.left_bottom() + vec2(10.0, -34.0), vec2(170.0, 26.0));
         ui.painter().rect_filled(place, 5.0, Color32::from_black_alpha(150));
-        ui.put(Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0)), egui::Spinner::new());
+        ui.put(
+            Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0)),
+            egui::Spinner::new().color(Color32::WHITE),
+        );
         let text = format!("Computing, {:.0} s", since.elapsed().as_secs_f32());
         let font = egui::FontId::proportional(12.0);
         ui.painter().text(place.left_center() + vec2(28.0, 0.0), egui::Align2::LEFT_CENTER, text, font, Color32::WHITE);

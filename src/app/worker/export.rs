@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use biscale::close_up::CloseUp;
+use biscale::export::tile::TileOptions;
 use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
+use biscale::fit::{self, Model};
+use biscale::geometry::TileMesh;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::LoadedScene;
@@ -54,10 +57,15 @@ impl Default for TableChoice {
     }
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum What {
     Table(TableChoice),
-    Picture { size: [usize; 2] },
+    /// A few parameters, glTF or MaterialX by the ending.
+    Fit,
+    Tile(TileOptions),
+    Picture {
+        size: [usize; 2],
+    },
 }
 
 pub enum ExportAnswer {
@@ -80,8 +88,15 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
     answer(ExportAnswer::Progress(0.0, "Computing the material"));
     let mut pipeline = Pipeline::new();
     pipeline.cancel_with(cancel.clone());
+    if let What::Tile(options) = &job.what {
+        return tile(job, &pipeline.mesh(&job.loaded)?, options);
+    }
     let outcome = pipeline.effective(&job.loaded)?;
     match job.what {
+        What::Tile(_) | What::Fit => {
+            answer(ExportAnswer::Progress(0.5, "Fitting"));
+            fitted(job, &outcome, cancel)
+        }
         What::Table(choice) => {
             let meta = ExportMeta::of(&job.loaded, &outcome, pipeline.mesh(&job.loaded)?.closes_plane);
             let options = ExportOptions { resolution: choice.resolution(&job.path), radiance: choice.radiance };
@@ -105,6 +120,28 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
+}
+
+/// The GGX base with a matte part, which both formats hold.
+fn fitted(job: &ExportJob, outcome: &Outcome, cancel: &Cancel) -> Result<String> {
+    let model = *Model::ALL.last().ok_or_else(|| Error::failed("no model to fit"))?;
+    let fit = fit::fit(&outcome.brdf, model)?;
+    cancel.check()?;
+    let is_gltf = job.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+    let text = if is_gltf { fit::gltf(&fit, &job.loaded.name) } else { fit::materialx(&fit, &job.loaded.name) };
+    export::replace_file(&job.path, text.as_bytes())?;
+    Ok(format!(
+        "Wrote {}: {}; the few parameters are {:.1} % from the material ({:.1} dB). A table keeps all of it.",
+        job.path.display(),
+        model.name(),
+        100.0 * fit.errors.rel_l2,
+        fit.errors.psnr_db
+    ))
+}
+
+fn tile(job: &ExportJob, mesh: &TileMesh, options: &TileOptions) -> Result<String> {
+    let notes = export::tile::write(&job.loaded.scene, mesh, options, &job.path)?;
+    Ok(format!("Wrote {}: {}.", job.path.display(), notes.join("; ")))
 }
 
 fn picture(
