@@ -9,8 +9,8 @@ use std::f32::consts::{PI, TAU};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::gemm;
 use super::gram::{eigen, rank_for};
+use super::{catmull_rom, gemm};
 use crate::brdf::{LobeAngles, Measured};
 use crate::directions::{HalfDifferenceGrid, from_angles, half_vector};
 use crate::error::Result;
@@ -245,11 +245,6 @@ impl Mode {
     fn kappa(&self, grid: BasisGrid) -> f32 {
         self.multiplicity(grid) as f32
     }
-}
-
-fn catmull_rom(t: f32) -> [f32; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [0.5 * (2.0 * t2 - t - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
 }
 
 /// Blocks of all frequencies: `[2m + part][row * normal_rings + ring]`, without weights.

@@ -189,11 +189,10 @@ impl Pipeline {
         for (name, ms) in &times {
             plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
         }
-        let exact = Arc::new(brdf);
-        let brdf = match &between {
-            Some(table) => Arc::new((*exact).clone().interreflecting(table.clone())),
-            None => exact.clone(),
-        };
+        let brdf = Arc::new(match between {
+            Some(table) => brdf.interreflecting(table),
+            None => brdf,
+        });
         let mut notes = shape.mesh.notes.clone();
         if facets.skipped_triangles > 0 {
             notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
@@ -202,8 +201,7 @@ impl Pipeline {
             plan.factored(is_factored, errors.rel_l2);
         }
         let examined = Arc::default();
-        let pictures = Pictures::new(exact, &settings, plan.try_picture_table, earlier).with(between);
-        let pictures = Arc::new(pictures);
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, plan.try_picture_table, earlier));
         let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)

@@ -108,7 +108,10 @@ impl Default for Costs {
 }
 
 /// Queries of the picture that the cost model has in mind: 384x384, 32 lights, a third of them lit and covered.
-const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+pub(super) const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+
+/// Pairs of directions on which what pictures read is held against the BRDF.
+pub const PICTURE_CHECK_PAIRS: usize = 512;
 
 /// What will be done.
 #[derive(Debug, Clone, PartialEq)]
@@ -212,10 +215,6 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         // own grid at best (docs/accuracy.txt: 2.6 % on a V-groove).
         Method::Auto => allowed && found.lookups > 0 && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
     };
-    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
-    let tabulating_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * direct_query);
-    let pays = !found.flat && tabulating_ms.is_some_and(|ms| ms + table_ms < direct_ms);
-    let try_picture_table = decisions::is_on(settings.effects.picture_table, pays);
     let comparison = format!(
         "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
     );
@@ -235,22 +234,9 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         },
         if try_low_rank { 800.0 } else { 0.0 },
     );
+    let horizons = matches!(route, Route::HeightMarch | Route::HorizonScan);
+    let try_picture_table = decisions::picture_table(found, settings, costs, horizons, direct_query, &mut note);
     let forced = &settings.effects;
-    note(
-        "picture_table",
-        try_picture_table,
-        match tabulating_ms {
-            _ if found.flat => "a flat tile is its own BRDF".to_owned(),
-            None => "pictures evaluate the BRDF itself at this quality".to_owned(),
-            Some(ms) => format!(
-                "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {table_ms:.0} ms \
-                 from a table that takes {ms:.0} ms, once; kept if within {:.0} % and {:.0} dB of the sum",
-                settings.picture_tolerance.0 * 100.0,
-                settings.picture_tolerance.1
-            ),
-        },
-        if try_picture_table { tabulating_ms.unwrap_or(0.0) } else { 0.0 },
-    );
     note(
         "exact_lobes",
         decisions::is_on(forced.exact_lobes, found.distinct_normals.is_some()),

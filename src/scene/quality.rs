@@ -5,7 +5,6 @@ use super::schema::{Shape, number, scene_table};
 pub const PRESETS: &[&str] = &["draft", "standard", "fine", "reference", "wu2011"];
 pub const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub const METHODS: &[&str] = &["auto", "direct", "low_rank"];
-pub const PICTURES: &[&str] = &["auto", "exact"];
 
 const GRID_SIDE: Shape = Shape::Integer { min: 2, max: 512 };
 
@@ -30,9 +29,6 @@ scene_table! {
         /// How the product is computed: auto, direct or low_rank.
         #[serde(skip_serializing_if = "Option::is_none")]
         method: Option<String> = None, Shape::Choice(METHODS), "";
-        /// How pictures read the material: auto (from a table where it is close enough) or exact.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        pictures: Option<String> = None, Shape::Choice(PICTURES), "";
         /// Part of the BRDF matrix' power that is kept.
         #[serde(skip_serializing_if = "Option::is_none")]
         keep_m: Option<f32> = None, number(0.5, 1.0), "";

@@ -14,8 +14,8 @@ use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use self::columns::{Column, Weight};
-use super::Direct;
 use super::facet_sum::FacetSum;
+use super::{Direct, catmull_rom};
 use crate::cancel::Cancel;
 use crate::directions::{Places, PolarGrid, UpperPairs};
 use crate::error::Result;
@@ -207,9 +207,4 @@ impl PairTable {
         }
         total
     }
-}
-
-fn catmull_rom(t: f32) -> [f32; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [0.5 * (2.0 * t2 - t - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
 }
