@@ -81,7 +81,7 @@ impl Chosen {
 }
 
 /// Direction pairs of the small reference.
-const PAIRS: usize = 512;
+const PAIRS: usize = 1024;
 /// As in `biscale report`.
 const PAIRS_SEED: u64 = 20_110_801;
 const REFERENCE_FACETS: usize = 2048;
@@ -91,8 +91,10 @@ const LEAST_PASSES: usize = 4;
 const REFERENCE_LEAD_DB: f64 = 8.0;
 /// A rung that shows how bright a scene is.
 const TYPICAL: f64 = 6.0;
-/// Rungs are told apart this finely.
+/// Rungs are told apart this finely where errors fall evenly, and below [`JUMPING`] a rung is cut into [`SCANNED`].
 const STEP: f64 = 0.125;
+const JUMPING: f64 = 7.0;
+const SCANNED: u32 = 16;
 
 /// Chooses settings for `goal`; `progress` hears what is being done.
 ///
@@ -239,6 +241,16 @@ impl<'a> Search<'a> {
             // The best there was: errors need not fall with every step.
             let better = self.tried.iter().copied().max_by(|a, b| a.safe_db().total_cmp(&b.safe_db()));
             return Ok(better.unwrap_or(best));
+        }
+        // Errors of few facets jump from one number to the next: all rungs between are looked at, coarse ones first.
+        if best.rung <= JUMPING && best.rung > 0.0 {
+            for k in 1..SCANNED {
+                let tried = try_at(self, best.rung - 1.0 + f64::from(k) / f64::from(SCANNED), progress)?;
+                if tried.safe_db() >= db {
+                    return Ok(tried);
+                }
+            }
+            return Ok(best);
         }
         let mut step = 0.5;
         while step >= STEP && best.rung > 0.0 {
