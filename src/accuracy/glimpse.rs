@@ -9,8 +9,8 @@ use crate::filtering::Reflectance;
 use crate::geometry::{FacetSampler, Facets, SampleShift};
 use crate::visibility::lifted_origins;
 
-/// Facets that a query sums over. Their visible area divides the sum: with fewer, the bias of that ratio (of the order of one
-/// over their number) shows.
+/// Facets that a query sums over. Where a tile leaves holes their visible area divides the sum: with fewer, the bias of that
+/// ratio (of the order of one over their number) shows.
 const FACETS: usize = 256;
 /// Sets of facets to draw from.
 const SETS: usize = 128;
@@ -48,6 +48,10 @@ impl Reflectance for Glimpse<'_> {
             for s in (first..self.facets.len()).step_by(SETS) {
                 seen += self.add(s, lights, o, &mut sums);
             }
+        }
+        if self.reference.mesh.closes_plane {
+            // Known, where all that is under the base is hidden: what is estimated would be noise in the divisor.
+            seen = f64::from(self.reference.mesh.base_area() * o.z.max(0.0)) / SETS as f64;
         }
         for (out, sum) in out.iter_mut().zip(sums) {
             *out = if seen > 0.0 { (sum / seen).as_vec3() } else { Vec3::ZERO };
@@ -94,28 +98,35 @@ mod tests {
             let loaded = crate::scene::open(name, &[]).unwrap();
             let pairs = mirror_biased_pairs(24, 5);
             let settings = ReferenceSettings { facets: 8192, max_passes: 4, target: 0.0, seed: 3 };
-            let (exact, means) = Pipeline::new()
-                .with_reference(&loaded, |reference| {
-                    let exact = reference.estimate(&pairs, &settings, |_, _| true);
-                    let mut means = vec![Vec3::ZERO; pairs.len()];
-                    for seed in 0..32 {
-                        let glimpse = reference.glimpse(seed, &Cancel::default()).unwrap();
-                        for (mean, pair) in means.iter_mut().zip(&pairs) {
-                            let mut value = [Vec3::ZERO];
-                            glimpse.eval_lights(&[pair.i], pair.o, &mut value);
-                            *mean += value[0] / 32.0;
-                        }
+            let mean_of = |reference: &Reference<'_>, seeds: std::ops::Range<u64>| -> Vec<Vec3> {
+                let part = 1.0 / (seeds.end - seeds.start) as f32;
+                let mut means = vec![Vec3::ZERO; pairs.len()];
+                for seed in seeds {
+                    let glimpse = reference.glimpse(seed, &Cancel::default()).unwrap();
+                    for (mean, pair) in means.iter_mut().zip(&pairs) {
+                        let mut value = [Vec3::ZERO];
+                        glimpse.eval_lights(&[pair.i], pair.o, &mut value);
+                        *mean += value[0] * part;
                     }
-                    (exact, means)
-                })
-                .unwrap();
-            let (mut off, mut norm) = (0.0, 0.0);
-            for (exact, mean) in exact.iter().zip(&means) {
-                off += exact.f_bar.distance_squared(*mean);
+                }
+                means
+            };
+            let estimate = |reference: &Reference<'_>| {
+                (
+                    reference.estimate(&pairs, &settings, |_, _| true),
+                    [0..32, 32..64].map(|seeds| mean_of(reference, seeds)),
+                )
+            };
+            let (exact, [a, b]) = Pipeline::new().with_reference(&loaded, estimate).unwrap();
+            let (mut off, mut noise, mut norm) = (0.0, 0.0, 0.0);
+            for (exact, (a, b)) in exact.iter().zip(a.iter().zip(&b)) {
+                off += exact.f_bar.distance_squared(0.5 * (*a + *b));
+                noise += 0.25 * a.distance_squared(*b);
                 norm += exact.f_bar.length_squared();
             }
-            // 32 times 256 facets: as many as one pass, whose error is below 2 % on these tiles.
-            assert!((off / norm).sqrt() < 0.03, "{name}: {}", (off / norm).sqrt());
+            let (off, noise) = ((off / norm).sqrt(), (noise / norm).sqrt());
+            // 3 % for what interpolated normals change in the projected area, and for the reference's own error.
+            assert!(off < 2.5 * noise + 0.03 && noise < 0.25, "{name}: {off} with a noise of {noise}");
         }
     }
 }
