@@ -81,7 +81,7 @@ impl Chosen {
 }
 
 /// Direction pairs of the small reference.
-const PAIRS: usize = 1024;
+const PAIRS: usize = 512;
 /// As in `biscale report`.
 const PAIRS_SEED: u64 = 20_110_801;
 const REFERENCE_FACETS: usize = 2048;
@@ -246,7 +246,8 @@ impl<'a> Search<'a> {
         if best.rung <= JUMPING && best.rung > 0.0 {
             for k in 1..SCANNED {
                 let tried = try_at(self, best.rung - 1.0 + f64::from(k) / f64::from(SCANNED), progress)?;
-                if tried.safe_db() >= db {
+                // The first of many that passes is likely to be a lucky one: twice the margin.
+                if tried.safe_db() - tried.doubt_db >= db {
                     return Ok(tried);
                 }
             }

@@ -53,7 +53,7 @@ type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
 type ShapeKey = (Tile, PathBuf, Painted);
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
 /// Mesh, count, seed, whether they are drawn as the paper does, and whether their colours count.
-type FacetKey = (Version, usize, u64, bool, Switch);
+type FacetKey = (Version, [Option<usize>; 2], u64, bool, Switch);
 type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
@@ -114,7 +114,8 @@ impl Pipeline {
         let (materials, materials_version) = self.materials(loaded, &shape.mesh, &mut times)?;
         let sum_materials = &materials.1;
         let colors = settings.effects.color_weights;
-        let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011, colors);
+        let counts = [Some(settings.facets), settings.normal_bins];
+        let facet_key = (shape_version, counts, settings.seed, settings.preset == Preset::Wu2011, colors);
         let (facets, facets_version) =
             self.facets.get("facets", facet_key, &mut times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
         let material_of_slot = &grouped(&materials.0, &facets, &settings);

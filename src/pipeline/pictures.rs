@@ -11,7 +11,7 @@ use crate::accuracy::{Errors, picture_pairs, upper_errors};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
 use crate::error::Result;
-use crate::filtering::{EffectiveBrdf, Form, PairTable};
+use crate::filtering::{EffectiveBrdf, Form, Interpolation, PairTable};
 use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
 
 /// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
@@ -40,6 +40,7 @@ pub(super) type Earlier = (Arc<EffectiveBrdf>, bool);
 pub(super) struct Pictures {
     exact: Arc<EffectiveBrdf>,
     grids: Vec<UpperPairs>,
+    interpolation: Interpolation,
     tolerance: (f64, f64),
     seed: u64,
     earlier: Mutex<Option<Earlier>>,
@@ -52,6 +53,7 @@ impl Pictures {
         Self {
             exact,
             grids: if wanted { settings.picture_grids.clone() } else { Vec::new() },
+            interpolation: settings.interpolation,
             tolerance: settings.picture_tolerance,
             seed: settings.seed,
             earlier: Mutex::new(earlier),
@@ -113,7 +115,7 @@ impl Pictures {
                     None => break,
                 },
             };
-            let brdf = self.exact.with_direct_form(Form::Table(table));
+            let brdf = self.exact.with_direct_form(Form::Table(table.read(self.interpolation)));
             let errors = upper_errors(&values(&brdf), &exact);
             if self.is_close(errors) {
                 return Ok((Arc::new(brdf), Some(errors)));

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Method, Preset, Settings, decisions};
+use super::{Method, Preset, Settings, Sighting, decisions};
 
 /// One effect of the plan, as `biscale plan --json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -163,6 +163,8 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     };
     let facets = settings.facets as f64;
     let route = route(found, settings, costs);
+    let what =
+        if settings.sighting == Sighting::Auto { "surfaces overhang" } else { "asked for by quality.visibility" };
     let (what, predicted) = match route {
         Route::None => (decisions::no_visibility(found, settings), 0.0),
         Route::HeightMarch => (
@@ -178,7 +180,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         ),
         Route::Slices => (
             format!(
-                "surfaces overhang: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
+                "{what}: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
                 settings.slice_azimuths,
                 maps_ms(found, settings, costs)
             ),
@@ -186,7 +188,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         ),
         Route::CpuMaps => (
             format!(
-                "surfaces overhang: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
+                "{what}: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
                 settings.map_grid.len(),
                 settings.map_resolution,
                 scan_ms(found, settings, costs)
@@ -194,7 +196,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             maps_ms(found, settings, costs),
         ),
         Route::GpuMaps => (
-            format!("surfaces overhang and a GPU is at hand: {} toroidal shadow maps", settings.map_grid.len()),
+            format!("{what}, on the GPU: {} toroidal shadow maps", settings.map_grid.len()),
             settings.map_grid.len() as f64 * found.triangles as f64 * 2e-6,
         ),
     };
@@ -324,15 +326,19 @@ fn maps_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
 fn route(found: &Findings, settings: &Settings, costs: &Costs) -> Route {
     if !decisions::is_on(settings.effects.visibility, !found.flat && !decisions::is_shallow(found, settings)) {
         Route::None
-    } else if found.height_samples {
-        Route::HeightMarch
-    } else if found.height_field {
-        Route::HorizonScan
-    } else if found.hardware_gpu {
-        Route::GpuMaps
-    } else if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) {
-        Route::Slices
     } else {
-        Route::CpuMaps
+        let maps = if found.hardware_gpu { Route::GpuMaps } else { Route::CpuMaps };
+        match settings.sighting {
+            Sighting::Slices => Route::Slices,
+            Sighting::Maps => maps,
+            Sighting::Auto if found.height_samples => Route::HeightMarch,
+            Sighting::Auto if found.height_field => Route::HorizonScan,
+            Sighting::Auto
+                if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) && !found.hardware_gpu =>
+            {
+                Route::Slices
+            }
+            Sighting::Auto => maps,
+        }
     }
 }

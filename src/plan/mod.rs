@@ -7,4 +7,4 @@ mod settings;
 mod tests;
 
 pub use effects::{Costs, Effect, Findings, PICTURE_CHECK_PAIRS, Plan, Route, decide};
-pub use settings::{Backend, Method, Preset, Settings};
+pub use settings::{Backend, Method, Preset, Settings, Sighting};

@@ -5,6 +5,8 @@ use super::schema::{Shape, number, scene_table};
 pub const PRESETS: &[&str] = &["draft", "standard", "fine", "reference", "wu2011"];
 pub const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub const METHODS: &[&str] = &["auto", "direct", "low_rank"];
+pub const VISIBILITIES: &[&str] = &["auto", "slices", "maps"];
+pub const INTERPOLATIONS: &[&str] = &["cubic", "linear"];
 
 const GRID_SIDE: Shape = Shape::Integer { min: 2, max: 512 };
 
@@ -26,6 +28,12 @@ scene_table! {
         /// Elevation rings at which visibility is computed.
         #[serde(skip_serializing_if = "Option::is_none")]
         rings: Option<usize> = None, Shape::Integer { min: 2, max: 512 }, "";
+        /// How visibility is computed: auto (what is cheapest), slices or maps.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        visibility: Option<String> = None, Shape::Choice(VISIBILITIES), "";
+        /// Bins over the sphere of normals; facets of a bin share one lobe. None: normals as they are.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        normal_bins: Option<usize> = None, Shape::Integer { min: 16, max: 1_000_000 }, "";
         /// How the product is computed: auto, direct or low_rank.
         #[serde(skip_serializing_if = "Option::is_none")]
         method: Option<String> = None, Shape::Choice(METHODS), "";
@@ -41,6 +49,9 @@ scene_table! {
         /// Rings and azimuths of the direction grid of the factored form.
         #[serde(skip_serializing_if = "Option::is_none")]
         grid: Option<[usize; 2]> = None, Shape::List { of: &GRID_SIDE, min: 2, max: 2 }, "";
+        /// Between the nodes of factors and of tables for pictures: cubic or linear.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        interpolation: Option<String> = None, Shape::Choice(INTERPOLATIONS), "";
         /// Rays or samples of the reference for each pair of directions.
         #[serde(skip_serializing_if = "Option::is_none")]
         reference_samples: Option<usize> = None, Shape::Integer { min: 16, max: 1_000_000_000 }, "";
