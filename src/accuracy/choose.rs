@@ -91,8 +91,10 @@ const LEAST_PASSES: usize = 4;
 const REFERENCE_LEAD_DB: f64 = 8.0;
 /// A rung that shows how bright a scene is.
 const TYPICAL: f64 = 6.0;
-/// Rungs are told apart this finely.
+/// Rungs are told apart this finely where errors fall evenly, and below [`JUMPING`] a rung is cut into [`SCANNED`].
 const STEP: f64 = 0.125;
+const JUMPING: f64 = 7.0;
+const SCANNED: u32 = 16;
 
 /// Chooses settings for `goal`; `progress` hears what is being done.
 ///
@@ -239,6 +241,17 @@ impl<'a> Search<'a> {
             // The best there was: errors need not fall with every step.
             let better = self.tried.iter().copied().max_by(|a, b| a.safe_db().total_cmp(&b.safe_db()));
             return Ok(better.unwrap_or(best));
+        }
+        // Errors of few facets jump from one number to the next: all rungs between are looked at, coarse ones first.
+        if best.rung <= JUMPING && best.rung > 0.0 {
+            for k in 1..SCANNED {
+                let tried = try_at(self, best.rung - 1.0 + f64::from(k) / f64::from(SCANNED), progress)?;
+                // The first of many that passes is likely to be a lucky one: twice the margin.
+                if tried.safe_db() - tried.doubt_db >= db {
+                    return Ok(tried);
+                }
+            }
+            return Ok(best);
         }
         let mut step = 0.5;
         while step >= STEP && best.rung > 0.0 {

@@ -52,11 +52,14 @@ impl Candidate {
 const KNOBS: &[(&str, &[&str], &[&str])] = &[
     ("facets", &["512", "1024", "2048", "4096", "8192", "24576"], &["quality.method=\"direct\""]),
     ("azimuths", &["12", "24", "36", "64", "96", "144"], &["quality.method=\"direct\""]),
+    ("visibility", &["\"slices\"", "\"maps\""], &["quality.method=\"direct\""]),
+    ("normal_bins", &["64", "256", "1024", "4096"], &["quality.method=\"direct\""]),
     ("penumbra_deg", &["0.1", "3", "6"], &["quality.method=\"direct\""]),
     ("method", &["\"direct\"", "\"low_rank\""], &[]),
     ("keep_m", &["0.9", "0.98", "0.995", "0.9999"], &["quality.method=\"low_rank\""]),
     ("keep_n", &["0.9", "0.98", "0.995", "0.9999"], &["quality.method=\"low_rank\""]),
     ("grid", &["[8,16]", "[12,24]", "[24,48]"], &["quality.method=\"low_rank\""]),
+    ("interpolation", &["\"linear\""], &["quality.method=\"low_rank\""]),
     ("colors", &["1", "2", "3"], &["quality.method=\"low_rank\""]),
 ];
 

@@ -188,7 +188,7 @@ fn thumbnails(loaded: &LoadedScene, bar: &ProgressBar) -> Result<Vec<Thumbnail>>
     let picture = |preset: &'static str, set: &[String]| -> Result<_> {
         let candidate = Candidate { family: Family::Preset, preset, set: set.to_vec() };
         let brdf: std::sync::Arc<EffectiveBrdf> = Pipeline::new().effective(&with_settings(loaded, &candidate)?)?.brdf;
-        Ok(studio.picture(&brdf)?)
+        Ok(studio.picture(&*brdf)?)
     };
     let facets = FINEST[usize::from(has_measured(loaded))];
     bar.set_message("the finest picture");

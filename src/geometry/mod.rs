@@ -10,6 +10,7 @@ pub mod heightfield;
 pub mod image_file;
 pub(crate) mod kd_tree;
 mod mesh_file;
+mod normal_bins;
 pub mod obj;
 mod pyramids;
 mod rods;

@@ -1,5 +1,6 @@
 //! Decisions of the plan that a scene's shape and materials settle, and what a person forces.
 
+use super::effects::{PICTURE_CHECK_PAIRS, PICTURE_QUERIES};
 use super::{Costs, Effect, Findings, Preset, Settings};
 use crate::interreflection::predicted_share;
 use crate::scene::Switch;
@@ -42,6 +43,44 @@ pub(super) fn no_visibility(found: &Findings, settings: &Settings) -> String {
             25.0 * settings.tolerance
         )
     }
+}
+
+/// Whether pictures read something quicker than the BRDF itself. `query_ms`: one direct sum, all threads at work.
+pub(super) fn picture_table(
+    found: &Findings,
+    settings: &Settings,
+    costs: &Costs,
+    horizons: bool,
+    query_ms: f64,
+    note: &mut impl Note,
+) -> bool {
+    let direct_ms = PICTURE_QUERIES * query_ms;
+    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
+    let making_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * query_ms);
+    let pays = !found.flat && making_ms.is_some_and(|ms| ms + table_ms < direct_ms);
+    let on = is_on(settings.effects.picture_table, pays);
+    let thinned = horizons && found.distinct_normals.is_some();
+    let reason = match making_ms {
+        _ if found.flat => "a flat tile is its own BRDF".to_owned(),
+        None => "pictures evaluate the BRDF itself at this quality".to_owned(),
+        Some(ms) => {
+            let (percent, db) = (settings.picture_tolerance.0 * 100.0, settings.picture_tolerance.1);
+            let kept = format!("kept if within {percent:.0} % and {db:.0} dB of the sum");
+            let direct = format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly");
+            let table = format!("{table_ms:.0} ms from a table that takes {ms:.0} ms, once");
+            if thinned {
+                format!(
+                    "few normals: pictures sum over a tenth or a third of the facets, else ({direct}) {table}; {kept}"
+                )
+            } else {
+                format!("{direct}, {table}; {kept}")
+            }
+        }
+    };
+    // Thinning takes no more than its check.
+    let predicted = if thinned { PICTURE_CHECK_PAIRS as f64 * query_ms } else { making_ms.unwrap_or(0.0) };
+    note("picture_table", on, reason, if on { predicted } else { 0.0 });
+    on
 }
 
 /// The part of all directions in which facets see each other: `1 - A/S` of a surface that closes the plane (every ray of uniform

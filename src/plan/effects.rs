@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Method, Preset, Settings, decisions};
+use super::{Method, Preset, Settings, Sighting, decisions};
 
 /// One effect of the plan, as `biscale plan --json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -108,7 +108,10 @@ impl Default for Costs {
 }
 
 /// Queries of the picture that the cost model has in mind: 384x384, 32 lights, a third of them lit and covered.
-const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+pub(super) const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+
+/// Pairs of directions on which what pictures read is held against the BRDF.
+pub const PICTURE_CHECK_PAIRS: usize = 512;
 
 /// What will be done.
 #[derive(Debug, Clone, PartialEq)]
@@ -160,6 +163,8 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     };
     let facets = settings.facets as f64;
     let route = route(found, settings, costs);
+    let what =
+        if settings.sighting == Sighting::Auto { "surfaces overhang" } else { "asked for by quality.visibility" };
     let (what, predicted) = match route {
         Route::None => (decisions::no_visibility(found, settings), 0.0),
         Route::HeightMarch => (
@@ -175,7 +180,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         ),
         Route::Slices => (
             format!(
-                "surfaces overhang: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
+                "{what}: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
                 settings.slice_azimuths,
                 maps_ms(found, settings, costs)
             ),
@@ -183,7 +188,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         ),
         Route::CpuMaps => (
             format!(
-                "surfaces overhang: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
+                "{what}: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
                 settings.map_grid.len(),
                 settings.map_resolution,
                 scan_ms(found, settings, costs)
@@ -191,7 +196,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             maps_ms(found, settings, costs),
         ),
         Route::GpuMaps => (
-            format!("surfaces overhang and a GPU is at hand: {} toroidal shadow maps", settings.map_grid.len()),
+            format!("{what}, on the GPU: {} toroidal shadow maps", settings.map_grid.len()),
             settings.map_grid.len() as f64 * found.triangles as f64 * 2e-6,
         ),
     };
@@ -212,10 +217,6 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         // own grid at best (docs/accuracy.txt: 2.6 % on a V-groove).
         Method::Auto => allowed && found.lookups > 0 && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
     };
-    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
-    let tabulating_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * direct_query);
-    let pays = !found.flat && tabulating_ms.is_some_and(|ms| ms + table_ms < direct_ms);
-    let try_picture_table = decisions::is_on(settings.effects.picture_table, pays);
     let comparison = format!(
         "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
     );
@@ -235,22 +236,9 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         },
         if try_low_rank { 800.0 } else { 0.0 },
     );
+    let horizons = matches!(route, Route::HeightMarch | Route::HorizonScan);
+    let try_picture_table = decisions::picture_table(found, settings, costs, horizons, direct_query, &mut note);
     let forced = &settings.effects;
-    note(
-        "picture_table",
-        try_picture_table,
-        match tabulating_ms {
-            _ if found.flat => "a flat tile is its own BRDF".to_owned(),
-            None => "pictures evaluate the BRDF itself at this quality".to_owned(),
-            Some(ms) => format!(
-                "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {table_ms:.0} ms \
-                 from a table that takes {ms:.0} ms, once; kept if within {:.0} % and {:.0} dB of the sum",
-                settings.picture_tolerance.0 * 100.0,
-                settings.picture_tolerance.1
-            ),
-        },
-        if try_picture_table { tabulating_ms.unwrap_or(0.0) } else { 0.0 },
-    );
     note(
         "exact_lobes",
         decisions::is_on(forced.exact_lobes, found.distinct_normals.is_some()),
@@ -338,15 +326,19 @@ fn maps_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
 fn route(found: &Findings, settings: &Settings, costs: &Costs) -> Route {
     if !decisions::is_on(settings.effects.visibility, !found.flat && !decisions::is_shallow(found, settings)) {
         Route::None
-    } else if found.height_samples {
-        Route::HeightMarch
-    } else if found.height_field {
-        Route::HorizonScan
-    } else if found.hardware_gpu {
-        Route::GpuMaps
-    } else if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) {
-        Route::Slices
     } else {
-        Route::CpuMaps
+        let maps = if found.hardware_gpu { Route::GpuMaps } else { Route::CpuMaps };
+        match settings.sighting {
+            Sighting::Slices => Route::Slices,
+            Sighting::Maps => maps,
+            Sighting::Auto if found.height_samples => Route::HeightMarch,
+            Sighting::Auto if found.height_field => Route::HorizonScan,
+            Sighting::Auto
+                if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) && !found.hardware_gpu =>
+            {
+                Route::Slices
+            }
+            Sighting::Auto => maps,
+        }
     }
 }

@@ -6,5 +6,5 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use effects::{Costs, Effect, Findings, Plan, Route, decide};
-pub use settings::{Backend, Method, Preset, Settings};
+pub use effects::{Costs, Effect, Findings, PICTURE_CHECK_PAIRS, Plan, Route, decide};
+pub use settings::{Backend, Method, Preset, Settings, Sighting};

@@ -120,7 +120,7 @@ impl Runner {
         pipeline.cancel_with(cancel.clone());
         let start = Instant::now();
         let outcome = pipeline.effective(&scene)?;
-        let picture = studio.picture(&outcome.for_pictures(cancel)?.brdf)?;
+        let picture = studio.picture(&*outcome.for_pictures(cancel)?.brdf)?;
         let first_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(Self { scene, studio, pipeline, outcome, picture, first_ms, times: Vec::new() })
     }
@@ -132,7 +132,7 @@ impl Runner {
         moved.scene.quality.seed ^= if self.times.is_empty() && run == 0 { 1 } else { run };
         let start = Instant::now();
         self.outcome = self.pipeline.effective(&moved)?;
-        self.picture = self.studio.picture(&self.outcome.for_pictures(cancel)?.brdf)?;
+        self.picture = self.studio.picture(&*self.outcome.for_pictures(cancel)?.brdf)?;
         self.times.push(start.elapsed().as_secs_f64() * 1e3);
         Ok(())
     }
