@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use biscale::large_scale::CameraView;
 use biscale::scene::{Material, Scene};
 use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
 
@@ -13,14 +12,12 @@ use super::document::{Document, Recovered, RecoveryFile, Settings};
 use super::messages::{Level, Messages};
 use super::paint::Stroke;
 use super::panels::{self, materials};
-use super::pick;
 use super::theme;
-use super::views::brushes;
 use super::views::gallery::Gallery;
 use super::views::hand::Hand;
 use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
-use super::views::tile::{self, TileState, Which};
+use super::views::tile::TileState;
 
 /// What a person reads at the first start, until it is closed.
 const WELCOME: &str = "welcome";
@@ -54,8 +51,8 @@ pub struct Editor {
     /// Pixels of the object view.
     pub(super) size: [usize; 2],
     /// What the hand did on the tile in this frame.
-    hand: Vec<Hand>,
-    from_view: Option<Action>,
+    pub(super) hand: Vec<Hand>,
+    pub(super) from_view: Option<Action>,
     pub(super) copied: Option<Material>,
     /// Why pictures are not made on the device any more, as it was said.
     pub(super) device_trouble: Option<String>,
@@ -215,74 +212,6 @@ impl Editor {
         self.keep_recovery(&ctx);
         self.fill_gallery();
         self.measure_accuracy();
-    }
-
-    fn gallery_ui(&mut self, ui: &mut Ui) -> Option<Action> {
-        if !self.settings.gallery {
-            return None;
-        }
-        let panel = Panel::left("gallery").default_size(self.settings.gallery_width).size_range(118.0..=480.0);
-        let shown = panel.show(ui, |ui| self.gallery.ui(ui, &self.document.name));
-        self.settings.gallery_width = shown.response.rect.width();
-        let chosen = shown.inner;
-        chosen.map(|name| Action::OpenShipped(name.to_owned()))
-    }
-
-    fn object_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
-        let fill = ui.visuals().panel_fill;
-        egui::Frame::new().fill(fill).inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
-            ui.take_available_width();
-            self.from_view = self.object.toolbar(ui, scene);
-        });
-        self.size = self.object.ui(ui, scene);
-        self.pick();
-    }
-
-    /// What the pointer is over tells the lobe view and the tile.
-    fn pick(&mut self) {
-        let (Some(at), Some(made)) = (self.object.pointed, &self.object.made) else { return };
-        let Some((mesh, lights)) = &made.set else { return };
-        let size = [made.picture.width, made.picture.height];
-        let Ok(view) = CameraView::new(&made.camera, mesh, size) else { return };
-        let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
-        if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
-            self.lobe.viewer = Some(picked.viewer);
-            self.lobe.light = picked.light.unwrap_or(self.lobe.light);
-            let value = made.brdf.eval(self.lobe.light, picked.viewer).max_element();
-            self.tile.picked = Some((picked.viewer, 4.0 * value));
-            self.tile.show = Which::Contribution;
-        }
-    }
-
-    /// The tile with its toolbar; `below` is kept free.
-    fn tile_ui(&mut self, ui: &mut Ui, scene: &Scene, below: f32) {
-        ui.add_space(3.0);
-        if let Some(on) = self.tile.toolbar(ui) {
-            self.tile.set_painting(on);
-        }
-        let size = if below > 0.0 { tile::fitting(ui, below) } else { ui.available_size() };
-        self.hand = self.tile.ui(ui, scene.tile.size, size);
-    }
-
-    /// The smaller view, and under it the brush or the lobe.
-    fn side_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
-        if self.exchanged {
-            let size = tile::fitting(ui, 300.0);
-            ui.allocate_ui(size, |ui| self.object_ui(ui, scene));
-        } else {
-            let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + 90.0 };
-            self.tile_ui(ui, scene, below);
-        }
-        ui.add_space(6.0);
-        if self.tile.painting {
-            ScrollArea::vertical().show(ui, |ui| {
-                if let Some(asked) = brushes::ui(ui, &mut self.tile.brush, scene) {
-                    self.brush_asked(asked);
-                }
-            });
-        } else {
-            self.lobe.ui(ui);
-        }
     }
 
     /// Strokes come after the panels: what they edit is the scene as it is then.

@@ -2,15 +2,15 @@
 
 use biscale::export::tile::TileOptions;
 use biscale::scene::{BrdfSpec, Geometry, TermSpec};
-use eframe::egui::{self, Key, Modifiers};
+use eframe::egui::{self, Key};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
-use crate::app::dialogs::{Dialog, Purpose};
+use crate::app::dialogs::Dialog;
 use crate::app::paint::Tool;
-use crate::app::worker::{LOSE_DEVICE, TableChoice, What};
+use crate::app::worker::TableChoice;
 
 #[test]
 fn the_gallery_is_searched_by_words_and_says_when_nothing_is_found() {
@@ -61,75 +61,6 @@ fn help_is_closed_by_escape() {
     harness.key_press(Key::Escape);
     harness.run_steps(2);
     assert!(editor(&mut harness).dialog.is_none());
-}
-
-#[test]
-fn an_export_offers_formats_by_name_and_the_name_takes_the_ending() {
-    let mut harness = harness(quick());
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::E);
-    harness.run_steps(3);
-    harness.get_by_label("Format").click();
-    harness.run_steps(2);
-    let mitsuba = harness.get_all_by_label_contains("RGL tensor (.bsdf)").last().unwrap();
-    mitsuba.click();
-    harness.run_steps(2);
-    let Some(Dialog::Files(files)) = &editor(&mut harness).dialog else { panic!("no dialog") };
-    assert_eq!(files.typed, "quick.bsdf");
-}
-
-#[test]
-fn a_lost_device_is_a_message_and_pictures_go_on_on_the_processor() {
-    if let Err(error) = biscale::gpu::Gpu::open() {
-        return eprintln!("SKIPPED: {error}");
-    }
-    let mut harness = harness(quick());
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.quality.backend = "gpu".to_owned();
-    editor(&mut harness).document.edit(scene);
-    harness.step();
-    settle(&mut harness);
-    let device = editor(&mut harness).object.made.as_ref().unwrap().device.clone();
-    if device.starts_with("CPU") {
-        return eprintln!("SKIPPED: pictures are not made on the device ({device})");
-    }
-    LOSE_DEVICE.store(true, std::sync::atomic::Ordering::SeqCst);
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.light.rotation_deg = 25.0;
-    editor(&mut harness).document.edit(scene.clone());
-    harness.step();
-    settle(&mut harness);
-    for _ in 0..300 {
-        harness.step();
-        if editor(&mut harness).messages.texts().iter().any(|text| text.contains("graphics device failed")) {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-    let editor = editor(&mut harness);
-    let texts = editor.messages.texts().join("; ");
-    assert!(texts.contains("graphics device failed") && texts.contains("document is kept"), "{texts}");
-    assert_eq!(**editor.document.scene(), scene);
-    let made = editor.object.made.as_ref().unwrap();
-    assert!(made.picture.pixels.iter().all(|pixel| pixel.is_finite()));
-}
-
-#[test]
-fn an_editor_that_moves_to_another_window_keeps_its_document_and_makes_its_pictures_anew() {
-    let mut harness = harness(quick());
-    settle(&mut harness);
-    let ctx = harness.ctx.clone();
-    editor(&mut harness).action(&ctx, Action::Snapshot);
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.light.count = 3;
-    editor(&mut harness).document.edit(scene.clone());
-    editor(&mut harness).move_to(&ctx);
-    harness.step();
-    settle(&mut harness);
-    let editor = editor(&mut harness);
-    assert_eq!(**editor.document.scene(), scene);
-    assert!(editor.document.undo_name().is_some() && editor.object.kept.is_some());
-    assert!(editor.messages.texts().iter().any(|text| text.contains("new window")));
-    assert_eq!(editor.object.made.as_ref().unwrap().version, editor.document.version());
 }
 
 #[test]
@@ -195,39 +126,6 @@ fn every_control_of_every_panel_and_dialog_has_a_name() {
 }
 
 #[test]
-fn what_is_typed_and_is_no_number_is_a_message_and_the_value_stays() {
-    let mut harness = harness(quick());
-    settle(&mut harness);
-    let before = editor(&mut harness).document.scene().clone();
-    for text in ["nan", "inf"] {
-        let field = harness.get_all_by_role(egui::Role::SpinButton).nth(1).unwrap();
-        field.click();
-        harness.run_steps(2);
-        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
-        harness.event(egui::Event::Text(text.to_owned()));
-        harness.run_steps(2);
-        harness.key_press(Key::Enter);
-        harness.run_steps(2);
-        let texts = editor(&mut harness).messages.texts().join("; ");
-        assert!(texts.contains("not a number"), "{text}: {texts}");
-        assert_eq!(*editor(&mut harness).document.scene(), before);
-    }
-}
-
-#[test]
-fn a_place_that_cannot_be_written_says_so_and_the_document_stays_unsaved() {
-    let mut harness = harness(quick());
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.light.count = 3;
-    let editor = editor(&mut harness);
-    editor.document.edit(scene);
-    editor.save(std::path::Path::new("/nonexistent/folder/a.toml"));
-    let texts = editor.messages.texts().join("; ");
-    assert!(texts.contains("Not saved") && texts.contains("nonexistent") && texts.contains("still here"), "{texts}");
-    assert!(editor.document.is_dirty());
-}
-
-#[test]
 fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not() {
     let mut harness = harness(quick());
     let text =
@@ -245,71 +143,6 @@ fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not
         let texts = editor(&mut harness).messages.texts().join("; ");
         assert!(texts.contains("clipboard holds no material") || texts.contains("Not pasted"), "{texts}");
     }
-}
-
-#[test]
-fn an_export_takes_the_size_that_was_chosen_shows_its_progress_and_can_be_given_up() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("small.bsdf");
-    let mut harness = harness(quick());
-    settle(&mut harness);
-    editor(&mut harness).dialog = Some(Dialog::Table { path: path.clone(), choice: TableChoice::default() });
-    harness.run_steps(3);
-    harness.get_by_label_contains("Small: 9 x 24").click();
-    harness.run_steps(2);
-    harness.get_by_label("Export").click();
-    harness.run_steps(2);
-    assert!(editor(&mut harness).exporting.is_some() && harness.query_by_label("Cancel").is_some());
-    harness.get_by_label("Cancel").click();
-    harness.run_steps(2);
-    assert!(editor(&mut harness).exporting.is_none());
-    let mut choice = TableChoice { theta: 2, phi: 4, ..TableChoice::default() };
-    choice.rgl = Some([3, 4, 4, 4]);
-    editor(&mut harness).export(path.clone(), What::Table(choice));
-    let start = std::time::Instant::now();
-    while !path.exists() {
-        harness.step();
-        assert!(start.elapsed().as_secs() < 60, "{:?}", editor(&mut harness).messages.texts());
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-    // Three elevations, four azimuths and the first again, of 4 x 4 samples: far below the small size.
-    assert!(std::fs::metadata(&path).unwrap().len() < 20_000);
-}
-
-#[test]
-fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut harness = harness(quick());
-    settle(&mut harness);
-    let ctx = harness.ctx.clone();
-    for ending in ["obj", "stl", "png", "svg", "pdf", "gltf", "mtlx"] {
-        let path = folder.path().join(format!("a.{ending}"));
-        let purpose = if ending.len() > 3 { Purpose::ExportTable } else { Purpose::ExportTile };
-        editor(&mut harness).chosen(&ctx, purpose, path.clone());
-        harness.run_steps(2);
-        harness.get_by_label("Export").click();
-        let start = std::time::Instant::now();
-        harness.run_steps(2);
-        while editor(&mut harness).exporting.is_some() {
-            harness.step();
-            assert!(start.elapsed().as_secs() < 60, "{ending}");
-            std::thread::sleep(std::time::Duration::from_millis(10));
-        }
-        let texts = editor(&mut harness).messages.texts().join("; ");
-        assert!(texts.contains("Wrote") && std::fs::metadata(&path).unwrap().len() > 100, "{ending}: {texts}");
-    }
-}
-
-#[test]
-fn a_table_that_is_too_large_is_refused_before_any_work() {
-    let mut harness = harness(quick());
-    let choice = TableChoice { theta: 180, phi: 720, ..TableChoice::default() };
-    editor(&mut harness).dialog = Some(Dialog::Table { path: "large.npz".into(), choice });
-    harness.run_steps(3);
-    assert!(harness.query_by_label_contains("at most").is_some());
-    harness.key_press(Key::Enter);
-    harness.run_steps(2);
-    assert!(editor(&mut harness).dialog.is_some() && editor(&mut harness).exporting.is_none());
 }
 
 #[test]

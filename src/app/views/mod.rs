@@ -6,3 +6,4 @@ pub mod hand;
 pub mod lobe;
 pub mod object;
 pub mod tile;
+pub mod wipe;

@@ -1,14 +1,13 @@
 //! The large view: the object, shaded by the effective BRDF. Drag turns it, the wheel comes closer.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use biscale::scene::{Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
-    self, Color32, ColorImage, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions,
-    Ui, pos2, vec2,
+    self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 
+use super::wipe::Kept;
 use crate::app::actions::Action;
 use crate::app::panels::fields::words;
 use crate::app::worker::{Grade, Made};
@@ -19,16 +18,6 @@ const NEAREST: f32 = 2.2;
 const SLOW: f32 = 0.33;
 /// A lens narrower than this widens before the camera moves away.
 const NARROW: f32 = 14.0;
-
-/// A picture kept for comparison.
-pub struct Kept {
-    image: Arc<ColorImage>,
-    /// Of the document.
-    version: u64,
-    pub texture: TextureHandle,
-    pub scene: Arc<Scene>,
-    pub name: String,
-}
 
 /// What the view holds between frames.
 #[derive(Default)]
@@ -96,17 +85,6 @@ impl ObjectView {
         }
         if let Some(made) = &self.made {
             self.texture = Some(ctx.load_texture("object", made.image.clone(), TextureOptions::LINEAR));
-        }
-    }
-
-    /// Keeps what is shown now beside what comes.
-    pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) {
-        if let Some(made) = &self.made {
-            let texture = ctx.load_texture("kept", made.image.clone(), TextureOptions::LINEAR);
-            let image = made.image.clone();
-            self.kept =
-                Some(Kept { image, version: made.version, texture, scene: scene.clone(), name: name.to_owned() });
-            self.wipe = 0.5;
         }
     }
 
@@ -186,33 +164,6 @@ impl ObjectView {
         });
         action
     }
-
-    fn is_on_wipe(&self, area: Rect, at: Pos2) -> bool {
-        (at.x - (area.left() + self.wipe * area.width())).abs() < 12.0
-    }
-
-    /// What was kept, left of a line that can be moved.
-    fn wipe_ui(&mut self, ui: &mut Ui, area: Rect) {
-        let Some(kept) = &self.kept else { return };
-        let x = area.left() + self.wipe * area.width();
-        let left = Rect::from_min_max(area.min, pos2(x, area.bottom()));
-        let shown = covered(area, kept.texture.size_vec2());
-        let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        ui.painter().with_clip_rect(left).image(kept.texture.id(), shown, uv, Color32::WHITE);
-        ui.painter().vline(x, area.y_range(), egui::Stroke::new(1.5, Color32::from_white_alpha(200)));
-        ui.painter().circle_filled(pos2(x, area.center().y), 7.0, Color32::from_white_alpha(220));
-        let font = egui::FontId::proportional(12.0);
-        let white = Color32::from_white_alpha(210);
-        let at = pos2(x - 8.0, area.top() + 8.0);
-        ui.painter().text(at, egui::Align2::RIGHT_TOP, format!("A  {}", kept.name), font.clone(), white);
-        ui.painter().text(pos2(x + 8.0, area.top() + 8.0), egui::Align2::LEFT_TOP, "B  now", font, white);
-        let grip = Rect::from_min_max(pos2(x - 8.0, area.top()), pos2(x + 8.0, area.bottom()));
-        let response =
-            ui.interact(grip, ui.scope_id().with("wipe"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
-        if response.dragged() {
-            self.wipe = (self.wipe + response.drag_delta().x / area.width()).clamp(0.0, 1.0);
-        }
-    }
 }
 
 fn object_ui(ui: &mut Ui, scene: &mut Scene) {
@@ -238,7 +189,7 @@ fn exposure_ui(ui: &mut Ui, scene: &mut Scene) {
 }
 
 /// The rectangle that covers `area` with a picture of another shape, centred: a resized view keeps the object's shape.
-fn covered(area: Rect, picture: egui::Vec2) -> Rect {
+pub(super) fn covered(area: Rect, picture: egui::Vec2) -> Rect {
     let scale = (area.width() / picture.x.max(1.0)).max(area.height() / picture.y.max(1.0));
     let rect = Rect::from_center_size(area.center(), picture * scale);
     if (rect.width() - area.width()).abs() < 4.0 && (rect.height() - area.height()).abs() < 4.0 { area } else { rect }
