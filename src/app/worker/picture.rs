@@ -1,6 +1,7 @@
 //! The object's picture: a draft at once, then the scene's own quality while the hand rests.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -25,6 +26,8 @@ const FINAL_MS: f64 = 8000.0;
 const MOST_PIXELS: f64 = 768.0 * 768.0;
 /// A draft that takes longer than this is given up for a newer edit; quicker ones are all shown, so that the picture follows.
 const PATIENCE: Duration = Duration::from_millis(700);
+/// How often refinement looks whether the draft is there.
+const POLL: Duration = Duration::from_millis(5);
 /// How long the hand must rest before refinement begins.
 const REST: Duration = Duration::from_millis(120);
 
@@ -36,6 +39,17 @@ type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
 pub struct Shared {
     best: Mutex<Option<(SmallScale, Outcome)>>,
     last: Mutex<Option<Finished>>,
+    /// The newest version whose draft is done with.
+    drafted: AtomicU64,
+}
+
+/// Notes that a draft is done with, also where it failed.
+struct Drafted<'a>(&'a Shared, u64);
+
+impl Drop for Drafted<'_> {
+    fn drop(&mut self) {
+        self.0.drafted.fetch_max(self.1, Ordering::Relaxed);
+    }
 }
 
 /// A full picture and what it shows.
@@ -62,6 +76,8 @@ impl Photographer {
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.
     pub fn draft(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
+        let shared = self.shared.clone();
+        let _drafted = Drafted(&shared, job.version);
         let done = self.toned(job).and_then(|toned| match toned {
             Some(made) => Ok(made),
             None => self.drafted(job, &desk.cancel.after(PATIENCE)),
@@ -82,7 +98,12 @@ impl Photographer {
 
     /// The scene's own quality, once the hand rests; given up when newer work is there.
     pub fn refine(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
-        if desk.is_newest_after(REST) {
+        let mut is_newest = desk.is_newest_after(REST);
+        // Both want all cores, and the draft is what the hand waits for.
+        while is_newest && self.shared.drafted.load(Ordering::Relaxed) < job.version {
+            is_newest = desk.is_newest_after(POLL);
+        }
+        if is_newest {
             tell(job, self.refined(job, desk, answer), answer);
         }
     }
