@@ -149,15 +149,18 @@ pub(super) fn of_the_scene(found: &Findings, settings: &Settings, note: &mut imp
         },
         0.0,
     );
+    let anisotropic = is_on(forced.anisotropy, !found.flat);
     note(
         "anisotropy",
-        !found.flat,
-        if found.flat {
-            "flat, and all BRDFs are isotropic: the result does not turn with the tile; a 3-D table (.binary) loses nothing"
-                .to_owned()
-        } else {
-            "the result may turn with the tile: four angles".to_owned()
-        },
+        anisotropic,
+        match (anisotropic, found.flat) {
+            (false, true) => {
+                "flat, and all BRDFs are isotropic: tables have three angles (.bsdf; .binary loses nothing)"
+            }
+            (false, false) => "taken not to turn with the tile, as asked: tables have three angles (.bsdf)",
+            (true, _) => "the result may turn with the tile: four angles",
+        }
+        .to_owned(),
         0.0,
     );
     note(
@@ -234,6 +237,7 @@ pub(super) fn mark(effects: &mut [Effect], found: &Findings, settings: &Settings
             "material_groups" => (forced.material_groups, Some(ROUNDING)),
             "black_materials" => (forced.black_materials, Some(ROUNDING)),
             "mirror_symmetry" => (forced.mirror_symmetry, (!on_interreflection).then_some(ROUNDING)),
+            "anisotropy" => (forced.anisotropy, Some(ROUNDING)),
             "self_shadow" => (forced.self_shadow, Some(0.0)),
             "faint_lights" => (forced.faint_lights, Some(0.0)),
             // What it would change is an estimate, no bound, unless there is nothing.

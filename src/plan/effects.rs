@@ -134,6 +134,11 @@ impl Plan {
         matches!(self.route, Route::Slices | Route::CpuMaps | Route::GpuMaps)
     }
 
+    /// Is an effect on?
+    pub fn is_on(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name && effect.on)
+    }
+
     /// Notes how far the factored form was from the direct sum, and whether it was kept.
     pub fn factored(&mut self, kept: bool, rel_l2: f64) {
         for effect in &mut self.effects {
