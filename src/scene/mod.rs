@@ -90,7 +90,7 @@ impl Scene {
     pub fn of(geometry: Geometry) -> Self {
         Self {
             version: 1,
-            tile: Tile { size: glam::Vec2::ONE, unit: "mm".to_owned(), geometry },
+            tile: Tile::of(geometry),
             materials: Vec::new(),
             object: Object::default(),
             light: Light::default(),

@@ -21,7 +21,7 @@ const TASKS: [(&str, &str); 6] = [
     ),
     (
         "Take it to another renderer",
-        "File, Export BRDF table. The ending chooses the format; the file says in words what it holds.",
+        "File, Export the material. The ending chooses the format; the file says in words what it holds.",
     ),
     ("Compare two versions", "Press B to keep what you see as A, edit on, and drag the line between A and now."),
     (
@@ -61,5 +61,5 @@ pub fn help_ui(ctx: &Context) -> bool {
                 });
             });
         });
-    open
+    open && !ctx.input(|input| input.key_pressed(egui::Key::Escape))
 }
