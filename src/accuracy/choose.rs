@@ -39,6 +39,17 @@ pub struct Tried {
 }
 
 impl Tried {
+    /// With errors on as many other pairs.
+    fn with(self, (psnr_db, doubt_db, rel_l2): (f64, f64, f64)) -> Self {
+        let power = |db: f64| 10_f64.powf(-0.1 * db);
+        Self {
+            psnr_db: -10.0 * (0.5 * (power(self.psnr_db) + power(psnr_db))).log10(),
+            doubt_db: 0.5 * self.doubt_db.hypot(doubt_db),
+            rel_l2: (0.5 * (self.rel_l2 * self.rel_l2 + rel_l2 * rel_l2)).sqrt(),
+            ..self
+        }
+    }
+
     /// Likely to be reached on other pairs too.
     fn safe_db(&self) -> f64 {
         self.psnr_db - self.doubt_db
@@ -132,9 +143,10 @@ impl SmallReference {
         loaded: &LoadedScene,
         outcome: &Outcome,
         db: f64,
+        pairs_seed: u64,
         progress: &mut impl FnMut(&str),
     ) -> Result<Self> {
-        let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
+        let pairs = mirror_biased_pairs(PAIRS, pairs_seed);
         let settings =
             ReferenceSettings { facets: REFERENCE_FACETS, max_passes: MAX_PASSES, target: 1e-5, seed: 20_110_807 };
         let mut own = 0.0;
@@ -223,7 +235,7 @@ impl<'a> Search<'a> {
     /// The coarsest rung that reaches `db`, or the finest.
     fn reach(&mut self, db: f64, progress: &mut impl FnMut(&str)) -> Result<Tried> {
         let coarse = self.build(TYPICAL, 1)?.0;
-        let reference = SmallReference::new(&mut self.pipeline, self.loaded, &coarse, db, progress)?;
+        let reference = SmallReference::new(&mut self.pipeline, self.loaded, &coarse, db, PAIRS_SEED, progress)?;
         let try_at = |search: &mut Self, rung: f64, progress: &mut dyn FnMut(&str)| -> Result<Tried> {
             let (outcome, ms) = search.build(rung, 1)?;
             let (psnr_db, doubt_db, rel_l2) = reference.errors(&outcome);
@@ -242,16 +254,20 @@ impl<'a> Search<'a> {
             let better = self.tried.iter().copied().max_by(|a, b| a.safe_db().total_cmp(&b.safe_db()));
             return Ok(better.unwrap_or(best));
         }
-        // Errors of few facets jump from one number to the next: all rungs between are looked at, coarse ones first.
         if best.rung <= JUMPING && best.rung > 0.0 {
-            for k in 1..SCANNED {
+            // Errors of few facets jump from one number to the next: all rungs between are looked at, coarse ones first. The
+            // first of many that passes is likely to be a lucky one: it must pass on other pairs, too.
+            let other = SmallReference::new(&mut self.pipeline, self.loaded, &coarse, db, PAIRS_SEED + 1, progress)?;
+            for k in 1..=2 * SCANNED {
                 let tried = try_at(self, best.rung - 1.0 + f64::from(k) / f64::from(SCANNED), progress)?;
-                // The first of many that passes is likely to be a lucky one: twice the margin.
-                if tried.safe_db() - tried.doubt_db >= db {
-                    return Ok(tried);
+                if tried.safe_db() < db {
+                    continue;
+                }
+                let both = tried.with(other.errors(&self.build(tried.rung, 1)?.0));
+                if both.safe_db() >= db || k == 2 * SCANNED {
+                    return Ok(both);
                 }
             }
-            return Ok(best);
         }
         let mut step = 0.5;
         while step >= STEP && best.rung > 0.0 {
