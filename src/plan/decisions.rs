@@ -65,15 +65,12 @@ pub(super) fn picture_table(
         None => "pictures evaluate the BRDF itself at this quality".to_owned(),
         Some(ms) => {
             let (percent, db) = (settings.picture_tolerance.0 * 100.0, settings.picture_tolerance.1);
-            let kept = format!("kept if within {percent:.0} % and {db:.0} dB of the sum");
+            let kept = format!("if within {percent:.0} % and {db:.0} dB of the sum");
             let direct = format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly");
-            let table = format!("{table_ms:.0} ms from a table that takes {ms:.0} ms, once");
             if thinned {
-                format!(
-                    "few normals: pictures sum over a tenth or a third of the facets, else ({direct}) {table}; {kept}"
-                )
+                format!("{direct}; few normals: a tenth or a third of the facets are summed, {kept}")
             } else {
-                format!("{direct}, {table}; {kept}")
+                format!("{direct}, {table_ms:.0} ms from a table that takes {ms:.0} ms, once; kept {kept}")
             }
         }
     };
