@@ -1,5 +1,6 @@
 //! What is right: the reference sum with its own error, metrics, and the direction pairs they are taken over.
 
+pub mod candidates;
 pub mod choose;
 mod glimpse;
 pub mod health;
@@ -9,6 +10,7 @@ mod pairs;
 mod paths;
 pub mod progressive;
 mod reference;
+mod small_reference;
 pub mod sweep;
 
 pub use glimpse::Glimpse;

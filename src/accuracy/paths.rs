@@ -135,3 +135,28 @@ fn cosine_direction(normal: Vec3, u: f32, v: f32) -> Vec3 {
     let (x, y) = normal.any_orthonormal_pair();
     (x * local.x + y * local.y + normal * local.z).normalize_or(normal)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Even on the disc below: the square of the sine and the azimuth are uniform.
+    #[test]
+    fn directions_of_paths_pass_the_chi_squared_test_for_the_cosine() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        for normal in [Vec3::Z, Vec3::NEG_Z, from_angles(1.1, 2.0), Vec3::X] {
+            let (x, y) = normal.any_orthonormal_pair();
+            let mut counts = vec![0.0; 16 * 32];
+            for _ in 0..1_000_000 {
+                let d = cosine_direction(normal, rng.random(), rng.random());
+                let at = |axis: Vec3| f64::from(d.dot(axis));
+                let ring = (16.0 * (at(x).powi(2) + at(y).powi(2))).clamp(0.0, 15.0) as usize;
+                let turn = (32.0 * (at(y).atan2(at(x)) / std::f64::consts::TAU + 1.0).fract()) as usize;
+                counts[32 * ring + turn.min(31)] += 1.0;
+            }
+            let p = crate::chi_square::p_value(&counts, &vec![1.0; counts.len()]);
+            // Šidák: four tests at 0.01 together.
+            assert!(p > 1.0 - 0.99_f64.powf(0.25), "{normal}: {p}");
+        }
+    }
+}

@@ -5,7 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use biscale::accuracy::sweep::{Candidate, Family, Point, Truth, candidates, measure, reference_point, with_settings};
+use biscale::accuracy::candidates::{Candidate, Family, candidates, with_settings};
+use biscale::accuracy::sweep::{Point, Truth, measure, reference_point};
 use biscale::accuracy::{ReferenceSettings, ladder};
 use biscale::export::replace_file;
 use biscale::filtering::EffectiveBrdf;

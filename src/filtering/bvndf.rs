@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::gemm;
-use super::gram::{eigen, rank_for};
+use super::gram::{rank_for, right_singular};
 use crate::directions::PolarGrid;
 use crate::error::Result;
 use crate::visibility::Visibility;
@@ -85,30 +85,10 @@ pub fn leading_features(
     }
     let mut q = vec![0.0; count * feature_count];
     gemm::multiply_parallel(count, facets, feature_count, &mixed, features, &mut q);
-    // The smaller of the two Gram matrices has the same leading values.
-    let (values, vectors) = if count < feature_count {
-        let transposed: Vec<f32> = (0..feature_count)
-            .flat_map(|f| {
-                (0..count).map({
-                    let q = &q;
-                    move |k| q[k * feature_count + f]
-                })
-            })
-            .collect();
-        let solved = eigen(gemm::gram(feature_count, count, &transposed))?;
-        // Right vectors from left ones: Qᵀ u / σ.
-        let wide = DMatrix::<f64>::from_fn(feature_count, count, |f, k| f64::from(q[k * feature_count + f]));
-        let mut right = wide * &solved.vectors;
-        for (k, mut column) in right.column_iter_mut().enumerate() {
-            let length = solved.values[k].sqrt();
-            column *= if length > 0.0 { 1.0 / length } else { 0.0 };
-        }
-        (solved.values, right)
-    } else {
-        let solved = eigen(gemm::gram(count, feature_count, &q))?;
-        (solved.values, solved.vectors)
-    };
-    let rank = rank_for(&values, kept).min(max_rank).min(feature_count);
+    let sketch = DMatrix::<f64>::from_fn(count, feature_count, |k, f| f64::from(q[k * feature_count + f]));
+    let most = max_rank.min(feature_count);
+    let (_, vectors) = right_singular(&sketch, |values| rank_for(values, kept).min(most))?;
+    let rank = vectors.ncols();
     let leading = (0..feature_count)
         .flat_map(|f| {
             (0..rank).map({
@@ -179,6 +159,14 @@ mod tests {
 
     fn rows(grid: PolarGrid, facets: usize) -> VisibilityRows {
         VisibilityRows { grid, facets, rows: noise(grid.len() * facets, 5) }
+    }
+
+    #[test]
+    fn normal_deviates_pass_the_chi_squared_test() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let values: Vec<f64> = (0..1_000_000).map(|_| f64::from(gaussian(&mut rng))).collect();
+        let p = crate::chi_square::p_value_of_normal(&values);
+        assert!(p > 0.01, "{p}");
     }
 
     #[test]

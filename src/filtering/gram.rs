@@ -44,6 +44,26 @@ pub fn rank_for(values: &[f64], kept: f64) -> usize {
     values.len().max(1)
 }
 
+/// The leading right singular vectors of `a` (columns) and the squares of all its singular values, descending; `rank` says
+/// from these how many. A Gram matrix squares the condition: one step of orthogonal iteration, there and back, makes the
+/// vectors as good as those of a factorization of `a` itself (Halko et al. 2011, Alg. 4.4).
+pub fn right_singular(a: &DMatrix<f64>, rank: impl FnOnce(&[f64]) -> usize) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    let wide = a.nrows() < a.ncols();
+    let solved = eigen(if wide { a * a.transpose() } else { a.transpose() * a })?;
+    let rank = rank(&solved.values).min(solved.values.len());
+    if rank == 0 {
+        return Ok((solved.values, DMatrix::zeros(a.ncols(), 0)));
+    }
+    let first = solved.vectors.columns(0, rank).into_owned();
+    // Scaled: products of entries near the ends of what is finite stay there.
+    let scale = a.amax();
+    let a = if scale > 0.0 { a / scale } else { a.clone() };
+    let there = |v: &DMatrix<f64>| (&a * v).qr().q();
+    let back = |u: &DMatrix<f64>| (a.transpose() * u).qr().q();
+    let right = if wide { back(&first) } else { first };
+    Ok((solved.values, back(&there(&right))))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,28 +111,32 @@ mod tests {
         u * s * v.transpose()
     }
 
-    #[test]
-    fn the_factorization_stays_within_lapacks_ratios_on_hard_matrices_of_any_scale() {
+    /// Matrices that factorizations trip over, and their singular values where they were built from some.
+    fn hard_matrices() -> Vec<(&'static str, DMatrix<f64>, Vec<f64>)> {
         let clustered: Vec<f64> =
             (0..24).map(|k| if k < 12 { 1.0 } else { 1e-6 } * (1.0 + 1e-14 * f64::from(k))).collect();
         let graded: Vec<f64> = (0..24).map(|k| 10_f64.powi(-k)).collect();
         let mut one_huge = vec![1.0; 24];
         one_huge[0] = 1e8;
-        let kinds: Vec<(&str, DMatrix<f64>)> = vec![
-            ("all ones", DMatrix::from_element(40, 24, 1.0)),
-            ("rank 0", DMatrix::zeros(40, 24)),
-            ("rank 1", noise(40, 1) * noise(1, 24)),
-            ("equal values", with_values(40, 24, &[1.0; 24])),
-            ("clustered values", with_values(40, 24, &clustered)),
-            ("values of 24 orders", with_values(40, 24, &graded)),
-            ("one huge value", with_values(40, 24, &one_huge)),
-            ("noise, more rows", noise(300, 24)),
-            ("noise, more columns", noise(24, 300)),
-            ("one entry", DMatrix::from_element(1, 1, 3.0)),
-            ("no rows", DMatrix::zeros(0, 7)),
-            ("no columns", DMatrix::zeros(7, 0)),
-        ];
-        for (name, matrix) in &kinds {
+        vec![
+            ("all ones", DMatrix::from_element(40, 24, 1.0), Vec::new()),
+            ("rank 0", DMatrix::zeros(40, 24), Vec::new()),
+            ("rank 1", noise(40, 1) * noise(1, 24), Vec::new()),
+            ("equal values", with_values(40, 24, &[1.0; 24]), vec![1.0; 24]),
+            ("clustered values", with_values(40, 24, &clustered), clustered),
+            ("values of 24 orders", with_values(40, 24, &graded), graded),
+            ("one huge value", with_values(40, 24, &one_huge), one_huge),
+            ("noise, more rows", noise(300, 24), Vec::new()),
+            ("noise, more columns", noise(24, 300), Vec::new()),
+            ("one entry", DMatrix::from_element(1, 1, 3.0), Vec::new()),
+            ("no rows", DMatrix::zeros(0, 7), Vec::new()),
+            ("no columns", DMatrix::zeros(7, 0), Vec::new()),
+        ]
+    }
+
+    #[test]
+    fn the_factorization_stays_within_lapacks_ratios_on_hard_matrices_of_any_scale() {
+        for (name, matrix, _) in &hard_matrices() {
             for scale in [1e-30, 1e-15, 1.0, 1e15, 1e30] {
                 let scaled = matrix * scale;
                 for gram in [scaled.transpose() * &scaled, &scaled * scaled.transpose()] {
@@ -121,6 +145,33 @@ mod tests {
                     assert!(lost < 50.0 && skew < 50.0, "{name} times {scale:e}: {lost:.1}, {skew:.1}");
                     assert!(solved.values.windows(2).all(|pair| pair[0] >= pair[1] && pair[1] >= 0.0), "{name}");
                     assert!((1..=gram.nrows().max(1)).contains(&rank_for(&solved.values, 0.98)), "{name}");
+                }
+            }
+        }
+    }
+
+    /// `‖A - U S V^T‖ / (‖A‖ max(m,n) ε)` and `‖I - V^T V‖ / (n ε)` of what the randomized factorizations end in, both ways
+    /// round. `U S` is `A V`, as they take it; values that are cut off may be missing, and no more.
+    #[test]
+    fn right_vectors_stay_within_lapacks_ratios_on_hard_matrices_of_any_scale() {
+        for (name, matrix, made) in &hard_matrices() {
+            for scale in [1e-30, 1e-15, 1.0, 1e15, 1e30] {
+                for a in [matrix * scale, matrix.transpose() * scale] {
+                    // As the paper's preset cuts: what f32 entries cannot tell from none.
+                    let sound = |values: &[f64]| {
+                        let floor = 1e-10 * values.first().copied().unwrap_or(0.0);
+                        values.iter().take_while(|value| **value > floor).count()
+                    };
+                    let (values, v) = right_singular(&a, sound).unwrap();
+                    let (n, rank) = (a.ncols() as f64, v.ncols());
+                    assert_eq!(rank, sound(&values), "{name} times {scale:e}");
+                    let skew = (v.transpose() * &v - DMatrix::identity(rank, rank)).norm();
+                    let cut = made.iter().skip(rank).map(|value| (value * scale).powi(2)).sum::<f64>().sqrt();
+                    let left = (&a - &a * &v * v.transpose()).norm() - cut;
+                    let rounding = f64::EPSILON * n.max(a.nrows() as f64);
+                    assert!(skew <= 50.0 * n * f64::EPSILON, "{name} times {scale:e}: skew {skew:e}");
+                    let ratio = if a.norm() > 0.0 { left / (a.norm() * rounding) } else { 0.0 };
+                    assert!(ratio < 50.0, "{name} times {scale:e}, {:?}: ratio {ratio:.1}", a.shape());
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! Planar samples of the small-scale surface.
 
+use std::collections::HashMap;
+
 use glam::{Vec2, Vec3};
 
 use super::TileMesh;
@@ -138,24 +140,77 @@ impl FacetSampler {
         self.order[k.min(self.order.len() - 1)]
     }
 
-    /// Systematic samples: facet k lies on the triangle at `(k + shift)/count` of the cumulative area, at a point of an R2
-    /// sequence (Roberts 2018) folded into it, and stands for `area/count`. Empty for a mesh without area.
+    /// Systematic samples: facet k lies on the triangle at `(k + shift)/count` of the cumulative area, at a point of
+    /// [`Insides`], and stands for `area/count`. Empty for a mesh without area.
     pub fn sample(&self, mesh: &TileMesh, count: usize, shift: SampleShift) -> Facets {
         let mut facets = Facets { skipped_triangles: self.skipped, ..Facets::default() };
         if self.order.is_empty() {
             return facets;
         }
         let area = (self.area() / count as f64) as f32;
+        let mut insides = Insides::new(shift.inside);
         let mut k = 0;
         for facet in 0..count {
             let target = (facet as f64 + f64::from(shift.along)) / count as f64 * self.area();
             while k + 1 < self.order.len() && self.cumulative[k] <= target {
                 k += 1;
             }
-            facets.push(mesh, self.order[k], fold(r2(facet, shift.inside)), area);
+            let point = insides.next(mesh, self.order[k]);
+            facets.push(mesh, self.order[k], fold(point), area);
         }
         facets
     }
+}
+
+/// Points inside triangles: an R2 sequence (Roberts 2018) for each shape of triangle, which its copies share in turn. One
+/// sequence through all triangles falls in step with what repeats along a mesh: on rectangular grooves at draft it met every
+/// second triangle of the walls at its 51st point, strips along their upper edges had twice their facets or none, and 80°
+/// from the normal the projected area was 36 % off.
+struct Insides {
+    shift: Vec2,
+    /// Where each shape starts, and points that it has had.
+    shapes: HashMap<[i32; 6], (Vec2, usize)>,
+    newest: Option<(u32, [i32; 6])>,
+}
+
+impl Insides {
+    fn new(shift: Vec2) -> Self {
+        Self { shift, shapes: HashMap::new(), newest: None }
+    }
+
+    fn next(&mut self, mesh: &TileMesh, triangle: u32) -> Vec2 {
+        let shape = match self.newest {
+            Some((same, shape)) if same == triangle => shape,
+            _ => shape_of(mesh, triangle),
+        };
+        self.newest = Some((triangle, shape));
+        let (start, used) = self.shapes.entry(shape).or_insert_with(|| (start_of(triangle), 0));
+        *used += 1;
+        r2(*used, self.shift + *start)
+    }
+}
+
+/// Where the shape of which this triangle is the first begins: of the triangle's number, which stays while a tile is edited.
+fn start_of(triangle: u32) -> Vec2 {
+    let bits = scrambled(u64::from(triangle));
+    let part = |bits: u64| (bits & 0xff_ffff) as f32 / (1 << 24) as f32;
+    Vec2::new(part(bits), part(bits >> 24))
+}
+
+/// The edges from a triangle's first corner in ten-thousandths of the tile: equal for copies of it.
+fn shape_of(mesh: &TileMesh, triangle: u32) -> [i32; 6] {
+    let [a, b, c] = mesh.corners(triangle as usize);
+    let unit = mesh.size.extend(mesh.size.max_element()) * 1e-4;
+    let [b, c] = [b - a, c - a].map(|edge| (edge / unit).round());
+    [b.x, b.y, b.z, c.x, c.y, c.z].map(|side| side as i32)
+}
+
+/// A number whose bits have nothing to do with those of `x` (SplitMix64; Steele et al. 2014).
+fn scrambled(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ x >> 31
 }
 
 /// Point `index` of the R2 sequence, shifted on the unit torus.

@@ -129,6 +129,21 @@ mod tests {
     }
 
     #[test]
+    fn axes_stray_evenly_over_the_disc_of_angles() {
+        let spec = Rods { spread_deg: 40.0, ..Rods::default() };
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut counts = vec![0.0; 10 * 20];
+        for _ in 0..200_000 {
+            let axis = stray(&spec, &mut rng);
+            let ring = (axis.z.acos().to_degrees() / 40.0).powi(2) * 10.0;
+            let turn = (axis.y.atan2(axis.x) / TAU + 1.0).fract() * 20.0;
+            counts[(ring as usize).min(9) * 20 + (turn as usize).min(19)] += 1.0;
+        }
+        let p = crate::chi_square::p_value(&counts, &[1.0; 200]);
+        assert!(p > 0.01, "{p}");
+    }
+
+    #[test]
     fn mantles_face_outwards_and_tips_upwards() {
         let spec = Rods { count: 9, lean_deg: 30.0, lean_azimuth_deg: 70.0, ..Rods::default() };
         let mesh = build(&spec, Vec2::ONE);

@@ -102,3 +102,27 @@ fn wrap(position: Vec3, size: Vec2) -> Vec3 {
     let wrapped = position.truncate() - size * (position.truncate() / size).floor();
     wrapped.clamp(Vec2::ZERO, size).extend(position.z)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_between_facets_pass_the_chi_squared_test_for_the_cosine() {
+        const RAYS: usize = 16;
+        for normal in [Vec3::Z, crate::directions::from_angles(1.1, 2.0)] {
+            let (x, y) = normal.any_orthonormal_pair();
+            let mut counts = vec![0.0; 8 * 16];
+            for (element, k) in (0..8192).flat_map(|element| (0..RAYS).map(move |k| (element, k))) {
+                let d = cosine_direction(normal, k, RAYS, element);
+                let at = |axis: Vec3| f64::from(d.dot(axis));
+                let ring = (8.0 * (at(x).powi(2) + at(y).powi(2))).clamp(0.0, 7.0) as usize;
+                let turn = (16.0 * (at(y).atan2(at(x)) / std::f64::consts::TAU + 1.0).fract()) as usize;
+                counts[16 * ring + turn.min(15)] += 1.0;
+            }
+            // Šidák: two tests at 0.01 together.
+            let p = crate::chi_square::p_value(&counts, &vec![1.0; counts.len()]);
+            assert!(p > 1.0 - 0.99_f64.sqrt(), "{normal}: {p}");
+        }
+    }
+}

@@ -188,7 +188,10 @@ impl Pipeline {
             None
         };
         for (name, ms) in &times {
-            plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
+            match *name {
+                "product" if plan.try_low_rank => plan.measured("low_rank", *ms),
+                name => plan.measured(name, *ms),
+            }
         }
         let brdf = Arc::new(match between {
             Some(table) => brdf.interreflecting(table),

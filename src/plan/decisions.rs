@@ -65,15 +65,12 @@ pub(super) fn picture_table(
         None => "pictures evaluate the BRDF itself at this quality".to_owned(),
         Some(ms) => {
             let (percent, db) = (settings.picture_tolerance.0 * 100.0, settings.picture_tolerance.1);
-            let kept = format!("kept if within {percent:.0} % and {db:.0} dB of the sum");
+            let kept = format!("if within {percent:.0} % and {db:.0} dB of the sum");
             let direct = format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly");
-            let table = format!("{table_ms:.0} ms from a table that takes {ms:.0} ms, once");
             if thinned {
-                format!(
-                    "few normals: pictures sum over a tenth or a third of the facets, else ({direct}) {table}; {kept}"
-                )
+                format!("{direct}; few normals: a tenth or a third of the facets are summed, {kept}")
             } else {
-                format!("{direct}, {table}; {kept}")
+                format!("{direct}, {table_ms:.0} ms from a table that takes {ms:.0} ms, once; kept {kept}")
             }
         }
     };
@@ -149,15 +146,18 @@ pub(super) fn of_the_scene(found: &Findings, settings: &Settings, note: &mut imp
         },
         0.0,
     );
+    let anisotropic = is_on(forced.anisotropy, !found.flat);
     note(
         "anisotropy",
-        !found.flat,
-        if found.flat {
-            "flat, and all BRDFs are isotropic: the result does not turn with the tile; a 3-D table (.binary) loses nothing"
-                .to_owned()
-        } else {
-            "the result may turn with the tile: four angles".to_owned()
-        },
+        anisotropic,
+        match (anisotropic, found.flat) {
+            (false, true) => {
+                "flat, and all BRDFs are isotropic: tables have three angles (.bsdf; .binary loses nothing)"
+            }
+            (false, false) => "taken not to turn with the tile, as asked: tables have three angles (.bsdf)",
+            (true, _) => "the result may turn with the tile: four angles",
+        }
+        .to_owned(),
         0.0,
     );
     note(
@@ -234,6 +234,7 @@ pub(super) fn mark(effects: &mut [Effect], found: &Findings, settings: &Settings
             "material_groups" => (forced.material_groups, Some(ROUNDING)),
             "black_materials" => (forced.black_materials, Some(ROUNDING)),
             "mirror_symmetry" => (forced.mirror_symmetry, (!on_interreflection).then_some(ROUNDING)),
+            "anisotropy" => (forced.anisotropy, Some(ROUNDING)),
             "self_shadow" => (forced.self_shadow, Some(0.0)),
             "faint_lights" => (forced.faint_lights, Some(0.0)),
             // What it would change is an estimate, no bound, unless there is nothing.

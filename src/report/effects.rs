@@ -31,7 +31,7 @@ pub struct EffectCost {
 }
 
 /// The switches of a scene, by name.
-pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 10] {
+pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 11] {
     [
         ("visibility", &mut effects.visibility),
         ("picture_table", &mut effects.picture_table),
@@ -41,6 +41,7 @@ pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 10] {
         ("black_materials", &mut effects.black_materials),
         ("interreflection", &mut effects.interreflection),
         ("mirror_symmetry", &mut effects.mirror_symmetry),
+        ("anisotropy", &mut effects.anisotropy),
         ("self_shadow", &mut effects.self_shadow),
         ("faint_lights", &mut effects.faint_lights),
     ]

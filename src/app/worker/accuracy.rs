@@ -4,9 +4,9 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use biscale::accuracy::candidates::with_settings;
 use biscale::accuracy::ladder;
 use biscale::accuracy::progressive::{Compared, ProgressiveReference};
-use biscale::accuracy::sweep::with_settings;
 use biscale::large_scale::Picture;
 use biscale::pipeline::Pipeline;
 use biscale::report::{EffectCost, Studio, heat, measure_effects};

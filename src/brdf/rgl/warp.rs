@@ -275,6 +275,30 @@ mod tests {
     }
 
     #[test]
+    fn samples_pass_the_chi_squared_test_for_their_density() {
+        use rand::{RngExt, SeedableRng};
+        let warp = Warp::new(GRID, densities()).unwrap();
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        const SIDE: usize = 24;
+        for slice in [0, 1] {
+            let mut counts = vec![0.0; SIDE * SIDE];
+            for _ in 0..500_000 {
+                let ([x, y], _) = warp.sample(slice, [rng.random(), rng.random()]);
+                let cell = |at: f64| ((at * SIDE as f64) as usize).min(SIDE - 1);
+                counts[cell(y) * SIDE + cell(x)] += 1.0;
+            }
+            // Bilinear between nodes that cells do not straddle: the mean over a cell is its middle.
+            let at = |k: usize| (k as f64 + 0.5) / SIDE as f64;
+            let values = &warp.density[slice * GRID.len()..(slice + 1) * GRID.len()];
+            let expected: Vec<f64> =
+                (0..SIDE * SIDE).map(|k| GRID.eval(values, [at(k % SIDE), at(k / SIDE)])).collect();
+            let p = crate::chi_square::p_value(&counts, &expected);
+            // Šidák: two tests at 0.01 together.
+            assert!(p > 1.0 - 0.99_f64.sqrt(), "{slice}: {p}");
+        }
+    }
+
+    #[test]
     fn four_slices_are_weighted_bilinearly() {
         let blend = Blend::new(Between { lower: 1, weight: 0.25 }, Between { lower: 0, weight: 0.5 }, 3);
         let value = blend.mix(|slice| [0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 5.0, 11.0][slice]);

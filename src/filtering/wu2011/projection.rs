@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::super::gram::{eigen, rank_for};
+use super::super::gram::{rank_for, right_singular};
 use crate::error::Result;
 
 /// Fills a block of R with independent N(0,1) values: the same seed and block give the same values, whatever thread asks.
@@ -37,21 +37,17 @@ pub(super) struct RightVectors {
 /// The fewest right singular vectors of `q` (l rows) that keep the part `keep` of its power, through its smaller Gram
 /// matrix. Power below the rounding of f32 entries, relative to `scale` (the power before the mean was taken off), is none.
 pub(super) fn right_vectors(q: &DMatrix<f64>, keep: f64, scale: f64) -> Result<RightVectors> {
-    let wide = q.nrows() < q.ncols();
-    let solved = eigen(if wide { q * q.transpose() } else { q.transpose() * q })?;
-    let floor = 1e-10 * scale.max(solved.values.first().copied().unwrap_or(0.0));
-    let sound = solved.values.iter().take_while(|&&value| value > floor).count();
-    let total: f64 = solved.values.iter().sum();
-    let rank = if sound == 0 { 0 } else { rank_for(&solved.values[..sound], keep) };
-    let leading = solved.vectors.columns(0, rank).into_owned();
-    let mut right = if wide { q.transpose() * leading } else { leading };
-    if wide {
-        for (mut column, value) in right.column_iter_mut().zip(&solved.values) {
-            column /= value.sqrt();
-        }
-    }
+    let sound = |values: &[f64]| {
+        let floor = 1e-10 * scale.max(values.first().copied().unwrap_or(0.0));
+        values.iter().take_while(|&&value| value > floor).count()
+    };
+    let (values, right) = right_singular(q, |values| match sound(values) {
+        0 => 0,
+        sound => rank_for(&values[..sound], keep),
+    })?;
+    let (rank, total) = (right.ncols(), values.iter().sum::<f64>());
     let vectors = right.transpose().as_slice().to_vec();
-    let kept = if total > 0.0 { solved.values[..rank].iter().sum::<f64>() / total } else { 1.0 };
+    let kept = if total > 0.0 { values[..rank].iter().sum::<f64>() / total } else { 1.0 };
     Ok(RightVectors { rank, vectors, kept })
 }
 
@@ -78,17 +74,8 @@ mod tests {
     fn normal_values_pass_the_chi_squared_test() {
         let mut values = vec![0.0; 1_000_000];
         fill_normal(9, 1, &mut values);
-        // Eleven bins of half a deviation; their chances from Abramowitz and Stegun, Table 26.1.
-        let below = [0.006_209_7, 0.022_750_1, 0.066_807_2, 0.158_655_3, 0.308_537_5, 0.5];
-        let cumulative: Vec<f64> = below.into_iter().chain(below[..5].iter().rev().map(|p| 1.0 - p)).collect();
-        let mut expected: Vec<f64> = cumulative.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        expected.insert(0, cumulative[0]);
-        expected.push(1.0 - cumulative[10]);
-        let mut counts = vec![0.0; expected.len()];
-        for value in values {
-            counts[((f64::from(value) + 3.0) / 0.5).floor().clamp(0.0, 11.0) as usize] += 1.0;
-        }
-        let p = crate::chi_square::p_value(&counts, &expected);
+        let values: Vec<f64> = values.into_iter().map(f64::from).collect();
+        let p = crate::chi_square::p_value_of_normal(&values);
         assert!(p > 0.01, "{p}");
     }
 
