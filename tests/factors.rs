@@ -40,7 +40,7 @@ fn settings(
     max_rank: usize,
     whole_sphere: bool,
 ) -> LowRankSettings {
-    let basis = BasisGrid { pairs, normal_rings, whole_sphere };
+    let basis = BasisGrid { pairs, normal_rings, whole_sphere, interpolation: Default::default() };
     LowRankSettings {
         directions,
         basis,

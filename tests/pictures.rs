@@ -111,7 +111,7 @@ fn a_thinned_sum_keeps_the_area_of_every_normal() {
 
 #[test]
 fn exact_pictures_can_be_asked_for() {
-    let scene = open("table4_plate", &["quality.preset=draft", "quality.pictures=exact"]);
+    let scene = open("table4_plate", &["quality.preset=draft", "effects.picture_table=off"]);
     let outcome = Pipeline::new().effective(&scene).unwrap();
     assert!(std::sync::Arc::ptr_eq(&pictured(&outcome), &outcome.brdf));
 }

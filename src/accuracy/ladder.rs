@@ -1,6 +1,6 @@
 //! One line through all settings, from faster to finer: what `--target-db`, `--budget-ms` and the editor's slider walk along.
 
-use super::sweep::{Candidate, Family};
+use super::candidates::{Candidate, Family};
 
 /// The finest rung: 131,072 facets.
 pub const FINEST: f64 = 13.0;
@@ -41,7 +41,7 @@ pub fn position(facets: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::with_settings;
+    use super::super::candidates::with_settings;
     use super::*;
     use crate::plan::Settings;
 

@@ -123,7 +123,7 @@ impl<'a> Paths<'a> {
         let size = self.mesh.size;
         let flat = hit.position.truncate();
         let position = (flat - size * (flat / size).floor()).clamp(Vec2::ZERO, size).extend(hit.position.z);
-        let material = &self.materials[self.material_of_slot[usize::from(self.mesh.triangle_slot[triangle])]];
+        let material = &self.materials[self.material_of_slot[usize::from(self.mesh.slot_at(triangle, flat))]];
         let color = material.color * self.mesh.color.at(position.truncate(), size);
         let origin = position + geometric * (LIFT * size.length());
         Vertex { origin, geometric, normal, triangle: hit.triangle, material, color }

@@ -40,12 +40,12 @@ pub struct Estimate {
 /// Everything the reference sum needs; facets are drawn anew for each pass.
 #[derive(Debug)]
 pub struct Reference<'a> {
-    mesh: &'a TileMesh,
-    grid: PeriodicGrid,
-    material_of_slot: Vec<usize>,
-    materials: Vec<SumMaterial>,
+    pub(super) mesh: &'a TileMesh,
+    pub(super) grid: PeriodicGrid,
+    pub(super) material_of_slot: Vec<usize>,
+    pub(super) materials: Vec<SumMaterial>,
     /// Reflections between facets that paths follow; 0 for the paper's definition.
-    bounces: usize,
+    pub(super) bounces: usize,
 }
 
 /// Sums over the passes of one pair: of `S = Σ ΔA V V f` and `a_v`, and of their second moments.

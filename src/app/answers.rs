@@ -35,6 +35,14 @@ impl Editor {
                 let answer = export::table_ui(ctx, path, choice);
                 self.exported(answer, path, What::Table(*choice))
             }
+            Dialog::Fit { path } => {
+                let answer = export::fit_ui(ctx, path);
+                self.exported(answer, path, What::Fit)
+            }
+            Dialog::Tile { path, options } => {
+                let answer = export::tile_ui(ctx, path, options);
+                self.exported(answer, path, What::Tile(options.clone()))
+            }
             Dialog::Picture { path, width, height } => {
                 let answer = export::picture_ui(ctx, path, width, height);
                 self.exported(answer, path, What::Picture { size: [*width, *height] })

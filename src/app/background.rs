@@ -126,7 +126,7 @@ impl Editor {
     pub(super) fn keep_recovery(&mut self, ctx: &Context) {
         let Some(recovery) = &self.recovery else { return };
         let (version, now) = (self.document.version(), ctx.time());
-        if !self.document.is_dirty() || version == self.background.autosaved.0 {
+        if !self.document.has_work() || version == self.background.autosaved.0 {
             return;
         }
         if now < self.background.autosaved.1 {
@@ -140,6 +140,17 @@ impl Editor {
             worker.ask(snapshot);
         }
         self.background.autosaved = (version, now + AUTOSAVE_SECS);
+    }
+
+    /// Writes the recovery file at once.
+    ///
+    /// # Errors
+    /// A place that cannot be written.
+    pub fn keep_now(&self) -> biscale::Result<()> {
+        match &self.recovery {
+            Some(recovery) if self.document.has_work() => recovery.prepare(&self.document)?.write(),
+            _ => Ok(()),
+        }
     }
 
     /// Before the window goes: nothing is left to recover.
@@ -206,7 +217,10 @@ impl Editor {
         match answer {
             PictureAnswer::Made(made) => {
                 self.messages.clear("picture");
-                self.object.since = None;
+                match &made.trouble {
+                    Some(why) => self.device_failed(why),
+                    None => self.device_trouble = None,
+                }
                 self.object.take(ctx, made);
             }
             PictureAnswer::Doing(version, what) if version == self.document.version() => {
@@ -225,6 +239,18 @@ impl Editor {
                 let text = format!("A fault in the program while computing ({text}). Your document is kept; edit on.");
                 self.messages.put(Level::Trouble, "picture", text);
             }
+        }
+    }
+
+    /// Says once that pictures come from the processor now.
+    fn device_failed(&mut self, why: &str) {
+        if self.device_trouble.as_deref() != Some(why) {
+            self.device_trouble = Some(why.to_owned());
+            let text = format!(
+                "The graphics device failed ({why}). Your document is kept; pictures are made on the processor. To try the \
+                 device again set Quality, Backend to Cpu and back to Auto."
+            );
+            self.messages.put(Level::Trouble, "device", text);
         }
     }
 

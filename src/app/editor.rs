@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use biscale::large_scale::CameraView;
 use biscale::scene::{Material, Scene};
 use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
 
@@ -13,13 +12,17 @@ use super::document::{Document, Recovered, RecoveryFile, Settings};
 use super::messages::{Level, Messages};
 use super::paint::Stroke;
 use super::panels::{self, materials};
-use super::pick;
 use super::theme;
-use super::views::brushes;
 use super::views::gallery::Gallery;
+use super::views::hand::Hand;
 use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
-use super::views::tile::{self, Hand, TileState, Which};
+use super::views::tile::TileState;
+
+/// What a person reads at the first start, until it is closed.
+const WELCOME: &str = "welcome";
+const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (left) and change its surface and materials \
+                            (right). F1 has the first steps of usual tasks, and all shortcuts.";
 
 /// Everything but the window.
 pub struct Editor {
@@ -43,13 +46,16 @@ pub struct Editor {
     pub(super) background: Background,
     /// The part of an export that is done, and what is being done.
     pub(super) exporting: Option<(f32, &'static str)>,
-    pub(super) gallery: Gallery,
+    pub gallery: Gallery,
     pub(super) slots: Vec<String>,
     /// Pixels of the object view.
     pub(super) size: [usize; 2],
-    hand: Option<Hand>,
-    from_view: Option<Action>,
+    /// What the hand did on the tile in this frame.
+    pub(super) hand: Vec<Hand>,
+    pub(super) from_view: Option<Action>,
     pub(super) copied: Option<Material>,
+    /// Why pictures are not made on the device any more, as it was said.
+    pub(super) device_trouble: Option<String>,
 }
 
 impl Editor {
@@ -63,6 +69,9 @@ impl Editor {
         let background = Background::new(ctx);
         if background.pictures.is_none() {
             messages.put(Level::Trouble, "worker", "The system gave no thread to compute on: nothing will be drawn.");
+        }
+        if !settings.welcomed && folder.is_some() {
+            messages.put(Level::Note, WELCOME, WELCOME_TEXT);
         }
         let recovered = folder.as_deref().map(Recovered::find).unwrap_or_default();
         let dialog = (!recovered.is_empty()).then_some(Dialog::Recover(recovered));
@@ -86,10 +95,29 @@ impl Editor {
             exporting: None,
             gallery: Gallery::default(),
             copied: None,
+            device_trouble: None,
             size: [64, 64],
-            hand: None,
+            hand: Vec::new(),
             from_view: None,
         }
+    }
+
+    /// Goes on in another window, with all its pictures to be made anew.
+    pub fn move_to(&mut self, ctx: &Context) {
+        theme::install(ctx);
+        ctx.set_theme(if self.settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
+        ctx.set_zoom_factor(self.settings.zoom);
+        std::mem::replace(&mut self.background, Background::new(ctx)).finish();
+        self.object.move_to(ctx);
+        self.tile.move_to();
+        self.lobe.move_to();
+        self.gallery = Gallery::default();
+        self.accuracy = panels::AccuracyState::default();
+        self.exporting = None;
+        self.title.clear();
+        let text = "The graphics device of the window was lost, so a new window was opened. Your document is as it was; \
+                    if this happens again, save, and update the graphics driver.";
+        self.messages.put(Level::Trouble, "window", text);
     }
 
     /// After the window is gone.
@@ -155,7 +183,10 @@ impl Editor {
         self.settings.side_width = side;
         CentralPanel::no_frame().show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
-            self.messages.ui(ui);
+            if self.messages.ui(ui) == Some(WELCOME) {
+                self.settings.welcomed = true;
+                self.settings.save(self.folder.as_deref());
+            }
             if self.exchanged {
                 self.tile_ui(ui, &scene, 0.0);
             } else {
@@ -169,6 +200,7 @@ impl Editor {
         }
         self.take_hand();
         self.brush_keys(&ctx);
+        self.take_pasted(&ctx);
         for action in action.into_iter().chain(from_menu).chain(from_gallery) {
             self.perform(&ctx, action);
         }
@@ -182,80 +214,13 @@ impl Editor {
         self.measure_accuracy();
     }
 
-    fn gallery_ui(&mut self, ui: &mut Ui) -> Option<Action> {
-        if !self.settings.gallery {
-            return None;
-        }
-        let panel = Panel::left("gallery").default_size(self.settings.gallery_width).size_range(118.0..=480.0);
-        let shown = panel.show(ui, |ui| self.gallery.ui(ui, &self.document.name));
-        self.settings.gallery_width = shown.response.rect.width();
-        let chosen = shown.inner;
-        chosen.map(|name| Action::OpenShipped(name.to_owned()))
-    }
-
-    fn object_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
-        let fill = ui.visuals().panel_fill;
-        egui::Frame::new().fill(fill).inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
-            ui.take_available_width();
-            self.from_view = self.object.toolbar(ui, scene);
-        });
-        self.size = self.object.ui(ui, scene);
-        self.pick();
-    }
-
-    /// What the pointer is over tells the lobe view and the tile.
-    fn pick(&mut self) {
-        let (Some(at), Some(made)) = (self.object.pointed, &self.object.made) else { return };
-        let Some((mesh, lights)) = &made.set else { return };
-        let size = [made.picture.width, made.picture.height];
-        let Ok(view) = CameraView::new(&made.camera, mesh, size) else { return };
-        let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
-        if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
-            self.lobe.viewer = Some(picked.viewer);
-            self.lobe.light = picked.light.unwrap_or(self.lobe.light);
-            let value = made.brdf.eval(self.lobe.light, picked.viewer).max_element();
-            self.tile.picked = Some((picked.viewer, 4.0 * value));
-            self.tile.show = Which::Contribution;
-        }
-    }
-
-    /// The tile with its toolbar; `below` is kept free.
-    fn tile_ui(&mut self, ui: &mut Ui, scene: &Scene, below: f32) {
-        ui.add_space(3.0);
-        if let Some(on) = self.tile.toolbar(ui) {
-            self.tile.set_painting(on);
-        }
-        let size = if below > 0.0 { tile::fitting(ui, below) } else { ui.available_size() };
-        self.hand = self.tile.ui(ui, scene.tile.size, size);
-    }
-
-    /// The smaller view, and under it the brush or the lobe.
-    fn side_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
-        if self.exchanged {
-            let size = tile::fitting(ui, 300.0);
-            ui.allocate_ui(size, |ui| self.object_ui(ui, scene));
-        } else {
-            let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + 90.0 };
-            self.tile_ui(ui, scene, below);
-        }
-        ui.add_space(6.0);
-        if self.tile.painting {
-            ScrollArea::vertical().show(ui, |ui| {
-                if let Some(asked) = brushes::ui(ui, &mut self.tile.brush) {
-                    self.brush_asked(asked);
-                }
-            });
-        } else {
-            self.lobe.ui(ui);
-        }
-    }
-
     /// Strokes come after the panels: what they edit is the scene as it is then.
     fn take_hand(&mut self) {
-        match self.hand.take() {
-            Some(hand) => self.paint(hand),
-            None if self.stroke.is_some() && !self.tile.painting => self.end_stroke(),
-            None => {}
+        for hand in std::mem::take(&mut self.hand) {
+            self.paint(hand);
+        }
+        if !self.tile.painting {
+            self.end_stroke();
         }
     }
 

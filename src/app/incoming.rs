@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use biscale::Result;
+use biscale::export::tile::TileOptions;
 use biscale::scene::{BrdfSpec, Geometry};
 use eframe::egui::Context;
 
@@ -12,6 +13,7 @@ use super::dialogs::{Dialog, Purpose};
 use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
+use super::views::brushes::Layer;
 use super::worker::{ExportAnswer, ExportJob, TableChoice, What};
 
 impl Editor {
@@ -22,9 +24,10 @@ impl Editor {
                 "mesh" => Purpose::TileMesh,
                 "object" => Purpose::ObjectMesh,
                 "environment" => Purpose::Environment,
-                "color_path" => Purpose::Colors,
+                "color_path" => Purpose::Paint(Layer::Colors),
+                "slot_path" => Purpose::Paint(Layer::Slots),
                 _ if matches!(self.document.scene().tile.geometry, Geometry::Mesh(_)) => Purpose::TileMesh,
-                _ => Purpose::Heights,
+                _ => Purpose::Paint(Layer::Heights),
             };
             self.browse(purpose, "");
         }
@@ -43,16 +46,21 @@ impl Editor {
 
     /// A file was chosen.
     pub(super) fn chosen(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
+        self.settings.files = path.parent().map(Path::to_owned);
         let mut scene = (**self.document.scene()).clone();
         let near = self.near(&path);
         match purpose {
             Purpose::OpenScene => return self.perform_now(ctx, Action::OpenFile(path)),
             Purpose::SaveScene => return self.save(&path),
             Purpose::Measured { material, term } => match materials::measured(&near) {
-                Some(measured) => materials::set_term(&mut scene, material, term, measured),
+                Some(measured) => {
+                    let name = scene.materials.get(material).map(|material| material.name.clone());
+                    materials::set_term(&mut scene, material, term, measured);
+                    self.as_measured(&mut scene, material, name.as_deref());
+                }
                 None => return self.unknown_file(&path),
             },
-            Purpose::Heights => match surface::of_file(&near, &scene) {
+            Purpose::Paint(Layer::Heights) => match surface::of_file(&near, &scene) {
                 Some(geometry) => scene.tile.geometry = geometry,
                 None => return self.unknown_file(&path),
             },
@@ -60,18 +68,22 @@ impl Editor {
                 Some(geometry) => scene.tile.geometry = geometry,
                 None => return self.unknown_file(&path),
             },
-            Purpose::Colors => {
-                if let Some(place) = super::document::color_path(&mut scene.tile.geometry) {
-                    *place = Some(near);
-                }
-            }
+            Purpose::Paint(Layer::Colors) => scene.tile.color_path = Some(near),
+            Purpose::Paint(Layer::Slots) => scene.tile.slot_path = Some(near),
             Purpose::ObjectMesh => {
                 "mesh".clone_into(&mut scene.object.kind);
                 scene.object.path = Some(near);
             }
             Purpose::Environment => scene.light.environment = near.to_string_lossy().into_owned(),
-            Purpose::SaveHeights => return self.save_image(&path, false),
-            Purpose::SaveColors => return self.save_image(&path, true),
+            Purpose::SavePaint(layer) => return self.save_image(&path, layer),
+            Purpose::ExportTable if path.extension().is_some_and(|ending| ending == "gltf" || ending == "mtlx") => {
+                self.dialog = Some(Dialog::Fit { path });
+                return;
+            }
+            Purpose::ExportTile => {
+                self.dialog = Some(Dialog::Tile { path, options: TileOptions::default() });
+                return;
+            }
             Purpose::ExportTable => {
                 match biscale::export::check_ending(&path) {
                     Ok(()) => self.dialog = Some(Dialog::Table { path, choice: TableChoice::default() }),
@@ -85,6 +97,24 @@ impl Editor {
             }
         }
         self.try_edit(scene);
+    }
+
+    /// A paint that was measured is shown as it was: no tint of the material before remains, and that is said.
+    fn as_measured(&mut self, scene: &mut biscale::scene::Scene, material: usize, name: Option<&str>) {
+        self.messages.clear("measured");
+        let Some(place) = scene.materials.get_mut(material) else { return };
+        let mut said = Vec::new();
+        if place.color != glam::Vec3::ONE {
+            place.color = glam::Vec3::ONE;
+            said.push("its colour is white now, so that the paint looks as it was measured");
+        }
+        if place.brdf.as_ref().is_some_and(|brdf| brdf.terms().len() > 1) {
+            said.push("the other lobes of the material are still added to it (× removes one)");
+        }
+        if !said.is_empty() {
+            let name = panels::fields::words(name.unwrap_or("default"));
+            self.messages.put(Level::Note, "measured", format!("{name}: {}.", said.join("; ")));
+        }
     }
 
     pub(super) fn try_edit(&mut self, scene: biscale::scene::Scene) {
@@ -125,14 +155,16 @@ impl Editor {
                     scene.materials.push(materials::grey());
                 }
                 let near = self.near(&path);
-                if let (Some(term), Some(first)) = (materials::measured(&near), scene.materials.first_mut()) {
-                    first.brdf = Some(BrdfSpec::One(term));
+                let at = scene.materials.iter().position(|material| material.name == "default").unwrap_or(0);
+                if let (Some(term), Some(place)) = (materials::measured(&near), scene.materials.get_mut(at)) {
+                    place.brdf = Some(BrdfSpec::One(term));
                 }
+                self.as_measured(&mut scene, at, None);
                 self.try_edit(scene);
             }
             "obj" => self.chosen(ctx, Purpose::TileMesh, path),
             "hdr" | "exr" => self.chosen(ctx, Purpose::Environment, path),
-            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.chosen(ctx, Purpose::Heights, path),
+            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.chosen(ctx, Purpose::Paint(Layer::Heights), path),
             _ => self.unknown_file(&path),
         }
     }

@@ -39,14 +39,17 @@ impl Messages {
         self.list.iter().map(|message| message.text.as_str()).collect()
     }
 
-    pub fn ui(&mut self, ui: &mut Ui) {
+    /// Shows them; the source of one that was closed.
+    pub fn ui(&mut self, ui: &mut Ui) -> Option<&'static str> {
         let mut closed = None;
         for (at, message) in self.list.iter().enumerate() {
             let color = match message.level {
                 Level::Note => theme::ACCENT,
                 Level::Trouble => theme::WARNING,
             };
-            let frame = Frame::new().fill(color.gamma_multiply(0.22)).inner_margin(egui::Margin::symmetric(10, 5));
+            let frame = Frame::new()
+                .fill(ui.visuals().panel_fill.lerp_to_gamma(color, 0.22))
+                .inner_margin(egui::Margin::symmetric(10, 5));
             frame.show(ui, |ui| {
                 ui.horizontal(|ui| {
                     let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(10.0), egui::Sense::hover());
@@ -62,8 +65,6 @@ impl Messages {
                 });
             });
         }
-        if let Some(at) = closed {
-            self.list.remove(at);
-        }
+        closed.map(|at| self.list.remove(at).source)
     }
 }

@@ -12,6 +12,7 @@ mod dialogs;
 mod document;
 mod editor;
 mod incoming;
+mod layout;
 mod menu;
 mod messages;
 mod paint;

@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
+use biscale::geometry::painted_slot;
 use biscale::scene::{Geometry, Pixels};
 use eframe::egui::{Context, Key};
 use glam::UVec2;
 
-use super::document::{color_path, write_colors, write_heights};
+use super::document::{write_colors, write_heights, write_slots};
 use super::editor::Editor;
 use super::messages::Level;
 use super::paint::{self, Stroke, Tool};
-use super::views::brushes::BrushAsked;
-use super::views::tile::Hand;
+use super::panels::materials;
+use super::views::brushes::{BrushAsked, Layer};
+use super::views::hand::Hand;
 
 impl Editor {
     /// Takes what the hand did on the tile.
@@ -34,6 +36,7 @@ impl Editor {
         if let Some(stroke) = self.stroke.take() {
             let name = match self.tile.brush.tool {
                 Tool::Color => "Paint colour".to_owned(),
+                Tool::Material => "Paint material".to_owned(),
                 tool => format!("Paint: {}", tool.name().to_lowercase()),
             };
             self.document.end_stroke(&name, &stroke.before);
@@ -42,7 +45,11 @@ impl Editor {
 
     /// Makes sure that there is an image to paint on; whether a stroke has begun.
     fn begin_stroke(&mut self) -> bool {
-        let ready = if self.tile.brush.tool == Tool::Color { self.have_colors() } else { self.have_heights() };
+        let ready = match self.tile.brush.tool {
+            Tool::Color => self.have_colors(),
+            Tool::Material => self.have_slots(),
+            _ => self.have_heights(),
+        };
         if ready {
             self.messages.clear("paint");
             self.stroke = Some(Stroke::begin(self.document.painted()));
@@ -77,21 +84,37 @@ impl Editor {
     }
 
     fn have_colors(&mut self) -> bool {
-        let mut geometry = self.document.scene().tile.geometry.clone();
-        if color_path(&mut geometry).is_none() {
-            let text = "Colours are painted on height-fields, flat tiles and meshes. Any height brush turns this surface \
-                        into a height-field first; or give its parts colours under Materials.";
-            self.messages.put(Level::Note, "paint", text);
-            return false;
+        if self.document.painted().colors.is_some() {
+            return true;
         }
-        if self.document.painted().colors.is_none() {
-            match paint::colors_of(&self.document.loaded()) {
-                Ok(colors) => self.document.paint_colors("Begin to paint colours", Some(colors)),
-                Err(error) => {
-                    self.messages.put(Level::Trouble, "paint", error.to_string());
-                    return false;
-                }
+        match paint::colors_of(&self.document.loaded()) {
+            Ok(colors) => self.document.paint_colors("Begin to paint colours", Some(colors)),
+            Err(error) => {
+                self.messages.put(Level::Trouble, "paint", error.to_string());
+                return false;
             }
+        }
+        true
+    }
+
+    /// An image of slots, and the material that the brush paints.
+    fn have_slots(&mut self) -> bool {
+        let mut scene = (**self.document.scene()).clone();
+        let added = materials::add_painted(&mut scene, self.tile.brush.slot);
+        if self.document.painted().slots.is_some() && !added {
+            return true;
+        }
+        match paint::slots_of(&self.document.loaded()) {
+            Ok(slots) => self.document.paint_slots("Begin to paint materials", scene, Some(slots)),
+            Err(error) => {
+                self.messages.put(Level::Trouble, "paint", error.to_string());
+                return false;
+            }
+        }
+        if added {
+            let name = crate::app::panels::fields::words(&painted_slot(self.tile.brush.slot));
+            let text = format!("\"{name}\" is a new material: its BRDF and colour are on the right, under Materials.");
+            self.messages.put(Level::Note, "relief", text);
         }
         true
     }
@@ -115,27 +138,29 @@ impl Editor {
     pub(super) fn brush_asked(&mut self, asked: BrushAsked) {
         use super::dialogs::Purpose;
         match asked {
-            BrushAsked::OpenHeights => self.browse(Purpose::Heights, ""),
-            BrushAsked::SaveHeights => self.browse(Purpose::SaveHeights, "heights.png"),
-            BrushAsked::OpenColors => self.browse(Purpose::Colors, ""),
-            BrushAsked::SaveColors => self.browse(Purpose::SaveColors, "colors.png"),
-            BrushAsked::Flatten => {
+            BrushAsked::Open(layer) => self.browse(Purpose::Paint(layer), ""),
+            BrushAsked::Save(layer) => self.browse(Purpose::SavePaint(layer), layer.file()),
+            BrushAsked::Clear(Layer::Heights) => {
                 let size = self.document.painted().heights.as_ref().map_or(UVec2::splat(128), |image| image.size);
                 let plane = Pixels { size, values: vec![0.5; (size.x * size.y) as usize] };
                 self.document.paint_heights("Flatten all", plane, None);
-                self.scene_changed();
             }
-            BrushAsked::ClearColors => self.document.paint_colors("No colours", None),
+            BrushAsked::Clear(Layer::Colors) => self.document.paint_colors("No colours", None),
+            BrushAsked::Clear(Layer::Slots) => {
+                let scene = (**self.document.scene()).clone();
+                self.document.paint_slots("No painted materials", scene, None);
+            }
         }
+        self.scene_changed();
     }
 
     /// Writes the painted images where they are asked for.
-    pub(super) fn save_image(&mut self, path: &Path, colors: bool) {
+    pub(super) fn save_image(&mut self, path: &Path, layer: Layer) {
         let loaded = self.document.loaded();
-        let written = if colors {
-            paint::colors_of(&loaded).and_then(|image| write_colors(&image, path))
-        } else {
-            paint::heights_of(&loaded).and_then(|image| write_heights(&image, path))
+        let written = match layer {
+            Layer::Heights => paint::heights_of(&loaded).and_then(|image| write_heights(&image, path)),
+            Layer::Colors => paint::colors_of(&loaded).and_then(|image| write_colors(&image, path)),
+            Layer::Slots => paint::slots_of(&loaded).and_then(|image| write_slots(&image, path)),
         };
         match written {
             Ok(()) => self.messages.put(Level::Note, "save", format!("Saved {}.", path.display())),

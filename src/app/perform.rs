@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use biscale::scene::Material;
-use eframe::egui::{Context, Theme};
+use eframe::egui::{Context, Event, Theme};
 
 use super::actions::Action;
 use super::dialogs::{Dialog, FileDialog, Purpose};
@@ -21,7 +21,7 @@ impl Editor {
             action,
             Action::New | Action::Open | Action::OpenFile(_) | Action::OpenShipped(_) | Action::Reload | Action::Quit
         );
-        if discards && self.document.is_dirty() {
+        if discards && self.document.has_work() {
             self.dialog = Some(Dialog::Unsaved(action));
             return;
         }
@@ -53,6 +53,10 @@ impl Editor {
             Action::ExportTable => {
                 let name = format!("{}.npz", self.document.name);
                 self.browse(Purpose::ExportTable, &name);
+            }
+            Action::ExportTile => {
+                let name = format!("{}.obj", self.document.name);
+                self.browse(Purpose::ExportTile, &name);
             }
             Action::ExportPicture => {
                 let name = format!("{}.png", self.document.name);
@@ -118,7 +122,10 @@ impl Editor {
     }
 
     pub(super) fn browse(&mut self, purpose: Purpose, name: &str) {
-        let folder = self.document.base_dir.clone();
+        // What belongs to a scene is saved beside it; what is opened lies where the last file was.
+        let own = Some(self.document.base_dir.clone()).filter(|folder| !folder.as_os_str().is_empty());
+        let last = self.settings.files.clone().filter(|folder| folder.is_dir());
+        let folder = if purpose.saves() { own.or(last) } else { last.or(own) }.unwrap_or_default();
         self.dialog = Some(Dialog::Files(FileDialog::new(purpose, &folder, name)));
     }
 
@@ -171,7 +178,9 @@ impl Editor {
         let scene = self.document.scene();
         let Some(material) = scene.materials.get(index) else { return };
         let found = scene.material_for_slot(&material.name);
-        let full = Material { brdf: found.ok().map(|found| found.brdf.clone()), ..material.clone() };
+        let mut full = Material { brdf: found.ok().map(|found| found.brdf.clone()), ..material.clone() };
+        // Another scene, elsewhere, is to find the files too.
+        super::document::make_absolute(&mut full, &self.document.base_dir);
         if let Ok(text) = toml::to_string(&full) {
             self.copied = Some(full);
             ctx.copy_text(text);
@@ -190,6 +199,32 @@ impl Editor {
             Some(place) => *place = pasted,
             None => scene.materials.push(pasted),
         }
-        self.document.edit_as("Paste a material", scene);
+        match scene.validate() {
+            Ok(()) => self.document.edit_as("Paste a material", scene),
+            Err(error) => self.messages.put(Level::Trouble, "paste", format!("Not pasted: {error}")),
+        }
+    }
+
+    /// Text that comes from the clipboard while no text is typed: a material, of this editor or another.
+    pub(super) fn take_pasted(&mut self, ctx: &Context) {
+        if self.dialog.is_some() || ctx.text_edit_focused() {
+            return;
+        }
+        let texts = ctx.input(|input| {
+            let pasted = |event: &Event| if let Event::Paste(text) = event { Some(text.clone()) } else { None };
+            input.events.iter().filter_map(pasted).collect::<Vec<_>>()
+        });
+        for text in texts {
+            match toml::from_str::<Material>(&text) {
+                Ok(material) => {
+                    self.copied = Some(material);
+                    self.paste_material("default");
+                }
+                Err(_) => {
+                    let text = "The clipboard holds no material: use Copy at a material, here or in another editor.";
+                    self.messages.put(Level::Note, "paste", text);
+                }
+            }
+        }
     }
 }

@@ -22,7 +22,7 @@ impl Editor {
                 ui.label("Computing the first picture");
                 return;
             };
-            let waits = self.object.asked.is_some_and(|(version, _)| version != made.version);
+            let waits = self.object.since.is_some();
             match (waits, made.grade, self.object.doing) {
                 (false, Grade::Final, _) => {
                     let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(12.0), egui::Sense::hover());

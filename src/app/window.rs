@@ -1,9 +1,11 @@
-//! The window: opens it, or says what is missing.
+//! The window: opens it, or says what is missing. A lost graphics device takes the window with it, not the document.
 
 use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
 use eframe::egui::{self, ViewportBuilder, ViewportCommand};
@@ -16,73 +18,132 @@ const NO_WINDOW: &str = "the editor needs a desktop (X11 or Wayland) and a Vulka
     Fedora: `dnf install mesa-vulkan-drivers libxkbcommon-x11 libwayland-client`. \
     Without a desktop, `biscale render SCENE -o picture.png` makes the same picture";
 
+/// A window that is lost sooner than this is not opened a further time.
+const SHORTEST: Duration = Duration::from_secs(3);
+
+/// The editor, kept while windows come and go.
+type Kept = Rc<RefCell<Option<Editor>>>;
+
 /// Opens the editor on a scene, a file or a shipped name.
 ///
 /// # Errors
 /// A scene that cannot be read, no display, no adapter: with what to do about it.
 pub fn run(scene: Option<&str>) -> Result<()> {
-    let document = Document::open(scene.unwrap_or("default"))?;
-    let folder = Settings::folder();
-    let settings = Settings::load(folder.as_deref());
-    let kept: Rc<RefCell<Option<Editor>>> = Rc::default();
-    let mut document = Some(document);
+    let mut document = Some(Document::open(scene.unwrap_or("default"))?);
+    let kept = Kept::default();
     loop {
-        let lost = Arc::new(AtomicBool::new(false));
-        let size = settings.window;
-        let options = eframe::NativeOptions {
-            viewport: ViewportBuilder::default()
-                .with_inner_size(size)
-                .with_min_inner_size([800.0, 560.0])
-                .with_title("biscale")
-                .with_app_id("biscale"),
-            ..eframe::NativeOptions::default()
-        };
-        let (kept_inside, lost_inside, folder) = (kept.clone(), lost.clone(), folder.clone());
-        let first = document.take();
-        let opened = eframe::run_native(
-            "biscale",
-            options,
-            Box::new(move |creation| {
-                watch_device(creation, &lost_inside);
-                if let Some(document) = first {
-                    *kept_inside.borrow_mut() = Some(Editor::new(&creation.egui_ctx, document, folder));
+        let (opened_at, lost) = (Instant::now(), Arc::new(AtomicBool::new(false)));
+        let opened = catch_unwind(AssertUnwindSafe(|| open(&kept, &lost, document.take())));
+        let has_left = kept.borrow().as_ref().is_none_or(|editor| editor.leaving);
+        match opened {
+            Ok(Ok(())) if has_left => {
+                if let Some(editor) = kept.borrow_mut().take() {
+                    editor.finish();
                 }
-                Ok(Box::new(Window { editor: kept_inside, lost: lost_inside }))
-            }),
-        );
-        if let Err(error) = opened {
-            return Err(anyhow!("{NO_WINDOW} ({error})"));
-        }
-        // A lost device takes the window with it, not the document.
-        if !lost.load(Ordering::Relaxed) {
-            if let Some(editor) = kept.borrow_mut().take() {
-                editor.finish();
+                return Ok(());
             }
-            return Ok(());
+            Ok(Ok(())) if lost.load(Ordering::Relaxed) && opened_at.elapsed() > SHORTEST => {
+                eprintln!("biscale: the window's graphics device was lost; a new window is opened");
+            }
+            Ok(Ok(())) => return Err(given_up(&kept, "it closed by itself")),
+            Ok(Err(error)) if kept.borrow().is_none() => return Err(anyhow!("{NO_WINDOW} ({error})")),
+            Ok(Err(error)) => return Err(given_up(&kept, &error.to_string())),
+            Err(_) => {
+                let told = given_up(&kept, "a fault in the program");
+                // What a panic left of this process' windows is no ground for another one.
+                if opened_at.elapsed() > SHORTEST && start_again().is_ok() {
+                    eprintln!("biscale: {told}; a new editor is started");
+                    return Ok(());
+                }
+                return Err(told);
+            }
         }
     }
 }
 
+/// One window, from its opening to its end.
+fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<Document>) -> eframe::Result {
+    let folder = Settings::folder();
+    let settings = Settings::load(folder.as_deref());
+    let options = eframe::NativeOptions {
+        viewport: ViewportBuilder::default()
+            .with_inner_size(settings.window)
+            .with_min_inner_size([800.0, 560.0])
+            .with_title("biscale")
+            .with_app_id("biscale"),
+        ..eframe::NativeOptions::default()
+    };
+    let (kept, lost) = (kept.clone(), lost.clone());
+    let create: eframe::AppCreator<'_> = Box::new(move |creation| {
+        let device = watch_device(creation, &lost);
+        let mut editor = kept.borrow_mut();
+        match (editor.as_mut(), first) {
+            (Some(editor), _) => editor.move_to(&creation.egui_ctx),
+            (None, Some(document)) => *editor = Some(Editor::new(&creation.egui_ctx, document, folder)),
+            (None, None) => {}
+        }
+        drop(editor);
+        Ok(Box::new(Window { editor: kept, lost, device }))
+    });
+    eframe::run_native("biscale", options, create)
+}
+
+/// Starts the program anew; it offers what the recovery file holds.
+fn start_again() -> std::io::Result<()> {
+    std::process::Command::new(std::env::current_exe()?).arg("edit").spawn().map(drop)
+}
+
+/// No window can be had any more: the document goes to the recovery file, which the next start offers.
+fn given_up(kept: &Kept, why: &str) -> anyhow::Error {
+    // A panic while it was borrowed leaves it borrowed; the last autosave is what there is then.
+    let saved = kept.try_borrow().ok().and_then(|editor| editor.as_ref().map(Editor::keep_now));
+    if let Ok(mut editor) = kept.try_borrow_mut()
+        && let Some(editor) = editor.take()
+    {
+        // Not dropped: that would remove the recovery file.
+        std::mem::forget(editor);
+    }
+    let kept = match saved {
+        Some(Ok(())) => "Unsaved work is kept and is offered at the next start",
+        Some(Err(_)) | None => "The work up to the last seconds is kept and is offered at the next start",
+    };
+    anyhow!("the window was lost ({why}). {kept}")
+}
+
 /// Errors of the window's own device are heard; the default handler would end the program.
-fn watch_device(creation: &eframe::CreationContext, lost: &Arc<AtomicBool>) {
-    if let Some(state) = &creation.wgpu_render_state {
-        let (lost, ctx) = (lost.clone(), creation.egui_ctx.clone());
-        state.device.set_device_lost_callback(move |reason, _| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                lost.store(true, Ordering::Relaxed);
-                ctx.request_repaint();
-            }
+fn watch_device(creation: &eframe::CreationContext, lost: &Arc<AtomicBool>) -> Option<wgpu::Device> {
+    let device = creation.wgpu_render_state.as_ref()?.device.clone();
+    let (lost, ctx) = (lost.clone(), creation.egui_ctx.clone());
+    device.set_device_lost_callback(move |_, _| {
+        lost.store(true, Ordering::Relaxed);
+        ctx.request_repaint();
+    });
+    device.on_uncaptured_error(Arc::new(|error| eprintln!("biscale: the window's device complains: {error}")));
+    #[cfg(debug_assertions)]
+    lose_for_tests(&device, &creation.egui_ctx);
+    Some(device)
+}
+
+/// `BISCALE_LOSE_DEVICE=5` in a debug build: the device is lost after so many seconds, once.
+#[cfg(debug_assertions)]
+fn lose_for_tests(device: &wgpu::Device, ctx: &egui::Context) {
+    static ONCE: AtomicBool = AtomicBool::new(true);
+    let seconds = std::env::var("BISCALE_LOSE_DEVICE").ok().and_then(|text| text.parse().ok());
+    if let (Some(seconds), true) = (seconds, ONCE.swap(false, Ordering::Relaxed)) {
+        let (device, ctx) = (device.clone(), ctx.clone());
+        std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_secs(seconds));
+            device.destroy();
+            ctx.request_repaint();
         });
-        state
-            .device
-            .on_uncaptured_error(Arc::new(|error| eprintln!("biscale: the window's device complains: {error}")));
     }
 }
 
 /// What eframe runs.
 struct Window {
-    editor: Rc<RefCell<Option<Editor>>>,
+    editor: Kept,
     lost: Arc<AtomicBool>,
+    device: Option<wgpu::Device>,
 }
 
 impl eframe::App for Window {
@@ -90,7 +151,12 @@ impl eframe::App for Window {
         let mut editor = self.editor.borrow_mut();
         let Some(editor) = editor.as_mut() else { return };
         let ctx = ui.ctx().clone();
+        // A device that is gone says so when it is asked.
+        if let Some(device) = &self.device {
+            let _ = device.poll(wgpu::PollType::Poll);
+        }
         if self.lost.load(Ordering::Relaxed) {
+            // Nothing is drawn on a device that is gone: that would panic.
             ctx.send_viewport_cmd(ViewportCommand::Close);
             return;
         }

@@ -99,7 +99,7 @@ impl CloseUp {
     /// `f_r (n·i)+ V(i)` of a point [1/sr].
     fn lit(&self, hit: &Hit, i: Vec3, o: Vec3, wearing: Wearing<'_>) -> Vec3 {
         let (normal, geometric) = self.normals(hit, o);
-        let slot = usize::from(self.mesh.triangle_slot[hit.triangle as usize]);
+        let slot = usize::from(self.mesh.slot_at(hit.triangle as usize, hit.position.truncate()));
         let material = wearing.material_of_slot.get(slot).and_then(|index| wearing.materials.get(*index));
         let Some(material) = material else { return Vec3::ZERO };
         if normal.dot(i) <= 0.0 || !self.sees(hit, geometric, i) {

@@ -75,10 +75,12 @@ impl SceneArgs {
 
     /// Says what a person should know about how the result was made.
     pub fn notes(&self, outcome: &Outcome) {
-        if !self.quiet {
-            for note in &outcome.notes {
-                eprintln!("note: {note}");
-            }
+        // An examination costs some hundredths of a second: only where somebody reads it.
+        if self.quiet {
+            return;
+        }
+        for note in &outcome.notes {
+            eprintln!("note: {note}");
         }
         self.warn(outcome.health());
     }

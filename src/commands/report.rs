@@ -5,7 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use biscale::accuracy::sweep::{Candidate, Family, Point, Truth, candidates, measure, reference_point, with_settings};
+use biscale::accuracy::candidates::{Candidate, Family, candidates, with_settings};
+use biscale::accuracy::sweep::{Point, Truth, measure, reference_point};
 use biscale::accuracy::{ReferenceSettings, ladder};
 use biscale::export::replace_file;
 use biscale::filtering::EffectiveBrdf;
@@ -188,7 +189,7 @@ fn thumbnails(loaded: &LoadedScene, bar: &ProgressBar) -> Result<Vec<Thumbnail>>
     let picture = |preset: &'static str, set: &[String]| -> Result<_> {
         let candidate = Candidate { family: Family::Preset, preset, set: set.to_vec() };
         let brdf: std::sync::Arc<EffectiveBrdf> = Pipeline::new().effective(&with_settings(loaded, &candidate)?)?.brdf;
-        Ok(studio.picture(&brdf)?)
+        Ok(studio.picture(&*brdf)?)
     };
     let facets = FINEST[usize::from(has_measured(loaded))];
     bar.set_message("the finest picture");

@@ -29,8 +29,7 @@ pub struct UpperPairs {
 /// Directions of nodes stay this far [sine] above the horizon.
 const LOWEST: f32 = 2e-3;
 
-/// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²`: there shadows and cosines change fastest. On hammered
-/// metal, a GGX of 0.2, eight steps leave 38.6 dB with k = 1, 37 dB with k = 0 and 41 to 42 dB in between.
+/// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²`: there shadows and cosines change fastest.
 const CROWDING: f32 = 0.75;
 
 impl UpperPairs {

@@ -26,6 +26,8 @@ pub struct ExportMeta {
     pub tile_unit: String,
     /// Whether the tile closes the plane; where it does not, `a_v` is measured ([`crate::geometry::TileMesh::closes_plane`]).
     pub closes_plane: bool,
+    /// Whether turning the tile changes nothing, so that three angles tell all.
+    pub isotropic: bool,
     /// Notes on the way from scene to table (snapped parameters, health).
     pub notes: Vec<String>,
 }
@@ -41,6 +43,7 @@ impl ExportMeta {
             tile_size: tile.size.to_array(),
             tile_unit: tile.unit.clone(),
             closes_plane,
+            isotropic: !outcome.plan.is_on("anisotropy"),
             notes: outcome.notes.clone(),
         }
     }

@@ -79,6 +79,23 @@ impl EffectiveBrdf {
         Self { form: Form::Interreflecting(Box::new(self.form), table), ..self }
     }
 
+    /// How what facets reflect directly is held; without the light between them.
+    pub fn direct_form(&self) -> &Form {
+        match &self.form {
+            Form::Interreflecting(form, _) => form,
+            form => form,
+        }
+    }
+
+    /// The same light between facets, and another form of what they reflect directly.
+    pub fn with_direct_form(&self, form: Form) -> Self {
+        let form = match &self.form {
+            Form::Interreflecting(_, table) => Form::Interreflecting(Box::new(form), table.clone()),
+            _ => form,
+        };
+        Self { form, base_area: self.base_area }
+    }
+
     /// `a_v(o)`, and `a_v f̄` of each light into `out`.
     fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         if let Form::Interreflecting(form, table) = &self.form {

@@ -32,3 +32,29 @@ pub trait Reflectance: Sync {
     /// Unit vectors in the tangent frame (x, y along the tile, z the surface normal).
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
 }
+
+/// How samples that stand evenly are read between them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Interpolation {
+    /// Catmull and Rom (1974).
+    #[default]
+    Cubic,
+    /// Half the reading, and kinks.
+    Linear,
+}
+
+impl Interpolation {
+    /// Weights of four samples about a place `t` of the way from the second to the third.
+    fn weights(self, t: f32) -> [f32; 4] {
+        let (t2, t3) = (t * t, t * t * t);
+        match self {
+            Self::Cubic => [
+                0.5 * (2.0 * t2 - t - t3),
+                0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
+                0.5 * (t + 4.0 * t2 - 3.0 * t3),
+                0.5 * (t3 - t2),
+            ],
+            Self::Linear => [0.0, 1.0 - t, t, 0.0],
+        }
+    }
+}

@@ -9,8 +9,8 @@ use std::f32::consts::{PI, TAU};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::gemm;
 use super::gram::{eigen, rank_for};
+use super::{Interpolation, gemm};
 use crate::brdf::{LobeAngles, Measured};
 use crate::directions::{HalfDifferenceGrid, from_angles, half_vector};
 use crate::error::Result;
@@ -55,6 +55,8 @@ pub struct BasisGrid {
     pub normal_rings: usize,
     /// Whether normals reach below the horizon (overhangs): the whole sphere, else the upper half.
     pub whole_sphere: bool,
+    /// Between rings of normals.
+    pub interpolation: Interpolation,
 }
 
 impl BasisGrid {
@@ -152,7 +154,7 @@ impl RotatedBasis {
         let rings = self.grid.normal_rings as i64;
         let at = theta / self.grid.reach() * rings as f32 - 0.5;
         let base = at.floor();
-        let weights = catmull_rom(at - base);
+        let weights = self.grid.interpolation.weights(at - base);
         // A ring beyond the pole is the mirrored one half a turn on, where e^{-imφ} changes sign for odd m.
         let taps: [(usize, bool); 4] = std::array::from_fn(|k| {
             let ring = base as i64 - 1 + k as i64;
@@ -245,11 +247,6 @@ impl Mode {
     fn kappa(&self, grid: BasisGrid) -> f32 {
         self.multiplicity(grid) as f32
     }
-}
-
-fn catmull_rom(t: f32) -> [f32; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [0.5 * (2.0 * t2 - t - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
 }
 
 /// Blocks of all frequencies: `[2m + part][row * normal_rings + ring]`, without weights.
@@ -365,6 +362,7 @@ mod tests {
             pairs: HalfDifferenceGrid { rings: 20, azimuths: 64, difference: 8, turn: 6 },
             normal_rings: 48,
             whole_sphere: false,
+            interpolation: Interpolation::Cubic,
         };
         for lobe in [Lobe::cook_torrance(0.3), Lobe::ward(0.4), Lobe::Lambertian] {
             let basis = RotatedBasis::new(RotatedLobe::Analytic(lobe), grid, 0.999_99).unwrap();

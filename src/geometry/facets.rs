@@ -55,7 +55,7 @@ impl Facets {
         self.normals.push(interpolated.unwrap_or(geometric));
         self.geometric_normals.push(geometric);
         self.areas.push(area);
-        self.slots.push(mesh.triangle_slot[index]);
+        self.slots.push(mesh.slot_at(index, position.truncate()));
         self.colors.push(mesh.color.at(position.truncate(), mesh.size));
         self.triangles.push(triangle);
     }

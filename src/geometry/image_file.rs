@@ -42,6 +42,25 @@ pub fn read_colors(base_dir: &Path, path: &Path) -> Result<Pixels<Vec3>> {
     Ok(Pixels { size: pixels.size, values: pixels.values })
 }
 
+/// Slots that an image may paint.
+pub const MOST_SLOTS: u8 = 16;
+
+/// Reads painted slots: grey values, of 255 in integer formats.
+///
+/// # Errors
+/// As [`read_heights`], and values above [`MOST_SLOTS`].
+pub fn read_slots(base_dir: &Path, path: &Path) -> Result<Pixels<u8>> {
+    let pixels = read(base_dir, path)?;
+    let scale = if pixels.is_integer { 255.0 } else { 1.0 };
+    let number = |value: &Vec3| (luminance(*value) * scale).round();
+    if let Some(at) = pixels.values.iter().position(|value| !(0.0..=f32::from(MOST_SLOTS)).contains(&number(value))) {
+        let expected = format!("the number of a slot, 0 to {MOST_SLOTS} (a grey of 8 bits)");
+        let found = number(&pixels.values[at]);
+        return Err(InputError::new(pixel_name(at, pixels.size), found, expected).in_file(path).into());
+    }
+    Ok(Pixels { size: pixels.size, values: pixels.values.iter().map(|value| number(value) as u8).collect() })
+}
+
 /// Rec. 709; exact for greys.
 fn luminance(color: Vec3) -> f32 {
     if color.x == color.y && color.y == color.z { color.x } else { color.dot(Vec3::new(0.2126, 0.7152, 0.0722)) }

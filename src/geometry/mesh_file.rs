@@ -55,7 +55,7 @@ mod tests {
     fn load(text: &str) -> Result<TileMesh> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("tile.obj"), text).unwrap();
-        build(&MeshFile { path: "tile.obj".into(), color_path: None }, Vec2::ONE, folder.path())
+        build(&MeshFile { path: "tile.obj".into() }, Vec2::ONE, folder.path())
     }
 
     const PLANE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";

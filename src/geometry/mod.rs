@@ -10,6 +10,7 @@ pub mod heightfield;
 pub mod image_file;
 pub(crate) mod kd_tree;
 mod mesh_file;
+mod normal_bins;
 pub mod obj;
 mod pyramids;
 mod rods;
@@ -23,17 +24,17 @@ mod height_images;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use facets::{FacetSampler, Facets, SampleShift};
 pub use grooves::CrossSection;
 pub use pyramids::OnePyramid;
 pub use symmetry::mirror_planes;
-pub use tile_mesh::{ColorField, HeightGrid, TileMesh};
+pub use tile_mesh::{ColorField, HeightGrid, SlotField, TileMesh};
 
 use crate::error::{InputError, Result};
-use crate::scene::{Geometry, Painted, Tile};
+use crate::scene::{Geometry, Painted, Pixels, Tile};
 
 /// The mesh of a tile; `base_dir` is the scene file's folder, where relative paths start.
 ///
@@ -49,33 +50,56 @@ pub fn build(tile: &Tile, base_dir: &Path) -> Result<TileMesh> {
 /// As [`build`].
 pub fn build_painted(tile: &Tile, base_dir: &Path, painted: &Painted) -> Result<TileMesh> {
     let size = tile.size;
-    let (mut mesh, color_path) = match &tile.geometry {
-        Geometry::Grooves(spec) => (grooves::build(spec, size), None),
-        Geometry::Pyramids(spec) => (pyramids::build(spec, size), None),
-        Geometry::Rods(spec) => (rods::build(spec, size), None),
-        Geometry::Weave(spec) => (weave::build(spec, size), None),
-        Geometry::Heightfield(spec) => {
-            let mesh = match &painted.heights {
-                Some(heights) => heightfield::build_painted(spec, size, heights),
-                None => heightfield::build(spec, size, base_dir)?,
-            };
-            (mesh, spec.color_path.as_deref())
-        }
-        Geometry::Flat(spec) => (flat::build(spec, size), spec.color_path.as_deref()),
-        Geometry::Mesh(spec) => (mesh_file::build(spec, size, base_dir)?, spec.color_path.as_deref()),
+    let mut mesh = match &tile.geometry {
+        Geometry::Grooves(spec) => grooves::build(spec, size),
+        Geometry::Pyramids(spec) => pyramids::build(spec, size),
+        Geometry::Rods(spec) => rods::build(spec, size),
+        Geometry::Weave(spec) => weave::build(spec, size),
+        Geometry::Heightfield(spec) => match &painted.heights {
+            Some(heights) => heightfield::build_painted(spec, size, heights),
+            None => heightfield::build(spec, size, base_dir)?,
+        },
+        Geometry::Flat(spec) => flat::build(spec, size),
+        Geometry::Mesh(spec) => mesh_file::build(spec, size, base_dir)?,
     };
-    let takes_colors = matches!(&tile.geometry, Geometry::Heightfield(_) | Geometry::Flat(_) | Geometry::Mesh(_));
-    if let (true, Some(image)) = (takes_colors, &painted.colors) {
-        mesh.color = ColorField::Image { size: image.size, texels: Arc::new(image.values.clone()) };
-    } else if let Some(path) = color_path {
-        let image = image_file::read_colors(base_dir, path)?;
+    let file = |path: &PathBuf| image_file::read_colors(base_dir, path);
+    if let Some(image) = chosen(&painted.colors, &tile.color_path, file)? {
         mesh.color = ColorField::Image { size: image.size, texels: Arc::new(image.values) };
+    }
+    let file = |path: &PathBuf| image_file::read_slots(base_dir, path);
+    if let Some(image) = chosen(&painted.slots, &tile.slot_path, file)? {
+        paint_slots(&mut mesh, image);
     }
     check_extent(&mesh).map_err(|error| match &tile.geometry {
         Geometry::Mesh(spec) => error.in_file(&spec.path),
         _ => error,
     })?;
     Ok(mesh)
+}
+
+/// What was painted in memory, else what the file holds, if one is named.
+fn chosen<T: Clone>(
+    painted: &Option<Arc<Pixels<T>>>,
+    path: &Option<PathBuf>,
+    read: impl Fn(&PathBuf) -> Result<Pixels<T>>,
+) -> Result<Option<Pixels<T>>> {
+    match painted {
+        Some(image) => Ok(Some((**image).clone())),
+        None => path.as_ref().map(read).transpose(),
+    }
+}
+
+/// Slots `paint_1` ... of an image over those of the surface.
+fn paint_slots(mesh: &mut TileMesh, image: Pixels<u8>) {
+    let first = mesh.slots.len() as u16;
+    let most = image.values.iter().copied().max().unwrap_or(0);
+    mesh.slots.extend((1..=most).map(painted_slot));
+    mesh.painted_slots = Some(SlotField { size: image.size, texels: Arc::new(image.values), first });
+}
+
+/// The name of a slot that is painted: `paint_1` to `paint_16`.
+pub fn painted_slot(number: u8) -> String {
+    format!("paint_{number}")
 }
 
 /// Tile lengths that a mesh may reach up, down and sideways: beyond, an f32 cannot tell places within a tile apart at

@@ -65,7 +65,7 @@ impl Looks<'_> {
         Some(Seen {
             height: hit.position.z,
             normal: self.mesh.geometric_normal(triangle),
-            slot: self.mesh.triangle_slot[triangle],
+            slot: self.mesh.slot_at(triangle, place),
             color: self.mesh.color.at(place, self.mesh.size),
         })
     }

@@ -13,7 +13,7 @@ use super::*;
 use crate::scene::{Field, Geometry, GrooveProfile, Grooves, Pyramids, Rods, Shape, Tile, Weave};
 
 fn tile(geometry: Geometry) -> Tile {
-    Tile { size: Vec2::new(1.0, 1.2), unit: "mm".to_owned(), geometry }
+    Tile { size: Vec2::new(1.0, 1.2), ..Tile::of(geometry) }
 }
 
 fn built(geometry: Geometry) -> TileMesh {
@@ -208,11 +208,38 @@ fn colour_images_weight_the_facets() {
     let image =
         image::RgbImage::from_fn(2, 1, |x, _| if x == 0 { image::Rgb([255, 0, 0]) } else { image::Rgb([0, 255, 0]) });
     image.save(folder.path().join("c.png")).unwrap();
-    let spec = crate::scene::Flat { color_path: Some("c.png".into()), ..Default::default() };
-    let mesh = build(&tile(Geometry::Flat(spec)), folder.path()).unwrap();
+    let flat = tile(Geometry::Flat(Default::default()));
+    let mesh = build(&Tile { color_path: Some("c.png".into()), ..flat }, folder.path()).unwrap();
     let facets = Facets::sample(&mesh, 400, 0);
     let mean = facets.colors.iter().sum::<Vec3>() / 400.0;
     assert!((mean - Vec3::new(0.5, 0.5, 0.0)).length() < 0.02, "{mean}");
+}
+
+#[test]
+fn painted_slots_cover_their_part_of_any_surface_and_leave_the_rest_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    // Left half: the surface's own; right half: the second painted slot.
+    image::GrayImage::from_fn(4, 3, |x, _| image::Luma([if x < 2 { 0 } else { 2 }]))
+        .save(folder.path().join("s.png"))
+        .unwrap();
+    for geometry in [Geometry::Flat(Default::default()), Geometry::Grooves(Default::default())] {
+        let plain = build(&tile(geometry.clone()), folder.path()).unwrap();
+        let painted = Tile { slot_path: Some("s.png".into()), ..tile(geometry) };
+        let mesh = build(&painted, folder.path()).unwrap();
+        let own = plain.slots.len();
+        assert_eq!(mesh.slots[own..], ["paint_1", "paint_2"]);
+        let facets = Facets::sample(&mesh, 2000, 0);
+        for (slot, place) in facets.slots.iter().zip(&facets.positions) {
+            assert_eq!(usize::from(*slot) == own + 1, place.x >= 0.5, "{slot} at {place}");
+        }
+        // Beyond the edge the tile repeats.
+        assert_eq!(usize::from(mesh.slot_at(0, Vec2::new(-0.1, 7.3))), own + 1);
+        assert!(usize::from(mesh.slot_at(0, Vec2::new(1.1, -0.1))) < own);
+    }
+    image::GrayImage::from_pixel(2, 2, image::Luma([99])).save(folder.path().join("s.png")).unwrap();
+    let painted = Tile { slot_path: Some("s.png".into()), ..tile(Geometry::Flat(Default::default())) };
+    let error = build(&painted, folder.path()).unwrap_err().to_string();
+    assert!(error.contains("pixel (0, 0)") && error.contains("99") && error.contains("0 to 16"), "{error}");
 }
 
 fn any_family() -> impl Strategy<Value = (Table, [f32; 2])> {
@@ -248,7 +275,7 @@ proptest! {
     fn any_parameters_in_range_build_a_finite_mesh_that_closes_the_plane((table, size) in any_family()) {
         let geometry: Geometry = table.try_into().map_err(|error: toml::de::Error| TestCaseError::fail(error.to_string()))?;
         let closed = !matches!(geometry, Geometry::Rods(_));
-        let mesh = match build(&Tile { size: size.into(), unit: String::new(), geometry }, Path::new("")) {
+        let mesh = match build(&Tile { size: size.into(), ..Tile::of(geometry) }, Path::new("")) {
             Ok(mesh) => mesh,
             // Each parameter is in range, but the tile a tower.
             Err(error) => {

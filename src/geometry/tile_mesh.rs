@@ -21,12 +21,24 @@ pub struct TileMesh {
     pub slots: Vec<String>,
     /// Colour weights that vary over the tile.
     pub color: ColorField,
+    /// Slots painted over those of the triangles.
+    pub painted_slots: Option<SlotField>,
     /// Where the surface is a height-field: its samples.
     pub height_grid: Option<HeightGrid>,
     /// Every ray from above ends on a side that reflects: `a_v(o) = A cos θ_o` holds (with geometric normals).
     pub closes_plane: bool,
     /// What a person should know about how the parameters were met (snapped rotations, rounded counts).
     pub notes: Vec<String>,
+}
+
+/// Material slots over the tile, seen from above.
+#[derive(Debug, Clone)]
+pub struct SlotField {
+    pub size: UVec2,
+    /// Row 0 at y = 0; the texel that a place lies in counts. 0 leaves the triangle's slot, k is the slot `first + k - 1`.
+    pub texels: Arc<Vec<u8>>,
+    /// Index of the slot `paint_1` in the mesh.
+    pub first: u16,
 }
 
 /// Colour weights over the tile, multiplied with a material's own colour.
@@ -50,6 +62,18 @@ impl TileMesh {
     /// Corner positions of a triangle.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|index| self.positions[index as usize])
+    }
+
+    /// The material slot of a triangle at tile coordinates `xy`, wrapped.
+    pub fn slot_at(&self, triangle: usize, xy: Vec2) -> u16 {
+        let painted = self.painted_slots.as_ref().and_then(|field| field.at(xy, self.size));
+        painted.unwrap_or(self.triangle_slot[triangle])
+    }
+
+    /// The slot at the centre of a triangle.
+    pub fn slot_of(&self, triangle: usize) -> u16 {
+        let [a, b, c] = self.corners(triangle);
+        self.slot_at(triangle, ((a + b + c) / 3.0).truncate())
     }
 
     /// Unit geometric normal; zero for a triangle without area.
@@ -88,6 +112,17 @@ impl TileMesh {
     /// Base area `A` of the tile.
     pub fn base_area(&self) -> f32 {
         self.size.x * self.size.y
+    }
+}
+
+impl SlotField {
+    /// The slot painted at tile coordinates `xy` of a tile of extent `size`, if any is.
+    fn at(&self, xy: Vec2, tile_size: Vec2) -> Option<u16> {
+        let cell = (xy / tile_size * self.size.as_vec2()).floor();
+        let wrapped = |at: f32, count: u32| (at as i64).rem_euclid(i64::from(count)) as usize;
+        let (x, y) = (wrapped(cell.x, self.size.x), wrapped(cell.y, self.size.y));
+        let value = u16::from(self.texels[y * self.size.x as usize + x]);
+        (value > 0).then(|| self.first + value - 1)
     }
 }
 

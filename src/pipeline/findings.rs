@@ -7,7 +7,7 @@ use crate::filtering::{FacetSum, SumMaterial};
 use crate::geometry::Facets;
 use crate::gpu::Gpu;
 use crate::interreflection::mean_albedo;
-use crate::plan::{Backend, Findings, Settings};
+use crate::plan::{Backend, Findings, Settings, Sighting};
 use crate::scene::Scene;
 use crate::visibility::{PeriodicGrid, Slices};
 
@@ -24,7 +24,7 @@ impl Pipeline {
         settings: &Settings,
         facets_version: Version,
     ) -> Findings {
-        let needs_maps = !shape.flat && !shape.height_field;
+        let needs_maps = !shape.flat && (!shape.height_field || settings.sighting != Sighting::Auto);
         if needs_maps && settings.backend != Backend::Cpu && !self.gpu_asked {
             self.gpu_asked = true;
             self.gpu = Gpu::open().ok();

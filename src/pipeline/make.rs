@@ -26,6 +26,9 @@ pub(super) fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
     } else {
         FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
     };
+    if let Some(bins) = settings.normal_bins {
+        facets.bin_normals(bins);
+    }
     facets.sort_for_sums();
     if settings.effects.color_weights == Switch::Off {
         mean_colors(&mut facets);

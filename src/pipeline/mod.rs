@@ -53,7 +53,7 @@ type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
 type ShapeKey = (Tile, PathBuf, Painted);
 type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
 /// Mesh, count, seed, whether they are drawn as the paper does, and whether their colours count.
-type FacetKey = (Version, usize, u64, bool, Switch);
+type FacetKey = (Version, [Option<usize>; 2], u64, bool, Switch);
 type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
@@ -114,7 +114,8 @@ impl Pipeline {
         let (materials, materials_version) = self.materials(loaded, &shape.mesh, &mut times)?;
         let sum_materials = &materials.1;
         let colors = settings.effects.color_weights;
-        let facet_key = (shape_version, settings.facets, settings.seed, settings.preset == Preset::Wu2011, colors);
+        let counts = [Some(settings.facets), settings.normal_bins];
+        let facet_key = (shape_version, counts, settings.seed, settings.preset == Preset::Wu2011, colors);
         let (facets, facets_version) =
             self.facets.get("facets", facet_key, &mut times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
         let material_of_slot = &grouped(&materials.0, &facets, &settings);
@@ -187,13 +188,15 @@ impl Pipeline {
             None
         };
         for (name, ms) in &times {
-            plan.measured(if *name == "product" { "low_rank" } else { name }, *ms);
+            match *name {
+                "product" if plan.try_low_rank => plan.measured("low_rank", *ms),
+                name => plan.measured(name, *ms),
+            }
         }
-        let exact = Arc::new(brdf);
-        let brdf = match &between {
-            Some(table) => Arc::new((*exact).clone().interreflecting(table.clone())),
-            None => exact.clone(),
-        };
+        let brdf = Arc::new(match between {
+            Some(table) => brdf.interreflecting(table),
+            None => brdf,
+        });
         let mut notes = shape.mesh.notes.clone();
         if facets.skipped_triangles > 0 {
             notes.push(format!("{} triangles have no area and were left out", facets.skipped_triangles));
@@ -202,8 +205,7 @@ impl Pipeline {
             plan.factored(is_factored, errors.rel_l2);
         }
         let examined = Arc::default();
-        let pictures = Pictures::new(exact, &settings, plan.try_picture_table, earlier).with(between);
-        let pictures = Arc::new(pictures);
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, plan.try_picture_table, earlier));
         let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)

@@ -11,12 +11,8 @@ use crate::accuracy::{Errors, picture_pairs, upper_errors};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
 use crate::error::Result;
-use crate::filtering::{EffectiveBrdf, Form, PairTable};
-use crate::interreflection::InterreflectionTable;
-use crate::plan::Settings;
-
-/// Pairs that the table is checked on.
-const CHECK_PAIRS: usize = 512;
+use crate::filtering::{EffectiveBrdf, Form, Interpolation, PairTable};
+use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
 
 /// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
 /// recurrence that placed the facets stays spread out.
@@ -44,14 +40,11 @@ pub(super) type Earlier = (Arc<EffectiveBrdf>, bool);
 pub(super) struct Pictures {
     exact: Arc<EffectiveBrdf>,
     grids: Vec<UpperPairs>,
+    interpolation: Interpolation,
     tolerance: (f64, f64),
     seed: u64,
     earlier: Mutex<Option<Earlier>>,
     made: Mutex<Option<Pictured>>,
-    /// Light between facets, which has a table of its own: added to what is made.
-    between: Option<Arc<InterreflectionTable>>,
-    /// What was made with it.
-    whole: Mutex<Option<Arc<EffectiveBrdf>>>,
 }
 
 impl Pictures {
@@ -60,18 +53,12 @@ impl Pictures {
         Self {
             exact,
             grids: if wanted { settings.picture_grids.clone() } else { Vec::new() },
+            interpolation: settings.interpolation,
             tolerance: settings.picture_tolerance,
             seed: settings.seed,
             earlier: Mutex::new(earlier),
             made: Mutex::new(None),
-            between: None,
-            whole: Mutex::new(None),
         }
-    }
-
-    /// With light between facets, which `exact` leaves out.
-    pub(super) fn with(self, between: Option<Arc<InterreflectionTable>>) -> Self {
-        Self { between, ..self }
     }
 
     /// What the next edit may reuse.
@@ -84,14 +71,6 @@ impl Pictures {
 
     /// The table, made now if it was not yet.
     pub(super) fn get(&self, cancel: &Cancel) -> Result<Pictured> {
-        let made = self.get_direct(cancel)?;
-        let Some(table) = &self.between else { return Ok(made) };
-        let mut whole = lock(&self.whole);
-        let brdf = whole.get_or_insert_with(|| Arc::new((*made.brdf).clone().interreflecting(table.clone())));
-        Ok(Pictured { brdf: brdf.clone(), ..made })
-    }
-
-    fn get_direct(&self, cancel: &Cancel) -> Result<Pictured> {
         let mut made = lock(&self.made);
         if let Some(made) = &*made {
             return Ok(Pictured { ms: 0.0, ..made.clone() });
@@ -108,15 +87,15 @@ impl Pictures {
         if self.grids.is_empty() {
             return Ok((self.exact.clone(), least));
         }
-        let pairs = picture_pairs(CHECK_PAIRS, self.seed ^ 0x7ab1e);
+        let pairs = picture_pairs(PICTURE_CHECK_PAIRS, self.seed ^ 0x7ab1e);
         let values =
             |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
         let exact = values(&self.exact);
         let (mut reused, failed) = self.reused();
-        if let Form::Direct(direct) = &self.exact.form {
+        if let Form::Direct(direct) = self.exact.direct_form() {
             for step in THINNED {
                 let Some(thinned) = direct.thinned(step) else { break };
-                let brdf = EffectiveBrdf { form: Form::Direct(thinned), base_area: self.exact.base_area };
+                let brdf = self.exact.with_direct_form(Form::Direct(thinned));
                 let errors = upper_errors(&values(&brdf), &exact);
                 if self.is_close(errors) {
                     return Ok((Arc::new(brdf), Some(errors)));
@@ -136,7 +115,7 @@ impl Pictures {
                     None => break,
                 },
             };
-            let brdf = EffectiveBrdf { form: Form::Table(table), base_area: self.exact.base_area };
+            let brdf = self.exact.with_direct_form(Form::Table(table.read(self.interpolation)));
             let errors = upper_errors(&values(&brdf), &exact);
             if self.is_close(errors) {
                 return Ok((Arc::new(brdf), Some(errors)));
@@ -154,17 +133,19 @@ impl Pictures {
     }
 
     fn tabulate(&self, grid: UpperPairs, cancel: &Cancel) -> Result<Option<PairTable>> {
-        let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| self.exact.form.sums(lights, o, |k, sum| out[k] = sum);
-        match &self.exact.form {
+        match self.exact.direct_form() {
             Form::Direct(direct) => PairTable::build(direct, grid, cancel),
-            _ => PairTable::resample(sums, grid, cancel).map(Some),
+            form => {
+                let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| form.sums(lights, o, |k, sum| out[k] = sum);
+                PairTable::resample(sums, grid, cancel).map(Some)
+            }
         }
     }
 
     /// The earlier table, where it serves; and whether none was close enough to the same lobes before.
     fn reused(&self) -> (Option<PairTable>, bool) {
         let Some((earlier, same_lobes)) = lock(&self.earlier).take() else { return (None, false) };
-        match (&earlier.form, &self.exact.form) {
+        match (earlier.direct_form(), self.exact.direct_form()) {
             (Form::Table(table), Form::Direct(direct)) => (table.reused(&direct.sum, same_lobes), false),
             (Form::Table(_), _) => (None, false),
             _ => (None, same_lobes),

@@ -1,5 +1,6 @@
 //! Decisions of the plan that a scene's shape and materials settle, and what a person forces.
 
+use super::effects::{PICTURE_CHECK_PAIRS, PICTURE_QUERIES};
 use super::{Costs, Effect, Findings, Preset, Settings};
 use crate::interreflection::predicted_share;
 use crate::scene::Switch;
@@ -42,6 +43,41 @@ pub(super) fn no_visibility(found: &Findings, settings: &Settings) -> String {
             25.0 * settings.tolerance
         )
     }
+}
+
+/// Whether pictures read something quicker than the BRDF itself. `query_ms`: one direct sum, all threads at work.
+pub(super) fn picture_table(
+    found: &Findings,
+    settings: &Settings,
+    costs: &Costs,
+    horizons: bool,
+    query_ms: f64,
+    note: &mut impl Note,
+) -> bool {
+    let direct_ms = PICTURE_QUERIES * query_ms;
+    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
+    let making_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * query_ms);
+    let pays = !found.flat && making_ms.is_some_and(|ms| ms + table_ms < direct_ms);
+    let on = is_on(settings.effects.picture_table, pays);
+    let thinned = horizons && found.distinct_normals.is_some();
+    let reason = match making_ms {
+        _ if found.flat => "a flat tile is its own BRDF".to_owned(),
+        None => "pictures evaluate the BRDF itself at this quality".to_owned(),
+        Some(ms) => {
+            let (percent, db) = (settings.picture_tolerance.0 * 100.0, settings.picture_tolerance.1);
+            let kept = format!("if within {percent:.0} % and {db:.0} dB of the sum");
+            let direct = format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly");
+            if thinned {
+                format!("{direct}; few normals: a tenth or a third of the facets are summed, {kept}")
+            } else {
+                format!("{direct}, {table_ms:.0} ms from a table that takes {ms:.0} ms, once; kept {kept}")
+            }
+        }
+    };
+    // Thinning takes no more than its check.
+    let predicted = if thinned { PICTURE_CHECK_PAIRS as f64 * query_ms } else { making_ms.unwrap_or(0.0) };
+    note("picture_table", on, reason, if on { predicted } else { 0.0 });
+    on
 }
 
 /// The part of all directions in which facets see each other: `1 - A/S` of a surface that closes the plane (every ray of uniform
@@ -110,15 +146,18 @@ pub(super) fn of_the_scene(found: &Findings, settings: &Settings, note: &mut imp
         },
         0.0,
     );
+    let anisotropic = is_on(forced.anisotropy, !found.flat);
     note(
         "anisotropy",
-        !found.flat,
-        if found.flat {
-            "flat, and all BRDFs are isotropic: the result does not turn with the tile; a 3-D table (.binary) loses nothing"
-                .to_owned()
-        } else {
-            "the result may turn with the tile: four angles".to_owned()
-        },
+        anisotropic,
+        match (anisotropic, found.flat) {
+            (false, true) => {
+                "flat, and all BRDFs are isotropic: tables have three angles (.bsdf; .binary loses nothing)"
+            }
+            (false, false) => "taken not to turn with the tile, as asked: tables have three angles (.bsdf)",
+            (true, _) => "the result may turn with the tile: four angles",
+        }
+        .to_owned(),
         0.0,
     );
     note(
@@ -195,6 +234,7 @@ pub(super) fn mark(effects: &mut [Effect], found: &Findings, settings: &Settings
             "material_groups" => (forced.material_groups, Some(ROUNDING)),
             "black_materials" => (forced.black_materials, Some(ROUNDING)),
             "mirror_symmetry" => (forced.mirror_symmetry, (!on_interreflection).then_some(ROUNDING)),
+            "anisotropy" => (forced.anisotropy, Some(ROUNDING)),
             "self_shadow" => (forced.self_shadow, Some(0.0)),
             "faint_lights" => (forced.faint_lights, Some(0.0)),
             // What it would change is an estimate, no bound, unless there is nothing.

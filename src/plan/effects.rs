@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Method, Preset, Settings, decisions};
+use super::{Costs, Findings, Method, Preset, Route, Settings, Sighting, decisions};
 
 /// One effect of the plan, as `biscale plan --json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -20,95 +20,11 @@ pub struct Effect {
     pub bound: Option<f64>,
 }
 
-/// How visibility is computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Route {
-    /// A flat tile blocks nothing.
-    None,
-    /// Walking the samples of a height-field.
-    HeightMarch,
-    /// Slicing the mesh of a surface without overhangs.
-    HorizonScan,
-    /// Slicing a mesh with overhangs: horizons, and what hangs above them.
-    Slices,
-    /// Toroidal shadow maps on the CPU.
-    CpuMaps,
-    /// Toroidal shadow maps on a real GPU.
-    GpuMaps,
-}
-
-/// What the scene is like: all that the decisions rest on.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Findings {
-    pub flat: bool,
-    /// The largest angle between a surface normal and z [rad].
-    pub steepest: f32,
-    /// The largest part of uniform light that a material reflects.
-    pub albedo: f64,
-    /// Do all materials reflect all channels alike?
-    pub grey: bool,
-    /// Planes x = const and y = const that mirror the tile; `None` where nobody looked.
-    pub mirrors: Option<[bool; 2]>,
-    pub height_samples: bool,
-    pub height_field: bool,
-    pub closes_plane: bool,
-    pub hardware_gpu: bool,
-    pub triangles: usize,
-    /// Cells and triangles that one slice of the mesh looks at.
-    pub scan_work: f64,
-    /// Surface area over base area.
-    pub area_ratio: f64,
-    /// Materials that facets carry, black ones not counted.
-    pub materials: usize,
-    pub black_materials: usize,
-    /// Do colour weights differ within a material?
-    pub colors_vary: bool,
-    /// Lobes that a direct evaluation adds up, and measured look-ups.
-    pub lobes: usize,
-    pub lookups: usize,
-    pub only_lambertian: bool,
-    pub distinct_normals: Option<usize>,
-    pub object_self_shadows: bool,
-    pub lights: usize,
-    pub lights_below: usize,
-}
-
-/// Prices on the machine at hand, in nanoseconds; refined by what stages measure.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Costs {
-    pub lobe_ns: f64,
-    pub lookup_ns: f64,
-    pub facet_fill_ns: f64,
-    pub march_ns: f64,
-    pub scan_ns: f64,
-    pub factor_query_ns: f64,
-    pub table_query_ns: f64,
-    pub slice_ns: f64,
-    pub triangle_ns: f64,
-    pub texel_ns: f64,
-    pub threads: f64,
-}
-
-impl Default for Costs {
-    fn default() -> Self {
-        Self {
-            lobe_ns: 1.5,
-            lookup_ns: 30.0,
-            facet_fill_ns: 0.3,
-            march_ns: 1_000.0,
-            scan_ns: 1_000.0,
-            factor_query_ns: 1_500.0,
-            table_query_ns: 120.0,
-            slice_ns: 18.0,
-            triangle_ns: 60.0,
-            texel_ns: 10.0,
-            threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),
-        }
-    }
-}
-
 /// Queries of the picture that the cost model has in mind: 384x384, 32 lights, a third of them lit and covered.
-const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+pub(super) const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+
+/// Pairs of directions on which what pictures read is held against the BRDF.
+pub const PICTURE_CHECK_PAIRS: usize = 512;
 
 /// What will be done.
 #[derive(Debug, Clone, PartialEq)]
@@ -129,6 +45,11 @@ impl Plan {
     /// Does the route look for more than one horizon an azimuth?
     pub fn overhangs(&self) -> bool {
         matches!(self.route, Route::Slices | Route::CpuMaps | Route::GpuMaps)
+    }
+
+    /// Is an effect on?
+    pub fn is_on(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name && effect.on)
     }
 
     /// Notes how far the factored form was from the direct sum, and whether it was kept.
@@ -160,6 +81,8 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     };
     let facets = settings.facets as f64;
     let route = route(found, settings, costs);
+    let what =
+        if settings.sighting == Sighting::Auto { "surfaces overhang" } else { "asked for by quality.visibility" };
     let (what, predicted) = match route {
         Route::None => (decisions::no_visibility(found, settings), 0.0),
         Route::HeightMarch => (
@@ -175,7 +98,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         ),
         Route::Slices => (
             format!(
-                "surfaces overhang: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
+                "{what}: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
                 settings.slice_azimuths,
                 maps_ms(found, settings, costs)
             ),
@@ -183,7 +106,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         ),
         Route::CpuMaps => (
             format!(
-                "surfaces overhang: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
+                "{what}: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
                 settings.map_grid.len(),
                 settings.map_resolution,
                 scan_ms(found, settings, costs)
@@ -191,7 +114,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             maps_ms(found, settings, costs),
         ),
         Route::GpuMaps => (
-            format!("surfaces overhang and a GPU is at hand: {} toroidal shadow maps", settings.map_grid.len()),
+            format!("{what}, on the GPU: {} toroidal shadow maps", settings.map_grid.len()),
             settings.map_grid.len() as f64 * found.triangles as f64 * 2e-6,
         ),
     };
@@ -212,10 +135,6 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         // own grid at best (docs/accuracy.txt: 2.6 % on a V-groove).
         Method::Auto => allowed && found.lookups > 0 && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
     };
-    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
-    let tabulating_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * direct_query);
-    let pays = !found.flat && tabulating_ms.is_some_and(|ms| ms + table_ms < direct_ms);
-    let try_picture_table = decisions::is_on(settings.effects.picture_table, pays);
     let comparison = format!(
         "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
     );
@@ -235,22 +154,9 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         },
         if try_low_rank { 800.0 } else { 0.0 },
     );
+    let horizons = matches!(route, Route::HeightMarch | Route::HorizonScan);
+    let try_picture_table = decisions::picture_table(found, settings, costs, horizons, direct_query, &mut note);
     let forced = &settings.effects;
-    note(
-        "picture_table",
-        try_picture_table,
-        match tabulating_ms {
-            _ if found.flat => "a flat tile is its own BRDF".to_owned(),
-            None => "pictures evaluate the BRDF itself at this quality".to_owned(),
-            Some(ms) => format!(
-                "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {table_ms:.0} ms \
-                 from a table that takes {ms:.0} ms, once; kept if within {:.0} % and {:.0} dB of the sum",
-                settings.picture_tolerance.0 * 100.0,
-                settings.picture_tolerance.1
-            ),
-        },
-        if try_picture_table { tabulating_ms.unwrap_or(0.0) } else { 0.0 },
-    );
     note(
         "exact_lobes",
         decisions::is_on(forced.exact_lobes, found.distinct_normals.is_some()),
@@ -338,15 +244,19 @@ fn maps_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
 fn route(found: &Findings, settings: &Settings, costs: &Costs) -> Route {
     if !decisions::is_on(settings.effects.visibility, !found.flat && !decisions::is_shallow(found, settings)) {
         Route::None
-    } else if found.height_samples {
-        Route::HeightMarch
-    } else if found.height_field {
-        Route::HorizonScan
-    } else if found.hardware_gpu {
-        Route::GpuMaps
-    } else if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) {
-        Route::Slices
     } else {
-        Route::CpuMaps
+        let maps = if found.hardware_gpu { Route::GpuMaps } else { Route::CpuMaps };
+        match settings.sighting {
+            Sighting::Slices => Route::Slices,
+            Sighting::Maps => maps,
+            Sighting::Auto if found.height_samples => Route::HeightMarch,
+            Sighting::Auto if found.height_field => Route::HorizonScan,
+            Sighting::Auto
+                if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) && !found.hardware_gpu =>
+            {
+                Route::Slices
+            }
+            Sighting::Auto => maps,
+        }
     }
 }

@@ -2,9 +2,11 @@
 
 mod decisions;
 mod effects;
+mod findings;
 mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use effects::{Costs, Effect, Findings, Plan, Route, decide};
-pub use settings::{Backend, Method, Preset, Settings};
+pub use effects::{Effect, PICTURE_CHECK_PAIRS, Plan, decide};
+pub use findings::{Costs, Findings, Route};
+pub use settings::{Backend, Method, Preset, Settings, Sighting};

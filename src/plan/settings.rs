@@ -1,7 +1,7 @@
 //! Presets and knobs: how accurately everything is computed, as typed settings.
 
 use crate::directions::{HalfDifferenceGrid, PolarGrid, UpperPairs};
-use crate::filtering::{BasisGrid, LowRankSettings};
+use crate::filtering::{BasisGrid, Interpolation, LowRankSettings};
 use crate::interreflection::InterreflectionSettings;
 use crate::scene::{Effects, Quality, Scene};
 
@@ -36,6 +36,17 @@ pub enum Method {
     LowRank,
 }
 
+/// How visibility is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sighting {
+    /// Horizons where nothing overhangs, else what the plan expects to be cheaper.
+    Auto,
+    /// Cutting the mesh along azimuths.
+    Slices,
+    /// Shadow maps along directions.
+    Maps,
+}
+
 /// Where to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
@@ -50,8 +61,7 @@ pub struct Settings {
     pub preset: Preset,
     /// Facets that stand for the surface.
     pub facets: usize,
-    /// The same where nothing overhangs: no facet hides under others, and half as many are as good (hammered plate: 61.6 dB
-    /// with 6,144, leaning rods 36 dB, and 41 with 12,288).
+    /// The same where nothing overhangs: no facet hides under others, and fewer are as good.
     pub height_field_facets: usize,
     /// Azimuths of horizon maps.
     pub horizon_azimuths: usize,
@@ -64,6 +74,9 @@ pub struct Settings {
     pub map_resolution: u32,
     /// Width of the soft step at a horizon [rad].
     pub penumbra: f32,
+    pub sighting: Sighting,
+    /// Bins of normals whose facets share one lobe; `None` for normals as they are.
+    pub normal_bins: Option<usize>,
     pub method: Method,
     pub keep_m: f64,
     pub keep_n: f64,
@@ -72,6 +85,8 @@ pub struct Settings {
     pub grid: PolarGrid,
     pub pairs: HalfDifferenceGrid,
     pub normal_rings: usize,
+    /// Between the nodes of factors and picture tables.
+    pub interpolation: Interpolation,
     pub colors: Option<usize>,
     pub keep_color: f64,
     /// Relative L2 that the factored form may differ from the direct sum by.
@@ -139,6 +154,17 @@ impl Settings {
             Some("auto") => settings.method = Method::Auto,
             _ => {}
         }
+        match quality.visibility.as_deref() {
+            Some("slices") => settings.sighting = Sighting::Slices,
+            Some("maps") => settings.sighting = Sighting::Maps,
+            Some("auto") => settings.sighting = Sighting::Auto,
+            _ => {}
+        }
+        match quality.interpolation.as_deref() {
+            Some("linear") => settings.interpolation = Interpolation::Linear,
+            Some("cubic") => settings.interpolation = Interpolation::Cubic,
+            _ => {}
+        }
         if let Some(kept) = quality.keep_m {
             settings.keep_m = f64::from(kept);
         }
@@ -154,10 +180,8 @@ impl Settings {
         if let Some(samples) = quality.reference_samples {
             settings.reference_passes = samples.div_ceil(settings.reference_facets).max(2);
         }
-        if quality.pictures.as_deref() == Some("exact") {
-            settings.picture_grids.clear();
-        }
         settings.colors = quality.colors.or(settings.colors);
+        settings.normal_bins = quality.normal_bins.or(settings.normal_bins);
         settings
     }
 
@@ -171,6 +195,8 @@ impl Settings {
             map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
+            sighting: Sighting::Auto,
+            normal_bins: None,
             method: Method::Auto,
             keep_m: 0.9995,
             keep_n: 0.9995,
@@ -178,6 +204,7 @@ impl Settings {
             grid: PolarGrid::new(16, 36),
             pairs: HalfDifferenceGrid { rings: 32, azimuths: 64, difference: 16, turn: 8 },
             normal_rings: 64,
+            interpolation: Interpolation::Cubic,
             colors: None,
             keep_color: 0.999,
             tolerance: 0.04,
@@ -256,7 +283,12 @@ impl Settings {
     pub fn low_rank(&self, whole_sphere: bool) -> LowRankSettings {
         LowRankSettings {
             directions: self.grid,
-            basis: BasisGrid { pairs: self.pairs, normal_rings: self.normal_rings, whole_sphere },
+            basis: BasisGrid {
+                pairs: self.pairs,
+                normal_rings: self.normal_rings,
+                whole_sphere,
+                interpolation: self.interpolation,
+            },
             keep_m: self.keep_m,
             keep_n: self.keep_n,
             max_rank: self.max_rank,

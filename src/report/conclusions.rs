@@ -2,7 +2,8 @@
 
 use super::SceneReport;
 use super::svg::number;
-use crate::accuracy::sweep::{Family, Point, is_preset, pareto};
+use crate::accuracy::candidates::Family;
+use crate::accuracy::sweep::{Point, is_preset, pareto};
 use crate::plan::Preset;
 
 /// A sentence each.

@@ -31,7 +31,7 @@ pub struct EffectCost {
 }
 
 /// The switches of a scene, by name.
-pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 10] {
+pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 11] {
     [
         ("visibility", &mut effects.visibility),
         ("picture_table", &mut effects.picture_table),
@@ -41,6 +41,7 @@ pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 10] {
         ("black_materials", &mut effects.black_materials),
         ("interreflection", &mut effects.interreflection),
         ("mirror_symmetry", &mut effects.mirror_symmetry),
+        ("anisotropy", &mut effects.anisotropy),
         ("self_shadow", &mut effects.self_shadow),
         ("faint_lights", &mut effects.faint_lights),
     ]
@@ -120,7 +121,7 @@ impl Runner {
         pipeline.cancel_with(cancel.clone());
         let start = Instant::now();
         let outcome = pipeline.effective(&scene)?;
-        let picture = studio.picture(&outcome.for_pictures(cancel)?.brdf)?;
+        let picture = studio.picture(&*outcome.for_pictures(cancel)?.brdf)?;
         let first_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(Self { scene, studio, pipeline, outcome, picture, first_ms, times: Vec::new() })
     }
@@ -132,7 +133,7 @@ impl Runner {
         moved.scene.quality.seed ^= if self.times.is_empty() && run == 0 { 1 } else { run };
         let start = Instant::now();
         self.outcome = self.pipeline.effective(&moved)?;
-        self.picture = self.studio.picture(&self.outcome.for_pictures(cancel)?.brdf)?;
+        self.picture = self.studio.picture(&*self.outcome.for_pictures(cancel)?.brdf)?;
         self.times.push(start.elapsed().as_secs_f64() * 1e3);
         Ok(())
     }

@@ -4,8 +4,10 @@ use std::fmt::Write as _;
 
 use glam::Vec3;
 
+use crate::accuracy::Reference;
+use crate::cancel::Cancel;
 use crate::error::Result;
-use crate::filtering::EffectiveBrdf;
+use crate::filtering::Reflectance;
 use crate::large_scale::shading::Background;
 use crate::large_scale::tone_map::{ToneMap, srgb_byte};
 use crate::large_scale::{Picture, Stage, render};
@@ -34,8 +36,8 @@ impl Studio {
 
     /// # Errors
     /// A camera that sees nothing it could be framed by.
-    pub fn picture(&self, brdf: &EffectiveBrdf) -> Result<Picture> {
-        Ok(render(&self.stage.input(brdf, [SIZE, SIZE], 1, &Background::default()))?.picture)
+    pub fn picture(&self, material: &dyn Reflectance) -> Result<Picture> {
+        Ok(render(&self.stage.input(material, [SIZE, SIZE], 1, &Background::default()))?.picture)
     }
 
     /// As a PNG for a page.
@@ -44,6 +46,16 @@ impl Studio {
     /// None in practice: the picture is small.
     pub fn png(&self, picture: &Picture) -> Result<String> {
         data_url(picture, &self.tone_map)
+    }
+
+    /// The picture by the reference, noisy: the mean of many with other seeds is right. `None` where it takes too long.
+    ///
+    /// # Errors
+    /// As [`Studio::picture`], and [`crate::Error::Cancelled`].
+    pub fn reference_picture(&self, reference: &Reference<'_>, seed: u64, cancel: &Cancel) -> Result<Option<Picture>> {
+        let picture = reference.glimpse(seed, cancel).map(|glimpse| self.picture(&glimpse)).transpose()?;
+        cancel.check()?;
+        Ok(picture)
     }
 
     /// CIE 1976 ΔE of each pixel as it is shown.

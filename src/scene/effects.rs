@@ -37,6 +37,8 @@ scene_table! {
         bounces: usize = 4, Shape::Integer { min: 1, max: 64 }, "";
         /// Planes that mirror the tile spare half of the directions; on takes the tile to have both.
         mirror_symmetry: Switch = Switch::Auto, SWITCH, "";
+        /// The result turns with the tile; off tabulates it over three angles in place of four where a format can (.bsdf).
+        anisotropy: Switch = Switch::Auto, SWITCH, "";
         /// The object's shadows on itself.
         self_shadow: Switch = Switch::Auto, SWITCH, "";
         /// Lights that no part of the object faces, or too faint to be seen.

@@ -31,7 +31,7 @@ pub use effects::{Effects, Switch};
 pub use load::{LoadedScene, load, load_with_overrides, open, parse};
 pub use material::{BrdfSpec, Material, TermSpec};
 pub use painted::{Painted, Pixels};
-pub use quality::{BACKENDS, METHODS, PRESETS, Quality};
+pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
 pub use schema::{Field, Kind, Shape};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
@@ -90,7 +90,7 @@ impl Scene {
     pub fn of(geometry: Geometry) -> Self {
         Self {
             version: 1,
-            tile: Tile { size: glam::Vec2::ONE, unit: "mm".to_owned(), geometry },
+            tile: Tile::of(geometry),
             materials: Vec::new(),
             object: Object::default(),
             light: Light::default(),

@@ -55,7 +55,7 @@ fn parse_value(text: &str) -> Value {
 /// Files named on the command line are found from where the command runs, not only from the scene's folder.
 fn absolutize(key: &str, value: &mut Value) {
     match value {
-        Value::String(text) if matches!(key, "path" | "color_path" | "environment") => {
+        Value::String(text) if matches!(key, "path" | "color_path" | "slot_path" | "environment") => {
             let path = Path::new(text.as_str());
             if path.is_relative()
                 && path.is_file()

@@ -20,4 +20,6 @@ pub struct Painted {
     pub heights: Option<Arc<Pixels<f32>>>,
     /// In place of `color_path`: linear colour weights.
     pub colors: Option<Arc<Pixels<Vec3>>>,
+    /// In place of `slot_path`: 0 is the surface's own slot, k the slot `paint_k`.
+    pub slots: Option<Arc<Pixels<u8>>>,
 }

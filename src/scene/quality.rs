@@ -5,7 +5,8 @@ use super::schema::{Shape, number, scene_table};
 pub const PRESETS: &[&str] = &["draft", "standard", "fine", "reference", "wu2011"];
 pub const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub const METHODS: &[&str] = &["auto", "direct", "low_rank"];
-pub const PICTURES: &[&str] = &["auto", "exact"];
+pub const VISIBILITIES: &[&str] = &["auto", "slices", "maps"];
+pub const INTERPOLATIONS: &[&str] = &["cubic", "linear"];
 
 const GRID_SIDE: Shape = Shape::Integer { min: 2, max: 512 };
 
@@ -27,12 +28,15 @@ scene_table! {
         /// Elevation rings at which visibility is computed.
         #[serde(skip_serializing_if = "Option::is_none")]
         rings: Option<usize> = None, Shape::Integer { min: 2, max: 512 }, "";
+        /// How visibility is computed: auto (what is cheapest), slices or maps.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        visibility: Option<String> = None, Shape::Choice(VISIBILITIES), "";
+        /// Bins over the sphere of normals; facets of a bin share one lobe. None: normals as they are.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        normal_bins: Option<usize> = None, Shape::Integer { min: 16, max: 1_000_000 }, "";
         /// How the product is computed: auto, direct or low_rank.
         #[serde(skip_serializing_if = "Option::is_none")]
         method: Option<String> = None, Shape::Choice(METHODS), "";
-        /// How pictures read the material: auto (from a table where it is close enough) or exact.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        pictures: Option<String> = None, Shape::Choice(PICTURES), "";
         /// Part of the BRDF matrix' power that is kept.
         #[serde(skip_serializing_if = "Option::is_none")]
         keep_m: Option<f32> = None, number(0.5, 1.0), "";
@@ -45,6 +49,9 @@ scene_table! {
         /// Rings and azimuths of the direction grid of the factored form.
         #[serde(skip_serializing_if = "Option::is_none")]
         grid: Option<[usize; 2]> = None, Shape::List { of: &GRID_SIDE, min: 2, max: 2 }, "";
+        /// Between the nodes of factors and of tables for pictures: cubic or linear.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        interpolation: Option<String> = None, Shape::Choice(INTERPOLATIONS), "";
         /// Rays or samples of the reference for each pair of directions.
         #[serde(skip_serializing_if = "Option::is_none")]
         reference_samples: Option<usize> = None, Shape::Integer { min: 16, max: 1_000_000_000 }, "";

@@ -17,6 +17,12 @@ pub struct Tile {
     /// What a tile unit is called; only shown.
     #[serde(default = "millimetre")]
     pub unit: String,
+    /// Linear colour weights over the tile, seen from above; they multiply the materials.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color_path: Option<PathBuf>,
+    /// Materials over the tile, seen from above: a grey value of k (of 255) is the slot `paint_k`, 0 the surface's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slot_path: Option<PathBuf>,
     pub geometry: Geometry,
 }
 
@@ -29,6 +35,11 @@ fn millimetre() -> String {
 }
 
 impl Tile {
+    /// A tile of one by one millimetre without images.
+    pub fn of(geometry: Geometry) -> Self {
+        Self { size: unit_square(), unit: millimetre(), color_path: None, slot_path: None, geometry }
+    }
+
     pub fn fields() -> Vec<Field> {
         vec![
             Field::new(
@@ -39,6 +50,14 @@ impl Tile {
                 "Extent of the period in x and y.",
             ),
             Field::new("unit", "", Shape::Text, None, "Name of the length unit."),
+            Field::new("color_path", "", Shape::Path, None, "An image of colour weights over the tile."),
+            Field::new(
+                "slot_path",
+                "",
+                Shape::Path,
+                None,
+                "An image of materials over the tile: a grey of k (of 255) is the slot `paint_k`, 0 the surface's own.",
+            ),
             Field::required("geometry", Shape::Tagged(Geometry::kinds), "The surface on the tile."),
         ]
     }
@@ -291,9 +310,6 @@ scene_table! {
         /// Heights row by row, in place of an image.
         #[serde(skip_serializing_if = "Option::is_none")]
         values: Option<Vec<Vec<f32>>> = None, Shape::List { of: &HEIGHT_ROW, min: 1, max: 4096 }, "";
-        /// An image of colour weights over the tile.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        color_path: Option<PathBuf> = None, Shape::Path, "";
     }
 }
 
@@ -318,9 +334,6 @@ scene_table! {
         pattern: FlatPattern = FlatPattern::Plain, Shape::Choice(FlatPattern::NAMES), "";
         /// Periods across the tile.
         count: u32 = 4, Shape::Integer { min: 1, max: 64 }, "";
-        /// An image of colour weights over the tile.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        color_path: Option<PathBuf> = None, Shape::Path, "";
     }
 }
 
@@ -329,9 +342,6 @@ scene_table! {
     MeshFile {
         /// The OBJ file; its `usemtl` names choose the materials.
         path: PathBuf = PathBuf::new(), Shape::Path, "";
-        /// An image of colour weights over the tile.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        color_path: Option<PathBuf> = None, Shape::Path, "";
     }
 }
 

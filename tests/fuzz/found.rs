@@ -11,7 +11,7 @@ use glam::Vec3;
 fn tile(text: &str) -> Result<geometry::TileMesh, Error> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.obj"), text).unwrap();
-    let tile = scene::Scene::of(Geometry::Mesh(MeshFile { path: "a.obj".into(), color_path: None })).tile;
+    let tile = scene::Scene::of(Geometry::Mesh(MeshFile { path: "a.obj".into() })).tile;
     geometry::build(&tile, folder.path())
 }
 

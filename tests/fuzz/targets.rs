@@ -104,7 +104,7 @@ fn tile(geometry: Geometry, folder: &Path) -> std::result::Result<bool, String> 
 
 fn obj_tile(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
     std::fs::write(folder.join("a.obj"), bytes).map_err(|error| error.to_string())?;
-    tile(Geometry::Mesh(MeshFile { path: "a.obj".into(), color_path: None }), folder)
+    tile(Geometry::Mesh(MeshFile { path: "a.obj".into() }), folder)
 }
 
 fn obj_object(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {

@@ -24,7 +24,8 @@ except ImportError as error:
     skip(f"the Mitsuba checks need `pip install mitsuba numpy` ({error})")
 
 # Smooth: below 1 %. Glossy: below 3 %.
-SCENES = ["fig5a_isotropic:1", "fig4b_bicolor_cup:3", "fig7a_shot_silk:3", "default:3"]
+FLAT = Path(__file__).parent / "flat_metal.toml"
+SCENES = [f"{FLAT}:1", "fig5a_isotropic:1", "fig4b_bicolor_cup:3", "fig7a_shot_silk:3", "default:3"]
 LIGHTS = [([0.3, 0.5, 0.8], [2.0, 1.6, 1.2]), ([-0.8, 0.4, 0.4], [0.3, 0.6, 1.2]), ([0.2, -0.6, 0.7], [0.5, 0.4, 0.3])]
 DISTANCE, FOV_DEG, SIZE = 5.0, 30.0, 256
 EYE = [DISTANCE * np.sin(np.radians(25)) * np.cos(np.radians(20)), DISTANCE * np.sin(np.radians(20)), DISTANCE * np.cos(np.radians(25)) * np.cos(np.radians(20))]
@@ -130,7 +131,8 @@ def check_exports(arguments, folder):
         print("SKIPPED: the chi-squared test (Mitsuba's LLVM does not work here)")
     for entry in arguments.scenes:
         scene, limit, *sizes = entry.split(":")
-        path = Path(folder) / f"{scene}.bsdf"
+        name = Path(scene).stem
+        path = Path(folder) / f"{name}.bsdf"
         options = ["--resolution", sizes[0], "--resolution-o", sizes[1]] if sizes else []
         report, written = export(scene, path, *options)
         pairs = random_pairs(1000)
@@ -154,7 +156,7 @@ def check_exports(arguments, folder):
         allowed = f"{limit} %"
         table.check(
             error < float(limit) / 100 and passes and picture < float(limit) / 100,
-            scene, report["bytes"], f"{written:.1f}", f"{loaded:.2f}", f"{100 * error:.2f} %", allowed,
+            name, report["bytes"], f"{written:.1f}", f"{loaded:.2f}", f"{100 * error:.2f} %", allowed,
             f"{p:.3f}" if chi_works else "skipped", f"{100 * picture:.2f} %",
         )
     return table.passed

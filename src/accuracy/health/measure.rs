@@ -208,7 +208,7 @@ fn largest_effective_albedo(brdf: &EffectiveBrdf) -> (f32, [f32; 2]) {
 }
 
 pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: usize) -> Option<FactorHealth> {
-    let (used, ranks, step) = match &brdf.form {
+    let (used, ranks, step) = match brdf.direct_form() {
         Form::LowRank(factors) => {
             let step = std::f32::consts::FRAC_PI_2 / (factors.pairs.rings.max(2) - 1) as f32;
             (true, factors.channels.iter().map(|channel| channel.ranks.1).collect(), step)
@@ -227,7 +227,8 @@ pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: u
         used,
         relative_error,
         effective_digits: relative_error.filter(|error| *error > 0.0).map(|error| -error.log10()),
-        at_rank_limit: matches!(brdf.form, Form::LowRank(_)) && ranks.iter().any(|&rank: &usize| rank >= max_rank),
+        at_rank_limit: matches!(brdf.direct_form(), Form::LowRank(_))
+            && ranks.iter().any(|&rank: &usize| rank >= max_rank),
         ranks,
         lobe_grid_step_deg: step.to_degrees(),
     })

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui::{self, Key, RichText, ScrollArea, Ui};
 
+use crate::app::views::brushes::Layer;
+
 /// What a file is chosen for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Purpose {
@@ -14,14 +16,14 @@ pub enum Purpose {
         material: usize,
         term: usize,
     },
-    Heights,
-    Colors,
+    /// An image to paint on.
+    Paint(Layer),
     TileMesh,
     ObjectMesh,
     Environment,
-    SaveHeights,
-    SaveColors,
+    SavePaint(Layer),
     ExportTable,
+    ExportTile,
     ExportPicture,
 }
 
@@ -31,14 +33,17 @@ impl Purpose {
             Self::OpenScene => "Open a scene",
             Self::SaveScene => "Save the scene",
             Self::Measured { .. } => "Open a measured BRDF",
-            Self::Heights => "Open an image of heights",
-            Self::Colors => "Open an image of colours",
+            Self::Paint(Layer::Heights) => "Open an image of heights",
+            Self::Paint(Layer::Colors) => "Open an image of colours",
+            Self::Paint(Layer::Slots) => "Open an image of materials",
             Self::TileMesh => "Open a mesh for the tile",
             Self::ObjectMesh => "Open an object",
             Self::Environment => "Open an environment",
-            Self::SaveHeights => "Save the heights",
-            Self::SaveColors => "Save the colours",
-            Self::ExportTable => "Export the BRDF table",
+            Self::SavePaint(Layer::Heights) => "Save the heights",
+            Self::SavePaint(Layer::Colors) => "Save the colours",
+            Self::SavePaint(Layer::Slots) => "Save the painted materials",
+            Self::ExportTable => "Export the material",
+            Self::ExportTile => "Export the tile",
             Self::ExportPicture => "Export the picture",
         }
     }
@@ -47,16 +52,19 @@ impl Purpose {
         match self {
             Self::OpenScene | Self::SaveScene => &["toml"],
             Self::Measured { .. } => &["binary", "bsdf", "bin", "npz"],
-            Self::Heights | Self::Colors => &["png", "jpg", "jpeg", "tif", "tiff", "hdr", "exr"],
+            Self::Paint(_) => &["png", "jpg", "jpeg", "tif", "tiff", "hdr", "exr"],
             Self::TileMesh | Self::ObjectMesh => &["obj"],
             Self::Environment => &["hdr", "exr"],
-            Self::SaveHeights | Self::SaveColors | Self::ExportPicture => &["png", "exr"],
-            Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm"],
+            Self::SavePaint(Layer::Slots) => &["png"],
+            Self::SavePaint(_) | Self::ExportPicture => &["png", "exr"],
+            Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm", "gltf", "mtlx"],
+            Self::ExportTile => &["obj", "stl", "png", "svg", "pdf"],
         }
     }
 
-    fn saves(&self) -> bool {
-        matches!(self, Self::SaveScene | Self::SaveHeights | Self::SaveColors | Self::ExportTable | Self::ExportPicture)
+    pub fn saves(&self) -> bool {
+        let exports = matches!(self, Self::ExportTable | Self::ExportTile | Self::ExportPicture);
+        exports || matches!(self, Self::SaveScene | Self::SavePaint(_))
     }
 }
 
@@ -170,12 +178,16 @@ impl FileDialog {
         if let Some(folder) = go_to {
             self.folder = folder;
             self.list();
+            self.fresh = true;
         }
         let field = ui.horizontal(|ui| {
             let label = ui.label(if self.purpose.saves() { "Name or path" } else { "Path" });
             let width = ui.available_width();
             ui.add(egui::TextEdit::singleline(&mut self.typed).desired_width(width)).labelled_by(label.id)
         });
+        if let Some(formats) = super::formats::of(&self.purpose) {
+            super::formats::ui(ui, formats, &mut self.typed);
+        }
         if self.fresh {
             field.inner.request_focus();
             self.fresh = false;
@@ -220,6 +232,7 @@ impl FileDialog {
             self.folder = path;
             self.typed.clear();
             self.list();
+            self.fresh = true;
             return None;
         }
         if !self.purpose.saves() {

@@ -4,10 +4,10 @@ use eframe::egui::{self, Context, Grid, RichText, ScrollArea};
 
 use crate::app::actions;
 
-const TASKS: [(&str, &str); 6] = [
+const TASKS: [(&str, &str); 7] = [
     (
         "Make a blue velvet",
-        "In the gallery click \"Velvet spread\". In the panel, Materials, turn the colour of \"Default\" to blue, and that of \
+        "Search the gallery for \"velvet\" and click one. In the panel, Materials, turn the colour of \"Default\" to blue, and that of \
          \"Floor\" to a darker one; Surface has the spread, the lean and the number of the fibres.",
     ),
     (
@@ -16,12 +16,18 @@ const TASKS: [(&str, &str); 6] = [
          [ and ] change the size. The relief is saved beside the scene as an image.",
     ),
     (
+        "Paint what it is made of",
+        "Press P and choose Material: the first stroke makes \"Paint 1\", which stands under Materials like all others. Colour \
+         multiplies what is there. Both lie over any surface and are saved beside the scene.",
+    ),
+    (
         "Use a measured paint",
         "Drop a MERL .binary or an RGL .bsdf file on the window, or choose \"Measured\" as the BRDF of a material.",
     ),
     (
         "Take it to another renderer",
-        "File, Export BRDF table. The ending chooses the format; the file says in words what it holds.",
+        "File, Export the material: Format says who reads which. For Mitsuba 3 take RGL (.bsdf); a note beside the file says in \
+         words what it holds.",
     ),
     ("Compare two versions", "Press B to keep what you see as A, edit on, and drag the line between A and now."),
     (
@@ -61,5 +67,5 @@ pub fn help_ui(ctx: &Context) -> bool {
                 });
             });
         });
-    open
+    open && !ctx.input(|input| input.key_pressed(egui::Key::Escape))
 }

@@ -2,10 +2,12 @@
 
 pub mod export;
 mod files;
+mod formats;
 mod help;
 
 use std::path::PathBuf;
 
+use biscale::export::tile::TileOptions;
 use eframe::egui::{self, Context};
 
 pub use files::{FileDialog, Purpose};
@@ -33,6 +35,14 @@ pub enum Dialog {
     Table {
         path: PathBuf,
         choice: TableChoice,
+    },
+    /// Export of a few parameters that are fitted.
+    Fit {
+        path: PathBuf,
+    },
+    Tile {
+        path: PathBuf,
+        options: TileOptions,
     },
     Picture {
         path: PathBuf,

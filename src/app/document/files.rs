@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use biscale::scene::{BrdfSpec, Geometry, Pixels, Scene, TermSpec};
+use biscale::scene::{BrdfSpec, Geometry, Material, Pixels, Scene, TermSpec};
 use biscale::{InputError, Result, export};
 use glam::Vec3;
 
-use super::{Change, Document, color_path};
+use super::{Change, Document};
 
 /// A file as it was at some time.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,8 +71,11 @@ impl Document {
         if let (Geometry::Heightfield(field), Some(_)) = (&mut scene.tile.geometry, &self.state.painted.heights) {
             field.path = Some(PathBuf::from(format!("{stem}_heights.exr")));
         }
-        if let (Some(place), Some(_)) = (color_path(&mut scene.tile.geometry), &self.state.painted.colors) {
-            *place = Some(PathBuf::from(format!("{stem}_colors.exr")));
+        if self.state.painted.colors.is_some() {
+            scene.tile.color_path = Some(PathBuf::from(format!("{stem}_colors.exr")));
+        }
+        if self.state.painted.slots.is_some() {
+            scene.tile.slot_path = Some(PathBuf::from(format!("{stem}_materials.png")));
         }
     }
 
@@ -83,9 +86,11 @@ impl Document {
         {
             write_heights(image, &folder.join(file))?;
         }
-        let mut geometry = scene.tile.geometry.clone();
-        if let (Some(Some(file)), Some(image)) = (color_path(&mut geometry), &self.state.painted.colors) {
+        if let (Some(file), Some(image)) = (&scene.tile.color_path, &self.state.painted.colors) {
             write_colors(image, &folder.join(file))?;
+        }
+        if let (Some(file), Some(image)) = (&scene.tile.slot_path, &self.state.painted.slots) {
+            write_slots(image, &folder.join(file))?;
         }
         Ok(())
     }
@@ -126,6 +131,18 @@ pub fn write_colors(image: &Pixels<Vec3>, path: &Path) -> Result<()> {
     export::replace_file(path, &bytes)
 }
 
+/// Slots as a grey `.png` of 8 bits.
+///
+/// # Errors
+/// As [`write_heights`].
+pub fn write_slots(image: &Pixels<u8>, path: &Path) -> Result<()> {
+    if ending(path).as_deref() != Some("png") {
+        return Err(InputError::new("image", path.display(), "a name that ends in .png").into());
+    }
+    let buffer = image::GrayImage::from_raw(image.size.x, image.size.y, image.values.clone());
+    export::replace_file(path, &png(buffer.map(image::DynamicImage::ImageLuma8), path)?)
+}
+
 fn ending(path: &Path) -> Option<String> {
     path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase)
 }
@@ -159,21 +176,41 @@ fn exr(values: &[Vec3], size: glam::UVec2, path: &Path) -> Result<Vec<u8>> {
 pub fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
     let mut found: Vec<&mut PathBuf> = Vec::new();
     match &mut scene.tile.geometry {
-        Geometry::Heightfield(field) => found.extend(field.path.iter_mut().chain(&mut field.color_path)),
-        Geometry::Flat(flat) => found.extend(&mut flat.color_path),
-        Geometry::Mesh(mesh) => {
-            found.push(&mut mesh.path);
-            found.extend(&mut mesh.color_path);
-        }
+        Geometry::Heightfield(field) => found.extend(&mut field.path),
+        Geometry::Mesh(mesh) => found.push(&mut mesh.path),
         _ => {}
     }
+    found.extend(&mut scene.tile.color_path);
+    found.extend(&mut scene.tile.slot_path);
     for term in scene.materials.iter_mut().filter_map(|m| m.brdf.as_mut()).flat_map(BrdfSpec::terms_mut) {
-        if let TermSpec::Merl { path } | TermSpec::Rgl { path } = term {
+        if let TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } =
+            term
+        {
             found.push(path);
         }
     }
     found.extend(&mut scene.object.path);
     found
+}
+
+/// The measured files of a material.
+fn measured_paths(material: &mut Material) -> impl Iterator<Item = &mut PathBuf> {
+    material.brdf.iter_mut().flat_map(BrdfSpec::terms_mut).filter_map(|term| match term {
+        TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => {
+            Some(path)
+        }
+        _ => None,
+    })
+}
+
+/// Names a material's files so that any scene finds them.
+pub fn make_absolute(material: &mut Material, base_dir: &Path) {
+    for path in measured_paths(material) {
+        let there = base_dir.join(&*path);
+        if there.is_file() {
+            *path = std::path::absolute(&there).unwrap_or(there);
+        }
+    }
 }
 
 /// Relative paths that led somewhere from `old` lead there from `new`.

@@ -22,8 +22,13 @@ pub enum Change {
         before: Option<Arc<Pixels<Vec3>>>,
         after: Option<Arc<Pixels<Vec3>>>,
     },
+    SlotImage {
+        before: Option<Arc<Pixels<u8>>>,
+        after: Option<Arc<Pixels<u8>>>,
+    },
     Heights(Vec<Patch<f32>>),
     Colors(Vec<Patch<Vec3>>),
+    Slots(Vec<Patch<u8>>),
 }
 
 /// A rectangle of an image, before and after.
@@ -90,8 +95,10 @@ impl Change {
                 state.painted.heights = if forward { after } else { before }.clone();
             }
             Self::ColorImage { before, after } => state.painted.colors = if forward { after } else { before }.clone(),
+            Self::SlotImage { before, after } => state.painted.slots = if forward { after } else { before }.clone(),
             Self::Heights(patches) => apply_patches(&mut state.painted.heights, patches, forward),
             Self::Colors(patches) => apply_patches(&mut state.painted.colors, patches, forward),
+            Self::Slots(patches) => apply_patches(&mut state.painted.slots, patches, forward),
         }
     }
 
@@ -101,8 +108,10 @@ impl Change {
             Self::Scene { after, .. } => scene_bytes(after),
             Self::HeightImage { before, .. } => image(before.as_ref().map(|image| image.size), 4),
             Self::ColorImage { before, .. } => image(before.as_ref().map(|image| image.size), 12),
+            Self::SlotImage { before, .. } => image(before.as_ref().map(|image| image.size), 1),
             Self::Heights(patches) => patches.iter().map(|patch| 64 + 8 * patch.before.len()).sum(),
             Self::Colors(patches) => patches.iter().map(|patch| 64 + 24 * patch.before.len()).sum(),
+            Self::Slots(patches) => patches.iter().map(|patch| 64 + 2 * patch.before.len()).sum(),
         }
     }
 }

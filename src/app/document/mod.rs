@@ -2,6 +2,7 @@
 
 mod files;
 mod history;
+mod images;
 mod naming;
 mod recovery;
 mod settings;
@@ -10,11 +11,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use biscale::Result;
-use biscale::scene::{self, Geometry, LoadedScene, Painted, Pixels, Scene};
-use glam::Vec3;
+use biscale::scene::{self, LoadedScene, Painted, Scene};
 
 use files::Stamp;
-pub use files::{write_colors, write_heights};
+pub use files::{make_absolute, write_colors, write_heights, write_slots};
 pub use history::{Change, Patch};
 pub use recovery::{Recovered, RecoveryFile, Snapshot};
 pub use settings::Settings;
@@ -37,6 +37,8 @@ pub struct Document {
     pub name: String,
     /// The state that is on disk.
     saved: Option<u64>,
+    /// What was there at first.
+    opened: State,
     /// The file as it was last read or written.
     stamp: Option<Stamp>,
     version: u64,
@@ -49,16 +51,8 @@ impl Document {
         let stamp = path.as_deref().and_then(Stamp::of);
         let history = History::new(HISTORY_BYTES);
         let saved = Some(history.state());
-        Self {
-            state: State { scene: Arc::new(scene), painted },
-            history,
-            base_dir,
-            path,
-            name,
-            saved,
-            stamp,
-            version: 1,
-        }
+        let state = State { scene: Arc::new(scene), painted };
+        Self { opened: state.clone(), state, history, base_dir, path, name, saved, stamp, version: 1 }
     }
 
     /// Opens a scene file, or a shipped scene by name (which has no file of its own).
@@ -100,6 +94,18 @@ impl Document {
         self.saved != Some(self.history.state())
     }
 
+    /// Whether something would be missed. Who only turned a shipped scene and its light has nothing to save.
+    pub fn has_work(&self) -> bool {
+        self.is_dirty() && (self.path.is_some() || self.saved.is_none() || !self.is_as_opened_but_for_the_view())
+    }
+
+    fn is_as_opened_but_for_the_view(&self) -> bool {
+        let mut turned = (*self.opened.scene).clone();
+        turned.camera.clone_from(&self.state.scene.camera);
+        turned.light.rotation_deg = self.state.scene.light.rotation_deg;
+        turned == *self.state.scene && self.opened.painted == self.state.painted
+    }
+
     /// Takes the scene as the person left it, under the name of what differs. Edits of one control are one entry until
     /// [`Document::rest`].
     pub fn edit(&mut self, scene: Scene) {
@@ -117,26 +123,6 @@ impl Document {
         changes.insert(0, Change::Scene { before, after });
         self.history.push(name, changes);
         self.version += 1;
-    }
-
-    /// Painted images go where the person chose another file in their place.
-    fn dropped_images(&mut self, before: &Scene, after: &Scene) -> Vec<Change> {
-        let mut changes = Vec::new();
-        let painted = &mut self.state.painted;
-        if let (Geometry::Heightfield(old), Geometry::Heightfield(new)) = (&before.tile.geometry, &after.tile.geometry)
-            && (&old.path, &old.values) != (&new.path, &new.values)
-            && let Some(image) = painted.heights.take()
-        {
-            changes.push(Change::HeightImage { before: Some(image), after: None });
-        }
-        let (mut old, mut new) = (before.tile.geometry.clone(), after.tile.geometry.clone());
-        if let (Some(old), Some(new)) = (color_path(&mut old), color_path(&mut new))
-            && old != new
-            && let Some(image) = painted.colors.take()
-        {
-            changes.push(Change::ColorImage { before: Some(image), after: None });
-        }
-        changes
     }
 
     /// The hand rests: what follows is an entry of its own. (Views turned one after the other stay one.)
@@ -173,93 +159,10 @@ impl Document {
         &self.history
     }
 
-    /// Heights that are painted on stand where the scene's image stood; the geometry becomes a height-field.
-    pub fn paint_heights(&mut self, name: &str, heights: Pixels<f32>, height_scale: Option<f32>) {
-        let mut changes = Vec::new();
-        let mut scene = (*self.state.scene).clone();
-        let file = PathBuf::from(format!("{}_heights.exr", self.name));
-        let place = match &mut scene.tile.geometry {
-            Geometry::Heightfield(field) => field,
-            other => {
-                *other = Geometry::Heightfield(scene::Heightfield { height_scale: 0.2, ..Default::default() });
-                match other {
-                    Geometry::Heightfield(field) => field,
-                    _ => return,
-                }
-            }
-        };
-        (place.path, place.values) = (Some(file), None);
-        place.height_scale = height_scale.unwrap_or(place.height_scale);
-        if scene != *self.state.scene {
-            let after = Arc::new(scene);
-            let before = std::mem::replace(&mut self.state.scene, after.clone());
-            changes.push(Change::Scene { before, after });
-        }
-        let after = Some(Arc::new(heights));
-        let before = std::mem::replace(&mut self.state.painted.heights, after.clone());
-        changes.push(Change::HeightImage { before, after });
-        self.push(name, changes);
-    }
-
-    /// Colours painted over the tile, or none.
-    pub fn paint_colors(&mut self, name: &str, colors: Option<Pixels<Vec3>>) {
-        let mut changes = Vec::new();
-        let mut scene = (*self.state.scene).clone();
-        let file = colors.as_ref().map(|_| PathBuf::from(format!("{}_colors.exr", self.name)));
-        if let Some(place) = color_path(&mut scene.tile.geometry) {
-            *place = file;
-        }
-        if scene != *self.state.scene {
-            let after = Arc::new(scene);
-            let before = std::mem::replace(&mut self.state.scene, after.clone());
-            changes.push(Change::Scene { before, after });
-        }
-        let after = colors.map(Arc::new);
-        let before = std::mem::replace(&mut self.state.painted.colors, after.clone());
-        changes.push(Change::ColorImage { before, after });
-        self.push(name, changes);
-    }
-
-    /// Shows a stroke while it is drawn; [`Document::end_stroke`] makes it an entry.
-    pub fn show_stroke(&mut self, painted: Painted) {
-        self.state.painted = painted;
-        self.version += 1;
-    }
-
-    /// The stroke that led from `before` to what is shown is one entry.
-    pub fn end_stroke(&mut self, name: &str, before: &Painted) {
-        let mut changes = Vec::new();
-        if let (Some(old), Some(new)) = (&before.heights, &self.state.painted.heights) {
-            let patches = Patch::between(old, new);
-            if !patches.is_empty() {
-                changes.push(Change::Heights(patches));
-            }
-        }
-        if let (Some(old), Some(new)) = (&before.colors, &self.state.painted.colors) {
-            let patches = Patch::between(old, new);
-            if !patches.is_empty() {
-                changes.push(Change::Colors(patches));
-            }
-        }
-        if !changes.is_empty() {
-            self.push(name, changes);
-        }
-    }
-
     fn push(&mut self, name: &str, changes: Vec<Change>) {
         self.history.close();
         self.history.push(name, changes);
         self.history.close();
         self.version += 1;
-    }
-}
-
-/// The key of a colour image, where the geometry has one.
-pub fn color_path(geometry: &mut Geometry) -> Option<&mut Option<PathBuf>> {
-    match geometry {
-        Geometry::Heightfield(field) => Some(&mut field.color_path),
-        Geometry::Flat(flat) => Some(&mut flat.color_path),
-        Geometry::Mesh(mesh) => Some(&mut mesh.color_path),
-        _ => None,
     }
 }

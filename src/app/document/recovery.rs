@@ -18,6 +18,8 @@ struct Header {
     path: Option<PathBuf>,
     heights: bool,
     colors: bool,
+    #[serde(default)]
+    slots: bool,
     scene: String,
 }
 
@@ -44,6 +46,7 @@ impl RecoveryFile {
             path: document.path.clone(),
             heights: painted.heights.is_some(),
             colors: painted.colors.is_some(),
+            slots: painted.slots.is_some(),
             scene: document.scene().to_toml()?,
         };
         Ok(Snapshot { stem: self.stem.clone(), header, painted: painted.clone() })
@@ -83,6 +86,9 @@ impl Snapshot {
         }
         if let Some(colors) = &self.painted.colors {
             super::files::write_colors(colors, &with(&self.stem, "_colors.exr"))?;
+        }
+        if let Some(slots) = &self.painted.slots {
+            super::files::write_slots(slots, &with(&self.stem, "_materials.png"))?;
         }
         let text = toml::to_string(&self.header).map_err(Error::failed)?;
         replace_file(&with(&self.stem, ".toml"), text.as_bytes())
@@ -131,6 +137,10 @@ impl Recovered {
             let file = image("_colors.exr");
             painted.colors = Some(biscale::geometry::image_file::read_colors(Path::new(""), &file)?.into());
         }
+        if self.header.slots {
+            let file = image("_materials.png");
+            painted.slots = Some(biscale::geometry::image_file::read_slots(Path::new(""), &file)?.into());
+        }
         let loaded = LoadedScene { scene, base_dir: self.header.base_dir.clone(), name: self.name.clone(), painted };
         let mut document = Document::new(loaded, self.header.path.clone());
         document.saved = None;
@@ -149,7 +159,7 @@ fn with(stem: &Path, suffix: &str) -> PathBuf {
 }
 
 fn discard(stem: &Path) {
-    for suffix in [".toml", "_heights.exr", "_colors.exr"] {
+    for suffix in [".toml", "_heights.exr", "_colors.exr", "_materials.png"] {
         // Not there is as good as gone.
         let _ = fs::remove_file(with(stem, suffix));
     }

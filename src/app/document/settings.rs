@@ -16,6 +16,8 @@ pub struct Settings {
     pub zoom: f32,
     pub window: [f32; 2],
     pub recent: Vec<PathBuf>,
+    /// Where a file was chosen last.
+    pub files: Option<PathBuf>,
     pub gallery: bool,
     pub gallery_width: f32,
     pub parameters_width: f32,
@@ -31,6 +33,7 @@ impl Default for Settings {
             zoom: 1.0,
             window: [1440.0, 900.0],
             recent: Vec::new(),
+            files: None,
             gallery: true,
             gallery_width: 132.0,
             parameters_width: 348.0,

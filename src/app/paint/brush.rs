@@ -15,11 +15,17 @@ pub enum Tool {
     Noise,
     Stamp,
     Color,
+    Material,
 }
 
 impl Tool {
-    pub const ALL: [Self; 7] =
-        [Self::Raise, Self::Lower, Self::Smooth, Self::Flatten, Self::Noise, Self::Stamp, Self::Color];
+    pub const ALL: [Self; 8] =
+        [Self::Raise, Self::Lower, Self::Smooth, Self::Flatten, Self::Noise, Self::Stamp, Self::Color, Self::Material];
+
+    /// Whether it changes what the surface wears, not its shape.
+    pub fn prints(self) -> bool {
+        matches!(self, Self::Color | Self::Material)
+    }
 
     pub fn name(self) -> &'static str {
         match self {
@@ -30,6 +36,7 @@ impl Tool {
             Self::Noise => "Noise",
             Self::Stamp => "Stamp",
             Self::Color => "Colour",
+            Self::Material => "Material",
         }
     }
 
@@ -42,6 +49,7 @@ impl Tool {
             Self::Noise => "Roughens the surface",
             Self::Stamp => "Prints a pattern",
             Self::Color => "Paints colour weights, which multiply the materials",
+            Self::Material => "Gives the places it passes over a material of their own",
         }
     }
 }
@@ -60,6 +68,8 @@ pub struct Brush {
     pub wrap: bool,
     /// Linear RGB.
     pub color: Vec3,
+    /// The material: 0 the surface's own, k the slot `paint_k`.
+    pub slot: u8,
     /// The pattern of the stamp: a shipped image.
     pub stamp: &'static str,
 }
@@ -73,6 +83,7 @@ impl Default for Brush {
             falloff: 0.7,
             wrap: true,
             color: Vec3::new(0.02, 0.08, 0.5),
+            slot: 1,
             stamp: "hammered.png",
         }
     }
@@ -136,7 +147,7 @@ impl Brush {
                     let print = stamp.as_ref().map_or(0.5, |stamp| stamp.at(offset));
                     *value + (print - 0.5) * (0.4 * range * by)
                 }
-                Tool::Color => *value,
+                Tool::Color | Tool::Material => *value,
             }
             .clamp(bounds.0, bounds.1);
         });
@@ -149,6 +160,13 @@ impl Brush {
         self.under(image.size, at, |index, weight, _| {
             values[index] = values[index].lerp(self.color, amount * weight);
         });
+    }
+
+    /// A dab of material: a place has one, so the edge is hard.
+    pub fn dab_slot(&self, image: &mut Pixels<u8>, at: Vec2) {
+        let values = &mut image.values;
+        let hard = Self { falloff: 0.0, ..self.clone() };
+        hard.under(image.size, at, |index, _, _| values[index] = self.slot);
     }
 }
 

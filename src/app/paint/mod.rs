@@ -12,8 +12,9 @@ use biscale::geometry::image_file;
 use biscale::scene::{Geometry, LoadedScene, Pixels};
 use glam::{UVec2, Vec3};
 
-/// Samples a side of a new image (Wu et al. 2011, Sec. 5: 128).
+/// Samples a side of new heights (Wu et al. 2011, Sec. 5: 128), and of new colours and materials, whose edges show.
 const NEW_SIDE: u32 = 128;
+const NEW_PRINT_SIDE: u32 = 256;
 
 /// The heights that painting begins from: those of the scene, or a plane in the middle of the range.
 ///
@@ -32,14 +33,10 @@ pub fn heights_of(loaded: &LoadedScene) -> biscale::Result<Pixels<f32>> {
                 let size = UVec2::new(rows[0].len() as u32, rows.len() as u32);
                 Ok(Pixels { size, values: rows.concat() })
             }
-            _ => Ok(plane()),
+            _ => Ok(blank(NEW_SIDE, 0.5)),
         },
-        _ => Ok(plane()),
+        _ => Ok(blank(NEW_SIDE, 0.5)),
     }
-}
-
-fn plane() -> Pixels<f32> {
-    Pixels { size: UVec2::splat(NEW_SIDE), values: vec![0.5; (NEW_SIDE * NEW_SIDE) as usize] }
 }
 
 /// The colours that painting begins from: those of the scene, or white.
@@ -47,14 +44,27 @@ fn plane() -> Pixels<f32> {
 /// # Errors
 /// The scene's image cannot be read.
 pub fn colors_of(loaded: &LoadedScene) -> biscale::Result<Pixels<Vec3>> {
-    if let Some(painted) = &loaded.painted.colors {
-        return Ok((**painted).clone());
+    match (&loaded.painted.colors, &loaded.scene.tile.color_path) {
+        (Some(painted), _) => Ok((**painted).clone()),
+        (None, Some(path)) => image_file::read_colors(&loaded.base_dir, path),
+        (None, None) => Ok(blank(NEW_PRINT_SIDE, Vec3::ONE)),
     }
-    let mut geometry = loaded.scene.tile.geometry.clone();
-    match super::document::color_path(&mut geometry) {
-        Some(Some(path)) => image_file::read_colors(&loaded.base_dir, path),
-        _ => Ok(Pixels { size: UVec2::splat(NEW_SIDE), values: vec![Vec3::ONE; (NEW_SIDE * NEW_SIDE) as usize] }),
+}
+
+/// The slots that painting begins from: those of the scene, or the surface's own.
+///
+/// # Errors
+/// The scene's image cannot be read.
+pub fn slots_of(loaded: &LoadedScene) -> biscale::Result<Pixels<u8>> {
+    match (&loaded.painted.slots, &loaded.scene.tile.slot_path) {
+        (Some(painted), _) => Ok((**painted).clone()),
+        (None, Some(path)) => image_file::read_slots(&loaded.base_dir, path),
+        (None, None) => Ok(blank(NEW_PRINT_SIDE, 0)),
     }
+}
+
+fn blank<T: Clone>(side: u32, value: T) -> Pixels<T> {
+    Pixels { size: UVec2::splat(side), values: vec![value; (side * side) as usize] }
 }
 
 /// Any surface as heights from 0 to 1, seen from above, and the height of 1.

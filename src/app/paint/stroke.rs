@@ -17,6 +17,7 @@ pub struct Stroke {
     pub before: Painted,
     heights: Option<Arc<Pixels<f32>>>,
     colors: Option<Arc<Pixels<Vec3>>>,
+    slots: Option<Arc<Pixels<u8>>>,
     last: Option<Vec2>,
     level: f32,
     bounds: (f32, f32),
@@ -34,6 +35,7 @@ impl Stroke {
             before: before.clone(),
             heights,
             colors: before.colors.clone(),
+            slots: before.slots.clone(),
             last: None,
             level: 0.5,
             bounds: (low, high),
@@ -64,18 +66,18 @@ impl Stroke {
     }
 
     fn dab(&mut self, brush: &Brush, at: Vec2, pressure: f32) {
-        if brush.tool == Tool::Color {
-            if let Some(image) = &mut self.colors {
-                brush.dab_color(Arc::make_mut(image), at, pressure);
-            }
-        } else if let Some(image) = &mut self.heights {
-            brush.dab(Arc::make_mut(image), at, self.level, self.bounds, pressure);
+        match (brush.tool, &mut self.heights, &mut self.colors, &mut self.slots) {
+            (Tool::Color, _, Some(image), _) => brush.dab_color(Arc::make_mut(image), at, pressure),
+            (Tool::Material, _, _, Some(image)) => brush.dab_slot(Arc::make_mut(image), at),
+            (Tool::Color | Tool::Material, ..) => {}
+            (_, Some(image), ..) => brush.dab(Arc::make_mut(image), at, self.level, self.bounds, pressure),
+            _ => {}
         }
     }
 
     /// The images as the stroke left them.
     pub fn images(&self) -> Painted {
-        Painted { heights: self.heights.clone(), colors: self.colors.clone() }
+        Painted { heights: self.heights.clone(), colors: self.colors.clone(), slots: self.slots.clone() }
     }
 }
 

@@ -9,7 +9,7 @@ use super::*;
 
 fn flat() -> Painted {
     let heights = Some(Arc::new(Pixels { size: UVec2::splat(32), values: vec![0.5; 1024] }));
-    Painted { heights, colors: None }
+    Painted { heights, ..Painted::default() }
 }
 
 fn stroke(brush: &Brush, painted: &Painted, way: &[Vec2]) -> Pixels<f32> {
@@ -67,7 +67,27 @@ fn a_colour_stroke_moves_towards_the_colour_and_leaves_heights() {
         Brush { tool: Tool::Color, strength: 1.0, color: Vec3::X, radius: 0.3, falloff: 0.0, ..Brush::default() };
     let mut stroke = Stroke::begin(&painted);
     stroke.move_to(&brush, Vec2::splat(0.5), 1.0);
-    let Painted { heights, colors } = stroke.images();
+    let Painted { heights, colors, .. } = stroke.images();
     assert_eq!(heights, painted.heights);
     assert_eq!(colors.unwrap().values[8 * 4 + 4], Vec3::X);
+}
+
+#[test]
+fn a_material_stroke_gives_whole_places_its_slot_with_a_hard_edge_and_the_own_slot_wipes_it() {
+    let side = 32;
+    let slots = Some(Arc::new(Pixels { size: UVec2::splat(side), values: vec![0; (side * side) as usize] }));
+    let painted = Painted { slots, ..flat() };
+    let run = |painted: &Painted, slot: u8| {
+        let brush = Brush { tool: Tool::Material, slot, radius: 0.2, strength: 0.0, ..Brush::default() };
+        let mut stroke = Stroke::begin(painted);
+        stroke.move_to(&brush, Vec2::splat(0.5), 0.3);
+        stroke.images()
+    };
+    let after = run(&painted, 3);
+    assert_eq!(after.heights, painted.heights);
+    for (index, slot) in after.slots.as_ref().unwrap().values.iter().enumerate() {
+        let at = (Vec2::new((index as u32 % side) as f32, (index as u32 / side) as f32) + 0.5) / side as f32;
+        assert_eq!(*slot, if at.distance(Vec2::splat(0.5)) < 0.2 { 3 } else { 0 }, "{at}");
+    }
+    assert_eq!(run(&after, 0).slots, painted.slots);
 }

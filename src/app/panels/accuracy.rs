@@ -27,7 +27,8 @@ pub struct AccuracyState {
     asked: Option<(u64, bool, bool)>,
     rungs: Vec<Point>,
     present: Option<(u64, Point)>,
-    difference: Option<(u64, TextureHandle, f32)>,
+    /// Its picture, mean ΔE, and the noise of that.
+    difference: Option<(u64, TextureHandle, f32, Option<f32>)>,
     doing: Option<&'static str>,
     trouble: Option<String>,
 }
@@ -61,9 +62,9 @@ impl AccuracyState {
             AccuracyAnswer::Doing(what) => self.doing = Some(what),
             AccuracyAnswer::Rungs(rungs) => self.rungs = rungs,
             AccuracyAnswer::Present(version, point) => self.present = Some((version, point)),
-            AccuracyAnswer::Difference(version, image, mean) => {
-                let texture = ctx.load_texture("difference", image, TextureOptions::NEAREST);
-                self.difference = Some((version, texture, mean));
+            AccuracyAnswer::Difference(version, shown) => {
+                let texture = ctx.load_texture("difference", shown.image, TextureOptions::NEAREST);
+                self.difference = Some((version, texture, shown.mean, shown.noise));
             }
             AccuracyAnswer::Effects(version, costs) => {
                 self.measuring = false;
@@ -144,13 +145,19 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
             4 * point.compared.batches
         ));
     }
-    if let Some((measured, texture, mean)) = &state.difference
+    if let Some((measured, texture, mean, noise)) = &state.difference
         && *measured == version
         && state.comparing
     {
         let side = ui.available_width().min(220.0);
         ui.add(egui::Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text("Difference picture"));
-        ui.weak(format!("Difference to 65,536 facets: ΔE {mean:.2} on average; white is 10, 2 is just seen"));
+        let words = match noise {
+            Some(noise) => {
+                format!("Difference to the reference: ΔE {mean:.2} on average, of which its noise {noise:.2}")
+            }
+            None => format!("Difference to 65,536 facets: ΔE {mean:.2} on average"),
+        };
+        ui.weak(format!("{words}; white is 10, 2 is just seen"));
     }
     if let Some(trouble) = &state.trouble {
         ui.colored_label(ui.visuals().error_fg_color, trouble);

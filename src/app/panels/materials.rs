@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
+use biscale::geometry::image_file::MOST_SLOTS;
+use biscale::geometry::painted_slot;
 use biscale::scene::{BrdfSpec, Geometry, Material, Scene, TermSpec};
 use eframe::egui::{self, RichText, Ui};
 use glam::Vec3;
 use toml::Table;
 
+use super::controls;
 use super::fields::{self, Around};
 
 const DEFAULT: &str = "default";
@@ -38,12 +41,14 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], around: &mut Around)
     names.extend(slots.iter().filter(|slot| *slot != DEFAULT).cloned());
     names
         .extend(scene.materials.iter().map(|m| m.name.clone()).filter(|name| !slots.contains(name) && name != DEFAULT));
+    let has_own = |slot: &String| scene.materials.iter().any(|material| material.name == *slot);
+    let wearers: Vec<String> = slots.iter().filter(|slot| *slot != DEFAULT && !has_own(slot)).cloned().collect();
     for slot in names {
         let index = scene.materials.iter().position(|material| material.name == slot);
         let is_used = slot == DEFAULT || slots.contains(&slot);
         let asked = ui
             .push_id(&slot, |ui| match index {
-                Some(index) => own_ui(ui, scene, index, is_used, around),
+                Some(index) => own_ui(ui, scene, index, (is_used, &wearers), around),
                 None => inherited_ui(ui, scene, &slot),
             })
             .inner;
@@ -51,6 +56,30 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], around: &mut Around)
         ui.add_space(2.0);
     }
     request
+}
+
+/// Colours that painted materials begin with: none is like its neighbour.
+const PAINTS: [[f32; 3]; 6] =
+    [[0.75, 0.45, 0.05], [0.05, 0.2, 0.6], [0.55, 0.05, 0.05], [0.1, 0.4, 0.1], [0.6, 0.6, 0.55], [0.3, 0.08, 0.4]];
+
+/// Makes sure that the scene has the material of a painted slot; whether it was missing.
+pub fn add_painted(scene: &mut Scene, number: u8) -> bool {
+    let name = painted_slot(number);
+    if number == 0 || scene.materials.iter().any(|material| material.name == name) {
+        return false;
+    }
+    if scene.materials.is_empty() {
+        scene.materials.push(grey());
+    }
+    let albedo = Vec3::from_array(PAINTS[usize::from(number - 1) % PAINTS.len()]);
+    let brdf = Some(BrdfSpec::One(TermSpec::Lambertian { albedo }));
+    scene.materials.push(Material { name, brdf, color: Vec3::ONE });
+    true
+}
+
+/// The painted slots that a scene has materials for.
+pub fn painted(scene: &Scene) -> Vec<u8> {
+    (1..=MOST_SLOTS).filter(|k| scene.materials.iter().any(|material| material.name == painted_slot(*k))).collect()
 }
 
 pub fn grey() -> Material {
@@ -73,18 +102,26 @@ fn inherited_ui(ui: &mut Ui, scene: &mut Scene, slot: &str) -> Option<Request> {
     request
 }
 
-/// A material of its own.
-fn own_ui(ui: &mut Ui, scene: &mut Scene, index: usize, is_used: bool, around: &mut Around) -> Option<Request> {
+/// A material of its own. `wearers`: the parts of the surface that have none and wear the default.
+fn own_ui(
+    ui: &mut Ui,
+    scene: &mut Scene,
+    index: usize,
+    (is_used, wearers): (bool, &[String]),
+    around: &mut Around,
+) -> Option<Request> {
     let name = scene.materials[index].name.clone();
     let is_default = name == DEFAULT;
     let mut title = fields::words(&name);
-    if !is_used {
+    if is_default && !wearers.is_empty() {
+        title.push_str(&format!(" ({})", wearers.join(", ")));
+    } else if !is_used {
         title.push_str(" (not on this surface)");
     }
     let mut request = None;
     egui::CollapsingHeader::new(RichText::new(title).strong()).id_salt("material").default_open(true).show(ui, |ui| {
         let material = &mut scene.materials[index];
-        color_ui(ui, material);
+        color_ui(ui, material, around);
         request = match &mut material.brdf {
             Some(brdf) => brdf_ui(ui, brdf, index, around),
             None => {
@@ -106,11 +143,11 @@ fn own_ui(ui: &mut Ui, scene: &mut Scene, index: usize, is_used: bool, around: &
     request
 }
 
-fn color_ui(ui: &mut Ui, material: &mut Material) {
+fn color_ui(ui: &mut Ui, material: &mut Material, around: &mut Around) {
     let Some(field) = Material::fields().into_iter().find(|field| field.key == "color") else { return };
     if let Ok(mut table) = Table::try_from(&*material) {
         let before = table.clone();
-        fields::field_ui(ui, &mut table, &field, &mut Around::default());
+        fields::field_ui(ui, &mut table, &field, around);
         if table != before
             && let Ok(changed) = table.try_into::<Material>()
         {
@@ -132,7 +169,7 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
             let doc = kinds.iter().find(|kind| kind.kind == term.kind()).map_or("", |kind| kind.doc);
             let caption = if at == 0 { "BRDF" } else { "+ BRDF" };
             let chosen = fields::row(ui, caption, doc, |ui| {
-                let chosen = fields::kind_ui(ui, "BRDF", term.kind(), &kinds);
+                let chosen = controls::kind_ui(ui, "BRDF", term.kind(), &kinds);
                 if count > 1 && ui.small_button("×").on_hover_text("Remove this term of the sum").clicked() {
                     removed = Some(at);
                 }
@@ -149,6 +186,7 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
                 let before = table.clone();
                 let mut inside = Around { unit: around.unit.clone(), ..Around::default() };
                 fields::table_ui(ui, &mut table, &kind.fields, &[], &mut inside);
+                around.complaint = around.complaint.take().or(inside.complaint);
                 if inside.browse.is_some() {
                     request = Some(Request::Browse { material, term: at });
                 }

@@ -1,6 +1,7 @@
 //! The parameter panel: sections over one scene, generated from the catalogue.
 
 pub mod accuracy;
+mod controls;
 mod effects;
 pub mod fields;
 pub mod look;

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use biscale::scene::{Geometry, Heightfield, Painted, Scene, Tile};
+use biscale::scene::{Field, Geometry, Heightfield, Painted, Scene, Tile};
 use eframe::egui::Ui;
 use toml::{Table, Value};
 
+use super::controls;
 use super::fields::{self, Around};
 
 /// Heights that a height-field begins with.
@@ -17,7 +18,7 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, around:
     let kinds = Geometry::kinds();
     let now = scene.tile.geometry.kind();
     let doc = kinds.iter().find(|kind| kind.kind == now).map_or("", |kind| kind.doc);
-    let chosen = fields::row(ui, "Surface", doc, |ui| fields::kind_ui(ui, "surface", now, &kinds));
+    let chosen = fields::row(ui, "Surface", doc, |ui| controls::kind_ui(ui, "surface", now, &kinds));
     if let Some(kind) = chosen {
         match starting(kind, painted, name) {
             Some(geometry) => scene.tile.geometry = geometry,
@@ -56,10 +57,7 @@ fn starting(kind: &str, painted: &Painted, name: &str) -> Option<Geometry> {
 pub fn of_file(path: &Path, scene: &Scene) -> Option<Geometry> {
     let ending = path.extension()?.to_str()?.to_ascii_lowercase();
     match ending.as_str() {
-        "obj" => {
-            let color_path = None;
-            Some(Geometry::Mesh(biscale::scene::MeshFile { path: path.to_owned(), color_path }))
-        }
+        "obj" => Some(Geometry::Mesh(biscale::scene::MeshFile { path: path.to_owned() })),
         "png" | "tif" | "tiff" | "jpg" | "jpeg" => {
             let height_scale = match &scene.tile.geometry {
                 Geometry::Heightfield(field) => field.height_scale,
@@ -76,7 +74,13 @@ fn tile_ui(ui: &mut Ui, tile: &mut Tile, around: &mut Around) {
     let Ok(mut table) = Table::try_from(&*tile) else { return };
     let geometry = table.remove("geometry").unwrap_or(Value::Boolean(false));
     let before = table.clone();
-    let fields: Vec<_> = Tile::fields().into_iter().filter(|field| field.key != "geometry").collect();
+    // Images are opened where they are painted; here stand those that there are.
+    let is_shown = |field: &Field| match field.key {
+        "geometry" => false,
+        "color_path" | "slot_path" => table.contains_key(field.key),
+        _ => true,
+    };
+    let fields: Vec<_> = Tile::fields().into_iter().filter(is_shown).collect();
     ui.add_space(4.0);
     fields::table_ui(ui, &mut table, &fields, &[], around);
     if table != before {

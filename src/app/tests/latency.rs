@@ -7,8 +7,12 @@ use crate::app::document::Document;
 use crate::app::worker::Grade;
 
 /// Milliseconds to the first and to the final picture.
-fn after_an_edit(name: &str) -> (f64, f64, f64) {
+fn after_an_edit(name: &str, backend: &str) -> (f64, f64, f64) {
     let mut harness = harness(Document::open(name).unwrap());
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.quality.backend = backend.to_owned();
+    editor(&mut harness).document.edit(scene);
+    harness.step();
     super::settle(&mut harness);
     let mut times = Vec::new();
     for _ in 0..3 {
@@ -44,10 +48,12 @@ fn after_an_edit(name: &str) -> (f64, f64, f64) {
 #[test]
 #[ignore = "prints numbers: cargo test --bin biscale latency -- --ignored --nocapture"]
 fn latency_from_a_slider_on_the_scenes_of_table_4() {
-    println!("scene            draft  refined (coarse)  final   [ms, median of 3 geometry edits]");
+    println!("scene            route  draft  refined (coarse)  final   [ms, median of 3 geometry edits]");
     for name in ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"] {
-        let (draft, coarse, last) = after_an_edit(name);
-        println!("{name:<16} {draft:>5.0} {coarse:>12.0} {last:>12.0}");
-        assert!(draft.is_finite());
+        for backend in ["cpu", "gpu"] {
+            let (draft, coarse, last) = after_an_edit(name, backend);
+            println!("{name:<16} {backend:<5} {draft:>6.0} {coarse:>12.0} {last:>12.0}");
+            assert!(draft.is_finite());
+        }
     }
 }

@@ -1,9 +1,13 @@
 //! The interface without a window: every frame runs as in one, and the workers really work.
 
 mod documents;
+mod exports;
 mod interface;
 mod latency;
+mod newcomer;
+mod painting;
 mod soak;
+mod trouble;
 
 use std::time::{Duration, Instant};
 

@@ -77,7 +77,7 @@ fn soak(edits: usize, seed: u64) {
             2 => {
                 let editor = editor(&mut harness);
                 editor.tile.set_painting(true);
-                editor.tile.brush.tool = Tool::ALL[random.random_range(0..6usize)];
+                editor.tile.brush.tool = Tool::ALL[random.random_range(0..Tool::ALL.len())];
                 let at = Vec2::new(random.random(), random.random());
                 editor.draw(&[at, at + 0.2]);
                 editor.tile.set_painting(false);

@@ -1,33 +1,74 @@
 //! The brush, under the tile.
 
-use biscale::scene::shipped;
+use biscale::geometry::image_file::MOST_SLOTS;
+use biscale::geometry::painted_slot;
+use biscale::scene::{Scene, shipped};
 use eframe::egui::{self, Slider, Ui};
 
 use crate::app::paint::{Brush, Tool};
-use crate::app::panels::fields::row;
+use crate::app::panels::fields::{row, words};
+use crate::app::panels::materials;
+
+/// An image over the tile that is painted on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layer {
+    Heights,
+    Colors,
+    Slots,
+}
+
+impl Layer {
+    /// What its file is called unless a person says otherwise.
+    pub fn file(self) -> &'static str {
+        match self {
+            Self::Heights => "heights.png",
+            Self::Colors => "colors.png",
+            Self::Slots => "materials.png",
+        }
+    }
+}
 
 /// What is asked for here besides the brush.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BrushAsked {
-    OpenHeights,
-    SaveHeights,
-    OpenColors,
-    SaveColors,
-    Flatten,
-    ClearColors,
+    Open(Layer),
+    Save(Layer),
+    Clear(Layer),
 }
 
-pub fn ui(ui: &mut Ui, brush: &mut Brush) -> Option<BrushAsked> {
-    let mut asked = None;
+/// `scene` tells which materials there are to paint with.
+pub fn ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) -> Option<BrushAsked> {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 5.0;
-        for tool in Tool::ALL {
-            if ui.selectable_label(brush.tool == tool, tool.name()).on_hover_text(tool.tip()).clicked() {
-                brush.tool = tool;
-            }
-        }
+        let shape = Tool::ALL.iter().filter(|tool| !tool.prints());
+        shape.for_each(|tool| tool_ui(ui, brush, *tool));
     });
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 5.0;
+        Tool::ALL.iter().filter(|tool| tool.prints()).for_each(|tool| tool_ui(ui, brush, *tool));
+    });
+    shape_ui(ui, brush);
+    match brush.tool {
+        Tool::Color => color_ui(ui, brush),
+        Tool::Material => material_ui(ui, brush, scene),
+        Tool::Stamp => stamp_ui(ui, brush),
+        _ => {}
+    }
+    let asked = files_ui(ui, brush.tool);
+    ui.small("Right drag turns the tile, the wheel comes closer.");
+    asked
+}
+
+fn tool_ui(ui: &mut Ui, brush: &mut Brush, tool: Tool) {
+    if ui.selectable_label(brush.tool == tool, tool.name()).on_hover_text(tool.tip()).clicked() {
+        brush.tool = tool;
+    }
+}
+
+/// Size, strength, edge.
+fn shape_ui(ui: &mut Ui, brush: &mut Brush) {
     let percent = |ui: &mut Ui, caption: &str, tip: &str, value: &mut f32, most: f32| {
         row(ui, caption, tip, |ui| {
             let mut shown = *value * 100.0;
@@ -39,48 +80,76 @@ pub fn ui(ui: &mut Ui, brush: &mut Brush) -> Option<BrushAsked> {
         });
     };
     percent(ui, "Size", "Radius as a part of the tile ([ and ])", &mut brush.radius, 0.5);
-    percent(ui, "Strength", "How much a stroke does", &mut brush.strength, 1.0);
-    percent(ui, "Softness", "0: a hard edge. 100: soft from the middle on", &mut brush.falloff, 1.0);
+    // A place has one material, wholly.
+    if brush.tool != Tool::Material {
+        percent(ui, "Strength", "How much a stroke does; a pen's pressure lessens it", &mut brush.strength, 1.0);
+        percent(ui, "Softness", "0: a hard edge. 100: soft from the middle on", &mut brush.falloff, 1.0);
+    }
     row(ui, "Wrap", "Strokes go on at the opposite edge of the tile", |ui| {
         ui.checkbox(&mut brush.wrap, "around the edges")
     });
-    if brush.tool == Tool::Color {
-        row(ui, "Colour", "Multiplies the materials", |ui| {
-            let mut rgb = brush.color.to_array();
-            if ui.color_edit_button_rgb(&mut rgb).changed() {
-                brush.color = rgb.into();
-            }
-        });
-    }
-    if brush.tool == Tool::Stamp {
-        row(ui, "Pattern", "What the stamp prints", |ui| {
-            egui::ComboBox::from_id_salt("stamp").selected_text(brush.stamp).show_ui(ui, |ui| {
-                for (name, _) in shipped::ASSETS {
-                    ui.selectable_value(&mut brush.stamp, *name, *name);
-                }
-            });
-        });
-    }
-    ui.horizontal_wrapped(|ui| {
-        let choices: &[(&str, &str, BrushAsked)] = if brush.tool == Tool::Color {
-            &[
-                ("Open colours…", "An image of colour weights", BrushAsked::OpenColors),
-                ("Save colours…", "As .png or .exr", BrushAsked::SaveColors),
-                ("No colours", "Remove what was painted", BrushAsked::ClearColors),
-            ]
-        } else {
-            &[
-                ("Open heights…", "An image of heights", BrushAsked::OpenHeights),
-                ("Save heights…", "As .png or .exr", BrushAsked::SaveHeights),
-                ("Flatten all", "Back to a plane", BrushAsked::Flatten),
-            ]
-        };
-        for (name, tip, what) in choices {
-            if ui.button(*name).on_hover_text(*tip).clicked() {
-                asked = Some(*what);
-            }
+}
+
+fn color_ui(ui: &mut Ui, brush: &mut Brush) {
+    row(ui, "Colour", "Multiplies the materials", |ui| {
+        let mut rgb = brush.color.to_array();
+        if ui.color_edit_button_rgb(&mut rgb).changed() {
+            brush.color = rgb.into();
         }
     });
-    ui.small("Right drag turns the tile, the wheel comes closer.");
+}
+
+/// Which material is painted: the surface's own, those that there are, or one more.
+fn material_ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) {
+    let there = materials::painted(scene);
+    // The first stroke makes the material.
+    let next = (1..=MOST_SLOTS).find(|slot| !there.contains(slot));
+    let name = |slot: u8| if slot == 0 { "The surface's own".to_owned() } else { words(&painted_slot(slot)) };
+    let shown = if Some(brush.slot) == next { format!("{} (new)", name(brush.slot)) } else { name(brush.slot) };
+    row(ui, "Material", "What the places that are painted wear; its BRDF is under Materials", |ui| {
+        egui::ComboBox::from_id_salt("paint material").selected_text(shown).width(150.0).show_ui(ui, |ui| {
+            for slot in std::iter::once(0).chain(there) {
+                ui.selectable_value(&mut brush.slot, slot, name(slot));
+            }
+            if let Some(next) = next {
+                ui.selectable_value(&mut brush.slot, next, "A new material");
+            }
+        });
+    });
+}
+
+fn stamp_ui(ui: &mut Ui, brush: &mut Brush) {
+    row(ui, "Pattern", "What the stamp prints", |ui| {
+        egui::ComboBox::from_id_salt("stamp").selected_text(stem(brush.stamp)).show_ui(ui, |ui| {
+            for (name, _) in shipped::ASSETS {
+                ui.selectable_value(&mut brush.stamp, *name, stem(name));
+            }
+        });
+    });
+}
+
+/// A shipped image as a person calls it.
+fn stem(file: &str) -> String {
+    words(file.split('.').next().unwrap_or(file))
+}
+
+/// Images of the layer that the brush paints on.
+fn files_ui(ui: &mut Ui, tool: Tool) -> Option<BrushAsked> {
+    let (layer, names, clear) = match tool {
+        Tool::Color => (Layer::Colors, "colours", ("No colours", "Remove what was painted")),
+        Tool::Material => (Layer::Slots, "materials", ("No materials", "Every place wears the surface's own again")),
+        _ => (Layer::Heights, "heights", ("Flatten all", "Back to a plane")),
+    };
+    let mut asked = None;
+    ui.horizontal_wrapped(|ui| {
+        let mut button = |name: String, tip: &str, what: BrushAsked| {
+            if ui.button(name).on_hover_text(tip).clicked() {
+                asked = Some(what);
+            }
+        };
+        button(format!("Open {names}…"), "An image to go on with", BrushAsked::Open(layer));
+        button(format!("Save {names}…"), "As an image, beside what the scene saves by itself", BrushAsked::Save(layer));
+        button(clear.0.to_owned(), clear.1, BrushAsked::Clear(layer));
+    });
     asked
 }

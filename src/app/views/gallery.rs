@@ -12,6 +12,8 @@ pub struct Gallery {
     /// `None` for a scene that could not be shown.
     pictures: HashMap<&'static str, Option<TextureHandle>>,
     asked: Option<&'static str>,
+    /// What is looked for among names and descriptions.
+    pub sought: String,
 }
 
 impl Gallery {
@@ -42,17 +44,27 @@ impl Gallery {
     }
 
     /// The pictures; the one that was clicked.
-    pub fn ui(&self, ui: &mut Ui, current: &str) -> Option<&'static str> {
+    pub fn ui(&mut self, ui: &mut Ui, current: &str) -> Option<&'static str> {
         let mut chosen = None;
         ui.add_space(4.0);
         ui.label(RichText::new("Gallery").heading());
+        let hint = egui::TextEdit::singleline(&mut self.sought).hint_text("Search").desired_width(f32::INFINITY);
+        let field = ui.add(hint).on_hover_text("Words of a name or a description: velvet, groove, silver, Fig. 8");
+        field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Search the gallery"));
         ui.add_space(2.0);
+        let found: Vec<_> = shipped::names().filter(|name| is_sought(name, &self.sought)).collect();
+        if found.is_empty() {
+            ui.weak(format!("No scene is about \"{}\".", self.sought.trim()));
+            if ui.button("Show all").clicked() {
+                self.sought.clear();
+            }
+        }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             let columns = ((ui.available_width() + 6.0) / 118.0).floor().max(1.0);
             // A little less: a row that is too wide by rounding would wrap.
             let side = ((ui.available_width() - (columns - 1.0) * 6.0) / columns).floor() - 1.0;
             ui.horizontal_wrapped(|ui| {
-                for name in shipped::names() {
+                for name in found {
                     if self.item(ui, name, side, name == current) {
                         chosen = Some(name);
                     }
@@ -87,6 +99,13 @@ impl Gallery {
         painter.text(at, egui::Align2::LEFT_TOP, title(name), egui::FontId::proportional(11.0), text);
         response.on_hover_text(format!("{name}\n{}", shipped::description(name).unwrap_or_default())).clicked()
     }
+}
+
+/// Whether a scene's name and description have all the words.
+fn is_sought(name: &str, sought: &str) -> bool {
+    let description = shipped::description(name).unwrap_or_default();
+    let text = format!("{name} {} {description}", title(name)).to_lowercase();
+    sought.to_lowercase().split_whitespace().all(|word| text.contains(word))
 }
 
 /// `fig6a_velvet_spread` as a caption: `Velvet spread`.

@@ -53,6 +53,11 @@ impl LobeState {
         self.made = Some(made);
     }
 
+    /// Textures belong to a window; in another one they are made anew.
+    pub fn move_to(&mut self) {
+        (self.texture, self.asked) = (None, None);
+    }
+
     pub fn ui(&mut self, ui: &mut Ui) {
         let (theta, phi) = to_angles(self.light);
         ui.horizontal(|ui| {

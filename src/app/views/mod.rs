@@ -2,6 +2,8 @@
 
 pub mod brushes;
 pub mod gallery;
+pub mod hand;
 pub mod lobe;
 pub mod object;
 pub mod tile;
+pub mod wipe;

@@ -1,29 +1,23 @@
 //! The large view: the object, shaded by the effective BRDF. Drag turns it, the wheel comes closer.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use biscale::scene::{Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
-    self, Color32, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2,
-    vec2,
+    self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 
+use super::wipe::Kept;
 use crate::app::actions::Action;
 use crate::app::panels::fields::words;
 use crate::app::worker::{Grade, Made};
 
 /// The camera comes no nearer than this many radii; the lens does the rest.
 const NEAREST: f32 = 2.2;
+/// What takes longer than this says so [s].
+const SLOW: f32 = 0.33;
 /// A lens narrower than this widens before the camera moves away.
 const NARROW: f32 = 14.0;
-
-/// A picture kept for comparison.
-pub struct Kept {
-    pub texture: TextureHandle,
-    pub scene: Arc<Scene>,
-    pub name: String,
-}
 
 /// What the view holds between frames.
 #[derive(Default)]
@@ -50,7 +44,8 @@ pub struct ObjectView {
 impl ObjectView {
     /// Shows a picture, unless what is shown is newer or better.
     pub fn take(&mut self, ctx: &egui::Context, made: Box<Made>) {
-        let rank = |made: &Made| (made.version, made.grade);
+        // Of two pictures of one version a draft in the view's present shape is better than a full one in another.
+        let rank = |made: &Made| (made.version, self.has_shape(made), made.grade);
         if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
             return;
         }
@@ -63,15 +58,33 @@ impl ObjectView {
         if made.grade == Grade::Final {
             self.doing = None;
         }
+        // A was kept before it was finished: it gets the finished picture.
+        if let Some(kept) = &mut self.kept
+            && kept.version == made.version
+        {
+            kept.image = made.image.clone();
+            kept.texture.set(made.image.clone(), options);
+        }
         self.made = Some(made);
     }
 
-    /// Keeps what is shown now beside what comes.
-    pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) {
+    /// Whether a picture has the shape that was asked for last.
+    fn has_shape(&self, made: &Made) -> bool {
+        let ratio = |width: usize, height: usize| width as f32 / height.max(1) as f32;
+        self.asked.is_none_or(|(_, [width, height])| {
+            let (has, wanted) = (ratio(made.picture.width, made.picture.height), ratio(width, height));
+            (has / wanted - 1.0).abs() < 0.03
+        })
+    }
+
+    /// Textures belong to a window; in another one they are made anew.
+    pub fn move_to(&mut self, ctx: &egui::Context) {
+        (self.texture, self.asked, self.since) = (None, None, None);
+        if let Some(kept) = &mut self.kept {
+            kept.texture = ctx.load_texture("kept", kept.image.clone(), TextureOptions::LINEAR);
+        }
         if let Some(made) = &self.made {
-            let texture = ctx.load_texture("kept", made.image.clone(), TextureOptions::LINEAR);
-            self.kept = Some(Kept { texture, scene: scene.clone(), name: name.to_owned() });
-            self.wipe = 0.5;
+            self.texture = Some(ctx.load_texture("object", made.image.clone(), TextureOptions::LINEAR));
         }
     }
 
@@ -83,10 +96,12 @@ impl ObjectView {
         ui.painter().rect_filled(area, 0.0, Color32::from_gray(22));
         if let Some(texture) = &self.texture {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            ui.painter().image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
+            let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
+            painter.image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
         } else {
             ui.put(Rect::from_center_size(area.center(), vec2(40.0, 40.0)), egui::Spinner::new());
         }
+        self.waiting_ui(ui, area);
         self.wipe_ui(ui, area);
         let on_wipe =
             self.kept.is_some() && response.interact_pointer_pos().is_some_and(|at| self.is_on_wipe(area, at));
@@ -102,30 +117,32 @@ impl ObjectView {
         [pixels.x.round() as usize, pixels.y.round() as usize]
     }
 
+    /// Says that the first picture of an edit is still being computed, once that takes long.
+    fn waiting_ui(&self, ui: &mut Ui, area: Rect) {
+        let Some(since) = self.since.filter(|_| self.texture.is_some()) else { return };
+        let left = SLOW - since.elapsed().as_secs_f32();
+        if left > 0.0 {
+            ui.ctx().request_repaint_after_secs(left);
+            return;
+        }
+        let place = Rect::from_min_size(area.left_bottom() + vec2(10.0, -34.0), vec2(170.0, 26.0));
+        ui.painter().rect_filled(place, 5.0, Color32::from_black_alpha(150));
+        ui.put(
+            Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0)),
+            egui::Spinner::new().color(Color32::WHITE),
+        );
+        let text = format!("Computing, {:.0} s", since.elapsed().as_secs_f32());
+        let font = egui::FontId::proportional(12.0);
+        ui.painter().text(place.left_center() + vec2(28.0, 0.0), egui::Align2::LEFT_CENTER, text, font, Color32::WHITE);
+    }
+
     /// What is looked at and how, above the view.
     pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene) -> Option<Action> {
         let mut action = None;
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            egui::ComboBox::from_id_salt("object here").selected_text(words(&scene.object.kind)).width(90.0).show_ui(
-                ui,
-                |ui| {
-                    for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
-                        if ui.selectable_label(scene.object.kind == *kind, words(kind)).clicked() {
-                            (*kind).clone_into(&mut scene.object.kind);
-                            scene.object.path = None;
-                        }
-                    }
-                },
-            );
-            let camera = scene.camera.clone().unwrap_or_default();
-            let mut exposure = camera.exposure_ev;
-            let drag =
-                egui::DragValue::new(&mut exposure).range(-10.0..=10.0).speed(0.03).suffix(" EV").max_decimals(2);
-            let response = ui.add(drag).on_hover_text("Exposure: drag sideways");
-            if response.changed() && exposure.is_finite() {
-                scene.camera = Some(Camera { exposure_ev: exposure, ..camera });
-            }
+            ui.name_inputs("Object", |ui| object_ui(ui, scene));
+            ui.name_inputs("Exposure", |ui| exposure_ui(ui, scene));
             ui.separator();
             for (which, name, tip, on) in [
                 (Action::Frame, "Frame", "Show the whole object (F)", false),
@@ -147,37 +164,32 @@ impl ObjectView {
         });
         action
     }
+}
 
-    fn is_on_wipe(&self, area: Rect, at: Pos2) -> bool {
-        (at.x - (area.left() + self.wipe * area.width())).abs() < 12.0
-    }
-
-    /// What was kept, left of a line that can be moved.
-    fn wipe_ui(&mut self, ui: &mut Ui, area: Rect) {
-        let Some(kept) = &self.kept else { return };
-        let x = area.left() + self.wipe * area.width();
-        let left = Rect::from_min_max(area.min, pos2(x, area.bottom()));
-        let shown = covered(area, kept.texture.size_vec2());
-        let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        ui.painter().with_clip_rect(left).image(kept.texture.id(), shown, uv, Color32::WHITE);
-        ui.painter().vline(x, area.y_range(), egui::Stroke::new(1.5, Color32::from_white_alpha(200)));
-        ui.painter().circle_filled(pos2(x, area.center().y), 7.0, Color32::from_white_alpha(220));
-        let font = egui::FontId::proportional(12.0);
-        let white = Color32::from_white_alpha(210);
-        let at = pos2(x - 8.0, area.top() + 8.0);
-        ui.painter().text(at, egui::Align2::RIGHT_TOP, format!("A  {}", kept.name), font.clone(), white);
-        ui.painter().text(pos2(x + 8.0, area.top() + 8.0), egui::Align2::LEFT_TOP, "B  now", font, white);
-        let grip = Rect::from_min_max(pos2(x - 8.0, area.top()), pos2(x + 8.0, area.bottom()));
-        let response =
-            ui.interact(grip, ui.scope_id().with("wipe"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
-        if response.dragged() {
-            self.wipe = (self.wipe + response.drag_delta().x / area.width()).clamp(0.0, 1.0);
+fn object_ui(ui: &mut Ui, scene: &mut Scene) {
+    let combo = egui::ComboBox::from_id_salt("object here").selected_text(words(&scene.object.kind)).width(90.0);
+    combo.show_ui(ui, |ui| {
+        for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
+            if ui.selectable_label(scene.object.kind == *kind, words(kind)).clicked() {
+                (*kind).clone_into(&mut scene.object.kind);
+                scene.object.path = None;
+            }
         }
+    });
+}
+
+fn exposure_ui(ui: &mut Ui, scene: &mut Scene) {
+    let camera = scene.camera.clone().unwrap_or_default();
+    let mut exposure = camera.exposure_ev;
+    let drag = egui::DragValue::new(&mut exposure).range(-10.0..=10.0).speed(0.03).suffix(" EV").max_decimals(2);
+    let response = ui.add(drag).on_hover_text("Exposure: drag sideways");
+    if response.changed() && exposure.is_finite() {
+        scene.camera = Some(Camera { exposure_ev: exposure, ..camera });
     }
 }
 
 /// The rectangle that covers `area` with a picture of another shape, centred: a resized view keeps the object's shape.
-fn covered(area: Rect, picture: egui::Vec2) -> Rect {
+pub(super) fn covered(area: Rect, picture: egui::Vec2) -> Rect {
     let scale = (area.width() / picture.x.max(1.0)).max(area.height() / picture.y.max(1.0));
     let rect = Rect::from_center_size(area.center(), picture * scale);
     if (rect.width() - area.width()).abs() < 4.0 && (rect.height() - area.height()).abs() < 4.0 { area } else { rect }

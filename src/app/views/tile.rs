@@ -10,6 +10,7 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
+use super::hand::{self, Hand};
 use crate::app::paint::Brush;
 use crate::app::worker::{Show, TileJob, TileMade};
 
@@ -27,6 +28,8 @@ pub struct TileState {
     pub show: Which,
     pub facets: bool,
     pub painting: bool,
+    /// The hand is down, and how hard.
+    pressing: Option<f32>,
     pub brush: Brush,
     texture: Option<TextureHandle>,
     pub made: Option<Box<TileMade>>,
@@ -50,14 +53,6 @@ pub enum Which {
     Contribution,
 }
 
-/// What the hand does in paint mode, in parts of the tile.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hand {
-    /// It presses here, this hard.
-    Press(Vec2, f32),
-    Lifted,
-}
-
 impl Default for TileState {
     fn default() -> Self {
         Self {
@@ -68,6 +63,7 @@ impl Default for TileState {
             show: Which::Clay,
             facets: false,
             painting: false,
+            pressing: None,
             brush: Brush::default(),
             texture: None,
             made: None,
@@ -128,6 +124,11 @@ impl TileState {
         self.made = Some(made);
     }
 
+    /// Textures belong to a window; in another one they are made anew.
+    pub fn move_to(&mut self) {
+        (self.texture, self.asked, self.inputs) = (None, None, None);
+    }
+
     /// Turns paint mode on or off; painting looks straight down.
     pub fn set_painting(&mut self, on: bool) {
         if on == self.painting {
@@ -143,7 +144,7 @@ impl TileState {
     }
 
     /// Shows the picture; what the hand did, in paint mode.
-    pub fn ui(&mut self, ui: &mut Ui, tile: Vec2, size: egui::Vec2) -> Option<Hand> {
+    pub fn ui(&mut self, ui: &mut Ui, tile: Vec2, size: egui::Vec2) -> Vec<Hand> {
         let (area, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Tile view"));
         let pixels = area.size() * ui.pixels_per_point();
@@ -156,7 +157,7 @@ impl TileState {
         self.facets_ui(ui, area, tile);
         let paints = self.painting && !ui.input(|input| input.modifiers.alt);
         self.turn(ui, &response, tile, paints);
-        if paints { self.paint(ui, &response, area, tile) } else { None }
+        if paints { self.paint(ui, &response, area, tile) } else { Vec::new() }
     }
 
     fn turn(&mut self, ui: &Ui, response: &Response, tile: Vec2, paints: bool) {
@@ -196,19 +197,21 @@ impl TileState {
         Some(hit.position.truncate() / tile)
     }
 
-    fn paint(&mut self, ui: &Ui, response: &Response, area: Rect, tile: Vec2) -> Option<Hand> {
-        let at = response.hover_pos().or(response.interact_pointer_pos())?;
-        ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
-        let place = self.place(area, at, tile)?;
-        let radius =
-            self.brush.radius / self.span * tile.min_element() / tile.max_element() * area.width().min(area.height());
-        ui.painter().circle_stroke(at, radius, egui::Stroke::new(1.5, Color32::from_white_alpha(220)));
-        ui.painter().circle_stroke(at, radius + 1.0, egui::Stroke::new(1.0, Color32::from_black_alpha(160)));
-        if response.drag_stopped_by(PointerButton::Primary) || response.clicked() {
-            return Some(Hand::Lifted);
+    /// The brush's outline, and what the hand did since the last frame.
+    fn paint(&mut self, ui: &Ui, response: &Response, area: Rect, tile: Vec2) -> Vec<Hand> {
+        if let Some(at) = response.hover_pos().or(response.interact_pointer_pos()) {
+            ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
+            let shape = tile.min_element() / tile.max_element() * area.width().min(area.height());
+            let radius = self.brush.radius / self.span * shape;
+            ui.painter().circle_stroke(at, radius, egui::Stroke::new(1.5, Color32::from_white_alpha(220)));
+            ui.painter().circle_stroke(at, radius + 1.0, egui::Stroke::new(1.0, Color32::from_black_alpha(160)));
         }
-        let pressed = response.is_pointer_button_down_on() && ui.input(|input| input.pointer.primary_down());
-        pressed.then(|| Hand::Press(place, pressure(ui)))
+        let strokes = hand::strokes(ui, area, &mut self.pressing);
+        let on_tile = |touch: hand::Touch| match touch {
+            hand::Touch::At(at, pressure) => self.place(area, at, tile).map(|place| Hand::Press(place, pressure)),
+            hand::Touch::Lifted => Some(Hand::Lifted),
+        };
+        strokes.into_iter().filter_map(on_tile).collect()
     }
 
     /// Centres and normals of a sample of facets.
@@ -270,17 +273,6 @@ impl TileState {
         });
         painting
     }
-}
-
-/// How hard a pen presses; a mouse presses fully.
-fn pressure(ui: &Ui) -> f32 {
-    ui.input(|input| {
-        let mut forces = input.events.iter().filter_map(|event| match event {
-            egui::Event::Touch { force, .. } => *force,
-            _ => None,
-        });
-        forces.next_back().unwrap_or(1.0)
-    })
 }
 
 /// The width, and as much height as leaves room for what stands below.

@@ -4,9 +4,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use biscale::accuracy::candidates::with_settings;
 use biscale::accuracy::ladder;
 use biscale::accuracy::progressive::{Compared, ProgressiveReference};
-use biscale::accuracy::sweep::with_settings;
+use biscale::large_scale::Picture;
 use biscale::pipeline::Pipeline;
 use biscale::report::{EffectCost, Studio, heat, measure_effects};
 use biscale::scene::{LoadedScene, Quality};
@@ -44,21 +45,32 @@ pub enum AccuracyAnswer {
     Rungs(Vec<Point>),
     /// The present settings of a version of the document.
     Present(u64, Point),
-    /// ΔE between the present picture and a far finer one, as a picture, and its mean.
-    Difference(u64, Arc<ColorImage>, f32),
+    /// How far the picture of a version of the document is from the right one.
+    Difference(u64, Difference),
     /// What each effect costs and changes.
     Effects(u64, Vec<EffectCost>),
     Done(u64),
     Failed(String),
 }
 
+/// ΔE between the present picture and a better one.
+#[derive(Debug, Clone)]
+pub struct Difference {
+    pub image: Arc<ColorImage>,
+    pub mean: f32,
+    /// What of it is the noise of the reference's picture; `None` against a far finer setting, which has none.
+    pub noise: Option<f32>,
+}
+
 /// Rungs of the chart.
 const RUNGS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
-/// The rung that difference pictures are taken against.
+/// The rung that difference pictures are taken against where the reference is too slow for pictures.
 const FINEST: f64 = 12.0;
 const PAIRS: usize = 96;
 /// Batches of the reference: for the chart, and when it is asked for.
 const BATCHES: [usize; 2] = [2, 24];
+/// Noisy pictures of the reference that are averaged.
+const PICTURES: u64 = 24;
 
 /// What stays between jobs: the reference and the rungs belong to a scene, whatever its settings.
 #[derive(Default)]
@@ -118,22 +130,35 @@ impl Accuracy {
         if !job.compare {
             return Ok(());
         }
-        answer(AccuracyAnswer::Doing("Difference picture"));
-        let fine = with_settings(&job.loaded, &ladder::rung(FINEST, overhangs))?;
-        let studio = Studio::new(&job.loaded)?;
-        let now = studio.picture(&outcome.brdf)?;
-        desk.cancel.check()?;
-        let finest = studio.picture(&self.pipeline.effective(&fine)?.brdf)?;
-        let delta_e = studio.difference(&now, &finest);
-        let mean = delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32;
-        answer(AccuracyAnswer::Difference(job.version, Arc::new(picture(now.width, now.height, &delta_e)), mean));
         answer(AccuracyAnswer::Doing("Refining the reference"));
-        while reference.batches < BATCHES[1] {
+        let studio = Studio::new(&job.loaded)?;
+        let now = studio.picture(&*outcome.brdf)?;
+        let mut right = MeanPicture::default();
+        for seed in 0..PICTURES {
             desk.cancel.check()?;
-            reference.refine(&mut self.pipeline, &job.loaded)?;
-            self.reference = Some(reference.clone());
-            present.compared = reference.compare(&outcome.brdf);
-            answer(AccuracyAnswer::Present(job.version, present));
+            let drawn = self
+                .pipeline
+                .with_reference(&job.loaded, |reference| studio.reference_picture(reference, seed, desk.cancel))??;
+            match drawn {
+                Some(drawn) => right.add(drawn),
+                // Paths between facets: against the finest setting instead.
+                None if seed == 0 => {
+                    let fine = with_settings(&job.loaded, &ladder::rung(FINEST, overhangs))?;
+                    let finest = studio.picture(&*self.pipeline.effective(&fine)?.brdf)?;
+                    answer(AccuracyAnswer::Difference(job.version, difference(&studio, &now, &finest, None)));
+                }
+                None => {}
+            }
+            if let Some((mean, noise)) = right.mean_and_noise(&studio) {
+                let shown = difference(&studio, &now, &mean, Some(noise));
+                answer(AccuracyAnswer::Difference(job.version, shown));
+            }
+            if reference.batches < BATCHES[1] {
+                reference.refine(&mut self.pipeline, &job.loaded)?;
+                self.reference = Some(reference.clone());
+                present.compared = reference.compare(&outcome.brdf);
+                answer(AccuracyAnswer::Present(job.version, present));
+            }
         }
         Ok(())
     }
@@ -159,6 +184,47 @@ fn without_settings(loaded: &LoadedScene) -> LoadedScene {
     key.scene.light = Default::default();
     key.name.clear();
     key
+}
+
+/// Two means of every second picture each: how far they are apart tells their noise.
+#[derive(Default)]
+struct MeanPicture {
+    halves: [Option<Picture>; 2],
+    counts: [usize; 2],
+}
+
+impl MeanPicture {
+    fn add(&mut self, drawn: Picture) {
+        let half = usize::from(self.counts[0] > self.counts[1]);
+        self.counts[half] += 1;
+        let part = 1.0 / self.counts[half] as f32;
+        match &mut self.halves[half] {
+            Some(mean) => {
+                for (mean, drawn) in mean.pixels.iter_mut().zip(&drawn.pixels) {
+                    *mean += (*drawn - *mean) * part;
+                }
+            }
+            empty => *empty = Some(drawn),
+        }
+    }
+
+    /// `None` before the second picture. The mean of both halves has half the noise of their difference.
+    fn mean_and_noise(&self, studio: &Studio) -> Option<(Picture, f32)> {
+        let [Some(a), Some(b)] = &self.halves else { return None };
+        let part = self.counts[1] as f32 / (self.counts[0] + self.counts[1]) as f32;
+        let pixels = a.pixels.iter().zip(&b.pixels).map(|(a, b)| a.lerp(*b, part)).collect();
+        let noise = 0.5 * average(&studio.difference(a, b));
+        Some((Picture { pixels, ..*a }, noise))
+    }
+}
+
+fn average(delta_e: &[f32]) -> f32 {
+    delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32
+}
+
+fn difference(studio: &Studio, now: &Picture, right: &Picture, noise: Option<f32>) -> Difference {
+    let delta_e = studio.difference(now, right);
+    Difference { image: Arc::new(picture(now.width, now.height, &delta_e)), mean: average(&delta_e), noise }
 }
 
 fn picture(width: usize, height: usize, delta_e: &[f32]) -> ColorImage {

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use biscale::close_up::CloseUp;
+use biscale::export::tile::TileOptions;
 use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
+use biscale::fit::{self, Model};
+use biscale::geometry::TileMesh;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::LoadedScene;
@@ -26,20 +29,43 @@ pub struct TableChoice {
     /// Steps from the normal to the horizon, and around, for files whose grid is free.
     pub theta: usize,
     pub phi: usize,
+    /// Of an RGL file: elevations and azimuths of slices, samples along both sides of one; by itself where absent.
+    pub rgl: Option<[usize; 4]>,
     /// What a Radiance file holds.
     pub radiance: RadianceBasis,
+    /// Cells along a side of a tensor tree.
+    pub tree: usize,
+}
+
+impl TableChoice {
+    /// The grid that a file of this name gets; absent where the format has its own.
+    pub fn resolution(&self, path: &Path) -> Option<ExportResolution> {
+        let of = |[theta_i, phi_i, theta_o, phi_o]: [usize; 4]| ExportResolution { theta_i, phi_i, theta_o, phi_o };
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+        match ending.as_str() {
+            _ if export::grid_is_free(path) => Some(of([self.theta, self.phi, self.theta, self.phi])),
+            "bsdf" => self.rgl.map(of),
+            "xml" if self.radiance == RadianceBasis::TensorTree => Some(of([self.tree; 4])),
+            _ => None,
+        }
+    }
 }
 
 impl Default for TableChoice {
     fn default() -> Self {
-        Self { theta: 16, phi: 64, radiance: RadianceBasis::Klems }
+        Self { theta: 16, phi: 64, rgl: None, radiance: RadianceBasis::Klems, tree: 32 }
     }
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum What {
     Table(TableChoice),
-    Picture { size: [usize; 2] },
+    /// A few parameters, glTF or MaterialX by the ending.
+    Fit,
+    Tile(TileOptions),
+    Picture {
+        size: [usize; 2],
+    },
 }
 
 pub enum ExportAnswer {
@@ -62,13 +88,18 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
     answer(ExportAnswer::Progress(0.0, "Computing the material"));
     let mut pipeline = Pipeline::new();
     pipeline.cancel_with(cancel.clone());
+    if let What::Tile(options) = &job.what {
+        return tile(job, &pipeline.mesh(&job.loaded)?, options);
+    }
     let outcome = pipeline.effective(&job.loaded)?;
     match job.what {
-        What::Table(TableChoice { theta, phi, radiance }) => {
+        What::Tile(_) | What::Fit => {
+            answer(ExportAnswer::Progress(0.5, "Fitting"));
+            fitted(job, &outcome, cancel)
+        }
+        What::Table(choice) => {
             let meta = ExportMeta::of(&job.loaded, &outcome, pipeline.mesh(&job.loaded)?.closes_plane);
-            let steps = ExportResolution { theta_i: theta, phi_i: phi, theta_o: theta, phi_o: phi };
-            let resolution = export::grid_is_free(&job.path).then_some(steps);
-            let options = ExportOptions { resolution, radiance };
+            let options = ExportOptions { resolution: choice.resolution(&job.path), radiance: choice.radiance };
             let progress = |part: f32| {
                 answer(ExportAnswer::Progress(part, "Tabulating"));
                 !cancel.is_set()
@@ -89,6 +120,28 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
+}
+
+/// The GGX base with a matte part, which both formats hold.
+fn fitted(job: &ExportJob, outcome: &Outcome, cancel: &Cancel) -> Result<String> {
+    let model = *Model::ALL.last().ok_or_else(|| Error::failed("no model to fit"))?;
+    let fit = fit::fit(&outcome.brdf, model)?;
+    cancel.check()?;
+    let is_gltf = job.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+    let text = if is_gltf { fit::gltf(&fit, &job.loaded.name) } else { fit::materialx(&fit, &job.loaded.name) };
+    export::replace_file(&job.path, text.as_bytes())?;
+    Ok(format!(
+        "Wrote {}: {}; the few parameters are {:.1} % from the material ({:.1} dB). A table keeps all of it.",
+        job.path.display(),
+        model.name(),
+        100.0 * fit.errors.rel_l2,
+        fit.errors.psnr_db
+    ))
+}
+
+fn tile(job: &ExportJob, mesh: &TileMesh, options: &TileOptions) -> Result<String> {
+    let notes = export::tile::write(&job.loaded.scene, mesh, options, &job.path)?;
+    Ok(format!("Wrote {}: {}.", job.path.display(), notes.join("; ")))
 }
 
 fn picture(

@@ -3,6 +3,7 @@
 mod accuracy;
 mod export;
 mod lobe;
+mod made;
 mod picture;
 mod runner;
 mod studio;
@@ -18,8 +19,10 @@ use super::document::Snapshot;
 pub use accuracy::{AccuracyAnswer, AccuracyJob, Point};
 pub use export::{ExportAnswer, ExportJob, TableChoice, What};
 pub use lobe::{LobeJob, LobeMade, logarithmic};
-pub use picture::{Grade, Made, PictureAnswer, PictureJob};
+pub use made::{Grade, Made, PictureAnswer, PictureJob};
 pub use runner::Worker;
+#[cfg(test)]
+pub use studio::LOSE_DEVICE;
 pub use thumbnail::{Thumbnail, ThumbnailJob};
 pub use tile::{Show, TileAnswer, TileJob, TileMade};
 
@@ -49,8 +52,8 @@ impl Pictures {
         let shared = Arc::new(picture::Shared::default());
         let start = move || picture::Photographer::new(shared.clone());
         let (draft, refine, told, told_too) = (answer.clone(), answer.clone(), answer.clone(), answer);
-        let draft_work = move |kept: &mut picture::Photographer, job: PictureJob, _: &runner::Desk<PictureJob>| {
-            kept.draft(&job, &draft);
+        let draft_work = move |kept: &mut picture::Photographer, job: PictureJob, desk: &runner::Desk<PictureJob>| {
+            kept.draft(&job, desk, &draft);
         };
         let refine_work = move |kept: &mut picture::Photographer, job: PictureJob, desk: &runner::Desk<PictureJob>| {
             kept.refine(&job, desk, &refine);

@@ -1,19 +1,17 @@
 //! The object's picture: a draft at once, then the scene's own quality while the hand rests.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use biscale::close_up::CloseUp;
-use biscale::filtering::EffectiveBrdf;
 use biscale::large_scale::tone_map::ToneMap;
-use biscale::large_scale::{DirectionalLight, ObjectMesh, Picture};
 use biscale::pipeline::{Outcome, Pipeline};
-use biscale::plan::Effect;
 use biscale::scene::{Camera, Effects, LoadedScene, Material, Painted, Quality, Tile};
 use biscale::{Cancel, Error, Result};
-use eframe::egui::ColorImage;
 
+use super::made::{Grade, Made, PictureAnswer, PictureJob};
 use super::runner::Desk;
 use super::studio::{Close, Shot, Studio};
 use super::tone::color_image;
@@ -26,65 +24,12 @@ const STEPS_MS: [f64; 2] = [300.0, 2000.0];
 const FINAL_MS: f64 = 8000.0;
 /// Most pixels of a picture; a larger view shows it enlarged.
 const MOST_PIXELS: f64 = 768.0 * 768.0;
+/// A draft that takes longer than this is given up for a newer edit; quicker ones are all shown, so that the picture follows.
+const PATIENCE: Duration = Duration::from_millis(700);
+/// How often refinement looks whether the draft is there.
+const POLL: Duration = Duration::from_millis(5);
 /// How long the hand must rest before refinement begins.
 const REST: Duration = Duration::from_millis(120);
-
-/// A picture to make.
-#[derive(Debug, Clone)]
-pub struct PictureJob {
-    /// The document's version, handed back with every answer.
-    pub version: u64,
-    pub loaded: Arc<LoadedScene>,
-    /// Pixels of the view.
-    pub size: [usize; 2],
-    pub asked: Instant,
-}
-
-/// How far a picture is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Grade {
-    Draft,
-    /// On the way from draft to final.
-    Refining,
-    Final,
-}
-
-/// A picture and how it came about.
-#[derive(Debug, Clone)]
-pub struct Made {
-    pub version: u64,
-    pub grade: Grade,
-    pub picture: Arc<Picture>,
-    pub image: Arc<ColorImage>,
-    pub brdf: Arc<EffectiveBrdf>,
-    /// Milliseconds of what ran for it.
-    pub stages: Vec<(&'static str, f64)>,
-    /// From the edit to here.
-    pub latency_ms: f64,
-    pub device: String,
-    /// The object and its lights.
-    pub set: Option<(Arc<ObjectMesh>, Arc<Vec<DirectionalLight>>)>,
-    pub camera: Camera,
-    /// From the camera to the object, in radii.
-    pub distance: f32,
-    pub notes: Vec<String>,
-    /// What is weak about the material, known once the picture is final.
-    pub warnings: Vec<String>,
-    pub effects: Vec<Effect>,
-    /// What the preset that made it is called.
-    pub preset: &'static str,
-}
-
-/// What comes back.
-#[derive(Debug, Clone)]
-pub enum PictureAnswer {
-    Made(Box<Made>),
-    /// What is being done, for the status line.
-    Doing(u64, &'static str),
-    Failed(u64, String),
-    /// The worker met a fault and went on anew.
-    Fault(String),
-}
 
 /// What an effective BRDF depends on.
 type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
@@ -94,6 +39,17 @@ type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
 pub struct Shared {
     best: Mutex<Option<(SmallScale, Outcome)>>,
     last: Mutex<Option<Finished>>,
+    /// The newest version whose draft is done with.
+    drafted: AtomicU64,
+}
+
+/// Notes that a draft is done with, also where it failed.
+struct Drafted<'a>(&'a Shared, u64);
+
+impl Drop for Drafted<'_> {
+    fn drop(&mut self) {
+        self.0.drafted.fetch_max(self.1, Ordering::Relaxed);
+    }
 }
 
 /// A full picture and what it shows.
@@ -119,27 +75,35 @@ impl Photographer {
     }
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.
-    pub fn draft(&mut self, job: &PictureJob, answer: &dyn Fn(PictureAnswer)) {
+    pub fn draft(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
+        let shared = self.shared.clone();
+        let _drafted = Drafted(&shared, job.version);
         let done = self.toned(job).and_then(|toned| match toned {
             Some(made) => Ok(made),
-            None => self.drafted(job),
+            None => self.drafted(job, &desk.cancel.after(PATIENCE)),
         });
         tell(job, done.map(|made| answer(PictureAnswer::Made(Box::new(made)))), answer);
     }
 
-    fn drafted(&mut self, job: &PictureJob) -> Result<Made> {
+    fn drafted(&mut self, job: &PictureJob, cancel: &Cancel) -> Result<Made> {
+        self.pipeline.cancel_with(cancel.clone());
         self.studio.prepare(&job.loaded)?;
         let (outcome, which) = match self.known(&job.loaded) {
             Some(outcome) => (outcome.without_times(), 1),
             None => (self.pipeline.effective(&as_draft(&job.loaded))?, 0),
         };
         let size = self.affordable(job.size, which, DRAFT_MS);
-        self.shoot(job, &outcome, which, size, 1, &Cancel::default())
+        self.shoot(job, &outcome, which, size, 1, cancel)
     }
 
     /// The scene's own quality, once the hand rests; given up when newer work is there.
     pub fn refine(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
-        if desk.is_newest_after(REST) {
+        let mut is_newest = desk.is_newest_after(REST);
+        // Both want all cores, and the draft is what the hand waits for.
+        while is_newest && self.shared.drafted.load(Ordering::Relaxed) < job.version {
+            is_newest = desk.is_newest_after(POLL);
+        }
+        if is_newest {
             tell(job, self.refined(job, desk, answer), answer);
         }
     }
@@ -148,11 +112,11 @@ impl Photographer {
         if self.is_toned(job) {
             return Ok(());
         }
+        self.pipeline.cancel_with(desk.cancel.clone());
         let mut outcome = match self.known(&job.loaded) {
             Some(outcome) => outcome.without_times(),
             None => {
                 answer(PictureAnswer::Doing(job.version, "Refining the material"));
-                self.pipeline.cancel_with(desk.cancel.clone());
                 self.pipeline.effective(&job.loaded)?
             }
         };
@@ -263,6 +227,7 @@ impl Photographer {
             stages,
             latency_ms: ms(job.asked),
             device: self.studio.device(),
+            trouble: self.studio.trouble(),
             set: self.studio.set(),
             camera: camera.clone(),
             distance: self.studio.distance(&camera, size),

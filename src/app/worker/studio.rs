@@ -46,6 +46,8 @@ enum Device {
     NotAsked,
     /// Why pictures are made on the CPU.
     None(String),
+    /// It was in use and failed, for this reason.
+    Lost(String),
     /// The adapter that is software, used only where it is asked for.
     Slower(String),
     Open(Box<OnDevice>),
@@ -190,17 +192,30 @@ impl Studio {
         self.object.as_ref().is_some_and(of)
     }
 
+    /// What became of a device that failed while it was in use.
+    pub fn trouble(&self) -> Option<String> {
+        match &self.gpu {
+            Device::Lost(why) => Some(why.clone()),
+            _ => None,
+        }
+    }
+
     /// Where pictures are made, in words.
     pub fn device(&self) -> String {
         match &self.gpu {
             Device::NotAsked => "CPU".to_owned(),
             Device::Slower(name) => format!("CPU ({name} would be slower)"),
             Device::None(why) => format!("CPU ({why})"),
+            Device::Lost(_) => "CPU (the graphics device failed)".to_owned(),
             Device::Open(device) if device.renderer.is_some() => device.gpu.description(),
             Device::Open(device) => format!("CPU, beside {}", device.gpu.description()),
         }
     }
 }
+
+/// Tests set it: the next picture on a device finds it lost.
+#[cfg(test)]
+pub static LOSE_DEVICE: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
 
 impl Device {
     /// A picture on the device; `None` where the CPU is to make it. What fails here fails for good.
@@ -218,6 +233,10 @@ impl Device {
             };
         }
         let Self::Open(device) = self else { return None };
+        #[cfg(test)]
+        if LOSE_DEVICE.swap(false, std::sync::atomic::Ordering::SeqCst) {
+            device.gpu.device.destroy();
+        }
         let brdf = &shot.outcome.brdf;
         let made = match &mut device.renderer {
             Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
@@ -238,7 +257,7 @@ impl Device {
             Ok(rendered) => Some(rendered),
             Err(Error::Input(_)) => None,
             Err(error) => {
-                *self = Self::None(error.to_string());
+                *self = Self::Lost(error.to_string());
                 None
             }
         }

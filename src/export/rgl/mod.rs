@@ -1,4 +1,5 @@
-//! RGL tensor files (Dupuy and Jakob 2018), anisotropic: `.bsdf`, read by Mitsuba 3's `measured`, pbrt-v4 and brdf-loader.
+//! RGL tensor files (Dupuy and Jakob 2018), anisotropic, or of three angles where the plan knows that turning the tile changes
+//! nothing: `.bsdf`, read by Mitsuba 3's `measured`, pbrt-v4 and brdf-loader.
 //!
 //! `i` of the format, the side with the slices, is our viewer; its value is the BRDF times the cosine of the other side,
 //! which is exactly `f̄`. Samples lie on half vectors, where lobes stand still, crowded by a warp where normals are.
@@ -33,7 +34,7 @@ struct Tabulated {
 impl Tabulated {
     fn new(job: &Job<'_>, resolution: &ExportResolution) -> io::Result<Self> {
         let Job { brdf, progress, .. } = *job;
-        let sizes = Sizes::new(resolution);
+        let sizes = Sizes::new(resolution, job.meta.isotropic);
         let planes = planes(brdf, &sizes);
         let count = sizes.phis * sizes.thetas;
         let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice))?;
@@ -112,7 +113,7 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write, colors: Colors) -> io::Result<W
     Ok(Written {
         pairs: thetas * phis * samples.len(),
         reading,
-        conventions: conventions(colors),
+        conventions: conventions(colors, job.meta.isotropic),
         anisotropy_lost: None,
     })
 }
@@ -132,17 +133,22 @@ fn spectra(slices: &[Slice], plane: usize) -> Vec<f32> {
     values
 }
 
-fn conventions(colors: Colors) -> Vec<String> {
+fn conventions(colors: Colors, isotropic: bool) -> Vec<String> {
     let what = match colors {
         Colors::Rgb => "Field rgb: linear RGB, Rec. 709 primaries; for RGB variants of Mitsuba (pbrt upsamples).",
         Colors::Spectra => {
             "Fields spectra, wavelengths (nm): smooth spectra that look like our RGB in daylight (D65); for spectral variants."
         }
     };
+    let azimuths = if isotropic {
+        "Slices (theta_i) are directions of the viewer, Mitsuba's wi, at phi 0; isotropic: other azimuths turn the half vector back."
+    } else {
+        "Slices (phi_i, theta_i) are directions of the viewer, Mitsuba's wi; phi_i runs from -pi to pi, the seam twice."
+    };
     let lines = [
         what,
-        "RGL tensor file (Dupuy and Jakob 2018), anisotropic: Mitsuba 3's `measured`, pbrt-v4's `measured`, RGL's brdf-loader.",
-        "Slices (phi_i, theta_i) are directions of the viewer, Mitsuba's wi; phi_i runs from -pi to pi, the seam twice.",
+        "RGL tensor file (Dupuy and Jakob 2018): Mitsuba 3's `measured`, pbrt-v4's `measured`, RGL's brdf-loader.",
+        azimuths,
         "A value, rgb(s) ndf(u_m) / (4 sigma(u_i)), is the BRDF times the cosine of the other direction, Mitsuba's wo: f_bar.",
         "u = (sqrt(2 theta / pi), (phi + pi) / 2 pi); m is the half vector; s is u_m through the inverse of the warp by vndf.",
         "sigma is the visible projected area over the tile's area; ndf is the root of the luminance of G(m, m), of its largest, floored.",

@@ -36,7 +36,7 @@ const GRAZING_COSINE: f64 = 0.15;
 pub(super) struct Sizes {
     /// Elevations of the viewer from 0 to 90°.
     pub(super) thetas: usize,
-    /// Azimuths of the viewer from -π to π, the seam twice.
+    /// Azimuths of the viewer from -π to π, the seam twice; or 0 alone.
     pub(super) phis: usize,
     /// Of each slice: luminance and colours.
     pub(super) samples: Grid,
@@ -47,13 +47,13 @@ pub(super) struct Sizes {
 }
 
 impl Sizes {
-    pub(super) fn new(resolution: &ExportResolution) -> Self {
+    pub(super) fn new(resolution: &ExportResolution, isotropic: bool) -> Self {
         let ExportResolution { theta_i, phi_i, theta_o, phi_o } = *resolution;
         // Mitsuba loads square grids only.
         let side = ((theta_o * phi_o) as f64).sqrt().round().max(2.0) as usize;
         Self {
             thetas: theta_i.max(2),
-            phis: phi_i.max(3) + 1,
+            phis: if isotropic { 1 } else { phi_i.max(3) + 1 },
             samples: Grid { width: side, height: side },
             vndf: Grid { width: side, height: 2 * side },
             ndf: Grid { width: 4 * side, height: 4 * side },
@@ -67,7 +67,7 @@ impl Sizes {
     }
 
     fn phi(&self, k: usize) -> f64 {
-        k as f64 / (self.phis - 1) as f64 * TAU - PI
+        if self.phis == 1 { 0.0 } else { k as f64 / (self.phis - 1) as f64 * TAU - PI }
     }
 
     /// The direction of a slice's viewer, just above the horizon at least.

@@ -57,6 +57,25 @@ fn a_flat_tile_comes_back_as_a_small_scale_brdf_through_every_format_that_loads(
 }
 
 #[test]
+fn what_does_not_turn_with_the_tile_is_tabulated_over_three_angles() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.bsdf");
+    let tile = Scene::of(Geometry::Flat(Flat::default())).tile;
+    let glossy = Term::CookTorrance { roughness: 0.3, f0: Vec3::new(0.9, 0.6, 0.3) };
+    let brdf = brdf_of(&geometry::build(&tile, Path::new("")).unwrap(), glossy);
+    let size = ExportResolution { theta_i: 13, phi_i: 48, theta_o: 36, phi_o: 36 };
+    let three = write(&brdf, &ExportMeta { isotropic: true, ..meta() }, &sized(size), &path, &silent).unwrap();
+    let table = RglTable::from_fields(&TensorFile::read(&path).unwrap()).unwrap();
+    assert!(table.is_isotropic() && table.phi_i == [0.0]);
+    assert!(three.reading.mean < 0.02, "{:?}", three.reading);
+    assert!(std::fs::read_to_string(three.note.unwrap()).unwrap().contains("isotropic"));
+    assert!(crate::brdf::rgl::load(&path).is_ok());
+    let four = write(&brdf, &meta(), &sized(size), &path, &silent).unwrap();
+    assert_eq!(three.pairs * 49, four.pairs);
+    assert!(three.reading.mean < 1.5 * four.reading.mean + 1e-3, "{:?} {:?}", three.reading, four.reading);
+}
+
+#[test]
 fn reflectances_of_a_flat_lambertian_are_its_albedo() {
     let reflectances = Reflectances::of(&flat());
     let albedo = Vec3::new(1.0, 0.5, 0.25) * 0.8;

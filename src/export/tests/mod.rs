@@ -66,6 +66,7 @@ fn meta() -> ExportMeta {
         tile_size: [1.0, 2.0],
         tile_unit: "mm".to_owned(),
         closes_plane: true,
+        isotropic: false,
         notes: vec!["grooves: 7.3 became 7".to_owned()],
     }
 }

@@ -25,7 +25,7 @@ pub fn obj(mesh: &TileMesh, options: &TileOptions) -> (Vec<u8>, Vec<String>) {
         let _ = writeln!(text, "usemtl {name}");
         for period in 0..periods.len() {
             let first = period * mesh.positions.len() + 1;
-            let of_slot = (0..mesh.triangles.len()).filter(|&t| usize::from(mesh.triangle_slot[t]) == slot);
+            let of_slot = (0..mesh.triangles.len()).filter(|&t| usize::from(mesh.slot_of(t)) == slot);
             for triangle in of_slot {
                 text.push('f');
                 for (corner, vertex) in mesh.triangles[triangle].iter().enumerate() {

@@ -6,7 +6,7 @@ use super::page::{Line, Page};
 use super::{TileOptions, paper_color};
 use crate::error::{InputError, Result};
 use crate::geometry::{self, CrossSection, OnePyramid};
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Scene, Tile};
 
 /// Width of a tab, millimetres, and how far its ends draw in.
 const TAB_MM: f64 = 6.0;
@@ -227,7 +227,9 @@ fn unfold(polygon: &[DVec3], edge: [DVec3; 2], onto: [DVec2; 2]) -> Vec<DVec2> {
 }
 
 fn plane(scene: &Scene, options: &TileOptions, scale: f64) -> Result<(Page, Vec<String>)> {
-    let mesh = geometry::build(&scene.tile, std::path::Path::new(""))?;
+    // Images are not printed.
+    let bare = Tile { color_path: None, slot_path: None, ..scene.tile.clone() };
+    let mesh = geometry::build(&bare, std::path::Path::new(""))?;
     let colors: Vec<Vec3> = mesh.slots.iter().map(|slot| paper_color(scene, slot)).collect::<Result<_>>()?;
     let size = mesh.size.as_dvec2();
     let extent = size * options.repeat.as_dvec2() * scale;

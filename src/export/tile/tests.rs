@@ -93,7 +93,7 @@ fn an_obj_of_the_tile_loads_as_the_tile() {
     let (scene, mesh) = scene_of(v_grooves());
     write(&scene, &mesh, &TileOptions::default(), &folder.path().join("tile.obj")).unwrap();
     let mut again = scene;
-    again.tile.geometry = Geometry::Mesh(crate::scene::MeshFile { path: "tile.obj".into(), color_path: None });
+    again.tile.geometry = Geometry::Mesh(crate::scene::MeshFile { path: "tile.obj".into() });
     let back = geometry::build(&again.tile, folder.path()).unwrap();
     assert_eq!(back.triangles.len(), mesh.triangles.len());
     let area = |mesh: &TileMesh| (0..mesh.triangles.len()).map(|k| mesh.triangle_area(k)).sum::<f64>();

@@ -14,8 +14,8 @@ use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use self::columns::{Column, Weight};
-use super::Direct;
 use super::facet_sum::FacetSum;
+use super::{Direct, Interpolation};
 use crate::cancel::Cancel;
 use crate::directions::{Places, PolarGrid, UpperPairs};
 use crate::error::Result;
@@ -25,6 +25,8 @@ use crate::simd::PairVectors;
 #[derive(Debug, Clone)]
 pub struct PairTable {
     pub grid: UpperPairs,
+    /// Along θ_d; elsewhere it is linear.
+    pub interpolation: Interpolation,
     weights: Vec<Weight>,
     /// Whether the columns are those of a sum over facets, else the colours of another form.
     of_sum: bool,
@@ -117,7 +119,15 @@ impl PairTable {
         })?;
         let directions = PolarGrid::new(AREA_GRID[0], AREA_GRID[1]);
         let areas = directions.directions().into_par_iter().map(|o| (area(o) / f64::from(o.z)) as f32).collect();
-        Ok(Self { grid, weights, of_sum, fours, values: Arc::new(values), areas: Arc::new((directions, areas)) })
+        Ok(Self {
+            grid,
+            interpolation: Interpolation::Cubic,
+            weights,
+            of_sum,
+            fours,
+            values: Arc::new(values),
+            areas: Arc::new((directions, areas)),
+        })
     }
 
     /// The same table for another sum over the same facets seen alike, whose lobes may differ where `same_lobes` is not
@@ -129,6 +139,11 @@ impl PairTable {
             && weights.len() == self.weights.len()
             && (same_lobes || areas_only(&weights) && areas_only(&self.weights));
         serves.then(|| Self { weights, ..self.clone() })
+    }
+
+    /// The same, read in another way between its nodes.
+    pub fn read(self, interpolation: Interpolation) -> Self {
+        Self { interpolation, ..self }
     }
 
     /// Whether two tables differ in their weights only.
@@ -170,7 +185,7 @@ impl PairTable {
         let grid = &self.grid;
         let stored = grid.difference + 2;
         let low = (step as usize).min(grid.difference - 2);
-        let cubic = catmull_rom(step - low as f32);
+        let along = self.interpolation.weights(step - low as f32);
         let between = |at: f32, count: usize| {
             let low = (at as usize).min(count - 1);
             ([low, if low + 1 == count { 0 } else { low + 1 }], at - low as f32)
@@ -193,11 +208,11 @@ impl PairTable {
             let mut sums = Vec4::ZERO;
             for (start, weight) in corners {
                 let nodes = &self.values[start + four..start + four + 3 * self.fours + 1];
-                let along = nodes[0] * cubic[0]
-                    + nodes[self.fours] * cubic[1]
-                    + nodes[2 * self.fours] * cubic[2]
-                    + nodes[3 * self.fours] * cubic[3];
-                sums += along * weight;
+                let mut sum = nodes[self.fours] * along[1] + nodes[2 * self.fours] * along[2];
+                if self.interpolation == Interpolation::Cubic {
+                    sum += nodes[0] * along[0] + nodes[3 * self.fours] * along[3];
+                }
+                sums += sum * weight;
             }
             // A cubic may swing below zero; no sum does.
             let sums = sums.max(Vec4::ZERO).to_array();
@@ -207,9 +222,4 @@ impl PairTable {
         }
         total
     }
-}
-
-fn catmull_rom(t: f32) -> [f32; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [0.5 * (2.0 * t2 - t - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
 }

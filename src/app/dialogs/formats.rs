@@ -1,0 +1,97 @@
+//! The formats of a file in a person's words: what to choose for which program.
+
+use std::path::Path;
+
+use eframe::egui::{ComboBox, Ui};
+
+use super::Purpose;
+
+/// End of a file's name, what it is, who reads it.
+pub type Format = (&'static str, &'static str, &'static str);
+
+/// Tables of the BRDF, then what is fitted to it.
+const MATERIALS: [Format; 11] = [
+    (".npz", "NumPy arrays", "Python, and this program again"),
+    (".csv", "Text", "any program, a line a pair of directions"),
+    (".exr", "Image atlas", "shaders and viewers, an image a light"),
+    (".bsdf", "RGL tensor", "Mitsuba 3 (plugin `measured`), pbrt"),
+    ("_spec.bsdf", "RGL tensor with spectra", "Mitsuba 3 in spectral mode"),
+    (".binary", "MERL", "programs that read MERL files; isotropic"),
+    (".xml", "Radiance", "Radiance, EnergyPlus, daylight programs"),
+    (".bin", "UTIA", "programs that read UTIA files; anisotropic"),
+    (".astm", "ASTM E1392", "archives of measurements"),
+    (".gltf", "glTF", "game engines, the web; a few parameters"),
+    (".mtlx", "MaterialX", "film and CAD programs; a few parameters"),
+];
+
+const TILES: [Format; 5] = [
+    (".obj", "Triangles", "modellers, and this program again as a mesh"),
+    (".stl", "Solid", "3D printers"),
+    (".png", "Heights", "image editors, displacement maps"),
+    (".svg", "Pattern to fold", "cutters and vector editors; grooves, pyramids, flat"),
+    (".pdf", "Pattern to fold", "paper printers; grooves, pyramids, flat"),
+];
+
+/// The formats among which a purpose chooses.
+pub fn of(purpose: &Purpose) -> Option<&'static [Format]> {
+    match purpose {
+        Purpose::ExportTable => Some(&MATERIALS),
+        Purpose::ExportTile => Some(&TILES),
+        _ => None,
+    }
+}
+
+/// The longest ending of a name that is known.
+fn ending_of(formats: &[Format], name: &str) -> Option<usize> {
+    let fits = |at: &usize| name.to_ascii_lowercase().ends_with(formats[*at].0);
+    (0..formats.len()).filter(fits).max_by_key(|at| formats[*at].0.len())
+}
+
+/// A choice of formats; the name gets the ending of the one that is chosen.
+pub fn ui(ui: &mut Ui, formats: &[Format], name: &mut String) {
+    let now = ending_of(formats, name);
+    let words = |at: usize| format!("{} ({})", formats[at].1, formats[at].0);
+    ui.horizontal(|ui| {
+        let label = ui.label("Format");
+        let shown = now.map_or_else(|| "Choose, or type an ending".to_owned(), words);
+        let combo = ComboBox::from_id_salt("format").selected_text(shown).width(220.0).height(400.0);
+        let response = combo.show_ui(ui, |ui| {
+            for (at, (_, _, readers)) in formats.iter().enumerate() {
+                let text = format!("{}: {readers}", words(at));
+                if ui.selectable_label(now == Some(at), text).clicked() {
+                    *name = with_ending(formats, name, at);
+                }
+            }
+        });
+        response.response.labelled_by(label.id);
+        if let Some(at) = now {
+            ui.weak(format!("for {}", formats[at].2));
+        }
+    });
+}
+
+fn with_ending(formats: &[Format], name: &str, at: usize) -> String {
+    let stem = match ending_of(formats, name) {
+        Some(now) => name[..name.len() - formats[now].0.len()].to_owned(),
+        None => Path::new(name).with_extension("").to_string_lossy().into_owned(),
+    };
+    format!("{stem}{}", formats[at].0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_format_that_export_writes_is_offered_and_taken() {
+        for ending in biscale::export::endings() {
+            assert!(MATERIALS.iter().any(|(known, ..)| *known == format!(".{ending}")), "{ending}");
+        }
+        for (at, (ending, ..)) in MATERIALS.iter().enumerate() {
+            let name = with_ending(&MATERIALS, "my.cup.npz", at);
+            assert_eq!(name, format!("my.cup{ending}"));
+            assert!(biscale::export::check_ending(Path::new(&name)).is_ok() || [".gltf", ".mtlx"].contains(ending));
+            assert_eq!(with_ending(&MATERIALS, &name, 0), "my.cup.npz");
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Where the views stand: gallery, object, tile, and under the smaller one the brush or the lobe.
+
+use biscale::large_scale::CameraView;
+use biscale::scene::Scene;
+use eframe::egui::{self, Panel, ScrollArea, Ui};
+
+use super::actions::Action;
+use super::editor::Editor;
+use super::pick;
+use super::views::brushes;
+use super::views::tile::{self, Which};
+
+impl Editor {
+    pub(super) fn gallery_ui(&mut self, ui: &mut Ui) -> Option<Action> {
+        if !self.settings.gallery {
+            return None;
+        }
+        let panel = Panel::left("gallery").default_size(self.settings.gallery_width).size_range(118.0..=480.0);
+        let shown = panel.show(ui, |ui| self.gallery.ui(ui, &self.document.name));
+        self.settings.gallery_width = shown.response.rect.width();
+        let chosen = shown.inner;
+        chosen.map(|name| Action::OpenShipped(name.to_owned()))
+    }
+
+    pub(super) fn object_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
+        let fill = ui.visuals().panel_fill;
+        egui::Frame::new().fill(fill).inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+            ui.take_available_width();
+            self.from_view = self.object.toolbar(ui, scene);
+        });
+        self.size = self.object.ui(ui, scene);
+        self.pick();
+    }
+
+    /// What the pointer is over tells the lobe view and the tile.
+    fn pick(&mut self) {
+        let (Some(at), Some(made)) = (self.object.pointed, &self.object.made) else { return };
+        let Some((mesh, lights)) = &made.set else { return };
+        let size = [made.picture.width, made.picture.height];
+        let Ok(view) = CameraView::new(&made.camera, mesh, size) else { return };
+        let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
+        if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
+            self.lobe.viewer = Some(picked.viewer);
+            self.lobe.light = picked.light.unwrap_or(self.lobe.light);
+            let value = made.brdf.eval(self.lobe.light, picked.viewer).max_element();
+            self.tile.picked = Some((picked.viewer, 4.0 * value));
+            self.tile.show = Which::Contribution;
+        }
+    }
+
+    /// The tile with its toolbar; `below` is kept free.
+    pub(super) fn tile_ui(&mut self, ui: &mut Ui, scene: &Scene, below: f32) {
+        ui.add_space(3.0);
+        if let Some(on) = self.tile.toolbar(ui) {
+            self.tile.set_painting(on);
+        }
+        let size = if below > 0.0 { tile::fitting(ui, below) } else { ui.available_size() };
+        self.hand = self.tile.ui(ui, scene.tile.size, size);
+    }
+
+    /// The smaller view, and under it the brush or the lobe.
+    pub(super) fn side_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
+        if self.exchanged {
+            let size = tile::fitting(ui, 300.0);
+            ui.allocate_ui(size, |ui| self.object_ui(ui, scene));
+        } else {
+            let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + 90.0 };
+            self.tile_ui(ui, scene, below);
+        }
+        ui.add_space(6.0);
+        if self.tile.painting {
+            ScrollArea::vertical().show(ui, |ui| {
+                if let Some(asked) = brushes::ui(ui, &mut self.tile.brush, scene) {
+                    self.brush_asked(asked);
+                }
+            });
+        } else {
+            self.lobe.ui(ui);
+        }
+    }
+}

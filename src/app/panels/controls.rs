@@ -1,0 +1,233 @@
+//! One control for every shape that a value of the catalogue has.
+
+use std::cell::Cell;
+
+use biscale::scene::{Field, Kind, Shape};
+use eframe::egui::{self, DragValue, Slider, SliderClamping, Ui};
+use toml::Value;
+
+use super::fields::{Around, caption, suffix, words};
+use super::matrix;
+
+/// Notes in `wrong` when what is typed is no finite number; the value stays what it was then.
+fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
+    drag.custom_parser(move |text| {
+        let plain: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
+        let value: f64 = plain.replace('\u{2212}', "-").parse().ok()?;
+        wrong.set(wrong.get() || !value.is_finite());
+        value.is_finite().then_some(value)
+    })
+}
+
+/// Width of numbers beside sliders.
+const NUMBER: f32 = 76.0;
+
+/// A control for a value of a shape.
+pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &Shape, field: &Field, around: &mut Around) {
+    let wrong = Cell::new(false);
+    match *shape {
+        Shape::Number { min, max, soft_max } => {
+            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, around), &wrong);
+        }
+        Shape::Integer { min, max } => integer_ui(ui, value, (min, max), &wrong),
+        Shape::Color { max } => color_ui(ui, value, max, &wrong),
+        Shape::Vector { min, max, .. } => vector_ui(ui, value, (min, max), &wrong),
+        Shape::Text => text_ui(ui, value, 40.0, str::to_owned),
+        Shape::Path => {
+            text_ui(ui, value, 66.0, file_name);
+            if ui.button("…").on_hover_text("Choose a file").clicked() {
+                around.browse = Some(field.key);
+            }
+        }
+        Shape::Choice(names) => choice_ui(ui, value, names, field.key),
+        Shape::AnyOf(shapes) => any_of_ui(ui, value, shapes, field, around),
+        Shape::List { .. } if matrix::is_matrix(value) => matrix::ui(ui, value),
+        Shape::List { .. } => {
+            let entries = value.as_array().map_or(0, Vec::len);
+            ui.weak(format!("{entries} values in the file"));
+        }
+        Shape::Table(_) | Shape::Tagged(_) => {}
+    }
+    if wrong.get() {
+        let name = caption(field);
+        around.complaint = Some(format!("{name} keeps its value: what was typed is not a number. Type one like 0.25."));
+    }
+}
+
+/// Sliders of ranges that span decades move by factors.
+fn is_logarithmic(min: f64, soft_max: f64) -> bool {
+    min >= 0.0 && soft_max / min.max(1e-4) > 500.0
+}
+
+fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f64), suffix: &str, wrong: &Cell<bool>) {
+    let Some(before) = number(value) else { return };
+    // What f32 made of a short decimal reads short again.
+    let mut now = tidy(before);
+    let soft_min = if min < -10.0 * soft_max { -soft_max } else { min };
+    let range = soft_min..=soft_max.max(now);
+    let log = is_logarithmic(soft_min, soft_max) && soft_max > 2.0;
+    ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);
+    let slider = Slider::new(&mut now, range).show_value(false).clamping(SliderClamping::Never).logarithmic(log);
+    ui.add(slider);
+    let (speed, digits) = ((soft_max - soft_min).min(100.0) / 400.0, decimals(now));
+    let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(digits).suffix(suffix);
+    ui.add_sized([NUMBER, ui.spacing().interact_size.y], finite(drag, wrong));
+    if now.is_finite() && now != tidy(before) {
+        *value = Value::Float(now.clamp(min, max));
+    }
+}
+
+/// Three digits that say something.
+fn decimals(value: f64) -> usize {
+    match value.abs() {
+        v if v >= 100.0 => 0,
+        v if v >= 10.0 => 1,
+        v if v >= 1.0 || v == 0.0 => 2,
+        v if v >= 0.1 => 3,
+        _ => 4,
+    }
+}
+
+fn integer_ui(ui: &mut Ui, value: &mut Value, (min, max): (i64, i64), wrong: &Cell<bool>) {
+    let Some(mut now) = value.as_integer() else { return };
+    let before = now;
+    if max - min <= 5000 {
+        ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);
+        let slider = Slider::new(&mut now, min..=max).show_value(false).logarithmic(min >= 0 && max > 200);
+        ui.add(slider);
+    }
+    let drag = DragValue::new(&mut now).range(min..=max).speed(0.2);
+    ui.add_sized([NUMBER, ui.spacing().interact_size.y], finite(drag, wrong));
+    if now != before {
+        *value = Value::Integer(now);
+    }
+}
+
+fn color_ui(ui: &mut Ui, value: &mut Value, max: f64, wrong: &Cell<bool>) {
+    let Some(list) = value.as_array() else { return };
+    let mut rgb = [0.0f32; 3];
+    for (channel, value) in rgb.iter_mut().zip(list) {
+        *channel = number(value).unwrap_or(0.0) as f32;
+    }
+    let before = rgb;
+    // The picker knows 0 to 1; beyond that the colour keeps its brightness as a factor.
+    let gain = rgb.iter().copied().fold(1.0, f32::max);
+    let mut shown = rgb.map(|channel| channel / gain);
+    if ui.color_edit_button_rgb(&mut shown).on_hover_text("Linear RGB").changed() {
+        rgb = shown.map(|channel| channel * gain);
+    }
+    let width = ((ui.available_width() - 14.0) / 3.0).clamp(30.0, 48.0);
+    for channel in &mut rgb {
+        let drag = DragValue::new(channel).range(0.0..=max as f32).speed(0.005).max_decimals(3);
+        ui.add_sized([width, ui.spacing().interact_size.y], finite(drag, wrong));
+    }
+    if rgb != before && rgb.iter().all(|channel| channel.is_finite()) {
+        *value = Value::Array(rgb.map(|channel| Value::Float(f64::from(channel))).to_vec());
+    }
+}
+
+fn vector_ui(ui: &mut Ui, value: &mut Value, (min, max): (f64, f64), wrong: &Cell<bool>) {
+    let Value::Array(list) = value else { return };
+    for entry in list {
+        let Some(before) = number(entry) else { continue };
+        let mut now = tidy(before);
+        let drag = DragValue::new(&mut now).range(min..=max).speed(0.01).max_decimals(3);
+        ui.add_sized([58.0, ui.spacing().interact_size.y], finite(drag, wrong));
+        if now.is_finite() && now != tidy(before) {
+            *entry = Value::Float(now);
+        }
+    }
+}
+
+/// Text is taken over when it is finished, so that no half-typed path is ever looked for.
+/// `beside` is kept free for what follows in the row.
+fn text_ui(ui: &mut Ui, value: &mut Value, beside: f32, shown: impl Fn(&str) -> String) {
+    let Some(text) = value.as_str() else { return };
+    let id = ui.next_auto_id().with("draft");
+    let edited = ui.memory(|memory| memory.has_focus(id));
+    let draft = ui.data_mut(|data| data.get_temp::<String>(id)).filter(|_| edited);
+    let mut draft = draft.unwrap_or_else(|| if edited { text.to_owned() } else { shown(text) });
+    let width = (ui.available_width() - beside - 10.0).max(60.0);
+    let response = ui.add(egui::TextEdit::singleline(&mut draft).id(id).desired_width(width));
+    if response.has_focus() && edited {
+        ui.data_mut(|data| data.insert_temp(id, draft));
+        return;
+    }
+    if edited && response.lost_focus() && draft != text {
+        *value = Value::String(draft);
+    }
+    ui.data_mut(|data| data.remove::<String>(id));
+    response.on_hover_text(value.as_str().unwrap_or_default());
+}
+
+/// Of a long path the file's name is what tells.
+fn file_name(path: &str) -> String {
+    let name = std::path::Path::new(path).file_name();
+    name.map_or_else(|| path.to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
+fn choice_ui(ui: &mut Ui, value: &mut Value, names: &[&str], key: &str) {
+    let now = value.as_str().unwrap_or_default().to_owned();
+    let combo = egui::ComboBox::from_id_salt((key, "choice")).selected_text(words(&now));
+    combo.width(ui.available_width().min(180.0)).show_ui(ui, |ui| {
+        for name in names {
+            if ui.selectable_label(*name == now, words(name)).clicked() {
+                *value = Value::String((*name).to_owned());
+            }
+        }
+    });
+}
+
+/// Named patterns, or a matrix where there is one.
+fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[Shape], field: &Field, around: &mut Around) {
+    let names = shapes.iter().find_map(|shape| match shape {
+        Shape::Choice(names) => Some(*names),
+        _ => None,
+    });
+    match names {
+        Some(names) => matrix::pattern_ui(ui, value, names, field.key),
+        None => {
+            if let Some(first) = shapes.first() {
+                value_ui(ui, value, first, field, around);
+            }
+        }
+    }
+}
+
+/// What an optional field begins with when it is set by hand.
+pub(super) fn starting_value(shape: &Shape) -> Option<Value> {
+    Some(match *shape {
+        Shape::Number { min, soft_max, .. } => {
+            Value::Float(if min > 0.0 { (min * soft_max).sqrt() } else { 0.5 * soft_max })
+        }
+        Shape::Integer { min, max } => Value::Integer((min + (max - min) / 8).min(4096).max(min)),
+        Shape::Choice(names) => Value::String((*names.first()?).to_owned()),
+        Shape::Path => Value::String(String::new()),
+        _ => return None,
+    })
+}
+
+/// A kind of a tagged table, chosen by name with its text beside.
+pub fn kind_ui(ui: &mut Ui, label: &str, now: &str, kinds: &[Kind]) -> Option<&'static str> {
+    let mut chosen = None;
+    let combo = egui::ComboBox::from_id_salt(("kind", label)).selected_text(words(now)).height(400.0);
+    combo.width((ui.available_width() - 30.0).min(200.0)).show_ui(ui, |ui| {
+        for kind in kinds {
+            if ui.selectable_label(kind.kind == now, words(kind.kind)).on_hover_text(kind.doc).clicked()
+                && kind.kind != now
+            {
+                chosen = Some(kind.kind);
+            }
+        }
+    });
+    chosen
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|number| number as f64))
+}
+
+/// The shortest decimal that is the same f32.
+fn tidy(value: f64) -> f64 {
+    (value as f32).to_string().parse().unwrap_or(value)
+}

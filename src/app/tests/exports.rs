@@ -1,0 +1,87 @@
+//! Exports from their dialogs.
+
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+
+use super::{editor, harness, quick, settle};
+use crate::app::dialogs::{Dialog, Purpose};
+use crate::app::worker::{TableChoice, What};
+
+#[test]
+fn an_export_offers_formats_by_name_and_the_name_takes_the_ending() {
+    let mut harness = harness(quick());
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    harness.run_steps(3);
+    harness.get_by_label("Format").click();
+    harness.run_steps(2);
+    let mitsuba = harness.get_all_by_label_contains("RGL tensor (.bsdf)").last().unwrap();
+    mitsuba.click();
+    harness.run_steps(2);
+    let Some(Dialog::Files(files)) = &editor(&mut harness).dialog else { panic!("no dialog") };
+    assert_eq!(files.typed, "quick.bsdf");
+}
+
+#[test]
+fn an_export_takes_the_size_that_was_chosen_shows_its_progress_and_can_be_given_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.bsdf");
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    editor(&mut harness).dialog = Some(Dialog::Table { path: path.clone(), choice: TableChoice::default() });
+    harness.run_steps(3);
+    harness.get_by_label_contains("Small: 9 x 24").click();
+    harness.run_steps(2);
+    harness.get_by_label("Export").click();
+    harness.run_steps(2);
+    assert!(editor(&mut harness).exporting.is_some() && harness.query_by_label("Cancel").is_some());
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(2);
+    assert!(editor(&mut harness).exporting.is_none());
+    let mut choice = TableChoice { theta: 2, phi: 4, ..TableChoice::default() };
+    choice.rgl = Some([3, 4, 4, 4]);
+    editor(&mut harness).export(path.clone(), What::Table(choice));
+    let start = std::time::Instant::now();
+    while !path.exists() {
+        harness.step();
+        assert!(start.elapsed().as_secs() < 60, "{:?}", editor(&mut harness).messages.texts());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    // Three elevations, four azimuths and the first again, of 4 x 4 samples: far below the small size.
+    assert!(std::fs::metadata(&path).unwrap().len() < 20_000);
+}
+
+#[test]
+fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let ctx = harness.ctx.clone();
+    for ending in ["obj", "stl", "png", "svg", "pdf", "gltf", "mtlx"] {
+        let path = folder.path().join(format!("a.{ending}"));
+        let purpose = if ending.len() > 3 { Purpose::ExportTable } else { Purpose::ExportTile };
+        editor(&mut harness).chosen(&ctx, purpose, path.clone());
+        harness.run_steps(2);
+        harness.get_by_label("Export").click();
+        let start = std::time::Instant::now();
+        harness.run_steps(2);
+        while editor(&mut harness).exporting.is_some() {
+            harness.step();
+            assert!(start.elapsed().as_secs() < 60, "{ending}");
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        let texts = editor(&mut harness).messages.texts().join("; ");
+        assert!(texts.contains("Wrote") && std::fs::metadata(&path).unwrap().len() > 100, "{ending}: {texts}");
+    }
+}
+
+#[test]
+fn a_table_that_is_too_large_is_refused_before_any_work() {
+    let mut harness = harness(quick());
+    let choice = TableChoice { theta: 180, phi: 720, ..TableChoice::default() };
+    editor(&mut harness).dialog = Some(Dialog::Table { path: "large.npz".into(), choice });
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("at most").is_some());
+    harness.key_press(Key::Enter);
+    harness.run_steps(2);
+    assert!(editor(&mut harness).dialog.is_some() && editor(&mut harness).exporting.is_none());
+}

@@ -1,0 +1,158 @@
+//! What a person meets in the first hour: the gallery, a measured paint, names for a screen reader.
+
+use biscale::export::tile::TileOptions;
+use biscale::scene::{BrdfSpec, Geometry, TermSpec};
+use eframe::egui::{self, Key};
+use egui_kittest::kittest::Queryable;
+use glam::Vec3;
+
+use super::{editor, harness, quick, settle};
+use crate::app::actions::Action;
+use crate::app::dialogs::Dialog;
+use crate::app::paint::Tool;
+use crate::app::worker::TableChoice;
+
+#[test]
+fn the_gallery_is_searched_by_words_and_says_when_nothing_is_found() {
+    let mut harness = harness(quick());
+    editor(&mut harness).settings.gallery = true;
+    editor(&mut harness).gallery.sought = "velvet UP".to_owned();
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Velvet up").is_some() && harness.query_by_label("Pearl cup").is_none());
+    editor(&mut harness).gallery.sought = "spaceship".to_owned();
+    harness.run_steps(2);
+    assert!(harness.query_by_label("No scene is about \"spaceship\".").is_some());
+    harness.get_by_label("Show all").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Velvet up").is_some() && harness.query_by_label("Default").is_some());
+}
+
+#[test]
+fn a_measured_paint_that_is_dropped_is_not_tinted_by_what_was_there_and_that_is_said() {
+    let path = std::path::PathBuf::from("/nowhere/paint.bsdf");
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.materials[0].color = Vec3::new(0.1, 0.2, 0.9);
+    editor(&mut harness).document.edit(scene.clone());
+    editor(&mut harness).document.rest();
+    editor(&mut harness).dropped(&ctx, path.clone());
+    let editor = editor(&mut harness);
+    let material = editor.document.scene().materials[0].clone();
+    assert_eq!((material.brdf, material.color), (Some(BrdfSpec::One(TermSpec::Rgl { path })), Vec3::ONE));
+    assert!(editor.messages.texts().iter().any(|text| text.contains("white")), "{:?}", editor.messages.texts());
+    editor.document.undo();
+    assert_eq!(**editor.document.scene(), scene);
+}
+
+#[test]
+fn help_is_closed_by_escape() {
+    let mut harness = harness(quick());
+    harness.key_press(Key::F1);
+    harness.run_steps(2);
+    assert!(matches!(editor(&mut harness).dialog, Some(Dialog::Help)));
+    harness.key_press(Key::Escape);
+    harness.run_steps(2);
+    assert!(editor(&mut harness).dialog.is_none());
+}
+
+#[test]
+fn every_control_of_every_panel_and_dialog_has_a_name() {
+    let mut harness = harness(quick());
+    harness.set_size(egui::vec2(1500.0, 3600.0));
+    editor(&mut harness).settings.gallery = true;
+    settle(&mut harness);
+    for section in ["Camera", "Quality", "Effects", "Accuracy"] {
+        harness.get_by_label(section).click();
+        harness.run_steps(4);
+    }
+    harness.check_accessibility();
+    for kind in ["pyramids", "rods", "weave", "flat", "heightfield"] {
+        let mut scene = (**editor(&mut harness).document.scene()).clone();
+        scene.tile.geometry = Geometry::with_defaults(kind).unwrap();
+        if let Geometry::Heightfield(field) = &mut scene.tile.geometry {
+            field.path = Some("asset:ripples.png".into());
+        }
+        editor(&mut harness).document.edit(scene);
+        harness.run_steps(3);
+        harness.check_accessibility();
+    }
+    editor(&mut harness).tile.set_painting(true);
+    for tool in Tool::ALL {
+        editor(&mut harness).tile.brush.tool = tool;
+        harness.run_steps(2);
+        harness.check_accessibility();
+    }
+    let ctx = harness.ctx.clone();
+    for action in [
+        Action::Help,
+        Action::About,
+        Action::Open,
+        Action::ExportTable,
+        Action::ExportTile,
+        Action::ExportPicture,
+        Action::Quit,
+    ] {
+        editor(&mut harness).action(&ctx, action);
+        harness.run_steps(3);
+        assert!(editor(&mut harness).dialog.is_some());
+        harness.check_accessibility();
+        editor(&mut harness).dialog = None;
+    }
+    for path in ["a.npz", "a.xml"] {
+        let choice = TableChoice::default();
+        editor(&mut harness).dialog = Some(Dialog::Table { path: path.into(), choice });
+        harness.run_steps(3);
+        harness.check_accessibility();
+    }
+    editor(&mut harness).dialog = Some(Dialog::Fit { path: "a.gltf".into() });
+    harness.run_steps(3);
+    harness.check_accessibility();
+    for path in ["a.obj", "a.stl"] {
+        editor(&mut harness).dialog = Some(Dialog::Tile { path: path.into(), options: TileOptions::default() });
+        harness.run_steps(3);
+        harness.check_accessibility();
+    }
+    editor(&mut harness).dialog = Some(Dialog::Picture { path: "a.png".into(), width: 64, height: 64 });
+    harness.run_steps(3);
+    harness.check_accessibility();
+}
+
+#[test]
+fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not() {
+    let mut harness = harness(quick());
+    let text =
+        "name = \"gold\"\ncolor = [1.0, 0.5, 0.1]\n[brdf]\nkind = \"ggx\"\nroughness = 0.1\nf0 = [0.9, 0.7, 0.3]\n";
+    harness.event(egui::Event::Paste(text.to_owned()));
+    harness.run_steps(2);
+    let material = editor(&mut harness).document.scene().materials[0].clone();
+    assert_eq!((material.name.as_str(), material.color), ("default", Vec3::new(1.0, 0.5, 0.1)));
+    assert_eq!(editor(&mut harness).document.undo_name(), Some("Paste a material"));
+    let before = editor(&mut harness).document.scene().clone();
+    for text in ["hello", "name = \"x\"\ncolor = [nan, 0.0, 0.0]\n"] {
+        harness.event(egui::Event::Paste(text.to_owned()));
+        harness.run_steps(2);
+        assert_eq!(*editor(&mut harness).document.scene(), before, "{text}");
+        let texts = editor(&mut harness).messages.texts().join("; ");
+        assert!(texts.contains("clipboard holds no material") || texts.contains("Not pasted"), "{texts}");
+    }
+}
+
+#[test]
+fn who_only_turned_a_shipped_scene_is_not_asked_to_save_it() {
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.camera.get_or_insert_default().azimuth_deg = 77.0;
+    scene.light.rotation_deg = 12.0;
+    let editor = editor(&mut harness);
+    editor.document.edit(scene.clone());
+    assert!(editor.document.is_dirty() && !editor.document.has_work());
+    editor.action(&ctx, Action::New);
+    assert!(editor.dialog.is_none() && editor.document.name == "default");
+    let mut scene = (**editor.document.scene()).clone();
+    scene.light.count = 3;
+    editor.document.edit(scene);
+    editor.action(&ctx, Action::New);
+    assert!(matches!(editor.dialog, Some(Dialog::Unsaved(_))));
+}

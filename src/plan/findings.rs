@@ -1,0 +1,88 @@
+//! What decisions rest on: what the scene is like, and prices on the machine at hand.
+
+/// How visibility is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Route {
+    /// A flat tile blocks nothing.
+    None,
+    /// Walking the samples of a height-field.
+    HeightMarch,
+    /// Slicing the mesh of a surface without overhangs.
+    HorizonScan,
+    /// Slicing a mesh with overhangs: horizons, and what hangs above them.
+    Slices,
+    /// Toroidal shadow maps on the CPU.
+    CpuMaps,
+    /// Toroidal shadow maps on a real GPU.
+    GpuMaps,
+}
+
+/// What the scene is like: all that the decisions rest on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Findings {
+    pub flat: bool,
+    /// The largest angle between a surface normal and z [rad].
+    pub steepest: f32,
+    /// The largest part of uniform light that a material reflects.
+    pub albedo: f64,
+    /// Do all materials reflect all channels alike?
+    pub grey: bool,
+    /// Planes x = const and y = const that mirror the tile; `None` where nobody looked.
+    pub mirrors: Option<[bool; 2]>,
+    pub height_samples: bool,
+    pub height_field: bool,
+    pub closes_plane: bool,
+    pub hardware_gpu: bool,
+    pub triangles: usize,
+    /// Cells and triangles that one slice of the mesh looks at.
+    pub scan_work: f64,
+    /// Surface area over base area.
+    pub area_ratio: f64,
+    /// Materials that facets carry, black ones not counted.
+    pub materials: usize,
+    pub black_materials: usize,
+    /// Do colour weights differ within a material?
+    pub colors_vary: bool,
+    /// Lobes that a direct evaluation adds up, and measured look-ups.
+    pub lobes: usize,
+    pub lookups: usize,
+    pub only_lambertian: bool,
+    pub distinct_normals: Option<usize>,
+    pub object_self_shadows: bool,
+    pub lights: usize,
+    pub lights_below: usize,
+}
+
+/// Prices on the machine at hand, in nanoseconds; refined by what stages measure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    pub lobe_ns: f64,
+    pub lookup_ns: f64,
+    pub facet_fill_ns: f64,
+    pub march_ns: f64,
+    pub scan_ns: f64,
+    pub factor_query_ns: f64,
+    pub table_query_ns: f64,
+    pub slice_ns: f64,
+    pub triangle_ns: f64,
+    pub texel_ns: f64,
+    pub threads: f64,
+}
+
+impl Default for Costs {
+    fn default() -> Self {
+        Self {
+            lobe_ns: 1.5,
+            lookup_ns: 30.0,
+            facet_fill_ns: 0.3,
+            march_ns: 1_000.0,
+            scan_ns: 1_000.0,
+            factor_query_ns: 1_500.0,
+            table_query_ns: 120.0,
+            slice_ns: 18.0,
+            triangle_ns: 60.0,
+            texel_ns: 10.0,
+            threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),
+        }
+    }
+}
