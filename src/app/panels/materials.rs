@@ -60,7 +60,7 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], around: &mut Around)
 
 /// Colours that painted materials begin with: none is like its neighbour.
 const PAINTS: [[f32; 3]; 6] =
-    [[0.75, 0.45, 0.05], [0.05, 0.2, 0.6], [0.55, 0.05, 0.05], [0.1, 0.4, 0.1], [0.6, 0.6, 0.55], [0.3, 0.08, 0.4]];
+    [[0.05, 0.2, 0.6], [0.75, 0.45, 0.05], [0.55, 0.05, 0.05], [0.1, 0.4, 0.1], [0.6, 0.6, 0.55], [0.3, 0.08, 0.4]];
 
 /// Makes sure that the scene has the material of a painted slot; whether it was missing.
 pub fn add_painted(scene: &mut Scene, number: u8) -> bool {
