@@ -18,7 +18,8 @@ struct Sum {
     // Facets in all.
     facet_count: u32,
     color: vec3f,
-    pad_c: u32,
+    // Whether a pass over projected areas is the last of them.
+    last: u32,
 }
 
 @group(1) @binding(0) var<uniform> sum: Sum;

@@ -17,7 +17,11 @@ fn measure(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let to_viewer = sight_along(o);
+    // What the passes before found.
     var total = 0.0;
+    if sum.first > 0u {
+        total = scales[point];
+    }
     for (var start = sum.first; start < sum.end; start += BLOCK) {
         var part = 0.0;
         let end = min(start + BLOCK, sum.end);
@@ -29,5 +33,9 @@ fn measure(@builtin(global_invocation_id) id: vec3u) {
         }
         total += part;
     }
-    scales[point] = select(0.0, 1.0 / total, total > params.least_area);
+    if sum.last == 0u {
+        scales[point] = total;
+    } else {
+        scales[point] = select(0.0, 1.0 / total, total > params.least_area);
+    }
 }

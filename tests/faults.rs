@@ -72,6 +72,57 @@ fn a_program_killed_in_the_middle_of_an_export_leaves_the_old_table_or_a_whole_n
     assert_eq!(std::fs::read(&target).unwrap(), new);
 }
 
+/// As [`program`], with files of at most so many blocks of 512 bytes; `ends`: what the system does at the first byte beyond is
+/// to end the program there (as a kill would), else to refuse the write (as a full disk would).
+#[cfg(target_os = "linux")]
+fn limited(folder: &Path, blocks: usize, ends: bool, arguments: &[&str]) -> Command {
+    let mut command = Command::new("sh");
+    let ignored = if ends { "" } else { "trap '' XFSZ; " };
+    command
+        .args(["-c", &format!("{ignored}ulimit -c 0; ulimit -f {blocks}; exec \"$0\" \"$@\"")])
+        .arg(env!("CARGO_BIN_EXE_biscale"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// Not by chance of timing: at a given byte.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_program_that_ends_in_the_middle_of_writing_leaves_the_old_file_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.toml"), SCENE).unwrap();
+    for (file, more) in [("t.npz", &["--resolution", "8x16"][..]), ("t.csv", &["--resolution", "8x16"]), ("t.bin", &[])]
+    {
+        let arguments = [&["export", "a.toml", "-o", file, "--quiet"][..], more].concat();
+        let target = folder.path().join(file);
+        assert!(program(folder.path(), &arguments).status().unwrap().success());
+        let whole = std::fs::metadata(&target).unwrap().len() as usize;
+        std::fs::write(&target, "the old one").unwrap();
+        for blocks in [1, whole / 1024, whole / 512 - 1] {
+            for ends in [true, false] {
+                let output = limited(folder.path(), blocks, ends, &arguments).output().unwrap();
+                let said = String::from_utf8_lossy(&output.stderr);
+                assert!(!output.status.success() && !said.contains("panicked"), "{file}, {blocks} blocks: {said}");
+                assert_eq!(std::fs::read_to_string(&target).unwrap(), "the old one", "{file}, {blocks} blocks");
+                let all = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap());
+                let parts: Vec<_> =
+                    all.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part")).collect();
+                if ends {
+                    // It was in the middle: what it had written lies beside, and is no one's.
+                    let [part] = &parts[..] else { panic!("{file}: {parts:?}") };
+                    assert_eq!(part.metadata().unwrap().len() as usize, 512 * blocks, "{file}");
+                    std::fs::remove_file(part.path()).unwrap();
+                } else {
+                    assert!(parts.is_empty() && said.contains(file) && output.status.code() == Some(2), "{said}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn a_partial_file_of_an_earlier_process_of_the_same_number_does_not_stop_a_save() {
     let folder = tempfile::tempdir().unwrap();
@@ -147,21 +198,34 @@ fn a_disk_that_fills_in_the_middle_of_a_write_keeps_the_old_file_whole() {
 
 #[test]
 #[cfg(unix)]
-fn a_read_only_folder_is_a_message_that_names_it() {
-    use std::os::unix::fs::PermissionsExt;
+fn a_read_only_folder_is_a_message_that_names_the_file() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    use std::os::unix::process::CommandExt;
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.csv");
-    std::fs::write(&path, "old").unwrap();
+    std::fs::write(folder.path().join("a.toml"), SCENE).unwrap();
+    std::fs::write(folder.path().join("t.csv"), "old").unwrap();
     let set = |mode: u32| std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(mode)).unwrap();
     set(0o555);
-    let result = replace_file(&path, b"new");
-    let as_root = std::fs::write(folder.path().join("probe"), "").is_ok();
-    set(0o755);
-    if as_root {
-        return eprintln!("SKIPPED: this user writes to read-only folders");
+    for arguments in [&["export", "a.toml", "-o", "t.csv", "--resolution", "4x8"][..], &["plan", "a.toml"]] {
+        let mut command = program(folder.path(), arguments);
+        // For root no folder is read-only: as nobody, then.
+        if folder.path().metadata().unwrap().uid() == 0 {
+            command.uid(65_534).gid(65_534);
+        }
+        let output = match command.stderr(Stdio::piped()).output() {
+            Ok(output) => output,
+            Err(error) => return eprintln!("SKIPPED: no run as another user: {error}"),
+        };
+        let said = String::from_utf8_lossy(&output.stderr);
+        if arguments[0] == "plan" {
+            assert!(output.status.success(), "what writes nothing works: {said}");
+        } else {
+            assert!(output.status.code() == Some(2) && said.contains("t.csv"), "{:?}: {said}", output.status);
+        }
     }
-    assert!(result.unwrap_err().to_string().contains("a.csv"));
-    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    set(0o755);
+    assert_eq!(std::fs::read_to_string(folder.path().join("t.csv")).unwrap(), "old");
+    assert_eq!(names(folder.path()), ["a.toml", "t.csv"]);
 }
 
 #[test]

@@ -104,7 +104,7 @@ pub fn examine(case: &Case, m_directions: Option<usize>) -> Vec<Row> {
     rows
 }
 
-fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Vec3]) -> Row {
+pub fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Vec3]) -> Row {
     let brdf: &EffectiveBrdf = &evaluator.brdf;
     let (mut unsound, mut under_horizon) = (0, 0);
     let is_sound = |v: Vec3| v.is_finite() && v.min_element() >= 0.0;

@@ -4,6 +4,7 @@ use biscale::gpu::Gpu;
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::{GpuRenderer, Stage, render};
 use biscale::pipeline::Pipeline;
+use biscale::scene::LoadedScene;
 
 use crate::cases::{Case, brdfs, geometries};
 use crate::lab::open;
@@ -34,31 +35,33 @@ fn one_case_of_each_family_is_the_same_picture_on_the_graphics_processor() {
             let mut loaded = open(case, method, folder.path());
             loaded.scene.light.count = 8;
             loaded.scene.quality.facets = Some(400);
-            let outcome = Pipeline::new().effective(&loaded).unwrap();
-            let stage = Stage::new(&loaded).unwrap();
-            let background = Background::default();
-            let input = stage.input(&*outcome.brdf, [40, 40], 1, &background);
-            let cpu = render(&input).unwrap().picture.pixels;
-            let renderer = match GpuRenderer::new(&gpu, stage.occluder.as_ref(), &outcome.brdf) {
-                Ok(renderer) => renderer,
-                Err(error) => {
-                    eprintln!("SKIPPED: {name}, {method}: {error}");
-                    continue;
-                }
-            };
-            let device = renderer.render(&gpu, &input).unwrap().picture.pixels;
-            let bad = device.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);
-            assert_eq!(bad, None, "{name}, {method}: {:?}", bad.map(|at| device[at]));
-            // Edges may show another triangle, and narrow lobes multiply the G-buffer's last bits (gpu_shading_tests.rs).
-            let scale = cpu.iter().map(|pixel| pixel.max_element()).sum::<f32>() / cpu.len() as f32;
-            let mut apart: Vec<f32> = cpu
-                .iter()
-                .zip(&device)
-                .map(|(a, b)| (*a - *b).abs().max_element() / (a.max_element() + scale).max(1e-20))
-                .collect();
-            apart.sort_by(f32::total_cmp);
-            let most = apart[apart.len() * 9 / 10];
-            assert!(most < 0.05, "{name}, {method}: nine in ten pixels are within {most}");
+            same_picture(&gpu, &loaded, 40, &format!("{name}, {method}"));
         }
     }
+}
+
+/// The picture of a scene, `side` pixels wide and high, is what the CPU makes.
+pub fn same_picture(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
+    let outcome = Pipeline::new().effective(loaded).unwrap();
+    let stage = Stage::new(loaded).unwrap();
+    let background = Background::default();
+    let input = stage.input(&*outcome.brdf, [side; 2], 1, &background);
+    let cpu = render(&input).unwrap().picture.pixels;
+    let renderer = match GpuRenderer::new(gpu, stage.occluder.as_ref(), &outcome.brdf) {
+        Ok(renderer) => renderer,
+        Err(error) => return eprintln!("SKIPPED: {name}: {error}"),
+    };
+    let device = renderer.render(gpu, &input).unwrap().picture.pixels;
+    let bad = device.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);
+    assert_eq!(bad, None, "{name}: {:?}", bad.map(|at| device[at]));
+    // Edges may show another triangle, and narrow lobes multiply the G-buffer's last bits (gpu_shading_tests.rs).
+    let scale = cpu.iter().map(|pixel| pixel.max_element()).sum::<f32>() / cpu.len() as f32;
+    let mut apart: Vec<f32> = cpu
+        .iter()
+        .zip(&device)
+        .map(|(a, b)| (*a - *b).abs().max_element() / (a.max_element() + scale).max(1e-20))
+        .collect();
+    apart.sort_by(f32::total_cmp);
+    let most = apart[apart.len() * 9 / 10];
+    assert!(most < 0.05, "{name}: nine in ten pixels are within {most}");
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use biscale::accuracy::mirror_biased_pairs;
+use biscale::accuracy::{Pair, mirror_biased_pairs, picture_pairs};
 use biscale::brdf::{Brdf, Term};
 use biscale::directions::from_angles;
 use biscale::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
@@ -92,6 +92,20 @@ fn every_sampling_routine_passes_the_chi_squared_test() {
     let even = vec![1.0 / 800.0; 800];
     p_values.push(("lights of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.i)), &even)));
     p_values.push(("viewers of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.o)), &even)));
+    // Views of pictures: uniform in the square of the sine; of every second pair the light uniform in solid angle.
+    let pairs = picture_pairs(1_000_000, 13);
+    let binned = |part: &dyn Fn(&Pair) -> (f64, Vec3)| {
+        let mut counts = vec![0.0; 20 * 40];
+        for (height, d) in pairs.iter().step_by(2).map(part) {
+            let turn = (f64::from(d.y).atan2(f64::from(d.x)) / TAU + 1.0).fract() * 40.0;
+            counts[((height * 20.0) as usize).min(19) * 40 + (turn as usize).min(39)] += 1.0;
+        }
+        counts
+    };
+    let views = binned(&|p| (1.0 - f64::from(p.o.z).powi(2), p.o));
+    p_values.push(("views of pictures".to_owned(), p_value(&views, &even)));
+    let lights = binned(&|p| (f64::from(p.i.z), p.i));
+    p_values.push(("lights of pictures".to_owned(), p_value(&lights, &even)));
     for (what, p) in &p_values {
         eprintln!("p = {p:.4}  {what}");
         assert!(*p > level(p_values.len()), "{what}: p = {p}, below {}", level(p_values.len()));

@@ -1,12 +1,14 @@
 //! Passes of the live sum over facets: a projected area, then one pass a term of each group of facets.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::{GpuShading, Padded, Pass, Second, Variant, padded, shadow_swap};
 use crate::brdf::Term;
 use crate::filtering::Direct;
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Gpu, GpuError, Tier};
 use crate::simd::Lobe;
 use crate::visibility::{Horizons, Slices, SoftMaps, Visibility};
 
@@ -25,8 +27,13 @@ struct Sum {
     tint: Vec3,
     facet_count: u32,
     color: Vec3,
-    pad: u32,
+    /// Whether a pass over projected areas is the last of them.
+    last: u32,
 }
+
+/// Facets of one pass on software Vulkan: llvmpipe leaves all loops of a thread, without a word, after 65,535 rounds
+/// together. Eight lights, and eight things that hang over a facet, stay below that.
+const SOFTWARE_FACETS: usize = 512;
 
 /// `Patch` in `sum_patches.wgsl`.
 #[repr(C)]
@@ -54,6 +61,7 @@ impl GpuShading {
             ));
         }
         let facet_count = form.sum.facet_count();
+        let most = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { facet_count.max(1) };
         let visibility = form.visibility.as_ref();
         let see = visibility_file(visibility);
         let blank = with_visibility(Sum { facet_count: facet_count as u32, ..Sum::default() }, visibility);
@@ -65,23 +73,24 @@ impl GpuShading {
         };
         let mut planned = Vec::new();
         for group in groups.iter().filter(|group| group.color != Vec3::ZERO) {
-            let range = match &group.patches {
-                None => group.range.clone(),
+            let ranges: Vec<Range<usize>> = match &group.patches {
+                None => pieces(group.range.clone(), most).collect(),
                 Some(runs) => {
+                    let whole = runs.iter().map(|run| (run.normal, run.range.clone()));
+                    let cut = whole.flat_map(|(normal, range)| pieces(range, most).map(move |range| (normal, range)));
                     let first = patches.len();
-                    patches.extend(runs.iter().map(|run| Patch {
-                        normal: run.normal,
-                        first: run.range.start as u32,
-                        end: run.range.end as u32,
+                    patches.extend(cut.map(|(normal, range)| Patch {
+                        normal,
+                        first: range.start as u32,
+                        end: range.end as u32,
                         pad: [0; 3],
                     }));
-                    first..patches.len()
+                    passes_over(&patches, first, most)
                 }
             };
             for (lobe, term) in &group.lobes {
                 let (file, shape, scale) = lobe_file(*lobe);
-                let [first, end] = [range.start as u32, range.end as u32];
-                let sum = Sum { first, end, shape, scale, tint: base_tint(term), color: group.color, ..blank };
+                let sum = Sum { shape, scale, tint: base_tint(term), color: group.color, ..blank };
                 let swaps = vec![
                     shadow_swap(shadowed),
                     ("visibility_unblocked", see),
@@ -89,7 +98,8 @@ impl GpuShading {
                     ("weights_area", if group.rgb_areas.is_some() { "weights_rgb" } else { "weights_area" }),
                     ("sum_facets", if group.patches.is_some() { "sum_patches" } else { "sum_facets" }),
                 ];
-                planned.push((swaps, sum, group.range.len() as u64));
+                let work = (group.range.len() / ranges.len().max(1)) as u64;
+                planned.extend(ranges.iter().map(|range| (swaps.clone(), over(sum, range), work)));
             }
         }
         if !patches.is_empty() {
@@ -101,12 +111,16 @@ impl GpuShading {
             swaps: vec![("visibility_unblocked", see)],
             constants: Vec::new(),
         };
-        let mut passes = vec![Pass {
-            pipeline: self.pipeline(gpu, area, Second::Facets)?,
-            group: self.sum_group(gpu, &shared, Sum { end: facet_count as u32, ..blank })?,
-            work: facet_count as u64,
-            each_light: false,
-        }];
+        let mut passes = Vec::new();
+        for range in pieces(0..facet_count, most) {
+            let sum = Sum { last: u32::from(range.end == facet_count), ..over(blank, &range) };
+            passes.push(Pass {
+                pipeline: self.pipeline(gpu, area.clone(), Second::Facets)?,
+                group: self.sum_group(gpu, &shared, sum)?,
+                work: range.len() as u64,
+                each_light: false,
+            });
+        }
         for (swaps, sum, work) in planned {
             let variant = Variant { shader: "shade_direct", entry_point: "shade", swaps, constants: Vec::new() };
             passes.push(Pass {
@@ -124,6 +138,36 @@ impl GpuShading {
         let bound = [&uniform, &shared.facets, &shared.visibility, &shared.patches];
         gpu.group("facets", &self.facets, &bound.map(|buffer| buffer.as_entire_binding()))
     }
+}
+
+fn over(sum: Sum, range: &Range<usize>) -> Sum {
+    Sum { first: range.start as u32, end: range.end as u32, ..sum }
+}
+
+/// A range in pieces of `most`; an empty one is a piece.
+fn pieces(range: Range<usize>, most: usize) -> impl Iterator<Item = Range<usize>> {
+    let count = range.len().div_ceil(most).max(1);
+    (0..count).map(move |k| range.start + k * most..(range.start + (k + 1) * most).min(range.end))
+}
+
+/// Runs of the patches from `first` on that hold `most` facets together, or one patch.
+fn passes_over(patches: &[Patch], first: usize, most: usize) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    let mut held = 0;
+    for (k, patch) in patches.iter().enumerate().skip(first) {
+        let facets = (patch.end - patch.first) as usize;
+        match runs.last_mut() {
+            Some(run) if held + facets <= most => {
+                run.end = k + 1;
+                held += facets;
+            }
+            _ => {
+                runs.push(k..k + 1);
+                held = facets;
+            }
+        }
+    }
+    runs
 }
 
 /// Normal and area of each facet; where the colours of any differ, area times colour of each after that.
