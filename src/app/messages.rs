@@ -43,6 +43,10 @@ impl Messages {
     pub fn ui(&mut self, ui: &mut Ui) -> Option<&'static str> {
         let mut closed = None;
         for (at, message) in self.list.iter().enumerate() {
+            // Two workers may complain of one thing.
+            if self.list[..at].iter().any(|before| before.text == message.text) {
+                continue;
+            }
             let color = match message.level {
                 Level::Note => theme::ACCENT,
                 Level::Trouble => theme::WARNING,
@@ -65,6 +69,8 @@ impl Messages {
                 });
             });
         }
-        closed.map(|at| self.list.remove(at).source)
+        let closed = closed.map(|at| self.list.remove(at))?;
+        self.list.retain(|message| message.text != closed.text);
+        Some(closed.source)
     }
 }

@@ -11,7 +11,7 @@ use super::document::{write_colors, write_heights, write_slots};
 use super::editor::Editor;
 use super::messages::Level;
 use super::paint::{self, Stroke, Tool};
-use super::panels::materials;
+use super::panels::paints;
 use super::views::brushes::{BrushAsked, Layer};
 use super::views::hand::Hand;
 
@@ -100,7 +100,7 @@ impl Editor {
     /// An image of slots, and the material that the brush paints.
     fn have_slots(&mut self) -> bool {
         let mut scene = (**self.document.scene()).clone();
-        let added = materials::add_painted(&mut scene, self.tile.brush.slot);
+        let added = paints::add_painted(&mut scene, self.tile.brush.slot);
         if self.document.painted().slots.is_some() && !added {
             return true;
         }

@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use biscale::geometry::image_file::MOST_SLOTS;
-use biscale::geometry::painted_slot;
 use biscale::scene::{BrdfSpec, Geometry, Material, Scene, TermSpec};
 use eframe::egui::{self, RichText, Ui};
 use glam::Vec3;
@@ -56,30 +54,6 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], around: &mut Around)
         ui.add_space(2.0);
     }
     request
-}
-
-/// Colours that painted materials begin with: none is like its neighbour.
-const PAINTS: [[f32; 3]; 6] =
-    [[0.75, 0.45, 0.05], [0.05, 0.2, 0.6], [0.55, 0.05, 0.05], [0.1, 0.4, 0.1], [0.6, 0.6, 0.55], [0.3, 0.08, 0.4]];
-
-/// Makes sure that the scene has the material of a painted slot; whether it was missing.
-pub fn add_painted(scene: &mut Scene, number: u8) -> bool {
-    let name = painted_slot(number);
-    if number == 0 || scene.materials.iter().any(|material| material.name == name) {
-        return false;
-    }
-    if scene.materials.is_empty() {
-        scene.materials.push(grey());
-    }
-    let albedo = Vec3::from_array(PAINTS[usize::from(number - 1) % PAINTS.len()]);
-    let brdf = Some(BrdfSpec::One(TermSpec::Lambertian { albedo }));
-    scene.materials.push(Material { name, brdf, color: Vec3::ONE });
-    true
-}
-
-/// The painted slots that a scene has materials for.
-pub fn painted(scene: &Scene) -> Vec<u8> {
-    (1..=MOST_SLOTS).filter(|k| scene.materials.iter().any(|material| material.name == painted_slot(*k))).collect()
 }
 
 pub fn grey() -> Material {
@@ -193,7 +167,7 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
                 if table != before
                     && let Ok(changed) = table.try_into::<TermSpec>()
                 {
-                    *term = changed;
+                    *term = of_its_file(changed);
                 }
             }
         });
@@ -258,6 +232,16 @@ fn actions_ui(ui: &mut Ui, material: &Material, index: usize, is_default: bool) 
         }
     });
     (request, remove)
+}
+
+/// A measured term whose file was typed is of the kind that the file's ending says.
+fn of_its_file(term: TermSpec) -> TermSpec {
+    match &term {
+        TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => {
+            measured(path).unwrap_or(term)
+        }
+        _ => term,
+    }
 }
 
 /// The measured term that a file holds, by its ending.

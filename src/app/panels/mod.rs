@@ -7,6 +7,7 @@ pub mod fields;
 pub mod look;
 pub mod materials;
 mod matrix;
+pub mod paints;
 pub mod surface;
 
 use biscale::plan::Effect;

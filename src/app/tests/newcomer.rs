@@ -156,3 +156,23 @@ fn who_only_turned_a_shipped_scene_is_not_asked_to_save_it() {
     editor.action(&ctx, Action::New);
     assert!(matches!(editor.dialog, Some(Dialog::Unsaved(_))));
 }
+
+#[test]
+fn a_measured_file_that_is_typed_is_of_the_kind_that_its_ending_says() {
+    let mut document = quick();
+    let mut scene = (**document.scene()).clone();
+    scene.materials[0].brdf = Some(BrdfSpec::One(TermSpec::Merl { path: "gold.binary".into() }));
+    document.edit(scene);
+    let mut harness = harness(document);
+    let field =
+        harness.get_by(|node| node.role() == egui::Role::TextInput && node.value() == Some("gold.binary".into()));
+    field.click();
+    harness.run_steps(2);
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::A);
+    harness.event(egui::Event::Text("silk.bsdf".to_owned()));
+    harness.run_steps(2);
+    harness.key_press(Key::Enter);
+    harness.run_steps(2);
+    let brdf = editor(&mut harness).document.scene().materials[0].brdf.clone();
+    assert_eq!(brdf, Some(BrdfSpec::One(TermSpec::Rgl { path: "silk.bsdf".into() })));
+}

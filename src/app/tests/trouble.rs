@@ -94,3 +94,28 @@ fn a_place_that_cannot_be_written_says_so_and_the_document_stays_unsaved() {
     assert!(texts.contains("Not saved") && texts.contains("nonexistent") && texts.contains("still here"), "{texts}");
     assert!(editor.document.is_dirty());
 }
+
+#[test]
+fn a_file_that_another_program_wrote_is_asked_about_before_it_is_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shared.toml");
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).save(&path);
+    let theirs = std::fs::read_to_string(&path).unwrap() + "# someone else\n";
+    std::fs::write(&path, &theirs).unwrap();
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.light.count = 3;
+    editor(&mut harness).document.edit(scene.clone());
+    for (answer, is_ours) in [("Later", false), ("Keep mine", true)] {
+        editor(&mut harness).action(&ctx, Action::Save);
+        harness.run_steps(2);
+        assert!(harness.query_by_label_contains("was changed by another program").is_some());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), theirs);
+        harness.get_by_label(answer).click();
+        harness.run_steps(2);
+        assert_eq!(std::fs::read_to_string(&path).unwrap() != theirs, is_ours);
+        assert_eq!(editor(&mut harness).document.is_dirty(), !is_ours);
+    }
+    assert_eq!(**editor(&mut harness).document.scene(), scene);
+}

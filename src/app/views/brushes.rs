@@ -7,7 +7,7 @@ use eframe::egui::{self, Slider, Ui};
 
 use crate::app::paint::{Brush, Tool};
 use crate::app::panels::fields::{row, words};
-use crate::app::panels::materials;
+use crate::app::panels::paints;
 
 /// An image over the tile that is painted on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,7 +101,7 @@ fn color_ui(ui: &mut Ui, brush: &mut Brush) {
 
 /// Which material is painted: the surface's own, those that there are, or one more.
 fn material_ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) {
-    let there = materials::painted(scene);
+    let there = paints::painted(scene);
     // The first stroke makes the material.
     let next = (1..=MOST_SLOTS).find(|slot| !there.contains(slot));
     let name = |slot: u8| if slot == 0 { "The surface's own".to_owned() } else { words(&painted_slot(slot)) };

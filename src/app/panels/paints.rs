@@ -1,0 +1,32 @@
+//! Materials that are painted over the tile, in the slots `paint_1` and on.
+
+use biscale::geometry::image_file::MOST_SLOTS;
+use biscale::geometry::painted_slot;
+use biscale::scene::{BrdfSpec, Material, Scene, TermSpec};
+use glam::Vec3;
+
+use super::materials::grey;
+
+/// Colours that painted materials begin with: none is like its neighbour.
+const PAINTS: [[f32; 3]; 6] =
+    [[0.05, 0.2, 0.6], [0.75, 0.45, 0.05], [0.55, 0.05, 0.05], [0.1, 0.4, 0.1], [0.6, 0.6, 0.55], [0.3, 0.08, 0.4]];
+
+/// Makes sure that the scene has the material of a painted slot; whether it was missing.
+pub fn add_painted(scene: &mut Scene, number: u8) -> bool {
+    let name = painted_slot(number);
+    if number == 0 || scene.materials.iter().any(|material| material.name == name) {
+        return false;
+    }
+    if scene.materials.is_empty() {
+        scene.materials.push(grey());
+    }
+    let albedo = Vec3::from_array(PAINTS[usize::from(number - 1) % PAINTS.len()]);
+    let brdf = Some(BrdfSpec::One(TermSpec::Lambertian { albedo }));
+    scene.materials.push(Material { name, brdf, color: Vec3::ONE });
+    true
+}
+
+/// The painted slots that a scene has materials for.
+pub fn painted(scene: &Scene) -> Vec<u8> {
+    (1..=MOST_SLOTS).filter(|k| scene.materials.iter().any(|material| material.name == painted_slot(*k))).collect()
+}
