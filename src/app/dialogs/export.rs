@@ -70,7 +70,7 @@ fn grid_ui(ui: &mut Ui, choice: &mut TableChoice) {
 
 /// Sizes of an RGL file.
 fn rgl_ui(ui: &mut Ui, choice: &mut TableChoice) {
-    ui.radio_value(&mut choice.rgl, None, "As fine as the material asks for (the smallest that reads within 1 %)");
+    ui.radio_value(&mut choice.rgl, None, "As fine as the material asks for, up to the large one");
     for (name, sizes) in [
         ("Small: 9 x 24 slices of 24 x 24, about 3 MB", [9, 24, 24, 24]),
         ("Medium: 13 x 48 slices of 36 x 36, about 20 MB", [13, 48, 36, 36]),
