@@ -46,10 +46,12 @@ fn after_an_edit(name: &str, backend: &str) -> (f64, f64, f64) {
 }
 
 #[test]
-#[ignore = "prints numbers: cargo test --bin biscale latency -- --ignored --nocapture"]
+#[ignore = "prints numbers of one scene, of all five with BISCALE_TABLE=1: cargo test --release --bin biscale latency -- --ignored --nocapture"]
 fn latency_from_a_slider_on_the_scenes_of_table_4() {
     println!("scene            route  draft  refined (coarse)  final   [ms, median of 3 geometry edits]");
-    for name in ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"] {
+    let all = std::env::var_os("BISCALE_TABLE").is_some();
+    let scenes = ["table4_cup", "table4_plate", "table4_teapot", "table4_pillow", "table4_skirt"];
+    for name in &scenes[..if all { 5 } else { 1 }] {
         for backend in ["cpu", "gpu"] {
             let (draft, coarse, last) = after_an_edit(name, backend);
             println!("{name:<16} {backend:<5} {draft:>6.0} {coarse:>12.0} {last:>12.0}");
