@@ -163,7 +163,8 @@ const EVERY: usize = 12;
 
 /// The reference has values and standard errors, no G: what it says is held to its own error.
 fn reference(case: &Case, folder: &Path, pairs: &[Pair], direct: &Evaluator) -> Row {
-    let settings = ReferenceSettings { facets: 128, max_passes: 4, target: 0.0, seed: 3 };
+    let facets = 128;
+    let settings = ReferenceSettings { facets, max_passes: 4, target: 0.0, seed: 3 };
     let mut all: Vec<Pair> = pairs.iter().step_by(EVERY).copied().collect();
     let ordinary = all.len();
     all.extend(all.clone().iter().map(|p| Pair { i: p.o, o: p.i }));
@@ -180,7 +181,10 @@ fn reference(case: &Case, folder: &Path, pairs: &[Pair], direct: &Evaluator) -> 
     let under_horizon = found[above..].iter().filter(|e| e.f_bar != Vec3::ZERO).count();
     // Where the tile closes, f̄ cos θ_o is reciprocal: the difference in units of its standard error, a hundredth of it.
     let mut reciprocity = 0.0_f64;
-    if direct.health.result.projected_area_error.is_some() {
+    // Passes that see no facet from somewhere (a shaft a hundred tiles deep) have no spread to judge by.
+    let surface = &direct.health.surface;
+    let sees = facets * surface.fewest_facets_seen >= surface.facets;
+    if sees && direct.health.result.projected_area_error.is_some() {
         let scale = found[..ordinary].iter().map(|e| e.f_bar.max_element()).fold(0.0, f32::max);
         for k in 0..ordinary {
             let (there, back, p) = (found[k], found[ordinary + k], pairs[EVERY * k]);
