@@ -6,8 +6,7 @@ use super::candidates::{Candidate, Family};
 pub const FINEST: f64 = 13.0;
 /// Facets of the coarsest.
 const COARSEST_FACETS: f64 = 16.0;
-/// With fewer, single pairs near the horizon hold most of the error: 18 on Ward grooves left 42 dB on 512 pairs and 30 dB on 250
-/// others.
+/// With fewer, single pairs near the horizon hold most of the error, and other pairs miss them.
 const LEAST_AZIMUTHS: f64 = 24.0;
 /// From here on the narrower penumbra of `fine` pays.
 const FINE_FACETS: usize = 24_000;

@@ -67,8 +67,7 @@ pub struct Settings {
     pub horizon_azimuths: usize,
     /// Azimuths of slices under overhangs.
     pub slice_azimuths: usize,
-    /// Rings and azimuths of visibility maps, for overhangs. Azimuths count more than rings: on leaning rods with 8192
-    /// facets 32x64, 96x64, 64x128 and 64x256 leave 38.8, 38.6, 40.2 and 43.0 dB; 48x192 with 32,768 facets 46.0 dB.
+    /// Rings and azimuths of visibility maps, for overhangs. Azimuths count more than rings.
     pub map_grid: PolarGrid,
     /// Texels a side of the shadow maps behind them.
     pub map_resolution: u32,
