@@ -155,7 +155,7 @@ fn main() -> Result<(), biscale::Error> {
         let build = || LowRank::build(&facets, &horizons, &material_of_slot, &materials, &low_rank);
         bench.line(&format!("factors with their basis, {name}"), facets.len(), "facet", build);
         let base_area = f64::from(field.base_area());
-        let direct = Direct { sum: Arc::new(sum), visibility: horizons.clone() };
+        let direct = Direct::new(Arc::new(sum), horizons.clone());
         for (form_name, form) in [("direct", Form::Direct(direct)), ("factors", Form::LowRank(build()?))] {
             let brdf = EffectiveBrdf { form, base_area };
             bench.line(&format!("eval, {form_name}, {name}"), pairs.len(), "pair", || {

@@ -74,7 +74,7 @@ fn the_factored_form_approaches_the_direct_sum_as_grids_and_ranks_grow() {
             let brdf = EffectiveBrdf { form, base_area };
             pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
         };
-        let direct = values(Form::Direct(Direct { sum: Arc::new(sum), visibility: visibility.clone() }));
+        let direct = values(Form::Direct(Direct::new(Arc::new(sum), visibility.clone())));
         let error = |directions, difference, kept, rank| {
             let settings = settings(directions, difference, 48, kept, rank, !mesh.is_height_field());
             let factors =

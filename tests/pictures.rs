@@ -42,7 +42,7 @@ fn a_table_is_the_sum_itself_on_its_nodes() {
     let outcome = Pipeline::new().effective(&draft("table4_plate")).unwrap();
     let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
     let grid = UpperPairs { rings: 6, azimuths: 8, turn: 4, difference: 5 };
-    let table = PairTable::build(direct, grid, &Cancel::default()).unwrap().unwrap();
+    let table = PairTable::build(direct, grid, [false; 2], &Cancel::default()).unwrap().unwrap();
     let read = EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area };
     let peak = (0..grid.nodes()).map(|node| grid.pair(node)).map(|(i, o)| outcome.brdf.g(i, o).max_element());
     let peak = peak.fold(0.0, f32::max);

@@ -300,10 +300,7 @@ fn effective(mesh: &TileMesh, count: usize, term: Term, maps: bool) -> Effective
         Visibility::Horizons(Horizons::scan(&grid, &facets, 48, 0.02))
     };
     let material = SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::ONE };
-    let form = Form::Direct(Direct {
-        sum: Arc::new(FacetSum::new(&facets, &[0], &[material])),
-        visibility: Arc::new(visibility),
-    });
+    let form = Form::Direct(Direct::new(Arc::new(FacetSum::new(&facets, &[0], &[material])), Arc::new(visibility)));
     EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
 }
 

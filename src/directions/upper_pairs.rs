@@ -42,6 +42,22 @@ impl UpperPairs {
         self.rings * self.azimuths
     }
 
+    /// The first azimuth φ_h that planes x = const and y = const (`mirrors`) turn one into, and whether φ_d changes its sign on
+    /// the way.
+    pub fn image(&self, azimuth: usize, [in_x, in_y]: [bool; 2]) -> (usize, bool) {
+        let n = self.azimuths;
+        // x becomes -x: φ becomes π - φ; y becomes -y: φ becomes -φ.
+        let half = n.is_multiple_of(2).then_some(n / 2);
+        let across_x = half.filter(|_| in_x).map(|half| ((half + n - azimuth) % n, true));
+        let across_y = in_y.then_some(((n - azimuth) % n, true));
+        let both = half.filter(|_| in_x && in_y).map(|half| ((azimuth + half) % n, false));
+        let itself = (azimuth, false);
+        [across_x, across_y, both]
+            .into_iter()
+            .flatten()
+            .fold(itself, |best, image| if image.0 < best.0 { image } else { best })
+    }
+
     /// `(i, o)` of a node.
     pub fn pair(&self, node: usize) -> (Vec3, Vec3) {
         let (step, rest) = (node % self.difference, node / self.difference);
@@ -143,6 +159,35 @@ mod tests {
             assert!(near(at[1], azimuth, GRID.azimuths) && near(at[2], turn, GRID.turn), "{node}: {at:?}");
             assert!((at[3] - step as f32).abs() < 4e-3, "{node}: {at:?} {step}");
             assert!((i_dot_h - i.dot((i + o).normalize())).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn mirror_images_of_nodes_are_the_mirrored_pairs() {
+        for (mirrors, azimuths) in [([true, false], 7), ([false, true], 7), ([true, true], 4), ([false, false], 12)] {
+            let mut made = std::collections::BTreeSet::new();
+            for azimuth in 0..GRID.azimuths {
+                let (image, turned) = GRID.image(azimuth, mirrors);
+                assert_eq!(GRID.image(image, mirrors), (image, false), "an image is its own");
+                made.insert(image);
+                for (ring, turn, step) in [(3, 1, 4), (5, 3, 2), (2, 0, 3)] {
+                    let node = |azimuth: usize, turn: usize| {
+                        ((ring * GRID.azimuths + azimuth) * GRID.turn + turn) * GRID.difference + step
+                    };
+                    let (i, o) = GRID.pair(node(azimuth, turn));
+                    let (k, l) = GRID.pair(node(image, if turned { (GRID.turn - turn) % GRID.turn } else { turn }));
+                    // One of the mirrors that there are, or both, or none, takes one pair into the other, the two swapped or not.
+                    let close = |a: Vec3, b: Vec3| (a - b).abs().max_element() < 1e-5;
+                    let found = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].into_iter().any(|[x, y]| {
+                        let allowed = (x > 0.0 || mirrors[0]) && (y > 0.0 || mirrors[1]);
+                        let flip = |d: Vec3| d * Vec3::new(x, y, 1.0);
+                        let same = close(flip(i), k) && close(flip(o), l) || close(flip(i), l) && close(flip(o), k);
+                        allowed && same
+                    });
+                    assert!(found, "{mirrors:?} {azimuth} {turn}");
+                }
+            }
+            assert_eq!(made.len(), azimuths, "{mirrors:?}");
         }
     }
 

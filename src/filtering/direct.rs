@@ -6,6 +6,8 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::facet_sum::FacetSum;
+use super::few_normals::FewNormals;
+use crate::simd::LightPairs;
 use crate::visibility::Visibility;
 
 /// Sums over facets at the query; exact in the lobes, interpolated only in the visibility.
@@ -13,10 +15,13 @@ use crate::visibility::Visibility;
 pub struct Direct {
     pub sum: Arc<FacetSum>,
     pub visibility: Arc<Visibility>,
+    /// Where normals are few, which pictures use.
+    few: Option<Arc<FewNormals>>,
 }
 
 #[derive(Default)]
 struct Scratch {
+    pairs: LightPairs,
     v_i: Vec<f32>,
     v_o: Vec<f32>,
 }
@@ -26,6 +31,11 @@ thread_local! {
 }
 
 impl Direct {
+    pub fn new(sum: Arc<FacetSum>, visibility: Arc<Visibility>) -> Self {
+        let few = FewNormals::of(&sum, &visibility).map(Arc::new);
+        Self { sum, visibility, few }
+    }
+
     /// Hands the visibilities along `i` and `o` of all facets to `work`.
     pub(crate) fn with_seen<T>(&self, i: Vec3, o: Vec3, work: impl FnOnce(&[f32], &[f32]) -> T) -> T {
         SCRATCH.with_borrow_mut(|scratch| {
@@ -46,13 +56,10 @@ impl Direct {
             scratch.v_o.resize(facets, 0.0);
             self.visibility.fill(o, 0..facets, &mut scratch.v_o);
             let area = self.sum.projected_area(&scratch.v_o, o);
-            if let (Visibility::Horizons(horizons), true) = (&*self.visibility, self.sum.has_few_normals()) {
-                // Little work a facet: visibility along the light need not be written down first.
-                for (k, &i) in lights.iter().enumerate() {
-                    let lit = i.z > 0.0 && o.z > 0.0 && area > 0.0;
-                    let seen = horizons.seen_along(i, &scratch.v_o);
-                    out(k, if lit { self.sum.sum_of_areas(i, o, seen) } else { DVec3::ZERO });
-                }
+            if let (Visibility::Horizons(horizons), Some(few), true) =
+                (&*self.visibility, &self.few, o.z > 0.0 && area > 0.0)
+            {
+                few.sums(&self.sum, horizons, lights, o, &scratch.v_o, &mut scratch.pairs, out);
                 return area;
             }
             for (k, &i) in lights.iter().enumerate() {

@@ -238,27 +238,10 @@ impl FacetSum {
         seen * value.as_dvec3()
     }
 
-    /// Whether every group has few normals and one colour: then [`FacetSum::sum_of_areas`] serves.
+    /// Whether every group has few normals and one colour: then `FewNormals` serves.
     pub(crate) fn has_few_normals(&self) -> bool {
         let few = |group: &Group| group.patches.is_some() && group.rgb_areas.is_none();
         self.groups.iter().all(|group| group.is_black || few(group))
-    }
-
-    /// [`FacetSum::sum`] where facets of few normals are the whole tile: `seen` tells how much of a run of facets, whose areas
-    /// it is handed, `i` and `o` both see.
-    pub(crate) fn sum_of_areas(&self, i: Vec3, o: Vec3, seen: impl Fn(Range<usize>, &[f32]) -> f64) -> DVec3 {
-        let pair = PairVectors::new(i, o);
-        let mut total = DVec3::ZERO;
-        for group in self.groups.iter().filter(|group| !group.is_black) {
-            let mut sum = DVec3::ZERO;
-            for patch in group.patches.iter().flatten() {
-                if let Some(value) = patch_value(group, patch, &pair) {
-                    sum += DVec3::splat(seen(patch.range.clone(), &self.areas[patch.range.clone()])) * value.as_dvec3();
-                }
-            }
-            total += group.color.as_dvec3() * sum;
-        }
-        total
     }
 
     /// Other facets of the same materials.

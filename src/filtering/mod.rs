@@ -5,6 +5,7 @@ mod direct;
 mod effective_brdf;
 mod facet_groups;
 mod facet_sum;
+mod few_normals;
 mod forced;
 pub(crate) mod gemm;
 mod gram;

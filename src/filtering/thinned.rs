@@ -17,7 +17,7 @@ impl Direct {
     pub fn thinned(&self, step: usize) -> Option<Self> {
         let Visibility::Horizons(horizons) = &*self.visibility else { return None };
         let (sum, kept) = self.sum.has_few_normals().then(|| self.sum.thinned(step))??;
-        Some(Self { sum: Arc::new(sum), visibility: Arc::new(Visibility::Horizons(horizons.picked(&kept))) })
+        Some(Self::new(Arc::new(sum), Arc::new(Visibility::Horizons(horizons.picked(&kept)))))
     }
 }
 

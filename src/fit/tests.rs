@@ -16,10 +16,7 @@ fn flat(terms: Vec<Term>) -> EffectiveBrdf {
     facets.sort_for_sums();
     let visibility = Visibility::Unblocked { facets: facets.len() };
     let sum = FacetSum::new(&facets, &[0], &[SumMaterial { brdf: Brdf { terms }, color: Vec3::ONE }]);
-    EffectiveBrdf {
-        form: Form::Direct(Direct { sum: Arc::new(sum), visibility: Arc::new(visibility) }),
-        base_area: 1.0,
-    }
+    EffectiveBrdf { form: Form::Direct(Direct::new(Arc::new(sum), Arc::new(visibility))), base_area: 1.0 }
 }
 
 #[test]

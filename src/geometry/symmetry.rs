@@ -12,18 +12,18 @@ const MOST_PLANES: usize = 128;
 const SAME_HEIGHT: f32 = 1e-4;
 const SAME_NORMAL: f32 = 1e-3;
 
-/// Is the tile its own mirror image in a plane x = const, and in one y = const? Shape, slots and colours are compared where rays
-/// from above fall, so only surfaces that are all seen from above can be told; others are taken to have none.
-pub fn mirror_planes(mesh: &TileMesh, height_field: bool) -> [bool; 2] {
-    if !height_field || mesh.triangles.is_empty() {
+/// Is the tile its own mirror image in a plane x = const, and in one y = const? Shape, slots and colours are compared along
+/// vertical lines, through all that lies above each other.
+pub fn mirror_planes(mesh: &TileMesh) -> [bool; 2] {
+    if mesh.triangles.is_empty() {
         return [false; 2];
     }
     let looks = Looks { mesh, grid: PeriodicGrid::new(mesh), bottom: mesh.z_range().0 };
-    let places: Vec<(Vec2, Option<Seen>)> = (0..PLACES).map(|k| at(&looks, k)).collect();
+    let places: Vec<(Vec2, Vec<Seen>)> = (0..PLACES).map(|k| at(&looks, k)).collect();
     [0, 1].map(|axis| candidates(mesh, axis).iter().any(|sum| looks.is_mirrored(&places, axis, *sum)))
 }
 
-fn at(looks: &Looks, k: usize) -> (Vec2, Option<Seen>) {
+fn at(looks: &Looks, k: usize) -> (Vec2, Vec<Seen>) {
     // The R2 sequence, away from round numbers where edges lie.
     let part = |step: f64| ((k as f64 + 0.317) * step).fract() as f32;
     let place = Vec2::new(part(0.754_877_666_246_692_8), part(0.569_840_290_998_053_3)) * looks.mesh.size;
@@ -48,7 +48,10 @@ struct Looks<'a> {
     bottom: f32,
 }
 
-/// What is seen from above.
+/// Surfaces above each other that are compared.
+const MOST_LAYERS: usize = 16;
+
+/// What a vertical line meets.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     height: f32,
@@ -58,36 +61,42 @@ struct Seen {
 }
 
 impl Looks<'_> {
-    fn down(&self, place: Vec2) -> Option<Seen> {
-        let start = place.extend(self.grid.top() + 1.0);
-        let hit = self.grid.nearest(start, Vec3::NEG_Z, self.bottom - 1.0)?;
-        let triangle = hit.triangle as usize;
-        Some(Seen {
-            height: hit.position.z,
-            normal: self.mesh.geometric_normal(triangle),
-            slot: self.mesh.slot_at(triangle, place),
-            color: self.mesh.color.at(place, self.mesh.size),
-        })
+    /// All that the vertical line meets, from the top down.
+    fn down(&self, place: Vec2) -> Vec<Seen> {
+        let (mut layers, mut start) = (Vec::new(), self.grid.top() + 1.0);
+        let step = SAME_HEIGHT * self.mesh.size.max_element();
+        while let Some(hit) = self.grid.nearest(place.extend(start), Vec3::NEG_Z, self.bottom - 1.0) {
+            let triangle = hit.triangle as usize;
+            layers.push(Seen {
+                height: hit.position.z,
+                normal: self.mesh.geometric_normal(triangle),
+                slot: self.mesh.slot_at(triangle, place),
+                color: self.mesh.color.at(place, self.mesh.size),
+            });
+            start = hit.position.z - step;
+            if layers.len() == MOST_LAYERS {
+                break;
+            }
+        }
+        layers
     }
 
-    fn is_mirrored(&self, places: &[(Vec2, Option<Seen>)], axis: usize, sum: f32) -> bool {
+    fn is_mirrored(&self, places: &[(Vec2, Vec<Seen>)], axis: usize, sum: f32) -> bool {
         let size = self.mesh.size;
         let mut differ = 0;
         for (place, seen) in places {
             let mut mirrored = *place;
             mirrored[axis] = (sum - place[axis]).rem_euclid(size[axis]);
-            let same = match (seen, self.down(mirrored)) {
-                (Some(a), Some(b)) => {
-                    let mut normal = b.normal;
-                    normal[axis] = -normal[axis];
-                    (a.height - b.height).abs() <= SAME_HEIGHT * size.max_element()
-                        && (a.normal - normal).abs().max_element() <= SAME_NORMAL
-                        && a.slot == b.slot
-                        && (a.color - b.color).abs().max_element() <= SAME_NORMAL
-                }
-                (None, None) => true,
-                _ => false,
+            let same = |a: &Seen, b: &Seen| {
+                let mut normal = b.normal;
+                normal[axis] = -normal[axis];
+                (a.height - b.height).abs() <= SAME_HEIGHT * size.max_element()
+                    && (a.normal - normal).abs().max_element() <= SAME_NORMAL
+                    && a.slot == b.slot
+                    && (a.color - b.color).abs().max_element() <= SAME_NORMAL
             };
+            let other = self.down(mirrored);
+            let same = seen.len() == other.len() && seen.iter().zip(&other).all(|(a, b)| same(a, b));
             // A ray that falls on an edge may take either side.
             differ += usize::from(!same);
             if differ > PLACES / 100 {
@@ -115,15 +124,14 @@ mod tests {
     #[test]
     fn grooves_and_waves_have_the_planes_that_they_were_made_with() {
         let v = r#"{ kind = "grooves", profile = "v", count = 3, depth = 0.1, side_angle_deg = 40, rotation_deg = 0 }"#;
-        assert_eq!(mirror_planes(&of(v), true), [true, true]);
-        assert_eq!(mirror_planes(&of(v), false), [false, false]);
+        assert_eq!(mirror_planes(&of(v)), [true, true]);
         let size = Vec2::ONE;
         let crooked = |at: Vec2| 0.1 * (TAU * (at.x + at.y)).cos() + 0.03 * (2.0 * TAU * at.x + 0.7).sin();
         let mesh = heightfield::from_function(UVec2::splat(32), size, crooked);
-        assert_eq!(mirror_planes(&mesh, true), [false, false]);
+        assert_eq!(mirror_planes(&mesh), [false, false]);
         // A saw along x, straight along y.
         let mesh = heightfield::from_function(UVec2::splat(32), size, |at| 0.1 * at.x);
-        assert_eq!(mirror_planes(&mesh, true), [false, true]);
+        assert_eq!(mirror_planes(&mesh), [false, true]);
     }
 
     #[test]
@@ -131,7 +139,7 @@ mod tests {
         let mut mesh = of(
             r#"{ kind = "grooves", profile = "trapezoid", count = 2, depth = 0.1, side_angle_deg = 45, rotation_deg = 0 }"#,
         );
-        assert_eq!(mirror_planes(&mesh, true), [true, true]);
+        assert_eq!(mirror_planes(&mesh), [true, true]);
         let marked = mesh.slots.len() as u16;
         mesh.slots.push("marked".to_owned());
         // One wall of one groove is made of something else.
@@ -142,6 +150,6 @@ mod tests {
                 mesh.triangle_slot[triangle] = marked;
             }
         }
-        assert!(!mirror_planes(&mesh, true)[0]);
+        assert!(!mirror_planes(&mesh)[0]);
     }
 }

@@ -36,7 +36,7 @@ impl Bounds3 {
         !misses
     }
 
-    fn half_area(&self) -> f32 {
+    pub(super) fn half_area(&self) -> f32 {
         let d = (self.high - self.low).max(Vec3::ZERO);
         d.x * d.y + d.y * d.z + d.z * d.x
     }

@@ -125,7 +125,7 @@ fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
             let Form::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
             if let Visibility::Slices(slices) = direct.visibility.as_ref() {
                 let maps = Visibility::Maps(slices.maps(12));
-                let form = Form::Direct(Direct { sum: direct.sum.clone(), visibility: Arc::new(maps) });
+                let form = Form::Direct(Direct::new(direct.sum.clone(), Arc::new(maps)));
                 seen[3] = true;
                 assert_same(&format!("{geometry} {brdf}, maps"), &gpu, kind, &EffectiveBrdf { form, ..brdf_form });
             }
@@ -170,10 +170,10 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
         Pipeline::new().sum_materials(&loaded).unwrap().1
     };
     let form = |brdf: &str| EffectiveBrdf {
-        form: Form::Direct(Direct {
-            sum: FacetSum::new(&facets, &[0], &material(brdf)).into(),
-            visibility: Visibility::Unblocked { facets: 300 }.into(),
-        }),
+        form: Form::Direct(Direct::new(
+            FacetSum::new(&facets, &[0], &material(brdf)).into(),
+            Visibility::Unblocked { facets: 300 }.into(),
+        )),
         base_area: 1.0,
     };
     let (first, second) = (form(LOBES[4]), form(&format!("[{}, {}]", LOBES[0], LOBES[2])));
@@ -231,10 +231,10 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
         color,
     };
     let form = |color| EffectiveBrdf {
-        form: Form::Direct(Direct {
-            sum: FacetSum::new(&facets, &[0], &[material(color)]).into(),
-            visibility: Visibility::Unblocked { facets: 1 }.into(),
-        }),
+        form: Form::Direct(Direct::new(
+            FacetSum::new(&facets, &[0], &[material(color)]).into(),
+            Visibility::Unblocked { facets: 1 }.into(),
+        )),
         base_area: 1.0,
     };
     let refused = GpuRenderer::new(&gpu, None, &form(Vec3::ONE)).map(drop);

@@ -32,6 +32,7 @@ pub mod shadow;
 pub mod shadow_cache;
 pub mod stage;
 pub mod tone_map;
+mod wide_bvh;
 
 pub use camera::CameraView;
 pub use gbuffer::GBuffer;

@@ -1,13 +1,13 @@
 //! Shadows kept while the camera moves: per triangle and light, whether the neighbourhood is all lit or all in shadow.
 //!
 //! Rays are cast from the vertices once. Where a triangle's vertices and those of its neighbours agree, points on the triangle
-//! take their answer; elsewhere (at shadow edges, at the terminator, on large triangles) each point casts its own ray, so
-//! edges stay as sharp as without the cache.
+//! take their answer; elsewhere (at shadow edges, on large triangles) each point casts its own ray, so edges stay as sharp as
+//! without the cache.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::bvh::Bvh;
+use super::wide_bvh::WideBvh;
 use super::{DirectionalLight, ObjectMesh};
 
 /// Triangles with an edge longer than this many radii of the object may hide a shadow between their vertices.
@@ -21,7 +21,8 @@ pub struct ShadowCache {
     sides: Vec<Side>,
 }
 
-/// Bit `k % 32` of word `k / 32` of a triangle belongs to light `k`. At most one of the two is set.
+/// Bit `k % 32` of word `k / 32` of a triangle belongs to light `k`. Both are set only where all vertices are turned away from
+/// it, and nobody asks.
 #[derive(Debug, Clone)]
 struct Side {
     lit: Vec<u32>,
@@ -30,7 +31,7 @@ struct Side {
 
 impl ShadowCache {
     /// Casts a ray from every vertex to every light above its horizon, from `lift` above the surface.
-    pub(super) fn new(mesh: &ObjectMesh, bvh: &Bvh, lights: &[DirectionalLight], lift: f32) -> Self {
+    pub(super) fn new(mesh: &ObjectMesh, bvh: &WideBvh, lights: &[DirectionalLight], lift: f32) -> Self {
         let words = lights.len().div_ceil(32).max(1);
         let facing: &[f32] = if mesh.two_sided { &[1.0, -1.0] } else { &[1.0] };
         let side = |&facing: &f32| {
@@ -38,16 +39,23 @@ impl ShadowCache {
             let vertices: Vec<(Vec<u32>, Vec<u32>)> = (0..mesh.positions.len())
                 .into_par_iter()
                 .with_min_len(64)
-                .map(|vertex| {
-                    let (mut lit, mut dark) = (vec![0u32; words], vec![0u32; words]);
-                    let normal = normal(vertex);
-                    let origin = mesh.positions[vertex] + normal * lift;
-                    for (k, light) in lights.iter().enumerate().filter(|(_, light)| light.direction.dot(normal) > 0.0) {
-                        let answers = if bvh.is_blocked(origin, light.direction) { &mut dark } else { &mut lit };
-                        answers[k / 32] |= 1 << (k % 32);
-                    }
-                    (lit, dark)
-                })
+                .map_init(
+                    || vec![0; lights.len()],
+                    |last, vertex| {
+                        // A vertex that a light is behind of has nothing against either answer.
+                        let (mut lit, mut dark) = (vec![u32::MAX; words], vec![u32::MAX; words]);
+                        let normal = normal(vertex);
+                        let origin = mesh.positions[vertex] + normal * lift;
+                        for (k, light) in
+                            lights.iter().enumerate().filter(|(_, light)| light.direction.dot(normal) > 0.0)
+                        {
+                            let is_blocked = bvh.is_blocked(origin, light.direction, &mut last[k]);
+                            let wrong = if is_blocked { &mut lit } else { &mut dark };
+                            wrong[k / 32] &= !(1 << (k % 32));
+                        }
+                        (lit, dark)
+                    },
+                )
                 .collect();
             let lit: Vec<u32> = vertices.iter().flat_map(|(lit, _)| lit).copied().collect();
             let dark: Vec<u32> = vertices.iter().flat_map(|(_, dark)| dark).copied().collect();

@@ -24,7 +24,7 @@ impl Pipeline {
         let effects = &settings.effects;
         match (effects.interreflection, effects.mirror_symmetry) {
             (Switch::On, Switch::Auto) if !shape.flat => {
-                let find = || Ok(mirror_planes(&shape.mesh, shape.height_field));
+                let find = || Ok(mirror_planes(&shape.mesh));
                 Ok(Some(*self.mirrors.get("mirrors", version, times, &self.cancel, find)?.0))
             }
             _ => Ok(None),

@@ -175,7 +175,7 @@ impl Pipeline {
             names: names(scene, &shape.mesh, &materials)?,
             closes_plane: shape.mesh.closes_plane,
         };
-        let direct = Direct { sum: Arc::new(sum), visibility: visibility.clone() };
+        let direct = Direct::new(Arc::new(sum), visibility.clone());
         let base_area = f64::from(shape.mesh.base_area());
         let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
@@ -205,7 +205,7 @@ impl Pipeline {
             plan.factored(is_factored, errors.rel_l2);
         }
         let examined = Arc::default();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, plan.try_picture_table, earlier));
+        let pictures = Arc::new(Pictures::new(brdf.clone(), &shape, &settings, plan.try_picture_table, earlier));
         let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
@@ -215,7 +215,7 @@ impl Pipeline {
     #[expect(clippy::too_many_arguments, reason = "the whole of the pipeline's state after the facets")]
     fn wu2011(
         &mut self,
-        shape: &Shape,
+        shape: &Arc<Shape>,
         facets: &Arc<Facets>,
         assigned: &Arc<Assigned>,
         names: Vec<String>,
@@ -265,7 +265,7 @@ impl Pipeline {
             closes_plane: shape.mesh.closes_plane,
         };
         let notes = shape.mesh.notes.clone();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), &settings, false, None));
+        let pictures = Arc::new(Pictures::new(brdf.clone(), shape, &settings, false, None));
         let examined = Arc::default();
         Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
     }

@@ -7,16 +7,19 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::Shape;
 use crate::accuracy::{Errors, picture_pairs, upper_errors};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
 use crate::error::Result;
 use crate::filtering::{EffectiveBrdf, Form, Interpolation, PairTable};
+use crate::geometry::mirror_planes;
 use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
+use crate::scene::Switch;
 
 /// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
 /// recurrence that placed the facets stays spread out.
-const THINNED: [usize; 2] = [10, 3];
+const THINNED: [usize; 4] = [27, 17, 10, 3];
 
 /// A table this many times too far off is not helped by the next finer grid, which has half its step.
 const HOPELESS: f64 = 2.5;
@@ -41,6 +44,8 @@ pub(super) struct Pictures {
     exact: Arc<EffectiveBrdf>,
     grids: Vec<UpperPairs>,
     interpolation: Interpolation,
+    /// The tile, whose mirror planes spare part of a table; absent where nothing shall be spared.
+    mirrored: Option<Arc<Shape>>,
     tolerance: (f64, f64),
     seed: u64,
     earlier: Mutex<Option<Earlier>>,
@@ -49,9 +54,16 @@ pub(super) struct Pictures {
 
 impl Pictures {
     /// `wanted`: whether the plan expects a table to pay.
-    pub(super) fn new(exact: Arc<EffectiveBrdf>, settings: &Settings, wanted: bool, earlier: Option<Earlier>) -> Self {
+    pub(super) fn new(
+        exact: Arc<EffectiveBrdf>,
+        shape: &Arc<Shape>,
+        settings: &Settings,
+        wanted: bool,
+        earlier: Option<Earlier>,
+    ) -> Self {
         Self {
             exact,
+            mirrored: (settings.effects.mirror_symmetry != Switch::Off).then(|| shape.clone()),
             grids: if wanted { settings.picture_grids.clone() } else { Vec::new() },
             interpolation: settings.interpolation,
             tolerance: settings.picture_tolerance,
@@ -133,11 +145,12 @@ impl Pictures {
     }
 
     fn tabulate(&self, grid: UpperPairs, cancel: &Cancel) -> Result<Option<PairTable>> {
+        let mirrors = self.mirrored.as_ref().map_or([false; 2], |shape| mirror_planes(&shape.mesh));
         match self.exact.direct_form() {
-            Form::Direct(direct) => PairTable::build(direct, grid, cancel),
+            Form::Direct(direct) => PairTable::build(direct, grid, mirrors, cancel),
             form => {
                 let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| form.sums(lights, o, |k, sum| out[k] = sum);
-                PairTable::resample(sums, grid, cancel).map(Some)
+                PairTable::resample(sums, grid, mirrors, cancel).map(Some)
             }
         }
     }

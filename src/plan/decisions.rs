@@ -68,7 +68,7 @@ pub(super) fn picture_table(
             let kept = format!("if within {percent:.0} % and {db:.0} dB of the sum");
             let direct = format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly");
             if thinned {
-                format!("{direct}; few normals: a tenth or a third of the facets are summed, {kept}")
+                format!("{direct}; few normals: part of the facets are summed, {kept}")
             } else {
                 format!("{direct}, {table_ms:.0} ms from a table that takes {ms:.0} ms, once; kept {kept}")
             }
@@ -114,7 +114,6 @@ pub(super) fn interreflection(found: &Findings, settings: &Settings, costs: &Cos
         )
     };
     note("interreflection", on, reason, if on { ms } else { 0.0 });
-    mirror_symmetry(found, settings, on, note);
     on
 }
 
@@ -207,15 +206,29 @@ pub(super) fn mirrors(found: &Findings, settings: &Settings) -> [bool; 2] {
     }
 }
 
-fn mirror_symmetry(found: &Findings, settings: &Settings, interreflection: bool, note: &mut impl Note) {
+/// Planes are looked for when something is tabulated: who edits the geometry need not wait for it.
+pub(super) fn mirror_symmetry(
+    found: &Findings,
+    settings: &Settings,
+    interreflection: bool,
+    picture_table: bool,
+    note: &mut impl Note,
+) {
     let planes = mirrors(found, settings);
-    let on = interreflection && planes != [false; 2];
-    let reason = match (interreflection, planes) {
-        (false, _) => "used only by light between facets, which is off",
-        (_, [true, true]) => "mirrored in planes x = const and y = const: a quarter of the viewers tells all",
-        (_, [false, false]) => {
-            "no plane x = const or y = const mirrors the tile (or it cannot be told under overhangs)"
+    let asked = settings.effects.mirror_symmetry;
+    let known = asked == Switch::On || found.mirrors.is_some();
+    let on = match (interreflection || picture_table, asked) {
+        (false, _) | (_, Switch::Off) => false,
+        (true, _) => !known || planes != [false; 2],
+    };
+    let reason = match planes {
+        _ if !interreflection && !picture_table => "nothing is tabulated that it could spare",
+        _ if asked == Switch::Off => "taken to have none, as asked",
+        _ if !known => {
+            "where planes x = const or y = const mirror the tile, the pictures' table takes half or a quarter"
         }
+        [true, true] => "mirrored in planes x = const and y = const: a quarter of the viewers tells all",
+        [false, false] => "no plane x = const or y = const mirrors the tile",
         _ => "mirrored in one plane: half of the viewers tells all",
     };
     note("mirror_symmetry", on, reason.to_owned(), 0.0);

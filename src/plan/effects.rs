@@ -216,6 +216,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         0.0,
     );
     let interreflection = decisions::interreflection(found, settings, costs, &mut note);
+    decisions::mirror_symmetry(found, settings, interreflection, try_picture_table, &mut note);
     decisions::of_the_scene(found, settings, &mut note);
     for (name, reason) in [
         ("transmission", "light through thin slabs (Dai et al. 2009): not asked for"),

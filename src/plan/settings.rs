@@ -187,10 +187,10 @@ impl Settings {
     pub fn of_preset(preset: Preset) -> Self {
         let standard = Self {
             preset,
-            facets: 12_288,
+            facets: 8192,
             height_field_facets: 6144,
             horizon_azimuths: 48,
-            slice_azimuths: 64,
+            slice_azimuths: 48,
             map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
@@ -223,7 +223,7 @@ impl Settings {
                 facets: 2048,
                 height_field_facets: 2048,
                 horizon_azimuths: 24,
-                slice_azimuths: 32,
+                slice_azimuths: 24,
                 map_grid: PolarGrid::new(20, 40),
                 map_resolution: 160,
                 keep_m: 0.999,

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::math::{exp_negative, ln_one_minus};
-use super::{LANES, blocks, lane, multiversion};
+use super::{LANES, LightPairs, blocks, lane, multiversion};
 use crate::directions::half_vector;
 
 /// The vectors of one pair of directions.
@@ -258,6 +258,37 @@ multiversion! {
             Lobe::CookTorrance { inverse_m2, scale } => each(pair, normals, out, CookTorrance { inverse_m2, scale, masking }),
             Lobe::Ward { inverse_alpha2, scale } => each(pair, normals, out, Ward { inverse_alpha2, scale }),
             Lobe::Ggx { alpha2, scale } => each(pair, normals, out, Ggx { alpha2, scale }),
+        }
+    }
+}
+
+#[inline(always)]
+fn each_light<V: Value>(pairs: &LightPairs, n: Vec3, out: &mut [f32; LANES], value: impl Fn(f32) -> V) {
+    let (o, count) = (pairs.o, pairs.padded());
+    let [[ix, iy, iz], [hx, hy, hz]] = [pairs.i.each_ref(), pairs.h.each_ref()].map(|v| v.map(|x| &x[..count]));
+    let (i_dot_h, out) = (&pairs.i_dot_h[..count], &mut out[..count]);
+    for k in 0..count {
+        let pair = PairVectors {
+            i: Vec3::new(ix[k], iy[k], iz[k]),
+            o,
+            h: Vec3::new(hx[k], hy[k], hz[k]),
+            i_dot_h: i_dot_h[k],
+        };
+        let seen = see(&pair, n.x, n.y, n.z);
+        let f = value(masking(&pair)).at(seen);
+        out[k] = if seen.lit() { f } else { 0.0 };
+    }
+}
+
+multiversion! {
+    /// `out[k] = lobe(n, i_k, o)`: the values of [`lobe_values`] for one normal and many lights.
+    pub fn light_lobes(lobe: Lobe, pairs: &LightPairs, normal: glam::Vec3, out: &mut [f32; super::LANES]) {
+        match lobe {
+            Lobe::Lambertian => each_light(pairs, normal, out, |_| Lambertian),
+            Lobe::BlinnPhong { half_exponent, scale } => each_light(pairs, normal, out, |_| BlinnPhong { half_exponent, scale }),
+            Lobe::CookTorrance { inverse_m2, scale } => each_light(pairs, normal, out, |masking| CookTorrance { inverse_m2, scale, masking }),
+            Lobe::Ward { inverse_alpha2, scale } => each_light(pairs, normal, out, |_| Ward { inverse_alpha2, scale }),
+            Lobe::Ggx { alpha2, scale } => each_light(pairs, normal, out, |_| Ggx { alpha2, scale }),
         }
     }
 }

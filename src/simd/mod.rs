@@ -11,8 +11,8 @@ mod tests;
 mod visibility;
 
 pub use gather::gathered_dot;
-pub use lobes::{Lobe, PairVectors, lobe_sums, lobe_values};
-pub use pairs::pair_places;
+pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
+pub use pairs::{LightPairs, azimuth_and_elevation, pair_places, pair_vectors};
 pub use visibility::{
     SWITCH, blend_bits, ground_masked_sum, ground_visibility, masked_sum, projected_area, stepped_visibility,
 };

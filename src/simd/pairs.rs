@@ -1,10 +1,97 @@
-//! Half and difference coordinates of many pairs at once.
+//! Many pairs of directions at once: one view, and the lights that shine there.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::Vec3;
 
 use super::{LANES, multiversion};
+
+/// Pairs of up to [`LANES`] lights with one view, each component by itself.
+#[derive(Debug, Clone)]
+pub struct LightPairs {
+    pub o: Vec3,
+    /// Directions to the lights, and unit half vectors.
+    pub i: [[f32; LANES]; 3],
+    pub h: [[f32; LANES]; 3],
+    pub i_dot_h: [f32; LANES],
+    /// Of the lights: in turns from 0 to 1, and in radians.
+    pub azimuths: [f32; LANES],
+    pub elevations: [f32; LANES],
+    /// Lights, rounded up to whole steps of the inner loops; lights beyond the last are straight above.
+    padded: usize,
+}
+
+/// Steps of the inner loops over lights.
+const STEP: usize = 16;
+
+impl LightPairs {
+    pub const MOST: usize = LANES;
+
+    pub fn new() -> Self {
+        let empty = [0.0; LANES];
+        let (three, o) = ([empty; 3], Vec3::Z);
+        Self { o, i: three, h: three, i_dot_h: empty, azimuths: empty, elevations: empty, padded: 0 }
+    }
+
+    /// Takes up to [`LightPairs::MOST`] lights and a view.
+    pub fn set(&mut self, lights: &[Vec3], o: Vec3) {
+        let lights = &lights[..lights.len().min(LANES)];
+        self.o = o;
+        self.padded = lights.len().next_multiple_of(STEP);
+        for k in 0..self.padded {
+            let light = lights.get(k).copied().unwrap_or(Vec3::Z);
+            for axis in 0..3 {
+                self.i[axis][k] = light[axis];
+            }
+        }
+        pair_vectors(self);
+    }
+
+    pub fn light(&self, k: usize) -> Vec3 {
+        Vec3::new(self.i[0][k], self.i[1][k], self.i[2][k])
+    }
+
+    pub(super) fn padded(&self) -> usize {
+        self.padded.min(LANES)
+    }
+}
+
+impl Default for LightPairs {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+multiversion! {
+    /// Half vectors and angles of the lights.
+    pub fn pair_vectors(pairs: &mut LightPairs) {
+        let (n, o) = (pairs.padded(), pairs.o);
+        for k in 0..n {
+            let (x, y, z) = (pairs.i[0][k], pairs.i[1][k], pairs.i[2][k]);
+            let (hx, hy, hz) = (x + o.x, y + o.y, z + o.z);
+            let length = (hx * hx + hy * hy + hz * hz).sqrt();
+            let opposite = length < 1e-20;
+            let per_length = 1.0 / length.max(1e-20);
+            let hx = if opposite { 0.0 } else { hx * per_length };
+            let hy = if opposite { 0.0 } else { hy * per_length };
+            let hz = if opposite { 1.0 } else { hz * per_length };
+            pairs.h[0][k] = hx;
+            pairs.h[1][k] = hy;
+            pairs.h[2][k] = hz;
+            pairs.i_dot_h[k] = 0.5 * ((x * hx + y * hy + z * hz) + (o.x * hx + o.y * hy + o.z * hz));
+            let half = upper_angle(y.abs(), x);
+            pairs.azimuths[k] = ((if y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
+            pairs.elevations[k] = upper_angle(z.max(0.0), (x * x + y * y).sqrt());
+        }
+    }
+}
+
+/// Azimuth in turns and elevation [rad] of one direction above the horizon, as [`LightPairs`] has them, to the same bits.
+pub fn azimuth_and_elevation(d: Vec3) -> (f32, f32) {
+    let half = upper_angle(d.y.abs(), d.x);
+    let azimuth = ((if d.y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
+    (azimuth, upper_angle(d.z.max(0.0), (d.x * d.x + d.y * d.y).sqrt()))
+}
 
 /// The angle of `(x, y)` in `[0, π]` for `y >= 0`, 0 at the origin; absolute error 1e-7 and rounding (Abramowitz and Stegun,
 /// 4.4.49).

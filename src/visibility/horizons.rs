@@ -11,7 +11,7 @@ use super::height_march::HeightMarch;
 use super::ray_cast::lifted_origin;
 use super::scan::BlockedSlopes;
 use super::slicer::Slicer;
-use crate::directions::{from_angles, to_angles};
+use crate::directions::from_angles;
 use crate::geometry::{Facets, HeightGrid};
 use crate::simd;
 
@@ -40,10 +40,11 @@ impl Horizons {
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
         Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
+            let slicer = slicer.turned(along.truncate());
             let mut blocked = BlockedSlopes::default();
             for (facet, horizon) in row.iter_mut().enumerate() {
                 let origin = lifted_origin(facets, facet, diagonal);
-                slicer.scan(origin, facets.normals[facet], along.truncate(), facets.triangles[facet], &mut blocked);
+                slicer.scan(origin, facets.normals[facet], facets.triangles[facet], &mut blocked);
                 *horizon = blocked.highest();
             }
             blocked.cut_short
@@ -118,11 +119,11 @@ impl Horizons {
         &self.elevations[azimuth * self.facets..][..self.facets]
     }
 
-    /// The two azimuths around a direction's, and their weights.
-    pub(super) fn taps(&self, direction: Vec3) -> [(usize, f32); 2] {
-        let at = to_angles(direction).1 / TAU * self.azimuths as f32;
-        let from = at as usize % self.azimuths;
-        let blend = at - at.floor();
+    /// The two azimuths around one [turns], and their weights.
+    pub(crate) fn taps(&self, azimuth: f32) -> [(usize, f32); 2] {
+        let at = azimuth * self.azimuths as f32;
+        let below = at as usize;
+        let (from, blend) = (below % self.azimuths, at - below as f32);
         [(from, 1.0 - blend), ((from + 1) % self.azimuths, blend)]
     }
 
@@ -134,22 +135,36 @@ impl Horizons {
     }
 
     /// `Σ w v(direction) v_o` over a run of facets with weights `w`, where `v_o` are visibilities of all facets along another
-    /// direction: [`Horizons::fill`] and [`simd::masked_sum`] at once, to the same bits.
-    pub fn seen_along<'a>(&'a self, direction: Vec3, v_o: &'a [f32]) -> impl Fn(Range<usize>, &[f32]) -> f64 + 'a {
-        let [(from, _), (to, blend)] = self.taps(direction);
-        let (from, to) = (self.row(from), self.row(to));
-        let elevation = FRAC_PI_2 - to_angles(direction).0;
-        move |range, weights| {
-            let (from, to, v_o) = (&from[range.clone()], &to[range.clone()], &v_o[range]);
-            simd::ground_masked_sum(weights, v_o, from, to, blend, elevation, 1.0 / self.ramp)
-        }
+    /// direction: [`Horizons::fill`] and [`simd::masked_sum`] at once, to the same bits. Azimuth in turns.
+    pub(crate) fn seen_along(
+        &self,
+        [azimuth, elevation]: [f32; 2],
+        range: Range<usize>,
+        weights: &[f32],
+        v_o: &[f32],
+    ) -> f64 {
+        let [(from, _), (to, blend)] = self.taps(azimuth);
+        let (from, to, v_o) = (&self.row(from)[range.clone()], &self.row(to)[range.clone()], &v_o[range]);
+        simd::ground_masked_sum(weights, v_o, from, to, blend, elevation, 1.0 / self.ramp)
+    }
+
+    /// Of each azimuth and run of facets, the elevations below which no facet and above which every facet sees a direction.
+    pub(crate) fn reach(&self, runs: &[Range<usize>]) -> Vec<[f32; 2]> {
+        let of = |horizons: &[f32]| {
+            let (low, high) = horizons.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
+                (if at < low { at } else { low }, if at > high { at } else { high })
+            });
+            // A little more than the ramp: the blend of two azimuths rounds.
+            [low - 0.51 * self.ramp - 1e-6, high + 0.51 * self.ramp + 1e-6]
+        };
+        (0..self.azimuths).flat_map(|azimuth| runs.iter().map(move |run| of(&self.row(azimuth)[run.clone()]))).collect()
     }
 
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
-        let [(from, _), (to, blend)] = self.taps(direction);
+        let (azimuth, elevation) = simd::azimuth_and_elevation(direction);
+        let [(from, _), (to, blend)] = self.taps(azimuth);
         let row = |azimuth: usize| &self.row(azimuth)[range.clone()];
-        let elevation = FRAC_PI_2 - to_angles(direction).0;
         simd::ground_visibility(row(from), row(to), blend, elevation, 1.0 / self.ramp, out);
     }
 }

@@ -3,7 +3,7 @@
 use glam::{IVec2, Vec2, Vec3};
 
 use super::periodic_grid::CellWalk;
-use super::slicer::Slicer;
+use super::slicer::TurnedSlicer;
 
 /// Blocked slopes (tangents of the elevation), sorted and disjoint, within `[0, ∞]`.
 #[derive(Debug, Default, Clone)]
@@ -105,10 +105,10 @@ const LOWEST_SLOPE: f32 = 0.005;
 /// the horizon (2° for pyramids of 100 tiles) and is left out; [`BlockedSlopes::cut_short`] counts such walks.
 const LEAST_LOOKS: usize = 16_384;
 
-impl Slicer<'_> {
-    /// Fills `blocked` with what a facet does not see along the unit plane direction `along`; `own` is ignored.
-    pub(super) fn scan(&self, origin: Vec3, normal: Vec3, along: Vec2, own: u32, blocked: &mut BlockedSlopes) {
-        let grid = self.grid;
+impl TurnedSlicer<'_> {
+    /// Fills `blocked` with what a facet does not see along the slicer's direction; its `own` triangle is ignored.
+    pub(super) fn scan(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
+        let (grid, along) = (self.grid, self.along);
         blocked.start_from_facing(normal, along);
         if blocked.ground == f32::INFINITY || grid.cancel.is_set() {
             return;
@@ -137,7 +137,7 @@ impl Slicer<'_> {
             let floor = origin.z + walk.entered * blocked.ground;
             if grid.z_max[cell] > floor {
                 let home = origin - (tile.as_vec2() * grid.tile_size).extend(0.0);
-                self.for_each_cut(cell, home, along, floor, |entry, low, high| {
+                self.for_each_cut(cell, home, floor, |entry, low, high| {
                     blocked.work += 1;
                     if entry.triangle == own && grid.lies_on(home, grid.copy_corners(entry, IVec2::ZERO)) {
                         return;

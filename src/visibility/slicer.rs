@@ -20,7 +20,7 @@ struct Block {
 /// A periodic grid made ready for vertical slices.
 #[derive(Debug)]
 pub(super) struct Slicer<'a> {
-    pub grid: &'a PeriodicGrid,
+    grid: &'a PeriodicGrid,
     starts: Vec<u32>,
     blocks: Vec<Block>,
 }
@@ -37,26 +37,49 @@ impl<'a> Slicer<'a> {
         Self { grid, starts, blocks }
     }
 
+    /// Ready for slices along the unit plane direction `along`.
+    pub fn turned(&self, along: Vec2) -> TurnedSlicer<'_> {
+        let blocks = self.blocks.iter().map(|block| block.turned(along)).collect();
+        TurnedSlicer { grid: self.grid, along, starts: &self.starts, blocks }
+    }
+}
+
+/// Four entries of a cell by their distances across the slices and along them: what lies beside a slice is told by two
+/// comparisons.
+#[derive(Debug, Clone)]
+struct TurnedBlock {
+    across: [Vec4; 3],
+    along: [Vec4; 3],
+    z: [Vec4; 3],
+    first: Vec4,
+    last: Vec4,
+    z_max: Vec4,
+}
+
+/// A grid seen in slices of one direction.
+#[derive(Debug)]
+pub(super) struct TurnedSlicer<'a> {
+    pub grid: &'a PeriodicGrid,
+    pub along: Vec2,
+    starts: &'a [u32],
+    blocks: Vec<TurnedBlock>,
+}
+
+impl TurnedSlicer<'_> {
     /// Blocks of triangles that a cell holds.
     pub fn blocks_in(&self, cell: usize) -> usize {
         (self.starts[cell + 1] - self.starts[cell]) as usize
     }
 
-    /// Calls `visit` with each entry of a cell that the half-plane from `origin` (seen from the cell's own tile copy) along
-    /// `along` cuts, and with the slopes `(low, high)` it covers; triangles no higher than `floor` are left out.
+    /// Calls `visit` with each entry of a cell that the half-plane from `origin` (seen from the cell's own tile copy) cuts,
+    /// and with the slopes `(low, high)` it covers; triangles no higher than `floor` are left out.
     #[inline]
-    pub fn for_each_cut(
-        &self,
-        cell: usize,
-        origin: Vec3,
-        along: Vec2,
-        floor: f32,
-        mut visit: impl FnMut(CellEntry, f32, f32),
-    ) {
+    pub fn for_each_cut(&self, cell: usize, origin: Vec3, floor: f32, mut visit: impl FnMut(CellEntry, f32, f32)) {
         let entries = self.grid.entries(cell);
         let blocks = &self.blocks[self.starts[cell] as usize..self.starts[cell + 1] as usize];
+        let origin = Vec3::new(self.along.perp_dot(origin.truncate()), self.along.dot(origin.truncate()), origin.z);
         for (block, entries) in blocks.iter().zip(entries.chunks(WIDTH)) {
-            let Some(cut) = block.cut(origin, along, floor) else { continue };
+            let Some(cut) = block.cut(origin, floor) else { continue };
             let mut lanes = cut.ahead | cut.over;
             let (low, high) = (cut.low.to_array(), cut.high.to_array());
             while lanes != 0 {
@@ -64,9 +87,7 @@ impl<'a> Slicer<'a> {
                 lanes &= lanes - 1;
                 if cut.over >> lane & 1 == 0 {
                     visit(entries[lane], low[lane], high[lane]);
-                } else if let Some((low, high)) =
-                    slice(origin, along, self.grid.copy_corners(entries[lane], IVec2::ZERO))
-                {
+                } else if let Some((low, high)) = slice(block.corners(lane).map(|corner| corner - origin)) {
                     visit(entries[lane], low, high);
                 }
             }
@@ -99,16 +120,33 @@ impl Block {
         block
     }
 
-    /// The twin of [`slice`] for four triangles; `None` where no lane is cut above `floor`.
+    fn turned(&self, direction: Vec2) -> TurnedBlock {
+        let across: [Vec4; 3] = std::array::from_fn(|k| direction.x * self.y[k] - direction.y * self.x[k]);
+        let along = std::array::from_fn(|k| direction.x * self.x[k] + direction.y * self.y[k]);
+        let first = across[0].min(across[1]).min(across[2]);
+        let last = across[0].max(across[1]).max(across[2]);
+        TurnedBlock { across, along, z: self.z, first, last, z_max: self.z_max }
+    }
+}
+
+impl TurnedBlock {
+    /// Corners of one triangle: across, along, up.
+    fn corners(&self, lane: usize) -> [Vec3; 3] {
+        std::array::from_fn(|k| Vec3::new(self.across[k][lane], self.along[k][lane], self.z[k][lane]))
+    }
+
+    /// The twin of [`slice`] for four triangles, from a point with distances across and along and a height; `None` where no
+    /// lane is cut above `floor`.
     #[inline]
-    fn cut(&self, origin: Vec3, along: Vec2, floor: f32) -> Option<Cut> {
-        let seen = |k: usize| Seen::new(self.x[k], self.y[k], self.z[k], origin, along);
-        let (a, b, c) = (seen(0), seen(1), seen(2));
-        let apart = (a.left() ^ b.left()) | (b.left() ^ c.left());
-        let met = apart & self.z_max.cmpgt(Vec4::splat(floor));
+    fn cut(&self, origin: Vec3, floor: f32) -> Option<Cut> {
+        let at = Vec4::splat(origin.x);
+        let met = self.first.cmplt(at) & self.last.cmpge(at) & self.z_max.cmpgt(Vec4::splat(floor));
         if !met.any() {
             return None;
         }
+        let seen =
+            |k: usize| Seen { across: self.across[k] - at, along: self.along[k] - origin.y, up: self.z[k] - origin.z };
+        let (a, b, c) = (seen(0), seen(1), seen(2));
         let mut covered =
             Covered { low: Vec4::INFINITY, high: Vec4::NEG_INFINITY, ahead: BVec4A::FALSE, behind: BVec4A::FALSE };
         covered.cross_edge(&a, &b);
@@ -132,12 +170,6 @@ struct Seen {
 }
 
 impl Seen {
-    #[inline]
-    fn new(x: Vec4, y: Vec4, z: Vec4, origin: Vec3, along: Vec2) -> Self {
-        let (x, y) = (x - origin.x, y - origin.y);
-        Self { across: along.x * y - along.y * x, along: along.x * x + along.y * y, up: z - origin.z }
-    }
-
     #[inline]
     fn left(&self) -> BVec4A {
         self.across.cmpge(Vec4::ZERO)
@@ -168,14 +200,9 @@ impl Covered {
     }
 }
 
-/// The slopes that a triangle covers in the vertical half-plane from `origin` along `along`; none below the horizon.
-fn slice(origin: Vec3, along: Vec2, corners: [Vec3; 3]) -> Option<(f32, f32)> {
-    let across = along.perp();
-    // (distance across the plane, distance along it, height above the origin)
-    let [a, b, c] = corners.map(|p| {
-        let q = p - origin;
-        Vec3::new(across.dot(q.truncate()), along.dot(q.truncate()), q.z)
-    });
+/// The slopes that a triangle covers in the vertical half-plane from a point: its corners are seen from there, as distances
+/// across the plane, along it and up; none below the horizon.
+fn slice([a, b, c]: [Vec3; 3]) -> Option<(f32, f32)> {
     let side = |p: Vec3| p.x >= 0.0;
     if side(a) == side(b) && side(b) == side(c) {
         return None;

@@ -10,7 +10,7 @@ use super::ray_cast::lifted_origin;
 use super::scan::BlockedSlopes;
 use super::slicer::Slicer;
 use super::{Horizons, PackedVisibility, PeriodicGrid, SoftMaps};
-use crate::directions::{PolarGrid, from_angles, to_angles};
+use crate::directions::{PolarGrid, from_angles};
 use crate::geometry::Facets;
 use crate::simd;
 
@@ -45,11 +45,13 @@ impl Slices {
         const AZIMUTHS: usize = 5;
         let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
         let mut blocked = BlockedSlopes::default();
-        for facet in (0..FACETS.min(facets.len())).map(|k| k * facets.len() / FACETS.min(facets.len())) {
-            for azimuth in 0..AZIMUTHS {
-                let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
+        let looked_at = FACETS.min(facets.len());
+        for azimuth in 0..AZIMUTHS {
+            let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
+            let slicer = slicer.turned(along);
+            for facet in (0..looked_at).map(|k| k * facets.len() / looked_at) {
                 let origin = lifted_origin(facets, facet, diagonal);
-                slicer.scan(origin, facets.normals[facet], along, facets.triangles[facet], &mut blocked);
+                slicer.scan(origin, facets.normals[facet], facets.triangles[facet], &mut blocked);
             }
         }
         blocked.work as f64 / (FACETS * AZIMUTHS) as f64
@@ -62,11 +64,12 @@ impl Slices {
             .into_par_iter()
             .map(|azimuth| {
                 let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
+                let slicer = slicer.turned(along);
                 let mut blocked = BlockedSlopes::default();
                 let (mut row, mut above) = (Vec::with_capacity(facets.len()), Vec::new());
                 for facet in 0..facets.len() {
                     let origin = lifted_origin(facets, facet, diagonal);
-                    slicer.scan(origin, facets.normals[facet], along, facets.triangles[facet], &mut blocked);
+                    slicer.scan(origin, facets.normals[facet], facets.triangles[facet], &mut blocked);
                     row.push(blocked.ground);
                     above.extend(blocked.floating_unfaced().map(|(low, high)| Floating {
                         facet: facet as u32,
@@ -101,8 +104,8 @@ impl Slices {
 
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
-        let [(from, _), (to, blend)] = self.horizons.taps(direction);
-        let elevation = FRAC_PI_2 - to_angles(direction).0;
+        let (azimuth, elevation) = simd::azimuth_and_elevation(direction);
+        let [(from, _), (to, blend)] = self.horizons.taps(azimuth);
         let sharpness = 1.0 / self.horizons.ramp();
         let row = |azimuth: usize| &self.horizons.row(azimuth)[range.clone()];
         let switch = &self.switch[range.clone()];

@@ -78,7 +78,7 @@ fn evaluators(mesh: &TileMesh, facets: &Facets) -> [(&'static str, EffectiveBrdf
     let factors = LowRank::build(facets, &visibility, &slots, &materials, &settings).unwrap();
     let sum = Arc::new(FacetSum::new(facets, &slots, &materials));
     [
-        ("direct", EffectiveBrdf { form: Form::Direct(Direct { sum, visibility }), base_area }),
+        ("direct", EffectiveBrdf { form: Form::Direct(Direct::new(sum, visibility)), base_area }),
         ("low rank", EffectiveBrdf { form: Form::LowRank(factors), base_area }),
     ]
 }

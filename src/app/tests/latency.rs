@@ -6,16 +6,23 @@ use super::{editor, harness};
 use crate::app::document::Document;
 use crate::app::worker::Grade;
 
-/// Milliseconds to the first and to the final picture.
-fn after_an_edit(name: &str, backend: &str) -> (f64, f64, f64) {
+/// Longer than this nobody waits for the final picture.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Milliseconds to the first, the refined and the final picture; NaN for what did not come in time.
+fn after_an_edit(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
     let mut harness = harness(Document::open(name).unwrap());
     let mut scene = (**editor(&mut harness).document.scene()).clone();
     scene.quality.backend = backend.to_owned();
     editor(&mut harness).document.edit(scene);
     harness.step();
-    super::settle(&mut harness);
+    let opened = Instant::now();
+    while editor(&mut harness).is_busy() && opened.elapsed() < PATIENCE {
+        harness.step();
+        std::thread::sleep(Duration::from_millis(10));
+    }
     let mut times = Vec::new();
-    for _ in 0..3 {
+    for _ in 0..edits {
         let mut scene = (**editor(&mut harness).document.scene()).clone();
         scene.nudge_geometry().unwrap();
         let start = Instant::now();
@@ -32,7 +39,9 @@ fn after_an_edit(name: &str, backend: &str) -> (f64, f64, f64) {
                 };
                 seen[at].get_or_insert(start.elapsed().as_secs_f64() * 1e3);
             }
-            assert!(start.elapsed() < Duration::from_secs(300), "{name}");
+            if start.elapsed() > PATIENCE {
+                break;
+            }
             std::thread::sleep(Duration::from_millis(2));
         }
         times.push(seen);
@@ -48,12 +57,14 @@ fn after_an_edit(name: &str, backend: &str) -> (f64, f64, f64) {
 #[test]
 #[ignore = "prints numbers of one scene, of all five with BISCALE_TABLE=1: cargo test --release --bin biscale latency -- --ignored --nocapture"]
 fn latency_from_a_slider_on_the_scenes_of_table_4() {
-    println!("scene            route  draft  refined (coarse)  final   [ms, median of 3 geometry edits]");
+    println!(
+        "scene            route  draft  refined (coarse)  final   [ms, median of 3 geometry edits; of 1 on the GPU]"
+    );
     let all = std::env::var_os("BISCALE_TABLE").is_some();
     let scenes = ["table4_cup", "table4_plate", "table4_teapot", "table4_pillow", "table4_skirt"];
     for name in &scenes[..if all { 5 } else { 1 }] {
-        for backend in ["cpu", "gpu"] {
-            let (draft, coarse, last) = after_an_edit(name, backend);
+        for (backend, edits) in [("cpu", 3), ("gpu", 1)] {
+            let (draft, coarse, last) = after_an_edit(name, backend, edits);
             println!("{name:<16} {backend:<5} {draft:>6.0} {coarse:>12.0} {last:>12.0}");
             assert!(draft.is_finite());
         }

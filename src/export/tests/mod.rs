@@ -40,7 +40,7 @@ fn brdf_of(mesh: &TileMesh, term: Term) -> EffectiveBrdf {
     };
     let materials = [SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::new(1.0, 0.5, 0.25) }];
     let sum = FacetSum::new(&facets, &[0], &materials);
-    let form = Form::Direct(Direct { sum: Arc::new(sum), visibility: Arc::new(visibility) });
+    let form = Form::Direct(Direct::new(Arc::new(sum), Arc::new(visibility)));
     EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
 }
 

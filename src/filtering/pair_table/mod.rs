@@ -43,15 +43,18 @@ pub struct PairTable {
 const AREA_GRID: [usize; 2] = [30, 72];
 
 impl PairTable {
-    /// Sums over facets at every node. `None` where the sum has too many parts for a table to pay.
+    /// Sums over facets at every node, or at half or a quarter of them where planes x = const and y = const `mirrors` the tile.
+    /// `None` where the sum has too many parts for a table to pay.
     ///
     /// # Errors
     /// [`crate::Error::Cancelled`].
-    pub fn build(direct: &Direct, grid: UpperPairs, cancel: &Cancel) -> Result<Option<Self>> {
+    pub fn build(direct: &Direct, grid: UpperPairs, mirrors: [bool; 2], cancel: &Cancel) -> Result<Option<Self>> {
         let Some(columns) = Column::of(&direct.sum) else { return Ok(None) };
-        let weights = columns.iter().map(|column| column.weight(&direct.sum)).collect();
+        let weights: Vec<Weight> = columns.iter().map(|column| column.weight(&direct.sum)).collect();
+        // Facets of one normal are not what their mirror image is.
+        let mirrors = if weights.iter().any(Weight::is_lobe) { [false; 2] } else { mirrors };
         let area = |o: Vec3| direct.sums(&[], o, |_, _| {});
-        let table = Self::tabulate(grid, weights, true, area, cancel, |i, o, sums| {
+        let table = Self::tabulate((grid, mirrors), weights, true, area, cancel, |i, o, sums| {
             let pair = PairVectors::new(i, o);
             direct.with_seen(i, o, |v_i, v_o| {
                 for (column, sum) in columns.iter().zip(sums) {
@@ -69,11 +72,12 @@ impl PairTable {
     pub fn resample(
         sums: impl Fn(&[Vec3], Vec3, &mut [DVec3]) -> f64 + Sync,
         grid: UpperPairs,
+        mirrors: [bool; 2],
         cancel: &Cancel,
     ) -> Result<Self> {
         let weights = Vec3::AXES.map(Weight::Fixed).to_vec();
         Self::tabulate(
-            grid,
+            (grid, mirrors),
             weights,
             false,
             |o| sums(&[], o, &mut []),
@@ -88,7 +92,7 @@ impl PairTable {
 
     /// `fill` writes the columns of a pair, `area` tells `a_v(o)`.
     fn tabulate(
-        grid: UpperPairs,
+        (grid, mirrors): (UpperPairs, [bool; 2]),
         weights: Vec<Weight>,
         of_sum: bool,
         area: impl Fn(Vec3) -> f64 + Sync,
@@ -97,9 +101,14 @@ impl PairTable {
     ) -> Result<Self> {
         let (fours, stored) = (weights.len().div_ceil(4), grid.difference + 2);
         let mut values = vec![Vec4::ZERO; grid.half_vectors() * grid.turn * stored * fours];
-        let half_vectors = values.par_chunks_mut(grid.turn * stored * fours).enumerate();
+        let (turn, half_vector) = (stored * fours, grid.turn * stored * fours);
+        let made_of: Vec<(usize, bool)> = (0..grid.azimuths).map(|azimuth| grid.image(azimuth, mirrors)).collect();
+        let half_vectors = values.par_chunks_mut(half_vector).enumerate();
         half_vectors.try_for_each(|(half_vector, nodes)| {
             cancel.check()?;
+            if made_of[half_vector % grid.azimuths].0 != half_vector % grid.azimuths {
+                return Ok(());
+            }
             let mut sums = vec![0.0; 4 * fours];
             for (turn, row) in nodes.chunks_mut(stored * fours).enumerate() {
                 for step in 0..grid.difference {
@@ -117,6 +126,15 @@ impl PairTable {
             }
             Ok::<_, crate::Error>(())
         })?;
+        for (azimuth, &(image, turned)) in made_of.iter().enumerate().filter(|(azimuth, (image, _))| image != azimuth) {
+            for ring in 0..grid.rings {
+                let place = |azimuth: usize| (ring * grid.azimuths + azimuth) * half_vector;
+                for step in 0..grid.turn {
+                    let from = place(image) + turn * if turned { (grid.turn - step) % grid.turn } else { step };
+                    values.copy_within(from..from + turn, place(azimuth) + turn * step);
+                }
+            }
+        }
         let directions = PolarGrid::new(AREA_GRID[0], AREA_GRID[1]);
         let areas = directions.directions().into_par_iter().map(|o| (area(o) / f64::from(o.z)) as f32).collect();
         Ok(Self {

@@ -1,0 +1,123 @@
+//! The sum over a tile of few normals for many lights at once: one lobe a normal, worked out for all lights together, times
+//! the area that light and view both see. That area needs no sum where the light is above or below all horizons of a normal.
+
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use super::facet_groups::{Group, Patch};
+use super::facet_sum::FacetSum;
+use crate::brdf::LobeAngles;
+use crate::simd::{self, LightPairs};
+use crate::visibility::{Horizons, Visibility};
+
+/// What is known of each run of facets with one normal before any direction is asked for.
+#[derive(Debug, Clone)]
+pub(super) struct FewNormals {
+    runs: usize,
+    /// `[azimuth][run]`: elevations [rad] up to which no facet and from which on every facet sees a direction.
+    reach: Vec<[f32; 2]>,
+}
+
+/// Runs of one normal with their groups; black groups have none.
+fn runs(sum: &FacetSum) -> impl Iterator<Item = (&Group, &Patch)> {
+    let lit = sum.groups().iter().filter(|group| !group.is_black);
+    lit.flat_map(|group| group.patches.iter().flatten().map(move |patch| (group, patch)))
+}
+
+impl FewNormals {
+    /// `None` where normals are many, colours vary over facets of one material, or visibility is not held as horizons.
+    pub(super) fn of(sum: &FacetSum, visibility: &Visibility) -> Option<Self> {
+        let Visibility::Horizons(horizons) = visibility else { return None };
+        let ranges: Vec<Range<usize>> =
+            sum.has_few_normals().then(|| runs(sum).map(|(_, patch)| patch.range.clone()).collect())?;
+        Some(Self { runs: ranges.len(), reach: horizons.reach(&ranges) })
+    }
+
+    /// `a_v f̄` of each light into `out`, from the visibilities `v_o` of all facets along `o`.
+    pub(super) fn sums(
+        &self,
+        sum: &FacetSum,
+        horizons: &Horizons,
+        lights: &[Vec3],
+        o: Vec3,
+        v_o: &[f32],
+        pairs: &mut LightPairs,
+        mut out: impl FnMut(usize, DVec3),
+    ) {
+        for (part, lights) in lights.chunks(LightPairs::MOST).enumerate() {
+            pairs.set(lights, o);
+            let mut totals = [DVec3::ZERO; LightPairs::MOST];
+            for (run, (group, patch)) in runs(sum).enumerate() {
+                if patch.normal.dot(o) > 0.0 {
+                    let seen = self.seen(run, sum, patch, horizons, pairs, lights.len(), v_o);
+                    add(group, patch.normal, pairs, &seen[..lights.len()], &mut totals);
+                }
+            }
+            for (k, (total, light)) in totals.into_iter().zip(lights).enumerate() {
+                out(part * LightPairs::MOST + k, if light.z > 0.0 { total } else { DVec3::ZERO });
+            }
+        }
+    }
+
+    /// The area of a run that each light and the view see.
+    fn seen(
+        &self,
+        run: usize,
+        sum: &FacetSum,
+        patch: &Patch,
+        horizons: &Horizons,
+        pairs: &LightPairs,
+        lights: usize,
+        v_o: &[f32],
+    ) -> [f64; LightPairs::MOST] {
+        let areas = sum.areas(patch.range.clone());
+        let along =
+            |azimuth: f32, elevation: f32| horizons.seen_along([azimuth, elevation], patch.range.clone(), areas, v_o);
+        let mut all = None;
+        let mut seen = [0.0; LightPairs::MOST];
+        for (k, seen) in seen.iter_mut().enumerate().take(lights) {
+            let (azimuth, elevation) = (pairs.azimuths[k], pairs.elevations[k]);
+            if patch.normal.dot(pairs.light(k)) <= 0.0 {
+                continue;
+            }
+            let [a, b] = horizons.taps(azimuth).map(|(azimuth, _)| self.reach[azimuth * self.runs + run]);
+            *seen = if elevation >= a[1].max(b[1]) {
+                *all.get_or_insert_with(|| along(azimuth, ABOVE_ALL))
+            } else if elevation <= a[0].min(b[0]) {
+                0.0
+            } else {
+                along(azimuth, elevation)
+            };
+        }
+        seen
+    }
+}
+
+/// Higher than any horizon [rad].
+const ABOVE_ALL: f32 = 4.0;
+
+/// Adds what facets of one normal reflect of each light.
+fn add(group: &Group, normal: Vec3, pairs: &LightPairs, seen: &[f64], totals: &mut [DVec3; LightPairs::MOST]) {
+    if seen.iter().all(|&seen| seen == 0.0) {
+        return;
+    }
+    let color = group.color.as_dvec3();
+    let mut values = [0.0; LightPairs::MOST];
+    for (lobe, term) in &group.lobes {
+        simd::light_lobes(*lobe, pairs, normal, &mut values);
+        for (k, (seen, total)) in seen.iter().zip(&mut *totals).enumerate().filter(|(_, (seen, _))| **seen > 0.0) {
+            *total += color * term.tint(pairs.i_dot_h[k]).as_dvec3() * (f64::from(values[k]) * seen);
+        }
+    }
+    for table in &group.measured {
+        for (k, (seen, total)) in seen.iter().zip(&mut *totals).enumerate().filter(|(_, (seen, _))| **seen > 0.0) {
+            let h = Vec3::new(pairs.h[0][k], pairs.h[1][k], pairs.h[2][k]);
+            let angles = LobeAngles::new(normal, pairs.light(k), pairs.o, h);
+            if angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
+                let value = table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
+                *total += color * value.as_dvec3() * *seen;
+            }
+        }
+    }
+}
