@@ -6,6 +6,10 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, InputError, Result};
+use crate::progress::{self, Progress};
+
+/// Bytes that are written between two calls of the progress function.
+const BYTES_A_STEP: usize = 1 << 20;
 
 /// Writes `bytes` beside `path` and renames.
 ///
@@ -13,6 +17,21 @@ use crate::error::{Error, InputError, Result};
 /// A place that cannot be written; what was there stays.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
     replacing(path, |out| out.write_all(bytes))
+}
+
+/// [`replace_file`] of what takes long to write.
+///
+/// # Errors
+/// As [`replace_file`], and [`Error::Cancelled`] when `progress` says so.
+pub(super) fn replace_large_file(path: &Path, bytes: &[u8], progress: &Progress<'_>) -> Result<()> {
+    replacing(path, |out| {
+        for (k, chunk) in bytes.chunks(BYTES_A_STEP).enumerate() {
+            let part = (k * BYTES_A_STEP) as f32 / bytes.len() as f32;
+            progress::tell(progress, part).map_err(io::Error::other)?;
+            out.write_all(chunk)?;
+        }
+        progress::tell(progress, 1.0).map_err(io::Error::other)
+    })
 }
 
 /// Opens a file beside `path`, lets `content` fill it, and renames it to `path`. Devices and pipes are written to.

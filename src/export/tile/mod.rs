@@ -11,9 +11,10 @@ use std::path::Path;
 
 use glam::{UVec2, Vec3};
 
-use super::replace_file;
+use super::replace::replace_large_file;
 use crate::error::{InputError, Result};
 use crate::geometry::TileMesh;
+use crate::progress::{Progress, part};
 use crate::scene::{BrdfSpec, Scene, TermSpec};
 
 /// What may be chosen about the files of a tile.
@@ -38,6 +39,8 @@ impl Default for TileOptions {
 /// Most periods, and most height samples of all of them together: a solid of 400 MB.
 const MOST_PERIODS: u32 = 10_000;
 const MOST_SAMPLES: u64 = 1 << 22;
+/// Most triangles of all periods together in an OBJ file: some hundred MB.
+const MOST_TRIANGLES: u64 = 1 << 24;
 
 impl TileOptions {
     fn check(&self) -> Result<()> {
@@ -66,25 +69,53 @@ fn check_samples(options: &TileOptions) -> Result<()> {
     Ok(())
 }
 
+/// Whether an OBJ file's triangles are of a number that can be held.
+fn check_triangles(mesh: &TileMesh, options: &TileOptions) -> Result<()> {
+    let all = u64::from(options.repeat.x) * u64::from(options.repeat.y) * mesh.triangles.len() as u64;
+    if all > MOST_TRIANGLES {
+        let expected = format!("at most {MOST_TRIANGLES} in all periods together");
+        return Err(InputError::new("repeat", format!("{all} triangles"), expected).into());
+    }
+    Ok(())
+}
+
+/// The part of the work that is done once the content is made and only to be written.
+const MADE: f32 = 0.7;
+
 /// Writes the tile of a scene by the ending of `path`, and returns what to know about the file.
 ///
 /// # Errors
-/// An unknown ending, an option out of range, a geometry without a pattern, a place that cannot be written.
-pub fn write(scene: &Scene, mesh: &TileMesh, options: &TileOptions, path: &Path) -> Result<Vec<String>> {
+/// An unknown ending, an option out of range, a geometry without a pattern, a place that cannot be written,
+/// [`crate::Error::Cancelled`] when `progress` says so. An old file stays whole then.
+pub fn write(
+    scene: &Scene,
+    mesh: &TileMesh,
+    options: &TileOptions,
+    path: &Path,
+    progress: &Progress<'_>,
+) -> Result<Vec<String>> {
     options.check()?;
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if matches!(ending.as_str(), "stl" | "png") {
         check_samples(options)?;
     }
+    let (making, writing) = (part(progress, 0.0, MADE), part(progress, MADE, 1.0));
+    let drawing = part(&making, 0.5, 1.0);
+    let sheet = || pattern::sheet(scene, options, millimetres(&scene.tile.unit)?, &part(&making, 0.0, 0.5));
     let (bytes, notes) = match ending.as_str() {
-        "obj" => mesh::obj(mesh, options),
-        "stl" => solid::stl(mesh, options, millimetres(&scene.tile.unit)?),
-        "png" => heights::png(mesh, options, &scene.tile.unit)?,
+        "obj" => {
+            check_triangles(mesh, options)?;
+            mesh::obj(mesh, options, &making)?
+        }
+        "stl" => solid::stl(mesh, options, millimetres(&scene.tile.unit)?, &making)?,
+        "png" => heights::png(mesh, options, &scene.tile.unit, &making)?,
         "svg" => {
-            pattern::sheet(scene, options, millimetres(&scene.tile.unit)?).map(|(page, notes)| (page.svg(), notes))?
+            let (page, notes) = sheet()?;
+            (page.svg(&drawing)?, notes)
         }
         "pdf" => {
-            pattern::sheet(scene, options, millimetres(&scene.tile.unit)?).map(|(page, notes)| (page.pdf(), notes))?
+            let (page, notes) = sheet()?;
+            (page.pdf(&drawing)?, notes)
         }
         other => {
             let found =
@@ -93,7 +124,7 @@ pub fn write(scene: &Scene, mesh: &TileMesh, options: &TileOptions, path: &Path)
             return Err(InputError::new("output", found, expected).in_file(path).into());
         }
     };
-    replace_file(path, &bytes)?;
+    replace_large_file(path, &bytes, &writing)?;
     Ok(notes)
 }
 
