@@ -15,7 +15,7 @@ use super::replace::replace_large_file;
 use crate::error::{InputError, Result};
 use crate::geometry::TileMesh;
 use crate::progress::{Progress, part};
-use crate::scene::{BrdfSpec, Scene, TermSpec};
+use crate::scene::{BrdfSpec, Scene, TermSpec, Tile};
 
 /// What may be chosen about the files of a tile.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +102,7 @@ pub fn write(
     let (making, writing) = (part(progress, 0.0, MADE), part(progress, MADE, 1.0));
     let drawing = part(&making, 0.5, 1.0);
     let sheet = || pattern::sheet(scene, options, millimetres(&scene.tile.unit)?, &part(&making, 0.0, 0.5));
-    let (bytes, notes) = match ending.as_str() {
+    let (bytes, mut notes) = match ending.as_str() {
         "obj" => {
             check_triangles(mesh, options)?;
             mesh::obj(mesh, options, &making)?
@@ -124,8 +124,22 @@ pub fn write(
             return Err(InputError::new("output", found, expected).in_file(path).into());
         }
     };
+    if matches!(ending.as_str(), "obj" | "svg" | "pdf") {
+        notes.extend(left_out(&scene.tile));
+    }
     replace_large_file(path, &bytes, &writing)?;
     Ok(notes)
+}
+
+/// What is painted over the tile and has no place in a file that shows materials.
+fn left_out(tile: &Tile) -> Option<String> {
+    let painted = match (&tile.color_path, &tile.slot_path) {
+        (None, None) => return None,
+        (Some(_), None) => "the image of colours (`tile.color_path`) is",
+        (None, Some(_)) => "the image of materials (`tile.slot_path`) is",
+        (Some(_), Some(_)) => "the images of colours and of materials (`tile.color_path`, `tile.slot_path`) are",
+    };
+    Some(format!("{painted} left out: each face stands in the plain material of its own slot"))
 }
 
 /// Millimetres of a tile unit.

@@ -164,3 +164,26 @@ fn a_pattern_keeps_the_area_of_what_it_unfolds() {
         assert!((printed / expected - 1.0).abs() < 1e-4, "{printed} {expected}");
     }
 }
+
+#[test]
+fn images_over_the_tile_that_a_file_leaves_out_are_named_in_its_notes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut scene, mesh) = scene_of(v_grooves());
+    let options = TileOptions { samples: UVec2::splat(16), ..TileOptions::default() };
+    let notes = |scene: &Scene, ending: &str| {
+        let path = folder.path().join("tile").with_extension(ending);
+        write(scene, &mesh, &options, &path, &silent).unwrap().join("; ")
+    };
+    for (colors, slots) in [(false, false), (true, false), (false, true), (true, true)] {
+        scene.tile.color_path = colors.then(|| "colors.png".into());
+        scene.tile.slot_path = slots.then(|| "slots.png".into());
+        for ending in ["obj", "svg", "pdf", "stl", "png"] {
+            // A solid and a picture of heights are of no colour.
+            let shows = !matches!(ending, "stl" | "png");
+            let notes = notes(&scene, ending);
+            assert_eq!(notes.contains("tile.color_path"), colors && shows, "{ending}: {notes}");
+            assert_eq!(notes.contains("tile.slot_path"), slots && shows, "{ending}: {notes}");
+            assert_eq!(notes.contains("left out"), (colors || slots) && shows, "{ending}: {notes}");
+        }
+    }
+}
