@@ -41,6 +41,8 @@ pub struct Editor {
     pub exchanged: bool,
     pub(super) stroke: Option<Stroke>,
     pub title: String,
+    /// The window has the focus again, and others may have written the file meanwhile.
+    came_back: bool,
     /// The window may go.
     pub leaving: bool,
     pub(super) background: Background,
@@ -90,6 +92,7 @@ impl Editor {
             exchanged: false,
             stroke: None,
             title: String::new(),
+            came_back: false,
             leaving: false,
             background,
             exporting: None,
@@ -135,9 +138,13 @@ impl Editor {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             self.perform(&ctx, Action::Quit);
         }
-        let came_back = ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
-        if came_back && self.dialog.is_none() && self.document.changed_on_disk() {
-            self.dialog = Some(Dialog::ChangedOnDisk { saving: false });
+        self.came_back |= ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
+        // Not over another question: the file is looked at once that is answered.
+        if self.came_back && self.dialog.is_none() {
+            self.came_back = false;
+            if self.document.changed_on_disk() {
+                self.dialog = Some(Dialog::ChangedOnDisk { saving: false });
+            }
         }
         if let Some(rect) = ctx.input(|input| input.viewport().inner_rect) {
             self.settings.window = rect.size().into();
