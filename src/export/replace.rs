@@ -39,7 +39,13 @@ pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
     // What `content` says in our own words stays so.
     let unwritable = |error: io::Error| {
         error.downcast::<Error>().unwrap_or_else(|error| {
-            InputError::new("output", error, "a place that can be written").in_file(path).into()
+            let full = matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
+            let error = if full {
+                InputError::new("output", "a full disk", "room for the file: free some, or choose another place")
+            } else {
+                InputError::new("output", error, "a place that can be written")
+            };
+            error.in_file(path).into()
         })
     };
     // Through a link, the file it leads to is replaced, not the link.

@@ -30,6 +30,8 @@ pub struct ObjectView {
     pub doing: Option<&'static str>,
     /// The version whose refinement was given up.
     pub stopped: Option<u64>,
+    /// The version of which no picture could be made.
+    pub failed: Option<u64>,
     pub kept: Option<Kept>,
     /// Where the wipe stands, 0 left to 1 right.
     pub wipe: f32,
@@ -49,7 +51,7 @@ impl ObjectView {
         if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
             return;
         }
-        self.since = None;
+        (self.since, self.failed) = (None, None);
         let options = TextureOptions::LINEAR;
         match &mut self.texture {
             Some(texture) => texture.set(made.image.clone(), options),
@@ -66,6 +68,11 @@ impl ObjectView {
             kept.texture.set(made.image.clone(), options);
         }
         self.made = Some(made);
+    }
+
+    /// No picture of this version comes: nothing is awaited any more.
+    pub fn fail(&mut self, version: u64) {
+        (self.doing, self.since, self.failed) = (None, None, Some(version));
     }
 
     /// Whether a picture has the shape that was asked for last.
