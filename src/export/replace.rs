@@ -41,7 +41,7 @@ pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
         error.downcast::<Error>().unwrap_or_else(|error| {
             let full = matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
             let error = if full {
-                InputError::new("output", "a full disk", "room for the file: free some, or choose another place")
+                InputError::new("output", "a full disk", "space for the file: free some, or choose another place")
             } else {
                 InputError::new("output", error, "a place that can be written")
             };

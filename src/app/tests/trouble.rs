@@ -102,6 +102,9 @@ fn a_scene_that_cannot_be_computed_says_so_and_nothing_spins_on() {
     };
     shows(&mut harness, "No picture could be made: see the message");
     assert!(editor(&mut harness).messages.texts().iter().any(|text| text.contains("not_there.binary")));
+    harness.run_steps(8);
+    let delay = harness.output().viewport_output[&egui::ViewportId::ROOT].repaint_delay;
+    assert!(delay.as_secs_f64() > 0.3, "nothing is painted again and again: {delay:?}");
     let ctx = harness.ctx.clone();
     editor(&mut harness).action(&ctx, Action::Undo);
     harness.step();

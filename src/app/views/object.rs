@@ -18,6 +18,8 @@ const NEAREST: f32 = 2.2;
 const SLOW: f32 = 0.33;
 /// A lens narrower than this widens before the camera moves away.
 const NARROW: f32 = 14.0;
+/// What the view leaves to the edges of panels, points.
+const EDGE: f32 = 6.0;
 
 /// What the view holds between frames.
 #[derive(Default)]
@@ -98,14 +100,16 @@ impl ObjectView {
     /// Shows the picture and moves the scene's camera and light by what the hand does. Returns the pixels it covers.
     pub fn ui(&mut self, ui: &mut Ui, scene: &mut Scene) -> [usize; 2] {
         let size = ui.available_size().max(vec2(64.0, 64.0));
-        let (area, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+        let (id, area) = ui.allocate_space(size);
+        // The edges of the panels beside it can be had from here, too.
+        let response = ui.interact(area.shrink2(vec2(EDGE, 0.0)), id, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Object view"));
         ui.painter().rect_filled(area, 0.0, Color32::from_gray(22));
         if let Some(texture) = &self.texture {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
             painter.image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
-        } else {
+        } else if self.failed.is_none() {
             ui.put(Rect::from_center_size(area.center(), vec2(40.0, 40.0)), egui::Spinner::new());
         }
         self.waiting_ui(ui, area);
@@ -132,7 +136,8 @@ impl ObjectView {
             ui.ctx().request_repaint_after_secs(left);
             return;
         }
-        let place = Rect::from_min_size(area.left_bottom() + vec2(10.0, -34.0), vec2(170.0, 26.0));
+        // Messages lie at the foot.
+        let place = Rect::from_min_size(area.left_top() + vec2(10.0, 8.0), vec2(170.0, 26.0));
         ui.painter().rect_filled(place, 5.0, Color32::from_black_alpha(150));
         ui.put(
             Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0)),
