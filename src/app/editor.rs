@@ -83,7 +83,7 @@ impl Editor {
         let dialog = (!recovered.is_empty()).then_some(Dialog::Recover(recovered));
         Self {
             recovery: folder.as_deref().map(RecoveryFile::new),
-            slots: materials::slots_of(&document.scene().tile.geometry),
+            slots: materials::slots_of(document.scene()),
             document,
             settings,
             folder,
@@ -238,14 +238,14 @@ impl Editor {
     }
 
     /// The scene as the panels and views left it, if it can be.
-    fn take_scene(&mut self, scene: Scene) {
+    pub(super) fn take_scene(&mut self, scene: Scene) {
         if scene == **self.document.scene() {
             return;
         }
         match scene.validate() {
             Ok(()) => {
                 self.messages.clear("edit");
-                self.slots = materials::slots_of(&scene.tile.geometry);
+                self.slots = materials::slots_of(&scene);
                 self.document.edit(scene);
             }
             Err(error) => self.messages.put(Level::Trouble, "edit", format!("Not taken over: {error}")),
