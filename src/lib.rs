@@ -29,6 +29,7 @@ pub mod interreflection;
 pub mod large_scale;
 pub mod pipeline;
 pub mod plan;
+pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod simd;
@@ -36,3 +37,4 @@ pub mod visibility;
 
 pub use cancel::Cancel;
 pub use error::{Error, InputError, Result};
+pub use progress::Progress;

@@ -92,7 +92,14 @@ impl Editor {
     }
 
     fn changed_on_disk(&mut self, ctx: &Context, saving: bool) -> bool {
-        let text = format!("\"{}\" was changed by another program.", self.document.name);
+        let reload = if self.document.is_dirty() {
+            "Reload shows it, and drops the changes you have not saved. Keep mine goes on with yours"
+        } else {
+            "Reload shows it. Keep mine goes on with what is open"
+        };
+        let name = &self.document.name;
+        let end = if saving { ", and saves over it." } else { "; the next Save writes over it." };
+        let text = format!("The file of \"{name}\" was changed by another program. {reload}{end}");
         let answers = ["Keep mine", "Reload", "Later"];
         let Some(answer) = dialogs::question(ctx, "The file has changed", &text, &answers) else { return false };
         match (answer, self.document.path.clone()) {

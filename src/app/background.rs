@@ -27,7 +27,7 @@ enum Answer {
     Thumbnail(Thumbnail),
     Export(ExportAnswer),
     Accuracy(AccuracyAnswer),
-    NotAutosaved(String),
+    Autosaved(Result<(), String>),
 }
 
 /// The workers, each absent where the system gave no thread, and what was asked of them last.
@@ -62,7 +62,7 @@ impl Background {
         let tiles = spawn_tile(move |answer| to_tile(Answer::Tile(answer)));
         let thumbnails = spawn_thumbnail(move |made| to_gallery(Answer::Thumbnail(made)));
         let exports = spawn_export(move |answer| to_export(Answer::Export(answer)));
-        let autosaver = spawn_autosave(move |text| to_save(Answer::NotAutosaved(text)));
+        let autosaver = spawn_autosave(move |done| to_save(Answer::Autosaved(done)));
         let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
         Self {
             pictures,
@@ -204,7 +204,8 @@ impl Editor {
                 Answer::Thumbnail(made) => self.gallery.take(ctx, made),
                 Answer::Accuracy(answer) => self.accuracy.take(ctx, answer),
                 Answer::Export(answer) => self.take_export(answer),
-                Answer::NotAutosaved(text) => {
+                Answer::Autosaved(Ok(())) => self.messages.clear("autosave"),
+                Answer::Autosaved(Err(text)) => {
                     let text = format!("No recovery file could be written ({text}). Save your work yourself.");
                     self.messages.put(Level::Trouble, "autosave", text);
                 }
@@ -228,14 +229,12 @@ impl Editor {
             }
             PictureAnswer::Doing(..) => {}
             PictureAnswer::Failed(version, _) if version < self.document.version() => {}
-            PictureAnswer::Failed(_, text) => {
-                self.object.doing = None;
-                self.object.since = None;
+            PictureAnswer::Failed(version, text) => {
+                self.object.fail(version);
                 self.messages.put(Level::Trouble, "picture", text);
             }
             PictureAnswer::Fault(text) => {
-                self.object.doing = None;
-                self.object.since = None;
+                self.object.fail(self.document.version());
                 let text = format!("A fault in the program while computing ({text}). Your document is kept; edit on.");
                 self.messages.put(Level::Trouble, "picture", text);
             }

@@ -24,6 +24,10 @@ const WELCOME: &str = "welcome";
 const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (left) and change its surface and materials \
                             (right). F1 has the first steps of usual tasks, and all shortcuts.";
 
+/// Width of the smaller view, and what panels leave of the window's width to the large one, points.
+const SIDE: [f32; 2] = [240.0, 900.0];
+const LEAST_VIEW: f32 = 260.0;
+
 /// Everything but the window.
 pub struct Editor {
     pub document: Document,
@@ -41,6 +45,8 @@ pub struct Editor {
     pub exchanged: bool,
     pub(super) stroke: Option<Stroke>,
     pub title: String,
+    /// The window has the focus again, and others may have written the file meanwhile.
+    came_back: bool,
     /// The window may go.
     pub leaving: bool,
     pub(super) background: Background,
@@ -71,13 +77,13 @@ impl Editor {
             messages.put(Level::Trouble, "worker", "The system gave no thread to compute on: nothing will be drawn.");
         }
         if !settings.welcomed && folder.is_some() {
-            messages.put(Level::Note, WELCOME, WELCOME_TEXT);
+            messages.put(Level::Guide, WELCOME, WELCOME_TEXT);
         }
         let recovered = folder.as_deref().map(Recovered::find).unwrap_or_default();
         let dialog = (!recovered.is_empty()).then_some(Dialog::Recover(recovered));
         Self {
             recovery: folder.as_deref().map(RecoveryFile::new),
-            slots: materials::slots_of(&document.scene().tile.geometry),
+            slots: materials::slots_of(document.scene()),
             document,
             settings,
             folder,
@@ -90,6 +96,7 @@ impl Editor {
             exchanged: false,
             stroke: None,
             title: String::new(),
+            came_back: false,
             leaving: false,
             background,
             exporting: None,
@@ -135,9 +142,13 @@ impl Editor {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             self.perform(&ctx, Action::Quit);
         }
-        let came_back = ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
-        if came_back && self.dialog.is_none() && self.document.changed_on_disk() {
-            self.dialog = Some(Dialog::ChangedOnDisk { saving: false });
+        self.came_back |= ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
+        // Not over another question: the file is looked at once that is answered.
+        if self.came_back && self.dialog.is_none() {
+            self.came_back = false;
+            if self.document.changed_on_disk() {
+                self.dialog = Some(Dialog::ChangedOnDisk { saving: false });
+            }
         }
         if let Some(rect) = ctx.input(|input| input.viewport().inner_rect) {
             self.settings.window = rect.size().into();
@@ -164,9 +175,10 @@ impl Editor {
         Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
         let from_gallery = self.gallery_ui(ui);
         let mut scene = (**self.document.scene()).clone();
+        let widest = (ui.available_width() - SIDE[0] - LEAST_VIEW).clamp(260.0, 620.0);
         let parameters = Panel::right("parameters")
             .default_size(self.settings.parameters_width)
-            .size_range(260.0..=620.0)
+            .size_range(260.0..=widest)
             .show(ui, |ui| {
                 let painted = self.document.painted().clone();
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
@@ -178,21 +190,22 @@ impl Editor {
             });
         self.settings.parameters_width = parameters.response.rect.width();
         let asked = parameters.inner.inner;
-        let side = Panel::right("side").default_size(self.settings.side_width).size_range(240.0..=900.0);
+        let widest = (ui.available_width() - LEAST_VIEW).clamp(SIDE[0], SIDE[1]);
+        let side = Panel::right("side").default_size(self.settings.side_width).size_range(SIDE[0]..=widest);
         let side = side.show(ui, |ui| self.side_ui(ui, &mut scene)).response.rect.width();
         self.settings.side_width = side;
-        CentralPanel::no_frame().show(ui, |ui| {
+        let large = CentralPanel::no_frame().show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
-            if self.messages.ui(ui) == Some(WELCOME) {
-                self.settings.welcomed = true;
-                self.settings.save(self.folder.as_deref());
-            }
             if self.exchanged {
                 self.tile_ui(ui, &scene, 0.0);
             } else {
                 self.object_ui(ui, &mut scene);
             }
         });
+        if self.messages.ui(&ctx, large.response.rect) == Some(WELCOME) {
+            self.settings.welcomed = true;
+            self.settings.save(self.folder.as_deref());
+        }
         self.take_scene(scene);
         self.take_asked(&ctx, asked);
         if let Some(action) = self.from_view.take() {
@@ -225,14 +238,14 @@ impl Editor {
     }
 
     /// The scene as the panels and views left it, if it can be.
-    fn take_scene(&mut self, scene: Scene) {
+    pub(super) fn take_scene(&mut self, scene: Scene) {
         if scene == **self.document.scene() {
             return;
         }
         match scene.validate() {
             Ok(()) => {
                 self.messages.clear("edit");
-                self.slots = materials::slots_of(&scene.tile.geometry);
+                self.slots = materials::slots_of(&scene);
                 self.document.edit(scene);
             }
             Err(error) => self.messages.put(Level::Trouble, "edit", format!("Not taken over: {error}")),

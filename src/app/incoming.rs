@@ -192,7 +192,8 @@ impl Editor {
                 self.exporting = None;
                 self.messages.put(Level::Trouble, "export", format!("Not exported: {text}"));
             }
-            ExportAnswer::Cancelled => self.exporting = None,
+            // Whoever gave it up took it off the status line; by now the next export may stand there.
+            ExportAnswer::Cancelled => {}
         }
     }
 }

@@ -153,7 +153,7 @@ impl Editor {
 
     /// After changes that did not come from the panels.
     pub(super) fn scene_changed(&mut self) {
-        self.slots = materials::slots_of(&self.document.scene().tile.geometry);
+        self.slots = materials::slots_of(self.document.scene());
     }
 
     pub(super) fn save(&mut self, path: &Path) {

@@ -17,13 +17,21 @@ impl Editor {
 
     pub(super) fn status_ui(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
+            let failed = self.object.failed == Some(self.document.version());
             let Some(made) = self.object.made.clone() else {
-                ui.spinner();
-                ui.label("Computing the first picture");
+                if failed {
+                    ui.label("No picture could be made: see the message");
+                } else {
+                    ui.spinner();
+                    ui.label("Computing the first picture");
+                }
                 return;
             };
             let waits = self.object.since.is_some();
             match (waits, made.grade, self.object.doing) {
+                _ if failed => {
+                    ui.label("Shows the last picture that could be made: see the message");
+                }
                 (false, Grade::Final, _) => {
                     let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(12.0), egui::Sense::hover());
                     ui.painter().circle_filled(dot.center(), 4.0, egui::Color32::from_rgb(96, 176, 96));

@@ -28,6 +28,8 @@ pub fn install(ctx: &Context) {
         style.spacing.combo_width = 120.0;
         style.spacing.menu_margin = Margin::same(6);
         style.interaction.tooltip_delay = 0.4;
+        // The view beside a panel's edge takes half of it.
+        style.interaction.resize_grab_radius_side = 7.0;
         style.visuals.slider_trailing_fill = true;
     });
 }

@@ -8,7 +8,7 @@ use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, Radianc
 use biscale::pipeline::Pipeline;
 use serde::Serialize;
 
-use super::print_json;
+use super::{bar, print_json, showing};
 use crate::{ExportArgs, Radiance};
 
 /// Relative L2 of reading a table back at which hardly anything of its lobes is right.
@@ -52,11 +52,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             Radiance::TensorTree => RadianceBasis::TensorTree,
         },
     };
-    let bar = bar(args.scene.quiet);
-    let progress = |part: f32| {
-        bar.set_position((part * 1000.0) as u64);
-        true
-    };
+    let bar = bar("tabulating", args.scene.quiet);
+    let progress = showing(&bar);
     if streams {
         // Standard output holds the table itself then.
         export::write_csv(&outcome.brdf, &meta, &options, &mut std::io::stdout().lock(), &progress)?;
@@ -121,16 +118,4 @@ fn resolution(args: &ExportArgs) -> Option<ExportResolution> {
     let [theta, phi] = args.resolution.or(args.resolution_o)?;
     let [theta_o, phi_o] = args.resolution_o.unwrap_or([theta, phi]);
     Some(ExportResolution { theta_i: theta, phi_i: phi, theta_o, phi_o })
-}
-
-/// A bar on a terminal, nothing in a pipe.
-fn bar(quiet: bool) -> indicatif::ProgressBar {
-    if quiet {
-        return indicatif::ProgressBar::hidden();
-    }
-    let bar = indicatif::ProgressBar::new(1000);
-    if let Ok(style) = indicatif::ProgressStyle::with_template("tabulating {wide_bar} {percent} %, {eta} left") {
-        bar.set_style(style);
-    }
-    bar
 }

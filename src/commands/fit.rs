@@ -14,7 +14,7 @@ use biscale::{Error, InputError};
 use glam::Vec3;
 use serde::Serialize;
 
-use super::print_json;
+use super::{bar, print_json, showing};
 use crate::FitArgs;
 
 #[derive(Serialize)]
@@ -42,7 +42,10 @@ pub fn run(args: &FitArgs) -> Result<()> {
     let mut reports = Vec::new();
     for model in Model::ALL {
         let start = std::time::Instant::now();
-        let found = fit::fit(&outcome.brdf, model)?;
+        let bar = bar("fitting", args.scene.quiet);
+        let found = fit::fit(&outcome.brdf, model, &showing(&bar));
+        bar.finish_and_clear();
+        let found = found?;
         reports.push(report(&found, start.elapsed().as_secs_f64()));
         fits.push(found);
     }

@@ -19,7 +19,7 @@ use biscale::accuracy::Health;
 use biscale::accuracy::choose::{Goal, choose};
 use biscale::pipeline::Outcome;
 use biscale::scene::{self, Effects, LoadedScene, Switch};
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Backend, Quality, SceneArgs};
 
@@ -143,6 +143,27 @@ pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
 pub fn parse_positive(text: &str) -> std::result::Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
     number.ok_or_else(|| format!("found `{text}`, expected a number above 0"))
+}
+
+/// A bar on a terminal, nothing in a pipe. `doing`: a word in front of it.
+pub fn bar(doing: &str, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(1000);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left") {
+        bar.set_style(style);
+    }
+    bar.set_message(doing.to_owned());
+    bar
+}
+
+/// What long work is given to show itself on a bar.
+pub fn showing(bar: &ProgressBar) -> impl Fn(f32) -> bool {
+    |part: f32| {
+        bar.set_position((part * 1000.0) as u64);
+        true
+    }
 }
 
 /// Prints JSON on standard output.

@@ -5,7 +5,7 @@ use biscale::export::tile::{self, TileOptions};
 use biscale::pipeline::Pipeline;
 use glam::UVec2;
 
-use super::print_json;
+use super::{bar, print_json, showing};
 use crate::TileArgs;
 
 pub fn run(args: &TileArgs) -> Result<()> {
@@ -14,7 +14,10 @@ pub fn run(args: &TileArgs) -> Result<()> {
     let count = |[x, y]: [usize; 2]| UVec2::new(x as u32, y as u32);
     let options =
         TileOptions { repeat: count(args.repeat), scale: args.scale, base_mm: args.base, samples: count(args.samples) };
-    let notes = tile::write(&loaded.scene, &mesh, &options, &args.output)?;
+    let bar = bar("writing", args.scene.quiet);
+    let notes = tile::write(&loaded.scene, &mesh, &options, &args.output, &showing(&bar));
+    bar.finish_and_clear();
+    let notes = notes?;
     if args.scene.json {
         return print_json(&serde_json::json!({ "output": args.output.display().to_string(), "notes": notes }));
     }

@@ -27,13 +27,14 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, InputError, Result};
 use crate::filtering::EffectiveBrdf;
+use crate::progress::Progress;
 
 pub use grid::ExportResolution;
 pub use meta::ExportMeta;
 pub use note::Reflectances;
 pub use radiance::RadianceBasis;
 pub use replace::replace_file;
-pub use sampler::{Progress, ReadingError};
+pub use sampler::ReadingError;
 
 use meta::Description;
 use table::Table;

@@ -6,6 +6,10 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, InputError, Result};
+use crate::progress::{self, Progress};
+
+/// Bytes that are written between two calls of the progress function.
+const BYTES_A_STEP: usize = 1 << 20;
 
 /// Writes `bytes` beside `path` and renames.
 ///
@@ -15,12 +19,33 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
     replacing(path, |out| out.write_all(bytes))
 }
 
+/// [`replace_file`] of what takes long to write.
+///
+/// # Errors
+/// As [`replace_file`], and [`Error::Cancelled`] when `progress` says so.
+pub(super) fn replace_large_file(path: &Path, bytes: &[u8], progress: &Progress<'_>) -> Result<()> {
+    replacing(path, |out| {
+        for (k, chunk) in bytes.chunks(BYTES_A_STEP).enumerate() {
+            let part = (k * BYTES_A_STEP) as f32 / bytes.len() as f32;
+            progress::tell(progress, part).map_err(io::Error::other)?;
+            out.write_all(chunk)?;
+        }
+        progress::tell(progress, 1.0).map_err(io::Error::other)
+    })
+}
+
 /// Opens a file beside `path`, lets `content` fill it, and renames it to `path`. Devices and pipes are written to.
 pub(super) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T> {
     // What `content` says in our own words stays so.
     let unwritable = |error: io::Error| {
         error.downcast::<Error>().unwrap_or_else(|error| {
-            InputError::new("output", error, "a place that can be written").in_file(path).into()
+            let full = matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
+            let error = if full {
+                InputError::new("output", "a full disk", "space for the file: free some, or choose another place")
+            } else {
+                InputError::new("output", error, "a place that can be written")
+            };
+            error.in_file(path).into()
         })
     };
     // Through a link, the file it leads to is replaced, not the link.

@@ -7,39 +7,23 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::accuracy::{Errors, compare, mirror_biased_pairs};
-use crate::error::Error;
 use crate::filtering::EffectiveBrdf;
+use crate::progress::{self, Progress};
 
-/// Is told the part that is done, 0 to 1, and returns whether to go on.
-pub type Progress<'a> = dyn Fn(f32) -> bool + 'a;
-
-/// Items between two calls of the progress function.
-const ITEMS_A_STEP: usize = 32;
 /// Pairs of the reading error, and the seed that fixes them.
 const CHECKED_PAIRS: usize = 400;
 const CHECKED_SEED: u64 = 2011;
 
-/// `work` of every index in parallel, in order.
+/// [`progress::in_parallel`] where a file is being written.
 ///
 /// # Errors
-/// [`Error::Cancelled`], inside, when `progress` says so.
+/// [`crate::Error::Cancelled`], inside, when `progress` says so.
 pub fn in_parallel<T: Send>(
     count: usize,
     progress: &Progress<'_>,
     work: impl Fn(usize) -> T + Sync,
 ) -> io::Result<Vec<T>> {
-    let mut results = Vec::with_capacity(count);
-    while results.len() < count {
-        go_on(progress, results.len() as f32 / count as f32)?;
-        let end = (results.len() + ITEMS_A_STEP).min(count);
-        results.par_extend((results.len()..end).into_par_iter().map(&work));
-    }
-    go_on(progress, 1.0)?;
-    Ok(results)
-}
-
-fn go_on(progress: &Progress<'_>, part: f32) -> io::Result<()> {
-    if progress(part) { Ok(()) } else { Err(io::Error::other(Error::Cancelled)) }
+    progress::in_parallel(count, progress, work).map_err(io::Error::other)
 }
 
 /// How far what a reader gets is from the function.

@@ -5,8 +5,9 @@ use std::io;
 use glam::Vec3;
 
 use super::grid::Grid;
-use super::sampler::{Progress, ReadingError, in_parallel, reading_error};
+use super::sampler::{ReadingError, in_parallel, reading_error};
 use crate::filtering::{EffectiveBrdf, Reflectance};
+use crate::progress::Progress;
 
 /// What a file holds.
 #[derive(Debug, Clone)]

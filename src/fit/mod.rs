@@ -9,14 +9,16 @@ mod least_squares;
 mod materialx;
 mod models;
 
+use std::cell::Cell;
+
 use argmin::core::{CostFunction, Executor, State as _};
 use argmin::solver::neldermead::NelderMead;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use crate::accuracy::{Errors, Pair, compare, mirror_biased_pairs};
 use crate::error::{Error, Result};
 use crate::filtering::{EffectiveBrdf, Reflectance};
+use crate::progress::{Progress, in_parallel, part, tell};
 
 pub use gltf::gltf;
 pub use materialx::materialx;
@@ -30,6 +32,8 @@ const CHECKED: usize = 1000;
 const SEED: u64 = 1997;
 /// Steps of the simplex a start.
 const STEPS: u64 = 150;
+/// Shapes tried between two calls of the progress function.
+const TRIED_A_STEP: u64 = 16;
 
 /// A fitted material.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,21 +49,26 @@ pub struct Fit {
 /// The best fit of `model` to `brdf`, in least squares of `f̄` over directions up to 85°.
 ///
 /// # Errors
-/// The search fails, which no finite BRDF brings about.
-pub fn fit(brdf: &EffectiveBrdf, model: Model) -> Result<Fit> {
+/// [`Error::Cancelled`] when `progress` says so; a search that fails, which no finite BRDF brings about.
+pub fn fit(brdf: &EffectiveBrdf, model: Model, progress: &Progress<'_>) -> Result<Fit> {
+    let (looking, searching, checking) = (part(progress, 0.0, 0.3), part(progress, 0.3, 0.9), part(progress, 0.9, 1.0));
     let pairs = mirror_biased_pairs(FITTED, SEED);
-    let targets: Vec<Vec3> = pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect();
+    let targets = in_parallel(pairs.len(), &looking, |k| brdf.eval(pairs[k].i, pairs[k].o))?;
+    let starts = model.starts();
     let problem = Problem { model, pairs, targets };
     let mut best: Option<(f64, Vec<f64>)> = None;
-    for start in model.starts() {
-        let solver = NelderMead::new(simplex(&start));
-        let run = Executor::new(&problem, solver)
-            .configure(|state| state.max_iters(STEPS))
-            .run()
-            .map_err(|error| Error::failed(format!("the fit: {error}")))?;
-        let (cost, shape) = (run.state.get_best_cost(), run.state.get_best_param().cloned().unwrap_or(start));
+    for (k, start) in starts.iter().enumerate() {
+        let of_all = |k: usize| k as f32 / starts.len() as f32;
+        let progress = part(&searching, of_all(k), of_all(k + 1));
+        tell(&progress, 0.0)?;
+        let search = Search { problem: &problem, asked: Cell::new(0), progress: &progress };
+        let solver = NelderMead::new(simplex(start));
+        let run = Executor::new(&search, solver).configure(|state| state.max_iters(STEPS)).run().map_err(|error| {
+            error.downcast::<Error>().unwrap_or_else(|error| Error::failed(format!("the fit: {error}")))
+        })?;
+        let (cost, shape) = (run.state.get_best_cost(), run.state.get_best_param().cloned());
         if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-            best = Some((cost, shape));
+            best = Some((cost, shape.unwrap_or_else(|| start.clone())));
         }
     }
     let (_, parameters) = best.ok_or_else(|| Error::failed("the fit has nowhere to start"))?;
@@ -67,7 +76,7 @@ pub fn fit(brdf: &EffectiveBrdf, model: Model) -> Result<Fit> {
     let (weights, _) = problem.weights(&shape);
     let mut fit = Fit { model, shape, weights, errors: Errors { rel_l2: 0.0, psnr_db: f64::INFINITY } };
     let checked = mirror_biased_pairs(CHECKED, SEED + 1);
-    let exact: Vec<Vec3> = checked.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect();
+    let exact = in_parallel(checked.len(), &checking, |k| brdf.eval(checked[k].i, checked[k].o))?;
     let found: Vec<Vec3> = checked.iter().map(|pair| fit.f_bar(pair.i, pair.o)).collect();
     fit.errors = compare(&found, &exact);
     Ok(fit)
@@ -103,12 +112,26 @@ impl Problem {
     }
 }
 
-impl CostFunction for &Problem {
+/// One search for the shape.
+struct Search<'a> {
+    problem: &'a Problem,
+    /// Shapes tried.
+    asked: Cell<u64>,
+    progress: &'a Progress<'a>,
+}
+
+impl CostFunction for &Search<'_> {
     type Param = Vec<f64>;
     type Output = f64;
 
     fn cost(&self, parameters: &Vec<f64>) -> std::result::Result<f64, argmin::core::Error> {
-        let (_, squares) = self.weights(&self.model.shape(parameters));
+        let asked = self.asked.replace(self.asked.get() + 1);
+        // Not at the corners of the first simplex: there the solver panics at an error.
+        if asked > 0 && asked.is_multiple_of(TRIED_A_STEP) {
+            // A step of the simplex tries two shapes, most of the time.
+            tell(self.progress, (asked as f32 / (2 * STEPS) as f32).min(1.0))?;
+        }
+        let (_, squares) = self.problem.weights(&self.problem.model.shape(parameters));
         Ok(squares)
     }
 }

@@ -1,3 +1,4 @@
+use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -7,6 +8,10 @@ use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
 use crate::geometry::{self, Facets};
 use crate::scene::{Flat, Geometry, Scene};
 use crate::visibility::Visibility;
+
+fn silent(_: f32) -> bool {
+    true
+}
 
 /// A flat tile of some terms.
 fn flat(terms: Vec<Term>) -> EffectiveBrdf {
@@ -23,12 +28,12 @@ fn flat(terms: Vec<Term>) -> EffectiveBrdf {
 fn a_flat_material_of_the_model_comes_back() {
     let (albedo, f0) = (Vec3::new(0.3, 0.2, 0.1), Vec3::new(0.5, 0.6, 0.2));
     let brdf = flat(vec![Term::Lambertian { albedo }, Term::CookTorrance { roughness: 0.35, f0 }]);
-    let found = fit(&brdf, Model::CookTorrance).unwrap();
+    let found = fit(&brdf, Model::CookTorrance, &silent).unwrap();
     assert!((found.shape.roughness[0] - 0.35).abs() < 2e-3, "{found:?}");
     assert!((found.weights[0] - albedo).abs().max_element() < 5e-3, "{found:?}");
     assert!((found.weights[1] - f0).abs().max_element() < 5e-3 && found.errors.rel_l2 < 1e-2, "{found:?}");
     let brdf = flat(vec![Term::Lambertian { albedo }, Term::Ggx { roughness: 0.25, f0 }]);
-    let found = fit(&brdf, Model::Ggx).unwrap();
+    let found = fit(&brdf, Model::Ggx, &silent).unwrap();
     assert!(found.shape.roughness.iter().all(|alpha| (alpha - 0.25).abs() < 5e-3), "{found:?}");
     assert!((found.weights[1] - f0).abs().max_element() < 1e-2 && found.errors.rel_l2 < 1e-2, "{found:?}");
 }
@@ -37,7 +42,7 @@ fn a_flat_material_of_the_model_comes_back() {
 fn a_matte_tile_has_no_edge_and_what_is_written_stays_in_the_ranges_of_the_formats() {
     let brdf = flat(vec![Term::Lambertian { albedo: Vec3::splat(0.7) }]);
     for model in Model::ALL {
-        let found = fit(&brdf, model).unwrap();
+        let found = fit(&brdf, model, &silent).unwrap();
         assert!(found.errors.rel_l2 < 1e-2 && (found.weights[0] - 0.7).abs().max_element() < 0.02, "{found:?}");
     }
     let rough = Fit {
@@ -68,7 +73,7 @@ fn materials_for_others_are_well_formed_and_hold_the_numbers() {
         Term::Lambertian { albedo: Vec3::new(0.6, 0.3, 0.1) },
         Term::Ggx { roughness: 0.3, f0: Vec3::splat(0.04) },
     ]);
-    let found = fit(&brdf, Model::Ggx).unwrap();
+    let found = fit(&brdf, Model::Ggx, &silent).unwrap();
     let file: serde_json::Value = serde_json::from_str(&gltf(&found, "a \"name\"")).unwrap();
     let material = &file["materials"][0];
     assert_eq!(material["pbrMetallicRoughness"]["metallicFactor"], 0.0);
@@ -78,4 +83,24 @@ fn materials_for_others_are_well_formed_and_hold_the_numbers() {
     let document = materialx(&found, "a \"name\"");
     assert!(document.contains("open_pbr_surface name=\"a__name__surface\"") && document.contains("specular_roughness"));
     assert_eq!(document.matches('<').count(), document.matches('>').count());
+}
+
+#[test]
+fn a_fit_tells_its_progress_and_is_given_up_wherever_it_is_told_to() {
+    let brdf = flat(vec![Term::Ggx { roughness: 0.3, f0: Vec3::splat(0.04) }]);
+    for model in Model::ALL {
+        let told = RefCell::new(Vec::new());
+        let tell = |part| {
+            told.borrow_mut().push(part);
+            true
+        };
+        fit(&brdf, model, &tell).unwrap();
+        let told = told.into_inner();
+        assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted(), "{told:?}");
+        // While targets are looked up, in the middle of the search, while the fit is checked.
+        for part in [0.0, 0.2, 0.6, 0.95] {
+            let until = |now| now < part;
+            assert!(matches!(fit(&brdf, model, &until), Err(Error::Cancelled)), "{part}");
+        }
+    }
 }

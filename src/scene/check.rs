@@ -22,11 +22,25 @@ pub struct Problem {
     pub found: String,
     pub expected: String,
     pub hint: Option<String>,
+    is_unknown_key: bool,
 }
 
 impl Problem {
-    fn new(path: &[Step], found: impl Into<String>, expected: impl Into<String>) -> Self {
-        Self { path: path.to_vec(), found: found.into(), expected: expected.into(), hint: None }
+    pub fn new(path: &[Step], found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self { path: path.to_vec(), found: found.into(), expected: expected.into(), hint: None, is_unknown_key: false }
+    }
+
+    /// A key that is unknown in the table at `depth` of the path, and known in the one around it, whose `fields` these are.
+    fn one_table_up(mut self, fields: &[Field], depth: usize) -> Self {
+        if self.is_unknown_key
+            && self.path.len() == depth + 1
+            && let Some(Step::Key(key)) = self.path.last()
+            && fields.iter().any(|field| field.key == key)
+        {
+            let outer = path_text(&self.path[..depth - 1]);
+            self.hint = Some(format!("`{key}` belongs one table up, in `[{outer}]`"));
+        }
+        self
     }
 
     /// As an error; `line` is where in the file it stands, if it stands in a file.
@@ -86,13 +100,17 @@ fn check_keys(table: &Table, fields: &[Field], tag: Option<&str>, path: &mut Vec
             path.push(Step::Key(key.clone()));
             let mut problem = Problem::new(path, format!("unknown key `{key}`"), format!("one of {}", list(known())));
             problem.hint = did_you_mean(key, known());
+            problem.is_unknown_key = true;
             return Err(problem);
         }
     }
     for field in fields {
         path.push(Step::Key(field.key.to_owned()));
         match table.get(field.key) {
-            Some(value) => check_value(value, &field.shape, path)?,
+            Some(value) => {
+                let depth = path.len();
+                check_value(value, &field.shape, path).map_err(|problem| problem.one_table_up(fields, depth))?;
+            }
             None if field.required => {
                 let mut problem = Problem::new(path, "nothing", format!("`{}`: {}", field.key, field.doc));
                 if let Some(tag) = table.get("kind").and_then(Value::as_str) {

@@ -151,9 +151,7 @@ impl Scene {
     /// Rules that tie fields to each other, which the catalogue cannot say.
     fn check_relations(&self) -> std::result::Result<(), Problem> {
         let key = |name: &str| Step::Key(name.to_owned());
-        let problem = |path: Vec<Step>, found: &str, expected: &str| {
-            Err(Problem { path, found: found.to_owned(), expected: expected.to_owned(), hint: None })
-        };
+        let problem = |path: Vec<Step>, found: &str, expected: &str| Err(Problem::new(&path, found, expected));
         let geometry = |name: &str| vec![key("tile"), key("geometry"), key(name)];
         match &self.tile.geometry {
             Geometry::Mesh(mesh) if mesh.path.as_os_str().is_empty() => {

@@ -88,6 +88,12 @@ fn unknown_keys_are_named_in_full_with_line_and_suggestion_at_every_level() {
             "[tile]\ngeometry = { kind = \"flat\" }\n[light]\ndirectional = [{ direction = [0,1,0], irradiance = 1, colour = 1 }]",
             ["line 4", "light.directional.0.colour", "irradiance"],
         ),
+        // Where it stood before it could lie over any surface.
+        (
+            "[tile.geometry]\nkind = \"heightfield\"\ncolor_path = \"colors.png\"",
+            ["line 3", "tile.geometry.color_path", "`color_path` belongs one table up, in `[tile]`"],
+        ),
+        ("[tile]\ngeometry = { kind = \"flat\", slot_path = \"m.png\" }", ["line 2", "slot_path", "in `[tile]`"]),
         ("[tile]\ngeometry = { kind = \"grroves\" }", ["line 2", "tile.geometry.kind", "did you mean `grooves`?"]),
         ("[tile]\ngeometry = { depth = 1 }", ["line 2", "tile.geometry.kind", "one of grooves"]),
         (

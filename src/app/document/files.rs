@@ -31,9 +31,10 @@ impl Document {
         now.is_some() && now != self.stamp
     }
 
-    /// Takes the file on disk as seen: it is not asked about again.
+    /// Takes the file on disk as seen: it is not asked about again, and what is open is not what is saved there.
     pub fn accept_disk(&mut self) {
         self.stamp = self.path.as_deref().and_then(Stamp::of);
+        self.saved = None;
     }
 
     /// Writes everything to `path`, images first, so that the scene never names one that is not there.

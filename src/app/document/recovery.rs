@@ -165,7 +165,35 @@ fn discard(stem: &Path) {
     }
 }
 
-/// Whether a process is there; where that cannot be asked, it is taken as gone.
+/// Whether an editor of this number is there; where that cannot be asked, it is taken as gone. One that has ended and that
+/// nobody has taken note of yet is gone, and so is one whose number another program has now.
 fn lives(process: u32) -> bool {
-    cfg!(target_os = "linux") && Path::new(&format!("/proc/{process}")).exists()
+    let stat = |of: &str| fs::read_to_string(format!("/proc/{of}/stat")).ok();
+    let (Some(its), Some(ours)) = (stat(&process.to_string()), stat("self")) else { return false };
+    let (Some(its), Some(ours)) = (name_and_state(&its), name_and_state(&ours)) else { return false };
+    its.0 == ours.0 && !matches!(its.1, 'Z' | 'X')
+}
+
+/// Of a line of `/proc/*/stat`: `4194 (bi) scale) S ...`.
+fn name_and_state(stat: &str) -> Option<(&str, char)> {
+    let (name, rest) = stat.split_once('(')?.1.rsplit_once(')')?;
+    Some((name, rest.trim_start().chars().next()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn this_process_lives_and_one_that_ended_or_is_another_program_does_not() {
+        assert_eq!(name_and_state("4194 (bi) scale) S 1 4194"), Some(("bi) scale", 'S')));
+        if cfg!(target_os = "linux") {
+            assert!(lives(std::process::id()));
+            let mut other = std::process::Command::new("sleep").arg("60").spawn().unwrap();
+            assert!(!lives(other.id()), "not an editor");
+            other.kill().unwrap();
+            other.wait().unwrap();
+        }
+        assert!(!lives(4_194_399));
+    }
 }

@@ -271,14 +271,16 @@ pub fn set_term(scene: &mut Scene, material: usize, term: usize, with: TermSpec)
     }
 }
 
-/// The slots of a family, as far as they are known without its mesh.
-pub fn slots_of(geometry: &Geometry) -> Vec<String> {
-    let names: &[&str] = match geometry {
+/// The slots of a scene, as far as they are known without its mesh: the family's own, and painted ones that have a material.
+pub fn slots_of(scene: &Scene) -> Vec<String> {
+    let names: &[&str] = match &scene.tile.geometry {
         Geometry::Grooves(_) => &["bottom", "sides"],
         Geometry::Pyramids(_) => &["faces", "floor"],
         Geometry::Rods(_) => &["rods", "floor"],
         Geometry::Weave(_) => &["warp", "weft"],
         _ => &[DEFAULT],
     };
-    names.iter().map(|name| (*name).to_owned()).collect()
+    let painted = scene.materials.iter().map(|material| material.name.as_str());
+    let painted = painted.filter(|name| scene.tile.slot_path.is_some() && name.starts_with("paint_"));
+    names.iter().copied().chain(painted).map(str::to_owned).collect()
 }

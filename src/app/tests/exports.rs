@@ -1,5 +1,6 @@
 //! Exports from their dialogs.
 
+use biscale::export::tile::TileOptions;
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 
@@ -48,6 +49,36 @@ fn an_export_takes_the_size_that_was_chosen_shows_its_progress_and_can_be_given_
     }
     // Three elevations, four azimuths and the first again, of 4 x 4 samples: far below the small size.
     assert!(std::fs::metadata(&path).unwrap().len() < 20_000);
+}
+
+#[test]
+fn a_large_solid_is_given_up_while_it_is_made_and_the_next_export_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let [large, small] = ["large.stl", "small.obj"].map(|name| folder.path().join(name));
+    std::fs::write(&large, "old").unwrap();
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let options = TileOptions { samples: glam::UVec2::splat(2048), ..TileOptions::default() };
+    editor(&mut harness).export(large.clone(), What::Tile(options));
+    let start = std::time::Instant::now();
+    while editor(&mut harness).exporting.is_none_or(|(part, _)| part == 0.0) {
+        harness.step();
+        assert!(start.elapsed().as_secs() < 60, "no progress");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(2);
+    assert!(editor(&mut harness).exporting.is_none());
+    editor(&mut harness).export(small, What::Tile(TileOptions::default()));
+    while editor(&mut harness).exporting.is_some() {
+        harness.step();
+        assert!(start.elapsed().as_secs() < 60, "not exported");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    // One after the other: by now the first has come to its end, too.
+    assert!(editor(&mut harness).messages.texts().join("; ").contains("small.obj"));
+    assert_eq!(std::fs::read(&large).unwrap(), b"old");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left beside");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The interface without a window: every frame runs as in one, and the workers really work.
 
+mod disk;
 mod documents;
 mod exports;
 mod interface;
@@ -54,7 +55,7 @@ fn harness(document: Document) -> Harness<'static, Option<Editor>> {
                 editor.settings.gallery = false;
                 editor
             });
-            editor.frame(ui);
+            editor.window_frame(ui);
         },
         None,
     );

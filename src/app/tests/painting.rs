@@ -68,6 +68,11 @@ fn a_material_is_painted_on_any_surface_undone_to_the_start_and_redone_to_the_en
     assert!(editor.document.painted().slots.is_none() && editor.document.scene().tile.slot_path.is_none());
     editor.document.undo();
     assert_eq!((editor.document.scene(), editor.document.painted()), (&end.0, &end.1));
+    // Who turns the light asks for no new tile: what is painted stays on it.
+    let mut scene = (**editor.document.scene()).clone();
+    scene.light.rotation_deg = 25.0;
+    editor.take_scene(scene);
+    assert!(["paint_1", "paint_2"].iter().all(|name| editor.slots.iter().any(|slot| slot == name)));
 }
 
 #[test]

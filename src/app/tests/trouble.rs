@@ -1,10 +1,13 @@
 //! What goes wrong is a message, and the document is kept.
 
+use biscale::scene::{BrdfSpec, TermSpec};
 use eframe::egui::{self, Key, Modifiers};
+use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
+use crate::app::editor::Editor;
 use crate::app::worker::LOSE_DEVICE;
 
 #[test]
@@ -83,39 +86,31 @@ fn what_is_typed_and_is_no_number_is_a_message_and_the_value_stays() {
 }
 
 #[test]
-fn a_place_that_cannot_be_written_says_so_and_the_document_stays_unsaved() {
-    let mut harness = harness(quick());
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.light.count = 3;
-    let editor = editor(&mut harness);
-    editor.document.edit(scene);
-    editor.save(std::path::Path::new("/nonexistent/folder/a.toml"));
-    let texts = editor.messages.texts().join("; ");
-    assert!(texts.contains("Not saved") && texts.contains("nonexistent") && texts.contains("still here"), "{texts}");
-    assert!(editor.document.is_dirty());
-}
-
-#[test]
-fn a_file_that_another_program_wrote_is_asked_about_before_it_is_written_over() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("shared.toml");
-    let mut harness = harness(quick());
+fn a_scene_that_cannot_be_computed_says_so_and_nothing_spins_on() {
+    let mut document = quick();
+    let mut scene = (**document.scene()).clone();
+    scene.materials[0].brdf = Some(BrdfSpec::One(TermSpec::Merl { path: "not_there.binary".into() }));
+    document.edit(scene);
+    let mut harness = harness(document);
+    let shows = |harness: &mut Harness<'static, Option<Editor>>, text: &str| {
+        let start = std::time::Instant::now();
+        while harness.query_by_label_contains(text).is_none() {
+            harness.step();
+            assert!(start.elapsed().as_secs() < 60, "{text}");
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    };
+    shows(&mut harness, "No picture could be made: see the message");
+    assert!(editor(&mut harness).messages.texts().iter().any(|text| text.contains("not_there.binary")));
+    harness.run_steps(8);
+    let delay = harness.output().viewport_output[&egui::ViewportId::ROOT].repaint_delay;
+    assert!(delay.as_secs_f64() > 0.3, "nothing is painted again and again: {delay:?}");
     let ctx = harness.ctx.clone();
-    editor(&mut harness).save(&path);
-    let theirs = std::fs::read_to_string(&path).unwrap() + "# someone else\n";
-    std::fs::write(&path, &theirs).unwrap();
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.light.count = 3;
-    editor(&mut harness).document.edit(scene.clone());
-    for (answer, is_ours) in [("Later", false), ("Keep mine", true)] {
-        editor(&mut harness).action(&ctx, Action::Save);
-        harness.run_steps(2);
-        assert!(harness.query_by_label_contains("was changed by another program").is_some());
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), theirs);
-        harness.get_by_label(answer).click();
-        harness.run_steps(2);
-        assert_eq!(std::fs::read_to_string(&path).unwrap() != theirs, is_ours);
-        assert_eq!(editor(&mut harness).document.is_dirty(), !is_ours);
-    }
-    assert_eq!(**editor(&mut harness).document.scene(), scene);
+    editor(&mut harness).action(&ctx, Action::Undo);
+    harness.step();
+    settle(&mut harness);
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("could be made").is_none());
+    editor(&mut harness).action(&ctx, Action::Redo);
+    shows(&mut harness, "Shows the last picture that could be made: see the message");
 }

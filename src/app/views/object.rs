@@ -18,6 +18,8 @@ const NEAREST: f32 = 2.2;
 const SLOW: f32 = 0.33;
 /// A lens narrower than this widens before the camera moves away.
 const NARROW: f32 = 14.0;
+/// What the view leaves to the edges of panels, points.
+const EDGE: f32 = 6.0;
 
 /// What the view holds between frames.
 #[derive(Default)]
@@ -30,6 +32,8 @@ pub struct ObjectView {
     pub doing: Option<&'static str>,
     /// The version whose refinement was given up.
     pub stopped: Option<u64>,
+    /// The version of which no picture could be made.
+    pub failed: Option<u64>,
     pub kept: Option<Kept>,
     /// Where the wipe stands, 0 left to 1 right.
     pub wipe: f32,
@@ -49,7 +53,7 @@ impl ObjectView {
         if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
             return;
         }
-        self.since = None;
+        (self.since, self.failed) = (None, None);
         let options = TextureOptions::LINEAR;
         match &mut self.texture {
             Some(texture) => texture.set(made.image.clone(), options),
@@ -66,6 +70,11 @@ impl ObjectView {
             kept.texture.set(made.image.clone(), options);
         }
         self.made = Some(made);
+    }
+
+    /// No picture of this version comes: nothing is awaited any more.
+    pub fn fail(&mut self, version: u64) {
+        (self.doing, self.since, self.failed) = (None, None, Some(version));
     }
 
     /// Whether a picture has the shape that was asked for last.
@@ -91,14 +100,16 @@ impl ObjectView {
     /// Shows the picture and moves the scene's camera and light by what the hand does. Returns the pixels it covers.
     pub fn ui(&mut self, ui: &mut Ui, scene: &mut Scene) -> [usize; 2] {
         let size = ui.available_size().max(vec2(64.0, 64.0));
-        let (area, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+        let (id, area) = ui.allocate_space(size);
+        // The edges of the panels beside it can be had from here, too.
+        let response = ui.interact(area.shrink2(vec2(EDGE, 0.0)), id, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Object view"));
         ui.painter().rect_filled(area, 0.0, Color32::from_gray(22));
         if let Some(texture) = &self.texture {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
             painter.image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
-        } else {
+        } else if self.failed.is_none() {
             ui.put(Rect::from_center_size(area.center(), vec2(40.0, 40.0)), egui::Spinner::new());
         }
         self.waiting_ui(ui, area);
@@ -125,7 +136,8 @@ impl ObjectView {
             ui.ctx().request_repaint_after_secs(left);
             return;
         }
-        let place = Rect::from_min_size(area.left_bottom() + vec2(10.0, -34.0), vec2(170.0, 26.0));
+        // Messages lie at the foot.
+        let place = Rect::from_min_size(area.left_top() + vec2(10.0, 8.0), vec2(170.0, 26.0));
         ui.painter().rect_filled(place, 5.0, Color32::from_black_alpha(150));
         ui.put(
             Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0)),

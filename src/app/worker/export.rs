@@ -11,7 +11,7 @@ use biscale::geometry::TileMesh;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::LoadedScene;
-use biscale::{Cancel, Error, Result};
+use biscale::{Cancel, Error, Progress, Result};
 
 use super::runner::Desk;
 use super::studio::{Close, Shot, Studio};
@@ -88,23 +88,23 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
     answer(ExportAnswer::Progress(0.0, "Computing the material"));
     let mut pipeline = Pipeline::new();
     pipeline.cancel_with(cancel.clone());
+    // Each is told as a part of what it is called.
+    let telling = |what: &'static str| {
+        move |part: f32| {
+            answer(ExportAnswer::Progress(part, what));
+            !cancel.is_set()
+        }
+    };
     if let What::Tile(options) = &job.what {
-        return tile(job, &pipeline.mesh(&job.loaded)?, options);
+        return tile(job, &pipeline.mesh(&job.loaded)?, options, &telling("Writing the tile"));
     }
     let outcome = pipeline.effective(&job.loaded)?;
     match job.what {
-        What::Tile(_) | What::Fit => {
-            answer(ExportAnswer::Progress(0.5, "Fitting"));
-            fitted(job, &outcome, cancel)
-        }
+        What::Tile(_) | What::Fit => fitted(job, &outcome, &telling("Fitting")),
         What::Table(choice) => {
             let meta = ExportMeta::of(&job.loaded, &outcome, pipeline.mesh(&job.loaded)?.closes_plane);
             let options = ExportOptions { resolution: choice.resolution(&job.path), radiance: choice.radiance };
-            let progress = |part: f32| {
-                answer(ExportAnswer::Progress(part, "Tabulating"));
-                !cancel.is_set()
-            };
-            let report = export::write(&outcome.brdf, &meta, &options, &job.path, &progress)?;
+            let report = export::write(&outcome.brdf, &meta, &options, &job.path, &telling("Tabulating"))?;
             Ok(format!(
                 "Wrote {}: {} pairs; read back it is within {:.1} % of the material.",
                 job.path.display(),
@@ -123,10 +123,9 @@ fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Syn
 }
 
 /// The GGX base with a matte part, which both formats hold.
-fn fitted(job: &ExportJob, outcome: &Outcome, cancel: &Cancel) -> Result<String> {
+fn fitted(job: &ExportJob, outcome: &Outcome, progress: &Progress<'_>) -> Result<String> {
     let model = *Model::ALL.last().ok_or_else(|| Error::failed("no model to fit"))?;
-    let fit = fit::fit(&outcome.brdf, model)?;
-    cancel.check()?;
+    let fit = fit::fit(&outcome.brdf, model, progress)?;
     let is_gltf = job.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
     let text = if is_gltf { fit::gltf(&fit, &job.loaded.name) } else { fit::materialx(&fit, &job.loaded.name) };
     export::replace_file(&job.path, text.as_bytes())?;
@@ -139,8 +138,8 @@ fn fitted(job: &ExportJob, outcome: &Outcome, cancel: &Cancel) -> Result<String>
     ))
 }
 
-fn tile(job: &ExportJob, mesh: &TileMesh, options: &TileOptions) -> Result<String> {
-    let notes = export::tile::write(&job.loaded.scene, mesh, options, &job.path)?;
+fn tile(job: &ExportJob, mesh: &TileMesh, options: &TileOptions, progress: &Progress<'_>) -> Result<String> {
+    let notes = export::tile::write(&job.loaded.scene, mesh, options, &job.path, progress)?;
     Ok(format!("Wrote {}: {}.", job.path.display(), notes.join("; ")))
 }
 

@@ -108,12 +108,10 @@ pub fn spawn_export(answer: impl Fn(ExportAnswer) + Clone + Send + Sync + 'stati
 }
 
 /// The thread that writes recovery files.
-pub fn spawn_autosave(failed: impl Fn(String) + Clone + Send + Sync + 'static) -> Option<Worker<Snapshot>> {
-    let told = failed.clone();
+pub fn spawn_autosave(done: impl Fn(Result<(), String>) + Clone + Send + Sync + 'static) -> Option<Worker<Snapshot>> {
+    let told = done.clone();
     let work = move |_: &mut (), snapshot: Snapshot, _: &runner::Desk<Snapshot>| {
-        if let Err(error) = snapshot.write() {
-            failed(error.to_string());
-        }
+        done(snapshot.write().map_err(|error| error.to_string()));
     };
-    Worker::spawn("autosave", 1, || (), work, told).ok()
+    Worker::spawn("autosave", 1, || (), work, move |text| told(Err(text))).ok()
 }

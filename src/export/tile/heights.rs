@@ -5,6 +5,7 @@ use glam::{DVec2, UVec2};
 use super::TileOptions;
 use crate::error::{Error, Result};
 use crate::geometry::TileMesh;
+use crate::progress::{self, Progress};
 
 /// Heights at regular places of one period, tile units.
 pub struct Heights {
@@ -17,10 +18,14 @@ pub struct Heights {
 
 impl Heights {
     /// The highest triangle over `((i + shift)/nx, (j + shift)/ny)` of the tile.
-    pub fn from_above(mesh: &TileMesh, count: UVec2, shift: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] when `progress` says so.
+    pub fn from_above(mesh: &TileMesh, count: UVec2, shift: f64, progress: &Progress<'_>) -> Result<Self> {
         let step = mesh.size.as_dvec2() / count.as_dvec2();
         let mut values = vec![f64::NEG_INFINITY; (count.x * count.y) as usize];
         for triangle in 0..mesh.triangles.len() {
+            progress::step(progress, triangle, mesh.triangles.len())?;
             let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
             let flat = [a, b, c].map(|p| p.truncate());
             let area = (flat[1] - flat[0]).perp_dot(flat[2] - flat[0]);
@@ -47,7 +52,7 @@ impl Heights {
         let holes = values.iter().filter(|value| !value.is_finite()).count();
         let lowest = f64::from(mesh.z_range().0);
         values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = lowest);
-        Self { count, values, holes }
+        Ok(Self { count, values, holes })
     }
 
     /// Of the surface repeated without end.
@@ -62,13 +67,19 @@ impl Heights {
 }
 
 /// 16 bits, 0 the lowest and 65535 the highest height, row 0 at y = 0: as the geometry `heightfield` reads it.
-pub fn png(mesh: &TileMesh, options: &TileOptions, unit: &str) -> Result<(Vec<u8>, Vec<String>)> {
-    let heights = Heights::from_above(mesh, options.samples, 0.5);
+pub fn png(
+    mesh: &TileMesh,
+    options: &TileOptions,
+    unit: &str,
+    progress: &Progress<'_>,
+) -> Result<(Vec<u8>, Vec<String>)> {
+    let heights = Heights::from_above(mesh, options.samples, 0.5, &progress::part(progress, 0.0, 0.5))?;
     let (low, high) = heights.range();
     let scale = if high > low { 65535.0 / (high - low) } else { 0.0 };
     let [width, height] = (options.samples * options.repeat).to_array();
     let mut pixels = Vec::with_capacity(2 * (width * height) as usize);
     for j in 0..height {
+        progress::tell(progress, 0.5 + 0.25 * j as f32 / height as f32)?;
         for i in 0..width {
             let value = ((heights.at(i, j) - low) * scale).round() as u16;
             pixels.extend(value.to_ne_bytes());

@@ -3,15 +3,19 @@
 use std::fmt::Write as _;
 
 use super::TileOptions;
+use crate::error::Result;
 use crate::geometry::TileMesh;
+use crate::progress::{self, Progress};
 
-pub fn obj(mesh: &TileMesh, options: &TileOptions) -> (Vec<u8>, Vec<String>) {
+pub fn obj(mesh: &TileMesh, options: &TileOptions, progress: &Progress<'_>) -> Result<(Vec<u8>, Vec<String>)> {
     let size = mesh.size.as_dvec2();
     let mut text = format!("# tile {} x {}, z up; slots are materials\n", size.x, size.y);
     let periods: Vec<(u32, u32)> =
         (0..options.repeat.y).flat_map(|y| (0..options.repeat.x).map(move |x| (x, y))).collect();
-    for &(x, y) in &periods {
-        for p in &mesh.positions {
+    let vertices = periods.len() * mesh.positions.len();
+    for (period, &(x, y)) in periods.iter().enumerate() {
+        for (k, p) in mesh.positions.iter().enumerate() {
+            progress::step(&progress::part(progress, 0.0, 0.4), period * mesh.positions.len() + k, vertices)?;
             let (px, py) = (f64::from(p.x) + f64::from(x) * size.x, f64::from(p.y) + f64::from(y) * size.y);
             let _ = writeln!(text, "v {} {} {}", px as f32, py as f32, p.z);
         }
@@ -21,12 +25,15 @@ pub fn obj(mesh: &TileMesh, options: &TileOptions) -> (Vec<u8>, Vec<String>) {
             let _ = writeln!(text, "vn {} {} {}", normal.x, normal.y, normal.z);
         }
     }
+    let mut written = 0;
     for (slot, name) in mesh.slots.iter().enumerate() {
         let _ = writeln!(text, "usemtl {name}");
         for period in 0..periods.len() {
             let first = period * mesh.positions.len() + 1;
             let of_slot = (0..mesh.triangles.len()).filter(|&t| usize::from(mesh.slot_of(t)) == slot);
             for triangle in of_slot {
+                progress::step(&progress::part(progress, 0.4, 1.0), written, periods.len() * mesh.triangles.len())?;
+                written += 1;
                 text.push('f');
                 for (corner, vertex) in mesh.triangles[triangle].iter().enumerate() {
                     let _ = write!(text, " {}", first + *vertex as usize);
@@ -40,5 +47,5 @@ pub fn obj(mesh: &TileMesh, options: &TileOptions) -> (Vec<u8>, Vec<String>) {
     }
     let note =
         "tile coordinates, z up; triangles may reach over the tile's edge, and slots stand as `usemtl`".to_owned();
-    (text.into_bytes(), vec![note])
+    Ok((text.into_bytes(), vec![note]))
 }

@@ -11,10 +11,11 @@ use std::path::Path;
 
 use glam::{UVec2, Vec3};
 
-use super::replace_file;
+use super::replace::replace_large_file;
 use crate::error::{InputError, Result};
 use crate::geometry::TileMesh;
-use crate::scene::{BrdfSpec, Scene, TermSpec};
+use crate::progress::{Progress, part};
+use crate::scene::{BrdfSpec, Scene, TermSpec, Tile};
 
 /// What may be chosen about the files of a tile.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +39,8 @@ impl Default for TileOptions {
 /// Most periods, and most height samples of all of them together: a solid of 400 MB.
 const MOST_PERIODS: u32 = 10_000;
 const MOST_SAMPLES: u64 = 1 << 22;
+/// Most triangles of all periods together in an OBJ file: some hundred MB.
+const MOST_TRIANGLES: u64 = 1 << 24;
 
 impl TileOptions {
     fn check(&self) -> Result<()> {
@@ -66,25 +69,53 @@ fn check_samples(options: &TileOptions) -> Result<()> {
     Ok(())
 }
 
+/// Whether an OBJ file's triangles are of a number that can be held.
+fn check_triangles(mesh: &TileMesh, options: &TileOptions) -> Result<()> {
+    let all = u64::from(options.repeat.x) * u64::from(options.repeat.y) * mesh.triangles.len() as u64;
+    if all > MOST_TRIANGLES {
+        let expected = format!("at most {MOST_TRIANGLES} in all periods together");
+        return Err(InputError::new("repeat", format!("{all} triangles"), expected).into());
+    }
+    Ok(())
+}
+
+/// The part of the work that is done once the content is made and only to be written.
+const MADE: f32 = 0.7;
+
 /// Writes the tile of a scene by the ending of `path`, and returns what to know about the file.
 ///
 /// # Errors
-/// An unknown ending, an option out of range, a geometry without a pattern, a place that cannot be written.
-pub fn write(scene: &Scene, mesh: &TileMesh, options: &TileOptions, path: &Path) -> Result<Vec<String>> {
+/// An unknown ending, an option out of range, a geometry without a pattern, a place that cannot be written,
+/// [`crate::Error::Cancelled`] when `progress` says so. An old file stays whole then.
+pub fn write(
+    scene: &Scene,
+    mesh: &TileMesh,
+    options: &TileOptions,
+    path: &Path,
+    progress: &Progress<'_>,
+) -> Result<Vec<String>> {
     options.check()?;
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if matches!(ending.as_str(), "stl" | "png") {
         check_samples(options)?;
     }
-    let (bytes, notes) = match ending.as_str() {
-        "obj" => mesh::obj(mesh, options),
-        "stl" => solid::stl(mesh, options, millimetres(&scene.tile.unit)?),
-        "png" => heights::png(mesh, options, &scene.tile.unit)?,
+    let (making, writing) = (part(progress, 0.0, MADE), part(progress, MADE, 1.0));
+    let drawing = part(&making, 0.5, 1.0);
+    let sheet = || pattern::sheet(scene, options, millimetres(&scene.tile.unit)?, &part(&making, 0.0, 0.5));
+    let (bytes, mut notes) = match ending.as_str() {
+        "obj" => {
+            check_triangles(mesh, options)?;
+            mesh::obj(mesh, options, &making)?
+        }
+        "stl" => solid::stl(mesh, options, millimetres(&scene.tile.unit)?, &making)?,
+        "png" => heights::png(mesh, options, &scene.tile.unit, &making)?,
         "svg" => {
-            pattern::sheet(scene, options, millimetres(&scene.tile.unit)?).map(|(page, notes)| (page.svg(), notes))?
+            let (page, notes) = sheet()?;
+            (page.svg(&drawing)?, notes)
         }
         "pdf" => {
-            pattern::sheet(scene, options, millimetres(&scene.tile.unit)?).map(|(page, notes)| (page.pdf(), notes))?
+            let (page, notes) = sheet()?;
+            (page.pdf(&drawing)?, notes)
         }
         other => {
             let found =
@@ -93,8 +124,22 @@ pub fn write(scene: &Scene, mesh: &TileMesh, options: &TileOptions, path: &Path)
             return Err(InputError::new("output", found, expected).in_file(path).into());
         }
     };
-    replace_file(path, &bytes)?;
+    if matches!(ending.as_str(), "obj" | "svg" | "pdf") {
+        notes.extend(left_out(&scene.tile));
+    }
+    replace_large_file(path, &bytes, &writing)?;
     Ok(notes)
+}
+
+/// What is painted over the tile and has no place in a file that shows materials.
+fn left_out(tile: &Tile) -> Option<String> {
+    let painted = match (&tile.color_path, &tile.slot_path) {
+        (None, None) => return None,
+        (Some(_), None) => "the image of colours (`tile.color_path`) is",
+        (None, Some(_)) => "the image of materials (`tile.slot_path`) is",
+        (Some(_), Some(_)) => "the images of colours and of materials (`tile.color_path`, `tile.slot_path`) are",
+    };
+    Some(format!("{painted} left out: each face stands in the plain material of its own slot"))
 }
 
 /// Millimetres of a tile unit.

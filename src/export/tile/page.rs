@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use glam::{DVec2, Vec3};
 
+use crate::error::Result;
 use crate::large_scale::tone_map::srgb_byte;
+use crate::progress::{self, Progress};
 
 /// How an outline is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,7 +87,9 @@ impl Page {
         (low - MARGIN_MM, high - low + 2.0 * MARGIN_MM)
     }
 
-    pub fn svg(&self) -> Vec<u8> {
+    /// # Errors
+    /// [`crate::Error::Cancelled`] when `progress` says so.
+    pub fn svg(&self, progress: &Progress<'_>) -> Result<Vec<u8>> {
         let (corner, size) = self.bounds();
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
         let _ = writeln!(
@@ -100,7 +104,8 @@ impl Page {
             text,
             "<g stroke-width=\"{LINE_MM}\" stroke-linejoin=\"round\" font-family=\"sans-serif\" font-size=\"{TEXT_MM}\">"
         );
-        for shape in &self.shapes {
+        for (k, shape) in self.shapes.iter().enumerate() {
+            progress::step(progress, k, self.shapes.len())?;
             let name = if shape.closed { "polygon" } else { "polyline" };
             let points: Vec<String> = shape.points.iter().map(|p| format!("{:.4},{:.4}", p.x, p.y)).collect();
             let fill = shape.fill.map_or_else(
@@ -122,18 +127,22 @@ impl Page {
             let _ = writeln!(text, "<text x=\"{:.3}\" y=\"{:.3}\">{words}</text>", at.x, at.y);
         }
         text.push_str("</g>\n</svg>\n");
-        text.into_bytes()
+        Ok(text.into_bytes())
     }
 
     /// One page, PDF 1.4.
-    pub fn pdf(&self) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// As [`Page::svg`].
+    pub fn pdf(&self, progress: &Progress<'_>) -> Result<Vec<u8>> {
         let (corner, size) = self.bounds();
         // PDF's y points upwards.
         let at = |p: DVec2| {
             format!("{:.4} {:.4}", (p.x - corner.x) * POINTS_PER_MM, (corner.y + size.y - p.y) * POINTS_PER_MM)
         };
         let mut content = format!("{:.4} w 1 j\n", LINE_MM * POINTS_PER_MM);
-        for shape in &self.shapes {
+        for (k, shape) in self.shapes.iter().enumerate() {
+            progress::step(progress, k, self.shapes.len())?;
             for (k, point) in shape.points.iter().enumerate() {
                 let _ = writeln!(content, "{} {}", at(*point), if k == 0 { "m" } else { "l" });
             }
@@ -181,6 +190,6 @@ impl Page {
         bytes.extend(
             format!("trailer\n<< /Size {} /Root 1 0 R >>\nstartxref\n{table}\n%%EOF\n", objects.len() + 1).bytes(),
         );
-        bytes
+        Ok(bytes)
     }
 }

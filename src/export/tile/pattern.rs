@@ -6,6 +6,7 @@ use super::page::{Line, Page};
 use super::{TileOptions, paper_color};
 use crate::error::{InputError, Result};
 use crate::geometry::{self, CrossSection, OnePyramid};
+use crate::progress::{self, Progress};
 use crate::scene::{Geometry, Scene, Tile};
 
 /// Width of a tab, millimetres, and how far its ends draw in.
@@ -16,34 +17,50 @@ const BEND_COSINE: f64 = 0.978;
 const MOST_NETS: usize = 200;
 
 /// The sheet of a scene's tile, `unit_mm` millimetres a tile unit.
-pub fn sheet(scene: &Scene, options: &TileOptions, unit_mm: f64) -> Result<(Page, Vec<String>)> {
+///
+/// # Errors
+/// A geometry that does not unfold, too many nets, [`crate::Error::Cancelled`] when `progress` says so.
+pub fn sheet(
+    scene: &Scene,
+    options: &TileOptions,
+    unit_mm: f64,
+    progress: &Progress<'_>,
+) -> Result<(Page, Vec<String>)> {
     let scale = unit_mm * f64::from(options.scale);
     let size = scene.tile.size;
     match &scene.tile.geometry {
         Geometry::Grooves(spec) => {
             let section = CrossSection::of(spec, size);
             let colors = [paper_color(scene, "bottom")?, paper_color(scene, "sides")?];
-            Ok(grooves(&section, options, scale, &colors))
+            grooves(&section, options, scale, &colors, progress)
         }
         Geometry::Pyramids(spec) => {
             let one = OnePyramid::of(spec, size);
             let colors = [paper_color(scene, "faces")?, paper_color(scene, "floor")?];
             pyramids(&one, size.as_dvec2(), options, scale, &colors)
         }
-        Geometry::Flat(_) => plane(scene, options, scale),
+        Geometry::Flat(_) => plane(scene, options, scale, progress),
         other => {
-            Err(InputError::new("tile.geometry.kind", other.kind(), "grooves, pyramids or flat, which unfold").into())
+            let expected = "grooves, pyramids or flat, which unfold";
+            Err(InputError::new("tile.geometry.kind", other.kind(), expected).into())
         }
     }
 }
 
 /// Mountains point at the reader, so that the printed side is the one that is seen.
-fn grooves(section: &CrossSection, options: &TileOptions, scale: f64, colors: &[Vec3; 2]) -> (Page, Vec<String>) {
+fn grooves(
+    section: &CrossSection,
+    options: &TileOptions,
+    scale: f64,
+    colors: &[Vec3; 2],
+    progress: &Progress<'_>,
+) -> Result<(Page, Vec<String>)> {
     let length = section.length * f64::from(options.repeat.y) * scale;
     let periods = section.count * options.repeat.x as usize;
     let mut page = Page::default();
     let (mut x, mut before) = (0.0, None::<DVec2>);
-    for _ in 0..periods {
+    for period in 0..periods {
+        progress::step(progress, period, periods)?;
         for pair in section.points.windows(2) {
             let along = (pair[1].0 - pair[0].0) * scale;
             let width = along.length();
@@ -81,7 +98,7 @@ fn grooves(section: &CrossSection, options: &TileOptions, scale: f64, colors: &[
         "{periods} grooves: a strip of {x:.2} x {length:.2} mm folds to {:.2} x {length:.2} mm",
         periods as f64 * pitch
     )];
-    (page, notes)
+    Ok((page, notes))
 }
 
 fn legend(page: &mut Page, at: DVec2) {
@@ -226,7 +243,7 @@ fn unfold(polygon: &[DVec3], edge: [DVec3; 2], onto: [DVec2; 2]) -> Vec<DVec2> {
     polygon.iter().map(|p| onto[0] + x * (*p - edge[0]).dot(along) + y * (*p - edge[0]).dot(inside)).collect()
 }
 
-fn plane(scene: &Scene, options: &TileOptions, scale: f64) -> Result<(Page, Vec<String>)> {
+fn plane(scene: &Scene, options: &TileOptions, scale: f64, progress: &Progress<'_>) -> Result<(Page, Vec<String>)> {
     // Images are not printed.
     let bare = Tile { color_path: None, slot_path: None, ..scene.tile.clone() };
     let mesh = geometry::build(&bare, std::path::Path::new(""))?;
@@ -235,6 +252,7 @@ fn plane(scene: &Scene, options: &TileOptions, scale: f64) -> Result<(Page, Vec<
     let extent = size * options.repeat.as_dvec2() * scale;
     let mut page = Page::default();
     for y in 0..options.repeat.y {
+        progress::tell(progress, y as f32 / options.repeat.y as f32)?;
         for x in 0..options.repeat.x {
             let shift = DVec2::new(f64::from(x), f64::from(y)) * size;
             for triangle in 0..mesh.triangles.len() {

@@ -4,17 +4,25 @@ use glam::{DVec3, Vec3};
 
 use super::TileOptions;
 use super::heights::Heights;
+use crate::error::Result;
 use crate::geometry::TileMesh;
+use crate::progress::{self, Progress};
 
-pub fn stl(mesh: &TileMesh, options: &TileOptions, unit_mm: f64) -> (Vec<u8>, Vec<String>) {
-    let heights = Heights::from_above(mesh, options.samples, 0.0);
+pub fn stl(
+    mesh: &TileMesh,
+    options: &TileOptions,
+    unit_mm: f64,
+    progress: &Progress<'_>,
+) -> Result<(Vec<u8>, Vec<String>)> {
+    let heights = Heights::from_above(mesh, options.samples, 0.0, &progress::part(progress, 0.0, 0.3))?;
     let scale = unit_mm * f64::from(options.scale);
-    let triangles = solid(&heights, mesh, options, scale);
+    let triangles = solid(&heights, mesh, options, scale, &progress::part(progress, 0.3, 0.5))?;
     let mut bytes = vec![0; 80];
     let title = b"biscale tile, millimetres";
     bytes[..title.len()].copy_from_slice(title);
     bytes.extend((triangles.len() as u32).to_le_bytes());
-    for [a, b, c] in &triangles {
+    for (k, [a, b, c]) in triangles.iter().enumerate() {
+        progress::step(&progress::part(progress, 0.5, 1.0), k, triangles.len())?;
         let normal = (*b - *a).cross(*c - *a).try_normalize().unwrap_or(Vec3::Z);
         bytes.extend([normal, *a, *b, *c].iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes));
         bytes.extend([0, 0]);
@@ -35,11 +43,17 @@ pub fn stl(mesh: &TileMesh, options: &TileOptions, unit_mm: f64) -> (Vec<u8>, Ve
             heights.values.len()
         ));
     }
-    (bytes, notes)
+    Ok((bytes, notes))
 }
 
 /// Triangles in millimetres, outside counter-clockwise.
-pub(super) fn solid(heights: &Heights, mesh: &TileMesh, options: &TileOptions, scale: f64) -> Vec<[Vec3; 3]> {
+pub(super) fn solid(
+    heights: &Heights,
+    mesh: &TileMesh,
+    options: &TileOptions,
+    scale: f64,
+    progress: &Progress<'_>,
+) -> Result<Vec<[Vec3; 3]>> {
     let [columns, rows] = (heights.count * options.repeat).to_array();
     let step = mesh.size.as_dvec2() / heights.count.as_dvec2() * scale;
     let (low, _) = heights.range();
@@ -52,6 +66,7 @@ pub(super) fn solid(heights: &Heights, mesh: &TileMesh, options: &TileOptions, s
     };
     let mut triangles = Vec::new();
     for j in 0..rows {
+        progress::tell(progress, j as f32 / rows as f32)?;
         for i in 0..columns {
             let (a, b, c, d) = (top(i, j), top(i + 1, j), top(i + 1, j + 1), top(i, j + 1));
             triangles.extend([[a, b, c], [a, c, d]]);
@@ -69,5 +84,5 @@ pub(super) fn solid(heights: &Heights, mesh: &TileMesh, options: &TileOptions, s
         let (under, next) = (from.with_z(0.0), to.with_z(0.0));
         triangles.extend([[under, next, to], [under, to, from], [next, under, middle]]);
     }
-    triangles
+    Ok(triangles)
 }

@@ -1,11 +1,17 @@
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 
 use glam::DVec2;
 
 use super::heights::Heights;
 use super::*;
+use crate::error::Error;
 use crate::geometry;
 use crate::scene::{Geometry, GrooveProfile, Grooves, Pyramids};
+
+fn silent(_: f32) -> bool {
+    true
+}
 
 fn scene_of(geometry: Geometry) -> (Scene, TileMesh) {
     let scene = Scene::of(geometry);
@@ -27,9 +33,9 @@ fn v_grooves() -> Geometry {
 fn every_edge_of_the_printed_solid_is_shared_by_two_triangles_that_run_opposite_ways() {
     let (_, mesh) = scene_of(Geometry::Pyramids(Pyramids { truncation: 0.3, ..Pyramids::default() }));
     let options = TileOptions { samples: UVec2::new(12, 9), repeat: UVec2::new(2, 1), ..TileOptions::default() };
-    let heights = Heights::from_above(&mesh, options.samples, 0.0);
+    let heights = Heights::from_above(&mesh, options.samples, 0.0, &silent).unwrap();
     assert_eq!(heights.holes, 0);
-    let triangles = solid::solid(&heights, &mesh, &options, 10.0);
+    let triangles = solid::solid(&heights, &mesh, &options, 10.0, &silent).unwrap();
     let mut edges: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
     let key = |p: Vec3| p.to_array().map(f32::to_bits);
     let mut volume = 0.0;
@@ -49,7 +55,7 @@ fn every_edge_of_the_printed_solid_is_shared_by_two_triangles_that_run_opposite_
 #[test]
 fn heights_of_grooves_are_the_cross_section() {
     let (_, mesh) = scene_of(v_grooves());
-    let heights = Heights::from_above(&mesh, UVec2::new(8, 2), 0.0);
+    let heights = Heights::from_above(&mesh, UVec2::new(8, 2), 0.0, &silent).unwrap();
     // Two V grooves a tile: 0 at the ridge, -0.25 in the middle, straight between.
     for (i, expected) in [0.0, -0.125, -0.25, -0.125, 0.0, -0.125, -0.25, -0.125].into_iter().enumerate() {
         assert!((heights.at(i as u32, 1) - expected).abs() < 1e-6, "{i}: {}", heights.at(i as u32, 1));
@@ -63,14 +69,14 @@ fn files_by_ending_and_complaints_about_the_rest() {
     let options = TileOptions { samples: UVec2::splat(16), ..TileOptions::default() };
     for ending in ["obj", "stl", "png", "svg", "pdf"] {
         let path = folder.path().join("tile").with_extension(ending);
-        assert!(!write(&scene, &mesh, &options, &path).unwrap().is_empty());
+        assert!(!write(&scene, &mesh, &options, &path, &silent).unwrap().is_empty());
         assert!(std::fs::metadata(&path).unwrap().len() > 100, "{ending}");
     }
     let stl = std::fs::read(folder.path().join("tile.stl")).unwrap();
     let count = u32::from_le_bytes(stl[80..84].try_into().unwrap()) as usize;
     assert_eq!(stl.len(), 84 + 50 * count);
     let complaint = |options: &TileOptions, name: &str| {
-        let error = write(&scene, &mesh, options, &folder.path().join(name)).unwrap_err();
+        let error = write(&scene, &mesh, options, &folder.path().join(name), &silent).unwrap_err();
         assert_eq!(error.exit_code(), 2);
         error.to_string()
     };
@@ -83,15 +89,46 @@ fn files_by_ending_and_complaints_about_the_rest() {
     let mut other = scene.clone();
     other.tile.unit = "furlong".to_owned();
     assert!(
-        write(&other, &mesh, &options, &folder.path().join("tile.stl")).unwrap_err().to_string().contains("tile.unit")
+        write(&other, &mesh, &options, &folder.path().join("tile.stl"), &silent)
+            .unwrap_err()
+            .to_string()
+            .contains("tile.unit")
     );
+}
+
+#[test]
+fn progress_of_every_format_goes_from_nothing_to_all_and_what_is_given_up_replaces_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, mesh) = scene_of(v_grooves());
+    let options = TileOptions { samples: UVec2::splat(16), ..TileOptions::default() };
+    for ending in ["obj", "stl", "png", "svg", "pdf"] {
+        let path = folder.path().join(format!("tile.{ending}"));
+        let told = RefCell::new(Vec::new());
+        let tell = |part| {
+            told.borrow_mut().push(part);
+            true
+        };
+        write(&scene, &mesh, &options, &path, &tell).unwrap();
+        let told = told.into_inner();
+        assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted(), "{ending}: {told:?}");
+        std::fs::write(&path, "old").unwrap();
+        // Given up at each of these places, the last of them with all bytes beside the old file.
+        for most in 0..told.len() {
+            let left = Cell::new(most);
+            let some = |_| left.get().checked_sub(1).map(|less| left.set(less)).is_some();
+            let error = write(&scene, &mesh, &options, &path, &some).unwrap_err();
+            assert!(matches!(error, Error::Cancelled), "{ending}, {most}: {error}");
+            assert_eq!(std::fs::read(&path).unwrap(), b"old", "{ending}, {most}");
+        }
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5, "nothing is left beside");
 }
 
 #[test]
 fn an_obj_of_the_tile_loads_as_the_tile() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, mesh) = scene_of(v_grooves());
-    write(&scene, &mesh, &TileOptions::default(), &folder.path().join("tile.obj")).unwrap();
+    write(&scene, &mesh, &TileOptions::default(), &folder.path().join("tile.obj"), &silent).unwrap();
     let mut again = scene;
     again.tile.geometry = Geometry::Mesh(crate::scene::MeshFile { path: "tile.obj".into() });
     let back = geometry::build(&again.tile, folder.path()).unwrap();
@@ -108,7 +145,7 @@ fn a_pattern_keeps_the_area_of_what_it_unfolds() {
     ] {
         let (scene, mesh) = scene_of(geometry);
         let options = TileOptions { scale, ..TileOptions::default() };
-        let (page, _) = pattern::sheet(&scene, &options, 1.0).unwrap();
+        let (page, _) = pattern::sheet(&scene, &options, 1.0, &silent).unwrap();
         let polygon_area = |points: &[DVec2]| {
             let twice: f64 = (0..points.len()).map(|k| points[k].perp_dot(points[(k + 1) % points.len()])).sum();
             0.5 * twice.abs()
@@ -125,5 +162,28 @@ fn a_pattern_keeps_the_area_of_what_it_unfolds() {
         };
         let expected = (slots + under) * f64::from(scale * scale);
         assert!((printed / expected - 1.0).abs() < 1e-4, "{printed} {expected}");
+    }
+}
+
+#[test]
+fn images_over_the_tile_that_a_file_leaves_out_are_named_in_its_notes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut scene, mesh) = scene_of(v_grooves());
+    let options = TileOptions { samples: UVec2::splat(16), ..TileOptions::default() };
+    let notes = |scene: &Scene, ending: &str| {
+        let path = folder.path().join("tile").with_extension(ending);
+        write(scene, &mesh, &options, &path, &silent).unwrap().join("; ")
+    };
+    for (colors, slots) in [(false, false), (true, false), (false, true), (true, true)] {
+        scene.tile.color_path = colors.then(|| "colors.png".into());
+        scene.tile.slot_path = slots.then(|| "slots.png".into());
+        for ending in ["obj", "svg", "pdf", "stl", "png"] {
+            // A solid and a picture of heights are of no colour.
+            let shows = !matches!(ending, "stl" | "png");
+            let notes = notes(&scene, ending);
+            assert_eq!(notes.contains("tile.color_path"), colors && shows, "{ending}: {notes}");
+            assert_eq!(notes.contains("tile.slot_path"), slots && shows, "{ending}: {notes}");
+            assert_eq!(notes.contains("left out"), (colors || slots) && shows, "{ending}: {notes}");
+        }
     }
 }
