@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::facet_sum::FacetSum;
-use super::few_normals::FewNormals;
+use super::few_normals::{FewNormals, View};
 use crate::simd::LightPairs;
 use crate::visibility::Visibility;
 
@@ -59,7 +59,8 @@ impl Direct {
             if let (Visibility::Horizons(horizons), Some(few), true) =
                 (&*self.visibility, &self.few, o.z > 0.0 && area > 0.0)
             {
-                few.sums(&self.sum, horizons, lights, o, &scratch.v_o, &mut scratch.pairs, out);
+                let view = View { sum: &self.sum, horizons, o, v_o: &scratch.v_o };
+                few.sums(view, lights, &mut scratch.pairs, out);
                 return area;
             }
             for (k, &i) in lights.iter().enumerate() {

@@ -19,6 +19,16 @@ pub(super) struct FewNormals {
     reach: Vec<[f32; 2]>,
 }
 
+/// One view of a tile.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub sum: &'a FacetSum,
+    pub horizons: &'a Horizons,
+    pub o: Vec3,
+    /// Visibilities of all facets along `o`.
+    pub v_o: &'a [f32],
+}
+
 /// Runs of one normal with their groups; black groups have none.
 fn runs(sum: &FacetSum) -> impl Iterator<Item = (&Group, &Patch)> {
     let lit = sum.groups().iter().filter(|group| !group.is_black);
@@ -34,23 +44,14 @@ impl FewNormals {
         Some(Self { runs: ranges.len(), reach: horizons.reach(&ranges) })
     }
 
-    /// `a_v f̄` of each light into `out`, from the visibilities `v_o` of all facets along `o`.
-    pub(super) fn sums(
-        &self,
-        sum: &FacetSum,
-        horizons: &Horizons,
-        lights: &[Vec3],
-        o: Vec3,
-        v_o: &[f32],
-        pairs: &mut LightPairs,
-        mut out: impl FnMut(usize, DVec3),
-    ) {
+    /// `a_v f̄` of each light into `out`.
+    pub(super) fn sums(&self, view: View, lights: &[Vec3], pairs: &mut LightPairs, mut out: impl FnMut(usize, DVec3)) {
         for (part, lights) in lights.chunks(LightPairs::MOST).enumerate() {
-            pairs.set(lights, o);
+            pairs.set(lights, view.o);
             let mut totals = [DVec3::ZERO; LightPairs::MOST];
-            for (run, (group, patch)) in runs(sum).enumerate() {
-                if patch.normal.dot(o) > 0.0 {
-                    let seen = self.seen(run, sum, patch, horizons, pairs, lights.len(), v_o);
+            for (run, (group, patch)) in runs(view.sum).enumerate() {
+                if patch.normal.dot(view.o) > 0.0 {
+                    let seen = self.seen(view, (run, patch), pairs, lights.len());
                     add(group, patch.normal, pairs, &seen[..lights.len()], &mut totals);
                 }
             }
@@ -63,17 +64,15 @@ impl FewNormals {
     /// The area of a run that each light and the view see.
     fn seen(
         &self,
-        run: usize,
-        sum: &FacetSum,
-        patch: &Patch,
-        horizons: &Horizons,
+        view: View,
+        (run, patch): (usize, &Patch),
         pairs: &LightPairs,
         lights: usize,
-        v_o: &[f32],
     ) -> [f64; LightPairs::MOST] {
-        let areas = sum.areas(patch.range.clone());
-        let along =
-            |azimuth: f32, elevation: f32| horizons.seen_along([azimuth, elevation], patch.range.clone(), areas, v_o);
+        let areas = view.sum.areas(patch.range.clone());
+        let along = |azimuth: f32, elevation: f32| {
+            view.horizons.seen_along([azimuth, elevation], patch.range.clone(), areas, view.v_o)
+        };
         let mut all = None;
         let mut seen = [0.0; LightPairs::MOST];
         for (k, seen) in seen.iter_mut().enumerate().take(lights) {
@@ -81,7 +80,7 @@ impl FewNormals {
             if patch.normal.dot(pairs.light(k)) <= 0.0 {
                 continue;
             }
-            let [a, b] = horizons.taps(azimuth).map(|(azimuth, _)| self.reach[azimuth * self.runs + run]);
+            let [a, b] = view.horizons.taps(azimuth).map(|(azimuth, _)| self.reach[azimuth * self.runs + run]);
             *seen = if elevation >= a[1].max(b[1]) {
                 *all.get_or_insert_with(|| along(azimuth, ABOVE_ALL))
             } else if elevation <= a[0].min(b[0]) {
