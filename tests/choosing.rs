@@ -23,7 +23,11 @@ const SCENES: [&str; 10] = [
     "table4_cup",
 ];
 
-/// Pairs and a seed that choosing does not use.
+/// Errors are reported over sets of so many pairs (DESIGN.md, Sec. 7); a few bright ones decide a single set's.
+const SET: usize = 500;
+const SETS: usize = 2;
+
+/// A seed that choosing does not use.
 fn right(loaded: &scene::LoadedScene, pairs: &[biscale::accuracy::Pair]) -> (Vec<Vec3>, f64) {
     let settings = ReferenceSettings { facets: 16_384, max_passes: 12, target: 2e-3, seed: 4711 };
     let mut own = 0.0;
@@ -41,7 +45,7 @@ fn right(loaded: &scene::LoadedScene, pairs: &[biscale::accuracy::Pair]) -> (Vec
 #[test]
 #[ignore = "minutes of reference: three scenes; BISCALE_TABLE=1 prints asked, got and milliseconds of all ten"]
 fn nine_of_ten_scenes_get_the_decibels_and_milliseconds_that_were_asked_for() {
-    let pairs = mirror_biased_pairs(300, 99);
+    let pairs = mirror_biased_pairs(SETS * SET, 99);
     eprintln!("{:<24} {:>10} {:>10} {:>10} {:>10}", "scene", "asked", "said", "got", "ms");
     let (mut hits, mut misses) = ([0, 0], Vec::new());
     let all = std::env::var_os("BISCALE_TABLE").is_some();
@@ -51,10 +55,14 @@ fn nine_of_ten_scenes_get_the_decibels_and_milliseconds_that_were_asked_for() {
         let chosen = choose(&loaded, Goal::Decibels(40.0), &Cancel::default(), |_| {}).unwrap();
         let outcome = Pipeline::new().effective(&chosen.scene).unwrap();
         let values: Vec<Vec3> = pairs.iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect();
-        let errors = compare(&values, &truth);
-        // The truth has an error of its own.
-        let ours = (errors.rel_l2.powi(2) - own.powi(2)).max(1e-12).sqrt();
-        let got = errors.psnr_db + 20.0 * (errors.rel_l2 / ours).log10();
+        let of_set = |(values, truth): (&[Vec3], &[Vec3])| {
+            let errors = compare(values, truth);
+            // The truth has an error of its own.
+            let ours = (errors.rel_l2.powi(2) - own.powi(2)).max(1e-12);
+            10_f64.powf(-0.1 * errors.psnr_db) * ours / errors.rel_l2.powi(2)
+        };
+        let power: f64 = values.chunks(SET).zip(truth.chunks(SET)).map(of_set).sum();
+        let got = -10.0 * (power / SETS as f64).log10();
         let coarsest = chosen.got.rung == 0.0;
         let good = (got - 40.0).abs() <= 3.0 || (got > 40.0 && coarsest);
         hits[0] += usize::from(good);

@@ -175,13 +175,14 @@ impl<'a> Search<'a> {
             // Errors of few facets jump from one number to the next: all rungs between are looked at, coarse ones first. The
             // first of many that passes is likely to be a lucky one: it must pass on other pairs, too.
             let other = SmallReference::new(&mut self.pipeline, self.loaded, &coarse, db, PAIRS_SEED + 1, progress)?;
-            for k in 1..=2 * SCANNED {
-                let tried = try_at(self, best.rung - 1.0 + f64::from(k) / f64::from(SCANNED), progress)?;
+            let first = (best.rung - 2.0).max(0.0);
+            for k in 1..=3 * SCANNED {
+                let tried = try_at(self, first + f64::from(k) / f64::from(SCANNED), progress)?;
                 if tried.safe_db() < db {
                     continue;
                 }
                 let both = tried.with(other.errors(&self.build(tried.rung, 1)?.0));
-                if both.safe_db() >= db || k == 2 * SCANNED {
+                if both.safe_db() >= db || k == 3 * SCANNED {
                     return Ok(both);
                 }
             }
