@@ -120,3 +120,34 @@ fn add(group: &Group, normal: Vec3, pairs: &LightPairs, seen: &[f64], totals: &m
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::directions::from_angles;
+    use crate::filtering::Form;
+    use crate::pipeline::Pipeline;
+
+    #[test]
+    fn sums_for_many_lights_are_the_plain_sums_whether_a_light_is_high_low_or_between() {
+        let loaded = crate::scene::open("fig4b_bicolor_cup", &["quality.preset=draft".to_owned()]).unwrap();
+        let outcome = Pipeline::new().effective(&loaded).unwrap();
+        let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+        assert!(FewNormals::of(&direct.sum, &direct.visibility).is_some());
+        let facets = direct.sum.facet_count();
+        let seen = |d: Vec3| {
+            let mut v = vec![0.0; facets];
+            direct.visibility.fill(d, 0..facets, &mut v);
+            v
+        };
+        let lights: Vec<Vec3> = (0..90_u8).map(|k| from_angles(f32::from(k) * 0.0174, f32::from(k) * 2.4)).collect();
+        for o in [from_angles(0.2, 1.0), from_angles(0.9, 4.0), from_angles(1.4, 2.0)] {
+            let v_o = seen(o);
+            let plain: Vec<DVec3> = lights.iter().map(|&i| direct.sum.sum(i, o, &seen(i), &v_o)).collect();
+            let peak = plain.iter().map(|sum| sum.max_element()).fold(0.0, f64::max);
+            direct.sums(&lights, o, |k, sum| {
+                assert!((sum - plain[k]).abs().max_element() < 1e-5 * peak, "{k}: {sum} {}", plain[k]);
+            });
+        }
+    }
+}

@@ -135,6 +135,12 @@ mod tests {
     }
 
     #[test]
+    fn a_plain_weave_has_both_planes_and_a_twill_has_not() {
+        assert_eq!(mirror_planes(&of(r#"{ kind = "weave", pattern = "plain" }"#)), [true, true]);
+        assert_ne!(mirror_planes(&of(r#"{ kind = "weave", pattern = "twill" }"#)), [true, true]);
+    }
+
+    #[test]
     fn slots_that_differ_break_the_mirror() {
         let mut mesh = of(
             r#"{ kind = "grooves", profile = "trapezoid", count = 2, depth = 0.1, side_angle_deg = 45, rotation_deg = 0 }"#,

@@ -201,3 +201,41 @@ fn nanoseconds_a_facet() {
         eprintln!("{lobe:?}: {best:.2} ns a facet");
     }
 }
+
+#[test]
+fn lobes_of_many_lights_are_those_of_each_pair_by_itself() {
+    let (lights, views) = (directions(37, 0.3, 1.56), directions(5, 0.7, 1.5));
+    let mut pairs = LightPairs::new();
+    for (lobe, _) in lobes() {
+        for (&o, normal) in views.iter().zip(directions(5, 0.1, 1.2)) {
+            pairs.set(&lights, o);
+            let mut together = [0.0; LANES];
+            light_lobes(lobe, &pairs, normal, &mut together);
+            for (k, &i) in lights.iter().enumerate() {
+                let mut alone = [0.0];
+                let [x, y, z] = [normal.x, normal.y, normal.z];
+                lobe_values(lobe, &PairVectors::new(i, o), [&[x], &[y], &[z]], &mut alone);
+                // Half vectors differ by rounding, which the sharpest lobes raise.
+                assert!(
+                    (together[k] - alone[0]).abs() <= 2e-3 * alone[0] + 1e-6,
+                    "{lobe:?}: {} {}",
+                    together[k],
+                    alone[0]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn angles_of_lights_are_those_of_the_directions() {
+    let lights = directions(64, 0.2, 1.57);
+    let mut pairs = LightPairs::new();
+    pairs.set(&lights, Vec3::Z);
+    for (k, &light) in lights.iter().enumerate() {
+        assert_eq!(azimuth_and_elevation(light), (pairs.azimuths[k], pairs.elevations[k]), "{light}");
+        let (theta, phi) = crate::directions::to_angles(light);
+        assert!((std::f32::consts::FRAC_PI_2 - theta - pairs.elevations[k]).abs() < 2e-6, "{light}");
+        assert!((phi / std::f32::consts::TAU - pairs.azimuths[k]).abs() < 1e-6, "{light}");
+    }
+}
