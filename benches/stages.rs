@@ -115,7 +115,7 @@ fn main() -> Result<(), biscale::Error> {
             Horizons::march(heights, field.size, &facets, azimuths, settings.penumbra)
         });
     }
-    let (grid, rod_grid) = (PeriodicGrid::new(&field), PeriodicGrid::new(&rods));
+    let (grid, rod_grid) = (PeriodicGrid::for_slices(&field), PeriodicGrid::for_slices(&rods));
     bench.line("horizons, scan of the triangles", count * azimuths, "azimuth", || {
         Horizons::scan(&grid, &facets, azimuths, settings.penumbra)
     });

@@ -37,7 +37,7 @@ impl Pipeline {
         let scan_work = match self.scan_work {
             Some((version, work)) if version == facets_version => work,
             _ if needs_maps && !hardware_gpu => {
-                let work = Slices::work(&PeriodicGrid::new(&shape.mesh), facets);
+                let work = Slices::work(&PeriodicGrid::for_slices(&shape.mesh), facets);
                 self.scan_work = Some((facets_version, work));
                 work
             }

@@ -57,7 +57,7 @@ pub(super) fn see(
     gpu: Option<&Gpu>,
     cancel: &Cancel,
 ) -> Result<Visibility> {
-    let periodic = || PeriodicGrid::new(mesh).cancelled_by(cancel);
+    let periodic = || PeriodicGrid::for_slices(mesh).cancelled_by(cancel);
     let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
     Ok(match (route, &mesh.height_grid, gpu) {
         (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::PeriodicGrid;
 use super::height_march::HeightMarch;
-use super::ray_cast::lifted_origin;
-use super::scan::BlockedSlopes;
+use super::ray_cast::lifted_origins;
+use super::scan::scan_all;
 use super::slicer::Slicer;
 use crate::directions::from_angles;
 use crate::geometry::{Facets, HeightGrid};
@@ -38,16 +38,11 @@ impl Horizons {
 
     /// Slices the mesh along every azimuth, for every facet: exact in elevation.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
-        let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
+        let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
-            let slicer = slicer.turned(along.truncate());
-            let mut blocked = BlockedSlopes::default();
-            for (facet, horizon) in row.iter_mut().enumerate() {
-                let origin = lifted_origin(facets, facet, diagonal);
-                slicer.scan(origin, facets.normals[facet], facets.triangles[facet], &mut blocked);
-                *horizon = blocked.highest();
-            }
-            blocked.cut_short
+            scan_all(&slicer.turned(along.truncate()), facets, &origins, &mut |facet, blocked| {
+                row[facet as usize] = blocked.highest();
+            })
         })
     }
 

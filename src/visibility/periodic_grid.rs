@@ -30,8 +30,10 @@ pub struct PeriodicGrid {
     pub(super) cancel: Cancel,
 }
 
-/// Measured on rods and a weave: slices take the same time from 3 to 8, half as much again at 1.5.
+/// What rays like.
 const TRIANGLES_A_CELL: f32 = 4.0;
+/// What slices like, which look at four triangles at once: measured on rods and a weave, a tenth less time than with 4 or 8.
+const TRIANGLES_A_SLICED_CELL: f32 = 16.0;
 const MAX_CELLS_A_SIDE: i32 = 512;
 
 impl PeriodicGrid {
@@ -43,11 +45,20 @@ impl PeriodicGrid {
 
     /// Triangles with corners that are not finite, or without area, block nothing.
     pub fn new(mesh: &TileMesh) -> Self {
+        Self::with_cells(mesh, TRIANGLES_A_CELL)
+    }
+
+    /// The same with larger cells, for slices.
+    pub fn for_slices(mesh: &TileMesh) -> Self {
+        Self::with_cells(mesh, TRIANGLES_A_SLICED_CELL)
+    }
+
+    fn with_cells(mesh: &TileMesh, triangles_a_cell: f32) -> Self {
         let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
         let solid: Vec<u32> = (0..corners.len() as u32)
             .filter(|&t| corners[t as usize].iter().all(|p| p.is_finite()) && mesh.triangle_area(t as usize) > 0.0)
             .collect();
-        let cells = cell_counts(mesh.size, &corners, &solid);
+        let cells = cell_counts(mesh.size, &corners, &solid, triangles_a_cell);
         let cell_size = mesh.size / cells.as_vec2();
         let cell_total = (cells.x * cells.y) as usize;
 
@@ -140,8 +151,8 @@ impl PeriodicGrid {
 }
 
 /// A few triangles a cell, following the tile's shape, and no finer than a large triangle warrants.
-fn cell_counts(tile_size: Vec2, corners: &[[Vec3; 3]], solid: &[u32]) -> IVec2 {
-    let wanted = (solid.len() as f32 / TRIANGLES_A_CELL).max(16.0);
+fn cell_counts(tile_size: Vec2, corners: &[[Vec3; 3]], solid: &[u32], triangles_a_cell: f32) -> IVec2 {
+    let wanted = (solid.len() as f32 / triangles_a_cell).max(16.0);
     // Grid density must not let a few huge triangles fill the entry list: bound the summed bounding-box areas.
     let boxes: f64 = solid
         .iter()
@@ -162,7 +173,9 @@ fn cell_counts(tile_size: Vec2, corners: &[[Vec3; 3]], solid: &[u32]) -> IVec2 {
 /// Walks the grid's cells from a point along a plane direction; endless, the caller stops.
 #[derive(Debug)]
 pub(super) struct CellWalk {
-    position: IVec2,
+    /// Place in the base period.
+    local: IVec2,
+    tile: IVec2,
     step: IVec2,
     next: Vec2,
     delta: Vec2,
@@ -172,6 +185,7 @@ pub(super) struct CellWalk {
 }
 
 impl CellWalk {
+    #[inline(always)]
     pub fn new(grid: &PeriodicGrid, from: Vec2, direction: Vec2) -> Self {
         let at = from / grid.cell_size;
         let speed = direction / grid.cell_size;
@@ -187,8 +201,10 @@ impl CellWalk {
         };
         let (step_x, next_x, delta_x) = axis(at.x, speed.x, position.x);
         let (step_y, next_y, delta_y) = axis(at.y, speed.y, position.y);
+        let tile = IVec2::new(position.x.div_euclid(grid.cells.x), position.y.div_euclid(grid.cells.y));
         Self {
-            position,
+            local: position - tile * grid.cells,
+            tile,
             step: IVec2::new(step_x, step_y),
             next: Vec2::new(next_x, next_y),
             delta: Vec2::new(delta_x, delta_y),
@@ -198,21 +214,30 @@ impl CellWalk {
     }
 
     /// Index of the present cell in the base period, and the tile copy it belongs to.
+    #[inline(always)]
     pub fn cell(&self) -> (usize, IVec2) {
-        let tile = IVec2::new(self.position.x.div_euclid(self.cells.x), self.position.y.div_euclid(self.cells.y));
-        let local = self.position - tile * self.cells;
-        ((local.y * self.cells.x + local.x) as usize, tile)
+        ((self.local.y * self.cells.x + self.local.x) as usize, self.tile)
     }
 
-    pub fn advance(&mut self) {
+    /// Goes on to the next cell; returns where it is entered.
+    #[inline(always)]
+    pub fn advance(&mut self) -> f32 {
+        // The next period begins where this one ends.
+        let stepped = |local: &mut i32, tile: &mut i32, step: i32, cells: i32| {
+            *local += step;
+            let over = i32::from(*local == cells) - i32::from(*local < 0);
+            *local -= over * cells;
+            *tile += over;
+        };
         if self.next.x <= self.next.y {
             self.entered = self.next.x;
             self.next.x += self.delta.x;
-            self.position.x += self.step.x;
+            stepped(&mut self.local.x, &mut self.tile.x, self.step.x, self.cells.x);
         } else {
             self.entered = self.next.y;
             self.next.y += self.delta.y;
-            self.position.y += self.step.y;
+            stepped(&mut self.local.y, &mut self.tile.y, self.step.y, self.cells.y);
         }
+        self.entered
     }
 }

@@ -3,7 +3,9 @@
 use glam::{IVec2, Vec2, Vec3};
 
 use super::periodic_grid::CellWalk;
-use super::slicer::TurnedSlicer;
+use super::slicer::{TurnedSlicer, WIDTH};
+use crate::geometry::Facets;
+use crate::simd::multiversion;
 
 /// Blocked slopes (tangents of the elevation), sorted and disjoint, within `[0, ∞]`.
 #[derive(Debug, Default, Clone)]
@@ -29,6 +31,12 @@ impl BlockedSlopes {
     /// The floating intervals, without what the facet is merely turned away from.
     pub fn floating_unfaced(&self) -> impl Iterator<Item = (f32, f32)> {
         self.floating.iter().copied().filter(|interval| interval.0 < self.overhead)
+    }
+
+    /// What a triangle must rise above, or hang outside of, to matter: the ground, and the first floating interval.
+    pub(super) fn known(&self) -> Known {
+        let (low, high) = self.floating.first().copied().unwrap_or((f32::INFINITY, f32::NEG_INFINITY));
+        Known { ground: self.ground, low, high }
     }
 
     /// The highest slope up to `reach` that is still open, `ground` or less where none is (one floating interval is looked at).
@@ -58,40 +66,46 @@ impl BlockedSlopes {
         };
     }
 
+    #[inline(never)]
     fn insert(&mut self, mut low: f32, mut high: f32) {
         if high <= self.ground {
-            return;
-        }
-        if self.floating.iter().any(|&(a, b)| a <= low && high <= b) {
             return;
         }
         // Facing surfaces share edges: a gap of rounding size is no gap.
         let reach = |slope: f32| slope + 1e-5 * (1.0 + slope * slope);
         if low <= reach(self.ground) {
             self.ground = high;
-            if self.floating.is_empty() {
-                return;
-            }
         } else {
-            self.floating.retain(|&(a, b)| {
-                let apart = a > reach(high) || low > reach(b);
-                if !apart {
-                    low = low.min(a);
-                    high = high.max(b);
-                }
-                apart
-            });
-            let at = self.floating.partition_point(|&(a, _)| a < low);
-            self.floating.insert(at, (low, high));
-        }
-        while let Some(&(a, b)) = self.floating.first() {
-            if a > reach(self.ground) {
-                break;
+            let first = self.floating.iter().take_while(|&&(_, b)| reach(b) < low).count();
+            let mut end = first;
+            while let Some(&(a, b)) = self.floating.get(end).filter(|&&(a, _)| a <= reach(high)) {
+                (low, high) = (low.min(a), high.max(b));
+                end += 1;
             }
+            if end == first {
+                self.floating.insert(first, (low, high));
+            } else {
+                self.floating[first] = (low, high);
+                self.floating.drain(first + 1..end);
+            }
+        }
+        let mut absorbed = 0;
+        while let Some(&(_, b)) = self.floating.get(absorbed).filter(|&&(a, _)| a <= reach(self.ground)) {
             self.ground = self.ground.max(b);
-            self.floating.remove(0);
+            absorbed += 1;
+        }
+        if absorbed > 0 {
+            self.floating.drain(..absorbed);
         }
     }
+}
+
+/// Slopes of which nothing new can be learned: up to `ground`, and from `low` to `high`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    pub ground: f32,
+    pub low: f32,
+    pub high: f32,
 }
 
 /// Sine of how far behind a facet its visibility is still computed: more than the step between azimuths.
@@ -105,8 +119,28 @@ const LOWEST_SLOPE: f32 = 0.005;
 /// the horizon (2° for pyramids of 100 tiles) and is left out; [`BlockedSlopes::cut_short`] counts such walks.
 const LEAST_LOOKS: usize = 16_384;
 
+multiversion! {
+    /// Scans every facet along the slicer's direction from its lifted origin, and hands each with what blocks it to `found`; returns how many walks
+    /// ended before all was known.
+    pub fn scan_all(
+        slicer: &TurnedSlicer,
+        facets: &Facets,
+        origins: &[Vec3],
+        found: &mut dyn FnMut(u32, &BlockedSlopes),
+    ) -> usize {
+        let mut blocked = BlockedSlopes::default();
+        for facet in slicer.order(facets) {
+            let at = facet as usize;
+            slicer.scan(origins[at], facets.normals[at], facets.triangles[at], &mut blocked);
+            found(facet, &blocked);
+        }
+        blocked.cut_short
+    }
+}
+
 impl TurnedSlicer<'_> {
     /// Fills `blocked` with what a facet does not see along the slicer's direction; its `own` triangle is ignored.
+    #[inline(always)]
     pub(super) fn scan(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
         let (grid, along) = (self.grid, self.along);
         blocked.start_from_facing(normal, along);
@@ -120,35 +154,50 @@ impl TurnedSlicer<'_> {
         let mut walk = CellWalk::new(grid, origin.truncate(), along);
         let period = grid.period_along(along);
         let mut looks = LEAST_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize;
-        // What a cell at distance r can block at most: clearance / r.
-        while blocked.open_below(clearance / walk.entered) > blocked.ground.max(LOWEST_SLOPE) {
+        loop {
+            // What a cell at distance r can block at most: clearance / r.
+            let open = blocked.open_below(clearance / walk.entered);
+            if open <= blocked.ground.max(LOWEST_SLOPE) {
+                return;
+            }
             // Along an axis all comes back after one tile, only further away: what did not rise above the ground never will.
             if walk.entered > period && blocked.floating_unfaced().next().is_none() {
                 return;
             }
             let (cell, tile) = walk.cell();
-            let costs = 1 + self.blocks_in(cell);
+            let (first, extents) = self.blocks(cell);
+            let costs = 1 + extents.len();
             if looks < costs {
                 blocked.cut_short += 1;
                 return;
             }
             looks -= costs;
             blocked.work += 1;
-            let floor = origin.z + walk.entered * blocked.ground;
-            if grid.z_max[cell] > floor {
-                let home = origin - (tile.as_vec2() * grid.tile_size).extend(0.0);
-                self.for_each_cut(cell, home, floor, |entry, low, high| {
+            let (entered, left) = (walk.entered, walk.advance());
+            let floor = origin.z + entered * blocked.ground;
+            if grid.z_max[cell] <= floor {
+                continue;
+            }
+            // What stands higher throughout blocks nothing in this cell that is still open.
+            let ceiling = origin.z + left * open;
+            let home = origin - (tile.as_vec2() * grid.tile_size).extend(0.0);
+            let eye = self.seen(home);
+            for (k, extent) in extents.iter().enumerate() {
+                let met = extent.meets(eye.x, [floor, ceiling]);
+                if !met.any() {
+                    continue;
+                }
+                for (lane, low, high) in self.block(first + k).cut(eye, met, blocked.known()).lanes() {
                     blocked.work += 1;
-                    if entry.triangle == own && grid.lies_on(home, grid.copy_corners(entry, IVec2::ZERO)) {
-                        return;
+                    let entry = self.entries(cell)[WIDTH * k + lane];
+                    if entry.triangle != own || !grid.lies_on(home, grid.copy_corners(entry, IVec2::ZERO)) {
+                        blocked.insert(low, high);
                     }
-                    blocked.insert(low, high);
-                });
-                if blocked.ground == f32::INFINITY {
-                    return;
                 }
             }
-            walk.advance();
+            if blocked.ground == f32::INFINITY {
+                return;
+            }
         }
     }
 }

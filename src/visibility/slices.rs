@@ -6,8 +6,8 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::ray_cast::lifted_origin;
-use super::scan::BlockedSlopes;
+use super::ray_cast::lifted_origins;
+use super::scan::{BlockedSlopes, scan_all};
 use super::slicer::Slicer;
 use super::{Horizons, PackedVisibility, PeriodicGrid, SoftMaps};
 use crate::directions::{PolarGrid, from_angles};
@@ -43,15 +43,14 @@ impl Slices {
     pub fn work(grid: &PeriodicGrid, facets: &Facets) -> f64 {
         const FACETS: usize = 48;
         const AZIMUTHS: usize = 5;
-        let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
+        let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         let mut blocked = BlockedSlopes::default();
         let looked_at = FACETS.min(facets.len());
         for azimuth in 0..AZIMUTHS {
             let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
             let slicer = slicer.turned(along);
             for facet in (0..looked_at).map(|k| k * facets.len() / looked_at) {
-                let origin = lifted_origin(facets, facet, diagonal);
-                slicer.scan(origin, facets.normals[facet], facets.triangles[facet], &mut blocked);
+                slicer.scan(origins[facet], facets.normals[facet], facets.triangles[facet], &mut blocked);
             }
         }
         blocked.work as f64 / (FACETS * AZIMUTHS) as f64
@@ -59,25 +58,22 @@ impl Slices {
 
     /// Slices the mesh along every azimuth, for every facet. Visibility ends in ramps of `ramp` radians.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
-        let (slicer, diagonal) = (Slicer::new(grid), grid.tile_size.length());
+        let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         let scanned: Vec<(Vec<f32>, Vec<Floating>, usize)> = (0..azimuths)
             .into_par_iter()
             .map(|azimuth| {
                 let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
-                let slicer = slicer.turned(along);
-                let mut blocked = BlockedSlopes::default();
-                let (mut row, mut above) = (Vec::with_capacity(facets.len()), Vec::new());
-                for facet in 0..facets.len() {
-                    let origin = lifted_origin(facets, facet, diagonal);
-                    slicer.scan(origin, facets.normals[facet], facets.triangles[facet], &mut blocked);
-                    row.push(blocked.ground);
+                let (mut row, mut above) = (vec![0.0; facets.len()], Vec::new());
+                let cut_short = scan_all(&slicer.turned(along), facets, &origins, &mut |facet, blocked| {
+                    row[facet as usize] = blocked.ground;
                     above.extend(blocked.floating_unfaced().map(|(low, high)| Floating {
-                        facet: facet as u32,
+                        facet,
                         low: low.atan(),
                         high: if high == f32::INFINITY { Horizons::BLOCKED } else { high.atan() },
                     }));
-                }
-                (row, above, blocked.cut_short)
+                });
+                above.sort_by_key(|hanging: &Floating| hanging.facet);
+                (row, above, cut_short)
             })
             .collect();
         let (mut rows, mut floating, mut cut_short) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);

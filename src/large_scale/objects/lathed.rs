@@ -61,7 +61,7 @@ pub(super) fn plate() -> ObjectMesh {
         (0.58, 0.035, 0.20),
         (0.0, 0.030, 0.0),
     ]);
-    builder.add_patch(&evenly(128), &profile.parameters(0.2, 4), lathe(|v| profile.at(v)));
+    builder.add_patch(&evenly(128), &profile.parameters(0.2, 6), lathe(|v| profile.at(v)));
     builder.lay_tangents_along(DVec3::X);
     builder.rotate(DQuat::from_rotation_x(56f64.to_radians()));
     builder.finish(false)

@@ -1,0 +1,166 @@
+"""Seconds for decibels: f_bar of the same pairs by `biscale eval`, by its plain reference, and by Mitsuba 3 tracing rays (LLVM,
+all cores), each against many more of Mitsuba's rays; and a Klems matrix by `biscale export` and by Radiance's rfluxmtx, which is
+what genBSDF runs.
+
+    python benches/equal_error.py
+
+after `pip install mitsuba pyradiance numpy`. BISCALE names the program. Seconds are those of the clock, a whole process for
+biscale; Mitsuba's hold neither its import nor the loading of the tile.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests/interop"))
+from common import Table, biscale, direction, evaluate, export, random_pairs, skip  # noqa: E402
+
+try:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+except ImportError as error:
+    skip(f"the comparison needs `pip install mitsuba numpy` ({error})")
+
+mi.set_variant("llvm_ad_rgb")
+ROUGHNESS, PAIRS, REPEAT, GOLDEN = 0.2, 400, 13, 0.6180339887
+# White, so that Fresnel's factor is 1 in both.
+GLOSSY = f'material=[{{ name = "default", brdf = {{ kind = "ggx", roughness = {ROUGHNESS}, f0 = 1 }} }}]'
+SCENES = ["table4_plate", "table4_skirt", "table4_pillow"]
+RAYS, TRUTH_RAYS = [16, 64, 256, 1024, 4096, 16384], 1 << 19
+# Rays of one launch at most.
+LAUNCH = 1 << 23
+
+
+def psnr(found, truth):
+    return 20 * np.log10(truth.max() / np.sqrt(np.mean((found - truth) ** 2)))
+
+
+def rel_l2(found, truth):
+    return np.linalg.norm(found - truth) / np.linalg.norm(truth)
+
+
+def tile(scene, folder):
+    """Many periods of the tile for Mitsuba, and the height of its top."""
+    path = Path(folder) / f"{scene}.obj"
+    biscale("tile", scene, "-o", path, "--repeat", f"{REPEAT}x{REPEAT}", "--quiet")
+    heights = [float(line.split()[3]) for line in path.open() if line.startswith("v ")]
+    return mi.load_dict({"type": "scene", "tile": {"type": "obj", "filename": str(path), "face_normals": True}}), max(heights)
+
+
+def ggx(n, i, o):
+    """f times the light's cosine: GGX with height-correlated shadowing, white."""
+    squared = ROUGHNESS**2
+    to_light, to_view = dr.dot(n, i), dr.dot(n, o)
+    h = dr.normalize(i + o)
+    across = dr.squared_norm(dr.cross(n, h))
+    peak = squared / (dr.pi * dr.square(across + squared * dr.square(dr.dot(n, h))))
+    def slope(cosine):
+        return dr.sqrt(squared + (1 - squared) * cosine * cosine)
+    shadowing = 2 * to_light * to_view / (to_view * slope(to_light) + to_light * slope(to_view))
+    return dr.select((to_light > 0) & (to_view > 0), peak * shadowing / (4 * to_view), 0)
+
+
+def traced(scene, top, pairs, rays, seed):
+    """f_bar by rays from one period of the plane above the tile: the mean of what they meet."""
+    lights, views = direction(pairs[:, 0], pairs[:, 1]), direction(pairs[:, 2], pairs[:, 3])
+    offsets = np.random.default_rng(seed).random((len(pairs), 2))
+    together = max(1, LAUNCH // rays)
+    values = []
+    for first in range(0, len(pairs), together):
+        part = slice(first, first + together)
+        count = len(lights[part])
+        index = dr.arange(mi.UInt32, count * rays)
+        pair, ray = index // rays, index % rays
+        def of(array):
+            columns = [mi.Float(array[part, axis].astype(np.float32)) for axis in range(array.shape[1])]
+            return [dr.gather(mi.Float, column, pair) for column in columns]
+        i, o, (x0, y0) = mi.Vector3f(*of(lights)), mi.Vector3f(*of(views)), of(offsets)
+        x, y = (mi.Float(ray) + x0) / rays, mi.Float(ray) * GOLDEN + y0
+        start = mi.Point3f(REPEAT // 2 + x - dr.floor(x), REPEAT // 2 + y - dr.floor(y), top + 1e-4)
+        met = scene.ray_intersect_preliminary(mi.Ray3f(start, -o))
+        surface = met.compute_surface_interaction(mi.Ray3f(start, -o))
+        valid = met.is_valid()
+        blocked = scene.ray_test(mi.Ray3f(surface.p + 2e-5 * surface.n, i), valid)
+        value = dr.select(valid & ~blocked, ggx(surface.n, i, o), 0)
+        values.append(np.array(dr.block_sum(value, rays)) / rays)
+    return np.concatenate(values)
+
+
+def timed(work):
+    """Seconds and the result of the second run: the first compiles."""
+    work()
+    start = time.time()
+    result = work()
+    return time.time() - start, result
+
+
+def compare(name, folder):
+    scene, top = tile(name, folder)
+    pairs = random_pairs(PAIRS)
+    truth = traced(scene, top, pairs, TRUTH_RAYS, 1)
+    again = traced(scene, top, pairs, TRUTH_RAYS // 4, 2)
+    print(f"\n{name}, GGX {ROUGHNESS}, {PAIRS} pairs; truth: {TRUTH_RAYS} rays a pair, {psnr(again, truth):.1f} dB from a quarter as many others")
+    table = Table("by", "setting", "seconds", "PSNR [dB]", "relative L2")
+    def row(by, setting, seconds, values):
+        table.row(by, setting, f"{seconds:.3f}", f"{psnr(values, truth):.1f}", f"{100 * rel_l2(values, truth):.2f} %")
+        return seconds, psnr(values, truth)
+    def eval_with(*options):
+        return lambda: evaluate(name, pairs, folder, "--set", GLOSSY, "--backend", "cpu", *options)[:, 1]
+    ours = [row("biscale", preset, *timed(eval_with("--quality", preset))) for preset in ["draft", "standard", "fine"]]
+    for samples in [256, 4096, 65536]:
+        options = ["--quality", "reference", "--set", f"quality.reference_samples={samples}"]
+        row("plain reference", f"{samples} rays", *timed(eval_with(*options)))
+    theirs = [row("Mitsuba", f"{rays} rays", *timed(lambda: traced(scene, top, pairs, rays, 3))) for rays in RAYS]
+    for seconds, decibels in ours:
+        print(f"at {decibels:.1f} dB: {seconds_at(theirs, decibels) / seconds:.1f} times as fast as Mitsuba")
+
+
+def seconds_at(points, decibels):
+    """Seconds for decibels on a line through the logarithms of the two points around; the last two beyond them."""
+    k = next((k for k in range(1, len(points)) if points[k][1] >= decibels), len(points) - 1)
+    (t0, d0), (t1, d1) = points[k - 1], points[k]
+    return np.exp(np.log(t0) + (np.log(t1) - np.log(t0)) * (decibels - d0) / (d1 - d0))
+
+
+def compare_klems(folder):
+    try:
+        from genbsdf_check import ALBEDO, RECEIVER, SCENE, SENDER, device, klems, projected
+        from radiance_check import ENVIRONMENT  # noqa: F401
+        from radiance_check import radiance
+    except (ImportError, SystemExit) as error:
+        print(f"SKIPPED: Radiance needs `pip install pyradiance` ({error})")
+        return
+    print(f"\nKlems matrix, 145 x 145, of {SCENE[0]} in one matte material; truth: `biscale export --quality fine --seed 9`")
+    export(SCENE[0], folder / "truth.xml", *SCENE[1:], "--quality", "fine", "--seed", 9)
+    truth = klems(folder / "truth.xml") * projected()[:, None]
+    table = Table("by", "setting", "seconds", "PSNR [dB]", "relative L2")
+    def row(by, setting, seconds, values):
+        table.row(by, setting, f"{seconds:.1f}", f"{psnr(values, truth):.1f}", f"{100 * rel_l2(values, truth):.2f} %")
+    for preset in ["draft", "standard"]:
+        start = time.time()
+        export(SCENE[0], folder / "tile.xml", *SCENE[1:], "--quality", preset)
+        row("biscale export", preset, time.time() - start, klems(folder / "tile.xml") * projected()[:, None])
+    material = f"plastic {{}}\n0\n0\n5 {ALBEDO} {ALBEDO} {ALBEDO} 0 0\n\n"
+    (folder / "device.rad").write_text(device(folder, SCENE, material))
+    (folder / "receiver.rad").write_text(RECEIVER)
+    (folder / "sender.rad").write_text(SENDER)
+    for rays in [250, 1000, 4000]:
+        start = time.time()
+        options = f"-h -ab 1 -ad 32 -lw 1e-9 -c {rays} -n 2".split()
+        text = radiance("rfluxmtx", *options, "sender.rad", "receiver.rad", "device.rad", cwd=folder)
+        matrix = np.array(text.split(), float).reshape(145, 145, 3)[:, :, 1].T
+        row("rfluxmtx", f"{rays} rays a patch", time.time() - start, matrix)
+
+
+def main():
+    print(f"Mitsuba {mi.__version__}")
+    with tempfile.TemporaryDirectory() as folder:
+        for name in SCENES:
+            compare(name, folder)
+        compare_klems(Path(folder))
+
+
+if __name__ == "__main__":
+    main()

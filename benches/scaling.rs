@@ -1,0 +1,215 @@
+//! How the time of each stage grows with its size: `cargo bench --bench scaling`. Each line doubles or quadruples one size, takes
+//! the least of a few runs, and fits an exponent; the last one tells what two threads save.
+
+use std::f32::consts::TAU;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use biscale::Result;
+use biscale::accuracy::mirror_biased_pairs;
+use biscale::brdf::{Brdf, Term};
+use biscale::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
+use biscale::geometry::{self, Facets, TileMesh, heightfield};
+use biscale::large_scale::shading::Background;
+use biscale::large_scale::{Stage, render};
+use biscale::pipeline::Pipeline;
+use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
+use glam::{UVec2, Vec2, Vec3};
+
+const RUNS: usize = 3;
+const RAMP: f32 = 0.02;
+const PICTURED: &str = "fig8a_hammered";
+
+type Work = Box<dyn FnMut() + Send>;
+
+struct Bench {
+    /// `cargo test --benches` asks only whether they run.
+    once: bool,
+}
+
+impl Bench {
+    /// Times `work` at each size, and prints the times and the exponent of their growth.
+    fn line(
+        &self,
+        name: &str,
+        expected: f64,
+        sizes: &[usize],
+        mut work: impl FnMut(usize) -> Result<Work>,
+    ) -> Result<()> {
+        let sizes = if self.once { &sizes[..1] } else { sizes };
+        let mut times = Vec::new();
+        for &size in sizes {
+            let mut run = work(size)?;
+            times.push(self.least_ms(&mut *run));
+        }
+        let exponent = slope(sizes, &times);
+        let times: Vec<String> = times.iter().map(|ms| format!("{ms:.3}")).collect();
+        println!(
+            "{name:<44} {:>9} to {:>9} {exponent:>8.2} {expected:>9.2}   {} ms",
+            sizes[0],
+            sizes[sizes.len() - 1],
+            times.join(" ")
+        );
+        Ok(())
+    }
+
+    fn least_ms(&self, run: &mut (dyn FnMut() + Send)) -> f64 {
+        let once = |run: &mut (dyn FnMut() + Send)| {
+            let start = Instant::now();
+            run();
+            start.elapsed().as_secs_f64() * 1e3
+        };
+        (0..if self.once { 1 } else { RUNS }).map(|_| once(run)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Least squares of log time over log size.
+fn slope(sizes: &[usize], times: &[f64]) -> f64 {
+    let logs: Vec<(f64, f64)> = sizes.iter().zip(times).map(|(&n, ms)| ((n as f64).ln(), ms.ln())).collect();
+    let count = logs.len() as f64;
+    let (x, y) = logs.iter().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / count, y + b / count));
+    let (up, down) =
+        logs.iter().fold((0.0, 0.0), |(up, down), (a, b)| (up + (a - x) * (b - y), down + (a - x) * (a - x)));
+    up / down
+}
+
+fn facets_of(mesh: &TileMesh, count: usize) -> Facets {
+    let mut facets = Facets::sample(mesh, count, 1);
+    facets.sort_for_sums();
+    facets
+}
+
+fn tile(scene: &str) -> Result<TileMesh> {
+    let loaded = biscale::scene::open(scene, &[])?;
+    geometry::build(&loaded.scene.tile, &loaded.base_dir)
+}
+
+/// About as many triangles as asked for over the same waves.
+fn waves(triangles: usize) -> TileMesh {
+    let side = ((triangles as f64 / 2.0).sqrt().round() as u32).max(2);
+    heightfield::from_function(UVec2::splat(side), Vec2::ONE, |p| {
+        0.05 * ((3.0 * TAU * p.x).sin() * (2.0 * TAU * p.y).cos() + (TAU * (5.0 * p.x + 4.0 * p.y)).sin())
+    })
+}
+
+fn main() -> Result<()> {
+    let bench = Bench { once: !std::env::args().any(|argument| argument == "--bench") };
+    println!("{:<44} {:>22} {:>8} {:>9}   times", "what grows", "from, to", "exponent", "expected");
+    let rods = Arc::new(tile("fig6a_velvet_spread")?);
+    let rod_grid = Arc::new(PeriodicGrid::for_slices(&rods));
+    let field = Arc::new(tile("fig8a_hammered")?);
+    geometry_lines(&bench, &rods, &rod_grid, &field)?;
+    sum_lines(&bench, &field)?;
+    picture_lines(&bench)?;
+    if !bench.once {
+        thread_lines(&bench, &rods, &rod_grid)?;
+    }
+    Ok(())
+}
+
+fn geometry_lines(
+    bench: &Bench,
+    rods: &Arc<TileMesh>,
+    rod_grid: &Arc<PeriodicGrid>,
+    field: &Arc<TileMesh>,
+) -> Result<()> {
+    let counts = [1024, 4096, 16_384];
+    bench.line("facets: sampled and sorted (rods)", 1.0, &[4096, 16_384, 65_536], |n| {
+        let rods = rods.clone();
+        Ok(Box::new(move || drop(black_box(facets_of(&rods, n)))))
+    })?;
+    bench.line("facets: slices (rods)", 1.0, &counts, |n| {
+        let (grid, facets) = (rod_grid.clone(), facets_of(rods, n));
+        Ok(Box::new(move || drop(black_box(Slices::scan(&grid, &facets, 16, RAMP)))))
+    })?;
+    bench.line("azimuths: slices (rods)", 1.0, &[8, 32, 128], |azimuths| {
+        let (grid, facets) = (rod_grid.clone(), facets_of(rods, 1024));
+        Ok(Box::new(move || drop(black_box(Slices::scan(&grid, &facets, azimuths, RAMP)))))
+    })?;
+    if field.height_grid.is_some() {
+        bench.line("facets: horizons (height-field)", 1.0, &counts, |n| {
+            let (field, facets) = (field.clone(), facets_of(field, n));
+            Ok(Box::new(move || {
+                let heights = field.height_grid.as_ref();
+                black_box(heights.map(|heights| Horizons::march(heights, field.size, &facets, 64, RAMP)));
+            }))
+        })?;
+    }
+    let triangles = [1000, 10_000, 100_000, 1_000_000];
+    bench.line("triangles: grid of cells (waves)", 1.0, &triangles, |n| {
+        let mesh = waves(n);
+        Ok(Box::new(move || drop(black_box(PeriodicGrid::for_slices(&mesh)))))
+    })?;
+    // Cells have a few triangles each, and a slice walks a line of them.
+    bench.line("triangles: slices of 2048 facets (waves)", 0.5, &triangles, |n| {
+        let mesh = waves(n);
+        let (grid, facets) = (PeriodicGrid::for_slices(&mesh), facets_of(&mesh, 2048));
+        Ok(Box::new(move || drop(black_box(Slices::scan(&grid, &facets, 16, RAMP)))))
+    })
+}
+
+fn sum_lines(bench: &Bench, field: &Arc<TileMesh>) -> Result<()> {
+    let direct = |facets: usize| {
+        let facets = facets_of(field, facets);
+        let horizons = Horizons::scan(&PeriodicGrid::for_slices(field), &facets, 32, RAMP);
+        let material = SumMaterial {
+            brdf: Brdf { terms: vec![Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) }] },
+            color: Vec3::ONE,
+        };
+        let sum = FacetSum::new(&facets, &vec![0; field.slots.len()], &[material]);
+        let form = Form::Direct(Direct::new(Arc::new(sum), Arc::new(Visibility::Horizons(horizons))));
+        EffectiveBrdf { form, base_area: f64::from(field.base_area()) }
+    };
+    bench.line("facets: 64 pairs of the sum (height-field)", 1.0, &[1024, 4096, 16_384, 65_536], |n| {
+        let (brdf, pairs) = (direct(n), mirror_biased_pairs(64, 1));
+        Ok(Box::new(move || {
+            black_box(pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).sum::<Vec3>());
+        }))
+    })?;
+    let brdf = Arc::new(direct(4096));
+    bench.line("pairs: the sum over 4096 facets", 1.0, &[64, 256, 1024], |n| {
+        let (brdf, pairs) = (brdf.clone(), mirror_biased_pairs(n, 1));
+        Ok(Box::new(move || {
+            black_box(pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).sum::<Vec3>());
+        }))
+    })
+}
+
+/// A picture of a scene whose shadows are kept, as the camera moves.
+fn picture(scene: &str, lights: usize, side: usize) -> Result<Work> {
+    let overrides = [format!("light.count={lights}"), "quality.backend=cpu".to_owned()];
+    let loaded = biscale::scene::open(scene, &overrides)?;
+    let pictured = Pipeline::new().effective(&loaded)?.for_pictures(&biscale::Cancel::default())?;
+    let mut stage = Stage::new(&loaded)?;
+    stage.settle();
+    Ok(Box::new(move || {
+        let background = Background::default();
+        let rendered = render(&stage.input(&*pictured.brdf, [side, side], 1, &background));
+        black_box(rendered.is_ok());
+    }))
+}
+
+fn picture_lines(bench: &Bench) -> Result<()> {
+    bench.line("lights: a picture of 384 x 384", 1.0, &[16, 64, 256], |lights| picture(PICTURED, lights, 384))?;
+    bench.line("pixels: a picture with 32 lights", 1.0, &[128 * 128, 256 * 256, 512 * 512, 1024 * 1024], |pixels| {
+        picture(PICTURED, 32, pixels.isqrt())
+    })
+}
+
+/// The same work on one thread and on two.
+fn thread_lines(bench: &Bench, rods: &Arc<TileMesh>, rod_grid: &Arc<PeriodicGrid>) -> Result<()> {
+    println!("\n{:<44} {:>12} {:>12} {:>8}", "threads", "one", "two", "faster");
+    let facets = facets_of(rods, 4096);
+    let grid = rod_grid.clone();
+    let slices: Work = Box::new(move || drop(black_box(Slices::scan(&grid, &facets, 32, RAMP))));
+    let picture = picture(PICTURED, 32, 384)?;
+    for (name, mut work) in [("slices (rods)", slices), ("a picture of 384 x 384, 32 lights", picture)] {
+        let times = [1, 2].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.map_or(f64::NAN, |pool| pool.install(|| bench.least_ms(&mut *work)))
+        });
+        println!("{name:<44} {:>9.1} ms {:>9.1} ms {:>8.2}", times[0], times[1], times[0] / times[1]);
+    }
+    Ok(())
+}
