@@ -75,6 +75,11 @@ fn a_table_of_a_mirrored_tile_is_its_own_mirror_image_and_close_to_the_whole_one
         let (want, found) = (whole.g(i, o), spared.g(i, o));
         error += (want - found).length_squared();
         power += want.length_squared();
+        // Half vectors on a plane are their own images: both sides of it are summed, each over its own facets.
+        let h = (i + o).normalize_or_zero();
+        if h.x.abs().min(h.y.abs()) < 1e-3 {
+            continue;
+        }
         for mirror in [Vec3::new(-1.0, 1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(-1.0, -1.0, 1.0)] {
             let image = spared.g(i * mirror, o * mirror);
             assert!(

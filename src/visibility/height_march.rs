@@ -3,7 +3,8 @@
 use glam::{Vec2, Vec3};
 
 use super::scan::FACING_MARGIN;
-use crate::geometry::HeightGrid;
+use crate::geometry::{Facets, HeightGrid};
+use crate::simd::multiversion;
 
 /// A height-field seen from points on it. Cells are split along the diagonal from (i, j) to (i+1, j+1).
 #[derive(Debug)]
@@ -17,19 +18,37 @@ pub(super) struct HeightMarch<'a> {
 /// over the horizon, and only of height-fields that are many tiles high.
 const LEAST_LINES: usize = 8192;
 
+multiversion! {
+    /// [`HeightMarch::highest_slope`] of every facet.
+    pub fn march_all(march: &HeightMarch, facets: &Facets, along: Vec2, slopes: &mut [f32]) {
+        for ((position, normal), slope) in facets.positions.iter().zip(&facets.normals).zip(slopes) {
+            *slope = march.highest_slope(*position, *normal, along);
+        }
+    }
+}
+
+/// `k` modulo `n`, without a division for what lies in the next tile.
+#[inline(always)]
+fn wrapped(k: i32, n: i32) -> i32 {
+    let near = k + n * (i32::from(k < 0) - i32::from(k >= n));
+    if (0..n).contains(&near) { near } else { near.rem_euclid(n) }
+}
+
 impl<'a> HeightMarch<'a> {
     pub fn new(heights: &'a HeightGrid, tile_size: Vec2) -> Self {
         let top = heights.heights.iter().fold(f32::NEG_INFINITY, |top, &z| top.max(z));
         Self { heights, samples_from_tile: heights.size.as_vec2() / tile_size, top }
     }
 
+    #[inline(always)]
     fn sample(&self, x: i32, y: i32) -> f32 {
         let (w, h) = (self.heights.size.x as i32, self.heights.size.y as i32);
-        self.heights.heights[(y.rem_euclid(h) * w + x.rem_euclid(w)) as usize]
+        self.heights.heights[(wrapped(y, h) * w + wrapped(x, w)) as usize]
     }
 
     /// The tangent of the horizon's elevation along the unit plane direction, no lower than what a facet of this normal
     /// is well turned away from; 0 where nothing rises above `from`.
+    #[inline(always)]
     pub fn highest_slope(&self, from: Vec3, normal: Vec3, along: Vec2) -> f32 {
         let clearance = self.top - from.z;
         let mut slope = (-(normal.truncate().dot(along) + FACING_MARGIN) / normal.z.max(1e-6)).max(0.0);
@@ -73,6 +92,7 @@ impl<'a> HeightMarch<'a> {
 
     /// Visits the crossings of one family of edges at increasing distance `r`, `most` of them, until nothing further can rise
     /// higher. `parallel`: the walk follows these edges and crosses none.
+    #[inline(always)]
     fn cross(
         &self,
         [at, speed]: [f32; 2],

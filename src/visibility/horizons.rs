@@ -7,7 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::PeriodicGrid;
-use super::height_march::HeightMarch;
+use super::height_march::{HeightMarch, march_all};
 use super::ray_cast::lifted_origins;
 use super::scan::scan_all;
 use super::slicer::Slicer;
@@ -50,9 +50,7 @@ impl Horizons {
     pub fn march(heights: &HeightGrid, tile_size: glam::Vec2, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let march = HeightMarch::new(heights, tile_size);
         Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
-            for ((position, normal), horizon) in facets.positions.iter().zip(&facets.normals).zip(row) {
-                *horizon = march.highest_slope(*position, *normal, along.truncate());
-            }
+            march_all(&march, facets, along.truncate(), row);
             0
         })
     }

@@ -7,7 +7,7 @@ use crate::app::document::Document;
 use crate::app::worker::Grade;
 
 /// Longer than this nobody waits for the final picture.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_secs(45);
 
 /// Milliseconds to the first, the refined and the final picture; NaN for what did not come in time.
 fn after_an_edit(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
