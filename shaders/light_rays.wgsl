@@ -2,10 +2,11 @@
 // the same hierarchy (src/large_scale/bvh.rs).
 
 struct Params {
-    point_count: u32,
+    // The points of this dispatch.
+    first_point: u32,
+    end_point: u32,
     light_count: u32,
     words_per_point: u32,
-    pad: u32,
 }
 
 struct Node {
@@ -110,10 +111,11 @@ fn is_blocked(origin: vec3f, light: Light) -> bool {
 
 @compute @workgroup_size(64)
 fn trace(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= params.point_count {
+    let at = params.first_point + id.x;
+    if at >= params.end_point {
         return;
     }
-    let point = points[id.x];
+    let point = points[at];
     var bits = 0u;
     let first = 32u * id.y;
     let count = min(32u, params.light_count - first);
@@ -123,5 +125,5 @@ fn trace(@builtin(global_invocation_id) id: vec3u) {
             bits |= 1u << k;
         }
     }
-    visible[id.x * params.words_per_point + id.y] = bits;
+    visible[at * params.words_per_point + id.y] = bits;
 }

@@ -3,7 +3,7 @@
 //!import shading_points
 //!import shadows_none
 //!import polar_grid
-//!import tint_fixed
+//!import tint_row
 
 // Whether any channel is a plain table (Lambertian) and whether any has a factor P.
 override HAS_TABLES: bool = true;
@@ -30,11 +30,7 @@ struct Channel {
     first_p: u32,
     columns: u32,
     is_table: u32,
-    tint: vec3f,
-    // 1: the tint follows tint(), 0: it stays.
-    follows: f32,
-    color: vec3f,
-    pad: u32,
+    tint: Tint,
 }
 
 @group(1) @binding(0) var<uniform> grids: Grids;
@@ -159,8 +155,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
         var value = vec3f(0.0);
         for (var c = 0u; c < grids.channel_count; c++) {
             let channel = channels[c];
-            let tinted = mix(channel.tint, tint(channel.tint, dot(i, h)), channel.follows);
-            value += tinted * channel.color * channel_value(channel);
+            value += tint_at(channel.tint, dot(i, h)) * channel_value(channel);
         }
         // Truncated factors may fall a little below zero; no BRDF does.
         total += lights[k].irradiance * max(value, vec3f(0.0)) * (horizon_taper(i.z) * horizon_taper(o.z));

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use biscale::Cancel;
 use biscale::export::replace_file;
 use biscale::gpu::Gpu;
 use biscale::large_scale::shading::Background;
@@ -262,7 +263,7 @@ fn a_device_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_goes_on() {
     let background = Background::default();
     let input = stage.input(&*outcome.brdf, [96, 96], 2, &background);
     let renderer = GpuRenderer::new(&gpu, stage.occluder.as_ref(), &outcome.brdf).unwrap();
-    renderer.render(&gpu, &input).unwrap();
+    renderer.render(&gpu, &input, &Cancel::default()).unwrap();
     // From another thread, while frames are drawn.
     let device = gpu.device.clone();
     let destroyer = std::thread::spawn(move || {
@@ -272,7 +273,7 @@ fn a_device_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_goes_on() {
     let start = Instant::now();
     let mut failed = None;
     while failed.is_none() && start.elapsed() < Duration::from_secs(60) {
-        match renderer.render(&gpu, &input) {
+        match renderer.render(&gpu, &input, &Cancel::default()) {
             Ok(rendered) => assert!(rendered.picture.pixels.iter().all(|pixel| pixel.is_finite())),
             Err(error) => failed = Some(error),
         }

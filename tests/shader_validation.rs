@@ -28,7 +28,9 @@ fn every_combination_of_effects_parses_and_validates() {
     };
     for shadows in ["shadows_none", "shadows_bits"] {
         for tint in ["tint_fixed", "tint_fresnel"] {
-            check("shade_low_rank", &[("shadows_none", shadows), ("tint_fixed", tint)]);
+            for shader in ["shade_low_rank", "shade_table"] {
+                check(shader, &[("shadows_none", shadows), ("tint_fixed", tint)]);
+            }
         }
         for see in ["visibility_unblocked", "visibility_horizons", "visibility_slices", "visibility_maps"] {
             check("projected_area", &[("visibility_unblocked", see)]);

@@ -28,6 +28,7 @@ pub enum Route {
 pub struct OnDevice {
     gpu: Gpu,
     renderer: GpuRenderer,
+    reads: Pictured,
     /// Whether the person asked for it.
     required: bool,
 }
@@ -46,8 +47,17 @@ impl Route {
             Err(error) if required => return Err(Error::from(error).into()),
             _ => return Ok(Route::Cpu { refused: None }),
         };
-        match GpuRenderer::new(&gpu, stage.occluder.as_ref(), &outcome.brdf) {
-            Ok(renderer) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, required }))),
+        let renderer = |brdf: &EffectiveBrdf| GpuRenderer::new(&gpu, stage.occluder.as_ref(), brdf);
+        let table = outcome.for_pictures(&Cancel::default())?;
+        let made = match renderer(&table.brdf) {
+            Err(GpuError::Unsupported(_)) => {
+                let sums = Pictured { brdf: outcome.brdf.clone(), errors: None, ms: table.ms };
+                renderer(&sums.brdf).map(|renderer| (renderer, sums))
+            }
+            made => made.map(|renderer| (renderer, table)),
+        };
+        match made {
+            Ok((renderer, reads)) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, reads, required }))),
             Err(error) if required => Err(Error::from(error).into()),
             Err(error) => Ok(Route::Cpu { refused: Some(error) }),
         }
@@ -65,7 +75,7 @@ impl Route {
         let input = stage.input(brdf, size, samples_per_side, &background);
         Ok(match self {
             Self::Cpu { .. } => render(&input)?,
-            Self::Gpu(device) => match device.renderer.render(&device.gpu, &input) {
+            Self::Gpu(device) => match device.renderer.render(&device.gpu, &input, &Cancel::default()) {
                 // What the device fails at the CPU still does, unless the device was asked for.
                 Err(Error::Failed(_)) if !device.required => render(&input)?,
                 rendered => rendered?,
@@ -73,11 +83,11 @@ impl Route {
         })
     }
 
-    /// The form of a material that this route reads: the CPU a table where it is close enough, a device the sums.
+    /// The form of a material that this route reads: a table where it is close enough, else the sums.
     pub fn reads(&self, outcome: &Outcome) -> Result<Pictured> {
         Ok(match self {
             Self::Cpu { .. } => outcome.for_pictures(&Cancel::default())?,
-            Self::Gpu(_) => Pictured { brdf: outcome.brdf.clone(), errors: None, ms: 0.0 },
+            Self::Gpu(device) => device.reads.clone(),
         })
     }
 

@@ -29,10 +29,10 @@ pub struct UpperPairs {
 /// Directions of nodes stay this far [sine] above the horizon.
 const LOWEST: f32 = 2e-3;
 
-/// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²`: there shadows and cosines change fastest.
-const CROWDING: f32 = 0.75;
-
 impl UpperPairs {
+    /// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²` with this `k`: there shadows and cosines change fastest.
+    pub const CROWDING: f32 = 0.75;
+
     pub fn nodes(&self) -> usize {
         self.half_vectors() * self.turn * self.difference
     }
@@ -74,7 +74,7 @@ impl UpperPairs {
         );
         let (sin_turn, cos_turn) = (PI * turn as f32 / self.turn as f32).sin_cos();
         let x = step as f32 / (self.difference - 1) as f32;
-        let u = x * (1.0 + CROWDING - CROWDING * x);
+        let u = x * (1.0 + Self::CROWDING - Self::CROWDING * x);
         // 1 - cos θ_max = m² / (r (r + n)), which loses nothing where θ_max is small.
         let (n, m) = (sin_theta_h * cos_turn.abs(), cos_theta_h);
         let r = n.hypot(m);
@@ -88,7 +88,7 @@ impl UpperPairs {
 
     /// Places of the pairs (light `k`, `o`) on the axes of the grid, in steps; all directions above the horizon.
     pub fn places(&self, lights: [&[f32]; 3], o: Vec3, out: &mut Places) {
-        crate::simd::pair_places(lights, o, CROWDING, &mut out.columns);
+        crate::simd::pair_places(lights, o, Self::CROWDING, &mut out.columns);
         let scales = [(self.rings - 1) as f32, self.azimuths as f32, self.turn as f32, (self.difference - 1) as f32];
         let n = lights[0].len().min(Places::MOST);
         for (column, scale) in out.columns.iter_mut().zip(scales) {

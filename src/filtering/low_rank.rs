@@ -32,15 +32,6 @@ pub struct LowRankSettings {
     pub seed: u64,
 }
 
-/// What multiplies a channel's scalar at the query.
-#[derive(Debug, Clone)]
-pub enum Tint {
-    /// The tint of an analytic term, exact at the query's `i·h`, times a colour.
-    Term(Term, Vec3),
-    /// A colour direction of a measured BRDF, times a colour.
-    Fixed(Vec3),
-}
-
 /// What a channel's tint is made of: a material and a term of it, by number, and a colour or colour direction that no edit
 /// of the material changes.
 #[derive(Debug, Clone, Copy)]
@@ -289,11 +280,7 @@ impl LowRank {
                     Some(p) => simd::gathered_dot(&channel.u, &io, p, &hd, channel.columns),
                     None => io.iter().map(|&(node, w)| w * channel.u[node]).sum(),
                 };
-                let tint = match &channel.tint {
-                    Tint::Term(term, color) => term.tint(i_dot_h) * *color,
-                    Tint::Fixed(color) => *color,
-                };
-                total += (tint * value).as_dvec3();
+                total += (channel.tint.at(i_dot_h) * value).as_dvec3();
             }
             // Truncated factors may fall a little below zero; no BRDF does.
             let taper = PolarGrid::horizon_taper(i.z) * PolarGrid::horizon_taper(o.z);

@@ -13,6 +13,7 @@ mod low_rank;
 mod pair_table;
 mod rotated_basis;
 mod thinned;
+mod tint;
 mod wu2011;
 
 use glam::Vec3;
@@ -22,9 +23,10 @@ pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use forced::mean_colors;
-pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings, Tint};
+pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings};
 pub use pair_table::PairTable;
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
+pub use tint::Tint;
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 
 /// What the large scale asks of a material: all it knows of the small scale.

@@ -7,7 +7,7 @@ use bytemuck::Pod;
 
 use super::{Gpu, GpuError};
 
-/// How long a read-back waits for the device before it is given up.
+/// How long to wait for the device before it is given up.
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Enough for one element of any of our arrays: a binding holds at least one.
@@ -55,19 +55,24 @@ impl Gpu {
         })
     }
 
+    /// Waits until the device has done all that was submitted.
+    pub fn wait(&self, during: &str) -> Result<(), GpuError> {
+        let during = during.to_owned();
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
+        match self.device.poll(wait) {
+            Ok(_) => Ok(()),
+            Err(wgpu::PollError::Timeout) => Err(GpuError::Timeout { during, seconds: PATIENCE.as_secs() }),
+            Err(other) => Err(GpuError::Refused { during, reason: other.to_string() }),
+        }
+    }
+
     /// Waits for the device and copies a mappable buffer's contents out.
     pub fn map<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
         let refused = |reason: String| GpuError::Refused { during: "reading back".to_owned(), reason };
         let (sender, receiver) = mpsc::channel();
         // The receiver outlives the wait below; after it, nobody is left to hear a late answer.
         staging.map_async(wgpu::MapMode::Read, .., move |answer| drop(sender.send(answer)));
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
-        self.device.poll(wait).map_err(|e| match e {
-            wgpu::PollError::Timeout => {
-                GpuError::Timeout { during: "reading back".to_owned(), seconds: PATIENCE.as_secs() }
-            }
-            other => refused(other.to_string()),
-        })?;
+        self.wait("reading back")?;
         match receiver.try_recv() {
             Ok(Ok(())) => {}
             Ok(Err(error)) => return Err(refused(error.to_string())),

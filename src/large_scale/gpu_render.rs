@@ -1,7 +1,7 @@
 //! The picture on wgpu: the twin of [`render`](super::render::render).
 //!
-//! G-buffer, light rays and shading run on the device; between them the CPU merges samples into shading points and gathers
-//! the picture.
+//! G-buffer, light rays and shading run on the device; the CPU merges samples into shading points and gathers the picture.
+//! Which lights a point sees never leaves the device.
 
 use std::time::Instant;
 
@@ -13,6 +13,7 @@ use super::render::{RenderInput, Rendered, StageTimes, check_size};
 use super::shading;
 use super::shading_points::ShadingPoints;
 use super::shadow::Occluder;
+use crate::cancel::Cancel;
 use crate::error::Result;
 use crate::filtering::EffectiveBrdf;
 use crate::gpu::{Gpu, GpuError};
@@ -52,8 +53,8 @@ impl GpuRenderer {
     /// Renders the object that the renderer was made for; `input.reflectance` and `input.shadow_cache` are not asked.
     ///
     /// # Errors
-    /// A size or camera that cannot be, and what the device refuses.
-    pub fn render(&self, gpu: &Gpu, input: &RenderInput) -> Result<Rendered> {
+    /// A size or camera that cannot be, what the device refuses, or [`crate::Error::Cancelled`].
+    pub fn render(&self, gpu: &Gpu, input: &RenderInput, cancel: &Cancel) -> Result<Rendered> {
         check_size(input.size, input.samples_per_side)?;
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let start = Instant::now();
@@ -62,11 +63,14 @@ impl GpuRenderer {
         drop(buffer);
         let after_gbuffer = Instant::now();
         let visible = match &self.rays {
-            Some((rays, occluder)) => Some(rays.visible(gpu, occluder, input.mesh, &points, input.lights, view.eye)?),
+            Some((rays, occluder)) => {
+                Some(rays.trace(gpu, occluder, input.mesh, &points, input.lights, view.eye, cancel)?)
+            }
             None => None,
         };
         let after_shadows = Instant::now();
-        let radiance = self.shading.radiance(gpu, &self.material, &points, input.lights, visible.as_ref(), view.eye)?;
+        let radiance =
+            self.shading.radiance(gpu, &self.material, &points, input.lights, visible.as_ref(), view.eye, cancel)?;
         let picture = shading::gather(&points, &radiance, &view, input.background);
         let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
         let times = StageTimes {
@@ -83,5 +87,5 @@ impl GpuRenderer {
 /// # Errors
 /// As [`GpuRenderer::new`] and [`GpuRenderer::render`].
 pub fn render_gpu(gpu: &Gpu, input: &RenderInput, brdf: &EffectiveBrdf) -> Result<Rendered> {
-    GpuRenderer::new(gpu, input.occluder, brdf)?.render(gpu, input)
+    GpuRenderer::new(gpu, input.occluder, brdf)?.render(gpu, input, &Cancel::default())
 }

@@ -12,7 +12,9 @@ use super::shading_points::ShadingPoints;
 use super::shadow::Occluder;
 use super::{CameraView, GBuffer, Picture, RenderInput, lights, objects, render, render_gpu};
 use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
-use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
+use crate::cancel::Cancel;
+use crate::directions::UpperPairs;
+use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, PairTable, SumMaterial};
 use crate::gpu::{Gpu, GpuError};
 use crate::pipeline::Pipeline;
 use crate::scene::{self, LoadedScene};
@@ -76,7 +78,10 @@ fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     let mut shading = GpuShading::new(gpu).unwrap();
     let material = shading.material(gpu, brdf, visible.is_some()).unwrap();
     let cpu = shading::radiance(&points, &lights.directional, visible.as_ref(), view.eye, brdf);
-    let device = shading.radiance(gpu, &material, &points, &lights.directional, visible.as_ref(), view.eye).unwrap();
+    let bits = visible.map(|visible| gpu.upload("bits", &visible.words, wgpu::BufferUsages::STORAGE).unwrap());
+    let none = Cancel::default();
+    let device =
+        shading.radiance(gpu, &material, &points, &lights.directional, bits.as_ref(), view.eye, &none).unwrap();
     let (_, worst, _) = distances(&cpu, &device);
     let pictures = [render(&input).unwrap().picture, render_gpu(gpu, &input, brdf).unwrap().picture];
     eprint!("{what}: shading within {worst:.1e}; ");
@@ -196,10 +201,82 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
         samples_per_side: 2,
         background: &Background::Wall,
     };
-    let pictures = [render(&input).unwrap().picture, renderer.render(&gpu, &input).unwrap().picture];
+    let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+    let pictures = [render(&input).unwrap().picture, device];
     assert_same_picture("coloured facets, lambertian and cook_torrance after ggx", &pictures);
     let none = RenderInput { lights: &[], ..input };
-    assert_same_picture("no lights", &[render(&none).unwrap().picture, renderer.render(&gpu, &none).unwrap().picture]);
+    let unlit = renderer.render(&gpu, &none, &Cancel::default()).unwrap().picture;
+    assert_same_picture("no lights", &[render(&none).unwrap().picture, unlit]);
+
+    // Six columns, which are two fours.
+    let Form::Direct(direct) = &second.form else { panic!("not direct") };
+    let table = PairTable::build(direct, GRID, [false; 2], &Cancel::default()).unwrap().unwrap();
+    assert_eq!(table.fours(), 2);
+    assert_same("a table of coloured facets", &gpu, "cup", &EffectiveBrdf { form: Form::Table(table), base_area: 1.0 });
+}
+
+const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 8, difference: 7 };
+
+#[test]
+fn tables_give_the_same_picture_between_their_nodes_by_cubics_and_by_straight_lines() {
+    let Some(gpu) = open_gpu() else { return };
+    for (geometry, brdf, kind, interpolation) in [
+        (GROOVES, LOBES[4], "cup", Interpolation::Cubic),
+        (PYRAMIDS, LOBES[1], "sphere", Interpolation::Linear),
+        (RODS, LOBES[0], "sphere", Interpolation::Cubic),
+    ] {
+        let exact = effective(&open(geometry, brdf, "direct"));
+        let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let what = format!("a table of {geometry} {brdf}");
+        let built = PairTable::build(direct, GRID, [false; 2], &Cancel::default()).unwrap().unwrap();
+        let of = |table: PairTable| EffectiveBrdf { form: Form::Table(table), base_area: exact.base_area };
+        if built.tints().is_some() {
+            assert_same(&what, &gpu, kind, &of(built.read(interpolation)));
+            continue;
+        }
+        // Facets of few normals: their lobes are summed, or tabulated with the rest.
+        let refused = GpuRenderer::new(&gpu, None, &of(built)).map(drop);
+        assert!(matches!(refused, Err(GpuError::Unsupported(_))), "{what}: {refused:?}");
+        let whole = |lights: &[Vec3], o: Vec3, out: &mut [glam::DVec3]| direct.sums(lights, o, |k, sum| out[k] = sum);
+        let table = PairTable::resample(whole, GRID, [false; 2], &Cancel::default()).unwrap();
+        assert_same(&what, &gpu, kind, &of(table.read(interpolation)));
+    }
+}
+
+#[test]
+fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
+    let Some(gpu) = open_gpu() else { return };
+    let brdf = effective(&open(RODS, LOBES[4], "direct"));
+    let mesh = objects::build(&scene::Object { kind: "cup".to_owned(), path: None }, Path::new(".")).unwrap();
+    let occluder = Occluder::of(&mesh);
+    let lights = lights::build(&scene::Light { count: 10, ..scene::Light::default() }, Path::new(".")).unwrap();
+    let renderer = GpuRenderer::new(&gpu, occluder.as_ref(), &brdf).unwrap();
+    let input = RenderInput {
+        mesh: &mesh,
+        occluder: occluder.as_ref(),
+        shadow_cache: None,
+        lights: &lights.directional,
+        camera: &scene::Camera::default(),
+        reflectance: &brdf,
+        size: [96, 96],
+        samples_per_side: 1,
+        background: &Background::Wall,
+    };
+    let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+    let cancel = Cancel::default();
+    cancel.set();
+    assert!(matches!(renderer.render(&gpu, &input, &cancel), Err(crate::Error::Cancelled)));
+    // Set while the device is at work: given up or, where it was quicker, done.
+    let cancel = Cancel::default();
+    let later = cancel.clone();
+    let setter = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        later.set();
+    });
+    let given_up = renderer.render(&gpu, &input, &cancel);
+    setter.join().unwrap();
+    assert!(matches!(&given_up, Err(crate::Error::Cancelled) | Ok(_)), "{given_up:?}");
+    assert_eq!(renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture.pixels, before.pixels);
 }
 
 #[derive(Debug, Default)]

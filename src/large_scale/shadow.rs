@@ -56,9 +56,14 @@ pub struct Visible {
 }
 
 impl Visible {
+    /// Words that a point's bits for so many lights take.
+    pub fn words_of(lights: usize) -> usize {
+        lights.div_ceil(32).max(1)
+    }
+
     /// No point sees any light.
     pub fn none(points: usize, lights: usize) -> Self {
-        let words_per_point = lights.div_ceil(32).max(1);
+        let words_per_point = Self::words_of(lights);
         Self { words_per_point, words: vec![0; points * words_per_point] }
     }
 

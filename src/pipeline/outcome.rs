@@ -46,6 +46,11 @@ impl Outcome {
         self.pictures.get(cancel)
     }
 
+    /// What [`Outcome::for_pictures`] made, if it was asked before.
+    pub fn pictured(&self) -> Option<Arc<EffectiveBrdf>> {
+        self.pictures.made()
+    }
+
     /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
     pub fn health(&self) -> &Health {
         let limits = limits(&self.settings);

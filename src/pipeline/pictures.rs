@@ -81,6 +81,11 @@ impl Pictures {
         lock(&self.earlier).as_ref().map(|(brdf, same)| (brdf.clone(), *same && same_lobes))
     }
 
+    /// The table, if it was made and nobody is making it.
+    pub(super) fn made(&self) -> Option<Arc<EffectiveBrdf>> {
+        self.made.try_lock().ok()?.as_ref().map(|made| made.brdf.clone())
+    }
+
     /// The table, made now if it was not yet.
     pub(super) fn get(&self, cancel: &Cancel) -> Result<Pictured> {
         let mut made = lock(&self.made);

@@ -1,5 +1,6 @@
 //! One case of each family on the graphics processor (lavapipe where there is none): finite, and what the CPU makes.
 
+use biscale::Cancel;
 use biscale::gpu::Gpu;
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::{GpuRenderer, Stage, render};
@@ -51,7 +52,7 @@ pub fn same_picture(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
         Ok(renderer) => renderer,
         Err(error) => return eprintln!("SKIPPED: {name}: {error}"),
     };
-    let device = renderer.render(gpu, &input).unwrap().picture.pixels;
+    let device = renderer.render(gpu, &input, &Cancel::default()).unwrap().picture.pixels;
     let bad = device.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);
     assert_eq!(bad, None, "{name}: {:?}", bad.map(|at| device[at]));
     // Edges may show another triangle, and narrow lobes multiply the G-buffer's last bits (gpu_shading_tests.rs).

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use biscale::close_up::{CloseUp, Wearing, on_object};
 use biscale::filtering::{EffectiveBrdf, Reflectance, SumMaterial};
-use biscale::gpu::{Gpu, Tier};
+use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::environment::{self, Environment};
 use biscale::large_scale::light_choice::worth_shading;
 use biscale::large_scale::lights::{self, Lights};
@@ -165,11 +165,11 @@ impl Studio {
             samples_per_side: shot.samples_per_side,
             background: &Background::default(),
         };
-        let mut rendered = match self.gpu.shoot(&input, shot) {
+        let mut rendered = match self.gpu.shoot(&input, shot, &mut table_ms, cancel)? {
             Some(rendered) => rendered,
             None => {
                 let pictured = shot.outcome.for_pictures(cancel)?;
-                table_ms = pictured.ms;
+                table_ms += pictured.ms;
                 let reflectance = Cancellable { brdf: &pictured.brdf, cancel };
                 render(&RenderInput { reflectance: &reflectance, ..input })?
             }
@@ -219,10 +219,19 @@ pub static LOSE_DEVICE: std::sync::atomic::AtomicBool = std::sync::atomic::Atomi
 
 impl Device {
     /// A picture on the device; `None` where the CPU is to make it. What fails here fails for good.
-    fn shoot(&mut self, input: &RenderInput, shot: &Shot) -> Option<Rendered> {
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    fn shoot(
+        &mut self,
+        input: &RenderInput,
+        shot: &Shot,
+        table_ms: &mut f64,
+        cancel: &Cancel,
+    ) -> Result<Option<Rendered>> {
         if shot.backend == "cpu" {
             *self = Self::NotAsked;
-            return None;
+            return Ok(None);
         }
         if matches!(self, Self::NotAsked) || matches!(self, Self::Slower(_)) && shot.backend == "gpu" {
             *self = match Gpu::open() {
@@ -232,35 +241,54 @@ impl Device {
                 Err(_) => Self::None("no graphics adapter".to_owned()),
             };
         }
-        let Self::Open(device) = self else { return None };
+        let Self::Open(device) = self else { return Ok(None) };
         #[cfg(test)]
         if LOSE_DEVICE.swap(false, std::sync::atomic::Ordering::SeqCst) {
             device.gpu.device.destroy();
         }
-        let brdf = &shot.outcome.brdf;
-        let made = match &mut device.renderer {
-            Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
-            Some((renderer, last)) => renderer.set_brdf(&device.gpu, brdf).map(|()| *last = brdf.clone()),
-            none => GpuRenderer::new(&device.gpu, input.occluder, brdf)
-                .map(|renderer| *none = Some((renderer, brdf.clone()))),
-        };
-        let rendered = match (made, &device.renderer) {
-            (Ok(()), Some((renderer, _))) => renderer.render(&device.gpu, input),
-            (Err(biscale::gpu::GpuError::Unsupported(_)), _) => {
-                device.renderer = None;
-                return None;
-            }
-            (Err(error), _) => Err(error.into()),
-            (Ok(()), None) => return None,
-        };
+        let rendered = device.wear(input, shot, table_ms, cancel).and_then(|worn| match &device.renderer {
+            Some((renderer, _)) if worn => renderer.render(&device.gpu, input, cancel).map(Some),
+            _ => Ok(None),
+        });
         match rendered {
-            Ok(rendered) => Some(rendered),
-            Err(Error::Input(_)) => None,
+            Ok(rendered) => Ok(rendered),
+            Err(Error::Cancelled) => Err(Error::Cancelled),
+            Err(Error::Input(_)) => Ok(None),
             Err(error) => {
                 *self = Self::Lost(error.to_string());
-                None
+                Ok(None)
             }
         }
+    }
+}
+
+impl OnDevice {
+    /// Takes the material over, as a table where that is there or pays, else as sums; whether the device shades it.
+    fn wear(&mut self, input: &RenderInput, shot: &Shot, table_ms: &mut f64, cancel: &Cancel) -> Result<bool> {
+        let exact = &shot.outcome.brdf;
+        // A graphics processor has a draft's sums done before the CPU has a table.
+        let pictured = match shot.outcome.pictured() {
+            None if self.gpu.tier == Tier::Software || shot.settle => {
+                let pictured = shot.outcome.for_pictures(cancel)?;
+                *table_ms += pictured.ms;
+                Some(pictured.brdf)
+            }
+            known => known,
+        };
+        for brdf in pictured.iter().chain([exact]) {
+            let made = match &mut self.renderer {
+                Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
+                Some((renderer, last)) => renderer.set_brdf(&self.gpu, brdf).map(|()| *last = brdf.clone()),
+                none => GpuRenderer::new(&self.gpu, input.occluder, brdf)
+                    .map(|renderer| *none = Some((renderer, brdf.clone()))),
+            };
+            match made {
+                Err(GpuError::Unsupported(_)) => {}
+                made => return made.map(|()| true).map_err(Error::from),
+            }
+        }
+        self.renderer = None;
+        Ok(false)
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use crate::brdf::{LobeAngles, Measured, Term};
+use crate::filtering::Tint;
 use crate::filtering::facet_sum::FacetSum;
 use crate::simd::PairVectors;
 
@@ -77,8 +78,8 @@ impl Column {
         let group = &sum.groups()[self.group];
         let color = group.color * self.channel.map_or(Vec3::ONE, |channel| Vec3::AXES[channel]);
         match self.part {
-            Part::Lobe(lobe) => Weight::Tint(group.lobes[lobe].1.clone(), color),
-            Part::Measured { color: of, .. } => Weight::Fixed(group.color * Vec3::AXES[of]),
+            Part::Lobe(lobe) => Weight::Tint(Tint::Term(group.lobes[lobe].1.clone(), color)),
+            Part::Measured { color: of, .. } => Weight::Tint(Tint::Fixed(group.color * Vec3::AXES[of])),
             Part::Area(patch) => Weight::Lobes {
                 normal: group.patches.as_ref().map_or(Vec3::Z, |patches| patches[patch].normal),
                 terms: group.lobes.iter().map(|(_, term)| term.clone()).collect(),
@@ -92,9 +93,7 @@ impl Column {
 /// What multiplies a column at a query.
 #[derive(Debug, Clone)]
 pub(super) enum Weight {
-    /// The tint of a term at the query's own `i·h`, times a colour.
-    Tint(Term, Vec3),
-    Fixed(Vec3),
+    Tint(Tint),
     /// All that facets of one normal reflect, times a colour.
     Lobes {
         normal: Vec3,
@@ -109,11 +108,17 @@ impl Weight {
         matches!(self, Self::Lobes { .. })
     }
 
+    pub(super) fn tint(&self) -> Option<&Tint> {
+        match self {
+            Self::Tint(tint) => Some(tint),
+            Self::Lobes { .. } => None,
+        }
+    }
+
     #[inline]
     pub(super) fn at(&self, pair: &PairVectors) -> Vec3 {
         match self {
-            Self::Fixed(color) => *color,
-            Self::Tint(term, color) => term.tint(pair.i_dot_h) * *color,
+            Self::Tint(tint) => tint.at(pair.i_dot_h),
             Self::Lobes { normal, terms, measured, color } => {
                 let angles = LobeAngles::new(*normal, pair.i, pair.o, pair.h);
                 if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use self::columns::{Column, Weight};
 use super::facet_sum::FacetSum;
-use super::{Direct, Interpolation};
+use super::{Direct, Interpolation, Tint};
 use crate::cancel::Cancel;
 use crate::directions::{Places, PolarGrid, UpperPairs};
 use crate::error::Result;
@@ -75,7 +75,7 @@ impl PairTable {
         mirrors: [bool; 2],
         cancel: &Cancel,
     ) -> Result<Self> {
-        let weights = Vec3::AXES.map(Weight::Fixed).to_vec();
+        let weights = Vec3::AXES.map(|color| Weight::Tint(Tint::Fixed(color))).to_vec();
         Self::tabulate(
             (grid, mirrors),
             weights,
@@ -167,6 +167,26 @@ impl PairTable {
     /// Whether two tables differ in their weights only.
     pub fn shares_values_with(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.values, &other.values)
+    }
+
+    /// What multiplies each column; `None` where a weight is more than a tint.
+    pub fn tints(&self) -> Option<Vec<&Tint>> {
+        self.weights.iter().map(Weight::tint).collect()
+    }
+
+    /// Fours of columns a node, black ones after the last.
+    pub fn fours(&self) -> usize {
+        self.fours
+    }
+
+    /// `[θ_h][φ_h][φ_d][θ_d][four]`, with one step of θ_d more at either end than the grid has.
+    pub fn values(&self) -> &[Vec4] {
+        &self.values
+    }
+
+    /// `a_v(o) / cos θ_o` and the directions it stands on.
+    pub fn areas(&self) -> (&PolarGrid, &[f32]) {
+        (&self.areas.0, &self.areas.1)
     }
 
     pub fn bytes(&self) -> usize {

@@ -1,11 +1,9 @@
 //! The pass of the factored form: all channels in one, because the sum over them is what must not be negative.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
 
-use super::direct::base_tint;
-use super::{GpuShading, Pass, Second, Variant, shadow_swap};
-use crate::filtering::{Channel, LowRank, Tint};
+use super::{GpuShading, Pass, Second, TintRow, Variant, shadow_swap, tint_file};
+use crate::filtering::{Channel, LowRank};
 use crate::gpu::{Gpu, GpuError};
 
 /// `Grids` in `shade_low_rank.wgsl`.
@@ -29,10 +27,7 @@ struct Row {
     first_p: u32,
     columns: u32,
     is_table: u32,
-    tint: Vec3,
-    follows: f32,
-    color: Vec3,
-    pad: u32,
+    tint: TintRow,
 }
 
 impl GpuShading {
@@ -59,12 +54,11 @@ impl GpuShading {
             gpu.upload("factors U", &u, usage)?,
             gpu.upload("factors P", &p, usage)?,
         ];
-        let follows = rows.iter().any(|row| row.follows > 0.0);
         let has = |table: u32| f64::from(u8::from(rows.iter().any(|row| row.is_table == table)));
         let variant = Variant {
             shader: "shade_low_rank",
             entry_point: "shade",
-            swaps: vec![shadow_swap(shadowed), ("tint_fixed", if follows { "tint_fresnel" } else { "tint_fixed" })],
+            swaps: vec![shadow_swap(shadowed), ("tint_fixed", tint_file(rows.iter().map(|row| &row.tint)))],
             constants: vec![("HAS_TABLES", has(1)), ("HAS_FACTORS", has(0))],
         };
         let resources: Vec<_> = bound.iter().map(wgpu::Buffer::as_entire_binding).collect();
@@ -94,18 +88,11 @@ fn add_channel(channel: &Channel, u: &mut Vec<f32>, p: &mut Vec<f32>) -> Row {
         }
     }
     u.resize(u.len().next_multiple_of(4), 0.0);
-    let (tint, follows, color) = match &channel.tint {
-        Tint::Term(term, color) => (base_tint(term), f32::from(u8::from(term.has_fresnel())), *color),
-        Tint::Fixed(color) => (Vec3::ONE, 0.0, *color),
-    };
     Row {
         first_u,
         first_p,
         columns: columns as u32,
         is_table: u32::from(channel.p.is_none()),
-        tint,
-        follows,
-        color,
-        pad: 0,
+        tint: TintRow::of(&channel.tint),
     }
 }

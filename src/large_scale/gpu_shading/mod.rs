@@ -5,24 +5,28 @@
 
 mod direct;
 mod low_rank;
+mod table;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::DirectionalLight;
+use super::gpu_batches::Batches;
 use super::shading_points::ShadingPoints;
 use super::shadow::Visible;
-use crate::filtering::{EffectiveBrdf, Form};
+use crate::cancel::Cancel;
+use crate::error::Result;
+use crate::filtering::{EffectiveBrdf, Form, Tint};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError, Swaps};
 
-/// Lobes or table rows that one submission adds up: a fraction of a second on slow cards, far from any watchdog.
-const BATCH_WORK: u64 = 1 << 28;
+/// Lobes or table rows that the first submission adds up, and the most that any does.
+const BATCH_WORK: [u64; 2] = [1 << 22, 1 << 28];
 const THREADS: u32 = 64;
 /// Lights that one thread adds up, as in the shader.
 const SLICE: u32 = 8;
 /// The most workgroups of a dispatch along one axis.
-const MAX_GROUPS: u32 = 65_535;
+const MAX_GROUPS: usize = 65_535;
 
 /// The layouts of all shading passes, and the pipelines compiled so far: build once, use for any material.
 #[derive(Debug)]
@@ -86,7 +90,7 @@ fn padded(v: Vec3) -> Padded {
 }
 
 impl GpuShading {
-    pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu) -> std::result::Result<Self, GpuError> {
         let layout = |label, bindings: &[wgpu::BindingType]| gpu.layout(label, wgpu::ShaderStages::COMPUTE, bindings);
         Ok(Self {
             points: layout("shading points", &[UNIFORM, READ, READ, READ, WRITE, WRITE])?,
@@ -100,16 +104,19 @@ impl GpuShading {
     ///
     /// # Errors
     /// [`GpuError::Unsupported`] for what only the CPU does (measured BRDFs that are not factored), and what devices refuse.
-    pub fn material(&mut self, gpu: &Gpu, brdf: &EffectiveBrdf, shadowed: bool) -> Result<GpuMaterial, GpuError> {
+    pub fn material(
+        &mut self,
+        gpu: &Gpu,
+        brdf: &EffectiveBrdf,
+        shadowed: bool,
+    ) -> std::result::Result<GpuMaterial, GpuError> {
         let passes = match &brdf.form {
             Form::Direct(form) => self.direct_passes(gpu, form, shadowed)?,
             Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
             Form::Interreflecting(..) => {
                 return Err(GpuError::Unsupported("light between facets is added on the CPU only".to_owned()));
             }
-            Form::Table(_) => {
-                return Err(GpuError::Unsupported("tables for pictures are read on the CPU only".to_owned()));
-            }
+            Form::Table(table) => vec![self.table_pass(gpu, table, shadowed)?],
             Form::Wu2011(_) => {
                 return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
             }
@@ -118,26 +125,32 @@ impl GpuShading {
     }
 
     /// Radiance towards the eye of each point, as [`shading::radiance`](super::shading::radiance) gives it but for
-    /// rounding. `visible` is read by materials that were made for shadows, and must then be there.
+    /// rounding. `visible`: the words of a [`Visible`] on the device; materials that were made for shadows read them.
+    ///
+    /// # Errors
+    /// What the device refuses, or [`crate::Error::Cancelled`].
+    #[expect(clippy::too_many_arguments, reason = "what to shade, and where")]
     pub fn radiance(
         &self,
         gpu: &Gpu,
         material: &GpuMaterial,
         points: &ShadingPoints,
         lights: &[DirectionalLight],
-        visible: Option<&Visible>,
+        visible: Option<&wgpu::Buffer>,
         eye: Vec3,
-    ) -> Result<Vec<Vec3>, GpuError> {
+        cancel: &Cancel,
+    ) -> Result<Vec<Vec3>> {
         use wgpu::BufferUsages as Usage;
         if points.is_empty() || lights.is_empty() {
             return Ok(vec![Vec3::ZERO; points.len()]);
         }
         let slices = lights.len().div_ceil(SLICE as usize);
-        if lights.len() > (MAX_GROUPS * SLICE) as usize || u32::try_from(points.len() * slices).is_err() {
-            return Err(GpuError::Unsupported(format!("{} points with {} lights", points.len(), lights.len())));
+        if slices > MAX_GROUPS || u32::try_from(points.len() * slices).is_err() {
+            let what = format!("{} points with {} lights", points.len(), lights.len());
+            return Err(GpuError::Unsupported(what).into());
         }
         if material.shadowed && visible.is_none() {
-            return Err(GpuError::Unsupported("shadows without an occluder".to_owned()));
+            return Err(GpuError::Unsupported("shadows without an occluder".to_owned()).into());
         }
         let point_data: Vec<[Padded; 3]> = (0..points.len())
             .map(|k| [points.positions[k], points.normals[k], points.tangents[k]].map(padded))
@@ -149,24 +162,27 @@ impl GpuShading {
         let bound = [
             gpu.upload("shading points", &point_data, Usage::STORAGE)?,
             gpu.upload("lights", &light_data, Usage::STORAGE)?,
-            gpu.upload("light visibility", visible.map_or(&[], |visible| &visible.words[..]), Usage::STORAGE)?,
+            match visible {
+                Some(words) => words.clone(),
+                None => gpu.upload::<u32>("light visibility", &[], Usage::STORAGE)?,
+            },
             radiance.clone(),
             gpu.buffer("scales", 4 * points.len() as u64, Usage::STORAGE)?,
         ];
         let resources: Vec<_> = std::iter::once(&params).chain(&bound).map(wgpu::Buffer::as_entire_binding).collect();
         let group = gpu.group("shading points", &self.points, &resources)?;
-        let batch = material.points_of_a_batch(lights.len());
-        for first in (0..points.len()).step_by(batch) {
-            let end = (first + batch).min(points.len());
+        let words = if visible.is_some() { Visible::words_of(lights.len()) } else { 0 };
+        Batches::of(points.len(), material.work(lights.len()), BATCH_WORK, THREADS).each(gpu, cancel, |range| {
+            let [first_point, end_point] = [range.start, range.end].map(|n| n as u32);
             gpu.write(
                 &params,
                 &[Params {
                     eye,
                     point_count: points.len() as u32,
-                    first_point: first as u32,
-                    end_point: end as u32,
+                    first_point,
+                    end_point,
                     light_count: lights.len() as u32,
-                    words_per_point: visible.map_or(0, Visible::words_per_point) as u32,
+                    words_per_point: words as u32,
                     least_area: material.least_area,
                     pad: [0; 3],
                 }],
@@ -179,12 +195,12 @@ impl GpuShading {
                     compute.set_bind_group(0, &group, &[]);
                     compute.set_bind_group(1, &pass.group, &[]);
                     let rows = if pass.each_light { slices as u32 } else { 1 };
-                    compute.dispatch_workgroups(((end - first) as u32).div_ceil(THREADS), rows, 1);
+                    compute.dispatch_workgroups((end_point - first_point).div_ceil(THREADS), rows, 1);
                 }
                 gpu.queue.submit([encoder.finish()]);
                 Ok(())
-            })?;
-        }
+            })
+        })?;
         let rows: Vec<[f32; 4]> = gpu.read(&radiance)?;
         let mut total = vec![Vec3::ZERO; points.len()];
         for row in rows.chunks_exact(points.len()).take(slices) {
@@ -195,7 +211,12 @@ impl GpuShading {
         Ok(total)
     }
 
-    fn pipeline(&mut self, gpu: &Gpu, variant: Variant, second: Second) -> Result<wgpu::ComputePipeline, GpuError> {
+    fn pipeline(
+        &mut self,
+        gpu: &Gpu,
+        variant: Variant,
+        second: Second,
+    ) -> std::result::Result<wgpu::ComputePipeline, GpuError> {
         if let Some((_, pipeline)) = self.compiled.iter().find(|(known, _)| *known == variant) {
             return Ok(pipeline.clone());
         }
@@ -220,15 +241,38 @@ enum Second {
 }
 
 impl GpuMaterial {
-    fn points_of_a_batch(&self, lights: usize) -> usize {
-        let work: u64 =
-            self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum();
-        let most = u64::from(MAX_GROUPS * THREADS);
-        (BATCH_WORK / work.max(1)).clamp(u64::from(THREADS), most) as usize
+    /// Lobes and table rows of one point.
+    fn work(&self, lights: usize) -> u64 {
+        self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum()
     }
 }
 
 /// The import that shadows stand behind, and what stands in for it.
 fn shadow_swap(shadowed: bool) -> (&'static str, &'static str) {
     ("shadows_none", if shadowed { "shadows_bits" } else { "shadows_none" })
+}
+
+/// `Tint` in `tint_row.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct TintRow {
+    base: Vec3,
+    follows: f32,
+    color: Vec3,
+    pad: u32,
+}
+
+impl TintRow {
+    fn of(tint: &Tint) -> Self {
+        let (base, follows, color) = match tint {
+            Tint::Term(term, color) => (term.tint(1.0), term.has_fresnel(), *color),
+            Tint::Fixed(color) => (Vec3::ONE, false, *color),
+        };
+        Self { base, follows: f32::from(u8::from(follows)), color, pad: 0 }
+    }
+}
+
+/// Which tints these call for.
+fn tint_file<'a>(mut rows: impl Iterator<Item = &'a TintRow>) -> &'static str {
+    if rows.any(|row| row.follows > 0.0) { "tint_fresnel" } else { "tint_fixed" }
 }
