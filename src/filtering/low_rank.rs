@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use super::bvndf::{VisibilityRows, leading_features, visibility_table};
 use super::facet_sum::{SumMaterial, analytic_lobe};
 use super::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
+use super::tint::Tint;
 use crate::brdf::{Brdf, ColorBasis, Term};
 use crate::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
 use crate::error::Result;
