@@ -4,7 +4,7 @@
 use biscale::Cancel;
 use biscale::accuracy::{compare, mirror_biased_pairs};
 use biscale::directions::UpperPairs;
-use biscale::filtering::{EffectiveBrdf, Form, Interpolation, PairTable};
+use biscale::filtering::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::plan::Route;
 use biscale::scene;
@@ -62,7 +62,7 @@ fn linear_interpolation_of_a_picture_table_is_farther_from_the_sum_than_cubic() 
     let sum = made("fig8a_hammered", &["quality.facets=1024", "quality.method=direct"]);
     let Form::Direct(direct) = &sum.brdf.form else { panic!("not a sum") };
     let grid = UpperPairs { rings: 16, azimuths: 24, turn: 6, difference: 8 };
-    let table = PairTable::build(direct, grid, [false; 2], &Cancel::default()).unwrap().unwrap();
+    let table = PairTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
     let pairs = mirror_biased_pairs(200, 8);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
     let off = |interpolation: Interpolation| {

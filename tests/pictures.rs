@@ -4,7 +4,7 @@
 use biscale::Cancel;
 use biscale::accuracy::{compare, picture_pairs};
 use biscale::directions::UpperPairs;
-use biscale::filtering::{EffectiveBrdf, Form, PairTable};
+use biscale::filtering::{EffectiveBrdf, Form, Nodes, PairTable};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::{self, LoadedScene};
 use glam::Vec3;
@@ -42,7 +42,7 @@ fn a_table_is_the_sum_itself_on_its_nodes() {
     let outcome = Pipeline::new().effective(&draft("table4_plate")).unwrap();
     let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
     let grid = UpperPairs { rings: 6, azimuths: 8, turn: 4, difference: 5 };
-    let table = PairTable::build(direct, grid, [false; 2], &Cancel::default()).unwrap().unwrap();
+    let table = PairTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
     let read = EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area };
     let peak = (0..grid.nodes()).map(|node| grid.pair(node)).map(|(i, o)| outcome.brdf.g(i, o).max_element());
     let peak = peak.fold(0.0, f32::max);
@@ -60,12 +60,58 @@ fn a_table_is_the_sum_itself_on_its_nodes() {
 }
 
 #[test]
+fn a_table_made_for_some_pairs_answers_these_as_the_whole_table_does() {
+    let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();
+    let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+    let grid = UpperPairs { rings: 7, azimuths: 12, turn: 6, difference: 5 };
+    let pairs = picture_pairs(20, 99);
+    for mirrors in [[false; 2], [true, false], [true; 2]] {
+        let read = |read_by| {
+            let nodes = Nodes { mirrors, read_by, ..Nodes::all(grid) };
+            let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+            let black = table.values().iter().filter(|value| **value == glam::Vec4::ZERO).count();
+            (EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area }, black)
+        };
+        let ((whole, none), (some, black)) = (read(None), read(Some(&pairs[..])));
+        assert!(black > none, "{mirrors:?}: nothing was left out");
+        for pair in &pairs {
+            assert_eq!(whole.eval(pair.i, pair.o), some.eval(pair.i, pair.o), "{mirrors:?} {pair:?}");
+        }
+    }
+}
+
+#[test]
+fn a_table_from_few_facets_that_shine_at_each_half_vector_is_close_to_the_one_from_all() {
+    for scene in ["table4_pillow", "fig6a_velvet_spread"] {
+        let outcome = Pipeline::new().effective(&draft(scene)).unwrap();
+        let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+        let grid = UpperPairs { rings: 12, azimuths: 16, turn: 6, difference: 6 };
+        let read = |facets| {
+            let nodes = Nodes { facets, ..Nodes::all(grid) };
+            let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+            EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area }
+        };
+        let (all, few) = (read(None), read(Some(direct.sum.facet_count() / 4)));
+        let (all, few) = (values(&all, 12), values(&few, 12));
+        let errors = compare(&few, &all);
+        assert!(errors.rel_l2 > 0.0 && errors.rel_l2 < 0.15, "{scene}: {:.1} %", errors.rel_l2 * 100.0);
+        // Weights keep the expectation: what is too much here is too little there.
+        let total = |values: &[Vec3]| values.iter().map(|value| value.element_sum()).sum::<f32>();
+        let drift = (total(&few) / total(&all) - 1.0).abs();
+        assert!(drift < 0.03, "{scene}: {:.1} % more or less in all", drift * 100.0);
+        // As many as there are: the sum itself.
+        assert_eq!(values(&read(Some(direct.sum.facet_count())), 12), all, "{scene}");
+    }
+}
+
+#[test]
 fn a_table_of_a_mirrored_tile_is_its_own_mirror_image_and_close_to_the_whole_one() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();
     let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
     let grid = UpperPairs { rings: 6, azimuths: 12, turn: 4, difference: 5 };
     let read = |mirrors: [bool; 2]| {
-        let table = PairTable::build(direct, grid, mirrors, &Cancel::default()).unwrap().unwrap();
+        let table =
+            PairTable::build(direct, Nodes { mirrors, ..Nodes::all(grid) }, &Cancel::default()).unwrap().unwrap();
         EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area }
     };
     let (whole, spared) = (read([false; 2]), read([true; 2]));

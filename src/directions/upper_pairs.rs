@@ -58,6 +58,12 @@ impl UpperPairs {
             .fold(itself, |best, image| if image.0 < best.0 { image } else { best })
     }
 
+    /// Nodes that are no images of others.
+    pub fn originals(&self, mirrors: [bool; 2]) -> usize {
+        let azimuths = (0..self.azimuths).filter(|&azimuth| self.image(azimuth, mirrors).0 == azimuth).count();
+        self.nodes() / self.azimuths * azimuths
+    }
+
     /// `(i, o)` of a node.
     pub fn pair(&self, node: usize) -> (Vec3, Vec3) {
         let (step, rest) = (node % self.difference, node / self.difference);

@@ -1,6 +1,7 @@
 //! What pictures read: a table of the effective BRDF, or a sum over fewer facets where normals are few, if it is close enough;
 //! made when the first picture asks.
 
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -8,14 +9,15 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Shape;
-use crate::accuracy::{Errors, picture_pairs, upper_errors};
+use crate::accuracy::{Errors, Pair, picture_pairs, upper_errors};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
 use crate::error::Result;
-use crate::filtering::{EffectiveBrdf, Form, Interpolation, PairTable};
+use crate::filtering::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
 use crate::geometry::mirror_planes;
 use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
 use crate::scene::Switch;
+use crate::visibility::Visibility;
 
 /// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
 /// recurrence that placed the facets stays spread out.
@@ -23,6 +25,20 @@ const THINNED: [usize; 4] = [27, 17, 10, 3];
 
 /// A table this many times too far off is not helped by the next finer grid, which has half its step.
 const HOPELESS: f64 = 2.5;
+
+/// One facet in so many makes a table of a slow sum, those first that shine where a half vector points.
+const PARTS: [usize; 2] = [5, 2];
+
+/// The same for coarse tables, of so many nodes, which are not tried before.
+const COARSE_PART: usize = 4;
+const COARSE: Range<usize> = 10_000..20_000;
+
+/// By how much fewer facets may raise a table's error.
+const NO_WORSE: f64 = 1.25;
+
+/// Tables of more nodes are first made only where the check's pairs read them, some 10,000 nodes, and in whole if that is close
+/// enough.
+const TRIED_FROM: usize = 60_000;
 
 /// The effective BRDF as pictures read it.
 #[derive(Debug, Clone)]
@@ -104,16 +120,13 @@ impl Pictures {
         if self.grids.is_empty() {
             return Ok((self.exact.clone(), least));
         }
-        let pairs = picture_pairs(PICTURE_CHECK_PAIRS, self.seed ^ 0x7ab1e);
-        let values =
-            |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
-        let exact = values(&self.exact);
+        let check = Check::new(&self.exact, self.seed);
         let (mut reused, failed) = self.reused();
         if let Form::Direct(direct) = self.exact.direct_form() {
             for step in THINNED {
                 let Some(thinned) = direct.thinned(step) else { break };
                 let brdf = self.exact.with_direct_form(Form::Direct(thinned));
-                let errors = upper_errors(&values(&brdf), &exact);
+                let errors = check.errors(&brdf);
                 if self.is_close(errors) {
                     return Ok((Arc::new(brdf), Some(errors)));
                 }
@@ -125,18 +138,22 @@ impl Pictures {
         let known = reused.as_ref().map(|table| table.grid);
         let first = self.grids.iter().position(|grid| Some(*grid) == known).unwrap_or(0);
         for grid in &self.grids[first..] {
-            let table = match reused.take() {
-                Some(table) => table,
-                None => match self.tabulate(*grid, cancel)? {
-                    Some(table) => table,
-                    None => break,
-                },
+            let made = match reused.take() {
+                Some(table) => Attempt::Made(table),
+                None => self.attempt(*grid, &check, cancel)?,
             };
-            let brdf = self.exact.with_direct_form(Form::Table(table.read(self.interpolation)));
-            let errors = upper_errors(&values(&brdf), &exact);
-            if self.is_close(errors) {
-                return Ok((Arc::new(brdf), Some(errors)));
-            }
+            let errors = match made {
+                Attempt::Made(table) => {
+                    let brdf = self.holding(table);
+                    let errors = check.errors(&brdf);
+                    if self.is_close(errors) {
+                        return Ok((Arc::new(brdf), Some(errors)));
+                    }
+                    errors
+                }
+                Attempt::TooFar(errors) => errors,
+                Attempt::Never => break,
+            };
             least = Some(errors);
             if errors.rel_l2 > HOPELESS * self.tolerance.0 {
                 break;
@@ -145,17 +162,52 @@ impl Pictures {
         Ok((self.exact.clone(), least))
     }
 
+    fn holding(&self, table: PairTable) -> EffectiveBrdf {
+        self.exact.with_direct_form(Form::Table(table.read(self.interpolation)))
+    }
+
+    /// A table on this grid, if a trial of some of its nodes is close enough; from fewer facets where that is no worse.
+    fn attempt(&self, grid: UpperPairs, check: &Check, cancel: &Cancel) -> Result<Attempt> {
+        let mirrors = self.mirrored.as_ref().map_or([false; 2], |shape| mirror_planes(&shape.mesh));
+        // What hangs over each facet is what makes sums slow.
+        let slow = match self.exact.direct_form() {
+            Form::Direct(direct) if matches!(*direct.visibility, Visibility::Slices(_)) => direct.sum.facet_count(),
+            _ => 0,
+        };
+        let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
+        let count = grid.originals(mirrors);
+        if count > TRIED_FROM {
+            let tried = |facets: Option<usize>| -> Result<Option<Errors>> {
+                let trial = self.tabulate(Nodes { facets, read_by: Some(&check.pairs), ..nodes }, cancel)?;
+                Ok(trial.map(|trial| check.errors(&self.holding(trial))))
+            };
+            let Some(best) = tried(None)? else { return Ok(Attempt::Never) };
+            if !self.is_close(best) {
+                return Ok(Attempt::TooFar(best));
+            }
+            for part in PARTS.into_iter().filter(|_| slow > 0) {
+                let sampled = tried(Some(slow / part))?;
+                if sampled.is_some_and(|errors| self.is_close(errors) && errors.rel_l2 < NO_WORSE * best.rel_l2) {
+                    nodes.facets = Some(slow / part);
+                    break;
+                }
+            }
+        } else if slow > 0 && COARSE.contains(&count) {
+            nodes.facets = Some(slow / COARSE_PART);
+        }
+        Ok(self.tabulate(nodes, cancel)?.map_or(Attempt::Never, Attempt::Made))
+    }
+
     fn is_close(&self, errors: Errors) -> bool {
         errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1
     }
 
-    fn tabulate(&self, grid: UpperPairs, cancel: &Cancel) -> Result<Option<PairTable>> {
-        let mirrors = self.mirrored.as_ref().map_or([false; 2], |shape| mirror_planes(&shape.mesh));
+    fn tabulate(&self, nodes: Nodes, cancel: &Cancel) -> Result<Option<PairTable>> {
         match self.exact.direct_form() {
-            Form::Direct(direct) => PairTable::build(direct, grid, mirrors, cancel),
+            Form::Direct(direct) => PairTable::build(direct, nodes, cancel),
             form => {
                 let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| form.sums(lights, o, |k, sum| out[k] = sum);
-                PairTable::resample(sums, grid, mirrors, cancel).map(Some)
+                PairTable::resample(sums, nodes, cancel).map(Some)
             }
         }
     }
@@ -168,6 +220,37 @@ impl Pictures {
             (Form::Table(_), _) => (None, false),
             _ => (None, same_lobes),
         }
+    }
+}
+
+/// What came of a grid.
+enum Attempt {
+    Made(PairTable),
+    /// A table's error would be this.
+    TooFar(Errors),
+    /// No grid serves.
+    Never,
+}
+
+/// Pairs as pictures ask for them, and the BRDF there.
+struct Check {
+    pairs: Vec<Pair>,
+    exact: Vec<Vec3>,
+}
+
+impl Check {
+    fn new(exact: &EffectiveBrdf, seed: u64) -> Self {
+        let mut check = Self { pairs: picture_pairs(PICTURE_CHECK_PAIRS, seed ^ 0x7ab1e), exact: Vec::new() };
+        check.exact = check.values(exact);
+        check
+    }
+
+    fn values(&self, brdf: &EffectiveBrdf) -> Vec<Vec3> {
+        self.pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
+    }
+
+    fn errors(&self, brdf: &EffectiveBrdf) -> Errors {
+        upper_errors(&self.values(brdf), &self.exact)
     }
 }
 

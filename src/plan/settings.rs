@@ -208,7 +208,7 @@ impl Settings {
             keep_color: 0.999,
             tolerance: 0.04,
             tolerance_db: 41.0,
-            picture_grids: vec![upper_pairs(24, 48, 8, 12), upper_pairs(32, 64, 12, 16)],
+            picture_grids: vec![upper_pairs(24, 48, 8, 12), upper_pairs(24, 48, 12, 16), upper_pairs(32, 64, 12, 16)],
             picture_tolerance: (0.08, 38.0),
             reference_facets: 16_384,
             reference_passes: 32,
@@ -235,7 +235,7 @@ impl Settings {
                 tolerance: 0.12,
                 tolerance_db: 28.0,
                 picture_grids: vec![upper_pairs(16, 24, 6, 8)],
-                picture_tolerance: (0.3, 30.0),
+                picture_tolerance: (0.35, 26.0),
                 ..standard
             },
             Preset::Fine | Preset::Reference => Self {

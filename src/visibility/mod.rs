@@ -74,6 +74,16 @@ impl Visibility {
         }
     }
 
+    /// That of some of the facets, in ascending order; `None` for maps, which are packed.
+    pub(crate) fn picked(&self, facets: &[usize]) -> Option<Self> {
+        match self {
+            Self::Unblocked { .. } => Some(Self::Unblocked { facets: facets.len() }),
+            Self::Horizons(horizons) => Some(Self::Horizons(horizons.picked(facets))),
+            Self::Slices(slices) => Some(Self::Slices(slices.picked(facets))),
+            Self::Maps(_) => None,
+        }
+    }
+
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction`; directions a facet does not face count as blocked or
     /// not, as the route has it: its cosine decides them.
     /// 0 at and under the horizon.

@@ -118,6 +118,23 @@ impl Slices {
         }
     }
 
+    /// Those of some of the facets, in ascending order.
+    pub(super) fn picked(&self, facets: &[usize]) -> Self {
+        let mut places = vec![u32::MAX; self.facets()];
+        for (place, &facet) in facets.iter().enumerate() {
+            places[facet] = place as u32;
+        }
+        let row = |row: &Vec<Floating>| -> Vec<Floating> {
+            let moved = row.iter().map(|hanging| Floating { facet: places[hanging.facet as usize], ..*hanging });
+            moved.filter(|hanging| hanging.facet != u32::MAX).collect()
+        };
+        Self {
+            horizons: self.horizons.picked(facets),
+            floating: self.floating.iter().map(row).collect(),
+            switch: facets.iter().map(|&facet| self.switch[facet]).collect(),
+        }
+    }
+
     /// What hangs above a run of facets along one azimuth.
     fn run(&self, azimuth: usize, range: &Range<usize>) -> &[Floating] {
         let row = &self.floating[azimuth];

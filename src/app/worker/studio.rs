@@ -275,7 +275,9 @@ impl OnDevice {
             }
             known => known,
         };
-        for brdf in pictured.iter().chain([exact]) {
+        // The processor in disguise is not asked for sums where the processor itself reads a table.
+        let sums = Some(exact).filter(|_| self.gpu.tier == Tier::Hardware || pictured.is_none());
+        for brdf in pictured.iter().chain(sums) {
             let made = match &mut self.renderer {
                 Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
                 Some((renderer, last)) => renderer.set_brdf(&self.gpu, brdf).map(|()| *last = brdf.clone()),

@@ -16,8 +16,9 @@ use rayon::prelude::*;
 use self::columns::{Column, Weight};
 use super::facet_sum::FacetSum;
 use super::{Direct, Interpolation, Tint};
+use crate::accuracy::Pair;
 use crate::cancel::Cancel;
-use crate::directions::{Places, PolarGrid, UpperPairs};
+use crate::directions::{self, Places, PolarGrid, UpperPairs};
 use crate::error::Result;
 use crate::simd::PairVectors;
 
@@ -39,22 +40,84 @@ pub struct PairTable {
     areas: Arc<(PolarGrid, Vec<f32>)>,
 }
 
+/// Which nodes of a table are made, and from what.
+#[derive(Debug, Clone, Copy)]
+pub struct Nodes<'a> {
+    pub grid: UpperPairs,
+    /// Planes x = const and y = const that mirror the tile: half or a quarter of the nodes are images of the others.
+    pub mirrors: [bool; 2],
+    /// About how many facets each half vector's sums take, where those are fewer than all.
+    pub facets: Option<usize>,
+    /// Pairs that will be asked for: other nodes stay black. All, where it is absent.
+    pub read_by: Option<&'a [Pair]>,
+}
+
+impl Nodes<'_> {
+    /// Every node by itself, from all facets.
+    pub fn all(grid: UpperPairs) -> Self {
+        Self { grid, mirrors: [false; 2], facets: None, read_by: None }
+    }
+}
+
+/// The eight rows of θ_d around a place and their weights, the step of θ_d below it, and how far it is from there to the next.
+#[inline]
+fn around(grid: &UpperPairs, [ring, azimuth, turn, step]: [f32; 4]) -> ([(usize, f32); 8], usize, f32) {
+    let low = (step as usize).min(grid.difference - 2);
+    let between = |at: f32, count: usize| {
+        let low = (at as usize).min(count - 1);
+        ([low, if low + 1 == count { 0 } else { low + 1 }], at - low as f32)
+    };
+    let low_ring = (ring as usize).min(grid.rings - 2);
+    let rings = [low_ring, low_ring + 1];
+    let ring_blend = ring - low_ring as f32;
+    let (azimuths, azimuth_blend) = between(azimuth, grid.azimuths);
+    let (turns, turn_blend) = between(turn, grid.turn);
+    let rows = std::array::from_fn(|k| {
+        let [a, b, d] = [k >> 2 & 1, k >> 1 & 1, k & 1];
+        let pick = |bit: usize, blend: f32| if bit == 1 { blend } else { 1.0 - blend };
+        let row = (rings[a] * grid.azimuths + azimuths[b]) * grid.turn + turns[d];
+        (row, pick(a, ring_blend) * pick(b, azimuth_blend) * pick(d, turn_blend))
+    });
+    (rows, low, step - low as f32)
+}
+
+/// Which nodes of a grid these pairs read, or the originals of which those are images.
+fn nodes_read(grid: &UpperPairs, made_of: &[(usize, bool)], pairs: &[Pair]) -> Vec<bool> {
+    let mut read = vec![false; grid.nodes()];
+    let mut places = Places::default();
+    for Pair { i, o } in pairs {
+        grid.places([&[i.x], &[i.y], &[i.z]], *o, &mut places);
+        let (rows, low, _) = around(grid, places.at(0));
+        for (row, _) in rows {
+            let (half_vector, turn) = (row / grid.turn, row % grid.turn);
+            let (image, turned) = made_of[half_vector % grid.azimuths];
+            let turn = if turned { (grid.turn - turn) % grid.turn } else { turn };
+            let row = (half_vector / grid.azimuths * grid.azimuths + image) * grid.turn + turn;
+            let steps = low.saturating_sub(1)..(low + 3).min(grid.difference);
+            read[row * grid.difference..][steps].fill(true);
+        }
+    }
+    read
+}
+
 /// Nodes of the projected area.
 const AREA_GRID: [usize; 2] = [30, 72];
 
 impl PairTable {
-    /// Sums over facets at every node, or at half or a quarter of them where planes x = const and y = const `mirrors` the tile.
-    /// `None` where the sum has too many parts for a table to pay.
+    /// Sums over facets at the nodes that are asked for. `None` where the sum has too many parts for a table to pay.
     ///
     /// # Errors
     /// [`crate::Error::Cancelled`].
-    pub fn build(direct: &Direct, grid: UpperPairs, mirrors: [bool; 2], cancel: &Cancel) -> Result<Option<Self>> {
+    pub fn build(direct: &Direct, nodes: Nodes, cancel: &Cancel) -> Result<Option<Self>> {
         let Some(columns) = Column::of(&direct.sum) else { return Ok(None) };
         let weights: Vec<Weight> = columns.iter().map(|column| column.weight(&direct.sum)).collect();
         // Facets of one normal are not what their mirror image is.
-        let mirrors = if weights.iter().any(Weight::is_lobe) { [false; 2] } else { mirrors };
+        let mirrors = if weights.iter().any(Weight::is_lobe) { [false; 2] } else { nodes.mirrors };
+        let (nodes, facets) = (Nodes { mirrors, ..nodes }, nodes.facets);
         let area = |o: Vec3| direct.sums(&[], o, |_, _| {});
-        let table = Self::tabulate((grid, mirrors), weights, true, area, cancel, |i, o, sums| {
+        let sampled = |h: Vec3| facets.and_then(|count| direct.about(h, count));
+        let table = Self::tabulate(nodes, weights, true, area, cancel, sampled, |sampled, i, o, sums| {
+            let direct = sampled.as_ref().unwrap_or(direct);
             let pair = PairVectors::new(i, o);
             direct.with_seen(i, o, |v_i, v_o| {
                 for (column, sum) in columns.iter().zip(sums) {
@@ -71,18 +134,19 @@ impl PairTable {
     /// [`crate::Error::Cancelled`].
     pub fn resample(
         sums: impl Fn(&[Vec3], Vec3, &mut [DVec3]) -> f64 + Sync,
-        grid: UpperPairs,
-        mirrors: [bool; 2],
+        nodes: Nodes,
         cancel: &Cancel,
     ) -> Result<Self> {
         let weights = Vec3::AXES.map(|color| Weight::Tint(Tint::Fixed(color))).to_vec();
+        let area = |o: Vec3| sums(&[], o, &mut []);
         Self::tabulate(
-            (grid, mirrors),
+            nodes,
             weights,
             false,
-            |o| sums(&[], o, &mut []),
+            area,
             cancel,
-            |i, o, out| {
+            |_| (),
+            |(), i, o, out| {
                 let mut sum = [DVec3::ZERO];
                 sums(&[i], o, &mut sum);
                 out[..3].copy_from_slice(&sum[0].as_vec3().to_array());
@@ -90,30 +154,42 @@ impl PairTable {
         )
     }
 
-    /// `fill` writes the columns of a pair, `area` tells `a_v(o)`.
-    fn tabulate(
-        (grid, mirrors): (UpperPairs, [bool; 2]),
+    /// `prepare` is told each half vector, `fill` writes the columns of a pair about it, `area` tells `a_v(o)`.
+    fn tabulate<P>(
+        Nodes { grid, mirrors, read_by, .. }: Nodes,
         weights: Vec<Weight>,
         of_sum: bool,
         area: impl Fn(Vec3) -> f64 + Sync,
         cancel: &Cancel,
-        fill: impl Fn(Vec3, Vec3, &mut [f32]) + Sync,
+        prepare: impl Fn(Vec3) -> P + Sync,
+        fill: impl Fn(&P, Vec3, Vec3, &mut [f32]) + Sync,
     ) -> Result<Self> {
         let (fours, stored) = (weights.len().div_ceil(4), grid.difference + 2);
         let mut values = vec![Vec4::ZERO; grid.half_vectors() * grid.turn * stored * fours];
         let (turn, half_vector) = (stored * fours, grid.turn * stored * fours);
         let made_of: Vec<(usize, bool)> = (0..grid.azimuths).map(|azimuth| grid.image(azimuth, mirrors)).collect();
+        let read = read_by.map(|pairs| nodes_read(&grid, &made_of, pairs));
+        let is_read = |node: usize| read.as_ref().is_none_or(|read| read[node]);
         let half_vectors = values.par_chunks_mut(half_vector).enumerate();
         half_vectors.try_for_each(|(half_vector, nodes)| {
             cancel.check()?;
-            if made_of[half_vector % grid.azimuths].0 != half_vector % grid.azimuths {
+            let first = half_vector * grid.turn * grid.difference;
+            if made_of[half_vector % grid.azimuths].0 != half_vector % grid.azimuths
+                || !(first..first + grid.turn * grid.difference).any(is_read)
+            {
                 return Ok(());
             }
+            let (i, o) = grid.pair(first);
+            let prepared = prepare(directions::half_vector(i, o));
             let mut sums = vec![0.0; 4 * fours];
             for (turn, row) in nodes.chunks_mut(stored * fours).enumerate() {
                 for step in 0..grid.difference {
-                    let (i, o) = grid.pair((half_vector * grid.turn + turn) * grid.difference + step);
-                    fill(i, o, &mut sums[..weights.len()]);
+                    let node = first + turn * grid.difference + step;
+                    if !is_read(node) {
+                        continue;
+                    }
+                    let (i, o) = grid.pair(node);
+                    fill(&prepared, i, o, &mut sums[..weights.len()]);
                     for (node, sums) in row[(step + 1) * fours..].iter_mut().zip(sums.as_chunks::<4>().0) {
                         *node = Vec4::from_array(*sums);
                     }
@@ -219,27 +295,11 @@ impl PairTable {
     }
 
     /// `Σ_c w_c T_c`: linear between half vectors and in φ_d, cubic in θ_d.
-    fn at(&self, i: Vec3, o: Vec3, [ring, azimuth, turn, step]: [f32; 4], i_dot_h: f32) -> Vec3 {
-        let grid = &self.grid;
-        let stored = grid.difference + 2;
-        let low = (step as usize).min(grid.difference - 2);
-        let along = self.interpolation.weights(step - low as f32);
-        let between = |at: f32, count: usize| {
-            let low = (at as usize).min(count - 1);
-            ([low, if low + 1 == count { 0 } else { low + 1 }], at - low as f32)
-        };
-        let low_ring = (ring as usize).min(grid.rings - 2);
-        let rings = [low_ring, low_ring + 1];
-        let ring_blend = ring - low_ring as f32;
-        let (azimuths, azimuth_blend) = between(azimuth, grid.azimuths);
-        let (turns, turn_blend) = between(turn, grid.turn);
-        let corners: [(usize, f32); 8] = std::array::from_fn(|k| {
-            let [a, b, d] = [k >> 2 & 1, k >> 1 & 1, k & 1];
-            let pick = |bit: usize, blend: f32| if bit == 1 { blend } else { 1.0 - blend };
-            let row = (rings[a] * grid.azimuths + azimuths[b]) * grid.turn + turns[d];
-            let weight = pick(a, ring_blend) * pick(b, azimuth_blend) * pick(d, turn_blend);
-            ((row * stored + low) * self.fours, weight)
-        });
+    fn at(&self, i: Vec3, o: Vec3, place: [f32; 4], i_dot_h: f32) -> Vec3 {
+        let stored = self.grid.difference + 2;
+        let (rows, low, between) = around(&self.grid, place);
+        let along = self.interpolation.weights(between);
+        let corners = rows.map(|(row, weight)| ((row * stored + low) * self.fours, weight));
         let pair = PairVectors { i, o, h: (i + o) / (2.0 * i_dot_h).max(1e-20), i_dot_h };
         let mut total = Vec3::ZERO;
         for four in 0..self.fours {

@@ -1,0 +1,156 @@
+//! A sum over part of its facets for pairs of directions about one half vector: all that a glossy lobe lights up, and few of
+//! those whose share is small.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::Direct;
+use super::facet_groups::{Group, Patch};
+use super::facet_sum::FacetSum;
+use crate::brdf::LobeAngles;
+
+/// Part of the samples that goes to facets whatever they reflect: lobes grow wider as light and view move apart.
+const EVENLY: f64 = 0.25;
+
+impl Direct {
+    /// Some `count` facets with weights that keep every sum's expectation, each picked with a probability that follows what it
+    /// reflects of light that comes and goes along `h`, at even steps along that measure (systematic sampling). Where facets
+    /// of one normal share a lobe, each is as likely. `None` where it saves nothing.
+    pub(super) fn about(&self, h: Vec3, count: usize) -> Option<Self> {
+        if self.sum.facet_count() < 2 * count {
+            return None;
+        }
+        let lit = self.sum.groups().iter().filter(|group| !group.is_black);
+        let facets: usize = lit.map(|group| group.range.len()).sum();
+        let share = |range: &Range<usize>| count as f64 * range.len() as f64 / facets.max(1) as f64;
+        let mut picks = Picks::default();
+        let groups = self.sum.groups().iter().map(|group| {
+            let first = picks.facets.len();
+            let patches = match &group.patches {
+                _ if group.is_black => None,
+                Some(patches) => Some(
+                    patches
+                        .iter()
+                        .map(|Patch { range, normal }| {
+                            let chance = (share(range) / range.len().max(1) as f64).min(1.0);
+                            let range = picks.walk(range.clone(), std::iter::repeat(chance));
+                            Patch { range, normal: *normal }
+                        })
+                        .collect(),
+                ),
+                None => {
+                    let chances = chances(&self.sum.shares(group, h), share(&group.range));
+                    picks.walk(group.range.clone(), chances.into_iter());
+                    None
+                }
+            };
+            (first..picks.facets.len(), patches)
+        });
+        let groups: Vec<_> = groups.collect();
+        let visibility = self.visibility.picked(&picks.facets)?;
+        Some(Self::new(Arc::new(self.sum.sampled(&picks, groups)), Arc::new(visibility)))
+    }
+}
+
+/// Facets in ascending order, and what each stands for.
+#[derive(Default)]
+struct Picks {
+    facets: Vec<usize>,
+    weights: Vec<f32>,
+}
+
+impl Picks {
+    /// Picks of a run of facets those at which the sum of the chances passes a whole number; where they stand.
+    fn walk(&mut self, range: Range<usize>, chances: impl Iterator<Item = f64>) -> Range<usize> {
+        let first = self.facets.len();
+        let mut walked = 0.5;
+        for (facet, chance) in range.zip(chances) {
+            walked += chance;
+            if walked >= 1.0 {
+                walked -= 1.0;
+                self.facets.push(facet);
+                self.weights.push((1.0 / chance) as f32);
+            }
+        }
+        first..self.facets.len()
+    }
+}
+
+/// Chances in `(0, 1]` in proportion to `shares`, which add up to 1, so that about `count` are picked.
+fn chances(shares: &[f64], count: f64) -> Vec<f64> {
+    let mut scale = count;
+    // Those that are certain leave more to the others.
+    for _ in 0..4 {
+        let expected: f64 = shares.iter().map(|share| (scale * share).min(1.0)).sum();
+        scale *= count / expected.max(1e-9);
+    }
+    shares.iter().map(|share| (scale * share).clamp(1e-9, 1.0)).collect()
+}
+
+impl FacetSum {
+    /// What part each facet of a group has in what the group reflects of light along `h` back along `h`: the mean over its
+    /// lobes, some of it the same for all.
+    fn shares(&self, group: &Group, h: Vec3) -> Vec<f64> {
+        let count = group.range.len();
+        let mut shares = vec![EVENLY / count.max(1) as f64; count];
+        let parts = group.lobes.len() + group.measured.len();
+        let mut values = vec![0.0_f64; count];
+        for part in 0..parts {
+            for (value, s) in values.iter_mut().zip(group.range.clone()) {
+                let (normal, area) = self.facet(s);
+                let angles = LobeAngles::new(normal, h, h, h);
+                *value = f64::from(area)
+                    * f64::from(match group.lobes.get(part) {
+                        Some((_, term)) => term.lobe_cos(&angles),
+                        None if angles.n_dot_i > 0.0 => {
+                            let table = &group.measured[part - group.lobes.len()];
+                            table.f_r(&angles).max_element().max(0.0) * angles.n_dot_i * angles.n_dot_o
+                        }
+                        None => 0.0,
+                    });
+            }
+            let total: f64 = values.iter().sum();
+            for (share, value) in shares.iter_mut().zip(&values) {
+                let part = if total > 0.0 { value / total } else { 1.0 / count as f64 };
+                *share += (1.0 - EVENLY) * part / parts as f64;
+            }
+        }
+        shares
+    }
+
+    /// Facets that stand for all; where those of each group stand, and their runs of one normal.
+    fn sampled(&self, picks: &Picks, groups: Vec<(Range<usize>, Option<Vec<Patch>>)>) -> Self {
+        let facets = || picks.facets.iter().zip(&picks.weights);
+        let areas = facets().map(|(&s, weight)| self.facet(s).1 * weight).collect();
+        let normals = [0, 1, 2].map(|axis| picks.facets.iter().map(|&s| self.facet(s).0[axis]).collect());
+        let groups = self.groups().iter().zip(groups).map(|(group, (range, patches))| {
+            let weighted = |areas: &Vec<f32>| -> Vec<f32> {
+                let of_group = facets().skip(range.start).take(range.len());
+                of_group.map(|(&s, weight)| areas[s - group.range.start] * weight).collect()
+            };
+            let rgb_areas = group.rgb_areas.as_ref().map(|rgb| rgb.each_ref().map(weighted));
+            Group { range, rgb_areas, patches, ..group.clone() }
+        });
+        self.over(normals, areas, groups.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chances_add_up_to_the_count_and_never_exceed_certainty() {
+        let raw: Vec<f64> = (0..1000).map(|k| if k % 100 == 0 { 50.0 } else { 1.0 }).collect();
+        let total: f64 = raw.iter().sum();
+        let shares: Vec<f64> = raw.iter().map(|share| share / total).collect();
+        let chances = chances(&shares, 200.0);
+        let expected: f64 = chances.iter().sum();
+        assert!((expected - 200.0).abs() < 1.0, "{expected}");
+        assert!(chances.iter().all(|&chance| chance > 0.0 && chance <= 1.0));
+        // What weighs fifty times as much is certain.
+        assert_eq!(chances[0], 1.0);
+    }
+}
