@@ -94,6 +94,10 @@ fn one_case_of_each_family_is_the_same_on_the_graphics_processor_at_finer_qualit
                 let mut loaded = open(&case, "direct", folder.path());
                 loaded.scene.quality.preset = preset.to_owned();
                 loaded.scene.quality.backend = backend.to_owned();
+                // By itself software Vulkan leaves overhangs to the CPU.
+                if backend == "gpu" && case.name == "overhang" {
+                    loaded.scene.quality.visibility = Some("maps".to_owned());
+                }
                 let outcome = Pipeline::new().effective(&loaded).unwrap();
                 assert_none(outcome.health().warnings.iter().filter(|words| words.contains("fault")).cloned());
                 pairs.iter().map(|p| outcome.brdf.eval(p.i, p.o)).collect()
