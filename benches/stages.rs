@@ -5,11 +5,13 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::accuracy::mirror_biased_pairs;
+use biscale::Cancel;
+use biscale::accuracy::{mirror_biased_pairs, picture_pairs};
 use biscale::brdf::{Brdf, Term};
-use biscale::directions::from_angles;
+use biscale::directions::{UpperPairs, from_angles};
 use biscale::filtering::{
-    Direct, EffectiveBrdf, FacetSum, Form, LowRank, RotatedBasis, RotatedLobe, SumMaterial, analytic_lobe,
+    Direct, EffectiveBrdf, FacetSum, Form, LowRank, Nodes, PairTable, Reflectance, RotatedBasis, RotatedLobe,
+    SumMaterial, analytic_lobe,
 };
 use biscale::geometry::{self, Facets, TileMesh};
 use biscale::plan::{Preset, Settings};
@@ -162,6 +164,64 @@ fn main() -> Result<(), biscale::Error> {
                 pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).sum::<Vec3>()
             });
         }
+    }
+    pictures(&bench, &rods, &rod_facets, sliced)
+}
+
+/// What pictures read, beside the sums it stands for.
+fn pictures(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -> Result<(), biscale::Error> {
+    let ggx = Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) };
+    let direct = |mesh: &TileMesh, facets: &Facets, visibility: Visibility| {
+        let (material_of_slot, materials) = materials(&ggx, mesh.slots.len());
+        Direct::new(Arc::new(FacetSum::new(facets, &material_of_slot, &materials)), Arc::new(visibility))
+    };
+    let rod_sum = direct(rods, facets, sliced);
+    let grid = UpperPairs { rings: 16, azimuths: 24, turn: 6, difference: 8 };
+    let checked = picture_pairs(64, 1);
+    let all = Nodes::all(grid);
+    for (name, nodes) in [
+        ("all facets", all),
+        ("a fifth of the facets", Nodes { facets: Some(facets.len() / 5), ..all }),
+        ("all facets, what 64 pairs read", Nodes { read_by: Some(&checked), ..all }),
+    ] {
+        bench.line(&format!("table (rods), {name}"), grid.nodes(), "node", || {
+            PairTable::build(&rod_sum, nodes, &Cancel::default())
+        });
+    }
+
+    let lights: Vec<Vec3> = (0..32_u8).map(|k| from_angles(0.2 + 0.03 * f32::from(k), 2.4 * f32::from(k))).collect();
+    let o = from_angles(0.6, 1.0);
+    let grooves = tile("fig4b_bicolor_cup")?;
+    let groove_facets = facets_of(&grooves, Settings::of_preset(Preset::Standard).height_field_facets);
+    let settings = Settings::of_preset(Preset::Standard);
+    let horizons = Horizons::scan(
+        &PeriodicGrid::for_slices(&grooves),
+        &groove_facets,
+        settings.horizon_azimuths,
+        settings.penumbra,
+    );
+    let groove_sum = direct(&grooves, &groove_facets, Visibility::Horizons(horizons));
+    let total = |form: &Form, base_area: f64| {
+        let (brdf, mut out) = (EffectiveBrdf { form: form.clone(), base_area }, vec![Vec3::ZERO; lights.len()]);
+        move |lights: &[Vec3]| {
+            brdf.eval_lights(lights, o, &mut out);
+            out.iter().sum::<Vec3>()
+        }
+    };
+    let mut lines = vec![("few normals, all at once (grooves)", Form::Direct(groove_sum.clone()), true)];
+    if let Some(thinned) = groove_sum.thinned(27) {
+        lines.push(("few normals, every 27th facet (grooves)", Form::Direct(thinned), true));
+    }
+    lines.push(("few normals, light by light (grooves)", Form::Direct(groove_sum), false));
+    if let Some(table) = PairTable::build(&rod_sum, all, &Cancel::default())? {
+        lines.push(("a table, all at once (rods)", Form::Table(table), true));
+    }
+    lines.push(("the sum, light by light (rods)", Form::Direct(rod_sum), false));
+    for (name, form, at_once) in lines {
+        let mut eval = total(&form, f64::from(rods.base_area()));
+        bench.line(name, lights.len(), "light", || {
+            if at_once { eval(&lights) } else { lights.iter().map(|light| eval(std::slice::from_ref(light))).sum() }
+        });
     }
     Ok(())
 }
