@@ -14,6 +14,9 @@ use crate::brdf::LobeAngles;
 /// Part of the samples that goes to facets whatever they reflect: lobes grow wider as light and view move apart.
 const EVENLY: f64 = 0.25;
 
+/// Facets that a group or a normal keeps at least.
+const FEWEST: f64 = 16.0;
+
 impl Direct {
     /// Some `count` facets with weights that keep every sum's expectation, each picked with a probability that follows what it
     /// reflects of light that comes and goes along `h`, at even steps along that measure (systematic sampling). Where facets
@@ -24,7 +27,10 @@ impl Direct {
         }
         let lit = self.sum.groups().iter().filter(|group| !group.is_black);
         let facets: usize = lit.map(|group| group.range.len()).sum();
-        let share = |range: &Range<usize>| count as f64 * range.len() as f64 / facets.max(1) as f64;
+        let share = |range: &Range<usize>| {
+            let length = range.len() as f64;
+            (count as f64 * length / facets.max(1) as f64).max(FEWEST).min(length)
+        };
         let mut picks = Picks::default();
         let groups = self.sum.groups().iter().map(|group| {
             let first = picks.facets.len();
@@ -34,7 +40,7 @@ impl Direct {
                     patches
                         .iter()
                         .map(|Patch { range, normal }| {
-                            let chance = (share(range) / range.len().max(1) as f64).min(1.0);
+                            let chance = share(range) / range.len().max(1) as f64;
                             let range = picks.walk(range.clone(), std::iter::repeat(chance));
                             Patch { range, normal: *normal }
                         })
