@@ -57,6 +57,7 @@ fn after_an_edit(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
 #[test]
 #[ignore = "prints numbers of one scene, of all five with BISCALE_TABLE=1: cargo test --release --bin biscale latency -- --ignored --nocapture"]
 fn latency_from_a_slider_on_the_scenes_of_table_4() {
+    let _alone = super::alone();
     println!(
         "scene            route  draft  refined (coarse)  final   [ms, median of 3 geometry edits; of 1 on the GPU]"
     );

@@ -10,6 +10,7 @@ mod painting;
 mod soak;
 mod trouble;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use biscale::scene::{self, Painted};
@@ -18,6 +19,12 @@ use egui_kittest::Harness;
 
 use super::document::Document;
 use super::editor::Editor;
+
+/// Held by tests that measure the process: its memory, or how long it makes a hand wait.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A scene that is quick to compute.
 const QUICK: &str = r#"

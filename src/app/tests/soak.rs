@@ -57,6 +57,7 @@ fn compare_with_nothing_kept(harness: &mut egui_kittest::Harness<'static, Option
 /// `edits` of them, and on for as many minutes as `BISCALE_SOAK_MINUTES` says.
 fn soak(edits: usize, seed: u64) {
     let minutes: f64 = std::env::var("BISCALE_SOAK_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(0.0);
+    let _alone = super::alone();
     let start = Instant::now();
     let goes_on = |step: usize| step < edits || edits > 100 && start.elapsed().as_secs_f64() < 60.0 * minutes;
     let folder = tempfile::tempdir().unwrap();
