@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
 use biscale::Cancel;
-use biscale::accuracy::{compare, picture_pairs};
+use biscale::accuracy::{compare, picture_pairs, upper_errors};
 use biscale::directions::UpperPairs;
 use biscale::filtering::{EffectiveBrdf, Form, Nodes, PairTable};
 use biscale::pipeline::{Outcome, Pipeline};
@@ -101,6 +101,35 @@ fn a_table_from_few_facets_that_shine_at_each_half_vector_is_close_to_the_one_fr
         assert!(drift < 0.03, "{scene}: {:.1} % more or less in all", drift * 100.0);
         // As many as there are: the sum itself.
         assert_eq!(values(&read(Some(direct.sum.facet_count())), 12), all, "{scene}");
+    }
+}
+
+/// Figures of docs/speed.md.
+#[test]
+#[ignore = "a table to be printed: cargo test --release --test pictures fewer_facets -- --ignored --nocapture"]
+fn fewer_facets_and_trials_against_whole_tables_at_standard() {
+    let pairs = picture_pairs(512, 12345);
+    let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
+    let grid = UpperPairs { rings: 24, azimuths: 48, turn: 8, difference: 12 };
+    println!("scene                facets      trial     whole   rel. L2   PSNR");
+    for scene in ["table4_pillow", "table4_skirt", "fig7a_shot_silk", "fig6a_velvet_spread"] {
+        let outcome = Pipeline::new().effective(&open(scene, &["quality.backend=cpu"])).unwrap();
+        let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("{scene}: not a sum") };
+        let exact = values(&outcome.brdf);
+        for facets in [None, Some(direct.sum.facet_count() / 5)] {
+            let made = |read_by| {
+                let start = std::time::Instant::now();
+                let nodes = Nodes { facets, read_by, ..Nodes::all(grid) };
+                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+                let ms = start.elapsed().as_secs_f64() * 1e3;
+                (values(&outcome.brdf.with_direct_form(Form::Table(table))), ms)
+            };
+            let ((tried, trial_ms), (whole, whole_ms)) = (made(Some(&pairs[..])), made(None));
+            assert_eq!(tried, whole, "{scene}: a trial tells another error than the table");
+            let errors = upper_errors(&whole, &exact);
+            let (percent, db, count) = (100.0 * errors.rel_l2, errors.psnr_db, facets.map_or("all", |_| "a fifth"));
+            println!("{scene:<20} {count:<8} {trial_ms:>6.0} ms {whole_ms:>6.0} ms {percent:>6.2} % {db:>6.1} dB");
+        }
     }
 }
 
