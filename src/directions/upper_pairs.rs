@@ -126,6 +126,11 @@ impl Places {
         std::array::from_fn(|axis| self.columns[axis][k])
     }
 
+    /// θ_h, φ_h, φ_d, θ_d in steps, and `i·h`, of all pairs.
+    pub fn columns(&self) -> &[[f32; Self::MOST]; 5] {
+        &self.columns
+    }
+
     pub fn i_dot_h(&self, k: usize) -> f32 {
         self.columns[4][k]
     }

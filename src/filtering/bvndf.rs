@@ -30,6 +30,18 @@ impl VisibilityRows {
         Self { grid, facets: facets.len(), rows }
     }
 
+    /// Each facet's visibility along any direction, read between the nodes as the factored form reads it.
+    pub fn read(&self, direction: Vec3, out: &mut [f32]) {
+        out.fill(0.0);
+        let taper = PolarGrid::horizon_taper(direction.z);
+        for (node, weight) in self.grid.taps(direction) {
+            let row = &self.rows[node * self.facets..][..self.facets];
+            for (out, v) in out.iter_mut().zip(row) {
+                *out += taper * weight * v;
+            }
+        }
+    }
+
     /// The same, of a run of its facets.
     pub fn part(&self, facets: std::ops::Range<usize>) -> Self {
         let rows = self.rows.chunks(self.facets.max(1)).flat_map(|row| row[facets.clone()].iter().copied()).collect();
@@ -112,6 +124,34 @@ pub fn visibility_table(visibility: &VisibilityRows, weights: &[f32], y: &[f32],
     pair_table(&visibility.rows, visibility.grid.len(), weights, y, columns)
 }
 
+/// [`visibility_table`] at some pairs of nodes `(o, i)`; elsewhere it is 0.
+pub fn visibility_at(
+    visibility: &VisibilityRows,
+    weights: &[f32],
+    y: &[f32],
+    columns: usize,
+    read: &[(usize, usize)],
+) -> Vec<f32> {
+    const PAIRS: usize = 64;
+    let (facets, nodes) = (visibility.facets, visibility.grid.len());
+    let row = |node: usize| &visibility.rows[node * facets..][..facets];
+    let mut sums = vec![0.0_f32; read.len() * columns];
+    sums.par_chunks_mut((PAIRS * columns).max(1)).zip(read.par_chunks(PAIRS)).for_each(|(sums, read)| {
+        let mut seen = vec![0.0_f32; read.len() * facets];
+        for (seen, &(o, i)) in seen.chunks_mut(facets.max(1)).zip(read) {
+            for (((seen, v_o), v_i), w) in seen.iter_mut().zip(row(o)).zip(row(i)).zip(weights) {
+                *seen = v_o * v_i * w;
+            }
+        }
+        gemm::multiply(read.len(), facets, columns, &seen, y, sums);
+    });
+    let mut table = vec![0.0_f32; nodes * nodes * columns];
+    for (&(o, i), sums) in read.iter().zip(sums.chunks(columns.max(1))) {
+        table[(o * nodes + i) * columns..][..columns].copy_from_slice(sums);
+    }
+    table
+}
+
 /// [`visibility_table`] of dense rows `[node][facet]` over any set of directions.
 pub(super) fn pair_table(rows: &[f32], nodes: usize, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
     const VIEWS: usize = 48;
@@ -178,6 +218,13 @@ mod tests {
         let table = visibility_table(&visibility, &weights, &y, columns);
         let nodes = grid.len();
         assert_eq!(table.len(), nodes * nodes * columns);
+        let read: Vec<(usize, usize)> = (0..200).map(|k| (k * 7 % nodes, k * 31 % nodes)).collect();
+        let part = visibility_at(&visibility, &weights, &y, columns, &read);
+        for (at, (got, want)) in part.iter().zip(&table).enumerate() {
+            let node = at / columns;
+            let want = if read.contains(&(node / nodes, node % nodes)) { *want } else { 0.0 };
+            assert!((got - want).abs() < 1e-5 * want.abs() + 1e-6, "{at}: {got} {want}");
+        }
         for o in 0..nodes {
             for i in 0..nodes {
                 for c in 0..columns {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use super::VisibilityRows;
 use super::facet_sum::FacetSum;
 use super::few_normals::{FewNormals, View};
 use crate::simd::LightPairs;
@@ -59,7 +60,10 @@ impl Direct {
             if let (Visibility::Horizons(horizons), Some(few), true) =
                 (&*self.visibility, &self.few, o.z > 0.0 && area > 0.0)
             {
-                let view = View { sum: &self.sum, horizons, o, v_o: &scratch.v_o };
+                for (v, area) in scratch.v_o.iter_mut().zip(self.sum.areas(0..facets)) {
+                    *v *= area;
+                }
+                let view = View { sum: &self.sum, horizons, o, areas: &scratch.v_o };
                 few.sums(view, lights, &mut scratch.pairs, out);
                 return area;
             }
@@ -73,5 +77,14 @@ impl Direct {
             }
             area
         })
+    }
+
+    /// `f̄(i, o)` as it would be if visibility were read between the nodes of `rows`, with exact lobes; above the horizon.
+    pub(crate) fn seen_between(&self, rows: &VisibilityRows, i: Vec3, o: Vec3) -> Vec3 {
+        let (mut v_i, mut v_o) = (vec![0.0; rows.facets], vec![0.0; rows.facets]);
+        rows.read(i, &mut v_i);
+        rows.read(o, &mut v_o);
+        let area = self.sum.projected_area(&v_o, o);
+        if area > 0.0 { (self.sum.sum(i, o, &v_i, &v_o) / area).as_vec3() } else { Vec3::ZERO }
     }
 }

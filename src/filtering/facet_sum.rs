@@ -210,9 +210,12 @@ impl FacetSum {
         for table in &group.measured {
             for s in 0..range.len() {
                 let seen = v_i[s] * v_o[s];
+                if seen <= 0.0 {
+                    continue;
+                }
                 let normal = Vec3::new(normals[0][s], normals[1][s], normals[2][s]);
                 let angles = LobeAngles::new(normal, pair.i, pair.o, pair.h);
-                if seen > 0.0 && angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
+                if angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
                     let weight = match &group.rgb_areas {
                         None => Vec3::splat(self.areas[range.start + s]),
                         Some([r, g, b]) => Vec3::new(r[s], g[s], b[s]),

@@ -25,8 +25,8 @@ pub(super) struct View<'a> {
     pub sum: &'a FacetSum,
     pub horizons: &'a Horizons,
     pub o: Vec3,
-    /// Visibilities of all facets along `o`.
-    pub v_o: &'a [f32],
+    /// Of all facets, the area times the visibility along `o`.
+    pub areas: &'a [f32],
 }
 
 /// Runs of one normal with their groups; black groups have none.
@@ -69,10 +69,9 @@ impl FewNormals {
         pairs: &LightPairs,
         lights: usize,
     ) -> [f64; LightPairs::MOST] {
-        let areas = view.sum.areas(patch.range.clone());
-        let along = |azimuth: f32, elevation: f32| {
-            view.horizons.seen_along([azimuth, elevation], patch.range.clone(), areas, view.v_o)
-        };
+        let areas = &view.areas[patch.range.clone()];
+        let along =
+            |azimuth: f32, elevation: f32| view.horizons.seen_along([azimuth, elevation], patch.range.clone(), areas);
         let mut all = None;
         let mut seen = [0.0; LightPairs::MOST];
         for (k, seen) in seen.iter_mut().enumerate().take(lights) {

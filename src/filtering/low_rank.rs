@@ -1,11 +1,12 @@
 //! The product with its factors kept apart until the query: `G(i,o) = Σ_c U_c(i,o) P_c(h,d)` (Wu et al. 2011, Eq. 12;
 //! DESIGN.md, Sec. 4, "Interpolate only what is smooth").
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::bvndf::{VisibilityRows, leading_features, visibility_table};
+use super::bvndf::{VisibilityRows, leading_features, visibility_at, visibility_table};
 use super::facet_sum::{SumMaterial, analytic_lobe};
 use super::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 use super::tint::Tint;
@@ -76,53 +77,7 @@ pub struct LowRank {
     pub projected_area: Arc<Vec<f32>>,
 }
 
-/// Facets of one group as the factors want them.
-#[derive(Debug)]
-pub struct GroupFacets<'a> {
-    pub visibility: &'a VisibilityRows,
-    pub normals: &'a [Vec3],
-    /// Area times colour weight.
-    pub weights: &'a [f32],
-}
-
 impl Channel {
-    /// A Lambertian lobe: one table of `Σ w V(i)(n·i)+ V(o)(n·o)+ / π`, smooth on its own.
-    fn lambertian(group: &GroupFacets<'_>, source: Source, tint: Tint) -> Self {
-        let cosines = group.visibility.with_cosines(group.normals);
-        let y = vec![std::f32::consts::FRAC_1_PI; group.weights.len()];
-        let u = visibility_table(&cosines, group.weights, &y, 1);
-        Self { u: Arc::new(u), p: None, columns: 1, tint, source, ranks: (1, 1) }
-    }
-
-    /// Any lobe, through its rotated basis.
-    fn factored(
-        group: &GroupFacets<'_>,
-        basis: &RotatedBasis,
-        settings: &LowRankSettings,
-        source: Source,
-        tint: Tint,
-    ) -> Result<Self> {
-        let count = basis.features();
-        let mut features = vec![0.0; group.normals.len() * count];
-        for (normal, row) in group.normals.iter().zip(features.chunks_mut(count.max(1))) {
-            basis.write_features(*normal, row);
-        }
-        let (leading, rank) = leading_features(
-            group.visibility,
-            group.weights,
-            &features,
-            count,
-            settings.keep_n,
-            settings.max_rank,
-            settings.seed,
-        )?;
-        let mut y = vec![0.0; group.normals.len() * rank];
-        super::gemm::multiply_parallel(group.normals.len(), count, rank, &features, &leading, &mut y);
-        let u = visibility_table(group.visibility, group.weights, &y, rank);
-        let p = basis.left_table(&leading, rank);
-        Ok(Self { u: Arc::new(u), p: Some(Arc::new(p)), columns: rank, tint, source, ranks: (basis.rank, rank) })
-    }
-
     pub fn bytes(&self) -> usize {
         4 * (self.u.len() + self.p.as_ref().map_or(0, |p| p.len()))
     }
@@ -131,7 +86,7 @@ impl Channel {
 /// A run of facets with one material, and what stands before its terms.
 #[derive(Debug)]
 struct Group {
-    range: std::ops::Range<usize>,
+    range: Range<usize>,
     material: usize,
     /// Area times colour weight, and the colour that column stands for: one for equal colours, else three.
     columns: Vec<(Vec<f32>, Vec3)>,
@@ -164,11 +119,154 @@ fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]
     groups
 }
 
-impl LowRank {
-    /// Factors everything: the bases of all materials, then N of each group in their metric.
+/// What a channel is made from: all but its table over pairs of directions.
+#[derive(Debug)]
+struct Part {
+    range: Range<usize>,
+    /// Area times colour weight.
+    weights: Vec<f32>,
+    /// `[facet][column]`; absent for a Lambertian lobe.
+    y: Option<Vec<f32>>,
+    p: Option<Arc<Vec<f32>>>,
+    columns: usize,
+    tint: Tint,
+    source: Source,
+    ranks: (usize, usize),
+}
+
+impl Part {
+    fn lambertian(range: Range<usize>, weights: Vec<f32>, source: Source, tint: Tint) -> Self {
+        Self { range, weights, y: None, p: None, columns: 1, tint, source, ranks: (1, 1) }
+    }
+
+    /// Any lobe, through its rotated basis.
+    fn factored(
+        (range, rows, normals): (Range<usize>, &VisibilityRows, &[Vec3]),
+        weights: Vec<f32>,
+        basis: &RotatedBasis,
+        settings: &LowRankSettings,
+        (source, tint): (Source, Tint),
+    ) -> Result<Self> {
+        let count = basis.features();
+        let mut features = vec![0.0; normals.len() * count];
+        for (normal, row) in normals.iter().zip(features.chunks_mut(count.max(1))) {
+            basis.write_features(*normal, row);
+        }
+        let (kept, most, seed) = (settings.keep_n, settings.max_rank, settings.seed);
+        let (leading, rank) = leading_features(rows, &weights, &features, count, kept, most, seed)?;
+        let mut y = vec![0.0; normals.len() * rank];
+        super::gemm::multiply_parallel(normals.len(), count, rank, &features, &leading, &mut y);
+        let p = Some(Arc::new(basis.left_table(&leading, rank)));
+        let ranks = (basis.rank, rank);
+        Ok(Self { range, weights, y: Some(y), p, columns: rank, tint, source, ranks })
+    }
+
+    fn tabulated(&self, rows: &VisibilityRows, normals: &[Vec3], read: Option<&[(usize, usize)]>) -> Channel {
+        let table = |rows: &VisibilityRows, y: &[f32]| match read {
+            None => visibility_table(rows, &self.weights, y, self.columns),
+            Some(nodes) => visibility_at(rows, &self.weights, y, self.columns, nodes),
+        };
+        let u = match &self.y {
+            Some(y) => table(rows, y),
+            // `Σ w V(i)(n·i)+ V(o)(n·o)+ / π`, smooth on its own.
+            None => table(&rows.with_cosines(normals), &vec![std::f32::consts::FRAC_1_PI; self.weights.len()]),
+        };
+        let (p, columns, ranks) = (self.p.clone(), self.columns, self.ranks);
+        Channel { u: Arc::new(u), p, columns, tint: self.tint.clone(), source: self.source, ranks }
+    }
+}
+
+/// Everything factored, and nothing yet tabulated over pairs of directions, which takes most of the time: the bases of all
+/// materials, and N of each group in their metric.
+#[derive(Debug)]
+pub struct Factors<'a> {
+    facets: &'a Facets,
+    rows: &'a VisibilityRows,
+    pairs: HalfDifferenceGrid,
+    parts: Vec<Part>,
+}
+
+impl<'a> Factors<'a> {
+    /// `rows`: visibility of all facets on the nodes of the settings' directions.
     ///
     /// # Errors
     /// A factorization that does not converge, or is handed values that are not finite.
+    pub fn new(
+        facets: &'a Facets,
+        rows: &'a VisibilityRows,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        settings: &LowRankSettings,
+    ) -> Result<Self> {
+        let mut parts = Vec::new();
+        for group in groups(facets, material_of_slot, materials) {
+            let part = rows.part(group.range.clone());
+            let over = || (group.range.clone(), &part, &facets.normals[group.range.clone()]);
+            for (k, term) in materials[group.material].brdf.terms.iter().enumerate() {
+                for (lobe, along) in &lobes_of(term, settings) {
+                    let basis = match lobe {
+                        RotatedLobe::Analytic(Lobe::Lambertian) => None,
+                        _ => Some(RotatedBasis::new(*lobe, settings.basis, settings.keep_m)?),
+                    };
+                    for (weights, column_color) in &group.columns {
+                        let source = Source { material: group.material, term: k, along: *along * *column_color };
+                        let (weights, tint) = (weights.clone(), source.tint(materials));
+                        match &basis {
+                            None => parts.push(Part::lambertian(group.range.clone(), weights, source, tint)),
+                            // A lobe that is 0 at every node has no features.
+                            Some(basis) if basis.features() == 0 => {}
+                            Some(basis) => {
+                                parts.push(Part::factored(over(), weights, basis, settings, (source, tint))?)
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        Ok(Self { facets, rows, pairs: settings.basis.pairs, parts })
+    }
+
+    /// The tables over all pairs of directions.
+    pub fn tabulate(&self) -> LowRank {
+        self.tabulated(None)
+    }
+
+    /// Tables that hold only what these pairs `(i, o)` read.
+    pub fn tabulate_for(&self, pairs: impl Iterator<Item = (Vec3, Vec3)>) -> LowRank {
+        let grid = self.rows.grid;
+        let mut read: Vec<(usize, usize)> = pairs
+            .filter(|(i, o)| i.z > 0.0 && o.z > 0.0)
+            .flat_map(|(i, o)| grid.taps(o).map(|(view, _)| grid.taps(i).map(|(light, _)| (view, light))))
+            .flatten()
+            .collect();
+        read.sort_unstable();
+        read.dedup();
+        self.tabulated(Some(&read))
+    }
+
+    fn tabulated(&self, read: Option<&[(usize, usize)]>) -> LowRank {
+        let channels = self.parts.chunk_by(|a, b| a.range == b.range).flat_map(|parts| {
+            let range = parts[0].range.clone();
+            let rows = self.rows.part(range.clone());
+            parts
+                .iter()
+                .map(|part| part.tabulated(&rows, &self.facets.normals[range.clone()], read))
+                .collect::<Vec<_>>()
+        });
+        LowRank {
+            directions: self.rows.grid,
+            pairs: self.pairs,
+            channels: channels.collect(),
+            projected_area: Arc::new(projected_area_table(self.facets, self.rows)),
+        }
+    }
+}
+
+impl LowRank {
+    /// [`Factors`], tabulated.
+    ///
+    /// # Errors
+    /// As [`Factors::new`].
     pub fn build(
         facets: &Facets,
         visibility: &Visibility,
@@ -176,39 +274,8 @@ impl LowRank {
         materials: &[SumMaterial],
         settings: &LowRankSettings,
     ) -> Result<Self> {
-        let all = VisibilityRows::new(visibility, 0..facets.len(), settings.directions);
-        let projected_area = projected_area_table(facets, &all);
-        let mut channels = Vec::new();
-        for group in groups(facets, material_of_slot, materials) {
-            let rows = all.part(group.range.clone());
-            let normals = &facets.normals[group.range.clone()];
-            for (k, term) in materials[group.material].brdf.terms.iter().enumerate() {
-                let lobes = lobes_of(term, settings);
-                for (weights, column_color) in &group.columns {
-                    let part = GroupFacets { visibility: &rows, normals, weights };
-                    for (lobe, along) in &lobes {
-                        let source = Source { material: group.material, term: k, along: *along * *column_color };
-                        let tint = source.tint(materials);
-                        channels.extend(match lobe {
-                            RotatedLobe::Analytic(Lobe::Lambertian) => Some(Channel::lambertian(&part, source, tint)),
-                            _ => {
-                                let basis = RotatedBasis::new(*lobe, settings.basis, settings.keep_m)?;
-                                // A lobe that is 0 at every node has no features.
-                                (basis.features() > 0)
-                                    .then(|| Channel::factored(&part, &basis, settings, source, tint))
-                                    .transpose()?
-                            }
-                        });
-                    }
-                }
-            }
-        }
-        Ok(Self {
-            directions: settings.directions,
-            pairs: settings.basis.pairs,
-            channels,
-            projected_area: Arc::new(projected_area),
-        })
+        let rows = VisibilityRows::new(visibility, 0..facets.len(), settings.directions);
+        Ok(Factors::new(facets, &rows, material_of_slot, materials, settings)?.tabulate())
     }
 }
 

@@ -24,7 +24,7 @@ pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use forced::mean_colors;
-pub use low_rank::{Channel, GroupFacets, LowRank, LowRankSettings};
+pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
 pub use pair_table::{Nodes, PairTable};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use tint::Tint;

@@ -1,23 +1,16 @@
 //! What single stages make, as plain functions of their input.
 
-use glam::Vec3;
-use rayon::prelude::*;
-
 use super::Assigned;
-use crate::accuracy::{Errors, mirror_biased_pairs, upper_errors};
 use crate::cancel::Cancel;
 use crate::error::Result;
-use crate::filtering::{Direct, EffectiveBrdf, Form, LowRank, mean_colors};
+use crate::filtering::mean_colors;
 use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
-use crate::plan::{Method, Preset, Route, Settings};
+use crate::plan::{Preset, Route, Settings};
 use crate::scene::{Scene, Switch};
 use crate::visibility::{
     Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
 };
-
-/// Pairs that the factored form is checked on.
-const CHECK_PAIRS: usize = 256;
 
 /// Facets of a tile, in the order that sums want.
 pub(super) fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
@@ -87,25 +80,6 @@ pub(super) fn same_lobes((slots, materials): &Assigned, (other_slots, others): &
     slots == other_slots
         && materials.len() == others.len()
         && materials.iter().zip(others).all(|(a, b)| a.same_lobes(b))
-}
-
-/// The factored form where there is one and it agrees with the direct sum, else the direct sum; and how far apart they are.
-pub(super) fn choose(
-    direct: Direct,
-    factors: Option<LowRank>,
-    base_area: f64,
-    settings: &Settings,
-) -> (EffectiveBrdf, Option<Errors>) {
-    let direct = EffectiveBrdf { form: Form::Direct(direct), base_area };
-    let Some(factors) = factors else { return (direct, None) };
-    let factored = EffectiveBrdf { form: Form::LowRank(factors), base_area };
-    let pairs = mirror_biased_pairs(CHECK_PAIRS, settings.seed ^ 0x5eed);
-    let values =
-        |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
-    let errors = upper_errors(&values(&factored), &values(&direct));
-    let close = errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
-    let keep = settings.method == Method::LowRank || close;
-    (if keep { factored } else { direct }, Some(errors))
 }
 
 /// What each assigned material is called.

@@ -1,5 +1,6 @@
 //! The stages in order, each with its last result and the input that made it: an edit recomputes what lies downstream.
 
+mod factored;
 mod findings;
 mod inputs;
 mod interreflection;
@@ -12,7 +13,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use self::make::{choose, grouped, names, same_lobes, sample, see};
+use self::factored::{Factored, Made, Source};
+use self::make::{grouped, names, same_lobes, sample, see};
 pub use self::outcome::Outcome;
 use self::outcome::limits;
 pub use self::pictures::Pictured;
@@ -25,7 +27,8 @@ use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
 use crate::filtering::{
-    Direct, EffectiveBrdf, FacetSum, Form, LowRank, MaterialFactors, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings,
+    Direct, EffectiveBrdf, FacetSum, Form, MaterialFactors, SumMaterial, VisibilityRows, VisibleFacets, Wu2011,
+    Wu2011Settings,
 };
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
@@ -63,8 +66,7 @@ type OutcomeKey = (Settings, [Version; 3]);
 struct Last {
     key: OutcomeKey,
     materials: Arc<Assigned>,
-    /// Kept or given up.
-    factors: Option<LowRank>,
+    factors: Option<Made>,
     outcome: Outcome,
 }
 
@@ -80,6 +82,8 @@ pub struct Pipeline {
     shape: Stage<ShapeKey, Shape>,
     facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
+    /// Visibility on the nodes that the factored form reads.
+    rows: Stage<([Version; 2], PolarGrid), VisibilityRows>,
     materials: Stage<MaterialKey, Assigned>,
     /// Rays between facets: facets, elements, rays of each.
     transport: Stage<(Version, usize, usize), Transport>,
@@ -164,10 +168,6 @@ impl Pipeline {
         }
         self.cancel.check()?;
         let start = Instant::now();
-        if plan.try_low_rank && factors.is_none() {
-            let knobs = settings.low_rank(!shape.height_field);
-            factors = Some(LowRank::build(&facets, &visibility, material_of_slot, sum_materials, &knobs)?);
-        }
         let evidence = Evidence {
             facets: facets.clone(),
             sight: Sight::Soft(visibility.clone()),
@@ -177,7 +177,19 @@ impl Pipeline {
         };
         let direct = Direct::new(Arc::new(sum), visibility.clone());
         let base_area = f64::from(shape.mesh.base_area());
-        let (brdf, factored) = choose(direct, factors.clone(), base_area, &settings);
+        let Factored { brdf, factors, errors: factored } = if plan.try_low_rank {
+            let of = Source {
+                facets: &facets,
+                material_of_slot,
+                materials: sum_materials,
+                whole_sphere: !shape.height_field,
+                base_area,
+                versions: [facets_version, visibility_version],
+            };
+            self.factored(direct, &of, factors, &settings)?
+        } else {
+            Factored { brdf: EffectiveBrdf { form: Form::Direct(direct), base_area }, factors: None, errors: None }
+        };
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
         let is_factored = matches!(brdf.form, Form::LowRank(_));
         let between = if plan.interreflection {

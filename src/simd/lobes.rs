@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::math::{exp_negative, ln_one_minus};
-use super::{LANES, LightPairs, blocks, lane, multiversion};
+use super::{LANES, LightPairs, blocks, lane, multiversion, total};
 use crate::directions::half_vector;
 
 /// The vectors of one pair of directions.
@@ -213,7 +213,7 @@ fn sum<const C: usize>(
             }
         }
         for c in 0..C {
-            totals[c] += lanes[c].iter().map(|&x| f64::from(x)).sum::<f64>();
+            totals[c] += total(&lanes[c]);
         }
     }
     totals

@@ -6,6 +6,7 @@ mod gather;
 mod lobes;
 mod math;
 mod pairs;
+mod rows;
 #[cfg(test)]
 mod tests;
 mod visibility;
@@ -13,8 +14,9 @@ mod visibility;
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub use pairs::{LightPairs, azimuth_and_elevation, pair_places, pair_vectors};
+pub use rows::{RowGrid, row_sums};
 pub use visibility::{
-    SWITCH, blend_bits, ground_masked_sum, ground_visibility, masked_sum, projected_area, stepped_visibility,
+    SWITCH, blend_bits, ground_sum, ground_visibility, masked_sum, projected_area, stepped_visibility,
 };
 
 /// Compiles a function for the baseline, AVX2 and AVX-512, and picks at run time.
@@ -74,4 +76,19 @@ pub(crate) fn lane(values: &[f32], at: usize) -> [f32; LANES] {
             lane
         }
     }
+}
+
+/// The sum of all lanes, a multiple of eight, by halves: one after the other each would wait for the last.
+#[inline(always)]
+pub(crate) fn total<const N: usize>(lanes: &[f32; N]) -> f64 {
+    let mut sums = [0.0_f64; 8];
+    for eight in lanes.as_chunks::<8>().0 {
+        for l in 0..8 {
+            sums[l] += f64::from(eight[l]);
+        }
+    }
+    for l in 0..4 {
+        sums[l] += sums[l + 4];
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
 }

@@ -239,3 +239,68 @@ fn angles_of_lights_are_those_of_the_directions() {
         assert!((phi / std::f32::consts::TAU - pairs.azimuths[k]).abs() < 1e-6, "{light}");
     }
 }
+
+#[test]
+fn readings_of_many_pairs_are_the_plain_blend_of_their_nodes_for_any_number_of_columns() {
+    use glam::Vec4;
+    for fours in [1, 2, 3] {
+        let grid = RowGrid { rings: 5, azimuths: 8, turn: 4, stored: 8, fours };
+        let values: Vec<Vec4> = (0..5 * 8 * 4 * 8 * fours)
+            .map(|k| Vec4::from_array(std::array::from_fn(|c| uniform(4 * k + c, 0.3))))
+            .collect();
+        // Both ends of each axis, and between.
+        let count = 50;
+        let spans = [4.0, 8.0, 4.0, 5.0, 1.0];
+        let place = |k: usize, axis: usize| match k {
+            0 => 0.0,
+            1 => 1.0,
+            k => uniform(k, 0.1 + 0.17 * axis as f64),
+        };
+        let places = std::array::from_fn(|axis| std::array::from_fn(|k| spans[axis] * place(k, axis)));
+        for cubic in [false, true] {
+            let mut got = vec![Vec4::ZERO; count * fours];
+            row_sums(&values, grid, &places, count, cubic, &mut got);
+            for (k, got) in got.chunks(fours).enumerate() {
+                let [ring, azimuth, turn, step] = std::array::from_fn(|axis| places[axis][k]);
+                let hat = |node: usize, at: f32| (1.0 - (node as f32 - at).abs()).max(0.0);
+                let round = |node: usize, at: f32, period: usize| hat(node, at) + hat(node + period, at);
+                let low = step.floor().min(4.0);
+                let along = |stored: usize| {
+                    // The node before the first stands in place 0 of what is stored.
+                    let d = (stored as f32 - 1.0 - low - (step - low)).abs();
+                    match (cubic, d) {
+                        (false, d) => (1.0 - d).max(0.0),
+                        (true, d) if d < 1.0 => 1.5 * d.powi(3) - 2.5 * d * d + 1.0,
+                        (true, d) if d < 2.0 => -0.5 * d.powi(3) + 2.5 * d * d - 4.0 * d + 2.0,
+                        (true, _) => 0.0,
+                    }
+                };
+                let mut want = vec![Vec4::ZERO; fours];
+                for (at, value) in values.iter().enumerate() {
+                    let (four, node) = (at % fours, at / fours);
+                    let (stored, row) = (node % 8, node / 8);
+                    let weight = hat(row / 32, ring) * round(row / 4 % 8, azimuth, 8) * round(row % 4, turn, 4);
+                    want[four] += *value * (weight * along(stored));
+                }
+                for (got, want) in got.iter().zip(&want) {
+                    assert!((*got - *want).abs().max_element() < 1e-5, "{fours} {cubic} {k}: {got} {want}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn visible_areas_are_the_plain_sums_for_runs_of_any_length() {
+    for count in [1, 9, 16, 57, 64, 1024, 1031, 2047] {
+        let row = |start: f64| -> Vec<f32> { (0..count).map(|k| uniform(k, start)).collect() };
+        let (weights, from, to) = (row(0.1), row(0.4), row(0.7));
+        for (blend, elevation) in [(0.0, 0.3), (0.6, 0.5), (0.3, 4.0), (0.5, -1.0)] {
+            let mut seen = vec![0.0; count];
+            ground_visibility(&from, &to, blend, elevation, 20.0, &mut seen);
+            let want: f64 = seen.iter().zip(&weights).map(|(v, w)| f64::from(*v) * f64::from(*w)).sum();
+            let got = ground_sum(&weights, &from, &to, blend, elevation, 20.0);
+            assert!((got - want).abs() < 2e-5 * want + 1e-6, "{count} facets: {got} {want}");
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Visibility of many facets along one direction, and sums over what is visible.
 
-use super::{BLOCK, LANES, blocks, lane, multiversion};
+use super::{BLOCK, LANES, blocks, lane, multiversion, total};
 
 #[inline(always)]
 fn soft_step(x: f32) -> f32 {
@@ -63,13 +63,14 @@ multiversion! {
     }
 }
 
+/// Facets that sums of visible areas take at a time: there is little work a facet, and runs are short.
+const WIDTH: usize = 16;
+
 multiversion! {
     /// `Σ w a b`, f64 between blocks, for each of the weight columns: the visible area of facets that share a normal.
     pub fn masked_sum<const C: usize>(weights: [&[f32]; C], a: &[f32], b: &[f32]) -> [f64; C] {
-        // Narrow lanes: there is little work a facet, and patches are short.
-        const WIDTH: usize = 16;
         weights.map(|weights| {
-            let mut total = 0.0;
+            let mut sum = 0.0;
             for ((w, a), b) in weights.chunks(BLOCK).zip(a.chunks(BLOCK)).zip(b.chunks(BLOCK)) {
                 let mut lanes = [0.0_f32; WIDTH];
                 let (w_head, w_tail) = w.as_chunks::<WIDTH>();
@@ -83,45 +84,52 @@ multiversion! {
                 for (((lane, w), a), b) in lanes.iter_mut().zip(w_tail).zip(a_tail).zip(b_tail) {
                     *lane += w * (a * b);
                 }
-                total += f64::from(lanes.iter().sum::<f32>());
+                sum += total(&lanes);
             }
-            total
+            sum
         })
     }
 }
 
 multiversion! {
-    /// [`masked_sum`] of one weight with `b` from [`ground_visibility`], to the same bits: no row is written on the way.
-    pub fn ground_masked_sum(weights: &[f32], a: &[f32], from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32) -> f64 {
-        const WIDTH: usize = 16;
-        let mut total = 0.0;
+    /// `Σ w v`, f64 between blocks, with `v` from [`ground_visibility`]: no row of it is written on the way.
+    pub fn ground_sum(weights: &[f32], from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32) -> f64 {
+        let mut sum = 0.0;
         for start in (0..weights.len()).step_by(BLOCK) {
             let end = (start + BLOCK).min(weights.len());
-            let (w, a, from, to) = (&weights[start..end], &a[start..end], &from[start..end], &to[start..end]);
+            let (w, from, to) = (&weights[start..end], &from[start..end], &to[start..end]);
             let mut lanes = [0.0_f32; WIDTH];
             let (w_head, w_tail) = w.as_chunks::<WIDTH>();
-            let (a_head, a_tail) = a.as_chunks::<WIDTH>();
             let (from_head, from_tail) = from.as_chunks::<WIDTH>();
             let (to_head, to_tail) = to.as_chunks::<WIDTH>();
-            for (((w, a), from), to) in w_head.iter().zip(a_head).zip(from_head).zip(to_head) {
+            for ((w, from), to) in w_head.iter().zip(from_head).zip(to_head) {
                 for l in 0..WIDTH {
-                    let seen = soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
-                    lanes[l] += w[l] * (a[l] * seen);
+                    lanes[l] += w[l] * soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
                 }
             }
-            for ((((lane, w), a), from), to) in lanes.iter_mut().zip(w_tail).zip(a_tail).zip(from_tail).zip(to_tail) {
-                *lane += w * (a * soft_step((elevation - (from + (to - from) * blend)) * sharpness));
+            // The rest as the end of sixteen that reach back: one by one they took as long as all before them.
+            let last = (w.last_chunk::<WIDTH>(), from.last_chunk::<WIDTH>(), to.last_chunk::<WIDTH>());
+            if let (false, (Some(w), Some(from), Some(to))) = (w_tail.is_empty(), last) {
+                let counted = WIDTH - w_tail.len();
+                for l in 0..WIDTH {
+                    let w = if l < counted { 0.0 } else { w[l] };
+                    lanes[l] += w * soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
+                }
+            } else {
+                for (((lane, w), from), to) in lanes.iter_mut().zip(w_tail).zip(from_tail).zip(to_tail) {
+                    *lane += w * soft_step((elevation - (from + (to - from) * blend)) * sharpness);
+                }
             }
-            total += f64::from(lanes.iter().sum::<f32>());
+            sum += total(&lanes);
         }
-        total
+        sum
     }
 }
 
 multiversion! {
     /// `Σ w v (n·d)+`: the visible projected area along `d` (Wu et al. 2011, Eq. 10), f64 between blocks.
     pub fn projected_area(normals: [&[f32]; 3], weights: &[f32], v: &[f32], d: glam::Vec3) -> f64 {
-        let mut total = 0.0;
+        let mut sum = 0.0;
         for block in blocks(v.len()) {
             let mut lanes = [0.0_f32; LANES];
             for at in block {
@@ -131,8 +139,8 @@ multiversion! {
                     lanes[l] += w[l] * v[l] * (x[l] * d.x + y[l] * d.y + z[l] * d.z).max(0.0);
                 }
             }
-            total += lanes.iter().map(|&x| f64::from(x)).sum::<f64>();
+            sum += total(&lanes);
         }
-        total
+        sum
     }
 }

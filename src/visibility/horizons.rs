@@ -112,12 +112,14 @@ impl Horizons {
         &self.elevations[azimuth * self.facets..][..self.facets]
     }
 
-    /// The two azimuths around one [turns], and their weights.
+    /// The two azimuths around one [turns, to 1 at most], and their weights.
     pub(crate) fn taps(&self, azimuth: f32) -> [(usize, f32); 2] {
         let at = azimuth * self.azimuths as f32;
         let below = at as usize;
-        let (from, blend) = (below % self.azimuths, at - below as f32);
-        [(from, 1.0 - blend), ((from + 1) % self.azimuths, blend)]
+        // No division: this is asked for each light of each pixel.
+        let around = |azimuth: usize| if azimuth >= self.azimuths { azimuth - self.azimuths } else { azimuth };
+        let (from, blend) = (around(below), at - below as f32);
+        [(from, 1.0 - blend), (around(from + 1), blend)]
     }
 
     /// The horizons of some of the facets, in their order.
@@ -127,18 +129,11 @@ impl Horizons {
         Self { facets: facets.len(), elevations, ..self.clone() }
     }
 
-    /// `Σ w v(direction) v_o` over a run of facets with weights `w`, where `v_o` are visibilities of all facets along another
-    /// direction: [`Horizons::fill`] and [`simd::masked_sum`] at once, to the same bits. Azimuth in turns.
-    pub(crate) fn seen_along(
-        &self,
-        [azimuth, elevation]: [f32; 2],
-        range: Range<usize>,
-        weights: &[f32],
-        v_o: &[f32],
-    ) -> f64 {
+    /// `Σ w v(direction)` over a run of facets with weights `w`: [`Horizons::fill`] and a sum at once. Azimuth in turns.
+    pub(crate) fn seen_along(&self, [azimuth, elevation]: [f32; 2], range: Range<usize>, weights: &[f32]) -> f64 {
         let [(from, _), (to, blend)] = self.taps(azimuth);
-        let (from, to, v_o) = (&self.row(from)[range.clone()], &self.row(to)[range.clone()], &v_o[range]);
-        simd::ground_masked_sum(weights, v_o, from, to, blend, elevation, 1.0 / self.ramp)
+        let row = |azimuth: usize| &self.row(azimuth)[range.clone()];
+        simd::ground_sum(weights, row(from), row(to), blend, elevation, 1.0 / self.ramp)
     }
 
     /// Of each azimuth and run of facets, the elevations below which no facet and above which every facet sees a direction.

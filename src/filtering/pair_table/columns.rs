@@ -119,20 +119,24 @@ impl Weight {
     pub(super) fn at(&self, pair: &PairVectors) -> Vec3 {
         match self {
             Self::Tint(tint) => tint.at(pair.i_dot_h),
-            Self::Lobes { normal, terms, measured, color } => {
-                let angles = LobeAngles::new(*normal, pair.i, pair.o, pair.h);
-                if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
-                    return Vec3::ZERO;
-                }
-                let mut value = Vec3::ZERO;
-                for term in terms {
-                    value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
-                }
-                for table in measured {
-                    value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
-                }
-                value * *color
-            }
+            Self::Lobes { normal, terms, measured, color } => lobes(*normal, terms, measured, pair) * *color,
         }
     }
+}
+
+/// All that facets of one normal reflect.
+#[inline(never)]
+fn lobes(normal: Vec3, terms: &[Term], measured: &[Arc<dyn Measured>], pair: &PairVectors) -> Vec3 {
+    let angles = LobeAngles::new(normal, pair.i, pair.o, pair.h);
+    if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let mut value = Vec3::ZERO;
+    for term in terms {
+        value += term.tint(pair.i_dot_h) * term.lobe_cos(&angles);
+    }
+    for table in measured {
+        value += table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
+    }
+    value
 }

@@ -20,7 +20,7 @@ use crate::accuracy::Pair;
 use crate::cancel::Cancel;
 use crate::directions::{self, Places, PolarGrid, UpperPairs};
 use crate::error::Result;
-use crate::simd::PairVectors;
+use crate::simd::{self, PairVectors, RowGrid};
 
 /// Columns of a table over pairs of directions, and what multiplies them.
 #[derive(Debug, Clone)]
@@ -59,26 +59,16 @@ impl Nodes<'_> {
     }
 }
 
-/// The eight rows of θ_d around a place and their weights, the step of θ_d below it, and how far it is from there to the next.
-#[inline]
-fn around(grid: &UpperPairs, [ring, azimuth, turn, step]: [f32; 4]) -> ([(usize, f32); 8], usize, f32) {
-    let low = (step as usize).min(grid.difference - 2);
-    let between = |at: f32, count: usize| {
+/// The eight rows of θ_d around a place, and the step of θ_d below it: what [`simd::row_sums`] reads.
+fn rows_around(grid: &UpperPairs, [ring, azimuth, turn, step]: [f32; 4]) -> ([usize; 8], usize) {
+    let around = |at: f32, count: usize| {
         let low = (at as usize).min(count - 1);
-        ([low, if low + 1 == count { 0 } else { low + 1 }], at - low as f32)
+        [low, if low + 1 == count { 0 } else { low + 1 }]
     };
-    let low_ring = (ring as usize).min(grid.rings - 2);
-    let rings = [low_ring, low_ring + 1];
-    let ring_blend = ring - low_ring as f32;
-    let (azimuths, azimuth_blend) = between(azimuth, grid.azimuths);
-    let (turns, turn_blend) = between(turn, grid.turn);
-    let rows = std::array::from_fn(|k| {
-        let [a, b, d] = [k >> 2 & 1, k >> 1 & 1, k & 1];
-        let pick = |bit: usize, blend: f32| if bit == 1 { blend } else { 1.0 - blend };
-        let row = (rings[a] * grid.azimuths + azimuths[b]) * grid.turn + turns[d];
-        (row, pick(a, ring_blend) * pick(b, azimuth_blend) * pick(d, turn_blend))
-    });
-    (rows, low, step - low as f32)
+    let ring = (ring as usize).min(grid.rings - 2);
+    let (azimuths, turns) = (around(azimuth, grid.azimuths), around(turn, grid.turn));
+    let row = |k: usize| ((ring + (k >> 2)) * grid.azimuths + azimuths[k >> 1 & 1]) * grid.turn + turns[k & 1];
+    (std::array::from_fn(row), (step as usize).min(grid.difference - 2))
 }
 
 /// Which nodes of a grid these pairs read, or the originals of which those are images.
@@ -87,8 +77,8 @@ fn nodes_read(grid: &UpperPairs, made_of: &[(usize, bool)], pairs: &[Pair]) -> V
     let mut places = Places::default();
     for Pair { i, o } in pairs {
         grid.places([&[i.x], &[i.y], &[i.z]], *o, &mut places);
-        let (rows, low, _) = around(grid, places.at(0));
-        for (row, _) in rows {
+        let (rows, low) = rows_around(grid, places.at(0));
+        for row in rows {
             let (half_vector, turn) = (row / grid.turn, row % grid.turn);
             let (image, turned) = made_of[half_vector % grid.azimuths];
             let turn = if turned { (grid.turn - turn) % grid.turn } else { turn };
@@ -278,6 +268,7 @@ impl PairTable {
         let relative: f32 = self.areas.0.taps(o).iter().map(|&(node, w)| w * self.areas.1[node]).sum();
         let mut places = Places::default();
         let mut components = [[0.0_f32; Places::MOST]; 3];
+        let mut sums = vec![Vec4::ZERO; Places::MOST.min(lights.len()) * self.fours];
         for (part, lights) in lights.chunks(Places::MOST).enumerate() {
             for (k, light) in lights.iter().enumerate() {
                 for axis in 0..3 {
@@ -286,35 +277,30 @@ impl PairTable {
             }
             let [x, y, z] = components.each_ref().map(|column| &column[..lights.len()]);
             self.grid.places([x, y, z], o, &mut places);
-            for (k, &i) in lights.iter().enumerate() {
-                let sum = if i.z > 0.0 { self.at(i, o, places.at(k), places.i_dot_h(k)) } else { Vec3::ZERO };
+            let sums = &mut sums[..lights.len() * self.fours];
+            let cubic = self.interpolation == Interpolation::Cubic;
+            simd::row_sums(&self.values, self.rows(), places.columns(), lights.len(), cubic, sums);
+            for ((k, &i), sums) in lights.iter().enumerate().zip(sums.chunks(self.fours)) {
+                let sum = if i.z > 0.0 { self.weighted(i, o, places.i_dot_h(k), sums) } else { Vec3::ZERO };
                 out(part * Places::MOST + k, sum.as_dvec3());
             }
         }
         f64::from(relative * o.z)
     }
 
-    /// `Σ_c w_c T_c`: linear between half vectors and in φ_d, cubic in θ_d.
-    fn at(&self, i: Vec3, o: Vec3, place: [f32; 4], i_dot_h: f32) -> Vec3 {
-        let stored = self.grid.difference + 2;
-        let (rows, low, between) = around(&self.grid, place);
-        let along = self.interpolation.weights(between);
-        let corners = rows.map(|(row, weight)| ((row * stored + low) * self.fours, weight));
+    fn rows(&self) -> RowGrid {
+        let UpperPairs { rings, azimuths, turn, difference } = self.grid;
+        RowGrid { rings, azimuths, turn, stored: difference + 2, fours: self.fours }
+    }
+
+    /// `Σ_c w_c T_c`
+    #[inline(always)]
+    fn weighted(&self, i: Vec3, o: Vec3, i_dot_h: f32, sums: &[Vec4]) -> Vec3 {
         let pair = PairVectors { i, o, h: (i + o) / (2.0 * i_dot_h).max(1e-20), i_dot_h };
         let mut total = Vec3::ZERO;
-        for four in 0..self.fours {
-            let mut sums = Vec4::ZERO;
-            for (start, weight) in corners {
-                let nodes = &self.values[start + four..start + four + 3 * self.fours + 1];
-                let mut sum = nodes[self.fours] * along[1] + nodes[2 * self.fours] * along[2];
-                if self.interpolation == Interpolation::Cubic {
-                    sum += nodes[0] * along[0] + nodes[3 * self.fours] * along[3];
-                }
-                sums += sum * weight;
-            }
+        for (sums, weights) in sums.iter().zip(self.weights.chunks(4)) {
             // A cubic may swing below zero; no sum does.
-            let sums = sums.max(Vec4::ZERO).to_array();
-            for (weight, sum) in self.weights[4 * four..].iter().zip(sums) {
+            for (sum, weight) in sums.max(Vec4::ZERO).to_array().into_iter().zip(weights) {
                 total += weight.at(&pair) * sum;
             }
         }
