@@ -4,7 +4,7 @@ Vulkan there is: medians in milliseconds.
     python benches/start_up.py [--cold] [--repeat 5] [SCENE ...]
 
 "on the screen" is read from the display's memory: the first pixels of the window, and the first of the object. The rest is what
-`biscale edit --start-times` says. `--cold` gives the driver an empty shader cache each time, as at the very first start.
+`biscale edit --start-times` says (a version without that option is stopped at its first picture). `--cold` gives the driver an empty shader cache each time, as at the very first start.
 """
 
 import argparse
@@ -29,6 +29,7 @@ MENU = (700, 12)
 OBJECT = [(426 + x, 462 + y) for x in (-90, -60, 60, 90) for y in (-90, -60, 60, 90)]
 EMPTY = (22, 22, 22)
 SAID = ["device and the interface's pipelines built", "first frame handed", "first picture made", "first picture handed"]
+SAYS = "--start-times" in subprocess.run([BISCALE, "edit", "--help"], capture_output=True, text=True).stdout
 
 
 class Screen:
@@ -49,7 +50,8 @@ def started(scene, screen, environment):
     """Milliseconds of one start, by name."""
     times = {}
     start = time.perf_counter()
-    editor = subprocess.Popen([BISCALE, "edit", "--start-times", scene], env=environment, stderr=subprocess.PIPE, text=True)
+    command = [BISCALE, "edit", *["--start-times"][:SAYS], scene]
+    editor = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     said = []
     listener = threading.Thread(target=lambda: said.extend(editor.stderr))
     listener.start()
@@ -61,6 +63,8 @@ def started(scene, screen, environment):
             pixels = [screen.pixel(*at) for at in OBJECT]
             if all(pixel != EMPTY and any(pixel) for pixel in pixels):
                 times["picture on the screen"] = now
+                if not SAYS:
+                    editor.terminate()
         time.sleep(0.002)
     editor.kill()
     listener.join()
@@ -97,9 +101,10 @@ def main():
             environment = {**os.environ, "DISPLAY": f":{display}", "XDG_STATE_HOME": f"{folder}/state", "XDG_RUNTIME_DIR": folder}
             environment.pop("WAYLAND_DISPLAY", None)
             names = ["window on the screen", "picture on the screen", *SAID]
+            shown = [name.replace("device and the interface's pipelines built", "device, pipelines") for name in names]
             cache = "an empty" if options.cold else "a filled"
             print(f"{BISCALE}, {os.cpu_count()} cores, {cache} shader cache; medians of {options.repeat} starts [ms]")
-            print(f"{'scene':<16}" + "".join(f"{name.replace(' the interface' + chr(39) + 's', ''):>28}" for name in names))
+            print(f"{'scene':<16}" + "".join(f"  {name}" for name in shown))
             for scene in options.scenes:
                 runs = []
                 # One more, not counted: it fills the caches.
@@ -109,7 +114,7 @@ def main():
                     runs.append(started(scene, screen, environment))
                     time.sleep(0.3)
                 medians = [statistics.median(run.get(name, float("nan")) for run in runs[-options.repeat :]) for name in names]
-                print(f"{scene:<16}" + "".join(f"{ms:>28.0f}" for ms in medians), flush=True)
+                print(f"{scene:<16}" + "".join(f"{ms:>{len(name) + 2}.0f}" for name, ms in zip(shown, medians)), flush=True)
         finally:
             server.terminate()
             server.wait()

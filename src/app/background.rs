@@ -17,7 +17,7 @@ use super::worker::{
 };
 
 /// What menu, toolbar and status line take of the window's height, points.
-const BARS: f32 = 80.0;
+const BARS: f32 = 79.0;
 /// Least time between recovery files.
 const AUTOSAVE_SECS: f64 = 5.0;
 
