@@ -5,7 +5,9 @@ mod commands;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
+use app::StartTimes;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// What does a surface with tiny structures look like from far away?
@@ -24,6 +26,10 @@ enum Command {
     Edit {
         /// A scene file, or the name of a shipped material.
         scene: Option<String>,
+        /// Say on standard error when the window, its device and the first picture were there, from the start of the program,
+        /// and quit.
+        #[arg(long)]
+        start_times: bool,
     },
     /// Shade the scene's object and write a picture (.png or linear .exr).
     Render(RenderArgs),
@@ -246,13 +252,16 @@ struct MaterialsArgs {
 }
 
 fn main() -> ExitCode {
+    let started = Instant::now();
     let cli = Cli::parse();
     let result = match cli.command {
-        None => app::run(cli.scene.as_deref()).map_err(|error| match error.downcast_ref::<biscale::Error>() {
-            Some(_) => error.context("taken as a scene to edit, as no command was given (see --help)"),
-            None => error,
+        None => app::run(cli.scene.as_deref(), StartTimes::default()).map_err(|error| {
+            match error.downcast_ref::<biscale::Error>() {
+                Some(_) => error.context("taken as a scene to edit, as no command was given (see --help)"),
+                None => error,
+            }
         }),
-        Some(command) => run(command),
+        Some(command) => run(command, started),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -267,9 +276,11 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(command: Command) -> anyhow::Result<()> {
+fn run(command: Command, started: Instant) -> anyhow::Result<()> {
     match command {
-        Command::Edit { scene } => app::run(scene.as_deref()),
+        Command::Edit { scene, start_times } => {
+            app::run(scene.as_deref(), StartTimes { since: start_times.then_some(started) })
+        }
         Command::Render(args) => commands::render::run(&args),
         Command::Eval(args) => commands::eval::run(&args),
         Command::Export(args) => commands::export::run(&args),

@@ -11,11 +11,13 @@ use super::document::Snapshot;
 use super::editor::Editor;
 use super::messages::Level;
 use super::worker::{
-    AccuracyAnswer, AccuracyJob, ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer, PictureJob,
-    Pictures, Thumbnail, ThumbnailJob, TileAnswer, TileJob, Worker, spawn_accuracy, spawn_autosave, spawn_export,
-    spawn_lobe, spawn_thumbnail, spawn_tile,
+    AccuracyAnswer, AccuracyJob, Devices, ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer,
+    PictureJob, Pictures, Thumbnail, ThumbnailJob, TileAnswer, TileJob, Worker, spawn_accuracy, spawn_autosave,
+    spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
 };
 
+/// What menu, toolbar and status line take of the window's height, points.
+const BARS: f32 = 79.0;
 /// Least time between recovery files.
 const AUTOSAVE_SECS: f64 = 5.0;
 
@@ -44,6 +46,10 @@ pub struct Background {
     answers: Receiver<Answer>,
     /// What workers are given, for a version of the document.
     loaded: Option<(u64, Arc<LoadedScene>)>,
+    /// The first picture was shown, or there is none to wait for: what it does not need may be computed.
+    opened: bool,
+    /// Drafted, not asked to be refined yet.
+    unrefined: Option<PictureJob>,
 }
 
 impl Background {
@@ -75,6 +81,8 @@ impl Background {
             autosaved: (1, 0.0),
             answers,
             loaded: None,
+            opened: false,
+            unrefined: None,
         }
     }
 
@@ -164,21 +172,33 @@ impl Editor {
         self.settings.save(self.folder.as_deref());
     }
 
-    /// Asks the workers for what is shown, once for every state and size.
-    pub(super) fn request(&mut self) {
-        let version = self.document.version();
-        if self.background.loaded.as_ref().is_none_or(|(last, _)| *last != version) {
-            self.background.loaded = Some((version, Arc::new(self.document.loaded())));
+    /// What was found of graphics devices.
+    pub fn tell_devices(&self, devices: Devices) {
+        if let Some(pictures) = &self.background.pictures {
+            pictures.tell_devices(devices);
         }
-        let Some((_, loaded)) = self.background.loaded.clone() else { return };
-        let wanted = (version, self.size);
-        if self.object.asked != Some(wanted) {
-            self.object.asked = Some(wanted);
-            self.object.since.get_or_insert_with(Instant::now);
-            if let Some(worker) = &self.background.pictures {
-                let job = PictureJob { version, loaded: loaded.clone(), size: self.size, asked: Instant::now() };
-                worker.ask(job);
+    }
+
+    /// Asks for the first picture while there is no window yet, in the size that the object's view is going to have.
+    pub fn ask_early(&mut self) {
+        let settings = &self.settings;
+        let gallery = if settings.gallery { settings.gallery_width } else { 0.0 };
+        let panels = [gallery + settings.parameters_width + settings.side_width, BARS];
+        self.size =
+            [0, 1].map(|axis| ((settings.window[axis] - panels[axis]) * settings.zoom).round().max(64.0) as usize);
+        self.request_picture();
+    }
+
+    /// Asks the workers for what is shown, once for every state and size.
+    pub(super) fn request(&mut self, ctx: &Context) {
+        let Some(loaded) = self.request_picture() else { return };
+        if !self.background.opened {
+            let answered = self.object.made.is_some() || self.object.failed.is_some();
+            self.background.opened = answered || self.background.pictures.is_none();
+            if self.background.opened {
+                ctx.request_repaint();
             }
+            return;
         }
         if let (Some(worker), Some(job)) = (&self.background.tiles, self.tile.job(&loaded, self.lobe.light)) {
             worker.ask(job);
@@ -189,6 +209,36 @@ impl Editor {
         {
             worker.ask(job);
         }
+    }
+
+    /// Asks for the object's picture where it is not what was asked for last; gives the scene as workers have it.
+    fn request_picture(&mut self) -> Option<Arc<LoadedScene>> {
+        let version = self.document.version();
+        if self.background.loaded.as_ref().is_none_or(|(last, _)| *last != version) {
+            self.background.loaded = Some((version, Arc::new(self.document.loaded())));
+        }
+        let (_, loaded) = self.background.loaded.clone()?;
+        let opened = self.background.opened;
+        if let (true, Some(worker)) = (opened, &self.background.pictures)
+            && let Some(job) = self.background.unrefined.take()
+        {
+            worker.refine(job);
+        }
+        let wanted = (version, self.size);
+        if self.object.asked != Some(wanted) {
+            self.object.asked = Some(wanted);
+            self.object.since.get_or_insert_with(Instant::now);
+            if let Some(worker) = &self.background.pictures {
+                let job = PictureJob { version, loaded: loaded.clone(), size: self.size, asked: Instant::now() };
+                if opened {
+                    worker.ask(job);
+                } else {
+                    worker.draft(job.clone());
+                    self.background.unrefined = Some(job);
+                }
+            }
+        }
+        Some(loaded)
     }
 
     pub(super) fn take_answers(&mut self, ctx: &Context) {

@@ -221,7 +221,7 @@ impl Editor {
         if !ctx.input(|input| input.pointer.any_down()) && !ctx.text_edit_focused() {
             self.document.rest();
         }
-        self.request();
+        self.request(&ctx);
         self.keep_recovery(&ctx);
         self.fill_gallery();
         self.measure_accuracy();

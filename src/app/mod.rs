@@ -20,6 +20,7 @@ mod painting;
 mod panels;
 mod perform;
 mod pick;
+mod start_times;
 mod status;
 #[cfg(test)]
 mod tests;
@@ -28,4 +29,5 @@ mod views;
 mod window;
 mod worker;
 
+pub use start_times::StartTimes;
 pub use window::run;

@@ -4,6 +4,7 @@ use eframe::egui::{self, RichText, Ui};
 
 use super::editor::Editor;
 use super::theme;
+use super::views::wheel::wheel;
 use super::worker::Grade;
 
 impl Editor {
@@ -22,7 +23,6 @@ impl Editor {
                 if failed {
                     ui.label("No picture could be made: see the message");
                 } else {
-                    ui.spinner();
                     ui.label("Computing the first picture");
                 }
                 return;
@@ -38,7 +38,7 @@ impl Editor {
                     ui.label(format!("Final, {} quality", made.preset));
                 }
                 (_, _, Some(doing)) => {
-                    ui.add(egui::Spinner::new().size(13.0));
+                    wheel(ui, 13.0, ui.visuals().strong_text_color());
                     ui.label(doing);
                     let stop = ui.small_button("Stop").on_hover_text("What is shown is good enough");
                     if stop.clicked() {
@@ -49,7 +49,7 @@ impl Editor {
                     ui.label("Stopped before the final picture");
                 }
                 _ => {
-                    ui.add(egui::Spinner::new().size(13.0));
+                    wheel(ui, 13.0, ui.visuals().strong_text_color());
                     ui.label("Following");
                 }
             }

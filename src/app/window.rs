@@ -8,10 +8,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
-use eframe::egui::{self, ViewportBuilder, ViewportCommand};
+use eframe::egui::{self, Context, ViewportBuilder, ViewportCommand};
 
 use super::document::{Document, Settings};
 use super::editor::Editor;
+use super::start_times::{FirstFrames, StartTimes};
+use super::worker::Devices;
 
 const NO_WINDOW: &str = "the editor needs a desktop (X11 or Wayland) and a Vulkan driver. \
     Debian, Ubuntu: `apt install mesa-vulkan-drivers libxkbcommon-x11-0 libwayland-client0`; \
@@ -28,12 +30,18 @@ type Kept = Rc<RefCell<Option<Editor>>>;
 ///
 /// # Errors
 /// A scene that cannot be read, no display, no adapter: with what to do about it.
-pub fn run(scene: Option<&str>) -> Result<()> {
-    let mut document = Some(Document::open(scene.unwrap_or("default"))?);
+pub fn run(scene: Option<&str>, times: StartTimes) -> Result<()> {
+    let document = Document::open(scene.unwrap_or("default"))?;
+    times.note("scene read");
+    // The first picture is computed while desktop, device and window are still to be had.
+    let ctx = context();
+    let mut editor = Editor::new(&ctx, document, Settings::folder());
+    editor.ask_early();
+    let mut first = Some((ctx, editor));
     let kept = Kept::default();
     loop {
         let (opened_at, lost) = (Instant::now(), Arc::new(AtomicBool::new(false)));
-        let opened = catch_unwind(AssertUnwindSafe(|| open(&kept, &lost, document.take())));
+        let opened = catch_unwind(AssertUnwindSafe(|| open(&kept, &lost, first.take(), times)));
         let has_left = kept.borrow().as_ref().is_none_or(|editor| editor.leaving);
         match opened {
             Ok(Ok(())) if has_left => {
@@ -62,10 +70,14 @@ pub fn run(scene: Option<&str>) -> Result<()> {
 }
 
 /// One window, from its opening to its end.
-fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<Document>) -> eframe::Result {
-    let folder = Settings::folder();
-    let settings = Settings::load(folder.as_deref());
+fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<(Context, Editor)>, times: StartTimes) -> eframe::Result {
+    let settings = Settings::load(Settings::folder().as_deref());
     let options = eframe::NativeOptions {
+        wgpu_options: noting(times),
+        window_builder: Some(Box::new(move |builder| {
+            times.note("desktop found");
+            builder
+        })),
         viewport: ViewportBuilder::default()
             .with_inner_size(settings.window)
             .with_min_inner_size([800.0, 560.0])
@@ -74,18 +86,55 @@ fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<Document>) -> eframe:
         ..eframe::NativeOptions::default()
     };
     let (kept, lost) = (kept.clone(), lost.clone());
+    let (ctx, first) = first.map_or_else(|| (context(), None), |(ctx, editor)| (ctx, Some(editor)));
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
+        times.note("device and the interface's pipelines built");
         let device = watch_device(creation, &lost);
         let mut editor = kept.borrow_mut();
         match (editor.as_mut(), first) {
             (Some(editor), _) => editor.move_to(&creation.egui_ctx),
-            (None, Some(document)) => *editor = Some(Editor::new(&creation.egui_ctx, document, folder)),
-            (None, None) => {}
+            (None, first) => *editor = first,
+        }
+        if let (Some(editor), Some(devices)) = (editor.as_ref(), devices(creation)) {
+            editor.tell_devices(devices);
         }
         drop(editor);
-        Ok(Box::new(Window { editor: kept, lost, device }))
+        times.note("editor made");
+        Ok(Box::new(Window { editor: kept, lost, device, first: FirstFrames::new(times) }))
     });
-    eframe::run_native("biscale", options, create)
+    eframe::run_native_ext("biscale", options, Some(ctx), create)
+}
+
+/// A context as eframe makes it, for a window that is still to come.
+fn context() -> Context {
+    let ctx = Context::default();
+    ctx.set_embed_viewports(false);
+    if let Ok(passes) = 2.try_into() {
+        ctx.options_mut(|options| options.max_passes = passes);
+    }
+    ctx
+}
+
+/// What the window's own instance sees of devices.
+fn devices(creation: &eframe::CreationContext) -> Option<Devices> {
+    let state = creation.wgpu_render_state.as_ref()?;
+    let adapters: Vec<_> = state.available_adapters.iter().map(wgpu::Adapter::get_info).collect();
+    let only_software = adapters.iter().all(|adapter| adapter.device_type == wgpu::DeviceType::Cpu);
+    let found = |adapter: &wgpu::AdapterInfo| Devices::OnlySoftware(adapter.name.clone());
+    Some(adapters.first().filter(|_| only_software).map_or(Devices::Perhaps, found))
+}
+
+/// What eframe makes a device with by itself, and a word when it has found the adapter.
+fn noting(times: StartTimes) -> eframe::egui_wgpu::WgpuConfiguration {
+    let mut options = eframe::egui_wgpu::WgpuConfiguration::default();
+    if let eframe::egui_wgpu::WgpuSetup::CreateNew(setup) = &mut options.wgpu_setup {
+        let description = setup.device_descriptor.clone();
+        setup.device_descriptor = Arc::new(move |adapter| {
+            times.note("window and adapter there");
+            description(adapter)
+        });
+    }
+    options
 }
 
 /// Starts the program anew; it offers what the recovery file holds.
@@ -144,6 +193,7 @@ struct Window {
     editor: Kept,
     lost: Arc<AtomicBool>,
     device: Option<wgpu::Device>,
+    first: FirstFrames,
 }
 
 impl eframe::App for Window {
@@ -160,6 +210,13 @@ impl eframe::App for Window {
             ctx.send_viewport_cmd(ViewportCommand::Close);
             return;
         }
+        editor.leaving |= self.first.before();
         editor.window_frame(ui);
+        if self.first.are_followed() {
+            self.first.after(editor.object.made.as_deref());
+            if self.first.is_told_by_the_next() {
+                ctx.request_repaint();
+            }
+        }
     }
 }

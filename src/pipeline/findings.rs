@@ -25,15 +25,16 @@ impl Pipeline {
         facets_version: Version,
     ) -> Findings {
         let needs_maps = !shape.flat && (!shape.height_field || settings.sighting != Sighting::Auto);
-        if needs_maps && settings.backend != Backend::Cpu && !self.gpu_asked {
+        let allowed = settings.backend != Backend::Cpu && !self.without_device;
+        if needs_maps && allowed && !self.gpu_asked {
             self.gpu_asked = true;
             self.gpu = Gpu::open().ok();
         }
         // The processor in disguise draws shadow maps far slower than the processor slices (the draft of the pillow: 78 s, not 0.1):
         // only where both are asked for.
         let asked = settings.backend == Backend::Gpu && settings.sighting == Sighting::Maps;
-        let hardware_gpu = settings.backend != Backend::Cpu
-            && self.gpu.as_ref().is_some_and(|gpu| asked || gpu.tier == crate::gpu::Tier::Hardware);
+        let hardware_gpu =
+            allowed && self.gpu.as_ref().is_some_and(|gpu| asked || gpu.tier == crate::gpu::Tier::Hardware);
         let scan_work = match self.scan_work {
             Some((version, work)) if version == facets_version => work,
             _ if needs_maps && !hardware_gpu => {

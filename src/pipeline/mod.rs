@@ -77,6 +77,8 @@ pub struct Pipeline {
     cancel: Cancel,
     gpu: Option<Gpu>,
     gpu_asked: bool,
+    /// Nobody may open a device here.
+    without_device: bool,
     /// Work of one slice of the mesh, for a version of the facets.
     scan_work: Option<(Version, f64)>,
     shape: Stage<ShapeKey, Shape>,
@@ -104,6 +106,11 @@ impl Pipeline {
     /// that were finished before stay.
     pub fn cancel_with(&mut self, cancel: Cancel) {
         self.cancel = cancel;
+    }
+
+    /// Whether a device may be opened. Without one all is computed as where there is no adapter that is worth it.
+    pub fn allow_device(&mut self, allowed: bool) {
+        self.without_device = !allowed;
     }
 
     /// The effective BRDF of a scene at its own quality.

@@ -1,7 +1,8 @@
 //! The interface through its accessible nodes, as a person with a keyboard or a screen reader uses it.
 
 use biscale::scene::{BrdfSpec, Geometry, TermSpec};
-use eframe::egui::{Key, Modifiers};
+use eframe::egui::{Key, Modifiers, Ui};
+use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::Vec2;
 
@@ -9,6 +10,7 @@ use super::{editor, harness, quick, settle};
 use crate::app::actions::{Action, ENTRIES};
 use crate::app::dialogs::Dialog;
 use crate::app::document::Document;
+use crate::app::editor::Editor;
 use crate::app::views::tile::Which;
 
 #[test]
@@ -268,4 +270,28 @@ fn the_effects_panel_forces_an_effect_and_the_picture_follows() {
     harness.get_by_label("As planned").click();
     harness.run_steps(2);
     assert!(editor(&mut harness).document.scene().effects.is_default());
+}
+
+#[test]
+fn the_picture_that_is_asked_for_before_the_window_has_the_size_of_its_view() {
+    let mut document = Some(quick());
+    let mut harness = Harness::builder().with_size([1400.0, 1000.0]).allow_missing_glyphs().build_ui_state(
+        move |ui: &mut Ui, state: &mut Option<(Editor, _)>| {
+            let ctx = ui.ctx().clone();
+            let (editor, _) = state.get_or_insert_with(|| {
+                let mut editor = Editor::new(&ctx, document.take().unwrap(), None);
+                // The harness leaves 8 points free on each side.
+                editor.settings.window = [1384.0, 984.0];
+                editor.ask_early();
+                let early = editor.object.asked;
+                (editor, early)
+            });
+            editor.window_frame(ui);
+        },
+        None,
+    );
+    harness.run_steps(3);
+    let (editor, early) = harness.state().as_ref().unwrap();
+    assert!(early.is_some());
+    assert_eq!(editor.object.asked, *early);
 }

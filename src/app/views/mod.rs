@@ -6,4 +6,5 @@ pub mod hand;
 pub mod lobe;
 pub mod object;
 pub mod tile;
+pub mod wheel;
 pub mod wipe;

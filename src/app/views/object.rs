@@ -7,6 +7,7 @@ use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 
+use super::wheel::wheel;
 use super::wipe::Kept;
 use crate::app::actions::Action;
 use crate::app::panels::fields::words;
@@ -110,7 +111,7 @@ impl ObjectView {
             let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
             painter.image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
         } else if self.failed.is_none() {
-            ui.put(Rect::from_center_size(area.center(), vec2(40.0, 40.0)), egui::Spinner::new());
+            self.first_ui(ui, area);
         }
         self.waiting_ui(ui, area);
         self.wipe_ui(ui, area);
@@ -128,6 +129,19 @@ impl ObjectView {
         [pixels.x.round() as usize, pixels.y.round() as usize]
     }
 
+    /// Says that there is no picture yet, in still words: while the processor draws the window, too, every frame holds the
+    /// picture up.
+    fn first_ui(&self, ui: &Ui, area: Rect) {
+        let seconds = self.since.map_or(0.0, |since| since.elapsed().as_secs_f32());
+        let text = match seconds {
+            ..1.0 => "Computing the picture".to_owned(),
+            _ => format!("Computing the picture, {seconds:.0} s"),
+        };
+        ui.ctx().request_repaint_after_secs(1.0 - seconds.fract());
+        let font = egui::FontId::proportional(13.0);
+        ui.painter().text(area.center(), egui::Align2::CENTER_CENTER, text, font, Color32::from_gray(150));
+    }
+
     /// Says that the first picture of an edit is still being computed, once that takes long.
     fn waiting_ui(&self, ui: &mut Ui, area: Rect) {
         let Some(since) = self.since.filter(|_| self.texture.is_some()) else { return };
@@ -139,10 +153,8 @@ impl ObjectView {
         // Messages lie at the foot.
         let place = Rect::from_min_size(area.left_top() + vec2(10.0, 8.0), vec2(170.0, 26.0));
         ui.painter().rect_filled(place, 5.0, Color32::from_black_alpha(150));
-        ui.put(
-            Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0)),
-            egui::Spinner::new().color(Color32::WHITE),
-        );
+        let left = Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0));
+        ui.scope_builder(egui::UiBuilder::new().max_rect(left), |ui| wheel(ui, 14.0, Color32::WHITE));
         let text = format!("Computing, {:.0} s", since.elapsed().as_secs_f32());
         let font = egui::FontId::proportional(12.0);
         ui.painter().text(place.left_center() + vec2(28.0, 0.0), egui::Align2::LEFT_CENTER, text, font, Color32::WHITE);

@@ -6,6 +6,7 @@ mod lobe;
 mod made;
 mod picture;
 mod runner;
+mod shared;
 mod studio;
 mod thumbnail;
 mod tile;
@@ -21,6 +22,7 @@ pub use export::{ExportAnswer, ExportJob, TableChoice, What};
 pub use lobe::{LobeJob, LobeMade, logarithmic};
 pub use made::{Grade, Made, PictureAnswer, PictureJob};
 pub use runner::Worker;
+pub use shared::Devices;
 #[cfg(test)]
 pub use studio::LOSE_DEVICE;
 pub use thumbnail::{Thumbnail, ThumbnailJob};
@@ -44,12 +46,14 @@ pub fn spawn_lobe(answer: impl Fn(LobeMade) + Clone + Send + Sync + 'static) -> 
 pub struct Pictures {
     draft: Worker<PictureJob>,
     refine: Worker<PictureJob>,
+    shared: Arc<shared::Shared>,
 }
 
 impl Pictures {
     /// `None` where the system gives no threads.
     pub fn spawn(answer: impl Fn(PictureAnswer) + Clone + Send + Sync + 'static) -> Option<Self> {
-        let shared = Arc::new(picture::Shared::default());
+        let shared = Arc::new(shared::Shared::default());
+        let told_devices = shared.clone();
         let start = move || picture::Photographer::new(shared.clone());
         let (draft, refine, told, told_too) = (answer.clone(), answer.clone(), answer.clone(), answer);
         let draft_work = move |kept: &mut picture::Photographer, job: PictureJob, desk: &runner::Desk<PictureJob>| {
@@ -62,12 +66,27 @@ impl Pictures {
             Worker::spawn("draft", 0, start.clone(), draft_work, move |text| told(PictureAnswer::Fault(text))).ok()?;
         let refine =
             Worker::spawn("refine", 0, start, refine_work, move |text| told_too(PictureAnswer::Fault(text))).ok()?;
-        Some(Self { draft, refine })
+        Some(Self { draft, refine, shared: told_devices })
     }
 
     pub fn ask(&self, job: PictureJob) {
-        self.refine.ask(job.clone());
+        self.refine(job.clone());
+        self.draft(job);
+    }
+
+    /// A draft only.
+    pub fn draft(&self, job: PictureJob) {
         self.draft.ask(job);
+    }
+
+    /// What a draft was asked of before.
+    pub fn refine(&self, job: PictureJob) {
+        self.refine.ask(job);
+    }
+
+    /// Tells what devices there are; only the first word counts.
+    pub fn tell_devices(&self, devices: Devices) {
+        let _ = self.shared.devices.set(devices);
     }
 
     pub fn finish(self, longest: Duration) {

@@ -1,18 +1,17 @@
 //! The object's picture: a draft at once, then the scene's own quality while the hand rests.
 
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use biscale::close_up::CloseUp;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::{Outcome, Pipeline};
-use biscale::scene::{Camera, Effects, LoadedScene, Material, Painted, Quality, Tile};
+use biscale::scene::{Camera, LoadedScene, Quality};
 use biscale::{Cancel, Error, Result};
 
 use super::made::{Grade, Made, PictureAnswer, PictureJob};
 use super::runner::Desk;
+use super::shared::{Devices, Shared, SmallScale, lock, small_scale};
 use super::studio::{Close, Shot, Studio};
 use super::tone::color_image;
 
@@ -31,30 +30,6 @@ const POLL: Duration = Duration::from_millis(5);
 /// How long the hand must rest before refinement begins.
 const REST: Duration = Duration::from_millis(120);
 
-/// What an effective BRDF depends on.
-type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
-
-/// What both workers know: the last BRDF at a scene's own quality, and the last full picture.
-#[derive(Default)]
-pub struct Shared {
-    best: Mutex<Option<(SmallScale, Outcome)>>,
-    last: Mutex<Option<Finished>>,
-    /// The newest version whose draft is done with.
-    drafted: AtomicU64,
-}
-
-/// Notes that a draft is done with, also where it failed.
-struct Drafted<'a>(&'a Shared, u64);
-
-impl Drop for Drafted<'_> {
-    fn drop(&mut self) {
-        self.0.drafted.fetch_max(self.1, Ordering::Relaxed);
-    }
-}
-
-/// A full picture and what it shows.
-type Finished = (Box<LoadedScene>, [usize; 2], Made);
-
 /// Keeps stages and what stays between pictures. One drafts, on a thread that is never kept long; another refines.
 pub struct Photographer {
     shared: Arc<Shared>,
@@ -64,6 +39,8 @@ pub struct Photographer {
     close: Option<(SmallScale, Close)>,
     /// Milliseconds a pixel, of the draft's and of the refined BRDF.
     cost: [f64; 2],
+    /// Where the next picture is made: the scene's own choice, or `cpu` before anybody knows what devices there are.
+    backend: String,
 }
 
 /// What a pixel is taken to cost before any was measured [ms].
@@ -71,13 +48,14 @@ const FIRST_COST: f64 = 2e-2;
 
 impl Photographer {
     pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, pipeline: Pipeline::new(), studio: Studio::default(), close: None, cost: [FIRST_COST; 2] }
+        let (pipeline, studio) = (Pipeline::new(), Studio::default());
+        Self { shared, pipeline, studio, close: None, cost: [FIRST_COST; 2], backend: String::new() }
     }
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.
     pub fn draft(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
         let shared = self.shared.clone();
-        let _drafted = Drafted(&shared, job.version);
+        let _drafting = shared.drafting(job.version);
         let done = self.toned(job).and_then(|toned| match toned {
             Some(made) => Ok(made),
             None => self.drafted(job, &desk.cancel.after(PATIENCE)),
@@ -87,8 +65,9 @@ impl Photographer {
 
     fn drafted(&mut self, job: &PictureJob, cancel: &Cancel) -> Result<Made> {
         self.pipeline.cancel_with(cancel.clone());
+        self.choose_device(job);
         self.studio.prepare(&job.loaded)?;
-        let (outcome, which) = match self.known(&job.loaded) {
+        let (outcome, which) = match self.shared.known(&job.loaded) {
             Some(outcome) => (outcome.without_times(), 1),
             None => (self.pipeline.effective(&as_draft(&job.loaded))?, 0),
         };
@@ -96,11 +75,22 @@ impl Photographer {
         self.shoot(job, &outcome, which, size, 1, cancel)
     }
 
+    /// Sees to it that no device is opened that is of no use, and none for the first draft.
+    fn choose_device(&mut self, job: &PictureJob) {
+        let devices = self.shared.devices.get();
+        if let Some(Devices::OnlySoftware(name)) = devices {
+            self.studio.leave_out(name);
+        }
+        let asked = &*job.loaded.scene.quality.backend;
+        self.backend = if devices.is_none() && asked == "auto" { "cpu" } else { asked }.to_owned();
+        self.pipeline.allow_device(asked == "gpu" || devices == Some(&Devices::Perhaps));
+    }
+
     /// The scene's own quality, once the hand rests; given up when newer work is there.
     pub fn refine(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
         let mut is_newest = desk.is_newest_after(REST);
         // Both want all cores, and the draft is what the hand waits for.
-        while is_newest && self.shared.drafted.load(Ordering::Relaxed) < job.version {
+        while is_newest && !self.shared.is_drafted(job.version) {
             is_newest = desk.is_newest_after(POLL);
         }
         if is_newest {
@@ -113,7 +103,9 @@ impl Photographer {
             return Ok(());
         }
         self.pipeline.cancel_with(desk.cancel.clone());
-        let mut outcome = match self.known(&job.loaded) {
+        self.shared.devices.get_or_init(|| Devices::Perhaps);
+        self.choose_device(job);
+        let mut outcome = match self.shared.known(&job.loaded) {
             Some(outcome) => outcome.without_times(),
             None => {
                 answer(PictureAnswer::Doing(job.version, "Refining the material"));
@@ -144,11 +136,6 @@ impl Photographer {
         *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
         answer(PictureAnswer::Made(Box::new(made)));
         Ok(())
-    }
-
-    fn known(&self, loaded: &LoadedScene) -> Option<Outcome> {
-        let best = lock(&self.shared.best);
-        best.as_ref().filter(|(key, _)| *key == small_scale(loaded)).map(|(_, outcome)| outcome.clone())
     }
 
     /// Whether the last full picture shows this but for its tones.
@@ -189,14 +176,13 @@ impl Photographer {
     ) -> Result<Made> {
         let camera = camera(&job.loaded);
         let tone_map = ToneMap::new(&camera)?;
-        let backend = job.loaded.scene.quality.backend.as_str();
         let settle = samples_per_side > 1;
-        let shot = Shot { camera: &camera, outcome, size, samples_per_side, settle, backend };
         if self.studio.is_close(&camera, size) {
             self.come_close(&job.loaded)?;
         } else {
             self.close = None;
         }
+        let shot = Shot { camera: &camera, outcome, size, samples_per_side, settle, backend: &self.backend };
         let close = self.close.as_ref().map(|(_, close)| close);
         let (rendered, table_ms) = self.studio.shoot(&shot, close, cancel)?;
         let times = rendered.times;
@@ -267,10 +253,6 @@ fn fitting(size: [usize; 2]) -> [usize; 2] {
     size.map(|side| ((side as f64 * scale) as usize).max(24))
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Says why there is no picture; work that was given up is none to speak of.
 fn tell(job: &PictureJob, done: Result<()>, answer: &dyn Fn(PictureAnswer)) {
     match done {
@@ -281,12 +263,6 @@ fn tell(job: &PictureJob, done: Result<()>, answer: &dyn Fn(PictureAnswer)) {
 
 fn camera(loaded: &LoadedScene) -> Camera {
     loaded.scene.camera.clone().unwrap_or_default()
-}
-
-fn small_scale(loaded: &LoadedScene) -> SmallScale {
-    let scene = &loaded.scene;
-    let parts = (scene.tile.clone(), scene.materials.clone(), scene.quality.clone(), scene.effects.clone());
-    (parts.0, parts.1, parts.2, parts.3, loaded.base_dir.clone(), loaded.painted.clone())
 }
 
 /// The same scene at the draft preset, without knobs that were turned by hand.

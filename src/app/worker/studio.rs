@@ -200,6 +200,13 @@ impl Studio {
         }
     }
 
+    /// There is only this adapter, which is software: it is not opened to find that out.
+    pub fn leave_out(&mut self, name: &str) {
+        if matches!(self.gpu, Device::NotAsked) {
+            self.gpu = Device::Slower(name.to_owned());
+        }
+    }
+
     /// Where pictures are made, in words.
     pub fn device(&self) -> String {
         match &self.gpu {
