@@ -12,6 +12,7 @@ use eframe::egui::{self, ViewportBuilder, ViewportCommand};
 
 use super::document::{Document, Settings};
 use super::editor::Editor;
+use crate::commands::cache;
 
 const NO_WINDOW: &str = "the editor needs a desktop (X11 or Wayland) and a Vulkan driver. \
     Debian, Ubuntu: `apt install mesa-vulkan-drivers libxkbcommon-x11-0 libwayland-client0`; \
@@ -79,7 +80,7 @@ fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<Document>) -> eframe:
         let mut editor = kept.borrow_mut();
         match (editor.as_mut(), first) {
             (Some(editor), _) => editor.move_to(&creation.egui_ctx),
-            (None, Some(document)) => *editor = Some(Editor::new(&creation.egui_ctx, document, folder)),
+            (None, Some(document)) => *editor = Some(Editor::new(&creation.egui_ctx, document, folder, cache::open())),
             (None, None) => {}
         }
         drop(editor);

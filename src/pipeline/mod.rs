@@ -3,6 +3,9 @@
 mod findings;
 mod inputs;
 mod interreflection;
+mod kept;
+#[cfg(test)]
+mod kept_tests;
 mod make;
 mod outcome;
 mod pictures;
@@ -12,7 +15,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use self::make::{choose, grouped, names, same_lobes, sample, see};
+use self::make::{choose, grouped, names, same_lobes, sample};
 pub use self::outcome::Outcome;
 use self::outcome::limits;
 pub use self::pictures::Pictured;
@@ -21,6 +24,7 @@ use self::stage::{Stage, Version};
 use crate::accuracy::health::{Evidence, Sight};
 use crate::accuracy::{Health, Reference};
 use crate::brdf::MeasuredCache;
+use crate::cache::Cache;
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
@@ -72,6 +76,7 @@ struct Last {
 #[derive(Debug, Default)]
 pub struct Pipeline {
     cache: MeasuredCache,
+    kept: Cache,
     cancel: Cancel,
     gpu: Option<Gpu>,
     gpu_asked: bool,
@@ -100,6 +105,11 @@ impl Pipeline {
     /// that were finished before stay.
     pub fn cancel_with(&mut self, cancel: Cancel) {
         self.cancel = cancel;
+    }
+
+    /// What takes long to make is looked for in `cache` from now on, and kept there. Without this nothing is.
+    pub fn keep_in(&mut self, cache: Cache) {
+        self.kept = cache;
     }
 
     /// The effective BRDF of a scene at its own quality.
@@ -139,14 +149,20 @@ impl Pipeline {
             settings.map_resolution,
             settings.penumbra.to_bits(),
         );
-        let (gpu, cancel) = (self.gpu.as_ref(), &self.cancel);
+        let (gpu, cancel, cache) = (self.gpu.as_ref(), &self.cancel, &self.kept);
+        let mut was_kept = false;
         let (visibility, visibility_version) = match plan.route {
             // Nothing is computed, and nothing kept.
             Route::None => (Arc::new(Visibility::Unblocked { facets: facets.len() }), 0),
             route => self.visibility.get("visibility", key, &mut times, cancel, || {
-                see(route, &shape.mesh, &facets, &settings, gpu, cancel)
+                let (seen, kept) = kept::visibility(cache, route, &shape.mesh, &facets, &settings, gpu, cancel)?;
+                was_kept = kept;
+                Ok(seen)
             })?,
         };
+        if let (true, Some((name, _))) = (was_kept, times.last_mut()) {
+            *name = kept::VISIBILITY;
+        }
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
         let (mut factors, mut earlier) = (None, None);
@@ -205,7 +221,8 @@ impl Pipeline {
             plan.factored(is_factored, errors.rel_l2);
         }
         let examined = Arc::default();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), &shape, &settings, plan.try_picture_table, earlier));
+        let pictures =
+            Arc::new(Pictures::new(brdf.clone(), &shape, &settings, plan.try_picture_table, earlier, &self.kept));
         let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
@@ -265,7 +282,7 @@ impl Pipeline {
             closes_plane: shape.mesh.closes_plane,
         };
         let notes = shape.mesh.notes.clone();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), shape, &settings, false, None));
+        let pictures = Arc::new(Pictures::new(brdf.clone(), shape, &settings, false, None, &self.kept));
         let examined = Arc::default();
         Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
     }

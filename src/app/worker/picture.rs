@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use biscale::cache::Cache;
 use biscale::close_up::CloseUp;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::{Outcome, Pipeline};
@@ -70,8 +71,10 @@ pub struct Photographer {
 const FIRST_COST: f64 = 2e-2;
 
 impl Photographer {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, pipeline: Pipeline::new(), studio: Studio::default(), close: None, cost: [FIRST_COST; 2] }
+    pub fn new(shared: Arc<Shared>, cache: &Cache) -> Self {
+        let mut pipeline = Pipeline::new();
+        pipeline.keep_in(cache.clone());
+        Self { shared, pipeline, studio: Studio::default(), close: None, cost: [FIRST_COST; 2] }
     }
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.
