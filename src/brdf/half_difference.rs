@@ -291,6 +291,20 @@ mod tests {
     }
 
     #[test]
+    fn content_is_that_of_shape_and_samples_whatever_the_name() {
+        let samples = vec![Vec4::splat(0.5); 24];
+        let table = |name: &str, shape, samples: &[Vec4]| {
+            HalfDifferenceTable::new(name.to_owned(), shape, samples.to_vec(), MeasuredReport::default()).content()
+        };
+        let content = table("a", [2, 3, 4], &samples);
+        assert_eq!(content, table("b", [2, 3, 4], &samples));
+        assert_ne!(content, table("a", [4, 3, 2], &samples));
+        let mut others = samples.clone();
+        others[17].y += 1e-6;
+        assert_ne!(content, table("a", [2, 3, 4], &others));
+    }
+
+    #[test]
     fn no_valid_neighbour_gives_zero() {
         let table =
             HalfDifferenceTable::new("none".to_owned(), [2, 2, 2], vec![Vec4::ZERO; 8], MeasuredReport::default());
