@@ -14,6 +14,7 @@
 
 pub mod accuracy;
 pub mod brdf;
+pub mod cache;
 pub mod cancel;
 #[cfg(test)]
 mod chi_square;

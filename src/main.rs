@@ -49,6 +49,8 @@ enum Command {
     Profile(ProfileArgs),
     /// Measure accuracy against time: every knob, the presets, and combinations, against the reference.
     Report(ReportArgs),
+    /// Say what is kept on disk between runs, and where; or remove it.
+    Cache(CacheArgs),
     /// List the materials that ship with the program.
     Materials(MaterialsArgs),
 }
@@ -115,6 +117,8 @@ struct PlanArgs {
 struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    keeping: KeepingArgs,
     /// The picture to write: .png (tone-mapped) or .exr (linear).
     #[arg(short, long)]
     output: PathBuf,
@@ -130,6 +134,8 @@ struct RenderArgs {
 struct EvalArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    keeping: KeepingArgs,
     /// CSV with the header theta_i,phi_i,theta_o,phi_o (radians); `-` is standard input.
     #[arg(long)]
     pairs: PathBuf,
@@ -145,6 +151,8 @@ struct EvalArgs {
 struct ExportArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    keeping: KeepingArgs,
     /// The table to write; the ending chooses the format. `-` is standard output (CSV).
     #[arg(short, long)]
     output: PathBuf,
@@ -244,6 +252,24 @@ struct ReportArgs {
     quiet: bool,
 }
 
+/// Of commands that keep what took long to make.
+#[derive(Debug, Args)]
+struct KeepingArgs {
+    /// Make everything anew, and keep nothing of it (see `biscale cache`).
+    #[arg(long)]
+    no_cache: bool,
+}
+
+#[derive(Debug, Args)]
+struct CacheArgs {
+    /// Remove all that was kept.
+    #[arg(long)]
+    clear: bool,
+    /// Machine-readable output.
+    #[arg(long)]
+    json: bool,
+}
+
 #[derive(Debug, Args)]
 struct MaterialsArgs {
     /// Machine-readable output.
@@ -290,6 +316,7 @@ fn run(command: Command, started: Instant) -> anyhow::Result<()> {
         Command::Basis(args) => commands::basis::run(&args),
         Command::Profile(args) => commands::profile::run(&args),
         Command::Report(args) => commands::report::run(&args),
+        Command::Cache(args) => commands::cache::run(&args),
         Command::Materials(args) => commands::materials::run(&args),
     }
 }

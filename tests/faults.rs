@@ -31,6 +31,7 @@ method = "direct"
 
 fn program(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_biscale"));
+    command.env("BISCALE_CACHE", "off");
     command.args(arguments).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::null());
     command
 }

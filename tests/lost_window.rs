@@ -33,6 +33,7 @@ fn a_lost_device_opens_a_new_window_and_the_program_goes_on() {
     let log = folder.path().join("log.txt");
     let mut command = Command::new(env!("CARGO_BIN_EXE_biscale"));
     command.args(["edit", "default"]).current_dir(folder.path()).env("DISPLAY", display);
+    command.env("BISCALE_CACHE", "off");
     command.env_remove("WAYLAND_DISPLAY").env("XDG_STATE_HOME", folder.path()).env("BISCALE_LOSE_DEVICE", "6");
     let mut editor = Process(command.stderr(std::fs::File::create(&log).unwrap()).spawn().unwrap());
     let start = Instant::now();

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use biscale::cache::Cache;
 use biscale::scene::LoadedScene;
 use eframe::egui::Context;
 
@@ -53,7 +54,7 @@ pub struct Background {
 }
 
 impl Background {
-    pub fn new(ctx: &Context) -> Self {
+    pub fn new(ctx: &Context, cache: &Cache) -> Self {
         let (to_us, answers) = channel();
         let wake = ctx.clone();
         let send = move |answer| {
@@ -64,10 +65,10 @@ impl Background {
         let (to_tile, to_lobe, to_gallery, to_export, to_save, to_chart) =
             (send.clone(), send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
         let accuracy = spawn_accuracy(move |answer| to_chart(Answer::Accuracy(answer)));
-        let pictures = Pictures::spawn(move |answer| send(Answer::Picture(answer)));
+        let pictures = Pictures::spawn(cache, move |answer| send(Answer::Picture(answer)));
         let tiles = spawn_tile(move |answer| to_tile(Answer::Tile(answer)));
         let thumbnails = spawn_thumbnail(move |made| to_gallery(Answer::Thumbnail(made)));
-        let exports = spawn_export(move |answer| to_export(Answer::Export(answer)));
+        let exports = spawn_export(cache, move |answer| to_export(Answer::Export(answer)));
         let autosaver = spawn_autosave(move |done| to_save(Answer::Autosaved(done)));
         let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
         Self {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use biscale::cache::Cache;
 use biscale::scene::{Material, Scene};
 use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
 
@@ -35,6 +36,8 @@ pub struct Editor {
     /// Where settings and recovery files are; none in tests.
     pub folder: Option<PathBuf>,
     pub recovery: Option<RecoveryFile>,
+    /// Results of earlier runs; off in tests.
+    cache: Cache,
     pub messages: Messages,
     pub dialog: Option<Dialog>,
     pub object: ObjectView,
@@ -65,14 +68,14 @@ pub struct Editor {
 }
 
 impl Editor {
-    /// `folder`: where settings are kept; without one nothing is remembered.
-    pub fn new(ctx: &Context, document: Document, folder: Option<PathBuf>) -> Self {
+    /// `folder`: where settings are kept; without one nothing is remembered. `cache`: where results are.
+    pub fn new(ctx: &Context, document: Document, folder: Option<PathBuf>, cache: Cache) -> Self {
         let settings = Settings::load(folder.as_deref());
         theme::install(ctx);
         ctx.set_theme(if settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
         ctx.set_zoom_factor(settings.zoom);
         let mut messages = Messages::default();
-        let background = Background::new(ctx);
+        let background = Background::new(ctx, &cache);
         if background.pictures.is_none() {
             messages.put(Level::Trouble, "worker", "The system gave no thread to compute on: nothing will be drawn.");
         }
@@ -83,6 +86,7 @@ impl Editor {
         let dialog = (!recovered.is_empty()).then_some(Dialog::Recover(recovered));
         Self {
             recovery: folder.as_deref().map(RecoveryFile::new),
+            cache,
             slots: materials::slots_of(document.scene()),
             document,
             settings,
@@ -114,7 +118,7 @@ impl Editor {
         theme::install(ctx);
         ctx.set_theme(if self.settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
         ctx.set_zoom_factor(self.settings.zoom);
-        std::mem::replace(&mut self.background, Background::new(ctx)).finish();
+        std::mem::replace(&mut self.background, Background::new(ctx, &self.cache)).finish();
         self.object.move_to(ctx);
         self.tile.move_to();
         self.lobe.move_to();
@@ -130,6 +134,8 @@ impl Editor {
     /// After the window is gone.
     pub fn finish(self) {
         self.background.finish();
+        // What could not be kept is made again.
+        let _ = self.cache.finish();
     }
 
     /// One frame in a window: title, files dropped, the way out.

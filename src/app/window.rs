@@ -14,6 +14,7 @@ use super::document::{Document, Settings};
 use super::editor::Editor;
 use super::start_times::{FirstFrames, StartTimes};
 use super::worker::Devices;
+use crate::commands::cache;
 
 const NO_WINDOW: &str = "the editor needs a desktop (X11 or Wayland) and a Vulkan driver. \
     Debian, Ubuntu: `apt install mesa-vulkan-drivers libxkbcommon-x11-0 libwayland-client0`; \
@@ -35,7 +36,7 @@ pub fn run(scene: Option<&str>, times: StartTimes) -> Result<()> {
     times.note("scene read");
     // The first picture is computed while desktop, device and window are still to be had.
     let ctx = context();
-    let mut editor = Editor::new(&ctx, document, Settings::folder());
+    let mut editor = Editor::new(&ctx, document, Settings::folder(), cache::open());
     editor.ask_early();
     let mut first = Some((ctx, editor));
     let kept = Kept::default();

@@ -7,12 +7,14 @@
 
 use std::f32::consts::FRAC_2_PI;
 use std::f64::consts::FRAC_PI_2;
+use std::sync::OnceLock;
 
 use glam::{Vec3, Vec4};
 
 use super::albedo::max_albedo;
 use super::fast_math::acos_over_sqrt_one_minus;
 use super::{LobeAngles, Measured, MeasuredReport};
+use crate::cache::Key;
 
 /// Samples at bin centres, `θ_h` index `N √(θ_h / 90°)`, `θ_d` and `φ_d` evenly over [0, π/2].
 #[derive(Clone)]
@@ -23,6 +25,8 @@ pub struct HalfDifferenceTable {
     /// `[θ_d][θ_h][φ_d]`, `φ_d` fastest: the facets under one pair of directions share `θ_d`, so all they read is near; RGB [1/sr] and 1 where measured, all 0 where not.
     samples: Vec<Vec4>,
     report: MeasuredReport,
+    /// Made when first asked for: some milliseconds.
+    content: OnceLock<Key>,
 }
 
 /// Bins in `θ_h`, `θ_d`, `φ_d`: MERL's, folded to a quarter turn.
@@ -51,7 +55,7 @@ impl HalfDifferenceTable {
     /// Each axis has at least two bins.
     pub(super) fn new(name: String, shape: [usize; 3], samples: Vec<Vec4>, report: MeasuredReport) -> Self {
         debug_assert!(shape.iter().all(|&n| n >= 2) && samples.len() == shape.iter().product::<usize>());
-        let mut table = Self { name, shape: shape.map(|n| n as i32), samples, report };
+        let mut table = Self { name, shape: shape.map(|n| n as i32), samples, report, content: OnceLock::new() };
         table.report.max_albedo = max_albedo(|angles| table.f_r(angles) * (angles.n_dot_i * angles.n_dot_o));
         table
     }
@@ -132,6 +136,13 @@ impl Measured for HalfDifferenceTable {
 
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn content(&self) -> Key {
+        *self.content.get_or_init(|| {
+            let samples = Key::of_numbers(&self.samples);
+            Key::of_numbers(&[bytemuck::cast_slice(&self.shape), &samples.bytes()[..]].concat())
+        })
     }
 
     fn report(&self) -> &MeasuredReport {
@@ -277,6 +288,20 @@ mod tests {
         for (angles, found) in angles.iter().zip(many) {
             assert_eq!(found, table.f_r(angles));
         }
+    }
+
+    #[test]
+    fn content_is_that_of_shape_and_samples_whatever_the_name() {
+        let samples = vec![Vec4::splat(0.5); 24];
+        let table = |name: &str, shape, samples: &[Vec4]| {
+            HalfDifferenceTable::new(name.to_owned(), shape, samples.to_vec(), MeasuredReport::default()).content()
+        };
+        let content = table("a", [2, 3, 4], &samples);
+        assert_eq!(content, table("b", [2, 3, 4], &samples));
+        assert_ne!(content, table("a", [4, 3, 2], &samples));
+        let mut others = samples.clone();
+        others[17].y += 1e-6;
+        assert_ne!(content, table("a", [2, 3, 4], &others));
     }
 
     #[test]

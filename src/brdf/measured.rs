@@ -8,6 +8,7 @@ use std::time::SystemTime;
 use glam::Vec3;
 
 use super::LobeAngles;
+use crate::cache::Key;
 use crate::error::{InputError, Result};
 
 /// A tabulated BRDF, already made reciprocal.
@@ -22,6 +23,8 @@ pub trait Measured: std::fmt::Debug + Send + Sync {
     }
     /// Where it came from, for messages.
     fn name(&self) -> &str;
+    /// All that its values depend on, as one number.
+    fn content(&self) -> Key;
     /// What reading it found.
     fn report(&self) -> &MeasuredReport;
 }

@@ -15,7 +15,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::print_json;
+use super::{cache, print_json};
 use crate::EvalArgs;
 
 /// Longer lists are no lists of pairs.
@@ -33,7 +33,9 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let rows = read(&args.pairs)?;
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
     let settings = Settings::from_quality(&loaded.scene.quality);
+    let cache = args.keeping.open();
     let mut pipeline = Pipeline::new();
+    pipeline.keep_in(cache.clone());
     let health;
     let mut form = "reference sum".to_owned();
     let (values, errors) = if settings.preset == Preset::Reference {
@@ -80,6 +82,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         }
         text.push('\n');
     }
+    cache::finish(&cache, args.scene.quiet);
     if args.output == Path::new("-") {
         std::io::stdout().lock().write_all(text.as_bytes())?;
         return Ok(());

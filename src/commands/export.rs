@@ -8,7 +8,7 @@ use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, Radianc
 use biscale::pipeline::Pipeline;
 use serde::Serialize;
 
-use super::{bar, print_json, showing};
+use super::{bar, cache, print_json, showing};
 use crate::{ExportArgs, Radiance};
 
 /// Relative L2 of reading a table back at which hardly anything of its lobes is right.
@@ -41,7 +41,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         export::check_ending(&args.output)?;
     }
     let loaded = args.scene.open()?;
+    let cache = args.keeping.open();
     let mut pipeline = Pipeline::new();
+    pipeline.keep_in(cache.clone());
     let outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
     let meta = ExportMeta::of(&loaded, &outcome, pipeline.mesh(&loaded)?.closes_plane);
@@ -58,11 +60,13 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         // Standard output holds the table itself then.
         export::write_csv(&outcome.brdf, &meta, &options, &mut std::io::stdout().lock(), &progress)?;
         bar.finish_and_clear();
+        cache::finish(&cache, args.scene.quiet);
         return Ok(());
     }
     let report = export::write(&outcome.brdf, &meta, &options, &args.output, &progress);
     bar.finish_and_clear();
     let report = report?;
+    cache::finish(&cache, args.scene.quiet);
     let reading = report.reading;
     let mut health = outcome.health().clone();
     if !(0.0..=MOST_LOST).contains(&reading.errors.rel_l2) {

@@ -1,6 +1,7 @@
 //! One file a subcommand; what they share stands here.
 
 pub mod basis;
+pub mod cache;
 pub mod eval;
 pub mod export;
 pub mod fit;

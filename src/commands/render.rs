@@ -12,7 +12,7 @@ use biscale::plan::Backend;
 use biscale::{Cancel, Error};
 use serde::Serialize;
 
-use super::print_json;
+use super::{cache, print_json};
 use crate::RenderArgs;
 
 /// Where pictures are made.
@@ -51,7 +51,7 @@ impl Route {
         let table = outcome.for_pictures(&Cancel::default())?;
         let made = match renderer(&table.brdf) {
             Err(GpuError::Unsupported(_)) => {
-                let sums = Pictured { brdf: outcome.brdf.clone(), errors: None, ms: table.ms };
+                let sums = Pictured { brdf: outcome.brdf.clone(), errors: None, ..table };
                 renderer(&sums.brdf).map(|renderer| (renderer, sums))
             }
             made => made.map(|renderer| (renderer, table)),
@@ -119,7 +119,10 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let loaded = args.scene.open()?;
     let stage = Stage::new(&loaded)?;
     let tone_map = ToneMap::new(&stage.camera)?;
-    let outcome = Pipeline::new().effective(&loaded)?;
+    let cache = args.keeping.open();
+    let mut pipeline = Pipeline::new();
+    pipeline.keep_in(cache.clone());
+    let outcome = pipeline.effective(&loaded)?;
     if !args.scene.quiet {
         for warning in stage.mesh.warnings.iter().chain(&stage.lights.warnings) {
             eprintln!("note: {warning}");
@@ -133,10 +136,11 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let pictured = route.reads(&outcome)?;
     let rendered = route.render(&stage, &pictured.brdf, args.size, usize::from(args.samples))?;
     rendered.picture.write(&args.output, &tone_map)?;
+    cache::finish(&cache, args.scene.quiet);
     if args.scene.json {
         let times = rendered.times;
         let large = [
-            ("picture_table", pictured.ms),
+            (if pictured.was_kept { "cached_picture_table" } else { "picture_table" }, pictured.ms),
             ("g_buffer", times.gbuffer_ms),
             ("shadows", times.shadows_ms),
             ("shading", times.shading_ms),

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::facet_groups::{Group, Patch, patch_value, patches, rgb_areas};
 use crate::brdf::{Brdf, LobeAngles, Term};
+use crate::cache::KeyBuilder;
 use crate::geometry::Facets;
 use crate::simd::{self, Lobe, PairVectors};
 
@@ -239,6 +240,30 @@ impl FacetSum {
             }
         };
         seen * value.as_dvec3()
+    }
+
+    /// All that the sums of single lobes depend on: not colours and tints, which are multiplied on afterwards.
+    pub(crate) fn identify(&self, key: &mut KeyBuilder) {
+        for axis in &self.normals {
+            key.numbers("normals", axis);
+        }
+        key.numbers("areas", &self.areas).flags("black ones too", [self.keep_black]);
+        for group in &self.groups {
+            key.counts("group", [group.range.start, group.range.end]).flags("black", [group.is_black]);
+            for (lobe, _) in &group.lobes {
+                key.numbers("lobe", &lobe.numbers());
+            }
+            for table in &group.measured {
+                key.numbers("measured", table.content().bytes());
+            }
+            for areas in group.rgb_areas.iter().flatten() {
+                key.numbers("colored areas", areas);
+            }
+            key.flags("few normals", [group.patches.is_some()]);
+            for patch in group.patches.iter().flatten() {
+                key.counts("patch", [patch.range.start, patch.range.end]).numbers("normal", &[patch.normal]);
+            }
+        }
     }
 
     /// Whether every group has few normals and one colour: then `FewNormals` serves.

@@ -25,7 +25,7 @@ pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use forced::mean_colors;
 pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
-pub use pair_table::{Nodes, PairTable};
+pub use pair_table::{Nodes, PairTable, TableContent};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use tint::Tint;
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};

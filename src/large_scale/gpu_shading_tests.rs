@@ -302,6 +302,9 @@ impl Measured for White {
     fn name(&self) -> &str {
         "white"
     }
+    fn content(&self) -> crate::cache::Key {
+        crate::cache::Key::of_numbers::<u8>(&[])
+    }
     fn report(&self) -> &MeasuredReport {
         &self.0
     }

@@ -4,6 +4,9 @@ mod factored;
 mod findings;
 mod inputs;
 mod interreflection;
+mod kept;
+#[cfg(test)]
+mod kept_tests;
 mod make;
 mod outcome;
 mod pictures;
@@ -14,7 +17,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use self::factored::{Factored, Made, Source};
-use self::make::{grouped, names, same_lobes, sample, see};
+use self::make::{grouped, names, same_lobes, sample};
 pub use self::outcome::Outcome;
 use self::outcome::limits;
 pub use self::pictures::Pictured;
@@ -23,6 +26,7 @@ use self::stage::{Stage, Version};
 use crate::accuracy::health::{Evidence, Sight};
 use crate::accuracy::{Health, Reference};
 use crate::brdf::MeasuredCache;
+use crate::cache::Cache;
 use crate::cancel::Cancel;
 use crate::directions::{ParaboloidMap, PolarGrid};
 use crate::error::Result;
@@ -74,6 +78,7 @@ struct Last {
 #[derive(Debug, Default)]
 pub struct Pipeline {
     cache: MeasuredCache,
+    kept: Cache,
     cancel: Cancel,
     gpu: Option<Gpu>,
     gpu_asked: bool,
@@ -113,6 +118,11 @@ impl Pipeline {
         self.without_device = !allowed;
     }
 
+    /// What takes long to make is looked for in `cache` from now on, and kept there. Without this nothing is.
+    pub fn keep_in(&mut self, cache: Cache) {
+        self.kept = cache;
+    }
+
     /// The effective BRDF of a scene at its own quality.
     ///
     /// # Errors
@@ -150,14 +160,20 @@ impl Pipeline {
             settings.map_resolution,
             settings.penumbra.to_bits(),
         );
-        let (gpu, cancel) = (self.gpu.as_ref(), &self.cancel);
+        let (gpu, cancel, cache) = (self.gpu.as_ref(), &self.cancel, &self.kept);
+        let mut was_kept = false;
         let (visibility, visibility_version) = match plan.route {
             // Nothing is computed, and nothing kept.
             Route::None => (Arc::new(Visibility::Unblocked { facets: facets.len() }), 0),
             route => self.visibility.get("visibility", key, &mut times, cancel, || {
-                see(route, &shape.mesh, &facets, &settings, gpu, cancel)
+                let (seen, kept) = kept::visibility(cache, route, &shape.mesh, &facets, &settings, gpu, cancel)?;
+                was_kept = kept;
+                Ok(seen)
             })?,
         };
+        if let (true, Some((name, _))) = (was_kept, times.last_mut()) {
+            *name = kept::VISIBILITY;
+        }
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
         let (mut factors, mut earlier) = (None, None);
@@ -224,7 +240,8 @@ impl Pipeline {
             plan.factored(is_factored, errors.rel_l2);
         }
         let examined = Arc::default();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), &shape, &settings, plan.try_picture_table, earlier));
+        let pictures =
+            Arc::new(Pictures::new(brdf.clone(), &shape, &settings, plan.try_picture_table, earlier, &self.kept));
         let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
@@ -284,7 +301,7 @@ impl Pipeline {
             closes_plane: shape.mesh.closes_plane,
         };
         let notes = shape.mesh.notes.clone();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), shape, &settings, false, None));
+        let pictures = Arc::new(Pictures::new(brdf.clone(), shape, &settings, false, None, &self.kept));
         let examined = Arc::default();
         Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
     }

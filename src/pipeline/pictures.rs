@@ -2,14 +2,16 @@
 //! made when the first picture asks.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::Shape;
+use super::{Shape, kept};
 use crate::accuracy::{Errors, Pair, picture_pairs, upper_errors};
+use crate::cache::Cache;
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
 use crate::error::Result;
@@ -49,6 +51,8 @@ pub struct Pictured {
     pub errors: Option<Errors>,
     /// Milliseconds that this call spent on it.
     pub ms: f64,
+    /// Whether tables, tried or taken, were read from a cache instead of being made.
+    pub was_kept: bool,
 }
 
 /// A BRDF that pictures read before, over the same facets; and whether its lobes are the same too.
@@ -65,6 +69,9 @@ pub(super) struct Pictures {
     tolerance: (f64, f64),
     seed: u64,
     earlier: Mutex<Option<Earlier>>,
+    cache: Cache,
+    /// Tables that were made, and read.
+    tables: [AtomicUsize; 2],
     made: Mutex<Option<Pictured>>,
 }
 
@@ -76,6 +83,7 @@ impl Pictures {
         settings: &Settings,
         wanted: bool,
         earlier: Option<Earlier>,
+        cache: &Cache,
     ) -> Self {
         Self {
             exact,
@@ -85,6 +93,8 @@ impl Pictures {
             tolerance: settings.picture_tolerance,
             seed: settings.seed,
             earlier: Mutex::new(earlier),
+            cache: cache.clone(),
+            tables: Default::default(),
             made: Mutex::new(None),
         }
     }
@@ -110,7 +120,9 @@ impl Pictures {
         }
         let start = Instant::now();
         let (brdf, errors) = self.make(cancel)?;
-        let pictured = Pictured { brdf, errors, ms: start.elapsed().as_secs_f64() * 1e3 };
+        let [tables_made, read] = self.tables.each_ref().map(|count| count.load(Ordering::Relaxed));
+        let was_kept = read > 0 && tables_made == 0;
+        let pictured = Pictured { brdf, errors, ms: start.elapsed().as_secs_f64() * 1e3, was_kept };
         *made = Some(pictured.clone());
         Ok(pictured)
     }
@@ -204,7 +216,13 @@ impl Pictures {
 
     fn tabulate(&self, nodes: Nodes, cancel: &Cancel) -> Result<Option<PairTable>> {
         match self.exact.direct_form() {
-            Form::Direct(direct) => PairTable::build(direct, nodes, cancel),
+            Form::Direct(direct) => {
+                let table = kept::table(&self.cache, direct, nodes, cancel)?;
+                Ok(table.map(|(table, was_kept)| {
+                    self.tables[usize::from(was_kept)].fetch_add(1, Ordering::Relaxed);
+                    table
+                }))
+            }
             form => {
                 let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| form.sums(lights, o, |k, sum| out[k] = sum);
                 PairTable::resample(sums, nodes, cancel).map(Some)

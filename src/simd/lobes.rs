@@ -54,6 +54,17 @@ impl Lobe {
         let alpha2 = roughness * roughness;
         Self::Ggx { alpha2, scale: alpha2 / (2.0 * PI) }
     }
+
+    /// Which lobe, and its constants: equal for equal lobes only.
+    pub(crate) fn numbers(&self) -> [f32; 3] {
+        match *self {
+            Self::Lambertian => [0.0; 3],
+            Self::BlinnPhong { half_exponent, scale } => [1.0, half_exponent, scale],
+            Self::CookTorrance { inverse_m2, scale } => [2.0, inverse_m2, scale],
+            Self::Ward { inverse_alpha2, scale } => [3.0, inverse_alpha2, scale],
+            Self::Ggx { alpha2, scale } => [4.0, alpha2, scale],
+        }
+    }
 }
 
 /// What an inner loop sees of one facet. `n·h` and `|n×h|²` come from `|n-h|²`, which loses nothing near the mirror

@@ -52,6 +52,24 @@ macro_rules! multiversion {
 }
 pub(crate) use multiversion;
 
+/// The instructions that these loops run with here: others round differently.
+pub fn instructions() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl")
+        {
+            return "avx512";
+        }
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            return "avx2";
+        }
+    }
+    "baseline"
+}
+
 /// Values worked on together: enough that the compiler keeps the loop over them and vectorises it.
 pub(crate) const LANES: usize = 64;
 

@@ -21,11 +21,11 @@ use crate::simd;
 /// Visibility ends in a ramp of `ramp` radians, so that what is computed from it is continuous.
 #[derive(Debug, Clone)]
 pub struct Horizons {
-    azimuths: usize,
-    facets: usize,
-    ramp: f32,
+    pub(super) azimuths: usize,
+    pub(super) facets: usize,
+    pub(super) ramp: f32,
     /// `[azimuth][facet]`; [`Horizons::FREE`] where nothing blocks, [`Horizons::BLOCKED`] where all is.
-    elevations: Vec<f32>,
+    pub(super) elevations: Vec<f32>,
     /// Walks that ended before all was known.
     pub(super) cut_short: usize,
 }

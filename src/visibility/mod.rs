@@ -6,6 +6,7 @@
 mod gpu_maps;
 mod height_march;
 mod horizons;
+mod kept;
 mod nearest;
 mod packed;
 mod periodic_grid;

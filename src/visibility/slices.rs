@@ -22,15 +22,16 @@ use crate::simd;
 pub struct Slices {
     pub(crate) horizons: Horizons,
     /// By azimuth, in the order of their facets.
-    floating: Vec<Vec<Floating>>,
+    pub(super) floating: Vec<Vec<Floating>>,
     /// Where between two azimuths a facet changes over from one's view to the other's.
-    switch: Vec<f32>,
+    pub(super) switch: Vec<f32>,
 }
 
 /// A blocked interval of elevations [rad] above a facet's horizon.
-#[derive(Debug, Clone, Copy)]
-struct Floating {
-    facet: u32,
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(super) struct Floating {
+    pub(super) facet: u32,
     low: f32,
     high: f32,
 }

@@ -34,6 +34,7 @@ impl Desk {
     pub fn run_with(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_biscale"))
             .args(arguments)
+            .env("BISCALE_CACHE", "off")
             .envs(variables.iter().copied())
             .current_dir(self.folder.path())
             .output()

@@ -279,7 +279,7 @@ fn the_picture_that_is_asked_for_before_the_window_has_the_size_of_its_view() {
         move |ui: &mut Ui, state: &mut Option<(Editor, _)>| {
             let ctx = ui.ctx().clone();
             let (editor, _) = state.get_or_insert_with(|| {
-                let mut editor = Editor::new(&ctx, document.take().unwrap(), None);
+                let mut editor = Editor::new(&ctx, document.take().unwrap(), None, biscale::cache::Cache::off());
                 // The harness leaves 8 points free on each side.
                 editor.settings.window = [1384.0, 984.0];
                 editor.ask_early();

@@ -57,7 +57,7 @@ fn harness(document: Document) -> Harness<'static, Option<Editor>> {
         move |ui: &mut egui::Ui, editor: &mut Option<Editor>| {
             let ctx = ui.ctx().clone();
             let editor = editor.get_or_insert_with(|| {
-                let mut editor = Editor::new(&ctx, document.take().unwrap(), None);
+                let mut editor = Editor::new(&ctx, document.take().unwrap(), None, biscale::cache::Cache::off());
                 // Thumbnails are not what is tested.
                 editor.settings.gallery = false;
                 editor

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use biscale::cache::Cache;
 use biscale::close_up::CloseUp;
 use biscale::export::tile::TileOptions;
 use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
@@ -76,18 +77,19 @@ pub enum ExportAnswer {
     Cancelled,
 }
 
-pub fn work(job: &ExportJob, desk: &Desk<ExportJob>, answer: &(dyn Fn(ExportAnswer) + Sync)) {
-    answer(match export(job, desk.cancel, answer) {
+pub fn work(job: &ExportJob, cache: &Cache, desk: &Desk<ExportJob>, answer: &(dyn Fn(ExportAnswer) + Sync)) {
+    answer(match export(job, cache, desk.cancel, answer) {
         Ok(text) => ExportAnswer::Done(text),
         Err(Error::Cancelled) => ExportAnswer::Cancelled,
         Err(error) => ExportAnswer::Failed(error.to_string()),
     });
 }
 
-fn export(job: &ExportJob, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Sync)) -> Result<String> {
+fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Sync)) -> Result<String> {
     answer(ExportAnswer::Progress(0.0, "Computing the material"));
     let mut pipeline = Pipeline::new();
     pipeline.cancel_with(cancel.clone());
+    pipeline.keep_in(cache.clone());
     // Each is told as a part of what it is called.
     let telling = |what: &'static str| {
         move |part: f32| {

@@ -15,6 +15,8 @@ mod tone;
 use std::sync::Arc;
 use std::time::Duration;
 
+use biscale::cache::Cache;
+
 use super::document::Snapshot;
 
 pub use accuracy::{AccuracyAnswer, AccuracyJob, Point};
@@ -51,10 +53,11 @@ pub struct Pictures {
 
 impl Pictures {
     /// `None` where the system gives no threads.
-    pub fn spawn(answer: impl Fn(PictureAnswer) + Clone + Send + Sync + 'static) -> Option<Self> {
+    pub fn spawn(cache: &Cache, answer: impl Fn(PictureAnswer) + Clone + Send + Sync + 'static) -> Option<Self> {
         let shared = Arc::new(shared::Shared::default());
         let told_devices = shared.clone();
-        let start = move || picture::Photographer::new(shared.clone());
+        let cache = cache.clone();
+        let start = move || picture::Photographer::new(shared.clone(), &cache);
         let (draft, refine, told, told_too) = (answer.clone(), answer.clone(), answer.clone(), answer);
         let draft_work = move |kept: &mut picture::Photographer, job: PictureJob, desk: &runner::Desk<PictureJob>| {
             kept.draft(&job, desk, &draft);
@@ -119,9 +122,14 @@ pub fn spawn_accuracy(answer: impl Fn(AccuracyAnswer) + Clone + Send + Sync + 's
 }
 
 /// The thread that exports.
-pub fn spawn_export(answer: impl Fn(ExportAnswer) + Clone + Send + Sync + 'static) -> Option<Worker<ExportJob>> {
+pub fn spawn_export(
+    cache: &Cache,
+    answer: impl Fn(ExportAnswer) + Clone + Send + Sync + 'static,
+) -> Option<Worker<ExportJob>> {
     let told = answer.clone();
-    let work = move |_: &mut (), job: ExportJob, desk: &runner::Desk<ExportJob>| export::work(&job, desk, &answer);
+    let cache = cache.clone();
+    let work =
+        move |_: &mut (), job: ExportJob, desk: &runner::Desk<ExportJob>| export::work(&job, &cache, desk, &answer);
     let panicked = move |text: String| told(ExportAnswer::Failed(format!("a fault in the program ({text})")));
     Worker::spawn("export", 0, || (), work, panicked).ok()
 }

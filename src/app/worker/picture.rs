@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use biscale::cache::Cache;
 use biscale::close_up::CloseUp;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::pipeline::{Outcome, Pipeline};
@@ -47,8 +48,9 @@ pub struct Photographer {
 const FIRST_COST: f64 = 2e-2;
 
 impl Photographer {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        let (pipeline, studio) = (Pipeline::new(), Studio::default());
+    pub fn new(shared: Arc<Shared>, cache: &Cache) -> Self {
+        let (mut pipeline, studio) = (Pipeline::new(), Studio::default());
+        pipeline.keep_in(cache.clone());
         Self { shared, pipeline, studio, close: None, cost: [FIRST_COST; 2], backend: String::new() }
     }
 

@@ -6,6 +6,7 @@
 //! `w_c` (DESIGN.md, Sec. 4, "Interpolate only what is smooth"). Colours are in the weights: editing them keeps the table.
 
 mod columns;
+mod content;
 mod facet_columns;
 
 use std::sync::Arc;
@@ -14,6 +15,7 @@ use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use self::columns::{Column, Weight};
+pub use self::content::TableContent;
 use super::facet_sum::FacetSum;
 use super::{Direct, Interpolation, Tint};
 use crate::accuracy::Pair;

@@ -1,0 +1,100 @@
+//! The content of a stage's inputs as one number.
+
+use super::Build;
+
+/// Counts changes of what is kept and how it is written.
+const FORMAT: u32 = 1;
+
+/// 256 bits (BLAKE3) of all that a result depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Key(pub(super) [u8; 32]);
+
+/// Gathers inputs, each under a name and with its length, so that no two lists of inputs run together to the same bytes.
+#[derive(Debug, Clone)]
+pub struct KeyBuilder(blake3::Hasher);
+
+impl KeyBuilder {
+    pub(super) fn new(kind: &str, build: &Build) -> Self {
+        let mut key = Self(blake3::Hasher::new());
+        key.numbers("format", &[FORMAT]).numbers("build", &build.bytes()).numbers("kind", kind.as_bytes());
+        key
+    }
+
+    #[cfg(test)]
+    pub(crate) fn for_tests() -> Self {
+        Self(blake3::Hasher::new())
+    }
+
+    /// The bits of numbers or vectors: 0 and -0 differ.
+    pub fn numbers<T: bytemuck::NoUninit>(&mut self, name: &str, numbers: &[T]) -> &mut Self {
+        let bytes: &[u8] = bytemuck::cast_slice(numbers);
+        for part in [name.as_bytes(), bytes] {
+            self.0.update(&(part.len() as u64).to_le_bytes());
+            self.0.update(part);
+        }
+        self
+    }
+
+    /// Sizes and counts.
+    pub fn counts(&mut self, name: &str, counts: impl IntoIterator<Item = usize>) -> &mut Self {
+        let counts: Vec<u64> = counts.into_iter().map(|count| count as u64).collect();
+        self.numbers(name, &counts)
+    }
+
+    /// What is there or not there.
+    pub fn flags(&mut self, name: &str, flags: impl IntoIterator<Item = bool>) -> &mut Self {
+        let flags: Vec<u8> = flags.into_iter().map(u8::from).collect();
+        self.numbers(name, &flags)
+    }
+
+    pub fn finish(&self) -> Key {
+        Key(*self.0.finalize().as_bytes())
+    }
+}
+
+impl Key {
+    /// For tests and for parts of other keys: that of numbers alone.
+    pub fn of_numbers<T: bytemuck::NoUninit>(numbers: &[T]) -> Self {
+        Self(*blake3::hash(bytemuck::cast_slice(numbers)).as_bytes())
+    }
+
+    pub fn bytes(&self) -> &[u8; 32] {
+        &self.0
+    }
+
+    pub(super) fn name(&self) -> String {
+        blake3::Hash::from_bytes(self.0).to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(kind: &str, inputs: impl FnOnce(&mut KeyBuilder)) -> Key {
+        let mut key = KeyBuilder::new(kind, &Build::of_this_program().unwrap());
+        inputs(&mut key);
+        key.finish()
+    }
+
+    #[test]
+    fn inputs_do_not_run_together() {
+        let keys = [
+            key("a", |_| {}),
+            key("b", |_| {}),
+            key("a", |key| _ = key.numbers("x", &[1_u8, 2])),
+            key("a", |key| _ = key.numbers("x", &[1_u8]).numbers("x", &[2_u8])),
+            key("a", |key| _ = key.numbers("y", &[1_u8, 2])),
+            key("a", |key| _ = key.numbers::<f32>("x", &[])),
+            key("a", |key| _ = key.numbers("x", &[0.0_f32])),
+            key("a", |key| _ = key.numbers("x", &[-0.0_f32])),
+            key("a", |key| _ = key.numbers("x", &[0.0_f32, 0.0])),
+        ];
+        for (k, a) in keys.iter().enumerate() {
+            for b in &keys[..k] {
+                assert_ne!(a, b, "{k}");
+            }
+        }
+        assert_eq!(keys[2], key("a", |key| _ = key.numbers("x", &[1_u8, 2])));
+    }
+}
