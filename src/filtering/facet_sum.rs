@@ -6,7 +6,7 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 
 use super::facet_groups::{Group, Patch, patch_value, patches, rgb_areas};
-use crate::brdf::{Brdf, LobeAngles, Term};
+use crate::brdf::{Brdf, LobeAngles, Measured, Term};
 use crate::cache::KeyBuilder;
 use crate::geometry::Facets;
 use crate::simd::{self, Lobe, PairVectors};
@@ -190,12 +190,51 @@ impl FacetSum {
         [&self.normals[0][range.clone()], &self.normals[1][range.clone()], &self.normals[2][range]]
     }
 
-    fn group_sum(&self, group: &Group, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
+    /// One measured BRDF over a group's facets, each channel with its own colour weights. Visibilities are those of all facets.
+    pub(crate) fn measured_sum(
+        &self,
+        group: &Group,
+        table: &dyn Measured,
+        pair: &PairVectors,
+        v_i: &[f32],
+        v_o: &[f32],
+    ) -> DVec3 {
+        const MOST: usize = 64;
+        let mut angles = Vec::with_capacity(MOST);
+        let mut weights = Vec::with_capacity(MOST);
+        let mut values = [Vec3::ZERO; MOST];
+        let mut total = DVec3::ZERO;
+        let Range { start, end } = group.range;
+        for first in (start..end).step_by(MOST) {
+            angles.clear();
+            weights.clear();
+            for s in first..(first + MOST).min(end) {
+                let seen = v_i[s] * v_o[s];
+                if seen <= 0.0 {
+                    continue;
+                }
+                let facet = LobeAngles::new(self.facet(s).0, pair.i, pair.o, pair.h);
+                if facet.n_dot_i > 0.0 && facet.n_dot_o > 0.0 {
+                    let weight = match &group.rgb_areas {
+                        None => Vec3::splat(self.areas[s]),
+                        Some([r, g, b]) => Vec3::new(r[s - start], g[s - start], b[s - start]),
+                    };
+                    weights.push(weight * (facet.n_dot_i * facet.n_dot_o * seen));
+                    angles.push(facet);
+                }
+            }
+            table.f_r_many(&angles, &mut values);
+            total += values.iter().zip(&weights).map(|(value, weight)| (*value * *weight).as_dvec3()).sum::<DVec3>();
+        }
+        total
+    }
+
+    fn group_sum(&self, group: &Group, pair: &PairVectors, v_i_all: &[f32], v_o_all: &[f32]) -> DVec3 {
         if let Some(patches) = &group.patches {
-            return patches.iter().map(|patch| self.patch_sum(group, patch, pair, v_i, v_o)).sum();
+            return patches.iter().map(|patch| self.patch_sum(group, patch, pair, v_i_all, v_o_all)).sum();
         }
         let range = group.range.clone();
-        let (v_i, v_o) = (&v_i[range.clone()], &v_o[range.clone()]);
+        let (v_i, v_o) = (&v_i_all[range.clone()], &v_o_all[range.clone()]);
         let normals = self.normals(range.clone());
         let mut total = DVec3::ZERO;
         for (lobe, term) in &group.lobes {
@@ -209,21 +248,7 @@ impl FacetSum {
                 };
         }
         for table in &group.measured {
-            for s in 0..range.len() {
-                let seen = v_i[s] * v_o[s];
-                if seen <= 0.0 {
-                    continue;
-                }
-                let normal = Vec3::new(normals[0][s], normals[1][s], normals[2][s]);
-                let angles = LobeAngles::new(normal, pair.i, pair.o, pair.h);
-                if angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
-                    let weight = match &group.rgb_areas {
-                        None => Vec3::splat(self.areas[range.start + s]),
-                        Some([r, g, b]) => Vec3::new(r[s], g[s], b[s]),
-                    };
-                    total += (table.f_r(&angles) * (weight * (angles.n_dot_i * angles.n_dot_o * seen))).as_dvec3();
-                }
-            }
+            total += self.measured_sum(group, table.as_ref(), pair, v_i_all, v_o_all);
         }
         total
     }

@@ -181,9 +181,13 @@ impl Pictures {
     /// A table on this grid, if a trial of some of its nodes is close enough; from fewer facets where that is no worse.
     fn attempt(&self, grid: UpperPairs, check: &Check, cancel: &Cancel) -> Result<Attempt> {
         let mirrors = self.mirrored.as_ref().map_or([false; 2], |shape| mirror_planes(&shape.mesh));
-        // What hangs over each facet is what makes sums slow.
+        // What hangs over each facet makes sums slow, and so does a look-up for each.
         let slow = match self.exact.direct_form() {
-            Form::Direct(direct) if matches!(*direct.visibility, Visibility::Slices(_)) => direct.sum.facet_count(),
+            Form::Direct(direct)
+                if matches!(*direct.visibility, Visibility::Slices(_)) || direct.sum.measured_count() > 0 =>
+            {
+                direct.sum.facet_count()
+            }
             _ => 0,
         };
         let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };

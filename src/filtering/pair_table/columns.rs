@@ -64,12 +64,34 @@ impl Column {
         (columns.len() <= MOST_COLUMNS).then_some(columns)
     }
 
-    /// The column's sum at a pair of directions, from the visibilities along them.
-    pub(super) fn sum(&self, sum: &FacetSum, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> f64 {
-        match self.part {
-            Part::Lobe(lobe) => sum.lobe_sum(self.group, lobe, self.channel, pair, v_i, v_o),
-            Part::Area(patch) => sum.visible_area(self.group, patch, self.channel, v_i, v_o),
-            Part::Measured { table, color } => sum.measured_sum(self.group, table, self.channel, color, pair, v_i, v_o),
+    /// The sums of columns at a pair of directions, from the visibilities along them.
+    pub(super) fn sums(
+        columns: &[Self],
+        sum: &FacetSum,
+        pair: &PairVectors,
+        v_i: &[f32],
+        v_o: &[f32],
+        out: &mut [f32],
+    ) {
+        // All colours of a measured BRDF come from one walk over the facets.
+        let mut last = None;
+        for (column, out) in columns.iter().zip(out) {
+            let Self { group, channel, .. } = *column;
+            *out = match column.part {
+                Part::Lobe(lobe) => sum.lobe_sum(group, lobe, channel, pair, v_i, v_o),
+                Part::Area(patch) => sum.visible_area(group, patch, channel, v_i, v_o),
+                Part::Measured { table, color } => {
+                    let colors = match last {
+                        Some((of, colors)) if of == (group, table) => colors,
+                        _ => {
+                            let group = &sum.groups()[group];
+                            sum.measured_sum(group, group.measured[table].as_ref(), pair, v_i, v_o)
+                        }
+                    };
+                    last = Some(((group, table), colors));
+                    colors[color]
+                }
+            } as f32;
         }
     }
 

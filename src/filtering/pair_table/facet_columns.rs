@@ -1,6 +1,5 @@
 //! Single columns of a sum over facets: one lobe, one colour, one normal.
 
-use crate::brdf::LobeAngles;
 use crate::filtering::facet_groups::Group;
 use crate::filtering::facet_sum::FacetSum;
 use crate::simd::{self, PairVectors};
@@ -45,31 +44,5 @@ impl FacetSum {
         let range = patch.range.clone();
         let weights = &self.weights(group, channel)[range.start - group.range.start..range.end - group.range.start];
         simd::masked_sum([weights], &v_i[range.clone()], &v_o[range])[0]
-    }
-
-    /// One colour of one measured BRDF of one group.
-    #[expect(clippy::too_many_arguments, reason = "what to sum, and where")]
-    pub(crate) fn measured_sum(
-        &self,
-        group: usize,
-        table: usize,
-        channel: Option<usize>,
-        color: usize,
-        pair: &PairVectors,
-        v_i: &[f32],
-        v_o: &[f32],
-    ) -> f64 {
-        let group = &self.groups()[group];
-        let (range, weights) = (group.range.clone(), self.weights(group, channel));
-        let mut total = 0.0;
-        for (s, weight) in range.zip(weights) {
-            let seen = v_i[s] * v_o[s];
-            let angles = LobeAngles::new(self.facet(s).0, pair.i, pair.o, pair.h);
-            if seen > 0.0 && angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
-                let value = group.measured[table].f_r(&angles)[color];
-                total += f64::from(value * weight * (angles.n_dot_i * angles.n_dot_o * seen));
-            }
-        }
-        total
     }
 }

@@ -112,9 +112,7 @@ impl PairTable {
             let direct = sampled.as_ref().unwrap_or(direct);
             let pair = PairVectors::new(i, o);
             direct.with_seen(i, o, |v_i, v_o| {
-                for (column, sum) in columns.iter().zip(sums) {
-                    *sum = column.sum(&direct.sum, &pair, v_i, v_o) as f32;
-                }
+                Column::sums(&columns, &direct.sum, &pair, v_i, v_o, sums);
             });
         });
         table.map(Some)
