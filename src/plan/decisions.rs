@@ -56,7 +56,9 @@ pub(super) fn picture_table(
 ) -> bool {
     let direct_ms = PICTURE_QUERIES * query_ms;
     let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
-    let making_ms = settings.picture_grids.first().map(|grid| grid.nodes() as f64 * query_ms);
+    let spared = settings.effects.mirror_symmetry != Switch::Off;
+    let mirrors = found.mirrors.filter(|_| spared).unwrap_or_default();
+    let making_ms = settings.picture_grids.first().map(|grid| grid.originals(mirrors) as f64 * query_ms);
     let pays = !found.flat && making_ms.is_some_and(|ms| ms + table_ms < direct_ms);
     let on = is_on(settings.effects.picture_table, pays);
     let thinned = horizons && found.distinct_normals.is_some();

@@ -120,10 +120,10 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     };
     note("visibility", route != Route::None, what, predicted);
 
-    let direct_query =
-        (found.lobes as f64 * costs.lobe_ns + found.lookups as f64 * costs.lookup_ns + facets * costs.facet_fill_ns)
-            * 1e-6
-            / costs.threads;
+    let fill_ns = if route == Route::Slices { costs.slice_fill_ns } else { costs.facet_fill_ns };
+    let direct_query = (found.lobes as f64 * costs.lobe_ns + found.lookups as f64 * costs.lookup_ns + facets * fill_ns)
+        * 1e-6
+        / costs.threads;
     let direct_ms = PICTURE_QUERIES * direct_query;
     let low_rank_ms = 800.0 + PICTURE_QUERIES * costs.factor_query_ns * 1e-6 / costs.threads;
     let allowed = !matches!(settings.preset, Preset::Reference | Preset::Wu2011);

@@ -58,7 +58,9 @@ pub struct Findings {
 pub struct Costs {
     pub lobe_ns: f64,
     pub lookup_ns: f64,
+    /// Visibility of a facet along both directions of a pair: from horizons or maps, and from slices.
     pub facet_fill_ns: f64,
+    pub slice_fill_ns: f64,
     pub march_ns: f64,
     pub scan_ns: f64,
     pub factor_query_ns: f64,
@@ -73,13 +75,14 @@ impl Default for Costs {
     fn default() -> Self {
         Self {
             lobe_ns: 1.5,
-            lookup_ns: 30.0,
+            lookup_ns: 15.0,
             facet_fill_ns: 0.3,
-            march_ns: 1_000.0,
-            scan_ns: 1_000.0,
+            slice_fill_ns: 3.1,
+            march_ns: 1_600.0,
+            scan_ns: 250.0,
             factor_query_ns: 1_500.0,
-            table_query_ns: 120.0,
-            slice_ns: 18.0,
+            table_query_ns: 100.0,
+            slice_ns: 52.0,
             triangle_ns: 60.0,
             texel_ns: 10.0,
             threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),

@@ -16,7 +16,7 @@ pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub use pairs::{LightPairs, azimuth_and_elevation, pair_places, pair_vectors};
 pub use rows::{RowGrid, row_sums};
 pub use visibility::{
-    SWITCH, blend_bits, ground_sum, ground_visibility, masked_sum, projected_area, stepped_visibility,
+    SWITCH, blend_bits, ground_sum, ground_visibility, interval_cover, masked_sum, projected_area, stepped_visibility,
 };
 
 /// Compiles a function for the baseline, AVX2 and AVX-512, and picks at run time.

@@ -39,8 +39,9 @@ fn taps(grid: RowGrid, places: &[[f32; LANES]; 5], count: usize, cubic: bool) ->
     let mut taps = Taps { starts: [[0; LANES]; 8], corners: [[0.0; LANES]; 8], along: [[0.0; LANES]; 4] };
     let [rings, azimuths, turns, stored, fours] =
         [grid.rings, grid.azimuths, grid.turn, grid.stored, grid.fours].map(|n| n as i32);
+    let [on_rings, on_azimuths, on_turns, on_steps, _] = places;
     for k in 0..count.min(LANES) {
-        let [ring, azimuth, turn, step] = [places[0][k], places[1][k], places[2][k], places[3][k]];
+        let [ring, azimuth, turn, step] = [on_rings[k], on_azimuths[k], on_turns[k], on_steps[k]];
         let low_ring = (ring as i32).clamp(0, rings - 2);
         let t = ring - low_ring as f32;
         let (azimuth, a) = around(azimuth, azimuths);
@@ -88,9 +89,9 @@ fn read<const F: usize>(values: &[Vec4], taps: &Taps, k: usize, out: &mut [Vec4]
     }
     for (four, out) in out[..F].iter_mut().enumerate() {
         let mut sums = [0.0_f32; 4];
-        for node in 0..4 {
+        for (node, along) in nodes.iter().zip(&taps.along) {
             for c in 0..4 {
-                sums[c] += taps.along[node][k] * nodes[node][four][c];
+                sums[c] += along[k] * node[four][c];
             }
         }
         *out = Vec4::from_array(sums);

@@ -39,6 +39,19 @@ multiversion! {
 }
 
 multiversion! {
+    /// How much each interval `(low, high)` of elevations takes off what its facet sees at an elevation, in `[0, 1]`, where
+    /// it belongs to the azimuth before (`side` 0) or after (1) and its facet changes over as in [`stepped_visibility`].
+    pub fn interval_cover(low: &[f32], high: &[f32], turn: (&[f32], f32, f32), elevation: f32, sharpness: f32, out: &mut [f32]) {
+        let (switch, blend, side) = turn;
+        for (((out, &low), &high), &switch) in out.iter_mut().zip(low).zip(high).zip(switch) {
+            let changed = ((blend - switch) * SWITCH + 0.5).clamp(0.0, 1.0);
+            let covered = soft_step((elevation - low) * sharpness) - soft_step((elevation - high) * sharpness);
+            *out = (1.0 - (side - changed).abs()) * covered;
+        }
+    }
+}
+
+multiversion! {
     /// Bits of four rows, weighted and summed: facet `first + k` into `out[k]`.
     pub fn blend_bits(rows: [&[u32]; 4], weights: [f32; 4], first: usize, out: &mut [f32]) {
         let word_at = |row: &[u32], k: usize| -> u32 {

@@ -1,6 +1,6 @@
 //! Visibility as it is kept between runs, and as an input of what is.
 
-use super::slices::Floating;
+use super::slices::Hanging;
 use super::{Horizons, PackedVisibility, Slices, SoftMaps, Visibility};
 use crate::cache::{KeyBuilder, Reader, Stored, Writer};
 use crate::directions::PolarGrid;
@@ -13,8 +13,8 @@ impl Visibility {
             Self::Horizons(horizons) => identify_horizons(horizons, key),
             Self::Slices(slices) => {
                 identify_horizons(&slices.horizons, key);
-                for above in &slices.floating {
-                    key.numbers("above", above);
+                for Hanging { facets, low, high, .. } in &slices.hanging {
+                    key.numbers("above", facets).numbers("from", low).numbers("to", high);
                 }
                 key.numbers("switch", &slices.switch)
             }
@@ -51,8 +51,12 @@ impl Stored for Visibility {
             Self::Slices(slices) => {
                 out.count(SLICES);
                 write_horizons(&slices.horizons, out);
-                slices.floating.iter().for_each(|above| out.numbers(above));
                 out.numbers(&slices.switch);
+                for Hanging { facets, low, high, .. } in &slices.hanging {
+                    out.numbers(facets);
+                    out.numbers(low);
+                    out.numbers(high);
+                }
             }
             Self::Maps(SoftMaps { grid, packed }) => {
                 out.count(MAPS);
@@ -69,15 +73,19 @@ impl Stored for Visibility {
             HORIZONS => Self::Horizons(read_horizons(from)?),
             SLICES => {
                 let horizons = read_horizons(from)?;
-                let floating =
-                    (0..horizons.azimuths).map(|_| from.numbers()).collect::<Option<Vec<Vec<Floating>>>>()?;
-                let in_order = |above: &Vec<Floating>| {
-                    above.is_sorted_by_key(|hanging| hanging.facet)
-                        && above.last().is_none_or(|last| (last.facet as usize) < horizons.facets)
-                };
-                let switch: Vec<f32> = from.numbers()?;
-                let fits = floating.iter().all(in_order) && switch.len() == horizons.facets;
-                fits.then_some(Self::Slices(Slices { horizons, floating, switch }))?
+                let switch: Vec<f32> = from.numbers().filter(|switch: &Vec<f32>| switch.len() == horizons.facets)?;
+                let hanging = (0..horizons.azimuths).map(|_| {
+                    let (facets, low, high): (Vec<u32>, Vec<f32>, Vec<f32>) =
+                        (from.numbers()?, from.numbers()?, from.numbers()?);
+                    let fits = facets.is_sorted()
+                        && facets.last().is_none_or(|last| (*last as usize) < horizons.facets)
+                        && [low.len(), high.len()] == [facets.len(); 2];
+                    let intervals =
+                        facets.into_iter().zip(low).zip(high).map(|((facet, low), high)| (facet, low, high));
+                    fits.then(|| Hanging::new(intervals, &switch))
+                });
+                let hanging = hanging.collect::<Option<_>>()?;
+                Self::Slices(Slices { horizons, hanging, switch })
             }
             MAPS => {
                 let [rings, azimuths] = [from.count()?, from.count()?];

@@ -21,20 +21,69 @@ use crate::simd;
 #[derive(Debug, Clone)]
 pub struct Slices {
     pub(crate) horizons: Horizons,
-    /// By azimuth, in the order of their facets.
-    pub(super) floating: Vec<Vec<Floating>>,
+    /// By azimuth.
+    pub(super) hanging: Vec<Hanging>,
     /// Where between two azimuths a facet changes over from one's view to the other's.
     pub(super) switch: Vec<f32>,
 }
 
-/// A blocked interval of elevations [rad] above a facet's horizon.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(super) struct Floating {
-    pub(super) facet: u32,
-    low: f32,
-    high: f32,
+/// What hangs above the facets along one azimuth: blocked intervals of elevations [rad] above the horizon, in the order of
+/// their facets.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Hanging {
+    pub(super) facets: Vec<u32>,
+    pub(super) low: Vec<f32>,
+    pub(super) high: Vec<f32>,
+    /// [`Slices::switch`] of the facet.
+    switch: Vec<f32>,
 }
+
+impl Hanging {
+    /// Facet, low and high of each interval, in the order of facets.
+    pub(super) fn new(intervals: impl Iterator<Item = (u32, f32, f32)>, switch: &[f32]) -> Self {
+        let mut hanging = Self::default();
+        for (facet, low, high) in intervals {
+            hanging.facets.push(facet);
+            hanging.low.push(low);
+            hanging.high.push(high);
+            hanging.switch.push(switch[facet as usize]);
+        }
+        hanging
+    }
+
+    /// Those of the facets that have a place, which is their new number.
+    fn picked(&self, places: &[u32]) -> Self {
+        let count = self.facets.len();
+        let (mut facets, mut columns) = (vec![0; count], [(); 3].map(|()| vec![0.0; count]));
+        let mut kept = 0;
+        // Every interval is written, and stays where it counts: which ones do cannot be foreseen, so a branch would cost more.
+        for k in 0..count {
+            let place = places[self.facets[k] as usize];
+            facets[kept] = place;
+            for (column, from) in columns.iter_mut().zip([&self.low, &self.high, &self.switch]) {
+                column[kept] = from[k];
+            }
+            kept += usize::from(place != NOWHERE);
+        }
+        facets.truncate(kept);
+        columns.iter_mut().for_each(|column| column.truncate(kept));
+        let [low, high, switch] = columns;
+        Self { facets, low, high, switch }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (u32, f32, f32)> {
+        self.facets.iter().zip(&self.low).zip(&self.high).map(|((facet, low), high)| (*facet, *low, *high))
+    }
+
+    /// Where the intervals of a run of facets stand.
+    fn of(&self, facets: &Range<usize>) -> Range<usize> {
+        let place = |facet: usize| self.facets.partition_point(|&hanging| (hanging as usize) < facet);
+        place(facets.start)..place(facets.end)
+    }
+}
+
+/// The place of a facet that is not picked.
+const NOWHERE: u32 = u32::MAX;
 
 /// 2³² over the golden ratio.
 const GOLDEN: u32 = 2_654_435_769;
@@ -60,34 +109,33 @@ impl Slices {
     /// Slices the mesh along every azimuth, for every facet. Visibility ends in ramps of `ramp` radians.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
-        let scanned: Vec<(Vec<f32>, Vec<Floating>, usize)> = (0..azimuths)
+        // The golden ratio's multiples fill [0, 1] evenly, for neighbours too.
+        let switch: Vec<f32> =
+            (0..facets.len() as u32).map(|k| k.wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0).collect();
+        let scanned: Vec<(Vec<f32>, Hanging, usize)> = (0..azimuths)
             .into_par_iter()
             .map(|azimuth| {
                 let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
                 let (mut row, mut above) = (vec![0.0; facets.len()], Vec::new());
                 let cut_short = scan_all(&slicer.turned(along), facets, &origins, &mut |facet, blocked| {
                     row[facet as usize] = blocked.ground;
-                    above.extend(blocked.floating_unfaced().map(|(low, high)| Floating {
-                        facet,
-                        low: low.atan(),
-                        high: if high == f32::INFINITY { Horizons::BLOCKED } else { high.atan() },
+                    above.extend(blocked.floating_unfaced().map(|(low, high)| {
+                        (facet, low.atan(), if high == f32::INFINITY { Horizons::BLOCKED } else { high.atan() })
                     }));
                 });
-                above.sort_by_key(|hanging: &Floating| hanging.facet);
-                (row, above, cut_short)
+                above.sort_by_key(|interval| interval.0);
+                (row, Hanging::new(above.into_iter(), &switch), cut_short)
             })
             .collect();
-        let (mut rows, mut floating, mut cut_short) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
+        let (mut rows, mut hanging, mut cut_short) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
         for (row, above, short) in scanned {
             rows.extend(row);
-            floating.push(above);
+            hanging.push(above);
             cut_short += short;
         }
         let mut horizons = Horizons::from_slopes(facets.len(), azimuths, ramp, rows);
         horizons.cut_short = cut_short;
-        // The golden ratio's multiples fill [0, 1] evenly, for neighbours too.
-        let switch = (0..facets.len() as u32).map(|k| k.wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0).collect();
-        Self { horizons, floating, switch }
+        Self { horizons, hanging, switch }
     }
 
     pub fn facets(&self) -> usize {
@@ -95,8 +143,8 @@ impl Slices {
     }
 
     pub fn bytes(&self) -> usize {
-        let floating: usize = self.floating.iter().map(Vec::len).sum();
-        self.horizons.bytes() + floating * size_of::<Floating>()
+        let intervals: usize = self.hanging.iter().map(|hanging| hanging.facets.len()).sum();
+        self.horizons.bytes() + intervals * size_of::<(u32, [f32; 3])>()
     }
 
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
@@ -105,42 +153,37 @@ impl Slices {
         let [(from, _), (to, blend)] = self.horizons.taps(azimuth);
         let sharpness = 1.0 / self.horizons.ramp();
         let row = |azimuth: usize| &self.horizons.row(azimuth)[range.clone()];
-        let switch = &self.switch[range.clone()];
-        simd::stepped_visibility(row(from), row(to), switch, blend, elevation, sharpness, out);
-        let above = |edge: f32| ((elevation - edge) * sharpness + 0.5).clamp(0.0, 1.0);
+        simd::stepped_visibility(row(from), row(to), &self.switch[range.clone()], blend, elevation, sharpness, out);
+        // What each interval covers in whole vectors first: one by one it took half of a sum's time.
+        const MOST: usize = 256;
+        let mut covered = [0.0; MOST];
         for (azimuth, side) in [(from, 0.0), (to, 1.0)] {
-            for hanging in self.run(azimuth, &range) {
-                let at = hanging.facet as usize - range.start;
-                let changed = ((blend - switch[at]) * simd::SWITCH + 0.5).clamp(0.0, 1.0);
-                let weight = 1.0 - (side - changed).abs();
-                let covered = above(hanging.low) - above(hanging.high);
-                out[at] = (out[at] - weight * covered).max(0.0);
+            let (hanging, run) = (&self.hanging[azimuth], self.hanging[azimuth].of(&range));
+            for first in run.clone().step_by(MOST) {
+                let part = first..(first + MOST).min(run.end);
+                let covered = &mut covered[..part.len()];
+                let (low, high) = (&hanging.low[part.clone()], &hanging.high[part.clone()]);
+                let turn = (&hanging.switch[part.clone()], blend, side);
+                simd::interval_cover(low, high, turn, elevation, sharpness, covered);
+                for (facet, covered) in hanging.facets[part].iter().zip(covered) {
+                    let out = &mut out[*facet as usize - range.start];
+                    *out = (*out - *covered).max(0.0);
+                }
             }
         }
     }
 
     /// Those of some of the facets, in ascending order.
     pub(super) fn picked(&self, facets: &[usize]) -> Self {
-        let mut places = vec![u32::MAX; self.facets()];
+        let mut places = vec![NOWHERE; self.facets()];
         for (place, &facet) in facets.iter().enumerate() {
             places[facet] = place as u32;
         }
-        let row = |row: &Vec<Floating>| -> Vec<Floating> {
-            let moved = row.iter().map(|hanging| Floating { facet: places[hanging.facet as usize], ..*hanging });
-            moved.filter(|hanging| hanging.facet != u32::MAX).collect()
-        };
         Self {
             horizons: self.horizons.picked(facets),
-            floating: self.floating.iter().map(row).collect(),
+            hanging: self.hanging.iter().map(|hanging| hanging.picked(&places)).collect(),
             switch: facets.iter().map(|&facet| self.switch[facet]).collect(),
         }
-    }
-
-    /// What hangs above a run of facets along one azimuth.
-    fn run(&self, azimuth: usize, range: &Range<usize>) -> &[Floating] {
-        let row = &self.floating[azimuth];
-        let place = |facet: usize| row.partition_point(|hanging| (hanging.facet as usize) < facet);
-        &row[place(range.start)..place(range.end)]
     }
 
     /// What hangs over each facet along each azimuth, the azimuths of a facet side by side: where the intervals
@@ -149,8 +192,8 @@ impl Slices {
         let (mut starts, mut intervals) = (vec![0], Vec::new());
         for facet in 0..self.facets() {
             for azimuth in 0..self.horizons.azimuths() {
-                let run = self.run(azimuth, &(facet..facet + 1));
-                intervals.extend(run.iter().map(|hanging| (hanging.low, hanging.high)));
+                let hanging = &self.hanging[azimuth];
+                intervals.extend(hanging.of(&(facet..facet + 1)).map(|k| (hanging.low[k], hanging.high[k])));
                 starts.push(intervals.len() as u32);
             }
         }
@@ -171,9 +214,9 @@ impl Slices {
                         packed.set_visible(node, facet);
                     }
                 }
-                for hanging in &self.floating[azimuth] {
-                    if hanging.low <= elevation && elevation <= hanging.high {
-                        packed.set_blocked(node, hanging.facet as usize);
+                for (facet, low, high) in self.hanging[azimuth].iter() {
+                    if low <= elevation && elevation <= high {
+                        packed.set_blocked(node, facet as usize);
                     }
                 }
             }
