@@ -19,6 +19,8 @@ mod wu2011;
 
 use glam::Vec3;
 
+use crate::simd::cubic_weights;
+
 pub use bvndf::VisibilityRows;
 pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
@@ -50,14 +52,8 @@ pub enum Interpolation {
 impl Interpolation {
     /// Weights of four samples about a place `t` of the way from the second to the third.
     fn weights(self, t: f32) -> [f32; 4] {
-        let (t2, t3) = (t * t, t * t * t);
         match self {
-            Self::Cubic => [
-                0.5 * (2.0 * t2 - t - t3),
-                0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
-                0.5 * (t + 4.0 * t2 - 3.0 * t3),
-                0.5 * (t3 - t2),
-            ],
+            Self::Cubic => cubic_weights(t),
             Self::Linear => [0.0, 1.0 - t, t, 0.0],
         }
     }

@@ -36,6 +36,13 @@ pub(crate) fn ln_one_minus(s: f32) -> f32 {
     series + k as f32 * std::f32::consts::LN_2 + lost
 }
 
+/// Weights of four even samples about a place `t` of the way from the second to the third (Catmull and Rom 1974).
+#[inline(always)]
+pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [0.5 * (2.0 * t2 - t - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -13,6 +13,7 @@ mod visibility;
 
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
+pub(crate) use math::cubic_weights;
 pub use pairs::{LightPairs, azimuth_and_elevation, pair_places, pair_vectors};
 pub use rows::{RowGrid, row_sums};
 pub use visibility::{

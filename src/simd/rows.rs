@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use super::{LANES, multiversion};
+use super::{LANES, cubic_weights, multiversion};
 
 /// The axes of a table: `[θ_h][φ_h][φ_d][θ_d][four]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,13 +55,7 @@ fn taps(grid: RowGrid, places: &[[f32; LANES]; 5], count: usize, cubic: bool) ->
             taps.corners[corner][k] = rings[p] * azimuth_weights[q] * turn_weights[r];
         }
         let t = step - low as f32;
-        let (t2, t3) = (t * t, t * t * t);
-        let curve = [
-            0.5 * (2.0 * t2 - t - t3),
-            0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
-            0.5 * (t + 4.0 * t2 - 3.0 * t3),
-            0.5 * (t3 - t2),
-        ];
+        let curve = cubic_weights(t);
         let line = [0.0, 1.0 - t, t, 0.0];
         for node in 0..4 {
             taps.along[node][k] = if cubic { curve[node] } else { line[node] };

@@ -120,7 +120,7 @@ multiversion! {
                     lanes[l] += w[l] * soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
                 }
             }
-            // The rest as the end of sixteen that reach back: one by one they took as long as all before them.
+            // The rest as the end of sixteen that reach back, in whole vectors too: runs of few normals are short.
             let last = (w.last_chunk::<WIDTH>(), from.last_chunk::<WIDTH>(), to.last_chunk::<WIDTH>());
             if let (false, (Some(w), Some(from), Some(to))) = (w_tail.is_empty(), last) {
                 let counted = WIDTH - w_tail.len();

@@ -154,7 +154,7 @@ impl Slices {
         let sharpness = 1.0 / self.horizons.ramp();
         let row = |azimuth: usize| &self.horizons.row(azimuth)[range.clone()];
         simd::stepped_visibility(row(from), row(to), &self.switch[range.clone()], blend, elevation, sharpness, out);
-        // What each interval covers in whole vectors first: one by one it took half of a sum's time.
+        // What each interval covers in whole vectors first: there are many for each facet.
         const MOST: usize = 256;
         let mut covered = [0.0; MOST];
         for (azimuth, side) in [(from, 0.0), (to, 1.0)] {
