@@ -8,8 +8,11 @@ use crate::simd::multiversion;
 
 /// A height-field seen from points on it. Cells are split along the diagonal from (i, j) to (i+1, j+1).
 #[derive(Debug)]
-pub(super) struct HeightMarch<'a> {
-    heights: &'a HeightGrid,
+pub(super) struct HeightMarch {
+    /// Row by row, with the first column and row once more at the end.
+    heights: Vec<f32>,
+    /// Columns and rows of the tile.
+    size: [usize; 2],
     samples_from_tile: Vec2,
     top: f32,
 }
@@ -17,6 +20,9 @@ pub(super) struct HeightMarch<'a> {
 /// Edges of one family that any walk may cross, besides those of sixteen tiles: what lies beyond blocks only directions low
 /// over the horizon, and only of height-fields that are many tiles high.
 const LEAST_LINES: usize = 8192;
+
+/// Crossings worked on together. Of eight the compiler unrolls the loops, and makes vectors of half of them only.
+const WIDTH: usize = 16;
 
 multiversion! {
     /// [`HeightMarch::highest_slope`] of every facet.
@@ -27,102 +33,136 @@ multiversion! {
     }
 }
 
-/// `k` modulo `n`, without a division for what lies in the next tile.
-#[inline(always)]
-fn wrapped(k: i32, n: i32) -> i32 {
-    let near = k + n * (i32::from(k < 0) - i32::from(k >= n));
-    if (0..n).contains(&near) { near } else { near.rem_euclid(n) }
+/// Parallel edges of the mesh, one a sample apart from the next.
+#[derive(Clone, Copy)]
+enum Edges {
+    /// On x = k, between rows.
+    Columns,
+    /// On y = k, between columns.
+    Rows,
+    /// On x - y = k.
+    Diagonals,
 }
 
-impl<'a> HeightMarch<'a> {
-    pub fn new(heights: &'a HeightGrid, tile_size: Vec2) -> Self {
-        let top = heights.heights.iter().fold(f32::NEG_INFINITY, |top, &z| top.max(z));
-        Self { heights, samples_from_tile: heights.size.as_vec2() / tile_size, top }
-    }
+/// A walk over one family of edges, in samples.
+struct Walk {
+    /// Where it begins, across the edges and along them, and how it goes on per unit of the plane.
+    across: [f32; 2],
+    along: [f32; 2],
+    /// Edges that it crosses at most.
+    most: usize,
+}
 
-    #[inline(always)]
-    fn sample(&self, x: i32, y: i32) -> f32 {
-        let (w, h) = (self.heights.size.x as i32, self.heights.size.y as i32);
-        self.heights.heights[(wrapped(y, h) * w + wrapped(x, w)) as usize]
+/// A whole number modulo another, exact below 2²¹: halfway between whole numbers no rounding of the product matters.
+#[inline(always)]
+fn wrapped(k: f32, [n, inverse]: [f32; 2]) -> u32 {
+    let rest = k - n * ((k + 0.5) * inverse).floor();
+    // Its mantissa, from 2²³ on: a cast looks out for what no whole number has, lane by lane.
+    (rest + 8_388_608.0).to_bits() & 0x007f_ffff
+}
+
+impl HeightMarch {
+    pub fn new(grid: &HeightGrid, tile_size: Vec2) -> Self {
+        let top = grid.heights.iter().fold(f32::NEG_INFINITY, |top, &z| top.max(z));
+        let size = [grid.size.x as usize, grid.size.y as usize];
+        let rows = (0..=size[1]).map(|y| &grid.heights[y % size[1] * size[0]..][..size[0]]);
+        let heights = rows.flat_map(|row| row.iter().chain(&row[..1])).copied().collect();
+        Self { heights, size, samples_from_tile: grid.size.as_vec2() / tile_size, top }
     }
 
     /// The tangent of the horizon's elevation along the unit plane direction, no lower than what a facet of this normal
     /// is well turned away from; 0 where nothing rises above `from`.
     #[inline(always)]
     pub fn highest_slope(&self, from: Vec3, normal: Vec3, along: Vec2) -> f32 {
-        let clearance = self.top - from.z;
         let mut slope = (-(normal.truncate().dot(along) + FACING_MARGIN) / normal.z.max(1e-6)).max(0.0);
-        if clearance <= 0.0 {
+        if self.top <= from.z {
             return slope;
         }
         let at = from.truncate() * self.samples_from_tile - 0.5;
         let speed = along * self.samples_from_tile;
-        // Edges x = k, where heights lie between rows; y = k, between columns; x - y = k, along the diagonals.
-        let [columns, rows] = [self.heights.size.x, self.heights.size.y];
         let (along_x, along_y) = (along.y.abs() < 1e-6, along.x.abs() < 1e-6);
         // Along an axis all comes back after one tile, only further away.
         let most = match (along_x, along_y) {
-            (true, _) => columns as usize + 1,
-            (_, true) => rows as usize + 1,
-            _ => LEAST_LINES + 16 * (columns + rows) as usize,
+            (true, _) => self.size[0] + 1,
+            (_, true) => self.size[1] + 1,
+            _ => LEAST_LINES + 16 * (self.size[0] + self.size[1]),
         };
-        self.cross([at.x, speed.x], along_y, most, [from.z, clearance], &mut slope, |line, r| {
-            let y = at.y + speed.y * r;
-            let low = y.floor();
-            let (a, b) = (self.sample(line, low as i32), self.sample(line, low as i32 + 1));
-            a + (b - a) * (y - low)
-        });
-        self.cross([at.y, speed.y], along_x, most, [from.z, clearance], &mut slope, |line, r| {
-            let x = at.x + speed.x * r;
-            let low = x.floor();
-            let (a, b) = (self.sample(low as i32, line), self.sample(low as i32 + 1, line));
-            a + (b - a) * (x - low)
-        });
+        let [x, y] = [[at.x, speed.x], [at.y, speed.y]];
+        if !along_y {
+            slope = self.cross(Edges::Columns, Walk { across: x, along: y, most }, from.z, slope);
+        }
+        if !along_x {
+            slope = self.cross(Edges::Rows, Walk { across: y, along: x, most }, from.z, slope);
+        }
         let turning = speed.x - speed.y;
-        let parallel = turning.abs() < 1e-6 * self.samples_from_tile.max_element();
-        self.cross([at.x - at.y, turning], parallel, most, [from.z, clearance], &mut slope, |line, r| {
-            let x = at.x + speed.x * r;
-            let low = x.floor();
-            let (i, j) = (low as i32, low as i32 - line);
-            let (a, b) = (self.sample(i, j), self.sample(i + 1, j + 1));
-            a + (b - a) * (x - low)
-        });
+        if turning.abs() >= 1e-6 * self.samples_from_tile.max_element() {
+            slope =
+                self.cross(Edges::Diagonals, Walk { across: [at.x - at.y, turning], along: x, most }, from.z, slope);
+        }
         slope
     }
 
-    /// Visits the crossings of one family of edges at increasing distance `r`, `most` of them, until nothing further can rise
-    /// higher. `parallel`: the walk follows these edges and crosses none.
+    /// The highest slope, `slope` at least, at the crossings of one family of edges at increasing distance, until nothing
+    /// further can rise higher.
     #[inline(always)]
-    fn cross(
-        &self,
-        [at, speed]: [f32; 2],
-        parallel: bool,
-        most: usize,
-        [z, clearance]: [f32; 2],
-        slope: &mut f32,
-        height: impl Fn(i32, f32) -> f32,
-    ) {
+    fn cross(&self, edges: Edges, walk: Walk, z: f32, mut slope: f32) -> f32 {
         /// Nothing below this slope is resolved.
         const LOWEST: f32 = 0.005;
-        if parallel || speed == 0.0 {
-            return;
-        }
+        let ([at, speed], [beside, drift]) = (walk.across, walk.along);
         let step = 1.0 / speed.abs();
-        let (mut line, turn) = if speed > 0.0 { (at.floor() as i32 + 1, 1) } else { (at.ceil() as i32 - 1, -1) };
-        let mut r = (line as f32 - at) / speed;
-        for _ in 0..most {
-            if r * slope.max(LOWEST) >= clearance {
-                return;
+        let (mut first, turn) = if speed > 0.0 { (at.floor() + 1.0, 1.0) } else { (at.ceil() - 1.0, -1.0) };
+        // At its own edge a point sees itself.
+        if (first - at) * turn < 1e-6 {
+            first += turn;
+        }
+        let start = (first - at) * turn * step;
+        let stride = self.size[0] + 1;
+        let [columns, rows] = self.size.map(|n| [n as f32, 1.0 / n as f32]);
+        let next = match edges {
+            Edges::Columns => stride,
+            Edges::Rows => 1,
+            Edges::Diagonals => stride + 1,
+        };
+        for k in (0..walk.most).step_by(WIDTH) {
+            let near = start + step * k as f32;
+            if near * slope.max(LOWEST) >= self.top - z {
+                break;
             }
-            // At its own edge a point sees itself.
-            if r > 1e-6 * step {
-                let rise = height(line, r) - z;
-                if rise > *slope * r {
-                    *slope = rise / r;
+            let line = first + turn * k as f32;
+            let (mut distances, mut places, mut parts) = ([0.0_f32; WIDTH], [0_u32; WIDTH], [0.0_f32; WIDTH]);
+            for l in 0..WIDTH {
+                let line = line + turn * l as f32;
+                distances[l] = near + step * l as f32;
+                let place = beside + drift * distances[l];
+                let low = place.floor();
+                let (column, row) = match edges {
+                    Edges::Columns => (line, low),
+                    Edges::Rows => (low, line),
+                    Edges::Diagonals => (low, low - line),
+                };
+                places[l] = wrapped(row, rows) * stride as u32 + wrapped(column, columns);
+                parts[l] = place - low;
+            }
+            let mut ends = [[0.0_f32; WIDTH]; 2];
+            for l in 0..WIDTH {
+                let place = places[l] as usize;
+                ends[0][l] = self.heights[place];
+                ends[1][l] = self.heights[place + next];
+            }
+            let mut steepness = [0.0_f32; WIDTH];
+            for l in 0..WIDTH {
+                steepness[l] = (ends[0][l] + (ends[1][l] - ends[0][l]) * parts[l] - z) / distances[l];
+            }
+            let mut width = WIDTH;
+            while width > 1 {
+                width /= 2;
+                for l in 0..width {
+                    let [a, b] = [steepness[l], steepness[l + width]];
+                    steepness[l] = if a > b { a } else { b };
                 }
             }
-            r += step;
-            line += turn;
+            slope = slope.max(steepness[0]);
         }
+        slope
     }
 }
