@@ -1,6 +1,6 @@
 //! The numbers of a [`super::Health`]: each examined on a few hundred directions, well under a second.
 
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,6 +14,10 @@ use crate::filtering::{EffectiveBrdf, Form, Reflectance, SumMaterial};
 /// Elevations of the directions that surfaces are looked at from [degrees], and azimuths of each.
 const ELEVATIONS_DEG: [f32; 6] = [5.0, 25.0, 45.0, 60.0, 70.0, 80.0];
 const AZIMUTHS: usize = 8;
+/// Rings of lights over which albedos are summed, and the half width of lobes that need the most.
+const COARSEST: usize = 12;
+const FINEST: usize = 22;
+const NARROWEST_DEG: f32 = 5.0;
 /// Pairs for reciprocity.
 const PAIRS: usize = 96;
 /// Normals about which facets are counted.
@@ -175,9 +179,8 @@ pub fn result(brdf: &EffectiveBrdf, evidence: &Evidence, lobe_deg: Option<f32>) 
         power += there.as_dvec3().length_squared();
     }
     health.reciprocity_residual = if difference > 0.0 { (difference / power).sqrt() } else { 0.0 };
-    // The quadrature must resolve the lobes: its nodes are 4° apart.
-    if lobe_deg.is_none_or(|degrees| degrees >= 6.0) {
-        let (albedo, at) = largest_effective_albedo(brdf);
+    if let Some(grid) = grid_for(lobe_deg) {
+        let (albedo, at) = largest_effective_albedo(brdf, grid);
         health.largest_albedo = Some(albedo);
         health.largest_albedo_at_deg = at;
         health.unsound_values += usize::from(!albedo.is_finite());
@@ -185,26 +188,41 @@ pub fn result(brdf: &EffectiveBrdf, evidence: &Evidence, lobe_deg: Option<f32>) 
     health
 }
 
+/// The coarsest grid of lights that resolves lobes of a half width.
+fn grid_for(lobe_deg: Option<f32>) -> Option<PolarGrid> {
+    let needed = lobe_deg.map_or(0, |degrees| (FINEST as f32 * NARROWEST_DEG / degrees).ceil() as usize);
+    let rings = needed.max(COARSEST);
+    (rings <= FINEST).then(|| PolarGrid::new(rings, (13 * rings).div_ceil(4)))
+}
+
 /// `max_o ∫ f̄(i,o) dω_i` of a few viewers, any channel.
-fn largest_effective_albedo(brdf: &EffectiveBrdf) -> (f32, [f32; 2]) {
-    let grid = PolarGrid::new(22, 72);
-    // The ring at the horizon has no solid angle of its own.
-    let nodes = grid.rings * grid.azimuths;
-    let lights: Vec<Vec3> = (0..nodes).map(|node| grid.direction(node)).collect();
+fn largest_effective_albedo(brdf: &EffectiveBrdf, grid: PolarGrid) -> (f32, [f32; 2]) {
     let viewers: Vec<[f32; 2]> =
         [0.0_f32, 30.0, 60.0, 80.0].iter().flat_map(|&theta| [[theta, 20.0], [theta, 110.0]]).skip(1).collect();
     let albedos: Vec<f32> = viewers
         .par_iter()
         .map(|[theta, phi]| {
-            let mut values = vec![Vec3::ZERO; nodes];
+            let (lights, solid_angles) = lights_around(phi / 360.0 * TAU + PI, grid);
+            let mut values = vec![Vec3::ZERO; lights.len()];
             brdf.eval_lights(&lights, from_angles(theta.to_radians(), phi / 360.0 * TAU), &mut values);
-            let sum: DVec3 =
-                values.iter().enumerate().map(|(node, v)| v.as_dvec3() * f64::from(grid.solid_angle(node))).sum();
+            let sum: DVec3 = values.iter().zip(solid_angles).map(|(v, part)| v.as_dvec3() * f64::from(part)).sum();
             sum.max_element() as f32
         })
         .collect();
     let largest = albedos.iter().zip(viewers).max_by(|a, b| a.0.total_cmp(b.0));
     largest.map_or((0.0, [0.0; 2]), |(albedo, at)| (*albedo, at))
+}
+
+/// The lights of a grid with their solid angles, four times as dense about one azimuth as on average: half vectors turn
+/// quickly there where the viewer is low.
+fn lights_around(azimuth: f32, grid: PolarGrid) -> (Vec<Vec3>, Vec<f32>) {
+    let lights = (0..grid.rings * grid.azimuths).map(|node| {
+        let turn = TAU * (node % grid.azimuths) as f32 / grid.azimuths as f32;
+        let density = 1.0 - 0.75 * turn.cos();
+        let phi = azimuth + turn - 0.75 * turn.sin();
+        (from_angles(grid.theta(node / grid.azimuths), phi), density * grid.solid_angle(node))
+    });
+    lights.unzip()
 }
 
 pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: usize) -> Option<FactorHealth> {
@@ -232,4 +250,44 @@ pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: u
         ranks,
         lobe_grid_step_deg: step.to_degrees(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::pipeline::Pipeline;
+    use crate::scene::{self, LoadedScene, Painted};
+
+    #[test]
+    fn albedos_are_summed_over_as_many_lights_as_lobes_need() {
+        for (brdf, rings) in [
+            (r#"{ kind = "lambertian", albedo = 0.5 }"#, 12),
+            (r#"{ kind = "ggx", roughness = 0.35, f0 = 0.8 }"#, 12),
+            (r#"{ kind = "ggx", roughness = 0.2, f0 = 0.8 }"#, 13),
+            (r#"{ kind = "ggx", roughness = 0.132, f0 = 0.8 }"#, 19),
+            (r#"{ kind = "ggx", roughness = 0.11, f0 = 0.8 }"#, 22),
+            (r#"{ kind = "ggx", roughness = 0.15, f0 = 0.04 }"#, 17),
+            (r#"{ kind = "cook_torrance", roughness = 0.15, f0 = 0.8 }"#, 13),
+            (r#"{ kind = "blinn_phong", exponent = 100.0, specular = 0.8 }"#, 14),
+        ] {
+            for geometry in ["{ kind = \"flat\" }", "{ kind = \"pyramids\", spacing = 0.25, height = 0.1 }"] {
+                let source = format!(
+                    "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\nfacets = 512\nmethod = \"direct\"\nbackend = \"cpu\"\n"
+                );
+                let (scene, name) = (scene::parse(&source).unwrap(), "test".to_owned());
+                let loaded = LoadedScene { scene, base_dir: PathBuf::new(), name, painted: Painted::default() };
+                let outcome = Pipeline::new().effective(&loaded).unwrap();
+                let materials = materials(&outcome.evidence.materials.1, &[]).1;
+                let grid = grid_for(materials[0].narrowest_lobe_deg).unwrap();
+                let [albedo, exact] =
+                    [grid, PolarGrid::new(96, 320)].map(|grid| largest_effective_albedo(&outcome.brdf, grid).0);
+                let error = (albedo / exact - 1.0).abs();
+                eprintln!("{brdf} {geometry}: {} rings, {:.3} %", grid.rings, 100.0 * error);
+                assert_eq!(grid.rings, rings, "{brdf}");
+                assert!(error < 0.03, "{brdf}, {geometry}: {albedo} {exact}");
+            }
+        }
+    }
 }
