@@ -2,12 +2,13 @@
 all cores), each against many more of Mitsuba's rays; and a Klems matrix by `biscale export` and by Radiance's rfluxmtx, which is
 what genBSDF runs.
 
-    python benches/equal_error.py
+    python benches/equal_error.py [SCENE... | klems] [--pairs 400] [--truth-rays 524288] [--no-reference]
 
 after `pip install mitsuba pyradiance numpy`. BISCALE names the program. Seconds are those of the clock, a whole process for
 biscale; Mitsuba's hold neither its import nor the loading of the tile.
 """
 
+import argparse
 import sys
 import tempfile
 import time
@@ -24,11 +25,11 @@ except ImportError as error:
     skip(f"the comparison needs `pip install mitsuba numpy` ({error})")
 
 mi.set_variant("llvm_ad_rgb")
-ROUGHNESS, PAIRS, REPEAT, GOLDEN = 0.2, 400, 13, 0.6180339887
+ROUGHNESS, REPEAT, GOLDEN = 0.2, 13, 0.6180339887
 # White, so that Fresnel's factor is 1 in both.
 GLOSSY = f'material=[{{ name = "default", brdf = {{ kind = "ggx", roughness = {ROUGHNESS}, f0 = 1 }} }}]'
-SCENES = ["table4_plate", "table4_skirt", "table4_pillow"]
-RAYS, TRUTH_RAYS = [16, 64, 256, 1024, 4096, 16384], 1 << 19
+SCENES = ["table4_plate", "table4_skirt", "table4_pillow", "klems"]
+RAYS = [16, 64, 256, 1024, 4096, 16384]
 # Rays of one launch at most.
 LAUNCH = 1 << 23
 
@@ -96,12 +97,12 @@ def timed(work):
     return time.time() - start, result
 
 
-def compare(name, folder):
+def compare(name, folder, asked):
     scene, top = tile(name, folder)
-    pairs = random_pairs(PAIRS)
-    truth = traced(scene, top, pairs, TRUTH_RAYS, 1)
-    again = traced(scene, top, pairs, TRUTH_RAYS // 4, 2)
-    print(f"\n{name}, GGX {ROUGHNESS}, {PAIRS} pairs; truth: {TRUTH_RAYS} rays a pair, {psnr(again, truth):.1f} dB from a quarter as many others")
+    pairs, rays = random_pairs(asked.pairs), asked.truth_rays
+    truth = traced(scene, top, pairs, rays, 1)
+    again = traced(scene, top, pairs, rays // 4, 2)
+    print(f"\n{name}, GGX {ROUGHNESS}, {len(pairs)} pairs; truth: {rays} rays a pair, {psnr(again, truth):.1f} dB from a quarter as many others")
     table = Table("by", "setting", "seconds", "PSNR [dB]", "relative L2")
     def row(by, setting, seconds, values):
         table.row(by, setting, f"{seconds:.3f}", f"{psnr(values, truth):.1f}", f"{100 * rel_l2(values, truth):.2f} %")
@@ -109,9 +110,12 @@ def compare(name, folder):
     def eval_with(*options):
         return lambda: evaluate(name, pairs, folder, "--set", GLOSSY, "--backend", "cpu", *options)[:, 1]
     ours = [row("biscale", preset, *timed(eval_with("--quality", preset))) for preset in ["draft", "standard", "fine"]]
-    theirs = [row("Mitsuba", f"{rays} rays", *timed(lambda: traced(scene, top, pairs, rays, 3))) for rays in RAYS]
+    fewer = [rays for rays in RAYS if 4 * rays <= asked.truth_rays]
+    theirs = [row("Mitsuba", f"{rays} rays", *timed(lambda: traced(scene, top, pairs, rays, 3))) for rays in fewer]
     for seconds, decibels in ours:
-        print(f"at {decibels:.1f} dB: {seconds_at(theirs, decibels) / seconds:.1f} times as fast as Mitsuba for {PAIRS} pairs")
+        print(f"at {decibels:.1f} dB: {seconds_at(theirs, decibels) / seconds:.1f} times as fast as Mitsuba for {len(pairs)} pairs", flush=True)
+    if not asked.reference:
+        return
     start = time.time()
     values = eval_with("--quality", "reference")()
     row("plain reference", "rays, no tables", time.time() - start, values)
@@ -155,11 +159,19 @@ def compare_klems(folder):
 
 
 def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scenes", nargs="*", default=SCENES)
+    parser.add_argument("--pairs", type=int, default=400)
+    parser.add_argument("--truth-rays", type=int, default=1 << 19)
+    parser.add_argument("--no-reference", dest="reference", action="store_false", help="leave the plain reference out, which takes minutes")
+    asked = parser.parse_args()
     print(f"Mitsuba {mi.__version__}")
     with tempfile.TemporaryDirectory() as folder:
-        for name in SCENES:
-            compare(name, folder)
-        compare_klems(Path(folder))
+        for name in asked.scenes:
+            if name == "klems":
+                compare_klems(Path(folder))
+            else:
+                compare(name, folder, asked)
 
 
 if __name__ == "__main__":

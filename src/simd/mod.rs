@@ -2,6 +2,7 @@
 //!
 //! Every function here has a plain twin elsewhere that the tests compare it with.
 
+mod eight;
 mod gather;
 mod lobes;
 mod math;
@@ -11,6 +12,9 @@ mod rows;
 mod tests;
 mod visibility;
 
+#[cfg(target_arch = "x86_64")]
+pub(crate) use eight::Wide;
+pub(crate) use eight::{Eight, Fours};
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub(crate) use math::cubic_weights;

@@ -5,7 +5,9 @@ use glam::{IVec2, Vec2, Vec3};
 use super::periodic_grid::CellWalk;
 use super::slicer::{TurnedSlicer, WIDTH};
 use crate::geometry::Facets;
-use crate::simd::multiversion;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::Wide;
+use crate::simd::{Eight, Fours};
 
 /// Blocked slopes (tangents of the elevation), sorted and disjoint, within `[0, ∞]`.
 #[derive(Debug, Default, Clone)]
@@ -119,29 +121,39 @@ const LOWEST_SLOPE: f32 = 0.005;
 /// the horizon (2° for pyramids of 100 tiles) and is left out; [`BlockedSlopes::cut_short`] counts such walks.
 const LEAST_LOOKS: usize = 16_384;
 
-multiversion! {
-    /// Scans every facet along the slicer's direction from its lifted origin, and hands each with what blocks it to `found`; returns how many walks
-    /// ended before all was known.
-    pub fn scan_all(
-        slicer: &TurnedSlicer,
-        facets: &Facets,
-        origins: &[Vec3],
-        found: &mut dyn FnMut(u32, &BlockedSlopes),
-    ) -> usize {
-        let mut blocked = BlockedSlopes::default();
-        for facet in slicer.order(facets) {
-            let at = facet as usize;
-            slicer.scan(origins[at], facets.normals[at], facets.triangles[at], &mut blocked);
-            found(facet, &blocked);
+/// Hands each facet of a scan with what blocks it to a caller.
+type Found<'a> = &'a mut dyn FnMut(u32, &BlockedSlopes);
+
+/// Scans every facet along the slicer's direction from its lifted origin, and hands each with what blocks it to `found`;
+/// returns how many walks ended before all was known.
+pub(super) fn scan_all(slicer: &TurnedSlicer, facets: &Facets, origins: &[Vec3], found: Found) -> usize {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        #[target_feature(enable = "avx2,fma")]
+        fn avx2(slicer: &TurnedSlicer, facets: &Facets, origins: &[Vec3], found: Found) -> usize {
+            scan_each::<Wide>(slicer, facets, origins, found)
         }
-        blocked.cut_short
+        // SAFETY: the features the function was compiled for were just found.
+        return unsafe { avx2(slicer, facets, origins, found) };
     }
+    scan_each::<Fours>(slicer, facets, origins, found)
+}
+
+#[inline(always)]
+fn scan_each<E: Eight>(slicer: &TurnedSlicer, facets: &Facets, origins: &[Vec3], found: Found) -> usize {
+    let mut blocked = BlockedSlopes::default();
+    for facet in slicer.order(facets) {
+        let at = facet as usize;
+        slicer.scan::<E>(origins[at], facets.normals[at], facets.triangles[at], &mut blocked);
+        found(facet, &blocked);
+    }
+    blocked.cut_short
 }
 
 impl TurnedSlicer<'_> {
     /// Fills `blocked` with what a facet does not see along the slicer's direction; its `own` triangle is ignored.
     #[inline(always)]
-    pub(super) fn scan(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
+    pub(super) fn scan<E: Eight>(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
         let (grid, along) = (self.grid, self.along);
         blocked.start_from_facing(normal, along);
         if blocked.ground == f32::INFINITY || grid.cancel.is_set() {
@@ -174,7 +186,7 @@ impl TurnedSlicer<'_> {
             looks -= costs;
             blocked.work += 1;
             let (entered, left) = (walk.entered, walk.advance());
-            let floor = origin.z + entered * blocked.ground;
+            let mut floor = origin.z + entered * blocked.ground;
             if grid.z_max[cell] <= floor {
                 continue;
             }
@@ -183,17 +195,21 @@ impl TurnedSlicer<'_> {
             let home = origin - (tile.as_vec2() * grid.tile_size).extend(0.0);
             let eye = self.seen(home);
             for (k, extent) in extents.iter().enumerate() {
-                let met = extent.meets(eye.x, [floor, ceiling]);
-                if !met.any() {
+                if extent.highest() <= floor {
+                    break;
+                }
+                let met = extent.meets::<E>(eye.x, [floor, ceiling]);
+                if met == 0 {
                     continue;
                 }
-                for (lane, low, high) in self.block(first + k).cut(eye, met, blocked.known()).lanes() {
+                for (lane, low, high) in self.block(first + k).cut::<E>(eye, met, blocked.known()).lanes() {
                     blocked.work += 1;
                     let entry = self.entries(cell)[WIDTH * k + lane];
                     if entry.triangle != own || !grid.lies_on(home, grid.copy_corners(entry, IVec2::ZERO)) {
                         blocked.insert(low, high);
                     }
                 }
+                floor = origin.z + entered * blocked.ground;
             }
             if blocked.ground == f32::INFINITY {
                 return;

@@ -1,23 +1,24 @@
-//! What do the triangles of a cell cover in a vertical half-plane? Four at a time, as slopes seen from a point.
+//! What do the triangles of a cell cover in a vertical half-plane? Eight at a time, as slopes seen from a point.
 
-use glam::{BVec4A, IVec2, Vec2, Vec3, Vec4};
+use glam::{IVec2, Vec2, Vec3};
 
 use super::PeriodicGrid;
 use super::periodic_grid::CellEntry;
 use super::scan::Known;
 use crate::geometry::Facets;
+use crate::simd::{Eight, Fours};
 
 /// Triangles worked on together.
-pub(super) const WIDTH: usize = 4;
+pub(super) const WIDTH: usize = 8;
 
-/// Four entries of a cell, where the tile copy of the cell has them. Lanes beyond a cell's entries lie lower than all.
+/// Eight entries of a cell, where the tile copy of the cell has them. Lanes beyond a cell's entries lie lower than all.
 #[derive(Debug, Clone)]
 struct Block {
-    x: [Vec4; 3],
-    y: [Vec4; 3],
-    z: [Vec4; 3],
-    z_min: Vec4,
-    z_max: Vec4,
+    x: [Fours; 3],
+    y: [Fours; 3],
+    z: [Fours; 3],
+    z_min: Fours,
+    z_max: Fours,
 }
 
 /// A periodic grid made ready for vertical slices.
@@ -47,44 +48,49 @@ impl<'a> Slicer<'a> {
     }
 }
 
-/// Four triangles of a cell by their distances across the slices: where each begins, bends and ends, and how its edges run
+/// Eight triangles of a cell by their distances across the slices: where each begins, bends and ends, and how its edges run
 /// along a slice and up from there.
 #[derive(Debug, Clone)]
 pub(super) struct TurnedBlock {
-    first: Vec4,
-    middle: Vec4,
+    first: Fours,
+    middle: Fours,
     /// From the first corner to the last; to the middle one; and from there to the last.
     edges: [Edge; 3],
 }
 
-/// What tells whether a slice meets four triangles at all: kept apart, so that more of it stays at hand.
+/// What tells whether a slice meets eight triangles at all: kept apart, so that more of it stays at hand.
 #[derive(Debug, Clone)]
 pub(super) struct Extent {
-    first: Vec4,
-    last: Vec4,
-    z_min: Vec4,
-    z_max: Vec4,
+    first: Fours,
+    last: Fours,
+    z_min: Fours,
+    z_max: Fours,
 }
 
 impl Extent {
-    /// Lanes that a slice at a distance `across` meets, and that reach above the height `floor` and below `ceiling`.
+    /// The height that nothing here, and nothing in later blocks of the cell, rises above.
     #[inline(always)]
-    pub fn meets(&self, across: f32, [floor, ceiling]: [f32; 2]) -> BVec4A {
-        let at = Vec4::splat(across);
-        self.first.cmplt(at)
-            & self.last.cmpge(at)
-            & self.z_max.cmpgt(Vec4::splat(floor))
-            & self.z_min.cmplt(Vec4::splat(ceiling))
+    pub fn highest(&self) -> f32 {
+        self.z_max.0[0].x
+    }
+
+    /// Lanes that a slice at a distance `across` meets, and that reach above the height `floor` and below `ceiling`: a bit each.
+    #[inline(always)]
+    pub fn meets<E: Eight>(&self, across: f32, [floor, ceiling]: [f32; 2]) -> u32 {
+        let at = E::splat(across);
+        let between = E::both(E::of(&self.first).less(at), E::of(&self.z_min).less(E::splat(ceiling)));
+        let high = E::both(between, E::splat(floor).less(E::of(&self.z_max)));
+        E::bits(high) & !E::bits(E::of(&self.last).less(at))
     }
 }
 
-/// Four edges, from the corner that comes first across the slices: so that neighbours agree about the edge they share.
+/// Eight edges, from the corner that comes first across the slices: so that neighbours agree about the edge they share.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
-    along: Vec4,
-    up: Vec4,
+    along: Fours,
+    up: Fours,
     /// Growth of both with the distance across.
-    rates: [Vec4; 2],
+    rates: [Fours; 2],
 }
 
 /// A grid seen in slices of one direction.
@@ -108,13 +114,13 @@ impl TurnedSlicer<'_> {
         order.into_iter().map(|(_, facet)| facet).collect()
     }
 
-    /// The triangles of a cell, four by four: their places among all, and where they lie.
+    /// The triangles of a cell, eight by eight: their places among all, and where they lie.
     pub fn blocks(&self, cell: usize) -> (usize, &[Extent]) {
         let (first, end) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);
         (first, &self.extents[first..end])
     }
 
-    /// Four triangles by their place.
+    /// Eight triangles by their place.
     #[inline(always)]
     pub fn block(&self, place: usize) -> &TurnedBlock {
         &self.blocks[place]
@@ -131,15 +137,16 @@ impl TurnedSlicer<'_> {
     }
 }
 
-/// The slopes that four triangles cover. Lanes outside the mask hold nothing.
-pub(super) struct Cut {
-    low: Vec4,
-    high: Vec4,
+/// The slopes that eight triangles cover. Lanes outside the mask hold nothing.
+pub(super) struct Cut<E> {
+    low: E,
+    high: E,
     lanes: u32,
 }
 
-impl Cut {
+impl<E: Eight> Cut<E> {
     /// Lanes that are cut, with their slopes `(low, high)`.
+    #[inline(always)]
     pub fn lanes(self) -> impl Iterator<Item = (usize, f32, f32)> {
         let (low, high) = (self.low.to_array(), self.high.to_array());
         let mut lanes = self.lanes;
@@ -155,30 +162,34 @@ impl Cut {
 
 impl Block {
     fn new(grid: &PeriodicGrid, entries: &[CellEntry]) -> Self {
-        let zero = [Vec4::ZERO; 3];
-        let mut block = Self { x: zero, y: zero, z: zero, z_min: Vec4::INFINITY, z_max: Vec4::NEG_INFINITY };
+        let zero = [Fours::splat(0.0); 3];
+        let (z_min, z_max) = (Fours::splat(f32::INFINITY), Fours::splat(f32::NEG_INFINITY));
+        let mut block = Self { x: zero, y: zero, z: zero, z_min, z_max };
         for (lane, &entry) in entries.iter().enumerate() {
-            for (k, corner) in grid.copy_corners(entry, IVec2::ZERO).iter().enumerate() {
-                block.x[k][lane] = corner.x;
-                block.y[k][lane] = corner.y;
-                block.z[k][lane] = corner.z;
-                block.z_min[lane] = block.z_min[lane].min(corner.z);
-                block.z_max[lane] = block.z_max[lane].max(corner.z);
+            let corners = grid.copy_corners(entry, IVec2::ZERO);
+            for (k, corner) in corners.iter().enumerate() {
+                block.x[k].set(lane, corner.x);
+                block.y[k].set(lane, corner.y);
+                block.z[k].set(lane, corner.z);
             }
+            let [a, b, c] = corners.map(|corner| corner.z);
+            block.z_min.set(lane, a.min(b).min(c));
+            block.z_max.set(lane, a.max(b).max(c));
         }
         block
     }
 
     fn turned(&self, direction: Vec2) -> (Extent, TurnedBlock) {
+        let [dx, dy] = direction.to_array().map(Fours::splat);
         let mut corners: [Corner; 3] = std::array::from_fn(|k| Corner {
-            across: direction.x * self.y[k] - direction.y * self.x[k],
-            along: direction.x * self.x[k] + direction.y * self.y[k],
+            across: dx * self.y[k] - dy * self.x[k],
+            along: dx * self.x[k] + dy * self.y[k],
             up: self.z[k],
         });
         for (a, b) in [(0, 1), (1, 2), (0, 1)] {
-            let in_order = corners[a].across.cmple(corners[b].across);
+            let swapped = corners[b].across.less(corners[a].across);
             (corners[a], corners[b]) =
-                (Corner::select(in_order, corners[a], corners[b]), Corner::select(in_order, corners[b], corners[a]));
+                (Corner::select(swapped, corners[b], corners[a]), Corner::select(swapped, corners[a], corners[b]));
         }
         let [first, middle, last] = corners;
         let extent = Extent { first: first.across, last: last.across, z_min: self.z_min, z_max: self.z_max };
@@ -191,17 +202,17 @@ impl Block {
     }
 }
 
-/// Corners of four triangles.
+/// Corners of eight triangles.
 #[derive(Clone, Copy)]
 struct Corner {
-    across: Vec4,
-    along: Vec4,
-    up: Vec4,
+    across: Fours,
+    along: Fours,
+    up: Fours,
 }
 
 impl Corner {
-    fn select(mask: BVec4A, yes: Self, no: Self) -> Self {
-        let of = |pick: fn(&Self) -> Vec4| Vec4::select(mask, pick(&yes), pick(&no));
+    fn select(mask: <Fours as Eight>::Mask, yes: Self, no: Self) -> Self {
+        let of = |pick: fn(&Self) -> Fours| Fours::select(mask, pick(&yes), pick(&no));
         Self { across: of(|c| c.across), along: of(|c| c.along), up: of(|c| c.up) }
     }
 }
@@ -209,43 +220,45 @@ impl Corner {
 impl Edge {
     fn between(from: Corner, to: Corner) -> Self {
         let width = to.across - from.across;
+        let zero = Fours::splat(0.0);
         // Edges without width are never met.
-        let inverse = Vec4::select(width.cmpgt(Vec4::ZERO), width.recip(), Vec4::ZERO);
+        let inverse = Fours::select(zero.less(width), Fours::splat(1.0) / width, zero);
         Self { along: from.along, up: from.up, rates: [(to.along - from.along) * inverse, (to.up - from.up) * inverse] }
     }
 }
 
 impl TurnedBlock {
-    /// What [`slice`] says of four triangles, of which those are `met`, from a point with distances across and along and a
+    /// What [`slice`] says of eight triangles, of which those are `met`, from a point with distances across and along and a
     /// height. Lanes that tell nothing new are left out.
     #[inline(always)]
-    pub fn cut(&self, origin: Vec3, met: BVec4A, known: Known) -> Cut {
-        let at = Vec4::splat(origin.x);
-        let (along, up) = (Vec4::splat(origin.y), Vec4::splat(origin.z));
+    pub fn cut<E: Eight>(&self, origin: Vec3, met: u32, known: Known) -> Cut<E> {
+        let [at, along, up] = origin.to_array().map(E::splat);
         let [long, before, after] = &self.edges;
-        let bent = self.middle.cmplt(at);
-        let pick = |before: Vec4, after: Vec4| Vec4::select(bent, after, before);
-        let t = [at - self.first, at - pick(self.first, self.middle)];
+        let (first, middle) = (E::of(&self.first), E::of(&self.middle));
+        let bent = middle.less(at);
+        let pick = |before: &Fours, after: &Fours| E::select(bent, E::of(after), E::of(before));
+        let t = [at - first, at - E::select(bent, middle, first)];
         let x = [
-            long.along + t[0] * long.rates[0] - along,
-            pick(before.along, after.along) + t[1] * pick(before.rates[0], after.rates[0]) - along,
+            E::of(&long.along) + t[0] * E::of(&long.rates[0]) - along,
+            pick(&before.along, &after.along) + t[1] * pick(&before.rates[0], &after.rates[0]) - along,
         ];
         let z = [
-            long.up + t[0] * long.rates[1] - up,
-            pick(before.up, after.up) + t[1] * pick(before.rates[1], after.rates[1]) - up,
+            E::of(&long.up) + t[0] * E::of(&long.rates[1]) - up,
+            pick(&before.up, &after.up) + t[1] * pick(&before.rates[1], &after.rates[1]) - up,
         ];
-        let ahead = x.map(|x| x.cmpgt(Vec4::ZERO));
+        let zero = E::splat(0.0);
+        let ahead = x.map(|x| zero.less(x));
         // Where a segment begins behind the point, it passes above or below: at distance 0 its slope is infinite.
         let [p, q] = [z[1] * x[0], z[0] * x[1]];
-        let [over, under] = [f32::INFINITY, f32::NEG_INFINITY].map(Vec4::splat);
+        let [over, under] = [f32::INFINITY, f32::NEG_INFINITY].map(E::splat);
         let slopes = [
-            Vec4::select(ahead[0], z[0] / x[0], Vec4::select(p.cmplt(q), over, under)),
-            Vec4::select(ahead[1], z[1] / x[1], Vec4::select(p.cmpgt(q), over, under)),
+            E::select(ahead[0], z[0] / x[0], E::select(p.less(q), over, under)),
+            E::select(ahead[1], z[1] / x[1], E::select(q.less(p), over, under)),
         ];
-        let (low, high) = (slopes[0].min(slopes[1]).max(Vec4::ZERO), slopes[0].max(slopes[1]));
-        let new = high.cmpgt(Vec4::splat(known.ground))
-            & (low.cmplt(Vec4::splat(known.low)) | high.cmpgt(Vec4::splat(known.high)));
-        Cut { low, high, lanes: (met & (ahead[0] | ahead[1]) & new).bitmask() }
+        let (low, high) = (slopes[0].min(slopes[1]).max(zero), slopes[0].max(slopes[1]));
+        let beyond = E::either(low.less(E::splat(known.low)), E::splat(known.high).less(high));
+        let new = E::both(E::splat(known.ground).less(high), beyond);
+        Cut { low, high, lanes: met & E::bits(E::both(E::either(ahead[0], ahead[1]), new)) }
     }
 }
 

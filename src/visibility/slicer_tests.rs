@@ -53,7 +53,15 @@ fn waves() -> TileMesh {
 }
 
 #[test]
-fn four_triangles_at_once_are_cut_as_one_by_one_ahead_behind_and_overhead() {
+fn eight_triangles_at_once_are_cut_as_one_by_one_ahead_behind_and_overhead() {
+    are_cut_as_one_by_one::<Fours>();
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        are_cut_as_one_by_one::<crate::simd::Wide>();
+    }
+}
+
+fn are_cut_as_one_by_one<E: Eight>() {
     let mesh = waves();
     let grid = PeriodicGrid::new(&mesh);
     let slicer = Slicer::new(&grid);
@@ -67,7 +75,7 @@ fn four_triangles_at_once_are_cut_as_one_by_one_ahead_behind_and_overhead() {
         for cell in 0..grid.z_max.len() {
             let (first, extents) = turned.blocks(cell);
             for (k, extent) in extents.iter().enumerate() {
-                let cut = turned.block(first + k).cut(eye, extent.meets(eye.x, ANYWHERE), NOTHING);
+                let cut = turned.block(first + k).cut::<E>(eye, extent.meets::<E>(eye.x, ANYWHERE), NOTHING);
                 let found: Vec<_> = cut.lanes().collect();
                 for (lane, &entry) in turned.entries(cell)[WIDTH * k..].iter().take(WIDTH).enumerate() {
                     let corners = grid.copy_corners(entry, IVec2::ZERO).map(|corner| turned.seen(corner) - eye);
@@ -105,8 +113,8 @@ fn what_is_known_hides_only_lanes_within_it() {
     for cell in 0..grid.z_max.len() {
         let (first, extents) = turned.blocks(cell);
         for (k, extent) in extents.iter().enumerate() {
-            let met = extent.meets(eye.x, ANYWHERE);
-            let lanes = |known| turned.block(first + k).cut(eye, met, known).lanes().collect::<Vec<_>>();
+            let met = extent.meets::<Fours>(eye.x, ANYWHERE);
+            let lanes = |known| turned.block(first + k).cut::<Fours>(eye, met, known).lanes().collect::<Vec<_>>();
             let some = lanes(known);
             for lane in lanes(NOTHING) {
                 let (_, low, high) = lane;

@@ -12,7 +12,7 @@ use super::slicer::Slicer;
 use super::{Horizons, PackedVisibility, PeriodicGrid, SoftMaps};
 use crate::directions::{PolarGrid, from_angles};
 use crate::geometry::Facets;
-use crate::simd;
+use crate::simd::{self, Fours};
 
 /// All blocked elevations of every facet along a number of azimuths, exact there.
 ///
@@ -100,7 +100,7 @@ impl Slices {
             let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
             let slicer = slicer.turned(along);
             for facet in (0..looked_at).map(|k| k * facets.len() / looked_at) {
-                slicer.scan(origins[facet], facets.normals[facet], facets.triangles[facet], &mut blocked);
+                slicer.scan::<Fours>(origins[facet], facets.normals[facet], facets.triangles[facet], &mut blocked);
             }
         }
         blocked.work as f64 / (FACETS * AZIMUTHS) as f64

@@ -1,0 +1,185 @@
+//! Eight values at once, for code with too many branches for the compiler to make vectors of.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+use glam::{BVec4A, Vec4};
+
+/// Arithmetic on eight values.
+pub(crate) trait Eight:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// A yes or no for each.
+    type Mask: Copy;
+
+    fn of(values: &Fours) -> Self;
+    fn splat(value: f32) -> Self;
+    fn to_array(self) -> [f32; 8];
+    /// The other's where that is less.
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn less(self, other: Self) -> Self::Mask;
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Bit `l` is that of value `l`.
+    fn bits(mask: Self::Mask) -> u32;
+}
+
+/// Eight values in memory, and how every machine computes with them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(32))]
+pub(crate) struct Fours(pub [Vec4; 2]);
+
+impl Fours {
+    pub fn splat(value: f32) -> Self {
+        Self([Vec4::splat(value); 2])
+    }
+
+    pub fn set(&mut self, lane: usize, value: f32) {
+        self.0[lane / 4][lane % 4] = value;
+    }
+}
+
+/// Operators of a type, each from one function of its halves or of its vector.
+macro_rules! operators {
+    ($type:ty, $($operator:ident $method:ident $of:expr),*) => {
+        $(impl $operator for $type {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                $of(self, other)
+            }
+        })*
+    };
+}
+
+#[inline(always)]
+fn halves<T: Copy, U: Copy, R>(a: [T; 2], b: [U; 2], of: impl Fn(T, U) -> R) -> [R; 2] {
+    [of(a[0], b[0]), of(a[1], b[1])]
+}
+
+operators! {
+    Fours,
+    Add add |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a + b)),
+    Sub sub |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a - b)),
+    Mul mul |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a * b)),
+    Div div |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a / b))
+}
+
+impl Eight for Fours {
+    type Mask = [BVec4A; 2];
+
+    #[inline(always)]
+    fn of(values: &Fours) -> Self {
+        *values
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self::splat(value)
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 8] {
+        let [a, b] = self.0.map(|half| half.to_array());
+        [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(halves(self.0, other.0, Vec4::min))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(halves(self.0, other.0, Vec4::max))
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> Self::Mask {
+        halves(self.0, other.0, Vec4::cmplt)
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self(halves(mask, [(yes.0[0], no.0[0]), (yes.0[1], no.0[1])], |mask, (yes, no)| Vec4::select(mask, yes, no)))
+    }
+    #[inline(always)]
+    fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        halves(a, b, |a, b| a & b)
+    }
+    #[inline(always)]
+    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        halves(a, b, |a, b| a | b)
+    }
+    #[inline(always)]
+    fn bits(mask: Self::Mask) -> u32 {
+        mask[0].bitmask() | mask[1].bitmask() << 4
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx::Wide;
+
+#[cfg(target_arch = "x86_64")]
+mod avx {
+    use std::arch::x86_64::*;
+
+    use super::{Add, Div, Eight, Fours, Mul, Sub};
+
+    /// Eight values in one register. To be used in functions only that are compiled for AVX and run where it was found.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Wide(__m256);
+
+    operators! {
+        Wide,
+        // SAFETY: of this and all below, as the type says: AVX is there.
+        Add add |a: Wide, b: Wide| Wide(unsafe { _mm256_add_ps(a.0, b.0) }),
+        Sub sub |a: Wide, b: Wide| Wide(unsafe { _mm256_sub_ps(a.0, b.0) }),
+        Mul mul |a: Wide, b: Wide| Wide(unsafe { _mm256_mul_ps(a.0, b.0) }),
+        Div div |a: Wide, b: Wide| Wide(unsafe { _mm256_div_ps(a.0, b.0) })
+    }
+
+    impl Eight for Wide {
+        type Mask = __m256;
+
+        #[inline(always)]
+        fn of(values: &Fours) -> Self {
+            // SAFETY: eight values in a row, as `repr(C)` lays them out, and aligned to all of them.
+            Self(unsafe { _mm256_load_ps(std::ptr::from_ref(values).cast()) })
+        }
+        #[inline(always)]
+        fn splat(value: f32) -> Self {
+            Self(unsafe { _mm256_set1_ps(value) })
+        }
+        #[inline(always)]
+        fn to_array(self) -> [f32; 8] {
+            let mut values = [0.0; 8];
+            // SAFETY: there is room for eight.
+            unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
+            values
+        }
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            Self(unsafe { _mm256_min_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            Self(unsafe { _mm256_max_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn less(self, other: Self) -> Self::Mask {
+            unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) }
+        }
+        #[inline(always)]
+        fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+            Self(unsafe { _mm256_blendv_ps(no.0, yes.0, mask) })
+        }
+        #[inline(always)]
+        fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+            unsafe { _mm256_and_ps(a, b) }
+        }
+        #[inline(always)]
+        fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+            unsafe { _mm256_or_ps(a, b) }
+        }
+        #[inline(always)]
+        fn bits(mask: Self::Mask) -> u32 {
+            unsafe { _mm256_movemask_ps(mask) as u32 }
+        }
+    }
+}
