@@ -1,7 +1,10 @@
-"""What an edit costs on the paper's five scenes, on the CPU: milliseconds as `biscale profile` prints them, beside a yardstick
-of this machine, and the most memory that any of it took.
+"""What an edit costs on the paper's five scenes, on the CPU: milliseconds as `biscale profile` prints them, for edits of the
+geometry as multiples of a yardstick of this machine, too; what `biscale eval` is off with the same settings; and the most
+memory that any of it took.
 
-    python benches/targets.py
+    python benches/targets.py [--no-errors]
+
+The reference that errors are told against takes minutes.
 
 MERL files of Table 3's paints are looked for in the folder that BISCALE_DATA names; without them that row says SKIPPED.
 """
@@ -9,11 +12,12 @@ MERL files of Table 3's paints are looked for in the folder that BISCALE_DATA na
 import json
 import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests/interop"))
-from common import BISCALE, Table, biscale, resource  # noqa: E402
+from common import BISCALE, Table, biscale, evaluate, np, random_pairs, resource  # noqa: E402
 
 SCENES = ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"]
 EDITS = [("geometry", "standard"), ("geometry", "draft"), ("brdf", "standard"), ("color", "standard"), ("camera", "standard")]
@@ -33,12 +37,27 @@ def profile(scene, *options):
     return json.loads(out)["total_ms"]
 
 
+def errors(table, qualities):
+    """Decibels under the peak and relative L2, of 200 pairs up to 85 degrees, half of them near the mirror direction."""
+    pairs = random_pairs(200)
+    with tempfile.TemporaryDirectory() as folder:
+        references = [evaluate(scene, pairs, folder, "--quality", "reference") for scene in SCENES]
+        for quality in qualities:
+            off = []
+            for scene, reference in zip(SCENES, references):
+                difference = evaluate(scene, pairs, folder, "--quality", quality, "--backend", "cpu") - reference
+                decibels = 20 * np.log10(reference.max() / np.sqrt(np.mean(difference**2)))
+                off.append(f"{decibels:.1f} dB, {100 * np.linalg.norm(difference) / np.linalg.norm(reference):.1f} %")
+            table.row(f"off, {quality}", *off)
+
+
 def main():
-    print(f"{BISCALE}, {os.cpu_count()} cores; yardstick {yardstick_ms():.0f} ms")
+    yardstick = yardstick_ms()
+    print(f"{BISCALE}, {os.cpu_count()} cores; yardstick y = {yardstick:.0f} ms")
     table = Table("edit, quality", *SCENES)
     for edit, quality in EDITS:
         times = [profile(scene, "--edit", edit, "--quality", quality) for scene in SCENES]
-        table.row(f"{edit}, {quality}", *(f"{ms:.1f} ms" for ms in times))
+        table.row(f"{edit}, {quality}", *(f"{ms:.1f} ms" + f", {ms / yardstick:.2f} y" * (ms > 1) for ms in times))
     paint = next((path for name in PAINTS if (path := Path(os.environ.get("BISCALE_DATA", ".")) / f"{name}.binary").exists()), None)
     if paint:
         swapped = [profile(scene, "--set", f'material.default.brdf={{ kind = "merl", path = "{paint}" }}') for scene in SCENES]
@@ -51,7 +70,9 @@ def main():
     print(f"Table 3, {len(rows)} materials: {sum(row['seconds'] for row in rows):.2f} s")
     if resource:
         print(f"most memory: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024:.0f} MB")
-    print(f"yardstick {yardstick_ms():.0f} ms")
+    print(f"yardstick {yardstick_ms():.0f} ms", flush=True)
+    if "--no-errors" not in sys.argv:
+        errors(table, ["standard", "draft"])
 
 
 if __name__ == "__main__":

@@ -299,7 +299,7 @@ impl FacetSum {
 
     /// Other facets of the same materials.
     pub(super) fn over(&self, normals: [Vec<f32>; 3], areas: Vec<f32>, groups: Vec<Group>) -> Self {
-        Self { normals, areas, groups, ..self.clone() }
+        Self { normals, areas, groups, keep_black: self.keep_black }
     }
 }
 

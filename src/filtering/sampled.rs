@@ -10,9 +10,10 @@ use super::Direct;
 use super::facet_groups::{Group, Patch};
 use super::facet_sum::FacetSum;
 use crate::brdf::LobeAngles;
+use crate::simd::{self, LANES, PairVectors, total};
 
 /// Part of the samples that goes to facets whatever they reflect: lobes grow wider as light and view move apart.
-const EVENLY: f64 = 0.25;
+const EVENLY: f32 = 0.25;
 
 /// Facets that a group or a normal keeps at least.
 const FEWEST: f64 = 16.0;
@@ -47,8 +48,8 @@ impl Direct {
                         .collect(),
                 ),
                 None => {
-                    let chances = chances(&self.sum.shares(group, h), share(&group.range));
-                    picks.walk(group.range.clone(), chances.into_iter());
+                    let chances = chances(self.sum.shares(group, h), share(&group.range) as f32);
+                    picks.walk(group.range.clone(), chances.into_iter().map(f64::from));
                     None
                 }
             };
@@ -85,42 +86,63 @@ impl Picks {
 }
 
 /// Chances in `(0, 1]` in proportion to `shares`, which add up to 1, so that about `count` are picked.
-fn chances(shares: &[f64], count: f64) -> Vec<f64> {
+fn chances(mut shares: Vec<f32>, count: f32) -> Vec<f32> {
     let mut scale = count;
     // Those that are certain leave more to the others.
     for _ in 0..4 {
-        let expected: f64 = shares.iter().map(|share| (scale * share).min(1.0)).sum();
+        let expected = sum(&shares, |share| least(scale * share, 1.0));
         scale *= count / expected.max(1e-9);
     }
-    shares.iter().map(|share| (scale * share).clamp(1e-9, 1.0)).collect()
+    for share in &mut shares {
+        *share = (scale * *share).clamp(1e-9, 1.0);
+    }
+    shares
+}
+
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The sum of what becomes of each value, in as many partial sums as fill vectors.
+fn sum(values: &[f32], of: impl Fn(f32) -> f32) -> f32 {
+    let mut lanes = [0.0; LANES];
+    for values in values.chunks(LANES) {
+        for (lane, value) in lanes.iter_mut().zip(values) {
+            *lane += of(*value);
+        }
+    }
+    total(&lanes) as f32
 }
 
 impl FacetSum {
     /// What part each facet of a group has in what the group reflects of light along `h` back along `h`: the mean over its
     /// lobes, some of it the same for all.
-    fn shares(&self, group: &Group, h: Vec3) -> Vec<f64> {
+    fn shares(&self, group: &Group, h: Vec3) -> Vec<f32> {
         let count = group.range.len();
-        let mut shares = vec![EVENLY / count.max(1) as f64; count];
+        let mut shares = vec![EVENLY / count.max(1) as f32; count];
         let parts = group.lobes.len() + group.measured.len();
-        let mut values = vec![0.0_f64; count];
+        let mut values = vec![0.0; count];
         for part in 0..parts {
-            for (value, s) in values.iter_mut().zip(group.range.clone()) {
-                let (normal, area) = self.facet(s);
-                let angles = LobeAngles::new(normal, h, h, h);
-                *value = f64::from(area)
-                    * f64::from(match group.lobes.get(part) {
-                        Some((_, term)) => term.lobe_cos(&angles),
-                        None if angles.n_dot_i > 0.0 => {
-                            let table = &group.measured[part - group.lobes.len()];
-                            table.f_r(&angles).max_element().max(0.0) * angles.n_dot_i * angles.n_dot_o
-                        }
-                        None => 0.0,
-                    });
+            match group.lobes.get(part) {
+                Some((lobe, _)) => {
+                    simd::lobe_values(*lobe, &PairVectors::new(h, h), self.normals(group.range.clone()), &mut values);
+                }
+                None => {
+                    let table = &group.measured[part - group.lobes.len()];
+                    for (value, s) in values.iter_mut().zip(group.range.clone()) {
+                        let angles = LobeAngles::new(self.facet(s).0, h, h, h);
+                        let lit = if angles.n_dot_i > 0.0 { angles.n_dot_i * angles.n_dot_o } else { 0.0 };
+                        *value = table.f_r(&angles).max_element().max(0.0) * lit;
+                    }
+                }
             }
-            let total: f64 = values.iter().sum();
+            for (value, area) in values.iter_mut().zip(self.areas(group.range.clone())) {
+                *value *= area;
+            }
+            let total = sum(&values, |value| value);
+            let each = (1.0 - EVENLY) / parts as f32;
             for (share, value) in shares.iter_mut().zip(&values) {
-                let part = if total > 0.0 { value / total } else { 1.0 / count as f64 };
-                *share += (1.0 - EVENLY) * part / parts as f64;
+                *share += each * if total > 0.0 { value / total } else { 1.0 / count as f32 };
             }
         }
         shares
@@ -149,11 +171,11 @@ mod tests {
 
     #[test]
     fn chances_add_up_to_the_count_and_never_exceed_certainty() {
-        let raw: Vec<f64> = (0..1000).map(|k| if k % 100 == 0 { 50.0 } else { 1.0 }).collect();
-        let total: f64 = raw.iter().sum();
-        let shares: Vec<f64> = raw.iter().map(|share| share / total).collect();
-        let chances = chances(&shares, 200.0);
-        let expected: f64 = chances.iter().sum();
+        let raw: Vec<f32> = (0..1000).map(|k| if k % 100 == 0 { 50.0 } else { 1.0 }).collect();
+        let total: f32 = raw.iter().sum();
+        let shares: Vec<f32> = raw.iter().map(|share| share / total).collect();
+        let chances = chances(shares, 200.0);
+        let expected: f32 = chances.iter().sum();
         assert!((expected - 200.0).abs() < 1.0, "{expected}");
         assert!(chances.iter().all(|&chance| chance > 0.0 && chance <= 1.0));
         // What weighs fifty times as much is certain.

@@ -19,7 +19,6 @@ use crate::filtering::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
 use crate::geometry::mirror_planes;
 use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
 use crate::scene::Switch;
-use crate::visibility::Visibility;
 
 /// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
 /// recurrence that placed the facets stays spread out.
@@ -28,7 +27,7 @@ const THINNED: [usize; 4] = [27, 17, 10, 3];
 /// A table this many times too far off is not helped by the next finer grid, which has half its step.
 const HOPELESS: f64 = 2.5;
 
-/// One facet in so many makes a table of a slow sum, those first that shine where a half vector points.
+/// One facet in so many makes a table, those first that shine where a half vector points.
 const PARTS: [usize; 2] = [5, 2];
 
 /// The same for coarse tables, of so many nodes, which are not tried before.
@@ -181,13 +180,8 @@ impl Pictures {
     /// A table on this grid, if a trial of some of its nodes is close enough; from fewer facets where that is no worse.
     fn attempt(&self, grid: UpperPairs, check: &Check, cancel: &Cancel) -> Result<Attempt> {
         let mirrors = self.mirrored.as_ref().map_or([false; 2], |shape| mirror_planes(&shape.mesh));
-        // What hangs over each facet makes sums slow, and so does a look-up for each.
-        let slow = match self.exact.direct_form() {
-            Form::Direct(direct)
-                if matches!(*direct.visibility, Visibility::Slices(_)) || direct.sum.measured_count() > 0 =>
-            {
-                direct.sum.facet_count()
-            }
+        let summed = match self.exact.direct_form() {
+            Form::Direct(direct) => direct.sum.facet_count(),
             _ => 0,
         };
         let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
@@ -201,15 +195,15 @@ impl Pictures {
             if !self.is_close(best) {
                 return Ok(Attempt::TooFar(best));
             }
-            for part in PARTS.into_iter().filter(|_| slow > 0) {
-                let sampled = tried(Some(slow / part))?;
+            for part in PARTS.into_iter().filter(|_| summed > 0) {
+                let sampled = tried(Some(summed / part))?;
                 if sampled.is_some_and(|errors| self.is_close(errors) && errors.rel_l2 < NO_WORSE * best.rel_l2) {
-                    nodes.facets = Some(slow / part);
+                    nodes.facets = Some(summed / part);
                     break;
                 }
             }
-        } else if slow > 0 && COARSE.contains(&count) {
-            nodes.facets = Some(slow / COARSE_PART);
+        } else if summed > 0 && COARSE.contains(&count) {
+            nodes.facets = Some(summed / COARSE_PART);
         }
         Ok(self.tabulate(nodes, cancel)?.map_or(Attempt::Never, Attempt::Made))
     }

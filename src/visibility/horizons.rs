@@ -126,7 +126,8 @@ impl Horizons {
     pub fn picked(&self, facets: &[usize]) -> Self {
         let rows = (0..self.azimuths).map(|azimuth| self.row(azimuth));
         let elevations = rows.flat_map(|row| facets.iter().map(|&facet| row[facet])).collect();
-        Self { facets: facets.len(), elevations, ..self.clone() }
+        let Self { azimuths, ramp, cut_short, .. } = *self;
+        Self { azimuths, facets: facets.len(), ramp, elevations, cut_short }
     }
 
     /// `Σ w v(direction)` over a run of facets with weights `w`: [`Horizons::fill`] and a sum at once. Azimuth in turns.
