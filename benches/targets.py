@@ -25,11 +25,15 @@ PAINTS = ["gold-metallic-paint", "silver-paint", "pearl-paint", "blue-metallic-p
 
 
 def yardstick_ms():
-    """A million dependent square roots in Python."""
-    x, start = 0.0, time.perf_counter()
-    for k in range(1_000_000):
-        x = (x + k) ** 0.5
-    return 1e3 * (time.perf_counter() - start)
+    """A million dependent square roots in Python, the quickest of five times."""
+
+    def once():
+        x, start = 0.0, time.perf_counter()
+        for k in range(1_000_000):
+            x = (x + k) ** 0.5
+        return time.perf_counter() - start
+
+    return 1e3 * min(once() for _ in range(5))
 
 
 def profile(scene, *options):
