@@ -29,23 +29,23 @@ fn mesh(size: Vec2, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> TileMesh 
 }
 
 /// A height-field with its samples kept, split along the diagonal from (i, j) to (i+1, j+1).
-fn height_field(n: u32, height: impl Fn(f32, f32) -> f32) -> TileMesh {
-    let at = |k: u32| (k as f32 + 0.5) / n as f32;
-    let heights: Vec<f32> = (0..n * n).map(|k| height(at(k % n), at(k / n))).collect();
-    let positions = (0..=n)
-        .flat_map(|j| (0..=n).map(move |i| (i, j)))
-        .map(|(i, j)| Vec3::new(at(i), at(j), heights[(j % n * n + i % n) as usize]))
+fn height_field([w, h]: [u32; 2], height: impl Fn(f32, f32) -> f32) -> TileMesh {
+    let at = |i: u32, j: u32| Vec2::new((i as f32 + 0.5) / w as f32, (j as f32 + 0.5) / h as f32);
+    let heights: Vec<f32> = (0..w * h).map(|k| at(k % w, k / w)).map(|place| height(place.x, place.y)).collect();
+    let positions = (0..=h)
+        .flat_map(|j| (0..=w).map(move |i| (i, j)))
+        .map(|(i, j)| at(i, j).extend(heights[(j % h * w + i % w) as usize]))
         .collect();
-    let cells = (0..n).flat_map(|j| (0..n).map(move |i| j * (n + 1) + i));
-    let triangles = cells.flat_map(|k| [[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]]).collect();
+    let cells = (0..h).flat_map(|j| (0..w).map(move |i| j * (w + 1) + i));
+    let triangles = cells.flat_map(|k| [[k, k + 1, k + w + 2], [k, k + w + 2, k + w + 1]]).collect();
     TileMesh {
-        height_grid: Some(HeightGrid { size: UVec2::splat(n), heights }),
+        height_grid: Some(HeightGrid { size: UVec2::new(w, h), heights }),
         ..mesh(Vec2::ONE, positions, triangles)
     }
 }
 
 fn dunes(n: u32) -> TileMesh {
-    height_field(n, |x, y| {
+    height_field([n, n], |x, y| {
         0.1 * (TAU * (x + 2.0 * y)).sin()
             + 0.06 * (TAU * (3.0 * x - y) + 1.0).sin()
             + 0.02 * (TAU * (5.0 * y + 4.0 * x)).cos()
@@ -192,6 +192,20 @@ fn walking_the_samples_finds_the_horizons_that_slicing_the_mesh_does() {
     }
     let total = march.len() * facets.len();
     assert!(differ * 500 < total, "{differ} of {total} horizons differ by more than 2 mrad");
+}
+
+#[test]
+fn fields_of_few_columns_and_thousands_of_rows_have_the_horizons_of_their_mesh() {
+    let mesh = height_field([2, 4096], |x, y| 0.1 * (6.0 * TAU * y).sin() + 0.05 * x);
+    let facets = sample(&mesh, 12);
+    let heights = mesh.height_grid.as_ref().unwrap();
+    let march = Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, 1024, 0.04));
+    let scan = Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(&mesh), &facets, 1024, 0.04));
+    let directions: Vec<Vec3> =
+        (0..1024_u16).map(|k| from_angles(1.2 + 0.3 * f32::from(k % 7) / 7.0, TAU * f32::from(k) / 1024.0)).collect();
+    let (march, scan) = (filled(&march, &directions), filled(&scan, &directions));
+    let differ = march.iter().flatten().zip(scan.iter().flatten()).filter(|(a, b)| (*a - *b).abs() > 0.05).count();
+    assert!(differ * 200 < march.len() * facets.len(), "{differ}");
 }
 
 /// Does a ray meet any of the copies of the tile around the base one? Möller and Trumbore 1997, in f64.

@@ -53,12 +53,14 @@ struct Walk {
     most: usize,
 }
 
-/// A whole number modulo another, exact below 2²¹: halfway between whole numbers no rounding of the product matters.
+/// A whole number modulo another: exact below 2²¹, as no rounding of the product matters halfway between whole numbers, and
+/// below the other anywhere (so far away nothing rises high enough to count).
 #[inline(always)]
-fn wrapped(k: f32, [n, inverse]: [f32; 2]) -> u32 {
-    let rest = k - n * ((k + 0.5) * inverse).floor();
+fn wrapped(k: f32, n: f32) -> u32 {
+    let rest = k - n * ((k + 0.5) * (1.0 / n)).floor();
     // Its mantissa, from 2²³ on: a cast looks out for what no whole number has, lane by lane.
-    (rest + 8_388_608.0).to_bits() & 0x007f_ffff
+    let rest = (rest + 8_388_608.0).to_bits() & 0x007f_ffff;
+    rest.min(n as u32 - 1)
 }
 
 impl HeightMarch {
@@ -117,7 +119,7 @@ impl HeightMarch {
         }
         let start = (first - at) * turn * step;
         let stride = self.size[0] + 1;
-        let [columns, rows] = self.size.map(|n| [n as f32, 1.0 / n as f32]);
+        let [columns, rows] = self.size.map(|n| n as f32);
         let next = match edges {
             Edges::Columns => stride,
             Edges::Rows => 1,
