@@ -1,5 +1,5 @@
-"""What an edit costs on the paper's five scenes, on the CPU: milliseconds as `biscale profile` prints them, for edits of the
-geometry as multiples of a yardstick of this machine, too; what `biscale eval` is off with the same settings; and the most
+"""What an edit costs on the paper's five scenes, on the CPU: milliseconds as `biscale profile` prints them, above one
+also as multiples of a yardstick of this machine; what `biscale eval` is off with the same settings; and the most
 memory that any of it took.
 
     python benches/targets.py [--no-errors]

@@ -19,6 +19,7 @@ use crate::filtering::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
 use crate::geometry::mirror_planes;
 use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
 use crate::scene::Switch;
+use crate::visibility::Visibility;
 
 /// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
 /// recurrence that placed the facets stays spread out.
@@ -30,7 +31,7 @@ const HOPELESS: f64 = 2.5;
 /// One facet in so many makes a table, those first that shine where a half vector points.
 const PARTS: [usize; 2] = [5, 2];
 
-/// The same for coarse tables, of so many nodes, which are not tried before.
+/// The same for coarse tables, of so many nodes, which are made at once; from all facets where that is not close enough.
 const COARSE_PART: usize = 4;
 const COARSE: Range<usize> = 10_000..20_000;
 
@@ -181,7 +182,8 @@ impl Pictures {
     fn attempt(&self, grid: UpperPairs, check: &Check, cancel: &Cancel) -> Result<Attempt> {
         let mirrors = self.mirrored.as_ref().map_or([false; 2], |shape| mirror_planes(&shape.mesh));
         let summed = match self.exact.direct_form() {
-            Form::Direct(direct) => direct.sum.facet_count(),
+            // Of maps no part can be picked.
+            Form::Direct(direct) if !matches!(*direct.visibility, Visibility::Maps(_)) => direct.sum.facet_count(),
             _ => 0,
         };
         let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
@@ -203,7 +205,11 @@ impl Pictures {
                 }
             }
         } else if summed > 0 && COARSE.contains(&count) {
-            nodes.facets = Some(summed / COARSE_PART);
+            let part = Nodes { facets: Some(summed / COARSE_PART), ..nodes };
+            let Some(table) = self.tabulate(part, cancel)? else { return Ok(Attempt::Never) };
+            if self.is_close(check.errors(&self.holding(table.clone()))) {
+                return Ok(Attempt::Made(table));
+            }
         }
         Ok(self.tabulate(nodes, cancel)?.map_or(Attempt::Never, Attempt::Made))
     }

@@ -14,7 +14,6 @@ pub(crate) trait Eight:
     fn of(values: &Fours) -> Self;
     fn splat(value: f32) -> Self;
     fn to_array(self) -> [f32; 8];
-    /// The other's where that is less.
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn less(self, other: Self) -> Self::Mask;
@@ -112,8 +111,27 @@ impl Eight for Fours {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-pub(crate) use avx::Wide;
+/// Work that computes with eight values at once, on whatever holds them.
+pub(crate) trait InEights {
+    type Output;
+
+    /// To be inlined always: only then is it compiled for what `E` needs.
+    fn with<E: Eight>(self) -> Self::Output;
+}
+
+/// Does the work in the widest registers that were found.
+pub(crate) fn eight<W: InEights>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        #[target_feature(enable = "avx2,fma")]
+        fn avx2<W: InEights>(work: W) -> W::Output {
+            work.with::<avx::Wide>()
+        }
+        // SAFETY: the features the function was compiled for were just found.
+        return unsafe { avx2(work) };
+    }
+    work.with::<Fours>()
+}
 
 #[cfg(target_arch = "x86_64")]
 mod avx {
@@ -121,13 +139,14 @@ mod avx {
 
     use super::{Add, Div, Eight, Fours, Mul, Sub};
 
-    /// Eight values in one register. To be used in functions only that are compiled for AVX and run where it was found.
+    /// Eight values in one register. Every `unsafe` here rests on AVX being there: none is made but by
+    /// [`eight`](super::eight), which looks first.
     #[derive(Clone, Copy)]
-    pub(crate) struct Wide(__m256);
+    pub(super) struct Wide(__m256);
 
     operators! {
         Wide,
-        // SAFETY: of this and all below, as the type says: AVX is there.
+        // SAFETY: of this and all below that is not said otherwise, as the type says.
         Add add |a: Wide, b: Wide| Wide(unsafe { _mm256_add_ps(a.0, b.0) }),
         Sub sub |a: Wide, b: Wide| Wide(unsafe { _mm256_sub_ps(a.0, b.0) }),
         Mul mul |a: Wide, b: Wide| Wide(unsafe { _mm256_mul_ps(a.0, b.0) }),

@@ -1,4 +1,5 @@
-//! Inner loops over facets, written so that the compiler vectorises them, with the widest instructions found at run time.
+//! Inner loops over facets, written so that the compiler vectorises them, with the widest instructions found at run time; and
+//! [`eight`] values at once for what it does not vectorise.
 //!
 //! Every function here has a plain twin elsewhere that the tests compare it with.
 
@@ -12,9 +13,7 @@ mod rows;
 mod tests;
 mod visibility;
 
-#[cfg(target_arch = "x86_64")]
-pub(crate) use eight::Wide;
-pub(crate) use eight::{Eight, Fours};
+pub(crate) use eight::{Eight, Fours, InEights, eight};
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub(crate) use math::cubic_weights;

@@ -49,12 +49,12 @@ struct Walk {
     /// Where it begins, across the edges and along them, and how it goes on per unit of the plane.
     across: [f32; 2],
     along: [f32; 2],
-    /// Edges that it crosses at most.
+    /// Edges that it crosses at most, or as many more as fill [`WIDTH`].
     most: usize,
 }
 
-/// A whole number modulo another: exact below 2²¹, as no rounding of the product matters halfway between whole numbers, and
-/// below the other anywhere (so far away nothing rises high enough to count).
+/// A whole number modulo another: exact below 2²¹, where `(k + ½)/n` is further from whole numbers than its rounding; below the
+/// other for whatever is given.
 #[inline(always)]
 fn wrapped(k: f32, n: f32) -> u32 {
     let rest = k - n * ((k + 0.5) * (1.0 / n)).floor();

@@ -5,9 +5,7 @@ use glam::{IVec2, Vec2, Vec3};
 use super::periodic_grid::CellWalk;
 use super::slicer::{TurnedSlicer, WIDTH};
 use crate::geometry::Facets;
-#[cfg(target_arch = "x86_64")]
-use crate::simd::Wide;
-use crate::simd::{Eight, Fours};
+use crate::simd::{Eight, InEights, eight};
 
 /// Blocked slopes (tangents of the elevation), sorted and disjoint, within `[0, ∞]`.
 #[derive(Debug, Default, Clone)]
@@ -121,33 +119,38 @@ const LOWEST_SLOPE: f32 = 0.005;
 /// the horizon (2° for pyramids of 100 tiles) and is left out; [`BlockedSlopes::cut_short`] counts such walks.
 const LEAST_LOOKS: usize = 16_384;
 
-/// Hands each facet of a scan with what blocks it to a caller.
-type Found<'a> = &'a mut dyn FnMut(u32, &BlockedSlopes);
-
 /// Scans every facet along the slicer's direction from its lifted origin, and hands each with what blocks it to `found`;
 /// returns how many walks ended before all was known.
-pub(super) fn scan_all(slicer: &TurnedSlicer, facets: &Facets, origins: &[Vec3], found: Found) -> usize {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-        #[target_feature(enable = "avx2,fma")]
-        fn avx2(slicer: &TurnedSlicer, facets: &Facets, origins: &[Vec3], found: Found) -> usize {
-            scan_each::<Wide>(slicer, facets, origins, found)
-        }
-        // SAFETY: the features the function was compiled for were just found.
-        return unsafe { avx2(slicer, facets, origins, found) };
-    }
-    scan_each::<Fours>(slicer, facets, origins, found)
+pub(super) fn scan_all(
+    slicer: &TurnedSlicer,
+    facets: &Facets,
+    origins: &[Vec3],
+    found: &mut dyn FnMut(u32, &BlockedSlopes),
+) -> usize {
+    eight(Scan { slicer, facets, origins, found })
 }
 
-#[inline(always)]
-fn scan_each<E: Eight>(slicer: &TurnedSlicer, facets: &Facets, origins: &[Vec3], found: Found) -> usize {
-    let mut blocked = BlockedSlopes::default();
-    for facet in slicer.order(facets) {
-        let at = facet as usize;
-        slicer.scan::<E>(origins[at], facets.normals[at], facets.triangles[at], &mut blocked);
-        found(facet, &blocked);
+/// The arguments of [`scan_all`].
+struct Scan<'a> {
+    slicer: &'a TurnedSlicer<'a>,
+    facets: &'a Facets,
+    origins: &'a [Vec3],
+    found: &'a mut dyn FnMut(u32, &BlockedSlopes),
+}
+
+impl InEights for Scan<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with<E: Eight>(self) -> usize {
+        let mut blocked = BlockedSlopes::default();
+        for facet in self.slicer.order(self.facets) {
+            let at = facet as usize;
+            self.slicer.scan::<E>(self.origins[at], self.facets.normals[at], self.facets.triangles[at], &mut blocked);
+            (self.found)(facet, &blocked);
+        }
+        blocked.cut_short
     }
-    blocked.cut_short
 }
 
 impl TurnedSlicer<'_> {
@@ -209,10 +212,10 @@ impl TurnedSlicer<'_> {
                         blocked.insert(low, high);
                     }
                 }
+                if blocked.ground == f32::INFINITY {
+                    return;
+                }
                 floor = origin.z + entered * blocked.ground;
-            }
-            if blocked.ground == f32::INFINITY {
-                return;
             }
         }
     }

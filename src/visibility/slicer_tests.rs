@@ -2,6 +2,7 @@ use rand::{RngExt as _, SeedableRng as _};
 
 use super::*;
 use crate::geometry::{TileMesh, heightfield};
+use crate::simd::{InEights, eight};
 
 /// Nothing known, nothing left out.
 const NOTHING: Known = Known { ground: 0.0, low: f32::INFINITY, high: f32::NEG_INFINITY };
@@ -55,9 +56,16 @@ fn waves() -> TileMesh {
 #[test]
 fn eight_triangles_at_once_are_cut_as_one_by_one_ahead_behind_and_overhead() {
     are_cut_as_one_by_one::<Fours>();
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        are_cut_as_one_by_one::<crate::simd::Wide>();
+    eight(CutInEights);
+}
+
+struct CutInEights;
+
+impl InEights for CutInEights {
+    type Output = ();
+
+    fn with<E: Eight>(self) {
+        are_cut_as_one_by_one::<E>();
     }
 }
 
