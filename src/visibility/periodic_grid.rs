@@ -20,6 +20,7 @@ pub struct PeriodicGrid {
     pub(super) cells: IVec2,
     pub(super) cell_size: Vec2,
     starts: Vec<u32>,
+    /// Those of a cell from the highest down.
     entries: Vec<CellEntry>,
     /// Highest z in each cell, of the triangles' parts anywhere (a bound).
     pub(super) z_max: Vec<f32>,
