@@ -1,9 +1,12 @@
-// The G-buffer: the twin of src/large_scale/gbuffer.rs, whose rules it follows.
+// The G-buffer and what is shaded of it: the twin of src/large_scale/gbuffer.rs and shading_points.rs, whose rules it
+// follows.
 //
-// The raster pipeline only finds which triangle each sample shows; `resolve` then meets the sample's ray with that
-// triangle's plane and interpolates, so that positions and frames do not depend on how a driver interpolates.
+// The raster pipeline only finds which triangle each sample shows; `find_points` then meets the sample's ray with that
+// triangle's plane and interpolates, so that positions and frames do not depend on how a driver interpolates, and lets
+// the samples of a pixel that show one smooth piece of surface share a point.
 
 //!import vectors
+//!import point
 
 struct Camera {
     eye: vec3f,
@@ -17,9 +20,16 @@ struct Camera {
     least_cosine: f32,
     // Samples across and down.
     size: vec2u,
-    // The first row of samples in the output, and how many rows it holds.
+    // The first row of pixels of this band, and how many it has.
     first_row: u32,
     rows: u32,
+    // Samples a pixel side.
+    samples: u32,
+    // Of a pixel, a unit away.
+    pixel_extent: f32,
+    // How far shadow rays start above the surface.
+    lift: f32,
+    two_sided: u32,
 }
 
 struct Vertex {
@@ -37,13 +47,17 @@ struct Vertex {
 @group(0) @binding(2) var<storage, read> indices: array<u32>;
 
 @group(1) @binding(0) var shown: texture_2d<u32>;
-@group(1) @binding(1) var<storage, read_write> triangles: array<u32>;
-// Three numbers a sample in each.
-@group(1) @binding(2) var<storage, read_write> positions: array<f32>;
-@group(1) @binding(3) var<storage, read_write> normals: array<f32>;
-@group(1) @binding(4) var<storage, read_write> tangents: array<f32>;
+// The first sample of every pixel of the band, the second of every pixel, and so on.
+@group(1) @binding(1) var<storage, read_write> points: array<Point>;
+// Where shadow rays of each start.
+@group(1) @binding(2) var<storage, read_write> origins: array<vec4f>;
 
-const NOTHING: u32 = 0xffffffffu;
+// Whether anything asks for the origins.
+override SHADOWED: bool = true;
+
+// SAME_NORMAL and SAME_TANGENT of shading_points.rs.
+const SAME_NORMAL: f32 = 0.99939;
+const SAME_TANGENT: f32 = 0.9962;
 
 struct Projected {
     @builtin(position) clip: vec4f,
@@ -96,41 +110,114 @@ fn meet(ray: vec3f, a: vec3f, ab: vec3f, ac: vec3f) -> vec2f {
     return weights / max(weights.x + weights.y, 1.0);
 }
 
+// What a sample shows.
+struct Sample {
+    // Triangle + 1; 0 where it shows the background.
+    name: u32,
+    position: vec3f,
+    normal: vec3f,
+    tangent: vec3f,
+}
+
+fn sample_at(at: vec2u) -> Sample {
+    let name = textureLoad(shown, at, 0).x;
+    if name == 0u {
+        return Sample();
+    }
+    let first = 3u * (name - 1u);
+    let a = vertices[indices[first]];
+    let b = vertices[indices[first + 1u]];
+    let c = vertices[indices[first + 2u]];
+    let ndc = (vec2f(at) + 0.5) / vec2f(camera.size) * 2.0 - 1.0;
+    let ray = camera.right * (ndc.x * camera.tan_half_fov_x) - camera.up * (ndc.y * camera.tan_half_fov_y) - camera.back;
+    let ab = b.position - a.position;
+    let ac = c.position - a.position;
+    let weights = meet(ray, a.position, ab, ac);
+    let first_weight = 1.0 - weights.x - weights.y;
+    let position = a.position + ab * weights.x + ac * weights.y;
+    let outside = cross(ab, ac);
+    let side = select(1.0, -1.0, dot(outside, camera.eye - a.position) < 0.0);
+    let mixed = a.normal * first_weight + b.normal * weights.x + c.normal * weights.y;
+    let smooth_normal = unit_or(mixed, unit_or(outside, camera.back)) * side;
+    let viewer = unit_or(camera.eye - position, camera.back);
+    let normal = bent_towards(smooth_normal, viewer);
+    let tangent = perpendicular(a.tangent * first_weight + b.tangent * weights.x + c.tangent * weights.y, normal);
+    return Sample(name, position, normal, tangent);
+}
+
+// Where shadow rays start: the twin of `ray_origin` (src/large_scale/shadow.rs).
+fn ray_origin(name: u32, p: vec3f) -> vec3f {
+    let first = 3u * (name - 1u);
+    var corners: array<vec3f, 3>;
+    for (var k = 0u; k < 3u; k++) {
+        corners[k] = vertices[indices[first + k]].position;
+    }
+    let area = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    let squared = dot(area, area);
+    if !(squared > 0.0) {
+        return p;
+    }
+    let facing = select(1.0, -1.0, camera.two_sided == 1u && dot(area, camera.eye - corners[0]) < 0.0);
+    var lift = vec3f(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        let weight = clamp(dot(cross(corners[(k + 1u) % 3u] - p, corners[(k + 2u) % 3u] - p), area) / squared, 0.0, 1.0);
+        let vertex_normal = vertices[indices[first + k]].normal * facing;
+        lift -= vertex_normal * (weight * min(dot(p - corners[k], vertex_normal), 0.0));
+    }
+    return p + lift + area * inverseSqrt(squared) * (facing * camera.lift);
+}
+
+fn add_point(slot: u32, weight: f32, found: Sample) {
+    points[slot] = Point(found.position, weight, found.normal, found.name - 1u, found.tangent, 0u);
+    if SHADOWED {
+        origins[slot] = vec4f(ray_origin(found.name, found.position), 0.0);
+    }
+}
+
 @compute @workgroup_size(8, 8)
-fn resolve(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= camera.size.x || id.y >= camera.rows {
+fn find_points(@builtin(global_invocation_id) id: vec3u) {
+    let side = camera.samples;
+    let width = camera.size.x / side;
+    if id.x >= width || id.y >= camera.rows {
         return;
     }
-    let sample = id.y * camera.size.x + id.x;
-    let at = vec2u(id.x, camera.first_row + id.y);
-    let name = textureLoad(shown, at, 0).x;
-    var position = vec3f(0.0);
-    var normal = vec3f(0.0);
-    var tangent = vec3f(0.0);
-    if name != 0u {
-        let first = 3u * (name - 1u);
-        let a = vertices[indices[first]];
-        let b = vertices[indices[first + 1u]];
-        let c = vertices[indices[first + 2u]];
-        let ndc = (vec2f(at) + 0.5) / vec2f(camera.size) * 2.0 - 1.0;
-        let ray = camera.right * (ndc.x * camera.tan_half_fov_x) - camera.up * (ndc.y * camera.tan_half_fov_y) - camera.back;
-        let ab = b.position - a.position;
-        let ac = c.position - a.position;
-        let weights = meet(ray, a.position, ab, ac);
-        let first_weight = 1.0 - weights.x - weights.y;
-        position = a.position + ab * weights.x + ac * weights.y;
-        let outside = cross(ab, ac);
-        let side = select(1.0, -1.0, dot(outside, camera.eye - a.position) < 0.0);
-        let mixed = a.normal * first_weight + b.normal * weights.x + c.normal * weights.y;
-        let smooth_normal = unit_or(mixed, unit_or(outside, camera.back)) * side;
-        let viewer = unit_or(camera.eye - position, camera.back);
-        normal = bent_towards(smooth_normal, viewer);
-        tangent = perpendicular(a.tangent * first_weight + b.tangent * weights.x + c.tangent * weights.y, normal);
+    let pixel = id.y * width + id.x;
+    let plane = width * camera.rows;
+    let corner = vec2u(id.x, camera.first_row + id.y) * side;
+    let count = side * side;
+    let share = 1.0 / f32(count);
+
+    let first = sample_at(corner);
+    let step = camera.pixel_extent * length(first.position - camera.eye);
+    var alike = count > 1u && first.name != 0u;
+    var normals = first.normal;
+    var tangents = first.tangent;
+    for (var k = 1u; k < count && alike; k++) {
+        let other = sample_at(corner + vec2u(k % side, k / side));
+        normals += other.normal;
+        tangents += other.tangent;
+        alike = other.name != 0u
+            && dot(other.normal, first.normal) >= SAME_NORMAL
+            && dot(other.tangent, first.tangent) >= SAME_TANGENT
+            && abs(dot(other.position - first.position, first.normal)) <= step;
     }
-    triangles[sample] = select(name - 1u, NOTHING, name == 0u);
-    for (var axis = 0u; axis < 3u; axis++) {
-        positions[3u * sample + axis] = position[axis];
-        normals[3u * sample + axis] = normal[axis];
-        tangents[3u * sample + axis] = tangent[axis];
+    if alike {
+        let normal = unit_or(normals * share, first.normal);
+        let tangent = perpendicular(tangents * share, normal);
+        // A place on the surface, not the mean: across a concave edge that lies inside the object, in the dark.
+        add_point(pixel, 1.0, Sample(first.name, first.position, normal, tangent));
+    }
+    for (var k = select(0u, 1u, alike); k < count; k++) {
+        let slot = k * plane + pixel;
+        if alike {
+            points[slot].weight = 0.0;
+            continue;
+        }
+        let found = sample_at(corner + vec2u(k % side, k / side));
+        if found.name == 0u {
+            points[slot].weight = 0.0;
+        } else {
+            add_point(slot, share, found);
+        }
     }
 }

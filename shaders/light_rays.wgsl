@@ -1,13 +1,7 @@
 // Which lights each shading point sees: the twin of `Occluder::visible` (src/large_scale/shadow.rs), ray by ray through
 // the same hierarchy (src/large_scale/bvh.rs).
 
-struct Params {
-    // The points of this dispatch.
-    first_point: u32,
-    end_point: u32,
-    light_count: u32,
-    words_per_point: u32,
-}
+//!import shading_points
 
 struct Node {
     low: vec3f,
@@ -28,28 +22,11 @@ struct Blocker {
     pad_2: u32,
 }
 
-struct Point {
-    // Where its rays start.
-    origin: vec3f,
-    pad_o: u32,
-    normal: vec3f,
-    pad_n: u32,
-}
-
-struct Light {
-    direction: vec3f,
-    pad_d: u32,
-    // 1 / direction, very large where that is infinite.
-    inverse: vec3f,
-    pad_i: u32,
-}
-
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> nodes: array<Node>;
-@group(0) @binding(2) var<storage, read> blockers: array<Blocker>;
-@group(0) @binding(3) var<storage, read> points: array<Point>;
-@group(0) @binding(4) var<storage, read> lights: array<Light>;
-@group(0) @binding(5) var<storage, read_write> visible: array<u32>;
+@group(1) @binding(0) var<storage, read> nodes: array<Node>;
+@group(1) @binding(1) var<storage, read> blockers: array<Blocker>;
+// Where the rays of each point start.
+@group(1) @binding(2) var<storage, read> origins: array<vec4f>;
+@group(1) @binding(3) var<storage, read_write> visible: array<u32>;
 
 // The deepest hierarchy (60 levels) and a little more.
 const STACK: u32 = 64;
@@ -83,24 +60,26 @@ fn is_entered(index: u32, origin: vec3f, inverse: vec3f) -> bool {
     return !(enter > leave * 1.000001);
 }
 
-fn is_blocked(origin: vec3f, light: Light) -> bool {
+fn is_blocked(origin: vec3f, direction: vec3f) -> bool {
+    // Very large numbers in place of infinities, which shaders need not support.
+    let inverse = select(clamp(1.0 / direction, vec3f(-1e30), vec3f(1e30)), vec3f(1e30), abs(direction) < vec3f(1e-30));
     var stack: array<u32, STACK>;
     stack[0] = 0u;
-    var depth = select(0u, 1u, is_entered(0u, origin, light.inverse));
+    var depth = select(0u, 1u, is_entered(0u, origin, inverse));
     while depth > 0u {
         depth--;
         let first = nodes[stack[depth]].first;
         let count = nodes[stack[depth]].count;
         if count > 0u {
             for (var k = first; k < first + count; k++) {
-                if is_hit(blockers[k], origin, light.direction) {
+                if is_hit(blockers[k], origin, direction) {
                     return true;
                 }
             }
             continue;
         }
         for (var child = first; child <= first + 1u; child++) {
-            if depth < STACK && is_entered(child, origin, light.inverse) {
+            if depth < STACK && is_entered(child, origin, inverse) {
                 stack[depth] = child;
                 depth++;
             }
@@ -111,19 +90,20 @@ fn is_blocked(origin: vec3f, light: Light) -> bool {
 
 @compute @workgroup_size(64)
 fn trace(@builtin(global_invocation_id) id: vec3u) {
-    let at = params.first_point + id.x;
-    if at >= params.end_point {
+    let point = id.x;
+    if is_empty(point) {
         return;
     }
-    let point = points[at];
+    let origin = origins[point].xyz;
+    let normal = points[point].normal;
     var bits = 0u;
     let first = 32u * id.y;
     let count = min(32u, params.light_count - first);
     for (var k = 0u; k < count; k++) {
-        let light = lights[first + k];
-        if dot(light.direction, point.normal) > 0.0 && !is_blocked(point.origin, light) {
+        let direction = lights[first + k].direction;
+        if dot(direction, normal) > 0.0 && !is_blocked(origin, direction) {
             bits |= 1u << k;
         }
     }
-    visible[at * params.words_per_point + id.y] = bits;
+    visible[point * params.words_per_point + id.y] = bits;
 }

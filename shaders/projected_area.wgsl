@@ -7,8 +7,8 @@
 
 @compute @workgroup_size(64)
 fn measure(@builtin(global_invocation_id) id: vec3u) {
-    let point = params.first_point + id.x;
-    if point >= params.end_point {
+    let point = id.x;
+    if is_empty(point) {
         return;
     }
     let o = view_of(point, frame_of(point));

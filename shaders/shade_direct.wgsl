@@ -11,16 +11,15 @@
 
 @compute @workgroup_size(64)
 fn shade(@builtin(global_invocation_id) id: vec3u) {
-    let point = params.first_point + id.x;
-    if point >= params.end_point || scales[point] == 0.0 {
+    let point = id.x;
+    if is_empty(point) || scales[point] == 0.0 {
         return;
     }
     let frame = frame_of(point);
     let o = view_of(point, frame);
     let to_viewer = sight_along(o);
     var total = vec3f(0.0);
-    let end = min((id.y + 1u) * SLICE, params.light_count);
-    for (var k = id.y * SLICE; k < end; k++) {
+    for (var k = id.y * params.slice; k < end_of(id.y); k++) {
         let i = in_tangent(frame, lights[k].direction);
         if i.z <= 0.0 || !sees_light(point, k) {
             continue;

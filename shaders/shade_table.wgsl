@@ -108,8 +108,8 @@ fn four_at(place: ptr<function, Place>, four: u32) -> vec4f {
 
 @compute @workgroup_size(64)
 fn shade(@builtin(global_invocation_id) id: vec3u) {
-    let point = params.first_point + id.x;
-    if point >= params.end_point {
+    let point = id.x;
+    if is_empty(point) {
         return;
     }
     let frame = frame_of(point);
@@ -127,8 +127,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     var total = vec3f(0.0);
-    let end = min((id.y + 1u) * SLICE, params.light_count);
-    for (var k = id.y * SLICE; k < end; k++) {
+    for (var k = id.y * params.slice; k < end_of(id.y); k++) {
         let i = in_tangent(frame, lights[k].direction);
         if i.z <= 0.0 || !sees_light(point, k) {
             continue;

@@ -1,31 +1,18 @@
-// What every shading pass shares: points, lights and where radiance goes. Directions are formed as in
+// What every pass over shading points shares: points, lights and where radiance goes. Directions are formed as in
 // src/large_scale/shading.rs.
 
 //!import vectors
+//!import point
 
 struct Params {
     eye: vec3f,
-    // Points in all.
     point_count: u32,
-    // The points of this dispatch.
-    first_point: u32,
-    end_point: u32,
     light_count: u32,
     words_per_point: u32,
+    // Lights that one thread adds up.
+    slice: u32,
     // A projected area below this shows nothing.
     least_area: f32,
-    pad_0: u32,
-    pad_1: u32,
-    pad_2: u32,
-}
-
-struct Point {
-    position: vec3f,
-    pad_p: u32,
-    normal: vec3f,
-    pad_n: u32,
-    tangent: vec3f,
-    pad_t: u32,
 }
 
 struct Light {
@@ -44,13 +31,14 @@ struct Light {
 @group(0) @binding(4) var<storage, read_write> radiance: array<vec4f>;
 // Binding 5: scales.wgsl.
 
-// Lights that one thread adds up.
-const SLICE: u32 = 8u;
-
 struct Frame {
     x: vec3f,
     y: vec3f,
     z: vec3f,
+}
+
+fn is_empty(point: u32) -> bool {
+    return point >= params.point_count || points[point].weight == 0.0;
 }
 
 fn frame_of(point: u32) -> Frame {
@@ -70,6 +58,11 @@ fn view_of(point: u32, frame: Frame) -> vec3f {
 
 fn half_vector(i: vec3f, o: vec3f) -> vec3f {
     return unit_or(i + o, vec3f(0.0, 0.0, 1.0));
+}
+
+// Behind the last light of a slice.
+fn end_of(slice: u32) -> u32 {
+    return min((slice + 1u) * params.slice, params.light_count);
 }
 
 fn add_radiance(point: u32, slice: u32, value: vec3f) {

@@ -1,7 +1,7 @@
 //! Plain data to the device and back.
 
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bytemuck::Pod;
 
@@ -9,6 +9,9 @@ use super::{Gpu, GpuError};
 
 /// How long to wait for the device before it is given up.
 const PATIENCE: Duration = Duration::from_secs(300);
+
+/// How often a device is asked that a window uses, too.
+const GLANCE: Duration = Duration::from_micros(200);
 
 /// Enough for one element of any of our arrays: a binding holds at least one.
 const LEAST_BYTES: u64 = 256;
@@ -55,29 +58,70 @@ impl Gpu {
         })
     }
 
+    /// Waits for the device and copies an image of four bytes a pixel (usage `COPY_SRC`) back, row by row.
+    pub fn read_image(&self, image: &wgpu::Texture) -> Result<Vec<u8>, GpuError> {
+        let size = image.size();
+        let row = 4 * size.width;
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+        let staging = self.buffer("read-back", u64::from(padded) * u64::from(size.height), usage)?;
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None };
+        let bytes: Vec<u8> = self.checked("reading back", || {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            encoder.copy_texture_to_buffer(
+                image.as_image_copy(),
+                wgpu::TexelCopyBufferInfo { buffer: &staging, layout },
+                size,
+            );
+            self.queue.submit([encoder.finish()]);
+            self.map(&staging)
+        })?;
+        let rows = bytes.chunks(padded as usize).take(size.height as usize);
+        Ok(rows.flat_map(|bytes| &bytes[..row as usize]).copied().collect())
+    }
+
     /// Waits until the device has done all that was submitted.
     pub fn wait(&self, during: &str) -> Result<(), GpuError> {
-        let during = during.to_owned();
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
-        match self.device.poll(wait) {
-            Ok(_) => Ok(()),
-            Err(wgpu::PollError::Timeout) => Err(GpuError::Timeout { during, seconds: PATIENCE.as_secs() }),
-            Err(other) => Err(GpuError::Refused { during, reason: other.to_string() }),
+        let (sender, receiver) = mpsc::channel();
+        self.queue.on_submitted_work_done(move || {
+            // Whoever waited may have lost patience.
+            let _ = sender.send(());
+        });
+        self.hear(&receiver, during)
+    }
+
+    /// Waits for what a callback of the device says.
+    fn hear<T>(&self, told: &mpsc::Receiver<T>, during: &str) -> Result<T, GpuError> {
+        let refused = |reason: String| GpuError::Refused { during: during.to_owned(), reason };
+        let timeout = || GpuError::Timeout { during: during.to_owned(), seconds: PATIENCE.as_secs() };
+        if !self.is_shared {
+            let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
+            match self.device.poll(wait) {
+                Ok(_) => {}
+                Err(wgpu::PollError::Timeout) => return Err(timeout()),
+                Err(other) => return Err(refused(other.to_string())),
+            }
+            return told.try_recv().map_err(|e| refused(e.to_string()));
         }
+        // A wait inside the driver would hold up what the window submits meanwhile.
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
+            self.device.poll(wgpu::PollType::Poll).map_err(|e| refused(e.to_string()))?;
+            match told.recv_timeout(GLANCE) {
+                Ok(answer) => return Ok(answer),
+                Err(mpsc::RecvTimeoutError::Timeout) => {}
+                Err(error) => return Err(refused(error.to_string())),
+            }
+        }
+        Err(timeout())
     }
 
     /// Waits for the device and copies a mappable buffer's contents out.
     pub fn map<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
         let refused = |reason: String| GpuError::Refused { during: "reading back".to_owned(), reason };
         let (sender, receiver) = mpsc::channel();
-        // The receiver outlives the wait below; after it, nobody is left to hear a late answer.
         staging.map_async(wgpu::MapMode::Read, .., move |answer| drop(sender.send(answer)));
-        self.wait("reading back")?;
-        match receiver.try_recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(refused(error.to_string())),
-            Err(error) => return Err(refused(error.to_string())),
-        }
+        self.hear(&receiver, "reading back")?.map_err(|error| refused(error.to_string()))?;
         let view = staging.get_mapped_range(..).map_err(|e| refused(e.to_string()))?;
         let values = bytemuck::pod_collect_to_vec(&view[..view.len() / size_of::<T>() * size_of::<T>()]);
         drop(view);

@@ -35,6 +35,8 @@ pub struct Gpu {
     /// What was granted: what the buffers need, or what the adapter has where that is less.
     pub limits: wgpu::Limits,
     pub tier: Tier,
+    /// Whether a window draws on it, too.
+    pub(super) is_shared: bool,
     faults: Arc<Mutex<Faults>>,
 }
 
@@ -43,6 +45,12 @@ pub struct Gpu {
 struct Faults {
     lost: Option<String>,
     uncaptured: Option<String>,
+}
+
+impl Faults {
+    fn lose(&mut self, reason: wgpu::DeviceLostReason, message: &str) {
+        self.lost.get_or_insert_with(|| format!("{reason:?}: {message}"));
+    }
 }
 
 impl Gpu {
@@ -62,40 +70,64 @@ impl Gpu {
         Self::from_adapter(&adapter)
     }
 
-    fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        let info = adapter.get_info();
+    /// What a device that is to be a [`Gpu`] must be asked for.
+    pub fn request(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let wanted = wgpu::Limits {
             max_storage_buffer_binding_size: WANTED_BUFFER_BYTES,
             max_buffer_size: WANTED_BUFFER_BYTES,
             ..wgpu::Limits::default()
         };
-        let limits = wanted.or_worse_values_from(&adapter.limits());
-        let description = wgpu::DeviceDescriptor {
+        wgpu::DeviceDescriptor {
             label: Some("biscale"),
-            required_limits: limits.clone(),
+            // Times of stages are told where the adapter has a clock.
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_limits: wanted.or_worse_values_from(&adapter.limits()),
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
-        };
-        let (device, queue) = pollster::block_on(adapter.request_device(&description))
-            .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), reason: e.to_string() })?;
+        }
+    }
 
-        let faults = Arc::new(Mutex::new(Faults::default()));
-        let heard = faults.clone();
-        device.set_device_lost_callback(move |reason, message| {
-            let mut heard = heard.lock().unwrap_or_else(PoisonError::into_inner);
-            heard.lost.get_or_insert_with(|| format!("{reason:?}: {message}"));
-        });
-        let heard = faults.clone();
-        device.on_uncaptured_error(Arc::new(move |error| {
+    fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        let info = adapter.get_info();
+        let (device, queue) = pollster::block_on(adapter.request_device(&Self::request(adapter)))
+            .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), reason: e.to_string() })?;
+        let gpu = Self::new(device, queue, info, false);
+        let heard = gpu.faults.clone();
+        gpu.device.on_uncaptured_error(Arc::new(move |error| {
             let mut heard = heard.lock().unwrap_or_else(PoisonError::into_inner);
             heard.uncaptured.get_or_insert_with(|| error.to_string());
         }));
+        Ok(gpu)
+    }
 
-        let tier = match info.device_type {
+    /// The device that a window draws on: what is made here can be shown without being read back. The window hears of
+    /// uncaptured errors itself; `lost` is told when the device is gone.
+    pub fn of_window(
+        adapter: &wgpu::Adapter,
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        lost: impl Fn() + Send + Sync + 'static,
+    ) -> Self {
+        let gpu = Self::new(device, queue, adapter.get_info(), true);
+        let heard = gpu.faults.clone();
+        gpu.device.set_device_lost_callback(move |reason, message| {
+            heard.lock().unwrap_or_else(PoisonError::into_inner).lose(reason, &message);
+            lost();
+        });
+        gpu
+    }
+
+    fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: wgpu::AdapterInfo, is_shared: bool) -> Self {
+        let faults = Arc::new(Mutex::new(Faults::default()));
+        let heard = faults.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            heard.lock().unwrap_or_else(PoisonError::into_inner).lose(reason, &message);
+        });
+        let tier = match adapter.device_type {
             wgpu::DeviceType::Cpu => Tier::Software,
             _ => Tier::Hardware,
         };
-        Ok(Self { device, queue, adapter: info, limits, tier, faults })
+        Self { limits: device.limits(), device, queue, adapter, tier, is_shared, faults }
     }
 
     /// The adapter and its driver on one line.

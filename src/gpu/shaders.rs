@@ -22,6 +22,8 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("lobe_input", include_str!("../../shaders/lobe_input.wgsl")),
     ("lobe_lambertian", include_str!("../../shaders/lobe_lambertian.wgsl")),
     ("lobe_ward", include_str!("../../shaders/lobe_ward.wgsl")),
+    ("picture", include_str!("../../shaders/picture.wgsl")),
+    ("point", include_str!("../../shaders/point.wgsl")),
     ("polar_grid", include_str!("../../shaders/polar_grid.wgsl")),
     ("projected_area", include_str!("../../shaders/projected_area.wgsl")),
     ("scales", include_str!("../../shaders/scales.wgsl")),

@@ -1,44 +1,72 @@
 //! The picture on wgpu: the twin of [`render`](super::render::render).
 //!
-//! G-buffer, light rays and shading run on the device; the CPU merges samples into shading points and gathers the picture.
-//! Which lights a point sees never leaves the device.
+//! G-buffer, points, light rays, shading and tones run on the device in one submission; what goes to a screen never leaves
+//! it. Only where the work is so much that a driver's watchdog or an impatient hand would mind is it cut into several.
 
 use std::time::Instant;
 
-use super::CameraView;
-use super::gpu_gbuffer::GpuGBuffer;
+use super::gpu_band::{Band, Need, Parts, Room};
+use super::gpu_clock::{Clock, Stage, Timed};
+use super::gpu_gbuffer::{Camera, GpuGBuffer, GpuObject};
 use super::gpu_light_rays::{GpuLightRays, GpuOccluder};
-use super::gpu_shading::{GpuMaterial, GpuShading};
+use super::gpu_picture::{self, GpuPictures, Output};
+use super::gpu_shading::{self, GpuMaterial, GpuShading, Light};
 use super::render::{RenderInput, Rendered, StageTimes, check_size};
-use super::shading;
-use super::shading_points::ShadingPoints;
 use super::shadow::Occluder;
+use super::tone_map::{ToneCurve, ToneMap};
+use super::{CameraView, ObjectMesh, Picture};
 use crate::cancel::Cancel;
 use crate::error::Result;
 use crate::filtering::EffectiveBrdf;
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Gpu, GpuError, Tier};
+
+/// Lobes or table rows of one submission: some tenths of a second for slow graphics processors, about one for software.
+const WORK: u64 = 1 << 32;
+const SOFTWARE_WORK: u64 = 1 << 29;
 
 /// All that stays on the device while the camera turns. Made for one object; the BRDF may be exchanged.
 #[derive(Debug)]
 pub struct GpuRenderer {
+    object: GpuObject,
     gbuffer: GpuGBuffer,
     /// Absent where the object cannot shadow itself: then no pass knows of shadows.
     rays: Option<(GpuLightRays, GpuOccluder)>,
     shading: GpuShading,
     material: GpuMaterial,
+    pictures: GpuPictures,
+    /// For pictures like the last one.
+    pub(super) room: Option<Room>,
+    /// Lobes or table rows of one submission.
+    pub(super) at_once: u64,
+    clock: Option<Clock>,
 }
 
 impl GpuRenderer {
     /// # Errors
     /// [`GpuError::Unsupported`] for a BRDF that only the CPU shades, and what the device refuses.
-    pub fn new(gpu: &Gpu, occluder: Option<&Occluder>, brdf: &EffectiveBrdf) -> std::result::Result<Self, GpuError> {
+    pub fn new(
+        gpu: &Gpu,
+        mesh: &ObjectMesh,
+        occluder: Option<&Occluder>,
+        brdf: &EffectiveBrdf,
+    ) -> std::result::Result<Self, GpuError> {
         let mut shading = GpuShading::new(gpu)?;
         let material = shading.material(gpu, brdf, occluder.is_some())?;
         let rays = match occluder {
             Some(occluder) => Some((GpuLightRays::new(gpu)?, GpuOccluder::new(gpu, occluder)?)),
             None => None,
         };
-        Ok(Self { gbuffer: GpuGBuffer::new(gpu)?, rays, shading, material })
+        Ok(Self {
+            object: GpuObject::new(gpu, mesh)?,
+            gbuffer: GpuGBuffer::new(gpu, rays.is_some())?,
+            rays,
+            shading,
+            material,
+            pictures: GpuPictures::new(gpu)?,
+            room: None,
+            at_once: if gpu.tier == Tier::Hardware { WORK } else { SOFTWARE_WORK },
+            clock: Clock::new(gpu)?,
+        })
     }
 
     /// Shades with another BRDF from now on; pipelines that were compiled before are kept.
@@ -50,35 +78,151 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Renders the object that the renderer was made for; `input.reflectance` and `input.shadow_cache` are not asked.
+    /// Renders the object that the renderer was made for and reads the picture back; `input.mesh` tells its bounds only,
+    /// `input.reflectance` and `input.shadow_cache` are not asked.
     ///
     /// # Errors
     /// A size or camera that cannot be, what the device refuses, or [`crate::Error::Cancelled`].
-    pub fn render(&self, gpu: &Gpu, input: &RenderInput, cancel: &Cancel) -> Result<Rendered> {
+    pub fn render(&mut self, gpu: &Gpu, input: &RenderInput, cancel: &Cancel) -> Result<Rendered> {
         check_size(input.size, input.samples_per_side)?;
+        let [width, height] = input.size;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let pixels = gpu.buffer("pixels", (16 * width * height) as u64, usage)?;
+        // Tones are not asked for.
+        let tone_map = ToneMap { curve: ToneCurve::Plain, gain: 1.0 };
+        let times = self.draw(gpu, input, &tone_map, Output::Radiance(&pixels), cancel)?;
+        let rows: Vec<[f32; 4]> = gpu.read(&pixels)?;
+        let rows = &rows[..width * height];
+        let points = rows.iter().map(|row| row[3] as usize).sum();
+        let pixels = rows.iter().map(|&[r, g, b, _]| glam::Vec3::new(r, g, b)).collect();
+        Ok(Rendered { picture: Picture { width, height, pixels }, times, points })
+    }
+
+    /// Renders as [`GpuRenderer::render`] does, into an image on the device that a screen shows; waits until it is there.
+    ///
+    /// # Errors
+    /// As [`GpuRenderer::render`].
+    pub fn show(
+        &mut self,
+        gpu: &Gpu,
+        input: &RenderInput,
+        tone_map: &ToneMap,
+        image: &wgpu::TextureView,
+        cancel: &Cancel,
+    ) -> Result<StageTimes> {
+        check_size(input.size, input.samples_per_side)?;
+        self.draw(gpu, input, tone_map, Output::Image(image), cancel)
+    }
+
+    fn draw(
+        &mut self,
+        gpu: &Gpu,
+        input: &RenderInput,
+        tone_map: &ToneMap,
+        output: Output,
+        cancel: &Cancel,
+    ) -> Result<StageTimes> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let start = Instant::now();
-        let buffer = self.gbuffer.draw(gpu, input.mesh, &view, input.samples_per_side)?;
-        let points = ShadingPoints::new(&buffer, &view, input.samples_per_side);
-        drop(buffer);
-        let after_gbuffer = Instant::now();
-        let visible = match &self.rays {
-            Some((rays, occluder)) => {
-                Some(rays.trace(gpu, occluder, input.mesh, &points, input.lights, view.eye, cancel)?)
+        let work = self.material.work(input.lights.len()).max(1);
+        let points = usize::try_from(self.at_once / work).unwrap_or(usize::MAX);
+        let need =
+            Need { size: input.size, samples_per_side: input.samples_per_side, lights: input.lights.len(), points };
+        let room = self.room(gpu, need)?;
+        let lights: Vec<Light> = input.lights.iter().map(Light::from).collect();
+        gpu.write(&room.lights, &lights)?;
+        for band in &room.bands {
+            let camera = Camera::new(&view, &self.object, need.samples_per_side, band.rows.clone());
+            let params = gpu_shading::Params {
+                eye: view.eye,
+                point_count: room.places(band),
+                light_count: need.lights as u32,
+                words_per_point: room.words,
+                slice: room.slice,
+                least_area: self.material.least_area(),
+            };
+            let counts = [room.slots(), room.slices];
+            let picture = gpu_picture::Params::new(need.size, band.rows.clone(), counts, input.background, tone_map);
+            band.write(gpu, camera, params, picture)?;
+        }
+        let group = self.pictures.output(gpu, output)?;
+        let a_band = room.bands.first().map_or(1, |band| u64::from(room.places(band)) * work);
+        let together = (self.at_once / a_band.max(1)).max(1) as usize;
+        let mut timed = Timed::default();
+        for (first, bands) in room.bands.chunks(together).enumerate() {
+            cancel.check()?;
+            gpu.checked("rendering", || {
+                let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                timed = Timed::default();
+                if first == 0 {
+                    let writes = self.clock.as_ref().and_then(|clock| clock.render_pass(&mut timed, Stage::GBuffer));
+                    self.gbuffer.draw(&mut encoder, &room.samples, &room.bands[0].scene, &self.object, writes);
+                }
+                for band in bands {
+                    self.encode(&mut encoder, &room, band, (output, &group), &mut timed);
+                }
+                if let Some(clock) = &self.clock {
+                    clock.resolve(&mut encoder, &timed);
+                }
+                gpu.queue.submit([encoder.finish()]);
+                Ok(())
+            })?;
+            gpu.wait("rendering")?;
+        }
+        let whole = start.elapsed().as_secs_f64() * 1e3;
+        let times = match &self.clock {
+            Some(clock) => clock.times(gpu, &timed, whole)?,
+            None => StageTimes { shading_ms: whole, ..StageTimes::default() },
+        };
+        self.room = Some(room);
+        Ok(times)
+    }
+
+    /// The room of the last picture where it serves, else a new one.
+    fn room(&mut self, gpu: &Gpu, need: Need) -> std::result::Result<Room, GpuError> {
+        match self.room.take() {
+            Some(room) if room.need == need => Ok(room),
+            _ => {
+                let Self { gbuffer, object, rays, shading, pictures, .. } = self;
+                Room::new(gpu, need, &Parts { gbuffer, object, rays: rays.as_ref(), shading, pictures })
             }
-            None => None,
-        };
-        let after_shadows = Instant::now();
-        let radiance =
-            self.shading.radiance(gpu, &self.material, &points, input.lights, visible.as_ref(), view.eye, cancel)?;
-        let picture = shading::gather(&points, &radiance, &view, input.background);
-        let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
-        let times = StageTimes {
-            gbuffer_ms: ms(start, after_gbuffer),
-            shadows_ms: ms(after_gbuffer, after_shadows),
-            shading_ms: ms(after_shadows, Instant::now()),
-        };
-        Ok(Rendered { picture, times, points: points.len() })
+        }
+    }
+
+    /// All that a band takes, from samples to pixels.
+    fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        room: &Room,
+        band: &Band,
+        output: (Output, &wgpu::BindGroup),
+        timed: &mut Timed,
+    ) {
+        let (points, pixels) = (room.places(band), [room.need.size[0], band.rows.len()].map(|n| n as u32));
+        encoder.clear_buffer(&room.radiance, 0, None);
+        let mut pass = self.pass(encoder, Stage::GBuffer, timed);
+        self.gbuffer.find_points(&mut pass, &band.scene, &room.to_points, pixels);
+        drop(pass);
+        let lit = room.need.lights > 0;
+        if let (true, Some((rays, _)), Some(group), Some(to_bits)) = (lit, &self.rays, &band.rays, &room.to_bits) {
+            let mut pass = self.pass(encoder, Stage::Shadows, timed);
+            rays.trace(&mut pass, group, to_bits, [points, room.words]);
+        }
+        let mut pass = self.pass(encoder, Stage::Shading, timed);
+        if lit {
+            self.material.shade(&mut pass, &band.shading, [points, room.slices]);
+        }
+        self.pictures.write(&mut pass, &band.pixels, output, pixels);
+    }
+
+    fn pass<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        stage: Stage,
+        timed: &mut Timed,
+    ) -> wgpu::ComputePass<'a> {
+        let timestamp_writes = self.clock.as_ref().and_then(|clock| clock.compute_pass(timed, stage));
+        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes })
     }
 }
 
@@ -87,5 +231,5 @@ impl GpuRenderer {
 /// # Errors
 /// As [`GpuRenderer::new`] and [`GpuRenderer::render`].
 pub fn render_gpu(gpu: &Gpu, input: &RenderInput, brdf: &EffectiveBrdf) -> Result<Rendered> {
-    GpuRenderer::new(gpu, input.occluder, brdf)?.render(gpu, input, &Cancel::default())
+    GpuRenderer::new(gpu, input.mesh, input.occluder, brdf)?.render(gpu, input, &Cancel::default())
 }

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::gpu_gbuffer::Point;
 use super::gpu_render::GpuRenderer;
-use super::gpu_shading::GpuShading;
+use super::gpu_shading::{GpuMaterial, GpuShading, Light, Params};
 use super::shading::{self, Background};
 use super::shading_points::ShadingPoints;
-use super::shadow::Occluder;
+use super::shadow::{Occluder, Visible};
 use super::{
     CameraView, DirectionalLight, GBuffer, ObjectMesh, Picture, RenderInput, lights, objects, render, render_gpu,
 };
@@ -105,12 +106,60 @@ fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) 
     let mut shading = GpuShading::new(gpu).unwrap();
     let material = shading.material(gpu, brdf, visible.is_some()).unwrap();
     let cpu = shading::radiance(&points, &lights, visible.as_ref(), view.eye, brdf);
-    let bits = visible.map(|visible| gpu.upload("bits", &visible.words, wgpu::BufferUsages::STORAGE).unwrap());
-    let device =
-        shading.radiance(gpu, &material, &points, &lights, bits.as_ref(), view.eye, &Cancel::default()).unwrap();
+    let device = radiance(gpu, &shading, &material, &points, &lights, visible.as_ref(), view.eye);
     let (_, worst, _) = distances(&cpu, &device);
     eprint!("{what}: shading within {worst:.1e}; ");
     assert!(worst < SHADING_TOLERANCE, "{what}: shading of the same points differs by {worst}");
+}
+
+/// The device's answer for points of the CPU, by slices of eight lights.
+fn radiance(
+    gpu: &Gpu,
+    shading: &GpuShading,
+    material: &GpuMaterial,
+    points: &ShadingPoints,
+    lights: &[DirectionalLight],
+    visible: Option<&Visible>,
+    eye: Vec3,
+) -> Vec<Vec3> {
+    use wgpu::BufferUsages as Usage;
+    let slices = lights.len().div_ceil(8);
+    let params = Params {
+        eye,
+        point_count: points.len() as u32,
+        light_count: lights.len() as u32,
+        words_per_point: Visible::words_of(lights.len()) as u32,
+        slice: 8,
+        least_area: material.least_area(),
+    };
+    let place = |k: usize| Point {
+        position: points.positions[k],
+        normal: points.normals[k],
+        tangent: points.tangents[k],
+        weight: 1.0,
+        ..Point::default()
+    };
+    let places: Vec<Point> = (0..points.len()).map(place).collect();
+    let lights: Vec<Light> = lights.iter().map(Light::from).collect();
+    let words = visible.map_or(Vec::new(), |visible| visible.words.clone());
+    let rows = gpu.buffer("radiance", (16 * points.len() * slices) as u64, Usage::STORAGE | Usage::COPY_SRC).unwrap();
+    let bound = [
+        &gpu.upload("parameters", &[params], Usage::UNIFORM).unwrap(),
+        &gpu.upload("points", &places, Usage::STORAGE).unwrap(),
+        &gpu.upload("lights", &lights, Usage::STORAGE).unwrap(),
+        &gpu.upload("bits", &words, Usage::STORAGE).unwrap(),
+        &rows,
+        &gpu.buffer("scales", 4 * points.len() as u64, Usage::STORAGE).unwrap(),
+    ];
+    let group = shading.points(gpu, bound).unwrap();
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    material.shade(&mut pass, &group, [points.len() as u32, slices as u32]);
+    drop(pass);
+    gpu.queue.submit([encoder.finish()]);
+    let rows: Vec<[f32; 4]> = gpu.read(&rows).unwrap();
+    let sum = |k: usize| (0..slices).map(|slice| Vec3::from_slice(&rows[slice * points.len() + k])).sum();
+    (0..points.len()).map(sum).collect()
 }
 
 /// Distances relative to a value and the mean: of 99 %, the largest, and of the means.
@@ -212,7 +261,7 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
 
     let mesh = objects::build(&scene::Object { kind: "sphere".to_owned(), path: None }, Path::new(".")).unwrap();
     let light = DirectionalLight { direction: Vec3::new(0.6, 0.48, 0.64), irradiance: Vec3::new(1.0, 2.0, 3.0) };
-    let mut renderer = GpuRenderer::new(&gpu, None, &first).unwrap();
+    let mut renderer = GpuRenderer::new(&gpu, &mesh, None, &first).unwrap();
     renderer.set_brdf(&gpu, &second).unwrap();
     let input = RenderInput {
         mesh: &mesh,
@@ -260,7 +309,7 @@ fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_strai
             continue;
         }
         // Facets of few normals: their lobes are summed, or tabulated with the rest.
-        let refused = GpuRenderer::new(&gpu, None, &of(built)).map(drop);
+        let refused = GpuShading::new(&gpu).unwrap().material(&gpu, &of(built), false).map(drop);
         assert!(matches!(refused, Err(GpuError::Unsupported(_))), "{what}: {refused:?}");
         let whole = |lights: &[Vec3], o: Vec3, out: &mut [glam::DVec3]| direct.sums(lights, o, |k, sum| out[k] = sum);
         let table = PairTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap();
@@ -269,12 +318,30 @@ fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_strai
 }
 
 #[test]
+fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
+    let Some(gpu) = open_gpu() else { return };
+    let brdf = effective(&open(PYRAMIDS, LOBES[4], "direct"));
+    let studio = Studio::of("cup");
+    let input = RenderInput { samples_per_side: 2, ..studio.input(&brdf, 50, &Background::Wall) };
+    let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder, &brdf).unwrap();
+    let bands = |renderer: &GpuRenderer| renderer.room.as_ref().unwrap().bands.len();
+    let whole = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
+    assert_eq!(bands(&renderer), 1);
+    // Three rows at a time, the last two by themselves.
+    renderer.at_once = renderer.at_once / bands(&renderer) as u64 / 1000;
+    let cut = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
+    assert!(bands(&renderer) > 10, "{}", bands(&renderer));
+    assert_eq!((cut.picture, cut.points), (whole.picture, whole.points));
+    assert_eq!(cut.points, render(&input).unwrap().points, "the CPU's points");
+}
+
+#[test]
 fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
     let Some(gpu) = open_gpu() else { return };
     let brdf = effective(&open(RODS, LOBES[4], "direct"));
     let studio = Studio::of("cup");
     let input = studio.input(&brdf, 96, &Background::Wall);
-    let renderer = GpuRenderer::new(&gpu, input.occluder, &brdf).unwrap();
+    let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder, &brdf).unwrap();
     let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
     let cancel = Cancel::default();
     cancel.set();
@@ -330,8 +397,9 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
         )),
         base_area: 1.0,
     };
-    let refused = GpuRenderer::new(&gpu, None, &form(Vec3::ONE)).map(drop);
+    let mut shading = GpuShading::new(&gpu).unwrap();
+    let refused = shading.material(&gpu, &form(Vec3::ONE), false).map(drop);
     assert!(matches!(&refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured")), "{refused:?}");
     // Black: it is never asked.
-    GpuRenderer::new(&gpu, None, &form(Vec3::ZERO)).map(drop).unwrap();
+    shading.material(&gpu, &form(Vec3::ZERO), false).map(drop).unwrap();
 }

@@ -12,11 +12,13 @@ pub mod bvh;
 pub mod camera;
 pub mod environment;
 pub mod gbuffer;
-pub mod gpu_batches;
+mod gpu_band;
+mod gpu_clock;
 mod gpu_gbuffer;
-pub mod gpu_light_rays;
+mod gpu_light_rays;
+pub mod gpu_picture;
 pub mod gpu_render;
-pub mod gpu_shading;
+mod gpu_shading;
 #[cfg(test)]
 mod gpu_shading_tests;
 #[cfg(test)]

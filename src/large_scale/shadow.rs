@@ -10,7 +10,7 @@ use super::wide_bvh::WideBvh;
 use super::{DirectionalLight, ObjectMesh};
 
 /// Rays start this many radii of the object above the surface.
-const LIFT: f32 = 2e-4;
+pub(super) const LIFT: f32 = 2e-4;
 /// A vertex may stand this many radii above a face's plane without counting as a dent.
 const FLAT: f32 = 2e-5;
 /// Vertices tested at once.

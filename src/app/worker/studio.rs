@@ -288,7 +288,7 @@ impl OnDevice {
             let made = match &mut self.renderer {
                 Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
                 Some((renderer, last)) => renderer.set_brdf(&self.gpu, brdf).map(|()| *last = brdf.clone()),
-                none => GpuRenderer::new(&self.gpu, input.occluder, brdf)
+                none => GpuRenderer::new(&self.gpu, input.mesh, input.occluder, brdf)
                     .map(|renderer| *none = Some((renderer, brdf.clone()))),
             };
             match made {

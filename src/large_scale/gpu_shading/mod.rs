@@ -1,6 +1,6 @@
 //! Deferred shading on wgpu: the twin of [`shading::radiance`](super::shading::radiance) with an [`EffectiveBrdf`].
 //!
-//! A material becomes a list of compute passes over points and slices of eight lights. Each pass is compiled for what it
+//! A material becomes a list of compute passes over points and slices of the lights. Each pass is compiled for what it
 //! meets (a lobe, a kind of visibility, shadows or none): an effect that a scene does not call for leaves no instruction.
 
 mod direct;
@@ -11,22 +11,13 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::DirectionalLight;
-use super::gpu_batches::Batches;
-use super::shading_points::ShadingPoints;
-use super::shadow::Visible;
-use crate::cancel::Cancel;
-use crate::error::Result;
 use crate::filtering::{EffectiveBrdf, Form, Tint};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError, Swaps};
 
-/// Lobes or table rows that the first submission adds up, and the most that any does.
-const BATCH_WORK: [u64; 2] = [1 << 22, 1 << 28];
 const THREADS: u32 = 64;
-/// Lights that one thread adds up, as in the shader.
-const SLICE: u32 = 8;
-/// The most workgroups of a dispatch along one axis.
-const MAX_GROUPS: usize = 65_535;
+/// The most points of one dispatch.
+pub(super) const MOST_POINTS: usize = 65_535 * THREADS as usize;
 
 /// The layouts of all shading passes, and the pipelines compiled so far: build once, use for any material.
 #[derive(Debug)]
@@ -51,8 +42,6 @@ struct Variant {
 pub struct GpuMaterial {
     passes: Vec<Pass>,
     least_area: f32,
-    /// Whether the passes were compiled to read the bits of shadows.
-    shadowed: bool,
 }
 
 #[derive(Debug)]
@@ -64,17 +53,28 @@ struct Pass {
     each_light: bool,
 }
 
+/// What all passes over the points of one band share.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Params {
-    eye: Vec3,
-    point_count: u32,
-    first_point: u32,
-    end_point: u32,
-    light_count: u32,
-    words_per_point: u32,
-    least_area: f32,
-    pad: [u32; 3],
+pub(super) struct Params {
+    pub eye: Vec3,
+    pub point_count: u32,
+    pub light_count: u32,
+    pub words_per_point: u32,
+    /// Lights that one thread adds up.
+    pub slice: u32,
+    pub least_area: f32,
+}
+
+/// A light as shaders see it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Light([Padded; 2]);
+
+impl From<&DirectionalLight> for Light {
+    fn from(light: &DirectionalLight) -> Self {
+        Self([light.direction, light.irradiance].map(padded))
+    }
 }
 
 /// A vector and padding to the 16 bytes WGSL gives it.
@@ -121,94 +121,16 @@ impl GpuShading {
                 return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
             }
         };
-        Ok(GpuMaterial { passes, least_area: (1e-12 * brdf.base_area) as f32, shadowed })
+        Ok(GpuMaterial { passes, least_area: (1e-12 * brdf.base_area) as f32 })
     }
 
-    /// Radiance towards the eye of each point, as [`shading::radiance`](super::shading::radiance) gives it but for
-    /// rounding. `visible`: the words of a [`Visible`] on the device; materials that were made for shadows read them.
-    ///
-    /// # Errors
-    /// What the device refuses, or [`crate::Error::Cancelled`].
-    #[expect(clippy::too_many_arguments, reason = "what to shade, and where")]
-    pub fn radiance(
+    /// [`Params`], points, lights, the bits of shadows, radiance and scales.
+    pub(super) fn points(
         &self,
         gpu: &Gpu,
-        material: &GpuMaterial,
-        points: &ShadingPoints,
-        lights: &[DirectionalLight],
-        visible: Option<&wgpu::Buffer>,
-        eye: Vec3,
-        cancel: &Cancel,
-    ) -> Result<Vec<Vec3>> {
-        use wgpu::BufferUsages as Usage;
-        if points.is_empty() || lights.is_empty() {
-            return Ok(vec![Vec3::ZERO; points.len()]);
-        }
-        let slices = lights.len().div_ceil(SLICE as usize);
-        if slices > MAX_GROUPS || u32::try_from(points.len() * slices).is_err() {
-            let what = format!("{} points with {} lights", points.len(), lights.len());
-            return Err(GpuError::Unsupported(what).into());
-        }
-        if material.shadowed && visible.is_none() {
-            return Err(GpuError::Unsupported("shadows without an occluder".to_owned()).into());
-        }
-        let point_data: Vec<[Padded; 3]> = (0..points.len())
-            .map(|k| [points.positions[k], points.normals[k], points.tangents[k]].map(padded))
-            .collect();
-        let light_data: Vec<[Padded; 2]> =
-            lights.iter().map(|light| [light.direction, light.irradiance].map(padded)).collect();
-        let params = gpu.buffer("parameters", size_of::<Params>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
-        let radiance = gpu.buffer("radiance", (16 * points.len() * slices) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
-        let bound = [
-            gpu.upload("shading points", &point_data, Usage::STORAGE)?,
-            gpu.upload("lights", &light_data, Usage::STORAGE)?,
-            match visible {
-                Some(words) => words.clone(),
-                None => gpu.upload::<u32>("light visibility", &[], Usage::STORAGE)?,
-            },
-            radiance.clone(),
-            gpu.buffer("scales", 4 * points.len() as u64, Usage::STORAGE)?,
-        ];
-        let resources: Vec<_> = std::iter::once(&params).chain(&bound).map(wgpu::Buffer::as_entire_binding).collect();
-        let group = gpu.group("shading points", &self.points, &resources)?;
-        let words = if visible.is_some() { Visible::words_of(lights.len()) } else { 0 };
-        Batches::of(points.len(), material.work(lights.len()), BATCH_WORK, THREADS).each(gpu, cancel, |range| {
-            let [first_point, end_point] = [range.start, range.end].map(|n| n as u32);
-            gpu.write(
-                &params,
-                &[Params {
-                    eye,
-                    point_count: points.len() as u32,
-                    first_point,
-                    end_point,
-                    light_count: lights.len() as u32,
-                    words_per_point: words as u32,
-                    least_area: material.least_area,
-                    pad: [0; 3],
-                }],
-            )?;
-            gpu.checked("shading", || {
-                let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                for pass in &material.passes {
-                    let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-                    compute.set_pipeline(&pass.pipeline);
-                    compute.set_bind_group(0, &group, &[]);
-                    compute.set_bind_group(1, &pass.group, &[]);
-                    let rows = if pass.each_light { slices as u32 } else { 1 };
-                    compute.dispatch_workgroups((end_point - first_point).div_ceil(THREADS), rows, 1);
-                }
-                gpu.queue.submit([encoder.finish()]);
-                Ok(())
-            })
-        })?;
-        let rows: Vec<[f32; 4]> = gpu.read(&radiance)?;
-        let mut total = vec![Vec3::ZERO; points.len()];
-        for row in rows.chunks_exact(points.len()).take(slices) {
-            for (total, [r, g, b, _]) in total.iter_mut().zip(row) {
-                *total += Vec3::new(*r, *g, *b);
-            }
-        }
-        Ok(total)
+        bound: [&wgpu::Buffer; 6],
+    ) -> std::result::Result<wgpu::BindGroup, GpuError> {
+        gpu.group("shading points", &self.points, &bound.map(wgpu::Buffer::as_entire_binding))
     }
 
     fn pipeline(
@@ -242,8 +164,29 @@ enum Second {
 
 impl GpuMaterial {
     /// Lobes and table rows of one point.
-    fn work(&self, lights: usize) -> u64 {
+    pub(super) fn work(&self, lights: usize) -> u64 {
         self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum()
+    }
+
+    /// A projected area [of the tile] below this shows nothing.
+    pub(super) fn least_area(&self) -> f32 {
+        self.least_area
+    }
+
+    /// Adds radiance towards the eye to the rows of a group's points, one for each slice of the lights.
+    pub(super) fn shade(
+        &self,
+        compute: &mut wgpu::ComputePass,
+        points: &wgpu::BindGroup,
+        [point_count, slices]: [u32; 2],
+    ) {
+        for pass in &self.passes {
+            compute.set_pipeline(&pass.pipeline);
+            compute.set_bind_group(0, points, &[]);
+            compute.set_bind_group(1, &pass.group, &[]);
+            let rows = if pass.each_light { slices } else { 1 };
+            compute.dispatch_workgroups(point_count.div_ceil(THREADS), rows, 1);
+        }
     }
 }
 
