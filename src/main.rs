@@ -222,6 +222,9 @@ struct ProfileArgs {
     /// What is edited; without it everything is computed from nothing.
     #[arg(long)]
     edit: Option<Edit>,
+    /// Width and height in pixels of the picture of `--edit camera`.
+    #[arg(long, default_value = "384x384", value_parser = commands::parse_size)]
+    size: [usize; 2],
     /// Timed runs after one warm-up; medians are printed.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,

@@ -36,7 +36,7 @@ impl Editor {
     fn pick(&mut self) {
         let (Some(at), Some(made)) = (self.object.pointed, &self.object.made) else { return };
         let Some((mesh, lights)) = &made.set else { return };
-        let size = [made.picture.width, made.picture.height];
+        let size = made.image.size();
         let Ok(view) = CameraView::new(&made.camera, mesh, size) else { return };
         let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
         if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {

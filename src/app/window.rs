@@ -8,12 +8,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
+use biscale::gpu::Gpu;
 use eframe::egui::{self, Context, ViewportBuilder, ViewportCommand};
 
 use super::document::{Document, Settings};
 use super::editor::Editor;
 use super::start_times::{FirstFrames, StartTimes};
-use super::worker::Devices;
+use super::worker::{Devices, Screen};
 use crate::commands::cache;
 
 const NO_WINDOW: &str = "the editor needs a desktop (X11 or Wayland) and a Vulkan driver. \
@@ -90,18 +91,18 @@ fn open(kept: &Kept, lost: &Arc<AtomicBool>, first: Option<(Context, Editor)>, t
     let (ctx, first) = first.map_or_else(|| (context(), None), |(ctx, editor)| (ctx, Some(editor)));
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
         times.note("device and the interface's pipelines built");
-        let device = watch_device(creation, &lost);
+        let gpu = watch_device(creation, &lost);
         let mut editor = kept.borrow_mut();
         match (editor.as_mut(), first) {
             (Some(editor), _) => editor.move_to(&creation.egui_ctx),
             (None, first) => *editor = first,
         }
-        if let (Some(editor), Some(devices)) = (editor.as_ref(), devices(creation)) {
+        if let (Some(editor), Some(devices)) = (editor.as_ref(), devices(creation, gpu.as_ref())) {
             editor.tell_devices(devices);
         }
         drop(editor);
         times.note("editor made");
-        Ok(Box::new(Window { editor: kept, lost, device, first: FirstFrames::new(times) }))
+        Ok(Box::new(Window { editor: kept, lost, gpu, first: FirstFrames::new(times) }))
     });
     eframe::run_native_ext("biscale", options, Some(ctx), create)
 }
@@ -117,22 +118,23 @@ fn context() -> Context {
 }
 
 /// What the window's own instance sees of devices.
-fn devices(creation: &eframe::CreationContext) -> Option<Devices> {
+fn devices(creation: &eframe::CreationContext, gpu: Option<&Arc<Gpu>>) -> Option<Devices> {
     let state = creation.wgpu_render_state.as_ref()?;
     let adapters: Vec<_> = state.available_adapters.iter().map(wgpu::Adapter::get_info).collect();
     let only_software = adapters.iter().all(|adapter| adapter.device_type == wgpu::DeviceType::Cpu);
-    let found = |adapter: &wgpu::AdapterInfo| Devices::OnlySoftware(adapter.name.clone());
-    Some(adapters.first().filter(|_| only_software).map_or(Devices::Perhaps, found))
+    Some(Devices {
+        only_software: adapters.first().filter(|_| only_software).map(|adapter| adapter.name.clone()),
+        screen: gpu.map(|gpu| Screen::new(gpu.clone(), state.renderer.clone())),
+    })
 }
 
-/// What eframe makes a device with by itself, and a word when it has found the adapter.
+/// A device that pictures can be made on, too, and a word when the adapter is found.
 fn noting(times: StartTimes) -> eframe::egui_wgpu::WgpuConfiguration {
     let mut options = eframe::egui_wgpu::WgpuConfiguration::default();
     if let eframe::egui_wgpu::WgpuSetup::CreateNew(setup) = &mut options.wgpu_setup {
-        let description = setup.device_descriptor.clone();
         setup.device_descriptor = Arc::new(move |adapter| {
             times.note("window and adapter there");
-            description(adapter)
+            Gpu::request(adapter)
         });
     }
     options
@@ -161,17 +163,17 @@ fn given_up(kept: &Kept, why: &str) -> anyhow::Error {
 }
 
 /// Errors of the window's own device are heard; the default handler would end the program.
-fn watch_device(creation: &eframe::CreationContext, lost: &Arc<AtomicBool>) -> Option<wgpu::Device> {
-    let device = creation.wgpu_render_state.as_ref()?.device.clone();
+fn watch_device(creation: &eframe::CreationContext, lost: &Arc<AtomicBool>) -> Option<Arc<Gpu>> {
+    let state = creation.wgpu_render_state.as_ref()?;
     let (lost, ctx) = (lost.clone(), creation.egui_ctx.clone());
-    device.set_device_lost_callback(move |_, _| {
+    let gpu = Gpu::of_window(state.adapter.get_info(), state.device.clone(), state.queue.clone(), move || {
         lost.store(true, Ordering::Relaxed);
         ctx.request_repaint();
     });
-    device.on_uncaptured_error(Arc::new(|error| eprintln!("biscale: the window's device complains: {error}")));
+    gpu.device.on_uncaptured_error(Arc::new(|error| eprintln!("biscale: the window's device complains: {error}")));
     #[cfg(debug_assertions)]
-    lose_for_tests(&device, &creation.egui_ctx);
-    Some(device)
+    lose_for_tests(&gpu.device, &creation.egui_ctx);
+    Some(Arc::new(gpu))
 }
 
 /// `BISCALE_LOSE_DEVICE=5` in a debug build: the device is lost after so many seconds, once.
@@ -193,7 +195,7 @@ fn lose_for_tests(device: &wgpu::Device, ctx: &egui::Context) {
 struct Window {
     editor: Kept,
     lost: Arc<AtomicBool>,
-    device: Option<wgpu::Device>,
+    gpu: Option<Arc<Gpu>>,
     first: FirstFrames,
 }
 
@@ -203,8 +205,8 @@ impl eframe::App for Window {
         let Some(editor) = editor.as_mut() else { return };
         let ctx = ui.ctx().clone();
         // A device that is gone says so when it is asked.
-        if let Some(device) = &self.device {
-            let _ = device.poll(wgpu::PollType::Poll);
+        if let Some(gpu) = &self.gpu {
+            let _ = gpu.device.poll(wgpu::PollType::Poll);
         }
         if self.lost.load(Ordering::Relaxed) {
             // Nothing is drawn on a device that is gone: that would panic.

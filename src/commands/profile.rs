@@ -38,7 +38,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let mut outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
     let mut form = outcome.brdf.form.describe();
-    let camera = if args.edit == Some(Edit::Camera) {
+    let mut camera = if args.edit == Some(Edit::Camera) {
         let mut stage = Stage::new(&loaded)?;
         let route = Route::of(&stage, &outcome)?;
         // A camera edit keeps what pictures read, and the shadows of the object.
@@ -52,9 +52,9 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
     for run in 0..=args.repeat {
         let start = Instant::now();
-        let times = match (&camera, args.edit) {
+        let times = match (&mut camera, args.edit) {
             (Some((stage, route, pictured)), _) => {
-                let times = route.render(stage, &pictured.brdf, [384, 384], 1)?.times;
+                let times = route.show(stage, &pictured.brdf, args.size)?;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
             }
             (None, Some(_)) => {

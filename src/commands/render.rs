@@ -4,6 +4,8 @@ use anyhow::Result;
 use biscale::accuracy::Health;
 use biscale::filtering::EffectiveBrdf;
 use biscale::gpu::{Gpu, GpuError, Tier};
+use biscale::large_scale::gpu_picture;
+use biscale::large_scale::render::StageTimes;
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::large_scale::{GpuRenderer, Rendered, Stage, render};
@@ -29,6 +31,8 @@ pub struct OnDevice {
     gpu: Gpu,
     renderer: GpuRenderer,
     reads: Pictured,
+    /// What a screen would show, and its size.
+    image: Option<([usize; 2], wgpu::TextureView)>,
     /// Whether the person asked for it.
     required: bool,
 }
@@ -57,7 +61,7 @@ impl Route {
             made => made.map(|renderer| (renderer, table)),
         };
         match made {
-            Ok((renderer, reads)) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, reads, required }))),
+            Ok((renderer, reads)) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, reads, image: None, required }))),
             Err(error) if required => Err(Error::from(error).into()),
             Err(error) => Ok(Route::Cpu { refused: Some(error) }),
         }
@@ -81,6 +85,22 @@ impl Route {
                 rendered => rendered?,
             },
         })
+    }
+
+    /// As [`Route::render`], as far as a screen needs it: a picture on the device stays there.
+    pub fn show(&mut self, stage: &Stage, brdf: &EffectiveBrdf, size: [usize; 2]) -> Result<StageTimes> {
+        let Self::Gpu(device) = self else { return Ok(self.render(stage, brdf, size, 1)?.times) };
+        let OnDevice { gpu, renderer, image, .. } = &mut **device;
+        let image = match image {
+            Some((of, view)) if *of == size => view,
+            none => {
+                let view = gpu_picture::image(gpu, size).map_err(Error::from)?.create_view(&Default::default());
+                &none.insert((size, view)).1
+            }
+        };
+        let background = Background::default();
+        let input = stage.input(brdf, size, 1, &background);
+        Ok(renderer.show(gpu, &input, &ToneMap::new(&stage.camera)?, image, &Cancel::default())?)
     }
 
     /// The form of a material that this route reads: a table where it is close enough, else the sums.
@@ -129,7 +149,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         }
     }
     args.scene.notes(&outcome);
-    let route = Route::of(&stage, &outcome)?;
+    let mut route = Route::of(&stage, &outcome)?;
     if let (Route::Cpu { refused: Some(error) }, false) = (&route, args.scene.quiet) {
         eprintln!("note: shaded on the CPU: {error}");
     }

@@ -103,12 +103,12 @@ impl Gpu {
     /// The device that a window draws on: what is made here can be shown without being read back. The window hears of
     /// uncaptured errors itself; `lost` is told when the device is gone.
     pub fn of_window(
-        adapter: &wgpu::Adapter,
+        adapter: wgpu::AdapterInfo,
         device: wgpu::Device,
         queue: wgpu::Queue,
         lost: impl Fn() + Send + Sync + 'static,
     ) -> Self {
-        let gpu = Self::new(device, queue, adapter.get_info(), true);
+        let gpu = Self::new(device, queue, adapter, true);
         let heard = gpu.faults.clone();
         gpu.device.set_device_lost_callback(move |reason, message| {
             heard.lock().unwrap_or_else(PoisonError::into_inner).lose(reason, &message);

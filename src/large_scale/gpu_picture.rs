@@ -12,7 +12,26 @@ use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
 
 /// What a screen shows: sRGB bytes, written by a shader.
-pub const IMAGE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const IMAGE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// Room for what a screen shows: written by shaders, sampled, read back.
+///
+/// # Errors
+/// What the device refuses.
+pub fn image(gpu: &Gpu, [width, height]: [usize; 2]) -> Result<wgpu::Texture, GpuError> {
+    use wgpu::TextureUsages as Usage;
+    let description = wgpu::TextureDescriptor {
+        label: Some("picture"),
+        size: wgpu::Extent3d { width: width as u32, height: height as u32, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: IMAGE,
+        usage: Usage::STORAGE_BINDING | Usage::TEXTURE_BINDING | Usage::COPY_SRC,
+        view_formats: &[],
+    };
+    gpu.checked("making room for a picture", || Ok(gpu.device.create_texture(&description)))
+}
 
 /// `picture.wgsl`, compiled.
 #[derive(Debug)]

@@ -177,16 +177,7 @@ fn what_a_screen_shows_is_what_is_read_back_through_the_tone_map() {
     let Some(gpu) = open_gpu() else { return };
     let (mesh, brdf, size) = (object("cup"), brdf(), [96, 64]);
     let mut renderer = GpuRenderer::new(&gpu, &mesh, None, &brdf).unwrap();
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d { width: 96, height: 64, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: gpu_picture::IMAGE,
-        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    });
+    let texture = gpu_picture::image(&gpu, size).unwrap();
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     for (curve, gain, background) in [
         (ToneCurve::Filmic, 1.0, Background::Wall),

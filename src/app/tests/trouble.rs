@@ -1,14 +1,18 @@
 //! What goes wrong is a message, and the document is kept.
 
+use std::sync::Arc;
+
 use biscale::scene::{BrdfSpec, TermSpec};
+use eframe::egui::mutex::RwLock;
 use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
+use crate::app::document::Document;
 use crate::app::editor::Editor;
-use crate::app::worker::LOSE_DEVICE;
+use crate::app::worker::{Devices, Image, LOSE_DEVICE, Screen};
 
 #[test]
 fn a_lost_device_is_a_message_and_pictures_go_on_on_the_processor() {
@@ -43,7 +47,80 @@ fn a_lost_device_is_a_message_and_pictures_go_on_on_the_processor() {
     assert!(texts.contains("graphics device failed") && texts.contains("document is kept"), "{texts}");
     assert_eq!(**editor.document.scene(), scene);
     let made = editor.object.made.as_ref().unwrap();
-    assert!(made.picture.pixels.iter().all(|pixel| pixel.is_finite()));
+    assert!(made.picture.as_ref().unwrap().pixels.iter().all(|pixel| pixel.is_finite()));
+}
+
+/// A device as a window's, and what would draw the interface there.
+fn screen() -> Option<Screen> {
+    let own = biscale::gpu::Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()?;
+    let gpu = biscale::gpu::Gpu::of_window(own.adapter, own.device, own.queue, || {});
+    let format = wgpu::TextureFormat::Rgba8Unorm;
+    let interface = eframe::egui_wgpu::Renderer::new(&gpu.device, format, Default::default());
+    Some(Screen::new(gpu.into(), Arc::new(RwLock::new(interface))))
+}
+
+fn on_gpu(document: &Document) -> biscale::scene::Scene {
+    let mut scene = (**document.scene()).clone();
+    scene.quality.backend = "gpu".to_owned();
+    scene
+}
+
+#[test]
+fn a_picture_on_the_window_s_device_is_shown_without_being_read_back_and_is_the_processor_s() {
+    let Some(screen) = screen() else { return };
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let cpu = editor(&mut harness).object.made.as_ref().unwrap().image.clone();
+    assert!(matches!(cpu, Image::Pixels(_)));
+    editor(&mut harness).tell_devices(Devices { only_software: None, screen: Some(screen) });
+    let scene = on_gpu(&editor(&mut harness).document);
+    editor(&mut harness).document.edit(scene);
+    harness.step();
+    settle(&mut harness);
+    let made = editor(&mut harness).object.made.clone().unwrap();
+    let Image::OnDevice(_) = &made.image else { panic!("{} made {:?}", made.device, made.image.size()) };
+    assert!(made.picture.is_none());
+    let (shown, cpu) = (made.image.pixels().unwrap(), cpu.pixels().unwrap());
+    assert_eq!(shown.size, cpu.size);
+    let off = |a: egui::Color32, b: egui::Color32| (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap_or(0);
+    let far = shown.pixels.iter().zip(&cpu.pixels).filter(|(a, b)| off(**a, **b) > 6).count();
+    // Silhouettes, where adapters snap to their own subpixels, and highlights that turn there.
+    assert!(far * 50 < cpu.pixels.len(), "{far} of {}", cpu.pixels.len());
+
+    // Other tones are another picture there; what was kept as A is pixels, and stays when the window goes.
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).action(&ctx, Action::Snapshot);
+    let mut brighter = (**editor(&mut harness).document.scene()).clone();
+    brighter.camera.get_or_insert_default().exposure_ev = 1.0;
+    editor(&mut harness).document.edit(brighter);
+    harness.step();
+    settle(&mut harness);
+    let brighter = editor(&mut harness).object.made.clone().unwrap();
+    let sum = |image: &Image| image.pixels().unwrap().pixels.iter().map(|p| u64::from(p.g())).sum::<u64>();
+    assert!(sum(&brighter.image) > sum(&made.image), "an exposure that was raised");
+    drop((made, brighter));
+    editor(&mut harness).move_to(&ctx);
+    harness.step();
+    settle(&mut harness);
+    assert!(editor(&mut harness).object.kept.is_some());
+}
+
+#[test]
+fn a_window_s_device_that_is_lost_leaves_pictures_to_the_processor() {
+    let Some(screen) = screen() else { return };
+    let mut harness = harness(quick());
+    editor(&mut harness).tell_devices(Devices { only_software: None, screen: Some(screen.clone()) });
+    let scene = on_gpu(&editor(&mut harness).document);
+    editor(&mut harness).document.edit(scene.clone());
+    harness.step();
+    settle(&mut harness);
+    screen.gpu.device.destroy();
+    let scene = biscale::scene::Scene { light: biscale::scene::Light { count: 3, ..scene.light.clone() }, ..scene };
+    editor(&mut harness).document.edit(scene);
+    harness.step();
+    settle(&mut harness);
+    let made = editor(&mut harness).object.made.clone().unwrap();
+    assert!(matches!(made.image, Image::Pixels(_)) && made.device.starts_with("CPU"), "{}", made.device);
 }
 
 #[test]

@@ -1,17 +1,19 @@
 //! The large view: the object, shaded by the effective BRDF. Drag turns it, the wheel comes closer.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use biscale::scene::{Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
-    self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2,
+    self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureId, TextureOptions, Ui,
+    pos2, vec2,
 };
 
 use super::wheel::wheel;
 use super::wipe::Kept;
 use crate::app::actions::Action;
 use crate::app::panels::fields::words;
-use crate::app::worker::{Grade, Made};
+use crate::app::worker::{DeviceImage, Grade, Image, Made};
 
 /// The camera comes no nearer than this many radii; the lens does the rest.
 const NEAREST: f32 = 2.2;
@@ -22,10 +24,32 @@ const NARROW: f32 = 14.0;
 /// What the view leaves to the edges of panels, points.
 const EDGE: f32 = 6.0;
 
+/// What the view draws.
+enum Texture {
+    Uploaded(TextureHandle),
+    OnDevice(Arc<DeviceImage>),
+}
+
+impl Texture {
+    fn id(&self) -> TextureId {
+        match self {
+            Self::Uploaded(texture) => texture.id(),
+            Self::OnDevice(image) => image.id,
+        }
+    }
+
+    fn size(&self) -> egui::Vec2 {
+        match self {
+            Self::Uploaded(texture) => texture.size_vec2(),
+            Self::OnDevice(image) => vec2(image.size[0] as f32, image.size[1] as f32),
+        }
+    }
+}
+
 /// What the view holds between frames.
 #[derive(Default)]
 pub struct ObjectView {
-    texture: Option<TextureHandle>,
+    texture: Option<Texture>,
     pub made: Option<Box<Made>>,
     /// Version and size of the picture that was asked for last.
     pub asked: Option<(u64, [usize; 2])>,
@@ -56,9 +80,12 @@ impl ObjectView {
         }
         (self.since, self.failed) = (None, None);
         let options = TextureOptions::LINEAR;
-        match &mut self.texture {
-            Some(texture) => texture.set(made.image.clone(), options),
-            None => self.texture = Some(ctx.load_texture("object", made.image.clone(), options)),
+        match (&mut self.texture, &made.image) {
+            (Some(Texture::Uploaded(texture)), Image::Pixels(image)) => texture.set(image.clone(), options),
+            (texture, Image::Pixels(image)) => {
+                *texture = Some(Texture::Uploaded(ctx.load_texture("object", image.clone(), options)));
+            }
+            (texture, Image::OnDevice(image)) => *texture = Some(Texture::OnDevice(image.clone())),
         }
         if made.grade == Grade::Final {
             self.doing = None;
@@ -66,9 +93,10 @@ impl ObjectView {
         // A was kept before it was finished: it gets the finished picture.
         if let Some(kept) = &mut self.kept
             && kept.version == made.version
+            && let Some(image) = made.image.pixels()
         {
-            kept.image = made.image.clone();
-            kept.texture.set(made.image.clone(), options);
+            kept.texture.set(image.clone(), options);
+            kept.image = image;
         }
         self.made = Some(made);
     }
@@ -82,7 +110,8 @@ impl ObjectView {
     fn has_shape(&self, made: &Made) -> bool {
         let ratio = |width: usize, height: usize| width as f32 / height.max(1) as f32;
         self.asked.is_none_or(|(_, [width, height])| {
-            let (has, wanted) = (ratio(made.picture.width, made.picture.height), ratio(width, height));
+            let [has_width, has_height] = made.image.size();
+            let (has, wanted) = (ratio(has_width, has_height), ratio(width, height));
             (has / wanted - 1.0).abs() < 0.03
         })
     }
@@ -93,8 +122,14 @@ impl ObjectView {
         if let Some(kept) = &mut self.kept {
             kept.texture = ctx.load_texture("kept", kept.image.clone(), TextureOptions::LINEAR);
         }
-        if let Some(made) = &self.made {
-            self.texture = Some(ctx.load_texture("object", made.image.clone(), TextureOptions::LINEAR));
+        match self.made.as_ref().map(|made| &made.image) {
+            Some(Image::Pixels(image)) => {
+                let texture = ctx.load_texture("object", image.clone(), TextureOptions::LINEAR);
+                self.texture = Some(Texture::Uploaded(texture));
+            }
+            // It went with the window.
+            Some(Image::OnDevice(_)) => self.made = None,
+            None => {}
         }
     }
 
@@ -109,7 +144,7 @@ impl ObjectView {
         if let Some(texture) = &self.texture {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
-            painter.image(texture.id(), covered(area, texture.size_vec2()), uv, Color32::WHITE);
+            painter.image(texture.id(), covered(area, texture.size()), uv, Color32::WHITE);
         } else if self.failed.is_none() {
             self.first_ui(ui, area);
         }

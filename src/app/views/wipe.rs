@@ -20,9 +20,10 @@ pub struct Kept {
 impl ObjectView {
     /// Keeps what is shown now beside what comes.
     pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) {
-        if let Some(made) = &self.made {
-            let texture = ctx.load_texture("kept", made.image.clone(), TextureOptions::LINEAR);
-            let image = made.image.clone();
+        if let Some(made) = &self.made
+            && let Some(image) = made.image.pixels()
+        {
+            let texture = ctx.load_texture("kept", image.clone(), TextureOptions::LINEAR);
             self.kept =
                 Some(Kept { image, version: made.version, texture, scene: scene.clone(), name: name.to_owned() });
             self.wipe = 0.5;

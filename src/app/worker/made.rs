@@ -9,6 +9,8 @@ use biscale::plan::Effect;
 use biscale::scene::{Camera, LoadedScene};
 use eframe::egui::ColorImage;
 
+use super::screen::DeviceImage;
+
 /// A picture to make.
 #[derive(Debug, Clone)]
 pub struct PictureJob {
@@ -29,13 +31,40 @@ pub enum Grade {
     Final,
 }
 
+/// A picture as the view shows it.
+#[derive(Debug, Clone)]
+pub enum Image {
+    /// To be uploaded.
+    Pixels(Arc<ColorImage>),
+    /// Where the window draws; it never was anywhere else.
+    OnDevice(Arc<DeviceImage>),
+}
+
+impl Image {
+    pub fn size(&self) -> [usize; 2] {
+        match self {
+            Self::Pixels(image) => image.size,
+            Self::OnDevice(image) => image.size,
+        }
+    }
+
+    /// Its pixels, read back where they are on a device; `None` where that is lost.
+    pub fn pixels(&self) -> Option<Arc<ColorImage>> {
+        match self {
+            Self::Pixels(image) => Some(image.clone()),
+            Self::OnDevice(image) => image.read().ok().map(Arc::new),
+        }
+    }
+}
+
 /// A picture and how it came about.
 #[derive(Debug, Clone)]
 pub struct Made {
     pub version: u64,
     pub grade: Grade,
-    pub picture: Arc<Picture>,
-    pub image: Arc<ColorImage>,
+    /// Its radiance, where that is not on the device.
+    pub picture: Option<Arc<Picture>>,
+    pub image: Image,
     pub brdf: Arc<EffectiveBrdf>,
     /// Milliseconds of what ran for it.
     pub stages: Vec<(&'static str, f64)>,

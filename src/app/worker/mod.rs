@@ -1,11 +1,13 @@
 //! Work behind the interface: one thread for the object's picture, one for the tile and its plots, one for thumbnails.
 
 mod accuracy;
+mod device;
 mod export;
 mod lobe;
 mod made;
 mod picture;
 mod runner;
+mod screen;
 mod shared;
 mod studio;
 mod thumbnail;
@@ -20,13 +22,14 @@ use biscale::cache::Cache;
 use super::document::Snapshot;
 
 pub use accuracy::{AccuracyAnswer, AccuracyJob, Point};
+#[cfg(test)]
+pub use device::LOSE_DEVICE;
 pub use export::{ExportAnswer, ExportJob, TableChoice, What};
 pub use lobe::{LobeJob, LobeMade, logarithmic};
-pub use made::{Grade, Made, PictureAnswer, PictureJob};
+pub use made::{Grade, Image, Made, PictureAnswer, PictureJob};
 pub use runner::Worker;
+pub use screen::{DeviceImage, Screen};
 pub use shared::Devices;
-#[cfg(test)]
-pub use studio::LOSE_DEVICE;
 pub use thumbnail::{Thumbnail, ThumbnailJob};
 pub use tile::{Show, TileAnswer, TileJob, TileMade};
 

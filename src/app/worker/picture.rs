@@ -10,9 +10,9 @@ use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::{Camera, LoadedScene, Quality};
 use biscale::{Cancel, Error, Result};
 
-use super::made::{Grade, Made, PictureAnswer, PictureJob};
+use super::made::{Grade, Image, Made, PictureAnswer, PictureJob};
 use super::runner::Desk;
-use super::shared::{Devices, Shared, SmallScale, lock, small_scale};
+use super::shared::{Shared, SmallScale, lock, small_scale};
 use super::studio::{Close, Shot, Studio};
 use super::tone::color_image;
 
@@ -22,8 +22,8 @@ const DRAFT_MS: f64 = 60.0;
 const STEPS_MS: [f64; 2] = [300.0, 2000.0];
 /// The last one; where the view's own size would take longer, it is smaller (an exported picture never is).
 const FINAL_MS: f64 = 8000.0;
-/// Most pixels of a picture; a larger view shows it enlarged.
-const MOST_PIXELS: f64 = 768.0 * 768.0;
+/// Most pixels of a picture, on the processor and on a graphics processor; a larger view shows it enlarged.
+const MOST_PIXELS: [f64; 2] = [768.0 * 768.0, 3840.0 * 2160.0];
 /// A draft that takes longer than this is given up for a newer edit; quicker ones are all shown, so that the picture follows.
 const PATIENCE: Duration = Duration::from_millis(700);
 /// How often refinement looks whether the draft is there.
@@ -67,7 +67,7 @@ impl Photographer {
 
     fn drafted(&mut self, job: &PictureJob, cancel: &Cancel) -> Result<Made> {
         self.pipeline.cancel_with(cancel.clone());
-        self.choose_device(job);
+        self.choose_device(job, false);
         self.studio.prepare(&job.loaded)?;
         let (outcome, which) = match self.shared.known(&job.loaded) {
             Some(outcome) => (outcome.without_times(), 1),
@@ -77,15 +77,20 @@ impl Photographer {
         self.shoot(job, &outcome, which, size, 1, cancel)
     }
 
-    /// Sees to it that no device is opened that is of no use, and none for the first draft.
-    fn choose_device(&mut self, job: &PictureJob) {
+    /// Sees to it that no device is opened that is of no use, and, unless there is time, none before the window told.
+    fn choose_device(&mut self, job: &PictureJob, has_time: bool) {
         let devices = self.shared.devices.get();
-        if let Some(Devices::OnlySoftware(name)) = devices {
-            self.studio.leave_out(name);
+        if let Some(devices) = devices {
+            if let Some(name) = &devices.only_software {
+                self.studio.leave_out(name);
+            }
+            self.studio.show_on(devices.screen.as_ref());
         }
         let asked = &*job.loaded.scene.quality.backend;
-        self.backend = if devices.is_none() && asked == "auto" { "cpu" } else { asked }.to_owned();
-        self.pipeline.allow_device(asked == "gpu" || devices == Some(&Devices::Perhaps));
+        let known = devices.is_some() || has_time;
+        self.backend = if !known && asked == "auto" { "cpu" } else { asked }.to_owned();
+        let perhaps = devices.map_or(has_time, |devices| devices.only_software.is_none());
+        self.pipeline.allow_device(asked == "gpu" || perhaps);
     }
 
     /// The scene's own quality, once the hand rests; given up when newer work is there.
@@ -105,8 +110,7 @@ impl Photographer {
             return Ok(());
         }
         self.pipeline.cancel_with(desk.cancel.clone());
-        self.shared.devices.get_or_init(|| Devices::Perhaps);
-        self.choose_device(job);
+        self.choose_device(job, true);
         let mut outcome = match self.shared.known(&job.loaded) {
             Some(outcome) => outcome.without_times(),
             None => {
@@ -135,7 +139,9 @@ impl Photographer {
         let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
         made.grade = Grade::Final;
         made.warnings.clone_from(&outcome.health().warnings);
-        *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, made.clone()));
+        // What stays on the device is made anew in other tones.
+        let last = made.picture.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, made.clone()));
+        *lock(&self.shared.last) = last;
         answer(PictureAnswer::Made(Box::new(made)));
         Ok(())
     }
@@ -159,7 +165,8 @@ impl Photographer {
         }
         let start = Instant::now();
         let Some((last, _, made)) = &mut *lock(&self.shared.last) else { return Ok(None) };
-        made.image = Arc::new(color_image(&made.picture, &ToneMap::new(&camera(&job.loaded))?));
+        let Some(picture) = &made.picture else { return Ok(None) };
+        made.image = Image::Pixels(Arc::new(color_image(picture, &ToneMap::new(&camera(&job.loaded))?)));
         made.version = job.version;
         made.stages = vec![("tone", ms(start))];
         made.latency_ms = ms(job.asked);
@@ -186,12 +193,19 @@ impl Photographer {
         }
         let shot = Shot { camera: &camera, outcome, size, samples_per_side, settle, backend: &self.backend };
         let close = self.close.as_ref().map(|(_, close)| close);
-        let (rendered, table_ms) = self.studio.shoot(&shot, close, cancel)?;
-        let times = rendered.times;
+        let shown = if close.is_none() { self.studio.show(&shot, &tone_map, cancel)? } else { None };
+        let (picture, image, times, table_ms, tone) = match shown {
+            Some(shown) => (None, Image::OnDevice(shown.image), shown.times, shown.table_ms, None),
+            None => {
+                let (rendered, table_ms) = self.studio.shoot(&shot, close, cancel)?;
+                let start = Instant::now();
+                let image = Image::Pixels(Arc::new(color_image(&rendered.picture, &tone_map)));
+                (Some(Arc::new(rendered.picture)), image, rendered.times, table_ms, Some(ms(start)))
+            }
+        };
         let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
         if samples_per_side == 1 {
-            let measured = spent / (size[0] * size[1]) as f64;
-            self.cost[which] = measured;
+            self.cost[which] = spent / (size[0] * size[1]) as f64;
         }
         let large = [
             ("picture table", table_ms),
@@ -199,17 +213,15 @@ impl Photographer {
             ("shadows", times.shadows_ms),
             ("shading", times.shading_ms),
         ];
-        let start = Instant::now();
-        let image = Arc::new(color_image(&rendered.picture, &tone_map));
         let mut stages = outcome.times.clone();
         stages.extend(large.into_iter().filter(|(_, ms)| *ms > 0.005));
-        stages.push(("tone", ms(start)));
+        stages.extend(tone.map(|ms| ("tone", ms)));
         let mut notes = outcome.notes.clone();
         notes.extend(self.studio.warnings());
         Ok(Made {
             version: job.version,
             grade: Grade::Draft,
-            picture: Arc::new(rendered.picture),
+            picture,
             image,
             brdf: outcome.brdf.clone(),
             stages,
@@ -238,7 +250,7 @@ impl Photographer {
 
     /// The largest size, the view's shape kept, that `budget_ms` is likely to pay for.
     fn affordable(&self, size: [usize; 2], which: usize, budget_ms: f64) -> [usize; 2] {
-        let full = fitting(size);
+        let full = fitting(size, MOST_PIXELS[usize::from(self.studio.is_fast())]);
         let pixels = (full[0] * full[1]) as f64;
         let scale = (budget_ms / self.cost[which] / pixels).sqrt();
         // Few sizes, so that the picture does not breathe while the hand moves.
@@ -249,9 +261,9 @@ impl Photographer {
 }
 
 /// The view's size, cut to what is ever rendered.
-fn fitting(size: [usize; 2]) -> [usize; 2] {
+fn fitting(size: [usize; 2], most: f64) -> [usize; 2] {
     let size = size.map(|side| side.clamp(24, 8192));
-    let scale = (MOST_PIXELS / (size[0] * size[1]) as f64).sqrt().min(1.0);
+    let scale = (most / (size[0] * size[1]) as f64).sqrt().min(1.0);
     size.map(|side| ((side as f64 * scale) as usize).max(24))
 }
 

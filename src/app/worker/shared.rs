@@ -8,6 +8,7 @@ use biscale::pipeline::Outcome;
 use biscale::scene::{Effects, LoadedScene, Material, Painted, Quality, Tile};
 
 use super::made::Made;
+use super::screen::Screen;
 
 /// What an effective BRDF depends on.
 pub type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
@@ -26,13 +27,13 @@ pub struct Shared {
     drafted: AtomicU64,
 }
 
-/// Whether opening a graphics device is worth while.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Devices {
-    /// There may be a graphics processor.
-    Perhaps,
+/// What the window knows of graphics devices.
+#[derive(Clone, Default)]
+pub struct Devices {
     /// There is only this adapter, which is the processor in disguise.
-    OnlySoftware(String),
+    pub only_software: Option<String>,
+    /// What the window draws on.
+    pub screen: Option<Screen>,
 }
 
 impl Shared {

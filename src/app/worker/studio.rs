@@ -7,20 +7,23 @@ use std::time::Instant;
 
 use biscale::close_up::{CloseUp, Wearing, on_object};
 use biscale::filtering::{EffectiveBrdf, Reflectance, SumMaterial};
-use biscale::gpu::{Gpu, GpuError, Tier};
+use biscale::gpu::Tier;
 use biscale::large_scale::environment::{self, Environment};
 use biscale::large_scale::light_choice::worth_shading;
 use biscale::large_scale::lights::{self, Lights};
+use biscale::large_scale::render::StageTimes;
 use biscale::large_scale::shading::Background;
 use biscale::large_scale::shadow::Occluder;
 use biscale::large_scale::shadow_cache::ShadowCache;
-use biscale::large_scale::{
-    CameraView, DirectionalLight, GpuRenderer, ObjectMesh, RenderInput, Rendered, objects, render,
-};
+use biscale::large_scale::tone_map::ToneMap;
+use biscale::large_scale::{CameraView, DirectionalLight, ObjectMesh, RenderInput, Rendered, objects, render};
 use biscale::pipeline::Outcome;
 use biscale::scene::{self, Camera, LoadedScene, Switch};
 use biscale::{Cancel, Error, Result};
 use glam::Vec3;
+
+use super::device::{Device, Subject};
+use super::screen::{DeviceImage, Screen, Turns};
 
 /// The large scale of a scene, ready to be shaded.
 #[derive(Default)]
@@ -31,6 +34,8 @@ pub struct Studio {
     /// For the object and the lights above.
     shadows: Option<ShadowCache>,
     gpu: Device,
+    screen: Option<Screen>,
+    images: Turns,
 }
 
 struct Object {
@@ -40,23 +45,12 @@ struct Object {
     occluder: Option<Occluder>,
 }
 
-#[derive(Default)]
-enum Device {
-    #[default]
-    NotAsked,
-    /// Why pictures are made on the CPU.
-    None(String),
-    /// It was in use and failed, for this reason.
-    Lost(String),
-    /// The adapter that is software, used only where it is asked for.
-    Slower(String),
-    Open(Box<OnDevice>),
-}
-
-struct OnDevice {
-    gpu: Gpu,
-    /// For the object above, with the BRDF that it shades with.
-    renderer: Option<(GpuRenderer, Arc<EffectiveBrdf>)>,
+/// A picture that is on the window's device.
+pub struct Shown {
+    pub image: Arc<DeviceImage>,
+    pub times: StageTimes,
+    /// What the table took that it reads.
+    pub table_ms: f64,
 }
 
 /// A tile with the materials of its slots, for pictures so close that it shows.
@@ -89,9 +83,7 @@ impl Studio {
             self.object = Some(Object { key, mesh, occluder });
             self.lights = None;
             self.shadows = None;
-            if let Device::Open(device) = &mut self.gpu {
-                device.renderer = None;
-            }
+            self.gpu.forget_object();
         }
         let key = (loaded.scene.light.environment.clone(), loaded.base_dir.clone());
         if self.environment.as_ref().is_none_or(|(last, _)| *last != key) {
@@ -134,6 +126,42 @@ impl Studio {
         self.object.as_ref().and_then(of).unwrap_or(4.0)
     }
 
+    /// What the window draws on.
+    pub fn show_on(&mut self, screen: Option<&Screen>) {
+        self.screen = screen.cloned();
+        // A device of its own gives way to the window's, which shows without reading back.
+        if let (Some(screen), Device::Open(device)) = (screen, &self.gpu)
+            && !device.is_of(screen)
+            && screen.gpu.tier == Tier::Hardware
+        {
+            self.gpu = Device::NotAsked;
+        }
+    }
+
+    /// A picture of what was prepared as an image on the window's device; `None` where that cannot make it.
+    ///
+    /// # Errors
+    /// A camera that cannot be, or [`Error::Cancelled`].
+    pub fn show(&mut self, shot: &Shot, tone_map: &ToneMap, cancel: &Cancel) -> Result<Option<Shown>> {
+        let (Some(object), Some((_, lights)), Some(screen)) = (&self.object, &self.lights, &self.screen) else {
+            return Ok(None);
+        };
+        let subject = Subject { mesh: &object.mesh, occluder: object.occluder.as_ref(), shot, screen: Some(screen) };
+        let background = Background::default();
+        let input = input(object, lights, shot, &*shot.outcome.brdf, &background);
+        let images = &mut self.images;
+        let shown = self.gpu.run(subject, cancel, |renderer, gpu| {
+            if !std::ptr::eq(gpu, &*screen.gpu) {
+                return Ok(None);
+            }
+            let image = images.next(screen, shot.size)?;
+            let times = renderer.show(gpu, &input, tone_map, &image.view, cancel)?;
+            Ok(Some((image, times)))
+        })?;
+        let made = |(shown, table_ms): (Option<_>, f64)| shown.map(|(image, times)| Shown { image, times, table_ms });
+        Ok(shown.and_then(made))
+    }
+
     /// One picture of what was prepared, and the milliseconds that the table it reads took.
     ///
     /// # Errors
@@ -142,43 +170,30 @@ impl Studio {
         let (Some(object), Some((_, lights))) = (&self.object, &self.lights) else {
             return Err(Error::failed("nothing was prepared"));
         };
-        let directional = &lights.directional;
-        if shot.settle
-            && self.shadows.is_none()
-            && let Some(occluder) = &object.occluder
-            && !directional.is_empty()
-        {
-            self.shadows = Some(occluder.cache(&object.mesh, directional));
-            cancel.check()?;
-        }
-        let occluder = object.occluder.as_ref().filter(|_| !directional.is_empty());
-        let reflectance = Cancellable { brdf: &shot.outcome.brdf, cancel };
-        let mut table_ms = 0.0;
-        let input = RenderInput {
-            mesh: &object.mesh,
-            occluder,
-            shadow_cache: self.shadows.as_ref(),
-            lights: directional,
-            camera: shot.camera,
-            reflectance: &reflectance,
-            size: shot.size,
-            samples_per_side: shot.samples_per_side,
-            background: &Background::default(),
-        };
-        let mut rendered = match self.gpu.shoot(&input, shot, &mut table_ms, cancel)? {
+        let (occluder, background) = (object.occluder.as_ref(), Background::default());
+        let subject = Subject { mesh: &object.mesh, occluder, shot, screen: self.screen.as_ref() };
+        let exact = Cancellable { brdf: &shot.outcome.brdf, cancel };
+        let seen = input(object, lights, shot, &exact, &background);
+        let on_device = self.gpu.run(subject, cancel, |renderer, gpu| renderer.render(gpu, &seen, cancel))?;
+        let (mut rendered, table_ms) = match on_device {
             Some(rendered) => rendered,
             None => {
+                if let (true, None, Some(occluder)) = (shot.settle, &self.shadows, seen.occluder) {
+                    self.shadows = Some(occluder.cache(&object.mesh, &lights.directional));
+                    cancel.check()?;
+                }
                 let pictured = shot.outcome.for_pictures(cancel)?;
-                table_ms += pictured.ms;
                 let reflectance = Cancellable { brdf: &pictured.brdf, cancel };
-                render(&RenderInput { reflectance: &reflectance, ..input })?
+                let shadow_cache = self.shadows.as_ref();
+                (render(&RenderInput { reflectance: &reflectance, shadow_cache, ..seen })?, pictured.ms)
             }
         };
         cancel.check()?;
         if let Some((tile, assigned)) = close {
             let start = Instant::now();
             let wearing = Wearing { material_of_slot: &assigned.0, materials: &assigned.1 };
-            tile.blend_into(&mut rendered.picture, &input, wearing, cancel)?;
+            let shadow_cache = self.shadows.as_ref();
+            tile.blend_into(&mut rendered.picture, &RenderInput { shadow_cache, ..seen }, wearing, cancel)?;
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
         }
         Ok((rendered, table_ms))
@@ -192,112 +207,45 @@ impl Studio {
         self.object.as_ref().is_some_and(of)
     }
 
+    /// Whether pictures are made on a graphics processor.
+    pub fn is_fast(&self) -> bool {
+        self.gpu.is_fast()
+    }
+
     /// What became of a device that failed while it was in use.
     pub fn trouble(&self) -> Option<String> {
-        match &self.gpu {
-            Device::Lost(why) => Some(why.clone()),
-            _ => None,
-        }
+        self.gpu.trouble()
     }
 
     /// There is only this adapter, which is software: it is not opened to find that out.
     pub fn leave_out(&mut self, name: &str) {
-        if matches!(self.gpu, Device::NotAsked) {
-            self.gpu = Device::Slower(name.to_owned());
-        }
+        self.gpu.leave_out(name);
     }
 
     /// Where pictures are made, in words.
     pub fn device(&self) -> String {
-        match &self.gpu {
-            Device::NotAsked => "CPU".to_owned(),
-            Device::Slower(name) => format!("CPU ({name} would be slower)"),
-            Device::None(why) => format!("CPU ({why})"),
-            Device::Lost(_) => "CPU (the graphics device failed)".to_owned(),
-            Device::Open(device) if device.renderer.is_some() => device.gpu.description(),
-            Device::Open(device) => format!("CPU, beside {}", device.gpu.description()),
-        }
+        self.gpu.describe()
     }
 }
 
-/// Tests set it: the next picture on a device finds it lost.
-#[cfg(test)]
-pub static LOSE_DEVICE: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
-
-impl Device {
-    /// A picture on the device; `None` where the CPU is to make it. What fails here fails for good.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`].
-    fn shoot(
-        &mut self,
-        input: &RenderInput,
-        shot: &Shot,
-        table_ms: &mut f64,
-        cancel: &Cancel,
-    ) -> Result<Option<Rendered>> {
-        if shot.backend == "cpu" {
-            *self = Self::NotAsked;
-            return Ok(None);
-        }
-        if matches!(self, Self::NotAsked) || matches!(self, Self::Slower(_)) && shot.backend == "gpu" {
-            *self = match Gpu::open() {
-                // The processor in disguise is slower than our own routes: it is not kept open.
-                Ok(gpu) if gpu.tier != Tier::Hardware && shot.backend != "gpu" => Self::Slower(gpu.adapter.name),
-                Ok(gpu) => Self::Open(Box::new(OnDevice { gpu, renderer: None })),
-                Err(_) => Self::None("no graphics adapter".to_owned()),
-            };
-        }
-        let Self::Open(device) = self else { return Ok(None) };
-        #[cfg(test)]
-        if LOSE_DEVICE.swap(false, std::sync::atomic::Ordering::SeqCst) {
-            device.gpu.device.destroy();
-        }
-        let rendered = device.wear(input, shot, table_ms, cancel).and_then(|worn| match &device.renderer {
-            Some((renderer, _)) if worn => renderer.render(&device.gpu, input, cancel).map(Some),
-            _ => Ok(None),
-        });
-        match rendered {
-            Ok(rendered) => Ok(rendered),
-            Err(Error::Cancelled) => Err(Error::Cancelled),
-            Err(Error::Input(_)) => Ok(None),
-            Err(error) => {
-                *self = Self::Lost(error.to_string());
-                Ok(None)
-            }
-        }
-    }
-}
-
-impl OnDevice {
-    /// Takes the material over, as a table where that is there or pays, else as sums; whether the device shades it.
-    fn wear(&mut self, input: &RenderInput, shot: &Shot, table_ms: &mut f64, cancel: &Cancel) -> Result<bool> {
-        let exact = &shot.outcome.brdf;
-        // A graphics processor has a draft's sums done before the CPU has a table.
-        let pictured = match shot.outcome.pictured() {
-            None if self.gpu.tier == Tier::Software || shot.settle => {
-                let pictured = shot.outcome.for_pictures(cancel)?;
-                *table_ms += pictured.ms;
-                Some(pictured.brdf)
-            }
-            known => known,
-        };
-        // The processor in disguise is not asked for sums where the processor itself reads a table.
-        let sums = Some(exact).filter(|_| self.gpu.tier == Tier::Hardware || pictured.is_none());
-        for brdf in pictured.iter().chain(sums) {
-            let made = match &mut self.renderer {
-                Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
-                Some((renderer, last)) => renderer.set_brdf(&self.gpu, brdf).map(|()| *last = brdf.clone()),
-                none => GpuRenderer::new(&self.gpu, input.mesh, input.occluder, brdf)
-                    .map(|renderer| *none = Some((renderer, brdf.clone()))),
-            };
-            match made {
-                Err(GpuError::Unsupported(_)) => {}
-                made => return made.map(|()| true).map_err(Error::from),
-            }
-        }
-        self.renderer = None;
-        Ok(false)
+/// All that a picture depends on; shadows only where there is light to cast them.
+fn input<'a>(
+    object: &'a Object,
+    lights: &'a Lights,
+    shot: &'a Shot,
+    reflectance: &'a dyn Reflectance,
+    background: &'a Background,
+) -> RenderInput<'a> {
+    RenderInput {
+        mesh: &object.mesh,
+        occluder: object.occluder.as_ref().filter(|_| !lights.directional.is_empty()),
+        shadow_cache: None,
+        lights: &lights.directional,
+        camera: shot.camera,
+        reflectance,
+        size: shot.size,
+        samples_per_side: shot.samples_per_side,
+        background,
     }
 }
 

@@ -1,0 +1,176 @@
+//! The graphics device of one worker: opened where it is of use, with the object and the material that it shades.
+
+use std::sync::Arc;
+
+use biscale::filtering::EffectiveBrdf;
+use biscale::gpu::{Gpu, GpuError, Tier};
+use biscale::large_scale::shadow::Occluder;
+use biscale::large_scale::{GpuRenderer, ObjectMesh};
+use biscale::{Cancel, Error, Result};
+
+use super::screen::Screen;
+use super::studio::Shot;
+
+#[derive(Default)]
+pub enum Device {
+    #[default]
+    NotAsked,
+    /// Why pictures are made on the CPU.
+    None(String),
+    /// It was in use and failed, for this reason.
+    Lost(String),
+    /// The adapter that is software, used only where it is asked for.
+    Slower(String),
+    Open(OnDevice),
+}
+
+pub struct OnDevice {
+    gpu: Arc<Gpu>,
+    /// For one object, with the BRDF that it shades with.
+    renderer: Option<(Box<GpuRenderer>, Arc<EffectiveBrdf>)>,
+}
+
+/// What is shaded, and what of it the device needs.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    pub mesh: &'a ObjectMesh,
+    pub occluder: Option<&'a Occluder>,
+    pub shot: &'a Shot<'a>,
+    pub screen: Option<&'a Screen>,
+}
+
+/// Tests set it: the next picture on a device finds it lost.
+#[cfg(test)]
+pub static LOSE_DEVICE: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
+
+impl Device {
+    /// Another object is to be shaded.
+    pub fn forget_object(&mut self) {
+        if let Self::Open(device) = self {
+            device.renderer = None;
+        }
+    }
+
+    /// There is only this adapter, which is software: it is not opened to find that out.
+    pub fn leave_out(&mut self, name: &str) {
+        if matches!(self, Self::NotAsked) {
+            *self = Self::Slower(name.to_owned());
+        }
+    }
+
+    /// Whether this is a graphics processor.
+    pub fn is_fast(&self) -> bool {
+        matches!(self, Self::Open(device) if device.gpu.tier == Tier::Hardware)
+    }
+
+    /// Runs `work` on the device, wearing the material; also tells what the table took that it reads. `None` where the CPU
+    /// is to do it. What fails here fails for good.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    pub fn run<T>(
+        &mut self,
+        subject: Subject,
+        cancel: &Cancel,
+        work: impl FnOnce(&mut GpuRenderer, &Gpu) -> Result<T>,
+    ) -> Result<Option<(T, f64)>> {
+        let backend = subject.shot.backend;
+        if backend == "cpu" {
+            *self = Self::NotAsked;
+            return Ok(None);
+        }
+        if matches!(self, Self::NotAsked) || matches!(self, Self::Slower(_)) && backend == "gpu" {
+            *self = Self::open(backend == "gpu", subject.screen);
+        }
+        let Self::Open(device) = self else { return Ok(None) };
+        #[cfg(test)]
+        if LOSE_DEVICE.swap(false, std::sync::atomic::Ordering::SeqCst) {
+            device.gpu.device.destroy();
+        }
+        let done = device.wear(subject, cancel).and_then(|worn| match (&mut device.renderer, worn) {
+            (Some((renderer, _)), Some(table_ms)) => work(renderer, &device.gpu).map(|done| Some((done, table_ms))),
+            _ => Ok(None),
+        });
+        match done {
+            Ok(done) => Ok(done),
+            Err(Error::Cancelled) => Err(Error::Cancelled),
+            Err(Error::Input(_)) => Ok(None),
+            Err(error) => {
+                *self = Self::Lost(error.to_string());
+                Ok(None)
+            }
+        }
+    }
+
+    fn open(asked: bool, screen: Option<&Screen>) -> Self {
+        let gpu = match screen.filter(|screen| asked || screen.gpu.tier == Tier::Hardware) {
+            Some(screen) => Ok(screen.gpu.clone()),
+            None => Gpu::open().map(Arc::new),
+        };
+        match gpu {
+            // The processor in disguise is slower than our own routes: it is not kept open.
+            Ok(gpu) if gpu.tier != Tier::Hardware && !asked => Self::Slower(gpu.adapter.name.clone()),
+            Ok(gpu) => Self::Open(OnDevice { gpu, renderer: None }),
+            Err(_) => Self::None("no graphics adapter".to_owned()),
+        }
+    }
+
+    /// What became of a device that failed while it was in use.
+    pub fn trouble(&self) -> Option<String> {
+        match self {
+            Self::Lost(why) => Some(why.clone()),
+            _ => None,
+        }
+    }
+
+    /// Where pictures are made, in words.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::NotAsked => "CPU".to_owned(),
+            Self::Slower(name) => format!("CPU ({name} would be slower)"),
+            Self::None(why) => format!("CPU ({why})"),
+            Self::Lost(_) => "CPU (the graphics device failed)".to_owned(),
+            Self::Open(device) if device.renderer.is_some() => device.gpu.description(),
+            Self::Open(device) => format!("CPU, beside {}", device.gpu.description()),
+        }
+    }
+}
+
+impl OnDevice {
+    /// Takes the material over, as a table where that is there or pays, else as sums; the table's milliseconds, or `None`
+    /// where the device does not shade this material.
+    fn wear(&mut self, subject: Subject, cancel: &Cancel) -> Result<Option<f64>> {
+        let Subject { mesh, occluder, shot, .. } = subject;
+        let exact = &shot.outcome.brdf;
+        let mut table_ms = 0.0;
+        // A graphics processor has a draft's sums done before the CPU has a table.
+        let pictured = match shot.outcome.pictured() {
+            None if self.gpu.tier == Tier::Software || shot.settle => {
+                let pictured = shot.outcome.for_pictures(cancel)?;
+                table_ms = pictured.ms;
+                Some(pictured.brdf)
+            }
+            known => known,
+        };
+        // The processor in disguise is not asked for sums where the processor itself reads a table.
+        let sums = Some(exact).filter(|_| self.gpu.tier == Tier::Hardware || pictured.is_none());
+        for brdf in pictured.iter().chain(sums) {
+            let made = match &mut self.renderer {
+                Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
+                Some((renderer, last)) => renderer.set_brdf(&self.gpu, brdf).map(|()| *last = brdf.clone()),
+                none => GpuRenderer::new(&self.gpu, mesh, occluder, brdf)
+                    .map(|renderer| *none = Some((Box::new(renderer), brdf.clone()))),
+            };
+            match made {
+                Err(GpuError::Unsupported(_)) => {}
+                made => return made.map(|()| Some(table_ms)).map_err(Error::from),
+            }
+        }
+        self.renderer = None;
+        Ok(None)
+    }
+
+    pub fn is_of(&self, screen: &Screen) -> bool {
+        Arc::ptr_eq(&self.gpu, &screen.gpu)
+    }
+}
