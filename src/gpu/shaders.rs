@@ -15,6 +15,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("exp_negative", include_str!("../../shaders/exp_negative.wgsl")),
     ("facets", include_str!("../../shaders/facets.wgsl")),
     ("gbuffer", include_str!("../../shaders/gbuffer.wgsl")),
+    ("height_march", include_str!("../../shaders/height_march.wgsl")),
     ("light_rays", include_str!("../../shaders/light_rays.wgsl")),
     ("lobe_blinn_phong", include_str!("../../shaders/lobe_blinn_phong.wgsl")),
     ("lobe_cook_torrance", include_str!("../../shaders/lobe_cook_torrance.wgsl")),

@@ -4,6 +4,7 @@
 //! horizons where nothing overhangs, as slices or as maps of bits where something does.
 
 mod gpu_maps;
+mod gpu_march;
 mod height_march;
 mod horizons;
 mod kept;
@@ -25,6 +26,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 pub use gpu_maps::{GpuShadowMaps, visibility_maps_gpu};
+pub use gpu_march::{GpuHeightMarch, GpuHorizons};
 pub use horizons::Horizons;
 pub use nearest::Hit;
 pub use packed::PackedVisibility;
