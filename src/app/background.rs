@@ -206,7 +206,7 @@ impl Editor {
         }
         if !self.tile.painting
             && let (Some(worker), Some(made)) = (&self.background.lobes, &self.object.made)
-            && let Some(job) = self.lobe.job(&made.brdf)
+            && let Some(job) = made.brdf.as_ref().and_then(|brdf| self.lobe.job(brdf))
         {
             worker.ask(job);
         }

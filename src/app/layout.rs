@@ -1,5 +1,6 @@
 //! Where the views stand: gallery, object, tile, and under the smaller one the brush or the lobe.
 
+use biscale::filtering::EffectiveBrdf;
 use biscale::large_scale::CameraView;
 use biscale::scene::Scene;
 use eframe::egui::{self, Panel, ScrollArea, Ui};
@@ -42,7 +43,8 @@ impl Editor {
         if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
             self.lobe.viewer = Some(picked.viewer);
             self.lobe.light = picked.light.unwrap_or(self.lobe.light);
-            let value = made.brdf.eval(self.lobe.light, picked.viewer).max_element();
+            let value = |brdf: &EffectiveBrdf| brdf.eval(self.lobe.light, picked.viewer).max_element();
+            let value = made.brdf.as_deref().map_or(0.0, value);
             self.tile.picked = Some((picked.viewer, 4.0 * value));
             self.tile.show = Which::Contribution;
         }

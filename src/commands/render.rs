@@ -51,7 +51,7 @@ impl Route {
             Err(error) if required => return Err(Error::from(error).into()),
             _ => return Ok(Route::Cpu { refused: None }),
         };
-        let renderer = |brdf: &EffectiveBrdf| GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref(), brdf);
+        let renderer = |brdf: &EffectiveBrdf| GpuRenderer::wearing(&gpu, &stage.mesh, stage.occluder.as_ref(), brdf);
         let table = outcome.for_pictures(&Cancel::default())?;
         let made = match renderer(&table.brdf) {
             Err(GpuError::Unsupported(_)) => {

@@ -15,6 +15,7 @@ mod rotated_basis;
 mod sampled;
 mod thinned;
 mod tint;
+mod unseen;
 mod wu2011;
 
 use glam::Vec3;
@@ -30,6 +31,7 @@ pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
 pub use pair_table::{Nodes, PairTable, TableContent};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use tint::Tint;
+pub use unseen::{Heights, Sight, UnseenSum};
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 
 /// What the large scale asks of a material: all it knows of the small scale.

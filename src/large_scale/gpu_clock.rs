@@ -5,11 +5,12 @@ use crate::gpu::{Gpu, GpuError};
 
 /// Passes that are timed; of a picture of more bands the first ones speak for all.
 const PASSES: u32 = 1024;
-const STAGES: usize = 3;
+const STAGES: usize = 4;
 
 /// Stages of [`StageTimes`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stage {
+    Product,
     GBuffer,
     Shadows,
     Shading,
@@ -87,8 +88,8 @@ impl Clock {
         }
         let total: f64 = parts.iter().sum();
         // A clock that stands still tells nothing.
-        let [gbuffer_ms, shadows_ms, shading_ms] =
-            if total > 0.0 { parts.map(|part| whole_ms * part / total) } else { [0.0, 0.0, whole_ms] };
-        Ok(StageTimes { gbuffer_ms, shadows_ms, shading_ms })
+        let [product_ms, gbuffer_ms, shadows_ms, shading_ms] =
+            if total > 0.0 { parts.map(|part| whole_ms * part / total) } else { [0.0, 0.0, 0.0, whole_ms] };
+        Ok(StageTimes { product_ms, gbuffer_ms, shadows_ms, shading_ms })
     }
 }

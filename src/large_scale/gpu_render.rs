@@ -10,15 +10,16 @@ use super::gpu_clock::{Clock, Stage, Timed};
 use super::gpu_gbuffer::{Camera, GpuGBuffer, GpuObject};
 use super::gpu_light_rays::{GpuLightRays, GpuOccluder};
 use super::gpu_picture::{self, GpuPictures, Output};
-use super::gpu_shading::{self, GpuMaterial, GpuShading, Light};
+use super::gpu_shading::{self, GpuMaterial, GpuShading, Light, Seen};
 use super::render::{RenderInput, Rendered, StageTimes, check_size};
 use super::shadow::Occluder;
 use super::tone_map::{ToneCurve, ToneMap};
 use super::{CameraView, ObjectMesh, Picture};
 use crate::cancel::Cancel;
 use crate::error::Result;
-use crate::filtering::EffectiveBrdf;
+use crate::filtering::{EffectiveBrdf, Heights, Sight, UnseenSum};
 use crate::gpu::{Gpu, GpuError, Tier};
+use crate::visibility::GpuHeightMarch;
 
 /// Lobes or table rows of one submission: some tenths of a second for slow graphics processors, about one for software.
 const WORK: u64 = 1 << 32;
@@ -32,7 +33,11 @@ pub struct GpuRenderer {
     /// Absent where the object cannot shadow itself: then no pass knows of shadows.
     rays: Option<(GpuLightRays, GpuOccluder)>,
     shading: GpuShading,
-    material: GpuMaterial,
+    /// Nothing is black.
+    material: Option<GpuMaterial>,
+    /// Whether the device has made what the material reads.
+    is_made: bool,
+    march: Option<GpuHeightMarch>,
     pictures: GpuPictures,
     /// For pictures like the last one.
     pub(super) room: Option<Room>,
@@ -42,16 +47,11 @@ pub struct GpuRenderer {
 }
 
 impl GpuRenderer {
+    /// An object without a material, which is black.
+    ///
     /// # Errors
-    /// [`GpuError::Unsupported`] for a BRDF that only the CPU shades, and what the device refuses.
-    pub fn new(
-        gpu: &Gpu,
-        mesh: &ObjectMesh,
-        occluder: Option<&Occluder>,
-        brdf: &EffectiveBrdf,
-    ) -> std::result::Result<Self, GpuError> {
-        let mut shading = GpuShading::new(gpu)?;
-        let material = shading.material(gpu, brdf, occluder.is_some())?;
+    /// What the device refuses.
+    pub fn new(gpu: &Gpu, mesh: &ObjectMesh, occluder: Option<&Occluder>) -> std::result::Result<Self, GpuError> {
         let rays = match occluder {
             Some(occluder) => Some((GpuLightRays::new(gpu)?, GpuOccluder::new(gpu, occluder)?)),
             None => None,
@@ -60,8 +60,10 @@ impl GpuRenderer {
             object: GpuObject::new(gpu, mesh)?,
             gbuffer: GpuGBuffer::new(gpu, rays.is_some())?,
             rays,
-            shading,
-            material,
+            shading: GpuShading::new(gpu)?,
+            material: None,
+            is_made: false,
+            march: None,
             pictures: GpuPictures::new(gpu)?,
             room: None,
             at_once: if gpu.tier == Tier::Hardware { WORK } else { SOFTWARE_WORK },
@@ -69,12 +71,49 @@ impl GpuRenderer {
         })
     }
 
+    /// An object in a material.
+    ///
+    /// # Errors
+    /// As [`GpuRenderer::new`] and [`GpuRenderer::set_brdf`].
+    pub fn wearing(
+        gpu: &Gpu,
+        mesh: &ObjectMesh,
+        occluder: Option<&Occluder>,
+        brdf: &EffectiveBrdf,
+    ) -> std::result::Result<Self, GpuError> {
+        let mut renderer = Self::new(gpu, mesh, occluder)?;
+        renderer.set_brdf(gpu, brdf)?;
+        Ok(renderer)
+    }
+
     /// Shades with another BRDF from now on; pipelines that were compiled before are kept.
     ///
     /// # Errors
-    /// As [`GpuRenderer::new`]; the BRDF before stays.
+    /// [`GpuError::Unsupported`] for a BRDF that only the CPU shades, and what the device refuses; the material before stays.
     pub fn set_brdf(&mut self, gpu: &Gpu, brdf: &EffectiveBrdf) -> std::result::Result<(), GpuError> {
-        self.material = self.shading.material(gpu, brdf, self.rays.is_some())?;
+        self.material = Some(self.shading.material(gpu, brdf, self.rays.is_some())?);
+        self.is_made = false;
+        Ok(())
+    }
+
+    /// Shades with a tile from now on, whose visibility and product the device makes in the submission of the next picture.
+    ///
+    /// # Errors
+    /// As [`GpuRenderer::set_brdf`].
+    pub fn set_tile(&mut self, gpu: &Gpu, tile: &UnseenSum) -> std::result::Result<(), GpuError> {
+        let seen = match &tile.sight {
+            Sight::Seen(visibility) => Seen::Held(visibility),
+            Sight::Heights(heights) => {
+                let march = match &mut self.march {
+                    Some(march) => march,
+                    none => none.insert(GpuHeightMarch::new(gpu)?),
+                };
+                let Heights { samples, tile_size, facets, azimuths, ramp } = heights;
+                Seen::Marched(march.horizons(gpu, samples, *tile_size, facets, *azimuths)?, *ramp)
+            }
+        };
+        self.material = Some(self.shading.tile(gpu, tile, seen, self.rays.is_some())?);
+        self.is_made = false;
         Ok(())
     }
 
@@ -124,7 +163,7 @@ impl GpuRenderer {
     ) -> Result<StageTimes> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let start = Instant::now();
-        let work = self.material.work(input.lights.len()).max(1);
+        let work = self.material.as_ref().map_or(1, |material| material.work(input.lights.len()).max(1));
         let points = usize::try_from(self.at_once / work).unwrap_or(usize::MAX);
         let need =
             Need { size: input.size, samples_per_side: input.samples_per_side, lights: input.lights.len(), points };
@@ -139,7 +178,7 @@ impl GpuRenderer {
                 light_count: need.lights as u32,
                 words_per_point: room.words,
                 slice: room.slice,
-                least_area: self.material.least_area(),
+                least_area: self.material.as_ref().map_or(0.0, GpuMaterial::least_area),
             };
             let counts = [room.slots(), room.slices];
             let picture = gpu_picture::Params::new(need.size, band.rows.clone(), counts, input.background, tone_map);
@@ -154,6 +193,10 @@ impl GpuRenderer {
             gpu.checked("rendering", || {
                 let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 timed = Timed::default();
+                if let (false, Some(material), true) = (self.is_made, &self.material, first == 0) {
+                    let writes = self.clock.as_ref().and_then(|clock| clock.compute_pass(&mut timed, Stage::Product));
+                    material.prepare(&mut encoder, writes);
+                }
                 if first == 0 {
                     let writes = self.clock.as_ref().and_then(|clock| clock.render_pass(&mut timed, Stage::GBuffer));
                     self.gbuffer.draw(&mut encoder, &room.samples, &room.bands[0].scene, &self.object, writes);
@@ -174,7 +217,7 @@ impl GpuRenderer {
             Some(clock) => clock.times(gpu, &timed, whole)?,
             None => StageTimes { shading_ms: whole, ..StageTimes::default() },
         };
-        self.room = Some(room);
+        (self.room, self.is_made) = (Some(room), true);
         Ok(times)
     }
 
@@ -209,8 +252,8 @@ impl GpuRenderer {
             rays.trace(&mut pass, group, to_bits, [points, room.words]);
         }
         let mut pass = self.pass(encoder, Stage::Shading, timed);
-        if lit {
-            self.material.shade(&mut pass, &band.shading, [points, room.slices]);
+        if let (true, Some(material)) = (lit, &self.material) {
+            material.shade(&mut pass, &band.shading, [points, room.slices]);
         }
         self.pictures.write(&mut pass, &band.pixels, output, pixels);
     }
@@ -229,7 +272,7 @@ impl GpuRenderer {
 /// One picture on the device; for more than one, keep a [`GpuRenderer`].
 ///
 /// # Errors
-/// As [`GpuRenderer::new`] and [`GpuRenderer::render`].
+/// As [`GpuRenderer::wearing`] and [`GpuRenderer::render`].
 pub fn render_gpu(gpu: &Gpu, input: &RenderInput, brdf: &EffectiveBrdf) -> Result<Rendered> {
-    GpuRenderer::new(gpu, input.mesh, input.occluder, brdf)?.render(gpu, input, &Cancel::default())
+    GpuRenderer::wearing(gpu, input.mesh, input.occluder, brdf)?.render(gpu, input, &Cancel::default())
 }

@@ -261,7 +261,7 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
 
     let mesh = objects::build(&scene::Object { kind: "sphere".to_owned(), path: None }, Path::new(".")).unwrap();
     let light = DirectionalLight { direction: Vec3::new(0.6, 0.48, 0.64), irradiance: Vec3::new(1.0, 2.0, 3.0) };
-    let mut renderer = GpuRenderer::new(&gpu, &mesh, None, &first).unwrap();
+    let mut renderer = GpuRenderer::wearing(&gpu, &mesh, None, &first).unwrap();
     renderer.set_brdf(&gpu, &second).unwrap();
     let input = RenderInput {
         mesh: &mesh,
@@ -323,7 +323,7 @@ fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
     let brdf = effective(&open(PYRAMIDS, LOBES[4], "direct"));
     let studio = Studio::of("cup");
     let input = RenderInput { samples_per_side: 2, ..studio.input(&brdf, 50, &Background::Wall) };
-    let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder, &brdf).unwrap();
+    let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
     let bands = |renderer: &GpuRenderer| renderer.room.as_ref().unwrap().bands.len();
     let whole = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
     assert_eq!(bands(&renderer), 1);
@@ -343,7 +343,7 @@ fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
     let brdf = effective(&open(RODS, LOBES[4], "direct"));
     let studio = Studio::of("cup");
     let input = studio.input(&brdf, 96, &Background::Wall);
-    let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder, &brdf).unwrap();
+    let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
     let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
     let cancel = Cancel::default();
     cancel.set();

@@ -53,7 +53,7 @@ fn brdf() -> EffectiveBrdf {
 /// What the device finds in a picture: the points of every sample's place, and where their rays start.
 fn found(gpu: &Gpu, mesh: &ObjectMesh, camera: &scene::Camera, size: [usize; 2], samples: usize) -> [Vec<Point>; 2] {
     let (occluder, brdf) = (Occluder::always(mesh), brdf());
-    let mut renderer = GpuRenderer::new(gpu, mesh, Some(&occluder), &brdf).unwrap();
+    let mut renderer = GpuRenderer::wearing(gpu, mesh, Some(&occluder), &brdf).unwrap();
     let input = RenderInput {
         mesh,
         occluder: Some(&occluder),
@@ -176,7 +176,7 @@ fn both_routes_let_the_same_samples_share_a_point() {
 fn what_a_screen_shows_is_what_is_read_back_through_the_tone_map() {
     let Some(gpu) = open_gpu() else { return };
     let (mesh, brdf, size) = (object("cup"), brdf(), [96, 64]);
-    let mut renderer = GpuRenderer::new(&gpu, &mesh, None, &brdf).unwrap();
+    let mut renderer = GpuRenderer::wearing(&gpu, &mesh, None, &brdf).unwrap();
     let texture = gpu_picture::image(&gpu, size).unwrap();
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     for (curve, gain, background) in [

@@ -34,6 +34,8 @@ pub struct RenderInput<'a> {
 /// Milliseconds a stage took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StageTimes {
+    /// Of visibility and product, where a device makes them with the picture.
+    pub product_ms: f64,
     pub gbuffer_ms: f64,
     pub shadows_ms: f64,
     pub shading_ms: f64,
@@ -64,6 +66,7 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
     let picture = shading::gather(&points, &radiance, &view, input.background);
     let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
     let times = StageTimes {
+        product_ms: 0.0,
         gbuffer_ms: ms(start, after_gbuffer),
         shadows_ms: ms(after_gbuffer, after_shadows),
         shading_ms: ms(after_shadows, Instant::now()),

@@ -1,5 +1,7 @@
 //! What a scene is like: all that the plan's decisions rest on.
 
+use std::sync::Arc;
+
 use super::stage::Version;
 use super::{Pipeline, Shape};
 use crate::brdf::Term;
@@ -28,7 +30,7 @@ impl Pipeline {
         let allowed = settings.backend != Backend::Cpu && !self.without_device;
         if needs_maps && allowed && !self.gpu_asked {
             self.gpu_asked = true;
-            self.gpu = Gpu::open().ok();
+            self.gpu = Gpu::open().ok().map(Arc::new);
         }
         // The processor in disguise draws shadow maps far slower than the processor slices (the draft of the pillow: 78 s, not 0.1):
         // only where both are asked for.

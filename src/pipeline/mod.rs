@@ -11,6 +11,7 @@ mod make;
 mod outcome;
 mod pictures;
 mod stage;
+mod unseen;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,6 +24,7 @@ use self::outcome::limits;
 pub use self::pictures::Pictured;
 use self::pictures::Pictures;
 use self::stage::{Stage, Version};
+pub use self::unseen::Unseen;
 use crate::accuracy::health::{Evidence, Sight};
 use crate::accuracy::{Health, Reference};
 use crate::brdf::MeasuredCache;
@@ -65,6 +67,21 @@ type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
 
+/// All that comes before visibility.
+#[derive(Debug)]
+struct Prepared {
+    shape: Arc<Shape>,
+    settings: Settings,
+    materials: Arc<Assigned>,
+    facets: Arc<Facets>,
+    material_of_slot: Vec<usize>,
+    sum: FacetSum,
+    plan: Plan,
+    shape_version: Version,
+    /// Of materials and facets.
+    versions: [Version; 2],
+}
+
 /// The last effective BRDF, and what a colour edit makes the next one from.
 #[derive(Debug)]
 struct Last {
@@ -80,7 +97,7 @@ pub struct Pipeline {
     cache: MeasuredCache,
     kept: Cache,
     cancel: Cancel,
-    gpu: Option<Gpu>,
+    gpu: Option<Arc<Gpu>>,
     gpu_asked: bool,
     /// Nobody may open a device here.
     without_device: bool,
@@ -118,9 +135,64 @@ impl Pipeline {
         self.without_device = !allowed;
     }
 
+    /// A device that is open already, to be used in place of one of its own.
+    pub fn use_device(&mut self, gpu: Arc<Gpu>) {
+        (self.gpu, self.gpu_asked) = (Some(gpu), true);
+    }
+
     /// What takes long to make is looked for in `cache` from now on, and kept there. Without this nothing is.
     pub fn keep_in(&mut self, cache: Cache) {
         self.kept = cache;
+    }
+
+    /// All that comes before visibility.
+    fn prepare(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Prepared> {
+        let scene = &loaded.scene;
+        let (shape, shape_version) = self.shape(loaded, times)?;
+        let settings = Settings::of(scene).for_shape(shape.height_field);
+        let (materials, materials_version) = self.materials(loaded, &shape.mesh, times)?;
+        let colors = settings.effects.color_weights;
+        let counts = [Some(settings.facets), settings.normal_bins];
+        let facet_key = (shape_version, counts, settings.seed, settings.preset == Preset::Wu2011, colors);
+        let (facets, facets_version) =
+            self.facets.get("facets", facet_key, times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
+        let material_of_slot = grouped(&materials.0, &facets, &settings);
+        let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.1);
+        sum.force(&facets, &settings.effects);
+        let of = (&material_of_slot[..], &materials.1[..]);
+        let found = self.findings(scene, &shape, &facets, &sum, of.0, of.1, &settings, facets_version);
+        let mirrors = self.mirror_planes(&shape, shape_version, &settings, times)?;
+        let plan = decide(&Findings { mirrors, ..found }, &settings, &Costs::default());
+        let versions = [materials_version, facets_version];
+        Ok(Prepared { shape, settings, materials, facets, material_of_slot, sum, plan, shape_version, versions })
+    }
+
+    /// What the facets see, by the plan's route.
+    fn seen(&mut self, of: &Prepared, times: &mut StageTimes) -> Result<(Arc<Visibility>, Version)> {
+        let Prepared { shape, settings, facets, plan, versions: [_, facets_version], .. } = of;
+        if plan.route == Route::None {
+            // Nothing is computed, and nothing kept.
+            return Ok((Arc::new(Visibility::Unblocked { facets: facets.len() }), 0));
+        }
+        let key = (
+            *facets_version,
+            plan.route,
+            [settings.horizon_azimuths, settings.slice_azimuths],
+            settings.map_grid,
+            settings.map_resolution,
+            settings.penumbra.to_bits(),
+        );
+        let (gpu, cancel, cache) = (self.gpu.as_deref(), &self.cancel, &self.kept);
+        let mut was_kept = false;
+        let seen = self.visibility.get("visibility", key, times, cancel, || {
+            let (seen, kept) = kept::visibility(cache, plan.route, &shape.mesh, facets, settings, gpu, cancel)?;
+            was_kept = kept;
+            Ok(seen)
+        })?;
+        if let (true, Some((name, _))) = (was_kept, times.last_mut()) {
+            *name = kept::VISIBILITY;
+        }
+        Ok(seen)
     }
 
     /// The effective BRDF of a scene at its own quality.
@@ -128,52 +200,17 @@ impl Pipeline {
     /// # Errors
     /// A file the scene names cannot be used, or a factorization fails.
     pub fn effective(&mut self, loaded: &LoadedScene) -> Result<Outcome> {
-        let scene = &loaded.scene;
         let mut times = StageTimes::new();
-        let (shape, shape_version) = self.shape(loaded, &mut times)?;
-        let settings = Settings::of(scene).for_shape(shape.height_field);
-        let (materials, materials_version) = self.materials(loaded, &shape.mesh, &mut times)?;
+        let prepared = self.prepare(loaded, &mut times)?;
+        if prepared.settings.preset == Preset::Wu2011 {
+            let names = names(&loaded.scene, &prepared.shape.mesh, &prepared.materials)?;
+            return self.wu2011(prepared, names, times);
+        }
+        let (visibility, visibility_version) = self.seen(&prepared, &mut times)?;
+        let Prepared { shape, settings, materials, facets, material_of_slot, sum, mut plan, versions, .. } = prepared;
+        let ([materials_version, facets_version], scene) = (versions, &loaded.scene);
         let sum_materials = &materials.1;
-        let colors = settings.effects.color_weights;
-        let counts = [Some(settings.facets), settings.normal_bins];
-        let facet_key = (shape_version, counts, settings.seed, settings.preset == Preset::Wu2011, colors);
-        let (facets, facets_version) =
-            self.facets.get("facets", facet_key, &mut times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
-        let material_of_slot = &grouped(&materials.0, &facets, &settings);
-        let mut sum = FacetSum::new(&facets, material_of_slot, sum_materials);
-        sum.force(&facets, &settings.effects);
-        let found =
-            self.findings(scene, &shape, &facets, &sum, material_of_slot, sum_materials, &settings, facets_version);
-        let mirrors = self.mirror_planes(&shape, shape_version, &settings, &mut times)?;
-        let found = Findings { mirrors, ..found };
-        let mut plan = decide(&found, &settings, &Costs::default());
-        if settings.preset == Preset::Wu2011 {
-            let names = names(scene, &shape.mesh, &materials)?;
-            let assigned = Arc::new((material_of_slot.clone(), materials.1.clone()));
-            return self.wu2011(&shape, &facets, &assigned, names, plan, settings, times, materials_version);
-        }
-        let key = (
-            facets_version,
-            plan.route,
-            [settings.horizon_azimuths, settings.slice_azimuths],
-            settings.map_grid,
-            settings.map_resolution,
-            settings.penumbra.to_bits(),
-        );
-        let (gpu, cancel, cache) = (self.gpu.as_ref(), &self.cancel, &self.kept);
-        let mut was_kept = false;
-        let (visibility, visibility_version) = match plan.route {
-            // Nothing is computed, and nothing kept.
-            Route::None => (Arc::new(Visibility::Unblocked { facets: facets.len() }), 0),
-            route => self.visibility.get("visibility", key, &mut times, cancel, || {
-                let (seen, kept) = kept::visibility(cache, route, &shape.mesh, &facets, &settings, gpu, cancel)?;
-                was_kept = kept;
-                Ok(seen)
-            })?,
-        };
-        if let (true, Some((name, _))) = (was_kept, times.last_mut()) {
-            *name = kept::VISIBILITY;
-        }
+        let material_of_slot = &material_of_slot;
 
         let key = (settings.clone(), [materials_version, facets_version, visibility_version]);
         let (mut factors, mut earlier) = (None, None);
@@ -248,18 +285,10 @@ impl Pipeline {
     }
 
     /// The paper's own way (Sec. 3.2 to 3.7): its directions, its facets, its truncations. M is kept between edits.
-    #[expect(clippy::too_many_arguments, reason = "the whole of the pipeline's state after the facets")]
-    fn wu2011(
-        &mut self,
-        shape: &Arc<Shape>,
-        facets: &Arc<Facets>,
-        assigned: &Arc<Assigned>,
-        names: Vec<String>,
-        plan: Plan,
-        settings: Settings,
-        mut times: StageTimes,
-        materials_version: Version,
-    ) -> Result<Outcome> {
+    fn wu2011(&mut self, of: Prepared, names: Vec<String>, mut times: StageTimes) -> Result<Outcome> {
+        let Prepared { shape, settings, materials: assigned, facets, material_of_slot, plan, .. } = of;
+        let (materials_version, shape, facets) = (of.versions[0], &shape, &facets);
+        let assigned = Arc::new((material_of_slot, assigned.1.clone()));
         let (material_of_slot, materials) = (&assigned.0, &assigned.1);
         let knobs =
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };

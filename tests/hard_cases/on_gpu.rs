@@ -48,7 +48,7 @@ pub fn same_picture(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
     let background = Background::default();
     let input = stage.input(&*outcome.brdf, [side; 2], 1, &background);
     let cpu = render(&input).unwrap().picture.pixels;
-    let mut renderer = match GpuRenderer::new(gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf) {
+    let mut renderer = match GpuRenderer::wearing(gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf) {
         Ok(renderer) => renderer,
         Err(error) => return eprintln!("SKIPPED: {name}: {error}"),
     };

@@ -72,7 +72,7 @@ pub struct ObjectView {
 
 impl ObjectView {
     /// Shows a picture, unless what is shown is newer or better.
-    pub fn take(&mut self, ctx: &egui::Context, made: Box<Made>) {
+    pub fn take(&mut self, ctx: &egui::Context, mut made: Box<Made>) {
         // Of two pictures of one version a draft in the view's present shape is better than a full one in another.
         let rank = |made: &Made| (made.version, self.has_shape(made), made.grade);
         if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
@@ -98,6 +98,8 @@ impl ObjectView {
             kept.texture.set(image.clone(), options);
             kept.image = image;
         }
+        // Until the next one is known, plots show the last.
+        made.brdf = made.brdf.or_else(|| self.made.as_ref().and_then(|last| last.brdf.clone()));
         self.made = Some(made);
     }
 

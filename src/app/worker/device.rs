@@ -6,10 +6,11 @@ use biscale::filtering::EffectiveBrdf;
 use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::shadow::Occluder;
 use biscale::large_scale::{GpuRenderer, ObjectMesh};
+use biscale::pipeline::Unseen;
 use biscale::{Cancel, Error, Result};
 
 use super::screen::Screen;
-use super::studio::Shot;
+use super::studio::{Shot, Worn};
 
 #[derive(Default)]
 pub enum Device {
@@ -27,7 +28,24 @@ pub enum Device {
 pub struct OnDevice {
     gpu: Arc<Gpu>,
     /// For one object, with the BRDF that it shades with.
-    renderer: Option<(Box<GpuRenderer>, Arc<EffectiveBrdf>)>,
+    renderer: Option<(Box<GpuRenderer>, Wears)>,
+}
+
+/// What a renderer wears.
+enum Wears {
+    Brdf(Arc<EffectiveBrdf>),
+    Tile(Arc<Unseen>),
+    Nothing,
+}
+
+impl Wears {
+    fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Brdf(a), Self::Brdf(b)) => Arc::ptr_eq(a, b),
+            (Self::Tile(a), Self::Tile(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
 }
 
 /// What is shaded, and what of it the device needs.
@@ -140,34 +158,54 @@ impl OnDevice {
     /// Takes the material over, as a table where that is there or pays, else as sums; the table's milliseconds, or `None`
     /// where the device does not shade this material.
     fn wear(&mut self, subject: Subject, cancel: &Cancel) -> Result<Option<f64>> {
-        let Subject { mesh, occluder, shot, .. } = subject;
-        let exact = &shot.outcome.brdf;
+        let outcome = match subject.shot.material {
+            Worn::Known(outcome) => outcome,
+            Worn::Unseen(tile) => return Ok(self.takes(subject, Wears::Tile(tile.clone()))?.then_some(0.0)),
+        };
         let mut table_ms = 0.0;
         // A graphics processor has a draft's sums done before the CPU has a table.
-        let pictured = match shot.outcome.pictured() {
-            None if self.gpu.tier == Tier::Software || shot.settle => {
-                let pictured = shot.outcome.for_pictures(cancel)?;
+        let pictured = match outcome.pictured() {
+            None if self.gpu.tier == Tier::Software || subject.shot.settle => {
+                let pictured = outcome.for_pictures(cancel)?;
                 table_ms = pictured.ms;
                 Some(pictured.brdf)
             }
             known => known,
         };
         // The processor in disguise is not asked for sums where the processor itself reads a table.
-        let sums = Some(exact).filter(|_| self.gpu.tier == Tier::Hardware || pictured.is_none());
+        let sums = Some(&outcome.brdf).filter(|_| self.gpu.tier == Tier::Hardware || pictured.is_none());
         for brdf in pictured.iter().chain(sums) {
-            let made = match &mut self.renderer {
-                Some((_, last)) if Arc::ptr_eq(last, brdf) => Ok(()),
-                Some((renderer, last)) => renderer.set_brdf(&self.gpu, brdf).map(|()| *last = brdf.clone()),
-                none => GpuRenderer::new(&self.gpu, mesh, occluder, brdf)
-                    .map(|renderer| *none = Some((Box::new(renderer), brdf.clone()))),
-            };
-            match made {
-                Err(GpuError::Unsupported(_)) => {}
-                made => return made.map(|()| Some(table_ms)).map_err(Error::from),
+            if self.takes(subject, Wears::Brdf(brdf.clone()))? {
+                return Ok(Some(table_ms));
             }
         }
         self.renderer = None;
         Ok(None)
+    }
+
+    /// Whether the device shades this.
+    fn takes(&mut self, Subject { mesh, occluder, .. }: Subject, what: Wears) -> Result<bool> {
+        if self.renderer.as_ref().is_some_and(|(_, last)| last.is_same(&what)) {
+            return Ok(true);
+        }
+        let gpu = &self.gpu;
+        let mut renderer = match self.renderer.take() {
+            Some((renderer, _)) => renderer,
+            None => Box::new(GpuRenderer::new(gpu, mesh, occluder)?),
+        };
+        let worn = match &what {
+            Wears::Brdf(brdf) => renderer.set_brdf(gpu, brdf),
+            Wears::Tile(tile) => renderer.set_tile(gpu, &tile.sum),
+            Wears::Nothing => Ok(()),
+        };
+        let taken = match worn {
+            Ok(()) => true,
+            Err(GpuError::Unsupported(_)) => false,
+            Err(error) => return Err(error.into()),
+        };
+        // Its pipelines stay for the next material.
+        self.renderer = Some((renderer, if taken { what } else { Wears::Nothing }));
+        Ok(taken)
     }
 
     pub fn is_of(&self, screen: &Screen) -> bool {

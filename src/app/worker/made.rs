@@ -65,7 +65,8 @@ pub struct Made {
     /// Its radiance, where that is not on the device.
     pub picture: Option<Arc<Picture>>,
     pub image: Image,
-    pub brdf: Arc<EffectiveBrdf>,
+    /// Absent where the device made the picture from the tile itself.
+    pub brdf: Option<Arc<EffectiveBrdf>>,
     /// Milliseconds of what ran for it.
     pub stages: Vec<(&'static str, f64)>,
     /// From the edit to here.

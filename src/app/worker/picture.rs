@@ -6,14 +6,15 @@ use std::time::{Duration, Instant};
 use biscale::cache::Cache;
 use biscale::close_up::CloseUp;
 use biscale::large_scale::tone_map::ToneMap;
-use biscale::pipeline::{Outcome, Pipeline};
+use biscale::pipeline::{Pipeline, Unseen};
+use biscale::plan::{Preset, Settings};
 use biscale::scene::{Camera, LoadedScene, Quality};
 use biscale::{Cancel, Error, Result};
 
 use super::made::{Grade, Image, Made, PictureAnswer, PictureJob};
 use super::runner::Desk;
 use super::shared::{Shared, SmallScale, lock, small_scale};
-use super::studio::{Close, Shot, Studio};
+use super::studio::{Close, Shot, Studio, Worn};
 use super::tone::color_image;
 
 /// A first picture should be there after this many milliseconds.
@@ -31,6 +32,13 @@ const POLL: Duration = Duration::from_millis(5);
 /// How long the hand must rest before refinement begins.
 const REST: Duration = Duration::from_millis(120);
 
+/// How fine drafts are that a graphics processor makes, before the scene's own quality.
+const RUNGS: [Preset; 2] = [Preset::Draft, Preset::Standard];
+/// Visibility and product of such a draft may take so long, and leave room for a finer one below the other.
+const MOST_PRODUCT_MS: f64 = 25.0;
+const LEAST_PRODUCT_MS: f64 = 2.0;
+const PRODUCT: &str = "visibility and product";
+
 /// Keeps stages and what stays between pictures. One drafts, on a thread that is never kept long; another refines.
 pub struct Photographer {
     shared: Arc<Shared>,
@@ -40,6 +48,10 @@ pub struct Photographer {
     close: Option<(SmallScale, Close)>,
     /// Milliseconds a pixel, of the draft's and of the refined BRDF.
     cost: [f64; 2],
+    /// The tile that the device makes all of by itself, and what it is; absent where it cannot.
+    tile: Option<((SmallScale, usize), Option<Arc<Unseen>>)>,
+    /// How fine such drafts are: an index into [`RUNGS`], or the scene's own quality above them.
+    rung: usize,
     /// Where the next picture is made: the scene's own choice, or `cpu` before anybody knows what devices there are.
     backend: String,
 }
@@ -51,7 +63,7 @@ impl Photographer {
     pub fn new(shared: Arc<Shared>, cache: &Cache) -> Self {
         let (mut pipeline, studio) = (Pipeline::new(), Studio::default());
         pipeline.keep_in(cache.clone());
-        Self { shared, pipeline, studio, close: None, cost: [FIRST_COST; 2], backend: String::new() }
+        Self { shared, pipeline, studio, close: None, cost: [FIRST_COST; 2], tile: None, rung: 0, backend: String::new() }
     }
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.
@@ -71,10 +83,45 @@ impl Photographer {
         self.studio.prepare(&job.loaded)?;
         let (outcome, which) = match self.shared.known(&job.loaded) {
             Some(outcome) => (outcome.without_times(), 1),
-            None => (self.pipeline.effective(&as_draft(&job.loaded))?, 0),
+            None => match self.drafted_on_device(job, cancel)? {
+                Some(made) => return Ok(made),
+                None => (self.pipeline.effective(&as_preset(&job.loaded, Preset::Draft))?, 0),
+            },
         };
         let size = self.affordable(job.size, which, DRAFT_MS);
-        self.shoot(job, &outcome, which, size, 1, cancel)
+        self.shoot(job, Worn::Known(&outcome), which, size, 1, cancel)
+    }
+
+    /// A draft whose visibility and product a graphics processor makes with the picture, as fine as it is fast.
+    fn drafted_on_device(&mut self, job: &PictureJob, cancel: &Cancel) -> Result<Option<Made>> {
+        if !self.studio.is_fast() || self.studio.is_close(&camera(&job.loaded), job.size) {
+            return Ok(None);
+        }
+        let key = (small_scale(&job.loaded), self.rung);
+        if self.tile.as_ref().is_none_or(|(last, _)| *last != key) {
+            let loaded = match RUNGS.get(self.rung) {
+                Some(preset) if !is_below(&job.loaded, *preset) => as_preset(&job.loaded, *preset),
+                _ => (*job.loaded).clone(),
+            };
+            let tile = self.pipeline.unseen(&loaded)?.map(Arc::new);
+            self.tile = Some((key, tile));
+        }
+        let Some((_, Some(tile))) = self.tile.clone() else { return Ok(None) };
+        let size = self.affordable(job.size, 0, DRAFT_MS);
+        let made = match self.shoot(job, Worn::Unseen(&tile), 0, size, 1, cancel) {
+            Ok(made) => made,
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            // The device does not do it, or failed at it.
+            Err(_) => return Ok(None),
+        };
+        // The next edit is as fine as leaves the picture in time.
+        let product = made.stages.iter().find(|(name, _)| *name == PRODUCT).map_or(0.0, |(_, ms)| *ms);
+        if product > MOST_PRODUCT_MS {
+            self.rung = self.rung.saturating_sub(1);
+        } else if product > 0.0 && product < LEAST_PRODUCT_MS {
+            self.rung = (self.rung + 1).min(RUNGS.len());
+        }
+        Ok(Some(made))
     }
 
     /// Sees to it that no device is opened that is of no use, and, unless there is time, none before the window told.
@@ -128,7 +175,7 @@ impl Photographer {
             let full = self.affordable(job.size, 1, FINAL_MS);
             // Steps that gain little are left out.
             if pixels >= 2 * shown && pixels * 3 < full[0] * full[1] * 2 {
-                let mut made = self.shoot(job, &outcome, 1, step, 1, desk.cancel)?;
+                let mut made = self.shoot(job, Worn::Known(&outcome), 1, step, 1, desk.cancel)?;
                 made.grade = Grade::Refining;
                 outcome.times = Vec::new();
                 shown = pixels;
@@ -136,7 +183,7 @@ impl Photographer {
             }
         }
         let full = self.affordable(job.size, 1, FINAL_MS);
-        let mut made = self.shoot(job, &outcome, 1, full, 2, desk.cancel)?;
+        let mut made = self.shoot(job, Worn::Known(&outcome), 1, full, 2, desk.cancel)?;
         made.grade = Grade::Final;
         made.warnings.clone_from(&outcome.health().warnings);
         // What stays on the device is made anew in other tones.
@@ -177,7 +224,7 @@ impl Photographer {
     fn shoot(
         &mut self,
         job: &PictureJob,
-        outcome: &Outcome,
+        worn: Worn,
         which: usize,
         size: [usize; 2],
         samples_per_side: usize,
@@ -191,7 +238,7 @@ impl Photographer {
         } else {
             self.close = None;
         }
-        let shot = Shot { camera: &camera, outcome, size, samples_per_side, settle, backend: &self.backend };
+        let shot = Shot { camera: &camera, material: worn, size, samples_per_side, settle, backend: &self.backend };
         let close = self.close.as_ref().map(|(_, close)| close);
         let shown = if close.is_none() { self.studio.show(&shot, &tone_map, cancel)? } else { None };
         let (picture, image, times, table_ms, tone) = match shown {
@@ -208,22 +255,27 @@ impl Photographer {
             self.cost[which] = spent / (size[0] * size[1]) as f64;
         }
         let large = [
+            (PRODUCT, times.product_ms),
             ("picture table", table_ms),
             ("g-buffer", times.gbuffer_ms),
             ("shadows", times.shadows_ms),
             ("shading", times.shading_ms),
         ];
-        let mut stages = outcome.times.clone();
+        let (plan, preset, times, notes, brdf) = match worn {
+            Worn::Known(of) => (&of.plan, of.settings.preset, &of.times, &of.notes, Some(of.brdf.clone())),
+            Worn::Unseen(of) => (&of.plan, of.settings.preset, &of.times, &of.notes, None),
+        };
+        let mut stages = times.clone();
         stages.extend(large.into_iter().filter(|(_, ms)| *ms > 0.005));
         stages.extend(tone.map(|ms| ("tone", ms)));
-        let mut notes = outcome.notes.clone();
+        let mut notes = notes.clone();
         notes.extend(self.studio.warnings());
         Ok(Made {
             version: job.version,
             grade: Grade::Draft,
             picture,
             image,
-            brdf: outcome.brdf.clone(),
+            brdf,
             stages,
             latency_ms: ms(job.asked),
             device: self.studio.device(),
@@ -233,8 +285,8 @@ impl Photographer {
             distance: self.studio.distance(&camera, size),
             notes,
             warnings: Vec::new(),
-            effects: outcome.plan.effects.clone(),
-            preset: outcome.settings.preset.name(),
+            effects: plan.effects.clone(),
+            preset: preset.name(),
         })
     }
 
@@ -279,17 +331,23 @@ fn camera(loaded: &LoadedScene) -> Camera {
     loaded.scene.camera.clone().unwrap_or_default()
 }
 
-/// The same scene at the draft preset, without knobs that were turned by hand.
-fn as_draft(loaded: &LoadedScene) -> LoadedScene {
+/// The same scene at a preset, without knobs that were turned by hand.
+fn as_preset(loaded: &LoadedScene, preset: Preset) -> LoadedScene {
     let mut draft = loaded.clone();
     let quality = &loaded.scene.quality;
     draft.scene.quality = Quality {
-        preset: "draft".to_owned(),
+        preset: preset.name().to_owned(),
         seed: quality.seed,
         backend: quality.backend.clone(),
         ..Quality::default()
     };
     draft
+}
+
+/// Whether a scene asks for less than a preset.
+fn is_below(loaded: &LoadedScene, preset: Preset) -> bool {
+    let own = Settings::from_quality(&loaded.scene.quality);
+    own.facets < Settings::of_preset(preset).facets
 }
 
 fn ms(since: Instant) -> f64 {

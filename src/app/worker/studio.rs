@@ -17,7 +17,7 @@ use biscale::large_scale::shadow::Occluder;
 use biscale::large_scale::shadow_cache::ShadowCache;
 use biscale::large_scale::tone_map::ToneMap;
 use biscale::large_scale::{CameraView, DirectionalLight, ObjectMesh, RenderInput, Rendered, objects, render};
-use biscale::pipeline::Outcome;
+use biscale::pipeline::{Outcome, Unseen};
 use biscale::scene::{self, Camera, LoadedScene, Switch};
 use biscale::{Cancel, Error, Result};
 use glam::Vec3;
@@ -56,10 +56,18 @@ pub struct Shown {
 /// A tile with the materials of its slots, for pictures so close that it shows.
 pub type Close = (CloseUp, (Vec<usize>, Vec<SumMaterial>));
 
+/// What the object wears.
+#[derive(Clone, Copy)]
+pub enum Worn<'a> {
+    Known(&'a Outcome),
+    /// A tile whose visibility and product the device makes.
+    Unseen(&'a Arc<Unseen>),
+}
+
 /// How a picture is made.
 pub struct Shot<'a> {
     pub camera: &'a Camera,
-    pub outcome: &'a Outcome,
+    pub material: Worn<'a>,
     pub size: [usize; 2],
     pub samples_per_side: usize,
     /// Whether a shadow cache may be made: it takes longer than a draft and pays when the camera moves on.
@@ -148,7 +156,7 @@ impl Studio {
         };
         let subject = Subject { mesh: &object.mesh, occluder: object.occluder.as_ref(), shot, screen: Some(screen) };
         let background = Background::default();
-        let input = input(object, lights, shot, &*shot.outcome.brdf, &background);
+        let input = input(object, lights, shot, &NOT_ASKED, &background);
         let images = &mut self.images;
         let shown = self.gpu.run(subject, cancel, |renderer, gpu| {
             if !std::ptr::eq(gpu, &*screen.gpu) {
@@ -167,12 +175,12 @@ impl Studio {
     /// # Errors
     /// A camera that cannot be, or [`Error::Cancelled`].
     pub fn shoot(&mut self, shot: &Shot, close: Option<&Close>, cancel: &Cancel) -> Result<(Rendered, f64)> {
-        let (Some(object), Some((_, lights))) = (&self.object, &self.lights) else {
+        let (Some(object), Some((_, lights)), Worn::Known(outcome)) = (&self.object, &self.lights, shot.material) else {
             return Err(Error::failed("nothing was prepared"));
         };
         let (occluder, background) = (object.occluder.as_ref(), Background::default());
         let subject = Subject { mesh: &object.mesh, occluder, shot, screen: self.screen.as_ref() };
-        let exact = Cancellable { brdf: &shot.outcome.brdf, cancel };
+        let exact = Cancellable { brdf: &outcome.brdf, cancel };
         let seen = input(object, lights, shot, &exact, &background);
         let on_device = self.gpu.run(subject, cancel, |renderer, gpu| renderer.render(gpu, &seen, cancel))?;
         let (mut rendered, table_ms) = match on_device {
@@ -182,7 +190,7 @@ impl Studio {
                     self.shadows = Some(occluder.cache(&object.mesh, &lights.directional));
                     cancel.check()?;
                 }
-                let pictured = shot.outcome.for_pictures(cancel)?;
+                let pictured = outcome.for_pictures(cancel)?;
                 let reflectance = Cancellable { brdf: &pictured.brdf, cancel };
                 let shadow_cache = self.shadows.as_ref();
                 (render(&RenderInput { reflectance: &reflectance, shadow_cache, ..seen })?, pictured.ms)
@@ -246,6 +254,17 @@ fn input<'a>(
         size: shot.size,
         samples_per_side: shot.samples_per_side,
         background,
+    }
+}
+
+/// For a device, which has its own.
+const NOT_ASKED: Black = Black;
+
+struct Black;
+
+impl Reflectance for Black {
+    fn eval_lights(&self, _: &[Vec3], _: Vec3, out: &mut [Vec3]) {
+        out.fill(Vec3::ZERO);
     }
 }
 

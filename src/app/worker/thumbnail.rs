@@ -9,7 +9,7 @@ use biscale::scene::{self, Quality};
 use eframe::egui::ColorImage;
 
 use super::runner::Desk;
-use super::studio::{Shot, Studio};
+use super::studio::{Shot, Studio, Worn};
 use super::tone::color_image;
 
 /// Pixels of a side.
@@ -48,7 +48,7 @@ fn render(studio: &mut Studio, name: &str, desk: &Desk<ThumbnailJob>) -> Result<
     let camera = loaded.scene.camera.clone().unwrap_or_default();
     let shot = Shot {
         camera: &camera,
-        outcome: &outcome,
+        material: Worn::Known(&outcome),
         size: [SIDE, SIDE],
         samples_per_side: 2,
         settle: false,

@@ -1,0 +1,44 @@
+//! A sum over facets as a device takes it that makes visibility and product itself.
+
+use std::sync::Arc;
+
+use glam::Vec2;
+
+use super::{FacetSum, Interpolation};
+use crate::directions::UpperPairs;
+use crate::geometry::{Facets, HeightGrid};
+use crate::visibility::Visibility;
+
+/// Facets and their lobes, and how they come to see.
+#[derive(Debug)]
+pub struct UnseenSum {
+    pub sum: FacetSum,
+    pub sight: Sight,
+    /// Base area `A` of the tile.
+    pub base_area: f64,
+    /// Planes that mirror the tile; none where they are not to be used.
+    pub mirrors: [bool; 2],
+    /// What a table for pictures stands on; absent where none is expected to pay.
+    pub grid: Option<UpperPairs>,
+    pub interpolation: Interpolation,
+}
+
+/// How facets come to see.
+#[derive(Debug)]
+pub enum Sight {
+    /// The CPU saw for them.
+    Seen(Arc<Visibility>),
+    /// By walking this height-field.
+    Heights(Heights),
+}
+
+/// A height-field, its tile and its facets.
+#[derive(Debug)]
+pub struct Heights {
+    pub samples: HeightGrid,
+    pub tile_size: Vec2,
+    pub facets: Arc<Facets>,
+    pub azimuths: usize,
+    /// Width of the soft step at a horizon [rad].
+    pub ramp: f32,
+}

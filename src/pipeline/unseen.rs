@@ -1,0 +1,58 @@
+//! A tile as a device takes it that makes visibility and product itself: what comes before them.
+
+use std::sync::Arc;
+
+use super::{Pipeline, Prepared, StageTimes};
+use crate::error::Result;
+use crate::filtering::{Heights, Sight, UnseenSum};
+use crate::geometry::mirror_planes;
+use crate::plan::{Plan, Preset, Route, Settings};
+use crate::scene::{LoadedScene, Switch};
+
+/// What is known of a tile without its visibility.
+#[derive(Debug)]
+pub struct Unseen {
+    pub sum: UnseenSum,
+    pub plan: Plan,
+    pub settings: Settings,
+    /// Of the stages that ran.
+    pub times: StageTimes,
+    pub notes: Vec<String>,
+}
+
+impl Pipeline {
+    /// What a device needs that makes visibility and product itself. `None` where only the CPU makes what the scene calls
+    /// for: measured BRDFs summed over facets, light between facets, the paper's own tables.
+    ///
+    /// # Errors
+    /// As [`Pipeline::effective`].
+    pub fn unseen(&mut self, loaded: &LoadedScene) -> Result<Option<Unseen>> {
+        let mut times = StageTimes::new();
+        let prepared = self.prepare(loaded, &mut times)?;
+        let Prepared { sum, plan, settings, .. } = &prepared;
+        if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
+            return Ok(None);
+        }
+        let sight = match &prepared.shape.mesh.height_grid {
+            Some(samples) if plan.route == Route::HeightMarch => Sight::Heights(Heights {
+                samples: samples.clone(),
+                tile_size: prepared.shape.mesh.size,
+                facets: prepared.facets.clone(),
+                azimuths: settings.horizon_azimuths,
+                ramp: settings.penumbra,
+            }),
+            _ => Sight::Seen(self.seen(&prepared, &mut times)?.0),
+        };
+        let Prepared { shape, settings, sum, plan, shape_version, .. } = prepared;
+        let grid = settings.picture_grids.last().copied().filter(|_| plan.try_picture_table);
+        let mirrors = if grid.is_some() && settings.effects.mirror_symmetry != Switch::Off {
+            let find = || Ok(mirror_planes(&shape.mesh));
+            *self.mirrors.get("mirrors", shape_version, &mut times, &self.cancel, find)?.0
+        } else {
+            [false; 2]
+        };
+        let base_area = f64::from(shape.mesh.base_area());
+        let sum = UnseenSum { sum, sight, base_area, mirrors, grid, interpolation: settings.interpolation };
+        Ok(Some(Unseen { sum, notes: shape.mesh.notes.clone(), plan, settings, times }))
+    }
+}
