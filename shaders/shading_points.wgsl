@@ -68,10 +68,6 @@ fn view_of(point: u32, frame: Frame) -> vec3f {
     return in_tangent(frame, unit_or(params.eye - points[point].position, frame.z));
 }
 
-fn half_vector(i: vec3f, o: vec3f) -> vec3f {
-    return unit_or(i + o, vec3f(0.0, 0.0, 1.0));
-}
-
 fn add_radiance(point: u32, slice: u32, value: vec3f) {
     radiance[slice * params.point_count + point] += vec4f(value, 0.0);
 }

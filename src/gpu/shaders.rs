@@ -33,6 +33,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("shadow_view", include_str!("../../shaders/shadow_view.wgsl")),
     ("shadows_bits", include_str!("../../shaders/shadows_bits.wgsl")),
     ("shadows_none", include_str!("../../shaders/shadows_none.wgsl")),
+    ("sum_areas", include_str!("../../shaders/sum_areas.wgsl")),
     ("sum_facets", include_str!("../../shaders/sum_facets.wgsl")),
     ("sum_patches", include_str!("../../shaders/sum_patches.wgsl")),
     ("tint_fixed", include_str!("../../shaders/tint_fixed.wgsl")),
