@@ -24,23 +24,23 @@ use crate::visibility::Visibility;
 
 /// Shading of the same points: the largest distance, relative to the point's radiance and the mean. Single precision on
 /// either side, lobes that multiply the rounding of half vectors by up to 1/roughness². Measured on lavapipe: 5e-6.
-const SHADING_TOLERANCE: f32 = 5e-5;
+pub(super) const SHADING_TOLERANCE: f32 = 5e-5;
 /// Pictures: 99 % of the pixels, and the mean. The G-buffers differ by up to 1e-3 in normals in 99 % of the samples
 /// (gpu_tests.rs), which lobes of width 0.2 turn into a percent; the rest are edges, where the adapter may show the
 /// neighbouring triangle.
 const PIXEL_TOLERANCE: f32 = 0.02;
 const MEAN_TOLERANCE: f32 = 2e-3;
 
-fn open_gpu() -> Option<Gpu> {
+pub(super) fn open_gpu() -> Option<Gpu> {
     Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
 }
 
-const GROOVES: &str = "{ kind = \"grooves\" }";
+pub(super) const GROOVES: &str = "{ kind = \"grooves\" }";
 const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
 const RODS: &str = "{ kind = \"rods\" }";
-const FLAT: &str = "{ kind = \"flat\" }";
+pub(super) const FLAT: &str = "{ kind = \"flat\" }";
 
-fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
+pub(super) fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
     let text = format!(
         "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\ncolor = [0.9, 0.7, 0.5]\n\
          [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 300\n"
@@ -53,20 +53,20 @@ fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
     }
 }
 
-fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
+pub(super) fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
     Pipeline::new().effective(loaded).unwrap().brdf.as_ref().clone()
 }
 
 /// An object, its shadows and ten lights.
-struct Studio {
-    mesh: ObjectMesh,
-    occluder: Option<Occluder>,
-    lights: Vec<DirectionalLight>,
-    camera: scene::Camera,
+pub(super) struct Studio {
+    pub(super) mesh: ObjectMesh,
+    pub(super) occluder: Option<Occluder>,
+    pub(super) lights: Vec<DirectionalLight>,
+    pub(super) camera: scene::Camera,
 }
 
 impl Studio {
-    fn of(kind: &str) -> Self {
+    pub(super) fn of(kind: &str) -> Self {
         let mesh = objects::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap();
         let lights = lights::build(&scene::Light { count: 10, ..scene::Light::default() }, Path::new(".")).unwrap();
         let occluder = Occluder::of(&mesh);
@@ -114,7 +114,7 @@ fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) 
 }
 
 /// Distances relative to a value and the mean: of 99 %, the largest, and of the means.
-fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
+pub(super) fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
     let mean = |values: &[Vec3]| values.iter().sum::<Vec3>() / values.len() as f32;
     let level = mean(cpu).max_element();
     assert!(level > 1e-4 && gpu.iter().all(|value| value.is_finite()), "{level}");
@@ -130,7 +130,7 @@ fn assert_same_picture(what: &str, [cpu, gpu]: &[Picture; 2]) {
     assert!(most < PIXEL_TOLERANCE && means < MEAN_TOLERANCE, "{what}: 99 % within {most}, means {means}");
 }
 
-const LOBES: [&str; 5] = [
+pub(super) const LOBES: [&str; 5] = [
     "{ kind = \"lambertian\", albedo = [0.8, 0.5, 0.2] }",
     "{ kind = \"blinn_phong\", exponent = 60.0, specular = [0.5, 0.4, 0.3] }",
     "{ kind = \"cook_torrance\", roughness = 0.25, f0 = [0.9, 0.6, 0.3] }",
@@ -293,7 +293,7 @@ fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
 }
 
 #[derive(Debug, Default)]
-struct White(MeasuredReport);
+pub(super) struct White(MeasuredReport);
 
 impl Measured for White {
     fn f_r(&self, _: &LobeAngles) -> Vec3 {

@@ -15,7 +15,7 @@ use crate::visibility::{Horizons, Slices, SoftMaps, Visibility};
 /// `Sum` in `facets.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-struct Sum {
+pub(super) struct Sum {
     first: u32,
     end: u32,
     azimuths: u32,
@@ -33,7 +33,7 @@ struct Sum {
 
 /// Facets of one pass on software Vulkan: llvmpipe leaves all loops of a thread, without a word, after 65,535 rounds
 /// together. Eight lights, and eight things that hang over a facet, stay below that.
-const SOFTWARE_FACETS: usize = 512;
+pub(super) const SOFTWARE_FACETS: usize = 512;
 
 /// `Patch` in `sum_patches.wgsl`.
 #[repr(C)]
@@ -46,7 +46,7 @@ struct Patch {
 }
 
 /// The buffers that all passes read.
-struct Shared {
+pub(super) struct Shared {
     facets: wgpu::Buffer,
     visibility: wgpu::Buffer,
     patches: wgpu::Buffer,
@@ -64,13 +64,9 @@ impl GpuShading {
         let most = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { facet_count.max(1) };
         let visibility = form.visibility.as_ref();
         let see = visibility_file(visibility);
-        let blank = with_visibility(Sum { facet_count: facet_count as u32, ..Sum::default() }, visibility);
+        let blank = Sum::blank(form);
         let mut patches: Vec<Patch> = Vec::new();
-        let mut shared = Shared {
-            facets: gpu.upload("facets", &facet_rows(form), wgpu::BufferUsages::STORAGE)?,
-            visibility: upload_visibility(gpu, visibility)?,
-            patches: gpu.upload::<u32>("patches", &[], wgpu::BufferUsages::STORAGE)?,
-        };
+        let mut shared = Shared::of(gpu, form)?;
         let mut planned = Vec::new();
         for group in groups.iter().filter(|group| group.color != Vec3::ZERO) {
             let ranges: Vec<Range<usize>> = match &group.patches {
@@ -89,8 +85,8 @@ impl GpuShading {
                 }
             };
             for (lobe, term) in &group.lobes {
-                let (file, shape, scale) = lobe_file(*lobe);
-                let sum = Sum { shape, scale, tint: base_tint(term), color: group.color, ..blank };
+                let (file, sum) = blank.of_lobe(*lobe);
+                let sum = Sum { tint: base_tint(term), color: group.color, ..sum };
                 let swaps = vec![
                     shadow_swap(shadowed),
                     ("visibility_unblocked", see),
@@ -99,7 +95,7 @@ impl GpuShading {
                     ("sum_facets", if group.patches.is_some() { "sum_patches" } else { "sum_facets" }),
                 ];
                 let work = (group.range.len() / ranges.len().max(1)) as u64;
-                planned.extend(ranges.iter().map(|range| (swaps.clone(), over(sum, range), work)));
+                planned.extend(ranges.iter().map(|range| (swaps.clone(), sum.over(range), work)));
             }
         }
         if !patches.is_empty() {
@@ -113,7 +109,7 @@ impl GpuShading {
         };
         let mut passes = Vec::new();
         for range in pieces(0..facet_count, most) {
-            let sum = Sum { last: u32::from(range.end == facet_count), ..over(blank, &range) };
+            let sum = Sum { last: u32::from(range.end == facet_count), ..blank.over(&range) };
             passes.push(Pass {
                 pipeline: self.pipeline(gpu, area.clone(), Second::Facets)?,
                 group: self.sum_group(gpu, &shared, sum)?,
@@ -133,19 +129,44 @@ impl GpuShading {
         Ok(passes)
     }
 
-    fn sum_group(&self, gpu: &Gpu, shared: &Shared, sum: Sum) -> Result<wgpu::BindGroup, GpuError> {
+    pub(super) fn sum_group(&self, gpu: &Gpu, shared: &Shared, sum: Sum) -> Result<wgpu::BindGroup, GpuError> {
         let uniform = gpu.upload("sum", &[sum], wgpu::BufferUsages::UNIFORM)?;
         let bound = [&uniform, &shared.facets, &shared.visibility, &shared.patches];
         gpu.group("facets", &self.facets, &bound.map(|buffer| buffer.as_entire_binding()))
     }
 }
 
-fn over(sum: Sum, range: &Range<usize>) -> Sum {
-    Sum { first: range.start as u32, end: range.end as u32, ..sum }
+impl Sum {
+    /// A sum over nothing of a form's facets, as they see.
+    pub(super) fn blank(form: &Direct) -> Self {
+        let sum = Self { facet_count: form.sum.facet_count() as u32, ..Self::default() };
+        with_visibility(sum, &form.visibility)
+    }
+
+    /// The same with the constants of a lobe, and the file of that.
+    pub(super) fn of_lobe(self, lobe: Lobe) -> (&'static str, Self) {
+        let (file, shape, scale) = lobe_file(lobe);
+        (file, Self { shape, scale, ..self })
+    }
+
+    pub(super) fn over(self, range: &Range<usize>) -> Self {
+        Self { first: range.start as u32, end: range.end as u32, ..self }
+    }
+}
+
+impl Shared {
+    /// A form's facets, what they see, and no patches.
+    pub(super) fn of(gpu: &Gpu, form: &Direct) -> Result<Self, GpuError> {
+        Ok(Self {
+            facets: gpu.upload("facets", &facet_rows(form), wgpu::BufferUsages::STORAGE)?,
+            visibility: upload_visibility(gpu, &form.visibility)?,
+            patches: gpu.upload::<u32>("patches", &[], wgpu::BufferUsages::STORAGE)?,
+        })
+    }
 }
 
 /// A range in pieces of `most`; an empty one is a piece.
-fn pieces(range: Range<usize>, most: usize) -> impl Iterator<Item = Range<usize>> {
+pub(super) fn pieces(range: Range<usize>, most: usize) -> impl Iterator<Item = Range<usize>> {
     let count = range.len().div_ceil(most).max(1);
     (0..count).map(move |k| range.start + k * most..(range.start + (k + 1) * most).min(range.end))
 }
@@ -188,7 +209,7 @@ fn facet_rows(form: &Direct) -> Vec<Padded> {
     rows
 }
 
-fn visibility_file(visibility: &Visibility) -> &'static str {
+pub(super) fn visibility_file(visibility: &Visibility) -> &'static str {
     match visibility {
         Visibility::Unblocked { .. } => "visibility_unblocked",
         Visibility::Horizons(_) => "visibility_horizons",

@@ -6,10 +6,14 @@
 mod direct;
 mod low_rank;
 mod table;
+mod table_of_sum;
+
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use self::table_of_sum::Making;
 use super::DirectionalLight;
 use super::gpu_batches::Batches;
 use super::shading_points::ShadingPoints;
@@ -34,6 +38,7 @@ pub struct GpuShading {
     points: wgpu::BindGroupLayout,
     facets: wgpu::BindGroupLayout,
     factors: wgpu::BindGroupLayout,
+    nodes: wgpu::BindGroupLayout,
     compiled: Vec<(Variant, wgpu::ComputePipeline)>,
 }
 
@@ -50,6 +55,10 @@ struct Variant {
 #[derive(Debug)]
 pub struct GpuMaterial {
     passes: Vec<Pass>,
+    /// What the passes read and the device has to make first.
+    making: Option<Making>,
+    /// Whether [`GpuShading::radiance`] has had it made.
+    is_made: AtomicBool,
     least_area: f32,
     /// Whether the passes were compiled to read the bits of shadows.
     shadowed: bool,
@@ -96,6 +105,7 @@ impl GpuShading {
             points: layout("shading points", &[UNIFORM, READ, READ, READ, WRITE, WRITE])?,
             facets: layout("facets", &[UNIFORM, READ, READ, READ])?,
             factors: layout("factors", &[UNIFORM, READ, READ, READ])?,
+            nodes: layout("nodes of a table", &[UNIFORM, READ, WRITE])?,
             compiled: Vec::new(),
         })
     }
@@ -121,7 +131,7 @@ impl GpuShading {
                 return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
             }
         };
-        Ok(GpuMaterial { passes, least_area: (1e-12 * brdf.base_area) as f32, shadowed })
+        Ok(GpuMaterial::of(passes, None, brdf, shadowed))
     }
 
     /// Radiance towards the eye of each point, as [`shading::radiance`](super::shading::radiance) gives it but for
@@ -171,6 +181,15 @@ impl GpuShading {
         ];
         let resources: Vec<_> = std::iter::once(&params).chain(&bound).map(wgpu::Buffer::as_entire_binding).collect();
         let group = gpu.group("shading points", &self.points, &resources)?;
+        if !material.is_made.load(Ordering::Acquire) {
+            gpu.checked("making a table", || {
+                let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                material.prepare(&mut encoder);
+                gpu.queue.submit([encoder.finish()]);
+                Ok(())
+            })?;
+            material.is_made.store(true, Ordering::Release);
+        }
         let words = if visible.is_some() { Visible::words_of(lights.len()) } else { 0 };
         Batches::of(points.len(), material.work(lights.len()), BATCH_WORK, THREADS).each(gpu, cancel, |range| {
             let [first_point, end_point] = [range.start, range.end].map(|n| n as u32);
@@ -217,17 +236,27 @@ impl GpuShading {
         variant: Variant,
         second: Second,
     ) -> std::result::Result<wgpu::ComputePipeline, GpuError> {
+        let layout = match second {
+            Second::Facets => &self.facets,
+            Second::Factors => &self.factors,
+        };
+        let groups = [self.points.clone(), layout.clone()];
+        self.pipeline_over(gpu, variant, &groups.each_ref())
+    }
+
+    /// A pipeline over these groups of bindings, from those compiled before if it is there.
+    fn pipeline_over(
+        &mut self,
+        gpu: &Gpu,
+        variant: Variant,
+        groups: &[&wgpu::BindGroupLayout],
+    ) -> std::result::Result<wgpu::ComputePipeline, GpuError> {
         if let Some((_, pipeline)) = self.compiled.iter().find(|(known, _)| *known == variant) {
             return Ok(pipeline.clone());
         }
         let swaps: Swaps<'_> = &variant.swaps;
         let module = gpu.swapped_module(variant.shader, swaps)?;
-        let layout = match second {
-            Second::Facets => &self.facets,
-            Second::Factors => &self.factors,
-        };
-        let pipeline =
-            gpu.compute_pipeline_with(&module, variant.entry_point, &[&self.points, layout], &variant.constants)?;
+        let pipeline = gpu.compute_pipeline_with(&module, variant.entry_point, groups, &variant.constants)?;
         self.compiled.push((variant, pipeline.clone()));
         Ok(pipeline)
     }
@@ -241,6 +270,19 @@ enum Second {
 }
 
 impl GpuMaterial {
+    fn of(passes: Vec<Pass>, making: Option<Making>, brdf: &EffectiveBrdf, shadowed: bool) -> Self {
+        let is_made = AtomicBool::new(making.is_none());
+        Self { passes, making, is_made, least_area: (1e-12 * brdf.base_area) as f32, shadowed }
+    }
+
+    /// Encodes what the device has to make before the first shading with this material: the table of
+    /// [`GpuShading::tabulated`]. Nothing for other materials. To encode it once is enough; twice makes the same again.
+    pub fn prepare(&self, encoder: &mut wgpu::CommandEncoder) {
+        if let Some(making) = &self.making {
+            making.encode(encoder);
+        }
+    }
+
     /// Lobes and table rows of one point.
     fn work(&self, lights: usize) -> u64 {
         self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum()
