@@ -2,8 +2,7 @@
 
 //!import shading_points
 //!import scales
-//!import facets
-//!import visibility_unblocked
+//!import sum_areas
 
 @compute @workgroup_size(64)
 fn measure(@builtin(global_invocation_id) id: vec3u) {
@@ -16,22 +15,10 @@ fn measure(@builtin(global_invocation_id) id: vec3u) {
         scales[point] = 0.0;
         return;
     }
-    let to_viewer = sight_along(o);
+    var total = visible_area(o);
     // What the passes before found.
-    var total = 0.0;
     if sum.first > 0u {
-        total = scales[point];
-    }
-    for (var start = sum.first; start < sum.end; start += BLOCK) {
-        var part = 0.0;
-        let end = min(start + BLOCK, sum.end);
-        for (var s = start; s < end; s++) {
-            let cosine = dot(facets[s].xyz, o);
-            if cosine > 0.0 {
-                part += facets[s].w * visibility(s, to_viewer) * cosine;
-            }
-        }
-        total += part;
+        total += scales[point];
     }
     if sum.last == 0u {
         scales[point] = total;

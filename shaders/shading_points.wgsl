@@ -56,10 +56,6 @@ fn view_of(point: u32, frame: Frame) -> vec3f {
     return in_tangent(frame, unit_or(params.eye - points[point].position, frame.z));
 }
 
-fn half_vector(i: vec3f, o: vec3f) -> vec3f {
-    return unit_or(i + o, vec3f(0.0, 0.0, 1.0));
-}
-
 // Behind the last light of a slice.
 fn end_of(slice: u32) -> u32 {
     return min((slice + 1u) * params.slice, params.light_count);

@@ -9,6 +9,10 @@ fn unit_or(v: vec3f, fallback: vec3f) -> vec3f {
     return v * inverseSqrt(squared);
 }
 
+fn half_vector(i: vec3f, o: vec3f) -> vec3f {
+    return unit_or(i + o, vec3f(0.0, 0.0, 1.0));
+}
+
 // Any unit vector perpendicular to the unit vector n (Duff et al. 2017).
 fn any_perpendicular(n: vec3f) -> vec3f {
     let s = select(-1.0, 1.0, n.z >= 0.0);

@@ -34,8 +34,11 @@ fn every_combination_of_effects_parses_and_validates() {
         }
         for see in ["visibility_unblocked", "visibility_horizons", "visibility_slices", "visibility_maps"] {
             check("projected_area", &[("visibility_unblocked", see)]);
+            check("table_areas", &[("visibility_unblocked", see)]);
             for lobe in ["lobe_lambertian", "lobe_blinn_phong", "lobe_cook_torrance", "lobe_ward", "lobe_ggx"] {
                 for weights in ["weights_area", "weights_rgb"] {
+                    let swaps = [("visibility_unblocked", see), ("lobe_lambertian", lobe), ("weights_area", weights)];
+                    check("table_of_sum", &swaps);
                     for sum in ["sum_facets", "sum_patches"] {
                         let swaps = [
                             ("shadows_none", shadows),

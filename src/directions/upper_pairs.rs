@@ -26,12 +26,12 @@ pub struct UpperPairs {
     pub difference: usize,
 }
 
-/// Directions of nodes stay this far [sine] above the horizon.
-const LOWEST: f32 = 2e-3;
-
 impl UpperPairs {
     /// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²` with this `k`: there shadows and cosines change fastest.
     pub const CROWDING: f32 = 0.75;
+
+    /// Directions of nodes stay this far [sine] above the horizon.
+    pub const LOWEST: f32 = 2e-3;
 
     pub fn nodes(&self) -> usize {
         self.half_vectors() * self.turn * self.difference
@@ -64,31 +64,41 @@ impl UpperPairs {
         self.nodes() / self.azimuths * azimuths
     }
 
+    /// φ_h of an azimuth [rad].
+    pub fn phi_h(&self, azimuth: usize) -> f32 {
+        TAU * azimuth as f32 / self.azimuths as f32
+    }
+
+    /// φ_d of a step [rad].
+    pub fn phi_d(&self, turn: usize) -> f32 {
+        PI * turn as f32 / self.turn as f32
+    }
+
     /// `(i, o)` of a node.
     pub fn pair(&self, node: usize) -> (Vec3, Vec3) {
         let (step, rest) = (node % self.difference, node / self.difference);
         let (turn, rest) = (rest % self.turn, rest / self.turn);
         let (azimuth, ring) = (rest % self.azimuths, rest / self.azimuths);
         let s = ring as f32 / (self.rings - 1) as f32;
-        let cos_theta_h = (1.0 - s * s).max(LOWEST);
+        let cos_theta_h = (1.0 - s * s).max(Self::LOWEST);
         let sin_theta_h = (1.0 - cos_theta_h * cos_theta_h).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = (TAU * azimuth as f32 / self.azimuths as f32).sin_cos();
+        let (sin_phi, cos_phi) = self.phi_h(azimuth).sin_cos();
         let frame = Mat3::from_cols(
             Vec3::new(cos_theta_h * cos_phi, cos_theta_h * sin_phi, -sin_theta_h),
             Vec3::new(-sin_phi, cos_phi, 0.0),
             Vec3::new(sin_theta_h * cos_phi, sin_theta_h * sin_phi, cos_theta_h),
         );
-        let (sin_turn, cos_turn) = (PI * turn as f32 / self.turn as f32).sin_cos();
+        let (sin_turn, cos_turn) = self.phi_d(turn).sin_cos();
         let x = step as f32 / (self.difference - 1) as f32;
         let u = x * (1.0 + Self::CROWDING - Self::CROWDING * x);
         // 1 - cos θ_max = m² / (r (r + n)), which loses nothing where θ_max is small.
         let (n, m) = (sin_theta_h * cos_turn.abs(), cos_theta_h);
         let r = n.hypot(m);
-        let versine = (u * u * m * m / (r * (r + n))).min(1.0 - LOWEST);
+        let versine = (u * u * m * m / (r * (r + n))).min(1.0 - Self::LOWEST);
         let sin_theta_d = (versine * (2.0 - versine)).sqrt();
         let across = Vec3::new(sin_theta_d * cos_turn, sin_theta_d * sin_turn, 0.0);
         let along = Vec3::Z * (1.0 - versine);
-        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(LOWEST)).normalize_or(Vec3::Z);
+        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(Self::LOWEST)).normalize_or(Vec3::Z);
         (lifted(frame * (along + across)), lifted(frame * (along - across)))
     }
 

@@ -193,7 +193,9 @@ impl GpuRenderer {
             gpu.checked("rendering", || {
                 let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 timed = Timed::default();
-                if let (false, Some(material), true) = (self.is_made, &self.material, first == 0) {
+                if let (true, Some(material)) = (first == 0 && !self.is_made, &self.material)
+                    && material.is_to_be_made()
+                {
                     let writes = self.clock.as_ref().and_then(|clock| clock.compute_pass(&mut timed, Stage::Product));
                     material.prepare(&mut encoder, writes);
                 }

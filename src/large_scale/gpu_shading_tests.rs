@@ -17,7 +17,7 @@ use super::{
 use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
-use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, SumMaterial};
+use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, Sight, SumMaterial};
 use crate::gpu::{Gpu, GpuError};
 use crate::pipeline::Pipeline;
 use crate::scene::{self, LoadedScene};
@@ -25,23 +25,23 @@ use crate::visibility::Visibility;
 
 /// Shading of the same points: the largest distance, relative to the point's radiance and the mean. Single precision on
 /// either side, lobes that multiply the rounding of half vectors by up to 1/roughness². Measured on lavapipe: 5e-6.
-const SHADING_TOLERANCE: f32 = 5e-5;
+pub(super) const SHADING_TOLERANCE: f32 = 5e-5;
 /// Pictures: 99 % of the pixels, and the mean. The G-buffers differ by up to 1e-3 in normals in 99 % of the samples
 /// (gpu_tests.rs), which lobes of width 0.2 turn into a percent; the rest are edges, where the adapter may show the
 /// neighbouring triangle.
 const PIXEL_TOLERANCE: f32 = 0.02;
 const MEAN_TOLERANCE: f32 = 2e-3;
 
-fn open_gpu() -> Option<Gpu> {
+pub(super) fn open_gpu() -> Option<Gpu> {
     Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
 }
 
-const GROOVES: &str = "{ kind = \"grooves\" }";
+pub(super) const GROOVES: &str = "{ kind = \"grooves\" }";
 const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
 const RODS: &str = "{ kind = \"rods\" }";
-const FLAT: &str = "{ kind = \"flat\" }";
+pub(super) const FLAT: &str = "{ kind = \"flat\" }";
 
-fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
+pub(super) fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
     let text = format!(
         "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\ncolor = [0.9, 0.7, 0.5]\n\
          [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 300\n"
@@ -54,20 +54,20 @@ fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
     }
 }
 
-fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
+pub(super) fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
     Pipeline::new().effective(loaded).unwrap().brdf.as_ref().clone()
 }
 
 /// An object, its shadows and ten lights.
-struct Studio {
-    mesh: ObjectMesh,
-    occluder: Option<Occluder>,
-    lights: Vec<DirectionalLight>,
-    camera: scene::Camera,
+pub(super) struct Studio {
+    pub(super) mesh: ObjectMesh,
+    pub(super) occluder: Option<Occluder>,
+    pub(super) lights: Vec<DirectionalLight>,
+    pub(super) camera: scene::Camera,
 }
 
 impl Studio {
-    fn of(kind: &str) -> Self {
+    pub(super) fn of(kind: &str) -> Self {
         let mesh = objects::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap();
         let lights = lights::build(&scene::Light { count: 10, ..scene::Light::default() }, Path::new(".")).unwrap();
         let occluder = Occluder::of(&mesh);
@@ -113,7 +113,7 @@ fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) 
 }
 
 /// The device's answer for points of the CPU, by slices of eight lights.
-fn radiance(
+pub(super) fn radiance(
     gpu: &Gpu,
     shading: &GpuShading,
     material: &GpuMaterial,
@@ -163,7 +163,7 @@ fn radiance(
 }
 
 /// Distances relative to a value and the mean: of 99 %, the largest, and of the means.
-fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
+pub(super) fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
     let mean = |values: &[Vec3]| values.iter().sum::<Vec3>() / values.len() as f32;
     let level = mean(cpu).max_element();
     assert!(level > 1e-4 && gpu.iter().all(|value| value.is_finite()), "{level}");
@@ -179,7 +179,7 @@ fn assert_same_picture(what: &str, [cpu, gpu]: &[Picture; 2]) {
     assert!(most < PIXEL_TOLERANCE && means < MEAN_TOLERANCE, "{what}: 99 % within {most}, means {means}");
 }
 
-const LOBES: [&str; 5] = [
+pub(super) const LOBES: [&str; 5] = [
     "{ kind = \"lambertian\", albedo = [0.8, 0.5, 0.2] }",
     "{ kind = \"blinn_phong\", exponent = 60.0, specular = [0.5, 0.4, 0.3] }",
     "{ kind = \"cook_torrance\", roughness = 0.25, f0 = [0.9, 0.6, 0.3] }",
@@ -318,6 +318,44 @@ fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_strai
 }
 
 #[test]
+fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture() {
+    let Some(gpu) = open_gpu() else { return };
+    for (geometry, brdf, kind, marched, tabulated) in [
+        ("{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.2 }", LOBES[4], "cup", true, true),
+        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[0], "sphere", false, true),
+        (PYRAMIDS, LOBES[2], "sphere", false, false),
+        (FLAT, LOBES[2], "sphere", false, false),
+    ] {
+        let mut loaded = open(geometry, brdf, "direct");
+        loaded.scene.effects.picture_table = scene::Switch::On;
+        let outcome = Pipeline::new().effective(&loaded).unwrap();
+        let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
+        assert_eq!(matches!(unseen.sum.sight, Sight::Heights(_)), marched, "{geometry}");
+        let (studio, background) = (Studio::of(kind), Background::Uniform(Vec3::ZERO));
+        let pictured = match tabulated {
+            true => {
+                let Form::Direct(direct) = &outcome.brdf.form else { panic!("{geometry}: not direct") };
+                let nodes = Nodes { mirrors: unseen.sum.mirrors, ..Nodes::all(unseen.sum.grid.unwrap()) };
+                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+                outcome.brdf.with_direct_form(Form::Table(table.read(unseen.sum.interpolation)))
+            }
+            false => outcome.brdf.as_ref().clone(),
+        };
+        let input = studio.input(&pictured, 64, &background);
+        let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder).unwrap();
+        renderer.set_tile(&gpu, &unseen.sum).unwrap();
+        // The first picture makes what the second only reads.
+        let first = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        let again = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        assert_eq!(first, again, "{geometry}");
+        assert_same_picture(geometry, &[render(&input).unwrap().picture, first]);
+    }
+    let mut glowing = open(PYRAMIDS, LOBES[0], "direct");
+    glowing.scene.effects.interreflection = scene::Switch::On;
+    assert!(Pipeline::new().unseen(&glowing).unwrap().is_none(), "light between facets is the CPU's");
+}
+
+#[test]
 fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
     let Some(gpu) = open_gpu() else { return };
     let brdf = effective(&open(PYRAMIDS, LOBES[4], "direct"));
@@ -362,7 +400,7 @@ fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
 }
 
 #[derive(Debug, Default)]
-struct White(MeasuredReport);
+pub(super) struct White(MeasuredReport);
 
 impl Measured for White {
     fn f_r(&self, _: &LobeAngles) -> Vec3 {

@@ -1,7 +1,5 @@
 //! A tile as a device takes it that makes visibility and product itself: what comes before them.
 
-use std::sync::Arc;
-
 use super::{Pipeline, Prepared, StageTimes};
 use crate::error::Result;
 use crate::filtering::{Heights, Sight, UnseenSum};

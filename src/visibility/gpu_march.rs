@@ -26,6 +26,7 @@ pub struct GpuHorizons {
     workgroups: [u32; 2],
     /// Elevations [rad], the azimuths of a facet side by side; zeros until it is made.
     pub elevations: wgpu::Buffer,
+    pub azimuths: usize,
 }
 
 #[repr(C)]
@@ -92,14 +93,14 @@ impl GpuHeightMarch {
             group: gpu.group("height-field", &self.layout, &bound.map(wgpu::Buffer::as_entire_binding))?,
             workgroups: [params.facet_count.div_ceil(THREADS), params.azimuths],
             elevations,
+            azimuths,
         })
     }
 }
 
 impl GpuHorizons {
     /// Encodes the making.
-    pub fn encode(&self, encoder: &mut wgpu::CommandEncoder) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    pub fn dispatch(&self, pass: &mut wgpu::ComputePass) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.group, &[]);
         pass.dispatch_workgroups(self.workgroups[0], self.workgroups[1], 1);
@@ -151,7 +152,7 @@ mod tests {
             let cpu = Horizons::march(&grid, Vec2::ONE, &facets, azimuths, 0.02);
             let made = march.horizons(&gpu, &grid, Vec2::ONE, &facets, azimuths).unwrap();
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            made.encode(&mut encoder);
+            made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
             gpu.queue.submit([encoder.finish()]);
             let device: Vec<f32> = gpu.read(&made.elevations).unwrap();
             let mut off: Vec<f32> = (0..facets.len() * azimuths)

@@ -77,7 +77,12 @@ impl Horizons {
                 slope.atan()
             };
         });
-        Self { azimuths, facets, ramp: ramp.clamp(1e-6, -2.0 * Self::FREE), elevations, cut_short: 0 }
+        Self { azimuths, facets, ramp: Self::soft(ramp), elevations, cut_short: 0 }
+    }
+
+    /// A width of the soft step [rad] that is one.
+    pub(crate) fn soft(ramp: f32) -> f32 {
+        ramp.clamp(1e-6, -2.0 * Self::FREE)
     }
 
     pub fn facets(&self) -> usize {

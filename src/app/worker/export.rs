@@ -15,7 +15,7 @@ use biscale::scene::LoadedScene;
 use biscale::{Cancel, Error, Progress, Result};
 
 use super::runner::Desk;
-use super::studio::{Close, Shot, Studio};
+use super::studio::{Close, Shot, Studio, Worn};
 
 #[derive(Debug, Clone)]
 pub struct ExportJob {
@@ -157,7 +157,8 @@ fn picture(
     let mut studio = Studio::default();
     studio.prepare(loaded)?;
     let backend = loaded.scene.quality.backend.as_str();
-    let shot = Shot { camera: &camera, outcome, size, samples_per_side: 3, settle: true, backend };
+    let shot =
+        Shot { camera: &camera, material: Worn::Known(outcome), size, samples_per_side: 3, settle: true, backend };
     let (rendered, _) = studio.shoot(&shot, Some(close), cancel)?;
     rendered.picture.write(path, &ToneMap::new(&camera)?)
 }

@@ -63,7 +63,16 @@ impl Photographer {
     pub fn new(shared: Arc<Shared>, cache: &Cache) -> Self {
         let (mut pipeline, studio) = (Pipeline::new(), Studio::default());
         pipeline.keep_in(cache.clone());
-        Self { shared, pipeline, studio, close: None, cost: [FIRST_COST; 2], tile: None, rung: 0, backend: String::new() }
+        Self {
+            shared,
+            pipeline,
+            studio,
+            close: None,
+            cost: [FIRST_COST; 2],
+            tile: None,
+            rung: 0,
+            backend: String::new(),
+        }
     }
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.

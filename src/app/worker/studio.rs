@@ -175,7 +175,8 @@ impl Studio {
     /// # Errors
     /// A camera that cannot be, or [`Error::Cancelled`].
     pub fn shoot(&mut self, shot: &Shot, close: Option<&Close>, cancel: &Cancel) -> Result<(Rendered, f64)> {
-        let (Some(object), Some((_, lights)), Worn::Known(outcome)) = (&self.object, &self.lights, shot.material) else {
+        let (Some(object), Some((_, lights)), Worn::Known(outcome)) = (&self.object, &self.lights, shot.material)
+        else {
             return Err(Error::failed("nothing was prepared"));
         };
         let (occluder, background) = (object.occluder.as_ref(), Background::default());

@@ -64,6 +64,15 @@ impl Column {
         (columns.len() <= MOST_COLUMNS).then_some(columns)
     }
 
+    /// Group, lobe and channel of a column that is one lobe over all facets; else what it is.
+    pub(super) fn lobe(&self) -> Result<(usize, usize, Option<usize>), &'static str> {
+        match self.part {
+            Part::Lobe(lobe) => Ok((self.group, lobe, self.channel)),
+            Part::Measured { .. } => Err("measured BRDFs are summed over facets on the CPU only"),
+            Part::Area(_) => Err("tables of what facets of one normal show are made on the CPU only"),
+        }
+    }
+
     /// The sums of columns at a pair of directions, from the visibilities along them.
     pub(super) fn sums(
         columns: &[Self],

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::columns::Column;
-use super::{AREA_GRID, Nodes, PairTable};
+use super::{Nodes, PairTable};
 use crate::cache::{KeyBuilder, Reader, Stored, Writer};
-use crate::directions::{PolarGrid, UpperPairs};
+use crate::directions::UpperPairs;
 use crate::filtering::{Direct, Interpolation};
 
 /// The numbers of a table of a sum; they serve every sum of the same lobes, whatever its colours.
@@ -41,7 +41,7 @@ impl PairTable {
     pub fn of_content(direct: &Direct, grid: UpperPairs, content: TableContent) -> Option<Self> {
         let weights: Vec<_> = Column::of(&direct.sum)?.iter().map(|column| column.weight(&direct.sum)).collect();
         let fours = weights.len().div_ceil(4);
-        let areas = PolarGrid::new(AREA_GRID[0], AREA_GRID[1]);
+        let areas = Self::area_grid();
         let nodes = grid.half_vectors() * grid.turn * (grid.difference + 2) * fours;
         (content.values.len() == nodes && content.areas.len() == areas.len()).then(|| Self {
             grid,

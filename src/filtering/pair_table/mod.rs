@@ -8,6 +8,7 @@
 mod columns;
 mod content;
 mod facet_columns;
+mod lobe_columns;
 
 use std::sync::Arc;
 
@@ -16,6 +17,7 @@ use rayon::prelude::*;
 
 use self::columns::{Column, Weight};
 pub use self::content::TableContent;
+pub(crate) use self::lobe_columns::LobeColumn;
 use super::facet_sum::FacetSum;
 use super::{Direct, Interpolation, Tint};
 use crate::accuracy::Pair;
@@ -201,7 +203,7 @@ impl PairTable {
                 }
             }
         }
-        let directions = PolarGrid::new(AREA_GRID[0], AREA_GRID[1]);
+        let directions = Self::area_grid();
         let areas = directions.directions().into_par_iter().map(|o| (area(o) / f64::from(o.z)) as f32).collect();
         Ok(Self {
             grid,

@@ -5,19 +5,26 @@
 
 mod direct;
 mod low_rank;
+mod seen;
 mod table;
+mod table_of_sum;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+pub use self::seen::Seen;
+use self::table_of_sum::Making;
 use super::DirectionalLight;
-use crate::filtering::{EffectiveBrdf, Form, Tint};
+use crate::filtering::{EffectiveBrdf, Form, Tint, UnseenSum};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError, Swaps};
+use crate::visibility::GpuHorizons;
 
 const THREADS: u32 = 64;
+/// The most workgroups of a dispatch along one axis.
+const MAX_GROUPS: usize = 65_535;
 /// The most points of one dispatch.
-pub(super) const MOST_POINTS: usize = 65_535 * THREADS as usize;
+pub(super) const MOST_POINTS: usize = MAX_GROUPS * THREADS as usize;
 
 /// The layouts of all shading passes, and the pipelines compiled so far: build once, use for any material.
 #[derive(Debug)]
@@ -25,6 +32,7 @@ pub struct GpuShading {
     points: wgpu::BindGroupLayout,
     facets: wgpu::BindGroupLayout,
     factors: wgpu::BindGroupLayout,
+    nodes: wgpu::BindGroupLayout,
     compiled: Vec<(Variant, wgpu::ComputePipeline)>,
 }
 
@@ -41,6 +49,9 @@ struct Variant {
 #[derive(Debug)]
 pub struct GpuMaterial {
     passes: Vec<Pass>,
+    /// What the passes read and the device has to make first.
+    horizons: Option<GpuHorizons>,
+    table: Option<Making>,
     least_area: f32,
 }
 
@@ -96,6 +107,7 @@ impl GpuShading {
             points: layout("shading points", &[UNIFORM, READ, READ, READ, WRITE, WRITE])?,
             facets: layout("facets", &[UNIFORM, READ, READ, READ])?,
             factors: layout("factors", &[UNIFORM, READ, READ, READ])?,
+            nodes: layout("nodes of a table", &[UNIFORM, READ, WRITE])?,
             compiled: Vec::new(),
         })
     }
@@ -111,7 +123,7 @@ impl GpuShading {
         shadowed: bool,
     ) -> std::result::Result<GpuMaterial, GpuError> {
         let passes = match &brdf.form {
-            Form::Direct(form) => self.direct_passes(gpu, form, shadowed)?,
+            Form::Direct(form) => self.direct_passes(gpu, &form.sum, &Seen::Held(&form.visibility), shadowed)?,
             Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
             Form::Interreflecting(..) => {
                 return Err(GpuError::Unsupported("light between facets is added on the CPU only".to_owned()));
@@ -121,7 +133,33 @@ impl GpuShading {
                 return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
             }
         };
-        Ok(GpuMaterial { passes, least_area: (1e-12 * brdf.base_area) as f32 })
+        Ok(GpuMaterial::of(passes, brdf.base_area))
+    }
+
+    /// A tile whose visibility and product the device makes where it can ([`GpuMaterial::prepare`]): a table of the sum where
+    /// that pays, else the sum itself.
+    ///
+    /// # Errors
+    /// As [`GpuShading::material`].
+    pub fn tile(
+        &mut self,
+        gpu: &Gpu,
+        tile: &UnseenSum,
+        seen: Seen,
+        shadowed: bool,
+    ) -> std::result::Result<GpuMaterial, GpuError> {
+        let UnseenSum { sum, grid, mirrors, interpolation, .. } = tile;
+        let table = grid.map(|grid| self.tabulated(gpu, (sum, &seen), (grid, *mirrors, *interpolation), shadowed));
+        let (passes, table) = match table {
+            Some(Ok((pass, table))) => (vec![pass], Some(table)),
+            None | Some(Err(GpuError::Unsupported(_))) => (self.direct_passes(gpu, sum, &seen, shadowed)?, None),
+            Some(Err(error)) => return Err(error),
+        };
+        let horizons = match seen {
+            Seen::Marched(horizons, _) => Some(horizons),
+            Seen::Held(_) => None,
+        };
+        Ok(GpuMaterial { horizons, table, ..GpuMaterial::of(passes, tile.base_area) })
     }
 
     /// [`Params`], points, lights, the bits of shadows, radiance and scales.
@@ -139,17 +177,27 @@ impl GpuShading {
         variant: Variant,
         second: Second,
     ) -> std::result::Result<wgpu::ComputePipeline, GpuError> {
+        let layout = match second {
+            Second::Facets => &self.facets,
+            Second::Factors => &self.factors,
+        };
+        let groups = [self.points.clone(), layout.clone()];
+        self.pipeline_over(gpu, variant, &groups.each_ref())
+    }
+
+    /// A pipeline over these groups of bindings, from those compiled before if it is there.
+    fn pipeline_over(
+        &mut self,
+        gpu: &Gpu,
+        variant: Variant,
+        groups: &[&wgpu::BindGroupLayout],
+    ) -> std::result::Result<wgpu::ComputePipeline, GpuError> {
         if let Some((_, pipeline)) = self.compiled.iter().find(|(known, _)| *known == variant) {
             return Ok(pipeline.clone());
         }
         let swaps: Swaps<'_> = &variant.swaps;
         let module = gpu.swapped_module(variant.shader, swaps)?;
-        let layout = match second {
-            Second::Facets => &self.facets,
-            Second::Factors => &self.factors,
-        };
-        let pipeline =
-            gpu.compute_pipeline_with(&module, variant.entry_point, &[&self.points, layout], &variant.constants)?;
+        let pipeline = gpu.compute_pipeline_with(&module, variant.entry_point, groups, &variant.constants)?;
         self.compiled.push((variant, pipeline.clone()));
         Ok(pipeline)
     }
@@ -163,6 +211,34 @@ enum Second {
 }
 
 impl GpuMaterial {
+    fn of(passes: Vec<Pass>, base_area: f64) -> Self {
+        Self { passes, horizons: None, table: None, least_area: (1e-12 * base_area) as f32 }
+    }
+
+    /// Whether [`GpuMaterial::prepare`] has anything to do.
+    pub(super) fn is_to_be_made(&self) -> bool {
+        self.horizons.is_some() || self.table.is_some()
+    }
+
+    /// Encodes what the device has to make before the first shading with this material: what facets see, and the table of
+    /// their sum. To encode it once is enough; twice makes the same again.
+    pub(super) fn prepare(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
+    ) {
+        if let Some(table) = &self.table {
+            table.clear(encoder);
+        }
+        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
+        if let Some(horizons) = &self.horizons {
+            horizons.dispatch(&mut compute);
+        }
+        if let Some(table) = &self.table {
+            table.dispatch(&mut compute);
+        }
+    }
+
     /// Lobes and table rows of one point.
     pub(super) fn work(&self, lights: usize) -> u64 {
         self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum()

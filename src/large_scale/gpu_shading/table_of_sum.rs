@@ -1,0 +1,260 @@
+//! A table for pictures that the device makes of a sum over facets: nothing is read back, and nobody waits.
+//!
+//! The twin of [`PairTable::build`] over all facets. One dispatch adds one lobe over some facets to its columns, a thread a
+//! node; the last one fills in mirror images and the ends of θ_d.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::direct::{SOFTWARE_FACETS, Shared, Sum, pieces};
+use super::seen::Seen;
+use super::table::Held;
+use super::{GpuShading, MAX_GROUPS, Padded, Pass, THREADS, Variant, padded};
+use crate::directions::{PolarGrid, UpperPairs};
+use crate::filtering::{FacetSum, Interpolation, LobeColumn, PairTable};
+use crate::gpu::{Gpu, GpuError, Tier};
+
+/// Lobes of one dispatch: a slow device takes a fifth of a second, far from its driver's watchdog.
+const MOST_LOBES: u64 = 1 << 30;
+
+/// `Nodes` in `table_nodes.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Nodes {
+    pairs: [u32; 4],
+    columns: [u32; 3],
+    column_count: u32,
+    width: u32,
+    crowding: f32,
+    lowest: f32,
+    pad: u32,
+}
+
+/// `Angle` in `table_nodes.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Angle {
+    cosine: f32,
+    sine: f32,
+    image: u32,
+    is_turned: u32,
+}
+
+/// How a table comes about.
+#[derive(Debug)]
+pub(super) struct Making {
+    /// The table, and the projected areas.
+    pub(super) sums: [wgpu::Buffer; 2],
+    steps: Vec<Step>,
+}
+
+/// A dispatch.
+#[derive(Debug)]
+struct Step {
+    pipeline: wgpu::ComputePipeline,
+    groups: Vec<wgpu::BindGroup>,
+    workgroups: [u32; 2],
+}
+
+impl Making {
+    /// Dispatches add to what is there: before the pass that they are in.
+    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder) {
+        for sums in &self.sums {
+            encoder.clear_buffer(sums, 0, None);
+        }
+    }
+
+    pub(super) fn dispatch(&self, compute: &mut wgpu::ComputePass) {
+        for Step { pipeline, groups, workgroups: [columns, rows] } in &self.steps {
+            compute.set_pipeline(pipeline);
+            for (group, index) in groups.iter().zip(0..) {
+                compute.set_bind_group(index, group, &[]);
+            }
+            compute.dispatch_workgroups(*columns, *rows, 1);
+        }
+    }
+}
+
+/// Which table: its grid, the planes that mirror the tile, and how many columns.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    grid: UpperPairs,
+    mirrors: [bool; 2],
+    fours: usize,
+}
+
+impl Shape {
+    fn rows(self) -> usize {
+        self.grid.half_vectors() * self.grid.turn
+    }
+
+    fn numbers(self) -> usize {
+        4 * self.fours * self.rows() * (self.grid.difference + 2)
+    }
+
+    fn nodes(self, columns: &[u32]) -> Nodes {
+        let UpperPairs { rings, azimuths, turn, difference } = self.grid;
+        let place = |k: usize| columns.get(k).copied().unwrap_or_default();
+        Nodes {
+            pairs: [rings, azimuths, turn, difference].map(|n| n as u32),
+            columns: [place(0), place(1), place(2)],
+            column_count: columns.len() as u32,
+            width: 4 * self.fours as u32,
+            crowding: UpperPairs::CROWDING,
+            lowest: UpperPairs::LOWEST,
+            pad: 0,
+        }
+    }
+
+    /// Azimuths of h, then steps of φ_d.
+    fn angles(self) -> Vec<Angle> {
+        let angle = |radians: f32, (image, is_turned): (usize, bool)| {
+            let (sine, cosine) = radians.sin_cos();
+            Angle { cosine, sine, image: image as u32, is_turned: is_turned.into() }
+        };
+        let grid = self.grid;
+        let azimuths = (0..grid.azimuths).map(|k| angle(grid.phi_h(k), grid.image(k, self.mirrors)));
+        azimuths.chain((0..grid.turn).map(|k| angle(grid.phi_d(k), (k, false)))).collect()
+    }
+
+    /// Facets of one dispatch.
+    fn most_facets(self, gpu: &Gpu) -> usize {
+        if gpu.tier == Tier::Software {
+            return SOFTWARE_FACETS;
+        }
+        let nodes = self.grid.originals(self.mirrors) as u64;
+        (MOST_LOBES / nodes.max(1)).max(SOFTWARE_FACETS as u64) as usize
+    }
+}
+
+/// Workgroups along the first axis of a dispatch: few, so that small tables go on along the second as large ones do.
+const COLUMNS: usize = 16;
+
+/// Workgroups along two axes for so many threads; those beyond have nothing to do.
+fn workgroups(threads: usize) -> Result<[u32; 2], GpuError> {
+    let rows = threads.div_ceil(THREADS as usize * COLUMNS);
+    if rows > MAX_GROUPS {
+        return Err(GpuError::Unsupported(format!("a table of {threads} numbers")));
+    }
+    Ok([COLUMNS, rows].map(|n| n as u32))
+}
+
+/// The columns that one sum over facets fills: one, or one for each channel.
+fn columns_of(columns: &[LobeColumn], sum: &LobeColumn) -> Vec<u32> {
+    let same = |column: &LobeColumn| (column.group, column.lobe) == (sum.group, sum.lobe);
+    columns.iter().zip(0..).filter(|(column, _)| same(column)).map(|(_, place)| place).collect()
+}
+
+impl GpuShading {
+    /// The pass of a table which the device itself makes of a sum over facets, and its making.
+    ///
+    /// # Errors
+    /// [`GpuError::Unsupported`] where the table would hold other things than lobes: those of measured BRDFs, or visible areas
+    /// of facets of one normal. And what the device refuses.
+    pub(super) fn tabulated(
+        &mut self,
+        gpu: &Gpu,
+        (sum, seen): (&FacetSum, &Seen),
+        (grid, mirrors, interpolation): (UpperPairs, [bool; 2], Interpolation),
+        shadowed: bool,
+    ) -> Result<(Pass, Making), GpuError> {
+        let refused = |reason: &str| GpuError::Unsupported(reason.to_owned());
+        let columns = PairTable::lobe_columns(sum).map_err(refused)?;
+        let shape = Shape { grid, mirrors, fours: columns.len().div_ceil(4) };
+        let directions = PairTable::area_grid();
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+        let values = gpu.buffer("table", 4 * shape.numbers() as u64, usage)?;
+        let areas = gpu.buffer("projected areas", 4 * directions.len() as u64, usage)?;
+        let held = Held {
+            grid,
+            interpolation,
+            tints: columns.iter().map(|column| &column.tint).collect(),
+            directions,
+            values: values.clone(),
+            areas: areas.clone(),
+        };
+        let pass = self.held_table_pass(gpu, held, shadowed)?;
+        let shared = Shared::of(gpu, sum, seen)?;
+        let of = (sum, seen, &shared);
+        let mut steps = self.area_steps(gpu, of, directions, &areas)?;
+        steps.extend(self.column_steps(gpu, of, &columns, shape, &values)?);
+        Ok((pass, Making { sums: [values, areas], steps }))
+    }
+
+    fn area_steps(
+        &mut self,
+        gpu: &Gpu,
+        (sum, seen, shared): (&FacetSum, &Seen, &Shared),
+        directions: PolarGrid,
+        areas: &wgpu::Buffer,
+    ) -> Result<Vec<Step>, GpuError> {
+        let facets = sum.facet_count();
+        let most = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { facets.max(1) };
+        let at: Vec<Padded> = directions.directions().into_iter().map(padded).collect();
+        let at = gpu.upload("directions", &at, wgpu::BufferUsages::STORAGE)?;
+        let nodes = self.nodes_group(gpu, Nodes::zeroed(), &at, areas)?;
+        let see = ("visibility_unblocked", seen.file());
+        let variant = Variant { shader: "table_areas", entry_point: "add", swaps: vec![see], constants: Vec::new() };
+        let layouts = [self.nodes.clone(), self.facets.clone()];
+        let pipeline = self.pipeline_over(gpu, variant, &layouts.each_ref())?;
+        let step = |range: Range<usize>| {
+            let groups = vec![nodes.clone(), self.sum_group(gpu, shared, Sum::blank(sum, seen).over(&range))?];
+            Ok(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(directions.len())? })
+        };
+        pieces(0..facets, most).map(step).collect()
+    }
+
+    fn column_steps(
+        &mut self,
+        gpu: &Gpu,
+        (sum, seen, shared): (&FacetSum, &Seen, &Shared),
+        columns: &[LobeColumn],
+        shape: Shape,
+        values: &wgpu::Buffer,
+    ) -> Result<Vec<Step>, GpuError> {
+        let angles = gpu.upload("angles", &shape.angles(), wgpu::BufferUsages::STORAGE)?;
+        let see = seen.file();
+        let layouts = [self.nodes.clone(), self.facets.clone()];
+        let mut steps = Vec::new();
+        // The first channel stands for all.
+        for column in columns.iter().filter(|column| column.channel.is_none_or(|channel| channel == 0)) {
+            let group = &sum.groups()[column.group];
+            let (lobe, added) = Sum::blank(sum, seen).of_lobe(group.lobes[column.lobe].0);
+            let swaps = vec![
+                ("visibility_unblocked", see),
+                ("lobe_lambertian", lobe),
+                ("weights_area", if column.channel.is_some() { "weights_rgb" } else { "weights_area" }),
+            ];
+            let variant = Variant { shader: "table_of_sum", entry_point: "add", swaps, constants: Vec::new() };
+            let pipeline = self.pipeline_over(gpu, variant, &layouts.each_ref())?;
+            let nodes = self.nodes_group(gpu, shape.nodes(&columns_of(columns, column)), &angles, values)?;
+            for range in pieces(group.range.clone(), shape.most_facets(gpu)) {
+                let groups = vec![nodes.clone(), self.sum_group(gpu, shared, added.over(&range))?];
+                steps.push(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(shape.grid.nodes())? });
+            }
+        }
+        let ends = Variant { shader: "table_ends", entry_point: "extend", swaps: Vec::new(), constants: Vec::new() };
+        steps.push(Step {
+            pipeline: self.pipeline_over(gpu, ends, &[&layouts[0]])?,
+            groups: vec![self.nodes_group(gpu, shape.nodes(&[]), &angles, values)?],
+            workgroups: workgroups(4 * shape.fours * shape.rows())?,
+        });
+        Ok(steps)
+    }
+
+    fn nodes_group(
+        &self,
+        gpu: &Gpu,
+        nodes: Nodes,
+        at: &wgpu::Buffer,
+        sums: &wgpu::Buffer,
+    ) -> Result<wgpu::BindGroup, GpuError> {
+        let uniform = gpu.upload("nodes", &[nodes], wgpu::BufferUsages::UNIFORM)?;
+        gpu.group("nodes of a table", &self.nodes, &[&uniform, at, sums].map(|buffer| buffer.as_entire_binding()))
+    }
+}
+
+#[cfg(test)]
+#[path = "table_of_sum_tests.rs"]
+mod tests;
