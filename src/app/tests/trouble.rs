@@ -8,7 +8,7 @@ use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use super::{editor, harness, quick, settle};
+use super::{QUICK, editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::document::Document;
 use crate::app::editor::Editor;
@@ -103,6 +103,43 @@ fn a_picture_on_the_window_s_device_is_shown_without_being_read_back_and_is_the_
     harness.step();
     settle(&mut harness);
     assert!(editor(&mut harness).object.kept.is_some());
+}
+
+#[test]
+fn on_a_graphics_processor_an_edit_s_first_picture_takes_no_visibility_of_the_cpu() {
+    let Some(screen) = screen() else { return };
+    let scene = QUICK
+        .replace("{ kind = \"grooves\", count = 2 }", "{ kind = \"heightfield\", path = \"asset:ripples.png\" }")
+        .replace("backend = \"cpu\"", "backend = \"gpu\"");
+    let scene = biscale::scene::parse(&scene).unwrap();
+    let painted = biscale::scene::Painted::default();
+    let loaded = biscale::scene::LoadedScene { scene, base_dir: "".into(), name: "ripples".into(), painted };
+    let mut harness = harness(Document::new(loaded, None));
+    // Software, taken for a graphics processor.
+    let mut screen = screen;
+    screen.is_fast = true;
+    editor(&mut harness).tell_devices(Devices { only_software: None, screen: Some(screen) });
+    settle(&mut harness);
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.nudge_geometry().unwrap();
+    editor(&mut harness).document.edit(scene);
+    let version = editor(&mut harness).document.version();
+    let start = std::time::Instant::now();
+    let draft = loop {
+        harness.step();
+        let made = editor(&mut harness).object.made.clone().unwrap();
+        if made.version == version {
+            break made;
+        }
+        assert!(start.elapsed().as_secs() < 60, "no picture");
+    };
+    let stages: Vec<_> = draft.stages.iter().map(|(name, _)| *name).collect();
+    assert!(matches!(draft.image, Image::OnDevice(_)), "{stages:?}");
+    assert!(stages.contains(&"visibility and product") && !stages.contains(&"visibility"), "{stages:?}");
+    assert!(draft.brdf.is_some(), "plots show the last BRDF until the next is known");
+    settle(&mut harness);
+    let made = editor(&mut harness).object.made.clone().unwrap();
+    assert!(!std::sync::Arc::ptr_eq(&made.brdf.unwrap(), &draft.brdf.unwrap()));
 }
 
 #[test]

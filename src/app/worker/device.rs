@@ -27,6 +27,8 @@ pub enum Device {
 
 pub struct OnDevice {
     gpu: Arc<Gpu>,
+    /// Whether it is a graphics processor.
+    is_fast: bool,
     /// For one object, with the BRDF that it shades with.
     renderer: Option<(Box<GpuRenderer>, Wears)>,
 }
@@ -78,7 +80,7 @@ impl Device {
 
     /// Whether this is a graphics processor.
     pub fn is_fast(&self) -> bool {
-        matches!(self, Self::Open(device) if device.gpu.tier == Tier::Hardware)
+        matches!(self, Self::Open(device) if device.is_fast)
     }
 
     /// Runs `work` on the device, wearing the material; also tells what the table took that it reads. `None` where the CPU
@@ -121,14 +123,17 @@ impl Device {
     }
 
     fn open(asked: bool, screen: Option<&Screen>) -> Self {
-        let gpu = match screen.filter(|screen| asked || screen.gpu.tier == Tier::Hardware) {
-            Some(screen) => Ok(screen.gpu.clone()),
-            None => Gpu::open().map(Arc::new),
+        let gpu = match screen.filter(|screen| asked || screen.is_fast) {
+            Some(screen) => Ok((screen.gpu.clone(), screen.is_fast)),
+            None => Gpu::open().map(|gpu| {
+                let is_fast = gpu.tier == Tier::Hardware;
+                (Arc::new(gpu), is_fast)
+            }),
         };
         match gpu {
             // The processor in disguise is slower than our own routes: it is not kept open.
-            Ok(gpu) if gpu.tier != Tier::Hardware && !asked => Self::Slower(gpu.adapter.name.clone()),
-            Ok(gpu) => Self::Open(OnDevice { gpu, renderer: None }),
+            Ok((gpu, false)) if !asked => Self::Slower(gpu.adapter.name.clone()),
+            Ok((gpu, is_fast)) => Self::Open(OnDevice { gpu, is_fast, renderer: None }),
             Err(_) => Self::None("no graphics adapter".to_owned()),
         }
     }
@@ -165,7 +170,7 @@ impl OnDevice {
         let mut table_ms = 0.0;
         // A graphics processor has a draft's sums done before the CPU has a table.
         let pictured = match outcome.pictured() {
-            None if self.gpu.tier == Tier::Software || subject.shot.settle => {
+            None if !self.is_fast || subject.shot.settle => {
                 let pictured = outcome.for_pictures(cancel)?;
                 table_ms = pictured.ms;
                 Some(pictured.brdf)
@@ -173,7 +178,7 @@ impl OnDevice {
             known => known,
         };
         // The processor in disguise is not asked for sums where the processor itself reads a table.
-        let sums = Some(&outcome.brdf).filter(|_| self.gpu.tier == Tier::Hardware || pictured.is_none());
+        let sums = Some(&outcome.brdf).filter(|_| self.is_fast || pictured.is_none());
         for brdf in pictured.iter().chain(sums) {
             if self.takes(subject, Wears::Brdf(brdf.clone()))? {
                 return Ok(Some(table_ms));

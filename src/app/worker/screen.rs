@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use biscale::gpu::{Gpu, GpuError};
+use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::gpu_picture;
 use eframe::egui::mutex::RwLock;
 use eframe::egui::{ColorImage, TextureId};
@@ -13,6 +13,8 @@ use eframe::egui_wgpu::Renderer;
 pub struct Screen {
     pub gpu: Arc<Gpu>,
     interface: Arc<RwLock<Renderer>>,
+    /// Whether this is a graphics processor.
+    pub is_fast: bool,
 }
 
 /// An image that shaders write and the interface shows. Dropping it takes it off the interface.
@@ -31,7 +33,7 @@ pub struct Turns(Vec<Arc<DeviceImage>>);
 
 impl Screen {
     pub fn new(gpu: Arc<Gpu>, interface: Arc<RwLock<Renderer>>) -> Self {
-        Self { gpu, interface }
+        Self { is_fast: gpu.tier == Tier::Hardware, gpu, interface }
     }
 
     fn image(&self, size: [usize; 2]) -> Result<DeviceImage, GpuError> {

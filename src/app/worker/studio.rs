@@ -7,7 +7,6 @@ use std::time::Instant;
 
 use biscale::close_up::{CloseUp, Wearing, on_object};
 use biscale::filtering::{EffectiveBrdf, Reflectance, SumMaterial};
-use biscale::gpu::Tier;
 use biscale::large_scale::environment::{self, Environment};
 use biscale::large_scale::light_choice::worth_shading;
 use biscale::large_scale::lights::{self, Lights};
@@ -140,7 +139,7 @@ impl Studio {
         // A device of its own gives way to the window's, which shows without reading back.
         if let (Some(screen), Device::Open(device)) = (screen, &self.gpu)
             && !device.is_of(screen)
-            && screen.gpu.tier == Tier::Hardware
+            && screen.is_fast
         {
             self.gpu = Device::NotAsked;
         }
