@@ -222,7 +222,10 @@ struct ProfileArgs {
     /// What is edited; without it everything is computed from nothing.
     #[arg(long)]
     edit: Option<Edit>,
-    /// Width and height in pixels of the picture of `--edit camera`.
+    /// From the edit to the picture, which stays on the device where that makes it.
+    #[arg(long, requires = "edit")]
+    picture: bool,
+    /// Width and height in pixels of that picture and of that of `--edit camera`.
     #[arg(long, default_value = "384x384", value_parser = commands::parse_size)]
     size: [usize; 2],
     /// Timed runs after one warm-up; medians are printed.

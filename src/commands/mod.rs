@@ -11,6 +11,7 @@ pub mod profile;
 pub mod render;
 pub mod report;
 pub mod tile;
+mod to_picture;
 
 use std::io::Write;
 

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::print_json;
 use super::render::Route;
+use super::to_picture::ToPicture;
 use crate::{Edit, ProfileArgs};
 
 #[derive(Serialize)]
@@ -37,6 +38,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let mut pipeline = Pipeline::new();
     let mut outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
+    let mut pictured = if args.picture { Some(ToPicture::new(&loaded, &outcome, args.size)?) } else { None };
     let mut form = outcome.brdf.form.describe();
     let mut camera = if args.edit == Some(Edit::Camera) {
         let mut stage = Stage::new(&loaded)?;
@@ -53,6 +55,12 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     for run in 0..=args.repeat {
         let start = Instant::now();
         let times = match (&mut camera, args.edit) {
+            (None, Some(_)) if pictured.is_some() => {
+                let Some(to_picture) = &mut pictured else { continue };
+                let times = to_picture.make(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
+                form.clone_from(&to_picture.form);
+                times
+            }
             (Some((stage, route, pictured)), _) => {
                 let times = route.show(stage, &pictured.brdf, args.size)?;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]

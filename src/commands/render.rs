@@ -41,16 +41,8 @@ impl Route {
     /// The route that the scene's back end asks for: `gpu` any adapter or an error that says why not, `cpu` none, `auto` a
     /// graphics processor that is more than the CPU in disguise, where it can shade this BRDF.
     pub fn of(stage: &Stage, outcome: &Outcome) -> Result<Self> {
-        let backend = outcome.settings.backend;
-        if backend == Backend::Cpu {
-            return Ok(Route::Cpu { refused: None });
-        }
-        let required = backend == Backend::Gpu;
-        let gpu = match Gpu::open() {
-            Ok(gpu) if required || gpu.tier == Tier::Hardware => gpu,
-            Err(error) if required => return Err(Error::from(error).into()),
-            _ => return Ok(Route::Cpu { refused: None }),
-        };
+        let required = outcome.settings.backend == Backend::Gpu;
+        let Some(gpu) = Self::device(outcome)? else { return Ok(Route::Cpu { refused: None }) };
         let renderer = |brdf: &EffectiveBrdf| GpuRenderer::wearing(&gpu, &stage.mesh, stage.occluder.as_ref(), brdf);
         let table = outcome.for_pictures(&Cancel::default())?;
         let made = match renderer(&table.brdf) {
@@ -64,6 +56,19 @@ impl Route {
             Ok((renderer, reads)) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, reads, image: None, required }))),
             Err(error) if required => Err(Error::from(error).into()),
             Err(error) => Ok(Route::Cpu { refused: Some(error) }),
+        }
+    }
+
+    /// The device that the scene's back end asks for, if it is there.
+    pub fn device(outcome: &Outcome) -> Result<Option<Gpu>> {
+        let backend = outcome.settings.backend;
+        if backend == Backend::Cpu {
+            return Ok(None);
+        }
+        match Gpu::open() {
+            Ok(gpu) if backend == Backend::Gpu || gpu.tier == Tier::Hardware => Ok(Some(gpu)),
+            Err(error) if backend == Backend::Gpu => Err(Error::from(error).into()),
+            _ => Ok(None),
         }
     }
 

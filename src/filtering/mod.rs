@@ -42,6 +42,16 @@ pub trait Reflectance: Sync {
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
 }
 
+/// Reflects nothing: where a device shades, which holds a material of its own.
+#[derive(Debug, Clone, Copy)]
+pub struct Black;
+
+impl Reflectance for Black {
+    fn eval_lights(&self, lights: &[Vec3], _: Vec3, out: &mut [Vec3]) {
+        out[..lights.len()].fill(Vec3::ZERO);
+    }
+}
+
 /// How samples that stand evenly are read between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Interpolation {

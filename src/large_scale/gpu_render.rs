@@ -3,14 +3,12 @@
 //! G-buffer, points, light rays, shading and tones run on the device in one submission; what goes to a screen never leaves
 //! it. Only where the work is so much that a driver's watchdog or an impatient hand would mind is it cut into several.
 
-use std::time::Instant;
-
 use super::gpu_band::{Band, Need, Parts, Room};
-use super::gpu_clock::{Clock, Stage, Timed};
 use super::gpu_gbuffer::{Camera, GpuGBuffer, GpuObject};
 use super::gpu_light_rays::{GpuLightRays, GpuOccluder};
 use super::gpu_picture::{self, GpuPictures, Output};
 use super::gpu_shading::{self, GpuMaterial, GpuShading, Light, Seen};
+use super::gpu_stages::{Clock, Recorder, Stage};
 use super::render::{RenderInput, Rendered, StageTimes, check_size};
 use super::shadow::Occluder;
 use super::tone_map::{ToneCurve, ToneMap};
@@ -44,6 +42,8 @@ pub struct GpuRenderer {
     /// Lobes or table rows of one submission.
     pub(super) at_once: u64,
     clock: Option<Clock>,
+    /// See [`Recorder::new`].
+    pub(super) by_stage: bool,
 }
 
 impl GpuRenderer {
@@ -68,6 +68,7 @@ impl GpuRenderer {
             room: None,
             at_once: if gpu.tier == Tier::Hardware { WORK } else { SOFTWARE_WORK },
             clock: Clock::new(gpu)?,
+            by_stage: gpu.tier != Tier::Hardware,
         })
     }
 
@@ -162,7 +163,6 @@ impl GpuRenderer {
         cancel: &Cancel,
     ) -> Result<StageTimes> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
-        let start = Instant::now();
         let work = self.material.as_ref().map_or(1, |material| material.work(input.lights.len()).max(1));
         let points = usize::try_from(self.at_once / work).unwrap_or(usize::MAX);
         let need =
@@ -187,38 +187,18 @@ impl GpuRenderer {
         let group = self.pictures.output(gpu, output)?;
         let a_band = room.bands.first().map_or(1, |band| u64::from(room.places(band)) * work);
         let together = (self.at_once / a_band.max(1)).max(1) as usize;
-        let mut timed = Timed::default();
+        let mut recorder = Recorder::new(gpu, self.clock.as_ref(), self.by_stage);
         for (first, bands) in room.bands.chunks(together).enumerate() {
             cancel.check()?;
-            gpu.checked("rendering", || {
-                let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                timed = Timed::default();
-                if let (true, Some(material)) = (first == 0 && !self.is_made, &self.material)
-                    && material.is_to_be_made()
-                {
-                    let writes = self.clock.as_ref().and_then(|clock| clock.compute_pass(&mut timed, Stage::Product));
-                    material.prepare(&mut encoder, writes);
-                }
-                if first == 0 {
-                    let writes = self.clock.as_ref().and_then(|clock| clock.render_pass(&mut timed, Stage::GBuffer));
-                    self.gbuffer.draw(&mut encoder, &room.samples, &room.bands[0].scene, &self.object, writes);
-                }
-                for band in bands {
-                    self.encode(&mut encoder, &room, band, (output, &group), &mut timed);
-                }
-                if let Some(clock) = &self.clock {
-                    clock.resolve(&mut encoder, &timed);
-                }
-                gpu.queue.submit([encoder.finish()]);
-                Ok(())
-            })?;
-            gpu.wait("rendering")?;
+            if first == 0 {
+                self.record_whole(&mut recorder, &room)?;
+            }
+            for band in bands {
+                self.record_band(&mut recorder, &room, band, (output, &group))?;
+            }
+            recorder.submit()?;
         }
-        let whole = start.elapsed().as_secs_f64() * 1e3;
-        let times = match &self.clock {
-            Some(clock) => clock.times(gpu, &timed, whole)?,
-            None => StageTimes { shading_ms: whole, ..StageTimes::default() },
-        };
+        let times = recorder.times();
         (self.room, self.is_made) = (Some(room), true);
         Ok(times)
     }
@@ -234,40 +214,46 @@ impl GpuRenderer {
         }
     }
 
+    /// What comes before all bands: the material where it is still to be made, and the samples.
+    fn record_whole(&self, recorder: &mut Recorder, room: &Room) -> std::result::Result<(), GpuError> {
+        if let Some(material) = self.material.as_ref().filter(|material| !self.is_made && material.is_to_be_made()) {
+            material.make(&mut recorder.compute_pass(Stage::Product, &material.sums()));
+            recorder.stage_ends(Stage::Product)?;
+        }
+        if let Some(band) = room.bands.first() {
+            let (encoder, writes) = recorder.render_pass(Stage::GBuffer);
+            self.gbuffer.draw(encoder, &room.samples, &band.scene, &self.object, writes);
+        }
+        Ok(())
+    }
+
     /// All that a band takes, from samples to pixels.
-    fn encode(
+    fn record_band(
         &self,
-        encoder: &mut wgpu::CommandEncoder,
+        recorder: &mut Recorder,
         room: &Room,
         band: &Band,
         output: (Output, &wgpu::BindGroup),
-        timed: &mut Timed,
-    ) {
+    ) -> std::result::Result<(), GpuError> {
         let (points, pixels) = (room.places(band), [room.need.size[0], band.rows.len()].map(|n| n as u32));
-        encoder.clear_buffer(&room.radiance, 0, None);
-        let mut pass = self.pass(encoder, Stage::GBuffer, timed);
+        let mut pass = recorder.compute_pass(Stage::GBuffer, &[]);
         self.gbuffer.find_points(&mut pass, &band.scene, &room.to_points, pixels);
         drop(pass);
+        recorder.stage_ends(Stage::GBuffer)?;
         let lit = room.need.lights > 0;
         if let (true, Some((rays, _)), Some(group), Some(to_bits)) = (lit, &self.rays, &band.rays, &room.to_bits) {
-            let mut pass = self.pass(encoder, Stage::Shadows, timed);
+            let mut pass = recorder.compute_pass(Stage::Shadows, &[]);
             rays.trace(&mut pass, group, to_bits, [points, room.words]);
+            drop(pass);
+            recorder.stage_ends(Stage::Shadows)?;
         }
-        let mut pass = self.pass(encoder, Stage::Shading, timed);
+        let mut pass = recorder.compute_pass(Stage::Shading, &[&room.radiance]);
         if let (true, Some(material)) = (lit, &self.material) {
             material.shade(&mut pass, &band.shading, [points, room.slices]);
         }
         self.pictures.write(&mut pass, &band.pixels, output, pixels);
-    }
-
-    fn pass<'a>(
-        &self,
-        encoder: &'a mut wgpu::CommandEncoder,
-        stage: Stage,
-        timed: &mut Timed,
-    ) -> wgpu::ComputePass<'a> {
-        let timestamp_writes = self.clock.as_ref().and_then(|clock| clock.compute_pass(timed, stage));
-        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes })
+        drop(pass);
+        recorder.stage_ends(Stage::Shading)
     }
 }
 

@@ -344,7 +344,8 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
         let input = studio.input(&pictured, 64, &background);
         let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder).unwrap();
         renderer.set_tile(&gpu, &unseen.sum).unwrap();
-        // The first picture makes what the second only reads.
+        // One submission, as on a graphics processor. The first picture makes what the second only reads.
+        renderer.by_stage = false;
         let first = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
         let again = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
         assert_eq!(first, again, "{geometry}");
@@ -369,7 +370,11 @@ fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
     renderer.at_once = renderer.at_once / bands(&renderer) as u64 / 1000;
     let cut = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
     assert!(bands(&renderer) > 10, "{}", bands(&renderer));
-    assert_eq!((cut.picture, cut.points), (whole.picture, whole.points));
+    assert_eq!((&cut.picture, cut.points), (&whole.picture, whole.points));
+    // As on a graphics processor: all stages of some bands together.
+    renderer.by_stage = !renderer.by_stage;
+    let together = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
+    assert_eq!((&together.picture, together.points), (&whole.picture, whole.points));
     // Silhouettes may lie on the other side of a sample.
     let points = render(&input).unwrap().points;
     assert!(cut.points.abs_diff(points) * 100 < points, "{} and the CPU's {points}", cut.points);

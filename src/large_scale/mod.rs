@@ -13,7 +13,6 @@ pub mod camera;
 pub mod environment;
 pub mod gbuffer;
 mod gpu_band;
-mod gpu_clock;
 mod gpu_gbuffer;
 mod gpu_light_rays;
 pub mod gpu_picture;
@@ -21,6 +20,7 @@ pub mod gpu_render;
 mod gpu_shading;
 #[cfg(test)]
 mod gpu_shading_tests;
+mod gpu_stages;
 #[cfg(test)]
 mod gpu_tests;
 pub mod light_choice;

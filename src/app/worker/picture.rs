@@ -141,6 +141,9 @@ impl Photographer {
                 self.studio.leave_out(name);
             }
             self.studio.show_on(devices.screen.as_ref());
+            if let Some(screen) = devices.screen.as_ref().filter(|screen| screen.is_fast) {
+                self.pipeline.use_device(screen.gpu.clone());
+            }
         }
         let asked = &*job.loaded.scene.quality.backend;
         let known = devices.is_some() || has_time;

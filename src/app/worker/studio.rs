@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use biscale::close_up::{CloseUp, Wearing, on_object};
-use biscale::filtering::{EffectiveBrdf, Reflectance, SumMaterial};
+use biscale::filtering::{Black, EffectiveBrdf, Reflectance, SumMaterial};
 use biscale::large_scale::environment::{self, Environment};
 use biscale::large_scale::light_choice::worth_shading;
 use biscale::large_scale::lights::{self, Lights};
@@ -155,7 +155,7 @@ impl Studio {
         };
         let subject = Subject { mesh: &object.mesh, occluder: object.occluder.as_ref(), shot, screen: Some(screen) };
         let background = Background::default();
-        let input = input(object, lights, shot, &NOT_ASKED, &background);
+        let input = input(object, lights, shot, &Black, &background);
         let images = &mut self.images;
         let shown = self.gpu.run(subject, cancel, |renderer, gpu| {
             if !std::ptr::eq(gpu, &*screen.gpu) {
@@ -254,17 +254,6 @@ fn input<'a>(
         size: shot.size,
         samples_per_side: shot.samples_per_side,
         background,
-    }
-}
-
-/// For a device, which has its own.
-const NOT_ASKED: Black = Black;
-
-struct Black;
-
-impl Reflectance for Black {
-    fn eval_lights(&self, _: &[Vec3], _: Vec3, out: &mut [Vec3]) {
-        out.fill(Vec3::ZERO);
     }
 }
 

@@ -136,7 +136,7 @@ impl GpuShading {
         Ok(GpuMaterial::of(passes, brdf.base_area))
     }
 
-    /// A tile whose visibility and product the device makes where it can ([`GpuMaterial::prepare`]): a table of the sum where
+    /// A tile whose visibility and product the device makes where it can ([`GpuMaterial::make`]): a table of the sum where
     /// that pays, else the sum itself.
     ///
     /// # Errors
@@ -215,27 +215,24 @@ impl GpuMaterial {
         Self { passes, horizons: None, table: None, least_area: (1e-12 * base_area) as f32 }
     }
 
-    /// Whether [`GpuMaterial::prepare`] has anything to do.
+    /// Whether [`GpuMaterial::make`] has anything to do.
     pub(super) fn is_to_be_made(&self) -> bool {
         self.horizons.is_some() || self.table.is_some()
     }
 
-    /// Encodes what the device has to make before the first shading with this material: what facets see, and the table of
-    /// their sum. To encode it once is enough; twice makes the same again.
-    pub(super) fn prepare(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
-    ) {
-        if let Some(table) = &self.table {
-            table.clear(encoder);
-        }
-        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
+    /// Buffers that [`GpuMaterial::make`] adds to.
+    pub(super) fn sums(&self) -> Vec<&wgpu::Buffer> {
+        self.table.iter().flat_map(|table| &table.sums).collect()
+    }
+
+    /// Records what the device has to make before the first shading with this material: what facets see, and the table of
+    /// their sum. Once is enough; twice makes the same again.
+    pub(super) fn make(&self, compute: &mut wgpu::ComputePass) {
         if let Some(horizons) = &self.horizons {
-            horizons.dispatch(&mut compute);
+            horizons.dispatch(compute);
         }
         if let Some(table) = &self.table {
-            table.dispatch(&mut compute);
+            table.dispatch(compute);
         }
     }
 

@@ -58,13 +58,7 @@ struct Step {
 }
 
 impl Making {
-    /// Dispatches add to what is there: before the pass that they are in.
-    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder) {
-        for sums in &self.sums {
-            encoder.clear_buffer(sums, 0, None);
-        }
-    }
-
+    /// Adds to what is in the sums, which are zeros at first.
     pub(super) fn dispatch(&self, compute: &mut wgpu::ComputePass) {
         for Step { pipeline, groups, workgroups: [columns, rows] } in &self.steps {
             compute.set_pipeline(pipeline);

@@ -47,7 +47,10 @@ fn tabulated(
 /// The table and the projected areas, as a material's device has them.
 fn made(gpu: &Gpu, material: &GpuMaterial) -> [Vec<f32>; 2] {
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    material.prepare(&mut encoder, None);
+    for sums in material.sums() {
+        encoder.clear_buffer(sums, 0, None);
+    }
+    material.make(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
     gpu.queue.submit([encoder.finish()]);
     material.table.as_ref().unwrap().sums.each_ref().map(|buffer| gpu.read(buffer).unwrap())
 }
@@ -256,7 +259,7 @@ fn the_table_of_a_height_field_is_timed() {
             let set_up = start.elapsed();
             let start = std::time::Instant::now();
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            material.prepare(&mut encoder, None);
+            material.make(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
             gpu.queue.submit([encoder.finish()]);
             let submitted = start.elapsed();
             gpu.wait("making a table").unwrap();

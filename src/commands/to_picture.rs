@@ -1,0 +1,85 @@
+//! From an edit to its picture, as the editor goes: on the device in one submission, or on the CPU through a table.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Result;
+use biscale::filtering::Black;
+use biscale::gpu::{Gpu, GpuError, Tier};
+use biscale::large_scale::shading::Background;
+use biscale::large_scale::tone_map::ToneMap;
+use biscale::large_scale::{GpuRenderer, Stage, gpu_picture, render};
+use biscale::pipeline::{Outcome, Pipeline};
+use biscale::scene::LoadedScene;
+use biscale::{Cancel, Error};
+
+use super::render::Route;
+
+/// All that lies between an edit and its picture.
+pub struct ToPicture {
+    stage: Stage,
+    /// With the device, absent where the CPU makes pictures.
+    renderer: Option<(Arc<Gpu>, GpuRenderer, wgpu::TextureView)>,
+    size: [usize; 2],
+    /// What the last picture was made with.
+    pub form: String,
+}
+
+impl ToPicture {
+    pub fn new(loaded: &LoadedScene, outcome: &Outcome, size: [usize; 2]) -> Result<Self> {
+        let mut stage = Stage::new(loaded)?;
+        let gpu = Route::device(outcome)?;
+        let renderer = match gpu {
+            Some(gpu) => {
+                let of_device = |error: GpuError| Error::from(error);
+                let renderer = GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref()).map_err(of_device)?;
+                let image = gpu_picture::image(&gpu, size).map_err(of_device)?;
+                let view = image.create_view(&wgpu::TextureViewDescriptor::default());
+                Some((Arc::new(gpu), renderer, view))
+            }
+            None => {
+                // What the camera's first picture would make.
+                stage.settle();
+                None
+            }
+        };
+        Ok(Self { stage, renderer, size, form: String::new() })
+    }
+
+    pub fn make(&mut self, pipeline: &mut Pipeline, loaded: &LoadedScene) -> Result<Vec<(&'static str, f64)>> {
+        let (cancel, background) = (Cancel::default(), Background::default());
+        let Self { stage, renderer, size, form } = self;
+        let on_device = match renderer {
+            Some((gpu, ..)) if gpu.tier == Tier::Hardware || loaded.scene.quality.backend == "gpu" => {
+                pipeline.use_device(gpu.clone());
+                pipeline.unseen(loaded)?
+            }
+            _ => None,
+        };
+        let (mut times, large) = match (on_device, renderer) {
+            (Some(tile), Some((gpu, renderer, view))) => {
+                let start = Instant::now();
+                renderer.set_tile(gpu, &tile.sum).map_err(Error::from)?;
+                let upload = ("upload", start.elapsed().as_secs_f64() * 1e3);
+                let input = stage.input(&Black, *size, 1, &background);
+                let tone_map = ToneMap::new(&stage.camera)?;
+                let large = renderer.show(gpu, &input, &tone_map, view, &cancel)?;
+                *form = format!("{} facets, on {}", tile.sum.sum.facet_count(), gpu.description());
+                let mut times = tile.times;
+                times.extend([upload, ("visibility_and_product", large.product_ms)]);
+                (times, large)
+            }
+            _ => {
+                let outcome = pipeline.effective(loaded)?;
+                let reads = outcome.for_pictures(&cancel)?;
+                let large = render(&stage.input(&*reads.brdf, *size, 1, &background))?.times;
+                *form = reads.brdf.form.describe();
+                let mut times = outcome.times;
+                times.push(("picture_table", reads.ms));
+                (times, large)
+            }
+        };
+        times.extend([("g_buffer", large.gbuffer_ms), ("shadows", large.shadows_ms), ("shading", large.shading_ms)]);
+        Ok(times)
+    }
+}
