@@ -15,6 +15,9 @@ struct Params {
     lowest: f32,
     // Heights that differ by less are the same.
     same_height: f32,
+    // The first view of this batch, and directions in all.
+    first_view: u32,
+    direction_count: u32,
 }
 
 // A triangle; a large one comes in pieces that share its number.
@@ -43,7 +46,10 @@ struct Facet {
 @group(0) @binding(5) var<storage, read_write> heights: array<atomic<u32>>;
 // Triangle + 1; 0 where no surface is.
 @group(0) @binding(6) var<storage, read_write> triangles: array<atomic<u32>>;
+// Bits of 32 facets, the directions side by side.
 @group(0) @binding(7) var<storage, read_write> visible: array<u32>;
+// Which direction each view is of.
+@group(0) @binding(8) var<storage, read> directions: array<u32>;
 
 const THREADS: u32 = 64;
 
@@ -66,7 +72,7 @@ fn widen(span: vec2f, y: f32, a: vec2f, b: vec2f) -> vec2f {
 
 // Draws one triangle over the torus: every texel whose centre it covers, edges included.
 fn draw(index: u32, direction: u32, name_triangles: bool) {
-    let view = views[direction];
+    let view = views[params.first_view + direction];
     let piece = corners[index];
     let a = vec3f(texel_of(view, piece.a), piece.a.z - params.lowest);
     let b = vec3f(texel_of(view, piece.b), piece.b.z - params.lowest);
@@ -163,7 +169,7 @@ fn blocked_weight(view: View, map: u32, p: vec3f, n: vec3f) -> f32 {
 
 @compute @workgroup_size(THREADS)
 fn test_facets(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let view = views[id.y];
+    let view = views[params.first_view + id.y];
     let map = id.y * params.map_stride;
     for (var word = id.x; word < params.words_per_row; word += groups.x * THREADS) {
         var bits = 0u;
@@ -175,6 +181,6 @@ fn test_facets(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
                 bits |= 1u << k;
             }
         }
-        visible[id.y * params.words_per_row + word] = bits;
+        visible[word * params.direction_count + directions[params.first_view + id.y]] = bits;
     }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::Vec2;
 
 use super::{FacetSum, Interpolation};
-use crate::directions::UpperPairs;
-use crate::geometry::{Facets, HeightGrid};
+use crate::directions::{PolarGrid, UpperPairs};
+use crate::geometry::{Facets, HeightGrid, TileMesh};
 use crate::visibility::Visibility;
 
 /// Facets and their lobes, and how they come to see.
@@ -30,6 +30,8 @@ pub enum Sight {
     Seen(Arc<Visibility>),
     /// By walking this height-field.
     Heights(Heights),
+    /// By drawing the tile from many directions.
+    Maps(Box<Maps>),
 }
 
 /// A height-field, its tile and its facets.
@@ -41,4 +43,14 @@ pub struct Heights {
     pub azimuths: usize,
     /// Width of the soft step at a horizon [rad].
     pub ramp: f32,
+}
+
+/// A tile that is drawn from the nodes of a grid.
+#[derive(Debug)]
+pub struct Maps {
+    pub mesh: TileMesh,
+    pub facets: Arc<Facets>,
+    pub grid: PolarGrid,
+    /// Texels a side.
+    pub resolution: u32,
 }

@@ -15,9 +15,9 @@ use super::tone_map::{ToneCurve, ToneMap};
 use super::{CameraView, ObjectMesh, Picture};
 use crate::cancel::Cancel;
 use crate::error::Result;
-use crate::filtering::{EffectiveBrdf, Heights, Sight, UnseenSum};
+use crate::filtering::{EffectiveBrdf, Heights, Maps, Sight, UnseenSum};
 use crate::gpu::{Gpu, GpuError, Tier};
-use crate::visibility::GpuHeightMarch;
+use crate::visibility::{GpuHeightMarch, GpuShadowMaps};
 
 /// Lobes or table rows of one submission: some tenths of a second for slow graphics processors, about one for software.
 const WORK: u64 = 1 << 32;
@@ -36,6 +36,7 @@ pub struct GpuRenderer {
     /// Whether the device has made what the material reads.
     is_made: bool,
     march: Option<GpuHeightMarch>,
+    maps: Option<GpuShadowMaps>,
     pictures: GpuPictures,
     /// For pictures like the last one.
     pub(super) room: Option<Room>,
@@ -64,6 +65,7 @@ impl GpuRenderer {
             material: None,
             is_made: false,
             march: None,
+            maps: None,
             pictures: GpuPictures::new(gpu)?,
             room: None,
             at_once: if gpu.tier == Tier::Hardware { WORK } else { SOFTWARE_WORK },
@@ -111,6 +113,14 @@ impl GpuRenderer {
                 };
                 let Heights { samples, tile_size, facets, azimuths, ramp } = heights;
                 Seen::Marched(march.horizons(gpu, samples, *tile_size, facets, *azimuths)?, *ramp)
+            }
+            Sight::Maps(of) => {
+                let maps = match &mut self.maps {
+                    Some(maps) => maps,
+                    none => none.insert(GpuShadowMaps::new(gpu)?),
+                };
+                let Maps { mesh, facets, grid, resolution } = &**of;
+                Seen::Drawn(maps.maps(gpu, mesh, facets, &grid.directions(), *resolution)?, *grid)
             }
         };
         self.material = Some(self.shading.tile(gpu, tile, seen, self.rays.is_some())?);
@@ -216,7 +226,19 @@ impl GpuRenderer {
 
     /// What comes before all bands: the material where it is still to be made, and the samples.
     fn record_whole(&self, recorder: &mut Recorder, room: &Room) -> std::result::Result<(), GpuError> {
-        if let Some(material) = self.material.as_ref().filter(|material| !self.is_made && material.is_to_be_made()) {
+        let unmade = self.material.as_ref().filter(|_| !self.is_made);
+        if let Some(maps) = unmade.and_then(GpuMaterial::maps) {
+            for (submission, batches) in maps.batches().enumerate() {
+                if submission > 0 {
+                    recorder.submit()?;
+                }
+                for batch in batches {
+                    maps.draw(batch, &mut recorder.compute_pass(Stage::Product, &maps.cleared()));
+                    recorder.stage_ends(Stage::Product)?;
+                }
+            }
+        }
+        if let Some(material) = unmade.filter(|material| material.is_to_be_made()) {
             material.make(&mut recorder.compute_pass(Stage::Product, &material.sums()));
             recorder.stage_ends(Stage::Product)?;
         }

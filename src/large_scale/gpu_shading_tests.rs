@@ -320,17 +320,35 @@ fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_strai
 #[test]
 fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture() {
     let Some(gpu) = open_gpu() else { return };
-    for (geometry, brdf, kind, marched, tabulated) in [
-        ("{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.2 }", LOBES[4], "cup", true, true),
-        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[0], "sphere", false, true),
-        (PYRAMIDS, LOBES[2], "sphere", false, false),
-        (FLAT, LOBES[2], "sphere", false, false),
+    for (geometry, brdf, kind, sight, tabulated) in [
+        (
+            "{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.2 }",
+            LOBES[4],
+            "cup",
+            "marched",
+            true,
+        ),
+        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[0], "sphere", "held", true),
+        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[4], "sphere", "drawn", true),
+        (PYRAMIDS, LOBES[2], "sphere", "held", false),
+        (FLAT, LOBES[2], "sphere", "held", false),
     ] {
         let mut loaded = open(geometry, brdf, "direct");
         loaded.scene.effects.picture_table = scene::Switch::On;
+        if sight == "drawn" {
+            // Else only a graphics processor draws maps.
+            let quality = &mut loaded.scene.quality;
+            (quality.visibility, quality.backend) = (Some("maps".to_owned()), "gpu".to_owned());
+            (quality.azimuths, quality.rings) = (Some(10), Some(5));
+        }
         let outcome = Pipeline::new().effective(&loaded).unwrap();
         let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
-        assert_eq!(matches!(unseen.sum.sight, Sight::Heights(_)), marched, "{geometry}");
+        let found = match &unseen.sum.sight {
+            Sight::Seen(_) => "held",
+            Sight::Heights(_) => "marched",
+            Sight::Maps(_) => "drawn",
+        };
+        assert_eq!(found, sight, "{geometry}");
         let (studio, background) = (Studio::of(kind), Background::Uniform(Vec3::ZERO));
         let pictured = match tabulated {
             true => {

@@ -2,7 +2,7 @@
 
 use super::{Pipeline, Prepared, StageTimes};
 use crate::error::Result;
-use crate::filtering::{Heights, Sight, UnseenSum};
+use crate::filtering::{Heights, Maps, Sight, UnseenSum};
 use crate::geometry::mirror_planes;
 use crate::plan::{Plan, Preset, Route, Settings};
 use crate::scene::{LoadedScene, Switch};
@@ -31,14 +31,21 @@ impl Pipeline {
         if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
             return Ok(None);
         }
-        let sight = match &prepared.shape.mesh.height_grid {
-            Some(samples) if plan.route == Route::HeightMarch => Sight::Heights(Heights {
+        let (mesh, facets) = (&prepared.shape.mesh, prepared.facets.clone());
+        let sight = match (plan.route, &mesh.height_grid) {
+            (Route::HeightMarch, Some(samples)) => Sight::Heights(Heights {
                 samples: samples.clone(),
-                tile_size: prepared.shape.mesh.size,
-                facets: prepared.facets.clone(),
+                tile_size: mesh.size,
+                facets,
                 azimuths: settings.horizon_azimuths,
                 ramp: settings.penumbra,
             }),
+            (Route::GpuMaps, _) => Sight::Maps(Box::new(Maps {
+                mesh: mesh.clone(),
+                facets,
+                grid: settings.map_grid,
+                resolution: settings.map_resolution,
+            })),
             _ => Sight::Seen(self.seen(&prepared, &mut times)?.0),
         };
         let Prepared { shape, settings, sum, plan, shape_version, .. } = prepared;

@@ -17,8 +17,10 @@ use crate::gpu::{Gpu, GpuError};
 
 /// Bytes of the maps of one batch: what a small card has to spare.
 const BATCH_BYTES: u64 = 128 << 20;
-/// Triangles drawn by one submission: fractions of a second, far from any driver's watchdog.
+/// Triangles drawn by one batch.
 const BATCH_TRIANGLES: u64 = 8 << 20;
+/// And by one submission: fractions of a second, far from any driver's watchdog.
+const SUBMITTED_TRIANGLES: u64 = 64 << 20;
 /// Edges longer than this part of the tile are cut.
 const LONGEST_EDGE: f32 = 1.0 / 16.0;
 /// No mesh is cut into more pieces than this beyond its own number of triangles.
@@ -54,7 +56,8 @@ struct Params {
     map_stride: u32,
     lowest: f32,
     same_height: f32,
-    pad: [u32; 2],
+    first_view: u32,
+    direction_count: u32,
 }
 
 #[repr(C)]
@@ -90,20 +93,24 @@ struct Facet {
     pad_n: u32,
 }
 
-/// The buffers of one call.
-struct Buffers {
-    heights: wgpu::Buffer,
-    triangles: wgpu::Buffer,
-    visible: wgpu::Buffer,
-    staging: wgpu::Buffer,
-    views: wgpu::Buffer,
-    group: wgpu::BindGroup,
+/// Maps that submissions are to draw, and the visibility that they make.
+#[derive(Debug)]
+pub struct GpuMaps {
+    /// Heights, triangles, facets; and their workgroups.
+    passes: [(wgpu::ComputePipeline, u32); 3],
+    /// With how many directions each has.
+    batches: Vec<(wgpu::BindGroup, u32)>,
+    maps: [wgpu::Buffer; 2],
+    /// Bits of 32 facets, the directions side by side; zeros until they are made.
+    pub bits: wgpu::Buffer,
+    /// Batches that one submission may draw.
+    together: usize,
 }
 
 impl GpuShadowMaps {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let module = gpu.module("shadow_map")?;
-        let bindings = [UNIFORM, READ, READ, READ, READ, WRITE, WRITE, WRITE];
+        let bindings = [UNIFORM, READ, READ, READ, READ, WRITE, WRITE, WRITE, READ];
         let layout = gpu.layout("shadow maps", wgpu::ShaderStages::COMPUTE, &bindings)?;
         Ok(Self {
             draw_heights: gpu.compute_pipeline(&module, "draw_heights", &[&layout])?,
@@ -123,22 +130,51 @@ impl GpuShadowMaps {
         resolution: u32,
     ) -> Result<PackedVisibility, GpuError> {
         let mut visibility = PackedVisibility::new(facets.len(), directions.len());
-        let extent = extent(mesh);
+        let maps = self.maps(gpu, mesh, facets, directions, resolution)?;
+        for batch in 0..maps.batches.len() {
+            gpu.checked("drawing shadow maps", || {
+                let mut encoder =
+                    gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("shadow maps") });
+                maps.maps.iter().for_each(|map| encoder.clear_buffer(map, 0, None));
+                maps.draw(batch, &mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+                gpu.queue.submit([encoder.finish()]);
+                Ok(())
+            })?;
+        }
+        let bits: Vec<u32> = gpu.read(&maps.bits)?;
+        let (words, count) = (visibility.words_per_row(), directions.len());
+        for d in 0..count {
+            for (word, to) in visibility.row_mut(d).iter_mut().enumerate().take(words) {
+                *to = bits[word * count + d];
+            }
+        }
+        Ok(visibility)
+    }
+
+    /// Uploads the tile and its facets.
+    ///
+    /// # Errors
+    /// What the device refuses.
+    pub fn maps(
+        &self,
+        gpu: &Gpu,
+        mesh: &TileMesh,
+        facets: &Facets,
+        directions: &[Vec3],
+        resolution: u32,
+    ) -> Result<GpuMaps, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let (extent, resolution) = (extent(mesh), affordable(mesh, resolution));
         let views = directions.iter().enumerate();
-        let resolution = affordable(mesh, resolution);
-        let views = views.filter_map(|(d, &w)| Some((d, ShadowView::new(mesh.size, extent, w, resolution)?)));
-        let views: Vec<(usize, ShadowView)> = views.collect();
-        let Some(stride) = views.iter().map(|(_, view)| view.texels() as u64).max().filter(|_| !facets.is_empty())
-        else {
-            return Ok(visibility);
-        };
+        let views = views.filter_map(|(d, &w)| Some((d as u32, ShadowView::new(mesh.size, extent, w, resolution)?)));
+        let (numbers, views): (Vec<u32>, Vec<ShadowView>) = views.filter(|_| !facets.is_empty()).unzip();
+        let stride = views.iter().map(|view| view.texels() as u64).max().unwrap_or(1);
         let corners = cut_large_triangles(mesh);
-        let words = visibility.words_per_row();
+        let words = facets.len().div_ceil(32);
         let most = BATCH_BYTES.min(gpu.limits.max_storage_buffer_binding_size);
-        let batch =
-            (most / (8 * stride)).min(most / (4 * words as u64)).min(BATCH_TRIANGLES / corners.len().max(1) as u64);
-        let groups_per_side = gpu.limits.max_compute_workgroups_per_dimension;
-        let batch = batch.clamp(1, u64::from(groups_per_side)).min(views.len() as u64) as usize;
+        let drawn = BATCH_TRIANGLES / corners.len().max(1) as u64;
+        let most_groups = gpu.limits.max_compute_workgroups_per_dimension;
+        let batch = (most / (8 * stride)).min(drawn).clamp(1, u64::from(most_groups)).min(views.len().max(1) as u64);
 
         let (lowest, highest) = mesh.z_range();
         let params = Params {
@@ -148,76 +184,68 @@ impl GpuShadowMaps {
             map_stride: stride as u32,
             lowest,
             same_height: 4.0 * f32::EPSILON * (highest - lowest),
-            pad: [0; 2],
+            first_view: 0,
+            direction_count: directions.len() as u32,
         };
-        let buffers = self.buffers(gpu, mesh, facets, &corners, params, batch)?;
-        for batch in views.chunks(batch) {
-            let gpu_views: Vec<View> = batch.iter().map(|(_, view)| gpu_view(view)).collect();
-            gpu.write(&buffers.views, &gpu_views)?;
-            gpu.checked("drawing shadow maps", || {
-                self.submit(gpu, &buffers, &params, batch.len() as u32);
-                Ok(())
-            })?;
-            let rows: Vec<u32> = gpu.checked("reading visibility back", || gpu.map(&buffers.staging))?;
-            for ((d, _), row) in batch.iter().zip(rows.chunks_exact(words)) {
-                visibility.row_mut(*d).copy_from_slice(row);
-            }
-        }
-        Ok(visibility)
-    }
-
-    fn buffers(
-        &self,
-        gpu: &Gpu,
-        mesh: &TileMesh,
-        facets: &Facets,
-        corners: &[Corners],
-        params: Params,
-        batch: usize,
-    ) -> Result<Buffers, GpuError> {
-        use wgpu::BufferUsages as Usage;
         let normals: Vec<[f32; 4]> =
             (0..mesh.triangles.len()).map(|k| mesh.geometric_normal(k).extend(0.0).into()).collect();
-        let facets = facets.positions.iter().zip(&facets.geometric_normals);
-        let facets: Vec<Facet> =
-            facets.map(|(p, n)| Facet { position: (*p).into(), pad_p: 0, normal: (*n).into(), pad_n: 0 }).collect();
-        let map_bytes = 4 * u64::from(params.map_stride) * batch as u64;
-        let row_bytes = 4 * u64::from(params.words_per_row) * batch as u64;
+        let places = facets.positions.iter().zip(&facets.geometric_normals);
+        let places: Vec<Facet> =
+            places.map(|(p, n)| Facet { position: (*p).into(), pad_p: 0, normal: (*n).into(), pad_n: 0 }).collect();
+        let gpu_views: Vec<View> = views.iter().map(gpu_view).collect();
+        let map = |label| gpu.buffer(label, 4 * stride * batch, Usage::STORAGE | Usage::COPY_DST);
+        let maps = [map("shadow maps (heights)")?, map("shadow maps (triangles)")?];
+        let bits = gpu.buffer("visibility", 4 * (words * directions.len()) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
+        let bound = [
+            &gpu.upload("views", &gpu_views, Usage::STORAGE)?,
+            &gpu.upload("triangles", &corners, Usage::STORAGE)?,
+            &gpu.upload("triangle normals", &normals, Usage::STORAGE)?,
+            &gpu.upload("facets", &places, Usage::STORAGE)?,
+            &maps[0],
+            &maps[1],
+            &bits,
+            &gpu.upload("numbers of views", &numbers, Usage::STORAGE)?,
+        ];
+        let batches = (0..views.len()).step_by(batch as usize).map(|first| {
+            let params = gpu.upload("parameters", &[Params { first_view: first as u32, ..params }], Usage::UNIFORM)?;
+            let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
+            Ok((gpu.group("shadow maps", &self.layout, &bound)?, (views.len() - first).min(batch as usize) as u32))
+        });
+        let groups = |items: u32| items.div_ceil(THREADS).clamp(1, most_groups);
+        Ok(GpuMaps {
+            passes: [
+                (self.draw_heights.clone(), groups(params.corner_count)),
+                (self.draw_triangles.clone(), groups(params.corner_count)),
+                (self.test_facets.clone(), groups(params.words_per_row)),
+            ],
+            batches: batches.collect::<Result<_, GpuError>>()?,
+            maps,
+            bits,
+            together: (SUBMITTED_TRIANGLES / (batch * corners.len().max(1) as u64)).max(1) as usize,
+        })
+    }
+}
 
-        let params = gpu.upload("parameters", &[params], Usage::UNIFORM)?;
-        let views = gpu.buffer("views", (batch * size_of::<View>()) as u64, Usage::STORAGE | Usage::COPY_DST)?;
-        let corners = gpu.upload("triangles", corners, Usage::STORAGE)?;
-        let normals = gpu.upload("triangle normals", &normals, Usage::STORAGE)?;
-        let facets = gpu.upload("facets", &facets, Usage::STORAGE)?;
-        let heights = gpu.buffer("shadow maps (heights)", map_bytes, Usage::STORAGE | Usage::COPY_DST)?;
-        let triangles = gpu.buffer("shadow maps (triangles)", map_bytes, Usage::STORAGE | Usage::COPY_DST)?;
-        let visible = gpu.buffer("visibility", row_bytes, Usage::STORAGE | Usage::COPY_SRC)?;
-        let staging = gpu.buffer("visibility read-back", visible.size(), Usage::COPY_DST | Usage::MAP_READ)?;
-        let bound = [&params, &views, &corners, &normals, &facets, &heights, &triangles, &visible];
-        let bound = bound.map(|buffer| buffer.as_entire_binding());
-        let group = gpu.group("shadow maps", &self.layout, &bound)?;
-        Ok(Buffers { heights, triangles, visible, staging, views, group })
+impl GpuMaps {
+    /// Batches of directions, some for each submission.
+    pub fn batches(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let count = self.batches.len();
+        (0..count).step_by(self.together).map(move |first| first..(first + self.together).min(count))
     }
 
-    fn submit(&self, gpu: &Gpu, buffers: &Buffers, params: &Params, directions: u32) {
-        let mut encoder =
-            gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("shadow maps") });
-        encoder.clear_buffer(&buffers.heights, 0, None);
-        encoder.clear_buffer(&buffers.triangles, 0, None);
-        let most = gpu.limits.max_compute_workgroups_per_dimension;
-        let groups = |items: u32| items.div_ceil(THREADS).clamp(1, most);
-        for (pipeline, groups) in [
-            (&self.draw_heights, groups(params.corner_count)),
-            (&self.draw_triangles, groups(params.corner_count)),
-            (&self.test_facets, groups(params.words_per_row)),
-        ] {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    /// What must be zeros before each batch.
+    pub fn cleared(&self) -> Vec<&wgpu::Buffer> {
+        self.maps.iter().collect()
+    }
+
+    /// Records one batch.
+    pub fn draw(&self, batch: usize, pass: &mut wgpu::ComputePass) {
+        let (group, directions) = &self.batches[batch];
+        for (pipeline, groups) in &self.passes {
             pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &buffers.group, &[]);
-            pass.dispatch_workgroups(groups, directions, 1);
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(*groups, *directions, 1);
         }
-        encoder.copy_buffer_to_buffer(&buffers.visible, 0, &buffers.staging, 0, buffers.visible.size());
-        gpu.queue.submit([encoder.finish()]);
     }
 }
 

@@ -25,7 +25,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-pub use gpu_maps::{GpuShadowMaps, visibility_maps_gpu};
+pub use gpu_maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
 pub use gpu_march::{GpuHeightMarch, GpuHorizons};
 pub use horizons::Horizons;
 pub use nearest::Hit;

@@ -18,7 +18,7 @@ use super::DirectionalLight;
 use crate::filtering::{EffectiveBrdf, Form, Tint, UnseenSum};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError, Swaps};
-use crate::visibility::GpuHorizons;
+use crate::visibility::{GpuHorizons, GpuMaps};
 
 const THREADS: u32 = 64;
 /// The most workgroups of a dispatch along one axis.
@@ -51,6 +51,7 @@ pub struct GpuMaterial {
     passes: Vec<Pass>,
     /// What the passes read and the device has to make first.
     horizons: Option<GpuHorizons>,
+    maps: Option<GpuMaps>,
     table: Option<Making>,
     least_area: f32,
 }
@@ -155,11 +156,12 @@ impl GpuShading {
             None | Some(Err(GpuError::Unsupported(_))) => (self.direct_passes(gpu, sum, &seen, shadowed)?, None),
             Some(Err(error)) => return Err(error),
         };
-        let horizons = match seen {
-            Seen::Marched(horizons, _) => Some(horizons),
-            Seen::Held(_) => None,
+        let (horizons, maps) = match seen {
+            Seen::Marched(horizons, _) => (Some(horizons), None),
+            Seen::Drawn(maps, _) => (None, Some(maps)),
+            Seen::Held(_) => (None, None),
         };
-        Ok(GpuMaterial { horizons, table, ..GpuMaterial::of(passes, tile.base_area) })
+        Ok(GpuMaterial { horizons, maps, table, ..GpuMaterial::of(passes, tile.base_area) })
     }
 
     /// [`Params`], points, lights, the bits of shadows, radiance and scales.
@@ -212,7 +214,12 @@ enum Second {
 
 impl GpuMaterial {
     fn of(passes: Vec<Pass>, base_area: f64) -> Self {
-        Self { passes, horizons: None, table: None, least_area: (1e-12 * base_area) as f32 }
+        Self { passes, horizons: None, maps: None, table: None, least_area: (1e-12 * base_area) as f32 }
+    }
+
+    /// Shadow maps that are to be drawn before [`GpuMaterial::make`].
+    pub(super) fn maps(&self) -> Option<&GpuMaps> {
+        self.maps.as_ref()
     }
 
     /// Whether [`GpuMaterial::make`] has anything to do.

@@ -1,8 +1,9 @@
 //! What facets see, on the device: uploaded as the CPU found it, or to be made there.
 
 use super::direct::Sum;
+use crate::directions::PolarGrid;
 use crate::gpu::{Gpu, GpuError};
-use crate::visibility::{GpuHorizons, Horizons, Slices, SoftMaps, Visibility};
+use crate::visibility::{GpuHorizons, GpuMaps, Horizons, Slices, SoftMaps, Visibility};
 
 /// How facets on a device come to see.
 #[derive(Debug)]
@@ -11,6 +12,8 @@ pub enum Seen<'a> {
     Held(&'a Visibility),
     /// Horizons that the device is to make, and the width of the soft step there [rad].
     Marched(GpuHorizons, f32),
+    /// Maps that the device is to draw, and what their directions are.
+    Drawn(GpuMaps, PolarGrid),
 }
 
 impl Seen<'_> {
@@ -20,7 +23,7 @@ impl Seen<'_> {
             Self::Held(Visibility::Unblocked { .. }) => "visibility_unblocked",
             Self::Held(Visibility::Horizons(_)) | Self::Marched(..) => "visibility_horizons",
             Self::Held(Visibility::Slices(_)) => "visibility_slices",
-            Self::Held(Visibility::Maps(_)) => "visibility_maps",
+            Self::Held(Visibility::Maps(_)) | Self::Drawn(..) => "visibility_maps",
         }
     }
 
@@ -31,12 +34,9 @@ impl Seen<'_> {
             Self::Held(Visibility::Unblocked { .. }) => sum,
             Self::Held(Visibility::Horizons(held)) => horizons(held.azimuths(), held.ramp()),
             Self::Held(Visibility::Slices(held)) => horizons(held.horizons.azimuths(), held.horizons.ramp()),
-            Self::Held(Visibility::Maps(maps)) => Sum {
-                azimuths: maps.grid.azimuths as u32,
-                rings: maps.grid.rings as u32,
-                nodes: maps.grid.len() as u32,
-                ..sum
-            },
+            Self::Held(Visibility::Maps(SoftMaps { grid, .. })) | Self::Drawn(_, grid) => {
+                Sum { azimuths: grid.azimuths as u32, rings: grid.rings as u32, nodes: grid.len() as u32, ..sum }
+            }
             Self::Marched(made, ramp) => horizons(made.azimuths, Horizons::soft(*ramp)),
         }
     }
@@ -50,6 +50,7 @@ impl Seen<'_> {
             Self::Held(Visibility::Horizons(horizons)) => gpu.upload("horizons", &horizons_by_facet(horizons), usage),
             Self::Held(Visibility::Maps(maps)) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
             Self::Marched(made, _) => Ok(made.elevations.clone()),
+            Self::Drawn(made, _) => Ok(made.bits.clone()),
         }
     }
 }
