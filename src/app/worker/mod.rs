@@ -5,6 +5,7 @@ mod device;
 mod export;
 mod lobe;
 mod made;
+mod on_device;
 mod picture;
 mod runner;
 mod screen;

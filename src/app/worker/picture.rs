@@ -6,12 +6,13 @@ use std::time::{Duration, Instant};
 use biscale::cache::Cache;
 use biscale::close_up::CloseUp;
 use biscale::large_scale::tone_map::ToneMap;
-use biscale::pipeline::{Pipeline, Unseen};
-use biscale::plan::{Preset, Settings};
-use biscale::scene::{Camera, LoadedScene, Quality};
+use biscale::pipeline::Pipeline;
+use biscale::plan::Preset;
+use biscale::scene::{Camera, LoadedScene};
 use biscale::{Cancel, Error, Result};
 
 use super::made::{Grade, Image, Made, PictureAnswer, PictureJob};
+use super::on_device::{DeviceDrafts, as_preset};
 use super::runner::Desk;
 use super::shared::{Shared, SmallScale, lock, small_scale};
 use super::studio::{Close, Shot, Studio, Worn};
@@ -32,11 +33,6 @@ const POLL: Duration = Duration::from_millis(5);
 /// How long the hand must rest before refinement begins.
 const REST: Duration = Duration::from_millis(120);
 
-/// How fine drafts are that a graphics processor makes, before the scene's own quality.
-const RUNGS: [Preset; 2] = [Preset::Draft, Preset::Standard];
-/// Visibility and product of such a draft may take so long, and leave room for a finer one below the other.
-const MOST_PRODUCT_MS: f64 = 25.0;
-const LEAST_PRODUCT_MS: f64 = 2.0;
 const PRODUCT: &str = "visibility and product";
 
 /// Keeps stages and what stays between pictures. One drafts, on a thread that is never kept long; another refines.
@@ -48,10 +44,7 @@ pub struct Photographer {
     close: Option<(SmallScale, Close)>,
     /// Milliseconds a pixel, of the draft's and of the refined BRDF.
     cost: [f64; 2],
-    /// The tile that the device makes all of by itself, and what it is; absent where it cannot.
-    tile: Option<((SmallScale, usize), Option<Arc<Unseen>>)>,
-    /// How fine such drafts are: an index into [`RUNGS`], or the scene's own quality above them.
-    rung: usize,
+    on_device: DeviceDrafts,
     /// Where the next picture is made: the scene's own choice, or `cpu` before anybody knows what devices there are.
     backend: String,
 }
@@ -69,8 +62,7 @@ impl Photographer {
             studio,
             close: None,
             cost: [FIRST_COST; 2],
-            tile: None,
-            rung: 0,
+            on_device: DeviceDrafts::default(),
             backend: String::new(),
         }
     }
@@ -106,16 +98,7 @@ impl Photographer {
         if !self.studio.is_fast() || self.studio.is_close(&camera(&job.loaded), job.size) {
             return Ok(None);
         }
-        let key = (small_scale(&job.loaded), self.rung);
-        if self.tile.as_ref().is_none_or(|(last, _)| *last != key) {
-            let loaded = match RUNGS.get(self.rung) {
-                Some(preset) if !is_below(&job.loaded, *preset) => as_preset(&job.loaded, *preset),
-                _ => (*job.loaded).clone(),
-            };
-            let tile = self.pipeline.unseen(&loaded)?.map(Arc::new);
-            self.tile = Some((key, tile));
-        }
-        let Some((_, Some(tile))) = self.tile.clone() else { return Ok(None) };
+        let Some(tile) = self.on_device.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
         let size = self.affordable(job.size, 0, DRAFT_MS);
         let made = match self.shoot(job, Worn::Unseen(&tile), 0, size, 1, cancel) {
             Ok(made) => made,
@@ -123,12 +106,8 @@ impl Photographer {
             // The device does not do it, or failed at it.
             Err(_) => return Ok(None),
         };
-        // The next edit is as fine as leaves the picture in time.
-        let product = made.stages.iter().find(|(name, _)| *name == PRODUCT).map_or(0.0, |(_, ms)| *ms);
-        if product > MOST_PRODUCT_MS {
-            self.rung = self.rung.saturating_sub(1);
-        } else if product > 0.0 && product < LEAST_PRODUCT_MS {
-            self.rung = (self.rung + 1).min(RUNGS.len());
+        if let Some((_, ms)) = made.stages.iter().find(|(name, _)| *name == PRODUCT) {
+            self.on_device.took(*ms);
         }
         Ok(Some(made))
     }
@@ -341,25 +320,6 @@ fn tell(job: &PictureJob, done: Result<()>, answer: &dyn Fn(PictureAnswer)) {
 
 fn camera(loaded: &LoadedScene) -> Camera {
     loaded.scene.camera.clone().unwrap_or_default()
-}
-
-/// The same scene at a preset, without knobs that were turned by hand.
-fn as_preset(loaded: &LoadedScene, preset: Preset) -> LoadedScene {
-    let mut draft = loaded.clone();
-    let quality = &loaded.scene.quality;
-    draft.scene.quality = Quality {
-        preset: preset.name().to_owned(),
-        seed: quality.seed,
-        backend: quality.backend.clone(),
-        ..Quality::default()
-    };
-    draft
-}
-
-/// Whether a scene asks for less than a preset.
-fn is_below(loaded: &LoadedScene, preset: Preset) -> bool {
-    let own = Settings::from_quality(&loaded.scene.quality);
-    own.facets < Settings::of_preset(preset).facets
 }
 
 fn ms(since: Instant) -> f64 {

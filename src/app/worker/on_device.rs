@@ -1,0 +1,108 @@
+//! Drafts that a graphics processor makes from the tile itself, as fine as it is fast.
+
+use std::sync::Arc;
+
+use biscale::Result;
+use biscale::pipeline::{Pipeline, Unseen};
+use biscale::plan::{Preset, Settings};
+use biscale::scene::{LoadedScene, Quality};
+
+use super::shared::{SmallScale, small_scale};
+
+/// From coarse to fine; above them the scene's own quality.
+const RUNGS: [Preset; 2] = [Preset::Draft, Preset::Standard];
+/// Visibility and product may take so long, and leave room for those of the next rung below the other.
+const MOST_MS: f64 = 25.0;
+const LEAST_MS: f64 = 2.0;
+
+/// What such drafts are made from, and how fine they are.
+#[derive(Default)]
+pub struct DeviceDrafts {
+    last: Option<Last>,
+    /// An index into [`RUNGS`], or their number for the scene's own quality.
+    rung: usize,
+    /// Quick drafts until a rung that was too slow is tried again, and how many those were the last time.
+    rest: u32,
+    rested: u32,
+}
+
+struct Last {
+    key: (SmallScale, usize),
+    /// Absent where only the CPU makes it.
+    tile: Option<Arc<Unseen>>,
+}
+
+impl DeviceDrafts {
+    /// The tile of a scene on the present rung, but no finer than the scene asks for; `None` where only the CPU makes it.
+    ///
+    /// # Errors
+    /// As [`Pipeline::unseen`].
+    pub fn tile(&mut self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<Unseen>>> {
+        let key = (small_scale(loaded), self.rung);
+        if let Some(last) = self.last.as_ref().filter(|last| last.key == key) {
+            return Ok(last.tile.clone());
+        }
+        let tile = match RUNGS.get(self.rung) {
+            Some(preset) if !is_below(loaded, *preset) => pipeline.unseen(&as_preset(loaded, *preset))?,
+            _ => pipeline.unseen(loaded)?,
+        };
+        let tile = tile.map(Arc::new);
+        self.last = Some(Last { key, tile: tile.clone() });
+        Ok(tile)
+    }
+
+    /// The next edit is as fine as leaves its picture in time. A rung that did not is tried again ever more seldom.
+    pub fn took(&mut self, product_ms: f64) {
+        if product_ms > MOST_MS {
+            self.rung = self.rung.saturating_sub(1);
+            self.rested = (4 * self.rested).clamp(8, 1 << 20);
+            self.rest = self.rested;
+        } else if product_ms < LEAST_MS && self.rung < RUNGS.len() {
+            match self.rest {
+                0 => self.rung += 1,
+                _ => self.rest -= 1,
+            }
+        }
+    }
+}
+
+/// The same scene at a preset, without knobs that were turned by hand.
+pub fn as_preset(loaded: &LoadedScene, preset: Preset) -> LoadedScene {
+    let mut draft = loaded.clone();
+    let quality = &loaded.scene.quality;
+    draft.scene.quality = Quality {
+        preset: preset.name().to_owned(),
+        seed: quality.seed,
+        backend: quality.backend.clone(),
+        ..Quality::default()
+    };
+    draft
+}
+
+/// Whether a scene asks for less than a preset.
+fn is_below(loaded: &LoadedScene, preset: Preset) -> bool {
+    let own = Settings::from_quality(&loaded.scene.quality);
+    own.facets < Settings::of_preset(preset).facets
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drafts_become_finer_while_they_are_quick_and_what_was_too_slow_is_seldom_tried_again() {
+        let mut drafts = DeviceDrafts::default();
+        let mut rungs = |times: &[f64]| -> Vec<usize> {
+            let after = times.iter().map(|ms| {
+                drafts.took(*ms);
+                drafts.rung
+            });
+            after.collect()
+        };
+        assert_eq!(rungs(&[1.0, 1.0, 1.0, 10.0, 40.0]), [1, 2, 2, 2, 1]);
+        assert_eq!(rungs(&[1.0; 9]), [1, 1, 1, 1, 1, 1, 1, 1, 2], "it is tried again after eight");
+        assert_eq!(rungs(&[40.0]), [1]);
+        assert_eq!(rungs(&[1.0; 32]), [1; 32], "and then after more");
+        assert_eq!(rungs(&[40.0, 40.0]), [0, 0], "the coarsest stays");
+    }
+}
