@@ -290,3 +290,55 @@ fn both_routes_see_the_same_lights() {
         assert!((differ as usize) < pairs / 5000, "{kind}: {differ} of {pairs}");
     }
 }
+
+/// `cargo test --release --lib counts_of_a_frame -- --ignored --nocapture`; what a pair, a facet and a point take is counted
+/// in the shaders by hand.
+#[test]
+#[ignore = "prints what a frame on a graphics processor reads and does"]
+fn counts_of_a_frame() {
+    use crate::plan::{Preset, Settings};
+    /// Of a GGX lobe of a facet at a pair of directions: what both see of it 44, the lobe and its weight 29.
+    const LOBE_OPERATIONS: f64 = 73.0;
+    /// The facet, which a workgroup shares, and two horizons for each direction.
+    const LOBE_BYTES: f64 = 32.0;
+    /// Of a pair read from a table of up to four columns: its place 140, eight rows of four nodes 320, tints 40.
+    const PAIR_OPERATIONS: f64 = 500.0;
+    const PAIR_BYTES: f64 = 32.0 * 16.0;
+    /// Operations and bytes a second: a quarter of what an H100 is sold for (67 T, 3.35 TB), and of a small card.
+    const CARDS: [(&str, f64, f64); 2] = [("H100", 17.0e12, 0.8e12), ("a card of 8 T a second", 2.0e12, 0.1e12)];
+    println!("product: table of one lobe      nodes  facets  lobes   operations  read (caches)  written");
+    for preset in [Preset::Draft, Preset::Standard, Preset::Fine] {
+        let settings = Settings::of_preset(preset);
+        let (grid, facets) = (settings.picture_grids.last().unwrap(), settings.height_field_facets);
+        let lobes = grid.nodes() as f64 * facets as f64;
+        let stored = (grid.half_vectors() * grid.turn * (grid.difference + 2) * 16) as f64;
+        let on =
+            CARDS.map(|(name, operations, _)| format!("{name} {:.1} ms", lobes * LOBE_OPERATIONS / operations * 1e3));
+        println!(
+            "{:<28} {:>8} {facets:>7} {lobes:>8.1e} {:>9.1e} {:>11.1e} B {:>9.1e} B   {}",
+            preset.name(),
+            grid.nodes(),
+            lobes * LOBE_OPERATIONS,
+            lobes * LOBE_BYTES,
+            stored,
+            on.join(", ")
+        );
+    }
+    println!("picture: 32 lights, half of it covered   points   pairs   operations  read (caches)  memory traffic");
+    for [width, height] in [[384, 384], [1920, 1080], [3840, 2160]] {
+        let points = (width * height) as f64;
+        let pairs = 0.5 * points * 32.0;
+        // Written and read again: samples, points, origins, bits, radiance; then the image.
+        let traffic = points * (2.0 * (4.0 + 4.0 + size_of::<Point>() as f64 + 16.0 + 4.0 + 16.0) + 4.0);
+        let on = CARDS.map(|(name, operations, bytes)| {
+            format!("{name} {:.1} ms", (pairs * PAIR_OPERATIONS / operations + traffic / bytes) * 1e3)
+        });
+        println!(
+            "{:<36} {points:>9.1e} {pairs:>8.1e} {:>9.1e} {:>11.1e} B {traffic:>9.1e} B   {}",
+            format!("{width} x {height}"),
+            pairs * PAIR_OPERATIONS,
+            pairs * PAIR_BYTES,
+            on.join(", ")
+        );
+    }
+}
