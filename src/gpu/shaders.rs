@@ -12,11 +12,15 @@ use super::GpuError;
 pub const SHADERS: &[(&str, &str)] = &[
     ("angles", include_str!("../../shaders/angles.wgsl")),
     ("azimuth_sight", include_str!("../../shaders/azimuth_sight.wgsl")),
+    ("blinn_phong", include_str!("../../shaders/blinn_phong.wgsl")),
+    ("cook_torrance", include_str!("../../shaders/cook_torrance.wgsl")),
     ("exp_negative", include_str!("../../shaders/exp_negative.wgsl")),
     ("facets", include_str!("../../shaders/facets.wgsl")),
     ("flat_index", include_str!("../../shaders/flat_index.wgsl")),
     ("gbuffer", include_str!("../../shaders/gbuffer.wgsl")),
+    ("ggx", include_str!("../../shaders/ggx.wgsl")),
     ("height_march", include_str!("../../shaders/height_march.wgsl")),
+    ("lambertian", include_str!("../../shaders/lambertian.wgsl")),
     ("light_rays", include_str!("../../shaders/light_rays.wgsl")),
     ("lobe_blinn_phong", include_str!("../../shaders/lobe_blinn_phong.wgsl")),
     ("lobe_cook_torrance", include_str!("../../shaders/lobe_cook_torrance.wgsl")),
@@ -52,6 +56,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("visibility_maps", include_str!("../../shaders/visibility_maps.wgsl")),
     ("visibility_slices", include_str!("../../shaders/visibility_slices.wgsl")),
     ("visibility_unblocked", include_str!("../../shaders/visibility_unblocked.wgsl")),
+    ("ward", include_str!("../../shaders/ward.wgsl")),
     ("weights_area", include_str!("../../shaders/weights_area.wgsl")),
     ("weights_rgb", include_str!("../../shaders/weights_rgb.wgsl")),
 ];
