@@ -28,8 +28,9 @@ fn every_combination_of_effects_parses_and_validates() {
     };
     for shadows in ["shadows_none", "shadows_bits"] {
         for tint in ["tint_fixed", "tint_fresnel"] {
-            for shader in ["shade_low_rank", "shade_table"] {
-                check(shader, &[("shadows_none", shadows), ("tint_fixed", tint)]);
+            check("shade_low_rank", &[("shadows_none", shadows), ("tint_fixed", tint)]);
+            for columns in ["column_tints", "column_lobes"] {
+                check("shade_table", &[("shadows_none", shadows), ("tint_fixed", tint), ("column_tints", columns)]);
             }
         }
         for see in ["visibility_unblocked", "visibility_horizons", "visibility_slices", "visibility_maps"] {
@@ -68,6 +69,11 @@ fn what_a_scene_does_not_call_for_is_not_in_the_shader() {
     let rich = biscale::gpu::swapped_source("shade_direct", &all).expect("known files");
     for absent in ["fn turn_of", "horizons[", "array<Patch>", "exp(", "visible["] {
         assert!(!flat.contains(absent) && rich.contains(absent), "{absent}");
+    }
+    let tints = biscale::gpu::swapped_source("shade_table", &[]).expect("known files");
+    let lobes = biscale::gpu::swapped_source("shade_table", &[("column_tints", "column_lobes")]).expect("known files");
+    for absent in ["struct Term", "fn see(", "exp(", "half_exponent"] {
+        assert!(!tints.contains(absent) && lobes.contains(absent), "{absent}");
     }
 }
 

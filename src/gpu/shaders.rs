@@ -13,6 +13,8 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("angles", include_str!("../../shaders/angles.wgsl")),
     ("azimuth_sight", include_str!("../../shaders/azimuth_sight.wgsl")),
     ("blinn_phong", include_str!("../../shaders/blinn_phong.wgsl")),
+    ("column_lobes", include_str!("../../shaders/column_lobes.wgsl")),
+    ("column_tints", include_str!("../../shaders/column_tints.wgsl")),
     ("cook_torrance", include_str!("../../shaders/cook_torrance.wgsl")),
     ("exp_negative", include_str!("../../shaders/exp_negative.wgsl")),
     ("facets", include_str!("../../shaders/facets.wgsl")),

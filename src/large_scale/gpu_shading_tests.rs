@@ -17,6 +17,7 @@ use super::{
 use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
+use crate::filtering::columns::Weight;
 use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, Sight, SumMaterial};
 use crate::gpu::{Gpu, GpuError};
 use crate::pipeline::Pipeline;
@@ -37,7 +38,7 @@ pub(super) fn open_gpu() -> Option<Gpu> {
 }
 
 pub(super) const GROOVES: &str = "{ kind = \"grooves\" }";
-const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
+pub(super) const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
 const RODS: &str = "{ kind = \"rods\" }";
 pub(super) const FLAT: &str = "{ kind = \"flat\" }";
 
@@ -293,27 +294,38 @@ const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 8, differenc
 #[test]
 fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_straight_lines() {
     let Some(gpu) = open_gpu() else { return };
-    for (geometry, brdf, kind, interpolation) in [
-        (GROOVES, LOBES[4], "sphere", Interpolation::Cubic),
-        (PYRAMIDS, LOBES[1], "sphere", Interpolation::Linear),
-        (RODS, LOBES[0], "sphere", Interpolation::Cubic),
+    for (geometry, brdf, interpolation) in [
+        (GROOVES, LOBES[4], Interpolation::Cubic),
+        (PYRAMIDS, LOBES[1], Interpolation::Linear),
+        (RODS, LOBES[0], Interpolation::Cubic),
     ] {
         let exact = effective(&open(geometry, brdf, "direct"));
         let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
-        let what = format!("a table of {geometry} {brdf}");
-        let built = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
-        let of = |table: PairTable| EffectiveBrdf { form: Form::Table(table), base_area: exact.base_area };
-        if built.tints().is_some() {
-            // So coarse a table is too bright at the rim, where the two G-buffers show different pixels.
-            assert_same_shading(&what, &gpu, kind, &of(built.read(interpolation)));
-            continue;
-        }
-        // Facets of few normals: their lobes are summed, or tabulated with the rest.
-        let refused = GpuShading::new(&gpu).unwrap().material(&gpu, &of(built), false).map(drop);
-        assert!(matches!(refused, Err(GpuError::Unsupported(_))), "{what}: {refused:?}");
         let whole = |lights: &[Vec3], o: Vec3, out: &mut [glam::DVec3]| direct.sums(lights, o, |k, sum| out[k] = sum);
-        let table = PairTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap();
-        assert_same_shading(&what, &gpu, kind, &of(table.read(interpolation)));
+        for (what, table) in [
+            ("its columns", PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap()),
+            ("its colours", PairTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap()),
+        ] {
+            let form = Form::Table(table.read(interpolation));
+            // So coarse a table is too bright at the rim, where the two G-buffers show different pixels.
+            let what = format!("a table of {geometry} {brdf}, {what}");
+            assert_same_shading(&what, &gpu, "sphere", &EffectiveBrdf { form, base_area: exact.base_area });
+        }
+    }
+}
+
+#[test]
+fn tables_of_areas_shade_with_the_lobes_of_their_normals_as_the_cpu_does() {
+    let Some(gpu) = open_gpu() else { return };
+    let all = format!("[{}]", LOBES.join(", "));
+    let cases = LOBES.map(|lobe| (PYRAMIDS, lobe)).into_iter().chain([(GROOVES, all.as_str()), (FLAT, LOBES[4])]);
+    for (geometry, brdf) in cases {
+        let exact = effective(&open(geometry, brdf, "direct"));
+        let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let table = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+        assert!(table.weights().iter().all(Weight::is_lobe), "{geometry}");
+        let table = EffectiveBrdf { form: Form::Table(table), base_area: exact.base_area };
+        assert_same_shading(&format!("areas of {geometry} {brdf}"), &gpu, "cup", &table);
     }
 }
 
@@ -327,7 +339,7 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
         (FLAT, LOBES[2], "sphere", false, false),
     ] {
         let mut loaded = open(geometry, brdf, "direct");
-        loaded.scene.effects.picture_table = scene::Switch::On;
+        loaded.scene.effects.picture_table = if tabulated { scene::Switch::On } else { scene::Switch::Off };
         let outcome = Pipeline::new().effective(&loaded).unwrap();
         let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
         assert_eq!(matches!(unseen.sum.sight, Sight::Heights(_)), marched, "{geometry}");
@@ -420,12 +432,15 @@ impl Measured for White {
 #[test]
 fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let Some(gpu) = open_gpu() else { return };
-    let mut facets = crate::geometry::Facets::default();
-    facets.positions.push(Vec3::ZERO);
-    facets.normals.push(Vec3::Z);
-    facets.areas.push(1.0);
-    facets.colors.push(Vec3::ONE);
-    facets.slots.push(0);
+    // Enough of one normal for an area of its own.
+    let facets = crate::geometry::Facets {
+        positions: vec![Vec3::ZERO; 8],
+        normals: vec![Vec3::Z; 8],
+        areas: vec![1.0; 8],
+        colors: vec![Vec3::ONE; 8],
+        slots: vec![0; 8],
+        ..Default::default()
+    };
     let material = |color| SumMaterial {
         brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] },
         color,
@@ -433,13 +448,20 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let form = |color| EffectiveBrdf {
         form: Form::Direct(Direct::new(
             FacetSum::new(&facets, &[0], &[material(color)]).into(),
-            Visibility::Unblocked { facets: 1 }.into(),
+            Visibility::Unblocked { facets: 8 }.into(),
         )),
         base_area: 1.0,
     };
     let mut shading = GpuShading::new(&gpu).unwrap();
     let refused = shading.material(&gpu, &form(Vec3::ONE), false).map(drop);
-    assert!(matches!(&refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured")), "{refused:?}");
+    let is_refused = |refused: &_| matches!(refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured"));
+    assert!(is_refused(&refused), "{refused:?}");
+    let Form::Direct(direct) = form(Vec3::ONE).form else { panic!("not direct") };
+    let table = PairTable::build(&direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+    assert!(table.weights().iter().all(Weight::is_lobe), "areas");
+    let table = EffectiveBrdf { form: Form::Table(table), base_area: 1.0 };
+    let refused = shading.material(&gpu, &table, false).map(drop);
+    assert!(is_refused(&refused), "{refused:?}");
     // Black: it is never asked.
     shading.material(&gpu, &form(Vec3::ZERO), false).map(drop).unwrap();
 }
