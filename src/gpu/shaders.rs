@@ -46,6 +46,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("sum_areas", include_str!("../../shaders/sum_areas.wgsl")),
     ("sum_facets", include_str!("../../shaders/sum_facets.wgsl")),
     ("sum_patches", include_str!("../../shaders/sum_patches.wgsl")),
+    ("sum_seen_areas", include_str!("../../shaders/sum_seen_areas.wgsl")),
     ("table_areas", include_str!("../../shaders/table_areas.wgsl")),
     ("table_ends", include_str!("../../shaders/table_ends.wgsl")),
     ("table_nodes", include_str!("../../shaders/table_nodes.wgsl")),

@@ -335,7 +335,7 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
     for (geometry, brdf, kind, marched, tabulated) in [
         ("{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.2 }", LOBES[4], "cup", true, true),
         ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[0], "sphere", false, true),
-        (PYRAMIDS, LOBES[2], "sphere", false, false),
+        (PYRAMIDS, LOBES[2], "sphere", false, true),
         (FLAT, LOBES[2], "sphere", false, false),
     ] {
         let mut loaded = open(geometry, brdf, "direct");

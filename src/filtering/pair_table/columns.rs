@@ -1,5 +1,6 @@
 //! What a pair table tabulates of a sum over facets, and what it leaves to the query.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -62,6 +63,15 @@ impl Column {
             }
         }
         (columns.len() <= MOST_COLUMNS).then_some(columns)
+    }
+
+    /// Those that it sums over.
+    pub(crate) fn facets(&self, sum: &FacetSum) -> Range<usize> {
+        let group = &sum.groups()[self.group];
+        match (self.part, &group.patches) {
+            (Part::Area(patch), Some(patches)) => patches[patch].range.clone(),
+            _ => group.range.clone(),
+        }
     }
 
     /// The sums of columns at a pair of directions, from the visibilities along them.

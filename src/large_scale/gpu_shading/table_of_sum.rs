@@ -1,7 +1,7 @@
 //! A table for pictures that the device makes of a sum over facets: nothing is read back, and nobody waits.
 //!
-//! The twin of [`PairTable::build`] over all facets. One dispatch adds one lobe over some facets to its columns, a thread a
-//! node; the last one fills in mirror images and the ends of θ_d.
+//! The twin of [`PairTable::build`] over all facets. One dispatch adds one lobe, or the area that is seen, over some
+//! facets to its columns, a thread a node; the last one fills in mirror images and the ends of θ_d.
 
 use std::ops::Range;
 
@@ -156,8 +156,7 @@ impl GpuShading {
     /// The pass of a table which the device itself makes of a sum over facets, and its making.
     ///
     /// # Errors
-    /// [`GpuError::Unsupported`] for measured BRDFs, for visible areas of facets of one normal and for sums of too many parts,
-    /// and what the device refuses.
+    /// [`GpuError::Unsupported`] for measured BRDFs and for sums of too many parts, and what the device refuses.
     pub(super) fn tabulated(
         &mut self,
         gpu: &Gpu,
@@ -226,9 +225,7 @@ impl GpuShading {
                     let (file, added) = blank.of_lobe(sum.groups()[column.group].lobes[lobe].0);
                     (("lobe_lambertian", file), added)
                 }
-                Part::Area(_) => {
-                    return Err(refused("tables of what facets of one normal show are made on the CPU only"));
-                }
+                Part::Area(_) => (("sum_facets", "sum_seen_areas"), blank),
                 Part::Measured { .. } => return Err(refused("measured BRDFs are summed over facets on the CPU only")),
             };
             let swaps = vec![
@@ -239,7 +236,7 @@ impl GpuShading {
             let variant = Variant { shader: "table_of_sum", entry_point: "add", swaps, constants: Vec::new() };
             let pipeline = self.pipeline_over(gpu, variant, &layouts.each_ref())?;
             let nodes = self.nodes_group(gpu, shape.nodes(&columns_of(columns, column)), &angles, values)?;
-            for range in pieces(sum.groups()[column.group].range.clone(), shape.most_facets(gpu)) {
+            for range in pieces(column.facets(sum), shape.most_facets(gpu)) {
                 let groups = vec![nodes.clone(), self.sum_group(gpu, shared, added.over(&range))?];
                 steps.push(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(shape.grid.nodes())? });
             }
