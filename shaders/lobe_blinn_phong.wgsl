@@ -1,20 +1,9 @@
-// (e+8)/(8π) (n·h)^e (n·i)(n·o), the power as exp(e/2 ln(1-sin²)); shape is e/2.
+// The lobe of a sum over facets: Blinn-Phong.
 
-//!import exp_negative
-//!import lobe_input
+//!import facets
+//!import blinn_phong
 //!import tint_fixed
 
-// ln(1 - s) for 0 <= s < 1 with an error relative to s: exact where huge exponents multiply it.
-fn ln_one_minus(s: f32) -> f32 {
-    if s > 0.5 {
-        return log(1.0 - s);
-    }
-    let r = -s / (2.0 - s);
-    let r2 = r * r;
-    return 2.0 * r * (1.0 + r2 * (1.0 / 3.0 + r2 * (1.0 / 5.0 + r2 * (1.0 / 7.0 + r2 * (1.0 / 9.0 + r2 * (1.0 / 11.0))))));
-}
-
 fn lobe(n: Seen, pair: Pair) -> f32 {
-    let power = exp_negative(min(sum.shape * ln_one_minus(min(n.sin2, 0.999999)), 0.0));
-    return sum.scale * power * n.n_dot_i * n.n_dot_o;
+    return blinn_phong(n, sum.shape, sum.scale);
 }

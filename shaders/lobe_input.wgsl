@@ -1,7 +1,5 @@
 // What lobes read: the vectors of a pair of directions and what they make with a normal (src/simd/lobes.rs).
 
-//!import facets
-
 struct Pair {
     i: vec3f,
     o: vec3f,

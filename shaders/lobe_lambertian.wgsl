@@ -1,8 +1,8 @@
-// (n·i)(n·o)/π
+// The lobe of a sum over facets: Lambertian.
 
-//!import lobe_input
+//!import lambertian
 //!import tint_fixed
 
 fn lobe(n: Seen, pair: Pair) -> f32 {
-    return n.n_dot_i * n.n_dot_o * 0.318309886183791;
+    return lambertian(n);
 }

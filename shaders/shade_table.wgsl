@@ -4,7 +4,7 @@
 //!import shading_points
 //!import shadows_none
 //!import polar_grid
-//!import tint_row
+//!import column_tints
 
 // Fours of columns a node, and whether θ_d is read by a cubic.
 override FOURS: u32 = 1u;
@@ -22,8 +22,6 @@ struct Table {
 }
 
 @group(1) @binding(0) var<uniform> table: Table;
-// Four for each of the fours, black where there are fewer.
-@group(1) @binding(1) var<storage, read> columns: array<Tint>;
 // [θ_h][φ_h][φ_d][θ_d][four], one step of θ_d more at either end.
 @group(1) @binding(2) var<storage, read> values: array<vec4f>;
 // a_v(o) / cos θ_o.
@@ -137,7 +135,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
         for (var four = 0u; four < FOURS; four++) {
             let sums = four_at(&place, four);
             for (var c = 0u; c < 4u; c++) {
-                value += tint_at(columns[4u * four + c], place.i_dot_h) * sums[c];
+                value += column_weight(4u * four + c, i, o, place.i_dot_h) * sums[c];
             }
         }
         total += lights[k].irradiance * value;

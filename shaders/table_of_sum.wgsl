@@ -1,12 +1,12 @@
-// Adds the sum of one lobe over some facets to its columns of a table, at every node that is no image of another: the twin
-// of PairTable::build (src/filtering/pair_table). A thread a node; its neighbours read the same facets at the same time.
+// Adds a sum over some facets to its columns of a table, at every node that is no image of another: the twin of
+// PairTable::build (src/filtering/pair_table). A thread a node; its neighbours read the same facets at the same time.
 
 //!import table_nodes
 //!import flat_index
 //!import vectors
 //!import visibility_unblocked
 //!import weights_area
-//!import lobe_lambertian
+//!import lobe_input
 //!import sum_facets
 
 fn lifted(d: vec3f) -> vec3f {

@@ -28,13 +28,19 @@ fn every_combination_of_effects_parses_and_validates() {
     };
     for shadows in ["shadows_none", "shadows_bits"] {
         for tint in ["tint_fixed", "tint_fresnel"] {
-            for shader in ["shade_low_rank", "shade_table"] {
-                check(shader, &[("shadows_none", shadows), ("tint_fixed", tint)]);
+            check("shade_low_rank", &[("shadows_none", shadows), ("tint_fixed", tint)]);
+            for columns in ["column_tints", "column_lobes"] {
+                check("shade_table", &[("shadows_none", shadows), ("tint_fixed", tint), ("column_tints", columns)]);
             }
         }
         for see in ["visibility_unblocked", "visibility_horizons", "visibility_slices", "visibility_maps"] {
             check("projected_area", &[("visibility_unblocked", see)]);
             check("table_areas", &[("visibility_unblocked", see)]);
+            for weights in ["weights_area", "weights_rgb"] {
+                let swaps =
+                    [("visibility_unblocked", see), ("weights_area", weights), ("sum_facets", "sum_seen_areas")];
+                check("table_of_sum", &swaps);
+            }
             for lobe in ["lobe_lambertian", "lobe_blinn_phong", "lobe_cook_torrance", "lobe_ward", "lobe_ggx"] {
                 for weights in ["weights_area", "weights_rgb"] {
                     let swaps = [("visibility_unblocked", see), ("lobe_lambertian", lobe), ("weights_area", weights)];
@@ -68,6 +74,17 @@ fn what_a_scene_does_not_call_for_is_not_in_the_shader() {
     let rich = biscale::gpu::swapped_source("shade_direct", &all).expect("known files");
     for absent in ["fn turn_of", "horizons[", "array<Patch>", "exp(", "visible["] {
         assert!(!flat.contains(absent) && rich.contains(absent), "{absent}");
+    }
+    let tints = biscale::gpu::swapped_source("shade_table", &[]).expect("known files");
+    let lobes = biscale::gpu::swapped_source("shade_table", &[("column_tints", "column_lobes")]).expect("known files");
+    for absent in ["struct Term", "fn see(", "exp(", "half_exponent"] {
+        assert!(!tints.contains(absent) && lobes.contains(absent), "{absent}");
+    }
+    let areas = [("sum_facets", "sum_seen_areas")];
+    let areas = biscale::gpu::swapped_source("table_of_sum", &areas).expect("known files");
+    let lobes = biscale::gpu::swapped_source("table_of_sum", &[]).expect("known files");
+    for absent in ["fn lobe(", "fn tint(", "is_lit(seen)"] {
+        assert!(!areas.contains(absent) && lobes.contains(absent), "{absent}");
     }
 }
 

@@ -69,15 +69,28 @@ impl ToPicture {
                 times.extend([upload, ("visibility_and_product", large.product_ms)]);
                 (times, large)
             }
-            _ => {
+            (None, renderer) => {
                 let outcome = pipeline.effective(loaded)?;
                 let reads = outcome.for_pictures(&cancel)?;
-                let large = render(&stage.input(&*reads.brdf, *size, 1, &background))?.times;
                 *form = reads.brdf.form.describe();
+                let input = stage.input(&*reads.brdf, *size, 1, &background);
                 let mut times = outcome.times;
                 times.push(("picture_table", reads.ms));
+                let worn = renderer.as_mut().map(|(gpu, renderer, view)| {
+                    let start = Instant::now();
+                    renderer.set_brdf(gpu, &reads.brdf).map(|()| (gpu, renderer, view, start.elapsed()))
+                });
+                let large = match worn {
+                    Some(Ok((gpu, renderer, view, upload))) => {
+                        times.push(("upload", upload.as_secs_f64() * 1e3));
+                        renderer.show(gpu, &input, &ToneMap::new(&stage.camera)?, view, &cancel)?
+                    }
+                    None | Some(Err(GpuError::Unsupported(_))) => render(&input)?.times,
+                    Some(Err(error)) => return Err(Error::from(error).into()),
+                };
                 (times, large)
             }
+            (Some(_), None) => return Err(Error::failed("a tile for a device that is not there").into()),
         };
         times.extend([("g_buffer", large.gbuffer_ms), ("shadows", large.shadows_ms), ("shading", large.shading_ms)]);
         Ok(times)

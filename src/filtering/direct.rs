@@ -37,6 +37,11 @@ impl Direct {
         Self { sum, visibility, few }
     }
 
+    /// Whether normals are so few that pictures sum over few facets.
+    pub fn has_few(&self) -> bool {
+        self.few.is_some()
+    }
+
     /// Hands the visibilities along `i` and `o` of all facets to `work`.
     pub(crate) fn with_seen<T>(&self, i: Vec3, o: Vec3, work: impl FnOnce(&[f32], &[f32]) -> T) -> T {
         SCRATCH.with_borrow_mut(|scratch| {

@@ -28,7 +28,7 @@ pub use effective_brdf::{EffectiveBrdf, Form};
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use forced::mean_colors;
 pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
-pub(crate) use pair_table::LobeColumn;
+pub(crate) use pair_table::columns;
 pub use pair_table::{Nodes, PairTable, TableContent};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use tint::Tint;

@@ -17,7 +17,8 @@ use super::{
 use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
 use crate::cancel::Cancel;
 use crate::directions::UpperPairs;
-use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, Sight, SumMaterial};
+use crate::filtering::columns::Weight;
+use crate::filtering::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, SumMaterial};
 use crate::gpu::{Gpu, GpuError};
 use crate::pipeline::Pipeline;
 use crate::scene::{self, LoadedScene};
@@ -37,8 +38,8 @@ pub(super) fn open_gpu() -> Option<Gpu> {
 }
 
 pub(super) const GROOVES: &str = "{ kind = \"grooves\" }";
-const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
-const RODS: &str = "{ kind = \"rods\" }";
+pub(super) const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
+pub(super) const RODS: &str = "{ kind = \"rods\" }";
 pub(super) const FLAT: &str = "{ kind = \"flat\" }";
 
 pub(super) fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
@@ -74,7 +75,12 @@ impl Studio {
         Self { mesh, occluder, lights: lights.directional, camera: scene::Camera::default() }
     }
 
-    fn input<'a>(&'a self, brdf: &'a EffectiveBrdf, side: usize, background: &'a Background) -> RenderInput<'a> {
+    pub(super) fn input<'a>(
+        &'a self,
+        brdf: &'a EffectiveBrdf,
+        side: usize,
+        background: &'a Background,
+    ) -> RenderInput<'a> {
         RenderInput {
             mesh: &self.mesh,
             occluder: self.occluder.as_ref(),
@@ -173,7 +179,7 @@ pub(super) fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
     (all[all.len() * 99 / 100], all[all.len() - 1], (mean(cpu) - mean(gpu)).abs().max_element() / level)
 }
 
-fn assert_same_picture(what: &str, [cpu, gpu]: &[Picture; 2]) {
+pub(super) fn assert_same_picture(what: &str, [cpu, gpu]: &[Picture; 2]) {
     let (most, worst, means) = distances(&cpu.pixels, &gpu.pixels);
     eprintln!("{what}: 99 % of the pixels within {most:.1e}, largest {worst:.1e}, means {means:.1e}");
     assert!(most < PIXEL_TOLERANCE && means < MEAN_TOLERANCE, "{what}: 99 % within {most}, means {means}");
@@ -293,133 +299,39 @@ const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 8, differenc
 #[test]
 fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_straight_lines() {
     let Some(gpu) = open_gpu() else { return };
-    for (geometry, brdf, kind, interpolation) in [
-        (GROOVES, LOBES[4], "sphere", Interpolation::Cubic),
-        (PYRAMIDS, LOBES[1], "sphere", Interpolation::Linear),
-        (RODS, LOBES[0], "sphere", Interpolation::Cubic),
+    for (geometry, brdf, interpolation) in [
+        (GROOVES, LOBES[4], Interpolation::Cubic),
+        (PYRAMIDS, LOBES[1], Interpolation::Linear),
+        (RODS, LOBES[0], Interpolation::Cubic),
     ] {
         let exact = effective(&open(geometry, brdf, "direct"));
         let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
-        let what = format!("a table of {geometry} {brdf}");
-        let built = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
-        let of = |table: PairTable| EffectiveBrdf { form: Form::Table(table), base_area: exact.base_area };
-        if built.tints().is_some() {
-            // So coarse a table is too bright at the rim, where the two G-buffers show different pixels.
-            assert_same_shading(&what, &gpu, kind, &of(built.read(interpolation)));
-            continue;
-        }
-        // Facets of few normals: their lobes are summed, or tabulated with the rest.
-        let refused = GpuShading::new(&gpu).unwrap().material(&gpu, &of(built), false).map(drop);
-        assert!(matches!(refused, Err(GpuError::Unsupported(_))), "{what}: {refused:?}");
         let whole = |lights: &[Vec3], o: Vec3, out: &mut [glam::DVec3]| direct.sums(lights, o, |k, sum| out[k] = sum);
-        let table = PairTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap();
-        assert_same_shading(&what, &gpu, kind, &of(table.read(interpolation)));
-    }
-}
-
-#[test]
-fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture() {
-    let Some(gpu) = open_gpu() else { return };
-    for (geometry, brdf, kind, sight, tabulated) in [
-        (
-            "{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.2 }",
-            LOBES[4],
-            "cup",
-            "marched",
-            true,
-        ),
-        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[0], "sphere", "held", true),
-        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[4], "sphere", "drawn", true),
-        (PYRAMIDS, LOBES[2], "sphere", "held", false),
-        (FLAT, LOBES[2], "sphere", "held", false),
-    ] {
-        let mut loaded = open(geometry, brdf, "direct");
-        loaded.scene.effects.picture_table = scene::Switch::On;
-        if sight == "drawn" {
-            // Else only a graphics processor draws maps.
-            let quality = &mut loaded.scene.quality;
-            (quality.visibility, quality.backend) = (Some("maps".to_owned()), "gpu".to_owned());
-            (quality.azimuths, quality.rings) = (Some(10), Some(5));
+        for (what, table) in [
+            ("its columns", PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap()),
+            ("its colours", PairTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap()),
+        ] {
+            let form = Form::Table(table.read(interpolation));
+            // So coarse a table is too bright at the rim, where the two G-buffers show different pixels.
+            let what = format!("a table of {geometry} {brdf}, {what}");
+            assert_same_shading(&what, &gpu, "sphere", &EffectiveBrdf { form, base_area: exact.base_area });
         }
-        let outcome = Pipeline::new().effective(&loaded).unwrap();
-        let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
-        let found = match &unseen.sum.sight {
-            Sight::Seen(_) => "held",
-            Sight::Heights(_) => "marched",
-            Sight::Maps(_) => "drawn",
-        };
-        assert_eq!(found, sight, "{geometry}");
-        let (studio, background) = (Studio::of(kind), Background::Uniform(Vec3::ZERO));
-        let pictured = match tabulated {
-            true => {
-                let Form::Direct(direct) = &outcome.brdf.form else { panic!("{geometry}: not direct") };
-                let nodes = Nodes { mirrors: unseen.sum.mirrors, ..Nodes::all(unseen.sum.grid.unwrap()) };
-                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
-                outcome.brdf.with_direct_form(Form::Table(table.read(unseen.sum.interpolation)))
-            }
-            false => outcome.brdf.as_ref().clone(),
-        };
-        let input = studio.input(&pictured, 64, &background);
-        let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder).unwrap();
-        renderer.set_tile(&gpu, &unseen.sum).unwrap();
-        // One submission, as on a graphics processor. The first picture makes what the second only reads.
-        renderer.by_stage = false;
-        let first = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
-        let again = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
-        assert_eq!(first, again, "{geometry}");
-        assert_same_picture(geometry, &[render(&input).unwrap().picture, first]);
     }
-    let mut glowing = open(PYRAMIDS, LOBES[0], "direct");
-    glowing.scene.effects.interreflection = scene::Switch::On;
-    assert!(Pipeline::new().unseen(&glowing).unwrap().is_none(), "light between facets is the CPU's");
 }
 
 #[test]
-fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
+fn tables_of_areas_shade_with_the_lobes_of_their_normals_as_the_cpu_does() {
     let Some(gpu) = open_gpu() else { return };
-    let brdf = effective(&open(PYRAMIDS, LOBES[4], "direct"));
-    let studio = Studio::of("cup");
-    let input = RenderInput { samples_per_side: 2, ..studio.input(&brdf, 50, &Background::Wall) };
-    let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
-    let bands = |renderer: &GpuRenderer| renderer.room.as_ref().unwrap().bands.len();
-    let whole = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
-    assert_eq!(bands(&renderer), 1);
-    // Three rows at a time, the last two by themselves.
-    renderer.at_once = renderer.at_once / bands(&renderer) as u64 / 1000;
-    let cut = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
-    assert!(bands(&renderer) > 10, "{}", bands(&renderer));
-    assert_eq!((&cut.picture, cut.points), (&whole.picture, whole.points));
-    // As on a graphics processor: all stages of some bands together.
-    renderer.by_stage = !renderer.by_stage;
-    let together = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
-    assert_eq!((&together.picture, together.points), (&whole.picture, whole.points));
-    // Silhouettes may lie on the other side of a sample.
-    let points = render(&input).unwrap().points;
-    assert!(cut.points.abs_diff(points) * 100 < points, "{} and the CPU's {points}", cut.points);
-}
-
-#[test]
-fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
-    let Some(gpu) = open_gpu() else { return };
-    let brdf = effective(&open(RODS, LOBES[4], "direct"));
-    let studio = Studio::of("cup");
-    let input = studio.input(&brdf, 96, &Background::Wall);
-    let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
-    let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
-    let cancel = Cancel::default();
-    cancel.set();
-    assert!(matches!(renderer.render(&gpu, &input, &cancel), Err(crate::Error::Cancelled)));
-    // Set while the device is at work: given up or, where it was quicker, done.
-    let cancel = Cancel::default();
-    let later = cancel.clone();
-    let setter = std::thread::spawn(move || {
-        std::thread::sleep(std::time::Duration::from_millis(20));
-        later.set();
-    });
-    let given_up = renderer.render(&gpu, &input, &cancel);
-    setter.join().unwrap();
-    assert!(matches!(&given_up, Err(crate::Error::Cancelled) | Ok(_)), "{given_up:?}");
-    assert_eq!(renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture.pixels, before.pixels);
+    let all = format!("[{}]", LOBES.join(", "));
+    let cases = LOBES.map(|lobe| (PYRAMIDS, lobe)).into_iter().chain([(GROOVES, all.as_str()), (FLAT, LOBES[4])]);
+    for (geometry, brdf) in cases {
+        let exact = effective(&open(geometry, brdf, "direct"));
+        let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let table = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+        assert!(table.weights().iter().all(Weight::is_lobe), "{geometry}");
+        let table = EffectiveBrdf { form: Form::Table(table), base_area: exact.base_area };
+        assert_same_shading(&format!("areas of {geometry} {brdf}"), &gpu, "cup", &table);
+    }
 }
 
 #[derive(Debug, Default)]
@@ -443,12 +355,15 @@ impl Measured for White {
 #[test]
 fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let Some(gpu) = open_gpu() else { return };
-    let mut facets = crate::geometry::Facets::default();
-    facets.positions.push(Vec3::ZERO);
-    facets.normals.push(Vec3::Z);
-    facets.areas.push(1.0);
-    facets.colors.push(Vec3::ONE);
-    facets.slots.push(0);
+    // Enough of one normal for an area of its own.
+    let facets = crate::geometry::Facets {
+        positions: vec![Vec3::ZERO; 8],
+        normals: vec![Vec3::Z; 8],
+        areas: vec![1.0; 8],
+        colors: vec![Vec3::ONE; 8],
+        slots: vec![0; 8],
+        ..Default::default()
+    };
     let material = |color| SumMaterial {
         brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] },
         color,
@@ -456,13 +371,20 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let form = |color| EffectiveBrdf {
         form: Form::Direct(Direct::new(
             FacetSum::new(&facets, &[0], &[material(color)]).into(),
-            Visibility::Unblocked { facets: 1 }.into(),
+            Visibility::Unblocked { facets: 8 }.into(),
         )),
         base_area: 1.0,
     };
     let mut shading = GpuShading::new(&gpu).unwrap();
     let refused = shading.material(&gpu, &form(Vec3::ONE), false).map(drop);
-    assert!(matches!(&refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured")), "{refused:?}");
+    let is_refused = |refused: &_| matches!(refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured"));
+    assert!(is_refused(&refused), "{refused:?}");
+    let Form::Direct(direct) = form(Vec3::ONE).form else { panic!("not direct") };
+    let table = PairTable::build(&direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+    assert!(table.weights().iter().all(Weight::is_lobe), "areas");
+    let table = EffectiveBrdf { form: Form::Table(table), base_area: 1.0 };
+    let refused = shading.material(&gpu, &table, false).map(drop);
+    assert!(is_refused(&refused), "{refused:?}");
     // Black: it is never asked.
     shading.material(&gpu, &form(Vec3::ZERO), false).map(drop).unwrap();
 }

@@ -17,6 +17,8 @@ mod gpu_gbuffer;
 mod gpu_light_rays;
 pub mod gpu_picture;
 pub mod gpu_render;
+#[cfg(test)]
+mod gpu_render_tests;
 mod gpu_shading;
 #[cfg(test)]
 mod gpu_shading_tests;

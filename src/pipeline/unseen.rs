@@ -28,7 +28,8 @@ impl Pipeline {
         let mut times = StageTimes::new();
         let prepared = self.prepare(loaded, &mut times)?;
         let Prepared { sum, plan, settings, .. } = &prepared;
-        if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
+        let few = sum.has_few_normals() && matches!(plan.route, Route::HeightMarch | Route::HorizonScan);
+        if few || settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
             return Ok(None);
         }
         let (mesh, facets) = (&prepared.shape.mesh, prepared.facets.clone());

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use biscale::filtering::EffectiveBrdf;
+use biscale::filtering::{EffectiveBrdf, Form};
 use biscale::gpu::{Gpu, GpuError, Tier};
 use biscale::large_scale::shadow::Occluder;
 use biscale::large_scale::{GpuRenderer, ObjectMesh};
@@ -168,9 +168,10 @@ impl OnDevice {
             Worn::Unseen(tile) => return Ok(self.takes(subject, Wears::Tile(tile.clone()))?.then_some(0.0)),
         };
         let mut table_ms = 0.0;
-        // A graphics processor has a draft's sums done before the CPU has a table.
+        // A graphics processor has a draft's sums done before the CPU has a table; few facets of few normals are picked at once.
+        let few = matches!(outcome.brdf.direct_form(), Form::Direct(direct) if direct.has_few());
         let pictured = match outcome.pictured() {
-            None if !self.is_fast || subject.shot.settle => {
+            None if few || !self.is_fast || subject.shot.settle => {
                 let pictured = outcome.for_pictures(cancel)?;
                 table_ms = pictured.ms;
                 Some(pictured.brdf)

@@ -1,5 +1,6 @@
 //! What a pair table tabulates of a sum over facets, and what it leaves to the query.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -11,15 +12,15 @@ use crate::simd::PairVectors;
 
 /// One scalar sum over facets of one group.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Column {
-    group: usize,
-    part: Part,
+pub(crate) struct Column {
+    pub(crate) group: usize,
+    pub(crate) part: Part,
     /// Which colour weights of the facets; `None` where they are all the same.
-    channel: Option<usize>,
+    pub(crate) channel: Option<usize>,
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Part {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
     /// A lobe, by number, summed over all facets.
     Lobe(usize),
     /// A colour of a measured BRDF, summed over all facets.
@@ -36,7 +37,7 @@ const MOST_NORMALS: usize = 8;
 
 impl Column {
     /// The columns of a sum; `None` where there are too many.
-    pub(super) fn of(sum: &FacetSum) -> Option<Vec<Self>> {
+    pub(crate) fn of(sum: &FacetSum) -> Option<Vec<Self>> {
         let mut columns = Vec::new();
         for (group, facets) in sum.groups().iter().enumerate() {
             if facets.is_black {
@@ -64,12 +65,12 @@ impl Column {
         (columns.len() <= MOST_COLUMNS).then_some(columns)
     }
 
-    /// Group, lobe and channel of a column that is one lobe over all facets; else what it is.
-    pub(super) fn lobe(&self) -> Result<(usize, usize, Option<usize>), &'static str> {
-        match self.part {
-            Part::Lobe(lobe) => Ok((self.group, lobe, self.channel)),
-            Part::Measured { .. } => Err("measured BRDFs are summed over facets on the CPU only"),
-            Part::Area(_) => Err("tables of what facets of one normal show are made on the CPU only"),
+    /// Those that it sums over.
+    pub(crate) fn facets(&self, sum: &FacetSum) -> Range<usize> {
+        let group = &sum.groups()[self.group];
+        match (self.part, &group.patches) {
+            (Part::Area(patch), Some(patches)) => patches[patch].range.clone(),
+            _ => group.range.clone(),
         }
     }
 
@@ -105,7 +106,7 @@ impl Column {
     }
 
     /// What multiplies the column at a query.
-    pub(super) fn weight(&self, sum: &FacetSum) -> Weight {
+    pub(crate) fn weight(&self, sum: &FacetSum) -> Weight {
         let group = &sum.groups()[self.group];
         let color = group.color * self.channel.map_or(Vec3::ONE, |channel| Vec3::AXES[channel]);
         match self.part {
@@ -123,7 +124,7 @@ impl Column {
 
 /// What multiplies a column at a query.
 #[derive(Debug, Clone)]
-pub(super) enum Weight {
+pub(crate) enum Weight {
     Tint(Tint),
     /// All that facets of one normal reflect, times a colour.
     Lobes {
@@ -135,15 +136,13 @@ pub(super) enum Weight {
 }
 
 impl Weight {
-    pub(super) fn is_lobe(&self) -> bool {
+    pub(crate) fn is_lobe(&self) -> bool {
         matches!(self, Self::Lobes { .. })
     }
 
-    pub(super) fn tint(&self) -> Option<&Tint> {
-        match self {
-            Self::Tint(tint) => Some(tint),
-            Self::Lobes { .. } => None,
-        }
+    /// The planes of a tile that mirror its table: facets of one normal are not what their mirror image is.
+    pub(crate) fn mirrors(weights: &[Self], of_tile: [bool; 2]) -> [bool; 2] {
+        if weights.iter().any(Self::is_lobe) { [false; 2] } else { of_tile }
     }
 
     #[inline]

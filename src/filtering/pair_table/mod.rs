@@ -5,10 +5,9 @@
 //! where few normals occur, the visible area of the facets of one normal, whose lobe is then a part of the exact weight
 //! `w_c` (DESIGN.md, Sec. 4, "Interpolate only what is smooth"). Colours are in the weights: editing them keeps the table.
 
-mod columns;
+pub(crate) mod columns;
 mod content;
 mod facet_columns;
-mod lobe_columns;
 
 use std::sync::Arc;
 
@@ -17,7 +16,6 @@ use rayon::prelude::*;
 
 use self::columns::{Column, Weight};
 pub use self::content::TableContent;
-pub(crate) use self::lobe_columns::LobeColumn;
 use super::facet_sum::FacetSum;
 use super::{Direct, Interpolation, Tint};
 use crate::accuracy::Pair;
@@ -105,8 +103,7 @@ impl PairTable {
     pub fn build(direct: &Direct, nodes: Nodes, cancel: &Cancel) -> Result<Option<Self>> {
         let Some(columns) = Column::of(&direct.sum) else { return Ok(None) };
         let weights: Vec<Weight> = columns.iter().map(|column| column.weight(&direct.sum)).collect();
-        // Facets of one normal are not what their mirror image is.
-        let mirrors = if weights.iter().any(Weight::is_lobe) { [false; 2] } else { nodes.mirrors };
+        let mirrors = Weight::mirrors(&weights, nodes.mirrors);
         let (nodes, facets) = (Nodes { mirrors, ..nodes }, nodes.facets);
         let area = |o: Vec3| direct.sums(&[], o, |_, _| {});
         let sampled = |h: Vec3| facets.and_then(|count| direct.about(h, count));
@@ -237,9 +234,9 @@ impl PairTable {
         Arc::ptr_eq(&self.values, &other.values)
     }
 
-    /// What multiplies each column; `None` where a weight is more than a tint.
-    pub fn tints(&self) -> Option<Vec<&Tint>> {
-        self.weights.iter().map(Weight::tint).collect()
+    /// What multiplies each column at a query.
+    pub(crate) fn weights(&self) -> &[Weight] {
+        &self.weights
     }
 
     /// Fours of columns a node, black ones after the last.
@@ -250,6 +247,11 @@ impl PairTable {
     /// `[θ_h][φ_h][φ_d][θ_d][four]`, with one step of θ_d more at either end than the grid has.
     pub fn values(&self) -> &[Vec4] {
         &self.values
+    }
+
+    /// Where a table knows the projected area.
+    pub(crate) fn area_grid() -> PolarGrid {
+        PolarGrid::new(AREA_GRID[0], AREA_GRID[1])
     }
 
     /// `a_v(o) / cos θ_o` and the directions it stands on.

@@ -3,6 +3,7 @@
 //! A material becomes a list of compute passes over points and slices of the lights. Each pass is compiled for what it
 //! meets (a lobe, a kind of visibility, shadows or none): an effect that a scene does not call for leaves no instruction.
 
+mod column_terms;
 mod direct;
 mod low_rank;
 mod seen;

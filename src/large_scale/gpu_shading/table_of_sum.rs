@@ -1,18 +1,20 @@
 //! A table for pictures that the device makes of a sum over facets: nothing is read back, and nobody waits.
 //!
-//! The twin of [`PairTable::build`] over all facets. One dispatch adds one lobe over some facets to its columns, a thread a
-//! node; the last one fills in mirror images and the ends of θ_d.
+//! The twin of [`PairTable::build`] over all facets. One dispatch adds one lobe, or the area that is seen, over some
+//! facets to its columns, a thread a node; the last one fills in mirror images and the ends of θ_d.
 
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::column_terms::ColumnTerms;
 use super::direct::{SOFTWARE_FACETS, Shared, Sum, pieces};
 use super::seen::Seen;
 use super::table::Held;
 use super::{GpuShading, MAX_GROUPS, Padded, Pass, THREADS, Variant, padded};
 use crate::directions::{PolarGrid, UpperPairs};
-use crate::filtering::{FacetSum, Interpolation, LobeColumn, PairTable};
+use crate::filtering::columns::{Column, Part, Weight};
+use crate::filtering::{FacetSum, Interpolation, PairTable};
 use crate::gpu::{Gpu, GpuError, Tier};
 
 /// Lobes of one dispatch: a slow device takes a fifth of a second, far from its driver's watchdog.
@@ -135,17 +137,20 @@ fn workgroups(threads: usize) -> Result<[u32; 2], GpuError> {
 }
 
 /// The columns that one sum over facets fills: one, or one for each channel.
-fn columns_of(columns: &[LobeColumn], sum: &LobeColumn) -> Vec<u32> {
-    let same = |column: &LobeColumn| (column.group, column.lobe) == (sum.group, sum.lobe);
+fn columns_of(columns: &[Column], sum: &Column) -> Vec<u32> {
+    let same = |column: &Column| (column.group, column.part) == (sum.group, sum.part);
     columns.iter().zip(0..).filter(|(column, _)| same(column)).map(|(_, place)| place).collect()
+}
+
+fn refused(reason: &str) -> GpuError {
+    GpuError::Unsupported(reason.to_owned())
 }
 
 impl GpuShading {
     /// The pass of a table which the device itself makes of a sum over facets, and its making.
     ///
     /// # Errors
-    /// [`GpuError::Unsupported`] where the table would hold other things than lobes: those of measured BRDFs, or visible areas
-    /// of facets of one normal. And what the device refuses.
+    /// [`GpuError::Unsupported`] for measured BRDFs and for sums of too many parts, and what the device refuses.
     pub(super) fn tabulated(
         &mut self,
         gpu: &Gpu,
@@ -153,21 +158,16 @@ impl GpuShading {
         (grid, mirrors, interpolation): (UpperPairs, [bool; 2], Interpolation),
         shadowed: bool,
     ) -> Result<(Pass, Making), GpuError> {
-        let refused = |reason: &str| GpuError::Unsupported(reason.to_owned());
-        let columns = PairTable::lobe_columns(sum).map_err(refused)?;
-        let shape = Shape { grid, mirrors, fours: columns.len().div_ceil(4) };
+        let columns = Column::of(sum).ok_or_else(|| refused("the sum has too many parts for a table to pay"))?;
+        let weights: Vec<Weight> = columns.iter().map(|column| column.weight(sum)).collect();
+        let terms = ColumnTerms::of(&weights)?;
+        let shape = Shape { grid, mirrors: Weight::mirrors(&weights, mirrors), fours: terms.fours };
         let directions = PairTable::area_grid();
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
         let values = gpu.buffer("table", 4 * shape.numbers() as u64, usage)?;
         let areas = gpu.buffer("projected areas", 4 * directions.len() as u64, usage)?;
-        let held = Held {
-            grid,
-            interpolation,
-            tints: columns.iter().map(|column| &column.tint).collect(),
-            directions,
-            values: values.clone(),
-            areas: areas.clone(),
-        };
+        let held =
+            Held { grid, interpolation, columns: terms, directions, values: values.clone(), areas: areas.clone() };
         let pass = self.held_table_pass(gpu, held, shadowed)?;
         let shared = Shared::of(gpu, sum, seen)?;
         let of = (sum, seen, &shared);
@@ -203,7 +203,7 @@ impl GpuShading {
         &mut self,
         gpu: &Gpu,
         (sum, seen, shared): (&FacetSum, &Seen, &Shared),
-        columns: &[LobeColumn],
+        columns: &[Column],
         shape: Shape,
         values: &wgpu::Buffer,
     ) -> Result<Vec<Step>, GpuError> {
@@ -213,17 +213,24 @@ impl GpuShading {
         let mut steps = Vec::new();
         // The first channel stands for all.
         for column in columns.iter().filter(|column| column.channel.is_none_or(|channel| channel == 0)) {
-            let group = &sum.groups()[column.group];
-            let (lobe, added) = Sum::blank(sum, seen).of_lobe(group.lobes[column.lobe].0);
+            let blank = Sum::blank(sum, seen);
+            let (summed, added) = match column.part {
+                Part::Lobe(lobe) => {
+                    let (file, added) = blank.of_lobe(sum.groups()[column.group].lobes[lobe].0);
+                    (("lobe_lambertian", file), added)
+                }
+                Part::Area(_) => (("sum_facets", "sum_seen_areas"), blank),
+                Part::Measured { .. } => return Err(refused("measured BRDFs are summed over facets on the CPU only")),
+            };
             let swaps = vec![
                 ("visibility_unblocked", see),
-                ("lobe_lambertian", lobe),
+                summed,
                 ("weights_area", if column.channel.is_some() { "weights_rgb" } else { "weights_area" }),
             ];
             let variant = Variant { shader: "table_of_sum", entry_point: "add", swaps, constants: Vec::new() };
             let pipeline = self.pipeline_over(gpu, variant, &layouts.each_ref())?;
             let nodes = self.nodes_group(gpu, shape.nodes(&columns_of(columns, column)), &angles, values)?;
-            for range in pieces(group.range.clone(), shape.most_facets(gpu)) {
+            for range in pieces(column.facets(sum), shape.most_facets(gpu)) {
                 let groups = vec![nodes.clone(), self.sum_group(gpu, shared, added.over(&range))?];
                 steps.push(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(shape.grid.nodes())? });
             }

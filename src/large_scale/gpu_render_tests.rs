@@ -1,0 +1,119 @@
+//! Whole pictures on the device: in bands, given up, and of tiles whose visibility and product it makes.
+
+use glam::Vec3;
+
+use super::gpu_render::GpuRenderer;
+use super::gpu_shading_tests::{FLAT, LOBES, PYRAMIDS, RODS, Studio, assert_same_picture, effective, open, open_gpu};
+use super::shading::Background;
+use super::{RenderInput, render};
+use crate::cancel::Cancel;
+use crate::filtering::{Form, Nodes, PairTable, Sight};
+use crate::pipeline::Pipeline;
+use crate::scene;
+
+#[test]
+fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture() {
+    let Some(gpu) = open_gpu() else { return };
+    for (geometry, brdf, kind, sight, tabulated) in [
+        (
+            "{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.2 }",
+            LOBES[4],
+            "cup",
+            "marched",
+            true,
+        ),
+        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[0], "sphere", "held", true),
+        ("{ kind = \"weave\", pattern = \"plain\" }", LOBES[4], "sphere", "drawn", true),
+        (RODS, LOBES[4], "sphere", "held", true),
+        (FLAT, LOBES[2], "sphere", "held", false),
+    ] {
+        let mut loaded = open(geometry, brdf, "direct");
+        loaded.scene.effects.picture_table = if tabulated { scene::Switch::On } else { scene::Switch::Off };
+        if sight == "drawn" {
+            // Else only a graphics processor draws maps.
+            let quality = &mut loaded.scene.quality;
+            (quality.visibility, quality.backend) = (Some("maps".to_owned()), "gpu".to_owned());
+            (quality.azimuths, quality.rings) = (Some(10), Some(5));
+        }
+        let outcome = Pipeline::new().effective(&loaded).unwrap();
+        let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
+        let found = match &unseen.sum.sight {
+            Sight::Seen(_) => "held",
+            Sight::Heights(_) => "marched",
+            Sight::Maps(_) => "drawn",
+        };
+        assert_eq!(found, sight, "{geometry}");
+        let (studio, background) = (Studio::of(kind), Background::Uniform(Vec3::ZERO));
+        let pictured = match tabulated {
+            true => {
+                let Form::Direct(direct) = &outcome.brdf.form else { panic!("{geometry}: not direct") };
+                let nodes = Nodes { mirrors: unseen.sum.mirrors, ..Nodes::all(unseen.sum.grid.unwrap()) };
+                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+                outcome.brdf.with_direct_form(Form::Table(table.read(unseen.sum.interpolation)))
+            }
+            false => outcome.brdf.as_ref().clone(),
+        };
+        let input = studio.input(&pictured, 64, &background);
+        let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder).unwrap();
+        renderer.set_tile(&gpu, &unseen.sum).unwrap();
+        // One submission, as on a graphics processor. The first picture makes what the second only reads.
+        renderer.by_stage = false;
+        let first = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        let again = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        assert_eq!(first, again, "{geometry}");
+        assert_same_picture(geometry, &[render(&input).unwrap().picture, first]);
+    }
+    let mut glowing = open(RODS, LOBES[0], "direct");
+    glowing.scene.effects.interreflection = scene::Switch::On;
+    assert!(Pipeline::new().unseen(&glowing).unwrap().is_none(), "light between facets is the CPU's");
+    let few = Pipeline::new().unseen(&open(PYRAMIDS, LOBES[0], "direct")).unwrap();
+    assert!(few.is_none(), "few normals are better summed over few of their facets, which the CPU picks");
+}
+
+#[test]
+fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
+    let Some(gpu) = open_gpu() else { return };
+    let brdf = effective(&open(PYRAMIDS, LOBES[4], "direct"));
+    let studio = Studio::of("cup");
+    let input = RenderInput { samples_per_side: 2, ..studio.input(&brdf, 50, &Background::Wall) };
+    let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
+    let bands = |renderer: &GpuRenderer| renderer.room.as_ref().unwrap().bands.len();
+    let whole = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
+    assert_eq!(bands(&renderer), 1);
+    // Three rows at a time, the last two by themselves.
+    renderer.at_once = renderer.at_once / bands(&renderer) as u64 / 1000;
+    let cut = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
+    assert!(bands(&renderer) > 10, "{}", bands(&renderer));
+    assert_eq!((&cut.picture, cut.points), (&whole.picture, whole.points));
+    // As on a graphics processor: all stages of some bands together.
+    renderer.by_stage = !renderer.by_stage;
+    let together = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
+    assert_eq!((&together.picture, together.points), (&whole.picture, whole.points));
+    // Silhouettes may lie on the other side of a sample.
+    let points = render(&input).unwrap().points;
+    assert!(cut.points.abs_diff(points) * 100 < points, "{} and the CPU's {points}", cut.points);
+}
+
+#[test]
+fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
+    let Some(gpu) = open_gpu() else { return };
+    let brdf = effective(&open(RODS, LOBES[4], "direct"));
+    let studio = Studio::of("cup");
+    let input = studio.input(&brdf, 96, &Background::Wall);
+    let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
+    let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+    let cancel = Cancel::default();
+    cancel.set();
+    assert!(matches!(renderer.render(&gpu, &input, &cancel), Err(crate::Error::Cancelled)));
+    // Set while the device is at work: given up or, where it was quicker, done.
+    let cancel = Cancel::default();
+    let later = cancel.clone();
+    let setter = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        later.set();
+    });
+    let given_up = renderer.render(&gpu, &input, &cancel);
+    setter.join().unwrap();
+    assert!(matches!(&given_up, Err(crate::Error::Cancelled) | Ok(_)), "{given_up:?}");
+    assert_eq!(renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture.pixels, before.pixels);
+}
