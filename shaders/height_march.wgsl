@@ -1,6 +1,8 @@
 // Horizons of a height-field: the twin of src/visibility/height_march.rs, which says how and why. One thread walks for one
 // facet along one azimuth.
 
+//!import angles
+
 struct Params {
     // Columns and rows of the tile.
     size: vec2u,
@@ -24,8 +26,9 @@ struct Place {
 @group(0) @binding(2) var<storage, read> places: array<Place>;
 // Elevations [rad], the azimuths of a facet side by side.
 @group(0) @binding(3) var<storage, read_write> horizons: array<f32>;
+// Unit vectors of the plane, one an azimuth.
+@group(0) @binding(4) var<storage, read> directions: array<vec2f>;
 
-const TAU: f32 = 6.283185307179586;
 // A horizon so low that the soft step never reaches above 0: Horizons::FREE.
 const FREE: f32 = -0.02;
 // Edges of one family that a walk crosses at most, besides those of sixteen tiles.
@@ -90,8 +93,7 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= params.facet_count {
         return;
     }
-    let angle = TAU * f32(id.y) / f32(params.azimuths);
-    let direction = vec2f(cos(angle), sin(angle));
+    let direction = directions[id.y];
     let start = places[id.x].position;
     let normal = places[id.x].normal;
     var slope = max(-(dot(normal.xy, direction) + params.facing_margin) / max(normal.z, 1e-6), 0.0);
@@ -120,5 +122,5 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
             slope = crossed(DIAGONALS, vec2f(at.x - at.y, turning), x, most, start.z, slope);
         }
     }
-    horizons[id.x * params.azimuths + id.y] = select(FREE, atan(slope), slope > 0.0);
+    horizons[id.x * params.azimuths + id.y] = select(FREE, angle_of(slope, 1.0), slope > 0.0);
 }

@@ -10,6 +10,9 @@ pub enum Error {
     Input(Box<InputError>),
     #[error("{0}")]
     Failed(String),
+    /// A graphics device failed at something that the CPU can do.
+    #[error("{0}")]
+    Device(crate::gpu::GpuError),
     /// The caller asked for it ([`crate::Cancel`]).
     #[error("cancelled")]
     Cancelled,
@@ -101,7 +104,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Input(_) => 2,
-            Self::Failed(_) | Self::Cancelled => 1,
+            Self::Failed(_) | Self::Device(_) | Self::Cancelled => 1,
         }
     }
 }

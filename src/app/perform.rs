@@ -81,7 +81,10 @@ impl Editor {
             Action::Snapshot => {
                 if self.object.kept.take().is_none() {
                     let (scene, name) = (self.document.scene().clone(), self.document.name.clone());
-                    self.object.keep(ctx, &scene, &name);
+                    if !self.object.keep(ctx, &scene, &name) {
+                        let text = "The picture could not be read from the graphics device, so there is nothing to compare with.";
+                        self.messages.put(Level::Trouble, "kept", text);
+                    }
                 }
             }
             Action::BackToA => {

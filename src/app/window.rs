@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
-use biscale::gpu::Gpu;
+use biscale::gpu::{Gpu, GpuError};
 use eframe::egui::{self, Context, ViewportBuilder, ViewportCommand};
 
 use super::document::{Document, Settings};
@@ -205,9 +205,9 @@ impl eframe::App for Window {
         let Some(editor) = editor.as_mut() else { return };
         let ctx = ui.ctx().clone();
         // A device that is gone says so when it is asked.
-        if let Some(gpu) = &self.gpu {
-            let _ = gpu.device.poll(wgpu::PollType::Poll);
-        }
+        let gone =
+            self.gpu.as_ref().is_some_and(|gpu| matches!(gpu.poll(wgpu::PollType::Poll), Err(GpuError::Lost(_))));
+        self.lost.fetch_or(gone, Ordering::Relaxed);
         if self.lost.load(Ordering::Relaxed) {
             // Nothing is drawn on a device that is gone: that would panic.
             ctx.send_viewport_cmd(ViewportCommand::Close);

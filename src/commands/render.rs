@@ -86,7 +86,7 @@ impl Route {
             Self::Cpu { .. } => render(&input)?,
             Self::Gpu(device) => match device.renderer.render(&device.gpu, &input, &Cancel::default()) {
                 // What the device fails at the CPU still does, unless the device was asked for.
-                Err(Error::Failed(_)) if !device.required => render(&input)?,
+                Err(Error::Failed(_) | Error::Device(_)) if !device.required => render(&input)?,
                 rendered => rendered?,
             },
         })

@@ -1,5 +1,6 @@
 //! Plain data to the device and back.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
@@ -10,8 +11,9 @@ use super::{Gpu, GpuError};
 /// How long to wait for the device before it is given up.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// How often a device is asked that a window uses, too.
+/// How often a device is asked that a window uses, too, once it takes longer than this.
 const GLANCE: Duration = Duration::from_micros(200);
+const FRAME: Duration = Duration::from_millis(3);
 
 /// Enough for one element of any of our arrays: a binding holds at least one.
 const LEAST_BYTES: u64 = 256;
@@ -95,25 +97,39 @@ impl Gpu {
         let refused = |reason: String| GpuError::Refused { during: during.to_owned(), reason };
         let timeout = || GpuError::Timeout { during: during.to_owned(), seconds: PATIENCE.as_secs() };
         if !self.is_shared {
-            let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
-            match self.device.poll(wait) {
-                Ok(_) => {}
-                Err(wgpu::PollError::Timeout) => return Err(timeout()),
-                Err(other) => return Err(refused(other.to_string())),
+            if !self.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) })? {
+                return Err(timeout());
             }
             return told.try_recv().map_err(|e| refused(e.to_string()));
         }
         // A wait inside the driver would hold up what the window submits meanwhile.
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
-            self.device.poll(wgpu::PollType::Poll).map_err(|e| refused(e.to_string()))?;
-            match told.recv_timeout(GLANCE) {
+            self.poll(wgpu::PollType::Poll)?;
+            match told.try_recv() {
                 Ok(answer) => return Ok(answer),
-                Err(mpsc::RecvTimeoutError::Timeout) => {}
+                Err(mpsc::TryRecvError::Empty) => {}
                 Err(error) => return Err(refused(error.to_string())),
             }
+            // A frame is worth some turns of a core; longer work is not.
+            if start.elapsed() < FRAME { std::thread::yield_now() } else { std::thread::sleep(GLANCE) }
         }
         Err(timeout())
+    }
+
+    /// Lets the device tell what it has done; whether it did in time. A device that is gone is an error here, where wgpu
+    /// panics.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`], [`GpuError::Refused`].
+    pub fn poll(&self, how: wgpu::PollType) -> Result<bool, GpuError> {
+        self.is_there()?;
+        match catch_unwind(AssertUnwindSafe(|| self.device.poll(how))) {
+            Ok(Ok(_)) => self.is_there().map(|()| true),
+            Ok(Err(wgpu::PollError::Timeout)) => Ok(false),
+            Ok(Err(other)) => Err(GpuError::Refused { during: "waiting".to_owned(), reason: other.to_string() }),
+            Err(_) => Err(self.lose("its driver gave it up")),
+        }
     }
 
     /// Waits for the device and copies a mappable buffer's contents out.

@@ -157,6 +157,18 @@ impl Gpu {
         done
     }
 
+    /// Whether the device was not lost.
+    pub(super) fn is_there(&self) -> Result<(), GpuError> {
+        let heard = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        heard.lost.clone().map_or(Ok(()), |reason| Err(GpuError::Lost(reason)))
+    }
+
+    /// Takes the device for lost, if it was not yet.
+    pub(super) fn lose(&self, reason: &str) -> GpuError {
+        let mut heard = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        GpuError::Lost(heard.lost.get_or_insert_with(|| reason.to_owned()).clone())
+    }
+
     /// What the handlers have heard since the device was opened, as an error; an uncaptured one is reported once.
     fn fault(&self) -> Result<(), GpuError> {
         let mut heard = self.faults.lock().unwrap_or_else(PoisonError::into_inner);

@@ -32,6 +32,6 @@ pub enum GpuError {
 
 impl From<GpuError> for crate::Error {
     fn from(error: GpuError) -> Self {
-        Self::failed(error)
+        Self::Device(error)
     }
 }

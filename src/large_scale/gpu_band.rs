@@ -80,7 +80,9 @@ impl Room {
         let words = if shadowed { Visible::words_of(need.lights) } else { 0 };
         let most_slices = need.lights.div_ceil(LEAST_SLICE).max(1);
         let slices = match gpu.tier {
-            Tier::Hardware => (BUSY / (width * height * slots)).clamp(1, most_slices),
+            Tier::Hardware => {
+                (BUSY / (width * height * slots).min(need.points.max(width * slots))).clamp(1, most_slices)
+            }
             _ => most_slices,
         };
         let slice = need.lights.div_ceil(slices).max(1);

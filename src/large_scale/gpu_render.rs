@@ -19,7 +19,8 @@ use crate::filtering::{EffectiveBrdf, Heights, Maps, Sight, UnseenSum};
 use crate::gpu::{Gpu, GpuError, Tier};
 use crate::visibility::{GpuHeightMarch, GpuShadowMaps};
 
-/// Lobes or table rows of one submission: some tenths of a second for slow graphics processors, about one for software.
+/// Lobes or table rows of one submission: some tenths of a second for graphics processors that are not slow, about one for
+/// software.
 const WORK: u64 = 1 << 32;
 const SOFTWARE_WORK: u64 = 1 << 29;
 
@@ -201,10 +202,10 @@ impl GpuRenderer {
         for (first, bands) in room.bands.chunks(together).enumerate() {
             cancel.check()?;
             if first == 0 {
-                self.record_whole(&mut recorder, &room)?;
+                self.record_whole(&mut recorder, &room, cancel)?;
             }
             for band in bands {
-                self.record_band(&mut recorder, &room, band, (output, &group))?;
+                self.record_band(&mut recorder, &room, band, (output, &group), a_band > self.at_once)?;
             }
             recorder.submit()?;
         }
@@ -215,9 +216,9 @@ impl GpuRenderer {
 
     /// The room of the last picture where it serves, else a new one.
     fn room(&mut self, gpu: &Gpu, need: Need) -> std::result::Result<Room, GpuError> {
-        match self.room.take() {
-            Some(room) if room.need == need => Ok(room),
-            _ => {
+        match self.room.take().filter(|room| room.need == need) {
+            Some(room) => Ok(room),
+            None => {
                 let Self { gbuffer, object, rays, shading, pictures, .. } = self;
                 Room::new(gpu, need, &Parts { gbuffer, object, rays: rays.as_ref(), shading, pictures })
             }
@@ -225,12 +226,13 @@ impl GpuRenderer {
     }
 
     /// What comes before all bands: the material where it is still to be made, and the samples.
-    fn record_whole(&self, recorder: &mut Recorder, room: &Room) -> std::result::Result<(), GpuError> {
+    fn record_whole(&self, recorder: &mut Recorder, room: &Room, cancel: &Cancel) -> Result<()> {
         let unmade = self.material.as_ref().filter(|_| !self.is_made);
         if let Some(maps) = unmade.and_then(GpuMaterial::maps) {
             for (submission, batches) in maps.batches().enumerate() {
                 if submission > 0 {
                     recorder.submit()?;
+                    cancel.check()?;
                 }
                 for batch in batches {
                     maps.draw(batch, &mut recorder.compute_pass(Stage::Product, &maps.cleared()));
@@ -239,8 +241,16 @@ impl GpuRenderer {
             }
         }
         if let Some(material) = unmade.filter(|material| material.is_to_be_made()) {
-            material.make(&mut recorder.compute_pass(Stage::Product, &material.sums()));
-            recorder.stage_ends(Stage::Product)?;
+            let parts = material.parts(self.at_once);
+            for (k, part) in parts.iter().enumerate() {
+                let cleared = if k == 0 { material.sums() } else { Vec::new() };
+                material.make(&mut recorder.compute_pass(Stage::Product, &cleared), part.clone());
+                recorder.stage_ends(Stage::Product)?;
+                if parts.len() > 1 {
+                    recorder.submit()?;
+                    cancel.check()?;
+                }
+            }
         }
         if let Some(band) = room.bands.first() {
             let (encoder, writes) = recorder.render_pass(Stage::GBuffer);
@@ -256,6 +266,7 @@ impl GpuRenderer {
         room: &Room,
         band: &Band,
         output: (Output, &wgpu::BindGroup),
+        is_heavy: bool,
     ) -> std::result::Result<(), GpuError> {
         let (points, pixels) = (room.places(band), [room.need.size[0], band.rows.len()].map(|n| n as u32));
         let mut pass = recorder.compute_pass(Stage::GBuffer, &[]);
@@ -269,9 +280,21 @@ impl GpuRenderer {
             drop(pass);
             recorder.stage_ends(Stage::Shadows)?;
         }
+        let passes = self.material.as_ref().filter(|_| lit).map_or(0, GpuMaterial::passes);
+        // A row of pixels may be more than one submission holds.
+        let together = if is_heavy { 1 } else { passes.max(1) };
         let mut pass = recorder.compute_pass(Stage::Shading, &[&room.radiance]);
-        if let (true, Some(material)) = (lit, &self.material) {
-            material.shade(&mut pass, &band.shading, [points, room.slices]);
+        for first in (0..passes).step_by(together) {
+            if let Some(material) = &self.material {
+                let some = first..(first + together).min(passes);
+                material.shade(&mut pass, some, &band.shading, [points, room.slices]);
+            }
+            if is_heavy {
+                drop(pass);
+                recorder.stage_ends(Stage::Shading)?;
+                recorder.submit()?;
+                pass = recorder.compute_pass(Stage::Shading, &[]);
+            }
         }
         self.pictures.write(&mut pass, &band.pixels, output, pixels);
         drop(pass);

@@ -160,7 +160,7 @@ pub(super) fn radiance(
     let group = shading.points(gpu, bound).unwrap();
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-    material.shade(&mut pass, &group, [points.len() as u32, slices as u32]);
+    material.shade(&mut pass, 0..material.passes(), &group, [points.len() as u32, slices as u32]);
     drop(pass);
     gpu.queue.submit([encoder.finish()]);
     let rows: Vec<[f32; 4]> = gpu.read(&rows).unwrap();

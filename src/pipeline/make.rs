@@ -66,7 +66,7 @@ pub(super) fn see(
             // A GPU that fails is no reason to stop: the CPU's maps are the same.
             let packed = match (route, gpu) {
                 (Route::GpuMaps, Some(gpu)) => {
-                    visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution).ok()
+                    visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution, cancel).ok()
                 }
                 _ => None,
             };

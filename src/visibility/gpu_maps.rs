@@ -11,6 +11,7 @@ use glam::Vec3;
 
 use super::PackedVisibility;
 use super::shadow_view::{ShadowView, affordable, extent};
+use crate::cancel::Cancel;
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
@@ -43,8 +44,9 @@ pub fn visibility_maps_gpu(
     facets: &Facets,
     directions: &[Vec3],
     resolution: u32,
+    cancel: &Cancel,
 ) -> Result<PackedVisibility, GpuError> {
-    GpuShadowMaps::new(gpu)?.visibility(gpu, mesh, facets, directions, resolution)
+    GpuShadowMaps::new(gpu)?.visibility(gpu, mesh, facets, directions, resolution, cancel)
 }
 
 #[repr(C)]
@@ -120,7 +122,8 @@ impl GpuShadowMaps {
         })
     }
 
-    /// Which facets each direction sees, as [`super::visibility_maps_cpu`] answers it but for rounding.
+    /// Which facets each direction sees, as [`super::visibility_maps_cpu`] answers it but for rounding; any answer once
+    /// `cancel` is set.
     pub fn visibility(
         &self,
         gpu: &Gpu,
@@ -128,18 +131,26 @@ impl GpuShadowMaps {
         facets: &Facets,
         directions: &[Vec3],
         resolution: u32,
+        cancel: &Cancel,
     ) -> Result<PackedVisibility, GpuError> {
         let mut visibility = PackedVisibility::new(facets.len(), directions.len());
         let maps = self.maps(gpu, mesh, facets, directions, resolution)?;
-        for batch in 0..maps.batches.len() {
+        for batches in maps.batches() {
             gpu.checked("drawing shadow maps", || {
                 let mut encoder =
                     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("shadow maps") });
-                maps.maps.iter().for_each(|map| encoder.clear_buffer(map, 0, None));
-                maps.draw(batch, &mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+                for batch in batches {
+                    maps.maps.iter().for_each(|map| encoder.clear_buffer(map, 0, None));
+                    maps.draw(batch, &mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+                }
                 gpu.queue.submit([encoder.finish()]);
                 Ok(())
             })?;
+            // A window may draw on the same device, and nobody may want the answer any more.
+            gpu.wait("drawing shadow maps")?;
+            if cancel.is_set() {
+                return Ok(visibility);
+            }
         }
         let bits: Vec<u32> = gpu.read(&maps.bits)?;
         let (words, count) = (visibility.words_per_row(), directions.len());

@@ -1,10 +1,13 @@
 //! Horizons of a height-field on wgpu: the twin of [`Horizons::march`](super::Horizons::march), left on the device for
 //! whatever reads horizons there (`shaders/visibility_horizons.wgsl`).
 
+use std::f32::consts::{FRAC_PI_2, TAU};
+
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::scan::FACING_MARGIN;
+use crate::directions::from_angles;
 use crate::geometry::{Facets, HeightGrid};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
@@ -52,7 +55,7 @@ struct Place {
 impl GpuHeightMarch {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let module = gpu.module("height_march")?;
-        let layout = gpu.layout("height-field", wgpu::ShaderStages::COMPUTE, &[UNIFORM, READ, READ, WRITE])?;
+        let layout = gpu.layout("height-field", wgpu::ShaderStages::COMPUTE, &[UNIFORM, READ, READ, WRITE, READ])?;
         Ok(Self { march: gpu.compute_pipeline(&module, "march", &[&layout])?, layout })
     }
 
@@ -80,6 +83,9 @@ impl GpuHeightMarch {
         let places = facets.positions.iter().zip(&facets.normals);
         let places: Vec<Place> =
             places.map(|(&position, &normal)| Place { position, pad_p: 0, normal, pad_n: 0 }).collect();
+        // The CPU's own: built-in sines and cosines may be off by 2⁻¹¹, and an axis would be missed.
+        let along = |azimuth: usize| from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
+        let directions: Vec<glam::Vec2> = (0..azimuths).map(along).collect();
         let elevations =
             gpu.buffer("horizons", (4 * facets.len() * azimuths) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
@@ -87,6 +93,7 @@ impl GpuHeightMarch {
             &gpu.upload("heights", &heights.heights, Usage::STORAGE)?,
             &gpu.upload("places of facets", &places, Usage::STORAGE)?,
             &elevations,
+            &gpu.upload("azimuths", &directions, Usage::STORAGE)?,
         ];
         Ok(GpuHorizons {
             pipeline: self.march.clone(),

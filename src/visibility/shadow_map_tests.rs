@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::{GpuShadowMaps, PackedVisibility, visibility_maps_cpu, visibility_maps_gpu};
+use crate::cancel::Cancel;
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
 
@@ -91,7 +92,7 @@ fn the_gpu_answers_as_the_cpu_does() {
     for (name, mesh, _) in all_meshes() {
         let facets = sample(&mesh, 1201);
         let cpu = visibility_maps_cpu(&mesh, &facets, &directions, 128);
-        let gpu = pipelines.visibility(&gpu, &mesh, &facets, &directions, 128).unwrap();
+        let gpu = pipelines.visibility(&gpu, &mesh, &facets, &directions, 128, &Cancel::default()).unwrap();
         let differ = disagreement(&facets, &directions[..45], &gpu, &cpu);
         // Texels whose centre lies on an edge up to rounding, and ties in height.
         assert!(differ < 3e-4, "{name}: {:.4} %", 100.0 * differ);
@@ -137,8 +138,8 @@ fn broken_meshes_and_no_facets_do_not_panic() {
     assert_eq!(visibility_maps_cpu(&empty, &Facets::default(), &directions, 50).facet_count, 0);
     assert!(visibility_maps_cpu(&empty, &facets, &[Vec3::Z], 50).is_visible(0, 0));
     let Some(gpu) = open_gpu() else { return };
-    visibility_maps_gpu(&gpu, &broken, &facets, &directions, 50).unwrap();
-    assert!(visibility_maps_gpu(&gpu, &empty, &facets, &[Vec3::Z], 50).unwrap().is_visible(0, 0));
+    visibility_maps_gpu(&gpu, &broken, &facets, &directions, 50, &Cancel::default()).unwrap();
+    assert!(visibility_maps_gpu(&gpu, &empty, &facets, &[Vec3::Z], 50, &Cancel::default()).unwrap().is_visible(0, 0));
 }
 
 /// The device, or a loud word that its tests are skipped.

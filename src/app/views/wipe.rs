@@ -18,16 +18,14 @@ pub struct Kept {
 }
 
 impl ObjectView {
-    /// Keeps what is shown now beside what comes.
-    pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) {
-        if let Some(made) = &self.made
-            && let Some(image) = made.image.pixels()
-        {
-            let texture = ctx.load_texture("kept", image.clone(), TextureOptions::LINEAR);
-            self.kept =
-                Some(Kept { image, version: made.version, texture, scene: scene.clone(), name: name.to_owned() });
-            self.wipe = 0.5;
-        }
+    /// Keeps what is shown now beside what comes; false where it cannot be had from the device.
+    pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) -> bool {
+        let Some(made) = &self.made else { return true };
+        let Some(image) = made.image.pixels() else { return false };
+        let texture = ctx.load_texture("kept", image.clone(), TextureOptions::LINEAR);
+        self.kept = Some(Kept { image, version: made.version, texture, scene: scene.clone(), name: name.to_owned() });
+        self.wipe = 0.5;
+        true
     }
 
     pub(super) fn is_on_wipe(&self, area: Rect, at: Pos2) -> bool {

@@ -115,6 +115,11 @@ impl Device {
             Ok(done) => Ok(done),
             Err(Error::Cancelled) => Err(Error::Cancelled),
             Err(Error::Input(_)) => Ok(None),
+            // Too much for it: the next picture may be less.
+            Err(Error::Device(GpuError::TooLarge { .. } | GpuError::OutOfMemory(_) | GpuError::Unsupported(_))) => {
+                device.renderer = None;
+                Ok(None)
+            }
             Err(error) => {
                 *self = Self::Lost(error.to_string());
                 Ok(None)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use biscale::Result;
 use biscale::pipeline::{Pipeline, Unseen};
-use biscale::plan::{Preset, Settings};
+use biscale::plan::{Preset, Route, Settings};
 use biscale::scene::{LoadedScene, Quality};
 
 use super::shared::{SmallScale, small_scale};
@@ -21,6 +21,8 @@ pub struct DeviceDrafts {
     last: Option<Last>,
     /// An index into [`RUNGS`], or their number for the scene's own quality.
     rung: usize,
+    /// Whether there was a table, how many lobes, and the route.
+    kind: Option<(bool, usize, Route)>,
     /// Quick drafts until a rung that was too slow is tried again, and how many those were the last time.
     rest: u32,
     rested: u32,
@@ -42,22 +44,33 @@ impl DeviceDrafts {
         if let Some(last) = self.last.as_ref().filter(|last| last.key == key) {
             return Ok(last.tile.clone());
         }
+        let made = self.make(loaded, pipeline)?;
+        // What a rung costs is known of tiles of one kind only.
+        let kind = made.as_ref().map(|tile| (tile.sum.grid.is_some(), tile.sum.sum.lobe_count(), tile.plan.route));
+        if kind == self.kind || self.rung == 0 {
+            self.kind = kind;
+            self.last = Some(Last { key, tile: made.clone() });
+            return Ok(made);
+        }
+        *self = Self { kind, ..Self::default() };
+        self.tile(loaded, pipeline)
+    }
+
+    fn make(&self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<Unseen>>> {
         let tile = match RUNGS.get(self.rung) {
             Some(preset) if !is_below(loaded, *preset) => pipeline.unseen(&as_preset(loaded, *preset))?,
             _ => pipeline.unseen(loaded)?,
         };
-        let tile = tile.map(Arc::new);
-        self.last = Some(Last { key, tile: tile.clone() });
-        Ok(tile)
+        Ok(tile.map(Arc::new))
     }
 
-    /// The next edit is as fine as leaves its picture in time. A rung that did not is tried again ever more seldom.
-    pub fn took(&mut self, product_ms: f64) {
-        if product_ms > MOST_MS {
+    /// `ms`: of what grows with the rung. The next edit is as fine as leaves its picture in time. A rung that did not is tried again ever more seldom.
+    pub fn took(&mut self, ms: f64) {
+        if ms > MOST_MS {
             self.rung = self.rung.saturating_sub(1);
             self.rested = (4 * self.rested).clamp(8, 1 << 20);
             self.rest = self.rested;
-        } else if product_ms < LEAST_MS && self.rung < RUNGS.len() {
+        } else if ms < LEAST_MS && self.rung < RUNGS.len() {
             match self.rest {
                 0 => self.rung += 1,
                 _ => self.rest -= 1,

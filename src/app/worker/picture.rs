@@ -35,6 +35,9 @@ const REST: Duration = Duration::from_millis(120);
 
 const PRODUCT: &str = "visibility and product";
 
+/// The longest side: twice as many samples are what any graphics processor draws.
+const LONGEST: f64 = 4096.0;
+
 /// Keeps stages and what stays between pictures. One drafts, on a thread that is never kept long; another refines.
 pub struct Photographer {
     shared: Arc<Shared>,
@@ -106,8 +109,12 @@ impl Photographer {
             // The device does not do it, or failed at it.
             Err(_) => return Ok(None),
         };
-        if let Some((_, ms)) = made.stages.iter().find(|(name, _)| *name == PRODUCT) {
-            self.on_device.took(*ms);
+        // Without a table it is the shading that takes the finer sum.
+        let counted: &[&str] = if tile.sum.grid.is_some() { &[PRODUCT] } else { &[PRODUCT, "shading"] };
+        let counted: Vec<f64> =
+            made.stages.iter().filter(|(name, _)| counted.contains(name)).map(|(_, ms)| *ms).collect();
+        if made.stages.iter().any(|(name, _)| *name == PRODUCT) {
+            self.on_device.took(counted.iter().sum());
         }
         Ok(Some(made))
     }
@@ -306,7 +313,8 @@ impl Photographer {
 /// The view's size, cut to what is ever rendered.
 fn fitting(size: [usize; 2], most: f64) -> [usize; 2] {
     let size = size.map(|side| side.clamp(24, 8192));
-    let scale = (most / (size[0] * size[1]) as f64).sqrt().min(1.0);
+    let longest = size[0].max(size[1]) as f64;
+    let scale = (most / (size[0] * size[1]) as f64).sqrt().min(LONGEST / longest).min(1.0);
     size.map(|side| ((side as f64 * scale) as usize).max(24))
 }
 

@@ -35,6 +35,9 @@ pub(super) struct Sum {
 /// together. Eight lights, and eight things that hang over a facet, stay below that.
 pub(super) const SOFTWARE_FACETS: usize = 512;
 
+/// And on others, where a pass over one row of pixels may be a submission.
+const HARDWARE_FACETS: usize = 1024;
+
 /// `Patch` in `sum_patches.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -67,7 +70,7 @@ impl GpuShading {
             ));
         }
         let facet_count = sum.facet_count();
-        let most = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { facet_count.max(1) };
+        let most = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { HARDWARE_FACETS };
         let see = seen.file();
         let blank = Sum::blank(sum, seen);
         let mut patches: Vec<Patch> = Vec::new();

@@ -10,6 +10,8 @@ mod seen;
 mod table;
 mod table_of_sum;
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -233,14 +235,19 @@ impl GpuMaterial {
         self.table.iter().flat_map(|table| &table.sums).collect()
     }
 
+    /// Dispatches of [`GpuMaterial::make`] whose lobes are no more than these together.
+    pub(super) fn parts(&self, most_lobes: u64) -> Vec<Range<usize>> {
+        self.table.as_ref().map_or_else(|| vec![Range::default()], |table| table.parts(most_lobes))
+    }
+
     /// Records what the device has to make before the first shading with this material: what facets see, and the table of
-    /// their sum. Once is enough; twice makes the same again.
-    pub(super) fn make(&self, compute: &mut wgpu::ComputePass) {
-        if let Some(horizons) = &self.horizons {
+    /// their sum, all parts in order. Once is enough; twice makes the same again.
+    pub(super) fn make(&self, compute: &mut wgpu::ComputePass, part: Range<usize>) {
+        if let (Some(horizons), 0) = (&self.horizons, part.start) {
             horizons.dispatch(compute);
         }
         if let Some(table) = &self.table {
-            table.dispatch(compute);
+            table.dispatch(compute, part);
         }
     }
 
@@ -254,14 +261,20 @@ impl GpuMaterial {
         self.least_area
     }
 
-    /// Adds radiance towards the eye to the rows of a group's points, one for each slice of the lights.
+    pub(super) fn passes(&self) -> usize {
+        self.passes.len()
+    }
+
+    /// Adds radiance towards the eye to the rows of a group's points, one for each slice of the lights; by some of the passes,
+    /// which must run in order.
     pub(super) fn shade(
         &self,
         compute: &mut wgpu::ComputePass,
+        passes: Range<usize>,
         points: &wgpu::BindGroup,
         [point_count, slices]: [u32; 2],
     ) {
-        for pass in &self.passes {
+        for pass in &self.passes[passes] {
             compute.set_pipeline(&pass.pipeline);
             compute.set_bind_group(0, points, &[]);
             compute.set_bind_group(1, &pass.group, &[]);

@@ -17,7 +17,7 @@ use crate::filtering::columns::{Column, Part, Weight};
 use crate::filtering::{FacetSum, Interpolation, PairTable};
 use crate::gpu::{Gpu, GpuError, Tier};
 
-/// Lobes of one dispatch: a slow device takes a fifth of a second, far from its driver's watchdog.
+/// Lobes of one dispatch: slow devices take a fifth of a second. A submission holds no more than its renderer allows.
 const MOST_LOBES: u64 = 1 << 30;
 
 /// `Nodes` in `table_nodes.wgsl`.
@@ -57,12 +57,32 @@ struct Step {
     pipeline: wgpu::ComputePipeline,
     groups: Vec<wgpu::BindGroup>,
     workgroups: [u32; 2],
+    /// Facets of all its threads together.
+    lobes: u64,
 }
 
 impl Making {
+    /// Runs of dispatches of no more lobes than these together, or of one dispatch.
+    pub(super) fn parts(&self, most: u64) -> Vec<Range<usize>> {
+        let (mut parts, mut held) = (Vec::<Range<usize>>::new(), 0);
+        for (k, step) in self.steps.iter().enumerate() {
+            match parts.last_mut() {
+                Some(part) if held + step.lobes <= most => {
+                    part.end = k + 1;
+                    held += step.lobes;
+                }
+                _ => {
+                    parts.push(k..k + 1);
+                    held = step.lobes;
+                }
+            }
+        }
+        parts
+    }
+
     /// Adds to what is in the sums, which are zeros at first.
-    pub(super) fn dispatch(&self, compute: &mut wgpu::ComputePass) {
-        for Step { pipeline, groups, workgroups: [columns, rows] } in &self.steps {
+    pub(super) fn dispatch(&self, compute: &mut wgpu::ComputePass, part: Range<usize>) {
+        for Step { pipeline, groups, workgroups: [columns, rows], .. } in &self.steps[part] {
             compute.set_pipeline(pipeline);
             for (group, index) in groups.iter().zip(0..) {
                 compute.set_bind_group(index, group, &[]);
@@ -194,7 +214,8 @@ impl GpuShading {
         let pipeline = self.pipeline_over(gpu, variant, &layouts.each_ref())?;
         let step = |range: Range<usize>| {
             let groups = vec![nodes.clone(), self.sum_group(gpu, shared, Sum::blank(sum, seen).over(&range))?];
-            Ok(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(directions.len())? })
+            let lobes = (directions.len() * range.len()) as u64;
+            Ok(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(directions.len())?, lobes })
         };
         pieces(0..facets, most).map(step).collect()
     }
@@ -232,7 +253,9 @@ impl GpuShading {
             let nodes = self.nodes_group(gpu, shape.nodes(&columns_of(columns, column)), &angles, values)?;
             for range in pieces(column.facets(sum), shape.most_facets(gpu)) {
                 let groups = vec![nodes.clone(), self.sum_group(gpu, shared, added.over(&range))?];
-                steps.push(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(shape.grid.nodes())? });
+                let lobes = (shape.grid.originals(shape.mirrors) * range.len()) as u64;
+                let workgroups = workgroups(shape.grid.nodes())?;
+                steps.push(Step { pipeline: pipeline.clone(), groups, workgroups, lobes });
             }
         }
         let ends = Variant { shader: "table_ends", entry_point: "extend", swaps: Vec::new(), constants: Vec::new() };
@@ -240,6 +263,7 @@ impl GpuShading {
             pipeline: self.pipeline_over(gpu, ends, &[&layouts[0]])?,
             groups: vec![self.nodes_group(gpu, shape.nodes(&[]), &angles, values)?],
             workgroups: workgroups(4 * shape.fours * shape.rows())?,
+            lobes: shape.numbers() as u64,
         });
         Ok(steps)
     }

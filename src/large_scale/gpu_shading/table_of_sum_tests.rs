@@ -50,7 +50,9 @@ fn made(gpu: &Gpu, material: &GpuMaterial) -> [Vec<f32>; 2] {
     for sums in material.sums() {
         encoder.clear_buffer(sums, 0, None);
     }
-    material.make(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+    for part in material.parts(u64::MAX) {
+        material.make(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), part);
+    }
     gpu.queue.submit([encoder.finish()]);
     material.table.as_ref().unwrap().sums.each_ref().map(|buffer| gpu.read(buffer).unwrap())
 }
@@ -308,7 +310,9 @@ fn the_table_of_a_height_field_is_timed() {
             let set_up = start.elapsed();
             let start = std::time::Instant::now();
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            material.make(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+            for part in material.parts(u64::MAX) {
+                material.make(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), part);
+            }
             gpu.queue.submit([encoder.finish()]);
             let submitted = start.elapsed();
             gpu.wait("making a table").unwrap();

@@ -90,7 +90,9 @@ fn speed_of_both_routes() {
                 times[1]
             };
             let cpu = time(&|| visibility_maps_cpu(&mesh, &facets, &directions, resolution));
-            let device = time(&|| pipelines.visibility(&gpu, &mesh, &facets, &directions, resolution).unwrap());
+            let device = time(&|| {
+                pipelines.visibility(&gpu, &mesh, &facets, &directions, resolution, &Cancel::default()).unwrap()
+            });
             let triangles = 1e-6 * (mesh.triangles.len() * directions.len()) as f64;
             let pairs = 1e-6 * (facets.len() * directions.len()) as f64;
             for (route, seconds) in [("cpu", cpu), ("gpu", device)] {
