@@ -8,6 +8,8 @@
 pub(crate) mod columns;
 mod content;
 mod facet_columns;
+#[cfg(test)]
+mod half_floats_tests;
 
 use std::sync::Arc;
 
