@@ -31,9 +31,8 @@ impl ToPicture {
         let gpu = Route::device(outcome)?;
         let renderer = match gpu {
             Some(gpu) => {
-                let of_device = |error: GpuError| Error::from(error);
-                let renderer = GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref()).map_err(of_device)?;
-                let image = gpu_picture::image(&gpu, size).map_err(of_device)?;
+                let renderer = GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref()).map_err(Error::from)?;
+                let image = gpu_picture::image(&gpu, size).map_err(Error::from)?;
                 let view = image.create_view(&wgpu::TextureViewDescriptor::default());
                 Some((Arc::new(gpu), renderer, view))
             }

@@ -18,6 +18,9 @@ pub struct Unseen {
     pub notes: Vec<String>,
 }
 
+/// To find mirror planes takes some milliseconds: more than half of a table of fewer nodes takes a device.
+const MIRRORED_FROM: usize = 60_000;
+
 impl Pipeline {
     /// What a device needs that makes visibility and product itself. `None` where only the CPU makes what the scene calls
     /// for: measured BRDFs summed over facets, light between facets, the paper's own tables.
@@ -51,7 +54,8 @@ impl Pipeline {
         };
         let Prepared { shape, settings, sum, plan, shape_version, .. } = prepared;
         let grid = settings.picture_grids.last().copied().filter(|_| plan.try_picture_table);
-        let mirrors = if grid.is_some() && settings.effects.mirror_symmetry != Switch::Off {
+        let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORED_FROM);
+        let mirrors = if is_large && settings.effects.mirror_symmetry != Switch::Off {
             let find = || Ok(mirror_planes(&shape.mesh));
             *self.mirrors.get("mirrors", shape_version, &mut times, &self.cancel, find)?.0
         } else {

@@ -64,7 +64,8 @@ impl DeviceDrafts {
         Ok(tile.map(Arc::new))
     }
 
-    /// `ms`: of what grows with the rung. The next edit is as fine as leaves its picture in time. A rung that did not is tried again ever more seldom.
+    /// `ms`: of what grows with the rung. The next edit is as fine as leaves its picture in time; a rung that did not is tried
+    /// again ever more seldom.
     pub fn took(&mut self, ms: f64) {
         if ms > MOST_MS {
             self.rung = self.rung.saturating_sub(1);
