@@ -2,12 +2,7 @@
 // a tint for the others. The twin of Weight::at (src/filtering/pair_table/columns.rs).
 
 //!import tint_row
-//!import lobe_input
-//!import lambertian
-//!import blinn_phong
-//!import cook_torrance
-//!import ward
-//!import ggx
+//!import lobe_by_number
 
 struct Term {
     tint: Tint,
@@ -32,23 +27,7 @@ fn lobe_of(term: Term, pair: Pair) -> f32 {
     if !is_lit(seen) {
         return 0.0;
     }
-    switch term.lobe {
-        case 1u: {
-            return lambertian(seen);
-        }
-        case 2u: {
-            return blinn_phong(seen, term.shape, term.scale);
-        }
-        case 3u: {
-            return cook_torrance(seen, pair.i_dot_h, term.shape, term.scale);
-        }
-        case 4u: {
-            return ward(seen, term.shape, term.scale);
-        }
-        default: {
-            return ggx(seen, term.shape, term.scale);
-        }
-    }
+    return lobe_by_number(term.lobe, seen, pair.i_dot_h, term.shape, term.scale);
 }
 
 fn column_weight(column: u32, i: vec3f, o: vec3f, i_dot_h: f32) -> vec3f {

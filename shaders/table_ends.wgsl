@@ -1,7 +1,7 @@
 // What the nodes of a table tell of the rest of it: images of rows in mirror planes, and the step of θ_d before the first
 // and after the last. A thread a row and column; it reads rows that are no images, which none of the others writes inside.
 
-//!import table_nodes
+//!import table_values
 //!import flat_index
 
 @compute @workgroup_size(THREADS)

@@ -133,6 +133,34 @@ fn fewer_facets_and_trials_against_whole_tables_at_standard() {
     }
 }
 
+/// Figures of docs/speed.md.
+#[test]
+#[ignore = "a table to be printed: cargo test --release --test pictures part_of_the_facets -- --ignored --nocapture"]
+fn trials_from_part_of_the_facets() {
+    let pairs = picture_pairs(512, 12345);
+    let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
+    println!("scene                preset    facets picked  rel. L2   PSNR");
+    let fields = ["table4_plate", "fig8b_ripples", "fig8d_leather"];
+    let overhangs = ["table4_pillow", "table4_skirt", "fig6a_velvet_spread"];
+    for (preset, [rings, azimuths, turn, difference]) in [("standard", [24, 48, 8, 12]), ("fine", [32, 64, 12, 16])] {
+        for scene in fields.into_iter().chain(overhangs) {
+            let set = ["quality.backend=cpu".to_owned(), format!("quality.preset={preset}")];
+            let outcome = Pipeline::new().effective(&scene::open(scene, &set).unwrap()).unwrap();
+            let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("{scene}: not a sum") };
+            let (exact, grid) = (values(&outcome.brdf), UpperPairs { rings, azimuths, turn, difference });
+            let all = direct.sum.facet_count();
+            for count in [all, 3200, 1600, 1200, 800, 400] {
+                let facets = (count < all).then_some(count);
+                let nodes = Nodes { facets, read_by: Some(&pairs[..]), ..Nodes::all(grid) };
+                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+                let errors = upper_errors(&values(&outcome.brdf.with_direct_form(Form::Table(table))), &exact);
+                let (percent, db) = (100.0 * errors.rel_l2, errors.psnr_db);
+                println!("{scene:<20} {preset:<9} {count:>5} of {all:>5} {percent:>6.2} % {db:>6.1} dB");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_table_of_a_mirrored_tile_is_its_own_mirror_image_and_close_to_the_whole_one() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();

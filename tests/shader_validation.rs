@@ -40,6 +40,7 @@ fn every_combination_of_effects_parses_and_validates() {
                 let swaps =
                     [("visibility_unblocked", see), ("weights_area", weights), ("sum_facets", "sum_seen_areas")];
                 check("table_of_sum", &swaps);
+                check("table_of_picks", &swaps[..2]);
             }
             for lobe in ["lobe_lambertian", "lobe_blinn_phong", "lobe_cook_torrance", "lobe_ward", "lobe_ggx"] {
                 for weights in ["weights_area", "weights_rgb"] {

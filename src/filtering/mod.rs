@@ -31,6 +31,7 @@ pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
 pub(crate) use pair_table::columns;
 pub use pair_table::{Nodes, PairTable, TableContent};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
+pub(crate) use sampled::share_of;
 pub use tint::Tint;
 pub use unseen::{Heights, Maps, Sight, UnseenSum};
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};

@@ -18,6 +18,20 @@ const EVENLY: f32 = 0.25;
 /// Facets that a group or a normal keeps at least.
 const FEWEST: f64 = 16.0;
 
+/// What is certain, in whole numbers: their sums have no rounding, and the twin of this on a device (`pick_facets.wgsl`) may
+/// add them up in any order. A chance of a hundredth is known to a thousandth of itself; what a pick stands for is told by the
+/// rounded one.
+const CERTAIN: u32 = 1 << 16;
+
+/// Rounds that leave to the others what those that are certain cannot use.
+const ROUNDS: usize = 2;
+
+/// How many of a run of facets are picked, where `count` are of `all`.
+pub(crate) fn share_of(run: usize, count: usize, all: usize) -> f64 {
+    let run = run as f64;
+    (count as f64 * run / all.max(1) as f64).max(FEWEST).min(run)
+}
+
 impl Direct {
     /// Some `count` facets with weights that keep every sum's expectation, each picked with a probability that follows what it
     /// reflects of light that comes and goes along `h`, at even steps along that measure (systematic sampling). Where facets
@@ -28,10 +42,7 @@ impl Direct {
         }
         let lit = self.sum.groups().iter().filter(|group| !group.is_black);
         let facets: usize = lit.map(|group| group.range.len()).sum();
-        let share = |range: &Range<usize>| {
-            let length = range.len() as f64;
-            (count as f64 * length / facets.max(1) as f64).max(FEWEST).min(length)
-        };
+        let share = |range: &Range<usize>| share_of(range.len(), count, facets);
         let mut picks = Picks::default();
         let groups = self.sum.groups().iter().map(|group| {
             let first = picks.facets.len();
@@ -41,7 +52,7 @@ impl Direct {
                     patches
                         .iter()
                         .map(|Patch { range, normal }| {
-                            let chance = share(range) / range.len().max(1) as f64;
+                            let chance = in_whole_numbers((share(range) / range.len().max(1) as f64) as f32);
                             let range = picks.walk(range.clone(), std::iter::repeat(chance));
                             Patch { range, normal: *normal }
                         })
@@ -49,7 +60,7 @@ impl Direct {
                 ),
                 None => {
                     let chances = chances(self.sum.shares(group, h), share(&group.range) as f32);
-                    picks.walk(group.range.clone(), chances.into_iter().map(f64::from));
+                    picks.walk(group.range.clone(), chances.into_iter().map(in_whole_numbers));
                     None
                 }
             };
@@ -69,27 +80,31 @@ struct Picks {
 }
 
 impl Picks {
-    /// Picks of a run of facets those at which the sum of the chances passes a whole number; where they stand.
-    fn walk(&mut self, range: Range<usize>, chances: impl Iterator<Item = f64>) -> Range<usize> {
+    /// Picks of a run of facets those at which the sum of the chances passes a multiple of [`CERTAIN`]; where they stand.
+    fn walk(&mut self, range: Range<usize>, chances: impl Iterator<Item = u32>) -> Range<usize> {
         let first = self.facets.len();
-        let mut walked = 0.5;
+        let mut walked = CERTAIN / 2;
         for (facet, chance) in range.zip(chances) {
             walked += chance;
-            if walked >= 1.0 {
-                walked -= 1.0;
+            if walked >= CERTAIN {
+                walked -= CERTAIN;
                 self.facets.push(facet);
-                self.weights.push((1.0 / chance) as f32);
+                self.weights.push(CERTAIN as f32 / chance as f32);
             }
         }
         first..self.facets.len()
     }
 }
 
-/// Chances in `(0, 1]` in proportion to `shares`, which add up to 1, so that about `count` are picked.
+/// A chance in `(0, 1]`, of [`CERTAIN`].
+fn in_whole_numbers(chance: f32) -> u32 {
+    (chance * CERTAIN as f32).round().clamp(1.0, CERTAIN as f32) as u32
+}
+
+/// Chances in `(0, 1]` in proportion to `shares`, which add up to 1, so that about `count` are picked, and no more.
 fn chances(mut shares: Vec<f32>, count: f32) -> Vec<f32> {
     let mut scale = count;
-    // Those that are certain leave more to the others.
-    for _ in 0..4 {
+    for _ in 0..ROUNDS {
         let expected = sum(&shares, |share| least(scale * share, 1.0));
         scale *= count / expected.max(1e-9);
     }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::Vec2;
 
-use super::{FacetSum, Interpolation};
-use crate::directions::{PolarGrid, UpperPairs};
+use super::{FacetSum, Interpolation, Nodes};
+use crate::directions::PolarGrid;
 use crate::geometry::{Facets, HeightGrid, TileMesh};
 use crate::visibility::Visibility;
 
@@ -16,10 +16,8 @@ pub struct UnseenSum {
     pub sight: Sight,
     /// Base area `A` of the tile.
     pub base_area: f64,
-    /// Planes that mirror the tile; none where they are not to be used.
-    pub mirrors: [bool; 2],
-    /// What a table for pictures stands on; absent where none is expected to pay.
-    pub grid: Option<UpperPairs>,
+    /// What a table for pictures is made of; absent where none is expected to pay.
+    pub nodes: Option<Nodes<'static>>,
     pub interpolation: Interpolation,
 }
 

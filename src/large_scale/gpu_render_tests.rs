@@ -47,8 +47,7 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
         let pictured = match tabulated {
             true => {
                 let Form::Direct(direct) = &outcome.brdf.form else { panic!("{geometry}: not direct") };
-                let nodes = Nodes { mirrors: unseen.sum.mirrors, ..Nodes::all(unseen.sum.grid.unwrap()) };
-                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+                let table = PairTable::build(direct, unseen.sum.nodes.unwrap(), &Cancel::default()).unwrap().unwrap();
                 outcome.brdf.with_direct_form(Form::Table(table.read(unseen.sum.interpolation)))
             }
             false => outcome.brdf.as_ref().clone(),

@@ -28,8 +28,10 @@ const THINNED: [usize; 4] = [27, 17, 10, 3];
 /// A table this many times too far off is not helped by the next finer grid, which has half its step.
 const HOPELESS: f64 = 2.5;
 
-/// One facet in so many makes a table, those first that shine where a half vector points.
-const PARTS: [usize; 2] = [5, 2];
+/// One facet in so many makes a table, those first that shine where a half vector points; less than a fifth where these are
+/// many nevertheless.
+const PARTS: [usize; 4] = [20, 10, 5, 2];
+const MANY: usize = 1600;
 
 /// The same for coarse tables, of so many nodes, which are made at once; from all facets where that is not close enough.
 const COARSE_PART: usize = 4;
@@ -197,7 +199,7 @@ impl Pictures {
             if !self.is_close(best) {
                 return Ok(Attempt::TooFar(best));
             }
-            for part in PARTS.into_iter().filter(|_| summed > 0) {
+            for part in PARTS.into_iter().filter(|part| summed > 0 && (*part <= 5 || summed >= MANY * part)) {
                 let sampled = tried(Some(summed / part))?;
                 if sampled.is_some_and(|errors| self.is_close(errors) && errors.rel_l2 < NO_WORSE * best.rel_l2) {
                     nodes.facets = Some(summed / part);

@@ -46,7 +46,7 @@ impl DeviceDrafts {
         }
         let made = self.make(loaded, pipeline)?;
         // What a rung costs is known of tiles of one kind only.
-        let kind = made.as_ref().map(|tile| (tile.sum.grid.is_some(), tile.sum.sum.lobe_count(), tile.plan.route));
+        let kind = made.as_ref().map(|tile| (tile.sum.nodes.is_some(), tile.sum.sum.lobe_count(), tile.plan.route));
         if kind == self.kind || self.rung == 0 {
             self.kind = kind;
             self.last = Some(Last { key, tile: made.clone() });

@@ -110,7 +110,7 @@ impl Photographer {
             Err(_) => return Ok(None),
         };
         // Without a table it is the shading that takes the finer sum.
-        let counted: &[&str] = if tile.sum.grid.is_some() { &[PRODUCT] } else { &[PRODUCT, "shading"] };
+        let counted: &[&str] = if tile.sum.nodes.is_some() { &[PRODUCT] } else { &[PRODUCT, "shading"] };
         let counted: Vec<f64> =
             made.stages.iter().filter(|(name, _)| counted.contains(name)).map(|(_, ms)| *ms).collect();
         if made.stages.iter().any(|(name, _)| *name == PRODUCT) {

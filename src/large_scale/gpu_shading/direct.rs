@@ -49,10 +49,12 @@ struct Patch {
 }
 
 /// The buffers that all passes read.
+#[derive(Clone)]
 pub(super) struct Shared {
-    facets: wgpu::Buffer,
-    visibility: wgpu::Buffer,
-    patches: wgpu::Buffer,
+    pub(super) facets: wgpu::Buffer,
+    pub(super) visibility: wgpu::Buffer,
+    /// Or the facets that were picked.
+    pub(super) patches: wgpu::Buffer,
 }
 
 impl GpuShading {

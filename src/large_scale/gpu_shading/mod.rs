@@ -6,6 +6,7 @@
 mod column_terms;
 mod direct;
 mod low_rank;
+mod picked;
 mod seen;
 mod table;
 mod table_of_sum;
@@ -152,8 +153,8 @@ impl GpuShading {
         seen: Seen,
         shadowed: bool,
     ) -> std::result::Result<GpuMaterial, GpuError> {
-        let UnseenSum { sum, grid, mirrors, interpolation, .. } = tile;
-        let table = grid.map(|grid| self.tabulated(gpu, (sum, &seen), (grid, *mirrors, *interpolation), shadowed));
+        let UnseenSum { sum, nodes, interpolation, .. } = tile;
+        let table = nodes.map(|nodes| self.tabulated(gpu, (sum, &seen), (nodes, *interpolation), shadowed));
         let (passes, table) = match table {
             Some(Ok((pass, table))) => (vec![pass], Some(table)),
             None | Some(Err(GpuError::Unsupported(_))) => (self.direct_passes(gpu, sum, &seen, shadowed)?, None),

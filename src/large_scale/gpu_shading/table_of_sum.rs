@@ -1,7 +1,8 @@
 //! A table for pictures that the device makes of a sum over facets: nothing is read back, and nobody waits.
 //!
-//! The twin of [`PairTable::build`] over all facets. One dispatch adds one lobe, or the area that is seen, over some
-//! facets to its columns, a thread a node; the last one fills in mirror images and the ends of θ_d.
+//! The twin of [`PairTable::build`]. One dispatch adds one lobe, or the area that is seen, over some facets to its columns, a
+//! thread a node; the last one fills in mirror images and the ends of θ_d. Where part of the facets are to be picked for each
+//! half vector, `picked.rs` has the steps.
 
 use std::ops::Range;
 
@@ -9,12 +10,13 @@ use bytemuck::{Pod, Zeroable};
 
 use super::column_terms::ColumnTerms;
 use super::direct::{SOFTWARE_FACETS, Shared, Sum, pieces};
+use super::picked::OfGroup;
 use super::seen::Seen;
 use super::table::Held;
 use super::{GpuShading, MAX_GROUPS, Padded, Pass, THREADS, Variant, padded};
 use crate::directions::{PolarGrid, UpperPairs};
 use crate::filtering::columns::{Column, Part, Weight};
-use crate::filtering::{FacetSum, Interpolation, PairTable};
+use crate::filtering::{self, FacetSum, Interpolation, PairTable};
 use crate::gpu::{Gpu, GpuError, Tier};
 
 /// Lobes of one dispatch: slow devices take a fifth of a second. A submission holds no more than its renderer allows.
@@ -23,14 +25,34 @@ const MOST_LOBES: u64 = 1 << 30;
 /// `Nodes` in `table_nodes.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Nodes {
+pub(super) struct Nodes {
     pairs: [u32; 4],
     columns: [u32; 3],
     column_count: u32,
+    seconds: [u32; 3],
     width: u32,
+    shapes: [f32; 2],
+    scales: [f32; 2],
+    picked: f32,
+    room: u32,
     crowding: f32,
     lowest: f32,
-    pad: u32,
+}
+
+impl Nodes {
+    /// The same where facets are picked, for one lobe or two: numbers, shapes and scales of these.
+    pub(super) fn with_lobes(self, seconds: &[u32], lobes: [[f32; 3]; 2], picked: f32, room: usize) -> Self {
+        let [[_, shape, scale], [_, other_shape, other_scale]] = lobes;
+        let place = |k: usize| seconds.get(k).copied().unwrap_or_default();
+        Self {
+            seconds: [place(0), place(1), place(2)],
+            shapes: [shape, other_shape],
+            scales: [scale, other_scale],
+            picked,
+            room: room as u32,
+            ..self
+        }
+    }
 }
 
 /// `Angle` in `table_nodes.wgsl`.
@@ -53,12 +75,12 @@ pub(super) struct Making {
 
 /// A dispatch.
 #[derive(Debug)]
-struct Step {
-    pipeline: wgpu::ComputePipeline,
-    groups: Vec<wgpu::BindGroup>,
-    workgroups: [u32; 2],
+pub(super) struct Step {
+    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) groups: Vec<wgpu::BindGroup>,
+    pub(super) workgroups: [u32; 2],
     /// Facets of all its threads together.
-    lobes: u64,
+    pub(super) lobes: u64,
 }
 
 impl Making {
@@ -94,9 +116,9 @@ impl Making {
 
 /// Which table: its grid, the planes that mirror the tile, and how many columns.
 #[derive(Debug, Clone, Copy)]
-struct Shape {
-    grid: UpperPairs,
-    mirrors: [bool; 2],
+pub(super) struct Shape {
+    pub(super) grid: UpperPairs,
+    pub(super) mirrors: [bool; 2],
     fours: usize,
 }
 
@@ -109,7 +131,7 @@ impl Shape {
         4 * self.fours * self.rows() * (self.grid.difference + 2)
     }
 
-    fn nodes(self, columns: &[u32]) -> Nodes {
+    pub(super) fn nodes(self, columns: &[u32]) -> Nodes {
         let UpperPairs { rings, azimuths, turn, difference } = self.grid;
         let place = |k: usize| columns.get(k).copied().unwrap_or_default();
         Nodes {
@@ -119,7 +141,7 @@ impl Shape {
             width: 4 * self.fours as u32,
             crowding: UpperPairs::CROWDING,
             lowest: UpperPairs::LOWEST,
-            pad: 0,
+            ..Nodes::zeroed()
         }
     }
 
@@ -148,7 +170,7 @@ impl Shape {
 const COLUMNS: usize = 16;
 
 /// Workgroups along two axes for so many threads; those beyond have nothing to do.
-fn workgroups(threads: usize) -> Result<[u32; 2], GpuError> {
+pub(super) fn workgroups(threads: usize) -> Result<[u32; 2], GpuError> {
     let rows = threads.div_ceil(THREADS as usize * COLUMNS);
     if rows > MAX_GROUPS {
         return Err(GpuError::Unsupported(format!("a table of {threads} numbers")));
@@ -157,7 +179,7 @@ fn workgroups(threads: usize) -> Result<[u32; 2], GpuError> {
 }
 
 /// The columns that one sum over facets fills: one, or one for each channel.
-fn columns_of(columns: &[Column], sum: &Column) -> Vec<u32> {
+pub(super) fn columns_of(columns: &[Column], sum: &Column) -> Vec<u32> {
     let same = |column: &Column| (column.group, column.part) == (sum.group, sum.part);
     columns.iter().zip(0..).filter(|(column, _)| same(column)).map(|(_, place)| place).collect()
 }
@@ -175,9 +197,10 @@ impl GpuShading {
         &mut self,
         gpu: &Gpu,
         (sum, seen): (&FacetSum, &Seen),
-        (grid, mirrors, interpolation): (UpperPairs, [bool; 2], Interpolation),
+        (nodes, interpolation): (filtering::Nodes, Interpolation),
         shadowed: bool,
     ) -> Result<(Pass, Making), GpuError> {
+        let filtering::Nodes { grid, mirrors, facets: picked, .. } = nodes;
         let columns = Column::of(sum).ok_or_else(|| refused("the sum has too many parts for a table to pay"))?;
         let weights: Vec<Weight> = columns.iter().map(|column| column.weight(sum)).collect();
         let terms = ColumnTerms::of(&weights)?;
@@ -192,7 +215,7 @@ impl GpuShading {
         let shared = Shared::of(gpu, sum, seen)?;
         let of = (sum, seen, &shared);
         let mut steps = self.area_steps(gpu, of, directions, &areas)?;
-        steps.extend(self.column_steps(gpu, of, &columns, shape, &values)?);
+        steps.extend(self.column_steps(gpu, of, (&columns, picked), shape, &values)?);
         Ok((pass, Making { sums: [values, areas], steps }))
     }
 
@@ -224,16 +247,25 @@ impl GpuShading {
         &mut self,
         gpu: &Gpu,
         (sum, seen, shared): (&FacetSum, &Seen, &Shared),
-        columns: &[Column],
+        (columns, picked): (&[Column], Option<usize>),
         shape: Shape,
         values: &wgpu::Buffer,
     ) -> Result<Vec<Step>, GpuError> {
+        // Less than half of them spares something.
+        let picked = picked.filter(|&count| sum.facet_count() >= 2 * count);
         let angles = gpu.upload("angles", &shape.angles(), wgpu::BufferUsages::STORAGE)?;
         let see = seen.file();
         let layouts = [self.nodes.clone(), self.facets.clone()];
         let mut steps = Vec::new();
         // The first channel stands for all.
         for column in columns.iter().filter(|column| column.channel.is_none_or(|channel| channel == 0)) {
+            if let (Some(count), Part::Lobe(lobe)) = (picked, column.part) {
+                if lobe == 0 {
+                    let of = OfGroup { sum, seen, shared, columns, group: column.group, count };
+                    steps.extend(self.picked_steps(gpu, &of, shape, [&angles, values])?);
+                }
+                continue;
+            }
             let blank = Sum::blank(sum, seen);
             let (summed, added) = match column.part {
                 Part::Lobe(lobe) => {
@@ -268,7 +300,7 @@ impl GpuShading {
         Ok(steps)
     }
 
-    fn nodes_group(
+    pub(super) fn nodes_group(
         &self,
         gpu: &Gpu,
         nodes: Nodes,

@@ -39,6 +39,17 @@ fn tabulated(
     of: (UpperPairs, [bool; 2], Interpolation),
     shadowed: bool,
 ) -> Result<GpuMaterial, GpuError> {
+    let (grid, mirrors, interpolation) = of;
+    tabulated_at(gpu, shading, brdf, (Nodes { mirrors, ..Nodes::all(grid) }, interpolation), shadowed)
+}
+
+fn tabulated_at(
+    gpu: &Gpu,
+    shading: &mut GpuShading,
+    brdf: &EffectiveBrdf,
+    of: (Nodes, Interpolation),
+    shadowed: bool,
+) -> Result<GpuMaterial, GpuError> {
     let Form::Direct(direct) = &brdf.form else { panic!("no sum over facets") };
     let (pass, table) = shading.tabulated(gpu, (&direct.sum, &Seen::Held(&direct.visibility)), of, shadowed)?;
     Ok(GpuMaterial { table: Some(table), ..GpuMaterial::of(vec![pass], brdf.base_area) })
@@ -186,6 +197,49 @@ fn areas_of_few_normals_stand_beside_lobes_of_many_a_channel_each_where_colours_
         let picked: Vec<usize> = (0..direct.sum.facet_count()).map(|k| k % horizons.facets()).collect();
         *direct = Direct::new(direct.sum.clone(), Visibility::Horizons(horizons.picked(&picked)).into());
         assert_eq!(assert_same_table(&format!("a mix, coloured {colored}"), &gpu, &brdf, [false; 2]), columns);
+    }
+}
+
+#[test]
+fn the_device_picks_the_facets_that_the_cpu_picks_for_each_half_vector() {
+    let Some(gpu) = open_gpu() else { return };
+    let two = format!("[{}, {}]", LOBES[4], LOBES[0]);
+    let three = format!("[{}, {}, {}]", LOBES[1], LOBES[2], LOBES[3]);
+    let mut ripples = open(RIPPLES, &two, "direct");
+    ripples.scene.quality.facets = Some(2000);
+    let black = "[{ kind = \"lambertian\", albedo = 0.0 }, { kind = \"lambertian\", albedo = 0.3 }]";
+    let each = |k| k;
+    // Of three lobes the CPU has one list of picks, the device one for the first two and one for the third.
+    for (what, brdf, mirrors, is_same) in [
+        ("ripples", effective(&ripples), [false; 2], true),
+        ("mirrored ripples", effective(&ripples), [true, false], true),
+        ("in colours", scattered_in_runs([&two, &two], true, each), [false; 2], true),
+        ("a black lobe", scattered_in_runs([black, LOBES[4]], false, each), [false; 2], true),
+        ("three lobes beside one", scattered_in_runs([&three, LOBES[4]], false, each), [false; 2], false),
+    ] {
+        let Form::Direct(direct) = &brdf.form else { panic!("{what}: not direct") };
+        let table = |facets| {
+            let nodes = Nodes { mirrors, facets, ..Nodes::all(GRID) };
+            (nodes, PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap())
+        };
+        let ((nodes, picked), (_, all)) = (table(Some(300)), table(None));
+        let mut shading = GpuShading::new(&gpu).unwrap();
+        let material = tabulated_at(&gpu, &mut shading, &brdf, (nodes, Interpolation::Cubic), false).unwrap();
+        let [values, _] = made(&gpu, &material);
+        let numbers = |table: &PairTable| bytemuck::cast_slice::<_, f32>(table.values()).to_vec();
+        let (cpu, all) = (numbers(&picked), numbers(&all));
+        let off = |a: &[f32], b: &[f32]| {
+            let square = |values: &mut dyn Iterator<Item = f32>| values.map(|v| f64::from(v * v)).sum::<f64>().sqrt();
+            square(&mut a.iter().zip(b).map(|(a, b)| a - b)) / square(&mut b.iter().copied())
+        };
+        let [from_cpu, cpu_from_all, from_all] = [off(&values, &cpu), off(&cpu, &all), off(&values, &all)];
+        eprintln!(
+            "{what}: {from_cpu:.1e} from the CPU's picks, {from_all:.3} from all facets; the CPU's {cpu_from_all:.3}"
+        );
+        assert!(cpu_from_all > 0.01 && from_all < 1.25 * cpu_from_all, "{what}");
+        // Where rounding decides, a neighbour is picked.
+        assert!(!is_same || from_cpu < 0.1 * cpu_from_all, "{what}: {from_cpu}");
+        assert_eq!(made(&gpu, &material)[0], values, "{what}: made twice");
     }
 }
 

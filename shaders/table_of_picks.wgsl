@@ -1,0 +1,52 @@
+// Adds sums over facets that were picked for each half vector (pick_facets.wgsl) to their columns of a table, as
+// table_of_sum.wgsl does over all facets; of up to two lobes at once.
+
+//!import table_values
+//!import table_pairs
+//!import table_picks
+//!import two_lobes
+//!import flat_index
+//!import visibility_unblocked
+//!import weights_area
+
+@group(1) @binding(3) var<storage, read> picks: array<Pick>;
+
+@compute @workgroup_size(THREADS)
+fn add(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let node = flat_index(id, groups);
+    let row = node / nodes.pairs.w;
+    let step = node % nodes.pairs.w;
+    if row >= row_count() {
+        return;
+    }
+    let h_index = row / nodes.pairs.z;
+    let azimuth = h_index % nodes.pairs.y;
+    if angles[azimuth].image != azimuth {
+        return;
+    }
+    let turn = angles[nodes.pairs.y + row % nodes.pairs.z];
+    let pair = pair_at(h_index / nodes.pairs.y, angles[azimuth], turn, step);
+    let to_light = sight_along(pair.i);
+    let to_viewer = sight_along(pair.o);
+    let first = h_index * nodes.room + 1u;
+    let end = min(sum.end, picks[first - 1u].facet);
+    var one = vec3f(0.0);
+    var two = vec3f(0.0);
+    for (var k = sum.first; k < end; k++) {
+        let pick = picks[first + k];
+        let seen = see(facets[pick.facet].xyz, pair);
+        if is_lit(seen) {
+            let area = weight(pick.facet) * (pick.weight * visibility(pick.facet, to_light) * visibility(pick.facet, to_viewer));
+            let lobes = two_lobes(seen, pair.i_dot_h);
+            one += vec3f(area * lobes.x);
+            two += vec3f(area * lobes.y);
+        }
+    }
+    let at = row * row_size() + (step + 1u) * nodes.width;
+    for (var c = 0u; c < nodes.column_count; c++) {
+        values[at + nodes.columns[c]] += one[c];
+        if SECOND != 0u {
+            values[at + nodes.seconds[c]] += two[c];
+        }
+    }
+}

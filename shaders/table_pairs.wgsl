@@ -1,0 +1,33 @@
+// The directions at the nodes of a table.
+
+//!import table_nodes
+//!import vectors
+//!import lobe_input
+
+fn lifted(d: vec3f) -> vec3f {
+    return unit_or(vec3f(d.xy, max(d.z, nodes.lowest)), vec3f(0.0, 0.0, 1.0));
+}
+
+// The twin of UpperPairs::pair (src/directions/upper_pairs.rs).
+fn pair_at(ring: u32, phi: Angle, turn: Angle, step: u32) -> Pair {
+    let s = f32(ring) / f32(nodes.pairs.x - 1u);
+    let m = max(1.0 - s * s, nodes.lowest);
+    let sin_theta_h = sqrt(max(1.0 - m * m, 0.0));
+    let frame = mat3x3f(
+        vec3f(m * phi.cosine, m * phi.sine, -sin_theta_h),
+        vec3f(-phi.sine, phi.cosine, 0.0),
+        vec3f(sin_theta_h * phi.cosine, sin_theta_h * phi.sine, m),
+    );
+    let x = f32(step) / f32(nodes.pairs.w - 1u);
+    let u = x * (1.0 + nodes.crowding - nodes.crowding * x);
+    let n = sin_theta_h * abs(turn.cosine);
+    let r = length(vec2f(n, m));
+    let versine = min(u * u * m * m / (r * (r + n)), 1.0 - nodes.lowest);
+    let sin_theta_d = sqrt(versine * (2.0 - versine));
+    let across = vec3f(sin_theta_d * turn.cosine, sin_theta_d * turn.sine, 0.0);
+    let along = vec3f(0.0, 0.0, 1.0 - versine);
+    let i = lifted(frame * (along + across));
+    let o = lifted(frame * (along - across));
+    let h = half_vector(i, o);
+    return Pair(i, o, h, 0.5 * (dot(i, h) + dot(o, h)));
+}
