@@ -33,7 +33,13 @@ fn every_combination_of_effects_parses_and_validates() {
                 check("shade_table", &[("shadows_none", shadows), ("tint_fixed", tint), ("column_tints", columns)]);
             }
         }
-        for see in ["visibility_unblocked", "visibility_horizons", "visibility_slices", "visibility_maps"] {
+        for see in [
+            "visibility_unblocked",
+            "visibility_horizons",
+            "visibility_slices",
+            "visibility_hanging",
+            "visibility_maps",
+        ] {
             check("projected_area", &[("visibility_unblocked", see)]);
             check("table_areas", &[("visibility_unblocked", see)]);
             for weights in ["weights_area", "weights_rgb"] {

@@ -33,7 +33,7 @@ pub use pair_table::{Nodes, PairTable, TableContent};
 pub use rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub(crate) use sampled::share_of;
 pub use tint::Tint;
-pub use unseen::{Heights, Maps, Sight, UnseenSum};
+pub use unseen::{Heights, Maps, Sight, Sliced, UnseenSum};
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 
 /// What the large scale asks of a material: all it knows of the small scale.

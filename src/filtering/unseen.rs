@@ -7,7 +7,7 @@ use glam::Vec2;
 use super::{FacetSum, Interpolation, Nodes};
 use crate::directions::PolarGrid;
 use crate::geometry::{Facets, HeightGrid, TileMesh};
-use crate::visibility::Visibility;
+use crate::visibility::{PeriodicGrid, Visibility};
 
 /// Facets and their lobes, and how they come to see.
 #[derive(Debug)]
@@ -28,8 +28,22 @@ pub enum Sight {
     Seen(Arc<Visibility>),
     /// By walking this height-field.
     Heights(Heights),
+    /// By cutting the tile along azimuths.
+    Slices(Box<Sliced>),
     /// By drawing the tile from many directions.
     Maps(Box<Maps>),
+}
+
+/// A tile that is cut in vertical slices.
+#[derive(Debug)]
+pub struct Sliced {
+    pub grid: PeriodicGrid,
+    pub facets: Arc<Facets>,
+    pub azimuths: usize,
+    /// Width of the soft step at a horizon [rad].
+    pub ramp: f32,
+    /// Whether anything may hang above a horizon.
+    pub overhangs: bool,
 }
 
 /// A height-field, its tile and its facets.

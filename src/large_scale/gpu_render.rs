@@ -15,9 +15,9 @@ use super::tone_map::{ToneCurve, ToneMap};
 use super::{CameraView, ObjectMesh, Picture};
 use crate::cancel::Cancel;
 use crate::error::Result;
-use crate::filtering::{EffectiveBrdf, Heights, Maps, Sight, UnseenSum};
+use crate::filtering::{EffectiveBrdf, Heights, Maps, Sight, Sliced, UnseenSum};
 use crate::gpu::{Gpu, GpuError, Tier};
-use crate::visibility::{GpuHeightMarch, GpuShadowMaps};
+use crate::visibility::{GpuHeightMarch, GpuShadowMaps, GpuSlicer};
 
 /// Lobes or table rows of one submission: some tenths of a second for graphics processors that are not slow, about one for
 /// software.
@@ -37,6 +37,7 @@ pub struct GpuRenderer {
     /// Whether the device has made what the material reads.
     is_made: bool,
     march: Option<GpuHeightMarch>,
+    slicer: Option<GpuSlicer>,
     maps: Option<GpuShadowMaps>,
     pictures: GpuPictures,
     /// For pictures like the last one.
@@ -66,6 +67,7 @@ impl GpuRenderer {
             material: None,
             is_made: false,
             march: None,
+            slicer: None,
             maps: None,
             pictures: GpuPictures::new(gpu)?,
             room: None,
@@ -114,6 +116,15 @@ impl GpuRenderer {
                 };
                 let Heights { samples, tile_size, facets, azimuths, ramp } = heights;
                 Seen::Marched(march.horizons(gpu, samples, *tile_size, facets, *azimuths)?, *ramp)
+            }
+            Sight::Slices(of) => {
+                let slicer = match &mut self.slicer {
+                    Some(slicer) => slicer,
+                    none => none.insert(GpuSlicer::new(gpu)?),
+                };
+                let Sliced { grid, facets, azimuths, ramp, overhangs } = &**of;
+                let made = slicer.slices(gpu, grid, facets, *azimuths, *overhangs)?;
+                if *overhangs { Seen::Sliced(made, *ramp) } else { Seen::Marched(made, *ramp) }
             }
             Sight::Maps(of) => {
                 let maps = match &mut self.maps {

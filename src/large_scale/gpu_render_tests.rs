@@ -7,7 +7,7 @@ use super::gpu_shading_tests::{FLAT, LOBES, PYRAMIDS, RODS, Studio, assert_same_
 use super::shading::Background;
 use super::{RenderInput, render};
 use crate::cancel::Cancel;
-use crate::filtering::{Form, Nodes, PairTable, Sight};
+use crate::filtering::{Form, PairTable, Sight};
 use crate::pipeline::Pipeline;
 use crate::scene;
 
@@ -40,6 +40,7 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
         let found = match &unseen.sum.sight {
             Sight::Seen(_) => "held",
             Sight::Heights(_) => "marched",
+            Sight::Slices(_) => "sliced",
             Sight::Maps(_) => "drawn",
         };
         assert_eq!(found, sight, "{geometry}");

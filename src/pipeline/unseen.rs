@@ -2,10 +2,11 @@
 
 use super::{Pipeline, Prepared, StageTimes};
 use crate::error::Result;
-use crate::filtering::{Heights, Maps, Nodes, Sight, UnseenSum};
+use crate::filtering::{Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
 use crate::geometry::mirror_planes;
-use crate::plan::{Plan, Preset, Route, Settings};
+use crate::plan::{Plan, Preset, Route, Settings, Sighting};
 use crate::scene::{LoadedScene, Switch};
+use crate::visibility::PeriodicGrid;
 
 /// What is known of a tile without its visibility.
 #[derive(Debug)]
@@ -48,12 +49,24 @@ impl Pipeline {
                 azimuths: settings.horizon_azimuths,
                 ramp: settings.penumbra,
             }),
-            (Route::GpuMaps, _) => Sight::Maps(Box::new(Maps {
-                mesh: mesh.clone(),
-                facets,
-                grid: settings.map_grid,
-                resolution: settings.map_resolution,
-            })),
+            (Route::GpuMaps | Route::CpuMaps, _) if settings.sighting == Sighting::Maps => {
+                Sight::Maps(Box::new(Maps {
+                    mesh: mesh.clone(),
+                    facets,
+                    grid: settings.map_grid,
+                    resolution: settings.map_resolution,
+                }))
+            }
+            (Route::HorizonScan | Route::Slices | Route::GpuMaps | Route::CpuMaps, _) => {
+                let overhangs = plan.route != Route::HorizonScan;
+                Sight::Slices(Box::new(Sliced {
+                    grid: PeriodicGrid::new(mesh),
+                    facets,
+                    azimuths: if overhangs { settings.slice_azimuths } else { settings.horizon_azimuths },
+                    ramp: settings.penumbra,
+                    overhangs,
+                }))
+            }
             _ => Sight::Seen(self.seen(&prepared, &mut times)?.0),
         };
         let Prepared { shape, settings, sum, plan, shape_version, .. } = prepared;

@@ -21,13 +21,13 @@ pub struct GpuHeightMarch {
     march: wgpu::ComputePipeline,
 }
 
-/// Horizons that a submission is to make.
+/// Horizons, or slices, that a submission is to make.
 #[derive(Debug)]
 pub struct GpuHorizons {
-    pipeline: wgpu::ComputePipeline,
-    group: wgpu::BindGroup,
-    workgroups: [u32; 2],
-    /// Elevations [rad], the azimuths of a facet side by side; zeros until it is made.
+    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) group: wgpu::BindGroup,
+    pub(super) workgroups: [u32; 2],
+    /// Elevations [rad], the azimuths of a facet side by side, or what `visibility_hanging.wgsl` reads; zeros until it is made.
     pub elevations: wgpu::Buffer,
     pub azimuths: usize,
 }

@@ -5,6 +5,7 @@
 
 mod gpu_maps;
 mod gpu_march;
+mod gpu_slices;
 mod height_march;
 mod horizons;
 mod kept;
@@ -27,6 +28,7 @@ use glam::Vec3;
 
 pub use gpu_maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
 pub use gpu_march::{GpuHeightMarch, GpuHorizons};
+pub use gpu_slices::GpuSlicer;
 pub use horizons::Horizons;
 pub use nearest::Hit;
 pub use packed::PackedVisibility;

@@ -80,7 +80,7 @@ fn meets(origin: Vec3, to: Vec3, corners: [Vec3; 3]) -> bool {
 }
 
 /// Length by which rays start off their facet, in units of the tile's diagonal.
-const LIFT: f32 = 2e-6;
+pub(super) const LIFT: f32 = 2e-6;
 
 /// Where rays of a facet start: lifted off on the side that reflects, so that coplanar neighbours do not block it.
 pub(super) fn lifted_origin(facets: &Facets, facet: usize, tile_diagonal: f32) -> Vec3 {

@@ -161,7 +161,7 @@ impl GpuShading {
             Some(Err(error)) => return Err(error),
         };
         let (horizons, maps) = match seen {
-            Seen::Marched(horizons, _) => (Some(horizons), None),
+            Seen::Marched(horizons, _) | Seen::Sliced(horizons, _) => (Some(horizons), None),
             Seen::Drawn(maps, _) => (None, Some(maps)),
             Seen::Held(_) => (None, None),
         };

@@ -12,6 +12,8 @@ pub enum Seen<'a> {
     Held(&'a Visibility),
     /// Horizons that the device is to make, and the width of the soft step there [rad].
     Marched(GpuHorizons, f32),
+    /// Slices that the device is to make, and the width of the soft step there [rad].
+    Sliced(GpuHorizons, f32),
     /// Maps that the device is to draw, and what their directions are.
     Drawn(GpuMaps, PolarGrid),
 }
@@ -23,6 +25,7 @@ impl Seen<'_> {
             Self::Held(Visibility::Unblocked { .. }) => "visibility_unblocked",
             Self::Held(Visibility::Horizons(_)) | Self::Marched(..) => "visibility_horizons",
             Self::Held(Visibility::Slices(_)) => "visibility_slices",
+            Self::Sliced(..) => "visibility_hanging",
             Self::Held(Visibility::Maps(_)) | Self::Drawn(..) => "visibility_maps",
         }
     }
@@ -37,7 +40,7 @@ impl Seen<'_> {
             Self::Held(Visibility::Maps(SoftMaps { grid, .. })) | Self::Drawn(_, grid) => {
                 Sum { azimuths: grid.azimuths as u32, rings: grid.rings as u32, nodes: grid.len() as u32, ..sum }
             }
-            Self::Marched(made, ramp) => horizons(made.azimuths, Horizons::soft(*ramp)),
+            Self::Marched(made, ramp) | Self::Sliced(made, ramp) => horizons(made.azimuths, Horizons::soft(*ramp)),
         }
     }
 
@@ -49,7 +52,7 @@ impl Seen<'_> {
             Self::Held(Visibility::Slices(slices)) => gpu.upload("slices", &slices_by_facet(slices), usage),
             Self::Held(Visibility::Horizons(horizons)) => gpu.upload("horizons", &horizons_by_facet(horizons), usage),
             Self::Held(Visibility::Maps(maps)) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
-            Self::Marched(made, _) => Ok(made.elevations.clone()),
+            Self::Marched(made, _) | Self::Sliced(made, _) => Ok(made.elevations.clone()),
             Self::Drawn(made, _) => Ok(made.bits.clone()),
         }
     }

@@ -1,0 +1,104 @@
+//! Both routes cut a tile alike.
+
+use super::*;
+use crate::geometry::TileMesh;
+use crate::gpu::Tier;
+use crate::pipeline::Pipeline;
+use crate::scene;
+use crate::visibility::{Horizons, Slices};
+
+fn open_gpu() -> Option<Gpu> {
+    Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
+}
+
+fn tile(name: &str, facets: usize) -> (TileMesh, Facets) {
+    let mesh = Pipeline::new().mesh(&scene::open(name, &[]).unwrap()).unwrap();
+    let facets = Facets::sample(&mesh, facets, 1);
+    (mesh, facets)
+}
+
+fn read(gpu: &Gpu, made: &GpuHorizons) -> Vec<u32> {
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+    gpu.queue.submit([encoder.finish()]);
+    gpu.read(&made.elevations).unwrap()
+}
+
+/// The distance that 99 % of the numbers stay within.
+fn most(mut off: Vec<f32>) -> f32 {
+    off.sort_by(f32::total_cmp);
+    off[off.len() * 99 / 100]
+}
+
+#[test]
+fn both_routes_find_the_same_horizons_of_meshes_without_overhangs() {
+    let Some(gpu) = open_gpu() else { return };
+    let slicer = GpuSlicer::new(&gpu).unwrap();
+    for (name, azimuths) in [("table4_teapot", 13), ("table4_cup", 8), ("fig5c_uneven", 11), ("fig8b_ripples", 10)] {
+        let (mesh, facets) = tile(name, 300);
+        let grid = PeriodicGrid::new(&mesh);
+        let cpu = Horizons::scan(&grid, &facets, azimuths, 0.02);
+        let made = slicer.slices(&gpu, &grid, &facets, azimuths, false).unwrap();
+        let device: Vec<f32> = read(&gpu, &made).into_iter().map(f32::from_bits).collect();
+        let off = (0..device.len()).map(|k| (device[k] - cpu.elevation(k % azimuths, k / azimuths)).abs());
+        let (within, blocked) = (most(off.collect()), device.iter().filter(|&&elevation| elevation > 0.0).count());
+        eprintln!("{name}: 99 % within {within:.1e} rad; {blocked} of {} rise", device.len());
+        assert!(blocked * 8 > device.len() && within < 1e-4, "{name}: {within}");
+    }
+}
+
+#[test]
+fn both_routes_find_the_same_intervals_under_overhangs() {
+    let Some(gpu) = open_gpu() else { return };
+    let slicer = GpuSlicer::new(&gpu).unwrap();
+    let azimuths = 12;
+    for name in ["table4_pillow", "table4_skirt", "fig6c_velvet_up"] {
+        let (mesh, facets) = tile(name, 200);
+        let grid = PeriodicGrid::new(&mesh);
+        let cpu = Slices::scan(&grid, &facets, azimuths, 0.02);
+        let (starts, intervals) = cpu.hanging_by_facet();
+        let made = slicer.slices(&gpu, &grid, &facets, azimuths, true).unwrap();
+        let words = read(&gpu, &made);
+        let (mut off, mut differ, mut hanging) = (Vec::new(), 0, 0);
+        for (slice, words) in words.chunks(WORDS_A_SLICE).enumerate() {
+            off.push((f32::from_bits(words[0]) - cpu.horizons.elevation(slice % azimuths, slice / azimuths)).abs());
+            let expected = &intervals[starts[slice] as usize..starts[slice + 1] as usize];
+            let found: Vec<(f32, f32)> = words[1..]
+                .iter()
+                .take_while(|&&word| word > 0)
+                .map(|&word| [word & 0xffff, word >> 16].map(|end| end as f32 * 1.590_796_3 / 65_535.0).into())
+                .collect();
+            hanging += expected.len();
+            let is_same = expected.len() == found.len()
+                && expected.iter().zip(&found).all(|(a, b)| (a.0 - b.0).abs() < 1e-3 && (a.1 - b.1).abs() < 1e-3);
+            differ += usize::from(!is_same);
+        }
+        let (within, slices) = (most(off), facets.len() * azimuths);
+        eprintln!("{name}: horizons within {within:.1e}; {hanging} intervals, {differ} of {slices} slices differ");
+        assert!(hanging * 10 > slices, "{name}: something hangs");
+        // Gaps of rounding size, and slices that graze an edge.
+        assert!(within < 1e-4 && differ * 100 < slices, "{name}: {within}, {differ} of {slices}");
+    }
+}
+
+/// `cargo test --release --lib looks_of_slices -- --ignored --nocapture`
+#[test]
+#[ignore = "prints how many cells and triangles slices look at"]
+fn looks_of_slices() {
+    let Some(gpu) = open_gpu() else { return };
+    assert_eq!(gpu.tier, Tier::Software, "a graphics processor takes a moment, too");
+    let slicer = GpuSlicer::new(&gpu).unwrap();
+    let module = gpu.module("slice_scan").unwrap();
+    let counting =
+        gpu.compute_pipeline_with(&module, "scan", &[&slicer.layout], &[("COUNTING", 1.0), ("HANGING", 1.0)]).unwrap();
+    for name in ["table4_pillow", "table4_skirt", "fig6a_velvet_spread", "table4_teapot", "table4_cup"] {
+        let (mesh, facets) = tile(name, 1024);
+        for grid in [PeriodicGrid::new(&mesh), PeriodicGrid::for_slices(&mesh)] {
+            let made = slicer.found_by(&gpu, &counting, 1, (&grid, &facets, 24)).unwrap();
+            let looks = read(&gpu, &made);
+            let mean = looks.iter().map(|&looks| f64::from(looks)).sum::<f64>() / looks.len() as f64;
+            let cells = grid.cells.x * grid.cells.y;
+            println!("{name:<20} {cells:>6} cells: {mean:>7.1} looks a slice, {:?} at most", looks.iter().max());
+        }
+    }
+}
