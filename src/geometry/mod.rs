@@ -13,6 +13,7 @@ pub(crate) mod kd_tree;
 mod mesh_file;
 mod normal_bins;
 pub mod obj;
+mod part;
 mod pyramids;
 mod rods;
 pub(crate) mod rounded;
