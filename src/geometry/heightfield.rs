@@ -44,23 +44,8 @@ fn from_rows(rows: &[Vec<f32>]) -> Result<Pixels<f32>> {
 
 /// Two triangles a cell, between samples; the last row and column reach over the tile's edge to the first.
 pub fn from_grid(grid: HeightGrid, size: Vec2) -> TileMesh {
-    let (width, height) = (grid.size.x as usize, grid.size.y as usize);
-    let step = size / grid.size.as_vec2();
-    let mut positions = Vec::with_capacity((width + 1) * (height + 1));
-    for j in 0..=height {
-        for i in 0..=width {
-            let xy = (Vec2::new(i as f32, j as f32) + 0.5) * step;
-            positions.push(xy.extend(grid.heights[(j % height) * width + i % width]));
-        }
-    }
-    let index = |i: usize, j: usize| (j * (width + 1) + i) as u32;
-    let mut triangles = Vec::with_capacity(2 * width * height);
-    for j in 0..height {
-        for i in 0..width {
-            let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
-            triangles.extend([[a, b, c], [a, c, d]]);
-        }
-    }
+    let positions: Vec<Vec3> = positions(&grid, size).collect();
+    let triangles: Vec<[u32; 3]> = triangles(grid.size).collect();
     TileMesh {
         size,
         triangle_slot: vec![0; triangles.len()],
@@ -71,6 +56,35 @@ pub fn from_grid(grid: HeightGrid, size: Vec2) -> TileMesh {
         closes_plane: true,
         ..TileMesh::default()
     }
+}
+
+fn positions(grid: &HeightGrid, size: Vec2) -> impl Iterator<Item = Vec3> {
+    let step = size / grid.size.as_vec2();
+    let [width, height] = grid.size.to_array().map(|side| side as usize);
+    (0..=height).flat_map(move |j| {
+        let row = &grid.heights[j % height * width..][..width];
+        (0..=width).map(move |i| {
+            let xy = (Vec2::new(i as f32, j as f32) + 0.5) * step;
+            xy.extend(if i < width { row[i] } else { row[0] })
+        })
+    })
+}
+
+/// The cell between samples (i, j) and (i + 1, j + 1) has the triangles `2 (j width + i)` and the next.
+fn triangles(size: UVec2) -> impl Iterator<Item = [u32; 3]> {
+    let index = move |i: u32, j: u32| j * (size.x + 1) + i;
+    let cell = move |i, j| {
+        let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    (0..size.y).flat_map(move |j| (0..size.x).flat_map(move |i| cell(i, j)))
+}
+
+/// Is it what [`from_grid`] makes of its samples, all of them finite?
+pub(super) fn is_made_of(mesh: &TileMesh, grid: &HeightGrid) -> bool {
+    mesh.positions.iter().all(|position| position.is_finite())
+        && positions(grid, mesh.size).eq(mesh.positions.iter().copied())
+        && triangles(grid.size).eq(mesh.triangles.iter().copied())
 }
 
 /// A height-field from a function of tile coordinates: for tests and examples.

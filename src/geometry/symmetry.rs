@@ -1,8 +1,10 @@
 //! Mirror planes of a tile: then half of the directions tell the other half.
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::TileMesh;
+use super::part::below;
 use crate::visibility::PeriodicGrid;
 
 /// Places that are compared, and planes that are tried along each axis.
@@ -18,16 +20,50 @@ pub fn mirror_planes(mesh: &TileMesh) -> [bool; 2] {
     if mesh.triangles.is_empty() {
         return [false; 2];
     }
-    let looks = Looks { mesh, grid: PeriodicGrid::new(mesh), bottom: mesh.z_range().0 };
-    let places: Vec<(Vec2, Vec<Seen>)> = (0..PLACES).map(|k| at(&looks, k)).collect();
-    [0, 1].map(|axis| candidates(mesh, axis).iter().any(|sum| looks.is_mirrored(&places, axis, *sum)))
+    let sums = [0, 1].map(|axis| candidates(mesh, axis));
+    let sums = if is_refused(mesh, &sums) { [vec![], vec![]] } else { sums };
+    if sums.iter().all(Vec::is_empty) { [false; 2] } else { among(mesh, &sums) }
 }
 
-fn at(looks: &Looks, k: usize) -> (Vec2, Vec<Seen>) {
+/// Are there planes among the candidates?
+fn among(mesh: &TileMesh, sums: &[Vec<f32>; 2]) -> [bool; 2] {
+    let looks = Looks { mesh, grid: PeriodicGrid::new(mesh), bottom: mesh.z_range().0 };
+    let places = (0..PLACES).into_par_iter().with_min_len(PLACES / 8);
+    let places: Vec<(Vec2, Vec<Seen>)> = places.map(|k| looks.at(k)).collect();
+    let has_plane = |axis: usize| sums[axis].iter().any(|sum| looks.is_mirrored(&places, axis, *sum));
+    rayon::join(|| has_plane(0), || has_plane(1)).into()
+}
+
+/// Places and planes of height-fields that are compared before all are.
+const FEW_PLACES: usize = 8;
+const FEW_PLANES: usize = 16;
+
+/// Do a few places already refuse all candidates? Asked of height-fields, where the triangles below a place are known: most of
+/// the time goes into a grid of all.
+fn is_refused(mesh: &TileMesh, sums: &[Vec<f32>; 2]) -> bool {
+    if sums.iter().map(Vec::len).sum::<usize>() > FEW_PLANES {
+        return false;
+    }
+    let planes = || [0, 1].into_iter().flat_map(|axis| sums[axis].iter().map(move |sum| (axis, *sum)));
+    let seen_from = |k| {
+        let place = place(k, mesh.size);
+        planes().map(move |(axis, sum)| mirrored(place, axis, sum, mesh.size)).chain([place])
+    };
+    let Some((part, grid)) = below(mesh, (0..FEW_PLACES).flat_map(seen_from)) else { return false };
+    let looks = Looks { mesh: &part, grid, bottom: mesh.z_range().0 };
+    let places: Vec<(Vec2, Vec<Seen>)> = (0..FEW_PLACES).map(|k| looks.at(k)).collect();
+    planes().all(|(axis, sum)| !looks.is_mirrored(&places, axis, sum))
+}
+
+fn place(k: usize, size: Vec2) -> Vec2 {
     // The R2 sequence, away from round numbers where edges lie.
     let part = |step: f64| ((k as f64 + 0.317) * step).fract() as f32;
-    let place = Vec2::new(part(0.754_877_666_246_692_8), part(0.569_840_290_998_053_3)) * looks.mesh.size;
-    (place, looks.down(place))
+    Vec2::new(part(0.754_877_666_246_692_8), part(0.569_840_290_998_053_3)) * size
+}
+
+fn mirrored(mut place: Vec2, axis: usize, sum: f32, size: Vec2) -> Vec2 {
+    place[axis] = (sum - place[axis]).rem_euclid(size[axis]);
+    place
 }
 
 /// Sums `x + x'` that planes could have: a highest vertex mirrors onto one of the same height.
@@ -61,6 +97,11 @@ struct Seen {
 }
 
 impl Looks<'_> {
+    fn at(&self, k: usize) -> (Vec2, Vec<Seen>) {
+        let place = place(k, self.mesh.size);
+        (place, self.down(place))
+    }
+
     /// All that the vertical line meets, from the top down.
     fn down(&self, place: Vec2) -> Vec<Seen> {
         let (mut layers, mut start) = (Vec::new(), self.grid.top() + 1.0);
@@ -85,8 +126,6 @@ impl Looks<'_> {
         let size = self.mesh.size;
         let mut differ = 0;
         for (place, seen) in places {
-            let mut mirrored = *place;
-            mirrored[axis] = (sum - place[axis]).rem_euclid(size[axis]);
             let same = |a: &Seen, b: &Seen| {
                 let mut normal = b.normal;
                 normal[axis] = -normal[axis];
@@ -95,7 +134,7 @@ impl Looks<'_> {
                     && a.slot == b.slot
                     && (a.color - b.color).abs().max_element() <= SAME_NORMAL
             };
-            let other = self.down(mirrored);
+            let other = self.down(mirrored(*place, axis, sum, size));
             let same = seen.len() == other.len() && seen.iter().zip(&other).all(|(a, b)| same(a, b));
             // A ray that falls on an edge may take either side.
             differ += usize::from(!same);
@@ -108,54 +147,5 @@ impl Looks<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::f32::consts::TAU;
-
-    use glam::UVec2;
-
-    use super::*;
-    use crate::geometry::{build, heightfield};
-
-    fn of(toml: &str) -> TileMesh {
-        let scene = crate::scene::parse(&format!("[tile]\ngeometry = {toml}\n")).unwrap();
-        build(&scene.tile, std::path::Path::new("")).unwrap()
-    }
-
-    #[test]
-    fn grooves_and_waves_have_the_planes_that_they_were_made_with() {
-        let v = r#"{ kind = "grooves", profile = "v", count = 3, depth = 0.1, side_angle_deg = 40, rotation_deg = 0 }"#;
-        assert_eq!(mirror_planes(&of(v)), [true, true]);
-        let size = Vec2::ONE;
-        let crooked = |at: Vec2| 0.1 * (TAU * (at.x + at.y)).cos() + 0.03 * (2.0 * TAU * at.x + 0.7).sin();
-        let mesh = heightfield::from_function(UVec2::splat(32), size, crooked);
-        assert_eq!(mirror_planes(&mesh), [false, false]);
-        // A saw along x, straight along y.
-        let mesh = heightfield::from_function(UVec2::splat(32), size, |at| 0.1 * at.x);
-        assert_eq!(mirror_planes(&mesh), [false, true]);
-    }
-
-    #[test]
-    fn a_plain_weave_has_both_planes_and_a_twill_has_not() {
-        assert_eq!(mirror_planes(&of(r#"{ kind = "weave", pattern = "plain" }"#)), [true, true]);
-        assert_ne!(mirror_planes(&of(r#"{ kind = "weave", pattern = "twill" }"#)), [true, true]);
-    }
-
-    #[test]
-    fn slots_that_differ_break_the_mirror() {
-        let mut mesh = of(
-            r#"{ kind = "grooves", profile = "trapezoid", count = 2, depth = 0.1, side_angle_deg = 45, rotation_deg = 0 }"#,
-        );
-        assert_eq!(mirror_planes(&mesh), [true, true]);
-        let marked = mesh.slots.len() as u16;
-        mesh.slots.push("marked".to_owned());
-        // One wall of one groove is made of something else.
-        let wall = (0..mesh.triangles.len()).find(|t| mesh.geometric_normal(*t).x.abs() > 0.5).unwrap();
-        let normal = mesh.geometric_normal(wall);
-        for triangle in 0..mesh.triangles.len() {
-            if (mesh.geometric_normal(triangle) - normal).length() < 1e-3 {
-                mesh.triangle_slot[triangle] = marked;
-            }
-        }
-        assert!(!mirror_planes(&mesh)[0]);
-    }
-}
+#[path = "symmetry_tests.rs"]
+mod tests;

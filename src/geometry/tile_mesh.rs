@@ -60,6 +60,7 @@ pub struct HeightGrid {
 
 impl TileMesh {
     /// Corner positions of a triangle.
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|index| self.positions[index as usize])
     }
@@ -77,11 +78,13 @@ impl TileMesh {
     }
 
     /// Unit geometric normal; zero for a triangle without area.
+    #[inline]
     pub fn geometric_normal(&self, triangle: usize) -> Vec3 {
         let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
         (b - a).cross(c - a).try_normalize().unwrap_or_default().as_vec3()
     }
 
+    #[inline]
     pub fn triangle_area(&self, triangle: usize) -> f64 {
         let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
         0.5 * (b - a).cross(c - a).length()

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::stage::Version;
 use super::{Assigned, Pipeline, Shape, StageTimes};
@@ -60,7 +61,7 @@ fn nothing_faces_down(mesh: &TileMesh) -> bool {
 
 /// The largest angle between a normal and z [rad].
 fn steepest(mesh: &TileMesh) -> f32 {
-    let cosine = |triangle| mesh.geometric_normal(triangle);
-    let normals = (0..mesh.triangles.len()).map(cosine).filter(|normal| *normal != Vec3::ZERO);
-    normals.map(|normal| normal.z).fold(1.0, f32::min).clamp(-1.0, 1.0).acos()
+    let normals = (0..mesh.triangles.len()).into_par_iter().with_min_len(2048).map(|t| mesh.geometric_normal(t));
+    let cosines = normals.filter(|normal| *normal != Vec3::ZERO).map(|normal| normal.z);
+    cosines.reduce(|| 1.0, f32::min).clamp(-1.0, 1.0).acos()
 }

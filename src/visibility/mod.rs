@@ -3,6 +3,9 @@
 //! [`Visibility`] is what the rest of the program reads: soft visibility of every facet along any direction, held as
 //! horizons where nothing overhangs, as slices or as maps of bits where something does.
 
+mod cell_lists;
+#[cfg(test)]
+mod cell_lists_tests;
 mod gpu_maps;
 mod gpu_march;
 mod gpu_slices;

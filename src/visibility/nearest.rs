@@ -110,16 +110,15 @@ fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)>
     let (ab, ac) = (b - a, c - a);
     let p = to.cross(ac);
     let determinant = ab.dot(p);
-    // Seen along its plane, whatever the unit of length.
-    if determinant.abs() <= 1e-8 * ab.length() * ac.length() {
-        return None;
-    }
     let offset = origin - a;
     let v = offset.dot(p) / determinant;
     let q = offset.cross(ab);
     let w = to.dot(q) / determinant;
-    let t = ac.dot(q) / determinant;
     // A hair of overlap, so that no ray slips between neighbours.
     let inside = v >= -1e-5 && w >= -1e-5 && v + w <= 1.0 + 1e-5;
-    inside.then_some((t, v, w))
+    // Seen along its plane, whatever the unit of length; asked last, for roots take long.
+    if !inside || determinant.abs() <= 1e-8 * ab.length() * ac.length() {
+        return None;
+    }
+    Some((ac.dot(q) / determinant, v, w))
 }

@@ -3,15 +3,9 @@
 use glam::{IVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::cell_lists::{A_THREAD, CellEntry, CellLists, highest};
 use crate::cancel::Cancel;
 use crate::geometry::TileMesh;
-
-/// A triangle copy that reaches into a cell: its index and how many tiles the copy is moved by.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CellEntry {
-    pub triangle: u32,
-    pub shift: [i16; 2],
-}
 
 /// A uniform grid over one period. A cell lists every periodic copy of a triangle whose xy-bounds reach into it.
 #[derive(Debug)]
@@ -56,50 +50,44 @@ impl PeriodicGrid {
     }
 
     fn with_cells(mesh: &TileMesh, triangles_a_cell: f32) -> Self {
-        let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
-        let mut solid: Vec<(f32, u32)> = (0..corners.len() as u32)
-            .filter(|&t| corners[t as usize].iter().all(|p| p.is_finite()) && mesh.triangle_area(t as usize) > 0.0)
-            .map(|t| (corners[t as usize].iter().fold(f32::NEG_INFINITY, |z, p| z.max(p.z)), t))
-            .collect();
-        // A cell's triangles from the highest down: walks can leave the rest of a cell out.
-        solid.par_sort_by(|a, b| b.0.total_cmp(&a.0));
-        let cells = cell_counts(mesh.size, &corners, &solid, triangles_a_cell);
-        let cell_size = mesh.size / cells.as_vec2();
-        let cell_total = (cells.x * cells.y) as usize;
-
-        let mut grid = Self {
-            tile_size: mesh.size,
-            cells,
-            cell_size,
-            starts: vec![0; cell_total + 1],
-            entries: Vec::new(),
-            z_max: vec![f32::NEG_INFINITY; cell_total],
-            top: f32::NEG_INFINITY,
-            corners,
-            cancel: Cancel::default(),
+        let corners = corners(mesh);
+        let solid = solid(mesh, &corners);
+        let extent = |&t: &u32| {
+            let [a, b, c] = corners[t as usize].map(|p| p.truncate());
+            let extent = a.max(b).max(c) - a.min(b).min(c);
+            f64::from(extent.x * extent.y)
         };
-        // Two passes: count, then fill.
-        let mut counts = vec![0_u32; cell_total];
-        for &(highest, t) in &solid {
-            grid.top = grid.top.max(highest);
-            grid.for_each_cell(t, |cell, _| counts[cell] += 1);
-        }
-        for (cell, count) in counts.iter().enumerate() {
-            grid.starts[cell + 1] = grid.starts[cell] + count;
-        }
-        let mut next = grid.starts.clone();
-        let mut entries = vec![CellEntry { triangle: 0, shift: [0; 2] }; grid.starts[cell_total] as usize];
-        let mut z_max = std::mem::take(&mut grid.z_max);
-        for &(highest, t) in &solid {
-            grid.for_each_cell(t, |cell, shift| {
-                entries[next[cell] as usize] = CellEntry { triangle: t, shift: [shift.x as i16, shift.y as i16] };
-                next[cell] += 1;
-                z_max[cell] = z_max[cell].max(highest);
-            });
-        }
-        grid.entries = entries;
-        grid.z_max = z_max;
-        grid
+        let boxes = solid.iter().map(extent).sum();
+        let cells = cell_counts(mesh.size, solid.len(), boxes, triangles_a_cell);
+        Self::of_solid(mesh, corners, &solid, cells)
+    }
+
+    /// The cells that [`Self::new`] makes for a mesh of so many triangles, all solid, that lie beside each other as those of a
+    /// height-field do.
+    pub(crate) fn cells_beside_each_other(tile_size: Vec2, triangles: usize) -> IVec2 {
+        let boxes = 2.0 * f64::from(tile_size.x * tile_size.y);
+        cell_counts(tile_size, triangles, boxes, TRIANGLES_A_CELL)
+    }
+
+    /// As if the triangles of `part` were those of a mesh with this highest z and these cells: a cell that none of the others
+    /// reach into lists the same.
+    pub(crate) fn of_part(part: &TileMesh, cells: IVec2, top: f32) -> Self {
+        let corners = corners(part);
+        let solid = solid(part, &corners);
+        Self { top, ..Self::of_solid(part, corners, &solid, cells) }
+    }
+
+    fn of_solid(mesh: &TileMesh, corners: Vec<[Vec3; 3]>, solid: &[u32], cells: IVec2) -> Self {
+        let cell_size = mesh.size / cells.as_vec2();
+        let top = solid.iter().map(|&t| highest(&corners[t as usize])).fold(f32::NEG_INFINITY, f32::max);
+        let CellLists { starts, entries, z_max } = CellLists::new(&corners, solid, cells, cell_size);
+        let cancel = Cancel::default();
+        Self { tile_size: mesh.size, cells, cell_size, starts, entries, z_max, top, corners, cancel }
+    }
+
+    /// The cell of a place in the plane, in the base period.
+    pub(crate) fn cell_of(tile_size: Vec2, cells: IVec2, place: Vec2) -> IVec2 {
+        (place / (tile_size / cells.as_vec2())).floor().as_ivec2().rem_euclid(cells)
     }
 
     /// Distance after which a walk along the unit plane direction `along` meets the same again; without end unless it follows
@@ -118,54 +106,35 @@ impl PeriodicGrid {
         let shift = (at + IVec2::new(i32::from(entry.shift[0]), i32::from(entry.shift[1]))).as_vec2() * self.tile_size;
         self.corners[entry.triangle as usize].map(|p| p + shift.extend(0.0))
     }
-
-    /// Calls `visit(cell, shift)` for each cell of the base period that a copy of the triangle, moved by `shift` tiles,
-    /// reaches into. A separating-axis test on the triangle's edges drops the corners of its bounding box.
-    fn for_each_cell(&self, triangle: u32, mut visit: impl FnMut(usize, IVec2)) {
-        let corners = self.corners[triangle as usize].map(|p| p.truncate());
-        let low = corners[0].min(corners[1]).min(corners[2]) / self.cell_size;
-        let high = corners[0].max(corners[1]).max(corners[2]) / self.cell_size;
-        // A hair wider than the bounds: rounding must not lose a copy at a cell's edge.
-        let slack = Vec2::splat(1e-3);
-        let (first, last) = ((low - slack).floor().as_ivec2(), (high + slack).floor().as_ivec2());
-        for y in first.y..=last.y {
-            for x in first.x..=last.x {
-                if !self.overlaps(&corners, IVec2::new(x, y)) {
-                    continue;
-                }
-                let tile = IVec2::new(x.div_euclid(self.cells.x), y.div_euclid(self.cells.y));
-                let local = IVec2::new(x, y) - tile * self.cells;
-                visit((local.y * self.cells.x + local.x) as usize, -tile);
-            }
-        }
-    }
-
-    fn overlaps(&self, corners: &[Vec2; 3], cell: IVec2) -> bool {
-        let centre = (cell.as_vec2() + 0.5) * self.cell_size;
-        let half = self.cell_size * 0.501;
-        (0..3).all(|k| {
-            let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-            let axis = (b - a).perp();
-            let radius = half.dot(axis.abs());
-            let (edge, opposite, at) = (axis.dot(a), axis.dot(c), axis.dot(centre));
-            at + radius >= edge.min(opposite) && at - radius <= edge.max(opposite)
-        })
-    }
 }
 
-/// A few triangles a cell, following the tile's shape, and no finer than a large triangle warrants.
-fn cell_counts(tile_size: Vec2, corners: &[[Vec3; 3]], solid: &[(f32, u32)], triangles_a_cell: f32) -> IVec2 {
-    let wanted = (solid.len() as f32 / triangles_a_cell).max(16.0);
+/// A key that puts numbers in the order of `total_cmp`, the highest first.
+fn descending(z: f32) -> u32 {
+    let bits = z.to_bits();
+    if bits >> 31 == 0 { !(bits | 1 << 31) } else { bits }
+}
+
+fn corners(mesh: &TileMesh) -> Vec<[Vec3; 3]> {
+    (0..mesh.triangles.len()).into_par_iter().with_min_len(A_THREAD).map(|t| mesh.corners(t)).collect()
+}
+
+/// Triangles with a place and an area, from the highest down: walks can leave the rest of a cell out. The triangle's number
+/// decides between equals.
+fn solid(mesh: &TileMesh, corners: &[[Vec3; 3]]) -> Vec<u32> {
+    let triangles = (0..corners.len()).into_par_iter().with_min_len(A_THREAD);
+    let is_solid = |t: &usize| corners[*t].iter().all(|p| p.is_finite()) && mesh.triangle_area(*t) > 0.0;
+    let key = |t: usize| u64::from(descending(highest(&corners[t]))) << 32 | t as u64;
+    let mut keys: Vec<u64> = triangles.filter(is_solid).map(key).collect();
+    keys.par_sort_unstable();
+    keys.into_iter().map(|key| key as u32).collect()
+}
+
+/// A few triangles a cell, following the tile's shape, and no finer than a large triangle warrants; `boxes` is the area of the
+/// triangles' bounds.
+fn cell_counts(tile_size: Vec2, triangles: usize, boxes: f64, triangles_a_cell: f32) -> IVec2 {
+    let wanted = (triangles as f32 / triangles_a_cell).max(16.0);
     // Grid density must not let a few huge triangles fill the entry list: bound the summed bounding-box areas.
-    let boxes: f64 = solid
-        .iter()
-        .map(|&(_, t)| {
-            let [a, b, c] = corners[t as usize].map(|p| p.truncate());
-            let extent = a.max(b).max(c) - a.min(b).min(c);
-            f64::from(extent.x * extent.y)
-        })
-        .sum::<f64>()
-        / f64::from(tile_size.x * tile_size.y).max(f64::MIN_POSITIVE);
+    let boxes = boxes / f64::from(tile_size.x * tile_size.y).max(f64::MIN_POSITIVE);
     let wanted = wanted.min((4e7 / boxes.max(1e-3)) as f32);
     let aspect = (tile_size.x / tile_size.y).clamp(1.0 / 64.0, 64.0);
     let x = (wanted * aspect).sqrt().round() as i32;

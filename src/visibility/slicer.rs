@@ -3,7 +3,7 @@
 use glam::{IVec2, Vec2, Vec3};
 
 use super::PeriodicGrid;
-use super::periodic_grid::CellEntry;
+use super::cell_lists::CellEntry;
 use super::scan::Known;
 use crate::geometry::Facets;
 use crate::simd::{Eight, Fours};
