@@ -36,6 +36,9 @@ const LEAST_LINES: u32 = 8192u;
 // Nothing below this slope is resolved.
 const LOWEST: f32 = 0.005;
 
+// Tests ask how many edges were crossed, instead of what was seen.
+override COUNTING: bool = false;
+
 const COLUMNS: u32 = 0u;
 const ROWS: u32 = 1u;
 const DIAGONALS: u32 = 2u;
@@ -48,6 +51,8 @@ fn wrapped(k: f32, n: u32) -> u32 {
 fn height_at(column: f32, row: f32) -> f32 {
     return heights[wrapped(row, params.size.y) * params.size.x + wrapped(column, params.size.x)];
 }
+
+var<private> crossings: u32;
 
 // The highest slope, `slope` at least, at the crossings of one family of edges at increasing distance. `across` and `along`:
 // where the walk begins and how it goes on, across the edges and along them.
@@ -66,6 +71,7 @@ fn crossed(edges: u32, across: vec2f, along: vec2f, most: u32, z: f32, least: f3
         if distance * max(slope, LOWEST) >= params.top - z {
             break;
         }
+        crossings++;
         let line = first + turn * f32(k);
         let place = along.x + along.y * distance;
         let low = floor(place);
@@ -93,6 +99,7 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= params.facet_count {
         return;
     }
+    crossings = 0u;
     let direction = directions[id.y];
     let start = places[id.x].position;
     let normal = places[id.x].normal;
@@ -121,6 +128,10 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         if abs(turning) >= 1e-6 * max(params.samples_from_tile.x, params.samples_from_tile.y) {
             slope = crossed(DIAGONALS, vec2f(at.x - at.y, turning), x, most, start.z, slope);
         }
+    }
+    if COUNTING {
+        horizons[id.x * params.azimuths + id.y] = f32(crossings);
+        return;
     }
     horizons[id.x * params.azimuths + id.y] = select(FREE, angle_of(slope, 1.0), slope > 0.0);
 }

@@ -50,7 +50,7 @@ struct Entry {
 
 // Whether what hangs above the horizon is told apart from it.
 override HANGING: bool = false;
-// Tests ask how many cells and triangles were looked at, instead of what was seen.
+// Tests ask how many cells and triangles were looked at, and of these how many were cut (times 2²⁰), instead of what was seen.
 override COUNTING: bool = false;
 
 // Horizons::FREE and Horizons::BLOCKED.
@@ -68,6 +68,7 @@ const KEPT: u32 = 4u;
 var<private> ground: f32;
 var<private> hanging: array<vec2f, MOST>;
 var<private> count: u32;
+var<private> cuts: u32;
 
 // Facing surfaces share edges: a gap of rounding size is no gap.
 fn reach(slope: f32) -> f32 {
@@ -282,6 +283,7 @@ fn walk(place: Place, along: vec2f, overhead: f32) -> u32 {
             if entry.z_min >= ceiling {
                 continue;
             }
+            cuts++;
             let slopes = cut(entry, along, eye);
             if slopes.y <= ground || count > 0u && hanging[0].x <= slopes.x && slopes.y <= hanging[0].y {
                 continue;
@@ -304,6 +306,7 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
     // What a facet is turned away from: nothing else about it needs to be known.
     let ahead = dot(place.normal.xy, along) + params.facing_margin;
     count = 0u;
+    cuts = 0u;
     ground = 0.0;
     var overhead = FAR;
     if ahead >= 0.0 {
@@ -323,7 +326,7 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
     }
     let slice = id.x * params.azimuths + id.y;
     if COUNTING {
-        found[slice] = looks;
+        found[slice] = min(looks, 0xfffffu) | min(cuts, 0xfffu) << 20u;
         return;
     }
     if !HANGING {

@@ -22,8 +22,9 @@ impl Direct {
 }
 
 impl FacetSum {
-    /// With the places of the facets that were kept. `None` if a group that reflects has many normals.
-    fn thinned(&self, step: usize) -> Option<(Self, Vec<usize>)> {
+    /// Every `step`-th facet of each normal, weighted to the same area, and the places of those. `None` if a group that reflects
+    /// has many normals.
+    pub(crate) fn thinned(&self, step: usize) -> Option<(Self, Vec<usize>)> {
         let (mut kept, mut areas, mut groups) = (Vec::new(), Vec::new(), Vec::new());
         for group in self.groups() {
             let first = kept.len();

@@ -37,7 +37,7 @@ pub enum Sight {
 /// A tile that is cut in vertical slices.
 #[derive(Debug)]
 pub struct Sliced {
-    pub grid: PeriodicGrid,
+    pub grid: Arc<PeriodicGrid>,
     pub facets: Arc<Facets>,
     pub azimuths: usize,
     /// Width of the soft step at a horizon [rad].

@@ -44,6 +44,23 @@ impl Facets {
         FacetSampler::new(mesh).sample(mesh, count, SampleShift::from_seed(seed))
     }
 
+    /// Some of them, by their places.
+    pub fn picked(&self, places: &[usize]) -> Self {
+        fn of<T: Copy>(column: &[T], places: &[usize]) -> Vec<T> {
+            places.iter().map(|&place| column[place]).collect()
+        }
+        Self {
+            positions: of(&self.positions, places),
+            normals: of(&self.normals, places),
+            geometric_normals: of(&self.geometric_normals, places),
+            areas: of(&self.areas, places),
+            slots: of(&self.slots, places),
+            colors: of(&self.colors, places),
+            triangles: of(&self.triangles, places),
+            skipped_triangles: self.skipped_triangles,
+        }
+    }
+
     /// Adds a facet at a point of a triangle; areas are filled in by the caller.
     pub(super) fn push(&mut self, mesh: &TileMesh, triangle: u32, barycentric: Vec3, area: f32) {
         let index = triangle as usize;

@@ -33,7 +33,7 @@ use std::sync::Arc;
 pub use facets::{FacetSampler, Facets, SampleShift};
 pub use grooves::CrossSection;
 pub use pyramids::OnePyramid;
-pub use symmetry::mirror_planes;
+pub use symmetry::{mirror_planes, mirror_planes_in};
 pub use tile_mesh::{ColorField, HeightGrid, SlotField, TileMesh};
 
 use crate::error::{InputError, Result};

@@ -17,17 +17,26 @@ const SAME_NORMAL: f32 = 1e-3;
 /// Is the tile its own mirror image in a plane x = const, and in one y = const? Shape, slots and colours are compared along
 /// vertical lines, through all that lies above each other.
 pub fn mirror_planes(mesh: &TileMesh) -> [bool; 2] {
+    mirror_planes_in(mesh, None)
+}
+
+/// The same where a grid of the mesh is at hand.
+pub fn mirror_planes_in(mesh: &TileMesh, grid: Option<&PeriodicGrid>) -> [bool; 2] {
     if mesh.triangles.is_empty() {
         return [false; 2];
     }
     let sums = [0, 1].map(|axis| candidates(mesh, axis));
     let sums = if is_refused(mesh, &sums) { [vec![], vec![]] } else { sums };
-    if sums.iter().all(Vec::is_empty) { [false; 2] } else { among(mesh, &sums) }
+    match grid {
+        _ if sums.iter().all(Vec::is_empty) => [false; 2],
+        Some(grid) => among(mesh, grid, &sums),
+        None => among(mesh, &PeriodicGrid::new(mesh), &sums),
+    }
 }
 
 /// Are there planes among the candidates?
-fn among(mesh: &TileMesh, sums: &[Vec<f32>; 2]) -> [bool; 2] {
-    let looks = Looks { mesh, grid: PeriodicGrid::new(mesh), bottom: mesh.z_range().0 };
+fn among(mesh: &TileMesh, grid: &PeriodicGrid, sums: &[Vec<f32>; 2]) -> [bool; 2] {
+    let looks = Looks { mesh, grid, bottom: mesh.z_range().0 };
     let places = (0..PLACES).into_par_iter().with_min_len(PLACES / 8);
     let places: Vec<(Vec2, Vec<Seen>)> = places.map(|k| looks.at(k)).collect();
     let has_plane = |axis: usize| sums[axis].iter().any(|sum| looks.is_mirrored(&places, axis, *sum));
@@ -50,7 +59,7 @@ fn is_refused(mesh: &TileMesh, sums: &[Vec<f32>; 2]) -> bool {
         planes().map(move |(axis, sum)| mirrored(place, axis, sum, mesh.size)).chain([place])
     };
     let Some((part, grid)) = below(mesh, (0..FEW_PLACES).flat_map(seen_from)) else { return false };
-    let looks = Looks { mesh: &part, grid, bottom: mesh.z_range().0 };
+    let looks = Looks { mesh: &part, grid: &grid, bottom: mesh.z_range().0 };
     let places: Vec<(Vec2, Vec<Seen>)> = (0..FEW_PLACES).map(|k| looks.at(k)).collect();
     planes().all(|(axis, sum)| !looks.is_mirrored(&places, axis, sum))
 }
@@ -80,7 +89,7 @@ fn candidates(mesh: &TileMesh, axis: usize) -> Vec<f32> {
 
 struct Looks<'a> {
     mesh: &'a TileMesh,
-    grid: PeriodicGrid,
+    grid: &'a PeriodicGrid,
     bottom: f32,
 }
 

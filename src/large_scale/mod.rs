@@ -13,6 +13,8 @@ pub mod camera;
 pub mod environment;
 pub mod gbuffer;
 mod gpu_band;
+#[cfg(test)]
+mod gpu_counts_tests;
 mod gpu_gbuffer;
 mod gpu_light_rays;
 pub mod gpu_picture;

@@ -24,7 +24,7 @@ impl Pipeline {
         material_of_slot: &[usize],
         materials: &[SumMaterial],
         settings: &Settings,
-        facets_version: Version,
+        costs_of: Option<Version>,
     ) -> Findings {
         let needs_maps = !shape.flat && (!shape.height_field || settings.sighting != Sighting::Auto);
         let allowed = settings.backend != Backend::Cpu && !self.without_device;
@@ -37,11 +37,11 @@ impl Pipeline {
         let asked = settings.backend == Backend::Gpu && settings.sighting == Sighting::Maps;
         let hardware_gpu =
             allowed && self.gpu.as_ref().is_some_and(|gpu| asked || gpu.tier == crate::gpu::Tier::Hardware);
-        let scan_work = match self.scan_work {
-            Some((version, work)) if version == facets_version => work,
-            _ if needs_maps && !hardware_gpu => {
+        let scan_work = match (self.scan_work, costs_of) {
+            (Some((known, work)), Some(version)) if known == version => work,
+            (_, Some(version)) if needs_maps && !hardware_gpu => {
                 let work = Slices::work(&PeriodicGrid::for_slices(&shape.mesh), facets);
-                self.scan_work = Some((facets_version, work));
+                self.scan_work = Some((version, work));
                 work
             }
             _ => 0.0,

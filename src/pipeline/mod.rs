@@ -41,7 +41,7 @@ use crate::gpu::Gpu;
 use crate::interreflection::{InterreflectionTable, Transport};
 use crate::plan::{Costs, Findings, Plan, Preset, Route, Settings, decide};
 use crate::scene::{LoadedScene, Material, Painted, Switch, Tile};
-use crate::visibility::{Visibility, visibility_maps_cpu};
+use crate::visibility::{PeriodicGrid, Visibility, visibility_maps_cpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
 pub type StageTimes = Vec<(&'static str, f64)>;
@@ -114,6 +114,8 @@ pub struct Pipeline {
     interreflection: Stage<OutcomeKey, InterreflectionTable>,
     /// Planes that mirror the mesh.
     mirrors: Stage<Version, [bool; 2]>,
+    /// The mesh as devices cut it.
+    cells: Stage<Version, PeriodicGrid>,
     /// M of each material, factored as the paper does, for a version of the materials, a seed and a number of colours.
     paper_factors: Stage<(Version, u64, usize), PaperFactors>,
     last: Option<Last>,
@@ -145,8 +147,8 @@ impl Pipeline {
         self.kept = cache;
     }
 
-    /// All that comes before visibility.
-    fn prepare(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Prepared> {
+    /// All that comes before visibility. `sees_itself`: the processor is to find out what facets see, and what that will cost.
+    fn prepare(&mut self, loaded: &LoadedScene, sees_itself: bool, times: &mut StageTimes) -> Result<Prepared> {
         let scene = &loaded.scene;
         let (shape, shape_version) = self.shape(loaded, times)?;
         let settings = Settings::of(scene).for_shape(shape.height_field);
@@ -160,7 +162,8 @@ impl Pipeline {
         let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.1);
         sum.force(&facets, &settings.effects);
         let of = (&material_of_slot[..], &materials.1[..]);
-        let found = self.findings(scene, &shape, &facets, &sum, of.0, of.1, &settings, facets_version);
+        let costs_of = sees_itself.then_some(facets_version);
+        let found = self.findings(scene, &shape, &facets, &sum, of.0, of.1, &settings, costs_of);
         let mirrors = self.mirror_planes(&shape, shape_version, &settings, times)?;
         let plan = decide(&Findings { mirrors, ..found }, &settings, &Costs::default());
         let versions = [materials_version, facets_version];
@@ -201,7 +204,7 @@ impl Pipeline {
     /// A file the scene names cannot be used, or a factorization fails.
     pub fn effective(&mut self, loaded: &LoadedScene) -> Result<Outcome> {
         let mut times = StageTimes::new();
-        let prepared = self.prepare(loaded, &mut times)?;
+        let prepared = self.prepare(loaded, true, &mut times)?;
         if prepared.settings.preset == Preset::Wu2011 {
             let names = names(&loaded.scene, &prepared.shape.mesh, &prepared.materials)?;
             return self.wu2011(prepared, names, times);
@@ -343,6 +346,7 @@ impl Pipeline {
             ("materials", self.materials.runs()),
             ("visibility", self.visibility.runs()),
             ("mirrors", self.mirrors.runs()),
+            ("cells", self.cells.runs()),
             ("transport", self.transport.runs()),
             ("interreflection", self.interreflection.runs()),
             ("basis", self.paper_factors.runs()),

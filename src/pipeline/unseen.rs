@@ -1,9 +1,11 @@
 //! A tile as a device takes it that makes visibility and product itself: what comes before them.
 
+use std::sync::Arc;
+
 use super::{Pipeline, Prepared, StageTimes};
 use crate::error::Result;
-use crate::filtering::{Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
-use crate::geometry::mirror_planes;
+use crate::filtering::{FacetSum, Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
+use crate::geometry::mirror_planes_in;
 use crate::plan::{Plan, Preset, Route, Settings, Sighting};
 use crate::scene::{LoadedScene, Switch};
 use crate::visibility::PeriodicGrid;
@@ -26,6 +28,21 @@ const MIRRORED_FROM: usize = 60_000;
 /// 2.2 % to 1.5 to 3 (docs/speed.md, "On a graphics processor").
 const PICKED: usize = 1600;
 
+/// Facets that are kept of few normals, whose lobes are exact: about as many as a device can sum for each pair of a picture.
+/// Of 32,768 they are 2 to 5 % off (docs/speed.md, "On a graphics processor").
+const THIN: usize = 400;
+
+/// Few of the facets of few normals, and their places, where a facet sees along horizons: they are left out before they see
+/// anything.
+fn thinned(sum: &FacetSum, route: Route) -> Option<(FacetSum, Vec<usize>)> {
+    let few = sum.has_few_normals() && sum.patch_count().is_some_and(|normals| normals <= FEW_NORMALS);
+    let along_horizons = matches!(route, Route::HeightMarch | Route::HorizonScan);
+    (few && along_horizons).then(|| sum.thinned(sum.facet_count().div_ceil(THIN))).flatten()
+}
+
+/// Of more, each would keep too many.
+const FEW_NORMALS: usize = 16;
+
 impl Pipeline {
     /// What a device needs that makes visibility and product itself. `None` where only the CPU makes what the scene calls
     /// for: measured BRDFs summed over facets, light between facets, the paper's own tables.
@@ -34,13 +51,14 @@ impl Pipeline {
     /// As [`Pipeline::effective`].
     pub fn unseen(&mut self, loaded: &LoadedScene) -> Result<Option<Unseen>> {
         let mut times = StageTimes::new();
-        let prepared = self.prepare(loaded, &mut times)?;
+        let prepared = self.prepare(loaded, false, &mut times)?;
         let Prepared { sum, plan, settings, .. } = &prepared;
-        let few = sum.has_few_normals() && matches!(plan.route, Route::HeightMarch | Route::HorizonScan);
-        if few || settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
+        if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
             return Ok(None);
         }
+        let thinned = thinned(sum, plan.route);
         let (mesh, facets) = (&prepared.shape.mesh, prepared.facets.clone());
+        let facets = thinned.as_ref().map_or(facets, |(_, kept)| Arc::new(prepared.facets.picked(kept)));
         let sight = match (plan.route, &mesh.height_grid) {
             (Route::HeightMarch, Some(samples)) => Sight::Heights(Heights {
                 samples: samples.clone(),
@@ -59,8 +77,10 @@ impl Pipeline {
             }
             (Route::HorizonScan | Route::Slices | Route::GpuMaps | Route::CpuMaps, _) => {
                 let overhangs = plan.route != Route::HorizonScan;
+                let cells = || Ok(PeriodicGrid::new(mesh));
+                let grid = self.cells.get("cells", prepared.shape_version, &mut times, &self.cancel, cells)?.0;
                 Sight::Slices(Box::new(Sliced {
-                    grid: PeriodicGrid::new(mesh),
+                    grid,
                     facets,
                     azimuths: if overhangs { settings.slice_azimuths } else { settings.horizon_azimuths },
                     ramp: settings.penumbra,
@@ -69,11 +89,18 @@ impl Pipeline {
             }
             _ => Sight::Seen(self.seen(&prepared, &mut times)?.0),
         };
+        let is_thin = thinned.is_some();
         let Prepared { shape, settings, sum, plan, shape_version, .. } = prepared;
-        let grid = settings.picture_grids.last().copied().filter(|_| plan.try_picture_table);
+        let sum = thinned.map_or(sum, |(thinned, _)| thinned);
+        // What is thin is exact between nodes, too.
+        let grid = settings.picture_grids.last().copied().filter(|_| plan.try_picture_table && !is_thin);
         let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORED_FROM);
         let mirrors = if is_large && settings.effects.mirror_symmetry != Switch::Off {
-            let find = || Ok(mirror_planes(&shape.mesh));
+            let cells = match &sight {
+                Sight::Slices(of) => Some(&*of.grid),
+                _ => None,
+            };
+            let find = || Ok(mirror_planes_in(&shape.mesh, cells));
             *self.mirrors.get("mirrors", shape_version, &mut times, &self.cancel, find)?.0
         } else {
             [false; 2]

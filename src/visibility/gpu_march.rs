@@ -114,26 +114,22 @@ impl GpuHorizons {
     }
 }
 
-/// Edges that all walks of `height_march.wgsl` cross, of facets at some azimuths.
+/// Edges that a walk of `height_march.wgsl` crosses on average.
 #[cfg(test)]
-pub(crate) fn crossings(heights: &HeightGrid, tile_size: glam::Vec2, facets: &Facets, azimuths: usize) -> u64 {
-    use rayon::prelude::*;
-    let top = heights.heights.iter().fold(f32::NEG_INFINITY, |top, &z| top.max(z));
-    let per_tile = heights.size.as_vec2() / tile_size;
-    let horizons = super::Horizons::march(heights, tile_size, facets, azimuths, 0.01);
-    let of_facet = |s: usize| -> u64 {
-        let mut count = 0;
-        for a in 0..azimuths {
-            let direction = from_angles(FRAC_PI_2, TAU * a as f32 / azimuths as f32).truncate();
-            // As if its horizon were known from the start: no fewer than these.
-            let slope = horizons.elevation(a, s).max(0.0).tan().max(0.005);
-            let far = (top - facets.positions[s].z).max(0.0) / slope;
-            let speed = direction * per_tile;
-            count += ((speed.x.abs() + speed.y.abs() + (speed.x - speed.y).abs()) * far) as u64;
-        }
-        count
-    };
-    (0..facets.len()).into_par_iter().map(of_facet).sum()
+pub(crate) fn crossings(
+    gpu: &Gpu,
+    (heights, tile_size, facets): (&HeightGrid, glam::Vec2, &Facets),
+    azimuths: usize,
+) -> f64 {
+    let mut march = GpuHeightMarch::new(gpu).unwrap();
+    let module = gpu.module("height_march").unwrap();
+    march.march = gpu.compute_pipeline_with(&module, "march", &[&march.layout], &[("COUNTING", 1.0)]).unwrap();
+    let made = march.horizons(gpu, heights, tile_size, facets, azimuths).unwrap();
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+    gpu.queue.submit([encoder.finish()]);
+    let counts: Vec<f32> = gpu.read(&made.elevations).unwrap();
+    counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len() as f64
 }
 
 #[cfg(test)]
@@ -165,24 +161,6 @@ mod tests {
             facets.slots.push(0);
         }
         (grid, facets)
-    }
-
-    #[test]
-    #[ignore = "x"]
-    fn count_crossings() {
-        for name in ["table4_plate", "fig8b_ripples", "fig8d_leather", "fig8c_brushed"] {
-            let loaded = crate::scene::open(name, &["quality.preset=fine".to_owned()]).unwrap();
-            let unseen = crate::pipeline::Pipeline::new().unseen(&loaded).unwrap().unwrap();
-            let crate::filtering::Sight::Heights(h) = &unseen.sum.sight else { continue };
-            let n = crossings(&h.samples, h.tile_size, &h.facets, h.azimuths);
-            println!(
-                "{name}: {} {:?} {:.3e} crossings, {:.1} a walk",
-                h.facets.len(),
-                h.samples.size,
-                n as f64,
-                n as f64 / (h.facets.len() * h.azimuths) as f64
-            );
-        }
     }
 
     #[test]

@@ -167,4 +167,4 @@ fn disc(corners: &[Vec3; 3]) -> [f32; 4] {
 
 #[cfg(test)]
 #[path = "gpu_slices_tests.rs"]
-mod tests;
+pub(crate) mod tests;

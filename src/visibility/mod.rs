@@ -30,8 +30,12 @@ use std::ops::Range;
 use glam::Vec3;
 
 pub use gpu_maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
+#[cfg(test)]
+pub(crate) use gpu_march::crossings;
 pub use gpu_march::{GpuHeightMarch, GpuHorizons};
 pub use gpu_slices::GpuSlicer;
+#[cfg(test)]
+pub(crate) use gpu_slices::tests::looks;
 pub use horizons::Horizons;
 pub use nearest::Hit;
 pub use packed::PackedVisibility;

@@ -1,0 +1,130 @@
+//! What an edit of the geometry asks of a graphics processor before its picture, counted; and what the processor does before.
+
+use std::time::Instant;
+
+use super::gpu_gbuffer::Point;
+use super::gpu_render::GpuRenderer;
+use super::gpu_shading_tests::{Studio, open_gpu};
+use crate::directions::UpperPairs;
+use crate::filtering::{Heights, Nodes, Sight, Sliced};
+use crate::gpu::Gpu;
+use crate::pipeline::{Pipeline, Unseen};
+use crate::scene;
+use crate::visibility::{crossings, looks};
+
+/// Operations, counted by hand in the shaders: of a walk over a height-field at each edge; of a slice at each cell or triangle,
+/// and at each that it cuts.
+const CROSSING: f64 = 45.0;
+const LOOK: f64 = 12.0;
+const CUT: f64 = 95.0;
+/// Of a lobe of a facet at a pair of directions: what both make with its normal 22, GGX and its weight 29; the next lobe 10.
+const SEE: f64 = 22.0;
+const LOBE: f64 = 29.0;
+const NEXT_LOBE: f64 = 10.0;
+/// Of two directions that one facet sees, above horizons and between slices.
+const ABOVE: f64 = 22.0;
+const BETWEEN: f64 = 70.0;
+/// Walks over all facets to pick some about each half vector, and what the last of them adds up.
+const WALKS: f64 = 4.0;
+const UP_TO: f64 = 40.0;
+/// Of a pair read from a table of up to four columns: its place 140, eight rows of four nodes 320, tints 40.
+const PAIR: f64 = 500.0;
+/// Operations and bytes a second: a quarter of what an H100 is sold for (67 T, 3.35 TB), and of a small card.
+const CARDS: [(f64, f64); 2] = [(17.0e12, 0.8e12), (2.0e12, 0.1e12)];
+/// Pictures of 1920 x 1080 with 32 lights, half covered.
+const POINTS: f64 = 1920.0 * 1080.0;
+const PAIRS: f64 = 0.5 * POINTS * 32.0;
+
+/// The same tile twice, a little edited: of each scene what an edit of its geometry changes.
+const EDITS: [(&str, &str, [&str; 2]); 5] = [
+    ("table4_plate", "height_scale", ["0.04", "0.041"]),
+    ("table4_teapot", "height", ["0.05", "0.051"]),
+    ("table4_pillow", "radius", ["0.018", "0.0181"]),
+    ("table4_cup", "depth", ["0.13", "0.131"]),
+    ("table4_skirt", "warp_width", ["0.85", "0.851"]),
+];
+
+/// Operations of visibility.
+fn sight(gpu: &Gpu, unseen: &Unseen) -> f64 {
+    match &unseen.sum.sight {
+        Sight::Heights(Heights { samples, tile_size, facets, azimuths, .. }) => {
+            let walks = (facets.len() * azimuths) as f64;
+            walks * CROSSING * crossings(gpu, (samples, *tile_size, facets), *azimuths)
+        }
+        Sight::Slices(of) => {
+            let Sliced { grid, facets, azimuths, overhangs, .. } = &**of;
+            let [looks, cuts] = looks(gpu, grid, facets, *azimuths, *overhangs);
+            (facets.len() * azimuths) as f64 * (LOOK * looks + CUT * cuts)
+        }
+        Sight::Seen(_) | Sight::Maps(_) => panic!("another route"),
+    }
+}
+
+/// Operations of a table, and of reading it for a picture; or of summing over facets for each pair.
+fn product(unseen: &Unseen) -> [f64; 2] {
+    let sum = &unseen.sum.sum;
+    let two = if matches!(unseen.sum.sight, Sight::Slices(ref of) if of.overhangs) { BETWEEN } else { ABOVE };
+    let Some(Nodes { grid, mirrors, facets: Some(picked), .. }) = unseen.sum.nodes else {
+        // A facet of few normals faces both directions in half of all cases.
+        return [0.0, PAIRS * 0.5 * sum.facet_count() as f64 * (two + 2.0)];
+    };
+    let UpperPairs { turn, difference, .. } = grid;
+    let nodes = grid.originals(mirrors) as f64;
+    let half_vectors = nodes / (turn * difference) as f64;
+    let (all, picked) = (sum.facet_count() as f64, picked as f64);
+    // Of each group's lobes two at a time; the groups share the picks as they share the facets.
+    let lobes = sum.groups().iter().map(|group| group.lobes.len()).max().unwrap_or(0);
+    let (pairs_of_lobes, extra) = (lobes.div_ceil(2) as f64, (lobes / 2) as f64);
+    let lobe = SEE + LOBE + NEXT_LOBE * extra / pairs_of_lobes;
+    let table = if all < 2.0 * picked {
+        nodes * all * (SEE + LOBE + two) * lobes as f64
+    } else {
+        pairs_of_lobes * (half_vectors * all * (WALKS * lobe + UP_TO) + nodes * picked * (lobe + two))
+    };
+    [table, PAIRS * PAIR]
+}
+
+/// Figures of docs/speed.md.
+#[test]
+#[ignore = "a table to be printed: cargo test --release --lib counts_of_an_edit -- --ignored --nocapture"]
+fn counts_of_an_edit() {
+    let Some(gpu) = open_gpu() else { return };
+    let Studio { mesh, occluder, .. } = Studio::of("cup");
+    // Written and read again: samples, points, origins, bits, radiance; then the image.
+    let traffic = POINTS * (2.0 * (4.0 + 4.0 + size_of::<Point>() as f64 + 16.0 + 4.0 + 16.0) + 4.0);
+    println!("1920 x 1080, 32 lights; CPU and upload in ms here, the rest in 10⁹ operations");
+    println!("scene          quality      CPU  upload  sight  table  shading   large card  with the CPU  small card");
+    for (name, key, values) in EDITS {
+        for preset in ["draft", "standard", "fine"] {
+            let set = |value| [format!("quality.preset={preset}"), format!("tile.geometry.{key}={value}")];
+            let scenes = values.map(|value| scene::open(name, &set(value)).unwrap());
+            let (mut pipeline, mut cpu, mut upload) = (Pipeline::new(), Vec::new(), Vec::new());
+            let mut renderer = GpuRenderer::new(&gpu, &mesh, occluder.as_ref()).unwrap();
+            let mut last = None;
+            for k in 0..11 {
+                let start = Instant::now();
+                let unseen = pipeline.unseen(&scenes[k % 2]).unwrap().unwrap();
+                cpu.push(start.elapsed().as_secs_f64() * 1e3);
+                let start = Instant::now();
+                renderer.set_tile(&gpu, &unseen.sum).unwrap();
+                upload.push(start.elapsed().as_secs_f64() * 1e3);
+                last = Some(unseen);
+            }
+            let unseen = last.unwrap();
+            let median = |mut times: Vec<f64>| {
+                times.sort_by(f64::total_cmp);
+                times[times.len() / 2]
+            };
+            let (cpu, upload) = (median(cpu), median(upload));
+            let (seen, [table, shading]) = (sight(&gpu, &unseen), product(&unseen));
+            let [large, small] =
+                CARDS.map(|(operations, bytes)| ((seen + table + shading) / operations + traffic / bytes) * 1e3);
+            let [seen, table, shading] = [seen, table, shading].map(|operations| operations * 1e-9);
+            println!(
+                "{name:<14} {preset:<9} {cpu:>6.1}  {upload:>6.1} {seen:>6.1} {table:>6.1}  {shading:>7.1} {large:>9.1} ms \
+                 {:>10.1} ms {small:>8.1} ms",
+                large + cpu + upload
+            );
+        }
+    }
+}
