@@ -26,27 +26,28 @@ struct Place {
     pad: u32,
 }
 
-// A copy of a triangle that reaches into a cell.
+// A copy of a triangle that reaches into a cell: what tells whether a slice meets it first.
 struct Entry {
-    a: vec3f,
-    triangle: u32,
-    b: vec3f,
+    // Corners in the plane.
+    a: vec2f,
+    b: vec2f,
+    c: vec2f,
+    z_max: f32,
     z_min: f32,
-    c: vec3f,
-    pad: u32,
+    heights: vec3f,
+    triangle: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 // First entry of each cell, and the end of all.
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
-// Around each entry in the plane: centre, radius; and its highest z. Those of a cell from the highest down.
-@group(0) @binding(2) var<storage, read> discs: array<vec4f>;
-@group(0) @binding(3) var<storage, read> entries: array<Entry>;
-@group(0) @binding(4) var<storage, read> places: array<Place>;
+// Those of a cell from the highest down.
+@group(0) @binding(2) var<storage, read> entries: array<Entry>;
+@group(0) @binding(3) var<storage, read> places: array<Place>;
 // Unit vectors of the plane, one an azimuth.
-@group(0) @binding(5) var<storage, read> directions: array<vec2f>;
+@group(0) @binding(4) var<storage, read> directions: array<vec2f>;
 // The azimuths of a facet side by side: horizons [rad], or what visibility_hanging.wgsl reads.
-@group(0) @binding(6) var<storage, read_write> found: array<u32>;
+@group(0) @binding(5) var<storage, read_write> found: array<u32>;
 
 // Whether what hangs above the horizon is told apart from it.
 override HANGING: bool = false;
@@ -129,23 +130,22 @@ fn across(along: vec2f, p: vec2f) -> f32 {
     return along.x * p.y - along.y * p.x;
 }
 
-// A corner's distances across the slice and along it, and its height.
-fn seen(along: vec2f, p: vec3f) -> vec3f {
-    return vec3f(across(along, p.xy), dot(along, p.xy), p.z);
-}
 
-// Where an edge that begins first across the slice crosses it: how far ahead, and how high above the eye.
+// Where an edge crosses the slice: how far ahead, and how high above the eye. It is given from the corner that comes first, so
+// that neighbours agree about the edge they share.
 fn crossing(from_corner: vec3f, to_corner: vec3f, eye: vec3f) -> vec2f {
     let width = to_corner.x - from_corner.x;
     let part = select(0.0, 1.0 / width, width > 0.0);
     return from_corner.yz + (eye.x - from_corner.x) * ((to_corner.yz - from_corner.yz) * part) - eye.yz;
 }
 
-// The slopes that a triangle covers; none, the second below the first, where the slice does not meet it ahead.
-fn cut(entry: Entry, along: vec2f, eye: vec3f) -> vec2f {
-    var first = seen(along, entry.a);
-    var middle = seen(along, entry.b);
-    var last = seen(along, entry.c);
+// The slopes that an entry covers whose corners lie so far across the slice, on both sides of the eye; none, the second below
+// the first, where the slice meets it behind.
+fn cut(k: u32, distances: vec3f, along: vec2f, eye: vec3f) -> vec2f {
+    let heights = entries[k].heights;
+    var first = vec3f(distances.x, dot(along, entries[k].a), heights.x);
+    var middle = vec3f(distances.y, dot(along, entries[k].b), heights.y);
+    var last = vec3f(distances.z, dot(along, entries[k].c), heights.z);
     if middle.x < first.x {
         let other = first;
         first = middle;
@@ -162,9 +162,6 @@ fn cut(entry: Entry, along: vec2f, eye: vec3f) -> vec2f {
         middle = other;
     }
     let none = vec2f(1.0, -1.0);
-    if !(first.x < eye.x) || last.x < eye.x {
-        return none;
-    }
     let p = crossing(first, last, eye);
     var q: vec2f;
     if middle.x < eye.x {
@@ -190,8 +187,9 @@ fn cut(entry: Entry, along: vec2f, eye: vec3f) -> vec2f {
 
 // Is this copy of a facet's triangle the one it lies on? Other copies block it like any other surface.
 fn lies_on(origin: vec3f, entry: Entry) -> bool {
-    let normal = cross(entry.b - entry.a, entry.c - entry.a);
-    return abs(dot(normal, origin - entry.a)) <= length(normal) * params.near;
+    let a = vec3f(entry.a, entry.heights.x);
+    let normal = cross(vec3f(entry.b, entry.heights.y) - a, vec3f(entry.c, entry.heights.z) - a);
+    return abs(dot(normal, origin - a)) <= length(normal) * params.near;
 }
 
 fn elevation(slope: f32) -> f32 {
@@ -268,27 +266,25 @@ fn walk(place: Place, along: vec2f, overhead: f32) -> u32 {
         tile += over;
 
         let ceiling = origin.z + entered * open;
-        let eye = seen(along, home);
+        let eye = vec3f(across(along, home.xy), dot(along, home.xy), home.z);
         for (var k = starts[cell]; k < starts[cell + 1u]; k++) {
             looks++;
-            let disc = discs[k];
-            // What stands higher throughout blocks nothing in this cell that is still open.
-            if disc.w <= origin.z + began * ground {
+            if entries[k].z_max <= origin.z + began * ground {
                 break;
             }
-            if abs(across(along, disc.xy) - eye.x) > disc.z {
-                continue;
-            }
-            let entry = entries[k];
-            if entry.z_min >= ceiling {
+            let a = across(along, entries[k].a);
+            let b = across(along, entries[k].b);
+            let c = across(along, entries[k].c);
+            // What stands higher throughout blocks nothing in this cell that is still open.
+            if min(min(a, b), c) >= eye.x || max(max(a, b), c) < eye.x || entries[k].z_min >= ceiling {
                 continue;
             }
             cuts++;
-            let slopes = cut(entry, along, eye);
+            let slopes = cut(k, vec3f(a, b, c), along, eye);
             if slopes.y <= ground || count > 0u && hanging[0].x <= slopes.x && slopes.y <= hanging[0].y {
                 continue;
             }
-            if slopes.x <= slopes.y && (entry.triangle != place.triangle || !lies_on(home, entry)) {
+            if slopes.x <= slopes.y && (entries[k].triangle != place.triangle || !lies_on(home, entries[k])) {
                 insert(slopes.x, slopes.y);
             }
         }

@@ -8,10 +8,11 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 use bytemuck::{Pod, Zeroable};
 use glam::{IVec2, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::PeriodicGrid;
 use super::gpu_march::GpuHorizons;
-use super::ray_cast::{LIFT, lifted_origins};
+use super::ray_cast::{LIFT, lifted_origin};
 use super::scan::FACING_MARGIN;
 use crate::directions::from_angles;
 use crate::geometry::Facets;
@@ -61,18 +62,25 @@ struct Place {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Entry {
-    a: Vec3,
-    triangle: u32,
-    b: Vec3,
+    corners: [Vec2; 3],
+    z_max: f32,
     z_min: f32,
-    c: Vec3,
-    pad: u32,
+    heights: Vec3,
+    triangle: u32,
+}
+
+impl Entry {
+    fn new(triangle: u32, corners: [Vec3; 3]) -> Self {
+        let heights = Vec3::from(corners.map(|corner| corner.z));
+        let (z_max, z_min) = (heights.max_element(), heights.min_element());
+        Self { corners: corners.map(Vec3::truncate), z_max, z_min, heights, triangle }
+    }
 }
 
 impl GpuSlicer {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let module = gpu.module("slice_scan")?;
-        let bindings = [UNIFORM, READ, READ, READ, READ, READ, WRITE];
+        let bindings = [UNIFORM, READ, READ, READ, READ, WRITE];
         let layout = gpu.layout("slices", wgpu::ShaderStages::COMPUTE, &bindings)?;
         let pipeline = |hanging: bool| {
             gpu.compute_pipeline_with(&module, "scan", &[&layout], &[("HANGING", f64::from(u8::from(hanging)))])
@@ -105,7 +113,6 @@ impl GpuSlicer {
         (grid, facets, azimuths): (&PeriodicGrid, &Facets, usize),
     ) -> Result<GpuHorizons, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let cells = (grid.cells.x * grid.cells.y) as usize;
         let params = Params {
             tile_size: grid.tile_size,
             cell_size: grid.cell_size,
@@ -117,24 +124,17 @@ impl GpuSlicer {
             looks: (LEAST_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize) as u32,
             near: 10.0 * LIFT * grid.tile_size.length(),
         };
-        let (mut starts, mut discs, mut entries) = (vec![0_u32], Vec::new(), Vec::new());
-        for cell in 0..cells {
-            for &entry in grid.entries(cell) {
-                let corners = grid.copy_corners(entry, IVec2::ZERO);
-                discs.push(disc(&corners));
-                let ([a, b, c], z_min) = (corners, corners.iter().fold(f32::INFINITY, |z, p| z.min(p.z)));
-                entries.push(Entry { a, triangle: entry.triangle, b, z_min, c, pad: 0 });
-            }
-            starts.push(entries.len() as u32);
-        }
-        let origins = lifted_origins(facets, grid.tile_size);
-        let places = (0..facets.len()).map(|s| Place {
-            origin: origins[s],
+        let (starts, entries) = grid.all_entries();
+        let corners = |&entry| grid.copy_corners(entry, IVec2::ZERO);
+        let entries: Vec<Entry> = entries.par_iter().map(|entry| Entry::new(entry.triangle, corners(entry))).collect();
+        let diagonal = grid.tile_size.length();
+        let place = |s: usize| Place {
+            origin: lifted_origin(facets, s, diagonal),
             triangle: facets.triangles[s],
             normal: facets.normals[s],
             pad: 0,
-        });
-        let places: Vec<Place> = places.collect();
+        };
+        let places: Vec<Place> = (0..facets.len()).into_par_iter().map(place).collect();
         // The CPU's own: see gpu_march.rs.
         let along = |azimuth: usize| from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
         let directions: Vec<Vec2> = (0..azimuths).map(along).collect();
@@ -142,8 +142,7 @@ impl GpuSlicer {
         let found = gpu.buffer("slices", bytes, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
             &gpu.upload("tile", &[params], Usage::UNIFORM)?,
-            &gpu.upload("cells", &starts, Usage::STORAGE)?,
-            &gpu.upload("discs", &discs, Usage::STORAGE)?,
+            &gpu.upload("cells", starts, Usage::STORAGE)?,
             &gpu.upload("triangles of cells", &entries, Usage::STORAGE)?,
             &gpu.upload("places of facets", &places, Usage::STORAGE)?,
             &gpu.upload("azimuths", &directions, Usage::STORAGE)?,
@@ -153,16 +152,6 @@ impl GpuSlicer {
         let workgroups = [params.facet_count.div_ceil(THREADS), params.azimuths];
         Ok(GpuHorizons { pipeline: pipeline.clone(), group, workgroups, elevations: found, azimuths })
     }
-}
-
-/// A circle around a triangle seen from above, a hair wider than it, and the triangle's highest point.
-fn disc(corners: &[Vec3; 3]) -> [f32; 4] {
-    let plane = corners.map(|corner| corner.truncate());
-    let centre = 0.5 * (plane[0].min(plane[1]).min(plane[2]) + plane[0].max(plane[1]).max(plane[2]));
-    let radius = plane.iter().fold(0.0_f32, |radius, corner| radius.max(corner.distance(centre)));
-    let extent = plane.iter().fold(radius, |extent, corner| extent.max(corner.abs().max_element()));
-    let top = corners.iter().fold(f32::NEG_INFINITY, |top, corner| top.max(corner.z));
-    [centre.x, centre.y, radius + 1e-5 * extent, top]
 }
 
 #[cfg(test)]

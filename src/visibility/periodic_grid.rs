@@ -101,6 +101,11 @@ impl PeriodicGrid {
         &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
+    /// The first entry of each cell, with the end of all; and the entries.
+    pub(super) fn all_entries(&self) -> (&[u32], &[CellEntry]) {
+        (&self.starts, &self.entries)
+    }
+
     /// Corners of the copy that an entry names, seen from the tile copy `at` (in tiles).
     pub(super) fn copy_corners(&self, entry: CellEntry, at: IVec2) -> [Vec3; 3] {
         let shift = (at + IVec2::new(i32::from(entry.shift[0]), i32::from(entry.shift[1]))).as_vec2() * self.tile_size;
