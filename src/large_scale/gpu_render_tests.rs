@@ -5,9 +5,11 @@ use glam::Vec3;
 use super::gpu_render::GpuRenderer;
 use super::gpu_shading_tests::{FLAT, LOBES, PYRAMIDS, RODS, Studio, assert_same_picture, effective, open, open_gpu};
 use super::shading::Background;
-use super::{RenderInput, render};
+use super::stage::Stage;
+use super::tone_map::ToneMap;
+use super::{Picture, RenderInput, render};
 use crate::cancel::Cancel;
-use crate::filtering::{Form, PairTable, Sight};
+use crate::filtering::{Black, Form, PairTable, Sight};
 use crate::pipeline::Pipeline;
 use crate::scene;
 
@@ -130,4 +132,31 @@ fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
     setter.join().unwrap();
     assert!(matches!(&given_up, Err(crate::Error::Cancelled) | Ok(_)), "{given_up:?}");
     assert_eq!(renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture.pixels, before.pixels);
+}
+
+/// What the editor shows first on a graphics processor, beside what the CPU refines it to.
+#[test]
+#[ignore = "takes a minute on software Vulkan"]
+fn pictures_of_the_papers_five_scenes_made_from_the_tile_itself_are_the_cpu_s() {
+    let Some(gpu) = open_gpu() else { return };
+    let background = Background::Uniform(Vec3::ZERO);
+    for name in ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"] {
+        let loaded = scene::open(name, &[]).unwrap();
+        let outcome = Pipeline::new().effective(&loaded).unwrap();
+        let reads = outcome.for_pictures(&Cancel::default()).unwrap().brdf;
+        let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
+        let stage = Stage::new(&loaded).unwrap();
+        let cpu = render(&stage.input(&*reads, [160, 160], 1, &background)).unwrap().picture;
+        let mut renderer = GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref()).unwrap();
+        renderer.set_tile(&gpu, &unseen.sum).unwrap();
+        let input = stage.input(&Black, [160, 160], 1, &background);
+        let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        let tones = ToneMap::new(&stage.camera).unwrap();
+        let shown = |picture: &Picture| -> Vec<u8> { picture.to_srgb(&tones) };
+        let (a, b) = (shown(&cpu), shown(&device));
+        let squares = a.iter().zip(&b).map(|(a, b)| (f64::from(a.abs_diff(*b)) / 255.0).powi(2)).sum::<f64>();
+        let db = -10.0 * (squares / a.len() as f64).log10();
+        eprintln!("{name}: {db:.1} dB from the CPU's");
+        assert!(db > 44.0, "{name}: {db:.1} dB");
+    }
 }
