@@ -35,8 +35,12 @@ fn add(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups
     for (var k = sum.first; k < end; k++) {
         let pick = picks[first + k];
         let seen = see(facets[pick.facet].xyz, pair);
-        if is_lit(seen) {
-            let area = weight(pick.facet) * (pick.weight * visibility(pick.facet, to_light) * visibility(pick.facet, to_viewer));
+        if !is_lit(seen) {
+            continue;
+        }
+        let seen_by_viewer = visibility(pick.facet, to_viewer);
+        if seen_by_viewer > 0.0 {
+            let area = weight(pick.facet) * (pick.weight * seen_by_viewer * visibility(pick.facet, to_light));
             let lobes = two_lobes(seen, pair.i_dot_h);
             one += vec3f(area * lobes.x);
             two += vec3f(area * lobes.y);

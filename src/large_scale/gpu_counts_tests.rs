@@ -25,13 +25,22 @@ const NEXT_LOBE: f64 = 10.0;
 /// Of two directions that one facet sees, above horizons and between slices.
 const ABOVE: f64 = 22.0;
 const BETWEEN: f64 = 100.0;
+/// Bytes from caches: an edge's two heights; a cell's or triangle's entry; a pick and its facet, and what two directions ask
+/// of it above horizons and between slices; rows of a table.
+const EDGE_BYTES: f64 = 8.0;
+const LOOK_BYTES: f64 = 48.0;
+const PICK_BYTES: f64 = 24.0;
+const ABOVE_BYTES: f64 = 16.0;
+const BETWEEN_BYTES: f64 = 40.0;
+const PAIR_BYTES: f64 = 32.0 * 16.0;
 /// Walks over all facets to pick some about each half vector, and what the last of them adds up.
 const WALKS: f64 = 4.0;
 const UP_TO: f64 = 40.0;
 /// Of a pair read from a table of up to four columns: its place 140, eight rows of four nodes 320, tints 40.
 const PAIR: f64 = 500.0;
-/// Operations and bytes a second: a quarter of what an H100 is sold for (67 T, 3.35 TB), and of a small card.
-const CARDS: [(f64, f64); 2] = [(17.0e12, 0.8e12), (2.0e12, 0.1e12)];
+/// Operations and bytes of memory a second: a half and a quarter of what an H100 is sold for (67 T, 3.35 TB), and a quarter of
+/// a small card (8 T, 0.4 TB).
+const CARDS: [(f64, f64); 3] = [(33.5e12, 1.7e12), (17.0e12, 0.8e12), (2.0e12, 0.1e12)];
 /// Pictures of 1920 x 1080 with 32 lights, half covered.
 const POINTS: f64 = 1920.0 * 1080.0;
 const PAIRS: f64 = 0.5 * POINTS * 32.0;
@@ -51,29 +60,31 @@ fn some(facets: &Facets) -> Facets {
     facets.picked(&(0..facets.len()).step_by(step).collect::<Vec<_>>())
 }
 
-/// Operations of visibility.
-fn sight(gpu: &Gpu, unseen: &Unseen) -> f64 {
+/// Operations of visibility, and bytes.
+fn sight(gpu: &Gpu, unseen: &Unseen) -> [f64; 2] {
     match &unseen.sum.sight {
         Sight::Heights(Heights { samples, tile_size, facets, azimuths, .. }) => {
-            let walks = (facets.len() * azimuths) as f64;
-            walks * CROSSING * crossings(gpu, (samples, *tile_size, &some(facets)), *azimuths)
+            let crossed = crossings(gpu, (samples, *tile_size, &some(facets)), *azimuths);
+            [CROSSING, EDGE_BYTES].map(|each| (facets.len() * azimuths) as f64 * crossed * each)
         }
         Sight::Slices(of) => {
             let Sliced { grid, facets, azimuths, overhangs, .. } = &**of;
             let [looks, cuts] = looks(gpu, grid, &some(facets), *azimuths, *overhangs);
-            (facets.len() * azimuths) as f64 * (LOOK * looks + CUT * cuts)
+            [LOOK * looks + CUT * cuts, LOOK_BYTES * looks].map(|each| (facets.len() * azimuths) as f64 * each)
         }
         Sight::Seen(_) | Sight::Maps(_) => panic!("another route"),
     }
 }
 
-/// Operations of a table, and of reading it for a picture; or of summing over facets for each pair.
-fn product(unseen: &Unseen) -> [f64; 2] {
+/// Operations and bytes of a table, and of reading it for a picture; or of summing over facets for each pair.
+fn product(unseen: &Unseen) -> [[f64; 2]; 2] {
     let sum = &unseen.sum.sum;
-    let two = if matches!(unseen.sum.sight, Sight::Slices(ref of) if of.overhangs) { BETWEEN } else { ABOVE };
+    let overhangs = matches!(unseen.sum.sight, Sight::Slices(ref of) if of.overhangs);
+    let (two, bytes) = if overhangs { (BETWEEN, BETWEEN_BYTES) } else { (ABOVE, ABOVE_BYTES) };
     let Some(Nodes { grid, mirrors, facets: Some(picked), .. }) = unseen.sum.nodes else {
         // A facet of few normals faces both directions in half of all cases.
-        return [0.0, PAIRS * 0.5 * sum.facet_count() as f64 * (two + 2.0)];
+        let facets = PAIRS * 0.5 * sum.facet_count() as f64;
+        return [[0.0; 2], [facets * (two + 2.0), facets * (bytes + 16.0)]];
     };
     let UpperPairs { turn, difference, .. } = grid;
     let nodes = grid.originals(mirrors) as f64;
@@ -81,14 +92,18 @@ fn product(unseen: &Unseen) -> [f64; 2] {
     let (all, picked) = (sum.facet_count() as f64, picked as f64);
     // Of each group's lobes two at a time; the groups share the picks as they share the facets.
     let lobes = sum.groups().iter().map(|group| group.lobes.len()).max().unwrap_or(0);
-    let (pairs_of_lobes, extra) = (lobes.div_ceil(2) as f64, (lobes / 2) as f64);
-    let lobe = SEE + LOBE + NEXT_LOBE * extra / pairs_of_lobes;
+    let (walks, extra) = (lobes.div_ceil(2) as f64, (lobes / 2) as f64);
+    let lobe = SEE + LOBE + NEXT_LOBE * extra / walks;
     let table = if all < 2.0 * picked {
-        nodes * all * (SEE + LOBE + two) * lobes as f64
+        [nodes * all * (SEE + LOBE + two) * lobes as f64, nodes * all * (16.0 + bytes) * lobes as f64]
     } else {
-        pairs_of_lobes * (half_vectors * all * (WALKS * lobe + UP_TO) + nodes * picked * (lobe + two))
+        let (to_pick, to_sum) = (walks * half_vectors * all, walks * nodes * picked);
+        [
+            to_pick * (WALKS * lobe + UP_TO) + to_sum * (lobe + two),
+            to_pick * WALKS * 16.0 + to_sum * (PICK_BYTES + bytes),
+        ]
     };
-    [table, PAIRS * PAIR]
+    [table, [PAIRS * PAIR, PAIRS * PAIR_BYTES]]
 }
 
 /// Figures of docs/speed.md.
@@ -99,8 +114,28 @@ fn counts_of_an_edit() {
     let Studio { mesh, occluder, .. } = Studio::of("cup");
     // Written and read again: samples, points, origins, bits, radiance; then the image.
     let traffic = POINTS * (2.0 * (4.0 + 4.0 + size_of::<Point>() as f64 + 16.0 + 4.0 + 16.0) + 4.0);
-    println!("1920 x 1080, 32 lights; CPU and upload in ms here, the rest in 10⁹ operations");
-    println!("scene          quality      CPU  upload  sight  table  shading   large card  with the CPU  small card");
+    println!(
+        "1920 x 1080, 32 lights; CPU and upload in ms here; 10⁹ operations and, from caches, 10⁹ bytes; then ms of"
+    );
+    println!(
+        "the device at half and a quarter of an H100's pace and of a small card's, and of the edit with the first two"
+    );
+    println!(
+        "{:<14} {:<9} {:>5} {:>6} {:>7} {:>7} {:>7} {:>6}   {:>6} {:>6} {:>6}   {:>6} {:>6}",
+        "scene",
+        "quality",
+        "CPU",
+        "upload",
+        "sight",
+        "table",
+        "shading",
+        "bytes",
+        "half",
+        "quart.",
+        "small",
+        "half",
+        "quart."
+    );
     for (name, key, values) in EDITS {
         for preset in ["draft", "standard", "fine"] {
             let set = |value| [format!("quality.preset={preset}"), format!("tile.geometry.{key}={value}")];
@@ -124,13 +159,14 @@ fn counts_of_an_edit() {
             };
             let (cpu, upload) = (median(cpu), median(upload));
             let (seen, [table, shading]) = (sight(&gpu, &unseen), product(&unseen));
-            let [large, small] =
-                CARDS.map(|(operations, bytes)| ((seen + table + shading) / operations + traffic / bytes) * 1e3);
-            let [seen, table, shading] = [seen, table, shading].map(|operations| operations * 1e-9);
+            let [operations, bytes] = [0, 1].map(|k| seen[k] + table[k] + shading[k]);
+            let [half, quarter, small] = CARDS.map(|(pace, memory)| (operations / pace + traffic / memory) * 1e3);
+            let [seen, table, shading, bytes] = [seen[0], table[0], shading[0], bytes].map(|count| count * 1e-9);
+            let with_cpu = [half, quarter].map(|ms| ms + cpu + upload);
             println!(
-                "{name:<14} {preset:<9} {cpu:>6.1}  {upload:>6.1} {seen:>6.1} {table:>6.1}  {shading:>7.1} {large:>9.1} ms \
-                 {:>10.1} ms {small:>8.1} ms",
-                large + cpu + upload
+                "{name:<14} {preset:<9} {cpu:>5.1} {upload:>6.1} {seen:>7.1} {table:>7.1} {shading:>7.1} {bytes:>6.1}   \
+                 {half:>6.1} {quarter:>6.1} {small:>6.1}   {:>6.1} {:>6.1}",
+                with_cpu[0], with_cpu[1]
             );
         }
     }
