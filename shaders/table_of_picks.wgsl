@@ -13,22 +13,14 @@
 
 @compute @workgroup_size(THREADS)
 fn add(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let node = flat_index(id, groups);
-    let row = node / nodes.pairs.w;
-    let step = node % nodes.pairs.w;
-    if row >= row_count() {
+    let task = task_of(flat_index(id, groups));
+    if task.is_none {
         return;
     }
-    let h_index = row / nodes.pairs.z;
-    let azimuth = h_index % nodes.pairs.y;
-    if angles[azimuth].image != azimuth {
-        return;
-    }
-    let turn = angles[nodes.pairs.y + row % nodes.pairs.z];
-    let pair = pair_at(h_index / nodes.pairs.y, angles[azimuth], turn, step);
+    let pair = pair_of(task);
     let to_light = sight_along(pair.i);
     let to_viewer = sight_along(pair.o);
-    let first = h_index * nodes.room + 1u;
+    let first = task.half_vector * nodes.room + 1u;
     let end = min(sum.end, picks[first - 1u].facet);
     var one = vec3f(0.0);
     var two = vec3f(0.0);
@@ -46,7 +38,7 @@ fn add(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups
             two += vec3f(area * lobes.y);
         }
     }
-    let at = row * row_size() + (step + 1u) * nodes.width;
+    let at = task.row * row_size() + (task.step + 1u) * nodes.width;
     for (var c = 0u; c < nodes.column_count; c++) {
         values[at + nodes.columns[c]] += one[c];
         if SECOND != 0u {

@@ -31,3 +31,25 @@ fn pair_at(ring: u32, phi: Angle, turn: Angle, step: u32) -> Pair {
     let h = half_vector(i, o);
     return Pair(i, o, h, 0.5 * (dot(i, h) + dot(o, h)));
 }
+
+// What a thread makes of a table.
+struct Task {
+    row: u32,
+    step: u32,
+    half_vector: u32,
+    // Nothing, beyond the last node and where a mirror image tells.
+    is_none: bool,
+}
+
+fn task_of(node: u32) -> Task {
+    let row = node / nodes.pairs.w;
+    let half_vector = row / nodes.pairs.z;
+    let azimuth = half_vector % nodes.pairs.y;
+    return Task(row, node % nodes.pairs.w, half_vector, row >= row_count() || angles[azimuth].image != azimuth);
+}
+
+fn pair_of(task: Task) -> Pair {
+    let azimuth = angles[task.half_vector % nodes.pairs.y];
+    let turn = angles[nodes.pairs.y + task.row % nodes.pairs.z];
+    return pair_at(task.half_vector / nodes.pairs.y, azimuth, turn, task.step);
+}

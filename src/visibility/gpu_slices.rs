@@ -25,7 +25,8 @@ const THREADS: u32 = 64;
 const WORDS_A_SLICE: usize = 5;
 
 /// Cells and triangles that a walk looks at, besides the cells of sixteen tiles: see `scan.rs`. Fewer than there, as a device
-/// looks at one triangle at a time, and must not take long.
+/// looks at one triangle at a time, and must not take long. Walks that end there are not counted: the CPU's, which refine the
+/// picture, are.
 const LEAST_LOOKS: usize = 32_768;
 
 /// `slice_scan.wgsl`, compiled: build once, use for any tile.
