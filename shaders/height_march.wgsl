@@ -12,6 +12,9 @@ struct Params {
     facet_count: u32,
     // See scan.rs.
     facing_margin: f32,
+    // Of this dispatch.
+    first_azimuth: u32,
+    pad: u32,
 }
 
 struct Place {
@@ -100,7 +103,8 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     crossings = 0u;
-    let direction = directions[id.y];
+    let azimuth = params.first_azimuth + id.y;
+    let direction = directions[azimuth];
     let start = places[id.x].position;
     let normal = places[id.x].normal;
     var slope = max(-(dot(normal.xy, direction) + params.facing_margin) / max(normal.z, 1e-6), 0.0);
@@ -130,8 +134,8 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     if COUNTING {
-        horizons[id.x * params.azimuths + id.y] = f32(crossings);
+        horizons[id.x * params.azimuths + azimuth] = f32(crossings);
         return;
     }
-    horizons[id.x * params.azimuths + id.y] = select(FREE, angle_of(slope, 1.0), slope > 0.0);
+    horizons[id.x * params.azimuths + azimuth] = select(FREE, angle_of(slope, 1.0), slope > 0.0);
 }

@@ -13,6 +13,8 @@
 const EVENLY: f32 = 0.25;
 const CERTAIN: f32 = 65536.0;
 const ROUNDS: u32 = 2u;
+// What reflects less is black: its inverse might be no number.
+const DARKEST: f32 = 1e-36;
 
 var<workgroup> parts: array<vec2f, THREADS>;
 var<workgroup> steps: array<u32, THREADS>;
@@ -73,8 +75,9 @@ fn pick(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     let whole = together(thread, reflects);
     let lobes = select(vec2f(0.5), vec2f(1.0, 0.0), SECOND == 0u) * (1.0 - EVENLY);
     // A black lobe asks for none more than for another.
-    let per_lobe = select(vec2f(0.0), lobes / whole, whole > vec2f(0.0));
-    let even = (EVENLY + dot(lobes, select(vec2f(1.0), vec2f(0.0), whole > vec2f(0.0)))) / count;
+    let is_bright = whole > vec2f(DARKEST);
+    let per_lobe = select(vec2f(0.0), lobes / whole, is_bright);
+    let even = (EVENLY + dot(lobes, select(vec2f(1.0), vec2f(0.0), is_bright))) / count;
     var scale = nodes.picked;
     for (var round = 0u; round < ROUNDS; round++) {
         var expected = 0.0;

@@ -16,6 +16,9 @@ struct Params {
     looks: u32,
     // A facet this near to a copy of its triangle lies on it.
     near: f32,
+    // Of this dispatch.
+    first_azimuth: u32,
+    pad: u32,
 }
 
 struct Place {
@@ -59,7 +62,7 @@ const FREE: f32 = -0.02;
 const BLOCKED: f32 = 1.59079632679490;
 // Nothing below this slope is resolved, nor between this one and the vertical.
 const LOWEST: f32 = 0.005;
-const STEEPEST: f32 = 1e6;
+const STEEPEST: f32 = 1e12;
 const FAR: f32 = 1e30;
 // Intervals that a walk tells apart, and those that are kept.
 const MOST: u32 = 8u;
@@ -189,7 +192,10 @@ fn cut(k: u32, distances: vec3f, along: vec2f, eye: vec3f) -> vec2f {
 fn lies_on(origin: vec3f, entry: Entry) -> bool {
     let a = vec3f(entry.a, entry.heights.x);
     let normal = cross(vec3f(entry.b, entry.heights.y) - a, vec3f(entry.c, entry.heights.z) - a);
-    return abs(dot(normal, origin - a)) <= length(normal) * params.near;
+    // Its square may be too small a number.
+    let largest = max(max(abs(normal.x), abs(normal.y)), abs(normal.z));
+    let unit = normal / max(largest, 1e-38);
+    return abs(dot(unit, origin - a)) <= length(unit) * params.near;
 }
 
 fn elevation(slope: f32) -> f32 {
@@ -229,7 +235,8 @@ fn walk(place: Place, along: vec2f, overhead: f32) -> u32 {
     let in_y = axis(at.y, speed.y, position.y);
     var next = vec2f(in_x.x, in_y.x);
     let delta = vec2f(in_x.y, in_y.y);
-    var tile = vec2i(floor(position / vec2f(params.cells)));
+    // Half a cell further in, where no rounding of the division matters.
+    var tile = vec2i(floor((position + 0.5) / vec2f(params.cells)));
     var local = clamp(vec2i(position) - tile * params.cells, vec2i(0), params.cells - 1);
     // Along an axis all comes back after one tile, only further away: what did not rise above the ground never will.
     let period = 1.001 * min(
@@ -244,7 +251,7 @@ fn walk(place: Place, along: vec2f, overhead: f32) -> u32 {
         if count > 0u && hanging[0].y >= open {
             open = min(hanging[0].x, open);
         }
-        if open <= max(ground, LOWEST) || entered > period && !(count > 0u && hanging[0].x < overhead) {
+        if open <= max(ground, LOWEST) || (entered > period && !(count > 0u && hanging[0].x < overhead)) {
             break;
         }
         looks++;
@@ -267,7 +274,7 @@ fn walk(place: Place, along: vec2f, overhead: f32) -> u32 {
 
         let ceiling = origin.z + entered * open;
         let eye = vec3f(across(along, home.xy), dot(along, home.xy), home.z);
-        for (var k = starts[cell]; k < starts[cell + 1u]; k++) {
+        for (var k = starts[cell]; k < starts[cell + 1u] && looks < params.looks; k++) {
             looks++;
             if entries[k].z_max <= origin.z + began * ground {
                 break;
@@ -281,7 +288,7 @@ fn walk(place: Place, along: vec2f, overhead: f32) -> u32 {
             }
             cuts++;
             let slopes = cut(k, vec3f(a, b, c), along, eye);
-            if slopes.y <= ground || count > 0u && hanging[0].x <= slopes.x && slopes.y <= hanging[0].y {
+            if slopes.y <= ground || (count > 0u && hanging[0].x <= slopes.x && slopes.y <= hanging[0].y) {
                 continue;
             }
             if slopes.x <= slopes.y && (entries[k].triangle != place.triangle || !lies_on(home, entries[k])) {
@@ -298,7 +305,8 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let place = places[id.x];
-    let along = directions[id.y];
+    let azimuth = params.first_azimuth + id.y;
+    let along = directions[azimuth];
     // What a facet is turned away from: nothing else about it needs to be known.
     let ahead = dot(place.normal.xy, along) + params.facing_margin;
     count = 0u;
@@ -320,9 +328,9 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
     if ground < STEEPEST {
         looks = walk(place, along, overhead);
     }
-    let slice = id.x * params.azimuths + id.y;
+    let slice = id.x * params.azimuths + azimuth;
     if COUNTING {
-        found[slice] = min(looks, 0xfffffu) | min(cuts, 0xfffu) << 20u;
+        found[slice] = min(looks, 0xfffffu) | (min(cuts, 0xfffu) << 20u);
         return;
     }
     if !HANGING {
@@ -343,7 +351,7 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
             while k + 1u == KEPT && end + 1u < count && hanging[end + 1u].x < overhead {
                 end++;
             }
-            steps = steps_of(hanging[k].x) | max(steps_of(hanging[end].y), 1u) << 16u;
+            steps = steps_of(hanging[k].x) | (max(steps_of(hanging[end].y), 1u) << 16u);
         }
         found[first + 1u + k] = steps;
     }

@@ -1,16 +1,35 @@
-// Adds what some facets show of themselves to a_v(o) / cos θ_o at the nodes of a polar grid, which a table reads.
+// Adds what some facets show of themselves to a_v(o) / cos θ_o at the nodes of a polar grid, which a table reads. A workgroup a
+// node: there are few, and many facets.
 
+//!import facets
 //!import flat_index
-//!import sum_areas
+//!import visibility_unblocked
 
 @group(0) @binding(1) var<storage, read> directions: array<vec4f>;
 @group(0) @binding(2) var<storage, read_write> areas: array<f32>;
 
+var<workgroup> parts: array<f32, THREADS>;
+
 @compute @workgroup_size(THREADS)
-fn add(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let k = flat_index(id, groups);
-    if k < arrayLength(&directions) {
-        let o = directions[k].xyz;
-        areas[k] += visible_area(o) / o.z;
+fn add(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let o = directions[workgroup.x].xyz;
+    let to_viewer = sight_along(o);
+    var total = 0.0;
+    for (var s = sum.first + thread; s < sum.end; s += THREADS) {
+        let cosine = dot(facets[s].xyz, o);
+        if cosine > 0.0 {
+            total += facets[s].w * visibility(s, to_viewer) * cosine;
+        }
+    }
+    parts[thread] = total;
+    workgroupBarrier();
+    for (var half = THREADS / 2u; half > 0u; half /= 2u) {
+        if thread < half {
+            parts[thread] += parts[thread + half];
+        }
+        workgroupBarrier();
+    }
+    if thread == 0u {
+        areas[workgroup.x] += parts[0] / o.z;
     }
 }

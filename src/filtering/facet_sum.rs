@@ -291,6 +291,12 @@ impl FacetSum {
         }
     }
 
+    /// Normals of the groups that reflect, where each has few.
+    pub(crate) fn distinct_normals(&self) -> Option<usize> {
+        let lit = self.groups.iter().filter(|group| !group.is_black);
+        lit.map(|group| group.patches.as_ref().map(Vec::len)).sum()
+    }
+
     /// Whether every group has few normals and one colour: then `FewNormals` serves.
     pub(crate) fn has_few_normals(&self) -> bool {
         let few = |group: &Group| group.patches.is_some() && group.rgb_areas.is_none();

@@ -251,6 +251,19 @@ impl GpuRenderer {
                 }
             }
         }
+        if let Some(horizons) = unmade.and_then(GpuMaterial::horizons) {
+            let mut held = 0;
+            for run in 0..horizons.runs() {
+                if held > 0 && held + horizons.work(run) > self.at_once {
+                    recorder.submit()?;
+                    cancel.check()?;
+                    held = 0;
+                }
+                horizons.dispatch(&mut recorder.compute_pass(Stage::Product, &[]), run);
+                recorder.stage_ends(Stage::Product)?;
+                held += horizons.work(run);
+            }
+        }
         if let Some(material) = unmade.filter(|material| material.is_to_be_made()) {
             let parts = material.parts(self.at_once);
             for (k, part) in parts.iter().enumerate() {

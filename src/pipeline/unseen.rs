@@ -35,13 +35,17 @@ const THIN: usize = 400;
 /// Few of the facets of few normals, and their places, where a facet sees along horizons: they are left out before they see
 /// anything.
 fn thinned(sum: &FacetSum, route: Route) -> Option<(FacetSum, Vec<usize>)> {
-    let few = sum.has_few_normals() && sum.patch_count().is_some_and(|normals| normals <= FEW_NORMALS);
-    let along_horizons = matches!(route, Route::HeightMarch | Route::HorizonScan);
-    (few && along_horizons).then(|| sum.thinned(sum.facet_count().div_ceil(THIN))).flatten()
+    let few = sum.distinct_normals().is_some_and(|normals| normals <= FEW_NORMALS);
+    (few && is_few(sum, route)).then(|| sum.thinned(sum.facet_count().div_ceil(THIN))).flatten()
 }
 
-/// Of more, each would keep too many.
+/// Of more, each would keep too many: the CPU picks.
 const FEW_NORMALS: usize = 16;
+
+/// Whether normals are few, and seen along horizons.
+fn is_few(sum: &FacetSum, route: Route) -> bool {
+    sum.has_few_normals() && matches!(route, Route::HeightMarch | Route::HorizonScan)
+}
 
 impl Pipeline {
     /// What a device needs that makes visibility and product itself. `None` where only the CPU makes what the scene calls
@@ -57,6 +61,9 @@ impl Pipeline {
             return Ok(None);
         }
         let thinned = thinned(sum, plan.route);
+        if thinned.is_none() && is_few(sum, plan.route) {
+            return Ok(None);
+        }
         let (mesh, facets) = (&prepared.shape.mesh, prepared.facets.clone());
         let facets = thinned.as_ref().map_or(facets, |(_, kept)| Arc::new(prepared.facets.picked(kept)));
         let sight = match (plan.route, &mesh.height_grid) {

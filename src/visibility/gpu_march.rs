@@ -25,8 +25,8 @@ pub struct GpuHeightMarch {
 #[derive(Debug)]
 pub struct GpuHorizons {
     pub(super) pipeline: wgpu::ComputePipeline,
-    pub(super) group: wgpu::BindGroup,
-    pub(super) workgroups: [u32; 2],
+    /// With facets' workgroups and azimuths of each.
+    pub(super) runs: Vec<(wgpu::BindGroup, [u32; 2])>,
     /// Elevations [rad], the azimuths of a facet side by side, or what `visibility_hanging.wgsl` reads; zeros until it is made.
     pub elevations: wgpu::Buffer,
     pub azimuths: usize,
@@ -41,6 +41,8 @@ struct Params {
     azimuths: u32,
     facet_count: u32,
     facing_margin: f32,
+    first_azimuth: u32,
+    pad: u32,
 }
 
 #[repr(C)]
@@ -79,6 +81,8 @@ impl GpuHeightMarch {
             azimuths: azimuths as u32,
             facet_count: facets.len() as u32,
             facing_margin: FACING_MARGIN,
+            first_azimuth: 0,
+            pad: 0,
         };
         let places = facets.positions.iter().zip(&facets.normals);
         let places: Vec<Place> =
@@ -89,28 +93,58 @@ impl GpuHeightMarch {
         let elevations =
             gpu.buffer("horizons", (4 * facets.len() * azimuths) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
-            &gpu.upload("height-field", &[params], Usage::UNIFORM)?,
             &gpu.upload("heights", &heights.heights, Usage::STORAGE)?,
             &gpu.upload("places of facets", &places, Usage::STORAGE)?,
             &elevations,
             &gpu.upload("azimuths", &directions, Usage::STORAGE)?,
         ];
-        Ok(GpuHorizons {
-            pipeline: self.march.clone(),
-            group: gpu.group("height-field", &self.layout, &bound.map(wgpu::Buffer::as_entire_binding))?,
-            workgroups: [params.facet_count.div_ceil(THREADS), params.azimuths],
-            elevations,
-            azimuths,
-        })
+        let runs = runs(facets.len(), azimuths, |first_azimuth| {
+            let params = gpu.upload("height-field", &[Params { first_azimuth, ..params }], Usage::UNIFORM)?;
+            let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
+            gpu.group("height-field", &self.layout, &bound)
+        })?;
+        Ok(GpuHorizons { pipeline: self.march.clone(), runs, elevations, azimuths })
     }
 }
 
+/// Walks of one dispatch.
+const WALKS: usize = 1 << 21;
+
+/// What a walk counts for beside lobes: as many edges, or cells and triangles, where a tile is dense.
+const LOBES_A_WALK: u64 = 512;
+
+/// Runs of azimuths for one dispatch each: the group that begins with an azimuth, its workgroups and how many azimuths.
+pub(super) fn runs(
+    facets: usize,
+    azimuths: usize,
+    group: impl Fn(u32) -> Result<wgpu::BindGroup, GpuError>,
+) -> Result<Vec<(wgpu::BindGroup, [u32; 2])>, GpuError> {
+    let together = (WALKS / facets.max(1)).max(1);
+    let run = |first: usize| {
+        let count = together.min(azimuths - first) as u32;
+        Ok((group(first as u32)?, [(facets as u32).div_ceil(THREADS), count]))
+    };
+    (0..azimuths).step_by(together).map(run).collect()
+}
+
 impl GpuHorizons {
-    /// Encodes the making.
-    pub fn dispatch(&self, pass: &mut wgpu::ComputePass) {
+    /// Dispatches that make it.
+    pub fn runs(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// What one of them takes, in lobes.
+    pub fn work(&self, run: usize) -> u64 {
+        let [groups, azimuths] = self.runs[run].1.map(u64::from);
+        groups * u64::from(THREADS) * azimuths * LOBES_A_WALK
+    }
+
+    /// Encodes one of them.
+    pub fn dispatch(&self, pass: &mut wgpu::ComputePass, run: usize) {
+        let (group, [workgroups, azimuths]) = &self.runs[run];
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.group, &[]);
-        pass.dispatch_workgroups(self.workgroups[0], self.workgroups[1], 1);
+        pass.set_bind_group(0, group, &[]);
+        pass.dispatch_workgroups(*workgroups, *azimuths, 1);
     }
 }
 
@@ -126,7 +160,9 @@ pub(crate) fn crossings(
     march.march = gpu.compute_pipeline_with(&module, "march", &[&march.layout], &[("COUNTING", 1.0)]).unwrap();
     let made = march.horizons(gpu, heights, tile_size, facets, azimuths).unwrap();
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+    for run in 0..made.runs() {
+        made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
+    }
     gpu.queue.submit([encoder.finish()]);
     let counts: Vec<f32> = gpu.read(&made.elevations).unwrap();
     counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len() as f64
@@ -177,7 +213,7 @@ mod tests {
             let cpu = Horizons::march(&grid, Vec2::ONE, &facets, azimuths, 0.02);
             let made = march.horizons(&gpu, &grid, Vec2::ONE, &facets, azimuths).unwrap();
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+            made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), 0);
             gpu.queue.submit([encoder.finish()]);
             let device: Vec<f32> = gpu.read(&made.elevations).unwrap();
             let mut off: Vec<f32> = (0..facets.len() * azimuths)

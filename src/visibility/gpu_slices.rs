@@ -2,7 +2,7 @@
 //! [`Horizons::scan`](super::Horizons::scan), left on the device for whatever reads them there.
 //!
 //! A slice keeps four of the intervals that hang above its horizon; more come up in one of 400 slices of the densest pile of
-//! rods that ships, and the highest two of those are one then.
+//! rods that ships, and what is above the third is one then.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -11,15 +11,13 @@ use glam::{IVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::PeriodicGrid;
-use super::gpu_march::GpuHorizons;
+use super::gpu_march::{GpuHorizons, runs};
 use super::ray_cast::{LIFT, lifted_origin};
 use super::scan::FACING_MARGIN;
 use crate::directions::from_angles;
 use crate::geometry::Facets;
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
-
-const THREADS: u32 = 64;
 
 /// `KEPT` in `slice_scan.wgsl`, and the horizon.
 const WORDS_A_SLICE: usize = 5;
@@ -49,6 +47,8 @@ struct Params {
     facet_count: u32,
     looks: u32,
     near: f32,
+    first_azimuth: u32,
+    pad: u32,
 }
 
 #[repr(C)]
@@ -124,6 +124,8 @@ impl GpuSlicer {
             facet_count: facets.len() as u32,
             looks: (LEAST_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize) as u32,
             near: 10.0 * LIFT * grid.tile_size.length(),
+            first_azimuth: 0,
+            pad: 0,
         };
         let (starts, entries) = grid.all_entries();
         let corners = |&entry| grid.copy_corners(entry, IVec2::ZERO);
@@ -142,16 +144,18 @@ impl GpuSlicer {
         let bytes = (4 * words * facets.len() * azimuths) as u64;
         let found = gpu.buffer("slices", bytes, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
-            &gpu.upload("tile", &[params], Usage::UNIFORM)?,
             &gpu.upload("cells", starts, Usage::STORAGE)?,
             &gpu.upload("triangles of cells", &entries, Usage::STORAGE)?,
             &gpu.upload("places of facets", &places, Usage::STORAGE)?,
             &gpu.upload("azimuths", &directions, Usage::STORAGE)?,
             &found,
         ];
-        let group = gpu.group("slices", &self.layout, &bound.map(wgpu::Buffer::as_entire_binding))?;
-        let workgroups = [params.facet_count.div_ceil(THREADS), params.azimuths];
-        Ok(GpuHorizons { pipeline: pipeline.clone(), group, workgroups, elevations: found, azimuths })
+        let runs = runs(facets.len(), azimuths, |first_azimuth| {
+            let params = gpu.upload("tile", &[Params { first_azimuth, ..params }], Usage::UNIFORM)?;
+            let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
+            gpu.group("slices", &self.layout, &bound)
+        })?;
+        Ok(GpuHorizons { pipeline: pipeline.clone(), runs, elevations: found, azimuths })
     }
 }
 

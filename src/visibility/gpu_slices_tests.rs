@@ -18,7 +18,9 @@ fn tile(name: &str, facets: usize) -> (TileMesh, Facets) {
 
 fn read(gpu: &Gpu, made: &GpuHorizons) -> Vec<u32> {
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+    for run in 0..made.runs() {
+        made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
+    }
     gpu.queue.submit([encoder.finish()]);
     gpu.read(&made.elevations).unwrap()
 }

@@ -211,7 +211,7 @@ impl OnDevice {
         };
         let taken = match worn {
             Ok(()) => true,
-            Err(GpuError::Unsupported(_)) => false,
+            Err(GpuError::Unsupported(_) | GpuError::TooLarge { .. }) => false,
             Err(error) => return Err(error.into()),
         };
         // Its pipelines stay for the next material.

@@ -11,9 +11,10 @@ use super::shared::{SmallScale, small_scale};
 
 /// From coarse to fine; above them the scene's own quality.
 const RUNGS: [Preset; 2] = [Preset::Draft, Preset::Standard];
-/// Visibility and product may take so long, and leave room for those of the next rung below the other.
+/// Visibility and product may take so long, and leave room for those of the next rung below these: by count `standard` is ten
+/// drafts, and `fine` up to 3.4 of `standard`.
 const MOST_MS: f64 = 25.0;
-const LEAST_MS: f64 = 2.0;
+const LEAST_MS: [f64; RUNGS.len()] = [2.0, 7.0];
 
 /// What such drafts are made from, and how fine they are.
 #[derive(Default)]
@@ -71,7 +72,7 @@ impl DeviceDrafts {
             self.rung = self.rung.saturating_sub(1);
             self.rested = (4 * self.rested).clamp(8, 1 << 20);
             self.rest = self.rested;
-        } else if ms < LEAST_MS && self.rung < RUNGS.len() {
+        } else if LEAST_MS.get(self.rung).is_some_and(|least| ms < *least) {
             match self.rest {
                 0 => self.rung += 1,
                 _ => self.rest -= 1,
@@ -113,7 +114,7 @@ mod tests {
             });
             after.collect()
         };
-        assert_eq!(rungs(&[1.0, 1.0, 1.0, 10.0, 40.0]), [1, 2, 2, 2, 1]);
+        assert_eq!(rungs(&[3.0, 1.0, 6.0, 1.0, 10.0, 40.0]), [0, 1, 2, 2, 2, 1], "a draft leaves less room above it");
         assert_eq!(rungs(&[1.0; 9]), [1, 1, 1, 1, 1, 1, 1, 1, 2], "it is tried again after eight");
         assert_eq!(rungs(&[40.0]), [1]);
         assert_eq!(rungs(&[1.0; 32]), [1; 32], "and then after more");

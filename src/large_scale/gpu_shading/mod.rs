@@ -226,9 +226,14 @@ impl GpuMaterial {
         self.maps.as_ref()
     }
 
+    /// What facets see, which is to be made before [`GpuMaterial::make`].
+    pub(super) fn horizons(&self) -> Option<&GpuHorizons> {
+        self.horizons.as_ref()
+    }
+
     /// Whether [`GpuMaterial::make`] has anything to do.
     pub(super) fn is_to_be_made(&self) -> bool {
-        self.horizons.is_some() || self.table.is_some()
+        self.table.is_some()
     }
 
     /// Buffers that [`GpuMaterial::make`] adds to.
@@ -241,12 +246,9 @@ impl GpuMaterial {
         self.table.as_ref().map_or_else(|| vec![Range::default()], |table| table.parts(most_lobes))
     }
 
-    /// Records what the device has to make before the first shading with this material: what facets see, and the table of
-    /// their sum, all parts in order. Once is enough; twice makes the same again.
+    /// Records what the device has to make before the first shading with this material: the table of its sum, all parts in order.
+    /// Once is enough; twice makes the same again.
     pub(super) fn make(&self, compute: &mut wgpu::ComputePass, part: Range<usize>) {
-        if let (Some(horizons), 0) = (&self.horizons, part.start) {
-            horizons.dispatch(compute);
-        }
         if let Some(table) = &self.table {
             table.dispatch(compute, part);
         }

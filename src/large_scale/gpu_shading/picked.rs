@@ -17,7 +17,7 @@ const AT_ONCE: usize = 2;
 const PICKING: u64 = 4;
 
 /// A row of picks holds its count and, as shares that were rounded may add up to more than was asked for, a few more.
-const BESIDES: usize = 4;
+const BESIDES: usize = 16;
 
 /// `Pick` in `table_picks.wgsl`.
 pub(super) type Pick = [u32; 2];

@@ -22,6 +22,9 @@ use crate::gpu::{Gpu, GpuError, Tier};
 /// Lobes of one dispatch: slow devices take a fifth of a second. A submission holds no more than its renderer allows.
 const MOST_LOBES: u64 = 1 << 30;
 
+/// Facets of which some are picked, in one dispatch.
+const MOST_TO_PICK_FROM: usize = 1 << 19;
+
 /// `Nodes` in `table_nodes.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -238,7 +241,7 @@ impl GpuShading {
         let step = |range: Range<usize>| {
             let groups = vec![nodes.clone(), self.sum_group(gpu, shared, Sum::blank(sum, seen).over(&range))?];
             let lobes = (directions.len() * range.len()) as u64;
-            Ok(Step { pipeline: pipeline.clone(), groups, workgroups: workgroups(directions.len())?, lobes })
+            Ok(Step { pipeline: pipeline.clone(), groups, workgroups: [directions.len() as u32, 1], lobes })
         };
         pieces(0..facets, most).map(step).collect()
     }
@@ -251,8 +254,8 @@ impl GpuShading {
         shape: Shape,
         values: &wgpu::Buffer,
     ) -> Result<Vec<Step>, GpuError> {
-        // Less than half of them spares something.
-        let picked = picked.filter(|&count| sum.facet_count() >= 2 * count);
+        // Less than half of them spares something; and to pick from very many is too much for a dispatch.
+        let picked = picked.filter(|&count| sum.facet_count() >= 2 * count && sum.facet_count() <= MOST_TO_PICK_FROM);
         let angles = gpu.upload("angles", &shape.angles(), wgpu::BufferUsages::STORAGE)?;
         let see = seen.file();
         let layouts = [self.nodes.clone(), self.facets.clone()];
