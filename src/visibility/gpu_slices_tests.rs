@@ -18,6 +18,7 @@ fn tile(name: &str, facets: usize) -> (TileMesh, Facets) {
 
 fn read(gpu: &Gpu, made: &GpuHorizons) -> Vec<u32> {
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    assert!(made.runs() > 1);
     for run in 0..made.runs() {
         made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
     }
