@@ -5,7 +5,7 @@
 //!import table_picks
 //!import two_lobes
 //!import facets
-//!import flat_index
+//!import together
 
 @group(0) @binding(2) var<storage, read_write> picks: array<Pick>;
 
@@ -16,23 +16,7 @@ const ROUNDS: u32 = 2u;
 // What reflects less is black: its inverse might be no number.
 const DARKEST: f32 = 1e-36;
 
-var<workgroup> parts: array<vec2f, THREADS>;
 var<workgroup> steps: array<u32, THREADS>;
-
-// What all threads hold together. All must call it.
-fn together(thread: u32, part: vec2f) -> vec2f {
-    parts[thread] = part;
-    workgroupBarrier();
-    for (var half = THREADS / 2u; half > 0u; half /= 2u) {
-        if thread < half {
-            parts[thread] += parts[thread + half];
-        }
-        workgroupBarrier();
-    }
-    let whole = parts[0];
-    workgroupBarrier();
-    return whole;
-}
 
 // What those before a thread and the thread itself hold. All must call it.
 fn up_to(thread: u32, step: u32) -> u32 {

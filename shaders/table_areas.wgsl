@@ -2,13 +2,11 @@
 // node: there are few, and many facets.
 
 //!import facets
-//!import flat_index
+//!import together
 //!import visibility_unblocked
 
 @group(0) @binding(1) var<storage, read> directions: array<vec4f>;
 @group(0) @binding(2) var<storage, read_write> areas: array<f32>;
-
-var<workgroup> parts: array<f32, THREADS>;
 
 @compute @workgroup_size(THREADS)
 fn add(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) thread: u32) {
@@ -21,15 +19,8 @@ fn add(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
             total += facets[s].w * visibility(s, to_viewer) * cosine;
         }
     }
-    parts[thread] = total;
-    workgroupBarrier();
-    for (var half = THREADS / 2u; half > 0u; half /= 2u) {
-        if thread < half {
-            parts[thread] += parts[thread + half];
-        }
-        workgroupBarrier();
-    }
+    let area = together(thread, vec2f(total, 0.0)).x;
     if thread == 0u {
-        areas[workgroup.x] += parts[0] / o.z;
+        areas[workgroup.x] += area / o.z;
     }
 }

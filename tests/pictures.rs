@@ -161,6 +161,31 @@ fn trials_from_part_of_the_facets() {
     }
 }
 
+/// Figures of docs/speed.md.
+#[test]
+#[ignore = "a table to be printed: cargo test --release --test pictures few_normals_thinned -- --ignored --nocapture"]
+fn few_normals_thinned_to_what_devices_sum() {
+    let pairs = picture_pairs(512, 12345);
+    let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
+    println!("scene                  preset    facets kept  rel. L2   PSNR");
+    for scene in ["table4_teapot", "table4_cup", "fig9a_cylinder_grooves", "fig1c_silver_deep"] {
+        for preset in ["draft", "standard", "fine"] {
+            let set = ["quality.backend=cpu".to_owned(), format!("quality.preset={preset}")];
+            let outcome = Pipeline::new().effective(&scene::open(scene, &set).unwrap()).unwrap();
+            let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("{scene}: not a sum") };
+            let all = direct.sum.facet_count();
+            let step = [27, 17, 10, 3].into_iter().find(|step| all >= 600 * step).unwrap();
+            let thinned = direct.thinned(step).unwrap();
+            let kept = thinned.sum.facet_count();
+            let thinned = values(&outcome.brdf.with_direct_form(Form::Direct(thinned)));
+            let errors = upper_errors(&thinned, &values(&outcome.brdf));
+            let (percent, db) = (100.0 * errors.rel_l2, errors.psnr_db);
+            println!("{scene:<22} {preset:<9} {kept:>4} of {all:>5} {percent:>6.2} % {db:>6.1} dB");
+            assert!(errors.rel_l2 < 0.15, "{scene} {preset}: what falls in step is far off");
+        }
+    }
+}
+
 #[test]
 fn a_table_of_a_mirrored_tile_is_its_own_mirror_image_and_close_to_the_whole_one() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();

@@ -62,6 +62,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("tint_fixed", include_str!("../../shaders/tint_fixed.wgsl")),
     ("tint_fresnel", include_str!("../../shaders/tint_fresnel.wgsl")),
     ("tint_row", include_str!("../../shaders/tint_row.wgsl")),
+    ("together", include_str!("../../shaders/together.wgsl")),
     ("two_lobes", include_str!("../../shaders/two_lobes.wgsl")),
     ("vectors", include_str!("../../shaders/vectors.wgsl")),
     ("visibility_hanging", include_str!("../../shaders/visibility_hanging.wgsl")),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::pictures::THINNED;
 use super::{Pipeline, Prepared, StageTimes};
 use crate::error::Result;
 use crate::filtering::{FacetSum, Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
@@ -24,23 +25,23 @@ pub struct Unseen {
 /// To find mirror planes takes some milliseconds: more than half of a table of fewer nodes takes a device.
 const MIRRORED_FROM: usize = 60_000;
 
-/// Facets that are picked for each half vector of a table. Of 32,768 on height-fields they raise the table's error from 1.1 to
-/// 2.2 % to 1.5 to 3 (docs/speed.md, "On a graphics processor").
+/// Facets that are picked for each half vector of a table; how far it is off then, docs/speed.md tells ("On a graphics processor").
 const PICKED: usize = 1600;
 
-/// Facets that are kept of few normals, whose lobes are exact: about as many as a device can sum for each pair of a picture.
-/// Of 32,768 they are 2 to 5 % off (docs/speed.md, "On a graphics processor").
-const THIN: usize = 400;
+/// Facets that are kept at least of few normals, whose lobes are exact. How far these are off stands there, too. Nothing checks
+/// them before refinement does, so they are taken at the CPU's steps only: of every 82nd facet those of grooves fell in step (272 % off).
+const THIN: usize = 600;
+
+/// Of more normals, each would keep too many: the CPU picks.
+const FEW_NORMALS: usize = 16;
 
 /// Few of the facets of few normals, and their places, where a facet sees along horizons: they are left out before they see
 /// anything.
 fn thinned(sum: &FacetSum, route: Route) -> Option<(FacetSum, Vec<usize>)> {
     let few = sum.distinct_normals().is_some_and(|normals| normals <= FEW_NORMALS);
-    (few && is_few(sum, route)).then(|| sum.thinned(sum.facet_count().div_ceil(THIN))).flatten()
+    let step = THINNED.into_iter().find(|step| sum.facet_count() >= THIN * step).unwrap_or(1);
+    (few && is_few(sum, route)).then(|| sum.thinned(step)).flatten()
 }
-
-/// Of more, each would keep too many: the CPU picks.
-const FEW_NORMALS: usize = 16;
 
 /// Whether normals are few, and seen along horizons.
 fn is_few(sum: &FacetSum, route: Route) -> bool {

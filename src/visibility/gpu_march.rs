@@ -87,16 +87,13 @@ impl GpuHeightMarch {
         let places = facets.positions.iter().zip(&facets.normals);
         let places: Vec<Place> =
             places.map(|(&position, &normal)| Place { position, pad_p: 0, normal, pad_n: 0 }).collect();
-        // The CPU's own: built-in sines and cosines may be off by 2⁻¹¹, and an axis would be missed.
-        let along = |azimuth: usize| from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
-        let directions: Vec<glam::Vec2> = (0..azimuths).map(along).collect();
         let elevations =
             gpu.buffer("horizons", (4 * facets.len() * azimuths) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
             &gpu.upload("heights", &heights.heights, Usage::STORAGE)?,
             &gpu.upload("places of facets", &places, Usage::STORAGE)?,
             &elevations,
-            &gpu.upload("azimuths", &directions, Usage::STORAGE)?,
+            &gpu.upload("azimuths", &directions(azimuths), Usage::STORAGE)?,
         ];
         let runs = runs(facets.len(), azimuths, |first_azimuth| {
             let params = gpu.upload("height-field", &[Params { first_azimuth, ..params }], Usage::UNIFORM)?;
@@ -105,6 +102,13 @@ impl GpuHeightMarch {
         })?;
         Ok(GpuHorizons { pipeline: self.march.clone(), runs, elevations, azimuths })
     }
+}
+
+/// Unit vectors of the plane along so many azimuths, the CPU's own: built-in sines and cosines may be off by 2⁻¹¹, and an axis
+/// would be missed.
+pub(super) fn directions(azimuths: usize) -> Vec<glam::Vec2> {
+    let along = |azimuth: usize| from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
+    (0..azimuths).map(along).collect()
 }
 
 /// Walks of one dispatch; few in tests, so that all take several.

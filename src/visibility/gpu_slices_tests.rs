@@ -3,7 +3,9 @@
 use super::*;
 use crate::geometry::TileMesh;
 use crate::pipeline::Pipeline;
+use crate::plan::{Preset, Settings};
 use crate::scene;
+use crate::visibility::shadow_view::{ShadowView, affordable, extent};
 use crate::visibility::{Horizons, Slices};
 
 fn open_gpu() -> Option<Gpu> {
@@ -35,7 +37,7 @@ fn most(mut off: Vec<f32>) -> f32 {
 #[test]
 fn both_routes_find_the_same_horizons_of_meshes_without_overhangs() {
     let Some(gpu) = open_gpu() else { return };
-    let slicer = GpuSlicer::new(&gpu).unwrap();
+    let mut slicer = GpuSlicer::new(&gpu).unwrap();
     for (name, azimuths) in [("table4_teapot", 13), ("table4_cup", 8), ("fig5c_uneven", 11), ("fig8b_ripples", 10)] {
         let (mesh, facets) = tile(name, 300);
         let grid = PeriodicGrid::new(&mesh);
@@ -52,7 +54,7 @@ fn both_routes_find_the_same_horizons_of_meshes_without_overhangs() {
 #[test]
 fn both_routes_find_the_same_intervals_under_overhangs() {
     let Some(gpu) = open_gpu() else { return };
-    let slicer = GpuSlicer::new(&gpu).unwrap();
+    let mut slicer = GpuSlicer::new(&gpu).unwrap();
     let azimuths = 12;
     for name in ["table4_pillow", "table4_skirt", "fig6c_velvet_up"] {
         let (mesh, facets) = tile(name, 200);
@@ -87,25 +89,46 @@ fn both_routes_find_the_same_intervals_under_overhangs() {
 pub(crate) fn looks(gpu: &Gpu, grid: &PeriodicGrid, facets: &Facets, azimuths: usize, overhangs: bool) -> [f64; 2] {
     let slicer = GpuSlicer::new(gpu).unwrap();
     let constants = [("COUNTING", 1.0), ("HANGING", f64::from(u8::from(overhangs)))];
-    let module = gpu.module("slice_scan").unwrap();
-    let counting = gpu.compute_pipeline_with(&module, "scan", &[&slicer.layout], &constants).unwrap();
-    let made = slicer.found_by(gpu, &counting, 1, (grid, facets, azimuths)).unwrap();
+    let counting = gpu.compute_pipeline_with(&slicer.module, "scan", &[&slicer.layout], &constants).unwrap();
+    let made = slicer.found_by(gpu, counting, 1, (grid, facets, azimuths)).unwrap();
     let found = read(gpu, &made);
     let mean = |of: fn(u32) -> u32| found.iter().map(|&both| f64::from(of(both))).sum::<f64>() / found.len() as f64;
     [mean(|both| both & 0xf_ffff), mean(|both| both >> 20)]
 }
 
-/// `cargo test --release --lib looks_of_slices -- --ignored --nocapture`
+/// Texels of all maps of `fine` that a tile's triangles cover together.
+fn covered(mesh: &TileMesh) -> f64 {
+    let settings = Settings::of_preset(Preset::Fine);
+    let (extent, resolution) = (extent(mesh), affordable(mesh, settings.map_resolution));
+    let of_view = |direction: &Vec3| {
+        let view = ShadowView::new(mesh.size, extent, *direction, resolution).unwrap();
+        let twice = |triangle: usize| {
+            let [a, b, c] = mesh.corners(triangle).map(|corner| view.texel(corner));
+            f64::from((b - a).perp_dot(c - a).abs())
+        };
+        0.5 * (0..mesh.triangles.len()).map(twice).sum::<f64>()
+    };
+    settings.map_grid.directions().par_iter().map(of_view).sum()
+}
+
+/// Figures of docs/speed.md.
 #[test]
-#[ignore = "prints what slices look at in cells of two sizes"]
+#[ignore = "a table to be printed: cargo test --release --lib looks_of_slices -- --ignored --nocapture"]
 fn looks_of_slices() {
     let Some(gpu) = open_gpu() else { return };
-    for name in ["table4_pillow", "table4_skirt", "fig6a_velvet_spread", "table4_teapot", "table4_cup"] {
+    println!("scene                 cells  looks a slice  cuts  more than four hang  texels of maps at fine");
+    for name in
+        ["table4_pillow", "table4_skirt", "fig6a_velvet_spread", "fig6c_velvet_up", "table4_teapot", "table4_cup"]
+    {
         let (mesh, facets) = tile(name, 1024);
+        let of = Slices::scan(&PeriodicGrid::for_slices(&mesh), &facets, 24, 0.02);
+        let (starts, _) = of.hanging_by_facet();
+        let many = starts.windows(2).filter(|ends| ends[1] - ends[0] > 4).count();
+        let many = 100.0 * many as f64 / (starts.len() - 1) as f64;
         for grid in [PeriodicGrid::new(&mesh), PeriodicGrid::for_slices(&mesh)] {
             let [looks, cuts] = looks(&gpu, &grid, &facets, 24, true);
             let cells = grid.cells.x * grid.cells.y;
-            println!("{name:<20} {cells:>6} cells: {looks:>7.1} looks a slice, {cuts:>6.1} cuts");
+            println!("{name:<20} {cells:>6} {looks:>14.1} {cuts:>5.1} {many:>18.2} % {:>23.1e}", covered(&mesh));
         }
     }
 }

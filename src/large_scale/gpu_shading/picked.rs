@@ -20,7 +20,7 @@ const PICKING: u64 = 4;
 const BESIDES: usize = 16;
 
 /// `Pick` in `table_picks.wgsl`.
-pub(super) type Pick = [u32; 2];
+type Pick = [u32; 2];
 
 /// Which facets of a group, and what is summed over them.
 pub(super) struct OfGroup<'a> {
@@ -69,8 +69,8 @@ impl GpuShading {
         let colored = facets.rgb_areas.is_some();
         let picked = of.picked();
         let room = picked as usize + BESIDES;
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-        let picks = gpu.buffer("picks", (size_of::<Pick>() * half_vectors * room) as u64, usage)?;
+        let bytes = (size_of::<Pick>() * half_vectors * room) as u64;
+        let picks = gpu.buffer("picks", bytes, wgpu::BufferUsages::STORAGE)?;
         let from_picks = Shared { patches: picks.clone(), ..shared.clone() };
         let layouts = [self.nodes.clone(), self.facets.clone()];
         let originals = shape.grid.originals(shape.mirrors) as u64;
