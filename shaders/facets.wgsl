@@ -1,7 +1,7 @@
 // The facets of a tile, and what one pass sums: one term of one group (src/filtering/facet_sum.rs).
 
 struct Sum {
-    // Facets (sum_facets.wgsl, projected_area.wgsl) or patches (sum_patches.wgsl).
+    // Facets or patches (patches.wgsl).
     first: u32,
     end: u32,
     // Azimuths of horizons or of the map grid; rings and nodes of the grid.
@@ -18,8 +18,8 @@ struct Sum {
     // Facets in all.
     facet_count: u32,
     color: vec3f,
-    // Whether a pass over projected areas is the last of them.
-    last: u32,
+    // Of several passes over projected areas: 1 the first, 2 the last, 3 both.
+    place: u32,
 }
 
 @group(1) @binding(0) var<uniform> sum: Sum;

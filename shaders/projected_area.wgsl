@@ -17,10 +17,10 @@ fn measure(@builtin(global_invocation_id) id: vec3u) {
     }
     var total = visible_area(o);
     // What the passes before found.
-    if sum.first > 0u {
+    if (sum.place & 1u) == 0u {
         total += scales[point];
     }
-    if sum.last == 0u {
+    if (sum.place & 2u) == 0u {
         scales[point] = total;
     } else {
         scales[point] = select(0.0, 1.0 / total, total > params.least_area);

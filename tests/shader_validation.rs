@@ -41,6 +41,17 @@ fn every_combination_of_effects_parses_and_validates() {
             "visibility_maps",
         ] {
             check("projected_area", &[("visibility_unblocked", see)]);
+            let reach = match see {
+                "visibility_unblocked" => "reach_unblocked",
+                "visibility_horizons" => "reach_horizons",
+                _ => "reach_unknown",
+            };
+            let sees = [("visibility_unblocked", see), ("reach_unblocked", reach)];
+            check("projected_area", &[sees[0], sees[1], ("sum_areas", "sum_patch_areas")]);
+            for (weights, tint) in [("weights_area", "tint_fresnel"), ("weights_rgb", "tint_fixed")] {
+                let swaps = [("shadows_none", shadows), ("weights_area", weights), ("tint_fixed", tint)];
+                check("shade_patches", &[&sees[..], &swaps].concat());
+            }
             check("table_areas", &[("visibility_unblocked", see)]);
             for weights in ["weights_area", "weights_rgb"] {
                 let swaps =
@@ -52,16 +63,13 @@ fn every_combination_of_effects_parses_and_validates() {
                 for weights in ["weights_area", "weights_rgb"] {
                     let swaps = [("visibility_unblocked", see), ("lobe_lambertian", lobe), ("weights_area", weights)];
                     check("table_of_sum", &swaps);
-                    for sum in ["sum_facets", "sum_patches"] {
-                        let swaps = [
-                            ("shadows_none", shadows),
-                            ("visibility_unblocked", see),
-                            ("lobe_lambertian", lobe),
-                            ("weights_area", weights),
-                            ("sum_facets", sum),
-                        ];
-                        check("shade_direct", &swaps);
-                    }
+                    let swaps = [
+                        ("shadows_none", shadows),
+                        ("visibility_unblocked", see),
+                        ("lobe_lambertian", lobe),
+                        ("weights_area", weights),
+                    ];
+                    check("shade_direct", &swaps);
                 }
             }
         }
@@ -76,11 +84,16 @@ fn what_a_scene_does_not_call_for_is_not_in_the_shader() {
         ("shadows_none", "shadows_bits"),
         ("visibility_unblocked", "visibility_horizons"),
         ("lobe_lambertian", "lobe_cook_torrance"),
-        ("sum_facets", "sum_patches"),
     ];
     let rich = biscale::gpu::swapped_source("shade_direct", &all).expect("known files");
-    for absent in ["fn turn_of", "horizons[", "array<Patch>", "exp(", "visible["] {
+    for absent in ["fn turn_of", "horizons[", "exp(", "visible["] {
         assert!(!flat.contains(absent) && rich.contains(absent), "{absent}");
+    }
+    let horizons = [("visibility_unblocked", "visibility_horizons"), ("reach_unblocked", "reach_horizons")];
+    let [flat, hilly] = [&[][..], &horizons].map(|swaps| biscale::gpu::swapped_source("shade_patches", swaps));
+    let (flat, hilly) = (flat.expect("known files"), hilly.expect("known files"));
+    for absent in ["fn turn_of", "horizons[", "sight.elevation"] {
+        assert!(!flat.contains(absent) && hilly.contains(absent), "{absent}");
     }
     let tints = biscale::gpu::swapped_source("shade_table", &[]).expect("known files");
     let lobes = biscale::gpu::swapped_source("shade_table", &[("column_tints", "column_lobes")]).expect("known files");

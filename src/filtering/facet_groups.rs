@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::brdf::{LobeAngles, Measured, Term};
-use crate::geometry::Facets;
+use crate::geometry::{Facets, SAME_NORMAL};
 use crate::simd::{Lobe, PairVectors};
 
 /// A run of facets with one material.
@@ -31,9 +31,6 @@ pub(crate) struct Patch {
 
 /// A run must be this long on average for one lobe a run to pay.
 const FACETS_A_PATCH: usize = 8;
-
-/// Normals closer than this are one: rounding of coordinates, not shape.
-const SAME_NORMAL: f32 = 2e-5;
 
 impl Group {
     /// The same materials over other facets; `None` where they have colours of their own, or normals that matter.

@@ -25,6 +25,7 @@ use crate::simd::cubic_weights;
 pub use bvndf::VisibilityRows;
 pub use direct::Direct;
 pub use effective_brdf::{EffectiveBrdf, Form};
+pub(crate) use facet_groups::Group;
 pub use facet_sum::{FacetSum, SumMaterial, analytic_lobe};
 pub use forced::mean_colors;
 pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};

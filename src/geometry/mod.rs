@@ -34,6 +34,7 @@ pub use facets::{FacetSampler, Facets, SampleShift};
 pub use grooves::CrossSection;
 pub use pyramids::OnePyramid;
 pub use symmetry::{mirror_planes, mirror_planes_in};
+pub(crate) use tile_mesh::SAME_NORMAL;
 pub use tile_mesh::{ColorField, HeightGrid, SlotField, TileMesh};
 
 use crate::error::{InputError, Result};

@@ -4,6 +4,9 @@ use std::sync::Arc;
 
 use glam::{UVec2, Vec2, Vec3};
 
+/// Normals closer than this are one: rounding of coordinates, not shape.
+pub(crate) const SAME_NORMAL: f32 = 2e-5;
+
 /// One period of an endlessly repeated surface: x in `[0, size.x)`, y in `[0, size.y)`, z up. Triangles may reach
 /// over the tile's edge (their periodic copies come back in on the other side); they are never cut.
 #[derive(Debug, Clone, Default)]
@@ -95,6 +98,21 @@ impl TileMesh {
         let range =
             self.positions.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), p| (lo.min(p.z), hi.max(p.z)));
         if range.0 <= range.1 { range } else { (0.0, 0.0) }
+    }
+
+    /// How many normals the triangles have, if no more than `most`; `None` where normals turn inside triangles, too.
+    pub fn distinct_normals(&self, most: usize) -> Option<usize> {
+        let mut found: Vec<Vec3> = Vec::new();
+        for triangle in 0..self.triangles.len() {
+            let normal = self.geometric_normal(triangle);
+            if normal != Vec3::ZERO && !found.iter().any(|known| (*known - normal).abs().max_element() < SAME_NORMAL) {
+                found.push(normal);
+            }
+            if found.len() > most {
+                return None;
+            }
+        }
+        self.corner_normals.is_none().then_some(found.len())
     }
 
     /// Is it a single-valued surface without overhang, vertical walls allowed? Then light and view come only from above.

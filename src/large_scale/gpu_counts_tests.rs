@@ -2,16 +2,22 @@
 
 use std::time::Instant;
 
+use glam::{Mat3, Vec3};
+
 use super::gpu_gbuffer::Point;
 use super::gpu_render::GpuRenderer;
 use super::gpu_shading_tests::{Studio, open_gpu};
+use super::shading_points::ShadingPoints;
+use super::stage::Stage;
+use super::{CameraView, GBuffer};
 use crate::directions::UpperPairs;
 use crate::filtering::{Heights, Nodes, Sight, Sliced};
 use crate::geometry::Facets;
 use crate::gpu::Gpu;
 use crate::pipeline::{Pipeline, Unseen};
-use crate::scene;
-use crate::visibility::{crossings, looks};
+use crate::scene::{self, LoadedScene};
+use crate::simd::azimuth_and_elevation;
+use crate::visibility::{Horizons, crossings, looks};
 
 /// Operations, counted by hand in the shaders: of a walk over a height-field at each edge; of a slice at each cell or triangle,
 /// and at each that it cuts.
@@ -25,6 +31,8 @@ const NEXT_LOBE: f64 = 10.0;
 /// Of two directions that one facet sees, above horizons and between slices.
 const ABOVE: f64 = 22.0;
 const BETWEEN: f64 = 100.0;
+/// A direction to a light, its azimuth and elevation, how far that reaches, and its half vector.
+const DIRECTION: f64 = 85.0;
 /// Bytes from caches: an edge's two heights; a cell's or triangle's entry; a pick and its facet, and what two directions ask
 /// of it above horizons and between slices; rows of a table.
 const EDGE_BYTES: f64 = 8.0;
@@ -77,14 +85,12 @@ fn sight(gpu: &Gpu, unseen: &Unseen) -> [f64; 2] {
 }
 
 /// Operations and bytes of a table, and of reading it for a picture; or of summing over facets for each pair.
-fn product(unseen: &Unseen) -> [[f64; 2]; 2] {
+fn product(loaded: &LoadedScene, unseen: &Unseen) -> [[f64; 2]; 2] {
     let sum = &unseen.sum.sum;
     let overhangs = matches!(unseen.sum.sight, Sight::Slices(ref of) if of.overhangs);
     let (two, bytes) = if overhangs { (BETWEEN, BETWEEN_BYTES) } else { (ABOVE, ABOVE_BYTES) };
     let Some(Nodes { grid, mirrors, facets: Some(picked), .. }) = unseen.sum.nodes else {
-        // A facet of few normals faces both directions in half of all cases.
-        let facets = PAIRS * 0.5 * sum.facet_count() as f64;
-        return [[0.0; 2], [facets * (two + 2.0), facets * (bytes + 16.0)]];
+        return [[0.0; 2], few_normals(loaded, unseen)];
     };
     let UpperPairs { turn, difference, .. } = grid;
     let nodes = grid.originals(mirrors) as f64;
@@ -104,6 +110,106 @@ fn product(unseen: &Unseen) -> [[f64; 2]; 2] {
         ]
     };
     [table, [PAIRS * PAIR, PAIRS * PAIR_BYTES]]
+}
+
+/// Threads that go together: what one of them needs, all wait for.
+const TOGETHER: usize = 32;
+
+/// Operations and bytes of a sum over facets of few normals for each pair of a picture of this scene, and of its projected areas
+/// (`shade_patches.wgsl`, `sum_patch_areas.wgsl`).
+fn few_normals(loaded: &LoadedScene, unseen: &Unseen) -> [f64; 2] {
+    let horizons = match &unseen.sum.sight {
+        Sight::Heights(Heights { samples, tile_size, facets, azimuths, ramp }) => {
+            Horizons::march(samples, *tile_size, facets, *azimuths, *ramp)
+        }
+        Sight::Slices(of) => Horizons::scan(&of.grid, &of.facets, of.azimuths, of.ramp),
+        Sight::Seen(_) | Sight::Maps(_) => panic!("another route"),
+    };
+    let groups = unseen.sum.sum.groups();
+    let patches: Vec<_> =
+        groups.iter().flat_map(|group| group.patches.iter().flatten().map(move |patch| (group, patch))).collect();
+    let ranges: Vec<_> = patches.iter().map(|(_, patch)| patch.range.clone()).collect();
+    let reach = horizons.reach(&ranges);
+    let seen = |d: Vec3, patch: usize| {
+        let (azimuth, elevation) = azimuth_and_elevation(d);
+        let [a, b] = horizons.taps(azimuth).map(|(azimuth, _)| reach[azimuth * ranges.len() + patch]);
+        if elevation <= a[0].min(b[0]) {
+            Part::Nothing
+        } else if elevation >= a[1].max(b[1]) {
+            Part::Everything
+        } else {
+            Part::Some
+        }
+    };
+    let stage = Stage::new(loaded).unwrap();
+    let view = CameraView::new(&stage.camera, &stage.mesh, [960, 540]).unwrap();
+    let points = ShadingPoints::new(&GBuffer::new(&stage.mesh, &view, 1), &view, 1);
+    let [mut operations, mut bytes] = [0.0; 2];
+    let mut sum = |facets: usize, sides: f64| {
+        operations += facets as f64 * (0.5 * ABOVE * sides + 2.0);
+        bytes += facets as f64 * (0.5 * ABOVE_BYTES * sides + 16.0);
+    };
+    let mut others = 0.0;
+    let all: Vec<usize> = (0..points.len()).collect();
+    for some in all.chunks(TOGETHER) {
+        let frames: Vec<_> = some
+            .iter()
+            .map(|&k| {
+                Mat3::from_cols(points.tangents[k], points.normals[k].cross(points.tangents[k]), points.normals[k])
+                    .transpose()
+            })
+            .collect();
+        let views: Vec<_> =
+            frames.iter().zip(some).map(|(frame, &k)| *frame * (view.eye - points.positions[k]).normalize()).collect();
+        for (place, (group, patch)) in patches.iter().enumerate() {
+            let facets = patch.range.len();
+            let of_view: Vec<_> =
+                views.iter().map(|&o| if patch.normal.dot(o) > 0.0 { seen(o, place) } else { Part::Nothing }).collect();
+            let mut asked = of_view.contains(&Part::Some);
+            if asked {
+                sum(facets, 1.0);
+            }
+            if group.color == Vec3::ZERO || of_view.iter().all(|part| *part == Part::Nothing) {
+                continue;
+            }
+            for light in &stage.lights.directional {
+                let of_light = frames.iter().map(|frame| {
+                    let i = *frame * light.direction;
+                    if i.z > 0.0 && patch.normal.dot(i) > 0.0 { seen(i, place) } else { Part::Nothing }
+                });
+                let of_both: Vec<_> = of_light
+                    .zip(&of_view)
+                    .filter(|(light, view)| *light != Part::Nothing && **view != Part::Nothing)
+                    .collect();
+                others += DIRECTION;
+                if of_both.is_empty() {
+                    continue;
+                }
+                others += SEE + LOBE + NEXT_LOBE * (group.lobes.len() - 1) as f64;
+                // Ways that part wait for one another.
+                if asked && of_both.contains(&(Part::Everything, &Part::Some)) {
+                    sum(facets, 1.0);
+                    asked = false;
+                }
+                if of_both.contains(&(Part::Some, &Part::Everything)) {
+                    sum(facets, 1.0);
+                }
+                if of_both.contains(&(Part::Some, &Part::Some)) {
+                    sum(facets, 2.0);
+                }
+            }
+        }
+    }
+    let pairs = (all.len() * stage.lights.directional.len()) as f64 / TOGETHER as f64;
+    [operations + others, bytes].map(|count| count * PAIRS / pairs)
+}
+
+/// How much of the facets of one normal a direction sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Part {
+    Nothing,
+    Some,
+    Everything,
 }
 
 /// Figures of docs/speed.md.
@@ -158,7 +264,7 @@ fn counts_of_an_edit() {
                 times[times.len() / 2]
             };
             let (cpu, upload) = (median(cpu), median(upload));
-            let (seen, [table, shading]) = (sight(&gpu, &unseen), product(&unseen));
+            let (seen, [table, shading]) = (sight(&gpu, &unseen), product(&scenes[0], &unseen));
             let [operations, bytes] = [0, 1].map(|k| seen[k] + table[k] + shading[k]);
             let [half, quarter, small] = CARDS.map(|(pace, memory)| (operations / pace + traffic / memory) * 1e3);
             let [seen, table, shading, bytes] = [seen[0], table[0], shading[0], bytes].map(|count| count * 1e-9);

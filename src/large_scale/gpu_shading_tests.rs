@@ -160,6 +160,9 @@ pub(super) fn radiance(
     let group = shading.points(gpu, bound).unwrap();
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    for part in material.parts(u64::MAX) {
+        material.make(&mut pass, part);
+    }
     material.shade(&mut pass, 0..material.passes(), &group, [points.len() as u32, slices as u32]);
     drop(pass);
     gpu.queue.submit([encoder.finish()]);

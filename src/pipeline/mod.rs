@@ -82,6 +82,16 @@ struct Prepared {
     versions: [Version; 2],
 }
 
+/// Who is to find out what facets see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum For {
+    /// What that will cost is told, too.
+    Processor,
+    Device,
+    /// Of no more facets than these, as their normals are few.
+    DeviceOfFew(usize),
+}
+
 /// The last effective BRDF, and what a colour edit makes the next one from.
 #[derive(Debug)]
 struct Last {
@@ -105,6 +115,8 @@ pub struct Pipeline {
     scan_work: Option<(Version, f64)>,
     shape: Stage<ShapeKey, Shape>,
     facets: Stage<FacetKey, Facets>,
+    /// Those that devices see for where normals are few.
+    few_facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     /// Visibility on the nodes that the factored form reads.
     rows: Stage<([Version; 2], PolarGrid), VisibilityRows>,
@@ -147,23 +159,26 @@ impl Pipeline {
         self.kept = cache;
     }
 
-    /// All that comes before visibility. `sees_itself`: the processor is to find out what facets see, and what that will cost.
-    fn prepare(&mut self, loaded: &LoadedScene, sees_itself: bool, times: &mut StageTimes) -> Result<Prepared> {
+    /// All that comes before visibility.
+    fn prepare(&mut self, loaded: &LoadedScene, of: For, times: &mut StageTimes) -> Result<Prepared> {
         let scene = &loaded.scene;
         let (shape, shape_version) = self.shape(loaded, times)?;
-        let settings = Settings::of(scene).for_shape(shape.height_field);
+        let mut settings = Settings::of(scene).for_shape(shape.height_field);
+        if let For::DeviceOfFew(most) = of {
+            settings.facets = settings.facets.min(most);
+        }
         let (materials, materials_version) = self.materials(loaded, &shape.mesh, times)?;
         let colors = settings.effects.color_weights;
         let counts = [Some(settings.facets), settings.normal_bins];
         let facet_key = (shape_version, counts, settings.seed, settings.preset == Preset::Wu2011, colors);
+        let stage = if matches!(of, For::DeviceOfFew(_)) { &mut self.few_facets } else { &mut self.facets };
         let (facets, facets_version) =
-            self.facets.get("facets", facet_key, times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
+            stage.get("facets", facet_key, times, &self.cancel, || Ok(sample(&shape.mesh, &settings)))?;
         let material_of_slot = grouped(&materials.0, &facets, &settings);
         let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.1);
         sum.force(&facets, &settings.effects);
-        let of = (&material_of_slot[..], &materials.1[..]);
-        let costs_of = sees_itself.then_some(facets_version);
-        let found = self.findings(scene, &shape, &facets, &sum, of.0, of.1, &settings, costs_of);
+        let costs_of = (of == For::Processor).then_some(facets_version);
+        let found = self.findings(scene, &shape, &facets, &sum, &material_of_slot, &materials.1, &settings, costs_of);
         let mirrors = self.mirror_planes(&shape, shape_version, &settings, times)?;
         let plan = decide(&Findings { mirrors, ..found }, &settings, &Costs::default());
         let versions = [materials_version, facets_version];
@@ -204,7 +219,7 @@ impl Pipeline {
     /// A file the scene names cannot be used, or a factorization fails.
     pub fn effective(&mut self, loaded: &LoadedScene) -> Result<Outcome> {
         let mut times = StageTimes::new();
-        let prepared = self.prepare(loaded, true, &mut times)?;
+        let prepared = self.prepare(loaded, For::Processor, &mut times)?;
         if prepared.settings.preset == Preset::Wu2011 {
             let names = names(&loaded.scene, &prepared.shape.mesh, &prepared.materials)?;
             return self.wu2011(prepared, names, times);

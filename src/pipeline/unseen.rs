@@ -1,9 +1,6 @@
 //! A tile as a device takes it that makes visibility and product itself: what comes before them.
 
-use std::sync::Arc;
-
-use super::pictures::THINNED;
-use super::{Pipeline, Prepared, StageTimes};
+use super::{For, Pipeline, Prepared, StageTimes};
 use crate::error::Result;
 use crate::filtering::{FacetSum, Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
 use crate::geometry::mirror_planes_in;
@@ -28,20 +25,12 @@ const MIRRORED_FROM: usize = 60_000;
 /// Facets that are picked for each half vector of a table; how far it is off then, docs/speed.md tells ("On a graphics processor").
 const PICKED: usize = 1600;
 
-/// Facets that are kept at least of few normals, whose lobes are exact. How far these are off stands there, too. Nothing checks
-/// them before refinement does, so they are taken at the CPU's steps only: of every 82nd facet those of grooves fell in step (272 % off).
-const THIN: usize = 600;
+/// Facets of few normals, whose lobes are exact: placed anew, as many as the sequence that places them spreads well over the tiles
+/// that ship. Steps between the many leave grooves and pyramids unevenly covered: up to 11 % off where these are 4 %.
+const FEW_FACETS: usize = 700;
 
 /// Of more normals, each would keep too many: the CPU picks.
 const FEW_NORMALS: usize = 16;
-
-/// Few of the facets of few normals, and their places, where a facet sees along horizons: they are left out before they see
-/// anything.
-fn thinned(sum: &FacetSum, route: Route) -> Option<(FacetSum, Vec<usize>)> {
-    let few = sum.distinct_normals().is_some_and(|normals| normals <= FEW_NORMALS);
-    let step = THINNED.into_iter().find(|step| sum.facet_count() >= THIN * step).unwrap_or(1);
-    (few && is_few(sum, route)).then(|| sum.thinned(step)).flatten()
-}
 
 /// Whether normals are few, and seen along horizons.
 fn is_few(sum: &FacetSum, route: Route) -> bool {
@@ -56,17 +45,20 @@ impl Pipeline {
     /// As [`Pipeline::effective`].
     pub fn unseen(&mut self, loaded: &LoadedScene) -> Result<Option<Unseen>> {
         let mut times = StageTimes::new();
-        let prepared = self.prepare(loaded, false, &mut times)?;
+        let few = self.few_facets(loaded, &mut times)?;
+        let is_thin = few.is_some();
+        let prepared = match few {
+            Some(prepared) => prepared,
+            None => self.prepare(loaded, For::Device, &mut times)?,
+        };
         let Prepared { sum, plan, settings, .. } = &prepared;
         if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
             return Ok(None);
         }
-        let thinned = thinned(sum, plan.route);
-        if thinned.is_none() && is_few(sum, plan.route) {
+        if !is_thin && is_few(sum, plan.route) {
             return Ok(None);
         }
         let (mesh, facets) = (&prepared.shape.mesh, prepared.facets.clone());
-        let facets = thinned.as_ref().map_or(facets, |(_, kept)| Arc::new(prepared.facets.picked(kept)));
         let sight = match (plan.route, &mesh.height_grid) {
             (Route::HeightMarch, Some(samples)) => Sight::Heights(Heights {
                 samples: samples.clone(),
@@ -97,9 +89,7 @@ impl Pipeline {
             }
             _ => Sight::Seen(self.seen(&prepared, &mut times)?.0),
         };
-        let is_thin = thinned.is_some();
         let Prepared { shape, settings, sum, plan, shape_version, .. } = prepared;
-        let sum = thinned.map_or(sum, |(thinned, _)| thinned);
         // What is thin is exact between nodes, too.
         let grid = settings.picture_grids.last().copied().filter(|_| plan.try_picture_table && !is_thin);
         let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORED_FROM);
@@ -117,5 +107,18 @@ impl Pipeline {
         let nodes = grid.map(|grid| Nodes { mirrors, facets: Some(PICKED), ..Nodes::all(grid) });
         let sum = UnseenSum { sum, sight, base_area, nodes, interpolation: settings.interpolation };
         Ok(Some(Unseen { sum, notes: shape.mesh.notes.clone(), plan, settings, times }))
+    }
+
+    /// Where normals are few, few facets and what comes of them.
+    fn few_facets(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Option<Prepared>> {
+        let (shape, _) = self.shape(loaded, times)?;
+        if shape.mesh.distinct_normals(FEW_NORMALS).is_none() {
+            return Ok(None);
+        }
+        let prepared = self.prepare(loaded, For::DeviceOfFew(FEW_FACETS), times)?;
+        let Prepared { sum, plan, .. } = &prepared;
+        let few = sum.distinct_normals().is_some_and(|normals| normals <= FEW_NORMALS);
+        let serve = is_few(sum, plan.route) || plan.route == Route::None && sum.has_few_normals();
+        Ok((few && serve).then_some(prepared))
     }
 }

@@ -5,10 +5,12 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::few_normals::{Patches, reach_file};
 use super::seen::Seen;
+use super::table_of_sum::Making;
 use super::{GpuShading, Padded, Pass, Second, Variant, padded, shadow_swap};
 use crate::brdf::Term;
-use crate::filtering::FacetSum;
+use crate::filtering::{FacetSum, Group};
 use crate::gpu::{Gpu, GpuError, Tier};
 use crate::simd::Lobe;
 
@@ -27,8 +29,8 @@ pub(super) struct Sum {
     pub(super) tint: Vec3,
     pub(super) facet_count: u32,
     pub(super) color: Vec3,
-    /// Whether a pass over projected areas is the last of them.
-    pub(super) last: u32,
+    /// Of several passes over projected areas: 1 the first, 2 the last, 3 both.
+    pub(super) place: u32,
 }
 
 /// Facets of one pass on software Vulkan: llvmpipe leaves all loops of a thread, without a word, after 65,535 rounds
@@ -37,16 +39,6 @@ pub(super) const SOFTWARE_FACETS: usize = 512;
 
 /// And on others, where a pass over one row of pixels may be a submission.
 const HARDWARE_FACETS: usize = 1024;
-
-/// `Patch` in `sum_patches.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Patch {
-    normal: Vec3,
-    first: u32,
-    end: u32,
-    pad: [u32; 3],
-}
 
 /// The buffers that all passes read.
 #[derive(Clone)]
@@ -58,77 +50,65 @@ pub(super) struct Shared {
 }
 
 impl GpuShading {
+    /// The passes, and what the device has to make before the first.
     pub(super) fn direct_passes(
         &mut self,
         gpu: &Gpu,
         sum: &FacetSum,
         seen: &Seen,
         shadowed: bool,
-    ) -> Result<Vec<Pass>, GpuError> {
+    ) -> Result<(Vec<Pass>, Option<Making>), GpuError> {
         let groups = sum.groups();
         if groups.iter().any(|group| !group.measured.is_empty() && group.color != Vec3::ZERO) {
             return Err(GpuError::Unsupported(
                 "tables of measured BRDFs are summed over facets on the CPU only".to_owned(),
             ));
         }
-        let facet_count = sum.facet_count();
         let most = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { HARDWARE_FACETS };
-        let see = seen.file();
+        let (see, reach) = (("visibility_unblocked", seen.file()), ("reach_unblocked", reach_file(seen)));
+        let weights = |vary: bool| ("weights_area", if vary { "weights_rgb" } else { "weights_area" });
         let blank = Sum::blank(sum, seen);
-        let mut patches: Vec<Patch> = Vec::new();
         let mut shared = Shared::of(gpu, sum, seen)?;
-        let mut planned = Vec::new();
-        for group in groups.iter().filter(|group| group.color != Vec3::ZERO) {
-            let ranges: Vec<Range<usize>> = match &group.patches {
-                None => pieces(group.range.clone(), most).collect(),
-                Some(runs) => {
-                    let whole = runs.iter().map(|run| (run.normal, run.range.clone()));
-                    let cut = whole.flat_map(|(normal, range)| pieces(range, most).map(move |range| (normal, range)));
-                    let first = patches.len();
-                    patches.extend(cut.map(|(normal, range)| Patch {
-                        normal,
-                        first: range.start as u32,
-                        end: range.end as u32,
-                        pad: [0; 3],
-                    }));
-                    passes_over(&patches, first, most)
-                }
-            };
-            for (lobe, term) in &group.lobes {
-                let (file, sum) = blank.of_lobe(*lobe);
-                let sum = Sum { tint: base_tint(term), color: group.color, ..sum };
-                let swaps = vec![
-                    shadow_swap(shadowed),
-                    ("visibility_unblocked", see),
-                    ("lobe_lambertian", file),
-                    ("weights_area", if group.rgb_areas.is_some() { "weights_rgb" } else { "weights_area" }),
-                    ("sum_facets", if group.patches.is_some() { "sum_patches" } else { "sum_facets" }),
-                ];
-                let work = (group.range.len() / ranges.len().max(1)) as u64;
-                planned.extend(ranges.iter().map(|range| (swaps.clone(), sum.over(range), work)));
-            }
-        }
-        if !patches.is_empty() {
-            shared.patches = gpu.upload("patches", &patches, wgpu::BufferUsages::STORAGE)?;
-        }
-        let area = Variant {
-            shader: "projected_area",
-            entry_point: "measure",
-            swaps: vec![("visibility_unblocked", see)],
-            constants: Vec::new(),
-        };
+        let patches = Patches::of(sum, most);
+        let (on_device, tints, making) = self.patches(gpu, (sum, seen, &shared), &patches)?;
+        shared.patches = on_device;
+        let of_patches = |range: Range<usize>| (blank.over(&range), patches.facets(range));
+
+        let many = |group: &&Group| group.patches.is_none();
+        let of_facets = groups.iter().filter(many).flat_map(|group| pieces(group.range.clone(), most));
+        let of_facets = of_facets.map(|range| ("sum_areas", blank.over(&range), range.len() as u64));
+        let of_runs = patches.passes(most, true).into_iter().map(of_patches);
+        let of_runs = of_runs.map(|(sum, work)| ("sum_patch_areas", sum, work));
+        let areas: Vec<_> = of_facets.chain(of_runs).collect();
         let mut passes = Vec::new();
-        for range in pieces(0..facet_count, most) {
-            let sum = Sum { last: u32::from(range.end == facet_count), ..blank.over(&range) };
+        for (k, (file, sum, work)) in areas.iter().enumerate() {
+            let place = u32::from(k == 0) + 2 * u32::from(k + 1 == areas.len());
+            let swaps = vec![see, reach, ("sum_areas", *file)];
+            let variant = Variant { shader: "projected_area", entry_point: "measure", swaps, constants: Vec::new() };
             passes.push(Pass {
-                pipeline: self.pipeline(gpu, area.clone(), Second::Facets)?,
-                group: self.sum_group(gpu, &shared, sum)?,
-                work: range.len() as u64,
+                pipeline: self.pipeline(gpu, variant, Second::Facets)?,
+                group: self.sum_group(gpu, &shared, Sum { place, ..*sum })?,
+                work: *work,
                 each_light: false,
             });
         }
-        for (swaps, sum, work) in planned {
-            let variant = Variant { shader: "shade_direct", entry_point: "shade", swaps, constants: Vec::new() };
+
+        let mut planned = Vec::new();
+        for group in groups.iter().filter(many).filter(|group| group.color != Vec3::ZERO) {
+            for (lobe, term) in &group.lobes {
+                let (file, sum) = blank.of_lobe(*lobe);
+                let sum = Sum { tint: base_tint(term), color: group.color, ..sum };
+                let swaps =
+                    vec![shadow_swap(shadowed), see, ("lobe_lambertian", file), weights(group.rgb_areas.is_some())];
+                let passes = pieces(group.range.clone(), most).map(|range| (sum.over(&range), range.len() as u64));
+                planned.extend(passes.map(|(sum, work)| ("shade_direct", swaps.clone(), sum, work)));
+            }
+        }
+        let swaps = vec![shadow_swap(shadowed), see, reach, ("tint_fixed", tints), weights(sum.colors_vary())];
+        let of_runs = patches.passes(most, false).into_iter().map(of_patches);
+        planned.extend(of_runs.map(|(sum, work)| ("shade_patches", swaps.clone(), sum, work)));
+        for (shader, swaps, sum, work) in planned {
+            let variant = Variant { shader, entry_point: "shade", swaps, constants: Vec::new() };
             passes.push(Pass {
                 pipeline: self.pipeline(gpu, variant, Second::Facets)?,
                 group: self.sum_group(gpu, &shared, sum)?,
@@ -136,7 +116,7 @@ impl GpuShading {
                 each_light: true,
             });
         }
-        Ok(passes)
+        Ok((passes, making))
     }
 
     pub(super) fn sum_group(&self, gpu: &Gpu, shared: &Shared, sum: Sum) -> Result<wgpu::BindGroup, GpuError> {
@@ -178,26 +158,6 @@ impl Shared {
 pub(super) fn pieces(range: Range<usize>, most: usize) -> impl Iterator<Item = Range<usize>> {
     let count = range.len().div_ceil(most).max(1);
     (0..count).map(move |k| range.start + k * most..(range.start + (k + 1) * most).min(range.end))
-}
-
-/// Runs of the patches from `first` on that hold `most` facets together, or one patch.
-fn passes_over(patches: &[Patch], first: usize, most: usize) -> Vec<Range<usize>> {
-    let mut runs: Vec<Range<usize>> = Vec::new();
-    let mut held = 0;
-    for (k, patch) in patches.iter().enumerate().skip(first) {
-        let facets = (patch.end - patch.first) as usize;
-        match runs.last_mut() {
-            Some(run) if held + facets <= most => {
-                run.end = k + 1;
-                held += facets;
-            }
-            _ => {
-                runs.push(k..k + 1);
-                held = facets;
-            }
-        }
-    }
-    runs
 }
 
 /// Normal and area of each facet; where the colours of any differ, area times colour of each after that.

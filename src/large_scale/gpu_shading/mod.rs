@@ -5,6 +5,7 @@
 
 mod column_terms;
 mod direct;
+mod few_normals;
 mod low_rank;
 mod picked;
 mod seen;
@@ -56,7 +57,7 @@ pub struct GpuMaterial {
     /// What the passes read and the device has to make first.
     horizons: Option<GpuHorizons>,
     maps: Option<GpuMaps>,
-    table: Option<Making>,
+    making: Option<Making>,
     least_area: f32,
 }
 
@@ -128,7 +129,10 @@ impl GpuShading {
         shadowed: bool,
     ) -> std::result::Result<GpuMaterial, GpuError> {
         let passes = match &brdf.form {
-            Form::Direct(form) => self.direct_passes(gpu, &form.sum, &Seen::Held(&form.visibility), shadowed)?,
+            Form::Direct(form) => {
+                let (passes, making) = self.direct_passes(gpu, &form.sum, &Seen::Held(&form.visibility), shadowed)?;
+                return Ok(GpuMaterial { making, ..GpuMaterial::of(passes, brdf.base_area) });
+            }
             Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
             Form::Interreflecting(..) => {
                 return Err(GpuError::Unsupported("light between facets is added on the CPU only".to_owned()));
@@ -155,9 +159,9 @@ impl GpuShading {
     ) -> std::result::Result<GpuMaterial, GpuError> {
         let UnseenSum { sum, nodes, interpolation, .. } = tile;
         let table = nodes.map(|nodes| self.tabulated(gpu, (sum, &seen), (nodes, *interpolation), shadowed));
-        let (passes, table) = match table {
+        let (passes, making) = match table {
             Some(Ok((pass, table))) => (vec![pass], Some(table)),
-            None | Some(Err(GpuError::Unsupported(_))) => (self.direct_passes(gpu, sum, &seen, shadowed)?, None),
+            None | Some(Err(GpuError::Unsupported(_))) => self.direct_passes(gpu, sum, &seen, shadowed)?,
             Some(Err(error)) => return Err(error),
         };
         let (horizons, maps) = match seen {
@@ -165,7 +169,7 @@ impl GpuShading {
             Seen::Drawn(maps, _) => (None, Some(maps)),
             Seen::Held(_) => (None, None),
         };
-        Ok(GpuMaterial { horizons, maps, table, ..GpuMaterial::of(passes, tile.base_area) })
+        Ok(GpuMaterial { horizons, maps, making, ..GpuMaterial::of(passes, tile.base_area) })
     }
 
     /// [`Params`], points, lights, the bits of shadows, radiance and scales.
@@ -218,7 +222,7 @@ enum Second {
 
 impl GpuMaterial {
     fn of(passes: Vec<Pass>, base_area: f64) -> Self {
-        Self { passes, horizons: None, maps: None, table: None, least_area: (1e-12 * base_area) as f32 }
+        Self { passes, horizons: None, maps: None, making: None, least_area: (1e-12 * base_area) as f32 }
     }
 
     /// Shadow maps that are to be drawn before [`GpuMaterial::make`].
@@ -233,24 +237,25 @@ impl GpuMaterial {
 
     /// Whether [`GpuMaterial::make`] has anything to do.
     pub(super) fn is_to_be_made(&self) -> bool {
-        self.table.is_some()
+        self.making.is_some()
     }
 
     /// Buffers that [`GpuMaterial::make`] adds to.
     pub(super) fn sums(&self) -> Vec<&wgpu::Buffer> {
-        self.table.iter().flat_map(|table| &table.sums).collect()
+        self.making.iter().flat_map(|making| &making.sums).collect()
     }
 
     /// Dispatches of [`GpuMaterial::make`] whose lobes are no more than these together.
     pub(super) fn parts(&self, most_lobes: u64) -> Vec<Range<usize>> {
-        self.table.as_ref().map_or_else(|| vec![Range::default()], |table| table.parts(most_lobes))
+        self.making.as_ref().map_or_else(|| vec![Range::default()], |making| making.parts(most_lobes))
     }
 
-    /// Records what the device has to make before the first shading with this material: the table of its sum, all parts in order.
+    /// Records what the device has to make before the first shading with this material, all parts in order: the table of its
+    /// sum, or where few normals see alike.
     /// Once is enough; twice makes the same again.
     pub(super) fn make(&self, compute: &mut wgpu::ComputePass, part: Range<usize>) {
-        if let Some(table) = &self.table {
-            table.dispatch(compute, part);
+        if let Some(making) = &self.making {
+            making.dispatch(compute, part);
         }
     }
 

@@ -68,11 +68,11 @@ struct Angle {
     is_turned: u32,
 }
 
-/// How a table comes about.
+/// What is made before the first picture: a table, or less.
 #[derive(Debug)]
 pub(super) struct Making {
-    /// The table, and the projected areas.
-    pub(super) sums: [wgpu::Buffer; 2],
+    /// Buffers that are added to: the table, and the projected areas.
+    pub(super) sums: Vec<wgpu::Buffer>,
     steps: Vec<Step>,
 }
 
@@ -87,6 +87,11 @@ pub(super) struct Step {
 }
 
 impl Making {
+    /// One dispatch that adds to nothing.
+    pub(super) fn of(step: Step) -> Self {
+        Self { sums: Vec::new(), steps: vec![step] }
+    }
+
     /// Runs of dispatches of no more lobes than these together, or of one dispatch.
     pub(super) fn parts(&self, most: u64) -> Vec<Range<usize>> {
         let (mut parts, mut held) = (Vec::<Range<usize>>::new(), 0);
@@ -219,7 +224,7 @@ impl GpuShading {
         let of = (sum, seen, &shared);
         let mut steps = self.area_steps(gpu, of, directions, &areas)?;
         steps.extend(self.column_steps(gpu, of, (&columns, picked), shape, &values)?);
-        Ok((pass, Making { sums: [values, areas], steps }))
+        Ok((pass, Making { sums: vec![values, areas], steps }))
     }
 
     fn area_steps(

@@ -52,7 +52,7 @@ fn tabulated_at(
 ) -> Result<GpuMaterial, GpuError> {
     let Form::Direct(direct) = &brdf.form else { panic!("no sum over facets") };
     let (pass, table) = shading.tabulated(gpu, (&direct.sum, &Seen::Held(&direct.visibility)), of, shadowed)?;
-    Ok(GpuMaterial { table: Some(table), ..GpuMaterial::of(vec![pass], brdf.base_area) })
+    Ok(GpuMaterial { making: Some(table), ..GpuMaterial::of(vec![pass], brdf.base_area) })
 }
 
 /// The table and the projected areas, as a material's device has them.
@@ -65,7 +65,8 @@ fn made(gpu: &Gpu, material: &GpuMaterial) -> [Vec<f32>; 2] {
         material.make(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), part);
     }
     gpu.queue.submit([encoder.finish()]);
-    material.table.as_ref().unwrap().sums.each_ref().map(|buffer| gpu.read(buffer).unwrap())
+    let sums = &material.making.as_ref().unwrap().sums;
+    [&sums[0], &sums[1]].map(|buffer| gpu.read(buffer).unwrap())
 }
 
 /// The largest distance of numbers in rows of `width`; black columns are black.

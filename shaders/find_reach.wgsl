@@ -1,0 +1,33 @@
+// Of each patch and azimuth, and the next azimuth, the elevations [rad] up to which no facet and from which on every facet sees a
+// direction: the twin of Horizons::reach (src/visibility/horizons.rs). A thread a row.
+
+//!import visibility_horizons
+//!import flat_index
+
+// The patches, as patches.wgsl reads them.
+@group(0) @binding(2) var<storage, read_write> rows: array<vec4u>;
+
+const HEAD: u32 = 3u;
+
+@compute @workgroup_size(THREADS)
+fn find(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let k = flat_index(id, groups);
+    let patch_index = k / sum.azimuths;
+    if patch_index >= sum.end {
+        return;
+    }
+    let azimuth = k % sum.azimuths;
+    let next = (azimuth + 1u) % sum.azimuths;
+    let head = patch_index * (HEAD + sum.azimuths);
+    var low = 1e30;
+    var high = -1e30;
+    for (var s = rows[head].w; s < rows[head + 1u].x; s++) {
+        let here = horizons[s * sum.azimuths + azimuth];
+        let there = horizons[s * sum.azimuths + next];
+        low = min(low, min(here, there));
+        high = max(high, max(here, there));
+    }
+    // A little more than the ramp: the blend of two azimuths rounds.
+    let margin = 0.51 / sum.sharpness + 1e-6;
+    rows[head + HEAD + azimuth] = vec4u(bitcast<u32>(low - margin), bitcast<u32>(high + margin), 0u, 0u);
+}
