@@ -2,6 +2,7 @@
 // one facet along one azimuth.
 
 //!import angles
+//!import slice_entry
 
 struct Params {
     tile_size: vec2f,
@@ -27,18 +28,6 @@ struct Place {
     triangle: u32,
     normal: vec3f,
     pad: u32,
-}
-
-// A copy of a triangle that reaches into a cell: what tells whether a slice meets it first.
-struct Entry {
-    // Corners in the plane.
-    a: vec2f,
-    b: vec2f,
-    c: vec2f,
-    z_max: f32,
-    z_min: f32,
-    heights: vec3f,
-    triangle: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

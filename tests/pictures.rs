@@ -4,7 +4,7 @@
 use biscale::Cancel;
 use biscale::accuracy::{compare, picture_pairs, upper_errors};
 use biscale::directions::UpperPairs;
-use biscale::filtering::{EffectiveBrdf, Form, Nodes, PairTable};
+use biscale::filtering::{EffectiveBrdf, Form, Nodes, PairTable, Sight};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene::{self, LoadedScene};
 use glam::Vec3;
@@ -139,23 +139,36 @@ fn fewer_facets_and_trials_against_whole_tables_at_standard() {
 fn trials_from_part_of_the_facets() {
     let pairs = picture_pairs(512, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
-    println!("scene                preset    facets picked  rel. L2   PSNR");
+    println!("scene                preset    facets picked  azimuths  rel. L2   PSNR");
     let fields = ["table4_plate", "fig8b_ripples", "fig8d_leather"];
     let overhangs = ["table4_pillow", "table4_skirt", "fig6a_velvet_spread"];
     for (preset, [rings, azimuths, turn, difference]) in [("standard", [24, 48, 8, 12]), ("fine", [32, 64, 12, 16])] {
         for scene in fields.into_iter().chain(overhangs) {
             let set = ["quality.backend=cpu".to_owned(), format!("quality.preset={preset}")];
-            let outcome = Pipeline::new().effective(&scene::open(scene, &set).unwrap()).unwrap();
-            let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("{scene}: not a sum") };
+            let made = |set: &[String]| Pipeline::new().effective(&scene::open(scene, set).unwrap()).unwrap();
+            let outcome = made(&set);
+            let unseen = Pipeline::new().unseen(&scene::open(scene, &set).unwrap()).unwrap().unwrap();
+            let few = match &unseen.sum.sight {
+                Sight::Heights(heights) => heights.azimuths,
+                Sight::Slices(slices) => slices.azimuths,
+                _ => panic!("{scene}: another route"),
+            };
+            let as_device = made(&[&set[..], &[format!("quality.azimuths={few}")]].concat());
+            let field = matches!(unseen.sum.sight, Sight::Heights(_));
+            let many = if field { outcome.settings.horizon_azimuths } else { outcome.settings.slice_azimuths };
             let (exact, grid) = (values(&outcome.brdf), UpperPairs { rings, azimuths, turn, difference });
-            let all = direct.sum.facet_count();
-            for count in [all, 3200, 1600, 800] {
+            let all = outcome.settings.facets;
+            let mut cases = vec![(all, many), (3200, many), (1600, many), (1600, few), (800, few)];
+            cases.dedup();
+            for (count, azimuths) in cases {
+                let of = if azimuths == few { &as_device } else { &outcome };
+                let Form::Direct(direct) = of.brdf.direct_form() else { panic!("{scene}: not a sum") };
                 let facets = (count < all).then_some(count);
                 let nodes = Nodes { facets, read_by: Some(&pairs[..]), ..Nodes::all(grid) };
                 let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
                 let errors = upper_errors(&values(&outcome.brdf.with_direct_form(Form::Table(table))), &exact);
                 let (percent, db) = (100.0 * errors.rel_l2, errors.psnr_db);
-                println!("{scene:<20} {preset:<9} {count:>5} of {all:>5} {percent:>6.2} % {db:>6.1} dB");
+                println!("{scene:<20} {preset:<9} {count:>5} of {all:>5} {azimuths:>7} {percent:>6.2} % {db:>6.1} dB");
             }
         }
     }

@@ -17,6 +17,14 @@ pub(super) struct CellEntry {
     pub shift: [i16; 2],
 }
 
+impl CellEntry {
+    /// The triangle, and two halves with signs.
+    pub fn words(self) -> [u32; 2] {
+        let [x, y] = self.shift.map(|shift| u32::from(shift.cast_unsigned()));
+        [self.triangle, x | y << 16]
+    }
+}
+
 /// The lists of all cells, one after the other.
 #[derive(Debug, PartialEq)]
 pub(super) struct CellLists {

@@ -12,7 +12,7 @@ use crate::geometry::{Facets, HeightGrid};
 use crate::gpu::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
 
-const THREADS: u32 = 64;
+pub(super) const THREADS: u32 = 64;
 
 /// `height_march.wgsl`, compiled: build once, use for any tile.
 #[derive(Debug)]
@@ -21,9 +21,14 @@ pub struct GpuHeightMarch {
     march: wgpu::ComputePipeline,
 }
 
+/// A dispatch and its workgroups.
+pub(super) type Placing = (wgpu::ComputePipeline, wgpu::BindGroup, [u32; 2]);
+
 /// Horizons, or slices, that a submission is to make.
 #[derive(Debug)]
 pub struct GpuHorizons {
+    /// What the runs read and is made before the first.
+    pub(super) first: Option<Placing>,
     pub(super) pipeline: wgpu::ComputePipeline,
     /// With facets' workgroups and azimuths of each.
     pub(super) runs: Vec<(wgpu::BindGroup, [u32; 2])>,
@@ -100,7 +105,7 @@ impl GpuHeightMarch {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             gpu.group("height-field", &self.layout, &bound)
         })?;
-        Ok(GpuHorizons { pipeline: self.march.clone(), runs, elevations, azimuths })
+        Ok(GpuHorizons { first: None, pipeline: self.march.clone(), runs, elevations, azimuths })
     }
 }
 
@@ -143,8 +148,13 @@ impl GpuHorizons {
         groups * u64::from(THREADS) * azimuths * LOBES_A_WALK
     }
 
-    /// Encodes one of them.
+    /// Encodes one of them, in order.
     pub fn dispatch(&self, pass: &mut wgpu::ComputePass, run: usize) {
+        if let (0, Some((pipeline, group, [columns, rows]))) = (run, &self.first) {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(*columns, *rows, 1);
+        }
         let (group, [workgroups, azimuths]) = &self.runs[run];
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, group, &[]);

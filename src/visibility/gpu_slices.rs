@@ -9,7 +9,7 @@ use glam::{IVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::PeriodicGrid;
-use super::gpu_march::{GpuHorizons, directions, runs};
+use super::gpu_march::{GpuHorizons, Placing, THREADS, directions, runs};
 use super::ray_cast::{LIFT, lifted_origin};
 use super::scan::FACING_MARGIN;
 use crate::geometry::Facets;
@@ -18,6 +18,9 @@ use crate::gpu::{Gpu, GpuError};
 
 /// `KEPT` in `slice_scan.wgsl`, and the horizon.
 const WORDS_A_SLICE: usize = 5;
+
+/// The most workgroups of a dispatch along one axis.
+const MOST_GROUPS: u32 = 65_535;
 
 /// Cells and triangles that a walk looks at, besides the cells of sixteen tiles: see `scan.rs`. Fewer than there, as a device
 /// looks at one triangle at a time, and must not take long. Walks that end there are not counted: the CPU's, which refine the
@@ -29,6 +32,8 @@ const LEAST_LOOKS: usize = 32_768;
 pub struct GpuSlicer {
     layout: wgpu::BindGroupLayout,
     module: wgpu::ShaderModule,
+    to_place: wgpu::BindGroupLayout,
+    place: wgpu::ComputePipeline,
     /// Of horizons, and of slices.
     compiled: [Option<wgpu::ComputePipeline>; 2],
 }
@@ -49,6 +54,15 @@ struct Params {
     pad: u32,
 }
 
+/// `Tile` in `place_triangles.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct TileOf {
+    size: Vec2,
+    copies: u32,
+    pad: u32,
+}
+
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Place {
@@ -58,30 +72,18 @@ struct Place {
     pad: u32,
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Entry {
-    corners: [Vec2; 3],
-    z_max: f32,
-    z_min: f32,
-    heights: Vec3,
-    triangle: u32,
-}
-
-impl Entry {
-    fn new(triangle: u32, corners: [Vec3; 3]) -> Self {
-        let heights = Vec3::from(corners.map(|corner| corner.z));
-        let (z_max, z_min) = (heights.max_element(), heights.min_element());
-        Self { corners: corners.map(Vec3::truncate), z_max, z_min, heights, triangle }
-    }
-}
+/// Bytes of `Entry` in `slice_entry.wgsl`.
+const ENTRY_BYTES: usize = 48;
 
 impl GpuSlicer {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let module = gpu.module("slice_scan")?;
         let bindings = [UNIFORM, READ, READ, READ, READ, WRITE];
         let layout = gpu.layout("slices", wgpu::ShaderStages::COMPUTE, &bindings)?;
-        Ok(Self { layout, module, compiled: [None, None] })
+        let bindings = [UNIFORM, READ, READ, WRITE];
+        let to_place = gpu.layout("triangles of cells", wgpu::ShaderStages::COMPUTE, &bindings)?;
+        let place = gpu.compute_pipeline(&gpu.module("place_triangles")?, "place", &[&to_place])?;
+        Ok(Self { layout, module, to_place, place, compiled: [None, None] })
     }
 
     /// Uploads a tile and its facets; `hanging`: what hangs above the horizons is to be told apart from what lies below.
@@ -129,9 +131,6 @@ impl GpuSlicer {
             first_azimuth: 0,
             pad: 0,
         };
-        let (starts, entries) = grid.all_entries();
-        let corners = |&entry| grid.copy_corners(entry, IVec2::ZERO);
-        let entries: Vec<Entry> = entries.par_iter().map(|entry| Entry::new(entry.triangle, corners(entry))).collect();
         let diagonal = grid.tile_size.length();
         let place = |s: usize| Place {
             origin: lifted_origin(facets, s, diagonal),
@@ -140,11 +139,14 @@ impl GpuSlicer {
             pad: 0,
         };
         let places: Vec<Place> = (0..facets.len()).into_par_iter().map(place).collect();
+        let (starts, copies) = grid.all_entries();
+        let entries = gpu.buffer("triangles of cells", (ENTRY_BYTES * copies.len()) as u64, Usage::STORAGE)?;
+        let first = self.placing(gpu, grid, &entries)?;
         let bytes = (4 * words * facets.len() * azimuths) as u64;
         let found = gpu.buffer("slices", bytes, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
             &gpu.upload("cells", starts, Usage::STORAGE)?,
-            &gpu.upload("triangles of cells", &entries, Usage::STORAGE)?,
+            &entries,
             &gpu.upload("places of facets", &places, Usage::STORAGE)?,
             &gpu.upload("azimuths", &directions(azimuths), Usage::STORAGE)?,
             &found,
@@ -154,7 +156,24 @@ impl GpuSlicer {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             gpu.group("slices", &self.layout, &bound)
         })?;
-        Ok(GpuHorizons { pipeline, runs, elevations: found, azimuths })
+        Ok(GpuHorizons { first: Some(first), pipeline, runs, elevations: found, azimuths })
+    }
+
+    /// The dispatch that puts the copies of triangles where cells have them: it is quicker than to upload these.
+    fn placing(&self, gpu: &Gpu, grid: &PeriodicGrid, entries: &wgpu::Buffer) -> Result<Placing, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let (_, copies) = grid.all_entries();
+        let rows: Vec<[u32; 2]> = copies.iter().map(|copy| copy.words()).collect();
+        let bound = [
+            &gpu.upload("tile", &[TileOf { size: grid.tile_size, copies: rows.len() as u32, pad: 0 }], Usage::UNIFORM)?,
+            &gpu.upload("copies of triangles", &rows, Usage::STORAGE)?,
+            &gpu.upload("triangles", bytemuck::cast_slice::<_, f32>(&grid.corners), Usage::STORAGE)?,
+            entries,
+        ];
+        let group = gpu.group("triangles of cells", &self.to_place, &bound.map(wgpu::Buffer::as_entire_binding))?;
+        let across = (rows.len() as u32).div_ceil(THREADS).clamp(1, MOST_GROUPS);
+        let workgroups = [across, (rows.len() as u32).div_ceil(THREADS * across)];
+        Ok((self.place.clone(), group, workgroups))
     }
 }
 
