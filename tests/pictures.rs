@@ -139,7 +139,7 @@ fn fewer_facets_and_trials_against_whole_tables_at_standard() {
 fn trials_from_part_of_the_facets() {
     let pairs = picture_pairs(512, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
-    println!("scene                preset    facets picked  azimuths  rel. L2   PSNR");
+    println!("scene                preset    facets picked  azimuths  nodes  rel. L2   PSNR");
     let fields = ["table4_plate", "fig8b_ripples", "fig8d_leather"];
     let overhangs = ["table4_pillow", "table4_skirt", "fig6a_velvet_spread"];
     for (preset, [rings, azimuths, turn, difference]) in [("standard", [24, 48, 8, 12]), ("fine", [32, 64, 12, 16])] {
@@ -154,21 +154,26 @@ fn trials_from_part_of_the_facets() {
                 _ => panic!("{scene}: another route"),
             };
             let as_device = made(&[&set[..], &[format!("quality.azimuths={few}")]].concat());
+            let few = (few, unseen.sum.nodes.unwrap().grid);
+            let settings = &outcome.settings;
             let field = matches!(unseen.sum.sight, Sight::Heights(_));
-            let many = if field { outcome.settings.horizon_azimuths } else { outcome.settings.slice_azimuths };
-            let (exact, grid) = (values(&outcome.brdf), UpperPairs { rings, azimuths, turn, difference });
-            let all = outcome.settings.facets;
+            let many = if field { settings.horizon_azimuths } else { settings.slice_azimuths };
+            let (exact, many) = (values(&outcome.brdf), (many, UpperPairs { rings, azimuths, turn, difference }));
+            let all = settings.facets;
             let mut cases = vec![(all, many), (3200, many), (1600, many), (1600, few), (800, few)];
             cases.dedup();
-            for (count, azimuths) in cases {
-                let of = if azimuths == few { &as_device } else { &outcome };
+            for (count, (azimuths, grid)) in cases {
+                let of = if azimuths == few.0 { &as_device } else { &outcome };
                 let Form::Direct(direct) = of.brdf.direct_form() else { panic!("{scene}: not a sum") };
                 let facets = (count < all).then_some(count);
                 let nodes = Nodes { facets, read_by: Some(&pairs[..]), ..Nodes::all(grid) };
                 let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
                 let errors = upper_errors(&values(&outcome.brdf.with_direct_form(Form::Table(table))), &exact);
                 let (percent, db) = (100.0 * errors.rel_l2, errors.psnr_db);
-                println!("{scene:<20} {preset:<9} {count:>5} of {all:>5} {azimuths:>7} {percent:>6.2} % {db:>6.1} dB");
+                let nodes = grid.nodes();
+                println!(
+                    "{scene:<20} {preset:<9} {count:>5} of {all:>5} {azimuths:>7} {nodes:>7} {percent:>7.2} % {db:>6.1} dB"
+                );
             }
         }
     }

@@ -1,6 +1,7 @@
 //! A tile as a device takes it that makes visibility and product itself: what comes before them.
 
 use super::{For, Pipeline, Prepared, StageTimes};
+use crate::directions::UpperPairs;
 use crate::error::Result;
 use crate::filtering::{FacetSum, Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
 use crate::geometry::mirror_planes_in;
@@ -28,6 +29,9 @@ const PICKED: usize = 1600;
 /// Azimuths along which facets see at most where a table is made of them, on height-fields and under overhangs: it is
 /// as close then as with twice as many (the same section).
 const AZIMUTHS: [usize; 2] = [48, 96];
+
+/// Rings and azimuths of half vectors that a table has at most: with as many picks each, more of them are no closer.
+const HALF_VECTORS: [usize; 2] = [24, 48];
 
 /// Facets of few normals, whose lobes are exact: placed anew, as many as the sequence that places them spreads well over the tiles
 /// that ship. Steps between the many leave grooves and pyramids unevenly covered: up to 11 % off where these are 4 %.
@@ -63,7 +67,9 @@ impl Pipeline {
             return Ok(None);
         }
         // What is thin is exact between nodes, too.
-        let grid = settings.picture_grids.last().copied().filter(|_| plan.try_picture_table && !is_thin);
+        let grid = settings.picture_grids.last().filter(|_| plan.try_picture_table && !is_thin).map(|grid| {
+            UpperPairs { rings: grid.rings.min(HALF_VECTORS[0]), azimuths: grid.azimuths.min(HALF_VECTORS[1]), ..*grid }
+        });
         let [of_horizons, of_slices] = AZIMUTHS.map(|most| if grid.is_some() { most } else { usize::MAX });
         let of_horizons = settings.horizon_azimuths.min(of_horizons);
         let of_slices = settings.slice_azimuths.min(of_slices);
