@@ -29,7 +29,7 @@ fn place(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) grou
     }
     let triangle = copies[k].x;
     let halves = bitcast<i32>(copies[k].y);
-    let shift = vec2f(vec2i((halves << 16u) >> 16u, halves >> 16u)) * tile.size;
+    let shift = vec2f(vec2i(extractBits(halves, 0u, 16u), extractBits(halves, 16u, 16u))) * tile.size;
     let a = corner(3u * triangle);
     let b = corner(3u * triangle + 1u);
     let c = corner(3u * triangle + 2u);

@@ -78,6 +78,12 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
         assert_eq!(first, in_parts, "{geometry}");
         assert_same_picture(geometry, &[render(&input).unwrap().picture, first]);
     }
+    // A bottom so narrow that 700 facets leave it too few of its own: more of them serve.
+    let narrow = "{ kind = \"grooves\", profile = \"rectangular\", bottom_width = 0.01 }";
+    let mut narrow = open(narrow, LOBES[0], "direct");
+    narrow.scene.quality.facets = Some(6144);
+    let narrow = Pipeline::new().unseen(&narrow).unwrap().expect("a device serves");
+    assert!(narrow.sum.sum.facet_count() <= 2800, "{}", narrow.sum.sum.facet_count());
     let mut glowing = open(RODS, LOBES[0], "direct");
     glowing.scene.effects.interreflection = scene::Switch::On;
     assert!(Pipeline::new().unseen(&glowing).unwrap().is_none(), "light between facets is the CPU's");

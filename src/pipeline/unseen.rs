@@ -37,7 +37,7 @@ const HALF_VECTORS: [usize; 2] = [24, 48];
 /// that ship. Steps between the many leave grooves and pyramids unevenly covered: up to 11 % off where these are 4 %.
 const FEW_FACETS: usize = 700;
 
-/// Of more normals, each would keep too many: the CPU picks.
+/// Of more normals, too few facets are left to each: the CPU makes what is shown.
 const FEW_NORMALS: usize = 16;
 
 /// Whether normals are few, and seen along horizons.
@@ -122,16 +122,23 @@ impl Pipeline {
         Ok(Some(Unseen { sum, notes: shape.mesh.notes.clone(), plan, settings, times }))
     }
 
-    /// Where normals are few, few facets and what comes of them.
+    /// Where normals are few and seen along horizons, few facets and what comes of them; more where one material has a small share.
     fn few_facets(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Option<Prepared>> {
         let (shape, _) = self.shape(loaded, times)?;
         if shape.mesh.distinct_normals(FEW_NORMALS).is_none() {
             return Ok(None);
         }
-        let prepared = self.prepare(loaded, For::DeviceOfFew(FEW_FACETS), times)?;
-        let Prepared { sum, plan, .. } = &prepared;
-        let few = sum.distinct_normals().is_some_and(|normals| normals <= FEW_NORMALS);
-        let serve = is_few(sum, plan.route) || plan.route == Route::None && sum.has_few_normals();
-        Ok((few && serve).then_some(prepared))
+        for most in [1, 4, 16].map(|times| times * FEW_FACETS) {
+            let prepared = self.prepare(loaded, For::DeviceOfFew(most), times)?;
+            let Prepared { sum, plan, settings, .. } = &prepared;
+            if is_few(sum, plan.route) && sum.distinct_normals().is_some_and(|normals| normals <= FEW_NORMALS) {
+                return Ok(Some(prepared));
+            }
+            let is_seen_so = matches!(plan.route, Route::HeightMarch | Route::HorizonScan);
+            if !is_seen_so || sum.colors_vary() || settings.facets < most {
+                break;
+            }
+        }
+        Ok(None)
     }
 }

@@ -1,4 +1,5 @@
-//! Passes of the live sum over facets: a projected area, then one pass a term of each group of facets.
+//! Passes of the live sum over facets: a projected area, then one pass a term of each group of facets, or one
+//! for all terms where normals are few.
 
 use std::ops::Range;
 
