@@ -23,7 +23,7 @@ use crate::visibility::Visibility;
 
 /// Steps between the facets that pictures of few normals sum over, from coarse to fine: multiples at which the additive
 /// recurrence that placed the facets stays spread out.
-pub(super) const THINNED: [usize; 4] = [27, 17, 10, 3];
+const THINNED: [usize; 4] = [27, 17, 10, 3];
 
 /// A table this many times too far off is not helped by the next finer grid, which has half its step.
 const HOPELESS: f64 = 2.5;

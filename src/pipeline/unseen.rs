@@ -26,15 +26,15 @@ const MIRRORED_FROM: usize = 60_000;
 /// Facets that are picked for each half vector of a table; how far it is off then, docs/speed.md tells ("On a graphics processor").
 const PICKED: usize = 1600;
 
-/// Azimuths along which facets see at most where a table is made of them, on height-fields and under overhangs: it is
-/// as close then as with twice as many (the same section).
+/// Azimuths along which facets see at most where a table is made of them, on height-fields and under overhangs. What this and
+/// [`HALF_VECTORS`] change of its error, the same section tells.
 const AZIMUTHS: [usize; 2] = [48, 96];
 
-/// Rings and azimuths of half vectors that a table has at most: with as many picks each, more of them are no closer.
+/// Rings and azimuths of half vectors that a table has at most: picks leave more error than the steps between more of these.
 const HALF_VECTORS: [usize; 2] = [24, 48];
 
 /// Facets of few normals, whose lobes are exact: placed anew, as many as the sequence that places them spreads well over the tiles
-/// that ship. Steps between the many leave grooves and pyramids unevenly covered: up to 11 % off where these are 4 %.
+/// that ship. Steps between the many leave grooves and pyramids unevenly covered.
 const FEW_FACETS: usize = 700;
 
 /// Of more normals, too few facets are left to each: the CPU makes what is shown.

@@ -11,8 +11,8 @@ use super::shared::{SmallScale, small_scale};
 
 /// From coarse to fine; above them the scene's own quality.
 const RUNGS: [Preset; 2] = [Preset::Draft, Preset::Standard];
-/// Visibility and product may take so long, and leave room for those of the next rung below these: by count `standard` is ten
-/// drafts, and `fine` up to 3.4 of `standard`.
+/// Visibility and product may take so long, and leave room for those of the next rung below these: by count `standard` is up to
+/// six drafts, and `fine` up to three of `standard`.
 const MOST_MS: f64 = 25.0;
 const LEAST_MS: [f64; RUNGS.len()] = [2.0, 7.0];
 
