@@ -6,15 +6,18 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::Result;
-use biscale::accuracy::mirror_biased_pairs;
+use biscale::base::Result;
 use biscale::brdf::{Brdf, Term};
-use biscale::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
-use biscale::geometry::{self, Facets, TileMesh, heightfield};
-use biscale::large_scale::shading::Background;
-use biscale::large_scale::{Stage, render};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
+use biscale::geometry;
+use biscale::geometry::families::heightfield;
+use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
+use biscale::metrics::mirror_biased_pairs;
 use biscale::pipeline::Pipeline;
-use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
+use biscale::render::Stage;
+use biscale::render::image::render;
+use biscale::render::image::shading::Background;
+use biscale::visibility::{Horizons, Slices, Visibility};
 use glam::{UVec2, Vec2, Vec3};
 
 const RUNS: usize = 3;
@@ -180,7 +183,7 @@ fn sum_lines(bench: &Bench, field: &Arc<TileMesh>) -> Result<()> {
 fn picture(scene: &str, lights: usize, side: usize) -> Result<Work> {
     let overrides = [format!("light.count={lights}"), "quality.backend=cpu".to_owned()];
     let loaded = biscale::scene::open(scene, &overrides)?;
-    let pictured = Pipeline::new().effective(&loaded)?.for_pictures(&biscale::Cancel::default())?;
+    let pictured = Pipeline::new().effective(&loaded)?.for_pictures(&biscale::base::Cancel::default())?;
     let mut stage = Stage::new(&loaded)?;
     stage.settle();
     Ok(Box::new(move || {

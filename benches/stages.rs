@@ -5,17 +5,18 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::Cancel;
-use biscale::accuracy::{mirror_biased_pairs, picture_pairs};
+use biscale::base::Cancel;
 use biscale::brdf::{Brdf, Term};
-use biscale::directions::{UpperPairs, from_angles};
-use biscale::filtering::{
+use biscale::effective::{
     Direct, EffectiveBrdf, FacetSum, Form, LowRank, Nodes, PairTable, Reflectance, RotatedBasis, RotatedLobe,
     SumMaterial, analytic_lobe,
 };
-use biscale::geometry::{self, Facets, TileMesh};
+use biscale::geometry;
+use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
+use biscale::math::directions::{UpperPairs, from_angles};
+use biscale::metrics::{mirror_biased_pairs, picture_pairs};
 use biscale::plan::{Preset, Settings};
-use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
+use biscale::visibility::{Horizons, Slices, Visibility};
 use glam::Vec3;
 
 const RUNS: usize = 7;
@@ -75,7 +76,7 @@ impl Bench {
     }
 }
 
-fn tile(scene: &str) -> Result<TileMesh, biscale::Error> {
+fn tile(scene: &str) -> Result<TileMesh, biscale::base::Error> {
     let loaded = biscale::scene::open(scene, &[])?;
     geometry::build(&loaded.scene.tile, &loaded.base_dir)
 }
@@ -100,7 +101,7 @@ fn materials(term: &Term, slots: usize) -> (Vec<usize>, Vec<SumMaterial>) {
     (vec![0; slots], vec![SumMaterial { brdf: Brdf { terms: vec![term.clone()] }, color: Vec3::ONE }])
 }
 
-fn main() -> Result<(), biscale::Error> {
+fn main() -> Result<(), biscale::base::Error> {
     let bench = Bench::new();
     let settings = Settings::of_preset(Preset::Standard);
     let count = settings.facets;
@@ -169,7 +170,7 @@ fn main() -> Result<(), biscale::Error> {
 }
 
 /// What pictures read, beside the sums it stands for.
-fn pictures(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -> Result<(), biscale::Error> {
+fn pictures(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -> Result<(), biscale::base::Error> {
     let ggx = Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) };
     let direct = |mesh: &TileMesh, facets: &Facets, visibility: Visibility| {
         let (material_of_slot, materials) = materials(&ggx, mesh.slots.len());

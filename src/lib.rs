@@ -12,30 +12,29 @@
 )]
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "directions in tests are known not to be zero"))]
 
-pub mod accuracy;
+pub mod app;
+pub mod base;
 pub mod brdf;
 pub mod cache;
-pub mod cancel;
-#[cfg(test)]
-mod chi_square;
-pub mod close_up;
-pub mod directions;
-pub mod error;
+pub mod cli;
+pub mod diagnostics;
+pub mod effective;
 pub mod export;
-pub mod filtering;
 pub mod fit;
 pub mod geometry;
 pub mod gpu;
 pub mod interreflection;
-pub mod large_scale;
+pub mod math;
+pub mod metrics;
 pub mod pipeline;
 pub mod plan;
-pub mod progress;
+pub mod reference;
+pub mod render;
 pub mod report;
 pub mod scene;
-pub mod simd;
+#[cfg(test)]
+mod testing;
+pub mod tuning;
 pub mod visibility;
 
-pub use cancel::Cancel;
-pub use error::{Error, InputError, Result};
-pub use progress::Progress;
+pub use base::{Cancel, Error, InputError, Progress, Result};

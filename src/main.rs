@@ -1,305 +1,29 @@
-//! The `biscale` program: the command line in front of the library.
+//! The `biscale` program: subcommands of the library, and the editor.
 
-mod app;
-mod commands;
-
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use app::StartTimes;
-use clap::{Args, Parser, Subcommand, ValueEnum};
-
-/// What does a surface with tiny structures look like from far away?
-#[derive(Debug, Parser)]
-#[command(name = "biscale", version, about, args_conflicts_with_subcommands = true)]
-struct Cli {
-    #[command(subcommand)]
-    command: Option<Command>,
-    /// Opens the editor on this scene: a file, or the name of a shipped one.
-    scene: Option<String>,
-}
-
-#[derive(Debug, Subcommand)]
-enum Command {
-    /// Open the editor (also without this word).
-    Edit {
-        /// A scene file, or the name of a shipped material.
-        scene: Option<String>,
-        /// Say on standard error when the window, its device and the first picture were there, from the start of the program,
-        /// and quit.
-        #[arg(long)]
-        start_times: bool,
-    },
-    /// Shade the scene's object and write a picture (.png or linear .exr).
-    Render(RenderArgs),
-    /// Evaluate f̄ [1/sr] (the light's cosine included) at direction pairs of a CSV file.
-    Eval(EvalArgs),
-    /// Write the effective BRDF as a table, by the file's ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
-    Export(ExportArgs),
-    /// Fit Lambertian + Cook-Torrance and a GGX base, say what they lose, and write glTF, MaterialX or a picture of it.
-    Fit(FitArgs),
-    /// Write the tile itself: .obj, .stl (closed, millimetres), .png (16-bit heights), .svg or .pdf (a pattern to fold).
-    Tile(TileArgs),
-    /// List every effect: on or off, why, and what it costs.
-    Plan(PlanArgs),
-    /// Factor every material's rotated BRDF and list the sizes (Table 3 of Wu et al. 2011).
-    Basis(SceneArgs),
-    /// Time the stages from an edit to the effective BRDF (or the picture).
-    Profile(ProfileArgs),
-    /// Measure accuracy against time: every knob, the presets, and combinations, against the reference.
-    Report(ReportArgs),
-    /// Say what is kept on disk between runs, and where; or remove it.
-    Cache(CacheArgs),
-    /// List the materials that ship with the program.
-    Materials(MaterialsArgs),
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Quality {
-    Draft,
-    Standard,
-    Fine,
-    Reference,
-    Wu2011,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Backend {
-    Auto,
-    Gpu,
-    Cpu,
-}
-
-#[derive(Debug, Args)]
-struct SceneArgs {
-    /// A scene file, or the name of a shipped material (see `biscale materials`).
-    scene: String,
-    /// Override any field: `--set material.default.brdf.roughness=0.3` (repeatable).
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    set: Vec<String>,
-    /// Preset of accuracy and cost.
-    #[arg(long)]
-    quality: Option<Quality>,
-    /// Force an effect of the plan on or off: `--effect interreflection=on` (repeatable).
-    #[arg(long = "effect", value_name = "NAME=on|off|auto", value_parser = commands::parse_effect)]
-    effects: Vec<String>,
-    /// Choose the cheapest settings whose PSNR against a reference of the scene reaches so many decibels.
-    #[arg(long, value_name = "X", value_parser = commands::parse_positive)]
-    target_db: Option<f64>,
-    /// Choose the best settings within so many milliseconds from an edit of the geometry to the effective BRDF.
-    #[arg(long, value_name = "Y", value_parser = commands::parse_positive, conflicts_with = "target_db")]
-    budget_ms: Option<f64>,
-    /// Where to compute.
-    #[arg(long)]
-    backend: Option<Backend>,
-    /// Seed of all sampling.
-    #[arg(long)]
-    seed: Option<u64>,
-    /// Machine-readable output on standard output.
-    #[arg(long)]
-    json: bool,
-    /// No notes on standard error.
-    #[arg(long)]
-    quiet: bool,
-}
-
-#[derive(Debug, Args)]
-struct PlanArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    /// Also force each effect on and off: milliseconds, and what it changes in f̄ and in the picture.
-    #[arg(long)]
-    measure: bool,
-}
-
-#[derive(Debug, Args)]
-struct RenderArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    #[command(flatten)]
-    keeping: KeepingArgs,
-    /// The picture to write: .png (tone-mapped) or .exr (linear).
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Width and height in pixels.
-    #[arg(long, default_value = "768x768", value_parser = commands::parse_size)]
-    size: [usize; 2],
-    /// Samples a pixel side at edges.
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=8))]
-    samples: u8,
-}
-
-#[derive(Debug, Args)]
-struct EvalArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    #[command(flatten)]
-    keeping: KeepingArgs,
-    /// CSV with the header theta_i,phi_i,theta_o,phi_o (radians); `-` is standard input.
-    #[arg(long)]
-    pairs: PathBuf,
-    /// CSV to write; `-` is standard output.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Also write the columns se_r,se_g,se_b: the standard error (at `reference`; zero elsewhere).
-    #[arg(long)]
-    standard_error: bool,
-}
-
-#[derive(Debug, Args)]
-struct ExportArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    #[command(flatten)]
-    keeping: KeepingArgs,
-    /// The table to write; the ending chooses the format. `-` is standard output (CSV).
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Steps of theta and phi for each direction; without it, what suits the format.
-    #[arg(long, value_name = "THETAxPHI", value_parser = commands::parse_size)]
-    resolution: Option<[usize; 2]>,
-    /// The same for the second direction alone (in .bsdf: samples along the two axes of each warp).
-    #[arg(long, value_name = "THETAxPHI", value_parser = commands::parse_size)]
-    resolution_o: Option<[usize; 2]>,
-    /// What a Radiance .xml holds: 145 x 145 patches, or a tensor tree for what is sharp or anisotropic.
-    #[arg(long, value_enum, default_value_t = Radiance::Klems)]
-    radiance: Radiance,
-}
-
-#[derive(Debug, Args)]
-struct FitArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    /// Files to write, by ending (repeatable): .gltf and .mtlx (the GGX base), .json (all numbers), .png or .exr (the object
-    /// in the effective BRDF, in the Cook-Torrance and in the GGX fit; under them the differences).
-    #[arg(short, long)]
-    output: Vec<PathBuf>,
-    /// Width and height of each of the pictures.
-    #[arg(long, default_value = "384x384", value_parser = commands::parse_size)]
-    size: [usize; 2],
-}
-
-#[derive(Debug, Args)]
-struct TileArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    /// The file to write; the ending chooses what.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Periods in x and y.
-    #[arg(long, default_value = "1x1", value_parser = commands::parse_size)]
-    repeat: [usize; 2],
-    /// Enlarges what is made of matter (.stl, .svg, .pdf): 20 makes a tile unit of 1 mm 20 mm long.
-    #[arg(long, default_value_t = 1.0)]
-    scale: f32,
-    /// Thickness under the lowest point of the .stl, in millimetres; without it a tenth of the longer side.
-    #[arg(long, value_name = "MM")]
-    base: Option<f32>,
-    /// Samples of a period's heights (.stl, .png).
-    #[arg(long, default_value = "256x256", value_parser = commands::parse_size)]
-    samples: [usize; 2],
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Radiance {
-    Klems,
-    TensorTree,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Edit {
-    Geometry,
-    Brdf,
-    Color,
-    Camera,
-}
-
-#[derive(Debug, Args)]
-struct ProfileArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    /// What is edited; without it everything is computed from nothing.
-    #[arg(long)]
-    edit: Option<Edit>,
-    /// From the edit to the picture, which stays on the device where that makes it.
-    #[arg(long, requires = "edit")]
-    picture: bool,
-    /// Width and height in pixels of that picture and of that of `--edit camera`.
-    #[arg(long, default_value = "384x384", value_parser = commands::parse_size)]
-    size: [usize; 2],
-    /// Timed runs after one warm-up; medians are printed.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    repeat: u32,
-}
-
-#[derive(Debug, Args)]
-struct ReportArgs {
-    /// Scene files, or names of shipped materials.
-    #[arg(required = true)]
-    scenes: Vec<String>,
-    /// The folder for report.html, report.csv and report.json. A run that was broken off goes on from what is there.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Override any field of each scene: `--set material.default.brdf.roughness=0.3` (repeatable).
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    set: Vec<String>,
-    /// Minutes a scene; presets are always measured.
-    #[arg(long, default_value_t = 5.0, value_parser = commands::parse_minutes)]
-    minutes: f64,
-    /// Direction pairs that errors are taken over.
-    #[arg(long, default_value_t = 500, value_parser = commands::parse_count)]
-    pairs: usize,
-    /// Settings with all knobs turned at once.
-    #[arg(long, default_value_t = 40)]
-    combinations: usize,
-    /// No progress and no notes on standard error.
-    #[arg(long)]
-    quiet: bool,
-}
-
-/// Of commands that keep what took long to make.
-#[derive(Debug, Args)]
-struct KeepingArgs {
-    /// Make everything anew, and keep nothing of it (see `biscale cache`).
-    #[arg(long)]
-    no_cache: bool,
-}
-
-#[derive(Debug, Args)]
-struct CacheArgs {
-    /// Remove all that was kept.
-    #[arg(long)]
-    clear: bool,
-    /// Machine-readable output.
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Debug, Args)]
-struct MaterialsArgs {
-    /// Machine-readable output.
-    #[arg(long)]
-    json: bool,
-}
+#[cfg(feature = "editor")]
+use biscale::app;
+use biscale::cli::{self, Cli, Command};
+use clap::Parser;
 
 fn main() -> ExitCode {
     let started = Instant::now();
-    let cli = Cli::parse();
-    let result = match cli.command {
-        None => app::run(cli.scene.as_deref(), StartTimes::default()).map_err(|error| {
-            match error.downcast_ref::<biscale::Error>() {
-                Some(_) => error.context("taken as a scene to edit, as no command was given (see --help)"),
-                None => error,
-            }
+    let arguments = Cli::parse();
+    let result = match arguments.command {
+        None => edit(arguments.scene.as_deref(), None).map_err(|error| match error.downcast_ref::<biscale::Error>() {
+            Some(_) => error.context("taken as a scene to edit, as no command was given (see --help)"),
+            None => error,
         }),
-        Some(command) => run(command, started),
+        Some(Command::Edit { scene, start_times }) => edit(scene.as_deref(), start_times.then_some(started)),
+        Some(command) => cli::run(command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // A reader that closed the pipe has all it wanted.
-            if commands::is_broken_pipe(&error) {
+            if cli::is_broken_pipe(&error) {
                 return ExitCode::SUCCESS;
             }
             eprintln!("biscale: {error:#}");
@@ -308,21 +32,14 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(command: Command, started: Instant) -> anyhow::Result<()> {
-    match command {
-        Command::Edit { scene, start_times } => {
-            app::run(scene.as_deref(), StartTimes { since: start_times.then_some(started) })
-        }
-        Command::Render(args) => commands::render::run(&args),
-        Command::Eval(args) => commands::eval::run(&args),
-        Command::Export(args) => commands::export::run(&args),
-        Command::Fit(args) => commands::fit::run(&args),
-        Command::Tile(args) => commands::tile::run(&args),
-        Command::Plan(args) => commands::plan::run(&args),
-        Command::Basis(args) => commands::basis::run(&args),
-        Command::Profile(args) => commands::profile::run(&args),
-        Command::Report(args) => commands::report::run(&args),
-        Command::Cache(args) => commands::cache::run(&args),
-        Command::Materials(args) => commands::materials::run(&args),
-    }
+/// Opens the editor on a scene. With `since`, reports how long the first image took from that time, and quits.
+#[cfg(feature = "editor")]
+fn edit(scene: Option<&str>, since: Option<Instant>) -> anyhow::Result<()> {
+    app::run(scene, app::StartTimes { since })
+}
+
+/// The program was built without the editor.
+#[cfg(not(feature = "editor"))]
+fn edit(_: Option<&str>, _: Option<Instant>) -> anyhow::Result<()> {
+    anyhow::bail!("this program was built without the editor (feature `editor`); see `biscale --help` for its commands")
 }

@@ -4,11 +4,13 @@
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use biscale::accuracy::{Errors, Pair, ReferenceSettings, compare, mirror_biased_pairs};
-use biscale::filtering::EffectiveBrdf;
+use biscale::effective::EffectiveBrdf;
+use biscale::metrics::{Errors, Pair, compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::plan::{Preset, Settings};
-use biscale::scene::{self, LoadedScene};
+use biscale::reference::ReferenceSettings;
+use biscale::scene;
+use biscale::scene::LoadedScene;
 use glam::Vec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

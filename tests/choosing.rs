@@ -3,11 +3,12 @@
 
 use std::time::Instant;
 
-use biscale::Cancel;
-use biscale::accuracy::choose::{Goal, choose};
-use biscale::accuracy::{ReferenceSettings, compare, mirror_biased_pairs};
+use biscale::base::Cancel;
+use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
+use biscale::reference::ReferenceSettings;
 use biscale::scene;
+use biscale::tuning::choose::{Goal, choose};
 use glam::Vec3;
 
 const SCENES: [&str; 10] = [
@@ -28,7 +29,7 @@ const SET: usize = 500;
 const SETS: usize = 2;
 
 /// A seed that choosing does not use.
-fn right(loaded: &scene::LoadedScene, pairs: &[biscale::accuracy::Pair]) -> (Vec<Vec3>, f64) {
+fn right(loaded: &scene::LoadedScene, pairs: &[biscale::metrics::Pair]) -> (Vec<Vec3>, f64) {
     let settings = ReferenceSettings { facets: 16_384, max_passes: 12, target: 2e-3, seed: 4711 };
     let mut own = 0.0;
     let estimates = Pipeline::new()
@@ -86,7 +87,7 @@ fn nine_of_ten_scenes_get_the_decibels_and_milliseconds_that_were_asked_for() {
             .collect();
         times.sort_by(f64::total_cmp);
         let got = times[2];
-        let finest = chosen.got.rung >= biscale::accuracy::ladder::FINEST - 0.3;
+        let finest = chosen.got.rung >= biscale::tuning::ladder::FINEST - 0.3;
         let good = (got / asked - 1.0).abs() <= 0.2 || (got < asked && finest);
         hits[1] += usize::from(good);
         if !good {

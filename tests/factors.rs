@@ -1,15 +1,15 @@
 //! The low-rank form against the direct sum: it converges, and each of its interpolations has a measured price.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
-use biscale::accuracy::{Pair, compare, mirror_biased_pairs};
 use biscale::brdf::{Brdf, LobeAngles, Term};
-use biscale::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
-use biscale::filtering::{
+use biscale::effective::{
     BasisGrid, Direct, EffectiveBrdf, FacetSum, Form, LowRank, LowRankSettings, SumMaterial, VisibilityRows,
 };
-use biscale::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
-use biscale::scene;
-use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
+use biscale::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
+use biscale::math::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
+use biscale::metrics::{Pair, compare, mirror_biased_pairs};
+use biscale::visibility::{Horizons, Slices, Visibility};
+use biscale::{geometry, scene};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::path::Path;

@@ -6,13 +6,14 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use biscale::Cancel;
-use biscale::export::replace_file;
-use biscale::gpu::Gpu;
-use biscale::large_scale::shading::Background;
-use biscale::large_scale::{GpuRenderer, Stage, render};
+use biscale::base::{Cancel, replace_file};
+use biscale::gpu::{Gpu, GpuRenderer};
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, LoadedScene, Painted};
+use biscale::render::Stage;
+use biscale::render::render;
+use biscale::render::image::shading::Background;
+use biscale::scene;
+use biscale::scene::{LoadedScene, Painted};
 
 const SCENE: &str = r#"
 [tile]

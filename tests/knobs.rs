@@ -1,10 +1,10 @@
 //! Knobs of `[quality]` act, and what they trade is as said.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
-use biscale::Cancel;
-use biscale::accuracy::{compare, mirror_biased_pairs};
-use biscale::directions::UpperPairs;
-use biscale::filtering::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
+use biscale::base::Cancel;
+use biscale::effective::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
+use biscale::math::directions::UpperPairs;
+use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::plan::Route;
 use biscale::scene;

@@ -1,12 +1,13 @@
 //! What pictures read instead of the effective BRDF: close to it, kept under colour edits, never below zero.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
-use biscale::Cancel;
-use biscale::accuracy::{compare, picture_pairs, upper_errors};
-use biscale::directions::UpperPairs;
-use biscale::filtering::{EffectiveBrdf, Form, Nodes, PairTable, Sight};
+use biscale::base::Cancel;
+use biscale::effective::{EffectiveBrdf, Form, Nodes, PairTable, Sight};
+use biscale::math::directions::UpperPairs;
+use biscale::metrics::{compare, picture_pairs, upper_errors};
 use biscale::pipeline::{Outcome, Pipeline};
-use biscale::scene::{self, LoadedScene};
+use biscale::scene;
+use biscale::scene::LoadedScene;
 use glam::Vec3;
 
 fn open(name: &str, set: &[&str]) -> LoadedScene {
@@ -295,7 +296,7 @@ fn a_thinned_sum_keeps_the_area_of_every_normal() {
     let thinned = direct.thinned(10).unwrap();
     assert!(thinned.sum.facet_count() * 8 < direct.sum.facet_count());
     // From straight above all is seen: the projected area is that of the base.
-    let area = |of: &biscale::filtering::Direct| of.sums(&[], Vec3::Z, |_, _| {});
+    let area = |of: &biscale::effective::Direct| of.sums(&[], Vec3::Z, |_, _| {});
     assert!((area(&thinned) / area(direct) - 1.0).abs() < 1e-4);
 }
 

@@ -4,7 +4,8 @@
 use std::path::PathBuf;
 
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, LoadedScene};
+use biscale::scene;
+use biscale::scene::LoadedScene;
 use glam::Vec3;
 
 fn open(overrides: &[&str]) -> LoadedScene {

@@ -3,14 +3,13 @@
 
 use std::f32::consts::TAU;
 
-use biscale::accuracy::mirror_biased_pairs;
 use biscale::brdf::{Brdf, Term};
-use biscale::directions::{PolarGrid, from_angles};
-use biscale::filtering::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
-use biscale::geometry::{FacetSampler, Facets, HeightGrid, SampleShift, TileMesh};
-use biscale::visibility::{
-    Horizons, PackedVisibility, PeriodicGrid, Slices, Visibility, lifted_origins, ray_cast, sees, visibility_maps_cpu,
-};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
+use biscale::visibility::ray_cast;
+use biscale::geometry::{FacetSampler, Facets, HeightGrid, PeriodicGrid, SampleShift, TileMesh, lifted_origins, sees};
+use biscale::math::directions::{PolarGrid, from_angles};
+use biscale::metrics::mirror_biased_pairs;
+use biscale::visibility::{Horizons, PackedVisibility, Slices, Visibility, visibility_maps_cpu};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use biscale::cache::Cache;
-use biscale::scene::LoadedScene;
+use crate::cache::Cache;
+use crate::scene::LoadedScene;
 use eframe::egui::Context;
 
 use super::document::Snapshot;
@@ -155,7 +155,7 @@ impl Editor {
     ///
     /// # Errors
     /// A place that cannot be written.
-    pub fn keep_now(&self) -> biscale::Result<()> {
+    pub fn keep_now(&self) -> crate::base::Result<()> {
         match &self.recovery {
             Some(recovery) if self.document.has_work() => recovery.prepare(&self.document)?.write(),
             _ => Ok(()),

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use biscale::cache::Cache;
-use biscale::scene::{Material, Scene};
+use crate::cache::Cache;
+use crate::scene::{Material, Scene};
 use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
 
 use super::actions::{self, Action};

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use biscale::Result;
-use biscale::export::tile::TileOptions;
-use biscale::scene::{BrdfSpec, Geometry};
+use crate::base::Result;
+use crate::export::tile::TileOptions;
+use crate::scene::{BrdfSpec, Geometry};
 use eframe::egui::Context;
 
 use super::actions::Action;
@@ -85,7 +85,7 @@ impl Editor {
                 return;
             }
             Purpose::ExportTable => {
-                match biscale::export::check_ending(&path) {
+                match crate::export::check_ending(&path) {
                     Ok(()) => self.dialog = Some(Dialog::Table { path, choice: TableChoice::default() }),
                     Err(error) => self.messages.put(Level::Trouble, "export", error.to_string()),
                 }
@@ -100,7 +100,7 @@ impl Editor {
     }
 
     /// A paint that was measured is shown as it was: no tint of the material before remains, and that is said.
-    fn as_measured(&mut self, scene: &mut biscale::scene::Scene, material: usize, name: Option<&str>) {
+    fn as_measured(&mut self, scene: &mut crate::scene::Scene, material: usize, name: Option<&str>) {
         self.messages.clear("measured");
         let Some(place) = scene.materials.get_mut(material) else { return };
         let mut said = Vec::new();
@@ -117,7 +117,7 @@ impl Editor {
         }
     }
 
-    pub(super) fn try_edit(&mut self, scene: biscale::scene::Scene) {
+    pub(super) fn try_edit(&mut self, scene: crate::scene::Scene) {
         let checked: Result<()> = scene.validate();
         match checked {
             Ok(()) => self.document.edit(scene),

@@ -1,8 +1,8 @@
 //! Where the views stand: gallery, object, tile, and under the smaller one the brush or the lobe.
 
-use biscale::filtering::EffectiveBrdf;
-use biscale::large_scale::CameraView;
-use biscale::scene::Scene;
+use crate::effective::EffectiveBrdf;
+use crate::render::CameraView;
+use crate::scene::Scene;
 use eframe::egui::{self, Panel, ScrollArea, Ui};
 
 use super::actions::Action;

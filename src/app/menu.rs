@@ -1,6 +1,6 @@
 //! The menu bar.
 
-use biscale::scene::shipped;
+use crate::scene::shipped;
 use eframe::egui::{self, Button, MenuBar, RichText, Ui};
 
 use super::actions::{self, Action};

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use biscale::geometry::painted_slot;
-use biscale::scene::{Geometry, Pixels};
+use crate::geometry::painted_slot;
+use crate::scene::{Geometry, Pixels};
 use eframe::egui::{Context, Key};
 use glam::UVec2;
 

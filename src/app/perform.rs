@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use biscale::scene::Material;
+use crate::scene::Material;
 use eframe::egui::{Context, Event, Theme};
 
 use super::actions::Action;

@@ -1,7 +1,7 @@
 //! What is under the cursor on the object: the surface point, the viewer and the strongest light in its tangent frame.
 
-use biscale::large_scale::gbuffer::{bent_towards, perpendicular};
-use biscale::large_scale::{CameraView, DirectionalLight, ObjectMesh};
+use crate::render::image::gbuffer::{bent_towards, perpendicular};
+use crate::render::{CameraView, DirectionalLight, ObjectMesh};
 use glam::{Vec2, Vec3};
 
 /// A point of the object as its material sees it.
@@ -64,13 +64,13 @@ fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3], two_sided: bool) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
-    use biscale::large_scale::objects;
-    use biscale::scene;
+    use crate::render::object;
+    use crate::scene;
 
     #[test]
     fn the_middle_of_a_sphere_is_seen_along_its_normal_and_the_corner_shows_nothing() {
         let object = scene::Object { kind: "sphere".to_owned(), path: None };
-        let mesh = objects::build(&object, std::path::Path::new("")).unwrap();
+        let mesh = object::build(&object, std::path::Path::new("")).unwrap();
         let view = CameraView::new(&scene::Camera::default(), &mesh, [200, 100]).unwrap();
         let light = DirectionalLight { direction: view.back, irradiance: Vec3::ONE };
         let picked = pick(&mesh, &[light], &view, Vec2::new(100.0, 50.0)).unwrap();

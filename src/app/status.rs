@@ -99,7 +99,7 @@ fn time(ms: f64) -> String {
 
 /// Every effect, on or off, and why.
 fn effects(made: &super::worker::Made) -> String {
-    let line = |effect: &biscale::plan::Effect| {
+    let line = |effect: &crate::plan::Effect| {
         format!("{}  {}: {}", if effect.on { "on" } else { "off" }, effect.name, effect.reason)
     };
     made.effects.iter().map(line).collect::<Vec<_>>().join("\n")

@@ -7,15 +7,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::gpu::{Gpu, GpuError};
 use anyhow::{Result, anyhow};
-use biscale::gpu::{Gpu, GpuError};
 use eframe::egui::{self, Context, ViewportBuilder, ViewportCommand};
 
 use super::document::{Document, Settings};
 use super::editor::Editor;
 use super::start_times::{FirstFrames, StartTimes};
 use super::worker::{Devices, Screen};
-use crate::commands::cache;
+use crate::cli::cache;
 
 const NO_WINDOW: &str = "the editor needs a desktop (X11 or Wayland) and a Vulkan driver. \
     Debian, Ubuntu: `apt install mesa-vulkan-drivers libxkbcommon-x11-0 libwayland-client0`; \

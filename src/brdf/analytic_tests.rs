@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::super::{Brdf, LobeAngles, Term};
-use crate::directions::half_vector;
+use crate::math::directions::half_vector;
 
 /// DESIGN.md, Sec. 3, word for word: `f_r` without its colour.
 fn plain_f_r(term: &Term, ni: f64, no: f64, nh: f64, sin2: f64, ih: f64) -> f64 {

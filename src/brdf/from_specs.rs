@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::{Brdf, MeasuredCache, MeasuredKind, Term};
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 use crate::scene::{BrdfSpec, TermSpec};
 
 /// Below this a lobe is a mirror that no f32 direction meets.

@@ -169,7 +169,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::directions::{from_angles, half_vector};
+    use crate::math::directions::{from_angles, half_vector};
 
     /// Random values, a few percent of them invalid, in a small table.
     fn random_table(rng: &mut ChaCha8Rng) -> HalfDifferenceTable {

@@ -8,8 +8,8 @@ use std::time::SystemTime;
 use glam::Vec3;
 
 use super::LobeAngles;
+use crate::base::{InputError, Result};
 use crate::cache::Key;
-use crate::error::{InputError, Result};
 
 /// A tabulated BRDF, already made reciprocal.
 pub trait Measured: std::fmt::Debug + Send + Sync {

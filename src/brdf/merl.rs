@@ -9,9 +9,9 @@ use std::path::Path;
 
 use glam::{Vec3, Vec4};
 
-use super::half_difference::{HalfDifferenceTable, MERL_SHAPE, bin_angles, row_bins};
-use super::measured::MeasuredReport;
-use crate::error::{InputError, Result};
+use super::half_difference::{MERL_SHAPE, bin_angles, row_bins};
+use super::{HalfDifferenceTable, MeasuredReport};
+use crate::base::{InputError, Result};
 
 pub(crate) const BINS_H: usize = 90;
 pub(crate) const BINS_D: usize = 90;

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::super::half_difference::cosines;
 use super::super::{LobeAngles, Measured, Term};
 use super::*;
-use crate::directions::{from_angles, half_vector};
+use crate::math::directions::{from_angles, half_vector};
 
 /// A full-size file whose entries are `f(θ_h, θ_d, φ_d)` per channel, as the format stores them.
 fn file_of(f: impl Fn(f64, f64, f64) -> [f64; 3]) -> Vec<u8> {

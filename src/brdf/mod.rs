@@ -26,7 +26,7 @@ pub use color_basis::ColorBasis;
 pub use half_difference::HalfDifferenceTable;
 pub use measured::{Measured, MeasuredCache, MeasuredKind, MeasuredReport};
 
-use crate::directions::half_vector;
+use crate::math::directions::half_vector;
 
 /// The cosines an isotropic BRDF depends on. `n·h`, `n·i`, `n·o` may be negative: then the BRDF is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +40,7 @@ pub struct LobeAngles {
 }
 
 impl LobeAngles {
-    /// All unit vectors; `h` is [`crate::directions::half_vector`] of `i` and `o`. Swapping `i` and `o` swaps the two
+    /// All unit vectors; `h` is [`crate::math::directions::half_vector`] of `i` and `o`. Swapping `i` and `o` swaps the two
     /// cosines and leaves every other bit as it is.
     #[inline]
     pub fn new(n: Vec3, i: Vec3, o: Vec3, h: Vec3) -> Self {

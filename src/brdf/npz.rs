@@ -5,9 +5,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::half_difference::HalfDifferenceTable;
+use super::HalfDifferenceTable;
 use super::spherical::{SphericalTable, even_turn};
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 
 /// The largest export has 2^25 pairs of two quantities.
 const LARGEST_FILE: u64 = 1 << 30;

@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Brdf, LobeAngles, MeasuredCache, MeasuredKind, Term};
-use crate::directions::{from_angles, half_vector};
+use crate::math::directions::{from_angles, half_vector};
 
 /// Fastest of thirty runs, ns per item: what the code takes where others use the machine too.
 fn nanoseconds(items: usize, mut run: impl FnMut()) -> f64 {

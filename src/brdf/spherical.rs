@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DVec3, Vec4};
 
-use super::half_difference::{HalfDifferenceTable, bin_angles, cosines, row_bins};
-use super::measured::MeasuredReport;
+use super::half_difference::{bin_angles, cosines, row_bins};
+use super::{HalfDifferenceTable, MeasuredReport};
 
 /// No reflectance is above this [1/sr]: sums and squares of such still fit an f32.
 pub(super) const LARGEST: f64 = 1e15;
@@ -148,7 +148,7 @@ pub(super) fn even_turn(angles: &[f64]) -> bool {
 mod tests {
     use super::*;
     use crate::brdf::{LobeAngles, Measured};
-    use crate::directions::{from_angles, half_vector};
+    use crate::math::directions::{from_angles, half_vector};
 
     fn table(of: impl Fn(f64, f64, f64, f64) -> f64) -> SphericalTable {
         let theta: Vec<f64> = (0..7).map(|k| (f64::from(k) * 12.5).to_radians()).collect();

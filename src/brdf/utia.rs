@@ -7,9 +7,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::half_difference::HalfDifferenceTable;
+use super::HalfDifferenceTable;
 use super::spherical::{LARGEST, SphericalTable};
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 
 const ELEVATIONS: usize = 6;
 const STEP_DEG: f64 = 15.0;

@@ -2,7 +2,7 @@
 
 use std::time::UNIX_EPOCH;
 
-use crate::simd;
+use crate::math::simd;
 
 /// What the bits of a result depend on besides its inputs: the code, and the instructions that the processor has.
 #[derive(Debug, Clone, PartialEq, Eq)]

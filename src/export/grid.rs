@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::Vec3;
 
-use crate::directions::{from_angles, to_angles};
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
+use crate::math::directions::{from_angles, to_angles};
 
 /// Numbers of elevations and azimuths of the light and of the viewer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,8 +9,8 @@ use super::sampler::{in_parallel, reading_error};
 use super::{Job, Written};
 use crate::brdf::merl::{BINS_D, BINS_H, BINS_PHI, PLANE, SCALES, table_from_planes};
 use crate::brdf::{LobeAngles, Measured};
-use crate::directions::half_vector;
-use crate::filtering::EffectiveBrdf;
+use crate::effective::EffectiveBrdf;
+use crate::math::directions::half_vector;
 
 /// Azimuths of the tile that are averaged.
 const TURNS: usize = 12;

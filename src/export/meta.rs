@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{Job, Reflectances};
-use crate::accuracy::Errors;
+use crate::metrics::Errors;
 use crate::pipeline::Outcome;
 use crate::scene::LoadedScene;
 

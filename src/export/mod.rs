@@ -13,7 +13,6 @@ mod meta;
 mod note;
 mod npz;
 mod radiance;
-mod replace;
 mod rgl;
 mod sampler;
 mod table;
@@ -25,15 +24,13 @@ use std::ffi::OsString;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, InputError, Result};
-use crate::filtering::EffectiveBrdf;
-use crate::progress::Progress;
+use crate::base::{Error, InputError, Progress, Result, atomic_file, replace_file};
+use crate::effective::EffectiveBrdf;
 
 pub use grid::ExportResolution;
 pub use meta::ExportMeta;
 pub use note::Reflectances;
 pub use radiance::RadianceBasis;
-pub use replace::replace_file;
 pub use sampler::ReadingError;
 
 use meta::Description;
@@ -175,7 +172,7 @@ pub fn write(
     }
     let job = Job { brdf, meta, options, progress };
     // The place is opened first, so that one that cannot be written is found before the long work.
-    let (written, bytes) = replace::replacing(path, |out| {
+    let (written, bytes) = atomic_file::replacing(path, |out| {
         let mut counted = Counted { inner: out, bytes: 0 };
         let written = match format {
             Format::Npz => on_grid(&job, &mut counted, npz::write)?,

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::meta::{FRAME, PROGRAM};
 use super::{Job, Written};
-use crate::directions::from_angles;
-use crate::filtering::{EffectiveBrdf, Reflectance};
+use crate::effective::{EffectiveBrdf, Reflectance};
+use crate::math::directions::from_angles;
 
 /// Directional-hemispherical reflectances: the part of the light from one direction that leaves again, a channel.
 #[derive(Debug, Clone, PartialEq, Default)]

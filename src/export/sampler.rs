@@ -6,9 +6,9 @@ use std::io;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::accuracy::{Errors, compare, mirror_biased_pairs};
-use crate::filtering::EffectiveBrdf;
-use crate::progress::{self, Progress};
+use crate::base::{Progress, progress};
+use crate::effective::EffectiveBrdf;
+use crate::metrics::{Errors, compare, mirror_biased_pairs};
 
 /// Pairs of the reading error, and the seed that fixes them.
 const CHECKED_PAIRS: usize = 400;
@@ -17,7 +17,7 @@ const CHECKED_SEED: u64 = 2011;
 /// [`progress::in_parallel`] where a file is being written.
 ///
 /// # Errors
-/// [`crate::Error::Cancelled`], inside, when `progress` says so.
+/// [`crate::base::Error::Cancelled`], inside, when `progress` says so.
 pub fn in_parallel<T: Send>(
     count: usize,
     progress: &Progress<'_>,

@@ -4,10 +4,11 @@ use std::io;
 
 use glam::Vec3;
 
+use super::ReadingError;
 use super::grid::Grid;
-use super::sampler::{ReadingError, in_parallel, reading_error};
-use crate::filtering::{EffectiveBrdf, Reflectance};
-use crate::progress::Progress;
+use super::sampler::{in_parallel, reading_error};
+use crate::base::Progress;
+use crate::effective::{EffectiveBrdf, Reflectance};
 
 /// What a file holds.
 #[derive(Debug, Clone)]

@@ -15,10 +15,10 @@ use argmin::core::{CostFunction, Executor, State as _};
 use argmin::solver::neldermead::NelderMead;
 use glam::{DVec3, Vec3};
 
-use crate::accuracy::{Errors, Pair, compare, mirror_biased_pairs};
-use crate::error::{Error, Result};
-use crate::filtering::{EffectiveBrdf, Reflectance};
-use crate::progress::{Progress, in_parallel, part, tell};
+use crate::base::progress::{in_parallel, part, tell};
+use crate::base::{Error, Progress, Result};
+use crate::effective::{EffectiveBrdf, Reflectance};
+use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
 
 pub use gltf::gltf;
 pub use materialx::materialx;

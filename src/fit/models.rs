@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::Vec3;
 
 use crate::brdf::{LobeAngles, Term, schlick_weight};
-use crate::directions::half_vector;
+use crate::math::directions::half_vector;
 
 /// What is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::brdf::{Brdf, Term};
-use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
+use crate::effective::{Direct, FacetSum, Form, SumMaterial};
 use crate::geometry::{self, Facets};
 use crate::scene::{Flat, Geometry, Scene};
 use crate::visibility::Visibility;

@@ -8,7 +8,7 @@ use exr_file::{ReadChannels, ReadLayers};
 use glam::{UVec2, Vec3};
 use image::{DynamicImage, ImageReader, Limits};
 
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 pub use crate::scene::Pixels;
 use crate::scene::files;
 

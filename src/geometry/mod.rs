@@ -1,26 +1,13 @@
 //! From a geometry description to a periodic triangle mesh, and from the mesh to facets.
 
-mod builder;
 pub mod closure;
-mod facet_order;
-mod facets;
-mod flat;
-mod grooves;
-pub mod heightfield;
+pub mod facets;
+pub mod families;
+pub mod grid;
 pub mod image_file;
-mod insides;
-pub(crate) mod kd_tree;
-mod mesh_file;
-mod normal_bins;
 pub mod obj;
-mod part;
-mod pyramids;
-mod rods;
-pub(crate) mod rounded;
 mod symmetry;
 mod tile_mesh;
-mod voronoi;
-mod weave;
 
 #[cfg(test)]
 mod height_images;
@@ -31,13 +18,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use facets::{FacetSampler, Facets, SampleShift};
-pub use grooves::CrossSection;
-pub use pyramids::OnePyramid;
+pub use families::grooves::CrossSection;
+pub use families::pyramids::OnePyramid;
+use families::{flat, grooves, heightfield, mesh_file, pyramids, rods, weave};
+pub use grid::{Hit, PeriodicGrid, lifted_origins, sees};
 pub use symmetry::{mirror_planes, mirror_planes_in};
 pub(crate) use tile_mesh::SAME_NORMAL;
 pub use tile_mesh::{ColorField, HeightGrid, SlotField, TileMesh};
 
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 use crate::scene::{Geometry, Painted, Pixels, Tile};
 
 /// The mesh of a tile; `base_dir` is the scene file's folder, where relative paths start.

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 
 /// Vertices, corners, triangles of one file at most.
 const MOST: usize = 1 << 26;

@@ -3,9 +3,9 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::PeriodicGrid;
 use super::TileMesh;
-use super::part::below;
-use crate::visibility::PeriodicGrid;
+use super::families::part::below;
 
 /// Places that are compared, and planes that are tried along each axis.
 const PLACES: usize = 256;

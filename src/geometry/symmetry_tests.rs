@@ -5,7 +5,8 @@ use std::f32::consts::TAU;
 use glam::UVec2;
 
 use super::*;
-use crate::geometry::{build, heightfield};
+use crate::geometry::build;
+use crate::geometry::families::heightfield;
 
 fn of(toml: &str) -> TileMesh {
     let scene = crate::scene::parse(&format!("[tile]\ngeometry = {toml}\n")).unwrap();

@@ -117,7 +117,7 @@ fn noise_tile() -> TileMesh {
 /// Root mean square over passes of the relative error of `Σ ΔA (n·o)+`, against the sum over all triangles.
 fn error_of(mesh: &TileMesh, sample: impl Fn(u64) -> Facets) -> f64 {
     let (theta, phi) = (1.2, 0.4);
-    let o = crate::directions::from_angles(theta, phi);
+    let o = crate::math::directions::from_angles(theta, phi);
     let term = |t: usize| f64::from(mesh.geometric_normal(t).dot(o).max(0.0)) * mesh.triangle_area(t);
     let exact: f64 = (0..mesh.triangles.len()).map(term).sum();
     let errors = (0..24).map(|pass| (unshadowed_projected_area(&sample(pass), theta, phi) / exact - 1.0).powi(2));

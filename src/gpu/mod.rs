@@ -1,15 +1,10 @@
-//! The graphics processor: one device without a window, plain WGSL shaders, buffers up and down.
-//!
-//! What the machine has is decided once, as a [`Tier`], when [`Gpu::open`] is called; nothing else asks for features.
-//! Every stage that runs here has a twin on the CPU, and no failure here is a panic: [`GpuError`] says what happened and
-//! the caller falls back.
+//! The graphics processor: device, visibility, shading and whole images. Every stage here has a CPU twin.
 
-mod buffers;
-mod device;
-mod error;
-pub mod pipelines;
-mod shaders;
+pub mod device;
+pub mod render;
+pub mod shading;
+pub mod visibility;
 
-pub use device::{Gpu, Tier};
-pub use error::GpuError;
-pub use shaders::{SHADERS, Swaps, shader_source, swapped_source};
+pub use device::{Gpu, GpuError, SHADERS, Swaps, Tier, shader_source, swapped_source};
+pub use render::renderer::{GpuRenderer, render_gpu};
+pub use visibility::{GpuHeightMarch, GpuHorizons, GpuMaps, GpuShadowMaps, GpuSlicer, visibility_maps_gpu};

@@ -8,13 +8,12 @@ use rayon::prelude::*;
 use super::mirrored::Images;
 use super::transport::NOTHING;
 use super::{InterreflectionSettings, InterreflectionTable, Transport, mean_albedo};
+use crate::base::{Cancel, Result};
 use crate::brdf::{LobeAngles, Term};
-use crate::cancel::Cancel;
-use crate::directions::half_vector;
-use crate::error::Result;
-use crate::filtering::SumMaterial;
-use crate::filtering::gemm::multiply_transposed;
+use crate::effective::SumMaterial;
 use crate::geometry::{Facets, TileMesh};
+use crate::math::directions::half_vector;
+use crate::math::linalg::gemm::multiply_transposed;
 use crate::visibility::Visibility;
 
 /// Rays of one matrix product.

@@ -1,6 +1,6 @@
 //! Nodes of a polar grid under the mirror planes of a tile: one of each set of images is computed, the others follow.
 
-use crate::directions::PolarGrid;
+use crate::math::directions::PolarGrid;
 
 /// For each node the one that is computed in its place, and the reflection that takes the one to the other.
 #[derive(Debug, Clone)]

@@ -19,7 +19,7 @@ pub use table::InterreflectionTable;
 pub use transport::Transport;
 
 use crate::brdf::Brdf;
-use crate::directions::PolarGrid;
+use crate::math::directions::PolarGrid;
 
 /// How finely facets exchange light.
 #[derive(Debug, Clone, Copy, PartialEq)]

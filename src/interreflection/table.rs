@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::directions::PolarGrid;
+use crate::math::directions::PolarGrid;
 
 /// `G_indirect` at the nodes of a polar grid for both directions [1/sr]; symmetric.
 #[derive(Debug, Clone)]

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec3};
 
 use super::predicted_share;
-use crate::accuracy::{Pair, ReferenceSettings, mirror_biased_pairs};
-use crate::directions::{PolarGrid, from_angles};
-use crate::filtering::EffectiveBrdf;
+use crate::effective::EffectiveBrdf;
+use crate::math::directions::{PolarGrid, from_angles};
+use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::pipeline::Pipeline;
+use crate::reference::ReferenceSettings;
 use crate::scene::{self, LoadedScene, Painted};
 
 const DEEP: &str =
@@ -80,7 +81,7 @@ fn a_path_traced_white_cavity_returns_one_within_its_error_bars() {
                 reference.estimate(&pairs, &settings, |_, _| true)
             })
             .unwrap();
-        let sum = |pick: fn(&crate::accuracy::Estimate) -> f64| estimates.iter().map(pick).sum::<f64>();
+        let sum = |pick: fn(&crate::reference::Estimate) -> f64| estimates.iter().map(pick).sum::<f64>();
         let mean = sum(|one| f64::from(one.f_bar.x)) / pairs.len() as f64 * 2.0 * PI;
         let variance = sum(|one| f64::from(one.standard_error.x).powi(2)) / (pairs.len() as f64).powi(2);
         (mean, variance.sqrt() * 2.0 * PI)

@@ -3,12 +3,11 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::cancel::Cancel;
-use crate::directions::from_angles;
-use crate::error::Result;
-use crate::geometry::kd_tree::KdTree;
+use crate::base::{Cancel, Result};
+use crate::geometry::facets::kd_tree::KdTree;
 use crate::geometry::{Facets, TileMesh};
-use crate::visibility::{PeriodicGrid, lifted_origins};
+use crate::geometry::{PeriodicGrid, lifted_origins};
+use crate::math::directions::from_angles;
 
 /// No element is met: the ray leaves the tile or ends on a side that does not reflect.
 pub const NOTHING: u32 = u32::MAX;
@@ -110,7 +109,7 @@ mod tests {
     #[test]
     fn directions_between_facets_pass_the_chi_squared_test_for_the_cosine() {
         const RAYS: usize = 16;
-        for normal in [Vec3::Z, crate::directions::from_angles(1.1, 2.0)] {
+        for normal in [Vec3::Z, crate::math::directions::from_angles(1.1, 2.0)] {
             let (x, y) = normal.any_orthonormal_pair();
             let mut counts = vec![0.0; 8 * 16];
             for (element, k) in (0..8192).flat_map(|element| (0..RAYS).map(move |k| (element, k))) {
@@ -121,7 +120,7 @@ mod tests {
                 counts[16 * ring + turn.min(15)] += 1.0;
             }
             // Šidák: two tests at 0.01 together.
-            let p = crate::chi_square::p_value(&counts, &vec![1.0; counts.len()]);
+            let p = crate::testing::chi_square::p_value(&counts, &vec![1.0; counts.len()]);
             assert!(p > 1.0 - 0.99_f64.sqrt(), "{normal}: {p}");
         }
     }

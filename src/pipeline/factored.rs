@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use super::stage::Version;
 use super::{Pipeline, StageTimes};
-use crate::accuracy::{Errors, Pair, mirror_biased_pairs, upper_errors};
-use crate::error::Result;
-use crate::filtering::{Direct, EffectiveBrdf, Factors, Form, LowRank, SumMaterial, VisibilityRows};
+use crate::base::Result;
+use crate::effective::{Direct, EffectiveBrdf, Factors, Form, LowRank, SumMaterial, VisibilityRows};
 use crate::geometry::Facets;
+use crate::metrics::{Errors, Pair, mirror_biased_pairs, upper_errors};
 use crate::plan::{Method, Settings};
 
 /// Pairs that the factored form is checked on.
@@ -140,7 +140,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::filtering::FacetSum;
+    use crate::effective::FacetSum;
 
     #[test]
     fn factors_are_tried_no_further_than_shows_that_they_would_not_serve() {

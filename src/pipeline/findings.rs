@@ -5,13 +5,14 @@ use std::sync::Arc;
 use super::stage::Version;
 use super::{Pipeline, Shape};
 use crate::brdf::Term;
-use crate::filtering::{FacetSum, SumMaterial};
+use crate::effective::{FacetSum, SumMaterial};
 use crate::geometry::Facets;
+use crate::geometry::PeriodicGrid;
 use crate::gpu::Gpu;
 use crate::interreflection::mean_albedo;
 use crate::plan::{Backend, Findings, Settings, Sighting};
 use crate::scene::Scene;
-use crate::visibility::{PeriodicGrid, Slices};
+use crate::visibility::Slices;
 
 impl Pipeline {
     #[expect(clippy::too_many_arguments, reason = "one place that gathers all there is to know")]

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::stage::Version;
 use super::{Assigned, Pipeline, Shape, StageTimes};
+use crate::base::Result;
 use crate::brdf::Brdf;
-use crate::error::Result;
-use crate::filtering::SumMaterial;
+use crate::effective::SumMaterial;
 use crate::geometry::{self, TileMesh};
 use crate::scene::LoadedScene;
 

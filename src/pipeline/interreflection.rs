@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::stage::Version;
 use super::{OutcomeKey, Pipeline, Shape, StageTimes};
-use crate::error::Result;
-use crate::filtering::SumMaterial;
+use crate::base::Result;
+use crate::effective::SumMaterial;
 use crate::geometry::{Facets, mirror_planes};
 use crate::interreflection::{InterreflectionTable, Transport, gather};
 use crate::plan::Settings;

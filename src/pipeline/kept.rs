@@ -3,10 +3,9 @@
 use std::time::Instant;
 
 use super::make::see;
+use crate::base::{Cancel, Result};
 use crate::cache::{Cache, KeyBuilder};
-use crate::cancel::Cancel;
-use crate::error::Result;
-use crate::filtering::{Direct, Nodes, PairTable};
+use crate::effective::{Direct, Nodes, PairTable};
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
 use crate::plan::{Route, Settings};

@@ -7,13 +7,13 @@ use glam::{Vec2, Vec3};
 
 use super::kept::identify_sight;
 use super::{Outcome, Pipeline};
-use crate::accuracy::picture_pairs;
+use crate::base::Cancel;
 use crate::brdf::{Brdf, Measured, MeasuredReport, Term};
 use crate::cache::{Cache, Key, KeyBuilder, Stored, Writer};
-use crate::cancel::Cancel;
-use crate::directions::{PolarGrid, UpperPairs};
-use crate::filtering::{FacetSum, Form, Nodes, SumMaterial};
+use crate::effective::{FacetSum, Form, Nodes, SumMaterial};
 use crate::geometry::{Facets, TileMesh};
+use crate::math::directions::{PolarGrid, UpperPairs};
+use crate::metrics::picture_pairs;
 use crate::plan::{Route, Settings};
 use crate::scene;
 use crate::visibility::{Horizons, Visibility};

@@ -1,16 +1,15 @@
 //! What single stages make, as plain functions of their input.
 
 use super::Assigned;
-use crate::cancel::Cancel;
-use crate::error::Result;
-use crate::filtering::mean_colors;
+use crate::base::{Cancel, Result};
+use crate::effective::mean_colors;
+use crate::geometry::PeriodicGrid;
 use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
+use crate::gpu::visibility_maps_gpu;
 use crate::plan::{Preset, Route, Settings};
 use crate::scene::{Scene, Switch};
-use crate::visibility::{
-    Horizons, PeriodicGrid, Slices, SoftMaps, Visibility, visibility_maps_cpu, visibility_maps_gpu,
-};
+use crate::visibility::{Horizons, Slices, SoftMaps, Visibility, visibility_maps_cpu};
 
 /// Facets of a tile, in the order that sums want.
 pub(super) fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {

@@ -25,23 +25,23 @@ pub use self::pictures::Pictured;
 use self::pictures::Pictures;
 use self::stage::{Stage, Version};
 pub use self::unseen::Unseen;
-use crate::accuracy::health::{Evidence, Sight};
-use crate::accuracy::{Health, Reference};
+use crate::base::{Cancel, Result};
 use crate::brdf::MeasuredCache;
 use crate::cache::Cache;
-use crate::cancel::Cancel;
-use crate::directions::{ParaboloidMap, PolarGrid};
-use crate::error::Result;
-use crate::filtering::{
+use crate::diagnostics::{Evidence, Health, Sight};
+use crate::effective::{
     Direct, EffectiveBrdf, FacetSum, Form, MaterialFactors, SumMaterial, VisibilityRows, VisibleFacets, Wu2011,
     Wu2011Settings,
 };
+use crate::geometry::PeriodicGrid;
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
 use crate::interreflection::{InterreflectionTable, Transport};
+use crate::math::directions::{ParaboloidMap, PolarGrid};
 use crate::plan::{Costs, Findings, Plan, Preset, Route, Settings, decide};
+use crate::reference::Reference;
 use crate::scene::{LoadedScene, Material, Painted, Switch, Tile};
-use crate::visibility::{PeriodicGrid, Visibility, visibility_maps_cpu};
+use crate::visibility::{Visibility, visibility_maps_cpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
 pub type StageTimes = Vec<(&'static str, f64)>;
@@ -138,7 +138,7 @@ impl Pipeline {
         Self::default()
     }
 
-    /// What is asked of this pipeline from now on ends with [`crate::Error::Cancelled`] soon after `cancel` is set. Stages
+    /// What is asked of this pipeline from now on ends with [`crate::base::Error::Cancelled`] soon after `cancel` is set. Stages
     /// that were finished before stay.
     pub fn cancel_with(&mut self, cancel: Cancel) {
         self.cancel = cancel;

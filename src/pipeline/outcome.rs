@@ -4,13 +4,13 @@ use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
+use super::Pictured;
 use super::StageTimes;
-use super::pictures::{Pictured, Pictures};
-use crate::accuracy::health::{Evidence, Limits};
-use crate::accuracy::{Errors, Health};
-use crate::cancel::Cancel;
-use crate::error::Result;
-use crate::filtering::{EffectiveBrdf, Reflectance};
+use super::pictures::Pictures;
+use crate::base::{Cancel, Result};
+use crate::diagnostics::{Evidence, Health, Limits};
+use crate::effective::{EffectiveBrdf, Reflectance};
+use crate::metrics::Errors;
 use crate::plan::{Plan, Settings};
 
 /// What the stages made of a scene.
@@ -41,7 +41,7 @@ impl Outcome {
     /// makes it.
     ///
     /// # Errors
-    /// [`crate::Error::Cancelled`].
+    /// [`crate::base::Error::Cancelled`].
     pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
         self.pictures.get(cancel)
     }

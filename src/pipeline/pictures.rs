@@ -10,13 +10,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Shape, kept};
-use crate::accuracy::{Errors, Pair, picture_pairs, upper_errors};
+use crate::base::{Cancel, Result};
 use crate::cache::Cache;
-use crate::cancel::Cancel;
-use crate::directions::UpperPairs;
-use crate::error::Result;
-use crate::filtering::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
+use crate::effective::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
 use crate::geometry::mirror_planes;
+use crate::math::directions::UpperPairs;
+use crate::metrics::{Errors, Pair, picture_pairs, upper_errors};
 use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
 use crate::scene::Switch;
 use crate::visibility::Visibility;

@@ -4,8 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::StageTimes;
-use crate::cancel::Cancel;
-use crate::error::Result;
+use crate::base::{Cancel, Result};
 
 /// Counts the results that a stage has made.
 pub(super) type Version = u64;

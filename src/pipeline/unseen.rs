@@ -1,13 +1,13 @@
 //! A tile as a device takes it that makes visibility and product itself: what comes before them.
 
 use super::{For, Pipeline, Prepared, StageTimes};
-use crate::directions::UpperPairs;
-use crate::error::Result;
-use crate::filtering::{FacetSum, Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
+use crate::base::Result;
+use crate::effective::{FacetSum, Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
+use crate::geometry::PeriodicGrid;
 use crate::geometry::mirror_planes_in;
+use crate::math::directions::UpperPairs;
 use crate::plan::{Plan, Preset, Route, Settings, Sighting};
 use crate::scene::{LoadedScene, Switch};
-use crate::visibility::PeriodicGrid;
 
 /// What is known of a tile without its visibility.
 #[derive(Debug)]

@@ -1,6 +1,7 @@
 //! Decisions of the plan that a scene's shape and materials settle, and what a person forces.
 
-use super::effects::{PICTURE_CHECK_PAIRS, PICTURE_QUERIES};
+use super::PICTURE_CHECK_PAIRS;
+use super::effects::PICTURE_QUERIES;
 use super::{Costs, Effect, Findings, Preset, Settings};
 use crate::interreflection::predicted_share;
 use crate::scene::Switch;
@@ -192,7 +193,7 @@ pub(super) fn of_the_scene(found: &Findings, settings: &Settings, note: &mut imp
         } else {
             format!(
                 "lights that no part of the object faces, and the faintest with {:.1} ‰ of the power, are left out",
-                crate::large_scale::FAINT_PART * 1e3
+                crate::render::FAINT_PART * 1e3
             )
         },
         0.0,

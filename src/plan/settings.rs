@@ -1,8 +1,8 @@
 //! Presets and knobs: how accurately everything is computed, as typed settings.
 
-use crate::directions::{HalfDifferenceGrid, PolarGrid, UpperPairs};
-use crate::filtering::{BasisGrid, Interpolation, LowRankSettings};
+use crate::effective::{BasisGrid, Interpolation, LowRankSettings};
 use crate::interreflection::InterreflectionSettings;
+use crate::math::directions::{HalfDifferenceGrid, PolarGrid, UpperPairs};
 use crate::scene::{Effects, Quality, Scene};
 
 /// Named settings of the `[quality]` table.

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use glam::Vec3;
 
 use super::{Costs, Findings, Preset, Route, Settings, decide};
-use crate::accuracy::{compare, mirror_biased_pairs};
+use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::scene::{self, LoadedScene, Painted};
 
@@ -73,7 +73,7 @@ fn a_dropped_visibility_runs_no_stage_and_takes_no_memory() {
         let mut pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, BRDFS[0], effects)).unwrap();
         let runs = pipeline.runs().iter().find(|(name, _)| *name == "visibility").unwrap().1;
-        let crate::filtering::Form::Direct(direct) = &outcome.brdf.form else { panic!("summed directly") };
+        let crate::effective::Form::Direct(direct) = &outcome.brdf.form else { panic!("summed directly") };
         assert!(outcome.times.iter().any(|(name, _)| *name == "visibility") == (runs > 0));
         (runs, direct.visibility.bytes() > 0)
     };

@@ -2,9 +2,9 @@
 
 use super::SceneReport;
 use super::svg::number;
-use crate::accuracy::candidates::Family;
-use crate::accuracy::sweep::{Point, is_preset, pareto};
 use crate::plan::Preset;
+use crate::tuning::candidates::Family;
+use crate::tuning::sweep::{Point, is_preset, pareto};
 
 /// A sentence each.
 pub fn of(scene: &SceneReport) -> Vec<String> {

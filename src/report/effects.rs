@@ -7,11 +7,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Studio;
-use crate::accuracy::{compare, mirror_biased_pairs};
-use crate::cancel::Cancel;
-use crate::error::Result;
-use crate::large_scale::Picture;
+use crate::base::{Cancel, Result};
+use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
+use crate::render::Picture;
 use crate::scene::{Effects, LoadedScene, Switch};
 
 /// An effect forced on and off.

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::svg::{COLORS, Chart, LogAxis, escape, number, stacked_bars};
 use super::thumbnails::scale_strip;
 use super::{Report, SceneReport, conclusions};
-use crate::accuracy::candidates::Family;
-use crate::accuracy::sweep::{BANDS_DEG, Point, pareto};
+use crate::tuning::candidates::Family;
+use crate::tuning::sweep::{BANDS_DEG, Point, pareto};
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --ink: #1b1f24; --soft: #59636e; --line: #d9dee4; --card: #fff; --page: #f5f6f8; }

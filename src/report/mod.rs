@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub use effects::{EffectCost, measure_effects, switches};
 pub use thumbnails::{Studio, difference_png, heat};
 
-use crate::accuracy::sweep::Point;
+use crate::tuning::sweep::Point;
 
 /// Where the figures were taken: they hold nowhere else.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use glam::Vec3;
 
-use crate::accuracy::Reference;
-use crate::cancel::Cancel;
-use crate::error::Result;
-use crate::filtering::Reflectance;
-use crate::large_scale::shading::Background;
-use crate::large_scale::tone_map::{ToneMap, srgb_byte};
-use crate::large_scale::{Picture, Stage, render};
+use crate::base::{Cancel, Result};
+use crate::effective::Reflectance;
+use crate::reference::Reference;
+use crate::render::image::shading::Background;
+use crate::render::image::tone_map::{ToneMap, srgb_byte};
+use crate::render::render;
+use crate::render::{Picture, Stage};
 use crate::scene::LoadedScene;
 
 /// Pixels a side, and lights.
@@ -51,7 +51,7 @@ impl Studio {
     /// The picture by the reference, noisy: the mean of many with other seeds is right. `None` where it takes too long.
     ///
     /// # Errors
-    /// As [`Studio::picture`], and [`crate::Error::Cancelled`].
+    /// As [`Studio::picture`], and [`crate::base::Error::Cancelled`].
     pub fn reference_picture(&self, reference: &Reference<'_>, seed: u64, cancel: &Cancel) -> Result<Option<Picture>> {
         let picture = reference.glimpse(seed, cancel).map(|glimpse| self.picture(&glimpse)).transpose()?;
         cancel.check()?;
@@ -71,7 +71,7 @@ impl Studio {
 /// None in practice: the picture is small.
 pub fn difference_png(delta_e: &[f32]) -> Result<String> {
     let pixels = delta_e.iter().map(|delta| heat(*delta)).collect();
-    let plain = ToneMap { curve: crate::large_scale::tone_map::ToneCurve::Plain, gain: 1.0 };
+    let plain = ToneMap { curve: crate::render::image::tone_map::ToneCurve::Plain, gain: 1.0 };
     data_url(&Picture { width: SIZE, height: SIZE, pixels }, &plain)
 }
 

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use toml::{Table, Value};
 
-use super::schema::{Field, Shape};
-use crate::error::InputError;
+use super::{Field, Shape};
+use crate::base::InputError;
 
 /// One step into a document.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -3,9 +3,7 @@
 use toml::{Table, Value};
 
 use super::Scene;
-use super::material::TermSpec;
-use super::schema::{Kind, Shape};
-use super::tile::Geometry;
+use super::{Geometry, Kind, Shape, TermSpec};
 
 impl Scene {
     /// Moves the first numeric parameter of the geometry by 5 % and says which (`tile.geometry.depth`); `None` where

@@ -1,6 +1,7 @@
 //! The `[effects]` table: what the plan decides by itself unless a person forces it.
 
-use super::schema::{Shape, scene_choice, scene_table};
+use super::Shape;
+use super::schema::{scene_choice, scene_table};
 
 scene_choice! {
     /// Whether an effect is computed.

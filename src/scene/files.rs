@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::check;
 use super::shipped;
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 
 /// The bytes of a file named in a scene whose folder is `base_dir`, at most `limit` of them.
 ///

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::check::{self, Problem, Step};
 use super::{Painted, Scene, overrides, shipped};
-use crate::error::{Error, InputError, Result};
+use crate::base::{Error, InputError, Result};
 
 /// A scene with the folder that its relative paths start from.
 #[derive(Debug, Clone, PartialEq)]

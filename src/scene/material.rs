@@ -6,7 +6,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::color;
-use super::schema::{Field, Kind, Shape, number};
+use super::schema::number;
+use super::{Field, Kind, Shape};
 
 /// A material, assigned to the mesh slot of its name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

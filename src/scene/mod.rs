@@ -41,7 +41,7 @@ pub use view::{Camera, DirectionalSpec, Light, OBJECT_KINDS, Object, TONE_MAPS};
 
 use check::{Problem, Step};
 
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Result};
 
 /// A whole scene file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,10 +5,8 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::check::Step;
-use super::material::TermSpec;
-use super::schema::Kind;
-use super::tile::Geometry;
-use crate::error::{Error, InputError, Result};
+use super::{Geometry, Kind, TermSpec};
+use crate::base::{Error, InputError, Result};
 
 /// Applies one override. Lists are indexed by number, by `name`, or by `*` for every entry; missing tables are made.
 /// The value is TOML, or else a bare text. A new `kind` drops the keys that only the old kind had; a `path` set on a

@@ -1,6 +1,7 @@
 //! The `[quality]` table: a preset, and any of its knobs turned by hand.
 
-use super::schema::{Shape, number, scene_table};
+use super::Shape;
+use super::schema::{number, scene_table};
 
 pub const PRESETS: &[&str] = &["draft", "standard", "fine", "reference", "wu2011"];
 pub const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];

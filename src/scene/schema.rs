@@ -130,9 +130,9 @@ macro_rules! scene_table {
 
         impl $name {
             /// The catalogue entries of this table, in the order of the fields.
-            pub fn fields() -> Vec<$crate::scene::schema::Field> {
+            pub fn fields() -> Vec<$crate::scene::Field> {
                 let defaults = Self::default();
-                vec![ $( $crate::scene::schema::Field::new(
+                vec![ $( $crate::scene::Field::new(
                     stringify!($field), $unit, $shape,
                     $crate::scene::schema::DefaultNumber::default_number(&defaults.$field), $doc,
                 ), )* ]

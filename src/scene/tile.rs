@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
-use super::schema::{Field, Kind, Shape, length, number, scene_choice, scene_table};
+use super::schema::{length, number, scene_choice, scene_table};
+use super::{Field, Kind, Shape};
 
 /// One period of the small-scale surface.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

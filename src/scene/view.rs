@@ -6,7 +6,8 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::color;
-use super::schema::{Field, Shape, number, scene_table};
+use super::schema::{number, scene_table};
+use super::{Field, Shape};
 
 /// Objects that `object.kind` names; `mesh` reads `object.path`.
 pub const OBJECT_KINDS: &[&str] = &["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh"];

@@ -4,11 +4,11 @@ use glam::{Vec2, Vec3};
 
 use super::scan::FACING_MARGIN;
 use crate::geometry::{Facets, HeightGrid};
-use crate::simd::multiversion;
+use crate::math::simd::multiversion;
 
 /// A height-field seen from points on it. Cells are split along the diagonal from (i, j) to (i+1, j+1).
 #[derive(Debug)]
-pub(super) struct HeightMarch {
+pub(crate) struct HeightMarch {
     /// Row by row, with the first column and row once more at the end.
     heights: Vec<f32>,
     /// Columns and rows of the tile.

@@ -6,14 +6,13 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::PeriodicGrid;
 use super::height_march::{HeightMarch, march_all};
-use super::ray_cast::lifted_origins;
 use super::scan::scan_all;
 use super::slicer::Slicer;
-use crate::directions::from_angles;
 use crate::geometry::{Facets, HeightGrid};
-use crate::simd;
+use crate::geometry::{PeriodicGrid, lifted_origins};
+use crate::math::directions::from_angles;
+use crate::math::simd;
 
 /// For each azimuth and facet the elevation [rad] below which all is blocked; right for surfaces without overhangs.
 ///

@@ -3,44 +3,27 @@
 //! [`Visibility`] is what the rest of the program reads: soft visibility of every facet along any direction, held as
 //! horizons where nothing overhangs, as slices or as maps of bits where something does.
 
-mod cell_lists;
-#[cfg(test)]
-mod cell_lists_tests;
-mod gpu_maps;
-mod gpu_march;
-mod gpu_slices;
-mod height_march;
+pub(crate) mod height_march;
 mod horizons;
-mod kept;
-mod nearest;
 mod packed;
-mod periodic_grid;
 mod ray_cast;
-mod scan;
+pub(crate) mod scan;
 mod shadow_map;
 #[cfg(test)]
 mod shadow_map_tests;
-mod shadow_view;
-mod slicer;
-mod slices;
-mod soft_maps;
+pub(crate) mod shadow_view;
+pub(crate) mod slicer;
+pub(crate) mod slices;
+pub(crate) mod soft_maps;
+mod stored;
 
 use std::ops::Range;
 
 use glam::Vec3;
 
-pub use gpu_maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
-#[cfg(test)]
-pub(crate) use gpu_march::crossings;
-pub use gpu_march::{GpuHeightMarch, GpuHorizons};
-pub use gpu_slices::GpuSlicer;
-#[cfg(test)]
-pub(crate) use gpu_slices::tests::looks;
 pub use horizons::Horizons;
-pub use nearest::Hit;
 pub use packed::PackedVisibility;
-pub use periodic_grid::PeriodicGrid;
-pub use ray_cast::{lifted_origins, ray_cast, sees};
+pub use ray_cast::ray_cast;
 pub use shadow_map::visibility_maps_cpu;
 pub use slices::Slices;
 pub use soft_maps::SoftMaps;

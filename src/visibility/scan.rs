@@ -2,14 +2,14 @@
 
 use glam::{IVec2, Vec2, Vec3};
 
-use super::periodic_grid::CellWalk;
 use super::slicer::{TurnedSlicer, WIDTH};
 use crate::geometry::Facets;
-use crate::simd::{Eight, InEights, eight};
+use crate::geometry::grid::periodic_grid::CellWalk;
+use crate::math::simd::{Eight, InEights, eight};
 
 /// Blocked slopes (tangents of the elevation), sorted and disjoint, within `[0, ∞]`.
 #[derive(Debug, Default, Clone)]
-pub(super) struct BlockedSlopes {
+pub(crate) struct BlockedSlopes {
     /// Everything below this slope is blocked.
     pub ground: f32,
     /// Further blocked intervals above it.
@@ -34,7 +34,7 @@ impl BlockedSlopes {
     }
 
     /// What a triangle must rise above, or hang outside of, to matter: the ground, and the first floating interval.
-    pub(super) fn known(&self) -> Known {
+    pub(crate) fn known(&self) -> Known {
         let (low, high) = self.floating.first().copied().unwrap_or((f32::INFINITY, f32::NEG_INFINITY));
         Known { ground: self.ground, low, high }
     }
@@ -102,14 +102,14 @@ impl BlockedSlopes {
 
 /// Slopes of which nothing new can be learned: up to `ground`, and from `low` to `high`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Known {
+pub(crate) struct Known {
     pub ground: f32,
     pub low: f32,
     pub high: f32,
 }
 
 /// Sine of how far behind a facet its visibility is still computed: more than the step between azimuths.
-pub(super) const FACING_MARGIN: f32 = 0.3;
+pub(crate) const FACING_MARGIN: f32 = 0.3;
 
 /// The lowest elevation that is resolved: a walk ends where what is left could block no more than this slope.
 const LOWEST_SLOPE: f32 = 0.005;
@@ -121,7 +121,7 @@ const LEAST_LOOKS: usize = 16_384;
 
 /// Scans every facet along the slicer's direction from its lifted origin, and hands each with what blocks it to `found`;
 /// returns how many walks ended before all was known.
-pub(super) fn scan_all(
+pub(crate) fn scan_all(
     slicer: &TurnedSlicer,
     facets: &Facets,
     origins: &[Vec3],
@@ -156,7 +156,7 @@ impl InEights for Scan<'_> {
 impl TurnedSlicer<'_> {
     /// Fills `blocked` with what a facet does not see along the slicer's direction; its `own` triangle is ignored.
     #[inline(always)]
-    pub(super) fn scan<E: Eight>(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
+    pub(crate) fn scan<E: Eight>(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
         let (grid, along) = (self.grid, self.along);
         blocked.start_from_facing(normal, along);
         if blocked.ground == f32::INFINITY || grid.cancel.is_set() {

@@ -1,4 +1,4 @@
-//! Toroidal shadow maps on the CPU: the twin of [`super::gpu_maps`], and the same algorithm texel by texel.
+//! Toroidal shadow maps on the CPU: the twin of [`crate::gpu::visibility::maps`], and the same algorithm texel by texel.
 //!
 //! One map a direction holds the endlessly repeated tile at once (see [`super::shadow_view`]): each texel is one ray and
 //! keeps the highest point on it and the triangle that lies there. A facet then asks the four rays around its own.

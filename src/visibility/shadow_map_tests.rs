@@ -2,10 +2,11 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{GpuShadowMaps, PackedVisibility, visibility_maps_cpu, visibility_maps_gpu};
-use crate::cancel::Cancel;
+use super::{PackedVisibility, visibility_maps_cpu};
+use crate::base::Cancel;
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
+use crate::gpu::{GpuShadowMaps, visibility_maps_gpu};
 
 mod meshes;
 mod rays;

@@ -2,14 +2,14 @@
 
 use glam::{IVec2, Vec2, Vec3};
 
-use super::PeriodicGrid;
-use super::cell_lists::CellEntry;
 use super::scan::Known;
 use crate::geometry::Facets;
-use crate::simd::{Eight, Fours};
+use crate::geometry::PeriodicGrid;
+use crate::geometry::grid::cell_lists::CellEntry;
+use crate::math::simd::{Eight, Fours};
 
 /// Triangles worked on together.
-pub(super) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 /// Eight entries of a cell, where the tile copy of the cell has them. Lanes beyond a cell's entries lie lower than all.
 #[derive(Debug, Clone)]
@@ -23,7 +23,7 @@ struct Block {
 
 /// A periodic grid made ready for vertical slices.
 #[derive(Debug)]
-pub(super) struct Slicer<'a> {
+pub(crate) struct Slicer<'a> {
     grid: &'a PeriodicGrid,
     starts: Vec<u32>,
     blocks: Vec<Block>,
@@ -51,7 +51,7 @@ impl<'a> Slicer<'a> {
 /// Eight triangles of a cell by their distances across the slices: where each begins, bends and ends, and how its edges run
 /// along a slice and up from there.
 #[derive(Debug, Clone)]
-pub(super) struct TurnedBlock {
+pub(crate) struct TurnedBlock {
     first: Fours,
     middle: Fours,
     /// From the first corner to the last; to the middle one; and from there to the last.
@@ -60,7 +60,7 @@ pub(super) struct TurnedBlock {
 
 /// What tells whether a slice meets eight triangles at all: kept apart, so that more of it stays at hand.
 #[derive(Debug, Clone)]
-pub(super) struct Extent {
+pub(crate) struct Extent {
     first: Fours,
     last: Fours,
     z_min: Fours,
@@ -95,7 +95,7 @@ struct Edge {
 
 /// A grid seen in slices of one direction.
 #[derive(Debug)]
-pub(super) struct TurnedSlicer<'a> {
+pub(crate) struct TurnedSlicer<'a> {
     pub grid: &'a PeriodicGrid,
     pub along: Vec2,
     starts: &'a [u32],
@@ -138,7 +138,7 @@ impl TurnedSlicer<'_> {
 }
 
 /// The slopes that eight triangles cover. Lanes outside the mask hold nothing.
-pub(super) struct Cut<E> {
+pub(crate) struct Cut<E> {
     low: E,
     high: E,
     lanes: u32,

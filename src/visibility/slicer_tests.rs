@@ -1,8 +1,9 @@
 use rand::{RngExt as _, SeedableRng as _};
 
 use super::*;
-use crate::geometry::{TileMesh, heightfield};
-use crate::simd::{InEights, eight};
+use crate::geometry::TileMesh;
+use crate::geometry::families::heightfield;
+use crate::math::simd::{InEights, eight};
 
 /// Nothing known, nothing left out.
 const NOTHING: Known = Known { ground: 0.0, low: f32::INFINITY, high: f32::NEG_INFINITY };

@@ -6,13 +6,14 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::ray_cast::lifted_origins;
 use super::scan::{BlockedSlopes, scan_all};
 use super::slicer::Slicer;
-use super::{Horizons, PackedVisibility, PeriodicGrid, SoftMaps};
-use crate::directions::{PolarGrid, from_angles};
+use super::{Horizons, PackedVisibility, SoftMaps};
 use crate::geometry::Facets;
-use crate::simd::{self, Fours};
+use crate::geometry::{PeriodicGrid, lifted_origins};
+use crate::math::directions::{PolarGrid, from_angles};
+use crate::math::simd;
+use crate::math::simd::Fours;
 
 /// All blocked elevations of every facet along a number of azimuths, exact there.
 ///
@@ -22,25 +23,25 @@ use crate::simd::{self, Fours};
 pub struct Slices {
     pub(crate) horizons: Horizons,
     /// By azimuth.
-    pub(super) hanging: Vec<Hanging>,
+    pub(crate) hanging: Vec<Hanging>,
     /// Where between two azimuths a facet changes over from one's view to the other's.
-    pub(super) switch: Vec<f32>,
+    pub(crate) switch: Vec<f32>,
 }
 
 /// What hangs above the facets along one azimuth: blocked intervals of elevations [rad] above the horizon, in the order of
 /// their facets.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Hanging {
-    pub(super) facets: Vec<u32>,
-    pub(super) low: Vec<f32>,
-    pub(super) high: Vec<f32>,
+pub(crate) struct Hanging {
+    pub(crate) facets: Vec<u32>,
+    pub(crate) low: Vec<f32>,
+    pub(crate) high: Vec<f32>,
     /// [`Slices::switch`] of the facet.
     switch: Vec<f32>,
 }
 
 impl Hanging {
     /// Facet, low and high of each interval, in the order of facets.
-    pub(super) fn new(intervals: impl Iterator<Item = (u32, f32, f32)>, switch: &[f32]) -> Self {
+    pub(crate) fn new(intervals: impl Iterator<Item = (u32, f32, f32)>, switch: &[f32]) -> Self {
         let mut hanging = Self::default();
         for (facet, low, high) in intervals {
             hanging.facets.push(facet);
@@ -174,7 +175,7 @@ impl Slices {
     }
 
     /// Those of some of the facets, in ascending order.
-    pub(super) fn picked(&self, facets: &[usize]) -> Self {
+    pub(crate) fn picked(&self, facets: &[usize]) -> Self {
         let mut places = vec![NOWHERE; self.facets()];
         for (place, &facet) in facets.iter().enumerate() {
             places[facet] = place as u32;

@@ -5,8 +5,8 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::PackedVisibility;
-use crate::directions::PolarGrid;
-use crate::simd;
+use crate::math::directions::PolarGrid;
+use crate::math::simd;
 
 /// Bits on the nodes of a polar grid.
 #[derive(Debug, Clone)]

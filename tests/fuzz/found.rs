@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use biscale::filtering::Reflectance;
+use biscale::base::Error;
+use biscale::effective::Reflectance;
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, Geometry, LoadedScene, MeshFile, Painted};
-use biscale::{Error, geometry};
+use biscale::scene::{Geometry, LoadedScene, MeshFile, Painted};
+use biscale::{geometry, scene};
 use glam::Vec3;
 
 fn tile(text: &str) -> Result<geometry::TileMesh, Error> {
@@ -68,7 +69,7 @@ fn devices_are_no_files() {
         assert!(Brdf::from_specs(&BrdfSpec::One(term), Path::new(""), &mut MeasuredCache::default()).is_err());
     }
     let object = scene::Object { kind: "mesh".to_owned(), path: Some(endless.clone()) };
-    assert!(biscale::large_scale::objects::build(&object, Path::new("")).is_err());
+    assert!(biscale::render::object::build(&object, Path::new("")).is_err());
     assert!(scene::open("/dev/zero", &[]).is_err());
 }
 

@@ -92,13 +92,13 @@ macro_rules! targets {
         mod $name {
             #[test]
             fn mutated_files_are_read_or_refused_never_a_panic() {
-                super::briefly(stringify!($name));
+                crate::briefly(stringify!($name));
             }
 
             #[test]
             #[ignore = "half a minute; BISCALE_FUZZ_SECONDS=300 for five"]
             fn mutated_files_for_as_long_as_asked() {
-                super::at_length(stringify!($name));
+                crate::at_length(stringify!($name));
             }
         }
     )* };

@@ -107,7 +107,8 @@ pub fn utia() -> Vec<Vec<u8>> {
 
 /// The program's own export of a small isotropic material.
 pub fn npz() -> Vec<Vec<u8>> {
-    use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution};
+    use biscale::export;
+    use biscale::export::{ExportMeta, ExportOptions, ExportResolution};
     let text =
         "[tile]\ngeometry = { kind = \"flat\" }\n[quality]\npreset = \"draft\"\nfacets = 16\nbackend = \"cpu\"\n";
     let scene = biscale::scene::parse(text).unwrap();

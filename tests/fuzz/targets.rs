@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use biscale::Error;
+use biscale::base::{Error, Result};
 use biscale::brdf::{Brdf, MeasuredCache};
-use biscale::directions::from_angles;
-use biscale::large_scale::{lights, objects};
+use biscale::math::directions::from_angles;
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, BrdfSpec, Geometry, Heightfield, LoadedScene, MeshFile, Painted, TermSpec};
-use biscale::{Result, geometry};
+use biscale::render::lighting::lights;
+use biscale::render::object;
+use biscale::scene::{BrdfSpec, Geometry, Heightfield, LoadedScene, MeshFile, Painted, TermSpec};
+use biscale::{geometry, scene};
 use glam::Vec3;
 
 use crate::seeds;
@@ -110,7 +111,7 @@ fn obj_tile(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
 fn obj_object(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
     std::fs::write(folder.join("a.obj"), bytes).map_err(|error| error.to_string())?;
     let object = scene::Object { kind: "mesh".to_owned(), path: Some("a.obj".into()) };
-    judged(objects::build(&object, folder), |mesh| {
+    judged(object::build(&object, folder), |mesh| {
         let unit = |v: &Vec3| v.is_finite() && (v.length() - 1.0).abs() < 1e-2;
         mesh.positions.iter().all(|p| p.is_finite()) && mesh.normals.iter().chain(&mesh.tangents).all(unit)
     })
@@ -152,7 +153,7 @@ fn pipeline(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
     }
     let loaded = LoadedScene { scene, base_dir: folder.to_owned(), name: String::new(), painted: Painted::default() };
     judged(Pipeline::new().effective(&loaded), |outcome| {
-        let pairs = biscale::accuracy::mirror_biased_pairs(24, 1);
+        let pairs = biscale::metrics::mirror_biased_pairs(24, 1);
         pairs.iter().all(|p| is_sound(outcome.brdf.eval(p.i, p.o))) && outcome.health().result.unsound_values == 0
     })
 }

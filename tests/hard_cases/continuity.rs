@@ -1,12 +1,14 @@
 //! No slider jumps: a Lipschitz probe along every numeric parameter of the catalogue.
 
-use biscale::accuracy::{compare, mirror_biased_pairs};
-use biscale::filtering::Reflectance;
-use biscale::large_scale::shading::Background;
-use biscale::large_scale::{Stage, render};
+use biscale::effective::Reflectance;
+use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::plan::{Preset, Settings};
-use biscale::scene::{self, Camera, Geometry, Light, LoadedScene, Painted, Shape, TermSpec};
+use biscale::render::Stage;
+use biscale::render::image::shading::Background;
+use biscale::render::render;
+use biscale::scene;
+use biscale::scene::{Camera, Geometry, Light, LoadedScene, Painted, Shape, TermSpec};
 use glam::Vec3;
 
 /// Parameters that stand for a whole number: where they jump, the tile says in a note what they were taken for.

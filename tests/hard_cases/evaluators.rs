@@ -4,12 +4,11 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::{Arc, LazyLock, Mutex};
 
-use biscale::Cancel;
-use biscale::accuracy::Health;
-use biscale::accuracy::health::{Evidence, Limits, Sight};
-use biscale::directions::ParaboloidMap;
-use biscale::filtering::{EffectiveBrdf, Form, MaterialFactors, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings};
+use biscale::base::Cancel;
+use biscale::diagnostics::{Evidence, Health, Limits, Sight};
+use biscale::effective::{EffectiveBrdf, Form, MaterialFactors, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings};
 use biscale::geometry::Facets;
+use biscale::math::directions::ParaboloidMap;
 use biscale::pipeline::Pipeline;
 use biscale::visibility::visibility_maps_cpu;
 

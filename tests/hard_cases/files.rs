@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use biscale::accuracy::mirror_biased_pairs;
+use biscale::metrics::mirror_biased_pairs;
 use biscale::pipeline::Pipeline;
 use glam::Vec3;
 

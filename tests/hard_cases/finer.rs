@@ -1,7 +1,7 @@
 //! Finer qualities: a case of each family at standard and fine, and the paper's own method at its full size.
 
-use biscale::accuracy::{compare, mirror_biased_pairs};
 use biscale::gpu::Gpu;
+use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use glam::Vec3;
 

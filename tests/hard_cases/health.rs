@@ -1,8 +1,9 @@
 //! Trouble is named, with what would mend it; where there is none, nothing is said.
 
-use biscale::accuracy::Health;
+use biscale::diagnostics::Health;
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, LoadedScene, Painted};
+use biscale::scene;
+use biscale::scene::{LoadedScene, Painted};
 
 fn health(tile: &str, brdf: &str, quality: &str) -> Health {
     let text = format!(

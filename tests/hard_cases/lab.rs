@@ -3,16 +3,19 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use biscale::accuracy::{Pair, Reference, ReferenceSettings, compare, mirror_biased_pairs};
-use biscale::directions::from_angles;
-use biscale::filtering::{EffectiveBrdf, Reflectance};
+use biscale::effective::{EffectiveBrdf, Reflectance};
+use biscale::math::directions::from_angles;
+use biscale::metrics::{Pair, compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, LoadedScene, Painted};
+use biscale::reference::{Reference, ReferenceSettings};
+use biscale::scene;
+use biscale::scene::{LoadedScene, Painted};
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::cases::{Case, brdfs, geometries};
-use crate::evaluators::{self, Evaluator};
+use crate::evaluators;
+use crate::evaluators::Evaluator;
 
 /// What was found of one case with one evaluator. Deviations are zero where the invariant holds exactly.
 #[derive(Debug, Clone)]
@@ -193,7 +196,7 @@ fn reference(case: &Case, folder: &Path, pairs: &[Pair], direct: &Evaluator) -> 
             reciprocity = reciprocity.max(f64::from(difference / error.max(1e-20)));
         }
     }
-    let squares = |pick: fn(&biscale::accuracy::Estimate) -> Vec3| -> f64 {
+    let squares = |pick: fn(&biscale::reference::Estimate) -> Vec3| -> f64 {
         found[..swapped].iter().map(|e| pick(e).as_dvec3().length_squared()).sum()
     };
     let (errors, values) = (squares(|e| e.standard_error), squares(|e| e.f_bar));

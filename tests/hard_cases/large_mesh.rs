@@ -5,9 +5,10 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use biscale::accuracy::{compare, mirror_biased_pairs};
+use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, LoadedScene, Painted};
+use biscale::scene;
+use biscale::scene::{LoadedScene, Painted};
 use glam::Vec3;
 
 /// A sheet of `2 n²` triangles over the tile whose points are `place(u, v)` with `u` and `v` from 0 to 1.

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use biscale::directions::from_angles;
-use biscale::filtering::Reflectance;
-use biscale::large_scale::shading::Background;
-use biscale::large_scale::{Stage, render};
-use biscale::scene::{self, LoadedScene, Painted};
+use biscale::effective::Reflectance;
+use biscale::math::directions::from_angles;
+use biscale::render::Stage;
+use biscale::render::image::shading::Background;
+use biscale::render::render;
+use biscale::scene;
+use biscale::scene::{LoadedScene, Painted};
 use glam::Vec3;
 
 /// A white matte surface that needs no small scale.
@@ -20,7 +22,7 @@ impl Reflectance for White {
     }
 }
 
-fn stage(folder: &Path, text: &str) -> biscale::Result<Stage> {
+fn stage(folder: &Path, text: &str) -> biscale::base::Result<Stage> {
     let scene = scene::parse(&format!("[tile]\ngeometry = {{ kind = \"flat\" }}\n{text}")).unwrap();
     let base_dir: PathBuf = folder.to_owned();
     Stage::new(&LoadedScene { scene, base_dir, name: String::new(), painted: Painted::default() })

@@ -1,10 +1,11 @@
 //! One case of each family on the graphics processor (lavapipe where there is none): finite, and what the CPU makes.
 
-use biscale::Cancel;
-use biscale::gpu::Gpu;
-use biscale::large_scale::shading::Background;
-use biscale::large_scale::{GpuRenderer, Stage, render};
+use biscale::base::Cancel;
+use biscale::gpu::{Gpu, GpuRenderer};
 use biscale::pipeline::Pipeline;
+use biscale::render::Stage;
+use biscale::render::image::shading::Background;
+use biscale::render::render;
 use biscale::scene::LoadedScene;
 
 use crate::cases::{Case, brdfs, geometries};

@@ -1,8 +1,10 @@
 //! Refining converges, and the number of threads changes no bit.
 
-use biscale::accuracy::{Pair, ReferenceSettings, compare, mirror_biased_pairs};
+use biscale::metrics::{Pair, compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
-use biscale::scene::{self, LoadedScene, Painted};
+use biscale::reference::ReferenceSettings;
+use biscale::scene;
+use biscale::scene::{LoadedScene, Painted};
 use glam::Vec3;
 
 fn open(geometry: &str, brdf: &str, quality: &str) -> LoadedScene {

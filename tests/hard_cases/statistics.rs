@@ -2,16 +2,16 @@
 
 use std::f64::consts::{PI, TAU};
 
-use biscale::accuracy::{Pair, mirror_biased_pairs, picture_pairs};
 use biscale::brdf::{Brdf, Term};
-use biscale::directions::from_angles;
-use biscale::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
-use biscale::scene;
+use biscale::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
+use biscale::math::directions::from_angles;
+use biscale::metrics::{Pair, mirror_biased_pairs, picture_pairs};
+use biscale::{geometry, scene};
 use glam::Vec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-#[path = "../../src/chi_square.rs"]
+#[path = "../../src/testing/chi_square.rs"]
 mod chi_square;
 
 use chi_square::p_value;

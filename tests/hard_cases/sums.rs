@@ -1,7 +1,8 @@
 //! A million facets: sums in f32 lanes against the same terms in f64.
 
-use biscale::directions::from_angles;
-use biscale::simd::{self, Lobe, PairVectors};
+use biscale::math::directions::from_angles;
+use biscale::math::simd;
+use biscale::math::simd::{Lobe, PairVectors};
 use glam::Vec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use biscale::accuracy::mirror_biased_pairs;
 use biscale::brdf::{Brdf, Term};
-use biscale::filtering::{Direct, EffectiveBrdf, FacetSum, Form, LowRank, SumMaterial};
-use biscale::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Form, LowRank, SumMaterial};
+use biscale::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
+use biscale::metrics::mirror_biased_pairs;
 use biscale::plan::{Preset, Settings};
-use biscale::scene;
-use biscale::visibility::{Horizons, PeriodicGrid, Slices, Visibility};
+use biscale::visibility::{Horizons, Slices, Visibility};
+use biscale::{geometry, scene};
 use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 

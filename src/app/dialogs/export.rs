@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use biscale::export::RadianceBasis;
-use biscale::export::tile::TileOptions;
+use crate::export::RadianceBasis;
+use crate::export::tile::TileOptions;
 use eframe::egui::{self, Context, DragValue, Grid, Ui};
 
 use crate::app::theme;
@@ -34,7 +34,7 @@ pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     asked(ctx, "Export the BRDF as a table", path, |ui| {
         match ending.as_str() {
-            _ if biscale::export::grid_is_free(path) => grid_ui(ui, choice),
+            _ if crate::export::grid_is_free(path) => grid_ui(ui, choice),
             "bsdf" => rgl_ui(ui, choice),
             "xml" => radiance_ui(ui, choice),
             _ => drop(ui.label("This format brings its own grid of directions.")),

@@ -84,13 +84,13 @@ mod tests {
 
     #[test]
     fn every_format_that_export_writes_is_offered_and_taken() {
-        for ending in biscale::export::endings() {
+        for ending in crate::export::endings() {
             assert!(MATERIALS.iter().any(|(known, ..)| *known == format!(".{ending}")), "{ending}");
         }
         for (at, (ending, ..)) in MATERIALS.iter().enumerate() {
             let name = with_ending(&MATERIALS, "my.cup.npz", at);
             assert_eq!(name, format!("my.cup{ending}"));
-            assert!(biscale::export::check_ending(Path::new(&name)).is_ok() || [".gltf", ".mtlx"].contains(ending));
+            assert!(crate::export::check_ending(Path::new(&name)).is_ok() || [".gltf", ".mtlx"].contains(ending));
             assert_eq!(with_ending(&MATERIALS, &name, 0), "my.cup.npz");
         }
     }

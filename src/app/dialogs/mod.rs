@@ -7,7 +7,7 @@ mod help;
 
 use std::path::PathBuf;
 
-use biscale::export::tile::TileOptions;
+use crate::export::tile::TileOptions;
 use eframe::egui::{self, Context};
 
 pub use files::{FileDialog, Purpose};

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use biscale::scene::{BrdfSpec, Geometry, Material, Pixels, Scene, TermSpec};
-use biscale::{InputError, Result, export};
+use crate::base::{InputError, Result};
+use crate::scene::{BrdfSpec, Geometry, Material, Pixels, Scene, TermSpec};
 use glam::Vec3;
 
 use super::{Change, Document};
@@ -52,7 +52,7 @@ impl Document {
         self.name_images(&mut scene, &stem);
         scene.validate()?;
         self.write_images(&scene, &folder)?;
-        export::replace_file(&path, scene.to_toml()?.as_bytes())?;
+        crate::base::replace_file(&path, scene.to_toml()?.as_bytes())?;
         if scene != *self.state.scene {
             let after = Arc::new(scene);
             let before = std::mem::replace(&mut self.state.scene, after.clone());
@@ -111,7 +111,7 @@ pub fn write_heights(image: &Pixels<f32>, path: &Path) -> Result<()> {
         Some("exr") => exr(&image.values.iter().map(|v| Vec3::splat(*v)).collect::<Vec<_>>(), image.size, path)?,
         _ => return Err(InputError::new("image", path.display(), "a name that ends in .png or .exr").into()),
     };
-    export::replace_file(path, &bytes)
+    crate::base::replace_file(path, &bytes)
 }
 
 /// Linear colours by the file's ending: `.exr` as they are, `.png` as sRGB of 8 bits.
@@ -121,7 +121,7 @@ pub fn write_heights(image: &Pixels<f32>, path: &Path) -> Result<()> {
 pub fn write_colors(image: &Pixels<Vec3>, path: &Path) -> Result<()> {
     let bytes = match ending(path).as_deref() {
         Some("png") => {
-            let srgb = |v: &Vec3| v.to_array().map(|c| biscale::large_scale::tone_map::srgb_byte(c.clamp(0.0, 1.0)));
+            let srgb = |v: &Vec3| v.to_array().map(|c| crate::render::image::tone_map::srgb_byte(c.clamp(0.0, 1.0)));
             let values: Vec<u8> = image.values.iter().flat_map(srgb).collect();
             let buffer = image::RgbImage::from_raw(image.size.x, image.size.y, values);
             png(buffer.map(image::DynamicImage::ImageRgb8), path)?
@@ -129,7 +129,7 @@ pub fn write_colors(image: &Pixels<Vec3>, path: &Path) -> Result<()> {
         Some("exr") => exr(&image.values, image.size, path)?,
         _ => return Err(InputError::new("image", path.display(), "a name that ends in .png or .exr").into()),
     };
-    export::replace_file(path, &bytes)
+    crate::base::replace_file(path, &bytes)
 }
 
 /// Slots as a grey `.png` of 8 bits.
@@ -141,7 +141,7 @@ pub fn write_slots(image: &Pixels<u8>, path: &Path) -> Result<()> {
         return Err(InputError::new("image", path.display(), "a name that ends in .png").into());
     }
     let buffer = image::GrayImage::from_raw(image.size.x, image.size.y, image.values.clone());
-    export::replace_file(path, &png(buffer.map(image::DynamicImage::ImageLuma8), path)?)
+    crate::base::replace_file(path, &png(buffer.map(image::DynamicImage::ImageLuma8), path)?)
 }
 
 fn ending(path: &Path) -> Option<String> {
@@ -150,7 +150,7 @@ fn ending(path: &Path) -> Option<String> {
 
 fn png(image: Option<image::DynamicImage>, path: &Path) -> Result<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    let image = image.ok_or_else(|| biscale::Error::failed("an image whose size is not that of its values"))?;
+    let image = image.ok_or_else(|| crate::base::Error::failed("an image whose size is not that of its values"))?;
     image
         .write_to(&mut bytes, image::ImageFormat::Png)
         .map_err(|error| InputError::new("image", error, "an image that PNG can hold").in_file(path))?;

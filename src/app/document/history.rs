@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use biscale::scene::{Painted, Pixels, Scene};
+use crate::scene::{Painted, Pixels, Scene};
 use glam::Vec3;
 
 /// What one entry changed, with both sides of it.
@@ -127,7 +127,7 @@ fn apply_patches<T: Copy + PartialEq>(image: &mut Option<Arc<Pixels<T>>>, patche
 
 fn scene_bytes(scene: &Scene) -> usize {
     let heights = match &scene.tile.geometry {
-        biscale::scene::Geometry::Heightfield(field) => {
+        crate::scene::Geometry::Heightfield(field) => {
             field.values.as_ref().map_or(0, |rows| rows.iter().map(|row| 24 + 4 * row.len()).sum())
         }
         _ => 0,

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use biscale::scene::{Geometry, Heightfield, Painted, Pixels, Scene};
+use crate::scene::{Geometry, Heightfield, Painted, Pixels, Scene};
 use glam::Vec3;
 
 use super::{Change, Document, Patch};

@@ -10,8 +10,9 @@ mod settings;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use biscale::Result;
-use biscale::scene::{self, LoadedScene, Painted, Scene};
+use crate::base::Result;
+use crate::scene;
+use crate::scene::{LoadedScene, Painted, Scene};
 
 use files::Stamp;
 pub use files::{make_absolute, write_colors, write_heights, write_slots};

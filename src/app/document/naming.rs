@@ -1,6 +1,6 @@
 //! What an edit is called: the first place in which two scenes differ, in words.
 
-use biscale::scene::Scene;
+use crate::scene::Scene;
 use toml::{Table, Value};
 
 /// The name of the edit from `old` to `new`: `Depth`, `Roughness of "sides"`, `Turn the view`.

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use biscale::export::replace_file;
-use biscale::scene::{self, LoadedScene, Painted};
-use biscale::{Error, Result};
+use crate::base::{Error, Result, replace_file};
+use crate::scene;
+use crate::scene::{LoadedScene, Painted};
 use serde::{Deserialize, Serialize};
 
 use super::Document;
@@ -131,15 +131,15 @@ impl Recovered {
         let mut painted = Painted::default();
         if self.header.heights {
             let file = image("_heights.exr");
-            painted.heights = Some(biscale::geometry::image_file::read_heights(Path::new(""), &file)?.into());
+            painted.heights = Some(crate::geometry::image_file::read_heights(Path::new(""), &file)?.into());
         }
         if self.header.colors {
             let file = image("_colors.exr");
-            painted.colors = Some(biscale::geometry::image_file::read_colors(Path::new(""), &file)?.into());
+            painted.colors = Some(crate::geometry::image_file::read_colors(Path::new(""), &file)?.into());
         }
         if self.header.slots {
             let file = image("_materials.png");
-            painted.slots = Some(biscale::geometry::image_file::read_slots(Path::new(""), &file)?.into());
+            painted.slots = Some(crate::geometry::image_file::read_slots(Path::new(""), &file)?.into());
         }
         let loaded = LoadedScene { scene, base_dir: self.header.base_dir.clone(), name: self.name.clone(), painted };
         let mut document = Document::new(loaded, self.header.path.clone());

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use biscale::export::replace_file;
+use crate::base::replace_file;
 use serde::{Deserialize, Serialize};
 
 const RECENT: usize = 10;

@@ -1,7 +1,7 @@
 //! One dab of a brush.
 
-use biscale::geometry::image_file;
-use biscale::scene::Pixels;
+use crate::geometry::image_file;
+use crate::scene::Pixels;
 use glam::{IVec2, Vec2, Vec3};
 use std::path::Path;
 

@@ -8,8 +8,8 @@ mod tests;
 pub use brush::{Brush, Tool};
 pub use stroke::Stroke;
 
-use biscale::geometry::image_file;
-use biscale::scene::{Geometry, LoadedScene, Pixels};
+use crate::geometry::image_file;
+use crate::scene::{Geometry, LoadedScene, Pixels};
 use glam::{UVec2, Vec3};
 
 /// Samples a side of new heights (Wu et al. 2011, Sec. 5: 128), and of new colours and materials, whose edges show.
@@ -20,7 +20,7 @@ const NEW_PRINT_SIDE: u32 = 256;
 ///
 /// # Errors
 /// The scene's image cannot be read.
-pub fn heights_of(loaded: &LoadedScene) -> biscale::Result<Pixels<f32>> {
+pub fn heights_of(loaded: &LoadedScene) -> crate::base::Result<Pixels<f32>> {
     if let Some(painted) = &loaded.painted.heights
         && matches!(loaded.scene.tile.geometry, Geometry::Heightfield(_))
     {
@@ -43,7 +43,7 @@ pub fn heights_of(loaded: &LoadedScene) -> biscale::Result<Pixels<f32>> {
 ///
 /// # Errors
 /// The scene's image cannot be read.
-pub fn colors_of(loaded: &LoadedScene) -> biscale::Result<Pixels<Vec3>> {
+pub fn colors_of(loaded: &LoadedScene) -> crate::base::Result<Pixels<Vec3>> {
     match (&loaded.painted.colors, &loaded.scene.tile.color_path) {
         (Some(painted), _) => Ok((**painted).clone()),
         (None, Some(path)) => image_file::read_colors(&loaded.base_dir, path),
@@ -55,7 +55,7 @@ pub fn colors_of(loaded: &LoadedScene) -> biscale::Result<Pixels<Vec3>> {
 ///
 /// # Errors
 /// The scene's image cannot be read.
-pub fn slots_of(loaded: &LoadedScene) -> biscale::Result<Pixels<u8>> {
+pub fn slots_of(loaded: &LoadedScene) -> crate::base::Result<Pixels<u8>> {
     match (&loaded.painted.slots, &loaded.scene.tile.slot_path) {
         (Some(painted), _) => Ok((**painted).clone()),
         (None, Some(path)) => image_file::read_slots(&loaded.base_dir, path),
@@ -68,7 +68,7 @@ fn blank<T: Clone>(side: u32, value: T) -> Pixels<T> {
 }
 
 /// Any surface as heights from 0 to 1, seen from above, and the height of 1.
-pub fn relief_of(tile: &biscale::close_up::CloseUp) -> (Pixels<f32>, f32) {
+pub fn relief_of(tile: &crate::render::tile_view::CloseUp) -> (Pixels<f32>, f32) {
     let size = UVec2::splat(NEW_SIDE);
     let (low, high) = tile.mesh.z_range();
     let range = high - low;

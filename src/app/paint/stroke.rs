@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use biscale::scene::{Painted, Pixels};
+use crate::scene::{Painted, Pixels};
 use glam::{Vec2, Vec3};
 
 use super::brush::{Brush, Tool};

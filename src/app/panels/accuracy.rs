@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use biscale::accuracy::ladder;
-use biscale::plan::{Effect, Settings};
-use biscale::report::EffectCost;
-use biscale::scene::{LoadedScene, Quality, Scene};
+use crate::plan::{Effect, Settings};
+use crate::report::EffectCost;
+use crate::scene::{LoadedScene, Quality, Scene};
+use crate::tuning::ladder;
 use eframe::egui::{
     self, Align2, Color32, Context, FontId, Sense, Slider, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use biscale::scene::{Field, Kind, Shape};
+use crate::scene::{Field, Kind, Shape};
 use eframe::egui::{self, DragValue, Slider, SliderClamping, Ui};
 use toml::Value;
 

@@ -1,8 +1,8 @@
 //! Every effect of the plan: on or off, why, what it takes; and a switch to force it.
 
-use biscale::plan::Effect;
-use biscale::report::switches;
-use biscale::scene::{Scene, Switch};
+use crate::plan::Effect;
+use crate::report::switches;
+use crate::scene::{Scene, Switch};
 use eframe::egui::{self, ComboBox, DragValue, Ui};
 
 use super::{AccuracyState, fields};

@@ -1,6 +1,6 @@
 //! Widgets from the scene catalogue: a field's shape decides its control; its range, unit and text come along.
 
-use biscale::scene::{Field, Shape};
+use crate::scene::{Field, Shape};
 use eframe::egui::{self, Align, Layout, RichText, Ui};
 use toml::Table;
 

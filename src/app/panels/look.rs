@@ -1,6 +1,6 @@
 //! The large scale: object, light, camera, quality.
 
-use biscale::scene::{Camera, Light, Object, Quality, Scene};
+use crate::scene::{Camera, Light, Object, Quality, Scene};
 use eframe::egui::{self, Ui};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -56,7 +56,7 @@ pub fn light_ui(ui: &mut Ui, light: &mut Light, around: &mut Around) {
     for (at, lamp) in light.directional.iter_mut().enumerate() {
         ui.push_id(("lamp", at), |ui| {
             egui::CollapsingHeader::new(format!("Lamp {}", at + 1)).show(ui, |ui| {
-                edit(ui, lamp, &biscale::scene::DirectionalSpec::fields(), &[], around);
+                edit(ui, lamp, &crate::scene::DirectionalSpec::fields(), &[], around);
                 if ui.button("Remove lamp").clicked() {
                     removed = Some(at);
                 }
@@ -68,7 +68,7 @@ pub fn light_ui(ui: &mut Ui, light: &mut Light, around: &mut Around) {
     }
     if ui.button("Add a lamp").on_hover_text("A directional light besides the environment").clicked() {
         let direction = glam::Vec3::new(-0.5, 0.8, 0.6);
-        light.directional.push(biscale::scene::DirectionalSpec { direction, irradiance: glam::Vec3::splat(2.0) });
+        light.directional.push(crate::scene::DirectionalSpec { direction, irradiance: glam::Vec3::splat(2.0) });
     }
 }
 
@@ -112,7 +112,7 @@ pub fn quality_ui(ui: &mut Ui, quality: &mut Quality, around: &mut Around) {
 fn edit<T: Serialize + DeserializeOwned>(
     ui: &mut Ui,
     place: &mut T,
-    fields: &[biscale::scene::Field],
+    fields: &[crate::scene::Field],
     skip: &[&str],
     around: &mut Around,
 ) {

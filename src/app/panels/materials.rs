@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use biscale::scene::{BrdfSpec, Geometry, Material, Scene, TermSpec};
+use crate::scene::{BrdfSpec, Geometry, Material, Scene, TermSpec};
 use eframe::egui::{self, RichText, Ui};
 use glam::Vec3;
 use toml::Table;

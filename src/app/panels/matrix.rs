@@ -1,6 +1,6 @@
 //! A weave's pattern: a name, or a matrix to click on.
 
-use biscale::scene::FloatPattern;
+use crate::scene::FloatPattern;
 use eframe::egui::{self, Color32, Sense, Ui, vec2};
 use toml::Value;
 

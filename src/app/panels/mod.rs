@@ -10,8 +10,8 @@ mod matrix;
 pub mod paints;
 pub mod surface;
 
-use biscale::plan::Effect;
-use biscale::scene::{Painted, Scene};
+use crate::plan::Effect;
+use crate::scene::{Painted, Scene};
 use eframe::egui::{self, RichText, Ui};
 
 pub use accuracy::AccuracyState;

@@ -1,8 +1,8 @@
 //! Materials that are painted over the tile, in the slots `paint_1` and on.
 
-use biscale::geometry::image_file::MOST_SLOTS;
-use biscale::geometry::painted_slot;
-use biscale::scene::{BrdfSpec, Material, Scene, TermSpec};
+use crate::geometry::image_file::MOST_SLOTS;
+use crate::geometry::painted_slot;
+use crate::scene::{BrdfSpec, Material, Scene, TermSpec};
 use glam::Vec3;
 
 use super::materials::grey;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use biscale::scene::{Field, Geometry, Heightfield, Painted, Scene, Tile};
+use crate::scene::{Field, Geometry, Heightfield, Painted, Scene, Tile};
 use eframe::egui::Ui;
 use toml::{Table, Value};
 
@@ -57,7 +57,7 @@ fn starting(kind: &str, painted: &Painted, name: &str) -> Option<Geometry> {
 pub fn of_file(path: &Path, scene: &Scene) -> Option<Geometry> {
     let ending = path.extension()?.to_str()?.to_ascii_lowercase();
     match ending.as_str() {
-        "obj" => Some(Geometry::Mesh(biscale::scene::MeshFile { path: path.to_owned() })),
+        "obj" => Some(Geometry::Mesh(crate::scene::MeshFile { path: path.to_owned() })),
         "png" | "tif" | "tiff" | "jpg" | "jpeg" => {
             let height_scale = match &scene.tile.geometry {
                 Geometry::Heightfield(field) => field.height_scale,

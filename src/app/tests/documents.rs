@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use biscale::scene::{Geometry, Pixels};
+use crate::scene::{Geometry, Pixels};
 use glam::{UVec2, Vec2, Vec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -103,7 +103,7 @@ fn what_is_saved_and_opened_again_is_the_same_with_its_painted_images() {
     assert_eq!(opened.scene(), document.scene());
     let mesh = |document: &Document| {
         let loaded = document.loaded();
-        biscale::geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted).unwrap()
+        crate::geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted).unwrap()
     };
     let (ours, theirs) = (mesh(&document), mesh(&opened));
     assert_eq!(ours.positions, theirs.positions);
@@ -121,7 +121,7 @@ fn files_that_a_scene_names_are_found_after_it_is_saved_elsewhere() {
     document.save_as(&new.path().join("b.toml")).unwrap();
     let opened = Document::open(new.path().join("b.toml").to_str().unwrap()).unwrap();
     let loaded = opened.loaded();
-    biscale::geometry::build(&loaded.scene.tile, &loaded.base_dir).unwrap();
+    crate::geometry::build(&loaded.scene.tile, &loaded.base_dir).unwrap();
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Exports from their dialogs.
 
-use biscale::export::tile::TileOptions;
+use crate::export::tile::TileOptions;
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 

@@ -1,6 +1,6 @@
 //! The interface through its accessible nodes, as a person with a keyboard or a screen reader uses it.
 
-use biscale::scene::{BrdfSpec, Geometry, TermSpec};
+use crate::scene::{BrdfSpec, Geometry, TermSpec};
 use eframe::egui::{Key, Modifiers, Ui};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -259,7 +259,7 @@ fn the_effects_panel_forces_an_effect_and_the_picture_follows() {
     harness.run_steps(4);
     assert!(harness.query_by_label("Visibility").is_some() && harness.query_by_label("Interreflection").is_some());
     let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.effects.visibility = biscale::scene::Switch::Off;
+    scene.effects.visibility = crate::scene::Switch::Off;
     editor(&mut harness).document.edit(scene);
     harness.run_steps(1);
     settle(&mut harness);
@@ -279,7 +279,7 @@ fn the_picture_that_is_asked_for_before_the_window_has_the_size_of_its_view() {
         move |ui: &mut Ui, state: &mut Option<(Editor, _)>| {
             let ctx = ui.ctx().clone();
             let (editor, _) = state.get_or_insert_with(|| {
-                let mut editor = Editor::new(&ctx, document.take().unwrap(), None, biscale::cache::Cache::off());
+                let mut editor = Editor::new(&ctx, document.take().unwrap(), None, crate::cache::Cache::off());
                 // The harness leaves 8 points free on each side.
                 editor.settings.window = [1384.0, 984.0];
                 editor.ask_early();

@@ -13,7 +13,8 @@ mod trouble;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use biscale::scene::{self, Painted};
+use crate::scene;
+use crate::scene::Painted;
 use eframe::egui;
 use egui_kittest::Harness;
 
@@ -57,7 +58,7 @@ fn harness(document: Document) -> Harness<'static, Option<Editor>> {
         move |ui: &mut egui::Ui, editor: &mut Option<Editor>| {
             let ctx = ui.ctx().clone();
             let editor = editor.get_or_insert_with(|| {
-                let mut editor = Editor::new(&ctx, document.take().unwrap(), None, biscale::cache::Cache::off());
+                let mut editor = Editor::new(&ctx, document.take().unwrap(), None, crate::cache::Cache::off());
                 // Thumbnails are not what is tested.
                 editor.settings.gallery = false;
                 editor

@@ -1,7 +1,7 @@
 //! What a person meets in the first hour: the gallery, a measured paint, names for a screen reader.
 
-use biscale::export::tile::TileOptions;
-use biscale::scene::{BrdfSpec, Geometry, TermSpec};
+use crate::export::tile::TileOptions;
+use crate::scene::{BrdfSpec, Geometry, TermSpec};
 use eframe::egui::{self, Key};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;

@@ -1,7 +1,8 @@
 //! Colours and materials painted over the tile, from the hand to the reflection.
 
-use biscale::pipeline::Pipeline;
-use biscale::scene::{self, LoadedScene, Painted, Pixels};
+use crate::pipeline::Pipeline;
+use crate::scene;
+use crate::scene::{LoadedScene, Painted, Pixels};
 use glam::{UVec2, Vec2, Vec3};
 
 use super::{editor, harness, quick, settle};
@@ -93,8 +94,8 @@ fn painted_materials_are_saved_beside_the_scene_named_in_it_and_reopened_equal()
     assert_eq!(Some(slots), editor.document.painted().slots.as_deref().cloned());
     let facets = |document: &Document| {
         let loaded = document.loaded();
-        let mesh = biscale::geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted).unwrap();
-        biscale::geometry::Facets::sample(&mesh, 500, 0)
+        let mesh = crate::geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted).unwrap();
+        crate::geometry::Facets::sample(&mesh, 500, 0)
     };
     assert_eq!(facets(&opened), facets(&editor.document));
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use biscale::pipeline::Pipeline;
-use biscale::scene::{Geometry, OBJECT_KINDS, Scene, TermSpec};
+use crate::pipeline::Pipeline;
+use crate::scene::{Geometry, OBJECT_KINDS, Scene, TermSpec};
 use glam::{Vec2, Vec3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -49,7 +49,7 @@ fn compare_with_nothing_kept(harness: &mut egui_kittest::Harness<'static, Option
     let editor = editor(harness);
     let afresh = Pipeline::new().effective(&editor.document.loaded()).unwrap().brdf;
     let made = editor.object.made.as_ref().unwrap();
-    for pair in biscale::accuracy::mirror_biased_pairs(64, 7) {
+    for pair in crate::metrics::mirror_biased_pairs(64, 7) {
         assert_eq!(made.brdf.as_ref().unwrap().eval(pair.i, pair.o), afresh.eval(pair.i, pair.o));
     }
 }
@@ -105,7 +105,7 @@ fn soak(edits: usize, seed: u64) {
             assert_eq!(text.lines().filter(|line| !line.starts_with('#')).count(), 1 + 64, "{text}");
         }
         if let Ok(text) = std::fs::read_to_string(&saved) {
-            biscale::scene::parse(&text).unwrap();
+            crate::scene::parse(&text).unwrap();
         }
         if steps % CHECK == 0 {
             compare_with_nothing_kept(&mut harness);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use biscale::scene::{BrdfSpec, TermSpec};
+use crate::scene::{BrdfSpec, TermSpec};
 use eframe::egui::mutex::RwLock;
 use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::Harness;
@@ -16,7 +16,7 @@ use crate::app::worker::{Devices, Image, LOSE_DEVICE, Screen};
 
 #[test]
 fn a_lost_device_is_a_message_and_pictures_go_on_on_the_processor() {
-    if let Err(error) = biscale::gpu::Gpu::open() {
+    if let Err(error) = crate::gpu::Gpu::open() {
         return eprintln!("SKIPPED: {error}");
     }
     let mut harness = harness(quick());
@@ -52,14 +52,14 @@ fn a_lost_device_is_a_message_and_pictures_go_on_on_the_processor() {
 
 /// A device as a window's, and what would draw the interface there.
 fn screen() -> Option<Screen> {
-    let own = biscale::gpu::Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()?;
-    let gpu = biscale::gpu::Gpu::of_window(own.adapter, own.device, own.queue, || {});
+    let own = crate::gpu::Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()?;
+    let gpu = crate::gpu::Gpu::of_window(own.adapter, own.device, own.queue, || {});
     let format = wgpu::TextureFormat::Rgba8Unorm;
     let interface = eframe::egui_wgpu::Renderer::new(&gpu.device, format, Default::default());
     Some(Screen::new(gpu.into(), Arc::new(RwLock::new(interface))))
 }
 
-fn on_gpu(document: &Document) -> biscale::scene::Scene {
+fn on_gpu(document: &Document) -> crate::scene::Scene {
     let mut scene = (**document.scene()).clone();
     scene.quality.backend = "gpu".to_owned();
     scene
@@ -111,9 +111,9 @@ fn on_a_graphics_processor_an_edit_s_first_picture_takes_no_visibility_of_the_cp
     let scene = QUICK
         .replace("{ kind = \"grooves\", count = 2 }", "{ kind = \"heightfield\", path = \"asset:ripples.png\" }")
         .replace("backend = \"cpu\"", "backend = \"gpu\"");
-    let scene = biscale::scene::parse(&scene).unwrap();
-    let painted = biscale::scene::Painted::default();
-    let loaded = biscale::scene::LoadedScene { scene, base_dir: "".into(), name: "ripples".into(), painted };
+    let scene = crate::scene::parse(&scene).unwrap();
+    let painted = crate::scene::Painted::default();
+    let loaded = crate::scene::LoadedScene { scene, base_dir: "".into(), name: "ripples".into(), painted };
     let mut harness = harness(Document::new(loaded, None));
     // Software, taken for a graphics processor.
     let mut screen = screen;
@@ -152,7 +152,7 @@ fn a_window_s_device_that_is_lost_leaves_pictures_to_the_processor() {
     harness.step();
     settle(&mut harness);
     screen.gpu.device.destroy();
-    let scene = biscale::scene::Scene { light: biscale::scene::Light { count: 3, ..scene.light.clone() }, ..scene };
+    let scene = crate::scene::Scene { light: crate::scene::Light { count: 3, ..scene.light.clone() }, ..scene };
     editor(&mut harness).document.edit(scene);
     harness.step();
     settle(&mut harness);

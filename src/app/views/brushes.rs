@@ -1,8 +1,8 @@
 //! The brush, under the tile.
 
-use biscale::geometry::image_file::MOST_SLOTS;
-use biscale::geometry::painted_slot;
-use biscale::scene::{Scene, shipped};
+use crate::geometry::image_file::MOST_SLOTS;
+use crate::geometry::painted_slot;
+use crate::scene::{Scene, shipped};
 use eframe::egui::{self, Slider, Ui};
 
 use crate::app::paint::{Brush, Tool};

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use biscale::scene::shipped;
+use crate::scene::shipped;
 use eframe::egui::{self, Color32, Context, Rect, RichText, ScrollArea, Sense, TextureHandle, Ui, pos2, vec2};
 
 use crate::app::worker::{Thumbnail, ThumbnailJob};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use biscale::directions::{from_angles, to_angles};
-use biscale::filtering::EffectiveBrdf;
+use crate::effective::EffectiveBrdf;
+use crate::math::directions::{from_angles, to_angles};
 use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, TextureHandle, Ui, pos2, vec2};
 use glam::Vec3;
 

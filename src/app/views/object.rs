@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::scene::{Camera, OBJECT_KINDS, Scene};
+use crate::scene::{Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureId, TextureOptions, Ui,
     pos2, vec2,

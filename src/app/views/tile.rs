@@ -3,8 +3,8 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-use biscale::close_up::TileView;
-use biscale::scene::{Camera, Light, LoadedScene, Material, Painted, Tile};
+use crate::render::tile_view::TileView;
+use crate::scene::{Camera, Light, LoadedScene, Material, Painted, Tile};
 use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, Ui, pos2, vec2,
 };

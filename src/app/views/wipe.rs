@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use biscale::scene::Scene;
+use crate::scene::Scene;
 use eframe::egui::{self, Color32, ColorImage, CursorIcon, Pos2, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2};
 
 use super::object::{ObjectView, covered};

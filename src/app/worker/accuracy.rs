@@ -4,14 +4,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::accuracy::candidates::with_settings;
-use biscale::accuracy::ladder;
-use biscale::accuracy::progressive::{Compared, ProgressiveReference};
-use biscale::large_scale::Picture;
-use biscale::pipeline::Pipeline;
-use biscale::report::{EffectCost, Studio, heat, measure_effects};
-use biscale::scene::{LoadedScene, Quality};
-use biscale::{Error, Result};
+use crate::base::{Error, Result};
+use crate::pipeline::Pipeline;
+use crate::render::Picture;
+use crate::report::{EffectCost, Studio, heat, measure_effects};
+use crate::scene::{LoadedScene, Quality};
+use crate::tuning::candidates::with_settings;
+use crate::tuning::ladder;
+use crate::tuning::progressive::{Compared, ProgressiveReference};
 use eframe::egui::ColorImage;
 
 use super::runner::Desk;
@@ -229,7 +229,7 @@ fn difference(studio: &Studio, now: &Picture, right: &Picture, noise: Option<f32
 
 fn picture(width: usize, height: usize, delta_e: &[f32]) -> ColorImage {
     let color = |delta: &f32| {
-        let [r, g, b] = heat(*delta).to_array().map(biscale::large_scale::tone_map::srgb_byte);
+        let [r, g, b] = heat(*delta).to_array().map(crate::render::image::tone_map::srgb_byte);
         eframe::egui::Color32::from_rgb(r, g, b)
     };
     ColorImage::new([width, height], delta_e.iter().map(color).collect())

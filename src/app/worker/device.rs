@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use biscale::filtering::{EffectiveBrdf, Form};
-use biscale::gpu::{Gpu, GpuError, Tier};
-use biscale::large_scale::shadow::Occluder;
-use biscale::large_scale::{GpuRenderer, ObjectMesh};
-use biscale::pipeline::Unseen;
-use biscale::{Cancel, Error, Result};
+use crate::base::{Cancel, Error, Result};
+use crate::effective::{EffectiveBrdf, Form};
+use crate::gpu::{Gpu, GpuError, GpuRenderer, Tier};
+use crate::pipeline::Unseen;
+use crate::render::ObjectMesh;
+use crate::render::shadow::Occluder;
 
 use super::screen::Screen;
 use super::studio::{Shot, Worn};

@@ -3,16 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use biscale::cache::Cache;
-use biscale::close_up::CloseUp;
-use biscale::export::tile::TileOptions;
-use biscale::export::{self, ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
-use biscale::fit::{self, Model};
-use biscale::geometry::TileMesh;
-use biscale::large_scale::tone_map::ToneMap;
-use biscale::pipeline::{Outcome, Pipeline};
-use biscale::scene::LoadedScene;
-use biscale::{Cancel, Error, Progress, Result};
+use crate::base::{Cancel, Error, Progress, Result};
+use crate::cache::Cache;
+use crate::export::tile::TileOptions;
+use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
+use crate::fit::Model;
+use crate::geometry::TileMesh;
+use crate::pipeline::{Outcome, Pipeline};
+use crate::render::image::tone_map::ToneMap;
+use crate::render::tile_view::CloseUp;
+use crate::scene::LoadedScene;
+use crate::{export, fit};
 
 use super::runner::Desk;
 use super::studio::{Close, Shot, Studio, Worn};
@@ -130,7 +131,7 @@ fn fitted(job: &ExportJob, outcome: &Outcome, progress: &Progress<'_>) -> Result
     let fit = fit::fit(&outcome.brdf, model, progress)?;
     let is_gltf = job.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
     let text = if is_gltf { fit::gltf(&fit, &job.loaded.name) } else { fit::materialx(&fit, &job.loaded.name) };
-    export::replace_file(&job.path, text.as_bytes())?;
+    crate::base::replace_file(&job.path, text.as_bytes())?;
     Ok(format!(
         "Wrote {}: {}; the few parameters are {:.1} % from the material ({:.1} dB). A table keeps all of it.",
         job.path.display(),

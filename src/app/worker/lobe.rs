@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use biscale::directions::from_angles;
-use biscale::filtering::{EffectiveBrdf, Reflectance};
+use crate::effective::{EffectiveBrdf, Reflectance};
+use crate::math::directions::from_angles;
 use eframe::egui::{Color32, ColorImage};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -75,7 +75,7 @@ pub fn work(job: &LobeJob, desk: &Desk<LobeJob>, answer: &dyn Fn(LobeMade)) {
             None => Color32::TRANSPARENT,
             Some(value) => {
                 let shown = if job.log { logarithmic(*value / most) } else { *value / most };
-                let [r, g, b] = shown.to_array().map(biscale::large_scale::tone_map::srgb_byte);
+                let [r, g, b] = shown.to_array().map(crate::render::image::tone_map::srgb_byte);
                 Color32::from_rgb(r, g, b)
             }
         };

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::filtering::EffectiveBrdf;
-use biscale::large_scale::{DirectionalLight, ObjectMesh, Picture};
-use biscale::plan::Effect;
-use biscale::scene::{Camera, LoadedScene};
+use crate::effective::EffectiveBrdf;
+use crate::plan::Effect;
+use crate::render::{DirectionalLight, ObjectMesh, Picture};
+use crate::scene::{Camera, LoadedScene};
 use eframe::egui::ColorImage;
 
 use super::screen::DeviceImage;

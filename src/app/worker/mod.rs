@@ -18,7 +18,7 @@ mod tone;
 use std::sync::Arc;
 use std::time::Duration;
 
-use biscale::cache::Cache;
+use crate::cache::Cache;
 
 use super::document::Snapshot;
 

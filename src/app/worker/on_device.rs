@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use biscale::Result;
-use biscale::pipeline::{Pipeline, Unseen};
-use biscale::plan::{Preset, Route, Settings};
-use biscale::scene::{LoadedScene, Quality};
+use crate::base::Result;
+use crate::pipeline::{Pipeline, Unseen};
+use crate::plan::{Preset, Route, Settings};
+use crate::scene::{LoadedScene, Quality};
 
 use super::shared::{SmallScale, small_scale};
 

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use biscale::cache::Cache;
-use biscale::close_up::CloseUp;
-use biscale::large_scale::tone_map::ToneMap;
-use biscale::pipeline::Pipeline;
-use biscale::plan::Preset;
-use biscale::scene::{Camera, LoadedScene};
-use biscale::{Cancel, Error, Result};
+use crate::base::{Cancel, Error, Result};
+use crate::cache::Cache;
+use crate::pipeline::Pipeline;
+use crate::plan::Preset;
+use crate::render::image::tone_map::ToneMap;
+use crate::render::tile_view::CloseUp;
+use crate::scene::{Camera, LoadedScene};
 
 use super::made::{Grade, Image, Made, PictureAnswer, PictureJob};
 use super::on_device::{DeviceDrafts, as_preset};

@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use biscale::Cancel;
+use crate::base::Cancel;
 
 /// What a worker hands to its work besides the job.
 pub struct Desk<'a, J> {

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use biscale::gpu::{Gpu, GpuError, Tier};
-use biscale::large_scale::gpu_picture;
+use crate::gpu::render::picture;
+use crate::gpu::{Gpu, GpuError, Tier};
 use eframe::egui::mutex::RwLock;
 use eframe::egui::{ColorImage, TextureId};
 use eframe::egui_wgpu::Renderer;
@@ -37,7 +37,7 @@ impl Screen {
     }
 
     fn image(&self, size: [usize; 2]) -> Result<DeviceImage, GpuError> {
-        let texture = gpu_picture::image(&self.gpu, size)?;
+        let texture = picture::image(&self.gpu, size)?;
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.gpu.checked("showing a picture", || {
             let filter = wgpu::FilterMode::Linear;

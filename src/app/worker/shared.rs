@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use biscale::pipeline::Outcome;
-use biscale::scene::{Effects, LoadedScene, Material, Painted, Quality, Tile};
+use crate::pipeline::Outcome;
+use crate::scene::{Effects, LoadedScene, Material, Painted, Quality, Tile};
 
 use super::made::Made;
 use super::screen::Screen;

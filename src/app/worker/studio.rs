@@ -5,20 +5,23 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::close_up::{CloseUp, Wearing, on_object};
-use biscale::filtering::{Black, EffectiveBrdf, Reflectance, SumMaterial};
-use biscale::large_scale::environment::{self, Environment};
-use biscale::large_scale::light_choice::worth_shading;
-use biscale::large_scale::lights::{self, Lights};
-use biscale::large_scale::render::StageTimes;
-use biscale::large_scale::shading::Background;
-use biscale::large_scale::shadow::Occluder;
-use biscale::large_scale::shadow_cache::ShadowCache;
-use biscale::large_scale::tone_map::ToneMap;
-use biscale::large_scale::{CameraView, DirectionalLight, ObjectMesh, RenderInput, Rendered, objects, render};
-use biscale::pipeline::{Outcome, Unseen};
-use biscale::scene::{self, Camera, LoadedScene, Switch};
-use biscale::{Cancel, Error, Result};
+use crate::base::{Cancel, Error, Result};
+use crate::effective::{Black, EffectiveBrdf, Reflectance, SumMaterial};
+use crate::pipeline::{Outcome, Unseen};
+use crate::render::image::render::StageTimes;
+use crate::render::image::shading::Background;
+use crate::render::image::tone_map::ToneMap;
+use crate::render::lighting::environment::Environment;
+use crate::render::lighting::light_choice::worth_shading;
+use crate::render::lighting::lights::Lights;
+use crate::render::lighting::{environment, lights};
+use crate::render::render;
+use crate::render::shadow::Occluder;
+use crate::render::shadow::shadow_cache::ShadowCache;
+use crate::render::tile_view::{CloseUp, Wearing, on_object};
+use crate::render::{CameraView, DirectionalLight, ObjectMesh, RenderInput, Rendered, object};
+use crate::scene;
+use crate::scene::{Camera, LoadedScene, Switch};
 use glam::Vec3;
 
 use super::device::{Device, Subject};
@@ -81,7 +84,7 @@ impl Studio {
         let shadow = loaded.scene.effects.self_shadow;
         let key = (loaded.scene.object.clone(), loaded.base_dir.clone(), shadow);
         if self.object.as_ref().is_none_or(|object| object.key != key) {
-            let mesh = Arc::new(objects::build(&key.0, &key.1)?);
+            let mesh = Arc::new(object::build(&key.0, &key.1)?);
             let occluder = match key.2 {
                 Switch::Off => None,
                 Switch::On => Some(Occluder::always(&mesh)),

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use biscale::Result;
-use biscale::large_scale::tone_map::ToneMap;
-use biscale::pipeline::Pipeline;
-use biscale::scene::{self, Quality};
+use crate::base::Result;
+use crate::pipeline::Pipeline;
+use crate::render::image::tone_map::ToneMap;
+use crate::scene;
+use crate::scene::Quality;
 use eframe::egui::ColorImage;
 
 use super::runner::Desk;

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use biscale::close_up::{CloseUp, Look, TileView, Wearing};
-use biscale::geometry::Facets;
-use biscale::large_scale::DirectionalLight;
-use biscale::large_scale::lights;
-use biscale::large_scale::tone_map::{ToneCurve, ToneMap};
-use biscale::pipeline::Pipeline;
-use biscale::scene::{Light, LoadedScene, Painted, Tile};
-use biscale::{Error, Result};
+use crate::base::{Error, Result};
+use crate::geometry::Facets;
+use crate::pipeline::Pipeline;
+use crate::render::DirectionalLight;
+use crate::render::image::tone_map::{ToneCurve, ToneMap};
+use crate::render::lighting::lights;
+use crate::render::tile_view::{CloseUp, Look, TileView, Wearing};
+use crate::scene::{Light, LoadedScene, Painted, Tile};
 use eframe::egui::ColorImage;
 use glam::Vec3;
 
@@ -92,7 +92,7 @@ impl Macro {
         for (at, view) in passes.iter().enumerate() {
             let start = Instant::now();
             // The first pass is never given up: the picture follows the hand.
-            let never = biscale::Cancel::default();
+            let never = crate::base::Cancel::default();
             let cancel = if at == 0 { &never } else { desk.cancel };
             let picture = tile.picture(view, &look, wearing, Vec3::splat(0.02), cancel)?;
             let ms = start.elapsed().as_secs_f64() * 1e3;

@@ -1,7 +1,7 @@
 //! From linear radiance to a texture.
 
-use biscale::large_scale::Picture;
-use biscale::large_scale::tone_map::{ToneMap, srgb_byte};
+use crate::render::Picture;
+use crate::render::image::tone_map::{ToneMap, srgb_byte};
 use eframe::egui::{Color32, ColorImage};
 use rayon::prelude::*;
 

@@ -18,9 +18,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::LobeAngles;
-use super::half_difference::{HalfDifferenceTable, bin_angles, cosines, row_bins};
-use super::measured::{Measured, MeasuredReport};
-use crate::error::{InputError, Result};
+use super::half_difference::{bin_angles, cosines, row_bins};
+use super::{HalfDifferenceTable, Measured, MeasuredReport};
+use crate::base::{InputError, Result};
 use table::RglTable;
 use tensor_file::TensorFile;
 

@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use super::tensor_file::TensorFile;
 use super::warp::{Between, Blend, Grid, Warp};
+use crate::base::InputError;
 use crate::brdf::spectrum::rgb_weights;
-use crate::error::InputError;
 
 /// The coordinate of an elevation on the unit square, `√(2θ/π)`.
 pub(crate) fn u_of_theta(theta: f64) -> f64 {

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use crate::error::InputError;
+use crate::base::InputError;
 
 const MAGIC: &[u8; 12] = b"tensor_file\0";
 /// The largest published file (anisotropic, spectral) is 550 MB; isotropic RGB ones are under 1 MB.

@@ -1,6 +1,6 @@
 //! Functions on the unit square given at the vertices of a grid, bilinear between them, one per direction of one side.
 
-use crate::error::InputError;
+use crate::base::InputError;
 
 /// A grid: `width` values along x (fastest), `height` along y, both at least 2.
 #[derive(Debug, Clone, Copy)]
@@ -292,7 +292,7 @@ mod tests {
             let values = &warp.density[slice * GRID.len()..(slice + 1) * GRID.len()];
             let expected: Vec<f64> =
                 (0..SIDE * SIDE).map(|k| GRID.eval(values, [at(k % SIDE), at(k / SIDE)])).collect();
-            let p = crate::chi_square::p_value(&counts, &expected);
+            let p = crate::testing::chi_square::p_value(&counts, &expected);
             // Šidák: two tests at 0.01 together.
             assert!(p > 1.0 - 0.99_f64.sqrt(), "{slice}: {p}");
         }

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use super::super::sampler::{in_parallel, reading_error};
 use super::super::{Job, Written};
 use super::{Content, rgb, xyz};
-use crate::filtering::Reflectance;
+use crate::effective::Reflectance;
 
 /// Middle and upper bound of each ring in degrees, and its patches. The first patch of a ring is centred on azimuth 0.
 const RINGS: [(u32, u32, usize); 9] = [

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use super::super::sampler::{in_parallel, reading_error};
 use super::super::{ExportResolution, Job, Written};
 use super::{Content, rgb, xyz};
-use crate::filtering::{EffectiveBrdf, Reflectance};
+use crate::effective::{EffectiveBrdf, Reflectance};
 
 /// Cells along a side, where no resolution is asked for, and the fewest and most: powers of 2.
 const SIDE: usize = 32;

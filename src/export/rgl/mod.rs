@@ -10,7 +10,8 @@ use std::io::{self, Write};
 
 use glam::{DVec3, Vec3};
 
-use super::sampler::{ReadingError, in_parallel, reading_error};
+use super::ReadingError;
+use super::sampler::{in_parallel, reading_error};
 use super::{ExportResolution, Job, Written};
 use crate::brdf::rgl::table::RglTable;
 use crate::brdf::rgl::tensor_file::TensorWriter;

@@ -10,7 +10,7 @@ use super::super::ExportResolution;
 use crate::brdf::LUMINANCE;
 use crate::brdf::rgl::table::{RglTable, direction_of_u, u_of_direction};
 use crate::brdf::rgl::warp::{Grid, Warp};
-use crate::filtering::{EffectiveBrdf, Reflectance};
+use crate::effective::{EffectiveBrdf, Reflectance};
 
 /// The last elevation stands for 90°, where nothing is defined.
 const LAST_THETA: f64 = 89.9 / 90.0 * FRAC_PI_2;

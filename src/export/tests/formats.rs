@@ -8,7 +8,7 @@ use super::*;
 use crate::brdf::rgl::table::RglTable;
 use crate::brdf::rgl::tensor_file::TensorFile;
 use crate::brdf::{LobeAngles, Measured};
-use crate::directions::{from_angles, half_vector};
+use crate::math::directions::{from_angles, half_vector};
 
 /// What Mitsuba and the others do with a file, as `src/brdf/rgl` has it.
 #[test]

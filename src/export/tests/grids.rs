@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
 
 use super::*;
-use crate::directions::from_angles;
+use crate::math::directions::from_angles;
 
 /// `.npy` members of an `.npz` by name: (header, data), found through the directory, CRCs checked.
 fn read_npz(bytes: &[u8]) -> HashMap<String, (String, Vec<u8>)> {

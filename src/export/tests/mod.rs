@@ -11,9 +11,11 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::*;
 use crate::brdf::{Brdf, Term};
-use crate::directions::from_angles;
-use crate::filtering::{Direct, FacetSum, Form, SumMaterial};
-use crate::geometry::{self, Facets, TileMesh, heightfield};
+use crate::effective::{Direct, FacetSum, Form, SumMaterial};
+use crate::geometry;
+use crate::geometry::families::heightfield;
+use crate::geometry::{Facets, TileMesh};
+use crate::math::directions::from_angles;
 use crate::scene::{Flat, Geometry, Scene};
 use crate::visibility::{Horizons, Visibility};
 
@@ -173,7 +175,7 @@ fn a_failure_while_writing_leaves_the_old_file_whole() {
     let folder = tempfile::tempdir().unwrap();
     let old = folder.path().join("old.npz");
     std::fs::write(&old, b"old").unwrap();
-    let full = replace::replacing(&old, |out| {
+    let full = atomic_file::replacing(&old, |out| {
         out.write_all(b"half of the new")?;
         Err::<(), _>(io::Error::other("disk full"))
     });

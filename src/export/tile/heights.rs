@@ -3,9 +3,8 @@
 use glam::{DVec2, UVec2};
 
 use super::TileOptions;
-use crate::error::{Error, Result};
+use crate::base::{Error, Progress, Result, progress};
 use crate::geometry::TileMesh;
-use crate::progress::{self, Progress};
 
 /// Heights at regular places of one period, tile units.
 pub struct Heights {

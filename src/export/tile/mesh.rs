@@ -3,9 +3,8 @@
 use std::fmt::Write as _;
 
 use super::TileOptions;
-use crate::error::Result;
+use crate::base::{Progress, Result, progress};
 use crate::geometry::TileMesh;
-use crate::progress::{self, Progress};
 
 pub fn obj(mesh: &TileMesh, options: &TileOptions, progress: &Progress<'_>) -> Result<(Vec<u8>, Vec<String>)> {
     let size = mesh.size.as_dvec2();

@@ -11,10 +11,10 @@ use std::path::Path;
 
 use glam::{UVec2, Vec3};
 
-use super::replace::replace_large_file;
-use crate::error::{InputError, Result};
+use crate::base::atomic_file::replace_large_file;
+use crate::base::progress::part;
+use crate::base::{InputError, Progress, Result};
 use crate::geometry::TileMesh;
-use crate::progress::{Progress, part};
 use crate::scene::{BrdfSpec, Scene, TermSpec, Tile};
 
 /// What may be chosen about the files of a tile.
@@ -86,7 +86,7 @@ const MADE: f32 = 0.7;
 ///
 /// # Errors
 /// An unknown ending, an option out of range, a geometry without a pattern, a place that cannot be written,
-/// [`crate::Error::Cancelled`] when `progress` says so. An old file stays whole then.
+/// [`crate::base::Error::Cancelled`] when `progress` says so. An old file stays whole then.
 pub fn write(
     scene: &Scene,
     mesh: &TileMesh,

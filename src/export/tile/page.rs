@@ -4,9 +4,8 @@ use std::fmt::Write as _;
 
 use glam::{DVec2, Vec3};
 
-use crate::error::Result;
-use crate::large_scale::tone_map::srgb_byte;
-use crate::progress::{self, Progress};
+use crate::base::{Progress, Result, progress};
+use crate::render::image::tone_map::srgb_byte;
 
 /// How an outline is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,7 +87,7 @@ impl Page {
     }
 
     /// # Errors
-    /// [`crate::Error::Cancelled`] when `progress` says so.
+    /// [`crate::base::Error::Cancelled`] when `progress` says so.
     pub fn svg(&self, progress: &Progress<'_>) -> Result<Vec<u8>> {
         let (corner, size) = self.bounds();
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");

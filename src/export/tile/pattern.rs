@@ -4,9 +4,8 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::page::{Line, Page};
 use super::{TileOptions, paper_color};
-use crate::error::{InputError, Result};
+use crate::base::{InputError, Progress, Result, progress};
 use crate::geometry::{self, CrossSection, OnePyramid};
-use crate::progress::{self, Progress};
 use crate::scene::{Geometry, Scene, Tile};
 
 /// Width of a tab, millimetres, and how far its ends draw in.
@@ -19,7 +18,7 @@ const MOST_NETS: usize = 200;
 /// The sheet of a scene's tile, `unit_mm` millimetres a tile unit.
 ///
 /// # Errors
-/// A geometry that does not unfold, too many nets, [`crate::Error::Cancelled`] when `progress` says so.
+/// A geometry that does not unfold, too many nets, [`crate::base::Error::Cancelled`] when `progress` says so.
 pub fn sheet(
     scene: &Scene,
     options: &TileOptions,

@@ -4,9 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::TileOptions;
 use super::heights::Heights;
-use crate::error::Result;
+use crate::base::{Progress, Result, progress};
 use crate::geometry::TileMesh;
-use crate::progress::{self, Progress};
 
 pub fn stl(
     mesh: &TileMesh,

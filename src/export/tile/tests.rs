@@ -5,7 +5,7 @@ use glam::DVec2;
 
 use super::heights::Heights;
 use super::*;
-use crate::error::Error;
+use crate::base::Error;
 use crate::geometry;
 use crate::scene::{Geometry, GrooveProfile, Grooves, Pyramids};
 

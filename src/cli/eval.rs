@@ -1,0 +1,178 @@
+//! `biscale eval`: f̄ at the direction pairs of a file.
+
+use std::fmt::Write as _;
+use std::io::{Read, Write};
+use std::path::Path;
+
+use crate::base::{Error, InputError};
+use crate::diagnostics::Health;
+use crate::effective::Reflectance;
+use crate::math::directions::from_angles;
+use crate::metrics::Pair;
+use crate::pipeline::Pipeline;
+use crate::plan::{Preset, Settings};
+use crate::reference::ReferenceSettings;
+use anyhow::Result;
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::EvalArgs;
+use super::{cache, print_json};
+
+/// Longer lists are no lists of pairs.
+const LARGEST_FILE: u64 = 1 << 30;
+
+const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
+
+/// One line of the file.
+struct Row {
+    angles: [f64; 4],
+}
+
+pub fn run(args: &EvalArgs) -> Result<()> {
+    let loaded = args.scene.open()?;
+    let rows = read(&args.pairs)?;
+    let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
+    let settings = Settings::from_quality(&loaded.scene.quality);
+    let cache = args.keeping.open();
+    let mut pipeline = Pipeline::new();
+    pipeline.keep_in(cache.clone());
+    let health;
+    let mut form = "reference sum".to_owned();
+    let (values, errors) = if settings.preset == Preset::Reference {
+        let reference = ReferenceSettings {
+            facets: settings.reference_facets,
+            max_passes: settings.reference_passes,
+            target: 2e-3,
+            seed: settings.seed,
+        };
+        let bar = progress(settings.reference_passes, args.scene.quiet);
+        let estimates = pipeline.with_reference(&loaded, |evaluator| {
+            evaluator.estimate(&pairs, &reference, |passes, error| {
+                bar.set_position(passes as u64);
+                bar.set_message(format!("standard error {:.2} %", error * 100.0));
+                true
+            })
+        })?;
+        bar.finish_and_clear();
+        health = pipeline.input_health(&loaded)?;
+        args.scene.warn(&health);
+        estimates.iter().map(|estimate| (estimate.f_bar, estimate.standard_error)).unzip()
+    } else {
+        let outcome = pipeline.effective(&loaded)?;
+        args.scene.notes(&outcome);
+        health = outcome.health().clone();
+        form = outcome.brdf.form.describe();
+        let values: Vec<Vec3> = pairs
+            .par_iter()
+            .map(|pair| {
+                let mut out = [Vec3::ZERO];
+                outcome.brdf.eval_lights(&[pair.i], pair.o, &mut out);
+                out[0]
+            })
+            .collect();
+        let zeros = vec![Vec3::ZERO; values.len()];
+        (values, zeros)
+    };
+    let mut text = format!("{HEADER},r,g,b{}\n", if args.standard_error { ",se_r,se_g,se_b" } else { "" });
+    for ((row, value), error) in rows.iter().zip(&values).zip(&errors) {
+        let [a, b, c, d] = row.angles;
+        let _ = write!(text, "{a},{b},{c},{d},{},{},{}", value.x, value.y, value.z);
+        if args.standard_error {
+            let _ = write!(text, ",{},{},{}", error.x, error.y, error.z);
+        }
+        text.push('\n');
+    }
+    cache::finish(&cache, args.scene.quiet);
+    if args.output == Path::new("-") {
+        std::io::stdout().lock().write_all(text.as_bytes())?;
+        return Ok(());
+    }
+    crate::base::replace_file(&args.output, text.as_bytes())?;
+    if args.scene.json {
+        let output = args.output.display().to_string();
+        return print_json(&Report { output, pairs: values.len(), form, health });
+    }
+    Ok(())
+}
+
+/// What `--json` prints where standard output does not hold the values themselves.
+#[derive(Serialize)]
+struct Report {
+    output: String,
+    pairs: usize,
+    form: String,
+    health: Health,
+}
+
+/// A bar on a terminal, nothing in a pipe.
+fn progress(passes: usize, quiet: bool) -> indicatif::ProgressBar {
+    if quiet {
+        return indicatif::ProgressBar::hidden();
+    }
+    let bar = indicatif::ProgressBar::new(passes as u64);
+    if let Ok(style) =
+        indicatif::ProgressStyle::with_template("reference {wide_bar} {pos}/{len} passes, {msg}, {eta} left")
+    {
+        bar.set_style(style);
+    }
+    bar
+}
+
+impl Row {
+    fn pair(&self) -> Pair {
+        let [theta_i, phi_i, theta_o, phi_o] = self.angles;
+        let direction = |theta: f64, phi: f64| -> Vec3 {
+            // Exactly at or under the horizon stays there, whatever the rounding of a cosine.
+            if theta.abs() >= std::f64::consts::FRAC_PI_2 {
+                return from_angles(theta as f32, phi as f32).with_z(0.0);
+            }
+            let (sin_theta, cos_theta) = theta.sin_cos();
+            let (sin_phi, cos_phi) = phi.sin_cos();
+            glam::DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta).as_vec3()
+        };
+        Pair { i: direction(theta_i, phi_i), o: direction(theta_o, phi_o) }
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<Row>, Error> {
+    let complain = |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
+    let mut text = String::new();
+    let got = if path == Path::new("-") {
+        std::io::stdin().lock().take(LARGEST_FILE).read_to_string(&mut text)
+    } else {
+        std::fs::File::open(path).and_then(|file| file.take(LARGEST_FILE).read_to_string(&mut text))
+    };
+    got.map_err(|error| complain(String::new(), error.to_string(), "a CSV file that can be read"))?;
+    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let names: Vec<&str> = match lines.next() {
+        Some((_, header)) => header.split(',').map(str::trim).collect(),
+        None => {
+            return Err(complain("line 1".to_owned(), "an empty file".to_owned(), HEADER).into());
+        }
+    };
+    let mut columns = [0; 4];
+    for (column, wanted) in columns.iter_mut().zip(HEADER.split(',')) {
+        *column = names
+            .iter()
+            .position(|name| *name == wanted)
+            .ok_or_else(|| complain("line 1".to_owned(), format!("the columns {}", names.join(",")), HEADER))?;
+    }
+    lines
+        .map(|(number, line)| {
+            let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+            let place = || format!("line {}", number + 1);
+            let mut angles = [0.0; 4];
+            for (angle, &column) in angles.iter_mut().zip(&columns) {
+                let field = fields.get(column).ok_or_else(|| {
+                    complain(place(), format!("{} values", fields.len()), &format!("{} values", names.len()))
+                })?;
+                *angle = field.parse::<f64>().ok().filter(|angle| angle.is_finite()).ok_or_else(|| {
+                    complain(place(), format!("`{field}` for {}", names[column]), "an angle in radians")
+                })?;
+            }
+            Ok(Row { angles })
+        })
+        .collect()
+}

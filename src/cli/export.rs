@@ -1,0 +1,126 @@
+//! `biscale export`: the effective BRDF as a table.
+
+use std::path::Path;
+
+use crate::diagnostics::Health;
+use crate::export;
+use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
+use crate::pipeline::Pipeline;
+use anyhow::Result;
+use serde::Serialize;
+
+use super::{ExportArgs, Radiance};
+use super::{bar, cache, print_json, showing};
+
+/// Relative L2 of reading a table back at which hardly anything of its lobes is right.
+const MOST_LOST: f64 = 0.5;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    output: String,
+    /// The file of plain words beside it.
+    note: Option<String>,
+    pairs: usize,
+    bytes: u64,
+    /// Mean of `|read - eval|` over the mean of `eval`.
+    resampling_mean: f64,
+    resampling_rel_l2: f64,
+    /// Null where the table reads without error.
+    resampling_psnr_db: f64,
+    /// Relative L2 between azimuths that an isotropic format has lost.
+    anisotropy_lost: Option<f64>,
+    form: String,
+    /// Directional-hemispherical: theta and phi in degrees, R, G, B.
+    reflectance: Vec<[f32; 5]>,
+    health: &'a Health,
+}
+
+pub fn run(args: &ExportArgs) -> Result<()> {
+    let streams = args.output == Path::new("-");
+    if !streams {
+        // Before the long work.
+        export::check_ending(&args.output)?;
+    }
+    let loaded = args.scene.open()?;
+    let cache = args.keeping.open();
+    let mut pipeline = Pipeline::new();
+    pipeline.keep_in(cache.clone());
+    let outcome = pipeline.effective(&loaded)?;
+    args.scene.notes(&outcome);
+    let meta = ExportMeta::of(&loaded, &outcome, pipeline.mesh(&loaded)?.closes_plane);
+    let options = ExportOptions {
+        resolution: resolution(args),
+        radiance: match args.radiance {
+            Radiance::Klems => RadianceBasis::Klems,
+            Radiance::TensorTree => RadianceBasis::TensorTree,
+        },
+    };
+    let bar = bar("tabulating", args.scene.quiet);
+    let progress = showing(&bar);
+    if streams {
+        // Standard output holds the table itself then.
+        export::write_csv(&outcome.brdf, &meta, &options, &mut std::io::stdout().lock(), &progress)?;
+        bar.finish_and_clear();
+        cache::finish(&cache, args.scene.quiet);
+        return Ok(());
+    }
+    let report = export::write(&outcome.brdf, &meta, &options, &args.output, &progress);
+    bar.finish_and_clear();
+    let report = report?;
+    cache::finish(&cache, args.scene.quiet);
+    let reading = report.reading;
+    let mut health = outcome.health().clone();
+    if !(0.0..=MOST_LOST).contains(&reading.errors.rel_l2) {
+        let warning = "the table misses most of the highlights: raise --resolution, or the roughness, or choose a format that follows \
+                       lobes (.bsdf, --radiance tensor-tree)"
+            .to_owned();
+        if !args.scene.quiet {
+            eprintln!("warning: {warning}");
+        }
+        health.warnings.push(warning);
+    }
+    if args.scene.json {
+        return print_json(&Report {
+            output: args.output.display().to_string(),
+            note: report.note.as_ref().map(|note| note.display().to_string()),
+            pairs: report.pairs,
+            bytes: report.bytes,
+            resampling_mean: reading.mean,
+            resampling_rel_l2: reading.errors.rel_l2,
+            resampling_psnr_db: reading.errors.psnr_db,
+            anisotropy_lost: report.anisotropy_lost,
+            form: outcome.brdf.form.describe(),
+            health: &health,
+            reflectance: report.reflectances.rows(),
+        });
+    }
+    if !args.scene.quiet {
+        eprintln!(
+            "{} pairs, {} bytes; read back they differ from eval by {:.1} % in the mean, {:.1} % ({:.1} dB) in relative L2",
+            report.pairs,
+            report.bytes,
+            100.0 * reading.mean,
+            100.0 * reading.errors.rel_l2,
+            reading.errors.psnr_db
+        );
+        if let Some(lost) = report.anisotropy_lost {
+            eprintln!(
+                "the format is isotropic: {:.1} % (relative L2) between azimuths of the tile are lost",
+                100.0 * lost
+            );
+        }
+        eprintln!("directional-hemispherical reflectance (R G B):");
+        report.reflectances.lines().iter().for_each(|line| eprintln!("  {line}"));
+        if let Some(note) = &report.note {
+            eprintln!("conventions and more in {}", note.display());
+        }
+    }
+    Ok(())
+}
+
+/// What was asked for: `--resolution` for both sides, `--resolution-o` for the other one.
+fn resolution(args: &ExportArgs) -> Option<ExportResolution> {
+    let [theta, phi] = args.resolution.or(args.resolution_o)?;
+    let [theta_o, phi_o] = args.resolution_o.unwrap_or([theta, phi]);
+    Some(ExportResolution { theta_i: theta, phi_i: phi, theta_o, phi_o })
+}

@@ -1,0 +1,145 @@
+//! `biscale fit`: the best few parameters for pipelines without tables, and what they lose.
+
+use std::path::Path;
+
+use crate::base::{Error, InputError, replace_file};
+use crate::effective::Reflectance;
+use crate::fit;
+use crate::fit::{Fit, Model};
+use crate::pipeline::Pipeline;
+use crate::render::image::shading::Background;
+use crate::render::image::tone_map::ToneMap;
+use crate::render::render;
+use crate::render::{Picture, Stage};
+use anyhow::Result;
+use glam::Vec3;
+use serde::Serialize;
+
+use super::FitArgs;
+use super::{bar, print_json, showing};
+
+#[derive(Serialize)]
+struct Report {
+    model: &'static str,
+    rel_l2: f64,
+    psnr_db: f64,
+    roughness: [f32; 2],
+    rotation_rad: f32,
+    /// Fresnel's factor of the lobe at grazing angles.
+    edge: f32,
+    /// Linear RGB of each weight.
+    weights: serde_json::Map<String, serde_json::Value>,
+    seconds: f64,
+}
+
+pub fn run(args: &FitArgs) -> Result<()> {
+    for path in &args.output {
+        kind(path)?;
+    }
+    let loaded = args.scene.open()?;
+    let outcome = Pipeline::new().effective(&loaded)?;
+    args.scene.notes(&outcome);
+    let mut fits = Vec::new();
+    let mut reports = Vec::new();
+    for model in Model::ALL {
+        let start = std::time::Instant::now();
+        let bar = bar("fitting", args.scene.quiet);
+        let found = fit::fit(&outcome.brdf, model, &showing(&bar));
+        bar.finish_and_clear();
+        let found = found?;
+        reports.push(report(&found, start.elapsed().as_secs_f64()));
+        fits.push(found);
+    }
+    // What files for others hold is the last model, the GGX base.
+    let Some(base) = fits.last() else { return Ok(()) };
+    for path in &args.output {
+        match kind(path)? {
+            Kind::Gltf => replace_file(path, fit::gltf(base, &loaded.name).as_bytes())?,
+            Kind::MaterialX => replace_file(path, fit::materialx(base, &loaded.name).as_bytes())?,
+            Kind::Json => replace_file(path, format!("{:#}\n", serde_json::to_value(&reports)?).as_bytes())?,
+            Kind::Picture => {
+                let stage = Stage::new(&loaded)?;
+                let materials: [&dyn Reflectance; 3] = [&*outcome.brdf, &fits[0], &fits[1]];
+                side_by_side(&stage, &materials, args.size)?.write(path, &ToneMap::new(&stage.camera)?)?;
+            }
+        }
+    }
+    if args.scene.json {
+        return print_json(&reports);
+    }
+    println!("{:<26} {:>12} {:>10} {:>22} {:>9}", "model", "relative L2", "PSNR", "roughness", "seconds");
+    for report in &reports {
+        let [x, y] = report.roughness;
+        println!(
+            "{:<26} {:>10.1} % {:>7.1} dB {:>13.3} x {:.3} {:>9.2}",
+            report.model,
+            100.0 * report.rel_l2,
+            report.psnr_db,
+            x,
+            y,
+            report.seconds
+        );
+        for (name, weight) in &report.weights {
+            println!("  {name}: {weight}");
+        }
+    }
+    Ok(())
+}
+
+fn report(fit: &Fit, seconds: f64) -> Report {
+    let names = fit.model.weight_names().iter().zip(&fit.weights);
+    Report {
+        model: fit.model.name(),
+        rel_l2: fit.errors.rel_l2,
+        psnr_db: fit.errors.psnr_db,
+        roughness: fit.shape.roughness,
+        rotation_rad: fit.shape.rotation,
+        edge: fit.shape.edge,
+        weights: names.map(|(name, weight)| ((*name).to_owned(), serde_json::json!(weight.to_array()))).collect(),
+        seconds,
+    }
+}
+
+enum Kind {
+    Gltf,
+    MaterialX,
+    Json,
+    Picture,
+}
+
+fn kind(path: &Path) -> Result<Kind, Error> {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    Ok(match ending.as_str() {
+        "gltf" => Kind::Gltf,
+        "mtlx" => Kind::MaterialX,
+        "json" => Kind::Json,
+        "png" | "exr" => Kind::Picture,
+        other => {
+            let expected = "a name that ends in .gltf, .mtlx, .json, .png or .exr";
+            return Err(InputError::new("output", format!("the ending .{other}"), expected).in_file(path).into());
+        }
+    })
+}
+
+/// The object in each material, left to right, and under the fits their differences from the first.
+fn side_by_side(stage: &Stage, materials: &[&dyn Reflectance], size: [usize; 2]) -> Result<Picture> {
+    let background = Background::Uniform(Vec3::ZERO);
+    let mut pictures = Vec::new();
+    for &reflectance in materials {
+        pictures.push(render(&stage.input(reflectance, size, 2, &background))?.picture);
+    }
+    let [width, height] = size;
+    let mut sheet = Picture {
+        width: width * pictures.len(),
+        height: 2 * height,
+        pixels: vec![Vec3::ZERO; 2 * width * height * pictures.len()],
+    };
+    for (k, picture) in pictures.iter().enumerate() {
+        for (pixel, value) in picture.pixels.iter().enumerate() {
+            let (x, y) = (pixel % width + k * width, pixel / width);
+            sheet.pixels[y * sheet.width + x] = *value;
+            sheet.pixels[(y + height) * sheet.width + x] = (*value - pictures[0].pixels[pixel]).abs();
+        }
+    }
+    Ok(sheet)
+}

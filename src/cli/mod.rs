@@ -1,0 +1,210 @@
+//! One file a subcommand; what they share stands here.
+
+mod args;
+pub mod basis;
+pub mod cache;
+pub mod eval;
+pub mod export;
+pub mod fit;
+pub mod materials;
+pub mod plan;
+pub mod profile;
+pub mod render;
+pub mod report;
+pub mod tile;
+mod to_picture;
+
+use std::io::Write;
+
+use crate::base::Cancel;
+use crate::diagnostics::Health;
+use crate::pipeline::Outcome;
+use crate::scene;
+use crate::scene::{Effects, LoadedScene, Switch};
+use crate::tuning::choose::{Goal, choose};
+use anyhow::Result;
+use indicatif::{ProgressBar, ProgressStyle};
+
+pub use self::args::*;
+
+/// Runs a subcommand. `edit` belongs to the editor, which is a layer above.
+///
+/// # Errors
+/// The scene or another input cannot be used, or an output cannot be written.
+pub fn run(command: Command) -> Result<()> {
+    match command {
+        Command::Edit { .. } => anyhow::bail!("this program was built without the editor (feature `editor`)"),
+        Command::Render(args) => render::run(&args),
+        Command::Eval(args) => eval::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Fit(args) => fit::run(&args),
+        Command::Tile(args) => tile::run(&args),
+        Command::Plan(args) => plan::run(&args),
+        Command::Basis(args) => basis::run(&args),
+        Command::Profile(args) => profile::run(&args),
+        Command::Report(args) => report::run(&args),
+        Command::Cache(args) => cache::run(&args),
+        Command::Materials(args) => materials::run(&args),
+    }
+}
+
+impl SceneArgs {
+    /// The scene with all overrides of the command line.
+    pub fn open(&self) -> Result<LoadedScene> {
+        let mut set = self.set.clone();
+        if let Some(quality) = self.quality {
+            let name = match quality {
+                Quality::Draft => "draft",
+                Quality::Standard => "standard",
+                Quality::Fine => "fine",
+                Quality::Reference => "reference",
+                Quality::Wu2011 => "wu2011",
+            };
+            set.push(format!("quality.preset=\"{name}\""));
+        }
+        if let Some(backend) = self.backend {
+            let name = match backend {
+                Backend::Auto => "auto",
+                Backend::Gpu => "gpu",
+                Backend::Cpu => "cpu",
+            };
+            set.push(format!("quality.backend=\"{name}\""));
+        }
+        if let Some(seed) = self.seed {
+            set.push(format!("quality.seed={seed}"));
+        }
+        set.extend(self.effects.iter().cloned());
+        let loaded = scene::open(&self.scene, &set)?;
+        match self.goal() {
+            Some(goal) => self.choose(&loaded, goal),
+            None => Ok(loaded),
+        }
+    }
+
+    fn goal(&self) -> Option<Goal> {
+        self.target_db.map(Goal::Decibels).or(self.budget_ms.map(Goal::Milliseconds))
+    }
+
+    /// The scene with settings that were chosen for a goal. What was asked and got is always said: without it nobody could
+    /// repeat the settings.
+    fn choose(&self, loaded: &LoadedScene, goal: Goal) -> Result<LoadedScene> {
+        let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+        let chosen = choose(loaded, goal, &Cancel::default(), |doing| {
+            bar.set_message(doing.to_owned());
+            bar.tick();
+        })?;
+        bar.finish_and_clear();
+        eprintln!("{}", chosen.sentence());
+        Ok(chosen.scene)
+    }
+
+    /// Says what a person should know about how the result was made.
+    pub fn notes(&self, outcome: &Outcome) {
+        // An examination costs some hundredths of a second: only where somebody reads it.
+        if self.quiet {
+            return;
+        }
+        for note in &outcome.notes {
+            eprintln!("note: {note}");
+        }
+        self.warn(outcome.health());
+    }
+
+    /// Says what is weak about a result, and what would mend it.
+    pub fn warn(&self, health: &Health) {
+        if !self.quiet {
+            for warning in &health.warnings {
+                eprintln!("warning: {warning}");
+            }
+        }
+    }
+}
+
+/// `WIDTHxHEIGHT`.
+pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
+    let complain = || format!("found `{text}`, expected two numbers like 384x384");
+    let (a, b) = text.split_once(['x', 'X', '×']).ok_or_else(complain)?;
+    let number =
+        |text: &str| text.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n)).ok_or_else(complain);
+    Ok([number(a)?, number(b)?])
+}
+
+/// How many direction pairs.
+pub fn parse_count(text: &str) -> std::result::Result<usize, String> {
+    let count = text.parse::<usize>().ok().filter(|count| (16..=100_000).contains(count));
+    count.ok_or_else(|| format!("found `{text}`, expected a number from 16 to 100000"))
+}
+
+/// Minutes, a fraction too.
+pub fn parse_minutes(text: &str) -> std::result::Result<f64, String> {
+    let minutes = text.parse::<f64>().ok().filter(|minutes| (0.0..=1e4).contains(minutes));
+    minutes.ok_or_else(|| format!("found `{text}`, expected minutes from 0 to 10000"))
+}
+
+/// `NAME=on|off|auto` as the override it is. Factors are an effect of the plan too, and a knob of their own.
+pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
+    let complain = || format!("found `{text}`, expected NAME=on, NAME=off or NAME=auto");
+    let (name, value) = text.split_once('=').ok_or_else(complain)?;
+    let (name, value) = (name.trim(), value.trim());
+    if !Switch::NAMES.contains(&value) {
+        return Err(complain());
+    }
+    let known: Vec<&str> = Effects::fields().iter().map(|field| field.key).filter(|key| *key != "bounces").collect();
+    match name {
+        "low_rank" => {
+            let method = match value {
+                "on" => "low_rank",
+                "off" => "direct",
+                _ => "auto",
+            };
+            Ok(format!("quality.method={method}"))
+        }
+        name if known.contains(&name) => Ok(format!("effects.{name}={value}")),
+        name => Err(format!("found the effect `{name}`, expected one of low_rank, {}", known.join(", "))),
+    }
+}
+
+/// A number above zero.
+pub fn parse_positive(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| format!("found `{text}`, expected a number above 0"))
+}
+
+/// A bar on a terminal, nothing in a pipe. `doing`: a word in front of it.
+pub fn bar(doing: &str, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(1000);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left") {
+        bar.set_style(style);
+    }
+    bar.set_message(doing.to_owned());
+    bar
+}
+
+/// What long work is given to show itself on a bar.
+pub fn showing(bar: &ProgressBar) -> impl Fn(f32) -> bool {
+    |part: f32| {
+        bar.set_position((part * 1000.0) as u64);
+        true
+    }
+}
+
+/// Prints JSON on standard output.
+pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    serde_json::to_writer_pretty(&mut out, value)?;
+    writeln!(out)?;
+    Ok(())
+}
+
+/// Did the reader of our output go away?
+pub fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
+            || cause
+                .downcast_ref::<serde_json::Error>()
+                .is_some_and(|error| error.io_error_kind() == Some(std::io::ErrorKind::BrokenPipe))
+    })
+}

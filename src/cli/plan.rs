@@ -1,0 +1,103 @@
+//! `biscale plan`: every effect, on or off, why, and on request what it costs and changes.
+
+use std::io::Write;
+
+use crate::base::Cancel;
+use crate::diagnostics::Health;
+use crate::pipeline::Pipeline;
+use crate::render::Stage;
+use crate::report::{EffectCost, measure_effects};
+use anyhow::Result;
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use super::PlanArgs;
+use super::print_json;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    effects: &'a [crate::plan::Effect],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measured: Option<&'a [EffectCost]>,
+    /// How often each stage ran.
+    runs: std::collections::BTreeMap<&'static str, u64>,
+    /// Lights that were left out.
+    dropped_lights: usize,
+    notes: &'a [String],
+    health: &'a Health,
+}
+
+pub fn run(args: &PlanArgs) -> Result<()> {
+    let loaded = args.scene.open()?;
+    let mut pipeline = Pipeline::new();
+    let outcome = pipeline.effective(&loaded)?;
+    let dropped_lights = Stage::new(&loaded)?.dropped_lights;
+    let measured = if args.measure {
+        let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+        let costs = measure_effects(&loaded, &Cancel::default(), |name| {
+            bar.set_message(format!("with and without {name}"));
+            bar.tick();
+        })?;
+        bar.finish_and_clear();
+        Some(costs)
+    } else {
+        None
+    };
+    if args.scene.json {
+        args.scene.warn(outcome.health());
+        return print_json(&Report {
+            effects: &outcome.plan.effects,
+            measured: measured.as_deref(),
+            runs: pipeline.runs().into_iter().collect(),
+            dropped_lights,
+            notes: &outcome.notes,
+            health: outcome.health(),
+        });
+    }
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{:<20} {:<7} {:>12} {:>12}  reason", "effect", "", "predicted", "measured")?;
+    for effect in &outcome.plan.effects {
+        let measured = effect.measured_ms.map_or("-".to_owned(), |ms| format!("{ms:.1} ms"));
+        let predicted =
+            if effect.predicted_ms > 0.0 { format!("{:.1} ms", effect.predicted_ms) } else { "-".to_owned() };
+        let on = if effect.on { "on" } else { "off" };
+        let forced = if effect.forced { "!" } else { "" };
+        let bound = match effect.bound {
+            Some(bound) if bound >= 5e-4 => format!(" (on would change at most {:.1} %)", bound * 100.0),
+            Some(_) => " (on would change nothing)".to_owned(),
+            None => String::new(),
+        };
+        writeln!(
+            out,
+            "{:<20} {:<7} {predicted:>12} {measured:>12}  {}{bound}",
+            effect.name,
+            format!("{on}{forced}"),
+            effect.reason
+        )?;
+    }
+    if dropped_lights > 0 {
+        writeln!(out, "{dropped_lights} lights left out")?;
+    }
+    if let Some(measured) = &measured {
+        writeln!(
+            out,
+            "\n{:<20} {:>10} {:>10} {:>10} {:>10} {:>8} {:>8}",
+            "edit and picture", "on, ms", "off, ms", "auto, ms", "change, %", "mean ΔE", "95 % ΔE"
+        )?;
+        for cost in measured {
+            writeln!(
+                out,
+                "{:<20} {:>10.1} {:>10.1} {:>10.1} {:>10.2} {:>8.2} {:>8.2}",
+                cost.name,
+                cost.on_ms,
+                cost.off_ms,
+                cost.auto_ms,
+                cost.rel_l2 * 100.0,
+                cost.mean_delta_e,
+                cost.high_delta_e
+            )?;
+        }
+    }
+    args.scene.notes(&outcome);
+    Ok(())
+}

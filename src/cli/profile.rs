@@ -1,0 +1,123 @@
+//! `biscale profile`: milliseconds from an edit to the effective BRDF, or to the picture.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::time::Instant;
+
+use crate::base::{Error, InputError};
+use crate::pipeline::Pipeline;
+use crate::render::Stage;
+use anyhow::Result;
+use serde::Serialize;
+
+use super::print_json;
+use super::render::Route;
+use super::to_picture::ToPicture;
+use super::{Edit, ProfileArgs};
+
+#[derive(Serialize)]
+struct Report {
+    stages: BTreeMap<&'static str, f64>,
+    total_ms: f64,
+    /// What was moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    edited: Option<String>,
+    runs: u32,
+    form: String,
+}
+
+pub fn run(args: &ProfileArgs) -> Result<()> {
+    let loaded = args.scene.open()?;
+    let mut edited = loaded.clone();
+    let moved = match args.edit {
+        Some(Edit::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| nothing("tile.geometry"))?),
+        Some(Edit::Brdf) => Some(edited.scene.nudge_brdf().ok_or_else(|| nothing("material"))?),
+        Some(Edit::Color) => Some(edited.scene.nudge_color().ok_or_else(|| nothing("material"))?),
+        Some(Edit::Camera) | None => None,
+    };
+    let mut pipeline = Pipeline::new();
+    let mut outcome = pipeline.effective(&loaded)?;
+    args.scene.notes(&outcome);
+    let mut pictured = if args.picture { Some(ToPicture::new(&loaded, &outcome, args.size)?) } else { None };
+    let mut form = outcome.brdf.form.describe();
+    let mut camera = if args.edit == Some(Edit::Camera) {
+        let mut stage = Stage::new(&loaded)?;
+        let route = Route::of(&stage, &outcome)?;
+        // A camera edit keeps what pictures read, and the shadows of the object.
+        stage.settle();
+        let pictured = route.reads(&outcome)?;
+        form = pictured.brdf.form.describe();
+        Some((stage, route, pictured))
+    } else {
+        None
+    };
+    let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
+    for run in 0..=args.repeat {
+        let start = Instant::now();
+        let times = match (&mut camera, args.edit) {
+            (None, Some(_)) if pictured.is_some() => {
+                let Some(to_picture) = &mut pictured else { continue };
+                let times = to_picture.make(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
+                form.clone_from(&to_picture.form);
+                times
+            }
+            (Some((stage, route, pictured)), _) => {
+                let times = route.show(stage, &pictured.brdf, args.size)?;
+                vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
+            }
+            (None, Some(_)) => {
+                // To and fro: every run is an edit.
+                outcome = pipeline.effective(if run % 2 == 0 { &edited } else { &loaded })?;
+                outcome.times.clone()
+            }
+            (None, None) => {
+                outcome = Pipeline::new().effective(&loaded)?;
+                outcome.times.clone()
+            }
+        };
+        let total = start.elapsed().as_secs_f64() * 1e3;
+        // The first warms caches up.
+        if run > 0 {
+            runs.push((total, times));
+        }
+    }
+    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
+    for (_, times) in &runs {
+        for (name, ms) in times {
+            stages.entry(name).or_default().push(*ms);
+        }
+    }
+    let report = Report {
+        stages: stages.into_iter().map(|(name, ms)| (name, median(ms))).collect(),
+        total_ms: median(runs.iter().map(|run| run.0).collect()),
+        edited: moved,
+        runs: args.repeat,
+        form,
+    };
+    if args.scene.json {
+        return print_json(&report);
+    }
+    let mut out = std::io::stdout().lock();
+    if let Some(edited) = &report.edited {
+        writeln!(out, "edited {edited}")?;
+    }
+    for (name, ms) in &report.stages {
+        writeln!(out, "{name:<12} {ms:>10.2} ms")?;
+    }
+    writeln!(out, "{:<12} {:>10.2} ms   (median of {} runs; {})", "total", report.total_ms, report.runs, report.form)?;
+    Ok(())
+}
+
+fn nothing(place: &str) -> Error {
+    InputError::new(place, "no numeric parameter", "one that can be moved by 5 %").into()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    match n {
+        0 => 0.0,
+        _ if n % 2 == 1 => values[n / 2],
+        _ => 0.5 * (values[n / 2 - 1] + values[n / 2]),
+    }
+}

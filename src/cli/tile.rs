@@ -1,0 +1,29 @@
+//! `biscale tile`: the tile itself, to print, to fold, or for other programs.
+
+use crate::export::tile;
+use crate::export::tile::TileOptions;
+use crate::pipeline::Pipeline;
+use anyhow::Result;
+use glam::UVec2;
+
+use super::TileArgs;
+use super::{bar, print_json, showing};
+
+pub fn run(args: &TileArgs) -> Result<()> {
+    let loaded = args.scene.open()?;
+    let mesh = Pipeline::new().mesh(&loaded)?;
+    let count = |[x, y]: [usize; 2]| UVec2::new(x as u32, y as u32);
+    let options =
+        TileOptions { repeat: count(args.repeat), scale: args.scale, base_mm: args.base, samples: count(args.samples) };
+    let bar = bar("writing", args.scene.quiet);
+    let notes = tile::write(&loaded.scene, &mesh, &options, &args.output, &showing(&bar));
+    bar.finish_and_clear();
+    let notes = notes?;
+    if args.scene.json {
+        return print_json(&serde_json::json!({ "output": args.output.display().to_string(), "notes": notes }));
+    }
+    if !args.scene.quiet {
+        notes.iter().chain(&mesh.notes).for_each(|note| eprintln!("note: {note}"));
+    }
+    Ok(())
+}

@@ -1,0 +1,294 @@
+//! The numbers of a [`super::Health`]: each examined on a few hundred directions, well under a second.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{Evidence, FactorHealth, MaterialHealth, MeasuredHealth, ResultHealth, Sight, SurfaceHealth};
+use crate::brdf::{Brdf, LUMINANCE, LobeAngles, Measured, Term};
+use crate::effective::{EffectiveBrdf, Form, Reflectance, SumMaterial};
+use crate::math::directions::{PolarGrid, from_angles};
+use crate::metrics::{Errors, mirror_biased_pairs};
+
+/// Elevations of the directions that surfaces are looked at from [degrees], and azimuths of each.
+const ELEVATIONS_DEG: [f32; 6] = [5.0, 25.0, 45.0, 60.0, 70.0, 80.0];
+const AZIMUTHS: usize = 8;
+/// Rings of lights over which albedos are summed, and the half width of lobes that need the most.
+const COARSEST: usize = 12;
+const FINEST: usize = 22;
+const NARROWEST_DEG: f32 = 5.0;
+/// Pairs for reciprocity.
+const PAIRS: usize = 96;
+/// Normals about which facets are counted.
+const NORMALS: usize = 64;
+
+/// Directions with their angles in degrees, off the axes that tiles like to follow.
+fn views() -> impl Iterator<Item = ([f32; 2], Vec3)> {
+    ELEVATIONS_DEG.into_iter().flat_map(|theta| {
+        (0..AZIMUTHS).map(move |k| {
+            let phi = 360.0 * (k as f32 + 0.37) / AZIMUTHS as f32;
+            ([theta, phi], from_angles(theta.to_radians(), phi.to_radians()))
+        })
+    })
+}
+
+pub fn materials(materials: &[SumMaterial], names: &[String]) -> (Vec<MeasuredHealth>, Vec<MaterialHealth>) {
+    let mut measured: Vec<MeasuredHealth> = Vec::new();
+    let mut all = Vec::new();
+    for (k, material) in materials.iter().enumerate() {
+        for table in material.brdf.terms.iter().filter_map(Term::measured) {
+            let report = table.report();
+            let health = MeasuredHealth {
+                name: table.name().to_owned(),
+                samples: report.total,
+                rejected: report.invalid_samples,
+                reciprocity_residual: report.reciprocity_residual,
+                resampling_error: report.resampling_error,
+            };
+            if !measured.contains(&health) {
+                measured.push(health);
+            }
+        }
+        let name = names.get(k).cloned().unwrap_or_default();
+        let narrowest = material.brdf.terms.iter().filter_map(half_width).reduce(f32::min);
+        all.push(MaterialHealth {
+            name,
+            largest_albedo: largest_albedo(&material.brdf, material.color),
+            narrowest_lobe_deg: narrowest.map(f32::to_degrees),
+        });
+    }
+    (measured, all)
+}
+
+fn largest_albedo(brdf: &Brdf, color: Vec3) -> f32 {
+    let angles = [0.0_f32, 20.0, 40.0, 60.0, 80.0];
+    angles
+        .iter()
+        .map(|theta| (brdf.directional_albedo(theta.to_radians(), 48) * color).max_element())
+        .fold(0.0, f32::max)
+}
+
+/// Angle between normal and half vector at which a lobe has fallen to about a third [rad]; `None` for one without a peak.
+fn half_width(term: &Term) -> Option<f32> {
+    match term {
+        Term::Lambertian { .. } => None,
+        Term::BlinnPhong { exponent, .. } => (*exponent > 4.0).then(|| (2.0 / exponent).sqrt()),
+        Term::CookTorrance { roughness, .. } | Term::Ward { roughness, .. } => Some(roughness.atan()),
+        // (tan²θ/α² + 1)² = e.
+        Term::Ggx { roughness, .. } => Some((0.8 * roughness).atan()),
+        Term::Measured(table) => half_width_of_table(table.as_ref()),
+    }
+}
+
+fn half_width_of_table(table: &dyn Measured) -> Option<f32> {
+    let at = |theta: f32| {
+        let (sin, cos) = theta.sin_cos();
+        let angles = LobeAngles { n_dot_i: cos, n_dot_o: cos, n_dot_h: cos, sin2_theta_h: sin * sin, i_dot_h: 1.0 };
+        table.f_r(&angles).dot(LUMINANCE)
+    };
+    let steps: Vec<f32> = (0..180).map(|k| (0.25 + k as f32 * 0.25).to_radians()).collect();
+    let peak = steps.iter().map(|&theta| at(theta)).fold(0.0, f32::max);
+    let base = at(60.0_f32.to_radians()).min(peak);
+    // Matte ones have no peak to speak of above their base.
+    (peak > 3.0 * base.max(1e-6))
+        .then(|| steps.into_iter().find(|&theta| at(theta) - base < (peak - base) / std::f32::consts::E))
+        .flatten()
+}
+
+pub fn surface(evidence: &Evidence, lobe_deg: Option<f32>) -> SurfaceHealth {
+    let facets = &evidence.facets;
+    let mut health = SurfaceHealth {
+        facets: facets.len(),
+        triangles_left_out: facets.skipped_triangles,
+        has_holes: !evidence.closes_plane,
+        fewest_facets_seen: facets.len(),
+        facets_in_a_lobe: lobe_deg.and_then(|degrees| facets_within(&facets.normals, degrees.to_radians())),
+        ..SurfaceHealth::default()
+    };
+    let mut seen = vec![false; facets.len()];
+    match &evidence.sight {
+        Sight::Soft(visibility) => {
+            health.walks_cut_short = visibility.cut_short();
+            let mut v = vec![0.0; facets.len()];
+            for (angles, direction) in views() {
+                visibility.fill(direction, 0..facets.len(), &mut v);
+                let mut count = 0;
+                for ((seen, v), normal) in seen.iter_mut().zip(&v).zip(&facets.normals) {
+                    let sees = *v > 0.5 && normal.dot(direction) > 0.0;
+                    *seen |= sees;
+                    count += usize::from(sees);
+                }
+                if count < health.fewest_facets_seen {
+                    (health.fewest_facets_seen, health.fewest_seen_from_deg) = (count, angles);
+                }
+            }
+        }
+        Sight::Packed(packed) => {
+            for direction in 0..packed.direction_count {
+                for (facet, seen) in seen.iter_mut().enumerate() {
+                    *seen |= packed.is_visible(direction, facet);
+                }
+            }
+        }
+    }
+    let (mut hidden, mut all) = (0.0, 0.0);
+    for (area, seen) in facets.areas.iter().zip(&seen) {
+        all += f64::from(*area);
+        hidden += if *seen { 0.0 } else { f64::from(*area) };
+    }
+    health.area_never_seen = if all > 0.0 { hidden / all } else { 0.0 };
+    health
+}
+
+/// How many facets stand within `width` of a facet's normal: what nine in ten facets have at least.
+fn facets_within(normals: &[Vec3], width: f32) -> Option<usize> {
+    let least = width.cos();
+    let upward: Vec<Vec3> = normals.iter().copied().filter(|normal| normal.z > 0.05).collect();
+    let step = (upward.len() / NORMALS).max(1);
+    let mut counts: Vec<usize> = upward
+        .par_iter()
+        .step_by(step)
+        // Very narrow lobes: the cosine alone cannot tell.
+        .map(|n| normals.iter().filter(|other| (**other - *n).length() < width || other.dot(*n) > least).count())
+        .collect();
+    counts.sort_unstable();
+    counts.get(counts.len() / 10).copied()
+}
+
+pub fn result(brdf: &EffectiveBrdf, evidence: &Evidence, lobe_deg: Option<f32>) -> ResultHealth {
+    let mut health = ResultHealth::default();
+    let geometric = evidence.facets.normals == evidence.facets.geometric_normals;
+    if evidence.closes_plane && geometric && !evidence.facets.is_empty() {
+        let mut worst = 0.0;
+        for (angles, direction) in views() {
+            let error = (f64::from(brdf.relative_projected_area(direction) / direction.z) - 1.0).abs();
+            if error >= worst {
+                (worst, health.worst_angle_deg) = (error, angles);
+            }
+        }
+        health.projected_area_error = Some(worst);
+    }
+    let values: Vec<[Vec3; 2]> =
+        mirror_biased_pairs(PAIRS, 11).into_par_iter().map(|p| [brdf.g(p.i, p.o), brdf.g(p.o, p.i)]).collect();
+    let (mut difference, mut power) = (0.0, 0.0);
+    for [there, back] in &values {
+        let sound = |v: &Vec3| v.is_finite() && v.min_element() >= 0.0;
+        health.unsound_values += usize::from(!sound(there)) + usize::from(!sound(back));
+        difference += (*there - *back).as_dvec3().length_squared();
+        power += there.as_dvec3().length_squared();
+    }
+    health.reciprocity_residual = if difference > 0.0 { (difference / power).sqrt() } else { 0.0 };
+    if let Some(grid) = grid_for(lobe_deg) {
+        let (albedo, at) = largest_effective_albedo(brdf, grid);
+        health.largest_albedo = Some(albedo);
+        health.largest_albedo_at_deg = at;
+        health.unsound_values += usize::from(!albedo.is_finite());
+    }
+    health
+}
+
+/// The coarsest grid of lights that resolves lobes of a half width.
+fn grid_for(lobe_deg: Option<f32>) -> Option<PolarGrid> {
+    let needed = lobe_deg.map_or(0, |degrees| (FINEST as f32 * NARROWEST_DEG / degrees).ceil() as usize);
+    let rings = needed.max(COARSEST);
+    (rings <= FINEST).then(|| PolarGrid::new(rings, (13 * rings).div_ceil(4)))
+}
+
+/// `max_o ∫ f̄(i,o) dω_i` of a few viewers, any channel.
+fn largest_effective_albedo(brdf: &EffectiveBrdf, grid: PolarGrid) -> (f32, [f32; 2]) {
+    let viewers: Vec<[f32; 2]> =
+        [0.0_f32, 30.0, 60.0, 80.0].iter().flat_map(|&theta| [[theta, 20.0], [theta, 110.0]]).skip(1).collect();
+    let albedos: Vec<f32> = viewers
+        .par_iter()
+        .map(|[theta, phi]| {
+            let (lights, solid_angles) = lights_around(phi / 360.0 * TAU + PI, grid);
+            let mut values = vec![Vec3::ZERO; lights.len()];
+            brdf.eval_lights(&lights, from_angles(theta.to_radians(), phi / 360.0 * TAU), &mut values);
+            let sum: DVec3 = values.iter().zip(solid_angles).map(|(v, part)| v.as_dvec3() * f64::from(part)).sum();
+            sum.max_element() as f32
+        })
+        .collect();
+    let largest = albedos.iter().zip(viewers).max_by(|a, b| a.0.total_cmp(b.0));
+    largest.map_or((0.0, [0.0; 2]), |(albedo, at)| (*albedo, at))
+}
+
+/// The lights of a grid with their solid angles, four times as dense about one azimuth as on average: half vectors turn
+/// quickly there where the viewer is low.
+fn lights_around(azimuth: f32, grid: PolarGrid) -> (Vec<Vec3>, Vec<f32>) {
+    let lights = (0..grid.rings * grid.azimuths).map(|node| {
+        let turn = TAU * (node % grid.azimuths) as f32 / grid.azimuths as f32;
+        let density = 1.0 - 0.75 * turn.cos();
+        let phi = azimuth + turn - 0.75 * turn.sin();
+        (from_angles(grid.theta(node / grid.azimuths), phi), density * grid.solid_angle(node))
+    });
+    lights.unzip()
+}
+
+pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: usize) -> Option<FactorHealth> {
+    let (used, ranks, step) = match brdf.direct_form() {
+        Form::LowRank(factors) => {
+            let step = std::f32::consts::FRAC_PI_2 / (factors.pairs.rings.max(2) - 1) as f32;
+            (true, factors.channels.iter().map(|channel| channel.ranks.1).collect(), step)
+        }
+        Form::Wu2011(tables) => {
+            let ranks = tables.report.materials.iter().map(|material| material.n_rank).collect();
+            (true, ranks, (TAU / tables.direction_count().max(1) as f32).sqrt())
+        }
+        _ => {
+            factored?;
+            (false, Vec::new(), 0.0)
+        }
+    };
+    let relative_error = factored.map(|errors| errors.rel_l2);
+    Some(FactorHealth {
+        used,
+        relative_error,
+        effective_digits: relative_error.filter(|error| *error > 0.0).map(|error| -error.log10()),
+        at_rank_limit: matches!(brdf.direct_form(), Form::LowRank(_))
+            && ranks.iter().any(|&rank: &usize| rank >= max_rank),
+        ranks,
+        lobe_grid_step_deg: step.to_degrees(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::pipeline::Pipeline;
+    use crate::scene;
+    use crate::scene::{LoadedScene, Painted};
+
+    #[test]
+    fn albedos_are_summed_over_as_many_lights_as_lobes_need() {
+        for (brdf, rings) in [
+            (r#"{ kind = "lambertian", albedo = 0.5 }"#, 12),
+            (r#"{ kind = "ggx", roughness = 0.35, f0 = 0.8 }"#, 12),
+            (r#"{ kind = "ggx", roughness = 0.2, f0 = 0.8 }"#, 13),
+            (r#"{ kind = "ggx", roughness = 0.132, f0 = 0.8 }"#, 19),
+            (r#"{ kind = "ggx", roughness = 0.11, f0 = 0.8 }"#, 22),
+            (r#"{ kind = "ggx", roughness = 0.15, f0 = 0.04 }"#, 17),
+            (r#"{ kind = "cook_torrance", roughness = 0.15, f0 = 0.8 }"#, 13),
+            (r#"{ kind = "blinn_phong", exponent = 100.0, specular = 0.8 }"#, 14),
+        ] {
+            for geometry in ["{ kind = \"flat\" }", "{ kind = \"pyramids\", spacing = 0.25, height = 0.1 }"] {
+                let source = format!(
+                    "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\nfacets = 512\nmethod = \"direct\"\nbackend = \"cpu\"\n"
+                );
+                let (scene, name) = (scene::parse(&source).unwrap(), "test".to_owned());
+                let loaded = LoadedScene { scene, base_dir: PathBuf::new(), name, painted: Painted::default() };
+                let outcome = Pipeline::new().effective(&loaded).unwrap();
+                let materials = materials(&outcome.evidence.materials.1, &[]).1;
+                let grid = grid_for(materials[0].narrowest_lobe_deg).unwrap();
+                let [albedo, exact] =
+                    [grid, PolarGrid::new(96, 320)].map(|grid| largest_effective_albedo(&outcome.brdf, grid).0);
+                let error = (albedo / exact - 1.0).abs();
+                eprintln!("{brdf} {geometry}: {} rings, {:.3} %", grid.rings, 100.0 * error);
+                assert_eq!(grid.rings, rings, "{brdf}");
+                assert!(error < 0.03, "{brdf}, {geometry}: {albedo} {exact}");
+            }
+        }
+    }
+}

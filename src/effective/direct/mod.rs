@@ -1,0 +1,100 @@
+//! The effective BRDF as a live sum over facets: soft visibility, exact lobes, no table of the product.
+
+pub(crate) mod facet_groups;
+pub(crate) mod facet_sum;
+pub(crate) mod few_normals;
+pub(crate) mod forced;
+pub(crate) mod thinned;
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use self::few_normals::{FewNormals, View};
+use super::{FacetSum, VisibilityRows};
+use crate::math::simd::LightPairs;
+use crate::visibility::Visibility;
+
+/// Sums over facets at the query; exact in the lobes, interpolated only in the visibility.
+#[derive(Debug, Clone)]
+pub struct Direct {
+    pub sum: Arc<FacetSum>,
+    pub visibility: Arc<Visibility>,
+    /// Where normals are few, which pictures use.
+    few: Option<Arc<FewNormals>>,
+}
+
+#[derive(Default)]
+struct Scratch {
+    pairs: LightPairs,
+    v_i: Vec<f32>,
+    v_o: Vec<f32>,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+impl Direct {
+    pub fn new(sum: Arc<FacetSum>, visibility: Arc<Visibility>) -> Self {
+        let few = FewNormals::of(&sum, &visibility).map(Arc::new);
+        Self { sum, visibility, few }
+    }
+
+    /// Whether normals are so few that pictures sum over few facets.
+    pub fn has_few(&self) -> bool {
+        self.few.is_some()
+    }
+
+    /// Hands the visibilities along `i` and `o` of all facets to `work`.
+    pub(crate) fn with_seen<T>(&self, i: Vec3, o: Vec3, work: impl FnOnce(&[f32], &[f32]) -> T) -> T {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let facets = self.sum.facet_count();
+            scratch.v_i.resize(facets, 0.0);
+            scratch.v_o.resize(facets, 0.0);
+            self.visibility.fill(i, 0..facets, &mut scratch.v_i);
+            self.visibility.fill(o, 0..facets, &mut scratch.v_o);
+            work(&scratch.v_i, &scratch.v_o)
+        })
+    }
+
+    /// `a_v(o)` and, for each light, `Σ ΔA V V f = a_v f̄` into `out`.
+    pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let facets = self.sum.facet_count();
+            scratch.v_i.resize(facets, 0.0);
+            scratch.v_o.resize(facets, 0.0);
+            self.visibility.fill(o, 0..facets, &mut scratch.v_o);
+            let area = self.sum.projected_area(&scratch.v_o, o);
+            if let (Visibility::Horizons(horizons), Some(few), true) =
+                (&*self.visibility, &self.few, o.z > 0.0 && area > 0.0)
+            {
+                for (v, area) in scratch.v_o.iter_mut().zip(self.sum.areas(0..facets)) {
+                    *v *= area;
+                }
+                let view = View { sum: &self.sum, horizons, o, areas: &scratch.v_o };
+                few.sums(view, lights, &mut scratch.pairs, out);
+                return area;
+            }
+            for (k, &i) in lights.iter().enumerate() {
+                if i.z > 0.0 && o.z > 0.0 && area > 0.0 {
+                    self.visibility.fill(i, 0..facets, &mut scratch.v_i);
+                    out(k, self.sum.sum(i, o, &scratch.v_i, &scratch.v_o));
+                } else {
+                    out(k, DVec3::ZERO);
+                }
+            }
+            area
+        })
+    }
+
+    /// `f̄(i, o)` as it would be if visibility were read between the nodes of `rows`, with exact lobes; above the horizon.
+    pub(crate) fn seen_between(&self, rows: &VisibilityRows, i: Vec3, o: Vec3) -> Vec3 {
+        let (mut v_i, mut v_o) = (vec![0.0; rows.facets], vec![0.0; rows.facets]);
+        rows.read(i, &mut v_i);
+        rows.read(o, &mut v_o);
+        let area = self.sum.projected_area(&v_o, o);
+        if area > 0.0 { (self.sum.sum(i, o, &v_i, &v_o) / area).as_vec3() } else { Vec3::ZERO }
+    }
+}

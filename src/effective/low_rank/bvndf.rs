@@ -1,0 +1,321 @@
+//! The BVNDF in the metric of the rotated basis, by randomized SVD; N itself is never stored (Wu et al. 2011, Sec. 3.4).
+
+use glam::Vec3;
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::gram::{rank_for, right_singular};
+use crate::base::Result;
+use crate::math::directions::PolarGrid;
+use crate::math::linalg::gemm;
+use crate::visibility::Visibility;
+
+/// Visibility of a group of facets on the nodes of a direction grid, dense: `[node][facet]`.
+#[derive(Debug)]
+pub struct VisibilityRows {
+    pub grid: PolarGrid,
+    pub facets: usize,
+    pub rows: Vec<f32>,
+}
+
+impl VisibilityRows {
+    /// Of a run of facets.
+    pub fn new(visibility: &Visibility, facets: std::ops::Range<usize>, grid: PolarGrid) -> Self {
+        let mut rows = vec![0.0; grid.len() * facets.len()];
+        rows.par_chunks_mut(facets.len().max(1))
+            .enumerate()
+            .for_each(|(node, row)| visibility.fill(grid.direction(node), facets.clone(), row));
+        Self { grid, facets: facets.len(), rows }
+    }
+
+    /// Each facet's visibility along any direction, read between the nodes as the factored form reads it.
+    pub fn read(&self, direction: Vec3, out: &mut [f32]) {
+        out.fill(0.0);
+        let taper = PolarGrid::horizon_taper(direction.z);
+        for (node, weight) in self.grid.taps(direction) {
+            let row = &self.rows[node * self.facets..][..self.facets];
+            for (out, v) in out.iter_mut().zip(row) {
+                *out += taper * weight * v;
+            }
+        }
+    }
+
+    /// The same, of a run of its facets.
+    pub fn part(&self, facets: std::ops::Range<usize>) -> Self {
+        let rows = self.rows.chunks(self.facets.max(1)).flat_map(|row| row[facets.clone()].iter().copied()).collect();
+        Self { grid: self.grid, facets: facets.len(), rows }
+    }
+
+    /// Each facet's visibility times `(n·d)+`.
+    pub fn with_cosines(&self, normals: &[Vec3]) -> Self {
+        let grid = self.grid;
+        let mut rows = self.rows.clone();
+        rows.par_chunks_mut(self.facets.max(1)).enumerate().for_each(|(node, row)| {
+            let direction = grid.direction(node);
+            for (v, normal) in row.iter_mut().zip(normals) {
+                *v *= normal.dot(direction).max(0.0);
+            }
+        });
+        Self { rows, ..*self }
+    }
+}
+
+/// Random vectors used beyond the wanted rank.
+const EXTRA: usize = 20;
+
+/// The leading right vectors of N in the metric of the features: row-major `features x rank`.
+///
+/// Khatri-Rao projection `Q = Σ_s w_s (g·V_s)(h·V_s) x_s` with `count` random pairs `(g, h)`, weighted by √(solid angle).
+pub fn leading_features(
+    visibility: &VisibilityRows,
+    weights: &[f32],
+    features: &[f32],
+    feature_count: usize,
+    kept: f64,
+    max_rank: usize,
+    seed: u64,
+) -> Result<(Vec<f32>, usize)> {
+    let (facets, nodes) = (visibility.facets, visibility.grid.len());
+    let count = 2 * max_rank + EXTRA;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = || -> Vec<f32> {
+        (0..count * nodes).map(|k| gaussian(&mut rng) * visibility.grid.solid_angle(k % nodes).sqrt()).collect()
+    };
+    let (g, h) = (random(), random());
+    let project = |vectors: &[f32]| {
+        let mut out = vec![0.0; count * facets];
+        gemm::multiply_parallel(count, nodes, facets, vectors, &visibility.rows, &mut out);
+        out
+    };
+    let mut mixed = project(&g);
+    for (row, other) in mixed.chunks_mut(facets.max(1)).zip(project(&h).chunks(facets.max(1))) {
+        for ((x, y), w) in row.iter_mut().zip(other).zip(weights) {
+            *x *= y * w;
+        }
+    }
+    let mut q = vec![0.0; count * feature_count];
+    gemm::multiply_parallel(count, facets, feature_count, &mixed, features, &mut q);
+    let sketch = DMatrix::<f64>::from_fn(count, feature_count, |k, f| f64::from(q[k * feature_count + f]));
+    let most = max_rank.min(feature_count);
+    let (_, vectors) = right_singular(&sketch, |values| rank_for(values, kept).min(most))?;
+    let rank = vectors.ncols();
+    let leading = (0..feature_count)
+        .flat_map(|f| {
+            (0..rank).map({
+                let vectors = &vectors;
+                move |k| vectors[(f, k)] as f32
+            })
+        })
+        .collect();
+    Ok((leading, rank))
+}
+
+/// A normal deviate by Box and Muller.
+fn gaussian(rng: &mut ChaCha8Rng) -> f32 {
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    (radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()) as f32
+}
+
+/// `U_c(i,o) = Σ_s w_s y_c(s) V_s(i) V_s(o)` on all pairs of nodes: `[o][i][c]`, `c` contiguous. `y` is row-major
+/// `facets x columns`. A weighted Gram matrix a column, in blocks of views; symmetric in `i` and `o`.
+pub fn visibility_table(visibility: &VisibilityRows, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
+    pair_table(&visibility.rows, visibility.grid.len(), weights, y, columns)
+}
+
+/// [`visibility_table`] at some pairs of nodes `(o, i)`; elsewhere it is 0.
+pub fn visibility_at(
+    visibility: &VisibilityRows,
+    weights: &[f32],
+    y: &[f32],
+    columns: usize,
+    read: &[(usize, usize)],
+) -> Vec<f32> {
+    const PAIRS: usize = 64;
+    let (facets, nodes) = (visibility.facets, visibility.grid.len());
+    let row = |node: usize| &visibility.rows[node * facets..][..facets];
+    let mut sums = vec![0.0_f32; read.len() * columns];
+    sums.par_chunks_mut((PAIRS * columns).max(1)).zip(read.par_chunks(PAIRS)).for_each(|(sums, read)| {
+        let mut seen = vec![0.0_f32; read.len() * facets];
+        for (seen, &(o, i)) in seen.chunks_mut(facets.max(1)).zip(read) {
+            for (((seen, v_o), v_i), w) in seen.iter_mut().zip(row(o)).zip(row(i)).zip(weights) {
+                *seen = v_o * v_i * w;
+            }
+        }
+        gemm::multiply(read.len(), facets, columns, &seen, y, sums);
+    });
+    let mut table = vec![0.0_f32; nodes * nodes * columns];
+    for (&(o, i), sums) in read.iter().zip(sums.chunks(columns.max(1))) {
+        table[(o * nodes + i) * columns..][..columns].copy_from_slice(sums);
+    }
+    table
+}
+
+/// [`visibility_table`] of dense rows `[node][facet]` over any set of directions.
+pub(crate) fn pair_table(rows: &[f32], nodes: usize, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
+    const VIEWS: usize = 48;
+    let facets = weights.len();
+    let mut table = vec![0.0_f32; nodes * nodes * columns];
+    // Whole blocks right of the diagonal; the rest is mirrored afterwards.
+    table.par_chunks_mut(VIEWS * nodes * columns).enumerate().for_each(|(block, table)| {
+        let first = block * VIEWS;
+        let views = (nodes - first).min(VIEWS);
+        let width = nodes - first;
+        let mut scaled = vec![0.0_f32; views * facets];
+        let mut product = vec![0.0_f32; views * width];
+        for c in 0..columns {
+            for (scaled, row) in scaled.chunks_mut(facets.max(1)).zip(rows[first * facets..].chunks(facets.max(1))) {
+                for (s, (x, v)) in scaled.iter_mut().zip(row).enumerate() {
+                    *x = v * weights[s] * y[s * columns + c];
+                }
+            }
+            gemm::multiply_transposed(views, facets, width, &scaled, &rows[first * facets..], &mut product);
+            for view in 0..views {
+                for light in 0..width {
+                    table[(view * nodes + first + light) * columns + c] = product[view * width + light];
+                }
+            }
+        }
+    });
+    for o in 0..nodes {
+        for i in 0..(o / VIEWS) * VIEWS {
+            let (from, to) = ((i * nodes + o) * columns, (o * nodes + i) * columns);
+            table.copy_within(from..from + columns, to);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers in `[0, 1)` without structure; visibility of facets that nothing correlates.
+    fn noise(count: usize, seed: u64) -> Vec<f32> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..count).map(|_| rng.random::<f32>()).collect()
+    }
+
+    fn rows(grid: PolarGrid, facets: usize) -> VisibilityRows {
+        VisibilityRows { grid, facets, rows: noise(grid.len() * facets, 5) }
+    }
+
+    #[test]
+    fn normal_deviates_pass_the_chi_squared_test() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let values: Vec<f64> = (0..1_000_000).map(|_| f64::from(gaussian(&mut rng))).collect();
+        let p = crate::testing::chi_square::p_value_of_normal(&values);
+        assert!(p > 0.01, "{p}");
+    }
+
+    #[test]
+    fn the_table_is_the_weighted_gram_matrix_in_mirrored_blocks_too() {
+        // 168 nodes: three whole blocks of views and a part of a fourth.
+        let (grid, facets, columns) = (PolarGrid::new(6, 24), 37, 3);
+        let visibility = rows(grid, facets);
+        let (weights, y) = (noise(facets, 6), noise(facets * columns, 7));
+        let table = visibility_table(&visibility, &weights, &y, columns);
+        let nodes = grid.len();
+        assert_eq!(table.len(), nodes * nodes * columns);
+        let read: Vec<(usize, usize)> = (0..200).map(|k| (k * 7 % nodes, k * 31 % nodes)).collect();
+        let part = visibility_at(&visibility, &weights, &y, columns, &read);
+        for (at, (got, want)) in part.iter().zip(&table).enumerate() {
+            let node = at / columns;
+            let want = if read.contains(&(node / nodes, node % nodes)) { *want } else { 0.0 };
+            assert!((got - want).abs() < 1e-5 * want.abs() + 1e-6, "{at}: {got} {want}");
+        }
+        for o in 0..nodes {
+            for i in 0..nodes {
+                for c in 0..columns {
+                    let v = |node: usize, s: usize| f64::from(visibility.rows[node * facets + s]);
+                    let want: f64 =
+                        (0..facets).map(|s| f64::from(weights[s] * y[s * columns + c]) * v(i, s) * v(o, s)).sum();
+                    let got = f64::from(table[(o * nodes + i) * columns + c]);
+                    assert!((got - want).abs() < 1e-5 * want.abs() + 1e-6, "{i} {o} {c}: {got} {want}");
+                }
+            }
+        }
+    }
+
+    /// `‖N - N L Lᵀ‖² / ‖N‖²` with N built, over pairs of nodes weighted by solid angle.
+    fn lost(
+        visibility: &VisibilityRows,
+        weights: &[f32],
+        features: &[f32],
+        count: usize,
+        leading: &[f32],
+        rank: usize,
+    ) -> f64 {
+        let (nodes, facets) = (visibility.grid.len(), visibility.facets);
+        let (mut all, mut left) = (0.0, 0.0);
+        for o in 0..nodes {
+            for i in 0..nodes {
+                let measure = f64::from(visibility.grid.solid_angle(i) * visibility.grid.solid_angle(o));
+                let n: Vec<f64> = (0..count)
+                    .map(|f| {
+                        (0..facets)
+                            .map(|s| {
+                                let seen = visibility.rows[i * facets + s] * visibility.rows[o * facets + s];
+                                f64::from(weights[s] * seen * features[s * count + f])
+                            })
+                            .sum()
+                    })
+                    .collect();
+                let kept: Vec<f64> =
+                    (0..rank).map(|k| (0..count).map(|f| n[f] * f64::from(leading[f * rank + k])).sum()).collect();
+                let norm: f64 = n.iter().map(|x| x * x).sum();
+                all += measure * norm;
+                left += measure * (norm - kept.iter().map(|x| x * x).sum::<f64>());
+            }
+        }
+        left / all
+    }
+
+    #[test]
+    fn leading_features_lose_no_more_of_n_than_asked() {
+        let (grid, facets, count) = (PolarGrid::new(4, 8), 60, 24);
+        let visibility = rows(grid, facets);
+        let weights = noise(facets, 8);
+        // Features that fall off, as those of a basis do.
+        let features: Vec<f32> = noise(facets * count, 9)
+            .iter()
+            .enumerate()
+            .map(|(k, x)| (x - 0.5) * 0.75_f32.powi((k % count) as i32))
+            .collect();
+        let mut last = 0;
+        for kept in [0.9, 0.99, 0.999] {
+            let (leading, rank) = leading_features(&visibility, &weights, &features, count, kept, count, 1).unwrap();
+            assert!(rank > last && rank < count, "{kept}: rank {rank}");
+            last = rank;
+            for a in 0..rank {
+                for b in 0..rank {
+                    let dot: f32 = (0..count).map(|f| leading[f * rank + a] * leading[f * rank + b]).sum();
+                    assert!((dot - f32::from(a == b)).abs() < 1e-4, "columns {a} and {b} are not orthonormal: {dot}");
+                }
+            }
+            let lost = lost(&visibility, &weights, &features, count, &leading, rank);
+            // The sketch estimates N's energies; twice what was asked covers its noise.
+            assert!(lost < 2.0 * (1.0 - kept), "{kept}: lost {lost} at rank {rank}");
+        }
+    }
+
+    #[test]
+    fn features_that_depend_on_each_other_give_no_more_than_their_rank() {
+        let (grid, facets) = (PolarGrid::new(4, 8), 40);
+        let visibility = rows(grid, facets);
+        let (weights, plain) = (noise(facets, 8), noise(facets * 3, 9));
+        // Sixty features spanned by three: more features than random vectors, the other branch.
+        let features: Vec<f32> = (0..facets)
+            .flat_map(|s| {
+                (0..60).map({
+                    let plain = &plain;
+                    move |f| plain[s * 3 + f % 3] * (1.0 + f as f32)
+                })
+            })
+            .collect();
+        let (leading, rank) = leading_features(&visibility, &weights, &features, 60, 0.999_999, 8, 1).unwrap();
+        assert_eq!(rank, 3);
+        assert!(lost(&visibility, &weights, &features, 60, &leading, rank) < 1e-5);
+    }
+}

@@ -1,0 +1,366 @@
+//! The product with its factors kept apart until the query: `G(i,o) = Σ_c U_c(i,o) P_c(h,d)` (Wu et al. 2011, Eq. 12;
+//! DESIGN.md, Sec. 4, "Interpolate only what is smooth").
+
+pub(crate) mod bvndf;
+pub(crate) mod gram;
+pub(crate) mod rotated_basis;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use self::bvndf::{leading_features, visibility_at, visibility_table};
+use super::{BasisGrid, RotatedBasis, RotatedLobe, SumMaterial, Tint, VisibilityRows, analytic_lobe};
+use crate::base::Result;
+use crate::brdf::{Brdf, ColorBasis, Term};
+use crate::geometry::Facets;
+use crate::math::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
+use crate::math::simd;
+use crate::math::simd::Lobe;
+use crate::visibility::Visibility;
+
+/// Resolution and truncation of the low-rank form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowRankSettings {
+    /// Directions of the visibility factor.
+    pub directions: PolarGrid,
+    pub basis: BasisGrid,
+    /// Energy of M that is kept.
+    pub keep_m: f64,
+    /// Energy of N, in M's metric, that is kept.
+    pub keep_n: f64,
+    pub max_rank: usize,
+    /// Colour directions of a measured BRDF; `None`: as many as keep `keep_color` of its energy.
+    pub colors: Option<usize>,
+    pub keep_color: f64,
+    pub seed: u64,
+}
+
+/// What a channel's tint is made of: a material and a term of it, by number, and a colour or colour direction that no edit
+/// of the material changes.
+#[derive(Debug, Clone, Copy)]
+struct Source {
+    material: usize,
+    term: usize,
+    along: Vec3,
+}
+
+impl Source {
+    fn tint(&self, materials: &[SumMaterial]) -> Tint {
+        let material = &materials[self.material];
+        let color = material.color * self.along;
+        match &material.brdf.terms[self.term] {
+            Term::Measured(_) => Tint::Fixed(color),
+            term => Tint::Term(term.clone(), color),
+        }
+    }
+}
+
+/// One scalar BRDF over one group of facets with one set of weights.
+#[derive(Debug, Clone)]
+pub struct Channel {
+    pub(crate) u: Arc<Vec<f32>>,
+    /// `None` for a Lambertian lobe, whose cosines are in `u`.
+    pub(crate) p: Option<Arc<Vec<f32>>>,
+    pub(crate) columns: usize,
+    pub tint: Tint,
+    source: Source,
+    /// Rank of the basis that was used, and of N in its metric.
+    pub ranks: (usize, usize),
+}
+
+/// The effective BRDF as low-rank factors.
+#[derive(Debug, Clone)]
+pub struct LowRank {
+    pub directions: PolarGrid,
+    pub pairs: HalfDifferenceGrid,
+    pub channels: Vec<Channel>,
+    /// `a_v(o) / cos θ_o` on the nodes of `directions`.
+    pub projected_area: Arc<Vec<f32>>,
+}
+
+impl Channel {
+    pub fn bytes(&self) -> usize {
+        4 * (self.u.len() + self.p.as_ref().map_or(0, |p| p.len()))
+    }
+}
+
+/// A run of facets with one material, and what stands before its terms.
+#[derive(Debug)]
+struct Group {
+    range: Range<usize>,
+    material: usize,
+    /// Area times colour weight, and the colour that column stands for: one for equal colours, else three.
+    columns: Vec<(Vec<f32>, Vec3)>,
+}
+
+/// Facets by slot, skipping black materials. Facets are sorted by slot.
+fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]) -> Vec<Group> {
+    let mut groups = Vec::new();
+    let mut start = 0;
+    while start < facets.len() {
+        let slot = facets.slots[start];
+        let end = start + facets.slots[start..].iter().take_while(|&&other| other == slot).count();
+        let range = start..end;
+        start = end;
+        let material = material_of_slot[usize::from(slot)];
+        if materials[material].color == Vec3::ZERO {
+            continue;
+        }
+        let colors = &facets.colors[range.clone()];
+        let areas = &facets.areas[range.clone()];
+        let columns = if colors.iter().all(|&color| color == colors[0]) {
+            vec![(areas.to_vec(), colors[0])]
+        } else {
+            (0..3)
+                .map(|c| (colors.iter().zip(areas).map(|(color, area)| color[c] * area).collect(), Vec3::AXES[c]))
+                .collect()
+        };
+        groups.push(Group { range, material, columns });
+    }
+    groups
+}
+
+/// What a channel is made from: all but its table over pairs of directions.
+#[derive(Debug)]
+struct Part {
+    range: Range<usize>,
+    /// Area times colour weight.
+    weights: Vec<f32>,
+    /// `[facet][column]`; absent for a Lambertian lobe.
+    y: Option<Vec<f32>>,
+    p: Option<Arc<Vec<f32>>>,
+    columns: usize,
+    tint: Tint,
+    source: Source,
+    ranks: (usize, usize),
+}
+
+impl Part {
+    fn lambertian(range: Range<usize>, weights: Vec<f32>, source: Source, tint: Tint) -> Self {
+        Self { range, weights, y: None, p: None, columns: 1, tint, source, ranks: (1, 1) }
+    }
+
+    /// Any lobe, through its rotated basis.
+    fn factored(
+        (range, rows, normals): (Range<usize>, &VisibilityRows, &[Vec3]),
+        weights: Vec<f32>,
+        basis: &RotatedBasis,
+        settings: &LowRankSettings,
+        (source, tint): (Source, Tint),
+    ) -> Result<Self> {
+        let count = basis.features();
+        let mut features = vec![0.0; normals.len() * count];
+        for (normal, row) in normals.iter().zip(features.chunks_mut(count.max(1))) {
+            basis.write_features(*normal, row);
+        }
+        let (kept, most, seed) = (settings.keep_n, settings.max_rank, settings.seed);
+        let (leading, rank) = leading_features(rows, &weights, &features, count, kept, most, seed)?;
+        let mut y = vec![0.0; normals.len() * rank];
+        crate::math::linalg::gemm::multiply_parallel(normals.len(), count, rank, &features, &leading, &mut y);
+        let p = Some(Arc::new(basis.left_table(&leading, rank)));
+        let ranks = (basis.rank, rank);
+        Ok(Self { range, weights, y: Some(y), p, columns: rank, tint, source, ranks })
+    }
+
+    fn tabulated(&self, rows: &VisibilityRows, normals: &[Vec3], read: Option<&[(usize, usize)]>) -> Channel {
+        let table = |rows: &VisibilityRows, y: &[f32]| match read {
+            None => visibility_table(rows, &self.weights, y, self.columns),
+            Some(nodes) => visibility_at(rows, &self.weights, y, self.columns, nodes),
+        };
+        let u = match &self.y {
+            Some(y) => table(rows, y),
+            // `Σ w V(i)(n·i)+ V(o)(n·o)+ / π`, smooth on its own.
+            None => table(&rows.with_cosines(normals), &vec![std::f32::consts::FRAC_1_PI; self.weights.len()]),
+        };
+        let (p, columns, ranks) = (self.p.clone(), self.columns, self.ranks);
+        Channel { u: Arc::new(u), p, columns, tint: self.tint.clone(), source: self.source, ranks }
+    }
+}
+
+/// Everything factored, and nothing yet tabulated over pairs of directions, which takes most of the time: the bases of all
+/// materials, and N of each group in their metric.
+#[derive(Debug)]
+pub struct Factors<'a> {
+    facets: &'a Facets,
+    rows: &'a VisibilityRows,
+    pairs: HalfDifferenceGrid,
+    parts: Vec<Part>,
+}
+
+impl<'a> Factors<'a> {
+    /// `rows`: visibility of all facets on the nodes of the settings' directions.
+    ///
+    /// # Errors
+    /// A factorization that does not converge, or is handed values that are not finite.
+    pub fn new(
+        facets: &'a Facets,
+        rows: &'a VisibilityRows,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        settings: &LowRankSettings,
+    ) -> Result<Self> {
+        let mut parts = Vec::new();
+        for group in groups(facets, material_of_slot, materials) {
+            let part = rows.part(group.range.clone());
+            let over = || (group.range.clone(), &part, &facets.normals[group.range.clone()]);
+            for (k, term) in materials[group.material].brdf.terms.iter().enumerate() {
+                for (lobe, along) in &lobes_of(term, settings) {
+                    let basis = match lobe {
+                        RotatedLobe::Analytic(Lobe::Lambertian) => None,
+                        _ => Some(RotatedBasis::new(*lobe, settings.basis, settings.keep_m)?),
+                    };
+                    for (weights, column_color) in &group.columns {
+                        let source = Source { material: group.material, term: k, along: *along * *column_color };
+                        let (weights, tint) = (weights.clone(), source.tint(materials));
+                        match &basis {
+                            None => parts.push(Part::lambertian(group.range.clone(), weights, source, tint)),
+                            // A lobe that is 0 at every node has no features.
+                            Some(basis) if basis.features() == 0 => {}
+                            Some(basis) => {
+                                parts.push(Part::factored(over(), weights, basis, settings, (source, tint))?)
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        Ok(Self { facets, rows, pairs: settings.basis.pairs, parts })
+    }
+
+    /// The tables over all pairs of directions.
+    pub fn tabulate(&self) -> LowRank {
+        self.tabulated(None)
+    }
+
+    /// Tables that hold only what these pairs `(i, o)` read.
+    pub fn tabulate_for(&self, pairs: impl Iterator<Item = (Vec3, Vec3)>) -> LowRank {
+        let grid = self.rows.grid;
+        let mut read: Vec<(usize, usize)> = pairs
+            .filter(|(i, o)| i.z > 0.0 && o.z > 0.0)
+            .flat_map(|(i, o)| grid.taps(o).map(|(view, _)| grid.taps(i).map(|(light, _)| (view, light))))
+            .flatten()
+            .collect();
+        read.sort_unstable();
+        read.dedup();
+        self.tabulated(Some(&read))
+    }
+
+    fn tabulated(&self, read: Option<&[(usize, usize)]>) -> LowRank {
+        let channels = self.parts.chunk_by(|a, b| a.range == b.range).flat_map(|parts| {
+            let range = parts[0].range.clone();
+            let rows = self.rows.part(range.clone());
+            parts
+                .iter()
+                .map(|part| part.tabulated(&rows, &self.facets.normals[range.clone()], read))
+                .collect::<Vec<_>>()
+        });
+        LowRank {
+            directions: self.rows.grid,
+            pairs: self.pairs,
+            channels: channels.collect(),
+            projected_area: Arc::new(projected_area_table(self.facets, self.rows)),
+        }
+    }
+}
+
+impl LowRank {
+    /// [`Factors`], tabulated.
+    ///
+    /// # Errors
+    /// As [`Factors::new`].
+    pub fn build(
+        facets: &Facets,
+        visibility: &Visibility,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        settings: &LowRankSettings,
+    ) -> Result<Self> {
+        let rows = VisibilityRows::new(visibility, 0..facets.len(), settings.directions);
+        Ok(Factors::new(facets, &rows, material_of_slot, materials, settings)?.tabulate())
+    }
+}
+
+/// The scalar lobes of a term, and the colour direction of each: one for analytic terms, up to three for measured ones.
+fn lobes_of<'a>(term: &'a Term, settings: &LowRankSettings) -> Vec<(RotatedLobe<'a>, Vec3)> {
+    if let Some(lobe) = analytic_lobe(term) {
+        return vec![(RotatedLobe::Analytic(lobe), Vec3::ONE)];
+    }
+    let Term::Measured(table) = term else { return Vec::new() };
+    let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
+    let count = settings.colors.unwrap_or_else(|| colors.count_for(settings.keep_color)).clamp(1, 3);
+    let lobe = |along: Vec3| (RotatedLobe::Measured { table: table.as_ref(), along }, along);
+    colors.directions[..count].iter().map(|along| lobe(*along)).collect()
+}
+
+/// `a_v(o) / cos θ_o` at each node, in tile units squared.
+fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32> {
+    let component = |pick: fn(&Vec3) -> f32| -> Vec<f32> { facets.normals.iter().map(pick).collect() };
+    let (x, y, z) = (component(|n| n.x), component(|n| n.y), component(|n| n.z));
+    let grid = visibility.grid;
+    if facets.is_empty() {
+        return vec![0.0; grid.len()];
+    }
+    visibility
+        .rows
+        .chunks(facets.len().max(1))
+        .enumerate()
+        .map(|(node, row)| {
+            let direction = grid.direction(node);
+            (simd::projected_area([&x, &y, &z], &facets.areas, row, direction) / f64::from(direction.z)) as f32
+        })
+        .collect()
+}
+
+impl LowRank {
+    /// The same factors under other colours. `materials` must have the lobes that these were built from
+    /// ([`SumMaterial::same_lobes`]).
+    pub fn recolored(&self, materials: &[SumMaterial]) -> Self {
+        let mut recolored = self.clone();
+        for channel in &mut recolored.channels {
+            channel.tint = channel.source.tint(materials);
+        }
+        recolored
+    }
+
+    /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
+    pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        if o.z <= 0.0 {
+            (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
+            return 0.0;
+        }
+        let nodes = self.directions.len();
+        let view = self.directions.taps(o);
+        let relative: f32 = view.iter().map(|&(node, w)| w * self.projected_area[node]).sum();
+        for (k, &i) in lights.iter().enumerate() {
+            if i.z <= 0.0 {
+                out(k, DVec3::ZERO);
+                continue;
+            }
+            let light = self.directions.taps(i);
+            let io: [(usize, f32); 16] = std::array::from_fn(|t| {
+                let ((a, wa), (b, wb)) = (view[t / 4], light[t % 4]);
+                (a * nodes + b, wa * wb)
+            });
+            let hd = self.pairs.taps(i, o);
+            let i_dot_h = i.dot(half_vector(i, o));
+            let mut total = DVec3::ZERO;
+            for channel in &self.channels {
+                let value = match &channel.p {
+                    Some(p) => simd::gathered_dot(&channel.u, &io, p, &hd, channel.columns),
+                    None => io.iter().map(|&(node, w)| w * channel.u[node]).sum(),
+                };
+                total += (channel.tint.at(i_dot_h) * value).as_dvec3();
+            }
+            // Truncated factors may fall a little below zero; no BRDF does.
+            let taper = PolarGrid::horizon_taper(i.z) * PolarGrid::horizon_taper(o.z);
+            out(k, total.max(DVec3::ZERO) * f64::from(taper));
+        }
+        f64::from(relative * o.z)
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.channels.iter().map(Channel::bytes).sum()
+    }
+}

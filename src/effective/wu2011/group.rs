@@ -1,0 +1,98 @@
+//! Facets of one material through N and the product (Wu et al. 2011, Sec. 3.7, "Multiple Materials").
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::product::{PairTable, product};
+use super::visible_normals::BinnedFacets;
+use crate::base::{Error, Result};
+use crate::effective::{MaterialFactors, SumMaterial, VisibleFacets, Wu2011Settings};
+use crate::geometry::Facets;
+use crate::math::directions::ParaboloidMap;
+
+/// One material's row, as in Table 3, and what the product made of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MaterialReport {
+    /// Index into the materials.
+    pub material: usize,
+    pub m_rows: usize,
+    pub m_columns: usize,
+    pub m_directions: usize,
+    /// Directions that the paper's sampling asks for; more than `m_directions` where the cap cut in.
+    pub wanted_m_directions: usize,
+    pub m_rank: usize,
+    /// Power of M that was kept, measured over all of M (the lowest colour).
+    pub m_kept: f64,
+    pub m_bytes: usize,
+    pub m_seconds: f64,
+    /// Normal bins in use.
+    pub n_columns: usize,
+    pub n_rank: usize,
+    /// Power of the projected N that was kept.
+    pub n_kept: f64,
+}
+
+/// `G` of the facets of one material.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    pub map: Arc<ParaboloidMap>,
+    pub tables: Vec<PairTable>,
+}
+
+/// The facets of each material.
+pub(super) fn group_facets(facets: &Facets, material_of_slot: &[usize], materials: usize) -> Result<Vec<Vec<usize>>> {
+    let mut groups = vec![Vec::new(); materials];
+    for (s, &slot) in facets.slots.iter().enumerate() {
+        let group = material_of_slot.get(usize::from(slot)).and_then(|&material| groups.get_mut(material));
+        group.ok_or_else(|| Error::failed(format_args!("slot {slot} has no material")))?.push(s);
+    }
+    Ok(groups)
+}
+
+impl Group {
+    pub fn new(
+        tile: &VisibleFacets<'_>,
+        members: &[usize],
+        material: &SumMaterial,
+        factors: &MaterialFactors,
+        settings: &Wu2011Settings,
+    ) -> Result<(Self, MaterialReport)> {
+        let (facets, directions) = (tile.facets, tile.directions);
+        let visibility: Vec<f32> = (0..directions.len())
+            .flat_map(|node| members.iter().map(move |&s| f32::from(u8::from(tile.visibility.is_visible(node, s)))))
+            .collect();
+        let nearest: Vec<usize> = members.iter().map(|&s| factors.normals.nearest(facets.normals[s])).collect();
+        let binned = BinnedFacets::new(directions, &visibility, &nearest, &factors.normals);
+        // Colour weights that all facets share are a multiplication; others take an N for each channel (Sec. 3.7).
+        let shared = members.iter().all(|&s| facets.colors[s] == facets.colors[members[0]]);
+        let masks = if shared { vec![facets.colors[members[0]].as_dvec3()] } else { DVec3::AXES.to_vec() };
+        let mut tables = Vec::new();
+        let (mut n_rank, mut n_kept) = (0, 1.0_f64);
+        for (c, mask) in masks.into_iter().enumerate() {
+            let weight = |s: &usize| facets.areas[*s] * if shared { 1.0 } else { facets.colors[*s][c] };
+            let weights: Vec<f32> = members.iter().map(weight).collect();
+            let n = binned.factor(&weights, settings)?;
+            (n_rank, n_kept) = (n_rank.max(n.rank), n_kept.min(n.kept));
+            for m in &factors.channels {
+                let values = product(&n, directions, &binned.bins, m, &factors.directions, tile.base_area);
+                tables.push(PairTable { values, tint: m.tint(material.color) * mask });
+            }
+        }
+        let report = MaterialReport {
+            material: 0,
+            m_rows: factors.rows(),
+            m_columns: factors.columns(),
+            m_directions: factors.directions.len(),
+            wanted_m_directions: factors.wanted_directions,
+            m_rank: factors.rank(),
+            m_kept: factors.channels.iter().map(|channel| channel.kept).fold(1.0, f64::min),
+            m_bytes: factors.bytes(),
+            m_seconds: factors.seconds,
+            n_columns: binned.bins.len(),
+            n_rank,
+            n_kept,
+        };
+        Ok((Self { map: Arc::clone(&factors.directions), tables }, report))
+    }
+}

@@ -1,0 +1,180 @@
+//! The `wu2011` preset: the choices of Wu et al. 2011 as printed, to be compared with ours.
+//!
+//! Paraboloid maps for all directions and normals; N on nearest normals, M in streamed blocks, both reduced by random
+//! projection, mean subtraction and a small SVD, weighted against the map's distortion; their product tabulated on M's
+//! pairs and interpolated bilinearly. What the paper leaves open: which mean is subtracted (here: over rows, the pairs), and
+//! the random rows for M, whose ranks exceed the 50 it names for N (here 160).
+
+mod group;
+mod material;
+mod product;
+mod projection;
+mod rows;
+mod sampling;
+mod settings;
+#[cfg(test)]
+mod tests;
+mod visible_normals;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{DVec3, Vec3};
+
+use self::group::{Group, group_facets};
+use super::SumMaterial;
+use crate::base::{Error, InputError, Result};
+use crate::geometry::Facets;
+use crate::math::directions::{ParaboloidMap, Tap};
+use crate::visibility::PackedVisibility;
+pub use group::MaterialReport;
+pub use material::MaterialFactors;
+pub use settings::Wu2011Settings;
+
+/// Facets and what they see at the directions of a paraboloid map.
+#[derive(Debug, Clone, Copy)]
+pub struct VisibleFacets<'a> {
+    pub facets: &'a Facets,
+    /// Row `d` is the visibility along `directions.directions()[d]`.
+    pub visibility: &'a PackedVisibility,
+    pub directions: &'a ParaboloidMap,
+    /// Base area `A` of the tile.
+    pub base_area: f64,
+}
+
+/// What was built and how long it took.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Wu2011Report {
+    pub n_rows: usize,
+    pub materials: Vec<MaterialReport>,
+    /// Everything but M, which is precomputed.
+    pub product_seconds: f64,
+}
+
+/// The effective BRDF as the paper holds it.
+#[derive(Debug, Clone)]
+pub struct Wu2011 {
+    groups: Vec<Group>,
+    directions: ParaboloidMap,
+    /// `a_v / A` at the directions of visibility (Eq. 10).
+    projected_area: Vec<f32>,
+    base_area: f64,
+    pub report: Wu2011Report,
+}
+
+/// Number of unordered pairs of `count` things; also the row of M at which the pairs `(0..=count, count)` start.
+fn rows_of(count: usize) -> usize {
+    count * (count + 1) / 2
+}
+
+/// The pair `i <= o` of a row.
+fn pair_of_row(row: usize) -> (usize, usize) {
+    let mut o = (((8 * row + 1) as f64).sqrt() as usize).saturating_sub(1) / 2;
+    while rows_of(o + 1) <= row {
+        o += 1;
+    }
+    (row - rows_of(o), o)
+}
+
+impl Wu2011 {
+    /// Factors the materials and forms the product. Facets as sorted by [`Facets::sort_for_sums`].
+    pub fn build(
+        facets: &Facets,
+        visibility: &PackedVisibility,
+        directions: &ParaboloidMap,
+        base_area: f64,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        settings: &Wu2011Settings,
+    ) -> Result<Self> {
+        settings.check()?;
+        let groups = group_facets(facets, material_of_slot, materials.len())?;
+        let factors: Vec<Option<Arc<MaterialFactors>>> = materials
+            .iter()
+            .zip(&groups)
+            .map(|(material, group)| {
+                (!group.is_empty()).then(|| MaterialFactors::new(material, settings).map(Arc::new)).transpose()
+            })
+            .collect::<Result<_>>()?;
+        let tile = VisibleFacets { facets, visibility, directions, base_area };
+        Self::from_factors(&tile, material_of_slot, materials, &factors, settings)
+    }
+
+    /// The product alone: what an edit of the geometry or of a colour costs. `factors[m]` is of `materials[m]`, and may be
+    /// missing where no facet has that material.
+    pub fn from_factors(
+        tile: &VisibleFacets<'_>,
+        material_of_slot: &[usize],
+        materials: &[SumMaterial],
+        factors: &[Option<Arc<MaterialFactors>>],
+        settings: &Wu2011Settings,
+    ) -> Result<Self> {
+        settings.check()?;
+        let started = Instant::now();
+        let VisibleFacets { facets, visibility, directions, base_area } = *tile;
+        if visibility.facet_count != facets.len() || visibility.direction_count != directions.len() {
+            return Err(Error::failed("the visibility is of other facets or directions"));
+        }
+        if !(base_area > 0.0 && base_area.is_finite()) {
+            return Err(InputError::new("tile.size", base_area, "a tile with an area").into());
+        }
+        let mut report = Wu2011Report { n_rows: rows_of(directions.len()), ..Default::default() };
+        let mut groups = Vec::new();
+        for (material, members) in group_facets(facets, material_of_slot, materials.len())?.iter().enumerate() {
+            if members.is_empty() {
+                continue;
+            }
+            let factors = factors
+                .get(material)
+                .and_then(Option::as_ref)
+                .ok_or_else(|| Error::failed("a material without factors"))?;
+            let (group, row) = Group::new(tile, members, &materials[material], factors, settings)?;
+            report.materials.push(MaterialReport { material, ..row });
+            groups.push(group);
+        }
+        let projected_area = (0..directions.len())
+            .map(|node| {
+                let o = directions.directions()[node];
+                let seen = (0..facets.len()).filter(|&s| visibility.is_visible(node, s));
+                let sum: f64 =
+                    seen.map(|s| f64::from(facets.normals[s].dot(o).max(0.0)) * f64::from(facets.areas[s])).sum();
+                (sum / base_area) as f32
+            })
+            .collect();
+        report.product_seconds = started.elapsed().as_secs_f64();
+        Ok(Self { groups, directions: directions.clone(), projected_area, base_area, report })
+    }
+
+    /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
+    pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+        if o.z <= 0.0 {
+            (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
+            return 0.0;
+        }
+        let views: Vec<[Tap; 4]> = self.groups.iter().map(|group| group.map.taps(o)).collect();
+        for (k, &i) in lights.iter().enumerate() {
+            let mut total = DVec3::ZERO;
+            if i.z > 0.0 {
+                for (group, view) in self.groups.iter().zip(&views) {
+                    let light = group.map.taps(i);
+                    total += group.tables.iter().map(|table| table.tint * table.eval(&light, view)).sum::<DVec3>();
+                }
+            }
+            // Truncated factors may fall a little below zero; no BRDF does.
+            out(k, total.max(DVec3::ZERO) * self.base_area);
+        }
+        let relative: f32 = self.directions.taps(o).iter().map(|&(node, w)| w * self.projected_area[node]).sum();
+        f64::from(relative) * self.base_area
+    }
+
+    /// Directions that values are read from.
+    pub fn direction_count(&self) -> usize {
+        self.directions.len()
+    }
+
+    /// Bytes of the tables that a query reads.
+    pub fn bytes(&self) -> usize {
+        let tables = self.groups.iter().flat_map(|group| &group.tables);
+        4 * (tables.map(|table| table.values.len()).sum::<usize>() + self.projected_area.len())
+    }
+}

@@ -1,0 +1,36 @@
+//! Facets in the order that sums over them want: by material slot, then equal normals together.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::A_THREAD;
+use crate::geometry::Facets;
+use crate::geometry::families::rounded::rounded;
+
+impl Facets {
+    /// Sorts by slot and normal; facets that share a normal become neighbours. Stable, so the order stays deterministic.
+    pub fn sort_for_sums(&mut self) {
+        let keyed = |(s, (slot, normal)): (usize, (&u16, &Vec3))| (sum_key(*slot, *normal), s as u32);
+        let pairs = self.slots.par_iter().zip(&self.normals).with_min_len(A_THREAD);
+        let mut order: Vec<(u64, u32)> = pairs.enumerate().map(keyed).collect();
+        // The facet's number decides between equals: as good as stable, and quicker.
+        order.sort_unstable();
+        fn permuted<T: Copy + Send + Sync>(values: &[T], order: &[(u64, u32)]) -> Vec<T> {
+            order.par_iter().with_min_len(A_THREAD).map(|&(_, s)| values[s as usize]).collect()
+        }
+        self.positions = permuted(&self.positions, &order);
+        self.normals = permuted(&self.normals, &order);
+        self.geometric_normals = permuted(&self.geometric_normals, &order);
+        self.areas = permuted(&self.areas, &order);
+        self.slots = permuted(&self.slots, &order);
+        self.colors = permuted(&self.colors, &order);
+        self.triangles = permuted(&self.triangles, &order);
+    }
+}
+
+/// Slot, z, y, x, the first of them first; 16 bits hold each, for normals are of unit length.
+fn sum_key(slot: u16, normal: Vec3) -> u64 {
+    const STEPS: f32 = 4096.0;
+    let [x, y, z] = (normal * STEPS).to_array().map(|v| u64::from(rounded(v).clamp(-0x8000, 0x7fff) as u16 ^ 0x8000));
+    u64::from(slot) << 48 | z << 32 | y << 16 | x
+}

@@ -1,0 +1,38 @@
+//! The paper's way to facets: random points, areas by nearest centre (Wu et al. 2011, Sec. 3.2).
+
+use glam::Vec2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::fold;
+use super::kd_tree::KdTree;
+use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
+
+/// Points that vote on areas, for each facet.
+const VOTES_PER_FACET: usize = 64;
+
+impl Facets {
+    /// `count` facets at random points, triangles chosen by area; each stands for the part of the surface that is nearest
+    /// to its centre, found with 64 points a facet and a kd-tree. Areas sum to the tile's surface area.
+    pub fn sample_wu2011(mesh: &TileMesh, count: usize, seed: u64) -> Self {
+        let sampler = FacetSampler::new(mesh);
+        let mut facets = sampler.sample(mesh, 0, SampleShift::default());
+        if sampler.area() <= 0.0 || count == 0 {
+            return facets;
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        for _ in 0..count {
+            let triangle = sampler.triangle_at(random.random());
+            facets.push(mesh, triangle, fold(Vec2::new(random.random(), random.random())), 0.0);
+        }
+        let voters = sampler.sample(mesh, count * VOTES_PER_FACET, SampleShift::from_seed(seed.wrapping_add(1)));
+        let tree = KdTree::new(&facets.positions, mesh.size);
+        let nearest: Vec<Option<u32>> = voters.positions.par_iter().map(|position| tree.nearest(*position)).collect();
+        let mut votes = vec![0u32; count];
+        nearest.into_iter().flatten().for_each(|facet| votes[facet as usize] += 1);
+        let area = sampler.area() / (count * VOTES_PER_FACET) as f64;
+        facets.areas = votes.into_iter().map(|votes| (f64::from(votes) * area) as f32).collect();
+        facets
+    }
+}

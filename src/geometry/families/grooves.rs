@@ -1,0 +1,239 @@
+//! Parallel grooves of any direction in which the tile repeats.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, Vec2};
+
+use super::builder::MeshBuilder;
+use crate::geometry::TileMesh;
+use crate::scene::{GrooveProfile, Grooves};
+
+const BOTTOM: u16 = 0;
+const SIDES: u16 = 1;
+/// Facets of the half ellipse of a U groove.
+const ARC_SEGMENTS: usize = 24;
+
+/// Grooves as waves: `phase = m x / size.x + n y / size.y`, one groove a unit of phase. Whole m and n tile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Wave {
+    m: i64,
+    n: i64,
+    size: DVec2,
+}
+
+/// Grooves that cross one side of a tile at most.
+const MOST_WAVES: f64 = 2048.0;
+
+impl Wave {
+    /// The wave nearest to `count` grooves across the tile, turned by `rotation_deg` from running along y.
+    fn snapped(count: u32, rotation_deg: f32, size: Vec2) -> Self {
+        let size = size.as_dvec2();
+        let (sin, cos) = f64::from(rotation_deg).to_radians().sin_cos();
+        let count = f64::from(count);
+        // Tiles a million times as long as wide would get a million grooves: those turn less.
+        let most = |waves: f64| waves.round().clamp(-MOST_WAVES, MOST_WAVES) as i64;
+        let (m, n) = (most(count * cos), most(count * sin * size.y / size.x));
+        Self { m: if (m, n) == (0, 0) { 1 } else { m }, n, size }
+    }
+
+    fn gradient(&self) -> DVec2 {
+        DVec2::new(self.m as f64, self.n as f64) / self.size
+    }
+
+    /// Distance between grooves.
+    fn pitch(&self) -> f64 {
+        self.gradient().length_recip()
+    }
+
+    fn rotation_deg(&self) -> f64 {
+        let gradient = self.gradient();
+        gradient.y.atan2(gradient.x).to_degrees()
+    }
+}
+
+/// A corner of the cross-section: phase within one period and height, and the slot of the segment that follows.
+type ProfilePoint = (f64, f64, u16);
+
+/// The cross-section of grooves, for what is made of it besides the mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrossSection {
+    /// Corners over one period, `(x, z)` in tile units, and the slot (`bottom`, `sides`) of the piece that follows.
+    pub points: Vec<(DVec2, u16)>,
+    /// Distance between grooves.
+    pub pitch: f64,
+    /// Grooves on the tile, across their run.
+    pub count: usize,
+    /// Length of each on the tile.
+    pub length: f64,
+}
+
+impl CrossSection {
+    /// Of the grooves as they fit the tile.
+    pub fn of(spec: &Grooves, size: Vec2) -> Self {
+        let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
+        let pitch = wave.pitch();
+        let points =
+            profile(spec, pitch).into_iter().map(|(phase, z, slot)| (DVec2::new(phase * pitch, z), slot)).collect();
+        let count = wave.m.unsigned_abs().max(wave.n.unsigned_abs()).max(1) as usize;
+        Self { points, pitch, count, length: wave.size.x * wave.size.y / (count as f64 * pitch) }
+    }
+}
+
+pub fn build(spec: &Grooves, size: Vec2) -> TileMesh {
+    let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
+    let mut builder = MeshBuilder::new(size, &["bottom", "sides"]);
+    let turned = (wave.rotation_deg() - f64::from(spec.rotation_deg) + 180.0).rem_euclid(360.0) - 180.0;
+    if turned.abs() > 0.05 || spec.rotation_deg != 0.0 {
+        builder.note(format!(
+            "grooves run at {:.2} degrees, {:.4} apart, so that the tile repeats (asked for: {} degrees)",
+            wave.rotation_deg(),
+            wave.pitch(),
+            spec.rotation_deg
+        ));
+    }
+    extrude(&mut builder, &wave, &profile(spec, wave.pitch()));
+    builder.finish()
+}
+
+/// The cross-section over one period, from phase 0 to phase 1; the groove stands in the middle, land at z = 0.
+fn profile(spec: &Grooves, pitch: f64) -> Vec<ProfilePoint> {
+    let depth = f64::from(spec.depth);
+    let bottom = match spec.profile {
+        GrooveProfile::V => 0.0,
+        _ => f64::from(spec.bottom_width),
+    };
+    let slope_run =
+        if spec.side_angle_deg > 89.99 { 0.0 } else { depth / f64::from(spec.side_angle_deg).to_radians().tan() };
+    let run = match spec.profile {
+        GrooveProfile::V | GrooveProfile::Trapezoid => (slope_run / pitch).min(0.5 * (1.0 - bottom)),
+        GrooveProfile::U | GrooveProfile::Rectangular => 0.0,
+    };
+    let mut points = vec![(0.0, 0.0, SIDES)];
+    if spec.profile == GrooveProfile::U {
+        points.extend((0..=ARC_SEGMENTS).map(|k| {
+            let angle = PI * k as f64 / ARC_SEGMENTS as f64;
+            let slot = if (ARC_SEGMENTS / 4..ARC_SEGMENTS * 3 / 4).contains(&k) { BOTTOM } else { SIDES };
+            // sin π is not quite 0.
+            let z = if k == ARC_SEGMENTS { 0.0 } else { -depth * angle.sin() };
+            (0.5 - 0.5 * bottom * angle.cos(), z, slot)
+        }));
+    } else {
+        let (inner, outer) = (0.5 * bottom, 0.5 * bottom + run);
+        points.extend([
+            (0.5 - outer, 0.0, SIDES),
+            (0.5 - inner, -depth, BOTTOM),
+            (0.5 + inner, -depth, SIDES),
+            (0.5 + outer, 0.0, SIDES),
+        ]);
+    }
+    points.push((1.0, 0.0, SIDES));
+    points.dedup_by(|next, kept| {
+        (next.0 - kept.0).abs() < 1e-12 && next.1 == kept.1 && {
+            kept.2 = next.2;
+            true
+        }
+    });
+    points
+}
+
+/// Sweeps the cross-section along the grooves over one period of the plane: a parallelogram spanned by the shortest
+/// period along the grooves and one across them, cut into pieces whose corners meet those of their neighbours.
+fn extrude(builder: &mut MeshBuilder, wave: &Wave, profile: &[ProfilePoint]) {
+    let (grooves, a, b) = bezout(wave.m, wave.n);
+    let mut along = DVec2::new((wave.n / grooves) as f64, -(wave.m / grooves) as f64) * wave.size;
+    // A lattice vector that climbs `grooves` units of phase: with `along` it spans one tile's area.
+    let across = DVec2::new(a as f64, b as f64) * wave.size;
+    if across.perp_dot(along) < 0.0 {
+        along = -along;
+    }
+    let pieces = (along.length() / (0.25 * wave.size.min_element())).ceil().clamp(1.0, 4096.0);
+    // Shifting by whole pieces keeps corners on corners and makes the parallelogram nearly a rectangle.
+    let skew = (across.dot(along) / along.length_squared() * pieces).round() / pieces;
+    let across = (across - skew * along) / grooves as f64;
+    for groove in 0..grooves {
+        for corners in profile.windows(2) {
+            let ((phase, z, slot), (next_phase, next_z, _)) = (corners[0], corners[1]);
+            let at =
+                |phase: f64, z: f64, piece: f64| ((groove as f64 + phase) * across + piece / pieces * along).extend(z);
+            for piece in 0..pieces as usize {
+                let (from, to) = (piece as f64, piece as f64 + 1.0);
+                builder.polygon(
+                    &[at(phase, z, from), at(next_phase, next_z, from), at(next_phase, next_z, to), at(phase, z, to)],
+                    slot,
+                );
+            }
+        }
+    }
+}
+
+/// `(g, a, b)` with `a m + b n = g`, g the greatest common divisor, positive.
+fn bezout(m: i64, n: i64) -> (i64, i64, i64) {
+    let (mut old, mut new) = ((m, 1, 0), (n, 0, 1));
+    while new.0 != 0 {
+        let quotient = old.0 / new.0;
+        (old, new) = (new, (old.0 - quotient * new.0, old.1 - quotient * new.1, old.2 - quotient * new.2));
+    }
+    if old.0 < 0 { (-old.0, -old.1, -old.2) } else { old }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::closure::assert_closes_plane;
+
+    fn area(mesh: &TileMesh) -> f64 {
+        (0..mesh.triangles.len()).map(|triangle| mesh.triangle_area(triangle)).sum()
+    }
+
+    #[test]
+    fn full_v_grooves_have_the_area_of_their_slopes() {
+        let spec =
+            Grooves { profile: GrooveProfile::V, depth: 0.5, side_angle_deg: 45.0, count: 1, ..Grooves::default() };
+        let mesh = build(&spec, Vec2::ONE);
+        assert!((area(&mesh) - 2f64.sqrt()).abs() < 1e-6, "{}", area(&mesh));
+        assert!(mesh.is_height_field());
+        assert_closes_plane(&mesh);
+    }
+
+    #[test]
+    fn rectangular_grooves_add_two_walls_each() {
+        let spec = Grooves { profile: GrooveProfile::Rectangular, depth: 0.3, count: 5, ..Grooves::default() };
+        let mesh = build(&spec, Vec2::new(1.0, 2.0));
+        assert!((area(&mesh) - (2.0 + 5.0 * 2.0 * 0.3 * 2.0)).abs() < 1e-5);
+        assert_closes_plane(&mesh);
+    }
+
+    #[test]
+    fn rotated_grooves_still_tile_and_keep_the_base_area() {
+        for (count, rotation_deg, size) in [
+            (4, 30.0, Vec2::ONE),
+            (7, -61.0, Vec2::new(1.0, 0.6)),
+            (3, 90.0, Vec2::new(2.0, 1.0)),
+            (5, 180.0, Vec2::ONE),
+        ] {
+            for profile in [GrooveProfile::V, GrooveProfile::U, GrooveProfile::Trapezoid, GrooveProfile::Rectangular] {
+                let mesh = build(&Grooves { count, rotation_deg, profile, ..Grooves::default() }, size);
+                assert_closes_plane(&mesh);
+                assert!(mesh.is_height_field(), "{profile:?} {rotation_deg}");
+                assert!(!mesh.notes.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn a_u_groove_of_many_facets_nears_the_half_cylinder() {
+        // Opening 0.8, depth 0.4: a half circle of radius 0.4, arc 0.4 π, land 0.2.
+        let spec = Grooves { profile: GrooveProfile::U, depth: 0.4, bottom_width: 0.8, count: 1, ..Grooves::default() };
+        let expected = 0.4 * PI + 0.2;
+        assert!((area(&build(&spec, Vec2::ONE)) - expected).abs() < 2e-3 * expected);
+    }
+
+    #[test]
+    fn bezout_solves_its_equation() {
+        for (m, n) in [(4, 0), (0, -3), (12, 18), (-5, 7), (1, 1)] {
+            let (g, a, b) = bezout(m, n);
+            assert_eq!(a * m + b * n, g);
+            assert!(g > 0 && m % g == 0 && n % g == 0);
+        }
+    }
+}

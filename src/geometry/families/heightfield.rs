@@ -1,0 +1,134 @@
+//! Height-fields from images or lists of values.
+
+use std::path::Path;
+
+use glam::{UVec2, Vec2, Vec3};
+
+use crate::base::{InputError, Result};
+use crate::geometry::image_file::Pixels;
+use crate::geometry::{HeightGrid, TileMesh, image_file};
+use crate::scene::Heightfield;
+
+pub fn build(spec: &Heightfield, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
+    let mut pixels = match (&spec.path, &spec.values) {
+        (Some(path), _) => image_file::read_heights(base_dir, path)?,
+        (None, Some(rows)) => from_rows(rows)?,
+        (None, None) => {
+            return Err(InputError::new(
+                "tile.geometry",
+                "no heights",
+                "`path` (an image) or `values` (rows of heights)",
+            )
+            .into());
+        }
+    };
+    pixels.values.iter_mut().for_each(|height| *height *= spec.height_scale);
+    Ok(from_grid(HeightGrid { size: pixels.size, heights: pixels.values }, size))
+}
+
+/// As [`build`], from heights in memory.
+pub fn build_painted(spec: &Heightfield, size: Vec2, painted: &Pixels<f32>) -> TileMesh {
+    let heights = painted.values.iter().map(|height| height * spec.height_scale).collect();
+    from_grid(HeightGrid { size: painted.size, heights }, size)
+}
+
+fn from_rows(rows: &[Vec<f32>]) -> Result<Pixels<f32>> {
+    let width = rows.first().map_or(0, Vec::len);
+    if width == 0 || rows.iter().any(|row| row.len() != width) {
+        return Err(
+            InputError::new("tile.geometry.values", "rows of different lengths or none", "rows of one length").into()
+        );
+    }
+    Ok(Pixels { size: UVec2::new(width as u32, rows.len() as u32), values: rows.concat() })
+}
+
+/// Two triangles a cell, between samples; the last row and column reach over the tile's edge to the first.
+pub fn from_grid(grid: HeightGrid, size: Vec2) -> TileMesh {
+    let positions: Vec<Vec3> = positions(&grid, size).collect();
+    let triangles: Vec<[u32; 3]> = triangles(grid.size).collect();
+    TileMesh {
+        size,
+        triangle_slot: vec![0; triangles.len()],
+        positions,
+        triangles,
+        slots: vec!["default".to_owned()],
+        height_grid: Some(grid),
+        closes_plane: true,
+        ..TileMesh::default()
+    }
+}
+
+fn positions(grid: &HeightGrid, size: Vec2) -> impl Iterator<Item = Vec3> {
+    let step = size / grid.size.as_vec2();
+    let [width, height] = grid.size.to_array().map(|side| side as usize);
+    (0..=height).flat_map(move |j| {
+        let row = &grid.heights[j % height * width..][..width];
+        (0..=width).map(move |i| {
+            let xy = (Vec2::new(i as f32, j as f32) + 0.5) * step;
+            xy.extend(if i < width { row[i] } else { row[0] })
+        })
+    })
+}
+
+/// The cell between samples (i, j) and (i + 1, j + 1) has the triangles `2 (j width + i)` and the next.
+fn triangles(size: UVec2) -> impl Iterator<Item = [u32; 3]> {
+    let index = move |i: u32, j: u32| j * (size.x + 1) + i;
+    let cell = move |i, j| {
+        let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    (0..size.y).flat_map(move |j| (0..size.x).flat_map(move |i| cell(i, j)))
+}
+
+/// Is it what [`from_grid`] makes of its samples, all of them finite?
+pub(super) fn is_made_of(mesh: &TileMesh, grid: &HeightGrid) -> bool {
+    mesh.positions.iter().all(|position| position.is_finite())
+        && positions(grid, mesh.size).eq(mesh.positions.iter().copied())
+        && triangles(grid.size).eq(mesh.triangles.iter().copied())
+}
+
+/// A height-field from a function of tile coordinates: for tests and examples.
+pub fn from_function(samples: UVec2, size: Vec2, height: impl Fn(Vec2) -> f32) -> TileMesh {
+    let at = |k: u32| Vec2::new((k % samples.x) as f32 + 0.5, (k / samples.x) as f32 + 0.5) / samples.as_vec2() * size;
+    from_grid(HeightGrid { size: samples, heights: (0..samples.x * samples.y).map(|k| height(at(k))).collect() }, size)
+}
+
+/// Places of the samples: `((i+½)/w, (j+½)/h)` of the tile.
+pub fn sample_position(grid: &HeightGrid, index: usize, size: Vec2) -> Vec3 {
+    let (i, j) = (index % grid.size.x as usize, index / grid.size.x as usize);
+    ((Vec2::new(i as f32, j as f32) + 0.5) * size / grid.size.as_vec2()).extend(grid.heights[index])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::closure::assert_closes_plane;
+
+    #[test]
+    fn samples_sit_at_texel_centres_with_row_0_at_y_0() {
+        let spec = Heightfield {
+            values: Some(vec![vec![1.0, 2.0], vec![3.0, 4.0], vec![5.0, 6.0]]),
+            height_scale: 0.5,
+            ..Heightfield::default()
+        };
+        let mesh = build(&spec, Vec2::new(2.0, 3.0), Path::new("")).unwrap();
+        assert!(mesh.positions.contains(&Vec3::new(0.5, 0.5, 0.5)));
+        assert!(mesh.positions.contains(&Vec3::new(1.5, 2.5, 3.0)));
+        // The copy of sample (0, 0) beyond both edges.
+        assert!(mesh.positions.contains(&Vec3::new(2.5, 3.5, 0.5)));
+        let grid = mesh.height_grid.clone().unwrap();
+        for index in 0..6 {
+            assert!(mesh.positions.contains(&sample_position(&grid, index, mesh.size)));
+        }
+    }
+
+    #[test]
+    fn any_grid_closes_the_plane_without_overhang() {
+        for samples in [UVec2::new(1, 1), UVec2::new(2, 5), UVec2::new(33, 17)] {
+            let mesh = from_function(samples, Vec2::new(1.0, 0.7), |p| (p.x * 12.0).sin() * (p.y * 31.0).cos());
+            assert_closes_plane(&mesh);
+            assert!(mesh.is_height_field());
+            assert_eq!(mesh.triangles.len() as u32, 2 * samples.x * samples.y);
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! The part of a height-field that lies below some places.
+
+use std::ops::RangeInclusive;
+
+use glam::{IVec2, Vec2};
+
+use super::heightfield::is_made_of;
+use crate::geometry::{HeightGrid, PeriodicGrid, TileMesh};
+
+/// Beyond, neighbouring samples might share a place in f32, and triangles have no area.
+const MOST_SAMPLES_A_SIDE: u32 = 1 << 16;
+
+/// The triangles of a height-field that reach into the cells of some places, in their order, and a grid of them. Straight down
+/// from these places it tells the same as a grid of the whole mesh. `None` of a mesh that is not just samples.
+pub(crate) fn below(mesh: &TileMesh, places: impl Iterator<Item = Vec2>) -> Option<(TileMesh, PeriodicGrid)> {
+    let heights = mesh.height_grid.as_ref()?;
+    if heights.size.max_element() > MOST_SAMPLES_A_SIDE || !is_made_of(mesh, heights) {
+        return None;
+    }
+    let cells = PeriodicGrid::cells_beside_each_other(mesh.size, mesh.triangles.len());
+    let mut seen: Vec<[i32; 2]> =
+        places.map(|place| PeriodicGrid::cell_of(mesh.size, cells, place).to_array()).collect();
+    seen.sort_unstable();
+    seen.dedup();
+    let mut triangles: Vec<u32> = seen.iter().flat_map(|cell| below_cell(heights, (*cell).into(), cells)).collect();
+    triangles.sort_unstable();
+    triangles.dedup();
+    let part = part_of(mesh, &triangles);
+    let grid = PeriodicGrid::of_part(&part, cells, mesh.z_range().1);
+    Some((part, grid))
+}
+
+/// Triangles that reach into a cell.
+fn below_cell(heights: &HeightGrid, cell: IVec2, cells: IVec2) -> impl Iterator<Item = u32> {
+    let [width, height] = heights.size.to_array().map(|side| side as i32);
+    let columns = samples(cell.x, cells.x, width);
+    samples(cell.y, cells.y, height).flat_map(move |j| {
+        columns.clone().flat_map(move |i| {
+            let first = 2 * (j.rem_euclid(height) * width + i.rem_euclid(width)) as u32;
+            [first, first + 1]
+        })
+    })
+}
+
+/// Samples from which triangles begin that reach into a cell along one axis. They go from a sample's centre to the next one's;
+/// a grid takes what comes within a thousandth of a cell.
+fn samples(cell: i32, cells: i32, count: i32) -> RangeInclusive<i32> {
+    let sample = |at: f64| (at / f64::from(cells) * f64::from(count) - 0.5).floor() as i32;
+    let (first, last) = (sample(f64::from(cell) - 0.01), sample(f64::from(cell) + 1.01));
+    first..=last.min(first + count - 1)
+}
+
+fn part_of(mesh: &TileMesh, triangles: &[u32]) -> TileMesh {
+    let corners = triangles.iter().flat_map(|triangle| mesh.corners(*triangle as usize));
+    TileMesh {
+        size: mesh.size,
+        positions: corners.collect(),
+        triangles: (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
+        triangle_slot: triangles.iter().map(|triangle| mesh.triangle_slot[*triangle as usize]).collect(),
+        color: mesh.color.clone(),
+        painted_slots: mesh.painted_slots.clone(),
+        ..TileMesh::default()
+    }
+}

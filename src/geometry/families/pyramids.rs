@@ -1,0 +1,277 @@
+//! Pyramids on a floor that is cut out under them: a height-field without buried parts.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, Vec2};
+
+use super::builder::MeshBuilder;
+use crate::geometry::TileMesh;
+use crate::scene::{Arrangement, Pyramids};
+
+const FACES: u16 = 0;
+const FLOOR: u16 = 1;
+/// Cells along each side of the tile at most.
+const MOST_CELLS: f64 = 64.0;
+
+pub fn build(spec: &Pyramids, size: Vec2) -> TileMesh {
+    let mut builder = MeshBuilder::new(size, &["faces", "floor"]);
+    let lattice = Lattice::new(spec, size);
+    if let Some(note) = lattice.note(spec) {
+        builder.note(note);
+    }
+    let cell = lattice.cell();
+    let pyramid = Pyramid::fitted(spec, &cell);
+    for row in 0..lattice.rows {
+        for column in 0..lattice.columns {
+            let centre = lattice.centre(column, row);
+            let at = |corner: DVec2, z: f64| (centre + corner).extend(z);
+            for triangle in annulus(&cell, &pyramid.base) {
+                builder.polygon(&triangle.map(|corner| at(corner, 0.0)), FLOOR);
+            }
+            let corners = pyramid.base.len();
+            for k in 0..corners {
+                let next = (k + 1) % corners;
+                let (foot, next_foot) = (at(pyramid.base[k], 0.0), at(pyramid.base[next], 0.0));
+                let (top, next_top) = (at(pyramid.top[k], pyramid.top_z), at(pyramid.top[next], pyramid.top_z));
+                if spec.truncation > 0.0 {
+                    builder.polygon(&[foot, next_foot, next_top, top], FACES);
+                } else {
+                    builder.polygon(&[foot, next_foot, top], FACES);
+                }
+            }
+            if spec.truncation > 0.0 {
+                let top: Vec<_> = pyramid.top.iter().map(|corner| at(*corner, pyramid.top_z)).collect();
+                builder.polygon(&top, FACES);
+            }
+        }
+    }
+    builder.finish()
+}
+
+/// One pyramid and where its like stand, for what is made of it besides the mesh. Tile units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnePyramid {
+    /// Corners of the base and of the cut tip about the centre, counter-clockwise.
+    pub base: Vec<DVec2>,
+    pub top: Vec<DVec2>,
+    pub top_z: f64,
+    /// Whether the tip is cut.
+    pub has_top: bool,
+    pub centres: Vec<DVec2>,
+}
+
+impl OnePyramid {
+    /// Of the pyramids as they fit the tile.
+    pub fn of(spec: &Pyramids, size: Vec2) -> Self {
+        let lattice = Lattice::new(spec, size);
+        let Pyramid { base, top, top_z } = Pyramid::fitted(spec, &lattice.cell());
+        let places = (0..lattice.rows).flat_map(|row| (0..lattice.columns).map(move |column| (column, row)));
+        let centres = places.map(|(column, row)| lattice.centre(column, row)).collect();
+        Self { base, top, top_z, has_top: spec.truncation > 0.0, centres }
+    }
+}
+
+/// Where the pyramids stand.
+struct Lattice {
+    columns: usize,
+    rows: usize,
+    /// Distances between neighbours in a row, and between rows.
+    pitch: DVec2,
+    shifted: bool,
+    hexagonal: bool,
+}
+
+impl Lattice {
+    fn new(spec: &Pyramids, size: Vec2) -> Self {
+        let size = size.as_dvec2();
+        let spacing = f64::from(spec.spacing);
+        let shifted = spec.arrangement != Arrangement::Square;
+        let row_spacing = if spec.arrangement == Arrangement::Hex { spacing * 0.75f64.sqrt() } else { spacing };
+        let columns = (size.x / spacing).round().clamp(1.0, MOST_CELLS);
+        // Rows that are shifted by half come in pairs.
+        let step = if shifted { 2.0 } else { 1.0 };
+        let rows = ((size.y / row_spacing / step).round() * step).clamp(step, MOST_CELLS);
+        let pitch = size / DVec2::new(columns, rows);
+        let hexagonal = spec.arrangement == Arrangement::Hex && pitch.y > 0.55 * pitch.x;
+        Self { columns: columns as usize, rows: rows as usize, pitch, shifted, hexagonal }
+    }
+
+    fn note(&self, spec: &Pyramids) -> Option<String> {
+        let spacing = f64::from(spec.spacing);
+        let row_spacing = if spec.arrangement == Arrangement::Hex { spacing * 0.75f64.sqrt() } else { spacing };
+        let off = (self.pitch / DVec2::new(spacing, row_spacing) - 1.0).abs().max_element();
+        (off > 1e-3).then(|| {
+            format!(
+                "pyramids stand {:.4} x {:.4} apart, so that whole cells fit the tile (asked for: {:.4} x {:.4})",
+                self.pitch.x, self.pitch.y, spacing, row_spacing
+            )
+        })
+    }
+
+    fn centre(&self, column: usize, row: usize) -> DVec2 {
+        let shift = if self.shifted && row % 2 == 1 { 1.0 } else { 0.5 };
+        DVec2::new(column as f64 + shift, row as f64 + 0.5) * self.pitch
+    }
+
+    /// What belongs to one pyramid, about its centre, counter-clockwise. Corners of neighbours on an edge are corners too.
+    fn cell(&self) -> Vec<DVec2> {
+        let half = 0.5 * self.pitch;
+        if self.hexagonal {
+            // The Voronoi cell: corners are circumcentres of neighbouring centres.
+            let tip = (half.x * half.x + self.pitch.y * self.pitch.y) / (2.0 * self.pitch.y);
+            let shoulder = self.pitch.y - tip;
+            return vec![
+                DVec2::new(half.x, -shoulder),
+                DVec2::new(half.x, shoulder),
+                DVec2::new(0.0, tip),
+                DVec2::new(-half.x, shoulder),
+                DVec2::new(-half.x, -shoulder),
+                DVec2::new(0.0, -tip),
+            ];
+        }
+        let mut corners = vec![DVec2::new(half.x, -half.y), half];
+        if self.shifted {
+            corners.push(DVec2::new(0.0, half.y));
+        }
+        corners.extend([DVec2::new(-half.x, half.y), -half]);
+        if self.shifted {
+            corners.push(DVec2::new(0.0, -half.y));
+        }
+        corners
+    }
+}
+
+/// One pyramid about its centre.
+struct Pyramid {
+    base: Vec<DVec2>,
+    top: Vec<DVec2>,
+    top_z: f64,
+}
+
+impl Pyramid {
+    fn fitted(spec: &Pyramids, cell: &[DVec2]) -> Self {
+        let sides = f64::from(spec.sides);
+        let turn = f64::from(spec.rotation_deg).to_radians();
+        // A face looks along +x where the pyramid is not turned.
+        let unit: Vec<DVec2> =
+            (0..spec.sides).map(|k| DVec2::from_angle(turn + (TAU * f64::from(k) - PI) / sides)).collect();
+        let scale = f64::from(spec.base_size) * largest_scale(&unit, cell);
+        let base: Vec<DVec2> = unit.iter().map(|corner| *corner * scale).collect();
+        let ratio = f64::from(spec.face_ratio);
+        let inradius = scale * (PI / sides).cos();
+        let tip = DVec2::from_angle(turn) * inradius * (1.0 - ratio) / (1.0 + ratio);
+        let cut = f64::from(spec.truncation);
+        let top = base.iter().map(|corner| tip.lerp(*corner, cut)).collect();
+        Self { base, top, top_z: f64::from(spec.height) * (1.0 - cut) }
+    }
+}
+
+/// How much `polygon` can grow about the origin and stay in the convex `cell`.
+fn largest_scale(polygon: &[DVec2], cell: &[DVec2]) -> f64 {
+    let scale = |k: usize| {
+        let (from, to) = (cell[k], cell[(k + 1) % cell.len()]);
+        let outward = -(to - from).perp();
+        let reach = polygon.iter().map(|corner| corner.dot(outward)).fold(0.0, f64::max);
+        from.dot(outward) / reach
+    };
+    (0..cell.len()).map(scale).fold(f64::INFINITY, f64::min)
+}
+
+/// Triangles between two convex loops, the inner in the outer, both counter-clockwise, corners to corners. The edges are
+/// merged by direction, as in the lateral surface of the convex hull of both at different heights: no triangle turns over.
+fn annulus(outer: &[DVec2], inner: &[DVec2]) -> Vec<[DVec2; 3]> {
+    let mut edges = Vec::new();
+    for (is_inner, corners) in [(false, outer), (true, inner)] {
+        for k in 0..corners.len() {
+            let edge = corners[(k + 1) % corners.len()] - corners[k];
+            // Rounded, so that edges in line share their direction.
+            let direction = (edge.to_angle().rem_euclid(TAU) * 1e9).round() as i64 % (TAU * 1e9) as i64;
+            edges.push((direction, is_inner, k));
+        }
+    }
+    edges.sort_unstable();
+    let first = |wanted: bool| edges.iter().find(|(_, is_inner, _)| *is_inner == wanted).map_or(0, |edge| edge.2);
+    let (mut at_outer, mut at_inner) = (first(false), first(true));
+    let mut triangles = Vec::with_capacity(edges.len());
+    for (_, is_inner, _) in &edges {
+        if *is_inner {
+            let next = (at_inner + 1) % inner.len();
+            triangles.push([inner[at_inner], outer[at_outer], inner[next]]);
+            at_inner = next;
+        } else {
+            let next = (at_outer + 1) % outer.len();
+            triangles.push([outer[at_outer], outer[next], inner[at_inner]]);
+            at_outer = next;
+        }
+    }
+    // Where the outlines touch, the strip between them has no width.
+    let widest = outer.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max);
+    triangles.retain(|[a, b, c]| (*b - *a).perp_dot(*c - *a) > 1e-9 * widest);
+    triangles
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::closure::assert_closes_plane;
+
+    fn slot_area(mesh: &TileMesh, slot: u16) -> f64 {
+        (0..mesh.triangles.len()).filter(|&t| mesh.triangle_slot[t] == slot).map(|t| mesh.triangle_area(t)).sum()
+    }
+
+    #[test]
+    fn every_number_of_sides_and_arrangement_closes_the_plane_without_overhang() {
+        for sides in 3..=8 {
+            for arrangement in [Arrangement::Square, Arrangement::Hex, Arrangement::Staggered] {
+                for (rotation_deg, truncation, face_ratio) in [(0.0, 0.0, 1.0), (17.0, 0.4, 3.0), (45.0, 0.0, 0.2)] {
+                    let spec = Pyramids {
+                        sides,
+                        arrangement,
+                        rotation_deg,
+                        truncation,
+                        face_ratio,
+                        base_size: 0.9,
+                        ..Pyramids::default()
+                    };
+                    let mesh = build(&spec, Vec2::new(1.0, 1.3));
+                    assert_closes_plane(&mesh);
+                    assert!(mesh.is_height_field(), "{spec:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn square_pyramids_fill_the_plane_and_have_the_closed_form_area() {
+        let spec = Pyramids { height: 0.2, ..Pyramids::default() };
+        let mesh = build(&spec, Vec2::ONE);
+        // No floor is left, nor triangles without area in its place.
+        assert_eq!(mesh.triangles.len(), 4 * 16);
+        // Four faces of base 1/4 and slant √(h² + (1/8)²) on each of 16 cells.
+        let slant = (0.2f64 * 0.2 + 0.125 * 0.125).sqrt();
+        assert!((slot_area(&mesh, FACES) - 16.0 * 2.0 * 0.25 * slant).abs() < 1e-5);
+        assert!(slot_area(&mesh, FLOOR) < 1e-6);
+        assert_closes_plane(&mesh);
+    }
+
+    #[test]
+    fn hexagons_fill_a_tile_made_for_them() {
+        let spec = Pyramids { sides: 6, arrangement: Arrangement::Hex, spacing: 0.5, ..Pyramids::default() };
+        let mesh = build(&spec, Vec2::new(1.0, 3f32.sqrt()));
+        assert!(slot_area(&mesh, FLOOR) < 1e-4, "{}", slot_area(&mesh, FLOOR));
+        assert!(mesh.notes.is_empty(), "{:?}", mesh.notes);
+    }
+
+    #[test]
+    fn face_ratio_sets_the_ratio_of_the_projected_faces() {
+        let mesh = build(&Pyramids { face_ratio: 3.0, spacing: 1.0, ..Pyramids::default() }, Vec2::ONE);
+        let projected = |sign: f32| -> f64 {
+            let towards = |t: &usize| mesh.triangle_slot[*t] == FACES && mesh.geometric_normal(*t).x * sign > 0.1;
+            (0..mesh.triangles.len())
+                .filter(towards)
+                .map(|t| mesh.triangle_area(t) * f64::from(mesh.geometric_normal(t).z))
+                .sum()
+        };
+        assert!((projected(1.0) / projected(-1.0) - 3.0).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,394 @@
+//! The same picture on both routes, for each form of the effective BRDF and each kind of visibility.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::{GpuMaterial, GpuShading, Light, Params};
+use crate::base::Cancel;
+use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
+use crate::effective::shading_table::columns::Weight;
+use crate::effective::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, SumMaterial};
+use crate::gpu::render::gbuffer::Point;
+use crate::gpu::{Gpu, GpuError, GpuRenderer, render_gpu};
+use crate::math::directions::UpperPairs;
+use crate::pipeline::Pipeline;
+use crate::render::image::shading;
+use crate::render::image::shading::Background;
+use crate::render::image::shading_points::ShadingPoints;
+use crate::render::lighting::lights;
+use crate::render::render;
+use crate::render::shadow::{Occluder, Visible};
+use crate::render::{CameraView, DirectionalLight, GBuffer, ObjectMesh, Picture, RenderInput, object};
+use crate::scene;
+use crate::scene::LoadedScene;
+use crate::visibility::Visibility;
+
+/// Shading of the same points: the largest distance, relative to the point's radiance and the mean. Single precision on
+/// either side, lobes that multiply the rounding of half vectors by up to 1/roughness². Measured on lavapipe: 5e-6.
+pub(crate) const SHADING_TOLERANCE: f32 = 5e-5;
+/// Pictures: 99 % of the pixels, and the mean. The G-buffers differ by up to 1e-3 in normals in 99 % of the samples
+/// (gpu_tests.rs), which lobes of width 0.2 turn into a percent; the rest are edges, where the adapter may show the
+/// neighbouring triangle.
+const PIXEL_TOLERANCE: f32 = 0.02;
+const MEAN_TOLERANCE: f32 = 2e-3;
+
+pub(crate) fn open_gpu() -> Option<Gpu> {
+    Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
+}
+
+pub(crate) const GROOVES: &str = "{ kind = \"grooves\" }";
+pub(crate) const PYRAMIDS: &str = "{ kind = \"pyramids\" }";
+pub(crate) const RODS: &str = "{ kind = \"rods\" }";
+pub(crate) const FLAT: &str = "{ kind = \"flat\" }";
+
+pub(crate) fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
+    let text = format!(
+        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\ncolor = [0.9, 0.7, 0.5]\n\
+         [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 300\n"
+    );
+    LoadedScene {
+        scene: scene::parse(&text).unwrap(),
+        base_dir: ".".into(),
+        name: String::new(),
+        painted: scene::Painted::default(),
+    }
+}
+
+pub(crate) fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
+    Pipeline::new().effective(loaded).unwrap().brdf.as_ref().clone()
+}
+
+/// An object, its shadows and ten lights.
+pub(crate) struct Studio {
+    pub(crate) mesh: ObjectMesh,
+    pub(crate) occluder: Option<Occluder>,
+    pub(crate) lights: Vec<DirectionalLight>,
+    pub(crate) camera: scene::Camera,
+}
+
+impl Studio {
+    pub(crate) fn of(kind: &str) -> Self {
+        let mesh = object::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap();
+        let lights = lights::build(&scene::Light { count: 10, ..scene::Light::default() }, Path::new(".")).unwrap();
+        let occluder = Occluder::of(&mesh);
+        Self { mesh, occluder, lights: lights.directional, camera: scene::Camera::default() }
+    }
+
+    pub(crate) fn input<'a>(
+        &'a self,
+        brdf: &'a EffectiveBrdf,
+        side: usize,
+        background: &'a Background,
+    ) -> RenderInput<'a> {
+        RenderInput {
+            mesh: &self.mesh,
+            occluder: self.occluder.as_ref(),
+            shadow_cache: None,
+            lights: &self.lights,
+            camera: &self.camera,
+            reflectance: brdf,
+            size: [side; 2],
+            samples_per_side: 1,
+            background,
+        }
+    }
+}
+
+/// Both routes on an object: points of one G-buffer shaded by both, and both pictures, 64 x 64.
+fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
+    assert_same_shading(what, gpu, kind, brdf);
+    let (studio, background) = (Studio::of(kind), Background::Uniform(Vec3::ZERO));
+    let input = studio.input(brdf, 64, &background);
+    let pictures = [render(&input).unwrap().picture, render_gpu(gpu, &input, brdf).unwrap().picture];
+    assert_same_picture(what, &pictures);
+}
+
+fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
+    let Studio { mesh, occluder, lights, camera } = Studio::of(kind);
+    let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
+    let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
+    let visible = occluder.as_ref().map(|o| o.visible(&mesh, &points, &lights, view.eye, None));
+    let mut shading = GpuShading::new(gpu).unwrap();
+    let material = shading.material(gpu, brdf, visible.is_some()).unwrap();
+    let cpu = shading::radiance(&points, &lights, visible.as_ref(), view.eye, brdf);
+    let device = radiance(gpu, &shading, &material, &points, &lights, visible.as_ref(), view.eye);
+    let (_, worst, _) = distances(&cpu, &device);
+    eprint!("{what}: shading within {worst:.1e}; ");
+    assert!(worst < SHADING_TOLERANCE, "{what}: shading of the same points differs by {worst}");
+}
+
+/// The device's answer for points of the CPU, by slices of eight lights.
+pub(crate) fn radiance(
+    gpu: &Gpu,
+    shading: &GpuShading,
+    material: &GpuMaterial,
+    points: &ShadingPoints,
+    lights: &[DirectionalLight],
+    visible: Option<&Visible>,
+    eye: Vec3,
+) -> Vec<Vec3> {
+    use wgpu::BufferUsages as Usage;
+    let slices = lights.len().div_ceil(8);
+    let params = Params {
+        eye,
+        point_count: points.len() as u32,
+        light_count: lights.len() as u32,
+        words_per_point: Visible::words_of(lights.len()) as u32,
+        slice: 8,
+        least_area: material.least_area(),
+    };
+    let place = |k: usize| Point {
+        position: points.positions[k],
+        normal: points.normals[k],
+        tangent: points.tangents[k],
+        weight: 1.0,
+        ..Point::default()
+    };
+    let places: Vec<Point> = (0..points.len()).map(place).collect();
+    let lights: Vec<Light> = lights.iter().map(Light::from).collect();
+    let words = visible.map_or(Vec::new(), |visible| visible.words.clone());
+    let rows = gpu.buffer("radiance", (16 * points.len() * slices) as u64, Usage::STORAGE | Usage::COPY_SRC).unwrap();
+    let bound = [
+        &gpu.upload("parameters", &[params], Usage::UNIFORM).unwrap(),
+        &gpu.upload("points", &places, Usage::STORAGE).unwrap(),
+        &gpu.upload("lights", &lights, Usage::STORAGE).unwrap(),
+        &gpu.upload("bits", &words, Usage::STORAGE).unwrap(),
+        &rows,
+        &gpu.buffer("scales", 4 * points.len() as u64, Usage::STORAGE).unwrap(),
+    ];
+    let group = shading.points(gpu, bound).unwrap();
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    for part in material.parts(u64::MAX) {
+        material.make(&mut pass, part);
+    }
+    material.shade(&mut pass, 0..material.passes(), &group, [points.len() as u32, slices as u32]);
+    drop(pass);
+    gpu.queue.submit([encoder.finish()]);
+    let rows: Vec<[f32; 4]> = gpu.read(&rows).unwrap();
+    let sum = |k: usize| (0..slices).map(|slice| Vec3::from_slice(&rows[slice * points.len() + k])).sum();
+    (0..points.len()).map(sum).collect()
+}
+
+/// Distances relative to a value and the mean: of 99 %, the largest, and of the means.
+pub(crate) fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
+    let mean = |values: &[Vec3]| values.iter().sum::<Vec3>() / values.len() as f32;
+    let level = mean(cpu).max_element();
+    assert!(level > 1e-4 && gpu.iter().all(|value| value.is_finite()), "{level}");
+    let mut all: Vec<f32> =
+        cpu.iter().zip(gpu).map(|(a, b)| (*a - *b).abs().max_element() / (level + a.max_element())).collect();
+    all.sort_by(f32::total_cmp);
+    (all[all.len() * 99 / 100], all[all.len() - 1], (mean(cpu) - mean(gpu)).abs().max_element() / level)
+}
+
+pub(crate) fn assert_same_picture(what: &str, [cpu, gpu]: &[Picture; 2]) {
+    let (most, worst, means) = distances(&cpu.pixels, &gpu.pixels);
+    eprintln!("{what}: 99 % of the pixels within {most:.1e}, largest {worst:.1e}, means {means:.1e}");
+    assert!(most < PIXEL_TOLERANCE && means < MEAN_TOLERANCE, "{what}: 99 % within {most}, means {means}");
+}
+
+pub(crate) const LOBES: [&str; 5] = [
+    "{ kind = \"lambertian\", albedo = [0.8, 0.5, 0.2] }",
+    "{ kind = \"blinn_phong\", exponent = 60.0, specular = [0.5, 0.4, 0.3] }",
+    "{ kind = \"cook_torrance\", roughness = 0.25, f0 = [0.9, 0.6, 0.3] }",
+    "{ kind = \"ward\", roughness = 0.2, specular = [0.3, 0.4, 0.5] }",
+    "{ kind = \"ggx\", roughness = 0.2, f0 = [0.04, 0.05, 0.06] }",
+];
+
+#[test]
+fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
+    let Some(gpu) = open_gpu() else { return };
+    let mut seen = [false; 4];
+    let [lambertian, phong, beckmann, _, ggx] = LOBES;
+    for (geometry, kind, lobes) in [
+        (FLAT, "sphere", vec![lambertian, beckmann]),
+        (PYRAMIDS, "sphere", LOBES.to_vec()),
+        (GROOVES, "cup", vec![phong, ggx]),
+        (RODS, "sphere", LOBES.to_vec()),
+    ] {
+        for brdf in lobes {
+            let brdf_form = effective(&open(geometry, brdf, "direct"));
+            let Form::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
+            if let Visibility::Slices(slices) = direct.visibility.as_ref() {
+                let maps = Visibility::Maps(slices.maps(12));
+                let form = Form::Direct(Direct::new(direct.sum.clone(), Arc::new(maps)));
+                seen[3] = true;
+                assert_same(&format!("{geometry} {brdf}, maps"), &gpu, kind, &EffectiveBrdf { form, ..brdf_form });
+            }
+            seen[match direct.visibility.as_ref() {
+                Visibility::Unblocked { .. } => 0,
+                Visibility::Horizons(_) => 1,
+                Visibility::Slices(_) => 2,
+                Visibility::Maps(_) => 3,
+            }] = true;
+            assert_same(&format!("{geometry} {brdf}"), &gpu, kind, &brdf_form);
+        }
+    }
+    assert_eq!(seen, [true; 4], "kinds of visibility met");
+}
+
+#[test]
+fn factors_give_the_same_picture_for_tables_and_lobes() {
+    let Some(gpu) = open_gpu() else { return };
+    let sum = format!("[{}, {}]", LOBES[0], LOBES[4]);
+    for (geometry, brdf) in [(GROOVES, LOBES[0]), (PYRAMIDS, LOBES[2]), (RODS, sum.as_str())] {
+        let brdf_form = effective(&open(geometry, brdf, "low_rank"));
+        assert!(matches!(brdf_form.form, Form::LowRank(_)), "{geometry} {brdf}");
+        assert_same(&format!("{geometry} {brdf}"), &gpu, "cup", &brdf_form);
+    }
+}
+
+#[test]
+fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
+    let Some(gpu) = open_gpu() else { return };
+    // The colour of every facet is its own.
+    let mut facets = crate::geometry::Facets::default();
+    for k in 0..300 {
+        let (theta, phi) = (0.9 * (k as f32 * 0.618).fract(), 2.4 * k as f32);
+        facets.positions.push(Vec3::ZERO);
+        facets.normals.push(crate::math::directions::from_angles(theta, phi));
+        facets.areas.push(1.0 / 300.0);
+        facets.colors.push(Vec3::new(0.2, 0.9, 0.5) * (0.5 + 0.5 * phi.sin()));
+        facets.slots.push(0);
+    }
+    let material = |brdf: &str| {
+        let loaded = open(FLAT, brdf, "direct");
+        Pipeline::new().sum_materials(&loaded).unwrap().1
+    };
+    let form = |brdf: &str| EffectiveBrdf {
+        form: Form::Direct(Direct::new(
+            FacetSum::new(&facets, &[0], &material(brdf)).into(),
+            Visibility::Unblocked { facets: 300 }.into(),
+        )),
+        base_area: 1.0,
+    };
+    let (first, second) = (form(LOBES[4]), form(&format!("[{}, {}]", LOBES[0], LOBES[2])));
+    let Form::Direct(direct) = &first.form else { panic!("not direct") };
+    assert!(direct.sum.colors_vary());
+    assert_same("coloured facets, ggx", &gpu, "sphere", &first);
+
+    let mesh = object::build(&scene::Object { kind: "sphere".to_owned(), path: None }, Path::new(".")).unwrap();
+    let light = DirectionalLight { direction: Vec3::new(0.6, 0.48, 0.64), irradiance: Vec3::new(1.0, 2.0, 3.0) };
+    let mut renderer = GpuRenderer::wearing(&gpu, &mesh, None, &first).unwrap();
+    renderer.set_brdf(&gpu, &second).unwrap();
+    let input = RenderInput {
+        mesh: &mesh,
+        occluder: None,
+        shadow_cache: None,
+        lights: &[light; 9],
+        camera: &scene::Camera::default(),
+        reflectance: &second,
+        size: [64, 64],
+        samples_per_side: 2,
+        background: &Background::Wall,
+    };
+    let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+    let pictures = [render(&input).unwrap().picture, device];
+    assert_same_picture("coloured facets, lambertian and cook_torrance after ggx", &pictures);
+    let none = RenderInput { lights: &[], ..input };
+    let unlit = renderer.render(&gpu, &none, &Cancel::default()).unwrap().picture;
+    assert_same_picture("no lights", &[render(&none).unwrap().picture, unlit]);
+
+    // Six columns, which are two fours.
+    let Form::Direct(direct) = &second.form else { panic!("not direct") };
+    let table = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+    assert_eq!(table.fours(), 2);
+    assert_same("a table of coloured facets", &gpu, "cup", &EffectiveBrdf { form: Form::Table(table), base_area: 1.0 });
+}
+
+const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 8, difference: 7 };
+
+#[test]
+fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_straight_lines() {
+    let Some(gpu) = open_gpu() else { return };
+    for (geometry, brdf, interpolation) in [
+        (GROOVES, LOBES[4], Interpolation::Cubic),
+        (PYRAMIDS, LOBES[1], Interpolation::Linear),
+        (RODS, LOBES[0], Interpolation::Cubic),
+    ] {
+        let exact = effective(&open(geometry, brdf, "direct"));
+        let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let whole = |lights: &[Vec3], o: Vec3, out: &mut [glam::DVec3]| direct.sums(lights, o, |k, sum| out[k] = sum);
+        for (what, table) in [
+            ("its columns", PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap()),
+            ("its colours", PairTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap()),
+        ] {
+            let form = Form::Table(table.read(interpolation));
+            // So coarse a table is too bright at the rim, where the two G-buffers show different pixels.
+            let what = format!("a table of {geometry} {brdf}, {what}");
+            assert_same_shading(&what, &gpu, "sphere", &EffectiveBrdf { form, base_area: exact.base_area });
+        }
+    }
+}
+
+#[test]
+fn tables_of_areas_shade_with_the_lobes_of_their_normals_as_the_cpu_does() {
+    let Some(gpu) = open_gpu() else { return };
+    let all = format!("[{}]", LOBES.join(", "));
+    let cases = LOBES.map(|lobe| (PYRAMIDS, lobe)).into_iter().chain([(GROOVES, all.as_str()), (FLAT, LOBES[4])]);
+    for (geometry, brdf) in cases {
+        let exact = effective(&open(geometry, brdf, "direct"));
+        let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let table = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+        assert!(table.weights().iter().all(Weight::is_lobe), "{geometry}");
+        let table = EffectiveBrdf { form: Form::Table(table), base_area: exact.base_area };
+        assert_same_shading(&format!("areas of {geometry} {brdf}"), &gpu, "cup", &table);
+    }
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct White(MeasuredReport);
+
+impl Measured for White {
+    fn f_r(&self, _: &LobeAngles) -> Vec3 {
+        Vec3::ONE
+    }
+    fn name(&self) -> &str {
+        "white"
+    }
+    fn content(&self) -> crate::cache::Key {
+        crate::cache::Key::of_numbers::<u8>(&[])
+    }
+    fn report(&self) -> &MeasuredReport {
+        &self.0
+    }
+}
+
+#[test]
+fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
+    let Some(gpu) = open_gpu() else { return };
+    // Enough of one normal for an area of its own.
+    let facets = crate::geometry::Facets {
+        positions: vec![Vec3::ZERO; 8],
+        normals: vec![Vec3::Z; 8],
+        areas: vec![1.0; 8],
+        colors: vec![Vec3::ONE; 8],
+        slots: vec![0; 8],
+        ..Default::default()
+    };
+    let material = |color| SumMaterial {
+        brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] },
+        color,
+    };
+    let form = |color| EffectiveBrdf {
+        form: Form::Direct(Direct::new(
+            FacetSum::new(&facets, &[0], &[material(color)]).into(),
+            Visibility::Unblocked { facets: 8 }.into(),
+        )),
+        base_area: 1.0,
+    };
+    let mut shading = GpuShading::new(&gpu).unwrap();
+    let refused = shading.material(&gpu, &form(Vec3::ONE), false).map(drop);
+    let is_refused = |refused: &_| matches!(refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured"));
+    assert!(is_refused(&refused), "{refused:?}");
+    let Form::Direct(direct) = form(Vec3::ONE).form else { panic!("not direct") };
+    let table = PairTable::build(&direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+    assert!(table.weights().iter().all(Weight::is_lobe), "areas");
+    let table = EffectiveBrdf { form: Form::Table(table), base_area: 1.0 };
+    let refused = shading.material(&gpu, &table, false).map(drop);
+    assert!(is_refused(&refused), "{refused:?}");
+    // Black: it is never asked.
+    shading.material(&gpu, &form(Vec3::ZERO), false).map(drop).unwrap();
+}

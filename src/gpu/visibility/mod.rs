@@ -1,0 +1,13 @@
+//! Visibility of a tile, computed on the GPU.
+
+mod maps;
+mod march;
+mod slices;
+
+pub use maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
+#[cfg(test)]
+pub(crate) use march::crossings;
+pub use march::{GpuHeightMarch, GpuHorizons};
+pub use slices::GpuSlicer;
+#[cfg(test)]
+pub(crate) use slices::tests::looks;

@@ -1,0 +1,241 @@
+//! Paraboloid maps: a hemisphere on a square image, its non-empty pixels numbered (Brabec et al. 2002; Wu et al. 2011,
+//! Sec. 3.7).
+
+use std::f32::consts::TAU;
+
+use glam::{Vec2, Vec3};
+
+use super::Tap;
+
+/// Marks a pixel whose centre lies outside the unit disc.
+const EMPTY: u32 = u32::MAX;
+
+/// The upper hemisphere on a square image: `(x, y) / (1 + z)` fills the unit disc. Pixels whose centres lie in the disc are
+/// the nodes, numbered row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParaboloidMap {
+    /// Pixels along a side of the image.
+    pub side: usize,
+    node_of_pixel: Vec<u32>,
+    directions: Vec<Vec3>,
+    solid_angles: Vec<f32>,
+}
+
+impl ParaboloidMap {
+    /// At least two pixels a side, at most 256.
+    pub fn new(side: usize) -> Self {
+        let side = side.clamp(2, 256);
+        let mut map =
+            Self { side, node_of_pixel: vec![EMPTY; side * side], directions: Vec::new(), solid_angles: Vec::new() };
+        for pixel in 0..side * side {
+            let centre = map.centre(pixel % side, pixel / side);
+            let r2 = centre.length_squared();
+            if r2 <= 1.0 {
+                map.node_of_pixel[pixel] = map.directions.len() as u32;
+                map.directions.push((2.0 * centre).extend(1.0 - r2) / (1.0 + r2));
+                map.solid_angles.push(4.0 / (1.0 + r2).powi(2));
+            }
+        }
+        // What rim pixels lose and gain across the disc's edge is shared out: the weights sum to the hemisphere.
+        let total: f32 = map.solid_angles.iter().sum();
+        map.solid_angles.iter_mut().for_each(|omega| *omega *= TAU / total);
+        map
+    }
+
+    /// The map whose number of nodes is nearest to `count`: 137 (13 pixels a side) for the paper's 132 directions.
+    pub fn nearest_to(count: usize) -> Self {
+        // A map of side n has about n² π/4 nodes.
+        let around = (count as f64 * 4.0 / std::f64::consts::PI).sqrt() as usize;
+        let nodes = |side: usize| {
+            let half = 0.5 * (side as f64 - 1.0);
+            let row =
+                |y: usize| (0..side).filter(|&x| (x as f64 - half).hypot(y as f64 - half) <= 0.5 * side as f64).count();
+            (0..side).map(row).sum::<usize>()
+        };
+        let candidates = around.min(256).saturating_sub(2).max(2)..=around.min(254) + 2;
+        Self::new(candidates.min_by_key(|&side| nodes(side).abs_diff(count)).unwrap_or(2))
+    }
+
+    /// Number of nodes.
+    #[expect(clippy::len_without_is_empty, reason = "a map has at least four nodes")]
+    pub fn len(&self) -> usize {
+        self.directions.len()
+    }
+
+    pub fn directions(&self) -> &[Vec3] {
+        &self.directions
+    }
+
+    /// Solid angle [sr] that a node stands for: the map's distortion; they sum to 2π.
+    pub fn solid_angle(&self, node: usize) -> f32 {
+        self.solid_angles[node]
+    }
+
+    /// Bilinear taps of a direction of the upper hemisphere; weights are in `[0,1]` and sum to one. Empty pixels at the rim
+    /// give their share to the others.
+    pub fn taps(&self, direction: Vec3) -> [Tap; 4] {
+        let at = self.to_pixels(direction);
+        let base = at.floor();
+        let f = at - base;
+        let last = self.side as i32 - 1;
+        let (x, y) = (base.x as i32, base.y as i32);
+        let mut taps = [(0, 0.0); 4];
+        let mut sum = 0.0;
+        let mut innermost = (f32::INFINITY, 0);
+        for (k, tap) in taps.iter_mut().enumerate() {
+            let (right, down) = (k as i32 & 1, k as i32 >> 1);
+            let (column, row) = ((x + right).clamp(0, last) as usize, (y + down).clamp(0, last) as usize);
+            let node = self.node_of_pixel[row * self.side + column];
+            if node != EMPTY {
+                let weight = (if right == 1 { f.x } else { 1.0 - f.x }) * if down == 1 { f.y } else { 1.0 - f.y };
+                *tap = (node as usize, weight);
+                sum += weight;
+                let radius = self.centre(column, row).length_squared();
+                if radius < innermost.0 {
+                    innermost = (radius, node as usize);
+                }
+            }
+        }
+        if sum > 1e-6 {
+            taps.iter_mut().for_each(|tap| tap.1 /= sum);
+        } else {
+            taps = [(innermost.1, 1.0), (innermost.1, 0.0), (innermost.1, 0.0), (innermost.1, 0.0)];
+        }
+        taps
+    }
+
+    /// Centre of a pixel in the plane of the disc.
+    fn centre(&self, column: usize, row: usize) -> Vec2 {
+        let along = |pixel: usize| (2 * pixel + 1) as f32 / self.side as f32 - 1.0;
+        Vec2::new(along(column), along(row))
+    }
+
+    /// Position on the image in pixels, centres at whole numbers.
+    fn to_pixels(&self, direction: Vec3) -> Vec2 {
+        let disc = direction.truncate() / (1.0 + direction.z.max(0.0));
+        (disc.clamp_length_max(1.0) + 1.0) * (0.5 * self.side as f32) - 0.5
+    }
+
+    /// The node nearest to a direction among those within two pixels of it, with the cosine between them.
+    fn nearest(&self, direction: Vec3) -> (usize, f32) {
+        let at = self.to_pixels(direction).round().as_ivec2();
+        let last = self.side as i32 - 1;
+        let mut best = (0, f32::NEG_INFINITY);
+        for row in (at.y - 2).max(0)..=(at.y + 2).min(last) {
+            for column in (at.x - 2).max(0)..=(at.x + 2).min(last) {
+                let node = self.node_of_pixel[row as usize * self.side + column as usize];
+                if node != EMPTY {
+                    let cosine = self.directions[node as usize].dot(direction);
+                    if cosine > best.1 {
+                        best = (node as usize, cosine);
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Two paraboloid maps back to back: the whole sphere, for normals. The lower half follows the upper one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParaboloidSphere {
+    half: ParaboloidMap,
+}
+
+impl ParaboloidSphere {
+    /// From the map of one half.
+    pub fn new(half: ParaboloidMap) -> Self {
+        Self { half }
+    }
+
+    #[expect(clippy::len_without_is_empty, reason = "a map has at least four nodes")]
+    pub fn len(&self) -> usize {
+        2 * self.half.len()
+    }
+
+    pub fn direction(&self, node: usize) -> Vec3 {
+        let count = self.half.len();
+        if node < count {
+            self.half.directions[node]
+        } else {
+            self.half.directions[node - count] * Vec3::new(1.0, 1.0, -1.0)
+        }
+    }
+
+    /// Solid angle [sr]; they sum to 4π.
+    pub fn solid_angle(&self, node: usize) -> f32 {
+        self.half.solid_angle(node % self.half.len())
+    }
+
+    /// The node nearest to a direction.
+    pub fn nearest(&self, direction: Vec3) -> usize {
+        let (upper, upper_cosine) = self.half.nearest(direction);
+        let (lower, lower_cosine) = self.half.nearest(direction * Vec3::new(1.0, 1.0, -1.0));
+        if lower_cosine > upper_cosine { self.half.len() + lower } else { upper }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::directions::from_angles;
+
+    #[test]
+    fn the_papers_132_directions_become_137() {
+        let map = ParaboloidMap::nearest_to(132);
+        assert_eq!((map.side, map.len()), (13, 137));
+        assert_eq!(ParaboloidMap::nearest_to(0).side, 2);
+        assert!(ParaboloidMap::nearest_to(usize::MAX / 8).side <= 256);
+    }
+
+    #[test]
+    fn nodes_are_unit_vectors_of_the_upper_half_and_their_solid_angles_fill_it() {
+        for side in [2, 7, 12, 31] {
+            let map = ParaboloidMap::new(side);
+            assert!(map.directions().iter().all(|d| (d.length() - 1.0).abs() < 1e-6 && d.z >= -1e-6));
+            let (sum, cosine) = (0..map.len()).fold((0.0, 0.0), |(sum, cosine), node| {
+                (sum + map.solid_angle(node), cosine + map.solid_angle(node) * map.directions()[node].z)
+            });
+            assert!((sum - TAU).abs() < 1e-4);
+            // ∫ cosθ dω = π: the distortion is that of the map.
+            assert!(side < 12 || (cosine - 0.5 * TAU).abs() < 0.06, "{side}: {cosine}");
+        }
+    }
+
+    #[test]
+    fn taps_stand_on_the_nodes_and_stay_convex_out_to_the_horizon() {
+        for side in [2, 3, 13, 24] {
+            let map = ParaboloidMap::new(side);
+            for (node, &direction) in map.directions().iter().enumerate() {
+                let own: f32 = map.taps(direction).iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
+                assert!((own - 1.0).abs() < 1e-4, "{side} {node}");
+            }
+            for k in 0..2000 {
+                let taps = map.taps(from_angles(k as f32 / 1999.0 * 0.25 * TAU, k as f32 * 0.37));
+                assert!((taps.iter().map(|tap| tap.1).sum::<f32>() - 1.0).abs() < 1e-5);
+                assert!(taps.iter().all(|tap| tap.1 >= 0.0 && tap.0 < map.len()));
+            }
+        }
+    }
+
+    #[test]
+    fn interpolation_of_a_linear_function_of_the_image_is_exact_inside() {
+        let map = ParaboloidMap::new(16);
+        let field = |d: Vec3| 0.3 + (d.x - 2.0 * d.y) / (1.0 + d.z);
+        for k in 0..300 {
+            let d = from_angles(1.2 * (k as f32 / 300.0).sqrt(), k as f32 * 2.4);
+            let value: f32 = map.taps(d).iter().map(|&(node, w)| w * field(map.directions()[node])).sum();
+            assert!((value - field(d)).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn the_nearest_normal_is_the_one_brute_force_finds() {
+        let sphere = ParaboloidSphere::new(ParaboloidMap::new(9));
+        for k in 0..800 {
+            let d = from_angles(k as f32 / 799.0 * 0.5 * TAU, k as f32 * 2.399);
+            let best = (0..sphere.len()).map(|node| sphere.direction(node).dot(d)).fold(-1.0, f32::max);
+            assert!((sphere.direction(sphere.nearest(d)).dot(d) - best).abs() < 1e-6, "{d}");
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! A grid over the pairs of directions of the upper hemisphere, and over no others: half and difference coordinates
+//! (Rusinkiewicz 1998) whose difference angle ends where light or view sets.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Mat3, Vec3};
+
+/// A grid over `(θ_h, φ_h, φ_d, θ_d)`; `d` is the light in the frame of `h` (z to `h`, x along increasing θ).
+///
+/// - θ_h stands on `√(1 - cos θ_h)` in `[0, 1]`: the hemisphere in equal areas.
+/// - φ_d has period π: swapping light and view changes nothing.
+/// - θ_d ends at `θ_max`, `tan θ_max = 1 / (tan θ_h |cos φ_d|)`, where one of the two touches the horizon. It stands on
+///   `u = √((1 - cos θ_d) / (1 - cos θ_max))` in `[0, 1]`: no node is wasted under the horizon, no query is interpolated
+///   across it, and what falls to zero there does so on a node.
+///
+/// Node index is `((θ_h · azimuths + φ_h) · turn + φ_d) · difference + θ_d`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct UpperPairs {
+    /// Rings of θ_h, both ends included.
+    pub rings: usize,
+    /// Azimuths φ_h.
+    pub azimuths: usize,
+    /// Steps of φ_d over half a turn; even, so that a node stands on the kink of `θ_max` at a right angle.
+    pub turn: usize,
+    /// Steps of θ_d, both ends included.
+    pub difference: usize,
+}
+
+impl UpperPairs {
+    /// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²` with this `k`: there shadows and cosines change fastest.
+    pub const CROWDING: f32 = 0.75;
+
+    /// Directions of nodes stay this far [sine] above the horizon.
+    pub const LOWEST: f32 = 2e-3;
+
+    pub fn nodes(&self) -> usize {
+        self.half_vectors() * self.turn * self.difference
+    }
+
+    /// Half vectors; the nodes of each are contiguous.
+    pub fn half_vectors(&self) -> usize {
+        self.rings * self.azimuths
+    }
+
+    /// The first azimuth φ_h that planes x = const and y = const (`mirrors`) turn one into, and whether φ_d changes its sign on
+    /// the way.
+    pub fn image(&self, azimuth: usize, [in_x, in_y]: [bool; 2]) -> (usize, bool) {
+        let n = self.azimuths;
+        // x becomes -x: φ becomes π - φ; y becomes -y: φ becomes -φ.
+        let half = n.is_multiple_of(2).then_some(n / 2);
+        let across_x = half.filter(|_| in_x).map(|half| ((half + n - azimuth) % n, true));
+        let across_y = in_y.then_some(((n - azimuth) % n, true));
+        let both = half.filter(|_| in_x && in_y).map(|half| ((azimuth + half) % n, false));
+        let itself = (azimuth, false);
+        [across_x, across_y, both]
+            .into_iter()
+            .flatten()
+            .fold(itself, |best, image| if image.0 < best.0 { image } else { best })
+    }
+
+    /// Nodes that are no images of others.
+    pub fn originals(&self, mirrors: [bool; 2]) -> usize {
+        let azimuths = (0..self.azimuths).filter(|&azimuth| self.image(azimuth, mirrors).0 == azimuth).count();
+        self.nodes() / self.azimuths * azimuths
+    }
+
+    /// φ_h of an azimuth [rad].
+    pub fn phi_h(&self, azimuth: usize) -> f32 {
+        TAU * azimuth as f32 / self.azimuths as f32
+    }
+
+    /// φ_d of a step [rad].
+    pub fn phi_d(&self, turn: usize) -> f32 {
+        PI * turn as f32 / self.turn as f32
+    }
+
+    /// `(i, o)` of a node.
+    pub fn pair(&self, node: usize) -> (Vec3, Vec3) {
+        let (step, rest) = (node % self.difference, node / self.difference);
+        let (turn, rest) = (rest % self.turn, rest / self.turn);
+        let (azimuth, ring) = (rest % self.azimuths, rest / self.azimuths);
+        let s = ring as f32 / (self.rings - 1) as f32;
+        let cos_theta_h = (1.0 - s * s).max(Self::LOWEST);
+        let sin_theta_h = (1.0 - cos_theta_h * cos_theta_h).max(0.0).sqrt();
+        let (sin_phi, cos_phi) = self.phi_h(azimuth).sin_cos();
+        let frame = Mat3::from_cols(
+            Vec3::new(cos_theta_h * cos_phi, cos_theta_h * sin_phi, -sin_theta_h),
+            Vec3::new(-sin_phi, cos_phi, 0.0),
+            Vec3::new(sin_theta_h * cos_phi, sin_theta_h * sin_phi, cos_theta_h),
+        );
+        let (sin_turn, cos_turn) = self.phi_d(turn).sin_cos();
+        let x = step as f32 / (self.difference - 1) as f32;
+        let u = x * (1.0 + Self::CROWDING - Self::CROWDING * x);
+        // 1 - cos θ_max = m² / (r (r + n)), which loses nothing where θ_max is small.
+        let (n, m) = (sin_theta_h * cos_turn.abs(), cos_theta_h);
+        let r = n.hypot(m);
+        let versine = (u * u * m * m / (r * (r + n))).min(1.0 - Self::LOWEST);
+        let sin_theta_d = (versine * (2.0 - versine)).sqrt();
+        let across = Vec3::new(sin_theta_d * cos_turn, sin_theta_d * sin_turn, 0.0);
+        let along = Vec3::Z * (1.0 - versine);
+        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(Self::LOWEST)).normalize_or(Vec3::Z);
+        (lifted(frame * (along + across)), lifted(frame * (along - across)))
+    }
+
+    /// Places of the pairs (light `k`, `o`) on the axes of the grid, in steps; all directions above the horizon.
+    pub fn places(&self, lights: [&[f32]; 3], o: Vec3, out: &mut Places) {
+        crate::math::simd::pair_places(lights, o, Self::CROWDING, &mut out.columns);
+        let scales = [(self.rings - 1) as f32, self.azimuths as f32, self.turn as f32, (self.difference - 1) as f32];
+        let n = lights[0].len().min(Places::MOST);
+        for (column, scale) in out.columns.iter_mut().zip(scales) {
+            for at in &mut column[..n] {
+                *at *= scale;
+            }
+        }
+    }
+}
+
+/// Where pairs stand on the four axes of a grid, in its steps; and `i·h`.
+#[derive(Debug, Clone)]
+pub struct Places {
+    columns: [[f32; Places::MOST]; 5],
+}
+
+impl Default for Places {
+    fn default() -> Self {
+        Self { columns: [[0.0; Self::MOST]; 5] }
+    }
+}
+
+impl Places {
+    /// Most pairs at a time.
+    pub const MOST: usize = crate::math::simd::LANES;
+
+    /// θ_h, φ_h, φ_d, θ_d of pair `k`, in steps.
+    pub fn at(&self, k: usize) -> [f32; 4] {
+        std::array::from_fn(|axis| self.columns[axis][k])
+    }
+
+    /// θ_h, φ_h, φ_d, θ_d in steps, and `i·h`, of all pairs.
+    pub fn columns(&self) -> &[[f32; Self::MOST]; 5] {
+        &self.columns
+    }
+
+    pub fn i_dot_h(&self, k: usize) -> f32 {
+        self.columns[4][k]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 6, difference: 7 };
+
+    fn places(i: Vec3, o: Vec3) -> ([f32; 4], f32) {
+        let mut places = Places::default();
+        GRID.places([&[i.x], &[i.y], &[i.z]], o, &mut places);
+        (places.at(0), places.i_dot_h(0))
+    }
+
+    #[test]
+    fn every_node_lies_above_the_horizon_and_inside_nodes_are_found_where_they_are() {
+        for node in 0..GRID.nodes() {
+            let (i, o) = GRID.pair(node);
+            assert!(i.z > 1e-3 && o.z > 1e-3, "{node}: {i} {o}");
+            assert!(i.is_normalized() && o.is_normalized());
+            let (step, rest) = (node % GRID.difference, node / GRID.difference);
+            let (turn, rest) = (rest % GRID.turn, rest / GRID.turn);
+            let (azimuth, ring) = (rest % GRID.azimuths, rest / GRID.azimuths);
+            // At the pole, where i = o, and at the lifted horizon coordinates are not unique or are moved.
+            if ring == 0 || ring + 1 == GRID.rings || step == 0 || step + 1 == GRID.difference {
+                continue;
+            }
+            let (at, i_dot_h) = places(i, o);
+            let near = |a: f32, b: usize, period: usize| {
+                let d = (a - b as f32).abs();
+                d.min((period as f32 - d).abs()) < 2e-3
+            };
+            assert!((at[0] - ring as f32).abs() < 2e-3, "{node}: {at:?}");
+            assert!(near(at[1], azimuth, GRID.azimuths) && near(at[2], turn, GRID.turn), "{node}: {at:?}");
+            assert!((at[3] - step as f32).abs() < 4e-3, "{node}: {at:?} {step}");
+            assert!((i_dot_h - i.dot((i + o).normalize())).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn mirror_images_of_nodes_are_the_mirrored_pairs() {
+        for (mirrors, azimuths) in [([true, false], 7), ([false, true], 7), ([true, true], 4), ([false, false], 12)] {
+            let mut made = std::collections::BTreeSet::new();
+            for azimuth in 0..GRID.azimuths {
+                let (image, turned) = GRID.image(azimuth, mirrors);
+                assert_eq!(GRID.image(image, mirrors), (image, false), "an image is its own");
+                made.insert(image);
+                for (ring, turn, step) in [(3, 1, 4), (5, 3, 2), (2, 0, 3)] {
+                    let node = |azimuth: usize, turn: usize| {
+                        ((ring * GRID.azimuths + azimuth) * GRID.turn + turn) * GRID.difference + step
+                    };
+                    let (i, o) = GRID.pair(node(azimuth, turn));
+                    let (k, l) = GRID.pair(node(image, if turned { (GRID.turn - turn) % GRID.turn } else { turn }));
+                    // One of the mirrors that there are, or both, or none, takes one pair into the other, the two swapped or not.
+                    let close = |a: Vec3, b: Vec3| (a - b).abs().max_element() < 1e-5;
+                    let found = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].into_iter().any(|[x, y]| {
+                        let allowed = (x > 0.0 || mirrors[0]) && (y > 0.0 || mirrors[1]);
+                        let flip = |d: Vec3| d * Vec3::new(x, y, 1.0);
+                        let same = close(flip(i), k) && close(flip(o), l) || close(flip(i), l) && close(flip(o), k);
+                        allowed && same
+                    });
+                    assert!(found, "{mirrors:?} {azimuth} {turn}");
+                }
+            }
+            assert_eq!(made.len(), azimuths, "{mirrors:?}");
+        }
+    }
+
+    #[test]
+    fn every_pair_has_a_place_on_the_grid_and_its_mirror_image_the_same() {
+        for k in 0..4000_u32 {
+            let angle =
+                |j: u32| (k.wrapping_mul(2_654_435_761).wrapping_add(j.wrapping_mul(97_571)) % 9973) as f32 / 9973.0;
+            let i = crate::math::directions::from_angles(angle(1) * 1.57, angle(2) * TAU);
+            let o = crate::math::directions::from_angles(angle(3) * 1.57, angle(4) * TAU);
+            let (at, _) = places(i, o);
+            let last = [8.0, 12.0, 6.0, 6.0];
+            assert!(at.iter().zip(last).all(|(at, last)| (0.0..=last).contains(at)), "{i} {o}: {at:?}");
+            let (swapped, _) = places(o, i);
+            for axis in 0..4 {
+                let d = (at[axis] - swapped[axis]).abs();
+                let wrapped = if axis == 2 { d.min(6.0 - d) } else { d };
+                assert!(wrapped < 1e-2, "{i} {o}: {at:?} {swapped:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_at_the_poles_and_at_the_very_horizon_have_finite_places() {
+        let flat = Vec3::new(1.0, 0.0, 1e-30).normalize();
+        for (i, o) in [(Vec3::Z, Vec3::Z), (flat, flat), (flat, Vec3::new(-1.0, 0.0, 1e-30)), (Vec3::Z, flat)] {
+            let (at, i_dot_h) = places(i, o);
+            assert!(at.iter().all(|at| at.is_finite()) && i_dot_h.is_finite(), "{i} {o}: {at:?}");
+        }
+    }
+}

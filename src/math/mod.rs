@@ -1,0 +1,5 @@
+//! Numerical building blocks: directions and their grids, SIMD inner loops, linear algebra.
+
+pub mod directions;
+pub mod linalg;
+pub mod simd;

@@ -1,0 +1,148 @@
+//! Many pairs of directions at once: one view, and the lights that shine there.
+
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::Vec3;
+
+use super::{LANES, multiversion};
+
+/// Pairs of up to [`LANES`] lights with one view, each component by itself.
+#[derive(Debug, Clone)]
+pub struct LightPairs {
+    pub o: Vec3,
+    /// Directions to the lights, and unit half vectors.
+    pub i: [[f32; LANES]; 3],
+    pub h: [[f32; LANES]; 3],
+    pub i_dot_h: [f32; LANES],
+    /// Of the lights: in turns from 0 to 1, and in radians.
+    pub azimuths: [f32; LANES],
+    pub elevations: [f32; LANES],
+    /// Lights, rounded up to whole steps of the inner loops; lights beyond the last are straight above.
+    padded: usize,
+}
+
+/// Steps of the inner loops over lights.
+const STEP: usize = 16;
+
+impl LightPairs {
+    pub const MOST: usize = LANES;
+
+    pub fn new() -> Self {
+        let empty = [0.0; LANES];
+        let (three, o) = ([empty; 3], Vec3::Z);
+        Self { o, i: three, h: three, i_dot_h: empty, azimuths: empty, elevations: empty, padded: 0 }
+    }
+
+    /// Takes up to [`LightPairs::MOST`] lights and a view.
+    pub fn set(&mut self, lights: &[Vec3], o: Vec3) {
+        let lights = &lights[..lights.len().min(LANES)];
+        self.o = o;
+        self.padded = lights.len().next_multiple_of(STEP);
+        for k in 0..self.padded {
+            let light = lights.get(k).copied().unwrap_or(Vec3::Z);
+            for axis in 0..3 {
+                self.i[axis][k] = light[axis];
+            }
+        }
+        pair_vectors(self);
+    }
+
+    pub fn light(&self, k: usize) -> Vec3 {
+        Vec3::new(self.i[0][k], self.i[1][k], self.i[2][k])
+    }
+
+    pub(super) fn padded(&self) -> usize {
+        self.padded.min(LANES)
+    }
+}
+
+impl Default for LightPairs {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+multiversion! {
+    /// Half vectors and angles of the lights.
+    pub fn pair_vectors(pairs: &mut LightPairs) {
+        let (n, o) = (pairs.padded(), pairs.o);
+        for k in 0..n {
+            let (x, y, z) = (pairs.i[0][k], pairs.i[1][k], pairs.i[2][k]);
+            let (hx, hy, hz) = (x + o.x, y + o.y, z + o.z);
+            let length = (hx * hx + hy * hy + hz * hz).sqrt();
+            let opposite = length < 1e-20;
+            let per_length = 1.0 / length.max(1e-20);
+            let hx = if opposite { 0.0 } else { hx * per_length };
+            let hy = if opposite { 0.0 } else { hy * per_length };
+            let hz = if opposite { 1.0 } else { hz * per_length };
+            pairs.h[0][k] = hx;
+            pairs.h[1][k] = hy;
+            pairs.h[2][k] = hz;
+            pairs.i_dot_h[k] = 0.5 * ((x * hx + y * hy + z * hz) + (o.x * hx + o.y * hy + o.z * hz));
+            let half = upper_angle(y.abs(), x);
+            pairs.azimuths[k] = ((if y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
+            pairs.elevations[k] = upper_angle(z.max(0.0), (x * x + y * y).sqrt());
+        }
+    }
+}
+
+/// Azimuth in turns and elevation [rad] of one direction above the horizon, as [`LightPairs`] has them, to the same bits.
+pub fn azimuth_and_elevation(d: Vec3) -> (f32, f32) {
+    let half = upper_angle(d.y.abs(), d.x);
+    let azimuth = ((if d.y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
+    (azimuth, upper_angle(d.z.max(0.0), (d.x * d.x + d.y * d.y).sqrt()))
+}
+
+/// The angle of `(x, y)` in `[0, π]` for `y >= 0`, 0 at the origin; absolute error 1e-7 and rounding (Abramowitz and Stegun,
+/// 4.4.49).
+#[inline(always)]
+fn upper_angle(y: f32, x: f32) -> f32 {
+    let (longer, shorter) = (y.max(x.abs()), y.min(x.abs()));
+    let t = shorter / longer.max(1e-30);
+    let s = t * t;
+    let high = s * (-0.075_289_64 + s * (0.042_909_614 + s * (-0.016_165_737 + s * 0.002_866_225_7)));
+    let low = t * (1.0 + s * (-0.333_331_45 + s * (0.199_935_51 + s * (-0.142_089 + s * (0.106_562_64 + high)))));
+    let octant = if y > x.abs() { FRAC_PI_2 - low } else { low };
+    if x < 0.0 { PI - octant } else { octant }
+}
+
+multiversion! {
+    /// Coordinates of the pairs (light `k`, `o`) on [`UpperPairs`](crate::math::directions::UpperPairs), each in `[0, 1]`:
+    /// `√(1 - cos θ_h)`, φ_h in turns, φ_d in half turns, the place of θ_d for the given crowding; and `i·h`.
+    pub fn pair_places(lights: [&[f32]; 3], o: Vec3, crowding: f32, out: &mut [[f32; LANES]; 5]) {
+        let [x, y, z] = lights;
+        let n = x.len().min(y.len()).min(z.len()).min(LANES);
+        let (x, y, z) = (&x[..n], &y[..n], &z[..n]);
+        let [ring, azimuth, turn, step, i_dot_h] = out;
+        let (ring, azimuth, turn) = (&mut ring[..n], &mut azimuth[..n], &mut turn[..n]);
+        let (step, i_dot_h) = (&mut step[..n], &mut i_dot_h[..n]);
+        for k in 0..n {
+            let (hx, hy, hz) = (x[k] + o.x, y[k] + o.y, z[k] + o.z);
+            let across = (hx * hx + hy * hy).sqrt();
+            let length = (across * across + hz * hz).sqrt().max(1e-20);
+            let per_length = 1.0 / length;
+            let (sine, cosine) = (across * per_length, (hz * per_length).max(1e-20));
+            let pole = across < 1e-9 * length;
+            let per_across = 1.0 / across.max(1e-30);
+            let (ax, ay) = (if pole { 1.0 } else { hx * per_across }, if pole { 0.0 } else { hy * per_across });
+            // The light in the frame of h.
+            let dx = cosine * (ax * x[k] + ay * y[k]) - sine * z[k];
+            let dy = ax * y[k] - ay * x[k];
+            let dz = 0.5 * length;
+            // u² = (1 - cos θ_d) / (1 - cos θ_max), with sin θ_d taken out of both.
+            let (n, m2) = (sine * dx.abs(), cosine * cosine * (dx * dx + dy * dy));
+            let r = (n * n + m2).sqrt();
+            let u = (r * (r + n) / ((1.0 + dz) * cosine * cosine)).min(1.0).sqrt();
+            let c = 1.0 + crowding;
+            let root = (c * c - 4.0 * crowding * u).max(0.0).sqrt();
+            // (c - root) / 2k without the difference.
+            step[k] = (2.0 * u / (c + root)).min(1.0);
+            ring[k] = (sine * sine / (1.0 + cosine)).min(1.0).sqrt();
+            let half = upper_angle(ay.abs(), ax);
+            azimuth[k] = ((if ay < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
+            let sign = if dy < 0.0 { -1.0 } else { 1.0 };
+            turn[k] = (upper_angle(dy * sign, dx * sign) * (1.0 / PI)).min(1.0);
+            i_dot_h[k] = dz.min(1.0);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! The reference as pictures see it: each query sums over a few facets of its own, so that a whole picture takes seconds; the
+//! mean of many such pictures is the reference's.
+
+use glam::{DVec3, Vec3};
+
+use super::Reference;
+use crate::base::Cancel;
+use crate::effective::Reflectance;
+use crate::geometry::{FacetSampler, Facets, SampleShift, lifted_origins};
+
+/// Facets that a query sums over. Where a tile leaves holes their visible area divides the sum: with fewer, the bias of that
+/// ratio (of the order of one over their number) shows.
+const FACETS: usize = 256;
+/// Sets of facets to draw from.
+const SETS: usize = 128;
+
+/// A noisy evaluation of the reference, different at each direction and for each seed.
+#[derive(Debug)]
+pub struct Glimpse<'r> {
+    reference: &'r Reference<'r>,
+    facets: Facets,
+    origins: Vec<Vec3>,
+    seed: u64,
+    cancel: Cancel,
+}
+
+impl Reference<'_> {
+    /// The reference for one noisy picture; `None` where paths between facets are followed, which takes too long.
+    /// Once cancelled it is black, and quick.
+    pub fn glimpse(&self, seed: u64, cancel: &Cancel) -> Option<Glimpse<'_>> {
+        if self.bounces > 0 {
+            return None;
+        }
+        let facets = FacetSampler::new(self.mesh).sample(self.mesh, FACETS * SETS, SampleShift::from_seed(seed));
+        let origins = lifted_origins(&facets, self.mesh.size);
+        Some(Glimpse { reference: self, facets, origins, seed, cancel: cancel.clone() })
+    }
+}
+
+impl Reflectance for Glimpse<'_> {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        let mut sums = vec![DVec3::ZERO; lights.len()];
+        let mut seen = 0.0;
+        if o.z > 0.0 && !self.cancel.is_set() {
+            // Facets are spread along the surface in order: every SETS-th is a stratified set.
+            let first = hash(o, self.seed) as usize % SETS;
+            for s in (first..self.facets.len()).step_by(SETS) {
+                seen += self.add(s, lights, o, &mut sums);
+            }
+        }
+        if self.reference.mesh.closes_plane {
+            // Known, where all that is under the base is hidden: what is estimated would be noise in the divisor.
+            seen = f64::from(self.reference.mesh.base_area() * o.z.max(0.0)) / SETS as f64;
+        }
+        for (out, sum) in out.iter_mut().zip(sums) {
+            *out = if seen > 0.0 { (sum / seen).as_vec3() } else { Vec3::ZERO };
+        }
+    }
+}
+
+impl Glimpse<'_> {
+    /// Adds facet `s` to the sums; returns its visible area.
+    fn add(&self, s: usize, lights: &[Vec3], o: Vec3, sums: &mut [DVec3]) -> f64 {
+        let (normal, triangle) = (self.facets.normals[s], self.facets.triangles[s]);
+        let grid = &self.reference.grid;
+        let clear = |to: Vec3| normal.dot(to) > 0.0 && !grid.is_blocked(self.origins[s], to, triangle);
+        if !clear(o) {
+            return 0.0;
+        }
+        let material = &self.reference.materials[self.reference.material_of_slot[usize::from(self.facets.slots[s])]];
+        let weight = material.color * self.facets.colors[s] * self.facets.areas[s];
+        for (sum, &i) in sums.iter_mut().zip(lights) {
+            if i.z > 0.0 && clear(i) {
+                *sum += (material.brdf.f(normal, i, o) * weight).as_dvec3();
+            }
+        }
+        f64::from(self.facets.areas[s] * normal.dot(o))
+    }
+}
+
+/// Any two directions far apart in their bits.
+fn hash(direction: Vec3, seed: u64) -> u64 {
+    let mix = |state: u64, word: u64| (state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+    let state = direction.to_array().iter().fold(seed, |state, x| mix(state, u64::from(x.to_bits())));
+    mix(state, 0xd1b5_4a32) >> 20
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::mirror_biased_pairs;
+    use crate::pipeline::Pipeline;
+    use crate::reference::ReferenceSettings;
+
+    #[test]
+    fn the_mean_of_glimpses_is_the_reference() {
+        for name in ["fig4b_bicolor_cup", "fig8a_hammered", "fig6a_velvet_spread"] {
+            let loaded = crate::scene::open(name, &[]).unwrap();
+            let pairs = mirror_biased_pairs(24, 5);
+            let settings = ReferenceSettings { facets: 8192, max_passes: 4, target: 0.0, seed: 3 };
+            let mean_of = |reference: &Reference<'_>, seeds: std::ops::Range<u64>| -> Vec<Vec3> {
+                let part = 1.0 / (seeds.end - seeds.start) as f32;
+                let mut means = vec![Vec3::ZERO; pairs.len()];
+                for seed in seeds {
+                    let glimpse = reference.glimpse(seed, &Cancel::default()).unwrap();
+                    for (mean, pair) in means.iter_mut().zip(&pairs) {
+                        let mut value = [Vec3::ZERO];
+                        glimpse.eval_lights(&[pair.i], pair.o, &mut value);
+                        *mean += value[0] * part;
+                    }
+                }
+                means
+            };
+            let estimate = |reference: &Reference<'_>| {
+                (
+                    reference.estimate(&pairs, &settings, |_, _| true),
+                    [0..32, 32..64].map(|seeds| mean_of(reference, seeds)),
+                )
+            };
+            let (exact, [a, b]) = Pipeline::new().with_reference(&loaded, estimate).unwrap();
+            let (mut off, mut noise, mut norm) = (0.0, 0.0, 0.0);
+            for (exact, (a, b)) in exact.iter().zip(a.iter().zip(&b)) {
+                off += exact.f_bar.distance_squared(0.5 * (*a + *b));
+                noise += 0.25 * a.distance_squared(*b);
+                norm += exact.f_bar.length_squared();
+            }
+            let (off, noise) = ((off / norm).sqrt(), (noise / norm).sqrt());
+            // 3 % for what interpolated normals change in the projected area, and for the reference's own error.
+            assert!(off < 2.5 * noise + 0.03 && noise < 0.25, "{name}: {off} with a noise of {noise}");
+        }
+    }
+}

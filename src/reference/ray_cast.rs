@@ -1,0 +1,163 @@
+//! The reference: the same integral with exact ray-cast visibility and exact BRDFs, in independent passes that give
+//! it a standard error.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::paths::Paths;
+use crate::effective::{FacetSum, SumMaterial};
+use crate::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh, lifted_origins};
+use crate::metrics::Pair;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReferenceSettings {
+    /// Facets a pass.
+    pub facets: usize,
+    /// At most this many independent passes; at least four are made.
+    pub max_passes: usize,
+    /// Stops when the relative L2 of the standard errors falls below this.
+    pub target: f64,
+    pub seed: u64,
+}
+
+impl Default for ReferenceSettings {
+    fn default() -> Self {
+        Self { facets: 8192, max_passes: 16, target: 2e-3, seed: 1 }
+    }
+}
+
+/// With fewer, the spread of the passes says little about their mean.
+const LEAST_PASSES: usize = 4;
+
+/// `f̄` of one pair with its standard error, per channel [1/sr].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Estimate {
+    pub f_bar: Vec3,
+    pub standard_error: Vec3,
+}
+
+/// Everything the reference sum needs; facets are drawn anew for each pass.
+#[derive(Debug)]
+pub struct Reference<'a> {
+    pub(super) mesh: &'a TileMesh,
+    pub(super) grid: PeriodicGrid,
+    pub(super) material_of_slot: Vec<usize>,
+    pub(super) materials: Vec<SumMaterial>,
+    /// Reflections between facets that paths follow; 0 for the paper's definition.
+    pub(super) bounces: usize,
+}
+
+/// Sums over the passes of one pair: of `S = Σ ΔA V V f` and `a_v`, and of their second moments.
+#[derive(Debug, Clone, Copy, Default)]
+struct Moments {
+    s: DVec3,
+    a: f64,
+    ss: DVec3,
+    sa: DVec3,
+    aa: f64,
+}
+
+impl Moments {
+    fn estimate(&self, passes: usize) -> Estimate {
+        if self.a <= 0.0 {
+            return Estimate::default();
+        }
+        let n = passes as f64;
+        let ratio = self.s / self.a;
+        // Variance of the ratio estimate: of S_p - ratio a_p, over n(n-1) and the mean a squared.
+        let residual = (self.ss - 2.0 * ratio * self.sa + ratio * ratio * self.aa).max(DVec3::ZERO);
+        let error = (residual / (n * (n - 1.0).max(1.0))).map(f64::sqrt) / (self.a / n);
+        Estimate { f_bar: ratio.as_vec3(), standard_error: error.as_vec3() }
+    }
+}
+
+impl<'a> Reference<'a> {
+    pub fn new(mesh: &'a TileMesh, material_of_slot: &[usize], materials: &[SumMaterial]) -> Self {
+        Self {
+            mesh,
+            grid: PeriodicGrid::new(mesh),
+            material_of_slot: material_of_slot.to_vec(),
+            materials: materials.to_vec(),
+            bounces: 0,
+        }
+    }
+
+    /// Follows light from facet to facet too.
+    pub fn with_bounces(self, bounces: usize) -> Self {
+        Self { bounces, ..self }
+    }
+
+    /// Estimates `f̄` at each pair. `progress(passes done, relative L2 of the standard errors)` after each pass; it
+    /// returns whether to go on.
+    pub fn estimate(
+        &self,
+        pairs: &[Pair],
+        settings: &ReferenceSettings,
+        mut progress: impl FnMut(usize, f64) -> bool,
+    ) -> Vec<Estimate> {
+        let mut moments = vec![Moments::default(); pairs.len()];
+        let mut estimates = vec![Estimate::default(); pairs.len()];
+        let sampler = FacetSampler::new(self.mesh);
+        for pass in 0..settings.max_passes.max(LEAST_PASSES) {
+            // Shifts of one low-discrepancy sequence: the passes together are better than independent ones would be,
+            // so the standard error is, if anything, too large.
+            let shift = SampleShift::from_seed(settings.seed.wrapping_mul(4096).wrapping_add(pass as u64));
+            let mut facets = sampler.sample(self.mesh, settings.facets, shift);
+            facets.sort_for_sums();
+            let sum = FacetSum::new(&facets, &self.material_of_slot, &self.materials);
+            let origins = lifted_origins(&facets, self.mesh.size);
+            let paths = (self.bounces > 0)
+                .then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, &self.materials, self.bounces));
+            moments.par_iter_mut().zip(pairs).enumerate().for_each_init(
+                || (vec![0.0_f32; facets.len()], vec![0.0_f32; facets.len()]),
+                |(v_i, v_o), (at, (moments, pair))| {
+                    let (mut s, a) = self.one_pass(&facets, &sum, &origins, *pair, v_i, v_o);
+                    if let Some(paths) = &paths {
+                        let seed = settings.seed ^ (pass as u64) << 40 ^ (at as u64) << 8;
+                        s += paths.trace(&facets, &origins, v_o, *pair, seed);
+                    }
+                    moments.s += s;
+                    moments.a += a;
+                    moments.ss += s * s;
+                    moments.sa += s * a;
+                    moments.aa += a * a;
+                },
+            );
+            let passes = pass + 1;
+            let (mut error, mut norm) = (0.0, 0.0);
+            for (estimate, moments) in estimates.iter_mut().zip(&moments) {
+                *estimate = moments.estimate(passes);
+                error += estimate.standard_error.as_dvec3().length_squared();
+                norm += estimate.f_bar.as_dvec3().length_squared();
+            }
+            let relative = if error == 0.0 { 0.0 } else { (error / norm).sqrt() };
+            if !progress(passes, relative) || (passes >= LEAST_PASSES && relative < settings.target) {
+                break;
+            }
+        }
+        estimates
+    }
+
+    /// `(Σ ΔA V V f, a_v)` of one set of facets.
+    fn one_pass(
+        &self,
+        facets: &Facets,
+        sum: &FacetSum,
+        origins: &[Vec3],
+        pair: Pair,
+        v_i: &mut [f32],
+        v_o: &mut [f32],
+    ) -> (DVec3, f64) {
+        let Pair { i, o } = pair;
+        if i.z <= 0.0 || o.z <= 0.0 {
+            return (DVec3::ZERO, 0.0);
+        }
+        for s in 0..facets.len() {
+            let normal = facets.normals[s];
+            let clear = |to: Vec3| normal.dot(to) > 0.0 && !self.grid.is_blocked(origins[s], to, facets.triangles[s]);
+            v_o[s] = f32::from(clear(o));
+            v_i[s] = f32::from(v_o[s] > 0.0 && clear(i));
+        }
+        (sum.sum(i, o, v_i, v_o), sum.projected_area(v_o, o))
+    }
+}

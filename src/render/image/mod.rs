@@ -1,0 +1,10 @@
+//! From an object, lights and a material to an image.
+
+pub mod camera;
+pub mod gbuffer;
+pub mod picture;
+pub mod raster;
+pub mod render;
+pub mod shading;
+pub mod shading_points;
+pub mod tone_map;

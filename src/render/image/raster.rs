@@ -1,0 +1,286 @@
+//! Which triangle each sample of the picture shows. Rules, shared with the GPU:
+//!
+//! - sample (x, y) of a picture with `s` samples a pixel side sits at pixel coordinates `((x+½)/s, (y+½)/s)`;
+//! - vertices are snapped to 1/256 of a sample; edges are exact integers and the top-left rule decides ties, so
+//!   triangles that share an edge neither overlap nor leave a gap;
+//! - the nearest triangle wins; of equals, the first;
+//! - triangles turned away are dropped unless the surface is two-sided;
+//! - triangles are clipped at the camera's near plane.
+
+use glam::{DVec2, Vec3};
+use rayon::prelude::*;
+
+use crate::render::{CameraView, ObjectMesh};
+
+/// The triangle of a sample that shows none.
+pub const NOTHING: u32 = u32::MAX;
+
+/// Snapping: parts of a sample.
+const SUBSTEPS: f64 = 256.0;
+/// Snapped coordinates are kept within this, so that products of differences fit in 63 bits.
+const LARGEST: f64 = (1i64 << 29) as f64;
+/// Rows a task works on.
+const BAND: usize = 16;
+/// Triangles a task projects.
+const CHUNK: usize = 2048;
+
+/// What a sample shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Index into the mesh's triangles, or [`NOTHING`].
+    pub triangle: u32,
+    /// Barycentric weights (perspective-correct) of the triangle's second and third corner.
+    pub barycentric: [f32; 2],
+    /// One over the depth along the view direction; 0 where nothing shows.
+    pub inverse_depth: f32,
+}
+
+const EMPTY: Sample = Sample { triangle: NOTHING, barycentric: [0.0; 2], inverse_depth: 0.0 };
+
+/// A triangle (or a clipped piece of one) on the picture, wound so that its area is positive with y down.
+struct Projected {
+    triangle: u32,
+    /// Snapped coordinates.
+    corners: [[i64; 2]; 3],
+    inverse_depths: [f32; 3],
+    /// Barycentric coordinates of each corner in the mesh triangle.
+    barycentric: [Vec3; 3],
+    /// Sample rows touched, half-open.
+    rows: [usize; 2],
+}
+
+/// Samples row by row, `width x height` of them: the picture's size times the samples a side.
+pub fn rasterize(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) -> Vec<Sample> {
+    let projected = project(mesh, view, width, height);
+    let mut bands = vec![Vec::new(); height.div_ceil(BAND)];
+    for (k, piece) in projected.iter().enumerate() {
+        for band in &mut bands[piece.rows[0] / BAND..piece.rows[1].div_ceil(BAND)] {
+            band.push(k as u32);
+        }
+    }
+    let mut samples = vec![EMPTY; width * height];
+    samples.par_chunks_mut(width.max(1) * BAND).zip(&bands).enumerate().for_each(|(band, (samples, pieces))| {
+        for &piece in pieces {
+            fill(&projected[piece as usize], samples, width, band * BAND);
+        }
+    });
+    samples
+}
+
+fn project(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) -> Vec<Projected> {
+    let in_view: Vec<Vec3> = mesh.positions.iter().map(|p| view.view_from_world(*p)).collect();
+    let scale = DVec2::new(width as f64 / view.size[0] as f64, height as f64 / view.size[1] as f64) * SUBSTEPS;
+    let snap = |p: Vec3| {
+        let at = view.pixel_from_view(p).as_dvec2() * scale;
+        at.to_array().map(|x| x.round().clamp(-LARGEST, LARGEST) as i64)
+    };
+    let snapped: Vec<[i64; 2]> = in_view.iter().map(|p| snap(*p)).collect();
+    let pieces_of = |(first, triangles): (usize, &[[u32; 3]])| {
+        let mut pieces = Vec::with_capacity(triangles.len());
+        for (k, triangle) in triangles.iter().enumerate() {
+            let triangle_index = (first * CHUNK + k) as u32;
+            let corners = triangle.map(|v| in_view[v as usize]);
+            if corners.iter().all(|p| p.z >= view.near) {
+                let corners = [(corners[0], Vec3::X), (corners[1], Vec3::Y), (corners[2], Vec3::Z)];
+                let snapped = triangle.map(|v| snapped[v as usize]);
+                pieces.extend(place(triangle_index, corners, snapped, mesh.two_sided, height));
+                continue;
+            }
+            let polygon = clip_near(corners, view.near);
+            for fan in 2..polygon.len() {
+                let corners = [polygon[0], polygon[fan - 1], polygon[fan]];
+                pieces.extend(place(triangle_index, corners, corners.map(|(p, _)| snap(p)), mesh.two_sided, height));
+            }
+        }
+        pieces
+    };
+    let chunks: Vec<Vec<Projected>> = mesh.triangles.par_chunks(CHUNK).enumerate().map(pieces_of).collect();
+    chunks.into_iter().flatten().collect()
+}
+
+/// Winds the piece, culls it, and finds its rows.
+fn place(
+    triangle: u32,
+    mut corners: [(Vec3, Vec3); 3],
+    mut snapped: [[i64; 2]; 3],
+    two_sided: bool,
+    height: usize,
+) -> Option<Projected> {
+    let area = edge(snapped[0], snapped[1], snapped[2]);
+    // Counter-clockwise with y up is negative with y down: the side that faces us.
+    if area == 0 || (area > 0 && !two_sided) {
+        return None;
+    }
+    if area < 0 {
+        corners.swap(1, 2);
+        snapped.swap(1, 2);
+    }
+    let ys = snapped.map(|c| c[1]);
+    let (top, bottom) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
+    // Rows whose centres (at y + ½) lie between top and bottom.
+    let row = |y: i64| (y + 127).div_euclid(256).clamp(0, height as i64) as usize;
+    let rows = [row(top), row(bottom + 1)];
+    (rows[0] < rows[1]).then(|| Projected {
+        triangle,
+        corners: snapped,
+        inverse_depths: corners.map(|(p, _)| 1.0 / p.z),
+        barycentric: corners.map(|(_, b)| b),
+        rows,
+    })
+}
+
+/// The part of a triangle in front of the near plane as a convex polygon of (view position, barycentric coordinates).
+fn clip_near(corners: [Vec3; 3], near: f32) -> Vec<(Vec3, Vec3)> {
+    let all = [(corners[0], Vec3::X), (corners[1], Vec3::Y), (corners[2], Vec3::Z)];
+    let inside = corners.map(|p| p.z >= near);
+    let mut polygon = Vec::new();
+    for k in 0..3 {
+        let (from, to) = (all[k], all[(k + 1) % 3]);
+        if inside[k] {
+            polygon.push(from);
+        }
+        if inside[k] != inside[(k + 1) % 3] {
+            let t = (near - from.0.z) / (to.0.z - from.0.z);
+            let mut cut = from.0.lerp(to.0, t);
+            cut.z = near;
+            polygon.push((cut, from.1.lerp(to.1, t)));
+        }
+    }
+    polygon
+}
+
+/// Twice the signed area of a, b, p; positive to the right of a→b with y down.
+fn edge(a: [i64; 2], b: [i64; 2], p: [i64; 2]) -> i64 {
+    (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+}
+
+/// 0 for edges that own the points exactly on them (top or left), else -1.
+fn bias(a: [i64; 2], b: [i64; 2]) -> i64 {
+    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+    if dy < 0 || (dy == 0 && dx > 0) { 0 } else { -1 }
+}
+
+fn fill(piece: &Projected, samples: &mut [Sample], width: usize, first_row: usize) {
+    let [a, b, c] = piece.corners;
+    let rows = first_row.max(piece.rows[0])..piece.rows[1].min(first_row + samples.len() / width);
+    let xs = [a[0], b[0], c[0]];
+    let column = |x: i64| (x + 127).div_euclid(256).clamp(0, width as i64) as usize;
+    let columns = column(xs[0].min(xs[1]).min(xs[2]))..column(xs[0].max(xs[1]).max(xs[2]) + 1);
+    let area = edge(a, b, c) as f64;
+    let edges = [(b, c), (c, a), (a, b)];
+    let biases = edges.map(|(from, to)| bias(from, to));
+    let steps = edges.map(|(from, to)| -256 * (to[1] - from[1]));
+    for row in rows {
+        let start = [columns.start as i64 * 256 + 128, row as i64 * 256 + 128];
+        let mut values = edges.map(|(from, to)| edge(from, to, start));
+        let line = &mut samples[(row - first_row) * width..][columns.clone()];
+        for sample in line {
+            if (values[0] + biases[0]) | (values[1] + biases[1]) | (values[2] + biases[2]) >= 0 {
+                shade_sample(piece, values, area, sample);
+            }
+            for (value, step) in values.iter_mut().zip(steps) {
+                *value += step;
+            }
+        }
+    }
+}
+
+fn shade_sample(piece: &Projected, values: [i64; 3], area: f64, sample: &mut Sample) {
+    let weights: [f32; 3] = std::array::from_fn(|k| (values[k] as f64 / area) as f32 * piece.inverse_depths[k]);
+    let inverse_depth = weights[0] + weights[1] + weights[2];
+    if inverse_depth > sample.inverse_depth {
+        let sum: Vec3 = (0..3).map(|k| piece.barycentric[k] * weights[k]).sum();
+        let barycentric = sum / inverse_depth;
+        *sample = Sample { triangle: piece.triangle, barycentric: [barycentric.y, barycentric.z], inverse_depth };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::object;
+    use crate::render::object::Bounds;
+    use crate::scene;
+
+    /// A square [-1, 1]² in the plane z = 0, cut into `n x n` cells at awkward places, each two triangles.
+    fn square(n: usize, two_sided: bool) -> ObjectMesh {
+        let mut mesh = ObjectMesh { two_sided, ..ObjectMesh::default() };
+        for j in 0..=n {
+            for i in 0..=n {
+                let at = |k: usize| -1.0 + 2.0 * (k as f32 / n as f32).powf(1.3);
+                mesh.positions.push(Vec3::new(at(i), at(j), 0.0));
+            }
+        }
+        let row = n as u32 + 1;
+        for k in 0..(n * n) as u32 {
+            let a = k / n as u32 * row + k % n as u32;
+            mesh.triangles.extend([[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]);
+        }
+        (mesh.normals, mesh.tangents) = (vec![Vec3::Z; mesh.positions.len()], vec![Vec3::X; mesh.positions.len()]);
+        mesh.bounds = Bounds::of(&mesh.positions);
+        mesh
+    }
+
+    fn facing(mesh: &ObjectMesh, azimuth_deg: f32, distance: f32, size: [usize; 2]) -> CameraView {
+        let camera = scene::Camera { azimuth_deg, elevation_deg: 0.0, distance, ..scene::Camera::default() };
+        CameraView::new(&camera, mesh, size).unwrap()
+    }
+
+    #[test]
+    fn each_sample_inside_a_triangulated_square_is_covered_exactly_once() {
+        let mesh = square(13, false);
+        // The square fills the picture and more: counted per triangle, no sample is empty and none is drawn twice.
+        let view = facing(&mesh, 0.0, 1.5, [64, 64]);
+        let projected = project(&mesh, &view, 64, 64);
+        let mut hits = vec![0; 64 * 64];
+        for piece in &projected {
+            let mut alone = vec![EMPTY; 64 * 64];
+            fill(piece, &mut alone, 64, 0);
+            alone.iter().zip(&mut hits).for_each(|(sample, hits)| *hits += usize::from(sample.triangle != NOTHING));
+        }
+        assert!(hits.iter().all(|&h| h == 1), "{:?}", hits.iter().max());
+    }
+
+    #[test]
+    fn coverage_equals_the_projected_area_and_barycentrics_give_back_the_point() {
+        let mesh = square(3, false);
+        let view = facing(&mesh, 40.0, 4.0, [300, 200]);
+        let samples = rasterize(&mesh, &view, 300, 200);
+        let outline = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]| view.pixel_from_view(view.view_from_world(Vec3::new(x, y, 0.0))));
+        let area: f32 = (0..4).map(|k| 0.5 * outline[k].perp_dot(outline[(k + 1) % 4])).sum::<f32>().abs();
+        let covered = samples.iter().filter(|s| s.triangle != NOTHING).count() as f32;
+        assert!((covered / area - 1.0).abs() < 0.01, "{covered} {area}");
+        for (k, sample) in samples.iter().enumerate().filter(|(_, s)| s.triangle != NOTHING) {
+            let [a, b, c] = mesh.corners(sample.triangle as usize);
+            let [v, w] = sample.barycentric;
+            let in_view = view.view_from_world(a * (1.0 - v - w) + b * v + c * w);
+            let pixel = view.pixel_from_view(in_view);
+            let center = glam::Vec2::new((k % 300) as f32 + 0.5, (k / 300) as f32 + 0.5);
+            assert!((pixel - center).length() < 0.02, "{pixel} {center}");
+            assert!((in_view.z * sample.inverse_depth - 1.0).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_surface_turned_away_shows_only_where_it_is_two_sided() {
+        for (two_sided, shown) in [(false, false), (true, true)] {
+            let mesh = square(2, two_sided);
+            let samples = rasterize(&mesh, &facing(&mesh, 180.0, 4.0, [40, 40]), 40, 40);
+            assert_eq!(samples.iter().any(|s| s.triangle != NOTHING), shown);
+        }
+    }
+
+    #[test]
+    fn the_nearest_of_a_closed_object_faces_the_viewer_and_a_camera_inside_does_not_break() {
+        let sphere = object::build(&scene::Object::default(), std::path::Path::new(".")).unwrap();
+        let view = facing(&sphere, 10.0, 3.0, [80, 80]);
+        for sample in rasterize(&sphere, &view, 80, 80).iter().filter(|s| s.triangle != NOTHING) {
+            assert!(1.0 / sample.inverse_depth < 3.0);
+        }
+        let mut open = sphere;
+        open.two_sided = true;
+        let inside = rasterize(&open, &facing(&open, 10.0, 0.3, [80, 80]), 80, 80);
+        assert!(inside.iter().all(|s| s.triangle != NOTHING), "from inside the sphere is all around");
+    }
+}

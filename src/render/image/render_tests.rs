@@ -1,0 +1,242 @@
+//! Pictures with known answers.
+
+use std::f32::consts::PI;
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::*;
+use crate::render::lighting::lights;
+use crate::render::object;
+
+struct Lambertian;
+
+impl Reflectance for Lambertian {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        assert!(o.z > 0.0 && lights.len() == out.len());
+        for (i, out) in lights.iter().zip(out) {
+            assert!(i.z > 0.0);
+            *out = Vec3::splat(i.z / PI);
+        }
+    }
+}
+
+/// A Ward-like lobe that is narrow along tile x and wide along tile y (or the other way), on a dim base.
+struct Brushed {
+    alpha: [f32; 2],
+}
+
+impl Reflectance for Brushed {
+    fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        let [ax, ay] = self.alpha;
+        for (i, out) in lights.iter().zip(out) {
+            let h = (*i + o).normalize();
+            let slope = (h.x / ax).powi(2) + (h.y / ay).powi(2);
+            let lobe = (-slope / (h.z * h.z)).exp() / (4.0 * PI * ax * ay * (i.z * o.z).max(1e-3).sqrt());
+            *out = Vec3::new(0.85, 0.62, 0.35) * (0.5 * lobe * i.z) + Vec3::splat(0.08 * i.z / PI);
+        }
+    }
+}
+
+fn object(kind: &str) -> ObjectMesh {
+    let path = kind.ends_with(".obj").then(|| Path::new(kind).to_owned());
+    let kind = if path.is_some() { "mesh" } else { kind };
+    object::build(&scene::Object { kind: kind.to_owned(), path }, Path::new(".")).unwrap()
+}
+
+fn front() -> scene::Camera {
+    scene::Camera { azimuth_deg: 0.0, elevation_deg: 0.0, ..scene::Camera::default() }
+}
+
+fn picture(
+    mesh: &ObjectMesh,
+    lights: &[DirectionalLight],
+    reflectance: &dyn Reflectance,
+    camera: &scene::Camera,
+) -> Rendered {
+    let occluder = Occluder::of(mesh);
+    render(&RenderInput {
+        mesh,
+        occluder: occluder.as_ref(),
+        shadow_cache: None,
+        lights,
+        camera,
+        reflectance,
+        size: [128, 128],
+        samples_per_side: 2,
+        background: &Background::Uniform(Vec3::ZERO),
+    })
+    .unwrap()
+}
+
+/// The unit sphere's normal at the centre of a pixel, where it is hit.
+fn sphere_normal(camera: &scene::Camera, mesh: &ObjectMesh, pixel: usize) -> Option<Vec3> {
+    let view = CameraView::new(camera, mesh, [128, 128]).unwrap();
+    let ndc = glam::Vec2::new((pixel % 128) as f32 + 0.5, (pixel / 128) as f32 + 0.5) / 64.0 - 1.0;
+    let ray =
+        (view.right * (ndc.x * view.tan_half_fov.x) - view.up * (ndc.y * view.tan_half_fov.y) - view.back).normalize();
+    let b = view.eye.dot(ray);
+    let root = b * b - view.eye.length_squared() + 1.0;
+    (root > 0.0).then(|| view.eye + ray * (-b - root.sqrt()))
+}
+
+#[test]
+fn a_lambertian_sphere_has_its_closed_form_radiance() {
+    let mesh = object("sphere");
+    let direction = Vec3::new(0.48, 0.64, 0.6);
+    let lights = [DirectionalLight { direction, irradiance: Vec3::new(PI, 2.0 * PI, 0.0) }];
+    let rendered = picture(&mesh, &lights, &Lambertian, &front());
+    let mut checked = 0;
+    for (k, pixel) in rendered.picture.pixels.iter().enumerate() {
+        let Some(normal) = sphere_normal(&front(), &mesh, k) else {
+            continue;
+        };
+        if normal.z > 0.5 {
+            let expected = normal.dot(direction).max(0.0);
+            assert!((pixel.x - expected).abs() < 0.01 && (pixel.y - 2.0 * expected).abs() < 0.02 && pixel.z == 0.0);
+            checked += 1;
+        }
+    }
+    assert!(checked > 5000, "{checked}");
+}
+
+#[test]
+fn the_highlight_of_a_mirror_like_sphere_lies_where_the_half_vector_is_the_normal() {
+    let mesh = object("sphere");
+    let direction = Vec3::new(0.6, 0.48, 0.64);
+    let lights = [DirectionalLight { direction, irradiance: Vec3::ONE }];
+    let rendered = picture(&mesh, &lights, &Brushed { alpha: [0.05, 0.05] }, &front());
+    let brightest =
+        (0..128 * 128).max_by(|&a, &b| rendered.picture.pixels[a].x.total_cmp(&rendered.picture.pixels[b].x)).unwrap();
+    let normal = sphere_normal(&front(), &mesh, brightest).unwrap();
+    let eye = CameraView::new(&front(), &mesh, [128, 128]).unwrap().eye;
+    let half = (direction + (eye - normal).normalize()).normalize();
+    assert!(normal.dot(half) > 0.999, "{}", normal.dot(half));
+}
+
+#[test]
+fn an_anisotropic_highlight_on_a_sphere_stretches_along_tile_y_where_that_is_wide() {
+    // Tile y runs up the meridians: narrow in x, wide in y must give a tall highlight.
+    let mesh = object("sphere");
+    let lights = [DirectionalLight { direction: Vec3::Z, irradiance: Vec3::ONE }];
+    let extent = |alpha| {
+        let rendered = picture(&mesh, &lights, &Brushed { alpha }, &front());
+        let lit = |k: usize| rendered.picture.pixels[k].x > 0.4 * rendered.picture.pixels[64 * 128 + 64].x;
+        let wide = (0..128).filter(|x| lit(64 * 128 + x)).count();
+        let tall = (0..128).filter(|y| lit(y * 128 + 64)).count();
+        (wide, tall)
+    };
+    let (wide, tall) = extent([0.08, 0.35]);
+    assert!(tall > 3 * wide, "{wide} {tall}");
+    assert!(extent([0.35, 0.08]).0.abs_diff(tall) <= 4);
+}
+
+#[test]
+fn edges_are_averaged_in_linear_radiance_and_coverage_matches_the_disc() {
+    struct White;
+    impl Reflectance for White {
+        fn eval_lights(&self, _: &[Vec3], _: Vec3, out: &mut [Vec3]) {
+            out.fill(Vec3::ONE);
+        }
+    }
+    let mesh = object("sphere");
+    let lights = [DirectionalLight { direction: Vec3::Z, irradiance: Vec3::ONE }];
+    let camera = scene::Camera { distance: 40.0, fov_deg: 3.5, ..front() };
+    let rendered = picture(&mesh, &lights, &White, &camera);
+    let sum: f32 = rendered.picture.pixels.iter().map(|p| p.x).sum();
+    // The rim seen under perspective: angular radius asin(1/40).
+    let radius = 64.0 * (1f32 / 40.0).asin().tan() / 1.75f32.to_radians().tan();
+    assert!((sum / (PI * radius * radius) - 1.0).abs() < 0.01, "{sum}");
+    assert!(rendered.picture.pixels.iter().any(|p| p.x > 0.1 && p.x < 0.9));
+}
+
+#[test]
+fn one_and_several_threads_give_the_same_picture() {
+    let mesh = object("cup");
+    let lights = lights::build(&scene::Light::default(), Path::new(".")).unwrap().directional;
+    let with_threads = |n| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+        pool.install(|| picture(&mesh, &lights, &Lambertian, &scene::Camera::default()).picture)
+    };
+    assert_eq!(with_threads(1), with_threads(3));
+}
+
+#[test]
+fn sizes_that_make_no_picture_are_errors() {
+    let mesh = object("sphere");
+    for (size, samples_per_side) in [([0, 4], 1), ([4, 4], 0), ([1 << 20, 1 << 20], 2), ([usize::MAX, 2], 1)] {
+        let camera = front();
+        let input = RenderInput {
+            mesh: &mesh,
+            occluder: None,
+            shadow_cache: None,
+            lights: &[],
+            camera: &camera,
+            reflectance: &Lambertian,
+            size,
+            samples_per_side,
+            background: &Background::Wall,
+        };
+        assert_eq!(render(&input).unwrap_err().exit_code(), 2);
+    }
+}
+
+/// Contact sheets for the eye, and times: `BISCALE_PICTURES=/tmp/large cargo test --lib contact_sheet -- --nocapture`.
+#[test]
+fn contact_sheet_of_every_object_when_asked_for() {
+    let Some(folder) = std::env::var_os("BISCALE_PICTURES") else {
+        return;
+    };
+    let folder = Path::new(&folder);
+    std::fs::create_dir_all(folder).unwrap();
+    let only = std::env::var("BISCALE_OBJECTS").ok();
+    let environment = std::env::var("BISCALE_ENVIRONMENT").unwrap_or_else(|_| "studio".to_owned());
+    let light = scene::Light { environment, ..scene::Light::default() };
+    let lights = lights::build(&light, Path::new(".")).unwrap().directional;
+    let camera = scene::Camera::default();
+    let tone_map = crate::render::image::tone_map::ToneMap::new(&camera).unwrap();
+    let kinds = object::KINDS.iter().copied().filter(|kind| *kind != "mesh");
+    let kinds: Vec<_> = only.as_deref().map_or_else(|| kinds.collect(), |only| only.split(',').collect());
+    for kind in kinds {
+        let mesh = object(kind);
+        let name = Path::new(kind).file_name().unwrap().to_string_lossy().replace('.', "_");
+        let start = Instant::now();
+        let occluder = Occluder::of(&mesh);
+        let occluder_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        let cached = std::env::var_os("BISCALE_SHADOW_CACHE").is_some();
+        let cache = occluder.as_ref().filter(|_| cached).map(|occluder| occluder.cache(&mesh, &lights));
+        let cache_ms = start.elapsed().as_secs_f64() * 1e3;
+        for (look, reflectance) in
+            [("matte", &Lambertian as &dyn Reflectance), ("brushed", &Brushed { alpha: [0.12, 0.4] })]
+        {
+            let input = RenderInput {
+                mesh: &mesh,
+                occluder: occluder.as_ref(),
+                shadow_cache: cache.as_ref(),
+                lights: &lights,
+                camera: &camera,
+                reflectance,
+                size: [384, 384],
+                samples_per_side: 2,
+                background: &Background::Wall,
+            };
+            let runs: Vec<_> = (0..5).map(|_| render(&input).unwrap()).collect();
+            let best = runs.iter().min_by(|a, b| total(a).total_cmp(&total(b))).unwrap();
+            eprintln!(
+                "{name} {look}: {} triangles, {} points, occluder {occluder_ms:.1} ms, cache {cache_ms:.1} ms, gbuffer {:.1}, shadows {:.1}, shading {:.1}; {:?}",
+                mesh.triangles.len(),
+                best.points,
+                best.times.gbuffer_ms,
+                best.times.shadows_ms,
+                best.times.shading_ms,
+                mesh.warnings
+            );
+            best.picture.write(&folder.join(format!("{name}_{look}.png")), &tone_map).unwrap();
+        }
+    }
+}
+
+fn total(rendered: &Rendered) -> f64 {
+    rendered.times.gbuffer_ms + rendered.times.shadows_ms + rendered.times.shading_ms
+}

@@ -1,0 +1,92 @@
+//! Deferred shading: `Σ_k E_k f̄(i_k, o)` at every shading point, and the points gathered into the picture.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::shading_points::ShadingPoints;
+use crate::effective::Reflectance;
+use crate::render::shadow::Visible;
+use crate::render::{CameraView, DirectionalLight, Picture};
+
+/// Points a task works on.
+const CHUNK: usize = 256;
+
+/// Radiance towards the eye of each point. `visible` is absent where nothing is ever in the way.
+pub fn radiance(
+    points: &ShadingPoints,
+    lights: &[DirectionalLight],
+    visible: Option<&Visible>,
+    eye: Vec3,
+    reflectance: &dyn Reflectance,
+) -> Vec<Vec3> {
+    let mut radiance = vec![Vec3::ZERO; points.len()];
+    radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {
+        let (mut directions, mut irradiances) = (Vec::with_capacity(lights.len()), Vec::with_capacity(lights.len()));
+        let mut values = vec![Vec3::ZERO; lights.len()];
+        for (k, radiance) in radiance.iter_mut().enumerate() {
+            let point = chunk * CHUNK + k;
+            let (z, x) = (points.normals[point], points.tangents[point]);
+            let y = z.cross(x);
+            let in_tangent = |d: Vec3| Vec3::new(d.dot(x), d.dot(y), d.dot(z));
+            directions.clear();
+            irradiances.clear();
+            for (k, light) in lights.iter().enumerate() {
+                if visible.is_none_or(|visible| visible.sees(point, k)) && light.direction.dot(z) > 0.0 {
+                    directions.push(in_tangent(light.direction));
+                    irradiances.push(light.irradiance);
+                }
+            }
+            if directions.is_empty() {
+                continue;
+            }
+            let o = in_tangent((eye - points.positions[point]).try_normalize().unwrap_or(z));
+            let values = &mut values[..directions.len()];
+            reflectance.eval_lights(&directions, o, values);
+            *radiance = values.iter().zip(&irradiances).map(|(f, e)| *f * *e).sum();
+        }
+    });
+    radiance
+}
+
+/// What is behind the object.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Background {
+    /// A grey studio wall, lighter behind the object.
+    #[default]
+    Wall,
+    /// The same radiance everywhere.
+    Uniform(Vec3),
+}
+
+impl Background {
+    /// Radiance at the centre of a pixel.
+    fn at(&self, pixel: usize, [width, height]: [usize; 2]) -> Vec3 {
+        match self {
+            Self::Uniform(radiance) => *radiance,
+            Self::Wall => {
+                let shorter = width.min(height) as f32;
+                let x = ((pixel % width) as f32 + 0.5 - 0.5 * width as f32) / shorter;
+                let y = ((pixel / width) as f32 + 0.5 - 0.55 * height as f32) / shorter;
+                let glow = (-3.2 * (x * x + y * y)).exp();
+                Vec3::new(0.97, 1.0, 1.05) * (0.025 + 0.095 * glow)
+            }
+        }
+    }
+}
+
+/// The picture: points averaged within their pixels over the background, in linear radiance.
+pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &Background) -> Picture {
+    let [width, height] = view.size;
+    let mut coverage = vec![0f32; width * height];
+    let mut pixels = vec![Vec3::ZERO; width * height];
+    for ((&pixel, &weight), radiance) in points.pixels.iter().zip(&points.weights).zip(radiance) {
+        coverage[pixel as usize] += weight;
+        pixels[pixel as usize] += *radiance * weight;
+    }
+    for (k, (pixel, covered)) in pixels.iter_mut().zip(coverage).enumerate() {
+        if covered < 1.0 {
+            *pixel += background.at(k, view.size) * (1.0 - covered);
+        }
+    }
+    Picture { width, height, pixels }
+}

@@ -1,0 +1,340 @@
+//! Large-scale objects from OBJ files (read by tobj). The text is checked line by line first, because a person needs the
+//! line of a mistake and tobj does not say it (and trusts relative indices it should not).
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DVec3, Vec2, Vec3};
+
+use super::{Bounds, frames};
+use crate::base::{Error, InputError, Result};
+use crate::render::ObjectMesh;
+
+/// Larger files are refused before they are read.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Loads an OBJ as one mesh. Normals are the file's, else smoothed (area-weighted); tangents follow the UVs, else the
+/// horizontal, with a warning. A surface with open edges is seen from both sides.
+pub(super) fn load(path: &Path) -> Result<ObjectMesh> {
+    let unreadable = |what: &dyn std::fmt::Display| {
+        Error::from(InputError::new("object.path", what, "a readable OBJ file").in_file(path))
+    };
+    let there = std::fs::metadata(path).map_err(|error| unreadable(&error))?;
+    if !there.is_file() {
+        return Err(unreadable(&"a folder or device"));
+    }
+    let size = there.len();
+    if size > MAX_BYTES {
+        return Err(unreadable(&format!("{size} bytes (at most {MAX_BYTES} are read)")));
+    }
+    let bytes = std::fs::read(path).map_err(|error| unreadable(&error))?;
+    let text = String::from_utf8(bytes).map_err(|_| unreadable(&"bytes that are not UTF-8 text"))?;
+    parse(&text).map_err(|error| error.in_file(path))
+}
+
+/// See [`load`].
+fn parse(text: &str) -> Result<ObjectMesh> {
+    check_lines(text)?;
+    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+    let no_materials = |_: &Path| Ok((Vec::new(), HashMap::new()));
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials)
+        .map_err(|error| InputError::new("", error, "an OBJ file that tobj can read"))?;
+    let mut raw = RawMesh::default();
+    models.iter().for_each(|model| raw.append(&model.mesh));
+    raw.finish()
+}
+
+/// Checks numbers, and that face indices point at something, naming the line.
+fn check_lines(text: &str) -> Result<()> {
+    let mut counts = [0i64; 3];
+    let mut faces = 0usize;
+    // A face may use vertices written after it.
+    let mut largest = [(0i64, 0usize); 3];
+    for (k, line) in text.lines().enumerate() {
+        let number = k + 1;
+        let at = || format!("line {number}");
+        let mut words = line.split_whitespace();
+        let keyword = words.next().unwrap_or_default();
+        match keyword {
+            "v" | "vt" | "vn" => {
+                let needed = if keyword == "vt" { 1 } else { 3 };
+                let values: Vec<&str> = words.collect();
+                let bad = values.iter().find(|value| !value.parse::<f32>().is_ok_and(f32::is_finite));
+                if let Some(bad) = bad {
+                    return Err(InputError::new(at(), format!("{bad} in a {keyword} line"), "finite numbers").into());
+                }
+                if values.len() < needed {
+                    let found = format!("{} numbers in a {keyword} line", values.len());
+                    return Err(InputError::new(at(), found, format!("at least {needed}")).into());
+                }
+                counts[["v", "vt", "vn"].iter().position(|known| *known == keyword).unwrap_or(0)] += 1;
+            }
+            "f" => {
+                faces += 1;
+                let mut corners = 0;
+                for corner in words {
+                    corners += 1;
+                    check_corner(corner, number, &counts, &mut largest)?;
+                }
+                if corners < 3 {
+                    return Err(InputError::new(at(), format!("a face of {corners} corners"), "at least 3").into());
+                }
+            }
+            _ => {}
+        }
+    }
+    if faces == 0 {
+        return Err(InputError::new("", "no faces", "at least one f line").into());
+    }
+    for ((index, line), (count, what)) in largest.iter().zip(counts.iter().zip(["v", "vt", "vn"])) {
+        if index > count {
+            return Err(InputError::new(
+                format!("line {line}"),
+                format!("{what} index {index}"),
+                format!("1 to {count}"),
+            )
+            .into());
+        }
+    }
+    Ok(())
+}
+
+fn check_corner(corner: &str, line: usize, counts: &[i64; 3], largest: &mut [(i64, usize); 3]) -> Result<()> {
+    let malformed = |expected: &str| {
+        InputError::new(format!("line {line}"), format!("\"{corner}\" in a face"), expected.to_owned())
+    };
+    for (slot, part) in corner.split('/').enumerate() {
+        if slot > 2 {
+            return Err(malformed("at most v/vt/vn").into());
+        }
+        if part.is_empty() && slot > 0 {
+            continue;
+        }
+        let index: i64 = part.parse().map_err(|_| malformed("whole numbers as v, v/vt, v//vn or v/vt/vn"))?;
+        if index == 0 || index < -counts[slot] {
+            return Err(malformed("indices from 1, or negative ones that count back over lines above").into());
+        }
+        if index > largest[slot].0 {
+            largest[slot] = (index, line);
+        }
+    }
+    Ok(())
+}
+
+/// All models of a file in one set of arrays; `normals` and `uvs` are complete or to be made.
+#[derive(Default)]
+struct RawMesh {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl RawMesh {
+    fn append(&mut self, mesh: &tobj::Mesh) {
+        let base = self.positions.len() as u32;
+        let triples = |values: &[f32]| values.chunks_exact(3).map(Vec3::from_slice).collect::<Vec<_>>();
+        self.positions.extend(triples(&mesh.positions));
+        // Vertices of one model may lack what others have; then the arrays do not line up and cannot be used.
+        if mesh.normals.len() == mesh.positions.len() {
+            self.normals.extend(triples(&mesh.normals));
+        }
+        if mesh.texcoords.len() / 2 == mesh.positions.len() / 3 {
+            self.uvs.extend(mesh.texcoords.chunks_exact(2).map(Vec2::from_slice));
+        }
+        self.triangles
+            .extend(mesh.indices.chunks_exact(3).map(|corner| [corner[0] + base, corner[1] + base, corner[2] + base]));
+    }
+
+    /// Moves the mesh to the origin and scales it to radius 1: no later stage need fear tiny or huge units.
+    fn normalize(&mut self) {
+        let Some(first) = self.positions.first().map(|p| p.as_dvec3()) else {
+            return;
+        };
+        let wide = || self.positions.iter().map(|p| p.as_dvec3());
+        let (low, high) = wide().fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+        let center = 0.5 * (low + high);
+        let radius = wide().map(|p| p.distance(center)).fold(0.0, f64::max);
+        if radius > 0.0 {
+            self.positions.iter_mut().for_each(|p| *p = ((p.as_dvec3() - center) / radius).as_vec3());
+        }
+    }
+
+    fn finish(mut self) -> Result<ObjectMesh> {
+        let mut warnings = Vec::new();
+        self.normalize();
+        let all = self.triangles.len();
+        let area_vector = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|k| self.positions[k as usize].as_dvec3());
+            (b - a).cross(c - a)
+        };
+        self.triangles.retain(|triangle| area_vector(triangle).length_squared() > 0.0);
+        if self.triangles.is_empty() {
+            return Err(InputError::new("", format!("{all} triangles, none with an area"), "a surface").into());
+        }
+        if self.triangles.len() < all {
+            warnings.push(format!("{} of {all} triangles have no area and are left out", all - self.triangles.len()));
+        }
+        let places = frames::weld(&self.positions);
+        let closed = is_closed(&places, &self.triangles);
+        let mut inside_out = false;
+        if closed && signed_volume(&self.positions, &self.triangles) < 0.0 {
+            inside_out = true;
+            warnings.push("the mesh is closed but its triangles face inwards; they are turned around".to_owned());
+            self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        let normals = self.normals(inside_out, &mut warnings);
+        let tangents = self.tangents(&normals, &mut warnings);
+        Ok(ObjectMesh {
+            bounds: Bounds::of(&self.positions),
+            positions: self.positions,
+            normals,
+            tangents,
+            triangles: self.triangles,
+            two_sided: !closed,
+            warnings,
+        })
+    }
+
+    fn normals(&self, inside_out: bool, warnings: &mut Vec<String>) -> Vec<Vec3> {
+        let smooth = || frames::smooth_normals(&self.positions, &self.triangles);
+        if self.normals.len() != self.positions.len() {
+            if !self.normals.is_empty() {
+                warnings.push("only some faces have normals; all are smoothed instead".to_owned());
+            }
+            return smooth();
+        }
+        let sign = if inside_out { -1.0 } else { 1.0 };
+        let unit: Vec<_> =
+            self.normals.iter().map(|n| n.as_dvec3().try_normalize().map(|n| (n * sign).as_vec3())).collect();
+        if unit.iter().all(Option::is_some) {
+            return unit.into_iter().flatten().collect();
+        }
+        warnings.push("some normals have no length; smoothed ones take their place".to_owned());
+        unit.into_iter().zip(smooth()).map(|(given, made)| given.unwrap_or(made)).collect()
+    }
+
+    fn tangents(&self, normals: &[Vec3], warnings: &mut Vec<String>) -> Vec<Vec3> {
+        if self.uvs.len() != self.positions.len() {
+            let what = if self.uvs.is_empty() { "the mesh has no UVs" } else { "only some faces have UVs" };
+            warnings.push(format!(
+                "{what}: the tile lies with x horizontal, and turns about the points that face up or down"
+            ));
+            return normals.iter().map(|n| frames::around_vertical(n.as_dvec3()).as_vec3()).collect();
+        }
+        let (tangents, mirrored) = frames::tangents_from_uvs(&self.positions, normals, &self.uvs, &self.triangles);
+        if mirrored > 0 {
+            let all = self.triangles.len();
+            warnings.push(format!(
+                "{mirrored} of {all} triangles have mirrored UVs; the tile follows u but is not mirrored"
+            ));
+        }
+        tangents
+    }
+}
+
+/// Whether each edge (between places, not vertices) is shared by exactly two triangles that run along it in opposite ways.
+fn is_closed(places: &[u32], triangles: &[[u32; 3]]) -> bool {
+    let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(triangles.len() * 3);
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|k| places[k as usize]);
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            edges.push((from.min(to), from.max(to), from < to));
+        }
+    }
+    edges.sort_unstable();
+    let same_edge = |a: &(u32, u32, bool), b: &(u32, u32, bool)| (a.0, a.1) == (b.0, b.1);
+    edges.chunk_by(same_edge).all(|uses| uses.len() == 2 && uses[0].2 != uses[1].2)
+}
+
+/// Six times the enclosed volume.
+fn signed_volume(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
+    let origin = positions.first().map_or(DVec3::ZERO, |p| p.as_dvec3());
+    let volume = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|k| positions[k as usize].as_dvec3() - origin);
+        a.dot(b.cross(c))
+    };
+    triangles.iter().map(volume).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+    #[test]
+    fn a_tetrahedron_loads_closed_and_without_uvs_warns() {
+        let mesh = parse(TETRAHEDRON).unwrap();
+        assert_eq!((mesh.triangles.len(), mesh.two_sided), (4, false));
+        assert!(mesh.warnings.iter().any(|w| w.contains("no UVs")), "{:?}", mesh.warnings);
+        assert!(mesh.normals[0].dot(Vec3::splat(-1.0)) > 1.7);
+    }
+
+    #[test]
+    fn an_open_mesh_is_two_sided_and_an_inside_out_one_is_turned() {
+        assert!(parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n").unwrap().two_sided);
+        let turned = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n").unwrap();
+        assert!(turned.warnings.iter().any(|w| w.contains("inwards")));
+        assert!(turned.normals[0].dot(Vec3::splat(-1.0)) > 1.7);
+    }
+
+    #[test]
+    fn any_unit_of_length_gives_the_same_mesh() {
+        let original = parse(TETRAHEDRON).unwrap();
+        assert!((original.bounds.radius - 1.0).abs() < 1e-6);
+        for unit in ["1e-30", "1e30"] {
+            let scaled = parse(
+                &TETRAHEDRON
+                    .replace("v 1", &format!("v {unit}"))
+                    .replace(" 1\nf", &format!(" {unit}\nf"))
+                    .replace("0 1 0\nv", &format!("0 {unit} 0\nv")),
+            )
+            .unwrap();
+            for (a, b) in original.positions.iter().zip(&scaled.positions) {
+                assert!(a.distance(*b) < 1e-6, "{unit}: {a} {b}");
+            }
+            assert!(original.normals.iter().zip(&scaled.normals).all(|(a, b)| a.distance(*b) < 1e-5));
+        }
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        let cases = [
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
+            ("v 0 0 0\nv nan 0 0\n", "line 2: found nan"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4: found v index 4, expected 1 to 3"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "line 4"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n", "line 4"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/-1 2/-2 3/-9223372036854775808\n", "line 4"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/2 2/2 3/2\n", "vt index 2"),
+            ("v 0 0 0\nv 1 0 0\nf 1 2\n", "at least 3"),
+            ("v 0 0\n", "line 1"),
+            ("v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "none with an area"),
+        ];
+        for (text, expected) in cases {
+            let error = parse(text).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().contains(expected), "{text}: {error}");
+        }
+        let missing = load(Path::new("/nowhere/a.obj")).unwrap_err();
+        assert!(missing.to_string().contains("/nowhere/a.obj"), "{missing}");
+    }
+
+    #[test]
+    fn real_meshes_load_with_unit_frames() {
+        let folder = std::env::var_os("BISCALE_DATA")
+            .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), std::path::PathBuf::from);
+        if !folder.join("spot.obj").exists() {
+            eprintln!("SKIPPED: {} has no spot.obj", folder.display());
+            return;
+        }
+        for (name, triangles) in [("spot.obj", 5856), ("teapot.obj", 6320), ("stanford-bunny.obj", 69_451)] {
+            let mesh = load(&folder.join(name)).unwrap();
+            assert!(mesh.triangles.len().abs_diff(triangles) <= triangles / 50, "{name}: {}", mesh.triangles.len());
+            for (n, t) in mesh.normals.iter().zip(&mesh.tangents) {
+                assert!((n.length() - 1.0).abs() < 1e-5 && (t.length() - 1.0).abs() < 1e-5 && n.dot(*t).abs() < 1e-5);
+            }
+        }
+    }
+}

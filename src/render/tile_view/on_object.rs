@@ -1,0 +1,143 @@
+//! The zoom from the object to its tiles: where a tile is many pixels wide, its own geometry takes the effective BRDF's
+//! place. On average over a tile both are the same radiance, so the change has no step in brightness.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::{CloseUp, Wearing};
+use crate::base::{Cancel, Result};
+use crate::geometry::Hit;
+use crate::math::directions::half_vector;
+use crate::render::image::shading_points::ShadingPoints;
+use crate::render::{CameraView, GBuffer, ObjectMesh, Picture, RenderInput};
+
+/// A tile's shorter side, in radii of the object: small enough that the whole object shows none.
+pub const TILE_RADII: f32 = 0.012;
+/// Pixels a tile at which its geometry begins to show, and at which nothing else does.
+const SHOWS: [f32; 2] = [10.0, 28.0];
+
+/// How far the tile's own geometry shows (0 to 1) where a tile is this many pixels wide.
+fn weight(pixels: f32) -> f32 {
+    let t = ((pixels - SHOWS[0]) / (SHOWS[1] - SHOWS[0])).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Whether the nearest tiles that an object can have in a view are large enough to show.
+pub fn shows(view: &CameraView, mesh: &ObjectMesh) -> bool {
+    let radius = mesh.bounds.radius;
+    let nearest = ((view.eye - mesh.bounds.center).length() - radius).max(view.near);
+    weight(TILE_RADII * radius / (view.pixel_extent() * nearest)) > 0.0
+}
+
+impl CloseUp {
+    /// Blends the tile's own geometry into a picture that was made from `input` with one sample a pixel side or more.
+    /// Nothing is done (and nothing costs) where tiles are too small to be seen.
+    ///
+    /// # Errors
+    /// A camera that cannot be, or [`crate::base::Error::Cancelled`].
+    pub fn blend_into(
+        &self,
+        picture: &mut Picture,
+        input: &RenderInput,
+        wearing: Wearing<'_>,
+        cancel: &Cancel,
+    ) -> Result<()> {
+        let view = CameraView::new(input.camera, input.mesh, input.size)?;
+        if !shows(&view, input.mesh) {
+            return Ok(());
+        }
+        let radius = input.mesh.bounds.radius;
+        let buffer = GBuffer::new(input.mesh, &view, 1);
+        let points = ShadingPoints::new(&buffer, &view, 1);
+        let Some(anchor) = anchor(input, &view, &points) else { return Ok(()) };
+        let visible = input
+            .occluder
+            .map(|occluder| occluder.visible(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
+        let scale = self.mesh.size.min_element() / (TILE_RADII * radius);
+        let shaded: Vec<(f32, Vec3)> = (0..points.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|point| {
+                let (position, z, x) = (points.positions[point], points.normals[point], points.tangents[point]);
+                let depth = (view.eye - position).length();
+                let weight = weight(TILE_RADII * radius / (view.pixel_extent() * depth));
+                if weight == 0.0 || cancel.is_set() {
+                    return (0.0, Vec3::ZERO);
+                }
+                let y = z.cross(x);
+                let local = |d: Vec3| Vec3::new(d.dot(x), d.dot(y), d.dot(z));
+                let o = local((view.eye - position) / depth);
+                let Some(hit) = self.under(anchor.tile_coordinates(position) * scale, o) else {
+                    return (weight, Vec3::ZERO);
+                };
+                let lit = input.lights.iter().enumerate().filter(|(k, light)| {
+                    light.direction.dot(z) > 0.0 && visible.as_ref().is_none_or(|visible| visible.sees(point, *k))
+                });
+                (
+                    weight,
+                    lit.map(|(_, light)| self.lit(&hit, local(light.direction), o, wearing) * light.irradiance).sum(),
+                )
+            })
+            .collect();
+        cancel.check()?;
+        for (&pixel, (weight, radiance)) in points.pixels.iter().zip(shaded) {
+            let place = &mut picture.pixels[pixel as usize];
+            *place = place.lerp(radiance, weight);
+        }
+        Ok(())
+    }
+
+    /// What is seen along `o` through a place of the plane z = 0.
+    fn under(&self, place: Vec2, o: Vec3) -> Option<Hit> {
+        let o = Vec3::new(o.x, o.y, o.z.max(0.02)).try_normalize()?;
+        // Coordinates stay small, so that rays stay exact.
+        let inside = place - (place / self.mesh.size).floor() * self.mesh.size;
+        let start = inside.extend(0.0) + o * ((self.grid.top() + 1e-4) / o.z);
+        self.grid.nearest(start, -o, self.bottom)
+    }
+
+    /// `f_r (n·i)+ V(i)` of a point [1/sr].
+    fn lit(&self, hit: &Hit, i: Vec3, o: Vec3, wearing: Wearing<'_>) -> Vec3 {
+        let (normal, geometric) = self.normals(hit, o);
+        let slot = usize::from(self.mesh.slot_at(hit.triangle as usize, hit.position.truncate()));
+        let material = wearing.material_of_slot.get(slot).and_then(|index| wearing.materials.get(*index));
+        let Some(material) = material else { return Vec3::ZERO };
+        if normal.dot(i) <= 0.0 || !self.sees(hit, geometric, i) {
+            return Vec3::ZERO;
+        }
+        let angles = crate::brdf::LobeAngles::new(normal, i, o, half_vector(i, o));
+        let weight = self.mesh.color.at(hit.position.truncate(), self.mesh.size) * material.color;
+        material.brdf.f_cos(&angles) / normal.dot(o).max(1e-3) * weight
+    }
+}
+
+/// The vertex whose tangent plane tiles are laid out on: the one nearest to the middle of the picture.
+struct Anchor {
+    origin: Vec3,
+    x: Vec3,
+    y: Vec3,
+}
+
+impl Anchor {
+    fn tile_coordinates(&self, position: Vec3) -> Vec2 {
+        let offset = position - self.origin;
+        Vec2::new(offset.dot(self.x), offset.dot(self.y))
+    }
+}
+
+fn anchor(input: &RenderInput, view: &CameraView, points: &ShadingPoints) -> Option<Anchor> {
+    let [width, height] = view.size.map(|side| side as f32);
+    let from_middle = |point: &usize| {
+        let pixel = points.pixels[*point] as usize;
+        let at = Vec2::new((pixel % view.size[0]) as f32, (pixel / view.size[0]) as f32);
+        at.distance_squared(Vec2::new(width, height) / 2.0)
+    };
+    let middle = (0..points.len()).min_by(|a, b| from_middle(a).total_cmp(&from_middle(b)))?;
+    let triangle = input.mesh.triangles[points.triangles[middle] as usize];
+    let vertex = triangle.into_iter().min_by(|a, b| {
+        let distance = |vertex: &u32| input.mesh.positions[*vertex as usize].distance_squared(points.positions[middle]);
+        distance(a).total_cmp(&distance(b))
+    })? as usize;
+    let (z, x) = (input.mesh.normals[vertex], input.mesh.tangents[vertex]);
+    Some(Anchor { origin: input.mesh.positions[vertex], x, y: z.cross(x) })
+}

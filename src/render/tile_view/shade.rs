@@ -1,0 +1,116 @@
+//! The radiance of one point of the tile.
+
+use glam::Vec3;
+
+use super::{CloseUp, Look, Wearing};
+use crate::effective::SumMaterial;
+use crate::geometry::Hit;
+use crate::math::directions::{from_angles, half_vector};
+
+/// Rays start this part of the tile's size above the surface.
+const LIFT: f32 = 1e-4;
+
+/// Materials with the colours that clay takes from them.
+pub(super) struct Palette<'a> {
+    wearing: Wearing<'a>,
+    clay: Vec<Vec3>,
+}
+
+impl<'a> Palette<'a> {
+    pub(super) fn new(wearing: Wearing<'a>) -> Self {
+        Self { wearing, clay: wearing.materials.iter().map(clay_of).collect() }
+    }
+
+    fn material(&self, slot: u16) -> Option<(usize, &'a SumMaterial)> {
+        let index = *self.wearing.material_of_slot.get(usize::from(slot))?;
+        Some((index, self.wearing.materials.get(index)?))
+    }
+}
+
+/// The hue of a material as a matte colour: what it reflects at moderate angles, scaled to a clay's brightness.
+fn clay_of(material: &SumMaterial) -> Vec3 {
+    let i = from_angles(0.6, 0.0);
+    let seen = [(0.6, std::f32::consts::PI), (0.3, 0.5), (0.9, 2.0)];
+    let sum: Vec3 =
+        seen.iter().map(|&(theta, phi)| material.brdf.f_r(Vec3::Z, i, from_angles(theta, phi)).min(Vec3::ONE)).sum();
+    let hue = sum / sum.max_element().max(1e-6);
+    let color = hue * material.color;
+    // A material that is nearly black stays dark; a strong one does not glow.
+    color * (0.62 / color.max_element().max(0.62))
+}
+
+impl CloseUp {
+    /// Unit normals that reflect and that the triangle has, both towards the viewer.
+    pub fn normals(&self, hit: &Hit, to_viewer: Vec3) -> (Vec3, Vec3) {
+        let index = hit.triangle as usize;
+        let geometric = self.mesh.geometric_normal(index);
+        let [v, w] = hit.barycentric;
+        let smooth = self.mesh.corner_normals.as_ref().and_then(|normals| {
+            let [a, b, c] = normals[index];
+            (a * (1.0 - v - w) + b * v + c * w).try_normalize()
+        });
+        let side = if geometric.dot(to_viewer) < 0.0 { -1.0 } else { 1.0 };
+        (smooth.unwrap_or(geometric) * side, geometric * side)
+    }
+
+    /// Whether a point sees a direction above the horizon.
+    pub fn sees(&self, hit: &Hit, geometric: Vec3, to: Vec3) -> bool {
+        let origin = hit.position + geometric * (LIFT * self.mesh.size.max_element());
+        to.z > 0.0 && geometric.dot(to) > 0.0 && !self.grid.is_blocked(origin, to, hit.triangle)
+    }
+
+    pub(super) fn shade(&self, hit: &Hit, to_viewer: Vec3, look: &Look, palette: &Palette) -> Vec3 {
+        let (normal, geometric) = self.normals(hit, to_viewer);
+        let weight = self.mesh.color.at(hit.position.truncate(), self.mesh.size);
+        let slot = self.mesh.slot_at(hit.triangle as usize, hit.position.truncate());
+        let clay = palette.material(slot).map_or(Vec3::splat(0.5), |(index, _)| palette.clay[index]) * weight;
+        match look {
+            Look::Clay => clay * self.lamp(hit, normal, geometric),
+            Look::Materials(lights) => {
+                let Some((_, material)) = palette.material(slot) else { return Vec3::ZERO };
+                let shade = |light: &crate::render::DirectionalLight| {
+                    let i = light.direction;
+                    if normal.dot(i) <= 0.0 || !self.sees(hit, geometric, i) {
+                        return Vec3::ZERO;
+                    }
+                    let angles = crate::brdf::LobeAngles::new(normal, i, to_viewer, half_vector(i, to_viewer));
+                    let cosine = normal.dot(to_viewer).max(1e-3);
+                    light.irradiance * material.brdf.f_cos(&angles) / cosine
+                };
+                lights.iter().map(shade).sum::<Vec3>() * material.color * weight
+            }
+            Look::Contribution { i, o, scale } => {
+                let grey = Vec3::splat(0.05 + 0.1 * normal.z.max(0.0));
+                let Some((_, material)) = palette.material(slot) else { return grey };
+                if normal.dot(*i) <= 0.0 || normal.dot(*o) <= 0.0 {
+                    return grey;
+                }
+                if !self.sees(hit, geometric, *i) || !self.sees(hit, geometric, *o) {
+                    return grey;
+                }
+                let value = material.brdf.f(normal, *i, *o) * material.color * weight;
+                let heat = (value.dot(crate::brdf::LUMINANCE) / scale.max(1e-9)).sqrt().min(1.0);
+                grey + Vec3::new(heat, 0.55 * heat * heat, 0.2 * heat.powi(4))
+            }
+            Look::Normals => (normal + 1.0) * 0.5,
+            Look::Visibility(to) => {
+                let tone = if geometric.dot(*to) <= 0.0 {
+                    Vec3::splat(0.25)
+                } else if self.sees(hit, geometric, *to) {
+                    Vec3::new(0.18, 0.72, 0.3)
+                } else {
+                    Vec3::new(0.8, 0.16, 0.12)
+                };
+                tone * (0.45 + 0.55 * normal.z.max(0.0))
+            }
+        }
+    }
+
+    /// Irradiance over π of a lamp from the upper left with its shadow, a weak fill and a sky.
+    fn lamp(&self, hit: &Hit, normal: Vec3, geometric: Vec3) -> f32 {
+        let key = Vec3::new(-0.68, 0.52, 0.517);
+        let fill = Vec3::new(0.6, -0.2, 0.775);
+        let lit = if normal.dot(key) > 0.0 && self.sees(hit, geometric, key) { normal.dot(key) } else { 0.0 };
+        1.25 * lit + 0.16 * normal.dot(fill).max(0.0) + 0.14 * (0.5 + 0.5 * normal.z)
+    }
+}

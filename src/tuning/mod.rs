@@ -1,0 +1,8 @@
+//! Settings chosen by measurement: quality levels, targets in dB or milliseconds, and sweeps over the settings.
+
+pub mod candidates;
+pub mod choose;
+pub mod ladder;
+pub mod progressive;
+mod small_reference;
+pub mod sweep;

@@ -1,0 +1,123 @@
+//! A reference that grows while one looks: batches of passes are averaged, and errors come with error bars.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::base::Result;
+use crate::effective::EffectiveBrdf;
+use crate::metrics::{Pair, mirror_biased_pairs};
+use crate::pipeline::Pipeline;
+use crate::reference::ReferenceSettings;
+use crate::scene::LoadedScene;
+
+/// The mean of all batches so far.
+#[derive(Debug, Clone)]
+pub struct ProgressiveReference {
+    pairs: Vec<Pair>,
+    sums: Vec<DVec3>,
+    variances: Vec<DVec3>,
+    pub batches: usize,
+}
+
+/// How far `f̄` is from the reference, with one standard error of each figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compared {
+    /// Relative L2; the reference's own noise taken out.
+    pub rel_l2: f64,
+    pub rel_l2_error: f64,
+    pub psnr_db: f64,
+    pub psnr_db_error: f64,
+    /// Relative L2 of the reference's own standard errors.
+    pub own: f64,
+    pub batches: usize,
+}
+
+/// Facets of a pass; a batch is four.
+const FACETS: usize = 4096;
+const PASSES: usize = 4;
+
+impl ProgressiveReference {
+    pub fn new(pairs: usize) -> Self {
+        let pairs = mirror_biased_pairs(pairs, 20_110_801);
+        let zeros = vec![DVec3::ZERO; pairs.len()];
+        Self { sums: zeros.clone(), variances: zeros, pairs, batches: 0 }
+    }
+
+    /// Adds a batch.
+    ///
+    /// # Errors
+    /// As [`Pipeline::with_reference`].
+    pub fn refine(&mut self, pipeline: &mut Pipeline, loaded: &LoadedScene) -> Result<()> {
+        let seed = 20_110_807 + self.batches as u64;
+        let settings = ReferenceSettings { facets: FACETS, max_passes: PASSES, target: 0.0, seed };
+        let batch =
+            pipeline.with_reference(loaded, |reference| reference.estimate(&self.pairs, &settings, |_, _| true))?;
+        for (estimate, (sum, variance)) in batch.iter().zip(self.sums.iter_mut().zip(&mut self.variances)) {
+            let error = estimate.standard_error.as_dvec3();
+            *sum += estimate.f_bar.as_dvec3();
+            *variance += error * error;
+        }
+        self.batches += 1;
+        Ok(())
+    }
+
+    /// `f̄` of a BRDF against the mean so far.
+    pub fn compare(&self, brdf: &EffectiveBrdf) -> Compared {
+        let values: Vec<Vec3> = self.pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect();
+        let n = self.batches.max(1) as f64;
+        let (mut squares, mut noise, mut spread, mut norm, mut peak) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
+        for (value, (sum, variance)) in values.iter().zip(self.sums.iter().zip(&self.variances)) {
+            let (right, variance) = (*sum / n, *variance / (n * n));
+            let off = value.as_dvec3() - right;
+            squares += off.length_squared();
+            noise += variance.element_sum();
+            // Var (x - r)² = 4 (x - r)² σ² + 2 σ⁴.
+            spread += (4.0 * off * off * variance + 2.0 * variance * variance).element_sum();
+            norm += right.length_squared();
+            peak = peak.max(right.max_element());
+        }
+        if norm == 0.0 {
+            let none =
+                Compared { rel_l2: 0.0, rel_l2_error: 0.0, psnr_db: 0.0, psnr_db_error: 0.0, own: 0.0, batches: 0 };
+            return Compared { batches: self.batches, ..none };
+        }
+        let own = (noise / norm).sqrt();
+        let ours = ((squares - noise).max(0.1 * noise).min(squares) / norm).sqrt().max(1e-9);
+        let rel_l2_error = spread.sqrt() / norm / (2.0 * ours);
+        let peak_db = 20.0 * (peak / (norm / (3 * values.len()) as f64).sqrt()).log10();
+        let db = |x: f64| 20.0 * x.log10();
+        Compared {
+            rel_l2: ours,
+            rel_l2_error,
+            psnr_db: peak_db - db(ours),
+            psnr_db_error: db(1.0 + rel_l2_error / ours),
+            own,
+            batches: self.batches,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_batches_narrow_the_error_bars_and_agree_with_fewer() {
+        let loaded = crate::scene::open("fig4b_bicolor_cup", &["quality.facets=512".to_owned()]).unwrap();
+        let mut pipeline = Pipeline::new();
+        let brdf = pipeline.effective(&loaded).unwrap().brdf;
+        let mut reference = ProgressiveReference::new(40);
+        reference.refine(&mut pipeline, &loaded).unwrap();
+        let first = reference.compare(&brdf);
+        for _ in 0..3 {
+            reference.refine(&mut pipeline, &loaded).unwrap();
+        }
+        let last = reference.compare(&brdf);
+        assert!(last.own < 0.8 * first.own && last.rel_l2_error <= first.rel_l2_error, "{first:?} {last:?}");
+        assert!(
+            (last.rel_l2 - first.rel_l2).abs() < 4.0 * first.rel_l2_error + 0.3 * last.rel_l2,
+            "{first:?} {last:?}"
+        );
+        assert_eq!(last.batches, 4);
+    }
+}
