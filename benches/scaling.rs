@@ -15,7 +15,7 @@ use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
 use biscale::metrics::mirror_biased_pairs;
 use biscale::pipeline::Pipeline;
 use biscale::render::Stage;
-use biscale::render::image::render;
+use biscale::render::render;
 use biscale::render::image::shading::Background;
 use biscale::visibility::{Horizons, Slices, Visibility};
 use glam::{UVec2, Vec2, Vec3};
