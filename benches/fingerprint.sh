@@ -90,7 +90,16 @@ values() {
     printed "$threads" "$scene" "$variant" cat eval "$scene" --pairs "$pairs" -o - --backend cpu --quiet "$@"
 }
 
-# Filters of JSON from standard input. The order of effects and the other keys of an effect are left out.
+# reference SCENE VARIANT ARGUMENTS...: the reference with its standard errors. Two passes at every eighth pair limit its time.
+reference() {
+    local scene=$1 variant=$2
+    shift 2
+    awk 'NR % 8 == 1' "$pairs" > some_pairs.csv
+    printed 2 "$scene" "$variant" cat eval "$scene" --pairs some_pairs.csv -o - --backend cpu --quiet \
+        --quality reference --set quality.reference_samples=16 --standard-error "$@"
+}
+
+# Filters of standard output. The order of effects and the other keys of an effect are left out.
 effects_on() {
     python3 -c '
 import json, sys
@@ -112,15 +121,26 @@ for row in rows:
 print(json.dumps(rows, sort_keys=True))'
 }
 
+json_keys() {
+    python3 -c '
+import json, sys
+def keys(value, path):
+    for key, inner in value.items() if isinstance(value, dict) else []:
+        print(path + key)
+        keys(inner, path + key + ".")
+    for inner in value if isinstance(value, list) else []:
+        keys(inner, path + "[].")
+keys(json.load(sys.stdin), "")'
+}
 csv_values() { grep -v '^#'; }
 
 # Files that other outputs read: measured BRDFs in four formats and a mesh.
-make() { "$biscale" "$@" --quiet > /dev/null 2>&1; }
-make export fig5a_isotropic -o "$tmp/paint.binary" --quality draft --backend cpu
-make export fig9b_cylinder_stripes -o "$tmp/paint.bsdf" --quality draft --backend cpu --resolution 9x8
-make export fig9b_cylinder_stripes -o "$tmp/paint.bin" --quality draft --backend cpu
-make export fig9b_cylinder_stripes -o "$tmp/paint.npz" --quality draft --backend cpu --resolution 12x12
-make tile fig5d_pentagonal -o "$tmp/tile.obj"
+prepare() { "$biscale" "$@" --quiet > /dev/null 2>&1; }
+prepare export fig5a_isotropic -o "$tmp/paint.binary" --quality draft --backend cpu
+prepare export fig9b_cylinder_stripes -o "$tmp/paint.bsdf" --quality draft --backend cpu --resolution 9x8
+prepare export fig9b_cylinder_stripes -o "$tmp/paint.bin" --quality draft --backend cpu
+prepare export fig9b_cylinder_stripes -o "$tmp/paint.npz" --quality draft --backend cpu --resolution 12x12
+prepare tile fig5d_pentagonal -o "$tmp/tile.obj"
 brdf() { echo "material.default.brdf={ kind = \"$1\", path = \"$2\" }"; }
 
 for threads in 1 2; do
@@ -144,8 +164,9 @@ for scene in $six; do
     values 2 $scene interreflection --effect interreflection=on
 done
 for scene in fig1e_lambertian fig5b_anisotropic; do
-    values 2 $scene reference --quality reference --set quality.reference_samples=4096 --standard-error
+    reference $scene reference
 done
+reference fig1e_lambertian reference-interreflection --effect interreflection=on
 for scene in fig4c_ward_cup fig9a_cylinder_grooves; do
     values 2 $scene wu2011 --quality wu2011
 done
@@ -201,3 +222,23 @@ for scene in table4_cup fig7a_shot_silk; do
         written 2 $scene fit-$ending $ending fit $scene --quality draft --quiet --backend cpu
     done
 done
+
+# Keys of JSON in the order in which they are printed, which include the names of stages.
+for edit in geometry brdf color camera; do
+    printed 2 table4_cup profile-$edit-keys json_keys \
+        profile table4_cup --edit $edit --repeat 1 --size 64x64 --quality draft --json --quiet --backend cpu
+done
+printed 2 table4_cup render-keys json_keys \
+    render table4_cup -o keys.exr --size 64x64 --quality draft --json --quiet --backend cpu
+printed 2 table4_cup eval-keys json_keys \
+    eval table4_cup --pairs "$pairs" -o keys.csv --quality draft --json --quiet --backend cpu
+printed 2 table4_cup export-keys json_keys \
+    export table4_cup -o keys.csv --resolution 8x12 --quality draft --json --quiet --backend cpu
+printed 2 - materials-keys json_keys materials --json
+
+# Exit codes of wrong usage and of bad input.
+values 2 no_such_scene unknown-scene
+values 2 default unknown-key --set tile.geometry.dept=0.3
+values 2 default unknown-effect --effect no_such_effect=on
+written 2 default unknown-ending xyz export default --quiet
+written 2 default no-folder no/such/folder.csv export default --resolution 8x12 --quality draft --quiet --backend cpu

@@ -8,21 +8,21 @@ use std::time::Instant;
 
 use biscale::base::Result;
 use biscale::brdf::{Brdf, Term};
-use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Material, Representation};
 use biscale::geometry;
 use biscale::geometry::families::heightfield;
 use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
 use biscale::metrics::mirror_biased_pairs;
 use biscale::pipeline::Pipeline;
-use biscale::render::Stage;
-use biscale::render::render;
+use biscale::render::RenderScene;
 use biscale::render::image::shading::Background;
-use biscale::visibility::{Horizons, Slices, Visibility};
+use biscale::render::render;
+use biscale::visibility::{HorizonMap, OcclusionIntervals, Visibility};
 use glam::{UVec2, Vec2, Vec3};
 
 const RUNS: usize = 3;
 const RAMP: f32 = 0.02;
-const PICTURED: &str = "fig8a_hammered";
+const SHADING: &str = "fig8a_hammered";
 
 type Work = Box<dyn FnMut() + Send>;
 
@@ -104,7 +104,7 @@ fn main() -> Result<()> {
     let field = Arc::new(tile("fig8a_hammered")?);
     geometry_lines(&bench, &rods, &rod_grid, &field)?;
     sum_lines(&bench, &field)?;
-    picture_lines(&bench)?;
+    image_lines(&bench)?;
     if !bench.once {
         thread_lines(&bench, &rods, &rod_grid)?;
     }
@@ -124,18 +124,18 @@ fn geometry_lines(
     })?;
     bench.line("facets: slices (rods)", 1.0, &counts, |n| {
         let (grid, facets) = (rod_grid.clone(), facets_of(rods, n));
-        Ok(Box::new(move || drop(black_box(Slices::scan(&grid, &facets, 16, RAMP)))))
+        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 16, RAMP)))))
     })?;
     bench.line("azimuths: slices (rods)", 1.0, &[8, 32, 128], |azimuths| {
         let (grid, facets) = (rod_grid.clone(), facets_of(rods, 1024));
-        Ok(Box::new(move || drop(black_box(Slices::scan(&grid, &facets, azimuths, RAMP)))))
+        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, azimuths, RAMP)))))
     })?;
     if field.height_grid.is_some() {
         bench.line("facets: horizons (height-field)", 1.0, &counts, |n| {
             let (field, facets) = (field.clone(), facets_of(field, n));
             Ok(Box::new(move || {
                 let heights = field.height_grid.as_ref();
-                black_box(heights.map(|heights| Horizons::march(heights, field.size, &facets, 64, RAMP)));
+                black_box(heights.map(|heights| HorizonMap::march(heights, field.size, &facets, 64, RAMP)));
             }))
         })?;
     }
@@ -148,20 +148,20 @@ fn geometry_lines(
     bench.line("triangles: slices of 2048 facets (waves)", 0.5, &triangles, |n| {
         let mesh = waves(n);
         let (grid, facets) = (PeriodicGrid::for_slices(&mesh), facets_of(&mesh, 2048));
-        Ok(Box::new(move || drop(black_box(Slices::scan(&grid, &facets, 16, RAMP)))))
+        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 16, RAMP)))))
     })
 }
 
 fn sum_lines(bench: &Bench, field: &Arc<TileMesh>) -> Result<()> {
     let direct = |facets: usize| {
         let facets = facets_of(field, facets);
-        let horizons = Horizons::scan(&PeriodicGrid::for_slices(field), &facets, 32, RAMP);
-        let material = SumMaterial {
+        let horizons = HorizonMap::scan(&PeriodicGrid::for_slices(field), &facets, 32, RAMP);
+        let material = Material {
             brdf: Brdf { terms: vec![Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) }] },
             color: Vec3::ONE,
         };
         let sum = FacetSum::new(&facets, &vec![0; field.slots.len()], &[material]);
-        let form = Form::Direct(Direct::new(Arc::new(sum), Arc::new(Visibility::Horizons(horizons))));
+        let form = Representation::Direct(Direct::new(Arc::new(sum), Arc::new(Visibility::HorizonMap(horizons))));
         EffectiveBrdf { form, base_area: f64::from(field.base_area()) }
     };
     bench.line("facets: 64 pairs of the sum (height-field)", 1.0, &[1024, 4096, 16_384, 65_536], |n| {
@@ -180,23 +180,23 @@ fn sum_lines(bench: &Bench, field: &Arc<TileMesh>) -> Result<()> {
 }
 
 /// A picture of a scene whose shadows are kept, as the camera moves.
-fn picture(scene: &str, lights: usize, side: usize) -> Result<Work> {
+fn image(scene: &str, lights: usize, side: usize) -> Result<Work> {
     let overrides = [format!("light.count={lights}"), "quality.backend=cpu".to_owned()];
     let loaded = biscale::scene::open(scene, &overrides)?;
-    let pictured = Pipeline::new().effective(&loaded)?.for_pictures(&biscale::base::Cancel::default())?;
-    let mut stage = Stage::new(&loaded)?;
+    let shading_brdf = Pipeline::new().effective(&loaded)?.shading_brdf(&biscale::base::Cancel::default())?;
+    let mut stage = RenderScene::new(&loaded)?;
     stage.settle();
     Ok(Box::new(move || {
         let background = Background::default();
-        let rendered = render(&stage.input(&*pictured.brdf, [side, side], 1, &background));
+        let rendered = render(&stage.input(&*shading_brdf.brdf, [side, side], 1, &background));
         black_box(rendered.is_ok());
     }))
 }
 
-fn picture_lines(bench: &Bench) -> Result<()> {
-    bench.line("lights: a picture of 384 x 384", 1.0, &[16, 64, 256], |lights| picture(PICTURED, lights, 384))?;
+fn image_lines(bench: &Bench) -> Result<()> {
+    bench.line("lights: a picture of 384 x 384", 1.0, &[16, 64, 256], |lights| image(SHADING, lights, 384))?;
     bench.line("pixels: a picture with 32 lights", 1.0, &[128 * 128, 256 * 256, 512 * 512, 1024 * 1024], |pixels| {
-        picture(PICTURED, 32, pixels.isqrt())
+        image(SHADING, 32, pixels.isqrt())
     })
 }
 
@@ -205,9 +205,9 @@ fn thread_lines(bench: &Bench, rods: &Arc<TileMesh>, rod_grid: &Arc<PeriodicGrid
     println!("\n{:<44} {:>12} {:>12} {:>8}", "threads", "one", "two", "faster");
     let facets = facets_of(rods, 4096);
     let grid = rod_grid.clone();
-    let slices: Work = Box::new(move || drop(black_box(Slices::scan(&grid, &facets, 32, RAMP))));
-    let picture = picture(PICTURED, 32, 384)?;
-    for (name, mut work) in [("slices (rods)", slices), ("a picture of 384 x 384, 32 lights", picture)] {
+    let slices: Work = Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 32, RAMP))));
+    let image = image(SHADING, 32, 384)?;
+    for (name, mut work) in [("slices (rods)", slices), ("a picture of 384 x 384, 32 lights", image)] {
         let times = [1, 2].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.map_or(f64::NAN, |pool| pool.install(|| bench.least_ms(&mut *work)))

@@ -8,15 +8,15 @@ use std::time::Instant;
 use biscale::base::Cancel;
 use biscale::brdf::{Brdf, Term};
 use biscale::effective::{
-    Direct, EffectiveBrdf, FacetSum, Form, LowRank, Nodes, PairTable, Reflectance, RotatedBasis, RotatedLobe,
-    SumMaterial, analytic_lobe,
+    Direct, EffectiveBrdf, FacetSum, LowRank, Material, Nodes, Reflectance, Representation, RotatedBasis, RotatedLobe,
+    ShadingTable, analytic_lobe,
 };
 use biscale::geometry;
 use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
-use biscale::math::directions::{UpperPairs, from_angles};
-use biscale::metrics::{mirror_biased_pairs, picture_pairs};
+use biscale::math::directions::{HemispherePairGrid, from_angles};
+use biscale::metrics::{image_pairs, mirror_biased_pairs};
 use biscale::plan::{Preset, Settings};
-use biscale::visibility::{Horizons, Slices, Visibility};
+use biscale::visibility::{HorizonMap, OcclusionIntervals, Visibility};
 use glam::Vec3;
 
 const RUNS: usize = 7;
@@ -97,8 +97,8 @@ fn terms() -> Vec<(&'static str, Term)> {
     ]
 }
 
-fn materials(term: &Term, slots: usize) -> (Vec<usize>, Vec<SumMaterial>) {
-    (vec![0; slots], vec![SumMaterial { brdf: Brdf { terms: vec![term.clone()] }, color: Vec3::ONE }])
+fn materials(term: &Term, slots: usize) -> (Vec<usize>, Vec<Material>) {
+    (vec![0; slots], vec![Material { brdf: Brdf { terms: vec![term.clone()] }, color: Vec3::ONE }])
 }
 
 fn main() -> Result<(), biscale::base::Error> {
@@ -115,21 +115,22 @@ fn main() -> Result<(), biscale::base::Error> {
     let (facets, rod_facets) = (facets_of(&field, count), facets_of(&rods, count));
     if let Some(heights) = &field.height_grid {
         bench.line("horizons, march over the samples", count * azimuths, "azimuth", || {
-            Horizons::march(heights, field.size, &facets, azimuths, settings.penumbra)
+            HorizonMap::march(heights, field.size, &facets, azimuths, settings.penumbra)
         });
     }
     let (grid, rod_grid) = (PeriodicGrid::for_slices(&field), PeriodicGrid::for_slices(&rods));
     bench.line("horizons, scan of the triangles", count * azimuths, "azimuth", || {
-        Horizons::scan(&grid, &facets, azimuths, settings.penumbra)
+        HorizonMap::scan(&grid, &facets, azimuths, settings.penumbra)
     });
     let slices = settings.slice_azimuths;
     bench.line("slices of the triangles (rods)", count * slices, "slice", || {
-        Slices::scan(&rod_grid, &rod_facets, slices, settings.penumbra)
+        OcclusionIntervals::scan(&rod_grid, &rod_facets, slices, settings.penumbra)
     });
 
     let (i, o) = (from_angles(0.5, 0.3), from_angles(0.9, 2.0));
-    let horizons = Arc::new(Visibility::Horizons(Horizons::scan(&grid, &facets, azimuths, settings.penumbra)));
-    let sliced = Visibility::Slices(Slices::scan(&rod_grid, &rod_facets, slices, settings.penumbra));
+    let horizons = Arc::new(Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, azimuths, settings.penumbra)));
+    let sliced =
+        Visibility::OcclusionIntervals(OcclusionIntervals::scan(&rod_grid, &rod_facets, slices, settings.penumbra));
     let mut seen = vec![0.0; count];
     for (name, visibility) in [("horizons", horizons.as_ref()), ("slices", &sliced)] {
         // As many as were asked for, within the rounding of strata.
@@ -159,26 +160,28 @@ fn main() -> Result<(), biscale::base::Error> {
         bench.line(&format!("factors with their basis, {name}"), facets.len(), "facet", build);
         let base_area = f64::from(field.base_area());
         let direct = Direct::new(Arc::new(sum), horizons.clone());
-        for (form_name, form) in [("direct", Form::Direct(direct)), ("factors", Form::LowRank(build()?))] {
+        for (form_name, form) in
+            [("direct", Representation::Direct(direct)), ("factors", Representation::LowRank(build()?))]
+        {
             let brdf = EffectiveBrdf { form, base_area };
             bench.line(&format!("eval, {form_name}, {name}"), pairs.len(), "pair", || {
                 pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).sum::<Vec3>()
             });
         }
     }
-    pictures(&bench, &rods, &rod_facets, sliced)
+    images(&bench, &rods, &rod_facets, sliced)
 }
 
 /// What pictures read, beside the sums it stands for.
-fn pictures(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -> Result<(), biscale::base::Error> {
+fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -> Result<(), biscale::base::Error> {
     let ggx = Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) };
     let direct = |mesh: &TileMesh, facets: &Facets, visibility: Visibility| {
         let (material_of_slot, materials) = materials(&ggx, mesh.slots.len());
         Direct::new(Arc::new(FacetSum::new(facets, &material_of_slot, &materials)), Arc::new(visibility))
     };
     let rod_sum = direct(rods, facets, sliced);
-    let grid = UpperPairs { rings: 16, azimuths: 24, turn: 6, difference: 8 };
-    let checked = picture_pairs(64, 1);
+    let grid = HemispherePairGrid { rings: 16, azimuths: 24, turn: 6, difference: 8 };
+    let checked = image_pairs(64, 1);
     let all = Nodes::all(grid);
     for (name, nodes) in [
         ("all facets", all),
@@ -186,7 +189,7 @@ fn pictures(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility)
         ("all facets, what 64 pairs read", Nodes { read_by: Some(&checked), ..all }),
     ] {
         bench.line(&format!("table (rods), {name}"), grid.nodes(), "node", || {
-            PairTable::build(&rod_sum, nodes, &Cancel::default())
+            ShadingTable::build(&rod_sum, nodes, &Cancel::default())
         });
     }
 
@@ -195,29 +198,29 @@ fn pictures(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility)
     let grooves = tile("fig4b_bicolor_cup")?;
     let groove_facets = facets_of(&grooves, Settings::of_preset(Preset::Standard).height_field_facets);
     let settings = Settings::of_preset(Preset::Standard);
-    let horizons = Horizons::scan(
+    let horizons = HorizonMap::scan(
         &PeriodicGrid::for_slices(&grooves),
         &groove_facets,
         settings.horizon_azimuths,
         settings.penumbra,
     );
-    let groove_sum = direct(&grooves, &groove_facets, Visibility::Horizons(horizons));
-    let total = |form: &Form, base_area: f64| {
+    let groove_sum = direct(&grooves, &groove_facets, Visibility::HorizonMap(horizons));
+    let total = |form: &Representation, base_area: f64| {
         let (brdf, mut out) = (EffectiveBrdf { form: form.clone(), base_area }, vec![Vec3::ZERO; lights.len()]);
         move |lights: &[Vec3]| {
             brdf.eval_lights(lights, o, &mut out);
             out.iter().sum::<Vec3>()
         }
     };
-    let mut lines = vec![("few normals, all at once (grooves)", Form::Direct(groove_sum.clone()), true)];
-    if let Some(thinned) = groove_sum.thinned(27) {
-        lines.push(("few normals, every 27th facet (grooves)", Form::Direct(thinned), true));
+    let mut lines = vec![("few normals, all at once (grooves)", Representation::Direct(groove_sum.clone()), true)];
+    if let Some(strided_subset) = groove_sum.strided_subset(27) {
+        lines.push(("few normals, every 27th facet (grooves)", Representation::Direct(strided_subset), true));
     }
-    lines.push(("few normals, light by light (grooves)", Form::Direct(groove_sum), false));
-    if let Some(table) = PairTable::build(&rod_sum, all, &Cancel::default())? {
-        lines.push(("a table, all at once (rods)", Form::Table(table), true));
+    lines.push(("few normals, light by light (grooves)", Representation::Direct(groove_sum), false));
+    if let Some(table) = ShadingTable::build(&rod_sum, all, &Cancel::default())? {
+        lines.push(("a table, all at once (rods)", Representation::Table(table), true));
     }
-    lines.push(("the sum, light by light (rods)", Form::Direct(rod_sum), false));
+    lines.push(("the sum, light by light (rods)", Representation::Direct(rod_sum), false));
     for (name, form, at_once) in lines {
         let mut eval = total(&form, f64::from(rods.base_area()));
         bench.line(name, lights.len(), "light", || {

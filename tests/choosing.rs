@@ -8,7 +8,7 @@ use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::reference::ReferenceSettings;
 use biscale::scene;
-use biscale::tuning::choose::{Goal, choose};
+use biscale::tuning::choose::{Target, choose};
 use glam::Vec3;
 
 const SCENES: [&str; 10] = [
@@ -53,7 +53,7 @@ fn nine_of_ten_scenes_get_the_decibels_and_milliseconds_that_were_asked_for() {
     for name in SCENES.into_iter().step_by(if all { 1 } else { 4 }) {
         let loaded = scene::open(name, &["quality.backend=cpu".to_owned()]).unwrap();
         let (truth, own) = right(&loaded, &pairs);
-        let chosen = choose(&loaded, Goal::Decibels(40.0), &Cancel::default(), |_| {}).unwrap();
+        let chosen = choose(&loaded, Target::Decibels(40.0), &Cancel::default(), |_| {}).unwrap();
         let outcome = Pipeline::new().effective(&chosen.scene).unwrap();
         let values: Vec<Vec3> = pairs.iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect();
         let of_set = |(values, truth): (&[Vec3], &[Vec3])| {
@@ -73,7 +73,7 @@ fn nine_of_ten_scenes_get_the_decibels_and_milliseconds_that_were_asked_for() {
         eprintln!("{name:<24} {:>7} dB {:>7.1} dB {got:>7.1} dB {:>7.1} ms", 40, chosen.got.psnr_db, chosen.got.ms);
         assert!(got > 34.0, "{name}: {got:.1} dB is not nearly 40");
         let asked = 150.0;
-        let chosen = choose(&loaded, Goal::Milliseconds(asked), &Cancel::default(), |_| {}).unwrap();
+        let chosen = choose(&loaded, Target::Milliseconds(asked), &Cancel::default(), |_| {}).unwrap();
         let mut pipeline = Pipeline::new();
         pipeline.effective(&chosen.scene).unwrap();
         let mut times: Vec<f64> = (1..6)
@@ -87,7 +87,7 @@ fn nine_of_ten_scenes_get_the_decibels_and_milliseconds_that_were_asked_for() {
             .collect();
         times.sort_by(f64::total_cmp);
         let got = times[2];
-        let finest = chosen.got.rung >= biscale::tuning::ladder::FINEST - 0.3;
+        let finest = chosen.got.rung >= biscale::tuning::quality_scale::FINEST - 0.3;
         let good = (got / asked - 1.0).abs() <= 0.2 || (got < asked && finest);
         hits[1] += usize::from(good);
         if !good {

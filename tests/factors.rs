@@ -3,12 +3,12 @@
 
 use biscale::brdf::{Brdf, LobeAngles, Term};
 use biscale::effective::{
-    BasisGrid, Direct, EffectiveBrdf, FacetSum, Form, LowRank, LowRankSettings, SumMaterial, VisibilityRows,
+    BasisGrid, Direct, EffectiveBrdf, FacetSum, LowRank, LowRankSettings, Material, Representation, VisibilityRows,
 };
 use biscale::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
 use biscale::math::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
 use biscale::metrics::{Pair, compare, mirror_biased_pairs};
-use biscale::visibility::{Horizons, Slices, Visibility};
+use biscale::visibility::{HorizonMap, OcclusionIntervals, Visibility};
 use biscale::{geometry, scene};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -25,9 +25,9 @@ fn sample(mesh: &TileMesh, count: usize) -> (Facets, Visibility) {
     facets.sort_for_sums();
     let grid = PeriodicGrid::new(mesh);
     let visibility = if mesh.is_height_field() {
-        Visibility::Horizons(Horizons::scan(&grid, &facets, 48, 0.02))
+        Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, 48, 0.02))
     } else {
-        Visibility::Slices(Slices::scan(&grid, &facets, 48, 0.02))
+        Visibility::OcclusionIntervals(OcclusionIntervals::scan(&grid, &facets, 48, 0.02))
     };
     (facets, visibility)
 }
@@ -68,18 +68,18 @@ fn the_factored_form_approaches_the_direct_sum_as_grids_and_ranks_grow() {
     for (term, want) in
         [(Term::Lambertian { albedo: Vec3::ONE }, 0.03), (Term::CookTorrance { roughness: 0.4, f0: Vec3::ONE }, 0.06)]
     {
-        let material = SumMaterial { brdf: Brdf { terms: vec![term.clone()] }, color: Vec3::new(1.0, 0.5, 0.2) };
+        let material = Material { brdf: Brdf { terms: vec![term.clone()] }, color: Vec3::new(1.0, 0.5, 0.2) };
         let sum = FacetSum::new(&facets, &slots, std::slice::from_ref(&material));
         let values = |form| -> Vec<Vec3> {
             let brdf = EffectiveBrdf { form, base_area };
             pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
         };
-        let direct = values(Form::Direct(Direct::new(Arc::new(sum), visibility.clone())));
+        let direct = values(Representation::Direct(Direct::new(Arc::new(sum), visibility.clone())));
         let error = |directions, difference, kept, rank| {
             let settings = settings(directions, difference, 48, kept, rank, !mesh.is_height_field());
             let factors =
                 LowRank::build(&facets, &visibility, &slots, std::slice::from_ref(&material), &settings).unwrap();
-            compare(&values(Form::LowRank(factors)), &direct).rel_l2
+            compare(&values(Representation::LowRank(factors)), &direct).rel_l2
         };
         let coarse = error(
             PolarGrid::new(6, 12),

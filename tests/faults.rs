@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use biscale::base::{Cancel, replace_file};
 use biscale::gpu::{Gpu, GpuRenderer};
 use biscale::pipeline::Pipeline;
-use biscale::render::Stage;
-use biscale::render::render;
+use biscale::render::RenderScene;
 use biscale::render::image::shading::Background;
+use biscale::render::render;
 use biscale::scene;
 use biscale::scene::{LoadedScene, Painted};
 
@@ -261,7 +261,7 @@ fn a_device_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_goes_on() {
     };
     let loaded = loaded();
     let outcome = Pipeline::new().effective(&loaded).unwrap();
-    let stage = Stage::new(&loaded).unwrap();
+    let stage = RenderScene::new(&loaded).unwrap();
     let background = Background::default();
     let input = stage.input(&*outcome.brdf, [96, 96], 2, &background);
     let mut renderer = GpuRenderer::wearing(&gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf).unwrap();
@@ -276,7 +276,7 @@ fn a_device_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_goes_on() {
     let mut failed = None;
     while failed.is_none() && start.elapsed() < Duration::from_secs(60) {
         match renderer.render(&gpu, &input, &Cancel::default()) {
-            Ok(rendered) => assert!(rendered.picture.pixels.iter().all(|pixel| pixel.is_finite())),
+            Ok(rendered) => assert!(rendered.image.pixels.iter().all(|pixel| pixel.is_finite())),
             Err(error) => failed = Some(error),
         }
     }
@@ -285,7 +285,7 @@ fn a_device_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_goes_on() {
     assert!(!error.is_empty());
     eprintln!("the device was lost: {error}");
     // The same pipeline and stage still make the picture.
-    assert!(render(&input).unwrap().picture.pixels.iter().any(|pixel| pixel.max_element() > 0.0));
+    assert!(render(&input).unwrap().image.pixels.iter().any(|pixel| pixel.max_element() > 0.0));
 }
 
 #[test]

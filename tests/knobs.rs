@@ -2,11 +2,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
 use biscale::base::Cancel;
-use biscale::effective::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
-use biscale::math::directions::UpperPairs;
+use biscale::effective::{EffectiveBrdf, Interpolation, Nodes, Representation, ShadingTable};
+use biscale::math::directions::HemispherePairGrid;
 use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::{Outcome, Pipeline};
-use biscale::plan::Route;
+use biscale::plan::VisibilityAlgorithm;
 use biscale::scene;
 use glam::Vec3;
 
@@ -32,8 +32,11 @@ fn slices_and_maps_see_what_horizons_see() {
         made("fig8a_hammered", &[&set[..], &[&word]].concat())
     };
     let (horizons, slices, maps) = (with("auto"), with("slices"), with("maps"));
-    assert_eq!(horizons.plan.route, Route::HeightMarch);
-    assert_eq!((slices.plan.route, maps.plan.route), (Route::Slices, Route::CpuMaps));
+    assert_eq!(horizons.plan.route, VisibilityAlgorithm::HeightMarch);
+    assert_eq!(
+        (slices.plan.route, maps.plan.route),
+        (VisibilityAlgorithm::OcclusionIntervals, VisibilityAlgorithm::CpuMaps)
+    );
     let (sliced, mapped) = (apart(&slices, &horizons), apart(&maps, &horizons));
     assert!(sliced.1 > 40.0 && mapped.1 > 35.0, "{sliced:?} {mapped:?}");
     // Three ways of computing, not one under three names.
@@ -48,7 +51,7 @@ fn more_bins_of_normals_are_nearer_to_the_normals_themselves_and_fewer_are_fewer
     for bins in [64, 512, 4096] {
         let word = format!("quality.normal_bins={bins}");
         let binned = made("fig8a_hammered", &[&set[..], &[&word]].concat());
-        let Form::Direct(direct) = &binned.brdf.form else { panic!("not a sum") };
+        let Representation::Direct(direct) = &binned.brdf.form else { panic!("not a sum") };
         assert!(direct.sum.patch_count().is_some_and(|count| count < bins), "{bins}");
         let error = apart(&binned, &exact).0;
         assert!(error < 0.6 * last, "{bins}: {error} after {last}");
@@ -58,15 +61,15 @@ fn more_bins_of_normals_are_nearer_to_the_normals_themselves_and_fewer_are_fewer
 }
 
 #[test]
-fn linear_interpolation_of_a_picture_table_is_farther_from_the_sum_than_cubic() {
+fn linear_interpolation_of_a_shading_table_is_farther_from_the_sum_than_cubic() {
     let sum = made("fig8a_hammered", &["quality.facets=1024", "quality.method=direct"]);
-    let Form::Direct(direct) = &sum.brdf.form else { panic!("not a sum") };
-    let grid = UpperPairs { rings: 16, azimuths: 24, turn: 6, difference: 8 };
-    let table = PairTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
+    let Representation::Direct(direct) = &sum.brdf.form else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 16, azimuths: 24, turn: 6, difference: 8 };
+    let table = ShadingTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
     let pairs = mirror_biased_pairs(200, 8);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
     let off = |interpolation: Interpolation| {
-        let table = sum.brdf.with_direct_form(Form::Table(table.clone().read(interpolation)));
+        let table = sum.brdf.with_direct_form(Representation::Table(table.clone().read(interpolation)));
         compare(&values(&table), &values(&sum.brdf)).rel_l2
     };
     let (cubic, linear) = (off(Interpolation::Cubic), off(Interpolation::Linear));

@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
 use biscale::base::Cancel;
-use biscale::effective::{EffectiveBrdf, Form, Nodes, PairTable, Sight};
-use biscale::math::directions::UpperPairs;
-use biscale::metrics::{compare, picture_pairs, upper_errors};
+use biscale::effective::{EffectiveBrdf, GpuVisibilityInput, Nodes, Representation, ShadingTable};
+use biscale::math::directions::HemispherePairGrid;
+use biscale::metrics::{compare, image_pairs, upper_errors};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::scene;
 use biscale::scene::LoadedScene;
@@ -19,20 +19,20 @@ fn draft(name: &str) -> LoadedScene {
     open(name, &["quality.preset=draft"])
 }
 
-fn pictured(outcome: &Outcome) -> std::sync::Arc<EffectiveBrdf> {
-    outcome.for_pictures(&Cancel::default()).unwrap().brdf
+fn shading_brdf(outcome: &Outcome) -> std::sync::Arc<EffectiveBrdf> {
+    outcome.shading_brdf(&Cancel::default()).unwrap().brdf
 }
 
 fn values(brdf: &EffectiveBrdf, seed: u64) -> Vec<Vec3> {
-    picture_pairs(400, seed).iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
+    image_pairs(400, seed).iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
 }
 
 #[test]
-fn pictures_of_the_papers_five_scenes_read_a_form_within_28_decibels_on_pairs_it_was_not_checked_on() {
+fn images_of_the_papers_five_scenes_read_a_form_within_28_decibels_on_pairs_it_was_not_checked_on() {
     for (scene, table) in [("plate", true), ("teapot", false), ("pillow", true), ("cup", false), ("skirt", true)] {
         let outcome = Pipeline::new().effective(&draft(&format!("table4_{scene}"))).unwrap();
-        let read = pictured(&outcome);
-        assert_eq!(matches!(read.form, Form::Table(_)), table, "{scene}: {}", read.form.describe());
+        let read = shading_brdf(&outcome);
+        assert_eq!(matches!(read.form, Representation::Table(_)), table, "{scene}: {}", read.form.describe());
         let errors = compare(&values(&read, 4711), &values(&outcome.brdf, 4711));
         assert!(errors.psnr_db > 28.0, "{scene}: {:.1} dB {:.1} %", errors.psnr_db, errors.rel_l2 * 100.0);
     }
@@ -41,10 +41,10 @@ fn pictures_of_the_papers_five_scenes_read_a_form_within_28_decibels_on_pairs_it
 #[test]
 fn a_table_is_the_sum_itself_on_its_nodes() {
     let outcome = Pipeline::new().effective(&draft("table4_plate")).unwrap();
-    let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-    let grid = UpperPairs { rings: 6, azimuths: 8, turn: 4, difference: 5 };
-    let table = PairTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
-    let read = EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area };
+    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 6, azimuths: 8, turn: 4, difference: 5 };
+    let table = ShadingTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
+    let read = EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area };
     let peak = (0..grid.nodes()).map(|node| grid.pair(node)).map(|(i, o)| outcome.brdf.g(i, o).max_element());
     let peak = peak.fold(0.0, f32::max);
     for node in 0..grid.nodes() {
@@ -63,15 +63,15 @@ fn a_table_is_the_sum_itself_on_its_nodes() {
 #[test]
 fn a_table_made_for_some_pairs_answers_these_as_the_whole_table_does() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();
-    let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-    let grid = UpperPairs { rings: 7, azimuths: 12, turn: 6, difference: 5 };
-    let pairs = picture_pairs(20, 99);
+    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 7, azimuths: 12, turn: 6, difference: 5 };
+    let pairs = image_pairs(20, 99);
     for mirrors in [[false; 2], [true, false], [true; 2]] {
         let read = |read_by| {
             let nodes = Nodes { mirrors, read_by, ..Nodes::all(grid) };
-            let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+            let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
             let black = table.values().iter().filter(|value| **value == glam::Vec4::ZERO).count();
-            (EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area }, black)
+            (EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area }, black)
         };
         let ((whole, none), (some, black)) = (read(None), read(Some(&pairs[..])));
         assert!(black > none, "{mirrors:?}: nothing was left out");
@@ -85,12 +85,12 @@ fn a_table_made_for_some_pairs_answers_these_as_the_whole_table_does() {
 fn a_table_from_few_facets_that_shine_at_each_half_vector_is_close_to_the_one_from_all() {
     for scene in ["table4_pillow", "fig6a_velvet_spread"] {
         let outcome = Pipeline::new().effective(&draft(scene)).unwrap();
-        let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-        let grid = UpperPairs { rings: 12, azimuths: 16, turn: 6, difference: 6 };
+        let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+        let grid = HemispherePairGrid { rings: 12, azimuths: 16, turn: 6, difference: 6 };
         let read = |facets| {
             let nodes = Nodes { facets, ..Nodes::all(grid) };
-            let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
-            EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area }
+            let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+            EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area }
         };
         let (all, few) = (read(None), read(Some(direct.sum.facet_count() / 4)));
         let (all, few) = (values(&all, 12), values(&few, 12));
@@ -109,21 +109,21 @@ fn a_table_from_few_facets_that_shine_at_each_half_vector_is_close_to_the_one_fr
 #[test]
 #[ignore = "a table to be printed: cargo test --release --test pictures fewer_facets -- --ignored --nocapture"]
 fn fewer_facets_and_trials_against_whole_tables_at_standard() {
-    let pairs = picture_pairs(512, 12345);
+    let pairs = image_pairs(512, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
-    let grid = UpperPairs { rings: 24, azimuths: 48, turn: 8, difference: 12 };
+    let grid = HemispherePairGrid { rings: 24, azimuths: 48, turn: 8, difference: 12 };
     println!("scene                facets      trial     whole   rel. L2   PSNR");
     for scene in ["table4_pillow", "table4_skirt", "fig7a_shot_silk", "fig6a_velvet_spread"] {
         let outcome = Pipeline::new().effective(&open(scene, &["quality.backend=cpu"])).unwrap();
-        let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("{scene}: not a sum") };
+        let Representation::Direct(direct) = outcome.brdf.direct_form() else { panic!("{scene}: not a sum") };
         let exact = values(&outcome.brdf);
         for facets in [None, Some(direct.sum.facet_count() / 5)] {
             let made = |read_by| {
                 let start = std::time::Instant::now();
                 let nodes = Nodes { facets, read_by, ..Nodes::all(grid) };
-                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+                let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
                 let ms = start.elapsed().as_secs_f64() * 1e3;
-                (values(&outcome.brdf.with_direct_form(Form::Table(table))), ms)
+                (values(&outcome.brdf.with_direct_form(Representation::Table(table))), ms)
             };
             let ((tried, trial_ms), (whole, whole_ms)) = (made(Some(&pairs[..])), made(None));
             assert_eq!(tried, whole, "{scene}: a trial tells another error than the table");
@@ -138,7 +138,7 @@ fn fewer_facets_and_trials_against_whole_tables_at_standard() {
 #[test]
 #[ignore = "a table to be printed: cargo test --release --test pictures part_of_the_facets -- --ignored --nocapture"]
 fn trials_from_part_of_the_facets() {
-    let pairs = picture_pairs(512, 12345);
+    let pairs = image_pairs(512, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
     println!("scene                preset    facets picked  azimuths  nodes  rel. L2   PSNR");
     let fields = ["table4_plate", "fig8b_ripples", "fig8d_leather"];
@@ -150,26 +150,28 @@ fn trials_from_part_of_the_facets() {
             let outcome = made(&set);
             let unseen = Pipeline::new().unseen(&scene::open(scene, &set).unwrap()).unwrap().unwrap();
             let few = match &unseen.sum.sight {
-                Sight::Heights(heights) => heights.azimuths,
-                Sight::Slices(slices) => slices.azimuths,
+                GpuVisibilityInput::Heights(heights) => heights.azimuths,
+                GpuVisibilityInput::OcclusionIntervals(slices) => slices.azimuths,
                 _ => panic!("{scene}: another route"),
             };
             let as_device = made(&[&set[..], &[format!("quality.azimuths={few}")]].concat());
             let few = (few, unseen.sum.nodes.unwrap().grid);
             let settings = &outcome.settings;
-            let field = matches!(unseen.sum.sight, Sight::Heights(_));
+            let field = matches!(unseen.sum.sight, GpuVisibilityInput::Heights(_));
             let many = if field { settings.horizon_azimuths } else { settings.slice_azimuths };
-            let (exact, many) = (values(&outcome.brdf), (many, UpperPairs { rings, azimuths, turn, difference }));
+            let (exact, many) =
+                (values(&outcome.brdf), (many, HemispherePairGrid { rings, azimuths, turn, difference }));
             let all = settings.facets;
             let mut cases = vec![(all, many), (3200, many), (1600, many), (1600, few), (800, few)];
             cases.dedup();
             for (count, (azimuths, grid)) in cases {
                 let of = if azimuths == few.0 { &as_device } else { &outcome };
-                let Form::Direct(direct) = of.brdf.direct_form() else { panic!("{scene}: not a sum") };
+                let Representation::Direct(direct) = of.brdf.direct_form() else { panic!("{scene}: not a sum") };
                 let facets = (count < all).then_some(count);
                 let nodes = Nodes { facets, read_by: Some(&pairs[..]), ..Nodes::all(grid) };
-                let table = PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
-                let errors = upper_errors(&values(&outcome.brdf.with_direct_form(Form::Table(table))), &exact);
+                let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
+                let errors =
+                    upper_errors(&values(&outcome.brdf.with_direct_form(Representation::Table(table))), &exact);
                 let (percent, db) = (100.0 * errors.rel_l2, errors.psnr_db);
                 let nodes = grid.nodes();
                 println!(
@@ -184,7 +186,7 @@ fn trials_from_part_of_the_facets() {
 #[test]
 #[ignore = "a table to be printed: cargo test --release --test pictures few_facets -- --ignored --nocapture"]
 fn few_facets_of_few_normals_as_devices_sum_them() {
-    let pairs = picture_pairs(512, 12345);
+    let pairs = image_pairs(512, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
     println!("scene                  preset    facets        rel. L2   PSNR");
     let (mut scenes, mut worst) = (0, 0.0_f64);
@@ -219,12 +221,12 @@ fn few_facets_of_few_normals_as_devices_sum_them() {
 #[test]
 fn a_table_of_a_mirrored_tile_is_its_own_mirror_image_and_close_to_the_whole_one() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();
-    let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-    let grid = UpperPairs { rings: 6, azimuths: 12, turn: 4, difference: 5 };
+    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 6, azimuths: 12, turn: 4, difference: 5 };
     let read = |mirrors: [bool; 2]| {
         let table =
-            PairTable::build(direct, Nodes { mirrors, ..Nodes::all(grid) }, &Cancel::default()).unwrap().unwrap();
-        EffectiveBrdf { form: Form::Table(table), base_area: outcome.brdf.base_area }
+            ShadingTable::build(direct, Nodes { mirrors, ..Nodes::all(grid) }, &Cancel::default()).unwrap().unwrap();
+        EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area }
     };
     let (whole, spared) = (read([false; 2]), read([true; 2]));
     let (mut error, mut power) = (0.0, 0.0);
@@ -253,7 +255,7 @@ fn a_table_of_a_mirrored_tile_is_its_own_mirror_image_and_close_to_the_whole_one
 #[test]
 fn a_table_is_never_below_zero_and_dark_under_the_horizon() {
     let outcome = Pipeline::new().effective(&draft("table4_plate")).unwrap();
-    let read = pictured(&outcome);
+    let read = shading_brdf(&outcome);
     assert!(values(&read, 5).iter().all(|f| f.min_element() >= 0.0 && f.is_finite()));
     let under = Vec3::new(0.6, 0.0, -0.8);
     assert_eq!(read.eval(under, Vec3::Z), Vec3::ZERO);
@@ -264,15 +266,17 @@ fn a_table_is_never_below_zero_and_dark_under_the_horizon() {
 fn a_colour_edit_keeps_the_table_and_leaves_what_a_fresh_start_makes() {
     let mut pipeline = Pipeline::new();
     let before = pipeline.effective(&draft("table4_plate")).unwrap();
-    let first = before.for_pictures(&Cancel::default()).unwrap();
+    let first = before.shading_brdf(&Cancel::default()).unwrap();
     let mut edited = draft("table4_plate");
     edited.scene.nudge_color().unwrap();
     let after = pipeline.effective(&edited).unwrap();
-    let kept = after.for_pictures(&Cancel::default()).unwrap();
-    let fresh = pictured(&Pipeline::new().effective(&edited).unwrap());
+    let kept = after.shading_brdf(&Cancel::default()).unwrap();
+    let fresh = shading_brdf(&Pipeline::new().effective(&edited).unwrap());
     assert_eq!(values(&kept.brdf, 9), values(&fresh, 9));
     assert_ne!(values(&kept.brdf, 9), values(&first.brdf, 9));
-    let (Form::Table(a), Form::Table(b)) = (&first.brdf.form, &kept.brdf.form) else { panic!("no tables") };
+    let (Representation::Table(a), Representation::Table(b)) = (&first.brdf.form, &kept.brdf.form) else {
+        panic!("no tables")
+    };
     assert!(a.shares_values_with(b));
 }
 
@@ -280,11 +284,11 @@ fn a_colour_edit_keeps_the_table_and_leaves_what_a_fresh_start_makes() {
 fn a_brdf_edit_where_normals_are_many_makes_the_table_anew() {
     let mut pipeline = Pipeline::new();
     let scene = draft("table4_plate");
-    let first = pictured(&pipeline.effective(&scene).unwrap());
+    let first = shading_brdf(&pipeline.effective(&scene).unwrap());
     let mut edited = scene;
     edited.scene.nudge_brdf().unwrap();
-    let second = pictured(&pipeline.effective(&edited).unwrap());
-    let fresh = pictured(&Pipeline::new().effective(&edited).unwrap());
+    let second = shading_brdf(&pipeline.effective(&edited).unwrap());
+    let fresh = shading_brdf(&Pipeline::new().effective(&edited).unwrap());
     assert_eq!(values(&second, 3), values(&fresh, 3));
     assert_ne!(values(&second, 3), values(&first, 3));
 }
@@ -292,17 +296,17 @@ fn a_brdf_edit_where_normals_are_many_makes_the_table_anew() {
 #[test]
 fn a_thinned_sum_keeps_the_area_of_every_normal() {
     let outcome = Pipeline::new().effective(&draft("table4_teapot")).unwrap();
-    let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-    let thinned = direct.thinned(10).unwrap();
-    assert!(thinned.sum.facet_count() * 8 < direct.sum.facet_count());
+    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+    let strided_subset = direct.strided_subset(10).unwrap();
+    assert!(strided_subset.sum.facet_count() * 8 < direct.sum.facet_count());
     // From straight above all is seen: the projected area is that of the base.
     let area = |of: &biscale::effective::Direct| of.sums(&[], Vec3::Z, |_, _| {});
-    assert!((area(&thinned) / area(direct) - 1.0).abs() < 1e-4);
+    assert!((area(&strided_subset) / area(direct) - 1.0).abs() < 1e-4);
 }
 
 #[test]
-fn exact_pictures_can_be_asked_for() {
+fn exact_images_can_be_asked_for() {
     let scene = open("table4_plate", &["quality.preset=draft", "effects.picture_table=off"]);
     let outcome = Pipeline::new().effective(&scene).unwrap();
-    assert!(std::sync::Arc::ptr_eq(&pictured(&outcome), &outcome.brdf));
+    assert!(std::sync::Arc::ptr_eq(&shading_brdf(&outcome), &outcome.brdf));
 }

@@ -4,12 +4,12 @@
 use std::f32::consts::TAU;
 
 use biscale::brdf::{Brdf, Term};
-use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Form, SumMaterial};
-use biscale::visibility::ray_cast;
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Material, Representation};
 use biscale::geometry::{FacetSampler, Facets, HeightGrid, PeriodicGrid, SampleShift, TileMesh, lifted_origins, sees};
 use biscale::math::directions::{PolarGrid, from_angles};
 use biscale::metrics::mirror_biased_pairs;
-use biscale::visibility::{Horizons, PackedVisibility, Slices, Visibility, visibility_maps_cpu};
+use biscale::visibility::ray_cast;
+use biscale::visibility::{HorizonMap, OcclusionIntervals, PackedVisibility, Visibility, visibility_maps_cpu};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -148,8 +148,8 @@ fn all_routes_agree_on_a_height_field_up_to_85_degrees() {
     let sharp = 1e-6;
     let heights = mesh.height_grid.as_ref().unwrap();
     let march =
-        filled(&Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, AZIMUTHS, sharp)), &directions);
-    let scan = filled(&Visibility::Horizons(Horizons::scan(&grid, &facets, AZIMUTHS, sharp)), &directions);
+        filled(&Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, AZIMUTHS, sharp)), &directions);
+    let scan = filled(&Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, AZIMUTHS, sharp)), &directions);
     let maps = visibility_maps_cpu(&mesh, &facets, &directions, 512);
     let marched = disagreement(&facets, &directions, &exact, |d, s| march[d][s] > 0.5);
     let scanned = disagreement(&facets, &directions, &exact, |d, s| scan[d][s] > 0.5);
@@ -164,7 +164,7 @@ fn all_routes_agree_under_overhangs_up_to_85_degrees() {
     let facets = sample(&mesh, 1500);
     let grid = PeriodicGrid::new(&mesh);
     let nodes = PolarGrid::new(10, AZIMUTHS);
-    let soft = Slices::scan(&grid, &facets, AZIMUTHS, 1e-6).maps(nodes.rings);
+    let soft = OcclusionIntervals::scan(&grid, &facets, AZIMUTHS, 1e-6).maps(nodes.rings);
     let on_nodes: Vec<Vec3> = (0..9 * AZIMUTHS).map(|node| nodes.direction(node)).collect();
     let exact = ray_cast(&grid, &facets, &on_nodes);
     let scanned = disagreement(&facets, &on_nodes, &exact, |d, s| soft.packed.is_visible(d, s));
@@ -181,8 +181,8 @@ fn walking_the_samples_finds_the_horizons_that_slicing_the_mesh_does() {
     let heights = mesh.height_grid.as_ref().unwrap();
     // A wide ramp turns differences of the horizon into differences of visibility.
     let ramp = 0.04;
-    let march = Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, AZIMUTHS, ramp));
-    let scan = Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(&mesh), &facets, AZIMUTHS, ramp));
+    let march = Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, AZIMUTHS, ramp));
+    let scan = Visibility::HorizonMap(HorizonMap::scan(&PeriodicGrid::new(&mesh), &facets, AZIMUTHS, ramp));
     let directions = on_azimuths();
     let (march, scan) = (filled(&march, &directions), filled(&scan, &directions));
     let mut differ = 0;
@@ -198,8 +198,8 @@ fn fields_of_few_columns_and_thousands_of_rows_have_the_horizons_of_their_mesh()
     let mesh = height_field([2, 4096], |x, y| 0.1 * (6.0 * TAU * y).sin() + 0.05 * x);
     let facets = sample(&mesh, 12);
     let heights = mesh.height_grid.as_ref().unwrap();
-    let march = Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, 1024, 0.04));
-    let scan = Visibility::Horizons(Horizons::scan(&PeriodicGrid::new(&mesh), &facets, 1024, 0.04));
+    let march = Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, 1024, 0.04));
+    let scan = Visibility::HorizonMap(HorizonMap::scan(&PeriodicGrid::new(&mesh), &facets, 1024, 0.04));
     let directions: Vec<Vec3> =
         (0..1024_u16).map(|k| from_angles(1.2 + 0.3 * f32::from(k % 7) / 7.0, TAU * f32::from(k) / 1024.0)).collect();
     let (march, scan) = (filled(&march, &directions), filled(&scan, &directions));
@@ -308,12 +308,13 @@ fn effective(mesh: &TileMesh, count: usize, term: Term, maps: bool) -> Effective
     facets.sort_for_sums();
     let grid = PeriodicGrid::new(mesh);
     let visibility = if maps {
-        Visibility::Slices(Slices::scan(&grid, &facets, 48, 0.02))
+        Visibility::OcclusionIntervals(OcclusionIntervals::scan(&grid, &facets, 48, 0.02))
     } else {
-        Visibility::Horizons(Horizons::scan(&grid, &facets, 48, 0.02))
+        Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, 48, 0.02))
     };
-    let material = SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::ONE };
-    let form = Form::Direct(Direct::new(Arc::new(FacetSum::new(&facets, &[0], &[material])), Arc::new(visibility)));
+    let material = Material { brdf: Brdf { terms: vec![term] }, color: Vec3::ONE };
+    let form =
+        Representation::Direct(Direct::new(Arc::new(FacetSum::new(&facets, &[0], &[material])), Arc::new(visibility)));
     EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
 }
 

@@ -43,9 +43,9 @@ impl Editor {
                 let answer = export::tile_ui(ctx, path, options);
                 self.exported(answer, path, What::Tile(options.clone()))
             }
-            Dialog::Picture { path, width, height } => {
-                let answer = export::picture_ui(ctx, path, width, height);
-                self.exported(answer, path, What::Picture { size: [*width, *height] })
+            Dialog::Image { path, width, height } => {
+                let answer = export::image_ui(ctx, path, width, height);
+                self.exported(answer, path, What::Image { size: [*width, *height] })
             }
         };
         // An answer may have opened the next one.

@@ -12,9 +12,9 @@ use super::document::Snapshot;
 use super::editor::Editor;
 use super::messages::Level;
 use super::worker::{
-    AccuracyAnswer, AccuracyJob, Devices, ExportAnswer, ExportJob, Grade, LobeJob, LobeMade, Made, PictureAnswer,
-    PictureJob, Pictures, Thumbnail, ThumbnailJob, TileAnswer, TileJob, Worker, spawn_accuracy, spawn_autosave,
-    spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
+    AccuracyAnswer, AccuracyJob, Devices, ExportAnswer, ExportJob, Grade, ImageAnswer, ImageJob, Images, LobeJob,
+    LobeMade, Made, Thumbnail, ThumbnailJob, TileAnswer, TileJob, Worker, spawn_accuracy, spawn_autosave, spawn_export,
+    spawn_lobe, spawn_thumbnail, spawn_tile,
 };
 
 /// What menu, toolbar and status line take of the window's height, points.
@@ -24,7 +24,7 @@ const AUTOSAVE_SECS: f64 = 5.0;
 
 /// What workers send.
 enum Answer {
-    Picture(PictureAnswer),
+    Image(ImageAnswer),
     Tile(TileAnswer),
     Lobe(Box<LobeMade>),
     Thumbnail(Thumbnail),
@@ -35,7 +35,7 @@ enum Answer {
 
 /// The workers, each absent where the system gave no thread, and what was asked of them last.
 pub struct Background {
-    pub pictures: Option<Pictures>,
+    pub images: Option<Images>,
     tiles: Option<Worker<TileJob>>,
     lobes: Option<Worker<LobeJob>>,
     thumbnails: Option<Worker<ThumbnailJob>>,
@@ -50,7 +50,7 @@ pub struct Background {
     /// The first picture was shown, or there is none to wait for: what it does not need may be computed.
     opened: bool,
     /// Drafted, not asked to be refined yet.
-    unrefined: Option<PictureJob>,
+    unrefined: Option<ImageJob>,
 }
 
 impl Background {
@@ -65,14 +65,14 @@ impl Background {
         let (to_tile, to_lobe, to_gallery, to_export, to_save, to_chart) =
             (send.clone(), send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
         let accuracy = spawn_accuracy(move |answer| to_chart(Answer::Accuracy(answer)));
-        let pictures = Pictures::spawn(cache, move |answer| send(Answer::Picture(answer)));
+        let images = Images::spawn(cache, move |answer| send(Answer::Image(answer)));
         let tiles = spawn_tile(move |answer| to_tile(Answer::Tile(answer)));
         let thumbnails = spawn_thumbnail(move |made| to_gallery(Answer::Thumbnail(made)));
         let exports = spawn_export(cache, move |answer| to_export(Answer::Export(answer)));
         let autosaver = spawn_autosave(move |done| to_save(Answer::Autosaved(done)));
         let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
         Self {
-            pictures,
+            images,
             tiles,
             lobes,
             thumbnails,
@@ -90,7 +90,7 @@ impl Background {
     /// Ends all threads: none may still use a graphics driver while the process takes it down.
     pub fn finish(self) {
         let longest = Duration::from_secs(4);
-        self.pictures.into_iter().for_each(|workers| workers.finish(longest));
+        self.images.into_iter().for_each(|workers| workers.finish(longest));
         self.tiles.into_iter().for_each(|worker| worker.finish(longest));
         self.lobes.into_iter().for_each(|worker| worker.finish(longest));
         self.thumbnails.into_iter().for_each(|worker| worker.finish(longest));
@@ -175,8 +175,8 @@ impl Editor {
 
     /// What was found of graphics devices.
     pub fn tell_devices(&self, devices: Devices) {
-        if let Some(pictures) = &self.background.pictures {
-            pictures.tell_devices(devices);
+        if let Some(images) = &self.background.images {
+            images.tell_devices(devices);
         }
     }
 
@@ -187,15 +187,15 @@ impl Editor {
         let panels = [gallery + settings.parameters_width + settings.side_width, BARS];
         self.size =
             [0, 1].map(|axis| ((settings.window[axis] - panels[axis]) * settings.zoom).round().max(64.0) as usize);
-        self.request_picture();
+        self.request_image();
     }
 
     /// Asks the workers for what is shown, once for every state and size.
     pub(super) fn request(&mut self, ctx: &Context) {
-        let Some(loaded) = self.request_picture() else { return };
+        let Some(loaded) = self.request_image() else { return };
         if !self.background.opened {
             let answered = self.object.made.is_some() || self.object.failed.is_some();
-            self.background.opened = answered || self.background.pictures.is_none();
+            self.background.opened = answered || self.background.images.is_none();
             if self.background.opened {
                 ctx.request_repaint();
             }
@@ -213,14 +213,14 @@ impl Editor {
     }
 
     /// Asks for the object's picture where it is not what was asked for last; gives the scene as workers have it.
-    fn request_picture(&mut self) -> Option<Arc<LoadedScene>> {
+    fn request_image(&mut self) -> Option<Arc<LoadedScene>> {
         let version = self.document.version();
         if self.background.loaded.as_ref().is_none_or(|(last, _)| *last != version) {
             self.background.loaded = Some((version, Arc::new(self.document.loaded())));
         }
         let (_, loaded) = self.background.loaded.clone()?;
         let opened = self.background.opened;
-        if let (true, Some(worker)) = (opened, &self.background.pictures)
+        if let (true, Some(worker)) = (opened, &self.background.images)
             && let Some(job) = self.background.unrefined.take()
         {
             worker.refine(job);
@@ -229,8 +229,8 @@ impl Editor {
         if self.object.asked != Some(wanted) {
             self.object.asked = Some(wanted);
             self.object.since.get_or_insert_with(Instant::now);
-            if let Some(worker) = &self.background.pictures {
-                let job = PictureJob { version, loaded: loaded.clone(), size: self.size, asked: Instant::now() };
+            if let Some(worker) = &self.background.images {
+                let job = ImageJob { version, loaded: loaded.clone(), size: self.size, asked: Instant::now() };
                 if opened {
                     worker.ask(job);
                 } else {
@@ -260,14 +260,14 @@ impl Editor {
                     let text = format!("No recovery file could be written ({text}). Save your work yourself.");
                     self.messages.put(Level::Trouble, "autosave", text);
                 }
-                Answer::Picture(answer) => self.take_picture(ctx, answer),
+                Answer::Image(answer) => self.take_image(ctx, answer),
             }
         }
     }
 
-    pub(super) fn take_picture(&mut self, ctx: &Context, answer: PictureAnswer) {
+    pub(super) fn take_image(&mut self, ctx: &Context, answer: ImageAnswer) {
         match answer {
-            PictureAnswer::Made(made) => {
+            ImageAnswer::Made(made) => {
                 self.messages.clear("picture");
                 match &made.trouble {
                     Some(why) => self.device_failed(why),
@@ -275,16 +275,16 @@ impl Editor {
                 }
                 self.object.take(ctx, made);
             }
-            PictureAnswer::Doing(version, what) if version == self.document.version() => {
+            ImageAnswer::Doing(version, what) if version == self.document.version() => {
                 self.object.doing = Some(what);
             }
-            PictureAnswer::Doing(..) => {}
-            PictureAnswer::Failed(version, _) if version < self.document.version() => {}
-            PictureAnswer::Failed(version, text) => {
+            ImageAnswer::Doing(..) => {}
+            ImageAnswer::Failed(version, _) if version < self.document.version() => {}
+            ImageAnswer::Failed(version, text) => {
                 self.object.fail(version);
                 self.messages.put(Level::Trouble, "picture", text);
             }
-            PictureAnswer::Fault(text) => {
+            ImageAnswer::Fault(text) => {
                 self.object.fail(self.document.version());
                 let text = format!("A fault in the program while computing ({text}). Your document is kept; edit on.");
                 self.messages.put(Level::Trouble, "picture", text);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::cache::Cache;
-use crate::scene::{Material, Scene};
+use crate::scene::{MaterialSpec, Scene};
 use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
 
 use super::actions::{self, Action};
@@ -27,7 +27,7 @@ const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (left
 
 /// Width of the smaller view, and what panels leave of the window's width to the large one, points.
 const SIDE: [f32; 2] = [240.0, 900.0];
-const LEAST_VIEW: f32 = 260.0;
+const MIN_VIEW: f32 = 260.0;
 
 /// Everything but the window.
 pub struct Editor {
@@ -62,7 +62,7 @@ pub struct Editor {
     /// What the hand did on the tile in this frame.
     pub(super) hand: Vec<Hand>,
     pub(super) from_view: Option<Action>,
-    pub(super) copied: Option<Material>,
+    pub(super) copied: Option<MaterialSpec>,
     /// Why pictures are not made on the device any more, as it was said.
     pub(super) device_trouble: Option<String>,
 }
@@ -76,7 +76,7 @@ impl Editor {
         ctx.set_zoom_factor(settings.zoom);
         let mut messages = Messages::default();
         let background = Background::new(ctx, &cache);
-        if background.pictures.is_none() {
+        if background.images.is_none() {
             messages.put(Level::Trouble, "worker", "The system gave no thread to compute on: nothing will be drawn.");
         }
         if !settings.welcomed && folder.is_some() {
@@ -181,7 +181,7 @@ impl Editor {
         Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
         let from_gallery = self.gallery_ui(ui);
         let mut scene = (**self.document.scene()).clone();
-        let widest = (ui.available_width() - SIDE[0] - LEAST_VIEW).clamp(260.0, 620.0);
+        let widest = (ui.available_width() - SIDE[0] - MIN_VIEW).clamp(260.0, 620.0);
         let parameters = Panel::right("parameters")
             .default_size(self.settings.parameters_width)
             .size_range(260.0..=widest)
@@ -196,7 +196,7 @@ impl Editor {
             });
         self.settings.parameters_width = parameters.response.rect.width();
         let asked = parameters.inner.inner;
-        let widest = (ui.available_width() - LEAST_VIEW).clamp(SIDE[0], SIDE[1]);
+        let widest = (ui.available_width() - MIN_VIEW).clamp(SIDE[0], SIDE[1]);
         let side = Panel::right("side").default_size(self.settings.side_width).size_range(SIDE[0]..=widest);
         let side = side.show(ui, |ui| self.side_ui(ui, &mut scene)).response.rect.width();
         self.settings.side_width = side;

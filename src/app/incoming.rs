@@ -91,8 +91,8 @@ impl Editor {
                 }
                 return;
             }
-            Purpose::ExportPicture => {
-                self.dialog = Some(Dialog::Picture { path, width: 1024, height: 1024 });
+            Purpose::ExportImage => {
+                self.dialog = Some(Dialog::Image { path, width: 1024, height: 1024 });
                 return;
             }
         }

@@ -64,7 +64,7 @@ impl Editor {
         ui.separator();
         items(ui, &[Action::Save, Action::SaveAs], chosen);
         ui.separator();
-        items(ui, &[Action::ExportTable, Action::ExportTile, Action::ExportPicture], chosen);
+        items(ui, &[Action::ExportTable, Action::ExportTile, Action::ExportImage], chosen);
         ui.separator();
         items(ui, &[Action::Quit], chosen);
     }

@@ -32,7 +32,7 @@ impl Message {
 }
 
 /// Messages that are seen at once; the others wait behind a button.
-const MOST_SEEN: usize = 3;
+const MAX_SEEN: usize = 3;
 /// A note under the pointer is being read: it stays this long after the pointer has gone [s].
 const LINGERS: f64 = 3.0;
 const MARGIN: f32 = 8.0;
@@ -110,9 +110,9 @@ impl Messages {
         // Two workers may complain of one thing.
         let mut order: Vec<usize> = (0..self.list.len()).filter(is_first).collect();
         let all = order.len();
-        if !self.unfolded && all > MOST_SEEN {
+        if !self.unfolded && all > MAX_SEEN {
             order.sort_by_key(|&at| (self.list[at].level != Level::Trouble, std::cmp::Reverse(at)));
-            order.truncate(MOST_SEEN);
+            order.truncate(MAX_SEEN);
             order.sort_unstable();
         }
         let hidden = all - order.len();

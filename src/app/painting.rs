@@ -36,7 +36,7 @@ impl Editor {
         if let Some(stroke) = self.stroke.take() {
             let name = match self.tile.brush.tool {
                 Tool::Color => "Paint colour".to_owned(),
-                Tool::Material => "Paint material".to_owned(),
+                Tool::MaterialSpec => "Paint material".to_owned(),
                 tool => format!("Paint: {}", tool.name().to_lowercase()),
             };
             self.document.end_stroke(&name, &stroke.before);
@@ -47,7 +47,7 @@ impl Editor {
     fn begin_stroke(&mut self) -> bool {
         let ready = match self.tile.brush.tool {
             Tool::Color => self.have_colors(),
-            Tool::Material => self.have_slots(),
+            Tool::MaterialSpec => self.have_slots(),
             _ => self.have_heights(),
         };
         if ready {

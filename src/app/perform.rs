@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::scene::Material;
+use crate::scene::MaterialSpec;
 use eframe::egui::{Context, Event, Theme};
 
 use super::actions::Action;
@@ -58,9 +58,9 @@ impl Editor {
                 let name = format!("{}.obj", self.document.name);
                 self.browse(Purpose::ExportTile, &name);
             }
-            Action::ExportPicture => {
+            Action::ExportImage => {
                 let name = format!("{}.png", self.document.name);
-                self.browse(Purpose::ExportPicture, &name);
+                self.browse(Purpose::ExportImage, &name);
             }
             Action::Quit => self.leaving = true,
             Action::Undo => {
@@ -181,7 +181,7 @@ impl Editor {
         let scene = self.document.scene();
         let Some(material) = scene.materials.get(index) else { return };
         let found = scene.material_for_slot(&material.name);
-        let mut full = Material { brdf: found.ok().map(|found| found.brdf.clone()), ..material.clone() };
+        let mut full = MaterialSpec { brdf: found.ok().map(|found| found.brdf.clone()), ..material.clone() };
         // Another scene, elsewhere, is to find the files too.
         super::document::make_absolute(&mut full, &self.document.base_dir);
         if let Ok(text) = toml::to_string(&full) {
@@ -197,7 +197,7 @@ impl Editor {
         };
         self.messages.clear("paste");
         let mut scene = (**self.document.scene()).clone();
-        let pasted = Material { name: slot.to_owned(), ..copied };
+        let pasted = MaterialSpec { name: slot.to_owned(), ..copied };
         match scene.materials.iter_mut().find(|material| material.name == slot) {
             Some(place) => *place = pasted,
             None => scene.materials.push(pasted),
@@ -218,7 +218,7 @@ impl Editor {
             input.events.iter().filter_map(pasted).collect::<Vec<_>>()
         });
         for text in texts {
-            match toml::from_str::<Material>(&text) {
+            match toml::from_str::<MaterialSpec>(&text) {
                 Ok(material) => {
                     self.copied = Some(material);
                     self.paste_material("default");

@@ -25,13 +25,13 @@ pub struct FirstFrames {
     times: StartTimes,
     frames: u32,
     /// Whether a frame had a picture of the object.
-    pictured: bool,
+    shading_brdf: bool,
     said: bool,
 }
 
 impl FirstFrames {
     pub fn new(times: StartTimes) -> Self {
-        Self { times, frames: 0, pictured: false, said: false }
+        Self { times, frames: 0, shading_brdf: false, said: false }
     }
 
     pub fn are_followed(&self) -> bool {
@@ -45,23 +45,23 @@ impl FirstFrames {
             1 => self.times.note("first frame handed to the screen"),
             _ => {}
         }
-        if self.pictured && !self.said {
+        if self.shading_brdf && !self.said {
             self.said = true;
             self.times.note("first picture handed to the screen");
         }
-        self.pictured
+        self.shading_brdf
     }
 
     /// Whether the next frame, which the editor may not need, is the one that says something.
     pub fn is_told_by_the_next(&self) -> bool {
-        self.frames == 1 || self.pictured
+        self.frames == 1 || self.shading_brdf
     }
 
     /// After a frame was laid out.
     pub fn after(&mut self, made: Option<&Made>) {
         self.frames += 1;
-        if let (Some(made), false) = (made, self.pictured) {
-            self.pictured = true;
+        if let (Some(made), false) = (made, self.shading_brdf) {
+            self.shading_brdf = true;
             let stages: Vec<_> = made.stages.iter().map(|(name, ms)| format!("{name} {ms:.1}")).collect();
             self.times.note(&format!("first picture made ({:.1} ms: {})", made.latency_ms, stages.join(", ")));
         }

@@ -9,8 +9,8 @@ use super::worker::Grade;
 
 impl Editor {
     fn stop_refining(&mut self) {
-        if let Some(pictures) = &self.background.pictures {
-            pictures.stop();
+        if let Some(images) = &self.background.images {
+            images.stop();
         }
         self.object.doing = None;
         self.object.stopped = Some(self.document.version());

@@ -87,7 +87,7 @@ impl Drop for Temporary {
 /// A new file beside `path`. Its name may be taken: by another thread, or by a process of the same number that was killed
 /// (in a container all have the same).
 fn open_beside(path: &Path) -> io::Result<(Temporary, File)> {
-    const MOST_TRIES: u32 = 1000;
+    const MAX_TRIES: u32 = 1000;
     let mut attempt = 0;
     loop {
         let mut name = OsString::from(".");
@@ -95,7 +95,7 @@ fn open_beside(path: &Path) -> io::Result<(Temporary, File)> {
         name.push(format!(".{}-{attempt}.part", std::process::id()));
         let temporary = path.with_file_name(name);
         match File::create_new(&temporary) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < MOST_TRIES => attempt += 1,
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < MAX_TRIES => attempt += 1,
             opened => return opened.map(|file| (Temporary(temporary), file)),
         }
     }

@@ -49,10 +49,10 @@ impl InputError {
 }
 
 /// Characters of what was found that are said: decoders may list all they met.
-const MOST_SAID: usize = 400;
+const MAX_SAID: usize = 400;
 
 fn brief(mut text: String) -> String {
-    if let Some((end, _)) = text.char_indices().nth(MOST_SAID) {
+    if let Some((end, _)) = text.char_indices().nth(MAX_SAID) {
         text.truncate(end);
         text.push('…');
     }

@@ -120,13 +120,13 @@ fn sample_at(planes: &[u8], index: usize) -> Option<Vec3> {
         let at = 8 * (c * PLANE + index);
         let value = f64::from_le_bytes(*planes.get(at..)?.first_chunk()?) * SCALES[c];
         // A comparison that NaN fails.
-        (value >= 0.0 && value <= f64::from(LARGEST)).then_some(value as f32)
+        (value >= 0.0 && value <= f64::from(MAX)).then_some(value as f32)
     };
     Some(Vec3::new(channel(0)?, channel(1)?, channel(2)?))
 }
 
 /// No reflectance is above this [1/sr]; sums of eight such still fit an f32, squared too.
-const LARGEST: f32 = 1e15;
+const MAX: f32 = 1e15;
 
 #[cfg(test)]
 #[path = "merl_tests.rs"]

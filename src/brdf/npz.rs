@@ -10,21 +10,17 @@ use super::spherical::{SphericalTable, even_turn};
 use crate::base::{InputError, Result};
 
 /// The largest export has 2^25 pairs of two quantities.
-const LARGEST_FILE: u64 = 1 << 30;
+const MAX_FILE: u64 = 1 << 30;
 /// Relative L2 between azimuths up to which a table passes for isotropic.
-const MOST_ANISOTROPY: f64 = 0.05;
+const MAX_ANISOTROPY: f64 = 0.05;
 
 pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let name = path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned());
     let read = || {
         let unreadable = |error: std::io::Error| InputError::new("", error, "an .npz export that can be read");
         let length = std::fs::metadata(path).map_err(unreadable)?.len();
-        if length > LARGEST_FILE {
-            return Err(InputError::new(
-                "file size",
-                format!("{length} bytes"),
-                format!("at most {LARGEST_FILE} bytes"),
-            ));
+        if length > MAX_FILE {
+            return Err(InputError::new("file size", format!("{length} bytes"), format!("at most {MAX_FILE} bytes")));
         }
         table(&std::fs::read(path).map_err(unreadable)?)
     };
@@ -66,7 +62,7 @@ fn table(bytes: &[u8]) -> std::result::Result<SphericalTable, InputError> {
     let azimuths = phi_i.len();
     let table = SphericalTable { theta_i, theta_o, azimuths, values };
     let anisotropy = table.anisotropy();
-    if anisotropy > MOST_ANISOTROPY {
+    if anisotropy > MAX_ANISOTROPY {
         let found = format!("values that change by {:.0} % over {azimuths} azimuths", 100.0 * anisotropy);
         return Err(InputError::new("array \"brdf\"", found, "an isotropic table")
             .with_hint("anisotropic BRDFs turn with the tangent, which small-scale facets do not have"));

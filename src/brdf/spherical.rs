@@ -8,7 +8,7 @@ use super::half_difference::{bin_angles, cosines, row_bins};
 use super::{HalfDifferenceTable, MeasuredReport};
 
 /// No reflectance is above this [1/sr]: sums and squares of such still fit an f32.
-pub(super) const LARGEST: f64 = 1e15;
+pub(super) const MAX: f64 = 1e15;
 
 /// Bins of the table that is looked up: such files are coarse, MERL's folded shape holds all they have.
 const SHAPE: [usize; 3] = [90, 45, 30];
@@ -98,7 +98,7 @@ impl SphericalTable {
                 let weight = (n_dot_i * n_dot_o).powi(2);
                 difference += weight * (there - back).length_squared();
                 power += weight * there.length_squared();
-                (0.5 * (there + back)).clamp(DVec3::ZERO, DVec3::splat(LARGEST)).as_vec3().extend(1.0)
+                (0.5 * (there + back)).clamp(DVec3::ZERO, DVec3::splat(MAX)).as_vec3().extend(1.0)
             })
             .collect();
         let report = MeasuredReport {

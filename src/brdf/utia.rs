@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::HalfDifferenceTable;
-use super::spherical::{LARGEST, SphericalTable};
+use super::spherical::{MAX, SphericalTable};
 use crate::base::{InputError, Result};
 
 const ELEVATIONS: usize = 6;
@@ -27,8 +27,8 @@ pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     let numbers: Vec<f64> = bytes.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
-    if let Some(at) = numbers.iter().position(|value| !(-LARGEST..=LARGEST).contains(value)) {
-        let expected = format!("a finite number no larger than {LARGEST:e}");
+    if let Some(at) = numbers.iter().position(|value| !(-MAX..=MAX).contains(value)) {
+        let expected = format!("a finite number no larger than {MAX:e}");
         return Err(complain(InputError::new(format!("number {at}"), numbers[at], expected)).into());
     }
     let values = (0..PLANE).map(|k| DVec3::new(numbers[k], numbers[PLANE + k], numbers[2 * PLANE + k])).collect();

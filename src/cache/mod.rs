@@ -29,7 +29,7 @@ pub use self::store::Usage;
 use self::writing::Writing;
 
 /// Bytes that all files together may take.
-pub const LARGEST: u64 = 512 << 20;
+pub const MAX: u64 = 512 << 20;
 
 /// What is made sooner than this is not written: reading it back takes some milliseconds.
 const WORTH_KEEPING: Duration = Duration::from_millis(100);
@@ -58,7 +58,7 @@ impl Cache {
     /// program this is.
     pub fn at(folder: &Path) -> Self {
         match Build::of_this_program() {
-            Some(build) => Self::of(build, folder, LARGEST, WORTH_KEEPING),
+            Some(build) => Self::of(build, folder, MAX, WORTH_KEEPING),
             None => Self::off(),
         }
     }

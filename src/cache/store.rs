@@ -20,7 +20,7 @@ const UNFINISHED: &str = ".part";
 const ABANDONED: Duration = Duration::from_secs(3600);
 
 /// One result may take this part of all there is room for.
-const LARGEST_SHARE: u64 = 4;
+const MAX_SHARE: u64 = 4;
 
 /// Tells those who tidy and back up that nothing here is of worth (<https://bford.info/cachedir/>).
 const TAG: (&str, &str) =
@@ -84,7 +84,7 @@ impl Store {
     /// Writes beside the place and renames: who reads meanwhile, or writes the same, meets a whole file.
     pub(super) fn write(&self, key: &Key, payload: &[u8]) -> io::Result<()> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
-        if payload.len() as u64 > self.largest / LARGEST_SHARE {
+        if payload.len() as u64 > self.largest / MAX_SHARE {
             return Ok(());
         }
         self.make_folder()?;

@@ -254,7 +254,7 @@ fn what_can_only_be_read_is_read() {
 #[ignore = "prints what it costs: cargo test --release --lib costs_of_keeping -- --ignored --nocapture"]
 fn costs_of_keeping() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = Cache::of_everything(folder.path(), LARGEST);
+    let cache = Cache::of_everything(folder.path(), MAX);
     let values: Vec<f32> = (0..1 << 20).map(|k| (k as f32).sqrt()).collect();
     let ms = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
     println!("4 MiB, ms:  key    keep    write behind    read");

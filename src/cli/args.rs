@@ -218,7 +218,7 @@ pub struct ProfileArgs {
     pub edit: Option<Edit>,
     /// From the edit to the picture, which stays on the device where that makes it.
     #[arg(long, requires = "edit")]
-    pub picture: bool,
+    pub image: bool,
     /// Width and height in pixels of that picture and of that of `--edit camera`.
     #[arg(long, default_value = "384x384", value_parser = super::parse_size)]
     pub size: [usize; 2],

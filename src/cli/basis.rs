@@ -64,7 +64,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
         let grey = loaded.scene.material_for_slot("default")?;
         vec![(grey.name.to_owned(), grey.brdf.clone())]
     } else {
-        let spec = |material: &crate::scene::Material| -> Result<_> {
+        let spec = |material: &crate::scene::MaterialSpec| -> Result<_> {
             Ok((material.name.clone(), loaded.scene.material_for_slot(&material.name)?.brdf.clone()))
         };
         loaded.scene.materials.iter().map(spec).collect::<Result<_>>()?

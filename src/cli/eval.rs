@@ -21,7 +21,7 @@ use super::EvalArgs;
 use super::{cache, print_json};
 
 /// Longer lists are no lists of pairs.
-const LARGEST_FILE: u64 = 1 << 30;
+const MAX_FILE: u64 = 1 << 30;
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
 
@@ -37,7 +37,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let settings = Settings::from_quality(&loaded.scene.quality);
     let cache = args.keeping.open();
     let mut pipeline = Pipeline::new();
-    pipeline.keep_in(cache.clone());
+    pipeline.set_cache(cache.clone());
     let health;
     let mut form = "reference sum".to_owned();
     let (values, errors) = if settings.preset == Preset::Reference {
@@ -140,9 +140,9 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
     let complain = |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
     let mut text = String::new();
     let got = if path == Path::new("-") {
-        std::io::stdin().lock().take(LARGEST_FILE).read_to_string(&mut text)
+        std::io::stdin().lock().take(MAX_FILE).read_to_string(&mut text)
     } else {
-        std::fs::File::open(path).and_then(|file| file.take(LARGEST_FILE).read_to_string(&mut text))
+        std::fs::File::open(path).and_then(|file| file.take(MAX_FILE).read_to_string(&mut text))
     };
     got.map_err(|error| complain(String::new(), error.to_string(), "a CSV file that can be read"))?;
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));

@@ -13,7 +13,7 @@ use super::{ExportArgs, Radiance};
 use super::{bar, cache, print_json, showing};
 
 /// Relative L2 of reading a table back at which hardly anything of its lobes is right.
-const MOST_LOST: f64 = 0.5;
+const MAX_LOST: f64 = 0.5;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -44,7 +44,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let loaded = args.scene.open()?;
     let cache = args.keeping.open();
     let mut pipeline = Pipeline::new();
-    pipeline.keep_in(cache.clone());
+    pipeline.set_cache(cache.clone());
     let outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
     let meta = ExportMeta::of(&loaded, &outcome, pipeline.mesh(&loaded)?.closes_plane);
@@ -70,7 +70,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     cache::finish(&cache, args.scene.quiet);
     let reading = report.reading;
     let mut health = outcome.health().clone();
-    if !(0.0..=MOST_LOST).contains(&reading.errors.rel_l2) {
+    if !(0.0..=MAX_LOST).contains(&reading.errors.rel_l2) {
         let warning = "the table misses most of the highlights: raise --resolution, or the roughness, or choose a format that follows \
                        lobes (.bsdf, --radiance tensor-tree)"
             .to_owned();

@@ -10,7 +10,7 @@ use crate::pipeline::Pipeline;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
-use crate::render::{Picture, Stage};
+use crate::render::{Image, RenderScene};
 use anyhow::Result;
 use glam::Vec3;
 use serde::Serialize;
@@ -57,8 +57,8 @@ pub fn run(args: &FitArgs) -> Result<()> {
             Kind::Gltf => replace_file(path, fit::gltf(base, &loaded.name).as_bytes())?,
             Kind::MaterialX => replace_file(path, fit::materialx(base, &loaded.name).as_bytes())?,
             Kind::Json => replace_file(path, format!("{:#}\n", serde_json::to_value(&reports)?).as_bytes())?,
-            Kind::Picture => {
-                let stage = Stage::new(&loaded)?;
+            Kind::Image => {
+                let stage = RenderScene::new(&loaded)?;
                 let materials: [&dyn Reflectance; 3] = [&*outcome.brdf, &fits[0], &fits[1]];
                 side_by_side(&stage, &materials, args.size)?.write(path, &ToneMap::new(&stage.camera)?)?;
             }
@@ -104,7 +104,7 @@ enum Kind {
     Gltf,
     MaterialX,
     Json,
-    Picture,
+    Image,
 }
 
 fn kind(path: &Path) -> Result<Kind, Error> {
@@ -113,7 +113,7 @@ fn kind(path: &Path) -> Result<Kind, Error> {
         "gltf" => Kind::Gltf,
         "mtlx" => Kind::MaterialX,
         "json" => Kind::Json,
-        "png" | "exr" => Kind::Picture,
+        "png" | "exr" => Kind::Image,
         other => {
             let expected = "a name that ends in .gltf, .mtlx, .json, .png or .exr";
             return Err(InputError::new("output", format!("the ending .{other}"), expected).in_file(path).into());
@@ -122,23 +122,23 @@ fn kind(path: &Path) -> Result<Kind, Error> {
 }
 
 /// The object in each material, left to right, and under the fits their differences from the first.
-fn side_by_side(stage: &Stage, materials: &[&dyn Reflectance], size: [usize; 2]) -> Result<Picture> {
+fn side_by_side(stage: &RenderScene, materials: &[&dyn Reflectance], size: [usize; 2]) -> Result<Image> {
     let background = Background::Uniform(Vec3::ZERO);
-    let mut pictures = Vec::new();
+    let mut images = Vec::new();
     for &reflectance in materials {
-        pictures.push(render(&stage.input(reflectance, size, 2, &background))?.picture);
+        images.push(render(&stage.input(reflectance, size, 2, &background))?.image);
     }
     let [width, height] = size;
-    let mut sheet = Picture {
-        width: width * pictures.len(),
+    let mut sheet = Image {
+        width: width * images.len(),
         height: 2 * height,
-        pixels: vec![Vec3::ZERO; 2 * width * height * pictures.len()],
+        pixels: vec![Vec3::ZERO; 2 * width * height * images.len()],
     };
-    for (k, picture) in pictures.iter().enumerate() {
-        for (pixel, value) in picture.pixels.iter().enumerate() {
+    for (k, image) in images.iter().enumerate() {
+        for (pixel, value) in image.pixels.iter().enumerate() {
             let (x, y) = (pixel % width + k * width, pixel / width);
             sheet.pixels[y * sheet.width + x] = *value;
-            sheet.pixels[(y + height) * sheet.width + x] = (*value - pictures[0].pixels[pixel]).abs();
+            sheet.pixels[(y + height) * sheet.width + x] = (*value - images[0].pixels[pixel]).abs();
         }
     }
     Ok(sheet)

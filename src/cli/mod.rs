@@ -12,7 +12,7 @@ pub mod profile;
 pub mod render;
 pub mod report;
 pub mod tile;
-mod to_picture;
+mod to_image;
 
 use std::io::Write;
 
@@ -21,7 +21,7 @@ use crate::diagnostics::Health;
 use crate::pipeline::Outcome;
 use crate::scene;
 use crate::scene::{Effects, LoadedScene, Switch};
-use crate::tuning::choose::{Goal, choose};
+use crate::tuning::choose::{Target, choose};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -81,13 +81,13 @@ impl SceneArgs {
         }
     }
 
-    fn goal(&self) -> Option<Goal> {
-        self.target_db.map(Goal::Decibels).or(self.budget_ms.map(Goal::Milliseconds))
+    fn goal(&self) -> Option<Target> {
+        self.target_db.map(Target::Decibels).or(self.budget_ms.map(Target::Milliseconds))
     }
 
     /// The scene with settings that were chosen for a goal. What was asked and got is always said: without it nobody could
     /// repeat the settings.
-    fn choose(&self, loaded: &LoadedScene, goal: Goal) -> Result<LoadedScene> {
+    fn choose(&self, loaded: &LoadedScene, goal: Target) -> Result<LoadedScene> {
         let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         let chosen = choose(loaded, goal, &Cancel::default(), |doing| {
             bar.set_message(doing.to_owned());

@@ -5,7 +5,7 @@ use std::io::Write;
 use crate::base::Cancel;
 use crate::diagnostics::Health;
 use crate::pipeline::Pipeline;
-use crate::render::Stage;
+use crate::render::RenderScene;
 use crate::report::{EffectCost, measure_effects};
 use anyhow::Result;
 use indicatif::ProgressBar;
@@ -31,7 +31,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     let loaded = args.scene.open()?;
     let mut pipeline = Pipeline::new();
     let outcome = pipeline.effective(&loaded)?;
-    let dropped_lights = Stage::new(&loaded)?.dropped_lights;
+    let dropped_lights = RenderScene::new(&loaded)?.dropped_lights;
     let measured = if args.measure {
         let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         let costs = measure_effects(&loaded, &Cancel::default(), |name| {

@@ -6,13 +6,13 @@ use std::time::Instant;
 
 use crate::base::{Error, InputError};
 use crate::pipeline::Pipeline;
-use crate::render::Stage;
+use crate::render::RenderScene;
 use anyhow::Result;
 use serde::Serialize;
 
 use super::print_json;
-use super::render::Route;
-use super::to_picture::ToPicture;
+use super::render::RenderPath;
+use super::to_image::ToImage;
 use super::{Edit, ProfileArgs};
 
 #[derive(Serialize)]
@@ -38,16 +38,16 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let mut pipeline = Pipeline::new();
     let mut outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
-    let mut pictured = if args.picture { Some(ToPicture::new(&loaded, &outcome, args.size)?) } else { None };
+    let mut shading_brdf = if args.image { Some(ToImage::new(&loaded, &outcome, args.size)?) } else { None };
     let mut form = outcome.brdf.form.describe();
     let mut camera = if args.edit == Some(Edit::Camera) {
-        let mut stage = Stage::new(&loaded)?;
-        let route = Route::of(&stage, &outcome)?;
+        let mut stage = RenderScene::new(&loaded)?;
+        let route = RenderPath::of(&stage, &outcome)?;
         // A camera edit keeps what pictures read, and the shadows of the object.
         stage.settle();
-        let pictured = route.reads(&outcome)?;
-        form = pictured.brdf.form.describe();
-        Some((stage, route, pictured))
+        let shading_brdf = route.reads(&outcome)?;
+        form = shading_brdf.brdf.form.describe();
+        Some((stage, route, shading_brdf))
     } else {
         None
     };
@@ -55,14 +55,14 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     for run in 0..=args.repeat {
         let start = Instant::now();
         let times = match (&mut camera, args.edit) {
-            (None, Some(_)) if pictured.is_some() => {
-                let Some(to_picture) = &mut pictured else { continue };
-                let times = to_picture.make(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
-                form.clone_from(&to_picture.form);
+            (None, Some(_)) if shading_brdf.is_some() => {
+                let Some(to_image) = &mut shading_brdf else { continue };
+                let times = to_image.make(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
+                form.clone_from(&to_image.form);
                 times
             }
-            (Some((stage, route, pictured)), _) => {
-                let times = route.show(stage, &pictured.brdf, args.size)?;
+            (Some((stage, route, shading_brdf)), _) => {
+                let times = route.show(stage, &shading_brdf.brdf, args.size)?;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
             }
             (None, Some(_)) => {

@@ -3,15 +3,14 @@
 use crate::base::{Cancel, Error};
 use crate::diagnostics::Health;
 use crate::effective::EffectiveBrdf;
-use crate::gpu::render::picture;
 use crate::gpu::{Gpu, GpuError, GpuRenderer, Tier};
-use crate::pipeline::{Outcome, Pictured, Pipeline};
+use crate::pipeline::{Outcome, Pipeline, ShadingBrdf};
 use crate::plan::Backend;
-use crate::render::image::render::StageTimes;
+use crate::render::image::render::RenderTimes;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
-use crate::render::{Rendered, Stage};
+use crate::render::{RenderScene, Rendered};
 use anyhow::Result;
 use serde::Serialize;
 
@@ -19,7 +18,7 @@ use super::RenderArgs;
 use super::{cache, print_json};
 
 /// Where pictures are made.
-pub enum Route {
+pub enum RenderPath {
     /// `refused`: why the graphics processor, which is there, does not.
     Cpu {
         refused: Option<GpuError>,
@@ -31,32 +30,34 @@ pub enum Route {
 pub struct OnDevice {
     gpu: Gpu,
     renderer: GpuRenderer,
-    reads: Pictured,
+    reads: ShadingBrdf,
     /// What a screen would show, and its size.
     image: Option<([usize; 2], wgpu::TextureView)>,
     /// Whether the person asked for it.
     required: bool,
 }
 
-impl Route {
+impl RenderPath {
     /// The route that the scene's back end asks for: `gpu` any adapter or an error that says why not, `cpu` none, `auto` a
     /// graphics processor that is more than the CPU in disguise, where it can shade this BRDF.
-    pub fn of(stage: &Stage, outcome: &Outcome) -> Result<Self> {
+    pub fn of(stage: &RenderScene, outcome: &Outcome) -> Result<Self> {
         let required = outcome.settings.backend == Backend::Gpu;
-        let Some(gpu) = Self::device(outcome)? else { return Ok(Route::Cpu { refused: None }) };
+        let Some(gpu) = Self::device(outcome)? else { return Ok(RenderPath::Cpu { refused: None }) };
         let renderer = |brdf: &EffectiveBrdf| GpuRenderer::wearing(&gpu, &stage.mesh, stage.occluder.as_ref(), brdf);
-        let table = outcome.for_pictures(&Cancel::default())?;
+        let table = outcome.shading_brdf(&Cancel::default())?;
         let made = match renderer(&table.brdf) {
             Err(GpuError::Unsupported(_)) => {
-                let sums = Pictured { brdf: outcome.brdf.clone(), errors: None, ..table };
+                let sums = ShadingBrdf { brdf: outcome.brdf.clone(), errors: None, ..table };
                 renderer(&sums.brdf).map(|renderer| (renderer, sums))
             }
             made => made.map(|renderer| (renderer, table)),
         };
         match made {
-            Ok((renderer, reads)) => Ok(Route::Gpu(Box::new(OnDevice { gpu, renderer, reads, image: None, required }))),
+            Ok((renderer, reads)) => {
+                Ok(RenderPath::Gpu(Box::new(OnDevice { gpu, renderer, reads, image: None, required })))
+            }
             Err(error) if required => Err(Error::from(error).into()),
-            Err(error) => Ok(Route::Cpu { refused: Some(error) }),
+            Err(error) => Ok(RenderPath::Cpu { refused: Some(error) }),
         }
     }
 
@@ -76,7 +77,7 @@ impl Route {
     /// The stage's object in a material.
     pub fn render(
         &mut self,
-        stage: &Stage,
+        stage: &RenderScene,
         brdf: &EffectiveBrdf,
         size: [usize; 2],
         samples_per_side: usize,
@@ -93,14 +94,15 @@ impl Route {
         })
     }
 
-    /// As [`Route::render`], as far as a screen needs it: a picture on the device stays there.
-    pub fn show(&mut self, stage: &Stage, brdf: &EffectiveBrdf, size: [usize; 2]) -> Result<StageTimes> {
+    /// As [`RenderPath::render`], as far as a screen needs it: a picture on the device stays there.
+    pub fn show(&mut self, stage: &RenderScene, brdf: &EffectiveBrdf, size: [usize; 2]) -> Result<RenderTimes> {
         let Self::Gpu(device) = self else { return Ok(self.render(stage, brdf, size, 1)?.times) };
         let OnDevice { gpu, renderer, image, .. } = &mut **device;
         let image = match image {
             Some((of, view)) if *of == size => view,
             none => {
-                let view = picture::image(gpu, size).map_err(Error::from)?.create_view(&Default::default());
+                let view =
+                    crate::gpu::render::image::image(gpu, size).map_err(Error::from)?.create_view(&Default::default());
                 &none.insert((size, view)).1
             }
         };
@@ -110,9 +112,9 @@ impl Route {
     }
 
     /// The form of a material that this route reads: a table where it is close enough, else the sums.
-    pub fn reads(&self, outcome: &Outcome) -> Result<Pictured> {
+    pub fn reads(&self, outcome: &Outcome) -> Result<ShadingBrdf> {
         Ok(match self {
-            Self::Cpu { .. } => outcome.for_pictures(&Cancel::default())?,
+            Self::Cpu { .. } => outcome.shading_brdf(&Cancel::default())?,
             Self::Gpu(device) => device.reads.clone(),
         })
     }
@@ -128,7 +130,8 @@ impl Route {
 
 #[derive(Serialize)]
 struct Report<'a> {
-    picture: String,
+    #[serde(rename = "picture")]
+    image: String,
     width: usize,
     height: usize,
     lights: usize,
@@ -143,11 +146,11 @@ struct Report<'a> {
 
 pub fn run(args: &RenderArgs) -> Result<()> {
     let loaded = args.scene.open()?;
-    let stage = Stage::new(&loaded)?;
+    let stage = RenderScene::new(&loaded)?;
     let tone_map = ToneMap::new(&stage.camera)?;
     let cache = args.keeping.open();
     let mut pipeline = Pipeline::new();
-    pipeline.keep_in(cache.clone());
+    pipeline.set_cache(cache.clone());
     let outcome = pipeline.effective(&loaded)?;
     if !args.scene.quiet {
         for warning in stage.mesh.warnings.iter().chain(&stage.lights.warnings) {
@@ -155,18 +158,18 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         }
     }
     args.scene.notes(&outcome);
-    let mut route = Route::of(&stage, &outcome)?;
-    if let (Route::Cpu { refused: Some(error) }, false) = (&route, args.scene.quiet) {
+    let mut route = RenderPath::of(&stage, &outcome)?;
+    if let (RenderPath::Cpu { refused: Some(error) }, false) = (&route, args.scene.quiet) {
         eprintln!("note: shaded on the CPU: {error}");
     }
-    let pictured = route.reads(&outcome)?;
-    let rendered = route.render(&stage, &pictured.brdf, args.size, usize::from(args.samples))?;
-    rendered.picture.write(&args.output, &tone_map)?;
+    let shading_brdf = route.reads(&outcome)?;
+    let rendered = route.render(&stage, &shading_brdf.brdf, args.size, usize::from(args.samples))?;
+    rendered.image.write(&args.output, &tone_map)?;
     cache::finish(&cache, args.scene.quiet);
     if args.scene.json {
         let times = rendered.times;
         let large = [
-            (if pictured.was_kept { "cached_picture_table" } else { "picture_table" }, pictured.ms),
+            (if shading_brdf.was_kept { "cached_picture_table" } else { "picture_table" }, shading_brdf.ms),
             ("g_buffer", times.gbuffer_ms),
             ("shadows", times.shadows_ms),
             ("shading", times.shading_ms),
@@ -174,13 +177,13 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         let stages =
             outcome.times.iter().copied().chain(large).map(|(name, ms)| (name.to_owned(), ms.into())).collect();
         return print_json(&Report {
-            picture: args.output.display().to_string(),
+            image: args.output.display().to_string(),
             width: args.size[0],
             height: args.size[1],
             lights: stage.lights.directional.len(),
             points: rendered.points,
             device: route.describe(),
-            reads: pictured.brdf.form.describe(),
+            reads: shading_brdf.brdf.form.describe(),
             stages,
             health: outcome.health(),
         });

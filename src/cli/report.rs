@@ -8,11 +8,11 @@ use crate::base::{Error, InputError, replace_file};
 use crate::effective::EffectiveBrdf;
 use crate::pipeline::Pipeline;
 use crate::reference::ReferenceSettings;
-use crate::report::{Machine, Report, SceneReport, Studio, Thumbnail, difference_png};
+use crate::report::{Machine, Report, SceneReport, Thumbnail, ThumbnailRenderer, difference_png};
 use crate::scene;
 use crate::scene::LoadedScene;
 use crate::tuning::candidates::{Candidate, Family, candidates, with_settings};
-use crate::tuning::ladder;
+use crate::tuning::quality_scale;
 use crate::tuning::sweep::{Point, Truth, measure, reference_point};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -171,7 +171,7 @@ fn in_order(all: Vec<Candidate>) -> Vec<Candidate> {
 
 /// Whether one horizon an azimuth does not tell what a facet sees.
 fn overhangs(loaded: &LoadedScene) -> bool {
-    let settings = with_settings(loaded, &ladder::rung(0.0, false));
+    let settings = with_settings(loaded, &quality_scale::rung(0.0, false));
     settings.and_then(|scene| Pipeline::new().effective(&scene)).is_ok_and(|outcome| outcome.plan.overhangs())
 }
 
@@ -186,26 +186,21 @@ fn has_measured(loaded: &LoadedScene) -> bool {
 const FINEST: [usize; 2] = [65_536, 16_384];
 
 fn thumbnails(loaded: &LoadedScene, bar: &ProgressBar) -> Result<Vec<Thumbnail>> {
-    let studio = Studio::new(loaded)?;
-    let picture = |preset: &'static str, set: &[String]| -> Result<_> {
+    let studio = ThumbnailRenderer::new(loaded)?;
+    let image = |preset: &'static str, set: &[String]| -> Result<_> {
         let candidate = Candidate { family: Family::Preset, preset, set: set.to_vec() };
         let brdf: std::sync::Arc<EffectiveBrdf> = Pipeline::new().effective(&with_settings(loaded, &candidate)?)?.brdf;
-        Ok(studio.picture(&*brdf)?)
+        Ok(studio.image(&*brdf)?)
     };
     let facets = FINEST[usize::from(has_measured(loaded))];
     bar.set_message("the finest picture");
-    let finest = picture("fine", &[format!("quality.facets={facets}"), "quality.method=\"direct\"".to_owned()])?;
+    let finest = image("fine", &[format!("quality.facets={facets}"), "quality.method=\"direct\"".to_owned()])?;
     let label = format!("direct sum of {facets} facets");
-    let mut all = vec![Thumbnail {
-        label,
-        picture: studio.png(&finest)?,
-        difference: None,
-        mean_delta_e: 0.0,
-        high_delta_e: 0.0,
-    }];
+    let mut all =
+        vec![Thumbnail { label, image: studio.png(&finest)?, difference: None, mean_delta_e: 0.0, high_delta_e: 0.0 }];
     for preset in ["draft", "standard", "wu2011"] {
         bar.set_message(format!("picture at {preset}"));
-        let shown = picture(preset, &[])?;
+        let shown = image(preset, &[])?;
         let mut delta_e = studio.difference(&shown, &finest);
         let difference = Some(difference_png(&delta_e)?);
         delta_e.sort_by(f32::total_cmp);
@@ -213,7 +208,7 @@ fn thumbnails(loaded: &LoadedScene, bar: &ProgressBar) -> Result<Vec<Thumbnail>>
         let high_delta_e = delta_e.get(delta_e.len() * 95 / 100).copied().unwrap_or(0.0);
         all.push(Thumbnail {
             label: preset.to_owned(),
-            picture: studio.png(&shown)?,
+            image: studio.png(&shown)?,
             difference,
             mean_delta_e,
             high_delta_e,

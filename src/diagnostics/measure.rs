@@ -5,9 +5,9 @@ use std::f32::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Evidence, FactorHealth, MaterialHealth, MeasuredHealth, ResultHealth, Sight, SurfaceHealth};
+use super::{FactorHealth, HealthInputs, MaterialHealth, MeasuredHealth, ResultHealth, SurfaceHealth, VisibilityInput};
 use crate::brdf::{Brdf, LUMINANCE, LobeAngles, Measured, Term};
-use crate::effective::{EffectiveBrdf, Form, Reflectance, SumMaterial};
+use crate::effective::{EffectiveBrdf, Material, Reflectance, Representation};
 use crate::math::directions::{PolarGrid, from_angles};
 use crate::metrics::{Errors, mirror_biased_pairs};
 
@@ -33,7 +33,7 @@ fn views() -> impl Iterator<Item = ([f32; 2], Vec3)> {
     })
 }
 
-pub fn materials(materials: &[SumMaterial], names: &[String]) -> (Vec<MeasuredHealth>, Vec<MaterialHealth>) {
+pub fn materials(materials: &[Material], names: &[String]) -> (Vec<MeasuredHealth>, Vec<MaterialHealth>) {
     let mut measured: Vec<MeasuredHealth> = Vec::new();
     let mut all = Vec::new();
     for (k, material) in materials.iter().enumerate() {
@@ -96,7 +96,7 @@ fn half_width_of_table(table: &dyn Measured) -> Option<f32> {
         .flatten()
 }
 
-pub fn surface(evidence: &Evidence, lobe_deg: Option<f32>) -> SurfaceHealth {
+pub fn surface(evidence: &HealthInputs, lobe_deg: Option<f32>) -> SurfaceHealth {
     let facets = &evidence.facets;
     let mut health = SurfaceHealth {
         facets: facets.len(),
@@ -108,8 +108,8 @@ pub fn surface(evidence: &Evidence, lobe_deg: Option<f32>) -> SurfaceHealth {
     };
     let mut seen = vec![false; facets.len()];
     match &evidence.sight {
-        Sight::Soft(visibility) => {
-            health.walks_cut_short = visibility.cut_short();
+        VisibilityInput::Soft(visibility) => {
+            health.walks_cut_short = visibility.truncated();
             let mut v = vec![0.0; facets.len()];
             for (angles, direction) in views() {
                 visibility.fill(direction, 0..facets.len(), &mut v);
@@ -124,7 +124,7 @@ pub fn surface(evidence: &Evidence, lobe_deg: Option<f32>) -> SurfaceHealth {
                 }
             }
         }
-        Sight::Packed(packed) => {
+        VisibilityInput::Packed(packed) => {
             for direction in 0..packed.direction_count {
                 for (facet, seen) in seen.iter_mut().enumerate() {
                     *seen |= packed.is_visible(direction, facet);
@@ -156,7 +156,7 @@ fn facets_within(normals: &[Vec3], width: f32) -> Option<usize> {
     counts.get(counts.len() / 10).copied()
 }
 
-pub fn result(brdf: &EffectiveBrdf, evidence: &Evidence, lobe_deg: Option<f32>) -> ResultHealth {
+pub fn result(brdf: &EffectiveBrdf, evidence: &HealthInputs, lobe_deg: Option<f32>) -> ResultHealth {
     let mut health = ResultHealth::default();
     let geometric = evidence.facets.normals == evidence.facets.geometric_normals;
     if evidence.closes_plane && geometric && !evidence.facets.is_empty() {
@@ -227,11 +227,11 @@ fn lights_around(azimuth: f32, grid: PolarGrid) -> (Vec<Vec3>, Vec<f32>) {
 
 pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: usize) -> Option<FactorHealth> {
     let (used, ranks, step) = match brdf.direct_form() {
-        Form::LowRank(factors) => {
+        Representation::LowRank(factors) => {
             let step = std::f32::consts::FRAC_PI_2 / (factors.pairs.rings.max(2) - 1) as f32;
             (true, factors.channels.iter().map(|channel| channel.ranks.1).collect(), step)
         }
-        Form::Wu2011(tables) => {
+        Representation::Wu2011(tables) => {
             let ranks = tables.report.materials.iter().map(|material| material.n_rank).collect();
             (true, ranks, (TAU / tables.direction_count().max(1) as f32).sqrt())
         }
@@ -245,7 +245,7 @@ pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: u
         used,
         relative_error,
         effective_digits: relative_error.filter(|error| *error > 0.0).map(|error| -error.log10()),
-        at_rank_limit: matches!(brdf.direct_form(), Form::LowRank(_))
+        at_rank_limit: matches!(brdf.direct_form(), Representation::LowRank(_))
             && ranks.iter().any(|&rank: &usize| rank >= max_rank),
         ranks,
         lobe_grid_step_deg: step.to_degrees(),

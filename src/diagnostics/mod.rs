@@ -1,6 +1,6 @@
 //! How sound a result is: what was left out, where it is weakest, and what a person can do about it.
 //!
-//! Every [`crate::pipeline::Outcome`] carries the [`Evidence`]; the [`Health`] is measured from it when first asked for, so
+//! Every [`crate::pipeline::Outcome`] carries the [`HealthInputs`]; the [`Health`] is measured from it when first asked for, so
 //! that an editor's drafts do not wait for it.
 
 mod measure;
@@ -10,18 +10,18 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::effective::{EffectiveBrdf, SumMaterial};
+use crate::effective::{EffectiveBrdf, Material};
 use crate::geometry::{Facets, TileMesh};
 use crate::metrics::Errors;
 use crate::visibility::{PackedVisibility, Visibility};
 
 /// What the stages leave for the examination.
 #[derive(Debug, Clone)]
-pub struct Evidence {
+pub struct HealthInputs {
     pub facets: Arc<Facets>,
-    pub sight: Sight,
+    pub sight: VisibilityInput,
     /// The material of each slot, and the materials.
-    pub materials: Arc<(Vec<usize>, Vec<SumMaterial>)>,
+    pub materials: Arc<(Vec<usize>, Vec<Material>)>,
     /// Names of the materials.
     pub names: Vec<String>,
     pub closes_plane: bool,
@@ -29,7 +29,7 @@ pub struct Evidence {
 
 /// What facets see.
 #[derive(Debug, Clone)]
-pub enum Sight {
+pub enum VisibilityInput {
     Soft(Arc<Visibility>),
     /// Yes or no at fixed directions.
     Packed(Arc<PackedVisibility>),
@@ -134,7 +134,7 @@ pub struct Limits {
 
 impl Health {
     /// Examines a result.
-    pub fn of(brdf: &EffectiveBrdf, evidence: &Evidence, factored: Option<Errors>, limits: Limits) -> Self {
+    pub fn of(brdf: &EffectiveBrdf, evidence: &HealthInputs, factored: Option<Errors>, limits: Limits) -> Self {
         let (measured, materials) = measure::materials(&evidence.materials.1, &evidence.names);
         let lobe = materials.iter().filter_map(|material| material.narrowest_lobe_deg).reduce(f32::min);
         let conserving = materials.iter().all(|material| material.largest_albedo <= 1.0);
@@ -151,7 +151,7 @@ impl Health {
     }
 
     /// Of what has no effective BRDF to examine, as the reference sum: materials and mesh alone.
-    pub fn of_input(mesh: &TileMesh, materials: &[SumMaterial], names: &[String], limits: Limits) -> Self {
+    pub fn of_input(mesh: &TileMesh, materials: &[Material], names: &[String], limits: Limits) -> Self {
         let (measured, materials) = measure::materials(materials, names);
         let left_out = (0..mesh.triangles.len()).filter(|&triangle| mesh.triangle_area(triangle) <= 0.0).count();
         let surface = SurfaceHealth {

@@ -4,27 +4,27 @@ use super::{Health, Limits};
 
 /// Part of a measured file's samples that may be left out: below, what was interpolated in their place is a matter of single
 /// bins. (MERL's own files mark nothing; exports of other programs mark the bins under the horizon, 20 %.)
-const MOST_REJECTED: f64 = 0.25;
+const MAX_REJECTED: f64 = 0.25;
 /// Half a percent is what quadrature and rounding leave; pbrt's own test of energy allows 1 %.
-const MOST_ALBEDO: f32 = 1.01;
+const MAX_ALBEDO: f32 = 1.01;
 /// The effective albedo is summed on a coarser grid, of interpolated visibility: measured 1.00 to 1.03 on white tiles.
-const MOST_EFFECTIVE_ALBEDO: f32 = 1.06;
+const MAX_EFFECTIVE_ALBEDO: f32 = 1.06;
 /// A systematic sample of 2,048 facets leaves 1 to 5 % up to 80° on the shipped tiles; a tenth is seen in pictures.
-const MOST_AREA_ERROR: f64 = 0.15;
+const MAX_AREA_ERROR: f64 = 0.15;
 /// With fewer facets in sight the noise (one over the root of their number) is above 20 %.
-const FEWEST_IN_SIGHT: usize = 24;
+const MIN_IN_SIGHT: usize = 24;
 /// With fewer facets inside a lobe single facets show as sparkles: noise above 40 %.
-const FEWEST_IN_A_LOBE: usize = 6;
+const MIN_IN_A_LOBE: usize = 6;
 /// A narrowest lobe `w` read linearly from a grid of step `s` loses `(s/w)²/4` of its peak: above 0.63 a tenth and more.
 const WIDEST_STEP: f32 = 0.63;
 /// Averaging `f(i,o)` and `f(o,i)` changes the material visibly above this.
-const MOST_ASYMMETRY: f32 = 0.2;
+const MAX_ASYMMETRY: f32 = 0.2;
 /// A result is reciprocal by construction: what is left is rounding of f32 sums.
-const MOST_RESIDUAL: f64 = 1e-3;
+const MAX_RESIDUAL: f64 = 1e-3;
 /// Of the walks for horizons: what a few leave out is lost in the penumbra.
-const MOST_CUT_SHORT: f64 = 0.02;
+const MAX_CUT_SHORT: f64 = 0.02;
 /// Part of the area that may be in no one's sight: weaves hide 70 %, and facets spent there are missing elsewhere.
-const MOST_UNSEEN: f64 = 0.9;
+const MAX_UNSEEN: f64 = 0.9;
 
 pub fn of(health: &Health, limits: Limits, conserving: bool) -> Vec<String> {
     let mut words = Vec::new();
@@ -42,7 +42,7 @@ fn inputs(health: &Health, words: &mut Vec<String>) {
     for table in &health.measured {
         if table.samples > 0 && table.rejected == table.samples {
             words.push(format!("`{}` holds no valid sample and is black: is it the right file?", table.name));
-        } else if table.rejected as f64 > MOST_REJECTED * table.samples as f64 {
+        } else if table.rejected as f64 > MAX_REJECTED * table.samples as f64 {
             let part = percent(table.rejected as f64 / table.samples as f64);
             words.push(format!(
                 "{part} of the samples of `{}` are negative, NaN, infinite or missing; what surrounds them stands in: \
@@ -50,7 +50,7 @@ fn inputs(health: &Health, words: &mut Vec<String>) {
                 table.name
             ));
         }
-        if table.reciprocity_residual > MOST_ASYMMETRY {
+        if table.reciprocity_residual > MAX_ASYMMETRY {
             words.push(format!(
                 "`{}` changes by {} when light and viewer are swapped; the mean of both is used",
                 table.name,
@@ -58,7 +58,7 @@ fn inputs(health: &Health, words: &mut Vec<String>) {
             ));
         }
     }
-    for material in health.materials.iter().filter(|material| material.largest_albedo > MOST_ALBEDO) {
+    for material in health.materials.iter().filter(|material| material.largest_albedo > MAX_ALBEDO) {
         words.push(format!(
             "material `{}` sends back up to {:.3} times the light it gets: lower its colour, specular or albedo below {:.3} \
              of what it is to conserve energy",
@@ -75,7 +75,7 @@ fn surface(health: &Health, words: &mut Vec<String>) {
         words.push("the tile has no area: nothing reflects; check the mesh".to_owned());
         return;
     }
-    if surface.fewest_facets_seen < FEWEST_IN_SIGHT {
+    if surface.fewest_facets_seen < MIN_IN_SIGHT {
         let [theta, phi] = surface.fewest_seen_from_deg;
         words.push(format!(
             "from theta {theta:.0}°, phi {phi:.0}° only {} of {} facets are in sight, so values there are noisy: raise \
@@ -83,20 +83,20 @@ fn surface(health: &Health, words: &mut Vec<String>) {
             surface.fewest_facets_seen, surface.facets
         ));
     }
-    if surface.area_never_seen > MOST_UNSEEN {
+    if surface.area_never_seen > MAX_UNSEEN {
         words.push(format!(
             "{} of the surface is seen from nowhere above: remove what is hidden, or raise quality.facets",
             percent(surface.area_never_seen)
         ));
     }
-    if surface.walks_cut_short > MOST_CUT_SHORT {
+    if surface.walks_cut_short > MAX_CUT_SHORT {
         words.push(format!(
             "the tile is so deep or so dense that {} of the walks for its horizons were cut short: shadows from far away \
              may be missing low over the horizon",
             percent(surface.walks_cut_short)
         ));
     }
-    if surface.facets_in_a_lobe.is_some_and(|count| count < FEWEST_IN_A_LOBE) {
+    if surface.facets_in_a_lobe.is_some_and(|count| count < MIN_IN_A_LOBE) {
         words.push(format!(
             "the narrowest lobe ({}) meets only {} of {} facets at a time, so highlights sparkle: raise quality.facets or \
              the roughness",
@@ -122,7 +122,7 @@ fn result(health: &Health, limits: Limits, conserving: bool, words: &mut Vec<Str
             result.unsound_values
         ));
     }
-    if let Some(error) = result.projected_area_error.filter(|error| *error > MOST_AREA_ERROR) {
+    if let Some(error) = result.projected_area_error.filter(|error| *error > MAX_AREA_ERROR) {
         let [theta, phi] = result.worst_angle_deg;
         words.push(format!(
             "the facets' projected area is {} off at theta {theta:.0}°, phi {phi:.0}°: raise quality.facets or take a finer \
@@ -130,14 +130,14 @@ fn result(health: &Health, limits: Limits, conserving: bool, words: &mut Vec<Str
             percent(error)
         ));
     }
-    if let Some(albedo) = result.largest_albedo.filter(|albedo| conserving && *albedo > MOST_EFFECTIVE_ALBEDO) {
+    if let Some(albedo) = result.largest_albedo.filter(|albedo| conserving && *albedo > MAX_EFFECTIVE_ALBEDO) {
         let [theta, phi] = result.largest_albedo_at_deg;
         words.push(format!(
             "the result sends back {albedo:.3} times the light at theta {theta:.0}°, phi {phi:.0}° although its materials \
              conserve energy: take a finer preset or quality.method = \"direct\""
         ));
     }
-    if result.reciprocity_residual > MOST_RESIDUAL {
+    if result.reciprocity_residual > MAX_RESIDUAL {
         words.push(format!("light and viewer do not swap: {} (relative L2)", percent(result.reciprocity_residual)));
     }
     let Some(factors) = health.factorization.as_ref().filter(|factors| factors.used) else { return };

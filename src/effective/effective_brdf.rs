@@ -4,25 +4,25 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::{Direct, LowRank, PairTable, Reflectance, Wu2011};
+use super::{Direct, LowRank, Reflectance, ShadingTable, Wu2011};
 use crate::interreflection::InterreflectionTable;
 
 /// How `G` is held.
 #[derive(Debug, Clone)]
-pub enum Form {
+pub enum Representation {
     /// A live sum over facets with exact lobes.
     Direct(Direct),
     /// Visibility factors on an (i,o) grid times lobe factors on an (h,d) grid.
     LowRank(LowRank),
     /// A table of the sum over half and difference coordinates, for pictures.
-    Table(PairTable),
+    Table(ShadingTable),
     /// The paper's own tables.
     Wu2011(Wu2011),
     /// Any of these, and the light between facets added.
-    Interreflecting(Box<Form>, Arc<InterreflectionTable>),
+    Interreflecting(Box<Representation>, Arc<InterreflectionTable>),
 }
 
-impl Form {
+impl Representation {
     /// What holds the BRDF, in words.
     pub fn describe(&self) -> String {
         match self {
@@ -49,7 +49,7 @@ impl Form {
 /// The effective large-scale BRDF of a tile (Wu et al. 2011, Eq. 7). `f̄` includes the light's cosine.
 #[derive(Debug, Clone)]
 pub struct EffectiveBrdf {
-    pub form: Form,
+    pub form: Representation,
     /// Base area `A` of the tile.
     pub base_area: f64,
 }
@@ -76,21 +76,21 @@ impl EffectiveBrdf {
 
     /// With light between facets added.
     pub fn interreflecting(self, table: Arc<InterreflectionTable>) -> Self {
-        Self { form: Form::Interreflecting(Box::new(self.form), table), ..self }
+        Self { form: Representation::Interreflecting(Box::new(self.form), table), ..self }
     }
 
     /// How what facets reflect directly is held; without the light between them.
-    pub fn direct_form(&self) -> &Form {
+    pub fn direct_form(&self) -> &Representation {
         match &self.form {
-            Form::Interreflecting(form, _) => form,
+            Representation::Interreflecting(form, _) => form,
             form => form,
         }
     }
 
     /// The same light between facets, and another form of what they reflect directly.
-    pub fn with_direct_form(&self, form: Form) -> Self {
+    pub fn with_direct_form(&self, form: Representation) -> Self {
         let form = match &self.form {
-            Form::Interreflecting(_, table) => Form::Interreflecting(Box::new(form), table.clone()),
+            Representation::Interreflecting(_, table) => Representation::Interreflecting(Box::new(form), table.clone()),
             _ => form,
         };
         Self { form, base_area: self.base_area }
@@ -98,7 +98,7 @@ impl EffectiveBrdf {
 
     /// `a_v(o)`, and `a_v f̄` of each light into `out`.
     fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
-        if let Form::Interreflecting(form, table) = &self.form {
+        if let Representation::Interreflecting(form, table) = &self.form {
             let mut direct = vec![DVec3::ZERO; lights.len()];
             let area = form.sums(lights, o, |k, sum| direct[k] = sum);
             table.add(lights, o, |k, g| out(k, direct[k] + g * self.base_area));
@@ -108,15 +108,15 @@ impl EffectiveBrdf {
     }
 }
 
-impl Form {
+impl Representation {
     /// `a_v(o)`, and `a_v f̄` of each light into `out`; what facets send to each other is added by [`EffectiveBrdf`].
     pub(crate) fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         match self {
             Self::Interreflecting(form, _) => form.sums(lights, o, &mut out as &mut dyn FnMut(usize, DVec3)),
-            Form::Direct(direct) => direct.sums(lights, o, out),
-            Form::LowRank(factors) => factors.sums(lights, o, out),
-            Form::Table(table) => table.sums(lights, o, out),
-            Form::Wu2011(tables) => tables.sums(lights, o, out),
+            Representation::Direct(direct) => direct.sums(lights, o, out),
+            Representation::LowRank(factors) => factors.sums(lights, o, out),
+            Representation::Table(table) => table.sums(lights, o, out),
+            Representation::Wu2011(tables) => tables.sums(lights, o, out),
         }
     }
 }

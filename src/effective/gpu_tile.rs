@@ -11,9 +11,9 @@ use crate::visibility::Visibility;
 
 /// Facets and their lobes, and how they come to see.
 #[derive(Debug)]
-pub struct UnseenSum {
+pub struct GpuTileInput {
     pub sum: FacetSum,
-    pub sight: Sight,
+    pub sight: GpuVisibilityInput,
     /// Base area `A` of the tile.
     pub base_area: f64,
     /// What a table for pictures is made of; absent where none is expected to pay.
@@ -23,13 +23,13 @@ pub struct UnseenSum {
 
 /// How facets come to see.
 #[derive(Debug)]
-pub enum Sight {
+pub enum GpuVisibilityInput {
     /// The CPU saw for them.
     Seen(Arc<Visibility>),
     /// By walking this height-field.
     Heights(Heights),
     /// By cutting the tile along azimuths.
-    Slices(Box<Sliced>),
+    OcclusionIntervals(Box<Sliced>),
     /// By drawing the tile from many directions.
     Maps(Box<Maps>),
 }

@@ -14,17 +14,17 @@ use crate::math::simd::cubic_weights;
 
 pub use direct::Direct;
 pub(crate) use direct::facet_groups::Group;
-pub use direct::facet_sum::{FacetSum, SumMaterial, analytic_lobe};
+pub use direct::facet_sum::{FacetSum, Material, analytic_lobe};
 pub use direct::forced::mean_colors;
-pub use effective_brdf::{EffectiveBrdf, Form};
-pub use gpu_tile::{Heights, Maps, Sight, Sliced, UnseenSum};
+pub use effective_brdf::{EffectiveBrdf, Representation};
+pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, Heights, Maps, Sliced};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
 
 pub use shading_table::content::TableContent;
-pub(crate) use shading_table::sampled::share_of;
-pub use shading_table::{Nodes, PairTable};
+pub(crate) use shading_table::sampled_facets::share_of;
+pub use shading_table::{Nodes, ShadingTable};
 pub use tint::Tint;
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 

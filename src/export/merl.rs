@@ -14,7 +14,7 @@ use crate::math::directions::half_vector;
 
 /// Azimuths of the tile that are averaged.
 const TURNS: usize = 12;
-/// Places along `θ_d` and `φ_d` that are evaluated; the bins between are interpolated, for only facets' lobes, which stand
+/// GridCoordinates along `θ_d` and `φ_d` that are evaluated; the bins between are interpolated, for only facets' lobes, which stand
 /// still in `θ_h`, are sharp.
 const NODES_D: usize = 31;
 const NODES_PHI: usize = 31;
@@ -42,7 +42,7 @@ fn mean(brdf: &EffectiveBrdf, [theta_h, theta_d, phi_d]: [f64; 3], turning: &mut
             let turn = glam::DQuat::from_rotation_z(k as f64 / TURNS as f64 * TAU);
             let value = brdf.eval((turn * i).as_vec3(), (turn * o).as_vec3());
             // Noise of a vanishing cosine is no reflectance.
-            value.as_dvec3() / i.z.max(SMALLEST_COSINE)
+            value.as_dvec3() / i.z.max(MIN_COSINE)
         })
         .collect();
     let mean = values.iter().sum::<DVec3>() / TURNS as f64;
@@ -55,7 +55,7 @@ fn mean(brdf: &EffectiveBrdf, [theta_h, theta_d, phi_d]: [f64; 3], turning: &mut
     Some(mean)
 }
 
-const SMALLEST_COSINE: f64 = 1e-3;
+const MIN_COSINE: f64 = 1e-3;
 
 /// The angles of fractional bins.
 fn angles(h: f64, d: f64, phi: f64) -> [f64; 3] {

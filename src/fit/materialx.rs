@@ -5,17 +5,17 @@ use glam::Vec3;
 use super::Fit;
 
 /// No index of refraction is larger than that of this f0.
-const LARGEST_F0: f32 = 0.98;
+const MAX_F0: f32 = 0.98;
 
 /// `specular_color` scales a dielectric's whole Fresnel factor: it is the edge, and the index of refraction is the one whose f0
 /// is the fit's largest channel under it. A metal's edge is white.
 pub fn materialx(fit: &Fit, name: &str) -> String {
     let weight = |k: usize| fit.weights.get(k).copied().unwrap_or_default();
-    let (base, f0, fuzz) = (weight(0), weight(1).clamp(Vec3::ZERO, Vec3::splat(LARGEST_F0)), weight(2));
+    let (base, f0, fuzz) = (weight(0), weight(1).clamp(Vec3::ZERO, Vec3::splat(MAX_F0)), weight(2));
     let metal = f0.dot(crate::brdf::LUMINANCE) > base.dot(crate::brdf::LUMINANCE);
     let largest = f0.max_element();
-    let edge = fit.shape.edge.max(largest / LARGEST_F0).min(1.0);
-    let root = if edge > 0.0 { (largest / edge).min(LARGEST_F0).sqrt() } else { 0.0 };
+    let edge = fit.shape.edge.max(largest / MAX_F0).min(1.0);
+    let root = if edge > 0.0 { (largest / edge).min(MAX_F0).sqrt() } else { 0.0 };
     let ior = (1.0 + root) / (1.0 - root);
     let tint = edge * if largest > 1e-6 { f0 / largest } else { Vec3::ONE };
     let [x, y] = fit.shape.roughness;

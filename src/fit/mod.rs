@@ -22,7 +22,7 @@ use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
 
 pub use gltf::gltf;
 pub use materialx::materialx;
-pub use models::{Model, Shape};
+pub use models::{LobeShape, Model};
 
 use least_squares::Normal;
 
@@ -39,7 +39,7 @@ const TRIED_A_STEP: u64 = 16;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     pub model: Model,
-    pub shape: Shape,
+    pub shape: LobeShape,
     /// A weight a lobe of the model, linear RGB.
     pub weights: Vec<Vec3>,
     /// On pairs that were not fitted, `f̄`.
@@ -101,7 +101,7 @@ struct Problem {
 
 impl Problem {
     /// The best weights for a shape, and the squares that are left.
-    fn weights(&self, shape: &Shape) -> (Vec<Vec3>, f64) {
+    fn weights(&self, shape: &LobeShape) -> (Vec<Vec3>, f64) {
         let count = self.model.lobes();
         let mut normal = Normal::new(count);
         for (pair, target) in self.pairs.iter().zip(&self.targets) {

@@ -18,7 +18,7 @@ pub enum Model {
 
 /// What does not enter linearly.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shape {
+pub struct LobeShape {
     /// Width of the lobe along its own x and y: Beckmann's m, GGX's α.
     pub roughness: [f32; 2],
     /// Azimuth of the lobe's x from the tangent, radians.
@@ -74,22 +74,22 @@ impl Model {
         edges.iter().flat_map(|&edge| shapes.iter().map(move |shape| [&[edge], *shape].concat())).collect()
     }
 
-    pub(super) fn shape(self, parameters: &[f64]) -> Shape {
+    pub(super) fn shape(self, parameters: &[f64]) -> LobeShape {
         let bounded = |log: f64| (log.exp() as f32).clamp(ROUGHNESS[0], ROUGHNESS[1]);
         let edge = parameters.first().map_or(1.0, |angle| angle.sin().powi(2) as f32);
         match (self, parameters) {
             (Self::Ggx, [_, log, ratio, turn]) => {
-                Shape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *turn as f32, edge }
+                LobeShape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *turn as f32, edge }
             }
             _ => {
                 let roughness = bounded(parameters.get(1).copied().unwrap_or(-1.0));
-                Shape { roughness: [roughness; 2], rotation: 0.0, edge }
+                LobeShape { roughness: [roughness; 2], rotation: 0.0, edge }
             }
         }
     }
 
     /// Lobes at a pair above the horizon.
-    pub(super) fn evaluate(self, shape: &Shape, i: Vec3, o: Vec3) -> Lobes {
+    pub(super) fn evaluate(self, shape: &LobeShape, i: Vec3, o: Vec3) -> Lobes {
         let h = half_vector(i, o);
         let fresnel = f64::from(schlick_weight(i.dot(h)));
         let edge = f64::from(shape.edge) * fresnel;
@@ -112,7 +112,7 @@ impl Model {
 }
 
 /// `D G2 / (4 cosθ_o)` of anisotropic GGX with height-correlated Smith shadowing (Heitz 2014), the light's cosine included.
-fn anisotropic_ggx(shape: &Shape, i: Vec3, o: Vec3, h: Vec3) -> f64 {
+fn anisotropic_ggx(shape: &LobeShape, i: Vec3, o: Vec3, h: Vec3) -> f64 {
     let (sin, cos) = f64::from(shape.rotation).sin_cos();
     let turned = |v: Vec3| {
         let v = v.as_dvec3();
@@ -136,7 +136,7 @@ fn sheen(i: Vec3, o: Vec3, h: Vec3) -> f64 {
     density / (4.0 * (n_i + n_o - n_i * n_o))
 }
 
-impl Shape {
+impl LobeShape {
     /// glTF's and OpenPBR's roughness (the root of α) and anisotropy: α along the grain `α = r²`, glTF's
     /// `α_t = mix(r², 1, anisotropy²)`; OpenPBR's `1 - α_b/α_t`.
     pub fn perceptual(&self) -> (f32, f32) {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::brdf::{Brdf, Term};
-use crate::effective::{Direct, FacetSum, Form, SumMaterial};
+use crate::effective::{Direct, FacetSum, Material, Representation};
 use crate::geometry::{self, Facets};
 use crate::scene::{Flat, Geometry, Scene};
 use crate::visibility::Visibility;
@@ -20,8 +20,8 @@ fn flat(terms: Vec<Term>) -> EffectiveBrdf {
     let mut facets = Facets::sample(&mesh, 16, 1);
     facets.sort_for_sums();
     let visibility = Visibility::Unblocked { facets: facets.len() };
-    let sum = FacetSum::new(&facets, &[0], &[SumMaterial { brdf: Brdf { terms }, color: Vec3::ONE }]);
-    EffectiveBrdf { form: Form::Direct(Direct::new(Arc::new(sum), Arc::new(visibility))), base_area: 1.0 }
+    let sum = FacetSum::new(&facets, &[0], &[Material { brdf: Brdf { terms }, color: Vec3::ONE }]);
+    EffectiveBrdf { form: Representation::Direct(Direct::new(Arc::new(sum), Arc::new(visibility))), base_area: 1.0 }
 }
 
 #[test]
@@ -47,7 +47,7 @@ fn a_matte_tile_has_no_edge_and_what_is_written_stays_in_the_ranges_of_the_forma
     }
     let rough = Fit {
         model: Model::Ggx,
-        shape: Shape { roughness: [1.0, 0.5], rotation: 0.0, edge: 0.0 },
+        shape: LobeShape { roughness: [1.0, 0.5], rotation: 0.0, edge: 0.0 },
         weights: vec![Vec3::splat(0.5), Vec3::new(0.3, 0.2, 0.0), Vec3::splat(2.0)],
         errors: Errors { rel_l2: 0.1, psnr_db: 30.0 },
     };
@@ -62,7 +62,7 @@ fn a_matte_tile_has_no_edge_and_what_is_written_stays_in_the_ranges_of_the_forma
     let document = materialx(&rough, "rough");
     assert!(document.contains("geometry_tangent") && document.contains("rotate3d"), "{document}");
     let metal =
-        Fit { shape: Shape { roughness: [0.3; 2], ..rough.shape }, weights: vec![Vec3::ZERO, Vec3::ONE], ..rough };
+        Fit { shape: LobeShape { roughness: [0.3; 2], ..rough.shape }, weights: vec![Vec3::ZERO, Vec3::ONE], ..rough };
     let file: serde_json::Value = serde_json::from_str(&gltf(&metal, "metal")).unwrap();
     assert!(file.get("extensionsUsed").is_none(), "an empty list is against the schema");
 }

@@ -12,10 +12,10 @@ use crate::base::{InputError, Result};
 pub use crate::scene::Pixels;
 use crate::scene::files;
 
-const LARGEST_FILE: u64 = 256 << 20;
+const MAX_FILE: u64 = 256 << 20;
 /// Pixels along a side, and in all.
 const LARGEST_SIDE: u32 = 4096;
-const MOST_PIXELS: u64 = 1 << 22;
+const MAX_PIXELS: u64 = 1 << 22;
 
 /// Reads heights: the value of a grey image (0 to 1 for integer formats), the luminance of a coloured one.
 ///
@@ -43,18 +43,18 @@ pub fn read_colors(base_dir: &Path, path: &Path) -> Result<Pixels<Vec3>> {
 }
 
 /// Slots that an image may paint.
-pub const MOST_SLOTS: u8 = 16;
+pub const MAX_SLOTS: u8 = 16;
 
 /// Reads painted slots: grey values, of 255 in integer formats.
 ///
 /// # Errors
-/// As [`read_heights`], and values above [`MOST_SLOTS`].
+/// As [`read_heights`], and values above [`MAX_SLOTS`].
 pub fn read_slots(base_dir: &Path, path: &Path) -> Result<Pixels<u8>> {
     let pixels = read(base_dir, path)?;
     let scale = if pixels.is_integer { 255.0 } else { 1.0 };
     let number = |value: &Vec3| (luminance(*value) * scale).round();
-    if let Some(at) = pixels.values.iter().position(|value| !(0.0..=f32::from(MOST_SLOTS)).contains(&number(value))) {
-        let expected = format!("the number of a slot, 0 to {MOST_SLOTS} (a grey of 8 bits)");
+    if let Some(at) = pixels.values.iter().position(|value| !(0.0..=f32::from(MAX_SLOTS)).contains(&number(value))) {
+        let expected = format!("the number of a slot, 0 to {MAX_SLOTS} (a grey of 8 bits)");
         let found = number(&pixels.values[at]);
         return Err(InputError::new(pixel_name(at, pixels.size), found, expected).in_file(path).into());
     }
@@ -82,7 +82,7 @@ struct RawImage {
 }
 
 fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
-    let bytes = files::read(base_dir, path, LARGEST_FILE)?;
+    let bytes = files::read(base_dir, path, MAX_FILE)?;
     let complain = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
     let image =
@@ -98,8 +98,8 @@ fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
 
 fn check_size(size: UVec2, path: &Path) -> Result<()> {
     let pixels = u64::from(size.x) * u64::from(size.y);
-    if pixels == 0 || pixels > MOST_PIXELS || size.max_element() > LARGEST_SIDE {
-        let expected = format!("at most {MOST_PIXELS} pixels and {LARGEST_SIDE} on a side, at least one");
+    if pixels == 0 || pixels > MAX_PIXELS || size.max_element() > LARGEST_SIDE {
+        let expected = format!("at most {MAX_PIXELS} pixels and {LARGEST_SIDE} on a side, at least one");
         return Err(InputError::new("", format!("{} x {} pixels", size.x, size.y), expected).in_file(path).into());
     }
     Ok(())

@@ -97,9 +97,9 @@ pub fn painted_slot(number: u8) -> String {
 
 /// Tile lengths that a mesh may reach up, down and sideways: beyond, an f32 cannot tell places within a tile apart at
 /// grazing angles (a height of 10⁴ tiles lands 6 10⁶ tiles away at 89.9°).
-const MOST_TILES: f32 = 1e4;
+const MAX_TILES: f32 = 1e4;
 /// Tiles that the bounding boxes of all triangles may cover together: each copy is listed by every cell that it reaches.
-const MOST_TILES_COVERED: f64 = 1e7;
+const MAX_TILES_COVERED: f64 = 1e7;
 
 /// Is there something finite, near enough to the tile to compute with?
 fn check_extent(mesh: &TileMesh) -> std::result::Result<(), InputError> {
@@ -108,9 +108,9 @@ fn check_extent(mesh: &TileMesh) -> std::result::Result<(), InputError> {
     for (number, position) in mesh.positions.iter().enumerate() {
         let sideways = (position.truncate() / mesh.size).abs().max_element();
         // Comparisons that NaN fails.
-        if !(sideways <= MOST_TILES && position.z.abs() <= MOST_TILES * side) {
+        if !(sideways <= MAX_TILES && position.z.abs() <= MAX_TILES * side) {
             let found = format!("vertex {} at ({}, {}, {})", number + 1, position.x, position.y, position.z);
-            return complain(found, format!("finite coordinates within {MOST_TILES} tile lengths of the tile"));
+            return complain(found, format!("finite coordinates within {MAX_TILES} tile lengths of the tile"));
         }
     }
     let covered = |triangle| {
@@ -119,10 +119,10 @@ fn check_extent(mesh: &TileMesh) -> std::result::Result<(), InputError> {
         x * y
     };
     let tiles: f64 = (0..mesh.triangles.len()).map(covered).sum();
-    if tiles > MOST_TILES_COVERED {
+    if tiles > MAX_TILES_COVERED {
         return complain(
             format!("triangles that reach over {tiles:.0} tiles together"),
-            format!("at most {MOST_TILES_COVERED:.0}; coordinates are tile coordinates, from 0 to tile.size"),
+            format!("at most {MAX_TILES_COVERED:.0}; coordinates are tile coordinates, from 0 to tile.size"),
         );
     }
     Ok(())

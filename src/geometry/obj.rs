@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use crate::base::{InputError, Result};
 
 /// Vertices, corners, triangles of one file at most.
-const MOST: usize = 1 << 26;
+const MAX: usize = 1 << 26;
 
 /// An OBJ file with polygons cut into triangles.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -98,8 +98,8 @@ fn parse_line(
         // Groups, smoothing, lines, points and curves say nothing about the surface.
         _ => {}
     }
-    if mesh.positions.len() > MOST || mesh.triangles.len() > MOST {
-        return Err((format!("more than {MOST} vertices or triangles"), format!("at most {MOST}")));
+    if mesh.positions.len() > MAX || mesh.triangles.len() > MAX {
+        return Err((format!("more than {MAX} vertices or triangles"), format!("at most {MAX}")));
     }
     Ok(())
 }

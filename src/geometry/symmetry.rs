@@ -7,9 +7,9 @@ use super::PeriodicGrid;
 use super::TileMesh;
 use super::families::part::below;
 
-/// Places that are compared, and planes that are tried along each axis.
+/// GridCoordinates that are compared, and planes that are tried along each axis.
 const PLACES: usize = 256;
-const MOST_PLANES: usize = 128;
+const MAX_PLANES: usize = 128;
 /// Heights, in tile sizes, and normals that differ by less are the same.
 const SAME_HEIGHT: f32 = 1e-4;
 const SAME_NORMAL: f32 = 1e-3;
@@ -36,14 +36,14 @@ pub fn mirror_planes_in(mesh: &TileMesh, grid: Option<&PeriodicGrid>) -> [bool; 
 
 /// Are there planes among the candidates?
 fn among(mesh: &TileMesh, grid: &PeriodicGrid, sums: &[Vec<f32>; 2]) -> [bool; 2] {
-    let looks = Looks { mesh, grid, bottom: mesh.z_range().0 };
+    let looks = ColumnSamples { mesh, grid, bottom: mesh.z_range().0 };
     let places = (0..PLACES).into_par_iter().with_min_len(PLACES / 8);
-    let places: Vec<(Vec2, Vec<Seen>)> = places.map(|k| looks.at(k)).collect();
+    let places: Vec<(Vec2, Vec<SampledColumn>)> = places.map(|k| looks.at(k)).collect();
     let has_plane = |axis: usize| sums[axis].iter().any(|sum| looks.is_mirrored(&places, axis, *sum));
     rayon::join(|| has_plane(0), || has_plane(1)).into()
 }
 
-/// Places and planes of height-fields that are compared before all are.
+/// GridCoordinates and planes of height-fields that are compared before all are.
 const FEW_PLACES: usize = 8;
 const FEW_PLANES: usize = 16;
 
@@ -59,8 +59,8 @@ fn is_refused(mesh: &TileMesh, sums: &[Vec<f32>; 2]) -> bool {
         planes().map(move |(axis, sum)| mirrored(place, axis, sum, mesh.size)).chain([place])
     };
     let Some((part, grid)) = below(mesh, (0..FEW_PLACES).flat_map(seen_from)) else { return false };
-    let looks = Looks { mesh: &part, grid: &grid, bottom: mesh.z_range().0 };
-    let places: Vec<(Vec2, Vec<Seen>)> = (0..FEW_PLACES).map(|k| looks.at(k)).collect();
+    let looks = ColumnSamples { mesh: &part, grid: &grid, bottom: mesh.z_range().0 };
+    let places: Vec<(Vec2, Vec<SampledColumn>)> = (0..FEW_PLACES).map(|k| looks.at(k)).collect();
     planes().all(|(axis, sum)| !looks.is_mirrored(&places, axis, sum))
 }
 
@@ -84,58 +84,58 @@ fn candidates(mesh: &TileMesh, axis: usize) -> Vec<f32> {
     highest.sort_by(f32::total_cmp);
     highest.dedup_by(|a, b| (*a - *b).abs() < 1e-5 * size);
     let Some(&first) = highest.first() else { return Vec::new() };
-    highest.iter().take(MOST_PLANES).map(|x| first + x).collect()
+    highest.iter().take(MAX_PLANES).map(|x| first + x).collect()
 }
 
-struct Looks<'a> {
+struct ColumnSamples<'a> {
     mesh: &'a TileMesh,
     grid: &'a PeriodicGrid,
     bottom: f32,
 }
 
 /// Surfaces above each other that are compared.
-const MOST_LAYERS: usize = 16;
+const MAX_LAYERS: usize = 16;
 
 /// What a vertical line meets.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct SampledColumn {
     height: f32,
     normal: Vec3,
     slot: u16,
     color: Vec3,
 }
 
-impl Looks<'_> {
-    fn at(&self, k: usize) -> (Vec2, Vec<Seen>) {
+impl ColumnSamples<'_> {
+    fn at(&self, k: usize) -> (Vec2, Vec<SampledColumn>) {
         let place = place(k, self.mesh.size);
         (place, self.down(place))
     }
 
     /// All that the vertical line meets, from the top down.
-    fn down(&self, place: Vec2) -> Vec<Seen> {
+    fn down(&self, place: Vec2) -> Vec<SampledColumn> {
         let (mut layers, mut start) = (Vec::new(), self.grid.top() + 1.0);
         let step = SAME_HEIGHT * self.mesh.size.max_element();
         while let Some(hit) = self.grid.nearest(place.extend(start), Vec3::NEG_Z, self.bottom - 1.0) {
             let triangle = hit.triangle as usize;
-            layers.push(Seen {
+            layers.push(SampledColumn {
                 height: hit.position.z,
                 normal: self.mesh.geometric_normal(triangle),
                 slot: self.mesh.slot_at(triangle, place),
                 color: self.mesh.color.at(place, self.mesh.size),
             });
             start = hit.position.z - step;
-            if layers.len() == MOST_LAYERS {
+            if layers.len() == MAX_LAYERS {
                 break;
             }
         }
         layers
     }
 
-    fn is_mirrored(&self, places: &[(Vec2, Vec<Seen>)], axis: usize, sum: f32) -> bool {
+    fn is_mirrored(&self, places: &[(Vec2, Vec<SampledColumn>)], axis: usize, sum: f32) -> bool {
         let size = self.mesh.size;
         let mut differ = 0;
         for (place, seen) in places {
-            let same = |a: &Seen, b: &Seen| {
+            let same = |a: &SampledColumn, b: &SampledColumn| {
                 let mut normal = b.normal;
                 normal[axis] = -normal[axis];
                 (a.height - b.height).abs() <= SAME_HEIGHT * size.max_element()

@@ -51,8 +51,8 @@ fn slots_that_differ_break_the_mirror() {
     assert!(!mirror_planes(&mesh)[0]);
 }
 
-fn bits(seen: &[Seen]) -> Vec<[u32; 8]> {
-    let of = |s: &Seen| {
+fn bits(seen: &[SampledColumn]) -> Vec<[u32; 8]> {
+    let of = |s: &SampledColumn| {
         let [x, y, z] = s.normal.to_array().map(f32::to_bits);
         let [r, g, b] = s.color.to_array().map(f32::to_bits);
         [s.height.to_bits(), x, y, z, r, g, b, u32::from(s.slot)]
@@ -88,9 +88,9 @@ fn part_of_a_height_field_shows_below_its_places_what_all_of_it_shows() {
     for mesh in height_fields() {
         let places = || (0..PLACES).step_by(5).map(|k| place(k, mesh.size)).chain([Vec2::ZERO, mesh.size]);
         let Some((part, grid)) = below(&mesh, places()) else { continue };
-        let part = Looks { mesh: &part, grid: &grid, bottom: mesh.z_range().0 };
+        let part = ColumnSamples { mesh: &part, grid: &grid, bottom: mesh.z_range().0 };
         let grid = PeriodicGrid::new(&mesh);
-        let all = Looks { mesh: &mesh, grid: &grid, bottom: mesh.z_range().0 };
+        let all = ColumnSamples { mesh: &mesh, grid: &grid, bottom: mesh.z_range().0 };
         for place in places() {
             assert_eq!(bits(&part.down(place)), bits(&all.down(place)), "{place} of {}", mesh.size);
             shown += 1;

@@ -10,7 +10,7 @@ use toml::{Table, Value};
 
 use super::facets::unshadowed_projected_area;
 use super::*;
-use crate::scene::{Field, Geometry, GrooveProfile, Grooves, Pyramids, Rods, Shape, Tile, Weave};
+use crate::scene::{Field, FieldShape, Geometry, GrooveProfile, Grooves, Pyramids, Rods, Tile, Weave};
 
 fn tile(geometry: Geometry) -> Tile {
     Tile { size: Vec2::new(1.0, 1.2), ..Tile::of(geometry) }
@@ -246,7 +246,7 @@ fn any_family() -> impl Strategy<Value = (Table, [f32; 2])> {
     let kinds: Vec<_> = Geometry::kinds().into_iter().filter(|kind| kind.kind != "mesh").collect();
     let family = proptest::sample::select(kinds).prop_flat_map(|kind| {
         let name = kind.kind;
-        let is_file = |field: &Field| matches!(field.shape, Shape::Path);
+        let is_file = |field: &Field| matches!(field.shape, FieldShape::Path);
         let is_random = move |field: &Field| !is_file(field) && !matches!(field.key, "values");
         let fields: Vec<Field> = kind.fields.into_iter().filter(is_random).collect();
         let keys: Vec<&'static str> = fields.iter().map(|field| field.key).collect();

@@ -34,7 +34,7 @@ pub struct TileMesh {
     pub notes: Vec<String>,
 }
 
-/// Material slots over the tile, seen from above.
+/// MaterialSpec slots over the tile, seen from above.
 #[derive(Debug, Clone)]
 pub struct SlotField {
     pub size: UVec2,

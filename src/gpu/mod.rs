@@ -7,4 +7,4 @@ pub mod visibility;
 
 pub use device::{Gpu, GpuError, SHADERS, Swaps, Tier, shader_source, swapped_source};
 pub use render::renderer::{GpuRenderer, render_gpu};
-pub use visibility::{GpuHeightMarch, GpuHorizons, GpuMaps, GpuShadowMaps, GpuSlicer, visibility_maps_gpu};
+pub use visibility::{GpuHeightMarch, GpuHorizonMap, GpuMaps, GpuShadowMaps, GpuSlicer, visibility_maps_gpu};

@@ -10,7 +10,7 @@ use super::transport::NOTHING;
 use super::{InterreflectionSettings, InterreflectionTable, Transport, mean_albedo};
 use crate::base::{Cancel, Result};
 use crate::brdf::{LobeAngles, Term};
-use crate::effective::SumMaterial;
+use crate::effective::Material;
 use crate::geometry::{Facets, TileMesh};
 use crate::math::directions::half_vector;
 use crate::math::linalg::gemm::multiply_transposed;
@@ -21,14 +21,14 @@ const BLOCK: usize = 256;
 /// Blocks that are added up by one thread after the other: the sums do not depend on the number of threads.
 const PARTS: usize = 16;
 /// Cosines below this are taken as this: a ray along its own surface says nothing.
-const LEAST_COSINE: f32 = 1e-3;
+const MIN_COSINE: f32 = 1e-3;
 
 /// All that a bounce looks up.
 struct Scene<'a> {
     facets: &'a Facets,
     transport: &'a Transport,
-    /// Material and colour of each element.
-    materials: Vec<&'a SumMaterial>,
+    /// MaterialSpec and colour of each element.
+    materials: Vec<&'a Material>,
     colors: Vec<Vec3>,
     albedos: Vec<Vec3>,
     /// Node directions, and the visibility of every element (row) along them.
@@ -52,7 +52,7 @@ pub fn gather(
     facets: &Facets,
     visibility: &Visibility,
     transport: &Transport,
-    (material_of_slot, materials): (&[usize], &[SumMaterial]),
+    (material_of_slot, materials): (&[usize], &[Material]),
     settings: &InterreflectionSettings,
     cancel: &Cancel,
 ) -> Result<InterreflectionTable> {
@@ -100,13 +100,13 @@ impl<'a> Scene<'a> {
         visibility: &Visibility,
         transport: &'a Transport,
         material_of_slot: &[usize],
-        all: &'a [SumMaterial],
+        all: &'a [Material],
         settings: &InterreflectionSettings,
     ) -> Self {
         let nodes = settings.grid.directions();
         let elements = &transport.facets;
         let of = |s: &u32| &all[material_of_slot[usize::from(facets.slots[*s as usize])]];
-        let materials: Vec<&SumMaterial> = elements.iter().map(of).collect();
+        let materials: Vec<&Material> = elements.iter().map(of).collect();
         let colors: Vec<Vec3> =
             elements.iter().zip(&materials).map(|(s, material)| facets.colors[*s as usize] * material.color).collect();
         let plain: Vec<Vec3> = all.iter().map(|material| mean_albedo(&material.brdf, 8, 24)).collect();
@@ -141,7 +141,7 @@ impl<'a> Scene<'a> {
         let count = self.nodes.len();
         let seen = &self.seen[element * count..(element + 1) * count];
         let brdf = &self.materials[element].brdf;
-        let scale = self.colors[element] / cosine.max(LEAST_COSINE);
+        let scale = self.colors[element] / cosine.max(MIN_COSINE);
         let wanted = of.len();
         for (row, node) in of.enumerate() {
             let to = self.nodes[node];
@@ -264,7 +264,7 @@ fn has_no_hue(color: Vec3) -> bool {
 }
 
 /// Does a material reflect all channels alike? A measured one is taken not to.
-pub fn is_grey(material: &SumMaterial) -> bool {
+pub fn is_grey(material: &Material) -> bool {
     has_no_hue(material.color)
         && material.brdf.terms.iter().all(|term| match term {
             Term::Measured(_) => false,

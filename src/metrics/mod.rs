@@ -4,4 +4,4 @@ mod errors;
 mod pairs;
 
 pub use errors::{Errors, compare, upper_errors};
-pub use pairs::{Pair, mirror_biased_pairs, picture_pairs};
+pub use pairs::{Pair, image_pairs, mirror_biased_pairs};

@@ -19,7 +19,7 @@ pub struct Pair {
 
 /// `count` pairs as pictures ask for them: views by the area they cover (the cosine of their angle), lights from everywhere,
 /// every second one near the mirror direction of its view.
-pub fn picture_pairs(count: usize, seed: u64) -> Vec<Pair> {
+pub fn image_pairs(count: usize, seed: u64) -> Vec<Pair> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut pairs = Vec::with_capacity(count);
     while pairs.len() < count {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::stage::Version;
 use super::{Pipeline, StageTimes};
 use crate::base::Result;
-use crate::effective::{Direct, EffectiveBrdf, Factors, Form, LowRank, SumMaterial, VisibilityRows};
+use crate::effective::{Direct, EffectiveBrdf, Factors, LowRank, Material, Representation, VisibilityRows};
 use crate::geometry::Facets;
 use crate::metrics::{Errors, Pair, mirror_biased_pairs, upper_errors};
 use crate::plan::{Method, Settings};
@@ -18,7 +18,7 @@ const CHECK_PAIRS: usize = 256;
 pub(super) struct Source<'a> {
     pub facets: &'a Facets,
     pub material_of_slot: &'a [usize],
-    pub materials: &'a [SumMaterial],
+    pub materials: &'a [Material],
     /// Whether normals may point anywhere, as under overhangs.
     pub whole_sphere: bool,
     pub base_area: f64,
@@ -35,7 +35,7 @@ pub(super) enum Made {
 }
 
 impl Made {
-    pub(super) fn recolored(&self, materials: &[SumMaterial]) -> Self {
+    pub(super) fn recolored(&self, materials: &[Material]) -> Self {
         match self {
             Self::Whole(factors) => Self::Whole(factors.recolored(materials)),
             Self::Trial(factors) => Self::Trial(factors.recolored(materials)),
@@ -61,7 +61,7 @@ struct FactorCheck {
 
 impl FactorCheck {
     fn new(direct: Direct, base_area: f64, seed: u64) -> Self {
-        let direct = EffectiveBrdf { form: Form::Direct(direct), base_area };
+        let direct = EffectiveBrdf { form: Representation::Direct(direct), base_area };
         let pairs = mirror_biased_pairs(CHECK_PAIRS, seed ^ 0x5eed);
         let exact = pairs.par_iter().map(|pair| direct.eval(pair.i, pair.o)).collect();
         Self { direct, pairs, exact }
@@ -74,7 +74,7 @@ impl FactorCheck {
 
     /// Those of reading visibility between the nodes of `rows`, as factors do, with exact lobes: factors add theirs to it.
     fn errors_of_visibility(&self, rows: &VisibilityRows) -> Errors {
-        let Form::Direct(direct) = &self.direct.form else { return self.errors(&self.direct) };
+        let Representation::Direct(direct) = &self.direct.form else { return self.errors(&self.direct) };
         let values: Vec<Vec3> = self.pairs.par_iter().map(|pair| direct.seen_between(rows, pair.i, pair.o)).collect();
         upper_errors(&values, &self.exact)
     }
@@ -94,7 +94,10 @@ impl Pipeline {
         let check = FactorCheck::new(direct, of.base_area, settings.seed);
         let forced = settings.method == Method::LowRank;
         let close = |errors: Errors| errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
-        let held = |factors: &LowRank| EffectiveBrdf { form: Form::LowRank(factors.clone()), base_area: of.base_area };
+        let held = |factors: &LowRank| EffectiveBrdf {
+            form: Representation::LowRank(factors.clone()),
+            base_area: of.base_area,
+        };
         let whole = match made {
             Some(Made::Whole(factors)) => factors,
             made => {
@@ -147,7 +150,7 @@ mod tests {
         let loaded = crate::scene::open("fig8d_leather", &["quality.preset=draft".to_owned()]).unwrap();
         let outcome = Pipeline::new().effective(&loaded).unwrap();
         let (facets, materials) = (&outcome.evidence.facets, &outcome.evidence.materials);
-        let Form::Direct(made) = &outcome.brdf.form else { panic!("not a sum") };
+        let Representation::Direct(made) = &outcome.brdf.form else { panic!("not a sum") };
         let of = Source {
             facets,
             material_of_slot: &materials.0,
@@ -167,11 +170,11 @@ mod tests {
         let seen = with(0.0, None);
         assert!(seen.factors.is_none() && error(&seen) > 0.0);
         let whole = with(1.0, None);
-        assert!(matches!((&whole.brdf.form, &whole.factors), (Form::LowRank(_), Some(Made::Whole(_)))));
+        assert!(matches!((&whole.brdf.form, &whole.factors), (Representation::LowRank(_), Some(Made::Whole(_)))));
         // Visibility alone is a part of what factors are off.
         assert!(error(&seen) < error(&whole), "{} {}", error(&seen), error(&whole));
         let tried = with(0.5 * (error(&seen) + error(&whole)), None);
-        assert!(matches!((&tried.brdf.form, &tried.factors), (Form::Direct(_), Some(Made::Trial(_)))));
+        assert!(matches!((&tried.brdf.form, &tried.factors), (Representation::Direct(_), Some(Made::Trial(_)))));
         assert!((error(&tried) - error(&whole)).abs() < 1e-4 * error(&whole), "{} {}", error(&tried), error(&whole));
         // A colour edit judges the same trial again, and makes the rest of it where it serves now.
         let later = with(1.0, tried.factors.map(|factors| factors.recolored(&materials.1)));

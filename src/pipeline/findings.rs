@@ -3,31 +3,31 @@
 use std::sync::Arc;
 
 use super::stage::Version;
-use super::{Pipeline, Shape};
+use super::{Pipeline, TileShape};
 use crate::brdf::Term;
-use crate::effective::{FacetSum, SumMaterial};
+use crate::effective::{FacetSum, Material};
 use crate::geometry::Facets;
 use crate::geometry::PeriodicGrid;
 use crate::gpu::Gpu;
 use crate::interreflection::mean_albedo;
-use crate::plan::{Backend, Findings, Settings, Sighting};
+use crate::plan::{Backend, SceneFeatures, Settings, VisibilityMethod};
 use crate::scene::Scene;
-use crate::visibility::Slices;
+use crate::visibility::OcclusionIntervals;
 
 impl Pipeline {
     #[expect(clippy::too_many_arguments, reason = "one place that gathers all there is to know")]
     pub(super) fn findings(
         &mut self,
         scene: &Scene,
-        shape: &Shape,
+        shape: &TileShape,
         facets: &Facets,
         sum: &FacetSum,
         material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        materials: &[Material],
         settings: &Settings,
         costs_of: Option<Version>,
-    ) -> Findings {
-        let needs_maps = !shape.flat && (!shape.height_field || settings.sighting != Sighting::Auto);
+    ) -> SceneFeatures {
+        let needs_maps = !shape.flat && (!shape.height_field || settings.sighting != VisibilityMethod::Auto);
         let allowed = settings.backend != Backend::Cpu && !self.without_device;
         if needs_maps && allowed && !self.gpu_asked {
             self.gpu_asked = true;
@@ -35,13 +35,13 @@ impl Pipeline {
         }
         // The processor in disguise draws shadow maps far slower than the processor slices (the draft of the pillow: 78 s, not 0.1):
         // only where both are asked for.
-        let asked = settings.backend == Backend::Gpu && settings.sighting == Sighting::Maps;
+        let asked = settings.backend == Backend::Gpu && settings.sighting == VisibilityMethod::Maps;
         let hardware_gpu =
             allowed && self.gpu.as_ref().is_some_and(|gpu| asked || gpu.tier == crate::gpu::Tier::Hardware);
         let scan_work = match (self.scan_work, costs_of) {
             (Some((known, work)), Some(version)) if known == version => work,
             (_, Some(version)) if needs_maps && !hardware_gpu => {
-                let work = Slices::work(&PeriodicGrid::for_slices(&shape.mesh), facets);
+                let work = OcclusionIntervals::work(&PeriodicGrid::for_slices(&shape.mesh), facets);
                 self.scan_work = Some((version, work));
                 work
             }
@@ -54,7 +54,7 @@ impl Pipeline {
         let black_materials = used.iter().filter(is_black).count();
         let is_lambertian =
             |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
-        Findings {
+        SceneFeatures {
             flat: shape.flat,
             mirrors: None,
             steepest: shape.steepest,
@@ -83,6 +83,6 @@ impl Pipeline {
 }
 
 /// The largest part of uniform light that a material reflects in any channel.
-fn albedo(material: &SumMaterial) -> f64 {
+fn albedo(material: &Material) -> f64 {
     f64::from((mean_albedo(&material.brdf, 3, 12) * material.color).max_element()).min(1.0)
 }

@@ -6,15 +6,15 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::stage::Version;
-use super::{Assigned, Pipeline, Shape, StageTimes};
+use super::{MaterialAssignment, Pipeline, StageTimes, TileShape};
 use crate::base::Result;
 use crate::brdf::Brdf;
-use crate::effective::SumMaterial;
+use crate::effective::Material;
 use crate::geometry::{self, TileMesh};
 use crate::scene::LoadedScene;
 
 impl Pipeline {
-    pub(super) fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<Shape>, Version)> {
+    pub(super) fn shape(&mut self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<(Arc<TileShape>, Version)> {
         let key = (loaded.scene.tile.clone(), loaded.base_dir.clone(), loaded.painted.clone());
         self.shape.get("geometry", key, times, &self.cancel, || {
             let mesh = geometry::build_painted(&loaded.scene.tile, &loaded.base_dir, &loaded.painted)?;
@@ -22,7 +22,7 @@ impl Pipeline {
             let flat = high - low <= 1e-7 * mesh.size.max_element();
             let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
             let steepest = steepest(&mesh);
-            Ok(Shape { mesh, flat, height_field, steepest })
+            Ok(TileShape { mesh, flat, height_field, steepest })
         })
     }
 
@@ -31,12 +31,12 @@ impl Pipeline {
         loaded: &LoadedScene,
         mesh: &TileMesh,
         times: &mut StageTimes,
-    ) -> Result<(Arc<Assigned>, Version)> {
+    ) -> Result<(Arc<MaterialAssignment>, Version)> {
         let key = (loaded.scene.materials.clone(), mesh.slots.clone(), loaded.base_dir.clone());
         let cache = &mut self.cache;
         self.materials.get("materials", key, times, &self.cancel, || {
             let mut material_of_slot = Vec::with_capacity(mesh.slots.len());
-            let mut materials: Vec<SumMaterial> = Vec::new();
+            let mut materials: Vec<Material> = Vec::new();
             let mut made: Vec<Option<usize>> = Vec::new();
             for slot in &mesh.slots {
                 let found = loaded.scene.material_for_slot(slot)?;
@@ -45,7 +45,7 @@ impl Pipeline {
                     continue;
                 }
                 let brdf = Brdf::from_specs(found.brdf, &loaded.base_dir, cache)?;
-                materials.push(SumMaterial { brdf, color: found.color });
+                materials.push(Material { brdf, color: found.color });
                 made.push(found.index);
                 material_of_slot.push(materials.len() - 1);
             }

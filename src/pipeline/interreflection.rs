@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::stage::Version;
-use super::{OutcomeKey, Pipeline, Shape, StageTimes};
+use super::{OutcomeKey, Pipeline, StageTimes, TileShape};
 use crate::base::Result;
-use crate::effective::SumMaterial;
+use crate::effective::Material;
 use crate::geometry::{Facets, mirror_planes};
 use crate::interreflection::{InterreflectionTable, Transport, gather};
 use crate::plan::Settings;
@@ -16,7 +16,7 @@ impl Pipeline {
     /// Planes that mirror the tile, looked for where light between facets would use them.
     pub(super) fn mirror_planes(
         &mut self,
-        shape: &Shape,
+        shape: &TileShape,
         version: Version,
         settings: &Settings,
         times: &mut StageTimes,
@@ -34,8 +34,8 @@ impl Pipeline {
     /// What facets send to each other; rays are cast anew only for other facets.
     pub(super) fn between_facets(
         &mut self,
-        shape: &Shape,
-        (facets, visibility, materials, material_of_slot): (&Facets, &Visibility, &[SumMaterial], &[usize]),
+        shape: &TileShape,
+        (facets, visibility, materials, material_of_slot): (&Facets, &Visibility, &[Material], &[usize]),
         settings: &Settings,
         mirrors: [bool; 2],
         (facets_version, key): (Version, OutcomeKey),

@@ -5,10 +5,10 @@ use std::time::Instant;
 use super::make::see;
 use crate::base::{Cancel, Result};
 use crate::cache::{Cache, KeyBuilder};
-use crate::effective::{Direct, Nodes, PairTable};
+use crate::effective::{Direct, Nodes, ShadingTable};
 use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
-use crate::plan::{Route, Settings};
+use crate::plan::{Settings, VisibilityAlgorithm};
 use crate::visibility::Visibility;
 
 /// What the times of a run call visibility that was made in an earlier one.
@@ -17,7 +17,7 @@ pub(super) const VISIBILITY: &str = "cached_visibility";
 /// [`see`], or what it made before; and whether that was read.
 pub(super) fn visibility(
     cache: &Cache,
-    route: Route,
+    route: VisibilityAlgorithm,
     mesh: &TileMesh,
     facets: &Facets,
     settings: &Settings,
@@ -25,7 +25,7 @@ pub(super) fn visibility(
     cancel: &Cancel,
 ) -> Result<(Visibility, bool)> {
     // A device's maps are that device's, and quick.
-    let cache = if route == Route::GpuMaps { &Cache::off() } else { cache };
+    let cache = if route == VisibilityAlgorithm::GpuMaps { &Cache::off() } else { cache };
     let entry = cache.entry("visibility", |key| identify_sight(key, route, mesh, facets, settings));
     if let Some(seen) = entry.read().filter(|seen: &Visibility| seen.facets() == facets.len()) {
         return Ok((seen, true));
@@ -41,7 +41,7 @@ pub(super) fn visibility(
 /// All that [`see`] reads.
 pub(super) fn identify_sight(
     key: &mut KeyBuilder,
-    route: Route,
+    route: VisibilityAlgorithm,
     mesh: &TileMesh,
     facets: &Facets,
     settings: &Settings,
@@ -59,23 +59,23 @@ pub(super) fn identify_sight(
     key.numbers("texels", &[settings.map_resolution]);
 }
 
-/// [`PairTable::build`], or what it made before; and whether that was read.
+/// [`ShadingTable::build`], or what it made before; and whether that was read.
 pub(super) fn table(
     cache: &Cache,
     direct: &Direct,
     nodes: Nodes,
     cancel: &Cancel,
-) -> Result<Option<(PairTable, bool)>> {
+) -> Result<Option<(ShadingTable, bool)>> {
     let entry = cache.entry("table", |key| {
-        direct.sum.identify(key);
-        direct.visibility.identify(key);
-        nodes.identify(key);
+        direct.sum.hash_into(key);
+        direct.visibility.hash_into(key);
+        nodes.hash_into(key);
     });
-    if let Some(table) = entry.read().and_then(|content| PairTable::of_content(direct, nodes.grid, content)) {
+    if let Some(table) = entry.read().and_then(|content| ShadingTable::of_content(direct, nodes.grid, content)) {
         return Ok(Some((table, true)));
     }
     let start = Instant::now();
-    let made = PairTable::build(direct, nodes, cancel)?;
+    let made = ShadingTable::build(direct, nodes, cancel)?;
     if let Some(table) = &made {
         entry.keep(start, &table.content());
     }

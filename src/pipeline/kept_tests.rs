@@ -10,23 +10,23 @@ use super::{Outcome, Pipeline};
 use crate::base::Cancel;
 use crate::brdf::{Brdf, Measured, MeasuredReport, Term};
 use crate::cache::{Cache, Key, KeyBuilder, Stored, Writer};
-use crate::effective::{FacetSum, Form, Nodes, SumMaterial};
+use crate::effective::{FacetSum, Material, Nodes, Representation};
 use crate::geometry::{Facets, TileMesh};
-use crate::math::directions::{PolarGrid, UpperPairs};
-use crate::metrics::picture_pairs;
-use crate::plan::{Route, Settings};
+use crate::math::directions::{HemispherePairGrid, PolarGrid};
+use crate::metrics::image_pairs;
+use crate::plan::{Settings, VisibilityAlgorithm};
 use crate::scene;
-use crate::visibility::{Horizons, Visibility};
+use crate::visibility::{HorizonMap, Visibility};
 
-fn run(scene: &str, set: &[&str], cache: &Cache) -> (Outcome, super::Pictured) {
+fn run(scene: &str, set: &[&str], cache: &Cache) -> (Outcome, super::ShadingBrdf) {
     let set: Vec<String> =
         ["quality.backend=cpu", "quality.preset=draft"].iter().chain(set).map(|s| (*s).to_owned()).collect();
     let mut pipeline = Pipeline::new();
-    pipeline.keep_in(cache.clone());
+    pipeline.set_cache(cache.clone());
     let outcome = pipeline.effective(&scene::open(scene, &set).unwrap()).unwrap();
-    let pictured = outcome.for_pictures(&Cancel::default()).unwrap();
+    let shading_brdf = outcome.shading_brdf(&Cancel::default()).unwrap();
     assert_eq!(cache.finish(), None);
-    (outcome, pictured)
+    (outcome, shading_brdf)
 }
 
 fn stages(outcome: &Outcome) -> Vec<&'static str> {
@@ -34,15 +34,15 @@ fn stages(outcome: &Outcome) -> Vec<&'static str> {
 }
 
 /// All bits of visibility and table, and of some values.
-fn bits((outcome, pictured): &(Outcome, super::Pictured)) -> (Vec<u8>, Vec<u32>) {
-    let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("a sum") };
+fn bits((outcome, shading_brdf): &(Outcome, super::ShadingBrdf)) -> (Vec<u8>, Vec<u32>) {
+    let Representation::Direct(direct) = outcome.brdf.direct_form() else { panic!("a sum") };
     let mut out = Writer::default();
     direct.visibility.write(&mut out);
-    if let Form::Table(table) = pictured.brdf.direct_form() {
+    if let Representation::Table(table) = shading_brdf.brdf.direct_form() {
         table.content().write(&mut out);
     }
-    let values = picture_pairs(200, 3).into_iter().flat_map(|pair| {
-        [&outcome.brdf, &pictured.brdf].map(|brdf| brdf.eval(pair.i, pair.o).to_array().map(f32::to_bits))
+    let values = image_pairs(200, 3).into_iter().flat_map(|pair| {
+        [&outcome.brdf, &shading_brdf.brdf].map(|brdf| brdf.eval(pair.i, pair.o).to_array().map(f32::to_bits))
     });
     (out.into_bytes(), values.flatten().collect())
 }
@@ -50,7 +50,7 @@ fn bits((outcome, pictured): &(Outcome, super::Pictured)) -> (Vec<u8>, Vec<u32>)
 #[test]
 fn what_was_kept_is_the_same_bits_as_what_is_made() {
     let maps = "quality.visibility=\"maps\"";
-    // Slices, horizons by walking, horizons by slicing, maps; few normals; no table close enough.
+    // OcclusionIntervals, horizons by walking, horizons by slicing, maps; few normals; no table close enough.
     let cases: [(&str, &[&str]); 5] = [
         ("table4_skirt", &[]),
         ("table4_plate", &[]),
@@ -66,7 +66,7 @@ fn what_was_kept_is_the_same_bits_as_what_is_made() {
         let full = run(scene, set, &cache);
         assert!(stages(&empty.0).contains(&"visibility") && !empty.1.was_kept, "{scene} {set:?}");
         assert!(stages(&full.0).contains(&"cached_visibility"), "{scene} {set:?}: {:?}", stages(&full.0));
-        let has_table = matches!(without.1.brdf.direct_form(), Form::Table(_));
+        let has_table = matches!(without.1.brdf.direct_form(), Representation::Table(_));
         assert!(full.1.was_kept || !has_table, "{scene} {set:?}");
         assert!(bits(&without) == bits(&empty) && bits(&without) == bits(&full), "{scene} {set:?}");
         assert_eq!(without.1.errors.is_some(), full.1.errors.is_some());
@@ -92,8 +92,8 @@ fn another_material_surface_or_setting_is_made_anew() {
     let rough = run("table4_skirt", &["material.default.brdf={ kind = \"ggx\", roughness = 0.4, f0 = 0.9 }"], &cache);
     assert!(!rough.1.was_kept && stages(&rough.0).contains(&"cached_visibility"));
     for change in ["quality.facets=1000", "quality.azimuths=20", "quality.penumbra_deg=3", "quality.seed=2"] {
-        let (outcome, pictured) = run("table4_skirt", &[change], &cache);
-        assert!(!pictured.was_kept && !stages(&outcome).contains(&"cached_visibility"), "{change}");
+        let (outcome, shading_brdf) = run("table4_skirt", &[change], &cache);
+        assert!(!shading_brdf.was_kept && !stages(&outcome).contains(&"cached_visibility"), "{change}");
     }
 }
 
@@ -104,7 +104,7 @@ fn what_was_given_up_is_not_kept() {
     let loaded = scene::open("table4_skirt", &["quality.backend=cpu".to_owned()]).unwrap();
     let cancel = Cancel::default();
     let mut pipeline = Pipeline::new();
-    pipeline.keep_in(cache.clone());
+    pipeline.set_cache(cache.clone());
     pipeline.cancel_with(cancel.clone());
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -121,9 +121,9 @@ fn what_was_given_up_is_not_kept() {
 
 fn run_standard(loaded: &scene::LoadedScene, cache: &Cache) -> Vec<u8> {
     let mut pipeline = Pipeline::new();
-    pipeline.keep_in(cache.clone());
+    pipeline.set_cache(cache.clone());
     let outcome = pipeline.effective(loaded).unwrap();
-    let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("a sum") };
+    let Representation::Direct(direct) = outcome.brdf.direct_form() else { panic!("a sum") };
     let mut out = Writer::default();
     direct.visibility.write(&mut out);
     out.into_bytes()
@@ -137,23 +137,23 @@ fn all_differ(keys: Vec<(&str, Key)>) {
     }
 }
 
-fn key_of(identify: impl FnOnce(&mut KeyBuilder)) -> Key {
+fn key_of(hash_into: impl FnOnce(&mut KeyBuilder)) -> Key {
     let mut key = KeyBuilder::for_tests();
-    identify(&mut key);
+    hash_into(&mut key);
     key.finish()
 }
 
 #[test]
 fn each_input_of_visibility_counts() {
-    type Input = (Route, TileMesh, Facets, Settings);
+    type Input = (VisibilityAlgorithm, TileMesh, Facets, Settings);
     let loaded = scene::open("table4_plate", &["quality.preset=draft".to_owned()]).unwrap();
     let mesh = Pipeline::new().mesh(&loaded).unwrap();
     let facets = Facets::sample(&mesh, 64, 1);
-    let input: Input = (Route::HeightMarch, mesh, facets, Settings::of(&loaded.scene));
+    let input: Input = (VisibilityAlgorithm::HeightMarch, mesh, facets, Settings::of(&loaded.scene));
     type Change = (&'static str, fn(&mut Input));
     let changes: Vec<Change> = vec![
         ("nothing", |_| {}),
-        ("route", |input| input.0 = Route::HorizonScan),
+        ("route", |input| input.0 = VisibilityAlgorithm::HorizonScan),
         ("size of the tile", |input| input.1.size.x *= 2.0),
         ("a vertex", |input| input.1.positions[5].z += 1e-6),
         ("one vertex fewer", |input| _ = input.1.positions.pop()),
@@ -210,15 +210,15 @@ fn each_input_of_a_sum_counts_but_for_its_colours() {
     let mesh = Pipeline::new().mesh(&loaded).unwrap();
     let mut facets = Facets::sample(&mesh, 512, 1);
     facets.sort_for_sums();
-    type Input = (Facets, Vec<usize>, Vec<SumMaterial>);
-    let material = |terms: Vec<Term>| SumMaterial { brdf: Brdf { terms }, color: Vec3::ONE };
+    type Input = (Facets, Vec<usize>, Vec<Material>);
+    let material = |terms: Vec<Term>| Material { brdf: Brdf { terms }, color: Vec3::ONE };
     let rough = |roughness| Term::Ggx { roughness, f0: Vec3::splat(0.5) };
     let paint = |content| Term::Measured(Arc::new(Paint(content, MeasuredReport::default())));
     let input: Input = (facets, vec![0, 1], vec![material(vec![rough(0.2)]), material(vec![paint(1)])]);
     let with = |change: &dyn Fn(&mut Input)| {
         let mut changed = input.clone();
         change(&mut changed);
-        key_of(|key| FacetSum::new(&changed.0, &changed.1, &changed.2).identify(key))
+        key_of(|key| FacetSum::new(&changed.0, &changed.1, &changed.2).hash_into(key))
     };
     let same = with(&|_| {});
     assert_eq!(same, with(&|input| input.2[0].color = Vec3::new(0.5, 0.1, 0.2)), "a colour");
@@ -245,16 +245,16 @@ fn each_input_of_a_sum_counts_but_for_its_colours() {
 
 #[test]
 fn each_node_and_each_visibility_of_a_table_counts() {
-    let grid = UpperPairs { rings: 8, azimuths: 12, turn: 4, difference: 6 };
+    let grid = HemispherePairGrid { rings: 8, azimuths: 12, turn: 4, difference: 6 };
     let nodes = Nodes::all(grid);
-    let (pairs, others) = (picture_pairs(20, 1), picture_pairs(20, 2));
-    let key = |nodes: Nodes| key_of(|key| nodes.identify(key));
+    let (pairs, others) = (image_pairs(20, 1), image_pairs(20, 2));
+    let key = |nodes: Nodes| key_of(|key| nodes.hash_into(key));
     all_differ(vec![
         ("nothing", key(nodes)),
-        ("rings", key(Nodes { grid: UpperPairs { rings: 9, ..grid }, ..nodes })),
-        ("azimuths", key(Nodes { grid: UpperPairs { azimuths: 16, ..grid }, ..nodes })),
-        ("turn", key(Nodes { grid: UpperPairs { turn: 6, ..grid }, ..nodes })),
-        ("difference", key(Nodes { grid: UpperPairs { difference: 7, ..grid }, ..nodes })),
+        ("rings", key(Nodes { grid: HemispherePairGrid { rings: 9, ..grid }, ..nodes })),
+        ("azimuths", key(Nodes { grid: HemispherePairGrid { azimuths: 16, ..grid }, ..nodes })),
+        ("turn", key(Nodes { grid: HemispherePairGrid { turn: 6, ..grid }, ..nodes })),
+        ("difference", key(Nodes { grid: HemispherePairGrid { difference: 7, ..grid }, ..nodes })),
         ("mirror in x", key(Nodes { mirrors: [true, false], ..nodes })),
         ("mirror in y", key(Nodes { mirrors: [false, true], ..nodes })),
         ("part of the facets", key(Nodes { facets: Some(100), ..nodes })),
@@ -270,8 +270,8 @@ fn each_node_and_each_visibility_of_a_table_counts() {
     let facets = Facets::sample(&mesh, 64, 1);
     let heights = mesh.height_grid.as_ref().unwrap();
     let seen =
-        |size: Vec2, azimuths, ramp| Visibility::Horizons(Horizons::march(heights, size, &facets, azimuths, ramp));
-    let key = |visibility: &Visibility| key_of(|key| visibility.identify(key));
+        |size: Vec2, azimuths, ramp| Visibility::HorizonMap(HorizonMap::march(heights, size, &facets, azimuths, ramp));
+    let key = |visibility: &Visibility| key_of(|key| visibility.hash_into(key));
     all_differ(vec![
         ("nothing", key(&seen(mesh.size, 8, 0.02))),
         ("azimuths", key(&seen(mesh.size, 9, 0.02))),

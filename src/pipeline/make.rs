@@ -1,15 +1,15 @@
 //! What single stages make, as plain functions of their input.
 
-use super::Assigned;
+use super::MaterialAssignment;
 use crate::base::{Cancel, Result};
 use crate::effective::mean_colors;
 use crate::geometry::PeriodicGrid;
 use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 use crate::gpu::Gpu;
 use crate::gpu::visibility_maps_gpu;
-use crate::plan::{Preset, Route, Settings};
+use crate::plan::{Preset, Settings, VisibilityAlgorithm};
 use crate::scene::{Scene, Switch};
-use crate::visibility::{Horizons, Slices, SoftMaps, Visibility, visibility_maps_cpu};
+use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility, visibility_maps_cpu};
 
 /// Facets of a tile, in the order that sums want.
 pub(super) fn sample(mesh: &TileMesh, settings: &Settings) -> Facets {
@@ -42,7 +42,7 @@ pub(super) fn grouped(material_of_slot: &[usize], facets: &Facets, settings: &Se
 }
 
 pub(super) fn see(
-    route: Route,
+    route: VisibilityAlgorithm,
     mesh: &TileMesh,
     facets: &Facets,
     settings: &Settings,
@@ -52,19 +52,21 @@ pub(super) fn see(
     let periodic = || PeriodicGrid::for_slices(mesh).cancelled_by(cancel);
     let (azimuths, ramp) = (settings.horizon_azimuths, settings.penumbra);
     Ok(match (route, &mesh.height_grid, gpu) {
-        (Route::None, ..) => Visibility::Unblocked { facets: facets.len() },
-        (Route::HeightMarch, Some(heights), _) => {
-            Visibility::Horizons(Horizons::march(heights, mesh.size, facets, azimuths, ramp))
+        (VisibilityAlgorithm::None, ..) => Visibility::Unblocked { facets: facets.len() },
+        (VisibilityAlgorithm::HeightMarch, Some(heights), _) => {
+            Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, facets, azimuths, ramp))
         }
-        (Route::HeightMarch | Route::HorizonScan, ..) => {
-            Visibility::Horizons(Horizons::scan(&periodic(), facets, azimuths, ramp))
+        (VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan, ..) => {
+            Visibility::HorizonMap(HorizonMap::scan(&periodic(), facets, azimuths, ramp))
         }
-        (Route::Slices, ..) => Visibility::Slices(Slices::scan(&periodic(), facets, settings.slice_azimuths, ramp)),
-        (Route::GpuMaps | Route::CpuMaps, ..) => {
+        (VisibilityAlgorithm::OcclusionIntervals, ..) => {
+            Visibility::OcclusionIntervals(OcclusionIntervals::scan(&periodic(), facets, settings.slice_azimuths, ramp))
+        }
+        (VisibilityAlgorithm::GpuMaps | VisibilityAlgorithm::CpuMaps, ..) => {
             let (grid, resolution) = (settings.map_grid, settings.map_resolution);
             // A GPU that fails is no reason to stop: the CPU's maps are the same.
             let packed = match (route, gpu) {
-                (Route::GpuMaps, Some(gpu)) => {
+                (VisibilityAlgorithm::GpuMaps, Some(gpu)) => {
                     visibility_maps_gpu(gpu, mesh, facets, &grid.directions(), resolution, cancel).ok()
                 }
                 _ => None,
@@ -75,14 +77,18 @@ pub(super) fn see(
     })
 }
 
-pub(super) fn same_lobes((slots, materials): &Assigned, (other_slots, others): &Assigned) -> bool {
+pub(super) fn same_lobes((slots, materials): &MaterialAssignment, (other_slots, others): &MaterialAssignment) -> bool {
     slots == other_slots
         && materials.len() == others.len()
         && materials.iter().zip(others).all(|(a, b)| a.same_lobes(b))
 }
 
 /// What each assigned material is called.
-pub(super) fn names(scene: &Scene, mesh: &TileMesh, (material_of_slot, materials): &Assigned) -> Result<Vec<String>> {
+pub(super) fn names(
+    scene: &Scene,
+    mesh: &TileMesh,
+    (material_of_slot, materials): &MaterialAssignment,
+) -> Result<Vec<String>> {
     let mut names = vec![String::new(); materials.len()];
     for (slot, &material) in mesh.slots.iter().zip(material_of_slot) {
         scene.material_for_slot(slot)?.name.clone_into(&mut names[material]);

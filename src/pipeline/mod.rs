@@ -2,6 +2,8 @@
 
 mod factored;
 mod findings;
+mod gpu_tile;
+mod images;
 mod inputs;
 mod interreflection;
 mod kept;
@@ -9,28 +11,26 @@ mod kept;
 mod kept_tests;
 mod make;
 mod outcome;
-mod pictures;
 mod stage;
-mod unseen;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use self::factored::{Factored, Made, Source};
+pub use self::gpu_tile::GpuTile;
+use self::images::Images;
+pub use self::images::ShadingBrdf;
 use self::make::{grouped, names, same_lobes, sample};
 pub use self::outcome::Outcome;
 use self::outcome::limits;
-pub use self::pictures::Pictured;
-use self::pictures::Pictures;
 use self::stage::{Stage, Version};
-pub use self::unseen::Unseen;
 use crate::base::{Cancel, Result};
 use crate::brdf::MeasuredCache;
 use crate::cache::Cache;
-use crate::diagnostics::{Evidence, Health, Sight};
+use crate::diagnostics::{Health, HealthInputs, VisibilityInput};
 use crate::effective::{
-    Direct, EffectiveBrdf, FacetSum, Form, MaterialFactors, SumMaterial, VisibilityRows, VisibleFacets, Wu2011,
+    Direct, EffectiveBrdf, FacetSum, Material, MaterialFactors, Representation, VisibilityRows, VisibleFacets, Wu2011,
     Wu2011Settings,
 };
 use crate::geometry::PeriodicGrid;
@@ -38,9 +38,9 @@ use crate::geometry::{Facets, TileMesh};
 use crate::gpu::Gpu;
 use crate::interreflection::{InterreflectionTable, Transport};
 use crate::math::directions::{ParaboloidMap, PolarGrid};
-use crate::plan::{Costs, Findings, Plan, Preset, Route, Settings, decide};
+use crate::plan::{Costs, Plan, Preset, SceneFeatures, Settings, VisibilityAlgorithm, decide};
 use crate::reference::Reference;
-use crate::scene::{LoadedScene, Material, Painted, Switch, Tile};
+use crate::scene::{LoadedScene, MaterialSpec, Painted, Switch, Tile};
 use crate::visibility::{Visibility, visibility_maps_cpu};
 
 /// Milliseconds of the stages that ran, in order; a stage whose input did not change is not listed.
@@ -48,7 +48,7 @@ pub type StageTimes = Vec<(&'static str, f64)>;
 
 /// A geometry that is drawn on: the mesh and its parts that later stages ask for.
 #[derive(Debug)]
-struct Shape {
+struct TileShape {
     mesh: TileMesh,
     flat: bool,
     height_field: bool,
@@ -57,22 +57,22 @@ struct Shape {
 }
 
 /// The material of each slot of a mesh, by number, and the materials.
-type Assigned = (Vec<usize>, Vec<SumMaterial>);
+type MaterialAssignment = (Vec<usize>, Vec<Material>);
 type PaperFactors = Vec<Option<Arc<MaterialFactors>>>;
 type ShapeKey = (Tile, PathBuf, Painted);
-type MaterialKey = (Vec<Material>, Vec<String>, PathBuf);
+type MaterialKey = (Vec<MaterialSpec>, Vec<String>, PathBuf);
 /// Mesh, count, seed, whether they are drawn as the paper does, and whether their colours count.
 type FacetKey = (Version, [Option<usize>; 2], u64, bool, Switch);
-type VisibilityKey = (Version, Route, [usize; 2], PolarGrid, u32, u32);
+type VisibilityKey = (Version, VisibilityAlgorithm, [usize; 2], PolarGrid, u32, u32);
 /// Materials, facets (and so the mesh), visibility.
 type OutcomeKey = (Settings, [Version; 3]);
 
 /// All that comes before visibility.
 #[derive(Debug)]
 struct Prepared {
-    shape: Arc<Shape>,
+    shape: Arc<TileShape>,
     settings: Settings,
-    materials: Arc<Assigned>,
+    materials: Arc<MaterialAssignment>,
     facets: Arc<Facets>,
     material_of_slot: Vec<usize>,
     sum: FacetSum,
@@ -96,7 +96,7 @@ enum For {
 #[derive(Debug)]
 struct Last {
     key: OutcomeKey,
-    materials: Arc<Assigned>,
+    materials: Arc<MaterialAssignment>,
     factors: Option<Made>,
     outcome: Outcome,
 }
@@ -113,14 +113,14 @@ pub struct Pipeline {
     without_device: bool,
     /// Work of one slice of the mesh, for a version of the facets.
     scan_work: Option<(Version, f64)>,
-    shape: Stage<ShapeKey, Shape>,
+    shape: Stage<ShapeKey, TileShape>,
     facets: Stage<FacetKey, Facets>,
     /// Those that devices see for where normals are few.
     few_facets: Stage<FacetKey, Facets>,
     visibility: Stage<VisibilityKey, Visibility>,
     /// Visibility on the nodes that the factored form reads.
     rows: Stage<([Version; 2], PolarGrid), VisibilityRows>,
-    materials: Stage<MaterialKey, Assigned>,
+    materials: Stage<MaterialKey, MaterialAssignment>,
     /// Rays between facets: facets, elements, rays of each.
     transport: Stage<(Version, usize, usize), Transport>,
     interreflection: Stage<OutcomeKey, InterreflectionTable>,
@@ -155,7 +155,7 @@ impl Pipeline {
     }
 
     /// What takes long to make is looked for in `cache` from now on, and kept there. Without this nothing is.
-    pub fn keep_in(&mut self, cache: Cache) {
+    pub fn set_cache(&mut self, cache: Cache) {
         self.kept = cache;
     }
 
@@ -180,7 +180,7 @@ impl Pipeline {
         let costs_of = (of == For::Processor).then_some(facets_version);
         let found = self.findings(scene, &shape, &facets, &sum, &material_of_slot, &materials.1, &settings, costs_of);
         let mirrors = self.mirror_planes(&shape, shape_version, &settings, times)?;
-        let plan = decide(&Findings { mirrors, ..found }, &settings, &Costs::default());
+        let plan = decide(&SceneFeatures { mirrors, ..found }, &settings, &Costs::default());
         let versions = [materials_version, facets_version];
         Ok(Prepared { shape, settings, materials, facets, material_of_slot, sum, plan, shape_version, versions })
     }
@@ -188,7 +188,7 @@ impl Pipeline {
     /// What the facets see, by the plan's route.
     fn seen(&mut self, of: &Prepared, times: &mut StageTimes) -> Result<(Arc<Visibility>, Version)> {
         let Prepared { shape, settings, facets, plan, versions: [_, facets_version], .. } = of;
-        if plan.route == Route::None {
+        if plan.route == VisibilityAlgorithm::None {
             // Nothing is computed, and nothing kept.
             return Ok((Arc::new(Visibility::Unblocked { facets: facets.len() }), 0));
         }
@@ -238,7 +238,7 @@ impl Pipeline {
             }
             if last.key.0 == key.0 && last.key.1[1..] == key.1[1..] {
                 let same_lobes = same_lobes(&last.materials, &materials);
-                earlier = last.outcome.pictures.latest(same_lobes);
+                earlier = last.outcome.images.latest(same_lobes);
                 // Colours alone: the factors stay, and are judged anew.
                 let kept = last.factors.as_ref().filter(|_| plan.try_low_rank && same_lobes);
                 factors = kept.map(|factors| factors.recolored(sum_materials));
@@ -246,9 +246,9 @@ impl Pipeline {
         }
         self.cancel.check()?;
         let start = Instant::now();
-        let evidence = Evidence {
+        let evidence = HealthInputs {
             facets: facets.clone(),
-            sight: Sight::Soft(visibility.clone()),
+            sight: VisibilityInput::Soft(visibility.clone()),
             materials: materials.clone(),
             names: names(scene, &shape.mesh, &materials)?,
             closes_plane: shape.mesh.closes_plane,
@@ -266,10 +266,14 @@ impl Pipeline {
             };
             self.factored(direct, &of, factors, &settings)?
         } else {
-            Factored { brdf: EffectiveBrdf { form: Form::Direct(direct), base_area }, factors: None, errors: None }
+            Factored {
+                brdf: EffectiveBrdf { form: Representation::Direct(direct), base_area },
+                factors: None,
+                errors: None,
+            }
         };
         times.push(("product", start.elapsed().as_secs_f64() * 1e3));
-        let is_factored = matches!(brdf.form, Form::LowRank(_));
+        let is_factored = matches!(brdf.form, Representation::LowRank(_));
         let between = if plan.interreflection {
             let found = (facets_version, key.clone());
             let of = (&*facets, &*visibility, &materials.1[..], &material_of_slot[..]);
@@ -295,9 +299,9 @@ impl Pipeline {
             plan.factored(is_factored, errors.rel_l2);
         }
         let examined = Arc::default();
-        let pictures =
-            Arc::new(Pictures::new(brdf.clone(), &shape, &settings, plan.try_picture_table, earlier, &self.kept));
-        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, pictures };
+        let images =
+            Arc::new(Images::new(brdf.clone(), &shape, &settings, plan.try_shading_table, earlier, &self.kept));
+        let outcome = Outcome { brdf, plan, settings, times, factored, notes, evidence, examined, images };
         self.last = Some(Last { key, materials, factors, outcome: outcome.clone() });
         Ok(outcome)
     }
@@ -339,18 +343,18 @@ impl Pipeline {
         let tile = VisibleFacets { facets, visibility: &visibility, directions: &directions, base_area };
         let tables = Wu2011::from_factors(&tile, material_of_slot, materials, &factors, &knobs)?;
         timed(&mut times, "product", start);
-        let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
-        let evidence = Evidence {
+        let brdf = Arc::new(EffectiveBrdf { form: Representation::Wu2011(tables), base_area });
+        let evidence = HealthInputs {
             facets: facets.clone(),
-            sight: Sight::Packed(Arc::new(visibility)),
+            sight: VisibilityInput::Packed(Arc::new(visibility)),
             materials: assigned.clone(),
             names,
             closes_plane: shape.mesh.closes_plane,
         };
         let notes = shape.mesh.notes.clone();
-        let pictures = Arc::new(Pictures::new(brdf.clone(), shape, &settings, false, None, &self.kept));
+        let images = Arc::new(Images::new(brdf.clone(), shape, &settings, false, None, &self.kept));
         let examined = Arc::default();
-        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, pictures })
+        Ok(Outcome { brdf, plan, settings, times, factored: None, notes, evidence, examined, images })
     }
 
     /// How often each stage ran: a stage that the plan drops stays at 0.
@@ -380,7 +384,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// A slot without a material, or a BRDF file that cannot be used.
-    pub fn sum_materials(&mut self, loaded: &LoadedScene) -> Result<Assigned> {
+    pub fn sum_materials(&mut self, loaded: &LoadedScene) -> Result<MaterialAssignment> {
         let mut times = StageTimes::new();
         let shape = self.shape(loaded, &mut times)?.0;
         Ok(self.materials(loaded, &shape.mesh, &mut times)?.0.as_ref().clone())

@@ -4,11 +4,11 @@ use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
-use super::Pictured;
+use super::ShadingBrdf;
 use super::StageTimes;
-use super::pictures::Pictures;
+use super::images::Images;
 use crate::base::{Cancel, Result};
-use crate::diagnostics::{Evidence, Health, Limits};
+use crate::diagnostics::{Health, HealthInputs, Limits};
 use crate::effective::{EffectiveBrdf, Reflectance};
 use crate::metrics::Errors;
 use crate::plan::{Plan, Settings};
@@ -25,10 +25,10 @@ pub struct Outcome {
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
     /// What the health is measured from.
-    pub evidence: Evidence,
+    pub evidence: HealthInputs,
     /// The health, once it was asked for: see [`Outcome::health`].
     pub examined: Arc<OnceLock<Health>>,
-    pub(super) pictures: Arc<Pictures>,
+    pub(super) images: Arc<Images>,
 }
 
 impl Outcome {
@@ -42,13 +42,13 @@ impl Outcome {
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
-    pub fn for_pictures(&self, cancel: &Cancel) -> Result<Pictured> {
-        self.pictures.get(cancel)
+    pub fn shading_brdf(&self, cancel: &Cancel) -> Result<ShadingBrdf> {
+        self.images.get(cancel)
     }
 
-    /// What [`Outcome::for_pictures`] made, if it was asked before.
-    pub fn pictured(&self) -> Option<Arc<EffectiveBrdf>> {
-        self.pictures.made()
+    /// What [`Outcome::shading_brdf`] made, if it was asked before.
+    pub fn known_shading_brdf(&self) -> Option<Arc<EffectiveBrdf>> {
+        self.images.made()
     }
 
     /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.

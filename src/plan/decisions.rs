@@ -1,8 +1,8 @@
 //! Decisions of the plan that a scene's shape and materials settle, and what a person forces.
 
-use super::PICTURE_CHECK_PAIRS;
-use super::effects::PICTURE_QUERIES;
-use super::{Costs, Effect, Findings, Preset, Settings};
+use super::IMAGE_CHECK_PAIRS;
+use super::effects::IMAGE_QUERIES;
+use super::{Costs, Effect, Preset, SceneFeatures, Settings};
 use crate::interreflection::predicted_share;
 use crate::scene::Switch;
 
@@ -20,18 +20,18 @@ pub(super) fn is_on(switch: Switch, decided: bool) -> bool {
 }
 
 /// Of the light on a level plane, the part that comes from lower than the steepest slope: nothing above it is ever blocked.
-fn hidden_light(found: &Findings) -> f64 {
+fn hidden_light(found: &SceneFeatures) -> f64 {
     f64::from(found.steepest).sin().powi(2)
 }
 
 /// Can occlusion be left out within the tolerance? Only where nothing overhangs and no slope is steep: a direction that is
 /// higher than the steepest slope sees all of a height-field. A quarter of the tolerance is granted to it.
-pub(super) fn is_shallow(found: &Findings, settings: &Settings) -> bool {
+pub(super) fn is_shallow(found: &SceneFeatures, settings: &Settings) -> bool {
     found.height_field && found.closes_plane && hidden_light(found) <= 0.25 * settings.tolerance
 }
 
 /// Why visibility is not computed.
-pub(super) fn no_visibility(found: &Findings, settings: &Settings) -> String {
+pub(super) fn no_visibility(found: &SceneFeatures, settings: &Settings) -> String {
     if settings.effects.visibility == Switch::Off {
         "left out as asked: every facet sees every direction that it faces".to_owned()
     } else if found.flat {
@@ -48,29 +48,29 @@ pub(super) fn no_visibility(found: &Findings, settings: &Settings) -> String {
 
 /// Whether pictures read something quicker than the BRDF itself. `query_ms`: one direct sum, all threads at work.
 pub(super) fn picture_table(
-    found: &Findings,
+    found: &SceneFeatures,
     settings: &Settings,
     costs: &Costs,
     horizons: bool,
     query_ms: f64,
     note: &mut impl Note,
 ) -> bool {
-    let direct_ms = PICTURE_QUERIES * query_ms;
-    let table_ms = PICTURE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
+    let direct_ms = IMAGE_QUERIES * query_ms;
+    let table_ms = IMAGE_QUERIES * costs.table_query_ns * 1e-6 / costs.threads;
     let spared = settings.effects.mirror_symmetry != Switch::Off;
     let mirrors = found.mirrors.filter(|_| spared).unwrap_or_default();
-    let making_ms = settings.picture_grids.first().map(|grid| grid.originals(mirrors) as f64 * query_ms);
+    let making_ms = settings.image_grids.first().map(|grid| grid.originals(mirrors) as f64 * query_ms);
     let pays = !found.flat && making_ms.is_some_and(|ms| ms + table_ms < direct_ms);
     let on = is_on(settings.effects.picture_table, pays);
-    let thinned = horizons && found.distinct_normals.is_some();
+    let strided_subset = horizons && found.distinct_normals.is_some();
     let reason = match making_ms {
         _ if found.flat => "a flat tile is its own BRDF".to_owned(),
         None => "pictures evaluate the BRDF itself at this quality".to_owned(),
         Some(ms) => {
-            let (percent, db) = (settings.picture_tolerance.0 * 100.0, settings.picture_tolerance.1);
+            let (percent, db) = (settings.image_tolerance.0 * 100.0, settings.image_tolerance.1);
             let kept = format!("if within {percent:.0} % and {db:.0} dB of the sum");
             let direct = format!("a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly");
-            if thinned {
+            if strided_subset {
                 format!("{direct}; few normals: part of the facets are summed, {kept}")
             } else {
                 format!("{direct}, {table_ms:.0} ms from a table that takes {ms:.0} ms, once; kept {kept}")
@@ -78,20 +78,20 @@ pub(super) fn picture_table(
         }
     };
     // Thinning takes no more than its check.
-    let predicted = if thinned { PICTURE_CHECK_PAIRS as f64 * query_ms } else { making_ms.unwrap_or(0.0) };
+    let predicted = if strided_subset { IMAGE_CHECK_PAIRS as f64 * query_ms } else { making_ms.unwrap_or(0.0) };
     note("picture_table", on, reason, if on { predicted } else { 0.0 });
     on
 }
 
 /// The part of all directions in which facets see each other: `1 - A/S` of a surface that closes the plane (every ray of uniform
 /// light ends on it once), and a guess for others.
-fn hidden_directions(found: &Findings) -> f64 {
+fn hidden_directions(found: &SceneFeatures) -> f64 {
     if found.flat { 0.0 } else { (1.0 - 1.0 / found.area_ratio.max(1.0)).clamp(0.0, 1.0) }
 }
 
 /// Light between facets: only when asked for. `f̄` is the paper's Eq. 7 by default, which leaves it out, so that what other
 /// programs compute from the same definition stays comparable; the estimate says what is missed.
-pub(super) fn interreflection(found: &Findings, settings: &Settings, costs: &Costs, note: &mut impl Note) -> bool {
+pub(super) fn interreflection(found: &SceneFeatures, settings: &Settings, costs: &Costs, note: &mut impl Note) -> bool {
     let share = predicted_share(found.albedo, hidden_directions(found));
     let can = !found.flat && found.materials > 0 && settings.preset != Preset::Wu2011;
     let on = can && settings.effects.interreflection == Switch::On;
@@ -125,7 +125,7 @@ const RAY_NS: f64 = 1500.0;
 const LOBE_NS: f64 = 60.0;
 
 /// Effects that are read off the scene.
-pub(super) fn of_the_scene(found: &Findings, settings: &Settings, note: &mut impl Note) {
+pub(super) fn of_the_scene(found: &SceneFeatures, settings: &Settings, note: &mut impl Note) {
     let forced = &settings.effects;
     let keep_black = is_on(forced.black_materials, false);
     note(
@@ -201,7 +201,7 @@ pub(super) fn of_the_scene(found: &Findings, settings: &Settings, note: &mut imp
 }
 
 /// The mirror planes that are used.
-pub(super) fn mirrors(found: &Findings, settings: &Settings) -> [bool; 2] {
+pub(super) fn mirrors(found: &SceneFeatures, settings: &Settings) -> [bool; 2] {
     match settings.effects.mirror_symmetry {
         Switch::Auto => found.mirrors.unwrap_or_default(),
         Switch::On => [true; 2],
@@ -211,7 +211,7 @@ pub(super) fn mirrors(found: &Findings, settings: &Settings) -> [bool; 2] {
 
 /// Planes are looked for when something is tabulated: who edits the geometry need not wait for it.
 pub(super) fn mirror_symmetry(
-    found: &Findings,
+    found: &SceneFeatures,
     settings: &Settings,
     interreflection: bool,
     picture_table: bool,
@@ -238,7 +238,7 @@ pub(super) fn mirror_symmetry(
 }
 
 /// Marks what was forced, and how much turning on what is off by itself can change.
-pub(super) fn mark(effects: &mut [Effect], found: &Findings, settings: &Settings) {
+pub(super) fn mark(effects: &mut [Effect], found: &SceneFeatures, settings: &Settings) {
     let forced = &settings.effects;
     let on_interreflection = effects.iter().any(|effect| effect.name == "interreflection" && effect.on);
     for effect in effects {

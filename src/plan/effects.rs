@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Costs, Findings, Method, Preset, Route, Settings, Sighting, decisions};
+use super::{Costs, Method, Preset, SceneFeatures, Settings, VisibilityAlgorithm, VisibilityMethod, decisions};
 
 /// One effect of the plan, as `biscale plan --json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,15 +21,15 @@ pub struct Effect {
 }
 
 /// Queries of the picture that the cost model has in mind: 384x384, 32 lights, a third of them lit and covered.
-pub(super) const PICTURE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
+pub(super) const IMAGE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
 
 /// Pairs of directions on which what pictures read is held against the BRDF.
-pub const PICTURE_CHECK_PAIRS: usize = 512;
+pub const IMAGE_CHECK_PAIRS: usize = 512;
 
 /// What will be done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    pub route: Route,
+    pub route: VisibilityAlgorithm,
     /// Try the factored form first; it must pass its check against the direct sum.
     pub try_low_rank: bool,
     /// Add light that facets send to each other.
@@ -37,14 +37,17 @@ pub struct Plan {
     /// Mirror planes that spare the other half of the directions.
     pub mirrors: [bool; 2],
     /// Try a table for pictures first; it must pass its check against the BRDF.
-    pub try_picture_table: bool,
+    pub try_shading_table: bool,
     pub effects: Vec<Effect>,
 }
 
 impl Plan {
     /// Does the route look for more than one horizon an azimuth?
     pub fn overhangs(&self) -> bool {
-        matches!(self.route, Route::Slices | Route::CpuMaps | Route::GpuMaps)
+        matches!(
+            self.route,
+            VisibilityAlgorithm::OcclusionIntervals | VisibilityAlgorithm::CpuMaps | VisibilityAlgorithm::GpuMaps
+        )
     }
 
     /// Is an effect on?
@@ -74,29 +77,32 @@ impl Plan {
 }
 
 /// Decides everything from what was found.
-pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
+pub fn decide(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> Plan {
     let mut effects = Vec::new();
     let mut note = |name, on, reason: String, predicted_ms: f64| {
         effects.push(Effect { name, on, reason, predicted_ms, measured_ms: None, forced: false, bound: None });
     };
     let facets = settings.facets as f64;
     let route = route(found, settings, costs);
-    let what =
-        if settings.sighting == Sighting::Auto { "surfaces overhang" } else { "asked for by quality.visibility" };
+    let what = if settings.sighting == VisibilityMethod::Auto {
+        "surfaces overhang"
+    } else {
+        "asked for by quality.visibility"
+    };
     let (what, predicted) = match route {
-        Route::None => (decisions::no_visibility(found, settings), 0.0),
-        Route::HeightMarch => (
+        VisibilityAlgorithm::None => (decisions::no_visibility(found, settings), 0.0),
+        VisibilityAlgorithm::HeightMarch => (
             format!("a height-field: horizons along {} azimuths, walking its samples", settings.horizon_azimuths),
             facets * settings.horizon_azimuths as f64 * costs.march_ns * 1e-6 / costs.threads,
         ),
-        Route::HorizonScan => (
+        VisibilityAlgorithm::HorizonScan => (
             format!(
                 "no overhangs: horizons along {} azimuths, slicing {} triangles",
                 settings.horizon_azimuths, found.triangles
             ),
             facets * settings.horizon_azimuths as f64 * costs.scan_ns * 1e-6 / costs.threads,
         ),
-        Route::Slices => (
+        VisibilityAlgorithm::OcclusionIntervals => (
             format!(
                 "{what}: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
                 settings.slice_azimuths,
@@ -104,7 +110,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             ),
             scan_ms(found, settings, costs),
         ),
-        Route::CpuMaps => (
+        VisibilityAlgorithm::CpuMaps => (
             format!(
                 "{what}: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
                 settings.map_grid.len(),
@@ -113,19 +119,20 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
             ),
             maps_ms(found, settings, costs),
         ),
-        Route::GpuMaps => (
+        VisibilityAlgorithm::GpuMaps => (
             format!("{what}, on the GPU: {} toroidal shadow maps", settings.map_grid.len()),
             settings.map_grid.len() as f64 * found.triangles as f64 * 2e-6,
         ),
     };
-    note("visibility", route != Route::None, what, predicted);
+    note("visibility", route != VisibilityAlgorithm::None, what, predicted);
 
-    let fill_ns = if route == Route::Slices { costs.slice_fill_ns } else { costs.facet_fill_ns };
+    let fill_ns =
+        if route == VisibilityAlgorithm::OcclusionIntervals { costs.slice_fill_ns } else { costs.facet_fill_ns };
     let direct_query = (found.lobes as f64 * costs.lobe_ns + found.lookups as f64 * costs.lookup_ns + facets * fill_ns)
         * 1e-6
         / costs.threads;
-    let direct_ms = PICTURE_QUERIES * direct_query;
-    let low_rank_ms = 800.0 + PICTURE_QUERIES * costs.factor_query_ns * 1e-6 / costs.threads;
+    let direct_ms = IMAGE_QUERIES * direct_query;
+    let low_rank_ms = 800.0 + IMAGE_QUERIES * costs.factor_query_ns * 1e-6 / costs.threads;
     let allowed = !matches!(settings.preset, Preset::Reference | Preset::Wu2011);
     let try_low_rank = match settings.method {
         Method::Direct => false,
@@ -154,8 +161,8 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         },
         if try_low_rank { 800.0 } else { 0.0 },
     );
-    let horizons = matches!(route, Route::HeightMarch | Route::HorizonScan);
-    let try_picture_table = decisions::picture_table(found, settings, costs, horizons, direct_query, &mut note);
+    let horizons = matches!(route, VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan);
+    let try_shading_table = decisions::picture_table(found, settings, costs, horizons, direct_query, &mut note);
     let forced = &settings.effects;
     note(
         "exact_lobes",
@@ -216,7 +223,7 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
         0.0,
     );
     let interreflection = decisions::interreflection(found, settings, costs, &mut note);
-    decisions::mirror_symmetry(found, settings, interreflection, try_picture_table, &mut note);
+    decisions::mirror_symmetry(found, settings, interreflection, try_shading_table, &mut note);
     decisions::of_the_scene(found, settings, &mut note);
     for (name, reason) in [
         ("transmission", "light through thin slabs (Dai et al. 2009): not asked for"),
@@ -226,38 +233,38 @@ pub fn decide(found: &Findings, settings: &Settings, costs: &Costs) -> Plan {
     }
     decisions::mark(&mut effects, found, settings);
     let mirrors = decisions::mirrors(found, settings);
-    Plan { route, try_low_rank, try_picture_table, interreflection, mirrors, effects }
+    Plan { route, try_low_rank, try_shading_table, interreflection, mirrors, effects }
 }
 
 /// Slicing under overhangs: cells and triangles looked at, facet by facet.
-fn scan_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
+fn scan_ms(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> f64 {
     let slices = settings.facets as f64 * settings.slice_azimuths as f64;
     slices * found.scan_work * costs.slice_ns * 1e-6 / costs.threads
 }
 
 /// Shadow maps: triangles set up and texels covered, direction by direction.
-fn maps_ms(found: &Findings, settings: &Settings, costs: &Costs) -> f64 {
+fn maps_ms(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> f64 {
     let texels = f64::from(settings.map_resolution).powi(2) * found.area_ratio;
     let direction = found.triangles as f64 * costs.triangle_ns + texels * costs.texel_ns;
     settings.map_grid.len() as f64 * direction * 1e-6 / costs.threads
 }
 
-fn route(found: &Findings, settings: &Settings, costs: &Costs) -> Route {
+fn route(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> VisibilityAlgorithm {
     if !decisions::is_on(settings.effects.visibility, !found.flat && !decisions::is_shallow(found, settings)) {
-        Route::None
+        VisibilityAlgorithm::None
     } else {
-        let maps = if found.hardware_gpu { Route::GpuMaps } else { Route::CpuMaps };
+        let maps = if found.hardware_gpu { VisibilityAlgorithm::GpuMaps } else { VisibilityAlgorithm::CpuMaps };
         match settings.sighting {
-            Sighting::Slices => Route::Slices,
-            Sighting::Maps => maps,
-            Sighting::Auto if found.height_samples => Route::HeightMarch,
-            Sighting::Auto if found.height_field => Route::HorizonScan,
-            Sighting::Auto
+            VisibilityMethod::OcclusionIntervals => VisibilityAlgorithm::OcclusionIntervals,
+            VisibilityMethod::Maps => maps,
+            VisibilityMethod::Auto if found.height_samples => VisibilityAlgorithm::HeightMarch,
+            VisibilityMethod::Auto if found.height_field => VisibilityAlgorithm::HorizonScan,
+            VisibilityMethod::Auto
                 if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) && !found.hardware_gpu =>
             {
-                Route::Slices
+                VisibilityAlgorithm::OcclusionIntervals
             }
-            Sighting::Auto => maps,
+            VisibilityMethod::Auto => maps,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 /// How visibility is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Route {
+pub enum VisibilityAlgorithm {
     /// A flat tile blocks nothing.
     None,
     /// Walking the samples of a height-field.
@@ -10,7 +10,7 @@ pub enum Route {
     /// Slicing the mesh of a surface without overhangs.
     HorizonScan,
     /// Slicing a mesh with overhangs: horizons, and what hangs above them.
-    Slices,
+    OcclusionIntervals,
     /// Toroidal shadow maps on the CPU.
     CpuMaps,
     /// Toroidal shadow maps on a real GPU.
@@ -19,7 +19,7 @@ pub enum Route {
 
 /// What the scene is like: all that the decisions rest on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Findings {
+pub struct SceneFeatures {
     pub flat: bool,
     /// The largest angle between a surface normal and z [rad].
     pub steepest: f32,

@@ -7,6 +7,6 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use effects::{Effect, PICTURE_CHECK_PAIRS, Plan, decide};
-pub use findings::{Costs, Findings, Route};
-pub use settings::{Backend, Method, Preset, Settings, Sighting};
+pub use effects::{Effect, IMAGE_CHECK_PAIRS, Plan, decide};
+pub use findings::{Costs, SceneFeatures, VisibilityAlgorithm};
+pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};

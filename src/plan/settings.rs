@@ -2,7 +2,7 @@
 
 use crate::effective::{BasisGrid, Interpolation, LowRankSettings};
 use crate::interreflection::InterreflectionSettings;
-use crate::math::directions::{HalfDifferenceGrid, PolarGrid, UpperPairs};
+use crate::math::directions::{HalfDifferenceGrid, HemispherePairGrid, PolarGrid};
 use crate::scene::{Effects, Quality, Scene};
 
 /// Named settings of the `[quality]` table.
@@ -38,11 +38,11 @@ pub enum Method {
 
 /// How visibility is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sighting {
-    /// Horizons where nothing overhangs, else what the plan expects to be cheaper.
+pub enum VisibilityMethod {
+    /// HorizonMap where nothing overhangs, else what the plan expects to be cheaper.
     Auto,
     /// Cutting the mesh along azimuths.
-    Slices,
+    OcclusionIntervals,
     /// Shadow maps along directions.
     Maps,
 }
@@ -73,7 +73,7 @@ pub struct Settings {
     pub map_resolution: u32,
     /// Width of the soft step at a horizon [rad].
     pub penumbra: f32,
-    pub sighting: Sighting,
+    pub sighting: VisibilityMethod,
     /// Bins of normals whose facets share one lobe; `None` for normals as they are.
     pub normal_bins: Option<usize>,
     pub method: Method,
@@ -95,9 +95,9 @@ pub struct Settings {
     pub tolerance_db: f64,
     /// Grids of the table that pictures read, from coarse to fine; the first that is close enough is taken. None: pictures
     /// evaluate the BRDF itself.
-    pub picture_grids: Vec<UpperPairs>,
+    pub image_grids: Vec<HemispherePairGrid>,
     /// Relative L2 and PSNR [dB] that the table must keep to against the BRDF it is of.
-    pub picture_tolerance: (f64, f64),
+    pub image_tolerance: (f64, f64),
     pub reference_facets: usize,
     pub reference_passes: usize,
     pub backend: Backend,
@@ -106,8 +106,8 @@ pub struct Settings {
     pub effects: Effects,
 }
 
-const fn upper_pairs(rings: usize, azimuths: usize, turn: usize, difference: usize) -> UpperPairs {
-    UpperPairs { rings, azimuths, turn, difference }
+const fn hemisphere_pair_grid(rings: usize, azimuths: usize, turn: usize, difference: usize) -> HemispherePairGrid {
+    HemispherePairGrid { rings, azimuths, turn, difference }
 }
 
 impl Settings {
@@ -154,9 +154,9 @@ impl Settings {
             _ => {}
         }
         match quality.visibility.as_deref() {
-            Some("slices") => settings.sighting = Sighting::Slices,
-            Some("maps") => settings.sighting = Sighting::Maps,
-            Some("auto") => settings.sighting = Sighting::Auto,
+            Some("slices") => settings.sighting = VisibilityMethod::OcclusionIntervals,
+            Some("maps") => settings.sighting = VisibilityMethod::Maps,
+            Some("auto") => settings.sighting = VisibilityMethod::Auto,
             _ => {}
         }
         match quality.interpolation.as_deref() {
@@ -194,7 +194,7 @@ impl Settings {
             map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
-            sighting: Sighting::Auto,
+            sighting: VisibilityMethod::Auto,
             normal_bins: None,
             method: Method::Auto,
             keep_m: 0.9995,
@@ -208,8 +208,12 @@ impl Settings {
             keep_color: 0.999,
             tolerance: 0.04,
             tolerance_db: 41.0,
-            picture_grids: vec![upper_pairs(24, 48, 8, 12), upper_pairs(24, 48, 12, 16), upper_pairs(32, 64, 12, 16)],
-            picture_tolerance: (0.08, 38.0),
+            image_grids: vec![
+                hemisphere_pair_grid(24, 48, 8, 12),
+                hemisphere_pair_grid(24, 48, 12, 16),
+                hemisphere_pair_grid(32, 64, 12, 16),
+            ],
+            image_tolerance: (0.08, 38.0),
             reference_facets: 16_384,
             reference_passes: 32,
             backend: Backend::Auto,
@@ -234,8 +238,8 @@ impl Settings {
                 normal_rings: 48,
                 tolerance: 0.12,
                 tolerance_db: 28.0,
-                picture_grids: vec![upper_pairs(16, 24, 6, 8)],
-                picture_tolerance: (0.35, 26.0),
+                image_grids: vec![hemisphere_pair_grid(16, 24, 6, 8)],
+                image_tolerance: (0.35, 26.0),
                 ..standard
             },
             Preset::Fine | Preset::Reference => Self {
@@ -254,8 +258,12 @@ impl Settings {
                 normal_rings: 64,
                 tolerance: 0.015,
                 tolerance_db: 48.0,
-                picture_grids: if preset == Preset::Fine { vec![upper_pairs(32, 64, 12, 16)] } else { Vec::new() },
-                picture_tolerance: (0.03, 46.0),
+                image_grids: if preset == Preset::Fine {
+                    vec![hemisphere_pair_grid(32, 64, 12, 16)]
+                } else {
+                    Vec::new()
+                },
+                image_tolerance: (0.03, 46.0),
                 ..standard
             },
         }

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 
-use super::{Costs, Findings, Preset, Route, Settings, decide};
+use super::{Costs, Preset, SceneFeatures, Settings, VisibilityAlgorithm, decide};
 use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::scene::{self, LoadedScene, Painted};
@@ -73,7 +73,7 @@ fn a_dropped_visibility_runs_no_stage_and_takes_no_memory() {
         let mut pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, BRDFS[0], effects)).unwrap();
         let runs = pipeline.runs().iter().find(|(name, _)| *name == "visibility").unwrap().1;
-        let crate::effective::Form::Direct(direct) = &outcome.brdf.form else { panic!("summed directly") };
+        let crate::effective::Representation::Direct(direct) = &outcome.brdf.form else { panic!("summed directly") };
         assert!(outcome.times.iter().any(|(name, _)| *name == "visibility") == (runs > 0));
         (runs, direct.visibility.bytes() > 0)
     };
@@ -110,8 +110,8 @@ fn forcing_effects_off_acts() {
     assert!(both.x > 1.2 * both.y && (one.x - one.y).abs() < 1e-6 || one.y == 0.0, "{both} {one}");
 }
 
-fn findings() -> Findings {
-    Findings {
+fn findings() -> SceneFeatures {
+    SceneFeatures {
         flat: false,
         steepest: 0.05,
         albedo: 0.8,
@@ -140,7 +140,7 @@ fn findings() -> Findings {
 #[test]
 fn the_plan_is_monotone_in_the_tolerance() {
     for degrees in [0.5_f32, 2.0, 4.0, 8.0, 15.0, 40.0] {
-        let found = Findings { steepest: degrees.to_radians(), ..findings() };
+        let found = SceneFeatures { steepest: degrees.to_radians(), ..findings() };
         let mut last: Option<Vec<&str>> = None;
         for tolerance in [1e-4, 1e-3, 0.01, 0.04, 0.12, 0.5] {
             let settings = Settings { tolerance, ..Settings::of_preset(Preset::Standard) };
@@ -160,15 +160,15 @@ fn a_loose_tolerance_drops_the_visibility_of_a_shallow_tile_and_says_why() {
         let settings = Settings { tolerance, ..Settings::of_preset(Preset::Standard) };
         decide(&findings(), &settings, &Costs::default())
     };
-    assert_eq!(plan(0.04).route, Route::None);
+    assert_eq!(plan(0.04).route, VisibilityAlgorithm::None);
     let effect = plan(0.04).effects[0].clone();
     assert!(!effect.on && effect.reason.contains("shallow") && effect.bound.is_some(), "{effect:?}");
-    assert_eq!(plan(0.001).route, Route::HorizonScan);
+    assert_eq!(plan(0.001).route, VisibilityAlgorithm::HorizonScan);
 }
 
 #[test]
 fn interreflection_is_estimated_but_never_on_by_itself() {
-    let found = Findings { area_ratio: 3.0, ..findings() };
+    let found = SceneFeatures { area_ratio: 3.0, ..findings() };
     let plan = decide(&found, &Settings::of_preset(Preset::Standard), &Costs::default());
     let effect = plan.effects.iter().find(|effect| effect.name == "interreflection").unwrap();
     assert!(!plan.interreflection && !effect.on);

@@ -1,8 +1,8 @@
 //! Ray-cast ground truth with its own standard error: the sum over facets, and paths between facets.
 
-mod glimpse;
 mod paths;
 mod ray_cast;
+mod stochastic_reference;
 
-pub use glimpse::Glimpse;
 pub use ray_cast::{Estimate, Reference, ReferenceSettings};
+pub use stochastic_reference::StochasticReference;

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::effective::SumMaterial;
+use crate::effective::Material;
 use crate::geometry::{Facets, Hit, PeriodicGrid, TileMesh};
 use crate::math::directions::from_angles;
 use crate::metrics::Pair;
@@ -15,14 +15,14 @@ use crate::metrics::Pair;
 /// Lifts a ray off the surface it starts on, in units of the tile's diagonal; as facets' rays are.
 const LIFT: f32 = 2e-6;
 /// A cosine that is divided by is not taken smaller.
-const LEAST_COSINE: f32 = 1e-4;
+const MIN_COSINE: f32 = 1e-4;
 
 #[derive(Debug)]
 pub(super) struct Paths<'a> {
     mesh: &'a TileMesh,
     grid: &'a PeriodicGrid,
     material_of_slot: &'a [usize],
-    materials: &'a [SumMaterial],
+    materials: &'a [Material],
     normals: Vec<Vec3>,
     bottom: f32,
     bounces: usize,
@@ -34,7 +34,7 @@ struct Vertex<'a> {
     geometric: Vec3,
     normal: Vec3,
     triangle: u32,
-    material: &'a SumMaterial,
+    material: &'a Material,
     color: Vec3,
 }
 
@@ -43,7 +43,7 @@ impl<'a> Paths<'a> {
         mesh: &'a TileMesh,
         grid: &'a PeriodicGrid,
         material_of_slot: &'a [usize],
-        materials: &'a [SumMaterial],
+        materials: &'a [Material],
         bounces: usize,
     ) -> Self {
         let normals = (0..mesh.triangles.len()).map(|triangle| mesh.geometric_normal(triangle)).collect();
@@ -85,8 +85,8 @@ impl<'a> Paths<'a> {
             if from.dot(at.geometric) <= 0.0 {
                 break;
             }
-            let to_cosine = at.normal.dot(towards).max(LEAST_COSINE);
-            let from_cosine = at.normal.dot(from).max(LEAST_COSINE);
+            let to_cosine = at.normal.dot(towards).max(MIN_COSINE);
+            let from_cosine = at.normal.dot(from).max(MIN_COSINE);
             weight *= at.material.brdf.f(at.normal, from, towards) * at.color * (PI / (to_cosine * from_cosine));
             if weight.max_element() <= 0.0 {
                 break;
@@ -103,7 +103,7 @@ impl<'a> Paths<'a> {
             }
             let lit = at.normal.dot(pair.i) > 0.0 && !self.grid.is_blocked(at.origin, pair.i, at.triangle);
             if lit {
-                let reflected = at.material.brdf.f(at.normal, pair.i, towards) * at.color / cosine.max(LEAST_COSINE);
+                let reflected = at.material.brdf.f(at.normal, pair.i, towards) * at.color / cosine.max(MIN_COSINE);
                 radiance += weight * reflected;
             }
         }

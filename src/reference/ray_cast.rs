@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::paths::Paths;
-use crate::effective::{FacetSum, SumMaterial};
+use crate::effective::{FacetSum, Material};
 use crate::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh, lifted_origins};
 use crate::metrics::Pair;
 
@@ -27,7 +27,7 @@ impl Default for ReferenceSettings {
 }
 
 /// With fewer, the spread of the passes says little about their mean.
-const LEAST_PASSES: usize = 4;
+const MIN_PASSES: usize = 4;
 
 /// `f̄` of one pair with its standard error, per channel [1/sr].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Reference<'a> {
     pub(super) mesh: &'a TileMesh,
     pub(super) grid: PeriodicGrid,
     pub(super) material_of_slot: Vec<usize>,
-    pub(super) materials: Vec<SumMaterial>,
+    pub(super) materials: Vec<Material>,
     /// Reflections between facets that paths follow; 0 for the paper's definition.
     pub(super) bounces: usize,
 }
@@ -72,7 +72,7 @@ impl Moments {
 }
 
 impl<'a> Reference<'a> {
-    pub fn new(mesh: &'a TileMesh, material_of_slot: &[usize], materials: &[SumMaterial]) -> Self {
+    pub fn new(mesh: &'a TileMesh, material_of_slot: &[usize], materials: &[Material]) -> Self {
         Self {
             mesh,
             grid: PeriodicGrid::new(mesh),
@@ -98,7 +98,7 @@ impl<'a> Reference<'a> {
         let mut moments = vec![Moments::default(); pairs.len()];
         let mut estimates = vec![Estimate::default(); pairs.len()];
         let sampler = FacetSampler::new(self.mesh);
-        for pass in 0..settings.max_passes.max(LEAST_PASSES) {
+        for pass in 0..settings.max_passes.max(MIN_PASSES) {
             // Shifts of one low-discrepancy sequence: the passes together are better than independent ones would be,
             // so the standard error is, if anything, too large.
             let shift = SampleShift::from_seed(settings.seed.wrapping_mul(4096).wrapping_add(pass as u64));
@@ -131,7 +131,7 @@ impl<'a> Reference<'a> {
                 norm += estimate.f_bar.as_dvec3().length_squared();
             }
             let relative = if error == 0.0 { 0.0 } else { (error / norm).sqrt() };
-            if !progress(passes, relative) || (passes >= LEAST_PASSES && relative < settings.target) {
+            if !progress(passes, relative) || (passes >= MIN_PASSES && relative < settings.target) {
                 break;
             }
         }

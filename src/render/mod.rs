@@ -9,9 +9,9 @@ pub mod tile_view;
 
 pub use image::camera::CameraView;
 pub use image::gbuffer::GBuffer;
-pub use image::picture::Picture;
+pub use image::image_file::Image;
 pub use image::render::{RenderInput, Rendered, render};
 pub use lighting::light_choice::FAINT_PART;
 pub use lighting::lights::DirectionalLight;
 pub use object::ObjectMesh;
-pub use scene::Stage;
+pub use scene::RenderScene;

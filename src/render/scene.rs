@@ -12,7 +12,7 @@ use crate::effective::Reflectance;
 use crate::scene::{Camera, LoadedScene, Switch};
 
 /// The large scale of a scene, ready for any material.
-pub struct Stage {
+pub struct RenderScene {
     pub mesh: ObjectMesh,
     /// `None` where nothing can be shadowed.
     pub occluder: Option<Occluder>,
@@ -23,7 +23,7 @@ pub struct Stage {
     shadows: Option<ShadowCache>,
 }
 
-impl Stage {
+impl RenderScene {
     /// # Errors
     /// An object or an environment that cannot be used.
     pub fn new(loaded: &LoadedScene) -> Result<Self> {

@@ -6,11 +6,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Studio;
+use super::ThumbnailRenderer;
 use crate::base::{Cancel, Result};
 use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
-use crate::render::Picture;
+use crate::render::Image;
 use crate::scene::{Effects, LoadedScene, Switch};
 
 /// An effect forced on and off.
@@ -49,10 +49,10 @@ pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 11] {
 /// A scene with an effect forced one way, timed again and again.
 struct Runner {
     scene: LoadedScene,
-    studio: Studio,
+    studio: ThumbnailRenderer,
     pipeline: Pipeline,
     outcome: Outcome,
-    picture: Picture,
+    image: Image,
     first_ms: f64,
     times: Vec<f64>,
 }
@@ -98,7 +98,7 @@ pub fn measure_effects(
             }
         }
         let [on, auto, off] = &mut runners[..] else { continue };
-        let mut delta_e = on.studio.difference(&on.picture, &off.picture);
+        let mut delta_e = on.studio.difference(&on.image, &off.image);
         delta_e.sort_by(f32::total_cmp);
         all.push(EffectCost {
             name,
@@ -115,14 +115,14 @@ pub fn measure_effects(
 
 impl Runner {
     fn new(scene: LoadedScene, cancel: &Cancel) -> Result<Self> {
-        let studio = Studio::new(&scene)?;
+        let studio = ThumbnailRenderer::new(&scene)?;
         let mut pipeline = Pipeline::new();
         pipeline.cancel_with(cancel.clone());
         let start = Instant::now();
         let outcome = pipeline.effective(&scene)?;
-        let picture = studio.picture(&*outcome.for_pictures(cancel)?.brdf)?;
+        let image = studio.image(&*outcome.shading_brdf(cancel)?.brdf)?;
         let first_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(Self { scene, studio, pipeline, outcome, picture, first_ms, times: Vec::new() })
+        Ok(Self { scene, studio, pipeline, outcome, image, first_ms, times: Vec::new() })
     }
 
     /// Other facets each time: all that an edit of the geometry asks for; 0 are the scene's own.
@@ -132,7 +132,7 @@ impl Runner {
         moved.scene.quality.seed ^= if self.times.is_empty() && run == 0 { 1 } else { run };
         let start = Instant::now();
         self.outcome = self.pipeline.effective(&moved)?;
-        self.picture = self.studio.picture(&*self.outcome.for_pictures(cancel)?.brdf)?;
+        self.image = self.studio.image(&*self.outcome.shading_brdf(cancel)?.brdf)?;
         self.times.push(start.elapsed().as_secs_f64() * 1e3);
         Ok(())
     }

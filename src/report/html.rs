@@ -221,7 +221,7 @@ fn stage_times(scene: &SceneReport) -> String {
 fn thumbnails(scene: &SceneReport) -> String {
     let mut html = String::from("<div class='thumbs'>");
     for thumb in &scene.thumbnails {
-        let _ = write!(html, "<figure><img alt='{0} picture' src='{1}'>", escape(&thumb.label), thumb.picture);
+        let _ = write!(html, "<figure><img alt='{0} picture' src='{1}'>", escape(&thumb.label), thumb.image);
         if let Some(difference) = &thumb.difference {
             let _ = write!(
                 html,

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use serde::{Deserialize, Serialize};
 
 pub use effects::{EffectCost, measure_effects, switches};
-pub use thumbnails::{Studio, difference_png, heat};
+pub use thumbnails::{ThumbnailRenderer, difference_png, heat};
 
 use crate::tuning::sweep::Point;
 
@@ -47,7 +47,8 @@ fn processor_name() -> String {
 pub struct Thumbnail {
     pub label: String,
     /// `data:` addresses of the picture and of its difference; the finest has none.
-    pub picture: String,
+    #[serde(rename = "picture")]
+    pub image: String,
     pub difference: Option<String>,
     pub mean_delta_e: f32,
     /// Of 95 % of the pixels.

@@ -10,7 +10,7 @@ use crate::reference::Reference;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::{ToneMap, srgb_byte};
 use crate::render::render;
-use crate::render::{Picture, Stage};
+use crate::render::{Image, RenderScene};
 use crate::scene::LoadedScene;
 
 /// Pixels a side, and lights.
@@ -18,48 +18,51 @@ const SIZE: usize = 120;
 const LIGHTS: usize = 8;
 
 /// Renders a scene's object again and again with different materials.
-pub struct Studio {
-    stage: Stage,
+pub struct ThumbnailRenderer {
+    stage: RenderScene,
     tone_map: ToneMap,
 }
 
-impl Studio {
+impl ThumbnailRenderer {
     /// # Errors
     /// An object, an environment or a camera that cannot be used.
     pub fn new(loaded: &LoadedScene) -> Result<Self> {
         let mut few = loaded.clone();
         few.scene.light.count = few.scene.light.count.min(LIGHTS);
-        let stage = Stage::new(&few)?;
+        let stage = RenderScene::new(&few)?;
         let tone_map = ToneMap::new(&stage.camera)?;
         Ok(Self { stage, tone_map })
     }
 
     /// # Errors
     /// A camera that sees nothing it could be framed by.
-    pub fn picture(&self, material: &dyn Reflectance) -> Result<Picture> {
-        Ok(render(&self.stage.input(material, [SIZE, SIZE], 1, &Background::default()))?.picture)
+    pub fn image(&self, material: &dyn Reflectance) -> Result<Image> {
+        Ok(render(&self.stage.input(material, [SIZE, SIZE], 1, &Background::default()))?.image)
     }
 
     /// As a PNG for a page.
     ///
     /// # Errors
     /// None in practice: the picture is small.
-    pub fn png(&self, picture: &Picture) -> Result<String> {
-        data_url(picture, &self.tone_map)
+    pub fn png(&self, image: &Image) -> Result<String> {
+        data_url(image, &self.tone_map)
     }
 
     /// The picture by the reference, noisy: the mean of many with other seeds is right. `None` where it takes too long.
     ///
     /// # Errors
-    /// As [`Studio::picture`], and [`crate::base::Error::Cancelled`].
-    pub fn reference_picture(&self, reference: &Reference<'_>, seed: u64, cancel: &Cancel) -> Result<Option<Picture>> {
-        let picture = reference.glimpse(seed, cancel).map(|glimpse| self.picture(&glimpse)).transpose()?;
+    /// As [`ThumbnailRenderer::image`], and [`crate::base::Error::Cancelled`].
+    pub fn reference_image(&self, reference: &Reference<'_>, seed: u64, cancel: &Cancel) -> Result<Option<Image>> {
+        let image = reference
+            .stochastic_reference(seed, cancel)
+            .map(|stochastic_reference| self.image(&stochastic_reference))
+            .transpose()?;
         cancel.check()?;
-        Ok(picture)
+        Ok(image)
     }
 
     /// CIE 1976 ΔE of each pixel as it is shown.
-    pub fn difference(&self, a: &Picture, b: &Picture) -> Vec<f32> {
+    pub fn difference(&self, a: &Image, b: &Image) -> Vec<f32> {
         let lab = |p: &Vec3| lab(self.tone_map.apply(*p));
         a.pixels.iter().zip(&b.pixels).map(|(a, b)| lab(a).distance(lab(b))).collect()
     }
@@ -72,7 +75,7 @@ impl Studio {
 pub fn difference_png(delta_e: &[f32]) -> Result<String> {
     let pixels = delta_e.iter().map(|delta| heat(*delta)).collect();
     let plain = ToneMap { curve: crate::render::image::tone_map::ToneCurve::Plain, gain: 1.0 };
-    data_url(&Picture { width: SIZE, height: SIZE, pixels }, &plain)
+    data_url(&Image { width: SIZE, height: SIZE, pixels }, &plain)
 }
 
 /// ΔE that the difference pictures show as white; about 2 is just seen side by side.
@@ -97,8 +100,8 @@ fn lab(rgb: Vec3) -> Vec3 {
     Vec3::new(116.0 * f(y) - 16.0, 500.0 * (f(x) - f(y)), 200.0 * (f(y) - f(z)))
 }
 
-fn data_url(picture: &Picture, tone_map: &ToneMap) -> Result<String> {
-    let bytes = picture.png_bytes(tone_map)?;
+fn data_url(image: &Image, tone_map: &ToneMap) -> Result<String> {
+    let bytes = image.png_bytes(tone_map)?;
     Ok(format!("data:image/png;base64,{}", base64(&bytes)))
 }
 

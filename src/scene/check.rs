@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use toml::{Table, Value};
 
-use super::{Field, Shape};
+use super::{Field, FieldShape};
 use crate::base::InputError;
 
 /// One step into a document.
@@ -125,32 +125,32 @@ fn check_keys(table: &Table, fields: &[Field], tag: Option<&str>, path: &mut Vec
     Ok(())
 }
 
-fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(), Problem> {
+fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<Step>) -> Result<(), Problem> {
     match *shape {
-        Shape::Number { min, max, .. } => check_number(value, min, max, path),
-        Shape::Integer { min, max } => match value {
+        FieldShape::Number { min, max, .. } => check_number(value, min, max, path),
+        FieldShape::Integer { min, max } => match value {
             Value::Integer(number) if (min..=max).contains(number) => Ok(()),
             other => Err(Problem::new(path, show(other), format!("a whole number from {min} to {max}"))),
         },
-        Shape::Color { max } => match value {
+        FieldShape::Color { max } => match value {
             Value::Array(values) if values.len() == 3 => {
-                check_entries(values, &Shape::Number { min: 0.0, max, soft_max: max }, path)
+                check_entries(values, &FieldShape::Number { min: 0.0, max, soft_max: max }, path)
             }
             Value::Integer(_) | Value::Float(_) => check_number(value, 0.0, max, path),
             other => Err(Problem::new(path, show(other), format!("a number or a triple [r, g, b] from 0 to {max}"))),
         },
-        Shape::Vector { length, min, max } => match value {
+        FieldShape::Vector { length, min, max } => match value {
             Value::Array(values) if values.len() == length => {
-                check_entries(values, &Shape::Number { min, max, soft_max: max }, path)
+                check_entries(values, &FieldShape::Number { min, max, soft_max: max }, path)
             }
             other => Err(Problem::new(path, show(other), format!("a list of {length} numbers"))),
         },
-        Shape::Text => check_text(value, "a text", path).map(drop),
-        Shape::Path => match check_text(value, "a file name", path)? {
+        FieldShape::Text => check_text(value, "a text", path).map(drop),
+        FieldShape::Path => match check_text(value, "a file name", path)? {
             "" => Err(Problem::new(path, "an empty text", "a file name")),
             _ => Ok(()),
         },
-        Shape::Choice(names) => {
+        FieldShape::Choice(names) => {
             let expected = format!("one of {}", list(names.iter().copied()));
             let found = check_text(value, &expected, path)?;
             if names.contains(&found) {
@@ -160,11 +160,11 @@ fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(),
             problem.hint = did_you_mean(found, names.iter().copied());
             Err(problem)
         }
-        Shape::Table(fields) => match value {
+        FieldShape::Table(fields) => match value {
             Value::Table(table) => check_keys(table, &fields(), None, path),
             other => Err(Problem::new(path, show(other), "a table")),
         },
-        Shape::Tagged(kinds) => {
+        FieldShape::Tagged(kinds) => {
             let kinds = kinds();
             let names = || kinds.iter().map(|kind| kind.kind);
             let Value::Table(table) = value else {
@@ -184,14 +184,14 @@ fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(),
             path.pop();
             check_keys(table, &kind.fields, Some("kind"), path)
         }
-        Shape::List { of, min, max } => match value {
+        FieldShape::List { of, min, max } => match value {
             Value::Array(values) if (min..=max).contains(&values.len()) => check_entries(values, of, path),
             Value::Array(values) => {
                 Err(Problem::new(path, format!("{} entries", values.len()), format!("{min} to {max} entries")))
             }
             other => Err(Problem::new(path, show(other), "a list")),
         },
-        Shape::AnyOf(shapes) => {
+        FieldShape::AnyOf(shapes) => {
             let fitting = shapes.iter().find(|shape| takes_type(shape, value));
             match fitting.or(shapes.first()) {
                 Some(shape) => check_value(value, shape, path),
@@ -201,7 +201,7 @@ fn check_value(value: &Value, shape: &Shape, path: &mut Vec<Step>) -> Result<(),
     }
 }
 
-fn check_entries(values: &[Value], of: &Shape, path: &mut Vec<Step>) -> Result<(), Problem> {
+fn check_entries(values: &[Value], of: &FieldShape, path: &mut Vec<Step>) -> Result<(), Problem> {
     for (index, value) in values.iter().enumerate() {
         let name = value.get("name").and_then(Value::as_str).filter(|name| !name.is_empty());
         path.push(Step::Entry(index, name.map(str::to_owned)));
@@ -228,15 +228,15 @@ fn check_text<'a>(value: &'a Value, expected: &str, path: &[Step]) -> Result<&'a
     value.as_str().ok_or_else(|| Problem::new(path, show(value), expected))
 }
 
-fn takes_type(shape: &Shape, value: &Value) -> bool {
+fn takes_type(shape: &FieldShape, value: &Value) -> bool {
     match shape {
-        Shape::Number { .. } | Shape::Integer { .. } => {
+        FieldShape::Number { .. } | FieldShape::Integer { .. } => {
             matches!(value, Value::Integer(_) | Value::Float(_))
         }
-        Shape::Text | Shape::Path | Shape::Choice(_) => value.is_str(),
-        Shape::Table(_) | Shape::Tagged(_) => value.is_table(),
-        Shape::List { .. } | Shape::Vector { .. } | Shape::Color { .. } => value.is_array(),
-        Shape::AnyOf(shapes) => shapes.iter().any(|shape| takes_type(shape, value)),
+        FieldShape::Text | FieldShape::Path | FieldShape::Choice(_) => value.is_str(),
+        FieldShape::Table(_) | FieldShape::Tagged(_) => value.is_table(),
+        FieldShape::List { .. } | FieldShape::Vector { .. } | FieldShape::Color { .. } => value.is_array(),
+        FieldShape::AnyOf(shapes) => shapes.iter().any(|shape| takes_type(shape, value)),
     }
 }
 

@@ -3,7 +3,7 @@
 use toml::{Table, Value};
 
 use super::Scene;
-use super::{Geometry, Kind, Shape, TermSpec};
+use super::{FieldShape, Geometry, Kind, TermSpec};
 
 impl Scene {
     /// Moves the first numeric parameter of the geometry by 5 % and says which (`tile.geometry.depth`); `None` where
@@ -42,10 +42,10 @@ where
 {
     let kind = kinds.into_iter().find(|candidate| candidate.kind == kind)?;
     let mut table = Table::try_from(item).ok()?;
-    let rank = |shape: &Shape| match shape {
-        Shape::Number { .. } => Some(0),
-        Shape::Color { .. } => Some(1),
-        Shape::Integer { .. } => Some(2),
+    let rank = |shape: &FieldShape| match shape {
+        FieldShape::Number { .. } => Some(0),
+        FieldShape::Color { .. } => Some(1),
+        FieldShape::Integer { .. } => Some(2),
         _ => None,
     };
     let mut fields: Vec<_> = kind.fields.iter().filter_map(|field| Some((rank(&field.shape)?, field))).collect();
@@ -53,14 +53,14 @@ where
     let field = fields.into_iter().map(|(_, field)| field).find(|field| table.contains_key(field.key))?;
     let value = table.get_mut(field.key)?;
     *value = match (&*value, field.shape) {
-        (Value::Float(number), Shape::Number { min, max, soft_max }) => {
+        (Value::Float(number), FieldShape::Number { min, max, soft_max }) => {
             Value::Float(step(*number, min, max, soft_max - min))
         }
-        (Value::Integer(number), Shape::Integer { min, max }) => {
+        (Value::Integer(number), FieldShape::Integer { min, max }) => {
             let by = (number / 20).max(1);
             Value::Integer(if number + by <= max { number + by } else { (number - by).max(min) })
         }
-        (Value::Array(values), Shape::Color { max }) => {
+        (Value::Array(values), FieldShape::Color { max }) => {
             let moved =
                 values.iter().filter_map(Value::as_float).map(|number| Value::Float(step(number, 0.0, max, 1.0)));
             Value::Array(moved.collect())

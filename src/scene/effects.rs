@@ -1,6 +1,6 @@
 //! The `[effects]` table: what the plan decides by itself unless a person forces it.
 
-use super::Shape;
+use super::FieldShape;
 use super::schema::{scene_choice, scene_table};
 
 scene_choice! {
@@ -15,7 +15,7 @@ scene_choice! {
     }
 }
 
-const SWITCH: Shape = Shape::Choice(Switch::NAMES);
+const SWITCH: FieldShape = FieldShape::Choice(Switch::NAMES);
 
 scene_table! {
     /// Effects, each as the plan decides or forced on or off.
@@ -35,7 +35,7 @@ scene_table! {
         /// Light that facets send to each other. Auto is off: the paper's definition leaves it out.
         interreflection: Switch = Switch::Auto, SWITCH, "";
         /// Reflections between facets that are followed, where they are.
-        bounces: usize = 4, Shape::Integer { min: 1, max: 64 }, "";
+        bounces: usize = 4, FieldShape::Integer { min: 1, max: 64 }, "";
         /// Planes that mirror the tile spare half of the directions; on takes the tile to have both.
         mirror_symmetry: Switch = Switch::Auto, SWITCH, "";
         /// The result turns with the tile; off tabulates it over three angles in place of four where a format can (.bsdf).

@@ -23,7 +23,7 @@ pub struct LoadedScene {
 }
 
 /// A scene file is text written by people: more than this is something else.
-const LARGEST_FILE: u64 = 64 << 20;
+const MAX_FILE: u64 = 64 << 20;
 
 /// Opens `scene`, a file or the name of a shipped material, with `--set` overrides (`key.path=value`) applied.
 pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
@@ -61,13 +61,13 @@ pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
 pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScene> {
     let complain = |found: String| Error::from(InputError::new("", found, "a scene file (TOML, UTF-8)").in_file(path));
     let length = std::fs::metadata(path).map_err(|error| complain(error.to_string()))?.len();
-    if length > LARGEST_FILE {
+    if length > MAX_FILE {
         return Err(complain(format!("{length} bytes")));
     }
     let mut source = String::new();
     // A pipe does not say how long it is.
     let file = std::fs::File::open(path).map_err(|error| complain(error.to_string()))?;
-    file.take(LARGEST_FILE).read_to_string(&mut source).map_err(|error| complain(error.to_string()))?;
+    file.take(MAX_FILE).read_to_string(&mut source).map_err(|error| complain(error.to_string()))?;
     let scene = load_with_overrides(&source, overrides).map_err(|error| error.in_file(path))?;
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();

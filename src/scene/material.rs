@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use super::color;
 use super::schema::number;
-use super::{Field, Kind, Shape};
+use super::{Field, FieldShape, Kind};
 
 /// A material, assigned to the mesh slot of its name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Material {
+pub struct MaterialSpec {
     pub name: String,
     /// Without one, the BRDF of the material `default`: variants in colour need say no more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -26,17 +26,17 @@ fn white() -> Vec3 {
     Vec3::ONE
 }
 
-const TERM: Shape = Shape::Tagged(TermSpec::kinds);
+const TERM: FieldShape = FieldShape::Tagged(TermSpec::kinds);
 /// Colour weights and analytic parameters may gain energy, which is reported, not refused; beyond this it is a slip.
 const GAIN_LIMIT: f64 = 1000.0;
 
-impl Material {
+impl MaterialSpec {
     pub fn fields() -> Vec<Field> {
-        let brdf = Shape::AnyOf(&[TERM, Shape::List { of: &TERM, min: 1, max: 16 }]);
+        let brdf = FieldShape::AnyOf(&[TERM, FieldShape::List { of: &TERM, min: 1, max: 16 }]);
         vec![
-            Field::required("name", Shape::Text, "The mesh slot it is for; `default` is for all others."),
+            Field::required("name", FieldShape::Text, "The mesh slot it is for; `default` is for all others."),
             Field::new("brdf", "", brdf, None, "One term or a list of terms that are added."),
-            Field::new("color", "", Shape::Color { max: GAIN_LIMIT }, None, "Multiplies the BRDF."),
+            Field::new("color", "", FieldShape::Color { max: GAIN_LIMIT }, None, "Multiplies the BRDF."),
         ]
     }
 }
@@ -130,7 +130,7 @@ fn default_roughness() -> f32 {
 impl TermSpec {
     /// The catalogue of BRDF models.
     pub fn kinds() -> Vec<Kind> {
-        let color = |key, max, doc| Field::new(key, "", Shape::Color { max }, None, doc);
+        let color = |key, max, doc| Field::new(key, "", FieldShape::Color { max }, None, doc);
         let roughness = || {
             Field::new("roughness", "", number(1e-4, 2.0), Some(f64::from(default_roughness())), "Width of the lobe.")
         };
@@ -139,11 +139,11 @@ impl TermSpec {
         let exponent = Field::new(
             "exponent",
             "",
-            Shape::Number { min: 0.0, max: 1e6, soft_max: 1000.0 },
+            FieldShape::Number { min: 0.0, max: 1e6, soft_max: 1000.0 },
             Some(f64::from(blinn_phong_exponent())),
             "Sharpness of the lobe.",
         );
-        let path = |doc| Field::required("path", Shape::Path, doc);
+        let path = |doc| Field::required("path", FieldShape::Path, doc);
         let kind = |kind, doc, fields| Kind { kind, doc, fields };
         vec![
             kind(

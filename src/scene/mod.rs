@@ -29,10 +29,10 @@ use serde::{Deserialize, Serialize};
 
 pub use effects::{Effects, Switch};
 pub use load::{LoadedScene, load, load_with_overrides, open, parse};
-pub use material::{BrdfSpec, Material, TermSpec};
+pub use material::{BrdfSpec, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
-pub use schema::{Field, Kind, Shape};
+pub use schema::{Field, FieldShape, Kind};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
     MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
@@ -51,7 +51,7 @@ pub struct Scene {
     pub version: u32,
     pub tile: Tile,
     #[serde(default, rename = "material", skip_serializing_if = "Vec::is_empty")]
-    pub materials: Vec<Material>,
+    pub materials: Vec<MaterialSpec>,
     #[serde(default)]
     pub object: Object,
     #[serde(default)]
@@ -83,7 +83,7 @@ pub struct SlotMaterial<'a> {
 static GREY: LazyLock<BrdfSpec> = LazyLock::new(|| BrdfSpec::One(TermSpec::Lambertian { albedo: Vec3::splat(0.5) }));
 
 const DEFAULT_MATERIAL: &str = "default";
-const MATERIAL: Shape = Shape::Table(Material::fields);
+const MATERIAL: FieldShape = FieldShape::Table(MaterialSpec::fields);
 
 impl Scene {
     /// A scene that is all defaults but for its geometry.
@@ -104,14 +104,14 @@ impl Scene {
     pub fn fields() -> Vec<Field> {
         let optional = |key, shape, doc| Field::new(key, "", shape, None, doc);
         vec![
-            optional("version", Shape::Integer { min: 1, max: 1 }, "Version of the file format."),
-            Field::required("tile", Shape::Table(Tile::fields), "The small-scale surface."),
-            optional("material", Shape::List { of: &MATERIAL, min: 0, max: 4096 }, "Materials by slot name."),
-            optional("object", Shape::Table(Object::fields), "The large-scale object."),
-            optional("light", Shape::Table(Light::fields), "What lights it."),
-            optional("camera", Shape::Table(Camera::fields), "Where the picture is taken from."),
-            optional("quality", Shape::Table(Quality::fields), "How accurately."),
-            optional("effects", Shape::Table(Effects::fields), "Which effects are computed."),
+            optional("version", FieldShape::Integer { min: 1, max: 1 }, "Version of the file format."),
+            Field::required("tile", FieldShape::Table(Tile::fields), "The small-scale surface."),
+            optional("material", FieldShape::List { of: &MATERIAL, min: 0, max: 4096 }, "Materials by slot name."),
+            optional("object", FieldShape::Table(Object::fields), "The large-scale object."),
+            optional("light", FieldShape::Table(Light::fields), "What lights it."),
+            optional("camera", FieldShape::Table(Camera::fields), "Where the picture is taken from."),
+            optional("quality", FieldShape::Table(Quality::fields), "How accurately."),
+            optional("effects", FieldShape::Table(Effects::fields), "Which effects are computed."),
         ]
     }
 

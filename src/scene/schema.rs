@@ -7,7 +7,7 @@ pub struct Field {
     pub key: &'static str,
     /// `tile units`, `degrees`, ... or empty.
     pub unit: &'static str,
-    pub shape: Shape,
+    pub shape: FieldShape,
     /// Default of a numeric key.
     pub default: Option<f64>,
     pub required: bool,
@@ -16,11 +16,17 @@ pub struct Field {
 }
 
 impl Field {
-    pub fn new(key: &'static str, unit: &'static str, shape: Shape, default: Option<f64>, doc: &'static str) -> Self {
+    pub fn new(
+        key: &'static str,
+        unit: &'static str,
+        shape: FieldShape,
+        default: Option<f64>,
+        doc: &'static str,
+    ) -> Self {
         Self { key, unit, shape, default, required: false, doc: doc.trim_ascii() }
     }
 
-    pub fn required(key: &'static str, shape: Shape, doc: &'static str) -> Self {
+    pub fn required(key: &'static str, shape: FieldShape, doc: &'static str) -> Self {
         Self { required: true, ..Self::new(key, "", shape, None, doc) }
     }
 
@@ -34,7 +40,7 @@ impl Field {
 
 /// What a key may hold. Ranges are inclusive.
 #[derive(Debug, Clone, Copy)]
-pub enum Shape {
+pub enum FieldShape {
     /// Any number in `min..=max`; a slider ends at `soft_max`, beyond which values are legal but rarely meant.
     Number {
         min: f64,
@@ -62,12 +68,12 @@ pub enum Shape {
     /// A table whose `kind` says which keys it has.
     Tagged(fn() -> Vec<Kind>),
     List {
-        of: &'static Shape,
+        of: &'static FieldShape,
         min: usize,
         max: usize,
     },
     /// The first alternative of the value's TOML type decides.
-    AnyOf(&'static [Shape]),
+    AnyOf(&'static [FieldShape]),
 }
 
 /// One alternative of a tagged table: a geometry family, a BRDF model.
@@ -79,13 +85,13 @@ pub struct Kind {
 }
 
 /// A number in `min..=max`.
-pub const fn number(min: f64, max: f64) -> Shape {
-    Shape::Number { min, max, soft_max: max }
+pub const fn number(min: f64, max: f64) -> FieldShape {
+    FieldShape::Number { min, max, soft_max: max }
 }
 
 /// A length in tile units: any up to a hundred of the largest tiles, sliders end at `soft_max`.
-pub const fn length(min: f64, soft_max: f64) -> Shape {
-    Shape::Number { min, max: 1e8, soft_max }
+pub const fn length(min: f64, soft_max: f64) -> FieldShape {
+    FieldShape::Number { min, max: 1e8, soft_max }
 }
 
 /// The default of a field as the catalogue shows it: numbers have one, other types do not.
@@ -142,7 +148,7 @@ macro_rules! scene_table {
 }
 pub(super) use scene_table;
 
-/// A field-less enum that reads and writes as its snake-case names, with the list of them as a [`Shape`].
+/// A field-less enum that reads and writes as its snake-case names, with the list of them as a [`FieldShape`].
 macro_rules! scene_choice {
     ($(#[doc = $enum_doc:literal])* $name:ident { $( #[doc = $doc:literal] $variant:ident = $text:literal, )* }) => {
         $(#[doc = $enum_doc])*

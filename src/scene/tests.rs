@@ -320,7 +320,7 @@ fn every_number_of_the_catalogue_has_a_default_in_its_range_and_a_doc() {
         for field in kind.fields {
             assert!(!field.doc.is_empty() && !field.label().is_empty(), "{}.{}", kind.kind, field.key);
             match (field.shape, field.default) {
-                (Shape::Number { min, max, soft_max }, default) => {
+                (FieldShape::Number { min, max, soft_max }, default) => {
                     assert!(min < soft_max && soft_max <= max, "{}.{}", kind.kind, field.key);
                     assert!(
                         default.is_none_or(|value| (min..=soft_max).contains(&value)),
@@ -329,7 +329,7 @@ fn every_number_of_the_catalogue_has_a_default_in_its_range_and_a_doc() {
                         field.key
                     );
                 }
-                (Shape::Integer { min, max }, Some(value)) => {
+                (FieldShape::Integer { min, max }, Some(value)) => {
                     assert!((min as f64..=max as f64).contains(&value))
                 }
                 _ => {}
@@ -362,28 +362,30 @@ fn the_catalogue_lists_exactly_the_keys_that_serde_takes() {
 }
 
 /// A value that the catalogue allows: ends of ranges, and between.
-pub(crate) fn value_of(shape: Shape) -> BoxedStrategy<Value> {
+pub(crate) fn value_of(shape: FieldShape) -> BoxedStrategy<Value> {
     let number = |min: f64, max: f64| {
         let inside = (0.0..=1.0).prop_map(move |t| (min + t * (max - min)) as f32);
         let inside = inside.prop_map(move |x| f64::from(x.clamp(min as f32, max as f32)));
         prop_oneof![1 => Just(f64::from(min as f32)), 1 => Just(f64::from(max as f32)), 6 => inside]
     };
     match shape {
-        Shape::Number { min, soft_max, .. } => number(min, soft_max).prop_map(Value::Float).boxed(),
-        Shape::Integer { min, max } => (min..=max.min(min.saturating_add(64))).prop_map(Value::Integer).boxed(),
-        Shape::Color { max } => proptest::collection::vec(number(0.0, max.min(2.0)).prop_map(Value::Float), 3)
+        FieldShape::Number { min, soft_max, .. } => number(min, soft_max).prop_map(Value::Float).boxed(),
+        FieldShape::Integer { min, max } => (min..=max.min(min.saturating_add(64))).prop_map(Value::Integer).boxed(),
+        FieldShape::Color { max } => proptest::collection::vec(number(0.0, max.min(2.0)).prop_map(Value::Float), 3)
             .prop_map(Value::Array)
             .boxed(),
-        Shape::Vector { length, min, max } => {
+        FieldShape::Vector { length, min, max } => {
             proptest::collection::vec(number(min.max(0.1), max.min(4.0)).prop_map(Value::Float), length)
                 .prop_map(Value::Array)
                 .boxed()
         }
-        Shape::Choice(names) => proptest::sample::select(names).prop_map(|name| Value::String(name.to_owned())).boxed(),
-        Shape::Text | Shape::Path => "[a-z ./\\\\\"é]{1,9}".prop_map(Value::String).boxed(),
-        Shape::AnyOf(shapes) => value_of(shapes[0]),
-        Shape::Table(fields) => table_of(fields()).prop_map(Value::Table).boxed(),
-        Shape::Tagged(kinds) => proptest::sample::select(kinds())
+        FieldShape::Choice(names) => {
+            proptest::sample::select(names).prop_map(|name| Value::String(name.to_owned())).boxed()
+        }
+        FieldShape::Text | FieldShape::Path => "[a-z ./\\\\\"é]{1,9}".prop_map(Value::String).boxed(),
+        FieldShape::AnyOf(shapes) => value_of(shapes[0]),
+        FieldShape::Table(fields) => table_of(fields()).prop_map(Value::Table).boxed(),
+        FieldShape::Tagged(kinds) => proptest::sample::select(kinds())
             .prop_flat_map(|kind| {
                 let tag = Value::String(kind.kind.to_owned());
                 table_of(kind.fields).prop_map(move |mut table| {
@@ -392,7 +394,7 @@ pub(crate) fn value_of(shape: Shape) -> BoxedStrategy<Value> {
                 })
             })
             .boxed(),
-        Shape::List { of, min, max } => {
+        FieldShape::List { of, min, max } => {
             proptest::collection::vec(value_of(*of), min..=max.min(min + 3)).prop_map(Value::Array).boxed()
         }
     }

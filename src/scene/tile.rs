@@ -6,7 +6,7 @@ use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
 use super::schema::{length, number, scene_choice, scene_table};
-use super::{Field, Kind, Shape};
+use super::{Field, FieldShape, Kind};
 
 /// One period of the small-scale surface.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,20 +46,20 @@ impl Tile {
             Field::new(
                 "size",
                 "tile units",
-                Shape::Vector { length: 2, min: 1e-6, max: 1e6 },
+                FieldShape::Vector { length: 2, min: 1e-6, max: 1e6 },
                 None,
                 "Extent of the period in x and y.",
             ),
-            Field::new("unit", "", Shape::Text, None, "Name of the length unit."),
-            Field::new("color_path", "", Shape::Path, None, "An image of colour weights over the tile."),
+            Field::new("unit", "", FieldShape::Text, None, "Name of the length unit."),
+            Field::new("color_path", "", FieldShape::Path, None, "An image of colour weights over the tile."),
             Field::new(
                 "slot_path",
                 "",
-                Shape::Path,
+                FieldShape::Path,
                 None,
                 "An image of materials over the tile: a grey of k (of 255) is the slot `paint_k`, 0 the surface's own.",
             ),
-            Field::required("geometry", Shape::Tagged(Geometry::kinds), "The surface on the tile."),
+            Field::required("geometry", FieldShape::Tagged(Geometry::kinds), "The surface on the tile."),
         ]
     }
 }
@@ -145,9 +145,9 @@ scene_table! {
         /// Width of the bottom (U: of the opening) as a part of the distance between grooves; V grooves have none.
         bottom_width: f32 = 0.4, number(0.0, 0.95), "of the pitch";
         /// Cross-section.
-        profile: GrooveProfile = GrooveProfile::Trapezoid, Shape::Choice(GrooveProfile::NAMES), "";
+        profile: GrooveProfile = GrooveProfile::Trapezoid, FieldShape::Choice(GrooveProfile::NAMES), "";
         /// Grooves across the tile.
-        count: u32 = 4, Shape::Integer { min: 1, max: 64 }, "";
+        count: u32 = 4, FieldShape::Integer { min: 1, max: 64 }, "";
         /// Turns the grooves, which run along y, about z; snaps to a direction in which the tile repeats.
         rotation_deg: f32 = 0.0, number(-180.0, 180.0), "degrees";
     }
@@ -179,9 +179,9 @@ scene_table! {
         /// Distance between neighbours, rounded so that whole cells fit the tile.
         spacing: f32 = 0.25, length(1e-9, 1.0), "tile units";
         /// Sides of the base.
-        sides: u32 = 4, Shape::Integer { min: 3, max: 8 }, "";
+        sides: u32 = 4, FieldShape::Integer { min: 3, max: 8 }, "";
         /// How they stand.
-        arrangement: Arrangement = Arrangement::Square, Shape::Choice(Arrangement::NAMES), "";
+        arrangement: Arrangement = Arrangement::Square, FieldShape::Choice(Arrangement::NAMES), "";
         /// Turns each pyramid about its axis.
         rotation_deg: f32 = 0.0, number(-180.0, 180.0), "degrees";
     }
@@ -207,17 +207,17 @@ scene_table! {
         /// Randomness of the lengths, as a part of the length.
         length_variation: f32 = 0.1, number(0.0, 1.0), "";
         /// Rods on the tile.
-        count: u32 = 100, Shape::Integer { min: 1, max: 4000 }, "";
+        count: u32 = 100, FieldShape::Integer { min: 1, max: 4000 }, "";
         /// Rods per squared tile unit; stands in for the count.
         #[serde(skip_serializing_if = "Option::is_none")]
         density: Option<f32> = None, number(1e-3, 1e6), "per area";
         /// Seed of the random numbers.
-        seed: u64 = 1, Shape::Integer { min: 0, max: i64::MAX }, "";
+        seed: u64 = 1, FieldShape::Integer { min: 0, max: i64::MAX }, "";
     }
 }
 
 scene_choice! {
-    /// Shape of a thread across its run.
+    /// FieldShape of a thread across its run.
     CrossSection {
         /// Round or oval yarn.
         Elliptic = "elliptic",
@@ -265,10 +265,10 @@ scene_choice! {
     }
 }
 
-const WEAVE_BIT: Shape = Shape::Integer { min: 0, max: 1 };
-const WEAVE_ROW: Shape = Shape::List { of: &WEAVE_BIT, min: 1, max: 24 };
-const WEAVE_PATTERN: Shape =
-    Shape::AnyOf(&[Shape::Choice(FloatPattern::NAMES), Shape::List { of: &WEAVE_ROW, min: 1, max: 24 }]);
+const WEAVE_BIT: FieldShape = FieldShape::Integer { min: 0, max: 1 };
+const WEAVE_ROW: FieldShape = FieldShape::List { of: &WEAVE_BIT, min: 1, max: 24 };
+const WEAVE_PATTERN: FieldShape =
+    FieldShape::AnyOf(&[FieldShape::Choice(FloatPattern::NAMES), FieldShape::List { of: &WEAVE_ROW, min: 1, max: 24 }]);
 
 scene_table! {
     /// Woven threads (Wu et al. 2011, Fig. 7): warp threads run along y, weft threads along x, and touch where they cross.
@@ -284,33 +284,33 @@ scene_table! {
         /// Who bends: 0 only the weft, 1 only the warp.
         crimp: f32 = 0.5, number(0.0, 1.0), "";
         /// Warp threads on the tile, rounded to whole repeats of the pattern.
-        warp_count: u32 = 4, Shape::Integer { min: 1, max: 24 }, "";
+        warp_count: u32 = 4, FieldShape::Integer { min: 1, max: 24 }, "";
         /// Weft threads on the tile, rounded to whole repeats of the pattern.
-        weft_count: u32 = 4, Shape::Integer { min: 1, max: 24 }, "";
-        /// Shape of a thread across its run.
-        cross_section: CrossSection = CrossSection::Elliptic, Shape::Choice(CrossSection::NAMES), "";
+        weft_count: u32 = 4, FieldShape::Integer { min: 1, max: 24 }, "";
+        /// FieldShape of a thread across its run.
+        cross_section: CrossSection = CrossSection::Elliptic, FieldShape::Choice(CrossSection::NAMES), "";
         /// Which thread is on top: plain, twill, satin or a matrix of 0 and 1 (1: warp on top; a row per weft thread).
         pattern: WeavePattern = WeavePattern::Named(FloatPattern::Plain), WEAVE_PATTERN, "";
         /// What lies under the gaps: none, warp, weft or backing.
-        backing: Backing = Backing::Weft, Shape::Choice(Backing::NAMES), "";
+        backing: Backing = Backing::Weft, FieldShape::Choice(Backing::NAMES), "";
     }
 }
 
-const HEIGHT: Shape = Shape::Number { min: -1e6, max: 1e6, soft_max: 1.0 };
-const HEIGHT_ROW: Shape = Shape::List { of: &HEIGHT, min: 1, max: 4096 };
+const HEIGHT: FieldShape = FieldShape::Number { min: -1e6, max: 1e6, soft_max: 1.0 };
+const HEIGHT_ROW: FieldShape = FieldShape::List { of: &HEIGHT, min: 1, max: 4096 };
 
 scene_table! {
     /// A height-field (Wu et al. 2011, Fig. 8) from an image or from values in the file. Image values are linear,
     /// 0 to 1 for integer formats. Sample (column i, row j) sits at ((i+½)/w, (j+½)/h) of the tile, row 0 at y = 0.
     Heightfield {
         /// Height of the value 1.
-        height_scale: f32 = 1.0, Shape::Number { min: -1e8, max: 1e8, soft_max: 1.0 }, "tile units";
+        height_scale: f32 = 1.0, FieldShape::Number { min: -1e8, max: 1e8, soft_max: 1.0 }, "tile units";
         /// An image of heights: PNG of 8 or 16 bits, TIFF, HDR or EXR.
         #[serde(skip_serializing_if = "Option::is_none")]
-        path: Option<PathBuf> = None, Shape::Path, "";
+        path: Option<PathBuf> = None, FieldShape::Path, "";
         /// Heights row by row, in place of an image.
         #[serde(skip_serializing_if = "Option::is_none")]
-        values: Option<Vec<Vec<f32>>> = None, Shape::List { of: &HEIGHT_ROW, min: 1, max: 4096 }, "";
+        values: Option<Vec<Vec<f32>>> = None, FieldShape::List { of: &HEIGHT_ROW, min: 1, max: 4096 }, "";
     }
 }
 
@@ -332,9 +332,9 @@ scene_table! {
         /// Part of a stripe or check period that is `first`.
         ratio: f32 = 0.5, number(0.0, 1.0), "of the period";
         /// Division into slots.
-        pattern: FlatPattern = FlatPattern::Plain, Shape::Choice(FlatPattern::NAMES), "";
+        pattern: FlatPattern = FlatPattern::Plain, FieldShape::Choice(FlatPattern::NAMES), "";
         /// Periods across the tile.
-        count: u32 = 4, Shape::Integer { min: 1, max: 64 }, "";
+        count: u32 = 4, FieldShape::Integer { min: 1, max: 64 }, "";
     }
 }
 
@@ -342,7 +342,7 @@ scene_table! {
     /// A triangle mesh from an OBJ file, in tile coordinates.
     MeshFile {
         /// The OBJ file; its `usemtl` names choose the materials.
-        path: PathBuf = PathBuf::new(), Shape::Path, "";
+        path: PathBuf = PathBuf::new(), FieldShape::Path, "";
     }
 }
 

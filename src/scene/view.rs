@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::color;
 use super::schema::{number, scene_table};
-use super::{Field, Shape};
+use super::{Field, FieldShape};
 
 /// Objects that `object.kind` names; `mesh` reads `object.path`.
 pub const OBJECT_KINDS: &[&str] = &["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh"];
@@ -18,29 +18,29 @@ pub const TONE_MAPS: &[&str] = &["filmic", "plain"];
 scene_table! {
     /// The large-scale object that wears the material.
     Object {
-        /// Shape: sphere, plate, cup, cylinder, pillow, skirt, teapot or mesh.
-        kind: String = "sphere".to_owned(), Shape::Choice(OBJECT_KINDS), "";
+        /// FieldShape: sphere, plate, cup, cylinder, pillow, skirt, teapot or mesh.
+        kind: String = "sphere".to_owned(), FieldShape::Choice(OBJECT_KINDS), "";
         /// The OBJ file of the kind `mesh`.
         #[serde(skip_serializing_if = "Option::is_none")]
-        path: Option<PathBuf> = None, Shape::Path, "";
+        path: Option<PathBuf> = None, FieldShape::Path, "";
     }
 }
 
-const LIGHT: Shape = Shape::Table(DirectionalSpec::fields);
+const LIGHT: FieldShape = FieldShape::Table(DirectionalSpec::fields);
 
 scene_table! {
     /// What lights it.
     Light {
         /// A built-in sky (studio, clear_sky, overcast_sky, sun, none) or a .hdr / .exr file.
-        environment: String = "studio".to_owned(), Shape::Text, "";
+        environment: String = "studio".to_owned(), FieldShape::Text, "";
         /// How many directional lights stand for the environment.
-        count: usize = 32, Shape::Integer { min: 0, max: 4096 }, "";
+        count: usize = 32, FieldShape::Integer { min: 0, max: 4096 }, "";
         /// Turns the environment about the vertical.
         rotation_deg: f32 = 0.0, number(-360.0, 360.0), "degrees";
         /// Scales the environment's radiance.
-        intensity: f32 = 1.0, Shape::Number { min: 0.0, max: 1e6, soft_max: 10.0 }, "";
+        intensity: f32 = 1.0, FieldShape::Number { min: 0.0, max: 1e6, soft_max: 10.0 }, "";
         /// Further directional lights.
-        directional: Vec<DirectionalSpec> = Vec::new(), Shape::List { of: &LIGHT, min: 0, max: 4096 }, "";
+        directional: Vec<DirectionalSpec> = Vec::new(), FieldShape::List { of: &LIGHT, min: 0, max: 4096 }, "";
     }
 }
 
@@ -57,10 +57,14 @@ pub struct DirectionalSpec {
 
 impl DirectionalSpec {
     pub fn fields() -> Vec<Field> {
-        let direction = Shape::Vector { length: 3, min: -1e6, max: 1e6 };
+        let direction = FieldShape::Vector { length: 3, min: -1e6, max: 1e6 };
         vec![
             Field::required("direction", direction, "Towards the light, y up; any length but zero."),
-            Field::required("irradiance", Shape::Color { max: 1e9 }, "Irradiance on a surface that faces the light."),
+            Field::required(
+                "irradiance",
+                FieldShape::Color { max: 1e9 },
+                "Irradiance on a surface that faces the light.",
+            ),
         ]
     }
 }
@@ -73,14 +77,14 @@ scene_table! {
         /// Height of the camera above the horizon.
         elevation_deg: f32 = 20.0, number(-90.0, 90.0), "degrees";
         /// Distance in radii of the object's bounding sphere; 0 frames the object.
-        distance: f32 = 0.0, Shape::Number { min: 0.0, max: 1e4, soft_max: 20.0 }, "radii";
+        distance: f32 = 0.0, FieldShape::Number { min: 0.0, max: 1e4, soft_max: 20.0 }, "radii";
         /// Moves what is looked at across the picture: to the right and up.
-        pan: Vec2 = Vec2::ZERO, Shape::Vector { length: 2, min: -100.0, max: 100.0 }, "radii";
+        pan: Vec2 = Vec2::ZERO, FieldShape::Vector { length: 2, min: -100.0, max: 100.0 }, "radii";
         /// Vertical field of view.
         fov_deg: f32 = 30.0, number(1.0, 150.0), "degrees";
         /// Exposure in stops.
-        exposure_ev: f32 = 0.0, Shape::Number { min: -40.0, max: 40.0, soft_max: 8.0 }, "EV";
+        exposure_ev: f32 = 0.0, FieldShape::Number { min: -40.0, max: 40.0, soft_max: 8.0 }, "EV";
         /// How radiance becomes a pixel: filmic or plain.
-        tone_map: String = "filmic".to_owned(), Shape::Choice(TONE_MAPS), "";
+        tone_map: String = "filmic".to_owned(), FieldShape::Choice(TONE_MAPS), "";
     }
 }

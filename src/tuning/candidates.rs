@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ladder;
+use super::quality_scale;
 use crate::base::Result;
 use crate::scene::{LoadedScene, Quality};
 
@@ -70,7 +70,7 @@ pub fn candidates(measured_colors: bool, overhangs: bool, combinations: usize) -
             all.push(Candidate::new(Family::Knob((*key).to_owned()), "standard", set));
         }
     }
-    all.extend((1..=5).map(|k| ladder::rung(2.0 * f64::from(k), overhangs)));
+    all.extend((1..=5).map(|k| quality_scale::rung(2.0 * f64::from(k), overhangs)));
     all.extend((0..combinations).map(combination));
     all
 }

@@ -2,7 +2,7 @@
 
 pub mod candidates;
 pub mod choose;
-pub mod ladder;
 pub mod progressive;
+pub mod quality_scale;
 mod small_reference;
 pub mod sweep;

@@ -15,7 +15,7 @@ const PAIRS: usize = 512;
 pub const PAIRS_SEED: u64 = 20_110_801;
 const REFERENCE_FACETS: usize = 2048;
 const MAX_PASSES: usize = 128;
-const LEAST_PASSES: usize = 4;
+const MIN_PASSES: usize = 4;
 /// The reference must be this much better than what is asked for [dB].
 const REFERENCE_LEAD_DB: f64 = 8.0;
 /// A small reference of a scene, and how good it is itself.
@@ -53,7 +53,7 @@ impl SmallReference {
             reference.estimate(&pairs, &settings, |passes, error| {
                 own = error;
                 progress(&format!("reference, {passes} passes, standard error {:.2} %", error * 100.0));
-                passes < LEAST_PASSES || error > enough
+                passes < MIN_PASSES || error > enough
             })
         })?;
         Ok(Self { pairs, f_bar: estimates.iter().map(|one| one.f_bar).collect(), own, peak_db })
@@ -70,8 +70,8 @@ impl SmallReference {
         let ours = (errors.rel_l2.powi(2) - self.own.powi(2)).max((self.own / 3.0).powi(2)).sqrt().min(errors.rel_l2);
         // Upper errors are two standard errors of the mean square away.
         let upper = upper_errors(&values, &self.f_bar).rel_l2 / errors.rel_l2;
-        let doubt_db = 10.0 * (0.5 * (1.0 + upper * upper)).log10();
-        (self.peak_db - 20.0 * ours.max(1e-12).log10(), doubt_db, ours)
+        let psnr_std_error_db = 10.0 * (0.5 * (1.0 + upper * upper)).log10();
+        (self.peak_db - 20.0 * ours.max(1e-12).log10(), psnr_std_error_db, ours)
     }
 }
 

@@ -65,7 +65,7 @@ impl Truth {
         })?;
         let f_bar: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar).collect();
         let off: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar + estimate.standard_error).collect();
-        let own_db = compare(&off, &f_bar).psnr_db.min(MOST_DB);
+        let own_db = compare(&off, &f_bar).psnr_db.min(MAX_DB);
         Ok(Self { pairs, f_bar, own, own_db, passes, seconds: start.elapsed().as_secs_f64(), first_albedo: count })
     }
 
@@ -133,7 +133,7 @@ pub struct Point {
 }
 
 /// No difference at all, as a number that JSON can hold [dB].
-const MOST_DB: f64 = 300.0;
+const MAX_DB: f64 = 300.0;
 
 /// Most runs that a time is the median of, and the seconds after which there are no more.
 const RUNS: usize = 5;
@@ -181,7 +181,7 @@ pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Re
         ms,
         query_us: query_us(&outcome, truth),
         rel_l2: errors.rel_l2,
-        psnr_db: errors.psnr_db.min(MOST_DB),
+        psnr_db: errors.psnr_db.min(MAX_DB),
         albedo_error: truth.albedo_error(&values),
         rel_l2_by_angle: truth.by_angle(&values),
         stages: times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),

@@ -1,4 +1,4 @@
-//! Horizons of a height-field by walking its samples: the highest slope is reached where the slice crosses a mesh edge.
+//! HorizonMap of a height-field by walking its samples: the highest slope is reached where the slice crosses a mesh edge.
 
 use glam::{Vec2, Vec3};
 
@@ -19,7 +19,7 @@ pub(crate) struct HeightMarch {
 
 /// Edges of one family that any walk may cross, besides those of sixteen tiles: what lies beyond blocks only directions low
 /// over the horizon, and only of height-fields that are many tiles high.
-const LEAST_LINES: usize = 8192;
+const MIN_LINES: usize = 8192;
 
 /// Crossings worked on together. Of eight the compiler unrolls the loops, and makes vectors of half of them only.
 const WIDTH: usize = 16;
@@ -87,7 +87,7 @@ impl HeightMarch {
         let most = match (along_x, along_y) {
             (true, _) => self.size[0] + 1,
             (_, true) => self.size[1] + 1,
-            _ => LEAST_LINES + 16 * (self.size[0] + self.size[1]),
+            _ => MIN_LINES + 16 * (self.size[0] + self.size[1]),
         };
         let [x, y] = [[at.x, speed.x], [at.y, speed.y]];
         if !along_y {

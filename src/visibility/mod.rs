@@ -4,7 +4,8 @@
 //! horizons where nothing overhangs, as slices or as maps of bits where something does.
 
 pub(crate) mod height_march;
-mod horizons;
+mod horizon_map;
+pub(crate) mod occlusion_intervals;
 mod packed;
 mod ray_cast;
 pub(crate) mod scan;
@@ -13,7 +14,6 @@ mod shadow_map;
 mod shadow_map_tests;
 pub(crate) mod shadow_view;
 pub(crate) mod slicer;
-pub(crate) mod slices;
 pub(crate) mod soft_maps;
 mod stored;
 
@@ -21,11 +21,11 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-pub use horizons::Horizons;
+pub use horizon_map::HorizonMap;
+pub use occlusion_intervals::OcclusionIntervals;
 pub use packed::PackedVisibility;
 pub use ray_cast::ray_cast;
 pub use shadow_map::visibility_maps_cpu;
-pub use slices::Slices;
 pub use soft_maps::SoftMaps;
 
 /// Visibility of all facets along any direction.
@@ -35,8 +35,8 @@ pub enum Visibility {
     Unblocked {
         facets: usize,
     },
-    Horizons(Horizons),
-    Slices(Slices),
+    HorizonMap(HorizonMap),
+    OcclusionIntervals(OcclusionIntervals),
     Maps(SoftMaps),
 }
 
@@ -44,17 +44,17 @@ impl Visibility {
     pub fn facets(&self) -> usize {
         match self {
             Self::Unblocked { facets } => *facets,
-            Self::Horizons(horizons) => horizons.facets(),
-            Self::Slices(slices) => slices.facets(),
+            Self::HorizonMap(horizons) => horizons.facets(),
+            Self::OcclusionIntervals(slices) => slices.facets(),
             Self::Maps(maps) => maps.packed.facet_count,
         }
     }
 
-    /// Part of the walks over the tile that ended before all was known ([`Horizons::cut_short`]).
-    pub fn cut_short(&self) -> f64 {
+    /// Part of the walks over the tile that ended before all was known ([`HorizonMap::truncated`]).
+    pub fn truncated(&self) -> f64 {
         match self {
-            Self::Horizons(horizons) => horizons.cut_short(),
-            Self::Slices(slices) => slices.horizons.cut_short(),
+            Self::HorizonMap(horizons) => horizons.truncated(),
+            Self::OcclusionIntervals(slices) => slices.horizons.truncated(),
             Self::Unblocked { .. } | Self::Maps(_) => 0.0,
         }
     }
@@ -63,8 +63,8 @@ impl Visibility {
     pub fn bytes(&self) -> usize {
         match self {
             Self::Unblocked { .. } => 0,
-            Self::Horizons(horizons) => horizons.bytes(),
-            Self::Slices(slices) => slices.bytes(),
+            Self::HorizonMap(horizons) => horizons.bytes(),
+            Self::OcclusionIntervals(slices) => slices.bytes(),
             Self::Maps(maps) => 4 * maps.packed.words.len(),
         }
     }
@@ -73,8 +73,8 @@ impl Visibility {
     pub(crate) fn picked(&self, facets: &[usize]) -> Option<Self> {
         match self {
             Self::Unblocked { .. } => Some(Self::Unblocked { facets: facets.len() }),
-            Self::Horizons(horizons) => Some(Self::Horizons(horizons.picked(facets))),
-            Self::Slices(slices) => Some(Self::Slices(slices.picked(facets))),
+            Self::HorizonMap(horizons) => Some(Self::HorizonMap(horizons.picked(facets))),
+            Self::OcclusionIntervals(slices) => Some(Self::OcclusionIntervals(slices.picked(facets))),
             Self::Maps(_) => None,
         }
     }
@@ -89,8 +89,8 @@ impl Visibility {
         }
         match self {
             Self::Unblocked { .. } => out.fill(1.0),
-            Self::Horizons(horizons) => horizons.fill(direction, range, out),
-            Self::Slices(slices) => slices.fill(direction, range, out),
+            Self::HorizonMap(horizons) => horizons.fill(direction, range, out),
+            Self::OcclusionIntervals(slices) => slices.fill(direction, range, out),
             Self::Maps(maps) => maps.fill(direction, range, out),
         }
     }

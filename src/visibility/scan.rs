@@ -5,7 +5,7 @@ use glam::{IVec2, Vec2, Vec3};
 use super::slicer::{TurnedSlicer, WIDTH};
 use crate::geometry::Facets;
 use crate::geometry::grid::periodic_grid::CellWalk;
-use crate::math::simd::{Eight, InEights, eight};
+use crate::math::simd::{InSimdF32x8, SimdF32x8, eight};
 
 /// Blocked slopes (tangents of the elevation), sorted and disjoint, within `[0, ∞]`.
 #[derive(Debug, Default, Clone)]
@@ -19,7 +19,7 @@ pub(crate) struct BlockedSlopes {
     /// Cells and triangles looked at since this was made.
     pub work: u64,
     /// Walks that ended before all was known, since this was made.
-    pub cut_short: usize,
+    pub truncated: usize,
 }
 
 impl BlockedSlopes {
@@ -116,8 +116,8 @@ const LOWEST_SLOPE: f32 = 0.005;
 
 /// Cells and blocks of triangles that any walk may look at, besides the cells of sixteen tiles: on tiles a hundred times as
 /// high as they are long a walk that nothing stops would take millions. What lies beyond blocks only directions low over
-/// the horizon (2° for pyramids of 100 tiles) and is left out; [`BlockedSlopes::cut_short`] counts such walks.
-const LEAST_LOOKS: usize = 16_384;
+/// the horizon (2° for pyramids of 100 tiles) and is left out; [`BlockedSlopes::truncated`] counts such walks.
+const MIN_LOOKS: usize = 16_384;
 
 /// Scans every facet along the slicer's direction from its lifted origin, and hands each with what blocks it to `found`;
 /// returns how many walks ended before all was known.
@@ -138,25 +138,25 @@ struct Scan<'a> {
     found: &'a mut dyn FnMut(u32, &BlockedSlopes),
 }
 
-impl InEights for Scan<'_> {
+impl InSimdF32x8 for Scan<'_> {
     type Output = usize;
 
     #[inline(always)]
-    fn with<E: Eight>(self) -> usize {
+    fn with<E: SimdF32x8>(self) -> usize {
         let mut blocked = BlockedSlopes::default();
         for facet in self.slicer.order(self.facets) {
             let at = facet as usize;
             self.slicer.scan::<E>(self.origins[at], self.facets.normals[at], self.facets.triangles[at], &mut blocked);
             (self.found)(facet, &blocked);
         }
-        blocked.cut_short
+        blocked.truncated
     }
 }
 
 impl TurnedSlicer<'_> {
     /// Fills `blocked` with what a facet does not see along the slicer's direction; its `own` triangle is ignored.
     #[inline(always)]
-    pub(crate) fn scan<E: Eight>(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
+    pub(crate) fn scan<E: SimdF32x8>(&self, origin: Vec3, normal: Vec3, own: u32, blocked: &mut BlockedSlopes) {
         let (grid, along) = (self.grid, self.along);
         blocked.start_from_facing(normal, along);
         if blocked.ground == f32::INFINITY || grid.cancel.is_set() {
@@ -168,7 +168,7 @@ impl TurnedSlicer<'_> {
         }
         let mut walk = CellWalk::new(grid, origin.truncate(), along);
         let period = grid.period_along(along);
-        let mut looks = LEAST_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize;
+        let mut looks = MIN_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize;
         loop {
             // What a cell at distance r can block at most: clearance / r.
             let open = blocked.open_below(clearance / walk.entered);
@@ -183,7 +183,7 @@ impl TurnedSlicer<'_> {
             let (first, extents) = self.blocks(cell);
             let costs = 1 + extents.len();
             if looks < costs {
-                blocked.cut_short += 1;
+                blocked.truncated += 1;
                 return;
             }
             looks -= costs;

@@ -26,12 +26,12 @@ const MIN_SIDE: f64 = 8.0;
 
 /// Texels that the triangles of one map may cover together: a surface of hundreds of base areas (heights of 100 tiles) is
 /// drawn more coarsely.
-const MOST_COVERED: f64 = 4_194_304.0;
+const MAX_COVERED: f64 = 4_194_304.0;
 
 /// The resolution at which a mesh's maps are drawn where `resolution` is asked for.
 pub fn affordable(mesh: &TileMesh, resolution: u32) -> u32 {
     let surface: f64 = (0..mesh.triangles.len()).map(|k| mesh.triangle_area(k)).sum();
-    let most = (MOST_COVERED * f64::from(mesh.base_area()) / surface.max(f64::MIN_POSITIVE)).sqrt();
+    let most = (MAX_COVERED * f64::from(mesh.base_area()) / surface.max(f64::MIN_POSITIVE)).sqrt();
     resolution.min(most.max(32.0) as u32)
 }
 

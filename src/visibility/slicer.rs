@@ -1,4 +1,4 @@
-//! What do the triangles of a cell cover in a vertical half-plane? Eight at a time, as slopes seen from a point.
+//! What do the triangles of a cell cover in a vertical half-plane? SimdF32x8 at a time, as slopes seen from a point.
 
 use glam::{IVec2, Vec2, Vec3};
 
@@ -6,19 +6,19 @@ use super::scan::Known;
 use crate::geometry::Facets;
 use crate::geometry::PeriodicGrid;
 use crate::geometry::grid::cell_lists::CellEntry;
-use crate::math::simd::{Eight, Fours};
+use crate::math::simd::{F32x8Array, SimdF32x8};
 
 /// Triangles worked on together.
 pub(crate) const WIDTH: usize = 8;
 
-/// Eight entries of a cell, where the tile copy of the cell has them. Lanes beyond a cell's entries lie lower than all.
+/// SimdF32x8 entries of a cell, where the tile copy of the cell has them. Lanes beyond a cell's entries lie lower than all.
 #[derive(Debug, Clone)]
 struct Block {
-    x: [Fours; 3],
-    y: [Fours; 3],
-    z: [Fours; 3],
-    z_min: Fours,
-    z_max: Fours,
+    x: [F32x8Array; 3],
+    y: [F32x8Array; 3],
+    z: [F32x8Array; 3],
+    z_min: F32x8Array,
+    z_max: F32x8Array,
 }
 
 /// A periodic grid made ready for vertical slices.
@@ -48,12 +48,12 @@ impl<'a> Slicer<'a> {
     }
 }
 
-/// Eight triangles of a cell by their distances across the slices: where each begins, bends and ends, and how its edges run
+/// SimdF32x8 triangles of a cell by their distances across the slices: where each begins, bends and ends, and how its edges run
 /// along a slice and up from there.
 #[derive(Debug, Clone)]
 pub(crate) struct TurnedBlock {
-    first: Fours,
-    middle: Fours,
+    first: F32x8Array,
+    middle: F32x8Array,
     /// From the first corner to the last; to the middle one; and from there to the last.
     edges: [Edge; 3],
 }
@@ -61,10 +61,10 @@ pub(crate) struct TurnedBlock {
 /// What tells whether a slice meets eight triangles at all: kept apart, so that more of it stays at hand.
 #[derive(Debug, Clone)]
 pub(crate) struct Extent {
-    first: Fours,
-    last: Fours,
-    z_min: Fours,
-    z_max: Fours,
+    first: F32x8Array,
+    last: F32x8Array,
+    z_min: F32x8Array,
+    z_max: F32x8Array,
 }
 
 impl Extent {
@@ -76,7 +76,7 @@ impl Extent {
 
     /// Lanes that a slice at a distance `across` meets, and that reach above the height `floor` and below `ceiling`: a bit each.
     #[inline(always)]
-    pub fn meets<E: Eight>(&self, across: f32, [floor, ceiling]: [f32; 2]) -> u32 {
+    pub fn meets<E: SimdF32x8>(&self, across: f32, [floor, ceiling]: [f32; 2]) -> u32 {
         let at = E::splat(across);
         let between = E::both(E::of(&self.first).less(at), E::of(&self.z_min).less(E::splat(ceiling)));
         let high = E::both(between, E::splat(floor).less(E::of(&self.z_max)));
@@ -84,13 +84,13 @@ impl Extent {
     }
 }
 
-/// Eight edges, from the corner that comes first across the slices: so that neighbours agree about the edge they share.
+/// SimdF32x8 edges, from the corner that comes first across the slices: so that neighbours agree about the edge they share.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
-    along: Fours,
-    up: Fours,
+    along: F32x8Array,
+    up: F32x8Array,
     /// Growth of both with the distance across.
-    rates: [Fours; 2],
+    rates: [F32x8Array; 2],
 }
 
 /// A grid seen in slices of one direction.
@@ -120,7 +120,7 @@ impl TurnedSlicer<'_> {
         (first, &self.extents[first..end])
     }
 
-    /// Eight triangles by their place.
+    /// SimdF32x8 triangles by their place.
     #[inline(always)]
     pub fn block(&self, place: usize) -> &TurnedBlock {
         &self.blocks[place]
@@ -144,7 +144,7 @@ pub(crate) struct Cut<E> {
     lanes: u32,
 }
 
-impl<E: Eight> Cut<E> {
+impl<E: SimdF32x8> Cut<E> {
     /// Lanes that are cut, with their slopes `(low, high)`.
     #[inline(always)]
     pub fn lanes(self) -> impl Iterator<Item = (usize, f32, f32)> {
@@ -162,8 +162,8 @@ impl<E: Eight> Cut<E> {
 
 impl Block {
     fn new(grid: &PeriodicGrid, entries: &[CellEntry]) -> Self {
-        let zero = [Fours::splat(0.0); 3];
-        let (z_min, z_max) = (Fours::splat(f32::INFINITY), Fours::splat(f32::NEG_INFINITY));
+        let zero = [F32x8Array::splat(0.0); 3];
+        let (z_min, z_max) = (F32x8Array::splat(f32::INFINITY), F32x8Array::splat(f32::NEG_INFINITY));
         let mut block = Self { x: zero, y: zero, z: zero, z_min, z_max };
         for (lane, &entry) in entries.iter().enumerate() {
             let corners = grid.copy_corners(entry, IVec2::ZERO);
@@ -180,7 +180,7 @@ impl Block {
     }
 
     fn turned(&self, direction: Vec2) -> (Extent, TurnedBlock) {
-        let [dx, dy] = direction.to_array().map(Fours::splat);
+        let [dx, dy] = direction.to_array().map(F32x8Array::splat);
         let mut corners: [Corner; 3] = std::array::from_fn(|k| Corner {
             across: dx * self.y[k] - dy * self.x[k],
             along: dx * self.x[k] + dy * self.y[k],
@@ -205,14 +205,14 @@ impl Block {
 /// Corners of eight triangles.
 #[derive(Clone, Copy)]
 struct Corner {
-    across: Fours,
-    along: Fours,
-    up: Fours,
+    across: F32x8Array,
+    along: F32x8Array,
+    up: F32x8Array,
 }
 
 impl Corner {
-    fn select(mask: <Fours as Eight>::Mask, yes: Self, no: Self) -> Self {
-        let of = |pick: fn(&Self) -> Fours| Fours::select(mask, pick(&yes), pick(&no));
+    fn select(mask: <F32x8Array as SimdF32x8>::Mask, yes: Self, no: Self) -> Self {
+        let of = |pick: fn(&Self) -> F32x8Array| F32x8Array::select(mask, pick(&yes), pick(&no));
         Self { across: of(|c| c.across), along: of(|c| c.along), up: of(|c| c.up) }
     }
 }
@@ -220,9 +220,9 @@ impl Corner {
 impl Edge {
     fn between(from: Corner, to: Corner) -> Self {
         let width = to.across - from.across;
-        let zero = Fours::splat(0.0);
+        let zero = F32x8Array::splat(0.0);
         // Edges without width are never met.
-        let inverse = Fours::select(zero.less(width), Fours::splat(1.0) / width, zero);
+        let inverse = F32x8Array::select(zero.less(width), F32x8Array::splat(1.0) / width, zero);
         Self { along: from.along, up: from.up, rates: [(to.along - from.along) * inverse, (to.up - from.up) * inverse] }
     }
 }
@@ -231,12 +231,12 @@ impl TurnedBlock {
     /// What [`slice`] says of eight triangles, of which those are `met`, from a point with distances across and along and a
     /// height. Lanes that tell nothing new are left out.
     #[inline(always)]
-    pub fn cut<E: Eight>(&self, origin: Vec3, met: u32, known: Known) -> Cut<E> {
+    pub fn cut<E: SimdF32x8>(&self, origin: Vec3, met: u32, known: Known) -> Cut<E> {
         let [at, along, up] = origin.to_array().map(E::splat);
         let [long, before, after] = &self.edges;
         let (first, middle) = (E::of(&self.first), E::of(&self.middle));
         let bent = middle.less(at);
-        let pick = |before: &Fours, after: &Fours| E::select(bent, E::of(after), E::of(before));
+        let pick = |before: &F32x8Array, after: &F32x8Array| E::select(bent, E::of(after), E::of(before));
         let t = [at - first, at - E::select(bent, middle, first)];
         let x = [
             E::of(&long.along) + t[0] * E::of(&long.rates[0]) - along,

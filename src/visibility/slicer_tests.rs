@@ -3,7 +3,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use super::*;
 use crate::geometry::TileMesh;
 use crate::geometry::families::heightfield;
-use crate::math::simd::{InEights, eight};
+use crate::math::simd::{InSimdF32x8, eight};
 
 /// Nothing known, nothing left out.
 const NOTHING: Known = Known { ground: 0.0, low: f32::INFINITY, high: f32::NEG_INFINITY };
@@ -56,21 +56,21 @@ fn waves() -> TileMesh {
 
 #[test]
 fn eight_triangles_at_once_are_cut_as_one_by_one_ahead_behind_and_overhead() {
-    are_cut_as_one_by_one::<Fours>();
+    are_cut_as_one_by_one::<F32x8Array>();
     eight(CutInEights);
 }
 
 struct CutInEights;
 
-impl InEights for CutInEights {
+impl InSimdF32x8 for CutInEights {
     type Output = ();
 
-    fn with<E: Eight>(self) {
+    fn with<E: SimdF32x8>(self) {
         are_cut_as_one_by_one::<E>();
     }
 }
 
-fn are_cut_as_one_by_one<E: Eight>() {
+fn are_cut_as_one_by_one<E: SimdF32x8>() {
     let mesh = waves();
     let grid = PeriodicGrid::new(&mesh);
     let slicer = Slicer::new(&grid);
@@ -122,8 +122,8 @@ fn what_is_known_hides_only_lanes_within_it() {
     for cell in 0..grid.z_max.len() {
         let (first, extents) = turned.blocks(cell);
         for (k, extent) in extents.iter().enumerate() {
-            let met = extent.meets::<Fours>(eye.x, ANYWHERE);
-            let lanes = |known| turned.block(first + k).cut::<Fours>(eye, met, known).lanes().collect::<Vec<_>>();
+            let met = extent.meets::<F32x8Array>(eye.x, ANYWHERE);
+            let lanes = |known| turned.block(first + k).cut::<F32x8Array>(eye, met, known).lanes().collect::<Vec<_>>();
             let some = lanes(known);
             for lane in lanes(NOTHING) {
                 let (_, low, high) = lane;

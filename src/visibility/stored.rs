@@ -1,19 +1,19 @@
 //! Visibility as it is kept between runs, and as an input of what is.
 
-use super::slices::Hanging;
-use super::{Horizons, PackedVisibility, Slices, SoftMaps, Visibility};
+use super::occlusion_intervals::Overhangs;
+use super::{HorizonMap, OcclusionIntervals, PackedVisibility, SoftMaps, Visibility};
 use crate::cache::{KeyBuilder, Reader, Stored, Writer};
 use crate::math::directions::PolarGrid;
 
 impl Visibility {
     /// All that the visibilities of facets depend on.
-    pub(crate) fn identify(&self, key: &mut KeyBuilder) {
+    pub(crate) fn hash_into(&self, key: &mut KeyBuilder) {
         match self {
             Self::Unblocked { facets } => key.counts("unblocked", [*facets]),
-            Self::Horizons(horizons) => identify_horizons(horizons, key),
-            Self::Slices(slices) => {
+            Self::HorizonMap(horizons) => identify_horizons(horizons, key),
+            Self::OcclusionIntervals(slices) => {
                 identify_horizons(&slices.horizons, key);
-                for Hanging { facets, low, high, .. } in &slices.hanging {
+                for Overhangs { facets, low, high, .. } in &slices.hanging {
                     key.numbers("above", facets).numbers("from", low).numbers("to", high);
                 }
                 key.numbers("switch", &slices.switch)
@@ -26,7 +26,7 @@ impl Visibility {
     }
 }
 
-fn identify_horizons<'a>(horizons: &Horizons, key: &'a mut KeyBuilder) -> &'a mut KeyBuilder {
+fn identify_horizons<'a>(horizons: &HorizonMap, key: &'a mut KeyBuilder) -> &'a mut KeyBuilder {
     key.counts("horizons", [horizons.azimuths, horizons.facets]).numbers("ramp", &[horizons.ramp]);
     key.numbers("elevations", &horizons.elevations)
 }
@@ -44,15 +44,15 @@ impl Stored for Visibility {
                 out.count(UNBLOCKED);
                 out.count(*facets);
             }
-            Self::Horizons(horizons) => {
+            Self::HorizonMap(horizons) => {
                 out.count(HORIZONS);
                 write_horizons(horizons, out);
             }
-            Self::Slices(slices) => {
+            Self::OcclusionIntervals(slices) => {
                 out.count(SLICES);
                 write_horizons(&slices.horizons, out);
                 out.numbers(&slices.switch);
-                for Hanging { facets, low, high, .. } in &slices.hanging {
+                for Overhangs { facets, low, high, .. } in &slices.hanging {
                     out.numbers(facets);
                     out.numbers(low);
                     out.numbers(high);
@@ -70,7 +70,7 @@ impl Stored for Visibility {
     fn read(from: &mut Reader<'_>) -> Option<Self> {
         Some(match from.count()? {
             UNBLOCKED => Self::Unblocked { facets: from.count()? },
-            HORIZONS => Self::Horizons(read_horizons(from)?),
+            HORIZONS => Self::HorizonMap(read_horizons(from)?),
             SLICES => {
                 let horizons = read_horizons(from)?;
                 let switch: Vec<f32> = from.numbers().filter(|switch: &Vec<f32>| switch.len() == horizons.facets)?;
@@ -82,10 +82,10 @@ impl Stored for Visibility {
                         && [low.len(), high.len()] == [facets.len(); 2];
                     let intervals =
                         facets.into_iter().zip(low).zip(high).map(|((facet, low), high)| (facet, low, high));
-                    fits.then(|| Hanging::new(intervals, &switch))
+                    fits.then(|| Overhangs::new(intervals, &switch))
                 });
                 let hanging = hanging.collect::<Option<_>>()?;
-                Self::Slices(Slices { horizons, hanging, switch })
+                Self::OcclusionIntervals(OcclusionIntervals { horizons, hanging, switch })
             }
             MAPS => {
                 let [rings, azimuths] = [from.count()?, from.count()?];
@@ -102,16 +102,16 @@ impl Stored for Visibility {
     }
 }
 
-fn write_horizons(horizons: &Horizons, out: &mut Writer) {
-    [horizons.azimuths, horizons.facets, horizons.cut_short].into_iter().for_each(|count| out.count(count));
+fn write_horizons(horizons: &HorizonMap, out: &mut Writer) {
+    [horizons.azimuths, horizons.facets, horizons.truncated].into_iter().for_each(|count| out.count(count));
     out.numbers(&[horizons.ramp]);
     out.numbers(&horizons.elevations);
 }
 
-fn read_horizons(from: &mut Reader<'_>) -> Option<Horizons> {
-    let [azimuths, facets, cut_short] = [from.count()?, from.count()?, from.count()?];
+fn read_horizons(from: &mut Reader<'_>) -> Option<HorizonMap> {
+    let [azimuths, facets, truncated] = [from.count()?, from.count()?, from.count()?];
     let ramp = from.numbers()?.first().copied()?;
     let elevations: Vec<f32> = from.numbers()?;
     let fits = azimuths > 0 && azimuths.checked_mul(facets)? == elevations.len();
-    fits.then_some(Horizons { azimuths, facets, ramp, elevations, cut_short })
+    fits.then_some(HorizonMap { azimuths, facets, ramp, elevations, truncated })
 }

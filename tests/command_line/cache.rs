@@ -17,13 +17,13 @@ fn a_second_run_reads_what_the_first_one_kept_and_writes_the_same_bytes() {
     };
     let on = folder.to_str().unwrap();
     let usage = || json(&["cache", "--json"], on);
-    let render = |picture: &str, cache: &str, more: &[&str]| {
-        let common = ["render", SCENE, "-o", picture, "--size", "48x48", "--backend", "cpu", "--json", "--quiet"];
+    let render = |image: &str, cache: &str, more: &[&str]| {
+        let common = ["render", SCENE, "-o", image, "--size", "48x48", "--backend", "cpu", "--json", "--quiet"];
         let report = json(&[&common[..], more].concat(), cache);
         let has = |name: &str| report["stages"].get(name).is_some();
         let made = [has("visibility"), has("picture_table")];
         assert_eq!([has("cached_visibility"), has("cached_picture_table")], made.map(|made| !made));
-        (made, std::fs::read(desk.path(picture)).unwrap())
+        (made, std::fs::read(desk.path(image)).unwrap())
     };
     assert_eq!(usage()["files"], 0);
     let first = render("first.png", on, &[]);

@@ -44,7 +44,7 @@ fn plan_has_the_shape_of_the_contract_and_a_reason_for_everything() {
 }
 
 #[test]
-fn render_writes_pictures_of_the_size_asked_for() {
+fn render_writes_images_of_the_size_asked_for() {
     let desk = Desk::new();
     desk.write("scene.toml", GROOVES);
     for file in ["picture.png", "picture.exr"] {
@@ -62,9 +62,9 @@ fn render_writes_pictures_of_the_size_asked_for() {
             "--quiet",
         ]);
     }
-    let picture = image::open(desk.path("picture.png")).unwrap().to_rgb8();
-    assert_eq!(picture.dimensions(), (48, 32));
-    let distinct: std::collections::BTreeSet<[u8; 3]> = picture.pixels().map(|pixel| pixel.0).collect();
+    let image = image::open(desk.path("picture.png")).unwrap().to_rgb8();
+    assert_eq!(image.dimensions(), (48, 32));
+    let distinct: std::collections::BTreeSet<[u8; 3]> = image.pixels().map(|pixel| pixel.0).collect();
     assert!(distinct.len() > 20, "a shaded sphere has more than {} colours", distinct.len());
     let exr = exr::prelude::read_first_rgba_layer_from_file(
         desk.path("picture.exr"),

@@ -27,7 +27,7 @@ use targets::{TARGETS, Target};
 /// No single input may take longer, in a debug build on a busy machine.
 const LONGEST: Duration = Duration::from_secs(20);
 /// Bytes that the whole process may hold at most (all targets run in it side by side).
-const MOST_MEMORY: u64 = 6 << 30;
+const MAX_MEMORY: u64 = 6 << 30;
 
 /// Runs mutated inputs until `done(executions)`; how many, and how many of them were accepted.
 fn fuzz(target: &Target, seed: u64, done: impl Fn(usize) -> bool) -> (usize, usize) {
@@ -68,7 +68,7 @@ fn briefly(name: &str) {
     let target = TARGETS.iter().find(|target| target.name == name).unwrap();
     let (executions, accepted) = fuzz(target, 1, |executions| executions >= target.brief);
     assert!(accepted > 0, "{name}: none of {executions} inputs was accepted: the seeds are wrong");
-    assert!(peak_memory().is_none_or(|bytes| bytes < MOST_MEMORY));
+    assert!(peak_memory().is_none_or(|bytes| bytes < MAX_MEMORY));
 }
 
 fn at_length(name: &str) {
@@ -84,7 +84,7 @@ fn at_length(name: &str) {
          MB at most)",
         start.elapsed().as_secs_f64()
     );
-    assert!(peak_memory().is_none_or(|bytes| bytes < MOST_MEMORY));
+    assert!(peak_memory().is_none_or(|bytes| bytes < MAX_MEMORY));
 }
 
 macro_rules! targets {

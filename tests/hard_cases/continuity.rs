@@ -4,11 +4,11 @@ use biscale::effective::Reflectance;
 use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::plan::{Preset, Settings};
-use biscale::render::Stage;
+use biscale::render::RenderScene;
 use biscale::render::image::shading::Background;
 use biscale::render::render;
 use biscale::scene;
-use biscale::scene::{Camera, Geometry, Light, LoadedScene, Painted, Shape, TermSpec};
+use biscale::scene::{Camera, FieldShape, Geometry, Light, LoadedScene, Painted, TermSpec};
 use glam::Vec3;
 
 /// Parameters that stand for a whole number: where they jump, the tile says in a note what they were taken for.
@@ -78,7 +78,7 @@ fn no_slider_of_a_geometry_jumps() {
     for kind in Geometry::kinds().into_iter().filter(|kind| kind.kind != "mesh") {
         let mut pipeline = Pipeline::new();
         for field in &kind.fields {
-            let Shape::Number { min, soft_max, .. } = field.shape else { continue };
+            let FieldShape::Number { min, soft_max, .. } = field.shape else { continue };
             // A million rods or pyramids are legal and not meant.
             let (min, soft_max) = match field.key {
                 "density" => (4.0, 40.0),
@@ -142,14 +142,14 @@ impl Reflectance for White {
 
 #[test]
 fn no_slider_of_light_or_camera_jumps() {
-    let picture = |text: &str| -> Vec<Vec3> {
-        let stage = Stage::new(&open(text)).unwrap();
+    let image = |text: &str| -> Vec<Vec3> {
+        let stage = RenderScene::new(&open(text)).unwrap();
         let background = Background::Uniform(Vec3::ZERO);
-        render(&stage.input(&White, [64, 64], 4, &background)).unwrap().picture.pixels
+        render(&stage.input(&White, [64, 64], 4, &background)).unwrap().image.pixels
     };
     for (table, fields) in [("light", Light::fields()), ("camera", Camera::fields())] {
         for field in fields {
-            let Shape::Number { min, soft_max, .. } = field.shape else { continue };
+            let FieldShape::Number { min, soft_max, .. } = field.shape else { continue };
             // Exposure multiplies what is shown, not what is computed.
             if field.key == "exposure_ev" {
                 continue;
@@ -165,7 +165,7 @@ fn no_slider_of_light_or_camera_jumps() {
                         field.key
                     )
                 };
-                let jump = compare(&picture(&text(at + step)), &picture(&text(at))).rel_l2;
+                let jump = compare(&image(&text(at + step)), &image(&text(at))).rel_l2;
                 let jump = if jump.is_finite() { jump } else { 0.0 };
                 assert!(jump < 0.12, "{table} {} from {at} by {step}: {:.1} %", field.key, 100.0 * jump);
                 worst = worst.max(jump);
@@ -180,7 +180,7 @@ fn no_slider_of_a_brdf_jumps() {
     let mut pipeline = Pipeline::new();
     for kind in TermSpec::kinds() {
         for field in &kind.fields {
-            let Shape::Number { min, soft_max, .. } = field.shape else { continue };
+            let FieldShape::Number { min, soft_max, .. } = field.shape else { continue };
             let worst = probe(
                 &mut pipeline,
                 &format!("{} {}", kind.kind, field.key),

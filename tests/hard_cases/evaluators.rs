@@ -5,8 +5,10 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock, Mutex};
 
 use biscale::base::Cancel;
-use biscale::diagnostics::{Evidence, Health, Limits, Sight};
-use biscale::effective::{EffectiveBrdf, Form, MaterialFactors, SumMaterial, VisibleFacets, Wu2011, Wu2011Settings};
+use biscale::diagnostics::{VisibilityInput, Health, HealthInputs, Limits};
+use biscale::effective::{
+    EffectiveBrdf, Material, MaterialFactors, Representation, VisibleFacets, Wu2011, Wu2011Settings,
+};
 use biscale::geometry::Facets;
 use biscale::math::directions::ParaboloidMap;
 use biscale::pipeline::Pipeline;
@@ -33,8 +35,8 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
         made.push(Evaluator { name, brdf: outcome.brdf.clone(), health: health.clone() });
         if method == "direct" {
             // What pictures read; the direct sum itself where a table would not do.
-            let pictured = outcome.for_pictures(&Cancel::default()).unwrap();
-            made.push(Evaluator { name: "table", brdf: pictured.brdf, health });
+            let shading_brdf = outcome.shading_brdf(&Cancel::default()).unwrap();
+            made.push(Evaluator { name: "table", brdf: shading_brdf.brdf, health });
         }
     }
     let loaded = open(case, "direct", folder);
@@ -50,10 +52,10 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
     let factors: Vec<_> = assigned.1.iter().map(|material| factors(case, material, &settings)).collect();
     let tables = Wu2011::from_factors(&tile, &assigned.0, &assigned.1, &factors, &settings)
         .unwrap_or_else(|error| panic!("{}, wu2011: {error}", case.name));
-    let brdf = Arc::new(EffectiveBrdf { form: Form::Wu2011(tables), base_area });
-    let evidence = Evidence {
+    let brdf = Arc::new(EffectiveBrdf { form: Representation::Wu2011(tables), base_area });
+    let evidence = HealthInputs {
         facets: Arc::new(facets),
-        sight: Sight::Packed(Arc::new(visibility)),
+        sight: VisibilityInput::Packed(Arc::new(visibility)),
         names: vec!["default".to_owned(); assigned.1.len()],
         materials: Arc::new(assigned),
         closes_plane: mesh.closes_plane,
@@ -66,7 +68,7 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
 }
 
 /// M of a BRDF, for all the cases that have it.
-fn factors(case: &Case, material: &SumMaterial, settings: &Wu2011Settings) -> Option<Arc<MaterialFactors>> {
+fn factors(case: &Case, material: &Material, settings: &Wu2011Settings) -> Option<Arc<MaterialFactors>> {
     type Known = Mutex<HashMap<(String, Option<usize>), Arc<MaterialFactors>>>;
     static KNOWN: LazyLock<Known> = LazyLock::new(Mutex::default);
     let key = (case.brdf.clone(), settings.m_directions);

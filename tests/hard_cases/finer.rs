@@ -9,7 +9,7 @@ use crate::cases::{Case, brdfs, geometries};
 use crate::evaluators::Evaluator;
 use crate::invariants::{assert_none, broken};
 use crate::lab::{Row, examine, measured, open, pairs};
-use crate::on_gpu::same_picture;
+use crate::on_gpu::same_image;
 
 /// Family and name.
 const CHOSEN: [(&str, &str); 3] =
@@ -112,7 +112,7 @@ fn one_case_of_each_family_is_the_same_on_the_graphics_processor_at_finer_qualit
             let mut loaded = open(&case, "direct", folder.path());
             loaded.scene.quality.preset = preset.to_owned();
             loaded.scene.light.count = 4;
-            same_picture(&gpu, &loaded, 12, &format!("{}, {preset}", case.name));
+            same_image(&gpu, &loaded, 12, &format!("{}, {preset}", case.name));
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use biscale::effective::Reflectance;
 use biscale::math::directions::from_angles;
-use biscale::render::Stage;
+use biscale::render::RenderScene;
 use biscale::render::image::shading::Background;
 use biscale::render::render;
 use biscale::scene;
@@ -22,16 +22,16 @@ impl Reflectance for White {
     }
 }
 
-fn stage(folder: &Path, text: &str) -> biscale::base::Result<Stage> {
+fn stage(folder: &Path, text: &str) -> biscale::base::Result<RenderScene> {
     let scene = scene::parse(&format!("[tile]\ngeometry = {{ kind = \"flat\" }}\n{text}")).unwrap();
     let base_dir: PathBuf = folder.to_owned();
-    Stage::new(&LoadedScene { scene, base_dir, name: String::new(), painted: Painted::default() })
+    RenderScene::new(&LoadedScene { scene, base_dir, name: String::new(), painted: Painted::default() })
 }
 
-fn picture(stage: &Stage) -> Vec<Vec3> {
+fn image(stage: &RenderScene) -> Vec<Vec3> {
     let background = Background::Uniform(Vec3::ZERO);
     let rendered = render(&stage.input(&White, [48, 40], 2, &background)).unwrap();
-    let pixels = rendered.picture.pixels;
+    let pixels = rendered.image.pixels;
     let bad = pixels.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);
     assert_eq!(bad, None, "{:?}", bad.map(|at| pixels[at]));
     pixels
@@ -52,14 +52,14 @@ fn lights_of_1e8_and_1e_minus_8_shine_together_and_black_ones_not_at_all() {
     };
     // By itself the plan leaves lights out that another outshines a thousandfold.
     let told = lights(1e8, 1e-8) + "[effects]\nfaint_lights = \"on\"\n";
-    let both = picture(&stage(folder.path(), &told).unwrap());
+    let both = image(&stage(folder.path(), &told).unwrap());
     assert!(brightest(&both) > 1e7, "{}", brightest(&both));
     // Where the bright one does not reach, the faint one is seen.
     let faint = both.iter().filter(|pixel| pixel.x > 1e-11 && pixel.x < 1e-7).count();
     assert!(faint > 10, "{faint}");
-    assert_eq!(brightest(&picture(&stage(folder.path(), &lights(0.0, 0.0)).unwrap())), 0.0);
+    assert_eq!(brightest(&image(&stage(folder.path(), &lights(0.0, 0.0)).unwrap())), 0.0);
     let none = stage(folder.path(), "[light]\nenvironment = \"none\"\n").unwrap();
-    assert_eq!(brightest(&picture(&none)), 0.0);
+    assert_eq!(brightest(&image(&none)), 0.0);
     assert!(none.lights.warnings.iter().any(|warning| warning.contains("no light")));
 }
 
@@ -79,16 +79,16 @@ fn skies_with_a_sun_of_one_pixel_or_with_texels_that_are_none_light_the_object()
     write_sky(&path, 64, 32, |x, y| if (x, y) == (20, 6) { 1e6 } else { 0.0 });
     let sun = stage(folder.path(), sky).unwrap();
     assert_eq!(sun.lights.directional.len(), 1, "one pixel, one light");
-    assert!(brightest(&picture(&sun)) > 1.0);
+    assert!(brightest(&image(&sun)) > 1.0);
     // Infinite, NaN, negative and absurd texels among even ones.
     let hostile = [f32::INFINITY, f32::NAN, -5.0, 3e38];
     write_sky(&path, 64, 32, |x, y| if (x + 7 * y) % 31 < 4 { hostile[(x + 7 * y) % 31] } else { 1.0 });
     let spoilt = stage(folder.path(), sky).unwrap();
     assert!(spoilt.lights.warnings.iter().any(|w| w.contains("count as black")), "{:?}", spoilt.lights.warnings);
-    let found = brightest(&picture(&spoilt));
+    let found = brightest(&image(&spoilt));
     assert!(found > 0.3 && found < 3.0, "{found}");
     write_sky(&path, 64, 32, |_, _| 0.0);
-    assert_eq!(brightest(&picture(&stage(folder.path(), sky).unwrap())), 0.0);
+    assert_eq!(brightest(&image(&stage(folder.path(), sky).unwrap())), 0.0);
     // A side that is prime: nothing divides it.
     write_sky(&path, 1031, 3, |_, _| 1.0);
     let odd = stage(folder.path(), sky).unwrap();
@@ -114,7 +114,7 @@ fn objects_with_degenerate_uvs_poles_or_the_camera_inside_are_shaded() {
         let stage =
             stage(folder.path(), "[object]\nkind = \"mesh\"\npath = \"object.obj\"\n[camera]\nazimuth_deg = 0\n");
         let stage = stage.unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert!(brightest(&picture(&stage)) > 0.0, "{name}");
+        assert!(brightest(&image(&stage)) > 0.0, "{name}");
         let sound = |v: &Vec3| v.is_finite() && (v.length() - 1.0).abs() < 1e-3;
         assert!(stage.mesh.tangents.iter().chain(&stage.mesh.normals).all(sound), "{name}");
     }
@@ -127,7 +127,7 @@ fn objects_with_degenerate_uvs_poles_or_the_camera_inside_are_shaded() {
         "fov_deg = 150\ndistance = 0.5",
     ] {
         for kind in ["sphere", "cup", "teapot"] {
-            picture(&stage(folder.path(), &format!("[object]\nkind = \"{kind}\"\n[camera]\n{camera}\n")).unwrap());
+            image(&stage(folder.path(), &format!("[object]\nkind = \"{kind}\"\n[camera]\n{camera}\n")).unwrap());
         }
     }
 }
@@ -137,7 +137,7 @@ fn even_light_from_everywhere_leaves_a_white_sphere_white() {
     let folder = tempfile::tempdir().unwrap();
     write_sky(&folder.path().join("sky.exr"), 64, 32, |_, _| 1.0);
     let stage = stage(folder.path(), "[light]\nenvironment = \"sky.exr\"\ncount = 256\n").unwrap();
-    let mut values: Vec<f32> = picture(&stage).iter().map(|pixel| pixel.x).filter(|x| *x > 0.2).collect();
+    let mut values: Vec<f32> = image(&stage).iter().map(|pixel| pixel.x).filter(|x| *x > 0.2).collect();
     values.sort_by(f32::total_cmp);
     // A few hundred lights stand for all directions: 1 within what they leave.
     let median = values[values.len() / 2];

@@ -3,7 +3,7 @@
 use biscale::base::Cancel;
 use biscale::gpu::{Gpu, GpuRenderer};
 use biscale::pipeline::Pipeline;
-use biscale::render::Stage;
+use biscale::render::RenderScene;
 use biscale::render::image::shading::Background;
 use biscale::render::render;
 use biscale::scene::LoadedScene;
@@ -24,7 +24,7 @@ const CHOSEN: [&str; 8] = [
 ];
 
 #[test]
-fn one_case_of_each_family_is_the_same_picture_on_the_graphics_processor() {
+fn one_case_of_each_family_is_the_same_image_on_the_graphics_processor() {
     let gpu = match Gpu::open() {
         Ok(gpu) => gpu,
         Err(error) => return eprintln!("SKIPPED: {error}"),
@@ -37,23 +37,23 @@ fn one_case_of_each_family_is_the_same_picture_on_the_graphics_processor() {
             let mut loaded = open(case, method, folder.path());
             loaded.scene.light.count = 8;
             loaded.scene.quality.facets = Some(400);
-            same_picture(&gpu, &loaded, 40, &format!("{name}, {method}"));
+            same_image(&gpu, &loaded, 40, &format!("{name}, {method}"));
         }
     }
 }
 
 /// The picture of a scene, `side` pixels wide and high, is what the CPU makes.
-pub fn same_picture(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
+pub fn same_image(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
     let outcome = Pipeline::new().effective(loaded).unwrap();
-    let stage = Stage::new(loaded).unwrap();
+    let stage = RenderScene::new(loaded).unwrap();
     let background = Background::default();
     let input = stage.input(&*outcome.brdf, [side; 2], 1, &background);
-    let cpu = render(&input).unwrap().picture.pixels;
+    let cpu = render(&input).unwrap().image.pixels;
     let mut renderer = match GpuRenderer::wearing(gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf) {
         Ok(renderer) => renderer,
         Err(error) => return eprintln!("SKIPPED: {name}: {error}"),
     };
-    let device = renderer.render(gpu, &input, &Cancel::default()).unwrap().picture.pixels;
+    let device = renderer.render(gpu, &input, &Cancel::default()).unwrap().image.pixels;
     let bad = device.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);
     assert_eq!(bad, None, "{name}: {:?}", bad.map(|at| device[at]));
     // Edges may show another triangle, and narrow lobes multiply the G-buffer's last bits (gpu_shading_tests.rs).

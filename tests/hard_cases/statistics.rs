@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use biscale::brdf::{Brdf, Term};
 use biscale::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 use biscale::math::directions::from_angles;
-use biscale::metrics::{Pair, mirror_biased_pairs, picture_pairs};
+use biscale::metrics::{Pair, image_pairs, mirror_biased_pairs};
 use biscale::{geometry, scene};
 use glam::Vec3;
 use rand::{RngExt, SeedableRng};
@@ -99,7 +99,7 @@ fn every_sampling_routine_passes_the_chi_squared_test() {
     p_values.push(("lights of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.i)), &even)));
     p_values.push(("viewers of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.o)), &even)));
     // Views of pictures: uniform in the square of the sine; of every second pair the light uniform in solid angle.
-    let pairs = picture_pairs(1_000_000, 13);
+    let pairs = image_pairs(1_000_000, 13);
     let binned = |part: &dyn Fn(&Pair) -> (f64, Vec3)| {
         let mut counts = vec![0.0; 20 * 40];
         for (height, d) in pairs.iter().step_by(2).map(part) {

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use biscale::brdf::{Brdf, Term};
-use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Form, LowRank, SumMaterial};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, LowRank, Material, Representation};
 use biscale::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
 use biscale::metrics::mirror_biased_pairs;
 use biscale::plan::{Preset, Settings};
-use biscale::visibility::{Horizons, Slices, Visibility};
+use biscale::visibility::{HorizonMap, OcclusionIntervals, Visibility};
 use biscale::{geometry, scene};
 use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -59,15 +59,15 @@ fn moved(mesh: &TileMesh, facets: &Facets, matrix: Mat3) -> (TileMesh, Facets) {
 fn sight(mesh: &TileMesh, facets: &Facets) -> Visibility {
     let grid = PeriodicGrid::new(mesh);
     if mesh.is_height_field() {
-        Visibility::Horizons(Horizons::scan(&grid, facets, 32, 0.02))
+        Visibility::HorizonMap(HorizonMap::scan(&grid, facets, 32, 0.02))
     } else {
-        Visibility::Slices(Slices::scan(&grid, facets, 32, 0.02))
+        Visibility::OcclusionIntervals(OcclusionIntervals::scan(&grid, facets, 32, 0.02))
     }
 }
 
-fn material() -> SumMaterial {
+fn material() -> Material {
     let glossy = Term::CookTorrance { roughness: 0.35, f0: Vec3::new(0.9, 0.5, 0.1) };
-    SumMaterial { brdf: Brdf { terms: vec![glossy, Term::Lambertian { albedo: Vec3::splat(0.2) }] }, color: Vec3::ONE }
+    Material { brdf: Brdf { terms: vec![glossy, Term::Lambertian { albedo: Vec3::splat(0.2) }] }, color: Vec3::ONE }
 }
 
 fn evaluators(mesh: &TileMesh, facets: &Facets) -> [(&'static str, EffectiveBrdf); 2] {
@@ -78,8 +78,8 @@ fn evaluators(mesh: &TileMesh, facets: &Facets) -> [(&'static str, EffectiveBrdf
     let factors = LowRank::build(facets, &visibility, &slots, &materials, &settings).unwrap();
     let sum = Arc::new(FacetSum::new(facets, &slots, &materials));
     [
-        ("direct", EffectiveBrdf { form: Form::Direct(Direct::new(sum, visibility)), base_area }),
-        ("low rank", EffectiveBrdf { form: Form::LowRank(factors), base_area }),
+        ("direct", EffectiveBrdf { form: Representation::Direct(Direct::new(sum, visibility)), base_area }),
+        ("low rank", EffectiveBrdf { form: Representation::LowRank(factors), base_area }),
     ]
 }
 
@@ -102,7 +102,7 @@ fn turning_or_mirroring_tile_and_directions_together_changes_nothing_but_roundin
                     .collect();
                 apart.sort_by(f32::total_cmp);
                 // Grid steps turn onto grid steps: exact but for rounding, which at a silhouette may flip a facet's view (one
-                // of 512). Slices under overhangs change over between azimuths facet by facet, from one side to the other:
+                // of 512). OcclusionIntervals under overhangs change over between azimuths facet by facet, from one side to the other:
                 // their mirror image is another interpolation. The factored form's random projection is another one, too.
                 let (typical, worst) = (apart[apart.len() / 2] / largest, apart[apart.len() - 1] / largest);
                 let overhangs = ["rods", "threads"].contains(&name);

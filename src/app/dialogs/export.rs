@@ -97,7 +97,7 @@ fn radiance_ui(ui: &mut Ui, choice: &mut TableChoice) {
 }
 
 /// Size of a picture.
-pub fn picture_ui(ctx: &Context, path: &Path, width: &mut usize, height: &mut usize) -> Option<Answer> {
+pub fn image_ui(ctx: &Context, path: &Path, width: &mut usize, height: &mut usize) -> Option<Answer> {
     asked(ctx, "Export the picture", path, |ui| {
         ui.horizontal(|ui| {
             ui.label("Pixels");

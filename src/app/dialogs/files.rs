@@ -24,7 +24,7 @@ pub enum Purpose {
     SavePaint(Layer),
     ExportTable,
     ExportTile,
-    ExportPicture,
+    ExportImage,
 }
 
 impl Purpose {
@@ -44,7 +44,7 @@ impl Purpose {
             Self::SavePaint(Layer::Slots) => "Save the painted materials",
             Self::ExportTable => "Export the material",
             Self::ExportTile => "Export the tile",
-            Self::ExportPicture => "Export the picture",
+            Self::ExportImage => "Export the picture",
         }
     }
 
@@ -56,14 +56,14 @@ impl Purpose {
             Self::TileMesh | Self::ObjectMesh => &["obj"],
             Self::Environment => &["hdr", "exr"],
             Self::SavePaint(Layer::Slots) => &["png"],
-            Self::SavePaint(_) | Self::ExportPicture => &["png", "exr"],
+            Self::SavePaint(_) | Self::ExportImage => &["png", "exr"],
             Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm", "gltf", "mtlx"],
             Self::ExportTile => &["obj", "stl", "png", "svg", "pdf"],
         }
     }
 
     pub fn saves(&self) -> bool {
-        let exports = matches!(self, Self::ExportTable | Self::ExportTile | Self::ExportPicture);
+        let exports = matches!(self, Self::ExportTable | Self::ExportTile | Self::ExportImage);
         exports || matches!(self, Self::SaveScene | Self::SavePaint(_))
     }
 }

@@ -44,7 +44,7 @@ pub enum Dialog {
         path: PathBuf,
         options: TileOptions,
     },
-    Picture {
+    Image {
         path: PathBuf,
         width: usize,
         height: usize,

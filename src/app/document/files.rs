@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use crate::base::{InputError, Result};
-use crate::scene::{BrdfSpec, Geometry, Material, Pixels, Scene, TermSpec};
+use crate::scene::{BrdfSpec, Geometry, MaterialSpec, Pixels, Scene, TermSpec};
 use glam::Vec3;
 
 use super::{Change, Document};
@@ -195,7 +195,7 @@ pub fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
 }
 
 /// The measured files of a material.
-fn measured_paths(material: &mut Material) -> impl Iterator<Item = &mut PathBuf> {
+fn measured_paths(material: &mut MaterialSpec) -> impl Iterator<Item = &mut PathBuf> {
     material.brdf.iter_mut().flat_map(BrdfSpec::terms_mut).filter_map(|term| match term {
         TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => {
             Some(path)
@@ -205,7 +205,7 @@ fn measured_paths(material: &mut Material) -> impl Iterator<Item = &mut PathBuf>
 }
 
 /// Names a material's files so that any scene finds them.
-pub fn make_absolute(material: &mut Material, base_dir: &Path) {
+pub fn make_absolute(material: &mut MaterialSpec, base_dir: &Path) {
     for path in measured_paths(material) {
         let there = base_dir.join(&*path);
         if there.is_file() {

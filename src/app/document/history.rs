@@ -26,14 +26,14 @@ pub enum Change {
         before: Option<Arc<Pixels<u8>>>,
         after: Option<Arc<Pixels<u8>>>,
     },
-    Heights(Vec<Patch<f32>>),
-    Colors(Vec<Patch<Vec3>>),
-    Slots(Vec<Patch<u8>>),
+    Heights(Vec<ScenePatch<f32>>),
+    Colors(Vec<ScenePatch<Vec3>>),
+    Slots(Vec<ScenePatch<u8>>),
 }
 
 /// A rectangle of an image, before and after.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Patch<T> {
+pub struct ScenePatch<T> {
     pub x: usize,
     pub y: usize,
     pub width: usize,
@@ -44,7 +44,7 @@ pub struct Patch<T> {
 /// Side of the patches that a stroke is cut into.
 const PATCH: usize = 16;
 
-impl<T: Copy + PartialEq> Patch<T> {
+impl<T: Copy + PartialEq> ScenePatch<T> {
     /// The patches in which two images of one size differ.
     pub fn between(before: &Pixels<T>, after: &Pixels<T>) -> Vec<Self> {
         let (width, height) = (after.size.x as usize, after.size.y as usize);
@@ -116,7 +116,7 @@ impl Change {
     }
 }
 
-fn apply_patches<T: Copy + PartialEq>(image: &mut Option<Arc<Pixels<T>>>, patches: &[Patch<T>], forward: bool) {
+fn apply_patches<T: Copy + PartialEq>(image: &mut Option<Arc<Pixels<T>>>, patches: &[ScenePatch<T>], forward: bool) {
     if let Some(image) = image {
         let image = Arc::make_mut(image);
         for patch in patches {

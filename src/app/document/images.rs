@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::scene::{Geometry, Heightfield, Painted, Pixels, Scene};
 use glam::Vec3;
 
-use super::{Change, Document, Patch};
+use super::{Change, Document, ScenePatch};
 
 impl Document {
     /// Painted images go where the person chose another file in their place.
@@ -104,8 +104,8 @@ impl Document {
 fn patches<T: Copy + PartialEq>(
     before: &Option<Arc<Pixels<T>>>,
     after: &Option<Arc<Pixels<T>>>,
-) -> Option<Vec<Patch<T>>> {
+) -> Option<Vec<ScenePatch<T>>> {
     let (Some(before), Some(after)) = (before, after) else { return None };
-    let found = if Arc::ptr_eq(before, after) { Vec::new() } else { Patch::between(before, after) };
+    let found = if Arc::ptr_eq(before, after) { Vec::new() } else { ScenePatch::between(before, after) };
     (!found.is_empty()).then_some(found)
 }

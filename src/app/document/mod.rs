@@ -16,7 +16,7 @@ use crate::scene::{LoadedScene, Painted, Scene};
 
 use files::Stamp;
 pub use files::{make_absolute, write_colors, write_heights, write_slots};
-pub use history::{Change, Patch};
+pub use history::{Change, ScenePatch};
 pub use recovery::{Recovered, RecoveryFile, Snapshot};
 pub use settings::Settings;
 

@@ -15,16 +15,24 @@ pub enum Tool {
     Noise,
     Stamp,
     Color,
-    Material,
+    MaterialSpec,
 }
 
 impl Tool {
-    pub const ALL: [Self; 8] =
-        [Self::Raise, Self::Lower, Self::Smooth, Self::Flatten, Self::Noise, Self::Stamp, Self::Color, Self::Material];
+    pub const ALL: [Self; 8] = [
+        Self::Raise,
+        Self::Lower,
+        Self::Smooth,
+        Self::Flatten,
+        Self::Noise,
+        Self::Stamp,
+        Self::Color,
+        Self::MaterialSpec,
+    ];
 
     /// Whether it changes what the surface wears, not its shape.
     pub fn prints(self) -> bool {
-        matches!(self, Self::Color | Self::Material)
+        matches!(self, Self::Color | Self::MaterialSpec)
     }
 
     pub fn name(self) -> &'static str {
@@ -36,7 +44,7 @@ impl Tool {
             Self::Noise => "Noise",
             Self::Stamp => "Stamp",
             Self::Color => "Colour",
-            Self::Material => "Material",
+            Self::MaterialSpec => "Material",
         }
     }
 
@@ -49,7 +57,7 @@ impl Tool {
             Self::Noise => "Roughens the surface",
             Self::Stamp => "Prints a pattern",
             Self::Color => "Paints colour weights, which multiply the materials",
-            Self::Material => "Gives the places it passes over a material of their own",
+            Self::MaterialSpec => "Gives the places it passes over a material of their own",
         }
     }
 }
@@ -147,7 +155,7 @@ impl Brush {
                     let print = stamp.as_ref().map_or(0.5, |stamp| stamp.at(offset));
                     *value + (print - 0.5) * (0.4 * range * by)
                 }
-                Tool::Color | Tool::Material => *value,
+                Tool::Color | Tool::MaterialSpec => *value,
             }
             .clamp(bounds.0, bounds.1);
         });

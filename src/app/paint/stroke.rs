@@ -68,8 +68,8 @@ impl Stroke {
     fn dab(&mut self, brush: &Brush, at: Vec2, pressure: f32) {
         match (brush.tool, &mut self.heights, &mut self.colors, &mut self.slots) {
             (Tool::Color, _, Some(image), _) => brush.dab_color(Arc::make_mut(image), at, pressure),
-            (Tool::Material, _, _, Some(image)) => brush.dab_slot(Arc::make_mut(image), at),
-            (Tool::Color | Tool::Material, ..) => {}
+            (Tool::MaterialSpec, _, _, Some(image)) => brush.dab_slot(Arc::make_mut(image), at),
+            (Tool::Color | Tool::MaterialSpec, ..) => {}
             (_, Some(image), ..) => brush.dab(Arc::make_mut(image), at, self.level, self.bounds, pressure),
             _ => {}
         }

@@ -78,7 +78,7 @@ fn a_material_stroke_gives_whole_places_its_slot_with_a_hard_edge_and_the_own_sl
     let slots = Some(Arc::new(Pixels { size: UVec2::splat(side), values: vec![0; (side * side) as usize] }));
     let painted = Painted { slots, ..flat() };
     let run = |painted: &Painted, slot: u8| {
-        let brush = Brush { tool: Tool::Material, slot, radius: 0.2, strength: 0.0, ..Brush::default() };
+        let brush = Brush { tool: Tool::MaterialSpec, slot, radius: 0.2, strength: 0.0, ..Brush::default() };
         let mut stroke = Stroke::begin(painted);
         stroke.move_to(&brush, Vec2::splat(0.5), 0.3);
         stroke.images()

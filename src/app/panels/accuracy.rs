@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::plan::{Effect, Settings};
 use crate::report::EffectCost;
 use crate::scene::{LoadedScene, Quality, Scene};
-use crate::tuning::ladder;
+use crate::tuning::quality_scale;
 use eframe::egui::{
     self, Align2, Color32, Context, FontId, Sense, Slider, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
@@ -95,14 +95,14 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
     state.open = true;
     let overhangs = effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
     let settings = Settings::of(scene);
-    let mut rung = ladder::position(settings.facets);
+    let mut rung = quality_scale::position(settings.facets);
     let tip = "Walks along settings that balance facets and directions: time against error.";
     let changed = fields::row(ui, "Faster - finer", tip, |ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);
-        ui.add(Slider::new(&mut rung, 0.0..=ladder::FINEST).show_value(false)).changed()
+        ui.add(Slider::new(&mut rung, 0.0..=quality_scale::FINEST).show_value(false)).changed()
     });
     if changed {
-        let candidate = ladder::rung(rung, overhangs);
+        let candidate = quality_scale::rung(rung, overhangs);
         let plain = Quality {
             preset: candidate.preset.to_owned(),
             seed: scene.quality.seed,

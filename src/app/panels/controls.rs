@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use crate::scene::{Field, Kind, Shape};
+use crate::scene::{Field, FieldShape, Kind};
 use eframe::egui::{self, DragValue, Slider, SliderClamping, Ui};
 use toml::Value;
 
@@ -23,30 +23,30 @@ fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
 const NUMBER: f32 = 76.0;
 
 /// A control for a value of a shape.
-pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &Shape, field: &Field, around: &mut Around) {
+pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field: &Field, around: &mut Around) {
     let wrong = Cell::new(false);
     match *shape {
-        Shape::Number { min, max, soft_max } => {
+        FieldShape::Number { min, max, soft_max } => {
             number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, around), &wrong);
         }
-        Shape::Integer { min, max } => integer_ui(ui, value, (min, max), &wrong),
-        Shape::Color { max } => color_ui(ui, value, max, &wrong),
-        Shape::Vector { min, max, .. } => vector_ui(ui, value, (min, max), &wrong),
-        Shape::Text => text_ui(ui, value, 40.0, str::to_owned),
-        Shape::Path => {
+        FieldShape::Integer { min, max } => integer_ui(ui, value, (min, max), &wrong),
+        FieldShape::Color { max } => color_ui(ui, value, max, &wrong),
+        FieldShape::Vector { min, max, .. } => vector_ui(ui, value, (min, max), &wrong),
+        FieldShape::Text => text_ui(ui, value, 40.0, str::to_owned),
+        FieldShape::Path => {
             text_ui(ui, value, 66.0, file_name);
             if ui.button("…").on_hover_text("Choose a file").clicked() {
                 around.browse = Some(field.key);
             }
         }
-        Shape::Choice(names) => choice_ui(ui, value, names, field.key),
-        Shape::AnyOf(shapes) => any_of_ui(ui, value, shapes, field, around),
-        Shape::List { .. } if matrix::is_matrix(value) => matrix::ui(ui, value),
-        Shape::List { .. } => {
+        FieldShape::Choice(names) => choice_ui(ui, value, names, field.key),
+        FieldShape::AnyOf(shapes) => any_of_ui(ui, value, shapes, field, around),
+        FieldShape::List { .. } if matrix::is_matrix(value) => matrix::ui(ui, value),
+        FieldShape::List { .. } => {
             let entries = value.as_array().map_or(0, Vec::len);
             ui.weak(format!("{entries} values in the file"));
         }
-        Shape::Table(_) | Shape::Tagged(_) => {}
+        FieldShape::Table(_) | FieldShape::Tagged(_) => {}
     }
     if wrong.get() {
         let name = caption(field);
@@ -179,9 +179,9 @@ fn choice_ui(ui: &mut Ui, value: &mut Value, names: &[&str], key: &str) {
 }
 
 /// Named patterns, or a matrix where there is one.
-fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[Shape], field: &Field, around: &mut Around) {
+fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[FieldShape], field: &Field, around: &mut Around) {
     let names = shapes.iter().find_map(|shape| match shape {
-        Shape::Choice(names) => Some(*names),
+        FieldShape::Choice(names) => Some(*names),
         _ => None,
     });
     match names {
@@ -195,14 +195,14 @@ fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[Shape], field: &Field, ar
 }
 
 /// What an optional field begins with when it is set by hand.
-pub(super) fn starting_value(shape: &Shape) -> Option<Value> {
+pub(super) fn starting_value(shape: &FieldShape) -> Option<Value> {
     Some(match *shape {
-        Shape::Number { min, soft_max, .. } => {
+        FieldShape::Number { min, soft_max, .. } => {
             Value::Float(if min > 0.0 { (min * soft_max).sqrt() } else { 0.5 * soft_max })
         }
-        Shape::Integer { min, max } => Value::Integer((min + (max - min) / 8).min(4096).max(min)),
-        Shape::Choice(names) => Value::String((*names.first()?).to_owned()),
-        Shape::Path => Value::String(String::new()),
+        FieldShape::Integer { min, max } => Value::Integer((min + (max - min) / 8).min(4096).max(min)),
+        FieldShape::Choice(names) => Value::String((*names.first()?).to_owned()),
+        FieldShape::Path => Value::String(String::new()),
         _ => return None,
     })
 }

@@ -1,6 +1,6 @@
 //! Widgets from the scene catalogue: a field's shape decides its control; its range, unit and text come along.
 
-use crate::scene::{Field, Shape};
+use crate::scene::{Field, FieldShape};
 use eframe::egui::{self, Align, Layout, RichText, Ui};
 use toml::Table;
 
@@ -30,7 +30,7 @@ pub fn table_ui(ui: &mut Ui, table: &mut Table, fields: &[Field], skip: &[&str],
 /// One field's caption and control.
 pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, around: &mut Around) {
     let value = table.get(field.key).cloned();
-    let is_optional = value.is_none() || field.default.is_none() && matches!(field.shape, Shape::Path);
+    let is_optional = value.is_none() || field.default.is_none() && matches!(field.shape, FieldShape::Path);
     if let Some(mut value) = value {
         let keep = caption_row(ui, field, around, |ui, around| {
             value_ui(ui, &mut value, &field.shape, field, around);
@@ -44,7 +44,7 @@ pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, around: &mut Arou
         }
     } else if let Some(start) = starting_value(&field.shape) {
         caption_row(ui, field, around, |ui, around| match field.shape {
-            Shape::Path => {
+            FieldShape::Path => {
                 if ui.button("Choose…").on_hover_text(field.doc).clicked() {
                     around.browse = Some(field.key);
                 }
@@ -109,8 +109,8 @@ fn tooltip(field: &Field, around: &Around) -> String {
         text.push_str(&format!("\nIn {}.", unit_words(field.unit, around)));
     }
     match field.shape {
-        Shape::Number { min, max, .. } => text.push_str(&format!("\n{} to {}.", short(min), short(max))),
-        Shape::Integer { min, max } if max < i64::MAX => text.push_str(&format!("\n{min} to {max}.")),
+        FieldShape::Number { min, max, .. } => text.push_str(&format!("\n{} to {}.", short(min), short(max))),
+        FieldShape::Integer { min, max } if max < i64::MAX => text.push_str(&format!("\n{min} to {max}.")),
         _ => {}
     }
     if let Some(default) = field.default {

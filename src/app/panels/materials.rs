@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::scene::{BrdfSpec, Geometry, Material, Scene, TermSpec};
+use crate::scene::{BrdfSpec, Geometry, MaterialSpec, Scene, TermSpec};
 use eframe::egui::{self, RichText, Ui};
 use glam::Vec3;
 use toml::Table;
@@ -56,9 +56,9 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], around: &mut Around)
     request
 }
 
-pub fn grey() -> Material {
+pub fn grey() -> MaterialSpec {
     let brdf = Some(BrdfSpec::One(TermSpec::Lambertian { albedo: Vec3::splat(0.5) }));
-    Material { name: DEFAULT.to_owned(), brdf, color: Vec3::ONE }
+    MaterialSpec { name: DEFAULT.to_owned(), brdf, color: Vec3::ONE }
 }
 
 /// A slot that looks like the default.
@@ -70,7 +70,7 @@ fn inherited_ui(ui: &mut Ui, scene: &mut Scene, slot: &str) -> Option<Request> {
             request = Some(Request::Paste { slot: slot.to_owned() });
         }
         if ui.button("Customize").on_hover_text("Give this part of the surface a material of its own").clicked() {
-            scene.materials.push(Material { name: slot.to_owned(), brdf: None, color: Vec3::ONE });
+            scene.materials.push(MaterialSpec { name: slot.to_owned(), brdf: None, color: Vec3::ONE });
         }
     });
     request
@@ -117,13 +117,13 @@ fn own_ui(
     request
 }
 
-fn color_ui(ui: &mut Ui, material: &mut Material, around: &mut Around) {
-    let Some(field) = Material::fields().into_iter().find(|field| field.key == "color") else { return };
+fn color_ui(ui: &mut Ui, material: &mut MaterialSpec, around: &mut Around) {
+    let Some(field) = MaterialSpec::fields().into_iter().find(|field| field.key == "color") else { return };
     if let Ok(mut table) = Table::try_from(&*material) {
         let before = table.clone();
         fields::field_ui(ui, &mut table, &field, around);
         if table != before
-            && let Ok(changed) = table.try_into::<Material>()
+            && let Ok(changed) = table.try_into::<MaterialSpec>()
         {
             *material = changed;
         }
@@ -216,7 +216,7 @@ fn converted(term: &TermSpec, kind: &str) -> TermSpec {
 }
 
 /// Copy, paste, remove; whether it is to be removed.
-fn actions_ui(ui: &mut Ui, material: &Material, index: usize, is_default: bool) -> (Option<Request>, bool) {
+fn actions_ui(ui: &mut Ui, material: &MaterialSpec, index: usize, is_default: bool) -> (Option<Request>, bool) {
     let mut request = None;
     let mut remove = false;
     ui.horizontal(|ui| {

@@ -1,8 +1,8 @@
 //! Materials that are painted over the tile, in the slots `paint_1` and on.
 
-use crate::geometry::image_file::MOST_SLOTS;
+use crate::geometry::image_file::MAX_SLOTS;
 use crate::geometry::painted_slot;
-use crate::scene::{BrdfSpec, Material, Scene, TermSpec};
+use crate::scene::{BrdfSpec, MaterialSpec, Scene, TermSpec};
 use glam::Vec3;
 
 use super::materials::grey;
@@ -22,11 +22,11 @@ pub fn add_painted(scene: &mut Scene, number: u8) -> bool {
     }
     let albedo = Vec3::from_array(PAINTS[usize::from(number - 1) % PAINTS.len()]);
     let brdf = Some(BrdfSpec::One(TermSpec::Lambertian { albedo }));
-    scene.materials.push(Material { name, brdf, color: Vec3::ONE });
+    scene.materials.push(MaterialSpec { name, brdf, color: Vec3::ONE });
     true
 }
 
 /// The painted slots that a scene has materials for.
 pub fn painted(scene: &Scene) -> Vec<u8> {
-    (1..=MOST_SLOTS).filter(|k| scene.materials.iter().any(|material| material.name == painted_slot(*k))).collect()
+    (1..=MAX_SLOTS).filter(|k| scene.materials.iter().any(|material| material.name == painted_slot(*k))).collect()
 }

@@ -1,4 +1,4 @@
-//! Places that cannot be written, disks that are full, and files that others write too.
+//! GridCoordinates that cannot be written, disks that are full, and files that others write too.
 
 use std::path::Path;
 use std::time::{Duration, Instant};

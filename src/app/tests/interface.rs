@@ -14,7 +14,7 @@ use crate::app::editor::Editor;
 use crate::app::views::tile::Which;
 
 #[test]
-fn a_scene_opens_with_its_picture_and_both_views_are_named() {
+fn a_scene_opens_with_its_image_and_both_views_are_named() {
     let mut harness = harness(quick());
     settle(&mut harness);
     for name in ["Object view", "Tile view", "Lobe view"] {
@@ -22,7 +22,7 @@ fn a_scene_opens_with_its_picture_and_both_views_are_named() {
     }
     assert!(editor(&mut harness).messages.texts().is_empty());
     let made = editor(&mut harness).object.made.as_ref().unwrap();
-    assert!(made.picture.as_ref().unwrap().pixels.iter().all(|p| p.is_finite()) && made.image.size()[0] > 100);
+    assert!(made.radiance.as_ref().unwrap().pixels.iter().all(|p| p.is_finite()) && made.image.size()[0] > 100);
 }
 
 #[test]
@@ -248,10 +248,10 @@ fn the_accuracy_panel_measures_the_scene_and_its_slider_walks_from_faster_to_fin
 }
 
 #[test]
-fn the_effects_panel_forces_an_effect_and_the_picture_follows() {
+fn the_effects_panel_forces_an_effect_and_the_image_follows() {
     let mut harness = harness(quick());
     settle(&mut harness);
-    let before = editor(&mut harness).object.made.as_ref().unwrap().picture.as_ref().unwrap().pixels.clone();
+    let before = editor(&mut harness).object.made.as_ref().unwrap().radiance.as_ref().unwrap().pixels.clone();
     harness.set_size(eframe::egui::vec2(1400.0, 2600.0));
     harness.run_steps(2);
     settle(&mut harness);
@@ -266,14 +266,14 @@ fn the_effects_panel_forces_an_effect_and_the_picture_follows() {
     let made = editor(&mut harness).object.made.clone().unwrap();
     let effect = made.effects.iter().find(|effect| effect.name == "visibility").unwrap();
     assert!(effect.forced && !effect.on);
-    assert_ne!(made.picture.as_ref().unwrap().pixels, before);
+    assert_ne!(made.radiance.as_ref().unwrap().pixels, before);
     harness.get_by_label("As planned").click();
     harness.run_steps(2);
     assert!(editor(&mut harness).document.scene().effects.is_default());
 }
 
 #[test]
-fn the_picture_that_is_asked_for_before_the_window_has_the_size_of_its_view() {
+fn the_image_that_is_asked_for_before_the_window_has_the_size_of_its_view() {
     let mut document = Some(quick());
     let mut harness = Harness::builder().with_size([1400.0, 1000.0]).allow_missing_glyphs().build_ui_state(
         move |ui: &mut Ui, state: &mut Option<(Editor, _)>| {

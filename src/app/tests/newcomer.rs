@@ -90,7 +90,7 @@ fn every_control_of_every_panel_and_dialog_has_a_name() {
         Action::Open,
         Action::ExportTable,
         Action::ExportTile,
-        Action::ExportPicture,
+        Action::ExportImage,
         Action::Quit,
     ] {
         editor(&mut harness).action(&ctx, action);
@@ -113,7 +113,7 @@ fn every_control_of_every_panel_and_dialog_has_a_name() {
         harness.run_steps(3);
         harness.check_accessibility();
     }
-    editor(&mut harness).dialog = Some(Dialog::Picture { path: "a.png".into(), width: 64, height: 64 });
+    editor(&mut harness).dialog = Some(Dialog::Image { path: "a.png".into(), width: 64, height: 64 });
     harness.run_steps(3);
     harness.check_accessibility();
 }

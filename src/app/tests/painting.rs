@@ -43,7 +43,7 @@ fn a_material_is_painted_on_any_surface_undone_to_the_start_and_redone_to_the_en
     settle(&mut harness);
     let editor = editor(&mut harness);
     editor.tile.set_painting(true);
-    editor.tile.brush.tool = Tool::Material;
+    editor.tile.brush.tool = Tool::MaterialSpec;
     editor.draw(&[Vec2::splat(0.3), Vec2::splat(0.6)]);
     editor.tile.brush.slot = 2;
     editor.draw(&[Vec2::new(0.7, 0.2)]);
@@ -84,7 +84,7 @@ fn painted_materials_are_saved_beside_the_scene_named_in_it_and_reopened_equal()
     settle(&mut harness);
     let editor = editor(&mut harness);
     editor.tile.set_painting(true);
-    editor.tile.brush.tool = Tool::Material;
+    editor.tile.brush.tool = Tool::MaterialSpec;
     editor.draw(&[Vec2::splat(0.4), Vec2::splat(0.9)]);
     editor.document.save_as(&path).unwrap();
     assert!(std::fs::read_to_string(&path).unwrap().contains("slot_path = \"moss_materials.png\""));

@@ -140,7 +140,7 @@ fn memory() -> Option<u64> {
 }
 
 #[test]
-fn sixty_random_edits_end_in_the_picture_of_the_same_scene_computed_afresh() {
+fn sixty_random_edits_end_in_the_image_of_the_same_scene_computed_afresh() {
     soak(60, 1);
 }
 

@@ -12,10 +12,10 @@ use super::{QUICK, editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::document::Document;
 use crate::app::editor::Editor;
-use crate::app::worker::{Devices, Image, LOSE_DEVICE, Screen};
+use crate::app::worker::{Devices, DisplayImage, LOSE_DEVICE, Screen};
 
 #[test]
-fn a_lost_device_is_a_message_and_pictures_go_on_on_the_processor() {
+fn a_lost_device_is_a_message_and_images_go_on_on_the_processor() {
     if let Err(error) = crate::gpu::Gpu::open() {
         return eprintln!("SKIPPED: {error}");
     }
@@ -47,7 +47,7 @@ fn a_lost_device_is_a_message_and_pictures_go_on_on_the_processor() {
     assert!(texts.contains("graphics device failed") && texts.contains("document is kept"), "{texts}");
     assert_eq!(**editor.document.scene(), scene);
     let made = editor.object.made.as_ref().unwrap();
-    assert!(made.picture.as_ref().unwrap().pixels.iter().all(|pixel| pixel.is_finite()));
+    assert!(made.radiance.as_ref().unwrap().pixels.iter().all(|pixel| pixel.is_finite()));
 }
 
 /// A device as a window's, and what would draw the interface there.
@@ -66,20 +66,20 @@ fn on_gpu(document: &Document) -> crate::scene::Scene {
 }
 
 #[test]
-fn a_picture_on_the_window_s_device_is_shown_without_being_read_back_and_is_the_processor_s() {
+fn a_image_on_the_window_s_device_is_shown_without_being_read_back_and_is_the_processor_s() {
     let Some(screen) = screen() else { return };
     let mut harness = harness(quick());
     settle(&mut harness);
     let cpu = editor(&mut harness).object.made.as_ref().unwrap().image.clone();
-    assert!(matches!(cpu, Image::Pixels(_)));
+    assert!(matches!(cpu, DisplayImage::Pixels(_)));
     editor(&mut harness).tell_devices(Devices { only_software: None, screen: Some(screen) });
     let scene = on_gpu(&editor(&mut harness).document);
     editor(&mut harness).document.edit(scene);
     harness.step();
     settle(&mut harness);
     let made = editor(&mut harness).object.made.clone().unwrap();
-    let Image::OnDevice(_) = &made.image else { panic!("{} made {:?}", made.device, made.image.size()) };
-    assert!(made.picture.is_none());
+    let DisplayImage::OnDevice(_) = &made.image else { panic!("{} made {:?}", made.device, made.image.size()) };
+    assert!(made.radiance.is_none());
     let (shown, cpu) = (made.image.pixels().unwrap(), cpu.pixels().unwrap());
     assert_eq!(shown.size, cpu.size);
     let off = |a: egui::Color32, b: egui::Color32| (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap_or(0);
@@ -96,7 +96,7 @@ fn a_picture_on_the_window_s_device_is_shown_without_being_read_back_and_is_the_
     harness.step();
     settle(&mut harness);
     let brighter = editor(&mut harness).object.made.clone().unwrap();
-    let sum = |image: &Image| image.pixels().unwrap().pixels.iter().map(|p| u64::from(p.g())).sum::<u64>();
+    let sum = |image: &DisplayImage| image.pixels().unwrap().pixels.iter().map(|p| u64::from(p.g())).sum::<u64>();
     assert!(sum(&brighter.image) > sum(&made.image), "an exposure that was raised");
     drop((made, brighter));
     editor(&mut harness).move_to(&ctx);
@@ -106,7 +106,7 @@ fn a_picture_on_the_window_s_device_is_shown_without_being_read_back_and_is_the_
 }
 
 #[test]
-fn on_a_graphics_processor_an_edit_s_first_picture_takes_no_visibility_of_the_cpu() {
+fn on_a_graphics_processor_an_edit_s_first_image_takes_no_visibility_of_the_cpu() {
     let Some(screen) = screen() else { return };
     let scene = QUICK
         .replace("{ kind = \"grooves\", count = 2 }", "{ kind = \"heightfield\", path = \"asset:ripples.png\" }")
@@ -134,7 +134,7 @@ fn on_a_graphics_processor_an_edit_s_first_picture_takes_no_visibility_of_the_cp
         assert!(start.elapsed().as_secs() < 60, "no picture");
     };
     let stages: Vec<_> = draft.stages.iter().map(|(name, _)| *name).collect();
-    assert!(matches!(draft.image, Image::OnDevice(_)), "{stages:?}");
+    assert!(matches!(draft.image, DisplayImage::OnDevice(_)), "{stages:?}");
     assert!(stages.contains(&"visibility and product") && !stages.contains(&"visibility"), "{stages:?}");
     assert!(draft.brdf.is_some(), "plots show the last BRDF until the next is known");
     settle(&mut harness);
@@ -143,7 +143,7 @@ fn on_a_graphics_processor_an_edit_s_first_picture_takes_no_visibility_of_the_cp
 }
 
 #[test]
-fn a_window_s_device_that_is_lost_leaves_pictures_to_the_processor() {
+fn a_window_s_device_that_is_lost_leaves_images_to_the_processor() {
     let Some(screen) = screen() else { return };
     let mut harness = harness(quick());
     editor(&mut harness).tell_devices(Devices { only_software: None, screen: Some(screen.clone()) });
@@ -157,11 +157,11 @@ fn a_window_s_device_that_is_lost_leaves_pictures_to_the_processor() {
     harness.step();
     settle(&mut harness);
     let made = editor(&mut harness).object.made.clone().unwrap();
-    assert!(matches!(made.image, Image::Pixels(_)) && made.device.starts_with("CPU"), "{}", made.device);
+    assert!(matches!(made.image, DisplayImage::Pixels(_)) && made.device.starts_with("CPU"), "{}", made.device);
 }
 
 #[test]
-fn an_editor_that_moves_to_another_window_keeps_its_document_and_makes_its_pictures_anew() {
+fn an_editor_that_moves_to_another_window_keeps_its_document_and_makes_its_images_anew() {
     let mut harness = harness(quick());
     settle(&mut harness);
     let ctx = harness.ctx.clone();

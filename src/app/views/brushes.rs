@@ -1,6 +1,6 @@
 //! The brush, under the tile.
 
-use crate::geometry::image_file::MOST_SLOTS;
+use crate::geometry::image_file::MAX_SLOTS;
 use crate::geometry::painted_slot;
 use crate::scene::{Scene, shipped};
 use eframe::egui::{self, Slider, Ui};
@@ -52,7 +52,7 @@ pub fn ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) -> Option<BrushAsked> {
     shape_ui(ui, brush);
     match brush.tool {
         Tool::Color => color_ui(ui, brush),
-        Tool::Material => material_ui(ui, brush, scene),
+        Tool::MaterialSpec => material_ui(ui, brush, scene),
         Tool::Stamp => stamp_ui(ui, brush),
         _ => {}
     }
@@ -81,7 +81,7 @@ fn shape_ui(ui: &mut Ui, brush: &mut Brush) {
     };
     percent(ui, "Size", "Radius as a part of the tile ([ and ])", &mut brush.radius, 0.5);
     // A place has one material, wholly.
-    if brush.tool != Tool::Material {
+    if brush.tool != Tool::MaterialSpec {
         percent(ui, "Strength", "How much a stroke does; a pen's pressure lessens it", &mut brush.strength, 1.0);
         percent(ui, "Softness", "0: a hard edge. 100: soft from the middle on", &mut brush.falloff, 1.0);
     }
@@ -103,7 +103,7 @@ fn color_ui(ui: &mut Ui, brush: &mut Brush) {
 fn material_ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) {
     let there = paints::painted(scene);
     // The first stroke makes the material.
-    let next = (1..=MOST_SLOTS).find(|slot| !there.contains(slot));
+    let next = (1..=MAX_SLOTS).find(|slot| !there.contains(slot));
     let name = |slot: u8| if slot == 0 { "The surface's own".to_owned() } else { words(&painted_slot(slot)) };
     let shown = if Some(brush.slot) == next { format!("{} (new)", name(brush.slot)) } else { name(brush.slot) };
     row(ui, "Material", "What the places that are painted wear; its BRDF is under Materials", |ui| {
@@ -137,7 +137,9 @@ fn stem(file: &str) -> String {
 fn files_ui(ui: &mut Ui, tool: Tool) -> Option<BrushAsked> {
     let (layer, names, clear) = match tool {
         Tool::Color => (Layer::Colors, "colours", ("No colours", "Remove what was painted")),
-        Tool::Material => (Layer::Slots, "materials", ("No materials", "Every place wears the surface's own again")),
+        Tool::MaterialSpec => {
+            (Layer::Slots, "materials", ("No materials", "Every place wears the surface's own again"))
+        }
         _ => (Layer::Heights, "heights", ("Flatten all", "Back to a plane")),
     };
     let mut asked = None;

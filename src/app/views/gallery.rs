@@ -10,7 +10,7 @@ use crate::app::worker::{Thumbnail, ThumbnailJob};
 #[derive(Default)]
 pub struct Gallery {
     /// `None` for a scene that could not be shown.
-    pictures: HashMap<&'static str, Option<TextureHandle>>,
+    images: HashMap<&'static str, Option<TextureHandle>>,
     asked: Option<&'static str>,
     /// What is looked for among names and descriptions.
     pub sought: String,
@@ -20,7 +20,7 @@ impl Gallery {
     pub fn take(&mut self, ctx: &Context, made: Thumbnail) {
         let options = egui::TextureOptions::LINEAR;
         let texture = made.image.map(|image| ctx.load_texture(made.name, image, options));
-        self.pictures.insert(made.name, texture);
+        self.images.insert(made.name, texture);
         self.asked = None;
     }
 
@@ -29,7 +29,7 @@ impl Gallery {
         if self.asked.is_some() {
             return None;
         }
-        let name = shipped::names().find(|name| !self.pictures.contains_key(name))?;
+        let name = shipped::names().find(|name| !self.images.contains_key(name))?;
         self.asked = Some(name);
         Some(ThumbnailJob { name })
     }
@@ -80,22 +80,22 @@ impl Gallery {
         if !ui.is_rect_visible(area) {
             return response.clicked();
         }
-        let picture = Rect::from_min_size(area.min, vec2(side, side * 0.82));
+        let frame = Rect::from_min_size(area.min, vec2(side, side * 0.82));
         let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
-        match self.pictures.get(name) {
+        match self.images.get(name) {
             Some(Some(texture)) => {
                 let uv = Rect::from_min_max(pos2(0.0, 0.09), pos2(1.0, 0.91));
-                let image = egui::Image::new((texture.id(), picture.size())).uv(uv).corner_radius(4);
-                image.paint_at(ui, picture);
+                let image = egui::Image::new((texture.id(), frame.size())).uv(uv).corner_radius(4);
+                image.paint_at(ui, frame);
             }
             _ => {
-                painter.rect_filled(picture, 4.0, ui.visuals().faint_bg_color);
+                painter.rect_filled(frame, 4.0, ui.visuals().faint_bg_color);
             }
         }
         let color = if current || response.hovered() { super::super::theme::ACCENT } else { Color32::TRANSPARENT };
-        painter.rect_stroke(picture, 4.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Inside);
+        painter.rect_stroke(frame, 4.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Inside);
         let text = if current { ui.visuals().strong_text_color() } else { ui.visuals().text_color() };
-        let at = pos2(area.left() + 1.0, picture.bottom() + 2.0);
+        let at = pos2(area.left() + 1.0, frame.bottom() + 2.0);
         painter.text(at, egui::Align2::LEFT_TOP, title(name), egui::FontId::proportional(11.0), text);
         response.on_hover_text(format!("{name}\n{}", shipped::description(name).unwrap_or_default())).clicked()
     }

@@ -13,7 +13,7 @@ use super::wheel::wheel;
 use super::wipe::Kept;
 use crate::app::actions::Action;
 use crate::app::panels::fields::words;
-use crate::app::worker::{DeviceImage, Grade, Image, Made};
+use crate::app::worker::{DeviceImage, DisplayImage, Grade, Made};
 
 /// The camera comes no nearer than this many radii; the lens does the rest.
 const NEAREST: f32 = 2.2;
@@ -81,11 +81,11 @@ impl ObjectView {
         (self.since, self.failed) = (None, None);
         let options = TextureOptions::LINEAR;
         match (&mut self.texture, &made.image) {
-            (Some(Texture::Uploaded(texture)), Image::Pixels(image)) => texture.set(image.clone(), options),
-            (texture, Image::Pixels(image)) => {
+            (Some(Texture::Uploaded(texture)), DisplayImage::Pixels(image)) => texture.set(image.clone(), options),
+            (texture, DisplayImage::Pixels(image)) => {
                 *texture = Some(Texture::Uploaded(ctx.load_texture("object", image.clone(), options)));
             }
-            (texture, Image::OnDevice(image)) => *texture = Some(Texture::OnDevice(image.clone())),
+            (texture, DisplayImage::OnDevice(image)) => *texture = Some(Texture::OnDevice(image.clone())),
         }
         if made.grade == Grade::Final {
             self.doing = None;
@@ -125,12 +125,12 @@ impl ObjectView {
             kept.texture = ctx.load_texture("kept", kept.image.clone(), TextureOptions::LINEAR);
         }
         match self.made.as_ref().map(|made| &made.image) {
-            Some(Image::Pixels(image)) => {
+            Some(DisplayImage::Pixels(image)) => {
                 let texture = ctx.load_texture("object", image.clone(), TextureOptions::LINEAR);
                 self.texture = Some(Texture::Uploaded(texture));
             }
             // It went with the window.
-            Some(Image::OnDevice(_)) => self.made = None,
+            Some(DisplayImage::OnDevice(_)) => self.made = None,
             None => {}
         }
     }
@@ -250,9 +250,9 @@ fn exposure_ui(ui: &mut Ui, scene: &mut Scene) {
 }
 
 /// The rectangle that covers `area` with a picture of another shape, centred: a resized view keeps the object's shape.
-pub(super) fn covered(area: Rect, picture: egui::Vec2) -> Rect {
-    let scale = (area.width() / picture.x.max(1.0)).max(area.height() / picture.y.max(1.0));
-    let rect = Rect::from_center_size(area.center(), picture * scale);
+pub(super) fn covered(area: Rect, image: egui::Vec2) -> Rect {
+    let scale = (area.width() / image.x.max(1.0)).max(area.height() / image.y.max(1.0));
+    let rect = Rect::from_center_size(area.center(), image * scale);
     if (rect.width() - area.width()).abs() < 4.0 && (rect.height() - area.height()).abs() < 4.0 { area } else { rect }
 }
 

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 use crate::render::tile_view::TileView;
-use crate::scene::{Camera, Light, LoadedScene, Material, Painted, Tile};
+use crate::scene::{Camera, Light, LoadedScene, MaterialSpec, Painted, Tile};
 use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Pos2, Rect, Response, Sense, TextureHandle, Ui, pos2, vec2,
 };
@@ -15,7 +15,7 @@ use crate::app::paint::Brush;
 use crate::app::worker::{Show, TileJob, TileMade};
 
 /// What the picture of a tile depends on.
-type Inputs = (Tile, Vec<Material>, Painted, Option<(Light, Option<Camera>)>);
+type Inputs = (Tile, Vec<MaterialSpec>, Painted, Option<(Light, Option<Camera>)>);
 
 /// What the view holds between frames.
 pub struct TileState {

@@ -6,12 +6,12 @@ use std::time::Instant;
 
 use crate::base::{Error, Result};
 use crate::pipeline::Pipeline;
-use crate::render::Picture;
-use crate::report::{EffectCost, Studio, heat, measure_effects};
+use crate::render::Image;
+use crate::report::{EffectCost, ThumbnailRenderer, heat, measure_effects};
 use crate::scene::{LoadedScene, Quality};
 use crate::tuning::candidates::with_settings;
-use crate::tuning::ladder;
 use crate::tuning::progressive::{Compared, ProgressiveReference};
+use crate::tuning::quality_scale;
 use eframe::egui::ColorImage;
 
 use super::runner::Desk;
@@ -70,7 +70,7 @@ const PAIRS: usize = 96;
 /// Batches of the reference: for the chart, and when it is asked for.
 const BATCHES: [usize; 2] = [2, 24];
 /// Noisy pictures of the reference that are averaged.
-const PICTURES: u64 = 24;
+const IMAGES: u64 = 24;
 
 /// What stays between jobs: the reference and the rungs belong to a scene, whatever its settings.
 #[derive(Default)]
@@ -121,7 +121,7 @@ impl Accuracy {
             }
             desk.cancel.check()?;
             answer(AccuracyAnswer::Doing("Faster and finer settings"));
-            let scene = with_settings(&job.loaded, &ladder::rung(rung, overhangs))?;
+            let scene = with_settings(&job.loaded, &quality_scale::rung(rung, overhangs))?;
             let point = self.point(&scene, &reference)?;
             self.rungs.push((rung, point));
             answer(AccuracyAnswer::Rungs(self.rungs.iter().map(|(_, point)| *point).collect()));
@@ -131,20 +131,20 @@ impl Accuracy {
             return Ok(());
         }
         answer(AccuracyAnswer::Doing("Refining the reference"));
-        let studio = Studio::new(&job.loaded)?;
-        let now = studio.picture(&*outcome.brdf)?;
-        let mut right = MeanPicture::default();
-        for seed in 0..PICTURES {
+        let studio = ThumbnailRenderer::new(&job.loaded)?;
+        let now = studio.image(&*outcome.brdf)?;
+        let mut right = MeanImage::default();
+        for seed in 0..IMAGES {
             desk.cancel.check()?;
             let drawn = self
                 .pipeline
-                .with_reference(&job.loaded, |reference| studio.reference_picture(reference, seed, desk.cancel))??;
+                .with_reference(&job.loaded, |reference| studio.reference_image(reference, seed, desk.cancel))??;
             match drawn {
                 Some(drawn) => right.add(drawn),
                 // Paths between facets: against the finest setting instead.
                 None if seed == 0 => {
-                    let fine = with_settings(&job.loaded, &ladder::rung(FINEST, overhangs))?;
-                    let finest = studio.picture(&*self.pipeline.effective(&fine)?.brdf)?;
+                    let fine = with_settings(&job.loaded, &quality_scale::rung(FINEST, overhangs))?;
+                    let finest = studio.image(&*self.pipeline.effective(&fine)?.brdf)?;
                     answer(AccuracyAnswer::Difference(job.version, difference(&studio, &now, &finest, None)));
                 }
                 None => {}
@@ -188,13 +188,13 @@ fn without_settings(loaded: &LoadedScene) -> LoadedScene {
 
 /// Two means of every second picture each: how far they are apart tells their noise.
 #[derive(Default)]
-struct MeanPicture {
-    halves: [Option<Picture>; 2],
+struct MeanImage {
+    halves: [Option<Image>; 2],
     counts: [usize; 2],
 }
 
-impl MeanPicture {
-    fn add(&mut self, drawn: Picture) {
+impl MeanImage {
+    fn add(&mut self, drawn: Image) {
         let half = usize::from(self.counts[0] > self.counts[1]);
         self.counts[half] += 1;
         let part = 1.0 / self.counts[half] as f32;
@@ -209,12 +209,12 @@ impl MeanPicture {
     }
 
     /// `None` before the second picture. The mean of both halves has half the noise of their difference.
-    fn mean_and_noise(&self, studio: &Studio) -> Option<(Picture, f32)> {
+    fn mean_and_noise(&self, studio: &ThumbnailRenderer) -> Option<(Image, f32)> {
         let [Some(a), Some(b)] = &self.halves else { return None };
         let part = self.counts[1] as f32 / (self.counts[0] + self.counts[1]) as f32;
         let pixels = a.pixels.iter().zip(&b.pixels).map(|(a, b)| a.lerp(*b, part)).collect();
         let noise = 0.5 * average(&studio.difference(a, b));
-        Some((Picture { pixels, ..*a }, noise))
+        Some((Image { pixels, ..*a }, noise))
     }
 }
 
@@ -222,12 +222,12 @@ fn average(delta_e: &[f32]) -> f32 {
     delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32
 }
 
-fn difference(studio: &Studio, now: &Picture, right: &Picture, noise: Option<f32>) -> Difference {
+fn difference(studio: &ThumbnailRenderer, now: &Image, right: &Image, noise: Option<f32>) -> Difference {
     let delta_e = studio.difference(now, right);
-    Difference { image: Arc::new(picture(now.width, now.height, &delta_e)), mean: average(&delta_e), noise }
+    Difference { image: Arc::new(image(now.width, now.height, &delta_e)), mean: average(&delta_e), noise }
 }
 
-fn picture(width: usize, height: usize, delta_e: &[f32]) -> ColorImage {
+fn image(width: usize, height: usize, delta_e: &[f32]) -> ColorImage {
     let color = |delta: &f32| {
         let [r, g, b] = heat(*delta).to_array().map(crate::render::image::tone_map::srgb_byte);
         eframe::egui::Color32::from_rgb(r, g, b)

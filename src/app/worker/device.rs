@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::base::{Cancel, Error, Result};
-use crate::effective::{EffectiveBrdf, Form};
+use crate::effective::{EffectiveBrdf, Representation};
 use crate::gpu::{Gpu, GpuError, GpuRenderer, Tier};
-use crate::pipeline::Unseen;
+use crate::pipeline::GpuTile;
 use crate::render::ObjectMesh;
 use crate::render::shadow::Occluder;
 
@@ -36,7 +36,7 @@ pub struct OnDevice {
 /// What a renderer wears.
 enum Wears {
     Brdf(Arc<EffectiveBrdf>),
-    Tile(Arc<Unseen>),
+    Tile(Arc<GpuTile>),
     Nothing,
 }
 
@@ -170,22 +170,22 @@ impl OnDevice {
     fn wear(&mut self, subject: Subject, cancel: &Cancel) -> Result<Option<f64>> {
         let outcome = match subject.shot.material {
             Worn::Known(outcome) => outcome,
-            Worn::Unseen(tile) => return Ok(self.takes(subject, Wears::Tile(tile.clone()))?.then_some(0.0)),
+            Worn::GpuTile(tile) => return Ok(self.takes(subject, Wears::Tile(tile.clone()))?.then_some(0.0)),
         };
         let mut table_ms = 0.0;
         // A graphics processor has a draft's sums done before the CPU has a table; few facets of few normals are picked at once.
-        let few = matches!(outcome.brdf.direct_form(), Form::Direct(direct) if direct.has_few());
-        let pictured = match outcome.pictured() {
+        let few = matches!(outcome.brdf.direct_form(), Representation::Direct(direct) if direct.has_few());
+        let shading_brdf = match outcome.known_shading_brdf() {
             None if few || !self.is_fast || subject.shot.settle => {
-                let pictured = outcome.for_pictures(cancel)?;
-                table_ms = pictured.ms;
-                Some(pictured.brdf)
+                let shading_brdf = outcome.shading_brdf(cancel)?;
+                table_ms = shading_brdf.ms;
+                Some(shading_brdf.brdf)
             }
             known => known,
         };
         // The processor in disguise is not asked for sums where the processor itself reads a table.
-        let sums = Some(&outcome.brdf).filter(|_| self.is_fast || pictured.is_none());
-        for brdf in pictured.iter().chain(sums) {
+        let sums = Some(&outcome.brdf).filter(|_| self.is_fast || shading_brdf.is_none());
+        for brdf in shading_brdf.iter().chain(sums) {
             if self.takes(subject, Wears::Brdf(brdf.clone()))? {
                 return Ok(Some(table_ms));
             }

@@ -16,7 +16,7 @@ use crate::scene::LoadedScene;
 use crate::{export, fit};
 
 use super::runner::Desk;
-use super::studio::{Close, Shot, Studio, Worn};
+use super::studio::{Close, ImageStudio, Shot, Worn};
 
 #[derive(Debug, Clone)]
 pub struct ExportJob {
@@ -65,7 +65,7 @@ pub enum What {
     /// A few parameters, glTF or MaterialX by the ending.
     Fit,
     Tile(TileOptions),
-    Picture {
+    Image {
         size: [usize; 2],
     },
 }
@@ -90,7 +90,7 @@ fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, answer: &(dyn Fn(Expo
     answer(ExportAnswer::Progress(0.0, "Computing the material"));
     let mut pipeline = Pipeline::new();
     pipeline.cancel_with(cancel.clone());
-    pipeline.keep_in(cache.clone());
+    pipeline.set_cache(cache.clone());
     // Each is told as a part of what it is called.
     let telling = |what: &'static str| {
         move |part: f32| {
@@ -115,11 +115,11 @@ fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, answer: &(dyn Fn(Expo
                 100.0 * report.reading.errors.rel_l2
             ))
         }
-        What::Picture { size } => {
+        What::Image { size } => {
             answer(ExportAnswer::Progress(0.3, "Rendering"));
             let tile = CloseUp::new(Arc::new(pipeline.mesh(&job.loaded)?));
             let close = (tile, pipeline.sum_materials(&job.loaded)?);
-            picture(&job.loaded, &outcome, size, &job.path, &close, cancel)?;
+            image(&job.loaded, &outcome, size, &job.path, &close, cancel)?;
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
@@ -146,7 +146,7 @@ fn tile(job: &ExportJob, mesh: &TileMesh, options: &TileOptions, progress: &Prog
     Ok(format!("Wrote {}: {}.", job.path.display(), notes.join("; ")))
 }
 
-fn picture(
+fn image(
     loaded: &LoadedScene,
     outcome: &Outcome,
     size: [usize; 2],
@@ -155,11 +155,11 @@ fn picture(
     cancel: &Cancel,
 ) -> Result<()> {
     let camera = loaded.scene.camera.clone().unwrap_or_default();
-    let mut studio = Studio::default();
+    let mut studio = ImageStudio::default();
     studio.prepare(loaded)?;
     let backend = loaded.scene.quality.backend.as_str();
     let shot =
         Shot { camera: &camera, material: Worn::Known(outcome), size, samples_per_side: 3, settle: true, backend };
     let (rendered, _) = studio.shoot(&shot, Some(close), cancel)?;
-    rendered.picture.write(path, &ToneMap::new(&camera)?)
+    rendered.image.write(path, &ToneMap::new(&camera)?)
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::effective::EffectiveBrdf;
 use crate::plan::Effect;
-use crate::render::{DirectionalLight, ObjectMesh, Picture};
+use crate::render::{DirectionalLight, Image, ObjectMesh};
 use crate::scene::{Camera, LoadedScene};
 use eframe::egui::ColorImage;
 
@@ -13,7 +13,7 @@ use super::screen::DeviceImage;
 
 /// A picture to make.
 #[derive(Debug, Clone)]
-pub struct PictureJob {
+pub struct ImageJob {
     /// The document's version, handed back with every answer.
     pub version: u64,
     pub loaded: Arc<LoadedScene>,
@@ -33,14 +33,14 @@ pub enum Grade {
 
 /// A picture as the view shows it.
 #[derive(Debug, Clone)]
-pub enum Image {
+pub enum DisplayImage {
     /// To be uploaded.
     Pixels(Arc<ColorImage>),
     /// Where the window draws; it never was anywhere else.
     OnDevice(Arc<DeviceImage>),
 }
 
-impl Image {
+impl DisplayImage {
     pub fn size(&self) -> [usize; 2] {
         match self {
             Self::Pixels(image) => image.size,
@@ -63,8 +63,8 @@ pub struct Made {
     pub version: u64,
     pub grade: Grade,
     /// Its radiance, where that is not on the device.
-    pub picture: Option<Arc<Picture>>,
-    pub image: Image,
+    pub radiance: Option<Arc<Image>>,
+    pub image: DisplayImage,
     /// Absent where the device made the picture from the tile itself.
     pub brdf: Option<Arc<EffectiveBrdf>>,
     /// Milliseconds of what ran for it.
@@ -89,7 +89,7 @@ pub struct Made {
 
 /// What comes back.
 #[derive(Debug, Clone)]
-pub enum PictureAnswer {
+pub enum ImageAnswer {
     Made(Box<Made>),
     /// What is being done, for the status line.
     Doing(u64, &'static str),

@@ -3,10 +3,10 @@
 mod accuracy;
 mod device;
 mod export;
+mod image_worker;
 mod lobe;
 mod made;
 mod on_device;
-mod picture;
 mod runner;
 mod screen;
 mod shared;
@@ -27,7 +27,7 @@ pub use accuracy::{AccuracyAnswer, AccuracyJob, Point};
 pub use device::LOSE_DEVICE;
 pub use export::{ExportAnswer, ExportJob, TableChoice, What};
 pub use lobe::{LobeJob, LobeMade, logarithmic};
-pub use made::{Grade, Image, Made, PictureAnswer, PictureJob};
+pub use made::{DisplayImage, Grade, ImageAnswer, ImageJob, Made};
 pub use runner::Worker;
 pub use screen::{DeviceImage, Screen};
 pub use shared::Devices;
@@ -49,45 +49,45 @@ pub fn spawn_lobe(answer: impl Fn(LobeMade) + Clone + Send + Sync + 'static) -> 
 }
 
 /// The threads that make pictures: one drafts, one refines. Each gets every job.
-pub struct Pictures {
-    draft: Worker<PictureJob>,
-    refine: Worker<PictureJob>,
+pub struct Images {
+    draft: Worker<ImageJob>,
+    refine: Worker<ImageJob>,
     shared: Arc<shared::Shared>,
 }
 
-impl Pictures {
+impl Images {
     /// `None` where the system gives no threads.
-    pub fn spawn(cache: &Cache, answer: impl Fn(PictureAnswer) + Clone + Send + Sync + 'static) -> Option<Self> {
+    pub fn spawn(cache: &Cache, answer: impl Fn(ImageAnswer) + Clone + Send + Sync + 'static) -> Option<Self> {
         let shared = Arc::new(shared::Shared::default());
         let told_devices = shared.clone();
         let cache = cache.clone();
-        let start = move || picture::Photographer::new(shared.clone(), &cache);
+        let start = move || image_worker::Photographer::new(shared.clone(), &cache);
         let (draft, refine, told, told_too) = (answer.clone(), answer.clone(), answer.clone(), answer);
-        let draft_work = move |kept: &mut picture::Photographer, job: PictureJob, desk: &runner::Desk<PictureJob>| {
+        let draft_work = move |kept: &mut image_worker::Photographer, job: ImageJob, desk: &runner::Desk<ImageJob>| {
             kept.draft(&job, desk, &draft);
         };
-        let refine_work = move |kept: &mut picture::Photographer, job: PictureJob, desk: &runner::Desk<PictureJob>| {
+        let refine_work = move |kept: &mut image_worker::Photographer, job: ImageJob, desk: &runner::Desk<ImageJob>| {
             kept.refine(&job, desk, &refine);
         };
         let draft =
-            Worker::spawn("draft", 0, start.clone(), draft_work, move |text| told(PictureAnswer::Fault(text))).ok()?;
+            Worker::spawn("draft", 0, start.clone(), draft_work, move |text| told(ImageAnswer::Fault(text))).ok()?;
         let refine =
-            Worker::spawn("refine", 0, start, refine_work, move |text| told_too(PictureAnswer::Fault(text))).ok()?;
+            Worker::spawn("refine", 0, start, refine_work, move |text| told_too(ImageAnswer::Fault(text))).ok()?;
         Some(Self { draft, refine, shared: told_devices })
     }
 
-    pub fn ask(&self, job: PictureJob) {
+    pub fn ask(&self, job: ImageJob) {
         self.refine(job.clone());
         self.draft(job);
     }
 
     /// A draft only.
-    pub fn draft(&self, job: PictureJob) {
+    pub fn draft(&self, job: ImageJob) {
         self.draft.ask(job);
     }
 
     /// What a draft was asked of before.
-    pub fn refine(&self, job: PictureJob) {
+    pub fn refine(&self, job: ImageJob) {
         self.refine.ask(job);
     }
 
@@ -109,10 +109,10 @@ impl Pictures {
 
 /// The thread that makes thumbnails. One that fails stays a grey square.
 pub fn spawn_thumbnail(answer: impl Fn(Thumbnail) + Clone + Send + Sync + 'static) -> Option<Worker<ThumbnailJob>> {
-    let work = move |kept: &mut studio::Studio, job: ThumbnailJob, desk: &runner::Desk<ThumbnailJob>| {
+    let work = move |kept: &mut studio::ImageStudio, job: ThumbnailJob, desk: &runner::Desk<ThumbnailJob>| {
         thumbnail::work(kept, &job, desk, &answer);
     };
-    Worker::spawn("thumbnails", 1, studio::Studio::default, work, |_| {}).ok()
+    Worker::spawn("thumbnails", 1, studio::ImageStudio::default, work, |_| {}).ok()
 }
 
 /// The thread that measures accuracy against time.

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::base::Result;
-use crate::pipeline::{Pipeline, Unseen};
-use crate::plan::{Preset, Route, Settings};
+use crate::pipeline::{GpuTile, Pipeline};
+use crate::plan::{Preset, Settings, VisibilityAlgorithm};
 use crate::scene::{LoadedScene, Quality};
 
 use super::shared::{SmallScale, small_scale};
@@ -13,8 +13,8 @@ use super::shared::{SmallScale, small_scale};
 const RUNGS: [Preset; 2] = [Preset::Draft, Preset::Standard];
 /// Visibility and product may take so long, and leave room for those of the next rung below these: by count `standard` is up to
 /// six drafts, and `fine` up to three of `standard`.
-const MOST_MS: f64 = 25.0;
-const LEAST_MS: [f64; RUNGS.len()] = [2.0, 7.0];
+const MAX_MS: f64 = 25.0;
+const MIN_MS: [f64; RUNGS.len()] = [2.0, 7.0];
 
 /// What such drafts are made from, and how fine they are.
 #[derive(Default)]
@@ -23,7 +23,7 @@ pub struct DeviceDrafts {
     /// An index into [`RUNGS`], or their number for the scene's own quality.
     rung: usize,
     /// Whether there was a table, how many lobes, and the route.
-    kind: Option<(bool, usize, Route)>,
+    kind: Option<(bool, usize, VisibilityAlgorithm)>,
     /// Quick drafts until a rung that was too slow is tried again, and how many those were the last time.
     rest: u32,
     rested: u32,
@@ -32,7 +32,7 @@ pub struct DeviceDrafts {
 struct Last {
     key: (SmallScale, usize),
     /// Absent where only the CPU makes it.
-    tile: Option<Arc<Unseen>>,
+    tile: Option<Arc<GpuTile>>,
 }
 
 impl DeviceDrafts {
@@ -40,7 +40,7 @@ impl DeviceDrafts {
     ///
     /// # Errors
     /// As [`Pipeline::unseen`].
-    pub fn tile(&mut self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<Unseen>>> {
+    pub fn tile(&mut self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<GpuTile>>> {
         let key = (small_scale(loaded), self.rung);
         if let Some(last) = self.last.as_ref().filter(|last| last.key == key) {
             return Ok(last.tile.clone());
@@ -57,7 +57,7 @@ impl DeviceDrafts {
         self.tile(loaded, pipeline)
     }
 
-    fn make(&self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<Unseen>>> {
+    fn make(&self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<GpuTile>>> {
         let tile = match RUNGS.get(self.rung) {
             Some(preset) if !is_below(loaded, *preset) => pipeline.unseen(&as_preset(loaded, *preset))?,
             _ => pipeline.unseen(loaded)?,
@@ -68,11 +68,11 @@ impl DeviceDrafts {
     /// `ms`: of what grows with the rung. The next edit is as fine as leaves its picture in time; a rung that did not is tried
     /// again ever more seldom.
     pub fn took(&mut self, ms: f64) {
-        if ms > MOST_MS {
+        if ms > MAX_MS {
             self.rung = self.rung.saturating_sub(1);
             self.rested = (4 * self.rested).clamp(8, 1 << 20);
             self.rest = self.rested;
-        } else if LEAST_MS.get(self.rung).is_some_and(|least| ms < *least) {
+        } else if MIN_MS.get(self.rung).is_some_and(|least| ms < *least) {
             match self.rest {
                 0 => self.rung += 1,
                 _ => self.rest -= 1,

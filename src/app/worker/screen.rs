@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::gpu::render::picture;
 use crate::gpu::{Gpu, GpuError, Tier};
 use eframe::egui::mutex::RwLock;
 use eframe::egui::{ColorImage, TextureId};
@@ -37,7 +36,7 @@ impl Screen {
     }
 
     fn image(&self, size: [usize; 2]) -> Result<DeviceImage, GpuError> {
-        let texture = picture::image(&self.gpu, size)?;
+        let texture = crate::gpu::render::image::image(&self.gpu, size)?;
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.gpu.checked("showing a picture", || {
             let filter = wgpu::FilterMode::Linear;

@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::pipeline::Outcome;
-use crate::scene::{Effects, LoadedScene, Material, Painted, Quality, Tile};
+use crate::scene::{Effects, LoadedScene, MaterialSpec, Painted, Quality, Tile};
 
 use super::made::Made;
 use super::screen::Screen;
 
 /// What an effective BRDF depends on.
-pub type SmallScale = (Tile, Vec<Material>, Quality, Effects, PathBuf, Painted);
+pub type SmallScale = (Tile, Vec<MaterialSpec>, Quality, Effects, PathBuf, Painted);
 
 /// A full picture and what it shows.
 pub type Finished = (Box<LoadedScene>, [usize; 2], Made);

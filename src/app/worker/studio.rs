@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::base::{Cancel, Error, Result};
-use crate::effective::{Black, EffectiveBrdf, Reflectance, SumMaterial};
-use crate::pipeline::{Outcome, Unseen};
-use crate::render::image::render::StageTimes;
+use crate::effective::{Black, EffectiveBrdf, Material, Reflectance};
+use crate::pipeline::{GpuTile, Outcome};
+use crate::render::image::render::RenderTimes;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::lighting::environment::Environment;
@@ -18,7 +18,7 @@ use crate::render::lighting::{environment, lights};
 use crate::render::render;
 use crate::render::shadow::Occluder;
 use crate::render::shadow::shadow_cache::ShadowCache;
-use crate::render::tile_view::{CloseUp, Wearing, on_object};
+use crate::render::tile_view::{CloseUp, ShadedMaterials, on_object};
 use crate::render::{CameraView, DirectionalLight, ObjectMesh, RenderInput, Rendered, object};
 use crate::scene;
 use crate::scene::{Camera, LoadedScene, Switch};
@@ -29,7 +29,7 @@ use super::screen::{DeviceImage, Screen, Turns};
 
 /// The large scale of a scene, ready to be shaded.
 #[derive(Default)]
-pub struct Studio {
+pub struct ImageStudio {
     object: Option<Object>,
     environment: Option<((String, PathBuf), Environment)>,
     lights: Option<((scene::Light, PathBuf, Switch), Lights)>,
@@ -50,20 +50,20 @@ struct Object {
 /// A picture that is on the window's device.
 pub struct Shown {
     pub image: Arc<DeviceImage>,
-    pub times: StageTimes,
+    pub times: RenderTimes,
     /// What the table took that it reads.
     pub table_ms: f64,
 }
 
 /// A tile with the materials of its slots, for pictures so close that it shows.
-pub type Close = (CloseUp, (Vec<usize>, Vec<SumMaterial>));
+pub type Close = (CloseUp, (Vec<usize>, Vec<Material>));
 
 /// What the object wears.
 #[derive(Clone, Copy)]
 pub enum Worn<'a> {
     Known(&'a Outcome),
     /// A tile whose visibility and product the device makes.
-    Unseen(&'a Arc<Unseen>),
+    GpuTile(&'a Arc<GpuTile>),
 }
 
 /// How a picture is made.
@@ -78,7 +78,7 @@ pub struct Shot<'a> {
     pub backend: &'a str,
 }
 
-impl Studio {
+impl ImageStudio {
     /// Takes the scene's object and lights over where they changed.
     pub fn prepare(&mut self, loaded: &LoadedScene) -> Result<()> {
         let shadow = loaded.scene.effects.self_shadow;
@@ -193,18 +193,18 @@ impl Studio {
                     self.shadows = Some(occluder.cache(&object.mesh, &lights.directional));
                     cancel.check()?;
                 }
-                let pictured = outcome.for_pictures(cancel)?;
-                let reflectance = Cancellable { brdf: &pictured.brdf, cancel };
+                let shading_brdf = outcome.shading_brdf(cancel)?;
+                let reflectance = Cancellable { brdf: &shading_brdf.brdf, cancel };
                 let shadow_cache = self.shadows.as_ref();
-                (render(&RenderInput { reflectance: &reflectance, shadow_cache, ..seen })?, pictured.ms)
+                (render(&RenderInput { reflectance: &reflectance, shadow_cache, ..seen })?, shading_brdf.ms)
             }
         };
         cancel.check()?;
         if let Some((tile, assigned)) = close {
             let start = Instant::now();
-            let wearing = Wearing { material_of_slot: &assigned.0, materials: &assigned.1 };
+            let wearing = ShadedMaterials { material_of_slot: &assigned.0, materials: &assigned.1 };
             let shadow_cache = self.shadows.as_ref();
-            tile.blend_into(&mut rendered.picture, &RenderInput { shadow_cache, ..seen }, wearing, cancel)?;
+            tile.blend_into(&mut rendered.image, &RenderInput { shadow_cache, ..seen }, wearing, cancel)?;
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
         }
         Ok((rendered, table_ms))

@@ -10,7 +10,7 @@ use crate::scene::Quality;
 use eframe::egui::ColorImage;
 
 use super::runner::Desk;
-use super::studio::{Shot, Studio, Worn};
+use super::studio::{ImageStudio, Shot, Worn};
 use super::tone::color_image;
 
 /// Pixels of a side.
@@ -29,7 +29,7 @@ pub struct Thumbnail {
     pub image: Option<Arc<ColorImage>>,
 }
 
-pub fn work(kept: &mut Studio, job: &ThumbnailJob, desk: &Desk<ThumbnailJob>, answer: &dyn Fn(Thumbnail)) {
+pub fn work(kept: &mut ImageStudio, job: &ThumbnailJob, desk: &Desk<ThumbnailJob>, answer: &dyn Fn(Thumbnail)) {
     let image = render(kept, job.name, desk);
     // What was given up is asked for again.
     if !desk.cancel.is_set() {
@@ -37,7 +37,7 @@ pub fn work(kept: &mut Studio, job: &ThumbnailJob, desk: &Desk<ThumbnailJob>, an
     }
 }
 
-fn render(studio: &mut Studio, name: &str, desk: &Desk<ThumbnailJob>) -> Result<ColorImage> {
+fn render(studio: &mut ImageStudio, name: &str, desk: &Desk<ThumbnailJob>) -> Result<ColorImage> {
     let mut loaded = scene::open(name, &[])?;
     loaded.scene.quality =
         Quality { preset: "draft".to_owned(), backend: "cpu".to_owned(), facets: Some(1024), ..Quality::default() };
@@ -56,5 +56,5 @@ fn render(studio: &mut Studio, name: &str, desk: &Desk<ThumbnailJob>) -> Result<
         backend: "cpu",
     };
     let (rendered, _) = studio.shoot(&shot, None, desk.cancel)?;
-    Ok(color_image(&rendered.picture, &ToneMap::new(&camera)?))
+    Ok(color_image(&rendered.image, &ToneMap::new(&camera)?))
 }

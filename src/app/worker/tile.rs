@@ -9,7 +9,7 @@ use crate::pipeline::Pipeline;
 use crate::render::DirectionalLight;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 use crate::render::lighting::lights;
-use crate::render::tile_view::{CloseUp, Look, TileView, Wearing};
+use crate::render::tile_view::{CloseUp, Look, ShadedMaterials, TileView};
 use crate::scene::{Light, LoadedScene, Painted, Tile};
 use eframe::egui::ColorImage;
 use glam::Vec3;
@@ -82,7 +82,7 @@ impl Macro {
     fn steps(&mut self, job: &TileJob, desk: &Desk<TileJob>, answer: &dyn Fn(TileAnswer)) -> Result<()> {
         let tile = self.tile(&job.loaded)?;
         let (material_of_slot, materials) = self.pipeline.sum_materials(&job.loaded)?;
-        let wearing = Wearing { material_of_slot: &material_of_slot, materials: &materials };
+        let wearing = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
         let facets = if job.facets { Some(self.facets(job, &tile)) } else { None };
         let (look, tone_map) = self.look(job)?;
         let pixels = (job.view.size[0] * job.view.size[1]) as f64;
@@ -94,10 +94,10 @@ impl Macro {
             // The first pass is never given up: the picture follows the hand.
             let never = crate::base::Cancel::default();
             let cancel = if at == 0 { &never } else { desk.cancel };
-            let picture = tile.picture(view, &look, wearing, Vec3::splat(0.02), cancel)?;
+            let image = tile.image(view, &look, wearing, Vec3::splat(0.02), cancel)?;
             let ms = start.elapsed().as_secs_f64() * 1e3;
             self.cost = ms / (view.size[0] * view.size[1]) as f64;
-            let image = Arc::new(color_image(&picture, &tone_map));
+            let image = Arc::new(color_image(&image, &tone_map));
             let (tile, facets) = (tile.clone(), facets.clone());
             answer(TileAnswer::Made(Box::new(TileMade { image, tile, facets })));
         }

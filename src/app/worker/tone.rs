@@ -1,6 +1,6 @@
 //! From linear radiance to a texture.
 
-use crate::render::Picture;
+use crate::render::Image;
 use crate::render::image::tone_map::{ToneMap, srgb_byte};
 use eframe::egui::{Color32, ColorImage};
 use rayon::prelude::*;
@@ -9,12 +9,12 @@ use rayon::prelude::*;
 const STEPS: usize = 4096;
 
 /// A picture as a screen shows it.
-pub fn color_image(picture: &Picture, tone_map: &ToneMap) -> ColorImage {
+pub fn color_image(image: &Image, tone_map: &ToneMap) -> ColorImage {
     let table: Vec<u8> = (0..=STEPS).map(|k| srgb_byte(k as f32 / STEPS as f32)).collect();
     let byte = |value: f32| table[(value * STEPS as f32 + 0.5) as usize];
-    let pixels = picture.pixels.par_iter().with_min_len(4096).map(|radiance| {
+    let pixels = image.pixels.par_iter().with_min_len(4096).map(|radiance| {
         let [r, g, b] = tone_map.apply(*radiance).to_array().map(byte);
         Color32::from_rgb(r, g, b)
     });
-    ColorImage::new([picture.width, picture.height], pixels.collect())
+    ColorImage::new([image.width, image.height], pixels.collect())
 }

@@ -26,14 +26,14 @@ use tensor_file::TensorFile;
 
 /// `f_r` is `f` divided by cosines no smaller than this: nothing is measured beyond, and the quotient would only carry
 /// noise from the horizon into the neighbouring bins.
-const SMALLEST_COSINE: f64 = 0.01;
+const MIN_COSINE: f64 = 0.01;
 
 /// Bins of the table. Against exact evaluation of the three files at hand, relative L2: MERL's 90 x 90 x 90 2.2 / 1.0 /
 /// 0.26 %, with 20 in `φ_d` 2.3 / 1.0 / 0.29 %, this 1.0 / 0.5 / 0.27 %.
 const SHAPE: [usize; 3] = [180, 90, 20];
 
 /// Relative L2 between azimuths up to which a file with many passes for isotropic: interpolation leaves some.
-const MOST_ANISOTROPY: f32 = 0.05;
+const MAX_ANISOTROPY: f32 = 0.05;
 /// Pairs that are turned to measure it.
 const CHECKED_TURNS: usize = 500;
 
@@ -70,7 +70,7 @@ impl RglTable {
             values.iter().for_each(|value| residual.add(*value - mean, mean, 1.0));
         }
         let change = residual.relative();
-        if change <= MOST_ANISOTROPY {
+        if change <= MAX_ANISOTROPY {
             return Ok(());
         }
         let found = format!("{} azimuths, over which values change by {:.0} %", self.phi_i.len(), 100.0 * change);
@@ -119,7 +119,7 @@ impl RglTable {
                             there,
                             theta_h.sin() * theta_h.sqrt() * theta_d.sin() * theta_d.cos(),
                         );
-                        let f_r = 0.5 * (there + back) / (i.z.max(SMALLEST_COSINE) * o.z.max(SMALLEST_COSINE));
+                        let f_r = 0.5 * (there + back) / (i.z.max(MIN_COSINE) * o.z.max(MIN_COSINE));
                         f_r.min(DVec3::splat(1e15)).as_vec3().extend(1.0)
                     })
                     .collect();

@@ -35,7 +35,7 @@ pub(crate) fn u_of_direction(v: DVec3) -> [f64; 2] {
     [u_of_theta(elevation(v)), u_of_phi(v.y.atan2(v.x))]
 }
 
-/// A file for exact evaluation. Slices run over `phi_i`, then `theta_i`.
+/// A file for exact evaluation. OcclusionIntervals run over `phi_i`, then `theta_i`.
 pub(crate) struct RglTable {
     pub phi_i: Vec<f64>,
     pub theta_i: Vec<f64>,

@@ -11,10 +11,10 @@ use crate::base::InputError;
 
 const MAGIC: &[u8; 12] = b"tensor_file\0";
 /// The largest published file (anisotropic, spectral) is 550 MB; isotropic RGB ones are under 1 MB.
-const LARGEST_FILE: u64 = 256 << 20;
+const MAX_FILE: u64 = 256 << 20;
 /// The published files have at most 12 fields of at most 5 dimensions.
-const MOST_FIELDS: u32 = 256;
-const MOST_DIMENSIONS: u16 = 8;
+const MAX_FIELDS: u32 = 256;
+const MAX_DIMENSIONS: u16 = 8;
 
 /// A file in memory, its table of contents checked against its size.
 pub(crate) struct TensorFile {
@@ -39,12 +39,12 @@ impl TensorFile {
         let unreadable = |error: std::io::Error| InputError::new("", error, "an RGL file that can be read");
         let file = File::open(path).map_err(unreadable)?;
         let len = file.metadata().map_err(unreadable)?.len();
-        if len > LARGEST_FILE {
-            let expected = format!("at most {LARGEST_FILE} bytes");
+        if len > MAX_FILE {
+            let expected = format!("at most {MAX_FILE} bytes");
             return Err(InputError::new("file size", format!("{len} bytes"), expected));
         }
         let mut bytes = Vec::with_capacity(len as usize);
-        file.take(LARGEST_FILE).read_to_end(&mut bytes).map_err(unreadable)?;
+        file.take(MAX_FILE).read_to_end(&mut bytes).map_err(unreadable)?;
         Self::parse(bytes)
     }
 
@@ -60,8 +60,8 @@ impl TensorFile {
             return Err(InputError::new("version", format!("{version:?}"), "[1, 0]"));
         }
         let count = u32::from_le_bytes(reader.take("field count")?);
-        if count > MOST_FIELDS {
-            return Err(InputError::new("field count", count, format!("at most {MOST_FIELDS}")));
+        if count > MAX_FIELDS {
+            return Err(InputError::new("field count", count, format!("at most {MAX_FIELDS}")));
         }
         let fields = (0..count).map(|_| reader.field()).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { bytes, fields })
@@ -185,11 +185,11 @@ impl Reader<'_> {
         let name = String::from_utf8_lossy(self.slice(usize::from(name_len), "field name")?).into_owned();
         let place = format!("field \"{name}\"");
         let dimensions = u16::from_le_bytes(self.take(&place)?);
-        if dimensions > MOST_DIMENSIONS {
+        if dimensions > MAX_DIMENSIONS {
             return Err(InputError::new(
                 place,
                 format!("{dimensions} dimensions"),
-                format!("at most {MOST_DIMENSIONS}"),
+                format!("at most {MAX_DIMENSIONS}"),
             ));
         }
         let [kind] = self.take(&place)?;

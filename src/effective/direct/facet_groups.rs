@@ -19,12 +19,12 @@ pub(crate) struct Group {
     /// Areas times colour weights, where those differ between the facets of the group.
     pub(crate) rgb_areas: Option<[Vec<f32>; 3]>,
     /// Runs of facets with one normal, where there are few of them.
-    pub(crate) patches: Option<Vec<Patch>>,
+    pub(crate) patches: Option<Vec<NormalCluster>>,
 }
 
 /// A run of facets with one normal.
 #[derive(Debug, Clone)]
-pub(crate) struct Patch {
+pub(crate) struct NormalCluster {
     pub(crate) range: Range<usize>,
     pub(crate) normal: Vec3,
 }
@@ -34,7 +34,7 @@ const FACETS_A_PATCH: usize = 8;
 
 impl Group {
     /// The same materials over other facets; `None` where they have colours of their own, or normals that matter.
-    pub(crate) fn over(&self, range: Range<usize>, patches: Vec<Patch>) -> Option<Self> {
+    pub(crate) fn over(&self, range: Range<usize>, patches: Vec<NormalCluster>) -> Option<Self> {
         (self.is_black || self.rgb_areas.is_none() && self.patches.is_some()).then(|| Self {
             range,
             rgb_areas: None,
@@ -62,7 +62,7 @@ impl Group {
 }
 
 /// What facets of one normal reflect; `None` where it faces away.
-pub(crate) fn patch_value(group: &Group, patch: &Patch, pair: &PairVectors) -> Option<Vec3> {
+pub(crate) fn patch_value(group: &Group, patch: &NormalCluster, pair: &PairVectors) -> Option<Vec3> {
     let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
     if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
         return None;
@@ -84,13 +84,13 @@ pub(crate) fn rgb_areas(facets: &Facets, range: Range<usize>) -> [Vec<f32>; 3] {
 }
 
 /// Runs of facets with one normal.
-pub(crate) fn patches(facets: &Facets, range: Range<usize>) -> Vec<Patch> {
-    let mut patches: Vec<Patch> = Vec::new();
+pub(crate) fn patches(facets: &Facets, range: Range<usize>) -> Vec<NormalCluster> {
+    let mut patches: Vec<NormalCluster> = Vec::new();
     for s in range {
         let normal = facets.normals[s];
         match patches.last_mut() {
             Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
-            _ => patches.push(Patch { range: s..s + 1, normal }),
+            _ => patches.push(NormalCluster { range: s..s + 1, normal }),
         }
     }
     patches

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::facet_groups::{Patch, patch_value, patches, rgb_areas};
+use super::facet_groups::{NormalCluster, patch_value, patches, rgb_areas};
 use crate::brdf::{Brdf, LobeAngles, Measured, Term};
 use crate::cache::KeyBuilder;
 use crate::effective::Group;
@@ -15,7 +15,7 @@ use crate::math::simd::{Lobe, PairVectors};
 
 /// A material as the sum sees it.
 #[derive(Debug, Clone)]
-pub struct SumMaterial {
+pub struct Material {
     pub brdf: Brdf,
     /// Multiplies the sum of the terms.
     pub color: Vec3,
@@ -27,7 +27,7 @@ fn is_zero(term: &Term) -> bool {
     !matches!(term, Term::Measured(_)) && term.tint(0.0) == Vec3::ZERO && term.tint(1.0) == Vec3::ZERO
 }
 
-impl SumMaterial {
+impl Material {
     /// Does it reflect nothing?
     pub fn is_black(&self) -> bool {
         self.color == Vec3::ZERO || self.brdf.terms.iter().all(is_zero)
@@ -65,7 +65,7 @@ pub struct FacetSum {
 
 impl FacetSum {
     /// Facets must be sorted by slot ([`Facets::sort_for_sums`]); `material_of_slot[slot]` indexes `materials`.
-    pub fn new(facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]) -> Self {
+    pub fn new(facets: &Facets, material_of_slot: &[usize], materials: &[Material]) -> Self {
         let component = |pick: fn(&Vec3) -> f32| facets.normals.iter().map(pick).collect();
         let mut sum = Self {
             normals: [component(|n| n.x), component(|n| n.y), component(|n| n.z)],
@@ -85,7 +85,7 @@ impl FacetSum {
     }
 
     /// Swaps the materials and keeps the facets: all that an edit of a BRDF or a colour costs.
-    pub fn set_materials(&mut self, facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]) {
+    pub fn set_materials(&mut self, facets: &Facets, material_of_slot: &[usize], materials: &[Material]) {
         for group in &mut self.groups {
             let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
             group.color = material.color;
@@ -201,16 +201,16 @@ impl FacetSum {
         v_i: &[f32],
         v_o: &[f32],
     ) -> DVec3 {
-        const MOST: usize = 64;
-        let mut angles = Vec::with_capacity(MOST);
-        let mut weights = Vec::with_capacity(MOST);
-        let mut values = [Vec3::ZERO; MOST];
+        const MAX: usize = 64;
+        let mut angles = Vec::with_capacity(MAX);
+        let mut weights = Vec::with_capacity(MAX);
+        let mut values = [Vec3::ZERO; MAX];
         let mut total = DVec3::ZERO;
         let Range { start, end } = group.range;
-        for first in (start..end).step_by(MOST) {
+        for first in (start..end).step_by(MAX) {
             angles.clear();
             weights.clear();
-            for s in first..(first + MOST).min(end) {
+            for s in first..(first + MAX).min(end) {
                 let seen = v_i[s] * v_o[s];
                 if seen <= 0.0 {
                     continue;
@@ -255,7 +255,7 @@ impl FacetSum {
         total
     }
 
-    fn patch_sum(&self, group: &Group, patch: &Patch, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
+    fn patch_sum(&self, group: &Group, patch: &NormalCluster, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
         let Some(value) = patch_value(group, patch, pair) else { return DVec3::ZERO };
         let range = patch.range.clone();
         let seen = match &group.rgb_areas {
@@ -270,7 +270,7 @@ impl FacetSum {
     }
 
     /// All that the sums of single lobes depend on: not colours and tints, which are multiplied on afterwards.
-    pub(crate) fn identify(&self, key: &mut KeyBuilder) {
+    pub(crate) fn hash_into(&self, key: &mut KeyBuilder) {
         for axis in &self.normals {
             key.numbers("normals", axis);
         }
@@ -299,7 +299,7 @@ impl FacetSum {
         lit.map(|group| group.patches.as_ref().map(Vec::len)).sum()
     }
 
-    /// Whether every group has few normals and one colour: then `FewNormals` serves.
+    /// Whether every group has few normals and one colour: then `ClusteredSum` serves.
     pub(crate) fn has_few_normals(&self) -> bool {
         let few = |group: &Group| group.patches.is_some() && group.rgb_areas.is_none();
         self.groups.iter().all(|group| group.is_black || few(group))

@@ -1,17 +1,17 @@
 //! The effective BRDF as a live sum over facets: soft visibility, exact lobes, no table of the product.
 
+pub(crate) mod clustered_sum;
 pub(crate) mod facet_groups;
 pub(crate) mod facet_sum;
-pub(crate) mod few_normals;
 pub(crate) mod forced;
-pub(crate) mod thinned;
+pub(crate) mod strided_subset;
 
 use std::cell::RefCell;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use self::few_normals::{FewNormals, View};
+use self::clustered_sum::{ClusteredSum, View};
 use super::{FacetSum, VisibilityRows};
 use crate::math::simd::LightPairs;
 use crate::visibility::Visibility;
@@ -22,7 +22,7 @@ pub struct Direct {
     pub sum: Arc<FacetSum>,
     pub visibility: Arc<Visibility>,
     /// Where normals are few, which pictures use.
-    few: Option<Arc<FewNormals>>,
+    few: Option<Arc<ClusteredSum>>,
 }
 
 #[derive(Default)]
@@ -38,7 +38,7 @@ thread_local! {
 
 impl Direct {
     pub fn new(sum: Arc<FacetSum>, visibility: Arc<Visibility>) -> Self {
-        let few = FewNormals::of(&sum, &visibility).map(Arc::new);
+        let few = ClusteredSum::of(&sum, &visibility).map(Arc::new);
         Self { sum, visibility, few }
     }
 
@@ -67,7 +67,7 @@ impl Direct {
             scratch.v_o.resize(facets, 0.0);
             self.visibility.fill(o, 0..facets, &mut scratch.v_o);
             let area = self.sum.projected_area(&scratch.v_o, o);
-            if let (Visibility::Horizons(horizons), Some(few), true) =
+            if let (Visibility::HorizonMap(horizons), Some(few), true) =
                 (&*self.visibility, &self.few, o.z > 0.0 && area > 0.0)
             {
                 for (v, area) in scratch.v_o.iter_mut().zip(self.sum.areas(0..facets)) {

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use self::bvndf::{leading_features, visibility_at, visibility_table};
-use super::{BasisGrid, RotatedBasis, RotatedLobe, SumMaterial, Tint, VisibilityRows, analytic_lobe};
+use super::{BasisGrid, Material, RotatedBasis, RotatedLobe, Tint, VisibilityRows, analytic_lobe};
 use crate::base::Result;
 use crate::brdf::{Brdf, ColorBasis, Term};
 use crate::geometry::Facets;
@@ -47,7 +47,7 @@ struct Source {
 }
 
 impl Source {
-    fn tint(&self, materials: &[SumMaterial]) -> Tint {
+    fn tint(&self, materials: &[Material]) -> Tint {
         let material = &materials[self.material];
         let color = material.color * self.along;
         match &material.brdf.terms[self.term] {
@@ -96,7 +96,7 @@ struct Group {
 }
 
 /// Facets by slot, skipping black materials. Facets are sorted by slot.
-fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[SumMaterial]) -> Vec<Group> {
+fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[Material]) -> Vec<Group> {
     let mut groups = Vec::new();
     let mut start = 0;
     while start < facets.len() {
@@ -198,7 +198,7 @@ impl<'a> Factors<'a> {
         facets: &'a Facets,
         rows: &'a VisibilityRows,
         material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        materials: &[Material],
         settings: &LowRankSettings,
     ) -> Result<Self> {
         let mut parts = Vec::new();
@@ -274,7 +274,7 @@ impl LowRank {
         facets: &Facets,
         visibility: &Visibility,
         material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        materials: &[Material],
         settings: &LowRankSettings,
     ) -> Result<Self> {
         let rows = VisibilityRows::new(visibility, 0..facets.len(), settings.directions);
@@ -315,8 +315,8 @@ fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32
 
 impl LowRank {
     /// The same factors under other colours. `materials` must have the lobes that these were built from
-    /// ([`SumMaterial::same_lobes`]).
-    pub fn recolored(&self, materials: &[SumMaterial]) -> Self {
+    /// ([`Material::same_lobes`]).
+    pub fn recolored(&self, materials: &[Material]) -> Self {
         let mut recolored = self.clone();
         for channel in &mut recolored.channels {
             channel.tint = channel.source.tint(materials);

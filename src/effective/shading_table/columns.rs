@@ -29,10 +29,10 @@ pub(crate) enum Part {
 }
 
 /// More columns than these cost a query more than they save it.
-const MOST_COLUMNS: usize = 32;
+const MAX_COLUMNS: usize = 32;
 
 /// More normals than these are summed as if each facet had its own.
-const MOST_NORMALS: usize = 8;
+const MAX_NORMALS: usize = 8;
 
 impl Column {
     /// The columns of a sum; `None` where there are too many.
@@ -47,7 +47,7 @@ impl Column {
             for &channel in channels {
                 let mut add = |part| columns.push(Self { group, part, channel });
                 match &facets.patches {
-                    Some(patches) if patches.len() <= MOST_NORMALS => {
+                    Some(patches) if patches.len() <= MAX_NORMALS => {
                         (0..patches.len()).for_each(|patch| add(Part::Area(patch)));
                     }
                     _ => {
@@ -61,7 +61,7 @@ impl Column {
                 }
             }
         }
-        (columns.len() <= MOST_COLUMNS).then_some(columns)
+        (columns.len() <= MAX_COLUMNS).then_some(columns)
     }
 
     /// Those that it sums over.

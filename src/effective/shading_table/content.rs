@@ -6,8 +6,8 @@ use glam::Vec4;
 
 use super::columns::Column;
 use crate::cache::{KeyBuilder, Reader, Stored, Writer};
-use crate::effective::{Direct, Interpolation, Nodes, PairTable};
-use crate::math::directions::UpperPairs;
+use crate::effective::{Direct, Interpolation, Nodes, ShadingTable};
+use crate::math::directions::HemispherePairGrid;
 
 /// The numbers of a table of a sum; they serve every sum of the same lobes, whatever its colours.
 #[derive(Debug, Clone)]
@@ -17,11 +17,11 @@ pub struct TableContent {
 }
 
 /// A larger table is none of ours.
-const MOST_WORDS: usize = 1 << 28;
+const MAX_WORDS: usize = 1 << 28;
 
 impl Nodes<'_> {
-    pub(crate) fn identify(&self, key: &mut KeyBuilder) {
-        let UpperPairs { rings, azimuths, turn, difference } = self.grid;
+    pub(crate) fn hash_into(&self, key: &mut KeyBuilder) {
+        let HemispherePairGrid { rings, azimuths, turn, difference } = self.grid;
         key.counts("grid", [rings, azimuths, turn, difference]).flags("mirrors", self.mirrors);
         key.counts("from facets", self.facets);
         if let Some(pairs) = self.read_by {
@@ -31,13 +31,13 @@ impl Nodes<'_> {
     }
 }
 
-impl PairTable {
+impl ShadingTable {
     pub fn content(&self) -> TableContent {
         TableContent { values: self.values.clone(), areas: self.areas.1.clone() }
     }
 
-    /// The table that [`PairTable::build`] made, for the same sum but for its colours; `None` for another sum or grid.
-    pub fn of_content(direct: &Direct, grid: UpperPairs, content: TableContent) -> Option<Self> {
+    /// The table that [`ShadingTable::build`] made, for the same sum but for its colours; `None` for another sum or grid.
+    pub fn of_content(direct: &Direct, grid: HemispherePairGrid, content: TableContent) -> Option<Self> {
         let weights: Vec<_> = Column::of(&direct.sum)?.iter().map(|column| column.weight(&direct.sum)).collect();
         let fours = weights.len().div_ceil(4);
         let areas = Self::area_grid();
@@ -62,7 +62,7 @@ impl Stored for TableContent {
     }
 
     fn read(from: &mut Reader<'_>) -> Option<Self> {
-        let values = bytemuck::pod_collect_to_vec(&from.sparse(MOST_WORDS)?);
+        let values = bytemuck::pod_collect_to_vec(&from.sparse(MAX_WORDS)?);
         Some(Self { values: Arc::new(values), areas: from.numbers()? })
     }
 }

@@ -5,9 +5,9 @@ use std::path::Path;
 use glam::{Vec3, Vec4};
 
 use crate::base::Cancel;
-use crate::effective::{EffectiveBrdf, Form, Nodes, PairTable};
-use crate::math::directions::UpperPairs;
-use crate::metrics::{picture_pairs, upper_errors};
+use crate::effective::{EffectiveBrdf, Nodes, Representation, ShadingTable};
+use crate::math::directions::HemispherePairGrid;
+use crate::metrics::{image_pairs, upper_errors};
 use crate::pipeline::Pipeline;
 use crate::scene;
 
@@ -19,7 +19,7 @@ fn as_half(x: f32) -> f32 {
 }
 
 /// The same table, each column scaled to 1 at most and held in half floats.
-fn in_halves(table: &PairTable) -> PairTable {
+fn in_halves(table: &ShadingTable) -> ShadingTable {
     let mut values: Vec<Vec4> = table.values.to_vec();
     for four in 0..table.fours {
         let highest = values.iter().skip(four).step_by(table.fours).fold(Vec4::ZERO, |high, v| high.max(v.abs()));
@@ -31,7 +31,7 @@ fn in_halves(table: &PairTable) -> PairTable {
             }
         }
     }
-    PairTable { values: values.into(), ..table.clone() }
+    ShadingTable { values: values.into(), ..table.clone() }
 }
 
 #[test]
@@ -46,19 +46,20 @@ fn halves_are_those_of_ieee_754() {
 #[test]
 #[ignore = "a table to be printed: cargo test --release --lib half_floats_would -- --ignored --nocapture"]
 fn half_floats_would_change_a_table_by_this() {
-    let pairs = picture_pairs(4096, 12345);
+    let pairs = image_pairs(4096, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
-    let grid = UpperPairs { rings: 24, azimuths: 48, turn: 8, difference: 12 };
+    let grid = HemispherePairGrid { rings: 24, azimuths: 48, turn: 8, difference: 12 };
     println!("scene            table against the sum    in halves                 halves against the table");
     for name in ["table4_plate", "table4_pillow", "table4_skirt", "fig6a_velvet_spread"] {
         let mut loaded = scene::open(name, &[]).unwrap();
         loaded.scene.quality.preset = "draft".to_owned();
         loaded.base_dir = Path::new(".").to_owned();
         let outcome = Pipeline::new().effective(&loaded).unwrap();
-        let Form::Direct(direct) = outcome.brdf.direct_form() else { panic!("{name}: not a sum") };
-        let table = PairTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
-        let halves = values(&outcome.brdf.with_direct_form(Form::Table(in_halves(&table))));
-        let (exact, whole) = (values(&outcome.brdf), values(&outcome.brdf.with_direct_form(Form::Table(table))));
+        let Representation::Direct(direct) = outcome.brdf.direct_form() else { panic!("{name}: not a sum") };
+        let table = ShadingTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
+        let halves = values(&outcome.brdf.with_direct_form(Representation::Table(in_halves(&table))));
+        let (exact, whole) =
+            (values(&outcome.brdf), values(&outcome.brdf.with_direct_form(Representation::Table(table))));
         let told = |a: &[Vec3], b: &[Vec3]| {
             let errors = upper_errors(a, b);
             format!("{:>7.3} % {:>5.1} dB", 100.0 * errors.rel_l2, errors.psnr_db)

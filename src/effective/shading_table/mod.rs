@@ -10,7 +10,7 @@ pub(crate) mod content;
 mod facet_columns;
 #[cfg(test)]
 mod half_floats_tests;
-pub(crate) mod sampled;
+pub(crate) mod sampled_facets;
 
 use std::sync::Arc;
 
@@ -20,21 +20,21 @@ use rayon::prelude::*;
 use self::columns::{Column, Weight};
 use super::{Direct, FacetSum, Interpolation, Tint};
 use crate::base::{Cancel, Result};
-use crate::math::directions::{Places, PolarGrid, UpperPairs};
+use crate::math::directions::{GridCoordinates, HemispherePairGrid, PolarGrid};
 use crate::math::simd::{PairVectors, RowGrid};
 use crate::math::{directions, simd};
 use crate::metrics::Pair;
 
 /// Columns of a table over pairs of directions, and what multiplies them.
 #[derive(Debug, Clone)]
-pub struct PairTable {
-    pub grid: UpperPairs,
+pub struct ShadingTable {
+    pub grid: HemispherePairGrid,
     /// Along θ_d; elsewhere it is linear.
     pub interpolation: Interpolation,
     weights: Vec<Weight>,
     /// Whether the columns are those of a sum over facets, else the colours of another form.
     of_sum: bool,
-    /// Fours of columns a node.
+    /// F32x8Array of columns a node.
     fours: usize,
     /// `[θ_h][φ_h][φ_d][θ_d][four]`. There is one step of θ_d more at either end than the grid has, so that a cubic has its
     /// four nodes everywhere: the mirror image of the second before the first, a straight line after the last.
@@ -46,7 +46,7 @@ pub struct PairTable {
 /// Which nodes of a table are made, and from what.
 #[derive(Debug, Clone, Copy)]
 pub struct Nodes<'a> {
-    pub grid: UpperPairs,
+    pub grid: HemispherePairGrid,
     /// Planes x = const and y = const that mirror the tile: half or a quarter of the nodes are images of the others.
     pub mirrors: [bool; 2],
     /// About how many facets each half vector's sums take, where those are fewer than all.
@@ -57,13 +57,13 @@ pub struct Nodes<'a> {
 
 impl Nodes<'_> {
     /// Every node by itself, from all facets.
-    pub fn all(grid: UpperPairs) -> Self {
+    pub fn all(grid: HemispherePairGrid) -> Self {
         Self { grid, mirrors: [false; 2], facets: None, read_by: None }
     }
 }
 
 /// The eight rows of θ_d around a place, and the step of θ_d below it: what [`simd::row_sums`] reads.
-fn rows_around(grid: &UpperPairs, [ring, azimuth, turn, step]: [f32; 4]) -> ([usize; 8], usize) {
+fn rows_around(grid: &HemispherePairGrid, [ring, azimuth, turn, step]: [f32; 4]) -> ([usize; 8], usize) {
     let around = |at: f32, count: usize| {
         let low = (at as usize).min(count - 1);
         [low, if low + 1 == count { 0 } else { low + 1 }]
@@ -75,9 +75,9 @@ fn rows_around(grid: &UpperPairs, [ring, azimuth, turn, step]: [f32; 4]) -> ([us
 }
 
 /// Which nodes of a grid these pairs read, or the originals of which those are images.
-fn nodes_read(grid: &UpperPairs, made_of: &[(usize, bool)], pairs: &[Pair]) -> Vec<bool> {
+fn nodes_read(grid: &HemispherePairGrid, made_of: &[(usize, bool)], pairs: &[Pair]) -> Vec<bool> {
     let mut read = vec![false; grid.nodes()];
-    let mut places = Places::default();
+    let mut places = GridCoordinates::default();
     for Pair { i, o } in pairs {
         grid.places([&[i.x], &[i.y], &[i.z]], *o, &mut places);
         let (rows, low) = rows_around(grid, places.at(0));
@@ -96,7 +96,7 @@ fn nodes_read(grid: &UpperPairs, made_of: &[(usize, bool)], pairs: &[Pair]) -> V
 /// Nodes of the projected area.
 const AREA_GRID: [usize; 2] = [30, 72];
 
-impl PairTable {
+impl ShadingTable {
     /// Sums over facets at the nodes that are asked for. `None` where the sum has too many parts for a table to pay.
     ///
     /// # Errors
@@ -240,7 +240,7 @@ impl PairTable {
         &self.weights
     }
 
-    /// Fours of columns a node, black ones after the last.
+    /// F32x8Array of columns a node, black ones after the last.
     pub fn fours(&self) -> usize {
         self.fours
     }
@@ -271,10 +271,10 @@ impl PairTable {
             return 0.0;
         }
         let relative: f32 = self.areas.0.taps(o).iter().map(|&(node, w)| w * self.areas.1[node]).sum();
-        let mut places = Places::default();
-        let mut components = [[0.0_f32; Places::MOST]; 3];
-        let mut sums = vec![Vec4::ZERO; Places::MOST.min(lights.len()) * self.fours];
-        for (part, lights) in lights.chunks(Places::MOST).enumerate() {
+        let mut places = GridCoordinates::default();
+        let mut components = [[0.0_f32; GridCoordinates::MAX]; 3];
+        let mut sums = vec![Vec4::ZERO; GridCoordinates::MAX.min(lights.len()) * self.fours];
+        for (part, lights) in lights.chunks(GridCoordinates::MAX).enumerate() {
             for (k, light) in lights.iter().enumerate() {
                 for axis in 0..3 {
                     components[axis][k] = light[axis];
@@ -287,14 +287,14 @@ impl PairTable {
             simd::row_sums(&self.values, self.rows(), places.columns(), lights.len(), cubic, sums);
             for ((k, &i), sums) in lights.iter().enumerate().zip(sums.chunks(self.fours)) {
                 let sum = if i.z > 0.0 { self.weighted(i, o, places.i_dot_h(k), sums) } else { Vec3::ZERO };
-                out(part * Places::MOST + k, sum.as_dvec3());
+                out(part * GridCoordinates::MAX + k, sum.as_dvec3());
             }
         }
         f64::from(relative * o.z)
     }
 
     fn rows(&self) -> RowGrid {
-        let UpperPairs { rings, azimuths, turn, difference } = self.grid;
+        let HemispherePairGrid { rings, azimuths, turn, difference } = self.grid;
         RowGrid { rings, azimuths, turn, stored: difference + 2, fours: self.fours }
     }
 

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::product::{PairTable, product};
+use super::product::{NodePairTable, product};
 use super::visible_normals::BinnedFacets;
 use crate::base::{Error, Result};
-use crate::effective::{MaterialFactors, SumMaterial, VisibleFacets, Wu2011Settings};
+use crate::effective::{Material, MaterialFactors, VisibleFacets, Wu2011Settings};
 use crate::geometry::Facets;
 use crate::math::directions::ParaboloidMap;
 
@@ -37,7 +37,7 @@ pub struct MaterialReport {
 #[derive(Debug, Clone)]
 pub(super) struct Group {
     pub map: Arc<ParaboloidMap>,
-    pub tables: Vec<PairTable>,
+    pub tables: Vec<NodePairTable>,
 }
 
 /// The facets of each material.
@@ -54,7 +54,7 @@ impl Group {
     pub fn new(
         tile: &VisibleFacets<'_>,
         members: &[usize],
-        material: &SumMaterial,
+        material: &Material,
         factors: &MaterialFactors,
         settings: &Wu2011Settings,
     ) -> Result<(Self, MaterialReport)> {
@@ -76,7 +76,7 @@ impl Group {
             (n_rank, n_kept) = (n_rank.max(n.rank), n_kept.min(n.kept));
             for m in &factors.channels {
                 let values = product(&n, directions, &binned.bins, m, &factors.directions, tile.base_area);
-                tables.push(PairTable { values, tint: m.tint(material.color) * mask });
+                tables.push(NodePairTable { values, tint: m.tint(material.color) * mask });
             }
         }
         let report = MaterialReport {

@@ -12,7 +12,7 @@ use super::rows_of;
 use super::sampling::Sampling;
 use crate::base::{InputError, Result};
 use crate::brdf::ColorBasis;
-use crate::effective::{SumMaterial, Wu2011Settings};
+use crate::effective::{Material, Wu2011Settings};
 use crate::math::directions::{ParaboloidMap, ParaboloidSphere};
 
 /// The paper's ranks of M reach 95, more than the 50 rows it names for N: M is projected onto this many.
@@ -49,7 +49,7 @@ pub(super) struct ChannelFactors {
 
 impl MaterialFactors {
     /// Tabulates and factors a material; its `color` is left to the product.
-    pub fn new(material: &SumMaterial, settings: &Wu2011Settings) -> Result<Self> {
+    pub fn new(material: &Material, settings: &Wu2011Settings) -> Result<Self> {
         let started = Instant::now();
         let wanted = Sampling::of(&material.brdf);
         let mut sampling = wanted.capped(&material.brdf);

@@ -22,7 +22,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 
 use self::group::{Group, group_facets};
-use super::SumMaterial;
+use super::Material;
 use crate::base::{Error, InputError, Result};
 use crate::geometry::Facets;
 use crate::math::directions::{ParaboloidMap, Tap};
@@ -84,7 +84,7 @@ impl Wu2011 {
         directions: &ParaboloidMap,
         base_area: f64,
         material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        materials: &[Material],
         settings: &Wu2011Settings,
     ) -> Result<Self> {
         settings.check()?;
@@ -105,7 +105,7 @@ impl Wu2011 {
     pub fn from_factors(
         tile: &VisibleFacets<'_>,
         material_of_slot: &[usize],
-        materials: &[SumMaterial],
+        materials: &[Material],
         factors: &[Option<Arc<MaterialFactors>>],
         settings: &Wu2011Settings,
     ) -> Result<Self> {

@@ -12,13 +12,13 @@ use crate::math::linalg::gemm;
 
 /// One scalar of `G` on the pairs of a map, and its colour.
 #[derive(Debug, Clone)]
-pub(super) struct PairTable {
+pub(super) struct NodePairTable {
     /// At `o(o+1)/2 + i` for `i <= o`.
     pub values: Vec<f32>,
     pub tint: DVec3,
 }
 
-impl PairTable {
+impl NodePairTable {
     /// Bilinear in both directions.
     pub fn eval(&self, light: &[Tap; 4], view: &[Tap; 4]) -> f64 {
         let mut sum = 0.0;

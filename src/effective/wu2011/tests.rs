@@ -16,15 +16,15 @@ fn exact() -> Wu2011Settings {
     Wu2011Settings { keep_m: 1.0, keep_n: 1.0, projection_rows: 460, m_directions: Some(132), ..Default::default() }
 }
 
-fn material(term: Term) -> SumMaterial {
-    SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::ONE }
+fn material(term: Term) -> Material {
+    Material { brdf: Brdf { terms: vec![term] }, color: Vec3::ONE }
 }
 
-fn lambertian() -> SumMaterial {
+fn lambertian() -> Material {
     material(Term::Lambertian { albedo: Vec3::new(0.8, 0.4, 0.2) })
 }
 
-fn glossy() -> SumMaterial {
+fn glossy() -> Material {
     material(Term::CookTorrance { roughness: 0.5, f0: Vec3::splat(0.9) })
 }
 
@@ -75,12 +75,12 @@ fn sampled(mesh: &TileMesh, count: usize) -> Sampled {
 }
 
 impl Sampled {
-    fn build(&self, material_of_slot: &[usize], materials: &[SumMaterial], settings: &Wu2011Settings) -> Wu2011 {
+    fn build(&self, material_of_slot: &[usize], materials: &[Material], settings: &Wu2011Settings) -> Wu2011 {
         Wu2011::build(&self.facets, &self.visibility, &self.map, 1.0, material_of_slot, materials, settings).unwrap()
     }
 
     /// `Σ_s ΔA α V V f(nearest normal)` by the definition.
-    fn brute_force(&self, i: usize, o: usize, normals: &[Vec3], material_of: impl Fn(usize) -> SumMaterial) -> DVec3 {
+    fn brute_force(&self, i: usize, o: usize, normals: &[Vec3], material_of: impl Fn(usize) -> Material) -> DVec3 {
         let (to_light, to_viewer) = (self.map.directions()[i], self.map.directions()[o]);
         (0..self.facets.len())
             .filter(|&s| self.visibility.is_visible(i, s) && self.visibility.is_visible(o, s))
@@ -92,7 +92,7 @@ impl Sampled {
             .sum()
     }
 
-    fn binned_normals(&self, material: &SumMaterial) -> Vec<Vec3> {
+    fn binned_normals(&self, material: &Material) -> Vec<Vec3> {
         let half = ParaboloidMap::nearest_to(sampling::Sampling::of(&material.brdf).half_normals);
         let normals = ParaboloidSphere::new(half);
         self.facets.normals.iter().map(|&n| normals.direction(normals.nearest(n))).collect()
@@ -157,7 +157,7 @@ fn several_materials_and_colour_weights_add_up() {
     for (color, position) in tile.facets.colors.iter_mut().zip(&tile.facets.positions) {
         *color = Vec3::new(position.x, 1.0 - position.x, 0.5);
     }
-    let materials = [lambertian(), SumMaterial { color: Vec3::new(1.0, 0.5, 0.1), ..lambertian() }];
+    let materials = [lambertian(), Material { color: Vec3::new(1.0, 0.5, 0.1), ..lambertian() }];
     let built = tile.build(&[0, 1], &materials, &exact());
     assert_eq!(built.report.materials.len(), 2);
     let normals = tile.binned_normals(&materials[0]);

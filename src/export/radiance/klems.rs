@@ -30,12 +30,12 @@ const LEAVING: usize = 5;
 
 /// A patch: bounds in radians.
 #[derive(Debug, Clone, Copy)]
-struct Patch {
+struct KlemsPatch {
     theta: [f64; 2],
     phi: [f64; 2],
 }
 
-impl Patch {
+impl KlemsPatch {
     /// All of them, in the order of the format.
     fn all() -> Vec<Self> {
         let mut lower = 0;
@@ -83,7 +83,7 @@ fn source_of(direction: DVec3) -> DVec3 {
 }
 
 pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
-    let patches = Patch::all();
+    let patches = KlemsPatch::all();
     let leaving: Vec<Vec3> =
         patches.iter().flat_map(|patch| patch.directions(LEAVING)).map(|direction| direction.as_vec3()).collect();
     // Reciprocal, so that one incident direction sees all that leave at once.
@@ -111,8 +111,8 @@ pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
         channels.iter_mut().for_each(|(_, text)| text.push('\n'));
     }
     let read = |i: Vec3, o: Vec3| {
-        let column = &columns[Patch::of(source_of(o.as_dvec3()))];
-        rgb(xyz(column[Patch::of(i.as_dvec3())].as_vec3())) * i.z
+        let column = &columns[KlemsPatch::of(source_of(o.as_dvec3()))];
+        rgb(xyz(column[KlemsPatch::of(i.as_dvec3())].as_vec3())) * i.z
     };
     let conventions = vec![
         "Klems full basis: 145 incident (columns) by 145 leaving (rows) patches, each the mean over its patch.".to_owned(),
@@ -149,11 +149,11 @@ mod tests {
 
     #[test]
     fn patches_hold_their_directions_and_fill_the_projected_hemisphere() {
-        let patches = Patch::all();
+        let patches = KlemsPatch::all();
         assert_eq!(patches.len(), PATCHES);
         let mut total = 0.0;
         for (k, patch) in patches.iter().enumerate() {
-            assert!(patch.directions(4).into_iter().all(|direction| Patch::of(direction) == k), "{k}");
+            assert!(patch.directions(4).into_iter().all(|direction| KlemsPatch::of(direction) == k), "{k}");
             let [low, high] = patch.theta.map(|theta| theta.sin().powi(2));
             total += 0.5 * (high - low) * (patch.phi[1] - patch.phi[0]);
         }

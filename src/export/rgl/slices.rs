@@ -15,7 +15,7 @@ use crate::effective::{EffectiveBrdf, Reflectance};
 /// The last elevation stands for 90°, where nothing is defined.
 const LAST_THETA: f64 = 89.9 / 90.0 * FRAC_PI_2;
 /// Where the projected area vanishes, sigma ends at this part of the base area.
-const SMALLEST_SIGMA: f64 = 1e-3;
+const MIN_SIGMA: f64 = 1e-3;
 /// What is added to `ndf`, of its largest value: normals that no retro-reflection shows may still reflect.
 const NDF_FLOOR: f64 = 1e-3;
 /// What is added to the density of normals, times their cosine, of the largest: faint tails keep some samples.
@@ -78,7 +78,7 @@ impl Sizes {
     }
 }
 
-/// Places of the vertices of a grid on the unit square, x fastest.
+/// GridCoordinates of the vertices of a grid on the unit square, x fastest.
 fn vertices(grid: Grid) -> impl Iterator<Item = [f64; 2]> + Clone {
     let at = |k: usize, n: usize| k as f64 / (n - 1) as f64;
     (0..grid.height).flat_map(move |y| (0..grid.width).map(move |x| [at(x, grid.width), at(y, grid.height)]))
@@ -146,7 +146,7 @@ pub(super) fn planes(brdf: &EffectiveBrdf, sizes: &Sizes) -> RglTable {
     let at = |place: &[f64; 2]| {
         let m = above_horizon(direction_of_u(*place)).as_vec3();
         let area = f64::from(brdf.relative_projected_area(m));
-        (luminance(brdf.eval(m, m).as_dvec3()) * area, area.max(SMALLEST_SIGMA))
+        (luminance(brdf.eval(m, m).as_dvec3()) * area, area.max(MIN_SIGMA))
     };
     let (retro, sigma): (Vec<f64>, Vec<f64>) = places.par_iter().map(at).unzip();
     let largest = retro.iter().copied().fold(f64::MIN_POSITIVE, f64::max);

@@ -11,13 +11,13 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::*;
 use crate::brdf::{Brdf, Term};
-use crate::effective::{Direct, FacetSum, Form, SumMaterial};
+use crate::effective::{Direct, FacetSum, Material, Representation};
 use crate::geometry;
 use crate::geometry::families::heightfield;
 use crate::geometry::{Facets, TileMesh};
 use crate::math::directions::from_angles;
 use crate::scene::{Flat, Geometry, Scene};
-use crate::visibility::{Horizons, Visibility};
+use crate::visibility::{HorizonMap, Visibility};
 
 const SMALL: ExportResolution = ExportResolution { theta_i: 4, phi_i: 6, theta_o: 5, phi_o: 8 };
 
@@ -37,12 +37,12 @@ fn brdf_of(mesh: &TileMesh, term: Term) -> EffectiveBrdf {
     let mut facets = Facets::sample(mesh, 300, 1);
     facets.sort_for_sums();
     let visibility = match &mesh.height_grid {
-        Some(heights) => Visibility::Horizons(Horizons::march(heights, mesh.size, &facets, 16, 0.02)),
+        Some(heights) => Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, 16, 0.02)),
         None => Visibility::Unblocked { facets: facets.len() },
     };
-    let materials = [SumMaterial { brdf: Brdf { terms: vec![term] }, color: Vec3::new(1.0, 0.5, 0.25) }];
+    let materials = [Material { brdf: Brdf { terms: vec![term] }, color: Vec3::new(1.0, 0.5, 0.25) }];
     let sum = FacetSum::new(&facets, &[0], &materials);
-    let form = Form::Direct(Direct::new(Arc::new(sum), Arc::new(visibility)));
+    let form = Representation::Direct(Direct::new(Arc::new(sum), Arc::new(visibility)));
     EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
 }
 

@@ -1,4 +1,4 @@
-//! Heights of the surface seen from above, and a 16-bit picture of them.
+//! SampledHeights of the surface seen from above, and a 16-bit picture of them.
 
 use glam::{DVec2, UVec2};
 
@@ -6,16 +6,16 @@ use super::TileOptions;
 use crate::base::{Error, Progress, Result, progress};
 use crate::geometry::TileMesh;
 
-/// Heights at regular places of one period, tile units.
-pub struct Heights {
+/// SampledHeights at regular places of one period, tile units.
+pub struct SampledHeights {
     pub count: UVec2,
     /// Row by row, y upwards.
     pub values: Vec<f64>,
-    /// Places that no triangle covers: they take the lowest height.
+    /// GridCoordinates that no triangle covers: they take the lowest height.
     pub holes: usize,
 }
 
-impl Heights {
+impl SampledHeights {
     /// The highest triangle over `((i + shift)/nx, (j + shift)/ny)` of the tile.
     ///
     /// # Errors
@@ -72,7 +72,7 @@ pub fn png(
     unit: &str,
     progress: &Progress<'_>,
 ) -> Result<(Vec<u8>, Vec<String>)> {
-    let heights = Heights::from_above(mesh, options.samples, 0.5, &progress::part(progress, 0.0, 0.5))?;
+    let heights = SampledHeights::from_above(mesh, options.samples, 0.5, &progress::part(progress, 0.0, 0.5))?;
     let (low, high) = heights.range();
     let scale = if high > low { 65535.0 / (high - low) } else { 0.0 };
     let [width, height] = (options.samples * options.repeat).to_array();

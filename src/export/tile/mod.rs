@@ -37,17 +37,17 @@ impl Default for TileOptions {
 }
 
 /// Most periods, and most height samples of all of them together: a solid of 400 MB.
-const MOST_PERIODS: u32 = 10_000;
+const MAX_PERIODS: u32 = 10_000;
 const MOST_SAMPLES: u64 = 1 << 22;
 /// Most triangles of all periods together in an OBJ file: some hundred MB.
-const MOST_TRIANGLES: u64 = 1 << 24;
+const MAX_TRIANGLES: u64 = 1 << 24;
 
 impl TileOptions {
     fn check(&self) -> Result<()> {
         let complain = |place: &str, found: String, expected: String| InputError::new(place, found, expected).into();
         let periods = u64::from(self.repeat.x) * u64::from(self.repeat.y);
-        if periods == 0 || periods > u64::from(MOST_PERIODS) {
-            return Err(complain("repeat", self.repeat.to_string(), format!("1 to {MOST_PERIODS} periods")));
+        if periods == 0 || periods > u64::from(MAX_PERIODS) {
+            return Err(complain("repeat", self.repeat.to_string(), format!("1 to {MAX_PERIODS} periods")));
         }
         if !(self.scale > 0.0 && self.scale <= 1e6) {
             return Err(complain("scale", self.scale.to_string(), "a positive number".to_owned()));
@@ -72,8 +72,8 @@ fn check_samples(options: &TileOptions) -> Result<()> {
 /// Whether an OBJ file's triangles are of a number that can be held.
 fn check_triangles(mesh: &TileMesh, options: &TileOptions) -> Result<()> {
     let all = u64::from(options.repeat.x) * u64::from(options.repeat.y) * mesh.triangles.len() as u64;
-    if all > MOST_TRIANGLES {
-        let expected = format!("at most {MOST_TRIANGLES} in all periods together");
+    if all > MAX_TRIANGLES {
+        let expected = format!("at most {MAX_TRIANGLES} in all periods together");
         return Err(InputError::new("repeat", format!("{all} triangles"), expected).into());
     }
     Ok(())

@@ -34,7 +34,7 @@ impl Line {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shape {
+pub struct PageShape {
     /// Millimetres, y downwards.
     pub points: Vec<DVec2>,
     pub closed: bool,
@@ -45,7 +45,7 @@ pub struct Shape {
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Page {
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<PageShape>,
     pub texts: Vec<(DVec2, String)>,
 }
 
@@ -57,11 +57,11 @@ const POINTS_PER_MM: f64 = 72.0 / 25.4;
 
 impl Page {
     pub fn polygon(&mut self, points: impl IntoIterator<Item = DVec2>, fill: Option<Vec3>, line: Line) {
-        self.shapes.push(Shape { points: points.into_iter().collect(), closed: true, fill, line });
+        self.shapes.push(PageShape { points: points.into_iter().collect(), closed: true, fill, line });
     }
 
     pub fn segment(&mut self, from: DVec2, to: DVec2, line: Line) {
-        self.shapes.push(Shape { points: vec![from, to], closed: false, fill: None, line });
+        self.shapes.push(PageShape { points: vec![from, to], closed: false, fill: None, line });
     }
 
     pub fn text(&mut self, at: DVec2, text: impl Into<String>) {

@@ -13,7 +13,7 @@ const TAB_MM: f64 = 6.0;
 /// Turns smaller than this are bent, not folded (cosine of 12°).
 const BEND_COSINE: f64 = 0.978;
 /// Nets on one sheet at most.
-const MOST_NETS: usize = 200;
+const MAX_NETS: usize = 200;
 
 /// The sheet of a scene's tile, `unit_mm` millimetres a tile unit.
 ///
@@ -134,9 +134,9 @@ fn pyramids(
 ) -> Result<(Page, Vec<String>)> {
     let periods = options.repeat.as_dvec2();
     let count = one.centres.len() * (options.repeat.x * options.repeat.y) as usize;
-    if count > MOST_NETS {
+    if count > MAX_NETS {
         let found = format!("{count} pyramids");
-        return Err(InputError::new("repeat", found, format!("at most {MOST_NETS} on a sheet")).into());
+        return Err(InputError::new("repeat", found, format!("at most {MAX_NETS} on a sheet")).into());
     }
     let mut page = Page::default();
     // The floor, with the outline of each base.

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::TileOptions;
-use super::heights::Heights;
+use super::heights::SampledHeights;
 use crate::base::{Progress, Result, progress};
 use crate::geometry::TileMesh;
 
@@ -13,7 +13,7 @@ pub fn stl(
     unit_mm: f64,
     progress: &Progress<'_>,
 ) -> Result<(Vec<u8>, Vec<String>)> {
-    let heights = Heights::from_above(mesh, options.samples, 0.0, &progress::part(progress, 0.0, 0.3))?;
+    let heights = SampledHeights::from_above(mesh, options.samples, 0.0, &progress::part(progress, 0.0, 0.3))?;
     let scale = unit_mm * f64::from(options.scale);
     let triangles = solid(&heights, mesh, options, scale, &progress::part(progress, 0.3, 0.5))?;
     let mut bytes = vec![0; 80];
@@ -47,7 +47,7 @@ pub fn stl(
 
 /// Triangles in millimetres, outside counter-clockwise.
 pub(super) fn solid(
-    heights: &Heights,
+    heights: &SampledHeights,
     mesh: &TileMesh,
     options: &TileOptions,
     scale: f64,

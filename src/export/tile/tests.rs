@@ -3,7 +3,7 @@ use std::collections::HashMap;
 
 use glam::DVec2;
 
-use super::heights::Heights;
+use super::heights::SampledHeights;
 use super::*;
 use crate::base::Error;
 use crate::geometry;
@@ -33,7 +33,7 @@ fn v_grooves() -> Geometry {
 fn every_edge_of_the_printed_solid_is_shared_by_two_triangles_that_run_opposite_ways() {
     let (_, mesh) = scene_of(Geometry::Pyramids(Pyramids { truncation: 0.3, ..Pyramids::default() }));
     let options = TileOptions { samples: UVec2::new(12, 9), repeat: UVec2::new(2, 1), ..TileOptions::default() };
-    let heights = Heights::from_above(&mesh, options.samples, 0.0, &silent).unwrap();
+    let heights = SampledHeights::from_above(&mesh, options.samples, 0.0, &silent).unwrap();
     assert_eq!(heights.holes, 0);
     let triangles = solid::solid(&heights, &mesh, &options, 10.0, &silent).unwrap();
     let mut edges: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
@@ -55,7 +55,7 @@ fn every_edge_of_the_printed_solid_is_shared_by_two_triangles_that_run_opposite_
 #[test]
 fn heights_of_grooves_are_the_cross_section() {
     let (_, mesh) = scene_of(v_grooves());
-    let heights = Heights::from_above(&mesh, UVec2::new(8, 2), 0.0, &silent).unwrap();
+    let heights = SampledHeights::from_above(&mesh, UVec2::new(8, 2), 0.0, &silent).unwrap();
     // Two V grooves a tile: 0 at the ridge, -0.25 in the middle, straight between.
     for (i, expected) in [0.0, -0.125, -0.25, -0.125, 0.0, -0.125, -0.25, -0.125].into_iter().enumerate() {
         assert!((heights.at(i as u32, 1) - expected).abs() < 1e-6, "{i}: {}", heights.at(i as u32, 1));

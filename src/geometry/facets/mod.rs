@@ -25,7 +25,7 @@ pub struct Facets {
     pub geometric_normals: Vec<Vec3>,
     /// Areas ΔA in squared tile units.
     pub areas: Vec<f32>,
-    /// Material slot of each.
+    /// MaterialSpec slot of each.
     pub slots: Vec<u16>,
     /// Colour weight of the tile's colour field at each centre.
     pub colors: Vec<Vec3>,

@@ -22,7 +22,7 @@ struct Wave {
 }
 
 /// Grooves that cross one side of a tile at most.
-const MOST_WAVES: f64 = 2048.0;
+const MAX_WAVES: f64 = 2048.0;
 
 impl Wave {
     /// The wave nearest to `count` grooves across the tile, turned by `rotation_deg` from running along y.
@@ -31,7 +31,7 @@ impl Wave {
         let (sin, cos) = f64::from(rotation_deg).to_radians().sin_cos();
         let count = f64::from(count);
         // Tiles a million times as long as wide would get a million grooves: those turn less.
-        let most = |waves: f64| waves.round().clamp(-MOST_WAVES, MOST_WAVES) as i64;
+        let most = |waves: f64| waves.round().clamp(-MAX_WAVES, MAX_WAVES) as i64;
         let (m, n) = (most(count * cos), most(count * sin * size.y / size.x));
         Self { m: if (m, n) == (0, 0) { 1 } else { m }, n, size }
     }

@@ -93,7 +93,7 @@ pub fn from_function(samples: UVec2, size: Vec2, height: impl Fn(Vec2) -> f32) -
     from_grid(HeightGrid { size: samples, heights: (0..samples.x * samples.y).map(|k| height(at(k))).collect() }, size)
 }
 
-/// Places of the samples: `((i+½)/w, (j+½)/h)` of the tile.
+/// GridCoordinates of the samples: `((i+½)/w, (j+½)/h)` of the tile.
 pub fn sample_position(grid: &HeightGrid, index: usize, size: Vec2) -> Vec3 {
     let (i, j) = (index % grid.size.x as usize, index / grid.size.x as usize);
     ((Vec2::new(i as f32, j as f32) + 0.5) * size / grid.size.as_vec2()).extend(grid.heights[index])

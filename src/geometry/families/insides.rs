@@ -29,7 +29,7 @@ struct Run {
 }
 
 /// The edges from a triangle's first corner in ten-thousandths of the tile: equal for copies of it.
-type Shape = [i32; 6];
+type TriangleShape = [i32; 6];
 
 impl Insides {
     /// For facets on these triangles, in this order.
@@ -43,7 +43,7 @@ impl Insides {
             run_of_facet.push(firsts.len() as u32 - 1);
         }
         let each = || firsts.par_iter().with_min_len(A_THREAD).map(|facet| triangles[*facet as usize]);
-        let shapes: Vec<Shape> = each().map(|triangle| shape_of(mesh, triangle)).collect();
+        let shapes: Vec<TriangleShape> = each().map(|triangle| shape_of(mesh, triangle)).collect();
         let normals = each().map(|triangle| mesh.geometric_normal(triangle as usize)).collect();
         let mut known = Known::new(&shapes);
         // Points that each shape has had, kept with the first run of it.
@@ -77,7 +77,7 @@ fn start_of(triangle: u32) -> Vec2 {
     Vec2::new(part(bits), part(bits >> 24))
 }
 
-fn shape_of(mesh: &TileMesh, triangle: u32) -> Shape {
+fn shape_of(mesh: &TileMesh, triangle: u32) -> TriangleShape {
     let [a, b, c] = mesh.corners(triangle as usize);
     let unit = mesh.size.extend(mesh.size.max_element()) * 1e-4;
     let [b, c] = [b - a, c - a].map(|edge| edge / unit);
@@ -87,14 +87,14 @@ fn shape_of(mesh: &TileMesh, triangle: u32) -> Shape {
 /// Which shapes have been met: a hash table of places in a list, a tenth of the memory of a `HashMap` of shapes; what that
 /// costs the first time it is touched is more than all that is looked up in it.
 struct Known<'a> {
-    shapes: &'a [Shape],
+    shapes: &'a [TriangleShape],
     table: Vec<u32>,
 }
 
 impl<'a> Known<'a> {
     const NOTHING: u32 = u32::MAX;
 
-    fn new(shapes: &'a [Shape]) -> Self {
+    fn new(shapes: &'a [TriangleShape]) -> Self {
         Self { shapes, table: vec![Self::NOTHING; (2 * shapes.len()).next_power_of_two()] }
     }
 

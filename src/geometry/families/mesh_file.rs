@@ -8,10 +8,10 @@ use crate::base::Result;
 use crate::geometry::{TileMesh, closure, obj};
 use crate::scene::{MeshFile, files};
 
-const LARGEST_FILE: u64 = 1 << 30;
+const MAX_FILE: u64 = 1 << 30;
 
 pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
-    let bytes = files::read(base_dir, &spec.path, LARGEST_FILE)?;
+    let bytes = files::read(base_dir, &spec.path, MAX_FILE)?;
     let file = obj::parse(&bytes, &spec.path)?;
     let mut mesh = TileMesh {
         size,

@@ -8,13 +8,13 @@ use super::heightfield::is_made_of;
 use crate::geometry::{HeightGrid, PeriodicGrid, TileMesh};
 
 /// Beyond, neighbouring samples might share a place in f32, and triangles have no area.
-const MOST_SAMPLES_A_SIDE: u32 = 1 << 16;
+const MAX_SAMPLES_A_SIDE: u32 = 1 << 16;
 
 /// The triangles of a height-field that reach into the cells of some places, in their order, and a grid of them. Straight down
 /// from these places it tells the same as a grid of the whole mesh. `None` of a mesh that is not just samples.
 pub(crate) fn below(mesh: &TileMesh, places: impl Iterator<Item = Vec2>) -> Option<(TileMesh, PeriodicGrid)> {
     let heights = mesh.height_grid.as_ref()?;
-    if heights.size.max_element() > MOST_SAMPLES_A_SIDE || !is_made_of(mesh, heights) {
+    if heights.size.max_element() > MAX_SAMPLES_A_SIDE || !is_made_of(mesh, heights) {
         return None;
     }
     let cells = PeriodicGrid::cells_beside_each_other(mesh.size, mesh.triangles.len());

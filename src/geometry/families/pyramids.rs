@@ -11,7 +11,7 @@ use crate::scene::{Arrangement, Pyramids};
 const FACES: u16 = 0;
 const FLOOR: u16 = 1;
 /// Cells along each side of the tile at most.
-const MOST_CELLS: f64 = 64.0;
+const MAX_CELLS: f64 = 64.0;
 
 pub fn build(spec: &Pyramids, size: Vec2) -> TileMesh {
     let mut builder = MeshBuilder::new(size, &["faces", "floor"]);
@@ -87,10 +87,10 @@ impl Lattice {
         let spacing = f64::from(spec.spacing);
         let shifted = spec.arrangement != Arrangement::Square;
         let row_spacing = if spec.arrangement == Arrangement::Hex { spacing * 0.75f64.sqrt() } else { spacing };
-        let columns = (size.x / spacing).round().clamp(1.0, MOST_CELLS);
+        let columns = (size.x / spacing).round().clamp(1.0, MAX_CELLS);
         // Rows that are shifted by half come in pairs.
         let step = if shifted { 2.0 } else { 1.0 };
-        let rows = ((size.y / row_spacing / step).round() * step).clamp(step, MOST_CELLS);
+        let rows = ((size.y / row_spacing / step).round() * step).clamp(step, MAX_CELLS);
         let pitch = size / DVec2::new(columns, rows);
         let hexagonal = spec.arrangement == Arrangement::Hex && pitch.y > 0.55 * pitch.x;
         Self { columns: columns as usize, rows: rows as usize, pitch, shifted, hexagonal }

@@ -12,15 +12,15 @@ use crate::scene::Rods;
 
 const RODS: u16 = 0;
 const FLOOR: u16 = 1;
-const MOST_RODS: f64 = 4000.0;
+const MAX_RODS: f64 = 4000.0;
 /// No rod lies flatter than this.
-const LARGEST_LEAN: f64 = 85.0;
+const MAX_LEAN: f64 = 85.0;
 
 pub fn build(spec: &Rods, size: Vec2) -> TileMesh {
     let mut builder = MeshBuilder::new(size, &["rods", "floor"]);
     let size = size.as_dvec2();
     let wanted = spec.density.map_or(f64::from(spec.count), |density| (f64::from(density) * size.x * size.y).round());
-    let count = wanted.clamp(1.0, MOST_RODS);
+    let count = wanted.clamp(1.0, MAX_RODS);
     if count != wanted {
         builder.note(format!("{count} rods stand on the tile (asked for: {wanted})"));
     }
@@ -61,11 +61,7 @@ fn stray(spec: &Rods, random: &mut ChaCha8Rng) -> DVec3 {
     let (across, other) = axis.any_orthonormal_pair();
     let moved = axis * angle.cos() + (across * around.cos() + other * around.sin()) * angle.sin();
     let theta = moved.truncate().length().atan2(moved.z);
-    if theta > LARGEST_LEAN.to_radians() {
-        from_angles(LARGEST_LEAN.to_radians(), moved.y.atan2(moved.x))
-    } else {
-        moved
-    }
+    if theta > MAX_LEAN.to_radians() { from_angles(MAX_LEAN.to_radians(), moved.y.atan2(moved.x)) } else { moved }
 }
 
 fn from_angles(theta: f64, phi: f64) -> DVec3 {

@@ -14,7 +14,7 @@ const BACKING: u16 = 2;
 /// Pieces of a thread between two crossings, and corners of a thread's cross-section.
 const STEPS: usize = 8;
 const CORNERS: usize = 16;
-const MOST_THREADS: usize = 24;
+const MAX_THREADS: usize = 24;
 
 pub fn build(spec: &Weave, size: Vec2) -> TileMesh {
     let pattern = pattern(&spec.pattern);
@@ -94,7 +94,7 @@ fn pattern(pattern: &WeavePattern) -> Vec<Vec<bool>> {
 /// The number of threads nearest to `count` that is a multiple of `period`, at least one repeat.
 fn whole_repeats(count: u32, period: usize) -> usize {
     let repeats = (count as usize + period / 2) / period;
-    repeats.clamp(1, (MOST_THREADS / period).max(1)) * period
+    repeats.clamp(1, (MAX_THREADS / period).max(1)) * period
 }
 
 /// Corners of a cross-section: x to the side, y up, from the right edge over the top.

@@ -33,7 +33,7 @@ impl PeriodicGrid {
         let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
         let mut best: Option<(f32, Hit)> = None;
         let nearest_allowed = -1e-6 * self.tile_size.max_element();
-        for _ in 0..MOST_CELLS {
+        for _ in 0..MAX_CELLS {
             if walk.entered > reach {
                 break;
             }
@@ -103,7 +103,7 @@ impl PeriodicGrid {
 /// Rays that travel farther without leaving the tiling are given up.
 const FARTHEST_TILES: f32 = 64.0;
 /// Cells that a ray walks through at most.
-const MOST_CELLS: usize = 1 << 16;
+const MAX_CELLS: usize = 1 << 16;
 
 /// Distance along the ray and the weights of the second and third corner (Möller and Trumbore 1997), both sides.
 fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)> {

@@ -22,7 +22,7 @@ pub struct PeriodicGrid {
     pub(crate) top: f32,
     /// Corners of each triangle.
     pub(crate) corners: Vec<[Vec3; 3]>,
-    /// Slices end at once when it is set.
+    /// OcclusionIntervals end at once when it is set.
     pub(crate) cancel: Cancel,
 }
 
@@ -33,7 +33,7 @@ const TRIANGLES_A_SLICED_CELL: f32 = 28.0;
 const MAX_CELLS_A_SIDE: i32 = 512;
 
 impl PeriodicGrid {
-    /// Slices of the whole mesh, which can take long, give up when `cancel` is set; what they found is then worthless.
+    /// OcclusionIntervals of the whole mesh, which can take long, give up when `cancel` is set; what they found is then worthless.
     pub fn cancelled_by(mut self, cancel: &Cancel) -> Self {
         self.cancel = cancel.clone();
         self

@@ -20,7 +20,7 @@ impl PeriodicGrid {
         }
         let reach = clearance / rise;
         let mut walk = CellWalk::new(self, origin.truncate(), plane);
-        for _ in 0..LEAST_CELLS + 16 * (self.cells.x + self.cells.y) {
+        for _ in 0..MIN_CELLS + 16 * (self.cells.x + self.cells.y) {
             if walk.entered > reach {
                 return false;
             }
@@ -45,7 +45,7 @@ impl PeriodicGrid {
 
 /// Cells that a ray walks through, besides those of sixteen tiles, before it counts as free: one that all but follows the
 /// horizon would never end.
-const LEAST_CELLS: i32 = 16_384;
+const MIN_CELLS: i32 = 16_384;
 
 impl PeriodicGrid {
     /// Is this copy of a facet's triangle the one it lies on? Other copies block it like any other surface.

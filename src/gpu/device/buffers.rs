@@ -16,12 +16,12 @@ const GLANCE: Duration = Duration::from_micros(200);
 const FRAME: Duration = Duration::from_millis(3);
 
 /// Enough for one element of any of our arrays: a binding holds at least one.
-const LEAST_BYTES: u64 = 256;
+const MIN_BYTES: u64 = 256;
 
 impl Gpu {
     /// A buffer without contents (zeros), of `bytes` rounded up to a multiple of 4; never empty, as bindings cannot be.
     pub fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
-        let size = bytes.max(LEAST_BYTES).next_multiple_of(4);
+        let size = bytes.max(MIN_BYTES).next_multiple_of(4);
         let bound = usage.intersects(wgpu::BufferUsages::STORAGE);
         let allowed =
             if bound { self.limits.max_storage_buffer_binding_size } else { u64::MAX }.min(self.limits.max_buffer_size);

@@ -6,10 +6,10 @@
 use std::ops::Range;
 
 use super::gbuffer::{Camera, GpuGBuffer, GpuObject, GpuSamples, Point};
+use super::image;
+use super::image::GpuImages;
 use super::light_rays::{GpuLightRays, GpuOccluder};
-use super::picture;
-use super::picture::GpuPictures;
-use crate::gpu::shading::{GpuShading, Light, MOST_POINTS};
+use crate::gpu::shading::{GpuShading, Light, MAX_POINTS};
 use crate::gpu::{Gpu, GpuError, Tier, shading};
 use crate::render::shadow::Visible;
 
@@ -18,7 +18,7 @@ const BAND_BYTES: usize = 256 << 20;
 /// Threads that keep a graphics processor busy: so many points need no further slices of the lights.
 const BUSY: usize = 1 << 20;
 /// Lights of a slice. On software Vulkan never more: see `SOFTWARE_FACETS` in gpu_shading/direct.rs.
-const LEAST_SLICE: usize = 8;
+const MIN_SLICE: usize = 8;
 
 /// What the room is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +37,7 @@ pub(super) struct Parts<'a> {
     pub object: &'a GpuObject,
     pub rays: Option<&'a (GpuLightRays, GpuOccluder)>,
     pub shading: &'a GpuShading,
-    pub pictures: &'a GpuPictures,
+    pub images: &'a GpuImages,
 }
 
 #[derive(Debug)]
@@ -65,7 +65,7 @@ pub(super) struct Band {
     pub rows: Range<usize>,
     camera: wgpu::Buffer,
     params: wgpu::Buffer,
-    picture: wgpu::Buffer,
+    image: wgpu::Buffer,
     pub scene: wgpu::BindGroup,
     pub rays: Option<wgpu::BindGroup>,
     pub shading: wgpu::BindGroup,
@@ -79,7 +79,7 @@ impl Room {
         let slots = need.samples_per_side * need.samples_per_side;
         let shadowed = parts.rays.is_some();
         let words = if shadowed { Visible::words_of(need.lights) } else { 0 };
-        let most_slices = need.lights.div_ceil(LEAST_SLICE).max(1);
+        let most_slices = need.lights.div_ceil(MIN_SLICE).max(1);
         let slices = match gpu.tier {
             Tier::Hardware => {
                 (BUSY / (width * height * slots).min(need.points.max(width * slots))).clamp(1, most_slices)
@@ -90,11 +90,11 @@ impl Room {
         let slices = need.lights.div_ceil(slice).max(1);
         let bytes = size_of::<Point>() + 16 + 16 * slices + 4 * words + 4;
         let a_row = width * slots;
-        if a_row > MOST_POINTS || slices > 65_535 {
+        if a_row > MAX_POINTS || slices > 65_535 {
             let what = format!("{} lights on {width} pixels a row", need.lights);
             return Err(GpuError::Unsupported(what));
         }
-        let rows = need.points.min(BAND_BYTES / bytes).min(MOST_POINTS) / a_row;
+        let rows = need.points.min(BAND_BYTES / bytes).min(MAX_POINTS) / a_row;
         let rows = rows.clamp(1, height);
         let most = (rows * a_row) as u64;
 
@@ -111,7 +111,7 @@ impl Room {
             let uniform = |label, bytes: usize| gpu.buffer(label, bytes as u64, Usage::UNIFORM | Usage::COPY_DST);
             let camera = uniform("camera", size_of::<Camera>())?;
             let params = uniform("parameters", size_of::<shading::Params>())?;
-            let picture = uniform("picture", size_of::<picture::Params>())?;
+            let image = uniform("picture", size_of::<image::Params>())?;
             let rays = parts.rays.map(|(rays, _)| rays.points(gpu, [&params, &points, &lights]));
             let shading = [&params, &points, &lights, &bits, &radiance, &scales];
             Ok(Band {
@@ -119,10 +119,10 @@ impl Room {
                 scene: parts.gbuffer.scene(gpu, parts.object, &camera)?,
                 rays: rays.transpose()?,
                 shading: parts.shading.points(gpu, shading)?,
-                pixels: parts.pictures.points(gpu, [&picture, &points, &radiance])?,
+                pixels: parts.images.points(gpu, [&image, &points, &radiance])?,
                 camera,
                 params,
-                picture,
+                image,
             })
         });
         let bands = bands.collect::<Result<_, GpuError>>()?;
@@ -149,7 +149,7 @@ impl Room {
         (self.need.samples_per_side * self.need.samples_per_side) as u32
     }
 
-    /// Places for points in a band.
+    /// GridCoordinates for points in a band.
     pub fn places(&self, band: &Band) -> u32 {
         (band.rows.len() * self.need.size[0]) as u32 * self.slots()
     }
@@ -161,10 +161,10 @@ impl Band {
         gpu: &Gpu,
         camera: Camera,
         params: shading::Params,
-        picture: picture::Params,
+        image: image::Params,
     ) -> Result<(), GpuError> {
         gpu.write(&self.camera, &[camera])?;
         gpu.write(&self.params, &[params])?;
-        gpu.write(&self.picture, &[picture])
+        gpu.write(&self.image, &[image])
     }
 }

@@ -5,19 +5,19 @@ use std::time::Instant;
 use glam::{Mat3, Vec3};
 
 use super::gbuffer::Point;
-use crate::effective::{Heights, Nodes, Sight, Sliced};
+use crate::effective::{GpuVisibilityInput, Heights, Nodes, Sliced};
 use crate::geometry::Facets;
-use crate::gpu::shading::tests::{Studio, open_gpu};
+use crate::gpu::shading::tests::{TestScene, open_gpu};
 use crate::gpu::visibility::{crossings, looks};
 use crate::gpu::{Gpu, GpuRenderer};
-use crate::math::directions::UpperPairs;
+use crate::math::directions::HemispherePairGrid;
 use crate::math::simd::azimuth_and_elevation;
-use crate::pipeline::{Pipeline, Unseen};
+use crate::pipeline::{GpuTile, Pipeline};
 use crate::render::image::shading_points::ShadingPoints;
-use crate::render::{CameraView, GBuffer, Stage};
+use crate::render::{CameraView, GBuffer, RenderScene};
 use crate::scene;
 use crate::scene::LoadedScene;
-use crate::visibility::Horizons;
+use crate::visibility::HorizonMap;
 
 /// Operations, counted by hand in the shaders: of a walk over a height-field at each edge; of a slice at each cell or triangle,
 /// and at each that it cuts.
@@ -69,30 +69,30 @@ fn some(facets: &Facets) -> Facets {
 }
 
 /// Operations of visibility, and bytes.
-fn sight(gpu: &Gpu, unseen: &Unseen) -> [f64; 2] {
+fn sight(gpu: &Gpu, unseen: &GpuTile) -> [f64; 2] {
     match &unseen.sum.sight {
-        Sight::Heights(Heights { samples, tile_size, facets, azimuths, .. }) => {
+        GpuVisibilityInput::Heights(Heights { samples, tile_size, facets, azimuths, .. }) => {
             let crossed = crossings(gpu, (samples, *tile_size, &some(facets)), *azimuths);
             [CROSSING, EDGE_BYTES].map(|each| (facets.len() * azimuths) as f64 * crossed * each)
         }
-        Sight::Slices(of) => {
+        GpuVisibilityInput::OcclusionIntervals(of) => {
             let Sliced { grid, facets, azimuths, overhangs, .. } = &**of;
             let [looks, cuts] = looks(gpu, grid, &some(facets), *azimuths, *overhangs);
             [LOOK * looks + CUT * cuts, LOOK_BYTES * looks].map(|each| (facets.len() * azimuths) as f64 * each)
         }
-        Sight::Seen(_) | Sight::Maps(_) => panic!("another route"),
+        GpuVisibilityInput::Seen(_) | GpuVisibilityInput::Maps(_) => panic!("another route"),
     }
 }
 
-/// Operations and bytes of a table, and of reading it for a picture; or of summing over facets for each pair.
-fn product(loaded: &LoadedScene, unseen: &Unseen) -> [[f64; 2]; 2] {
+/// Operations and bytes of a table, and of reading it for a image; or of summing over facets for each pair.
+fn product(loaded: &LoadedScene, unseen: &GpuTile) -> [[f64; 2]; 2] {
     let sum = &unseen.sum.sum;
-    let overhangs = matches!(unseen.sum.sight, Sight::Slices(ref of) if of.overhangs);
+    let overhangs = matches!(unseen.sum.sight, GpuVisibilityInput::OcclusionIntervals(ref of) if of.overhangs);
     let (two, bytes) = if overhangs { (BETWEEN, BETWEEN_BYTES) } else { (ABOVE, ABOVE_BYTES) };
     let Some(Nodes { grid, mirrors, facets: Some(picked), .. }) = unseen.sum.nodes else {
-        return [[0.0; 2], few_normals(loaded, unseen)];
+        return [[0.0; 2], clustered_sum(loaded, unseen)];
     };
-    let UpperPairs { turn, difference, .. } = grid;
+    let HemispherePairGrid { turn, difference, .. } = grid;
     let nodes = grid.originals(mirrors) as f64;
     let half_vectors = nodes / (turn * difference) as f64;
     let (all, picked) = (sum.facet_count() as f64, picked as f64);
@@ -117,13 +117,13 @@ const TOGETHER: usize = 32;
 
 /// Operations and bytes of a sum over facets of few normals for each pair of a picture of this scene, and of its projected areas
 /// (`shade_patches.wgsl`, `sum_patch_areas.wgsl`).
-fn few_normals(loaded: &LoadedScene, unseen: &Unseen) -> [f64; 2] {
+fn clustered_sum(loaded: &LoadedScene, unseen: &GpuTile) -> [f64; 2] {
     let horizons = match &unseen.sum.sight {
-        Sight::Heights(Heights { samples, tile_size, facets, azimuths, ramp }) => {
-            Horizons::march(samples, *tile_size, facets, *azimuths, *ramp)
+        GpuVisibilityInput::Heights(Heights { samples, tile_size, facets, azimuths, ramp }) => {
+            HorizonMap::march(samples, *tile_size, facets, *azimuths, *ramp)
         }
-        Sight::Slices(of) => Horizons::scan(&of.grid, &of.facets, of.azimuths, of.ramp),
-        Sight::Seen(_) | Sight::Maps(_) => panic!("another route"),
+        GpuVisibilityInput::OcclusionIntervals(of) => HorizonMap::scan(&of.grid, &of.facets, of.azimuths, of.ramp),
+        GpuVisibilityInput::Seen(_) | GpuVisibilityInput::Maps(_) => panic!("another route"),
     };
     let groups = unseen.sum.sum.groups();
     let patches: Vec<_> =
@@ -141,7 +141,7 @@ fn few_normals(loaded: &LoadedScene, unseen: &Unseen) -> [f64; 2] {
             Part::Some
         }
     };
-    let stage = Stage::new(loaded).unwrap();
+    let stage = RenderScene::new(loaded).unwrap();
     let view = CameraView::new(&stage.camera, &stage.mesh, [960, 540]).unwrap();
     let points = ShadingPoints::new(&GBuffer::new(&stage.mesh, &view, 1), &view, 1);
     let [mut operations, mut bytes] = [0.0; 2];
@@ -217,7 +217,7 @@ enum Part {
 #[ignore = "a table to be printed: cargo test --release --lib counts_of_an_edit -- --ignored --nocapture"]
 fn counts_of_an_edit() {
     let Some(gpu) = open_gpu() else { return };
-    let Studio { mesh, occluder, .. } = Studio::of("cup");
+    let TestScene { mesh, occluder, .. } = TestScene::of("cup");
     // Written and read again: samples, points, origins, bits, radiance; then the image.
     let traffic = POINTS * (2.0 * (4.0 + 4.0 + size_of::<Point>() as f64 + 16.0 + 4.0 + 16.0) + 4.0);
     println!(

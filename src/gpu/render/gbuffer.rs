@@ -15,7 +15,7 @@ use glam::Vec3;
 
 use crate::gpu::device::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
-use crate::render::image::gbuffer::LEAST_COSINE;
+use crate::render::image::gbuffer::MIN_COSINE;
 use crate::render::shadow::LIFT;
 use crate::render::{CameraView, ObjectMesh};
 
@@ -267,7 +267,7 @@ impl Camera {
             up: view.up,
             tan_half_fov_y: view.tan_half_fov.y,
             back: view.back,
-            least_cosine: LEAST_COSINE,
+            least_cosine: MIN_COSINE,
             size: view.size.map(|side| (side * samples_per_side) as u32),
             first_row: rows.start as u32,
             rows: rows.len() as u32,

@@ -4,8 +4,8 @@ mod band;
 #[cfg(test)]
 mod counts_tests;
 pub(crate) mod gbuffer;
+pub mod image;
 mod light_rays;
-pub mod picture;
 pub mod renderer;
 #[cfg(test)]
 mod renderer_tests;

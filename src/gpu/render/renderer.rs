@@ -5,19 +5,19 @@
 
 use super::band::{Band, Need, Parts, Room};
 use super::gbuffer::{Camera, GpuGBuffer, GpuObject};
+use super::image;
+use super::image::{GpuImages, Output};
 use super::light_rays::{GpuLightRays, GpuOccluder};
-use super::picture;
-use super::picture::{GpuPictures, Output};
-use super::stages::{Clock, Recorder, Stage};
+use super::stages::{Clock, GpuPassKind, Recorder};
 use crate::base::{Cancel, Result};
-use crate::effective::{EffectiveBrdf, Heights, Maps, Sight, Sliced, UnseenSum};
-use crate::gpu::shading::seen::Seen;
+use crate::effective::{EffectiveBrdf, GpuTileInput, GpuVisibilityInput, Heights, Maps, Sliced};
+use crate::gpu::shading::visibility::GpuVisibility;
 use crate::gpu::shading::{GpuMaterial, GpuShading, Light};
 use crate::gpu::{Gpu, GpuError, GpuHeightMarch, GpuShadowMaps, GpuSlicer, Tier, shading};
-use crate::render::image::render::{StageTimes, check_size};
+use crate::render::image::render::{RenderTimes, check_size};
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 use crate::render::shadow::Occluder;
-use crate::render::{CameraView, ObjectMesh, Picture, RenderInput, Rendered};
+use crate::render::{CameraView, Image, ObjectMesh, RenderInput, Rendered};
 
 /// Lobes or table rows of one submission: some tenths of a second for graphics processors that are not slow, about one for
 /// software.
@@ -39,7 +39,7 @@ pub struct GpuRenderer {
     march: Option<GpuHeightMarch>,
     slicer: Option<GpuSlicer>,
     maps: Option<GpuShadowMaps>,
-    pictures: GpuPictures,
+    images: GpuImages,
     /// For pictures like the last one.
     pub(super) room: Option<Room>,
     /// Lobes or table rows of one submission.
@@ -69,7 +69,7 @@ impl GpuRenderer {
             march: None,
             slicer: None,
             maps: None,
-            pictures: GpuPictures::new(gpu)?,
+            images: GpuImages::new(gpu)?,
             room: None,
             at_once: if gpu.tier == Tier::Hardware { WORK } else { SOFTWARE_WORK },
             clock: Clock::new(gpu)?,
@@ -106,33 +106,33 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// As [`GpuRenderer::set_brdf`].
-    pub fn set_tile(&mut self, gpu: &Gpu, tile: &UnseenSum) -> std::result::Result<(), GpuError> {
+    pub fn set_tile(&mut self, gpu: &Gpu, tile: &GpuTileInput) -> std::result::Result<(), GpuError> {
         let seen = match &tile.sight {
-            Sight::Seen(visibility) => Seen::Held(visibility),
-            Sight::Heights(heights) => {
+            GpuVisibilityInput::Seen(visibility) => GpuVisibility::Held(visibility),
+            GpuVisibilityInput::Heights(heights) => {
                 let march = match &mut self.march {
                     Some(march) => march,
                     none => none.insert(GpuHeightMarch::new(gpu)?),
                 };
                 let Heights { samples, tile_size, facets, azimuths, ramp } = heights;
-                Seen::Marched(march.horizons(gpu, samples, *tile_size, facets, *azimuths)?, *ramp)
+                GpuVisibility::Marched(march.horizons(gpu, samples, *tile_size, facets, *azimuths)?, *ramp)
             }
-            Sight::Slices(of) => {
+            GpuVisibilityInput::OcclusionIntervals(of) => {
                 let slicer = match &mut self.slicer {
                     Some(slicer) => slicer,
                     none => none.insert(GpuSlicer::new(gpu)?),
                 };
                 let Sliced { grid, facets, azimuths, ramp, overhangs } = &**of;
                 let made = slicer.slices(gpu, grid, facets, *azimuths, *overhangs)?;
-                if *overhangs { Seen::Sliced(made, *ramp) } else { Seen::Marched(made, *ramp) }
+                if *overhangs { GpuVisibility::Sliced(made, *ramp) } else { GpuVisibility::Marched(made, *ramp) }
             }
-            Sight::Maps(of) => {
+            GpuVisibilityInput::Maps(of) => {
                 let maps = match &mut self.maps {
                     Some(maps) => maps,
                     none => none.insert(GpuShadowMaps::new(gpu)?),
                 };
                 let Maps { mesh, facets, grid, resolution } = &**of;
-                Seen::Drawn(maps.maps(gpu, mesh, facets, &grid.directions(), *resolution)?, *grid)
+                GpuVisibility::Drawn(maps.maps(gpu, mesh, facets, &grid.directions(), *resolution)?, *grid)
             }
         };
         self.material = Some(self.shading.tile(gpu, tile, seen, self.rays.is_some())?);
@@ -157,7 +157,7 @@ impl GpuRenderer {
         let rows = &rows[..width * height];
         let points = rows.iter().map(|row| row[3] as usize).sum();
         let pixels = rows.iter().map(|&[r, g, b, _]| glam::Vec3::new(r, g, b)).collect();
-        Ok(Rendered { picture: Picture { width, height, pixels }, times, points })
+        Ok(Rendered { image: Image { width, height, pixels }, times, points })
     }
 
     /// Renders as [`GpuRenderer::render`] does, into an image on the device that a screen shows; waits until it is there.
@@ -171,7 +171,7 @@ impl GpuRenderer {
         tone_map: &ToneMap,
         image: &wgpu::TextureView,
         cancel: &Cancel,
-    ) -> Result<StageTimes> {
+    ) -> Result<RenderTimes> {
         check_size(input.size, input.samples_per_side)?;
         self.draw(gpu, input, tone_map, Output::Image(image), cancel)
     }
@@ -183,7 +183,7 @@ impl GpuRenderer {
         tone_map: &ToneMap,
         output: Output,
         cancel: &Cancel,
-    ) -> Result<StageTimes> {
+    ) -> Result<RenderTimes> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let work = self.material.as_ref().map_or(1, |material| material.work(input.lights.len()).max(1));
         let points = usize::try_from(self.at_once / work).unwrap_or(usize::MAX);
@@ -203,10 +203,10 @@ impl GpuRenderer {
                 least_area: self.material.as_ref().map_or(0.0, GpuMaterial::least_area),
             };
             let counts = [room.slots(), room.slices];
-            let picture = picture::Params::new(need.size, band.rows.clone(), counts, input.background, tone_map);
-            band.write(gpu, camera, params, picture)?;
+            let image = image::Params::new(need.size, band.rows.clone(), counts, input.background, tone_map);
+            band.write(gpu, camera, params, image)?;
         }
-        let group = self.pictures.output(gpu, output)?;
+        let group = self.images.output(gpu, output)?;
         let a_band = room.bands.first().map_or(1, |band| u64::from(room.places(band)) * work);
         let together = (self.at_once / a_band.max(1)).max(1) as usize;
         let mut recorder = Recorder::new(gpu, self.clock.as_ref(), self.by_stage);
@@ -230,8 +230,8 @@ impl GpuRenderer {
         match self.room.take().filter(|room| room.need == need) {
             Some(room) => Ok(room),
             None => {
-                let Self { gbuffer, object, rays, shading, pictures, .. } = self;
-                Room::new(gpu, need, &Parts { gbuffer, object, rays: rays.as_ref(), shading, pictures })
+                let Self { gbuffer, object, rays, shading, images, .. } = self;
+                Room::new(gpu, need, &Parts { gbuffer, object, rays: rays.as_ref(), shading, images })
             }
         }
     }
@@ -246,8 +246,8 @@ impl GpuRenderer {
                     cancel.check()?;
                 }
                 for batch in batches {
-                    maps.draw(batch, &mut recorder.compute_pass(Stage::Product, &maps.cleared()));
-                    recorder.stage_ends(Stage::Product)?;
+                    maps.draw(batch, &mut recorder.compute_pass(GpuPassKind::Product, &maps.cleared()));
+                    recorder.stage_ends(GpuPassKind::Product)?;
                 }
             }
         }
@@ -259,8 +259,8 @@ impl GpuRenderer {
                     cancel.check()?;
                     held = 0;
                 }
-                horizons.dispatch(&mut recorder.compute_pass(Stage::Product, &[]), run);
-                recorder.stage_ends(Stage::Product)?;
+                horizons.dispatch(&mut recorder.compute_pass(GpuPassKind::Product, &[]), run);
+                recorder.stage_ends(GpuPassKind::Product)?;
                 held += horizons.work(run);
             }
         }
@@ -268,8 +268,8 @@ impl GpuRenderer {
             let parts = material.parts(self.at_once);
             for (k, part) in parts.iter().enumerate() {
                 let cleared = if k == 0 { material.sums() } else { Vec::new() };
-                material.make(&mut recorder.compute_pass(Stage::Product, &cleared), part.clone());
-                recorder.stage_ends(Stage::Product)?;
+                material.make(&mut recorder.compute_pass(GpuPassKind::Product, &cleared), part.clone());
+                recorder.stage_ends(GpuPassKind::Product)?;
                 if parts.len() > 1 {
                     recorder.submit()?;
                     cancel.check()?;
@@ -277,7 +277,7 @@ impl GpuRenderer {
             }
         }
         if let Some(band) = room.bands.first() {
-            let (encoder, writes) = recorder.render_pass(Stage::GBuffer);
+            let (encoder, writes) = recorder.render_pass(GpuPassKind::GBuffer);
             self.gbuffer.draw(encoder, &room.samples, &band.scene, &self.object, writes);
         }
         Ok(())
@@ -293,21 +293,21 @@ impl GpuRenderer {
         is_heavy: bool,
     ) -> std::result::Result<(), GpuError> {
         let (points, pixels) = (room.places(band), [room.need.size[0], band.rows.len()].map(|n| n as u32));
-        let mut pass = recorder.compute_pass(Stage::GBuffer, &[]);
+        let mut pass = recorder.compute_pass(GpuPassKind::GBuffer, &[]);
         self.gbuffer.find_points(&mut pass, &band.scene, &room.to_points, pixels);
         drop(pass);
-        recorder.stage_ends(Stage::GBuffer)?;
+        recorder.stage_ends(GpuPassKind::GBuffer)?;
         let lit = room.need.lights > 0;
         if let (true, Some((rays, _)), Some(group), Some(to_bits)) = (lit, &self.rays, &band.rays, &room.to_bits) {
-            let mut pass = recorder.compute_pass(Stage::Shadows, &[]);
+            let mut pass = recorder.compute_pass(GpuPassKind::Shadows, &[]);
             rays.trace(&mut pass, group, to_bits, [points, room.words]);
             drop(pass);
-            recorder.stage_ends(Stage::Shadows)?;
+            recorder.stage_ends(GpuPassKind::Shadows)?;
         }
         let passes = self.material.as_ref().filter(|_| lit).map_or(0, GpuMaterial::passes);
         // A row of pixels may be more than one submission holds.
         let together = if is_heavy { 1 } else { passes.max(1) };
-        let mut pass = recorder.compute_pass(Stage::Shading, &[&room.radiance]);
+        let mut pass = recorder.compute_pass(GpuPassKind::Shading, &[&room.radiance]);
         for first in (0..passes).step_by(together) {
             if let Some(material) = &self.material {
                 let some = first..(first + together).min(passes);
@@ -315,14 +315,14 @@ impl GpuRenderer {
             }
             if is_heavy {
                 drop(pass);
-                recorder.stage_ends(Stage::Shading)?;
+                recorder.stage_ends(GpuPassKind::Shading)?;
                 recorder.submit()?;
-                pass = recorder.compute_pass(Stage::Shading, &[]);
+                pass = recorder.compute_pass(GpuPassKind::Shading, &[]);
             }
         }
-        self.pictures.write(&mut pass, &band.pixels, output, pixels);
+        self.images.write(&mut pass, &band.pixels, output, pixels);
         drop(pass);
-        recorder.stage_ends(Stage::Shading)
+        recorder.stage_ends(GpuPassKind::Shading)
     }
 }
 

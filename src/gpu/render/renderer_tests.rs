@@ -3,18 +3,20 @@
 use glam::Vec3;
 
 use crate::base::Cancel;
-use crate::effective::{Black, Form, PairTable, Sight};
+use crate::effective::{Black, GpuVisibilityInput, Representation, ShadingTable};
 use crate::gpu::GpuRenderer;
-use crate::gpu::shading::tests::{FLAT, LOBES, PYRAMIDS, RODS, Studio, assert_same_picture, effective, open, open_gpu};
+use crate::gpu::shading::tests::{
+    FLAT, LOBES, PYRAMIDS, RODS, TestScene, assert_same_image, effective, open, open_gpu,
+};
 use crate::pipeline::Pipeline;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
-use crate::render::{Picture, RenderInput, Stage};
+use crate::render::{Image, RenderInput, RenderScene};
 use crate::scene;
 
 #[test]
-fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture() {
+fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_image() {
     let Some(gpu) = open_gpu() else { return };
     for (geometry, brdf, kind, sight, tabulated) in [
         (
@@ -48,35 +50,36 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
         }
         let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
         let found = match &unseen.sum.sight {
-            Sight::Seen(_) => "held",
-            Sight::Heights(_) => "marched",
-            Sight::Slices(_) => "sliced",
-            Sight::Maps(_) => "drawn",
+            GpuVisibilityInput::Seen(_) => "held",
+            GpuVisibilityInput::Heights(_) => "marched",
+            GpuVisibilityInput::OcclusionIntervals(_) => "sliced",
+            GpuVisibilityInput::Maps(_) => "drawn",
         };
         assert_eq!(found, sight, "{geometry}");
-        let (studio, background) = (Studio::of(kind), Background::Uniform(Vec3::ZERO));
-        let pictured = match tabulated {
+        let (studio, background) = (TestScene::of(kind), Background::Uniform(Vec3::ZERO));
+        let shading_brdf = match tabulated {
             true => {
-                let Form::Direct(direct) = &outcome.brdf.form else { panic!("{geometry}: not direct") };
-                let table = PairTable::build(direct, unseen.sum.nodes.unwrap(), &Cancel::default()).unwrap().unwrap();
-                outcome.brdf.with_direct_form(Form::Table(table.read(unseen.sum.interpolation)))
+                let Representation::Direct(direct) = &outcome.brdf.form else { panic!("{geometry}: not direct") };
+                let table =
+                    ShadingTable::build(direct, unseen.sum.nodes.unwrap(), &Cancel::default()).unwrap().unwrap();
+                outcome.brdf.with_direct_form(Representation::Table(table.read(unseen.sum.interpolation)))
             }
             false => outcome.brdf.as_ref().clone(),
         };
-        let input = studio.input(&pictured, 64, &background);
+        let input = studio.input(&shading_brdf, 64, &background);
         let mut renderer = GpuRenderer::new(&gpu, input.mesh, input.occluder).unwrap();
         renderer.set_tile(&gpu, &unseen.sum).unwrap();
         // One submission, as on a graphics processor. The first picture makes what the second only reads.
         renderer.by_stage = false;
-        let first = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
-        let again = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        let first = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
+        let again = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
         assert_eq!(first, again, "{geometry}");
         // In many submissions it is the same to the bit.
         renderer.at_once = 1 << 20;
         renderer.set_tile(&gpu, &unseen.sum).unwrap();
-        let in_parts = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        let in_parts = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
         assert_eq!(first, in_parts, "{geometry}");
-        assert_same_picture(geometry, &[render(&input).unwrap().picture, first]);
+        assert_same_image(geometry, &[render(&input).unwrap().image, first]);
     }
     // A bottom so narrow that 700 facets leave it too few of its own: more of them serve.
     let narrow = "{ kind = \"grooves\", profile = \"rectangular\", bottom_width = 0.01 }";
@@ -94,10 +97,10 @@ fn a_tile_whose_visibility_and_product_the_device_makes_gives_the_cpu_s_picture(
 }
 
 #[test]
-fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
+fn a_image_in_many_bands_and_submissions_is_the_same_to_the_bit() {
     let Some(gpu) = open_gpu() else { return };
     let brdf = effective(&open(PYRAMIDS, LOBES[4], "direct"));
-    let studio = Studio::of("cup");
+    let studio = TestScene::of("cup");
     let input = RenderInput { samples_per_side: 2, ..studio.input(&brdf, 50, &Background::Wall) };
     let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
     let bands = |renderer: &GpuRenderer| renderer.room.as_ref().unwrap().bands.len();
@@ -107,24 +110,24 @@ fn a_picture_in_many_bands_and_submissions_is_the_same_to_the_bit() {
     renderer.at_once = renderer.at_once / bands(&renderer) as u64 / 1000;
     let cut = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
     assert!(bands(&renderer) > 10, "{}", bands(&renderer));
-    assert_eq!((&cut.picture, cut.points), (&whole.picture, whole.points));
+    assert_eq!((&cut.image, cut.points), (&whole.image, whole.points));
     // As on a graphics processor: all stages of some bands together.
     renderer.by_stage = !renderer.by_stage;
     let together = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
-    assert_eq!((&together.picture, together.points), (&whole.picture, whole.points));
+    assert_eq!((&together.image, together.points), (&whole.image, whole.points));
     // Silhouettes may lie on the other side of a sample.
     let points = render(&input).unwrap().points;
     assert!(cut.points.abs_diff(points) * 100 < points, "{} and the CPU's {points}", cut.points);
 }
 
 #[test]
-fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
+fn a_image_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
     let Some(gpu) = open_gpu() else { return };
     let brdf = effective(&open(RODS, LOBES[4], "direct"));
-    let studio = Studio::of("cup");
+    let studio = TestScene::of("cup");
     let input = studio.input(&brdf, 96, &Background::Wall);
     let mut renderer = GpuRenderer::wearing(&gpu, input.mesh, input.occluder, &brdf).unwrap();
-    let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+    let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
     let cancel = Cancel::default();
     cancel.set();
     assert!(matches!(renderer.render(&gpu, &input, &cancel), Err(crate::base::Error::Cancelled)));
@@ -138,28 +141,28 @@ fn a_picture_that_nobody_waits_for_is_given_up_and_the_next_one_is_whole() {
     let given_up = renderer.render(&gpu, &input, &cancel);
     setter.join().unwrap();
     assert!(matches!(&given_up, Err(crate::base::Error::Cancelled) | Ok(_)), "{given_up:?}");
-    assert_eq!(renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture.pixels, before.pixels);
+    assert_eq!(renderer.render(&gpu, &input, &Cancel::default()).unwrap().image.pixels, before.pixels);
 }
 
 /// What the editor shows first on a graphics processor, beside what the CPU refines it to.
 #[test]
 #[ignore = "takes a minute on software Vulkan"]
-fn pictures_of_the_papers_five_scenes_made_from_the_tile_itself_are_the_cpu_s() {
+fn images_of_the_papers_five_scenes_made_from_the_tile_itself_are_the_cpu_s() {
     let Some(gpu) = open_gpu() else { return };
     let background = Background::Uniform(Vec3::ZERO);
     for name in ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"] {
         let loaded = scene::open(name, &[]).unwrap();
         let outcome = Pipeline::new().effective(&loaded).unwrap();
-        let reads = outcome.for_pictures(&Cancel::default()).unwrap().brdf;
+        let reads = outcome.shading_brdf(&Cancel::default()).unwrap().brdf;
         let unseen = Pipeline::new().unseen(&loaded).unwrap().unwrap();
-        let stage = Stage::new(&loaded).unwrap();
-        let cpu = render(&stage.input(&*reads, [160, 160], 1, &background)).unwrap().picture;
+        let stage = RenderScene::new(&loaded).unwrap();
+        let cpu = render(&stage.input(&*reads, [160, 160], 1, &background)).unwrap().image;
         let mut renderer = GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref()).unwrap();
         renderer.set_tile(&gpu, &unseen.sum).unwrap();
         let input = stage.input(&Black, [160, 160], 1, &background);
-        let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
         let tones = ToneMap::new(&stage.camera).unwrap();
-        let shown = |picture: &Picture| -> Vec<u8> { picture.to_srgb(&tones) };
+        let shown = |image: &Image| -> Vec<u8> { image.to_srgb(&tones) };
         let (a, b) = (shown(&cpu), shown(&device));
         let squares = a.iter().zip(&b).map(|(a, b)| (f64::from(a.abs_diff(*b)) / 255.0).powi(2)).sum::<f64>();
         let db = -10.0 * (squares / a.len() as f64).log10();

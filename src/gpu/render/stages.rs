@@ -6,14 +6,14 @@
 use std::time::Instant;
 
 use crate::gpu::{Gpu, GpuError, Tier};
-use crate::render::image::render::StageTimes;
+use crate::render::image::render::RenderTimes;
 
 /// Passes of a submission that are timed; of more the first ones speak for all.
 const PASSES: u32 = 1024;
 
-/// Stages of [`StageTimes`].
+/// Stages of [`RenderTimes`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stage {
+pub(super) enum GpuPassKind {
     Product,
     GBuffer,
     Shadows,
@@ -55,7 +55,7 @@ pub(super) struct Recorder<'a> {
     by_stage: bool,
     encoder: wgpu::CommandEncoder,
     /// Of each timed pass of the submission that is recorded.
-    timed: Vec<Stage>,
+    timed: Vec<GpuPassKind>,
     begun: Instant,
     /// Milliseconds of what was submitted.
     spent: [f64; STAGES],
@@ -69,7 +69,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Where the next pass writes its times; `None` where it is not timed.
-    fn next_pass(&mut self, stage: Stage) -> Option<(&'a Clock, [u32; 2])> {
+    fn next_pass(&mut self, stage: GpuPassKind) -> Option<(&'a Clock, [u32; 2])> {
         let (clock, k) = (self.clock?, self.timed.len() as u32);
         (k < PASSES).then(|| {
             self.timed.push(stage);
@@ -80,7 +80,7 @@ impl<'a> Recorder<'a> {
     /// What a render pass of a stage is recorded with.
     pub fn render_pass(
         &mut self,
-        stage: Stage,
+        stage: GpuPassKind,
     ) -> (&mut wgpu::CommandEncoder, Option<wgpu::RenderPassTimestampWrites<'a>>) {
         let writes = self.next_pass(stage).map(|(clock, [begin, end])| wgpu::RenderPassTimestampWrites {
             query_set: &clock.queries,
@@ -91,7 +91,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// A compute pass of a stage, after these buffers were set to zeros.
-    pub fn compute_pass(&mut self, stage: Stage, cleared: &[&wgpu::Buffer]) -> wgpu::ComputePass<'_> {
+    pub fn compute_pass(&mut self, stage: GpuPassKind, cleared: &[&wgpu::Buffer]) -> wgpu::ComputePass<'_> {
         let timestamp_writes = self.next_pass(stage).map(|(clock, [begin, end])| wgpu::ComputePassTimestampWrites {
             query_set: &clock.queries,
             beginning_of_pass_write_index: Some(begin),
@@ -104,7 +104,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// A stage, or a band's part of it, is recorded.
-    pub fn stage_ends(&mut self, stage: Stage) -> Result<(), GpuError> {
+    pub fn stage_ends(&mut self, stage: GpuPassKind) -> Result<(), GpuError> {
         if self.by_stage {
             self.spent[stage as usize] += self.run()?;
         }
@@ -135,7 +135,7 @@ impl<'a> Recorder<'a> {
             (0..STAGES).for_each(|k| self.spent[k] += whole * parts[k] / total);
         } else {
             // Without a clock nobody knows.
-            self.spent[Stage::Shading as usize] += whole;
+            self.spent[GpuPassKind::Shading as usize] += whole;
         }
         Ok(())
     }
@@ -153,9 +153,9 @@ impl<'a> Recorder<'a> {
     }
 
     /// Of all that was submitted.
-    pub fn times(&self) -> StageTimes {
+    pub fn times(&self) -> RenderTimes {
         let [product_ms, gbuffer_ms, shadows_ms, shading_ms] = self.spent;
-        StageTimes { product_ms, gbuffer_ms, shadows_ms, shading_ms }
+        RenderTimes { product_ms, gbuffer_ms, shadows_ms, shading_ms }
     }
 }
 

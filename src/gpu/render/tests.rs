@@ -5,8 +5,8 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::gbuffer::Point;
+use super::image;
 use super::light_rays::{GpuLightRays, GpuOccluder};
-use super::picture;
 use crate::base::Cancel;
 use crate::effective::EffectiveBrdf;
 use crate::gpu::shading::{Light, Params};
@@ -177,7 +177,7 @@ fn what_a_screen_shows_is_what_is_read_back_through_the_tone_map() {
     let Some(gpu) = open_gpu() else { return };
     let (mesh, brdf, size) = (object("cup"), brdf(), [96, 64]);
     let mut renderer = GpuRenderer::wearing(&gpu, &mesh, None, &brdf).unwrap();
-    let texture = picture::image(&gpu, size).unwrap();
+    let texture = image::image(&gpu, size).unwrap();
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     for (curve, gain, background) in [
         (ToneCurve::Filmic, 1.0, Background::Wall),
@@ -196,12 +196,12 @@ fn what_a_screen_shows_is_what_is_read_back_through_the_tone_map() {
             background: &background,
         };
         let tone_map = ToneMap { curve, gain };
-        let picture = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
+        let image = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
         renderer.show(&gpu, &input, &tone_map, &view, &Cancel::default()).unwrap();
-        let image = gpu.read_image(&texture).unwrap();
-        let bytes = picture.pixels.iter().map(|pixel| tone_map.apply(*pixel).to_array().map(srgb_byte));
+        let shown_image = gpu.read_image(&texture).unwrap();
+        let bytes = image.pixels.iter().map(|pixel| tone_map.apply(*pixel).to_array().map(srgb_byte));
         let mut off = 0;
-        for (k, (bytes, shown)) in bytes.zip(image.as_chunks::<4>().0).enumerate() {
+        for (k, (bytes, shown)) in bytes.zip(shown_image.as_chunks::<4>().0).enumerate() {
             let difference = (0..3).map(|c| bytes[c].abs_diff(shown[c])).max();
             assert!(difference <= Some(1) && shown[3] == 255, "{k}: {bytes:?} {shown:?}");
             off += usize::from(difference == Some(1));

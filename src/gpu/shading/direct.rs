@@ -6,9 +6,9 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::few_normals::{Patches, reach_file};
-use super::seen::Seen;
-use super::table_of_sum::Making;
+use super::clustered_sum::{Patches, reach_file};
+use super::tabulate::Making;
+use super::visibility::GpuVisibility;
 use super::{GpuShading, Padded, Pass, Second, Variant, padded, shadow_swap};
 use crate::brdf::Term;
 use crate::effective::{FacetSum, Group};
@@ -35,7 +35,7 @@ pub(crate) struct Sum {
 }
 
 /// Facets of one pass on software Vulkan: llvmpipe leaves all loops of a thread, without a word, after 65,535 rounds
-/// together. Eight lights, and eight things that hang over a facet, stay below that.
+/// together. SimdF32x8 lights, and eight things that hang over a facet, stay below that.
 pub(crate) const SOFTWARE_FACETS: usize = 512;
 
 /// And on others, where a pass over one row of pixels may be a submission.
@@ -56,7 +56,7 @@ impl GpuShading {
         &mut self,
         gpu: &Gpu,
         sum: &FacetSum,
-        seen: &Seen,
+        seen: &GpuVisibility,
         shadowed: bool,
     ) -> Result<(Vec<Pass>, Option<Making>), GpuError> {
         let groups = sum.groups();
@@ -129,7 +129,7 @@ impl GpuShading {
 
 impl Sum {
     /// A sum over nothing of the facets, as they see.
-    pub(crate) fn blank(sum: &FacetSum, seen: &Seen) -> Self {
+    pub(crate) fn blank(sum: &FacetSum, seen: &GpuVisibility) -> Self {
         seen.with(Self { facet_count: sum.facet_count() as u32, ..Self::default() })
     }
 
@@ -146,7 +146,7 @@ impl Sum {
 
 impl Shared {
     /// Facets, what they see, and no patches.
-    pub(crate) fn of(gpu: &Gpu, sum: &FacetSum, seen: &Seen) -> Result<Self, GpuError> {
+    pub(crate) fn of(gpu: &Gpu, sum: &FacetSum, seen: &GpuVisibility) -> Result<Self, GpuError> {
         Ok(Self {
             facets: gpu.upload("facets", &facet_rows(sum), wgpu::BufferUsages::STORAGE)?,
             visibility: seen.on_device(gpu)?,

@@ -3,34 +3,34 @@
 //! A material becomes a list of compute passes over points and slices of the lights. Each pass is compiled for what it
 //! meets (a lobe, a kind of visibility, shadows or none): an effect that a scene does not call for leaves no instruction.
 
+mod clustered_sum;
 mod column_terms;
 mod direct;
-mod few_normals;
 mod low_rank;
-mod picked;
-pub(crate) mod seen;
+mod sampled_facets;
 mod table;
-mod table_of_sum;
+mod tabulate;
 #[cfg(test)]
 pub(crate) mod tests;
+pub(crate) mod visibility;
 
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-pub use self::seen::Seen;
-use self::table_of_sum::Making;
+use self::tabulate::Making;
+pub use self::visibility::GpuVisibility;
 use super::device::pipelines::{READ, UNIFORM, WRITE};
-use super::{Gpu, GpuError, GpuHorizons, GpuMaps, Swaps};
-use crate::effective::{EffectiveBrdf, Form, Tint, UnseenSum};
+use super::{Gpu, GpuError, GpuHorizonMap, GpuMaps, Swaps};
+use crate::effective::{EffectiveBrdf, GpuTileInput, Representation, Tint};
 use crate::render::DirectionalLight;
 
 const THREADS: u32 = 64;
 /// The most workgroups of a dispatch along one axis.
 const MAX_GROUPS: usize = 65_535;
 /// The most points of one dispatch.
-pub(crate) const MOST_POINTS: usize = MAX_GROUPS * THREADS as usize;
+pub(crate) const MAX_POINTS: usize = MAX_GROUPS * THREADS as usize;
 
 /// The layouts of all shading passes, and the pipelines compiled so far: build once, use for any material.
 #[derive(Debug)]
@@ -56,7 +56,7 @@ struct Variant {
 pub struct GpuMaterial {
     passes: Vec<Pass>,
     /// What the passes read and the device has to make first.
-    horizons: Option<GpuHorizons>,
+    horizons: Option<GpuHorizonMap>,
     maps: Option<GpuMaps>,
     making: Option<Making>,
     least_area: f32,
@@ -130,16 +130,17 @@ impl GpuShading {
         shadowed: bool,
     ) -> std::result::Result<GpuMaterial, GpuError> {
         let passes = match &brdf.form {
-            Form::Direct(form) => {
-                let (passes, making) = self.direct_passes(gpu, &form.sum, &Seen::Held(&form.visibility), shadowed)?;
+            Representation::Direct(form) => {
+                let (passes, making) =
+                    self.direct_passes(gpu, &form.sum, &GpuVisibility::Held(&form.visibility), shadowed)?;
                 return Ok(GpuMaterial { making, ..GpuMaterial::of(passes, brdf.base_area) });
             }
-            Form::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
-            Form::Interreflecting(..) => {
+            Representation::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
+            Representation::Interreflecting(..) => {
                 return Err(GpuError::Unsupported("light between facets is added on the CPU only".to_owned()));
             }
-            Form::Table(table) => vec![self.table_pass(gpu, table, shadowed)?],
-            Form::Wu2011(_) => {
+            Representation::Table(table) => vec![self.table_pass(gpu, table, shadowed)?],
+            Representation::Wu2011(_) => {
                 return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
             }
         };
@@ -154,11 +155,11 @@ impl GpuShading {
     pub fn tile(
         &mut self,
         gpu: &Gpu,
-        tile: &UnseenSum,
-        seen: Seen,
+        tile: &GpuTileInput,
+        seen: GpuVisibility,
         shadowed: bool,
     ) -> std::result::Result<GpuMaterial, GpuError> {
-        let UnseenSum { sum, nodes, interpolation, .. } = tile;
+        let GpuTileInput { sum, nodes, interpolation, .. } = tile;
         let table = nodes.map(|nodes| self.tabulated(gpu, (sum, &seen), (nodes, *interpolation), shadowed));
         let (passes, making) = match table {
             Some(Ok((pass, table))) => (vec![pass], Some(table)),
@@ -166,9 +167,9 @@ impl GpuShading {
             Some(Err(error)) => return Err(error),
         };
         let (horizons, maps) = match seen {
-            Seen::Marched(horizons, _) | Seen::Sliced(horizons, _) => (Some(horizons), None),
-            Seen::Drawn(maps, _) => (None, Some(maps)),
-            Seen::Held(_) => (None, None),
+            GpuVisibility::Marched(horizons, _) | GpuVisibility::Sliced(horizons, _) => (Some(horizons), None),
+            GpuVisibility::Drawn(maps, _) => (None, Some(maps)),
+            GpuVisibility::Held(_) => (None, None),
         };
         Ok(GpuMaterial { horizons, maps, making, ..GpuMaterial::of(passes, tile.base_area) })
     }
@@ -232,7 +233,7 @@ impl GpuMaterial {
     }
 
     /// What facets see, which is to be made before [`GpuMaterial::make`].
-    pub(crate) fn horizons(&self) -> Option<&GpuHorizons> {
+    pub(crate) fn horizons(&self) -> Option<&GpuHorizonMap> {
         self.horizons.as_ref()
     }
 

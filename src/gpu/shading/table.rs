@@ -4,9 +4,9 @@ use bytemuck::{Pod, Zeroable};
 
 use super::column_terms::ColumnTerms;
 use super::{GpuShading, Pass, Second, Variant, shadow_swap};
-use crate::effective::{Interpolation, PairTable};
+use crate::effective::{Interpolation, ShadingTable};
 use crate::gpu::{Gpu, GpuError};
-use crate::math::directions::{PolarGrid, UpperPairs};
+use crate::math::directions::{HemispherePairGrid, PolarGrid};
 
 /// `Table` in `shade_table.wgsl`.
 #[repr(C)]
@@ -21,18 +21,18 @@ struct Table {
 
 /// A table on the device.
 pub(crate) struct Held {
-    pub(crate) grid: UpperPairs,
+    pub(crate) grid: HemispherePairGrid,
     pub(crate) interpolation: Interpolation,
     pub(crate) columns: ColumnTerms,
     /// Those that the projected areas are known for.
     pub(crate) directions: PolarGrid,
-    /// As [`PairTable::values`] and [`PairTable::areas`].
+    /// As [`ShadingTable::values`] and [`ShadingTable::areas`].
     pub(crate) values: wgpu::Buffer,
     pub(crate) areas: wgpu::Buffer,
 }
 
 impl GpuShading {
-    pub(super) fn table_pass(&mut self, gpu: &Gpu, form: &PairTable, shadowed: bool) -> Result<Pass, GpuError> {
+    pub(super) fn table_pass(&mut self, gpu: &Gpu, form: &ShadingTable, shadowed: bool) -> Result<Pass, GpuError> {
         let columns = ColumnTerms::of(form.weights())?;
         let (directions, areas) = form.areas();
         let usage = wgpu::BufferUsages::STORAGE;
@@ -54,7 +54,7 @@ impl GpuShading {
             pairs: [grid.rings, grid.azimuths, grid.turn, grid.difference].map(|n| n as u32),
             rings: directions.rings as u32,
             azimuths: directions.azimuths as u32,
-            crowding: UpperPairs::CROWDING,
+            crowding: HemispherePairGrid::CROWDING,
             pad: 0,
         };
         let bound =

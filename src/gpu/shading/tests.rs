@@ -9,10 +9,10 @@ use super::{GpuMaterial, GpuShading, Light, Params};
 use crate::base::Cancel;
 use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
 use crate::effective::shading_table::columns::Weight;
-use crate::effective::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, SumMaterial};
+use crate::effective::{Direct, EffectiveBrdf, FacetSum, Interpolation, Material, Nodes, Representation, ShadingTable};
 use crate::gpu::render::gbuffer::Point;
 use crate::gpu::{Gpu, GpuError, GpuRenderer, render_gpu};
-use crate::math::directions::UpperPairs;
+use crate::math::directions::HemispherePairGrid;
 use crate::pipeline::Pipeline;
 use crate::render::image::shading;
 use crate::render::image::shading::Background;
@@ -20,7 +20,7 @@ use crate::render::image::shading_points::ShadingPoints;
 use crate::render::lighting::lights;
 use crate::render::render;
 use crate::render::shadow::{Occluder, Visible};
-use crate::render::{CameraView, DirectionalLight, GBuffer, ObjectMesh, Picture, RenderInput, object};
+use crate::render::{CameraView, DirectionalLight, GBuffer, Image, ObjectMesh, RenderInput, object};
 use crate::scene;
 use crate::scene::LoadedScene;
 use crate::visibility::Visibility;
@@ -61,14 +61,14 @@ pub(crate) fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
 }
 
 /// An object, its shadows and ten lights.
-pub(crate) struct Studio {
+pub(crate) struct TestScene {
     pub(crate) mesh: ObjectMesh,
     pub(crate) occluder: Option<Occluder>,
     pub(crate) lights: Vec<DirectionalLight>,
     pub(crate) camera: scene::Camera,
 }
 
-impl Studio {
+impl TestScene {
     pub(crate) fn of(kind: &str) -> Self {
         let mesh = object::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap();
         let lights = lights::build(&scene::Light { count: 10, ..scene::Light::default() }, Path::new(".")).unwrap();
@@ -99,14 +99,14 @@ impl Studio {
 /// Both routes on an object: points of one G-buffer shaded by both, and both pictures, 64 x 64.
 fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     assert_same_shading(what, gpu, kind, brdf);
-    let (studio, background) = (Studio::of(kind), Background::Uniform(Vec3::ZERO));
+    let (studio, background) = (TestScene::of(kind), Background::Uniform(Vec3::ZERO));
     let input = studio.input(brdf, 64, &background);
-    let pictures = [render(&input).unwrap().picture, render_gpu(gpu, &input, brdf).unwrap().picture];
-    assert_same_picture(what, &pictures);
+    let images = [render(&input).unwrap().image, render_gpu(gpu, &input, brdf).unwrap().image];
+    assert_same_image(what, &images);
 }
 
 fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
-    let Studio { mesh, occluder, lights, camera } = Studio::of(kind);
+    let TestScene { mesh, occluder, lights, camera } = TestScene::of(kind);
     let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
     let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
     let visible = occluder.as_ref().map(|o| o.visible(&mesh, &points, &lights, view.eye, None));
@@ -183,7 +183,7 @@ pub(crate) fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
     (all[all.len() * 99 / 100], all[all.len() - 1], (mean(cpu) - mean(gpu)).abs().max_element() / level)
 }
 
-pub(crate) fn assert_same_picture(what: &str, [cpu, gpu]: &[Picture; 2]) {
+pub(crate) fn assert_same_image(what: &str, [cpu, gpu]: &[Image; 2]) {
     let (most, worst, means) = distances(&cpu.pixels, &gpu.pixels);
     eprintln!("{what}: 99 % of the pixels within {most:.1e}, largest {worst:.1e}, means {means:.1e}");
     assert!(most < PIXEL_TOLERANCE && means < MEAN_TOLERANCE, "{what}: 99 % within {most}, means {means}");
@@ -198,7 +198,7 @@ pub(crate) const LOBES: [&str; 5] = [
 ];
 
 #[test]
-fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
+fn direct_sums_give_the_same_image_for_every_lobe_and_visibility() {
     let Some(gpu) = open_gpu() else { return };
     let mut seen = [false; 4];
     let [lambertian, phong, beckmann, _, ggx] = LOBES;
@@ -210,17 +210,17 @@ fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
     ] {
         for brdf in lobes {
             let brdf_form = effective(&open(geometry, brdf, "direct"));
-            let Form::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
-            if let Visibility::Slices(slices) = direct.visibility.as_ref() {
+            let Representation::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
+            if let Visibility::OcclusionIntervals(slices) = direct.visibility.as_ref() {
                 let maps = Visibility::Maps(slices.maps(12));
-                let form = Form::Direct(Direct::new(direct.sum.clone(), Arc::new(maps)));
+                let form = Representation::Direct(Direct::new(direct.sum.clone(), Arc::new(maps)));
                 seen[3] = true;
                 assert_same(&format!("{geometry} {brdf}, maps"), &gpu, kind, &EffectiveBrdf { form, ..brdf_form });
             }
             seen[match direct.visibility.as_ref() {
                 Visibility::Unblocked { .. } => 0,
-                Visibility::Horizons(_) => 1,
-                Visibility::Slices(_) => 2,
+                Visibility::HorizonMap(_) => 1,
+                Visibility::OcclusionIntervals(_) => 2,
                 Visibility::Maps(_) => 3,
             }] = true;
             assert_same(&format!("{geometry} {brdf}"), &gpu, kind, &brdf_form);
@@ -230,18 +230,18 @@ fn direct_sums_give_the_same_picture_for_every_lobe_and_visibility() {
 }
 
 #[test]
-fn factors_give_the_same_picture_for_tables_and_lobes() {
+fn factors_give_the_same_image_for_tables_and_lobes() {
     let Some(gpu) = open_gpu() else { return };
     let sum = format!("[{}, {}]", LOBES[0], LOBES[4]);
     for (geometry, brdf) in [(GROOVES, LOBES[0]), (PYRAMIDS, LOBES[2]), (RODS, sum.as_str())] {
         let brdf_form = effective(&open(geometry, brdf, "low_rank"));
-        assert!(matches!(brdf_form.form, Form::LowRank(_)), "{geometry} {brdf}");
+        assert!(matches!(brdf_form.form, Representation::LowRank(_)), "{geometry} {brdf}");
         assert_same(&format!("{geometry} {brdf}"), &gpu, "cup", &brdf_form);
     }
 }
 
 #[test]
-fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
+fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_image() {
     let Some(gpu) = open_gpu() else { return };
     // The colour of every facet is its own.
     let mut facets = crate::geometry::Facets::default();
@@ -258,14 +258,14 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
         Pipeline::new().sum_materials(&loaded).unwrap().1
     };
     let form = |brdf: &str| EffectiveBrdf {
-        form: Form::Direct(Direct::new(
+        form: Representation::Direct(Direct::new(
             FacetSum::new(&facets, &[0], &material(brdf)).into(),
             Visibility::Unblocked { facets: 300 }.into(),
         )),
         base_area: 1.0,
     };
     let (first, second) = (form(LOBES[4]), form(&format!("[{}, {}]", LOBES[0], LOBES[2])));
-    let Form::Direct(direct) = &first.form else { panic!("not direct") };
+    let Representation::Direct(direct) = &first.form else { panic!("not direct") };
     assert!(direct.sum.colors_vary());
     assert_same("coloured facets, ggx", &gpu, "sphere", &first);
 
@@ -284,21 +284,26 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_picture() {
         samples_per_side: 2,
         background: &Background::Wall,
     };
-    let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().picture;
-    let pictures = [render(&input).unwrap().picture, device];
-    assert_same_picture("coloured facets, lambertian and cook_torrance after ggx", &pictures);
+    let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
+    let images = [render(&input).unwrap().image, device];
+    assert_same_image("coloured facets, lambertian and cook_torrance after ggx", &images);
     let none = RenderInput { lights: &[], ..input };
-    let unlit = renderer.render(&gpu, &none, &Cancel::default()).unwrap().picture;
-    assert_same_picture("no lights", &[render(&none).unwrap().picture, unlit]);
+    let unlit = renderer.render(&gpu, &none, &Cancel::default()).unwrap().image;
+    assert_same_image("no lights", &[render(&none).unwrap().image, unlit]);
 
     // Six columns, which are two fours.
-    let Form::Direct(direct) = &second.form else { panic!("not direct") };
-    let table = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+    let Representation::Direct(direct) = &second.form else { panic!("not direct") };
+    let table = ShadingTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
     assert_eq!(table.fours(), 2);
-    assert_same("a table of coloured facets", &gpu, "cup", &EffectiveBrdf { form: Form::Table(table), base_area: 1.0 });
+    assert_same(
+        "a table of coloured facets",
+        &gpu,
+        "cup",
+        &EffectiveBrdf { form: Representation::Table(table), base_area: 1.0 },
+    );
 }
 
-const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 8, difference: 7 };
+const GRID: HemispherePairGrid = HemispherePairGrid { rings: 9, azimuths: 12, turn: 8, difference: 7 };
 
 #[test]
 fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_straight_lines() {
@@ -309,13 +314,13 @@ fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_strai
         (RODS, LOBES[0], Interpolation::Cubic),
     ] {
         let exact = effective(&open(geometry, brdf, "direct"));
-        let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let Representation::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
         let whole = |lights: &[Vec3], o: Vec3, out: &mut [glam::DVec3]| direct.sums(lights, o, |k, sum| out[k] = sum);
         for (what, table) in [
-            ("its columns", PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap()),
-            ("its colours", PairTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap()),
+            ("its columns", ShadingTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap()),
+            ("its colours", ShadingTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap()),
         ] {
-            let form = Form::Table(table.read(interpolation));
+            let form = Representation::Table(table.read(interpolation));
             // So coarse a table is too bright at the rim, where the two G-buffers show different pixels.
             let what = format!("a table of {geometry} {brdf}, {what}");
             assert_same_shading(&what, &gpu, "sphere", &EffectiveBrdf { form, base_area: exact.base_area });
@@ -330,10 +335,10 @@ fn tables_of_areas_shade_with_the_lobes_of_their_normals_as_the_cpu_does() {
     let cases = LOBES.map(|lobe| (PYRAMIDS, lobe)).into_iter().chain([(GROOVES, all.as_str()), (FLAT, LOBES[4])]);
     for (geometry, brdf) in cases {
         let exact = effective(&open(geometry, brdf, "direct"));
-        let Form::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
-        let table = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+        let Representation::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let table = ShadingTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
         assert!(table.weights().iter().all(Weight::is_lobe), "{geometry}");
-        let table = EffectiveBrdf { form: Form::Table(table), base_area: exact.base_area };
+        let table = EffectiveBrdf { form: Representation::Table(table), base_area: exact.base_area };
         assert_same_shading(&format!("areas of {geometry} {brdf}"), &gpu, "cup", &table);
     }
 }
@@ -368,12 +373,10 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
         slots: vec![0; 8],
         ..Default::default()
     };
-    let material = |color| SumMaterial {
-        brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] },
-        color,
-    };
+    let material =
+        |color| Material { brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] }, color };
     let form = |color| EffectiveBrdf {
-        form: Form::Direct(Direct::new(
+        form: Representation::Direct(Direct::new(
             FacetSum::new(&facets, &[0], &[material(color)]).into(),
             Visibility::Unblocked { facets: 8 }.into(),
         )),
@@ -383,10 +386,10 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let refused = shading.material(&gpu, &form(Vec3::ONE), false).map(drop);
     let is_refused = |refused: &_| matches!(refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured"));
     assert!(is_refused(&refused), "{refused:?}");
-    let Form::Direct(direct) = form(Vec3::ONE).form else { panic!("not direct") };
-    let table = PairTable::build(&direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+    let Representation::Direct(direct) = form(Vec3::ONE).form else { panic!("not direct") };
+    let table = ShadingTable::build(&direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
     assert!(table.weights().iter().all(Weight::is_lobe), "areas");
-    let table = EffectiveBrdf { form: Form::Table(table), base_area: 1.0 };
+    let table = EffectiveBrdf { form: Representation::Table(table), base_area: 1.0 };
     let refused = shading.material(&gpu, &table, false).map(drop);
     assert!(is_refused(&refused), "{refused:?}");
     // Black: it is never asked.

@@ -25,7 +25,7 @@ const SUBMITTED_TRIANGLES: u64 = 64 << 20;
 /// Edges longer than this part of the tile are cut.
 const LONGEST_EDGE: f32 = 1.0 / 16.0;
 /// No mesh is cut into more pieces than this beyond its own number of triangles.
-const MOST_PIECES: usize = 1 << 18;
+const MAX_PIECES: usize = 1 << 18;
 const THREADS: u32 = 64;
 
 /// `shadow_map.wgsl`, compiled: build once, use for any number of tiles.
@@ -278,7 +278,7 @@ fn gpu_view(view: &ShadowView) -> View {
 fn cut_large_triangles(mesh: &TileMesh) -> Vec<Corners> {
     let longest = LONGEST_EDGE * mesh.size.min_element();
     let mut pieces = Vec::with_capacity(mesh.triangles.len());
-    let mut left_to_cut = MOST_PIECES;
+    let mut left_to_cut = MAX_PIECES;
     let mut open = Vec::new();
     for triangle in 0..mesh.triangles.len() {
         open.push(mesh.corners(triangle));

@@ -1,4 +1,4 @@
-//! Horizons of a height-field on wgpu: the twin of [`Horizons::march`](crate::visibility::Horizons::march), left on the device for
+//! HorizonMap of a height-field on wgpu: the twin of [`HorizonMap::march`](crate::visibility::HorizonMap::march), left on the device for
 //! whatever reads horizons there (`shaders/visibility_horizons.wgsl`).
 
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -24,9 +24,9 @@ pub struct GpuHeightMarch {
 /// A dispatch and its workgroups.
 pub(super) type Placing = (wgpu::ComputePipeline, wgpu::BindGroup, [u32; 2]);
 
-/// Horizons, or slices, that a submission is to make.
+/// HorizonMap, or slices, that a submission is to make.
 #[derive(Debug)]
-pub struct GpuHorizons {
+pub struct GpuHorizonMap {
     /// What the runs read and is made before the first.
     pub(super) first: Option<Placing>,
     pub(super) pipeline: wgpu::ComputePipeline,
@@ -77,7 +77,7 @@ impl GpuHeightMarch {
         tile_size: glam::Vec2,
         facets: &Facets,
         azimuths: usize,
-    ) -> Result<GpuHorizons, GpuError> {
+    ) -> Result<GpuHorizonMap, GpuError> {
         use wgpu::BufferUsages as Usage;
         let params = Params {
             size: heights.size.to_array(),
@@ -105,7 +105,7 @@ impl GpuHeightMarch {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             gpu.group("height-field", &self.layout, &bound)
         })?;
-        Ok(GpuHorizons { first: None, pipeline: self.march.clone(), runs, elevations, azimuths })
+        Ok(GpuHorizonMap { first: None, pipeline: self.march.clone(), runs, elevations, azimuths })
     }
 }
 
@@ -136,7 +136,7 @@ pub(super) fn runs(
     (0..azimuths).step_by(together).map(run).collect()
 }
 
-impl GpuHorizons {
+impl GpuHorizonMap {
     /// Dispatches that make it.
     pub fn runs(&self) -> usize {
         self.runs.len()
@@ -187,7 +187,7 @@ mod tests {
     use glam::{UVec2, Vec2};
 
     use super::*;
-    use crate::visibility::Horizons;
+    use crate::visibility::HorizonMap;
 
     /// Heights of some waves and a little noise, and facets at odd places on them.
     fn field(size: UVec2, relief: f32) -> (HeightGrid, Facets) {
@@ -224,7 +224,7 @@ mod tests {
             [(UVec2::new(64, 64), 0.1, 48), (UVec2::new(37, 90), 0.3, 24), (UVec2::new(1, 200), 0.2, 10)]
         {
             let (grid, facets) = field(size, relief);
-            let cpu = Horizons::march(&grid, Vec2::ONE, &facets, azimuths, 0.02);
+            let cpu = HorizonMap::march(&grid, Vec2::ONE, &facets, azimuths, 0.02);
             let made = march.horizons(&gpu, &grid, Vec2::ONE, &facets, azimuths).unwrap();
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             assert!(made.runs() > 1);

@@ -7,7 +7,7 @@ mod slices;
 pub use maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
 #[cfg(test)]
 pub(crate) use march::crossings;
-pub use march::{GpuHeightMarch, GpuHorizons};
+pub use march::{GpuHeightMarch, GpuHorizonMap};
 pub use slices::GpuSlicer;
 #[cfg(test)]
 pub(crate) use slices::tests::looks;

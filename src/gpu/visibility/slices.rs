@@ -1,5 +1,5 @@
-//! Horizons and slices of any mesh on wgpu: the twin of [`Slices::scan`](crate::visibility::Slices::scan) and
-//! [`Horizons::scan`](crate::visibility::Horizons::scan), left on the device for whatever reads them there.
+//! HorizonMap and slices of any mesh on wgpu: the twin of [`OcclusionIntervals::scan`](crate::visibility::OcclusionIntervals::scan) and
+//! [`HorizonMap::scan`](crate::visibility::HorizonMap::scan), left on the device for whatever reads them there.
 //!
 //! A slice keeps four of the intervals that hang above its horizon; what is above the third is one where there are more (in 0.2 %
 //! of slices through the densest pile of rods that ships: `looks_of_slices` in the tests prints it).
@@ -12,19 +12,19 @@ use super::march::{Placing, THREADS, directions, runs};
 use crate::geometry::grid::ray_cast::{LIFT, lifted_origin};
 use crate::geometry::{Facets, PeriodicGrid};
 use crate::gpu::device::pipelines::{READ, UNIFORM, WRITE};
-use crate::gpu::{Gpu, GpuError, GpuHorizons};
+use crate::gpu::{Gpu, GpuError, GpuHorizonMap};
 use crate::visibility::scan::FACING_MARGIN;
 
 /// `KEPT` in `slice_scan.wgsl`, and the horizon.
 const WORDS_A_SLICE: usize = 5;
 
 /// The most workgroups of a dispatch along one axis.
-const MOST_GROUPS: u32 = 65_535;
+const MAX_GROUPS: u32 = 65_535;
 
 /// Cells and triangles that a walk looks at, besides the cells of sixteen tiles: see `scan.rs`. Fewer than there, as a device
 /// looks at one triangle at a time, and must not take long. Walks that end there are not counted: the CPU's, which refine the
 /// picture, are.
-const LEAST_LOOKS: usize = 32_768;
+const MIN_LOOKS: usize = 32_768;
 
 /// `slice_scan.wgsl`, compiled when a tile first asks for horizons or for slices: build once, use for any tile.
 #[derive(Debug)]
@@ -96,7 +96,7 @@ impl GpuSlicer {
         facets: &Facets,
         azimuths: usize,
         hanging: bool,
-    ) -> Result<GpuHorizons, GpuError> {
+    ) -> Result<GpuHorizonMap, GpuError> {
         let words = if hanging { WORDS_A_SLICE } else { 1 };
         let pipeline = match &self.compiled[usize::from(hanging)] {
             Some(pipeline) => pipeline.clone(),
@@ -115,7 +115,7 @@ impl GpuSlicer {
         pipeline: wgpu::ComputePipeline,
         words: usize,
         (grid, facets, azimuths): (&PeriodicGrid, &Facets, usize),
-    ) -> Result<GpuHorizons, GpuError> {
+    ) -> Result<GpuHorizonMap, GpuError> {
         use wgpu::BufferUsages as Usage;
         let params = Params {
             tile_size: grid.tile_size,
@@ -125,7 +125,7 @@ impl GpuSlicer {
             facing_margin: FACING_MARGIN,
             azimuths: azimuths as u32,
             facet_count: facets.len() as u32,
-            looks: (LEAST_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize) as u32,
+            looks: (MIN_LOOKS + 16 * (grid.cells.x + grid.cells.y) as usize) as u32,
             near: 10.0 * LIFT * grid.tile_size.length(),
             first_azimuth: 0,
             pad: 0,
@@ -155,7 +155,7 @@ impl GpuSlicer {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             gpu.group("slices", &self.layout, &bound)
         })?;
-        Ok(GpuHorizons { first: Some(first), pipeline, runs, elevations: found, azimuths })
+        Ok(GpuHorizonMap { first: Some(first), pipeline, runs, elevations: found, azimuths })
     }
 
     /// The dispatch that puts the copies of triangles where cells have them: it is quicker than to upload these.
@@ -170,7 +170,7 @@ impl GpuSlicer {
             entries,
         ];
         let group = gpu.group("triangles of cells", &self.to_place, &bound.map(wgpu::Buffer::as_entire_binding))?;
-        let across = (rows.len() as u32).div_ceil(THREADS).clamp(1, MOST_GROUPS);
+        let across = (rows.len() as u32).div_ceil(THREADS).clamp(1, MAX_GROUPS);
         let workgroups = [across, (rows.len() as u32).div_ceil(THREADS * across)];
         Ok((self.place.clone(), group, workgroups))
     }

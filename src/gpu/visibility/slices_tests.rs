@@ -6,7 +6,7 @@ use crate::pipeline::Pipeline;
 use crate::plan::{Preset, Settings};
 use crate::scene;
 use crate::visibility::shadow_view::{ShadowView, affordable, extent};
-use crate::visibility::{Horizons, Slices};
+use crate::visibility::{HorizonMap, OcclusionIntervals};
 
 fn open_gpu() -> Option<Gpu> {
     Gpu::open().map_err(|error| eprintln!("SKIPPED: {error}")).ok()
@@ -18,7 +18,7 @@ fn tile(name: &str, facets: usize) -> (TileMesh, Facets) {
     (mesh, facets)
 }
 
-fn read(gpu: &Gpu, made: &GpuHorizons) -> Vec<u32> {
+fn read(gpu: &Gpu, made: &GpuHorizonMap) -> Vec<u32> {
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     assert!(made.runs() > 1);
     for run in 0..made.runs() {
@@ -41,7 +41,7 @@ fn both_routes_find_the_same_horizons_of_meshes_without_overhangs() {
     for (name, azimuths) in [("table4_teapot", 13), ("table4_cup", 8), ("fig5c_uneven", 11), ("fig8b_ripples", 10)] {
         let (mesh, facets) = tile(name, 300);
         let grid = PeriodicGrid::new(&mesh);
-        let cpu = Horizons::scan(&grid, &facets, azimuths, 0.02);
+        let cpu = HorizonMap::scan(&grid, &facets, azimuths, 0.02);
         let made = slicer.slices(&gpu, &grid, &facets, azimuths, false).unwrap();
         let device: Vec<f32> = read(&gpu, &made).into_iter().map(f32::from_bits).collect();
         let off = (0..device.len()).map(|k| (device[k] - cpu.elevation(k % azimuths, k / azimuths)).abs());
@@ -59,7 +59,7 @@ fn both_routes_find_the_same_intervals_under_overhangs() {
     for name in ["table4_pillow", "table4_skirt", "fig6c_velvet_up"] {
         let (mesh, facets) = tile(name, 200);
         let grid = PeriodicGrid::new(&mesh);
-        let cpu = Slices::scan(&grid, &facets, azimuths, 0.02);
+        let cpu = OcclusionIntervals::scan(&grid, &facets, azimuths, 0.02);
         let (starts, intervals) = cpu.hanging_by_facet();
         let made = slicer.slices(&gpu, &grid, &facets, azimuths, true).unwrap();
         let words = read(&gpu, &made);
@@ -121,7 +121,7 @@ fn looks_of_slices() {
         ["table4_pillow", "table4_skirt", "fig6a_velvet_spread", "fig6c_velvet_up", "table4_teapot", "table4_cup"]
     {
         let (mesh, facets) = tile(name, 1024);
-        let of = Slices::scan(&PeriodicGrid::for_slices(&mesh), &facets, 24, 0.02);
+        let of = OcclusionIntervals::scan(&PeriodicGrid::for_slices(&mesh), &facets, 24, 0.02);
         let (starts, _) = of.hanging_by_facet();
         let many = starts.windows(2).filter(|ends| ends[1] - ends[0] > 4).count();
         let many = 100.0 * many as f64 / (starts.len() - 1) as f64;

@@ -1,16 +1,16 @@
 //! Directions of the upper hemisphere: angles, polar grids, half vectors. Small-scale frame: z up, angles in radians.
 
 mod half_difference;
+mod hemisphere_pair_grid;
 mod paraboloid;
 mod polar_grid;
-mod upper_pairs;
 
 use glam::Vec3;
 
 pub use half_difference::HalfDifferenceGrid;
+pub use hemisphere_pair_grid::{GridCoordinates, HemispherePairGrid};
 pub use paraboloid::{ParaboloidMap, ParaboloidSphere};
 pub use polar_grid::{PolarGrid, Tap};
-pub use upper_pairs::{Places, UpperPairs};
 
 /// The unit vector at `theta` from +z and `phi` from +x towards +y.
 pub fn from_angles(theta: f32, phi: f32) -> Vec3 {

@@ -1,17 +1,17 @@
-//! Eight values at once, for code with too many branches for the compiler to make vectors of.
+//! SimdF32x8 values at once, for code with too many branches for the compiler to make vectors of.
 
 use std::ops::{Add, Div, Mul, Sub};
 
 use glam::{BVec4A, Vec4};
 
 /// Arithmetic on eight values.
-pub(crate) trait Eight:
+pub(crate) trait SimdF32x8:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// A yes or no for each.
     type Mask: Copy;
 
-    fn of(values: &Fours) -> Self;
+    fn of(values: &F32x8Array) -> Self;
     fn splat(value: f32) -> Self;
     fn to_array(self) -> [f32; 8];
     fn min(self, other: Self) -> Self;
@@ -24,12 +24,12 @@ pub(crate) trait Eight:
     fn bits(mask: Self::Mask) -> u32;
 }
 
-/// Eight values in memory, and how every machine computes with them.
+/// SimdF32x8 values in memory, and how every machine computes with them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(32))]
-pub(crate) struct Fours(pub [Vec4; 2]);
+pub(crate) struct F32x8Array(pub [Vec4; 2]);
 
-impl Fours {
+impl F32x8Array {
     pub fn splat(value: f32) -> Self {
         Self([Vec4::splat(value); 2])
     }
@@ -58,18 +58,18 @@ fn halves<T: Copy, U: Copy, R>(a: [T; 2], b: [U; 2], of: impl Fn(T, U) -> R) -> 
 }
 
 operators! {
-    Fours,
-    Add add |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a + b)),
-    Sub sub |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a - b)),
-    Mul mul |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a * b)),
-    Div div |a: Fours, b: Fours| Fours(halves(a.0, b.0, |a, b| a / b))
+    F32x8Array,
+    Add add |a: F32x8Array, b: F32x8Array| F32x8Array(halves(a.0, b.0, |a, b| a + b)),
+    Sub sub |a: F32x8Array, b: F32x8Array| F32x8Array(halves(a.0, b.0, |a, b| a - b)),
+    Mul mul |a: F32x8Array, b: F32x8Array| F32x8Array(halves(a.0, b.0, |a, b| a * b)),
+    Div div |a: F32x8Array, b: F32x8Array| F32x8Array(halves(a.0, b.0, |a, b| a / b))
 }
 
-impl Eight for Fours {
+impl SimdF32x8 for F32x8Array {
     type Mask = [BVec4A; 2];
 
     #[inline(always)]
-    fn of(values: &Fours) -> Self {
+    fn of(values: &F32x8Array) -> Self {
         *values
     }
     #[inline(always)]
@@ -112,34 +112,34 @@ impl Eight for Fours {
 }
 
 /// Work that computes with eight values at once, on whatever holds them.
-pub(crate) trait InEights {
+pub(crate) trait InSimdF32x8 {
     type Output;
 
     /// To be inlined always: only then is it compiled for what `E` needs.
-    fn with<E: Eight>(self) -> Self::Output;
+    fn with<E: SimdF32x8>(self) -> Self::Output;
 }
 
 /// Does the work in the widest registers that were found.
-pub(crate) fn eight<W: InEights>(work: W) -> W::Output {
+pub(crate) fn eight<W: InSimdF32x8>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         #[target_feature(enable = "avx2,fma")]
-        fn avx2<W: InEights>(work: W) -> W::Output {
+        fn avx2<W: InSimdF32x8>(work: W) -> W::Output {
             work.with::<avx::Wide>()
         }
         // SAFETY: the features the function was compiled for were just found.
         return unsafe { avx2(work) };
     }
-    work.with::<Fours>()
+    work.with::<F32x8Array>()
 }
 
 #[cfg(target_arch = "x86_64")]
 mod avx {
     use std::arch::x86_64::*;
 
-    use super::{Add, Div, Eight, Fours, Mul, Sub};
+    use super::{Add, Div, F32x8Array, Mul, SimdF32x8, Sub};
 
-    /// Eight values in one register. Every `unsafe` here rests on AVX being there: none is made but by
+    /// SimdF32x8 values in one register. Every `unsafe` here rests on AVX being there: none is made but by
     /// [`eight`](super::eight), which looks first.
     #[derive(Clone, Copy)]
     pub(super) struct Wide(__m256);
@@ -153,11 +153,11 @@ mod avx {
         Div div |a: Wide, b: Wide| Wide(unsafe { _mm256_div_ps(a.0, b.0) })
     }
 
-    impl Eight for Wide {
+    impl SimdF32x8 for Wide {
         type Mask = __m256;
 
         #[inline(always)]
-        fn of(values: &Fours) -> Self {
+        fn of(values: &F32x8Array) -> Self {
             // SAFETY: eight values in a row, as `repr(C)` lays them out, and aligned to all of them.
             Self(unsafe { _mm256_load_ps(std::ptr::from_ref(values).cast()) })
         }

@@ -70,7 +70,7 @@ impl Lobe {
 /// What an inner loop sees of one facet. `n·h` and `|n×h|²` come from `|n-h|²`, which loses nothing near the mirror
 /// direction and is quadratic in the rounding of the normal's length.
 #[derive(Clone, Copy)]
-struct Seen {
+struct LobeInput {
     n_dot_i: f32,
     n_dot_o: f32,
     n_dot_h: f32,
@@ -78,11 +78,11 @@ struct Seen {
 }
 
 #[inline(always)]
-fn see(pair: &PairVectors, x: f32, y: f32, z: f32) -> Seen {
+fn see(pair: &PairVectors, x: f32, y: f32, z: f32) -> LobeInput {
     let (i, o, h) = (pair.i, pair.o, pair.h);
     let (dx, dy, dz) = (x - h.x, y - h.y, z - h.z);
     let d2 = dx * dx + dy * dy + dz * dz;
-    Seen {
+    LobeInput {
         n_dot_i: (x * i.x + y * i.y + z * i.z).max(0.0),
         n_dot_o: (x * o.x + y * o.y + z * o.z).max(0.0),
         n_dot_h: (1.0 - 0.5 * d2).max(1e-6),
@@ -90,7 +90,7 @@ fn see(pair: &PairVectors, x: f32, y: f32, z: f32) -> Seen {
     }
 }
 
-impl Seen {
+impl LobeInput {
     #[inline(always)]
     fn lit(self) -> bool {
         self.n_dot_i * self.n_dot_o > 0.0
@@ -102,7 +102,7 @@ impl Seen {
 /// A trait and not a closure: a closure cannot be made to inline, and one call a facet keeps the loop from vectorising
 /// (Blinn-Phong, whose power is long, ran twelve times slower that way).
 trait Value: Copy {
-    fn at(self, n: Seen) -> f32;
+    fn at(self, n: LobeInput) -> f32;
 }
 
 /// (n·i)(n·o)/π
@@ -111,7 +111,7 @@ struct Lambertian;
 
 impl Value for Lambertian {
     #[inline(always)]
-    fn at(self, n: Seen) -> f32 {
+    fn at(self, n: LobeInput) -> f32 {
         n.n_dot_i * n.n_dot_o * (1.0 / PI)
     }
 }
@@ -125,7 +125,7 @@ struct BlinnPhong {
 
 impl Value for BlinnPhong {
     #[inline(always)]
-    fn at(self, n: Seen) -> f32 {
+    fn at(self, n: LobeInput) -> f32 {
         let log = (self.half_exponent * ln_one_minus(n.sin2.min(0.999_999))).min(0.0);
         self.scale * exp_negative(log) * (n.n_dot_i * n.n_dot_o)
     }
@@ -141,7 +141,7 @@ struct CookTorrance {
 
 impl Value for CookTorrance {
     #[inline(always)]
-    fn at(self, n: Seen) -> f32 {
+    fn at(self, n: LobeInput) -> f32 {
         let inverse_cos2 = 1.0 / (n.n_dot_h * n.n_dot_h);
         let d = exp_negative(-n.sin2 * inverse_cos2 * self.inverse_m2) * inverse_cos2 * inverse_cos2 * self.scale;
         d * (self.masking * n.n_dot_h * n.n_dot_i.min(n.n_dot_o)).min(1.0)
@@ -157,7 +157,7 @@ struct Ward {
 
 impl Value for Ward {
     #[inline(always)]
-    fn at(self, n: Seen) -> f32 {
+    fn at(self, n: LobeInput) -> f32 {
         self.scale
             * exp_negative(-n.sin2 / (n.n_dot_h * n.n_dot_h) * self.inverse_alpha2)
             * (n.n_dot_i * n.n_dot_o).sqrt()
@@ -173,7 +173,7 @@ struct Ggx {
 
 impl Value for Ggx {
     #[inline(always)]
-    fn at(self, n: Seen) -> f32 {
+    fn at(self, n: LobeInput) -> f32 {
         let rest = 1.0 - self.alpha2;
         let t = n.sin2 + self.alpha2 * n.n_dot_h * n.n_dot_h;
         let smith_o = (self.alpha2 + rest * n.n_dot_i * n.n_dot_i).sqrt();

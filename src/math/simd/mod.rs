@@ -13,11 +13,11 @@ mod rows;
 mod tests;
 mod visibility;
 
-pub(crate) use eight::{Eight, Fours, InEights, eight};
+pub(crate) use eight::{F32x8Array, InSimdF32x8, SimdF32x8, eight};
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub(crate) use math::cubic_weights;
-pub use pairs::{LightPairs, azimuth_and_elevation, pair_places, pair_vectors};
+pub use pairs::{LightPairs, azimuth_and_elevation, pair_grid_coordinates, pair_vectors};
 pub use rows::{RowGrid, row_sums};
 pub use visibility::{
     SWITCH, blend_bits, ground_sum, ground_visibility, interval_cover, masked_sum, projected_area, stepped_visibility,

@@ -25,7 +25,7 @@ pub struct LightPairs {
 const STEP: usize = 16;
 
 impl LightPairs {
-    pub const MOST: usize = LANES;
+    pub const MAX: usize = LANES;
 
     pub fn new() -> Self {
         let empty = [0.0; LANES];
@@ -33,7 +33,7 @@ impl LightPairs {
         Self { o, i: three, h: three, i_dot_h: empty, azimuths: empty, elevations: empty, padded: 0 }
     }
 
-    /// Takes up to [`LightPairs::MOST`] lights and a view.
+    /// Takes up to [`LightPairs::MAX`] lights and a view.
     pub fn set(&mut self, lights: &[Vec3], o: Vec3) {
         let lights = &lights[..lights.len().min(LANES)];
         self.o = o;
@@ -107,9 +107,9 @@ fn upper_angle(y: f32, x: f32) -> f32 {
 }
 
 multiversion! {
-    /// Coordinates of the pairs (light `k`, `o`) on [`UpperPairs`](crate::math::directions::UpperPairs), each in `[0, 1]`:
+    /// Coordinates of the pairs (light `k`, `o`) on [`HemispherePairGrid`](crate::math::directions::HemispherePairGrid), each in `[0, 1]`:
     /// `√(1 - cos θ_h)`, φ_h in turns, φ_d in half turns, the place of θ_d for the given crowding; and `i·h`.
-    pub fn pair_places(lights: [&[f32]; 3], o: Vec3, crowding: f32, out: &mut [[f32; LANES]; 5]) {
+    pub fn pair_grid_coordinates(lights: [&[f32]; 3], o: Vec3, crowding: f32, out: &mut [[f32; LANES]; 5]) {
         let [x, y, z] = lights;
         let n = x.len().min(y.len()).min(z.len()).min(LANES);
         let (x, y, z) = (&x[..n], &y[..n], &z[..n]);

@@ -15,7 +15,7 @@ pub struct RowGrid {
     pub turn: usize,
     /// θ_d, with one more at either end than it has.
     pub stored: usize,
-    /// Fours of columns a node.
+    /// F32x8Array of columns a node.
     pub fours: usize,
 }
 
@@ -114,7 +114,7 @@ fn read_each(values: &[Vec4], fours: usize, taps: &Taps, k: usize, out: &mut [Ve
 
 multiversion! {
     /// All columns of `count` pairs, `[pair][four]`: linear between half vectors and in φ_d; along θ_d cubic (Catmull and Rom
-    /// 1974) or linear. `places` are those of [`UpperPairs::places`](crate::math::directions::UpperPairs::places), in steps.
+    /// 1974) or linear. `places` are those of [`HemispherePairGrid::places`](crate::math::directions::HemispherePairGrid::places), in steps.
     pub fn row_sums(values: &[Vec4], grid: RowGrid, places: &[[f32; LANES]; 5], count: usize, cubic: bool, out: &mut [Vec4]) {
         let taps = taps(grid, places, count, cubic);
         for (k, out) in out.chunks_mut(grid.fours.max(1)).enumerate().take(count.min(LANES)) {

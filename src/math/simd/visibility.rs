@@ -17,7 +17,7 @@ multiversion! {
     }
 }
 
-/// Horizons further apart than this [rad] belong to different things: nothing lies between them.
+/// HorizonMap further apart than this [rad] belong to different things: nothing lies between them.
 const JUMP: f32 = 0.1;
 
 /// How fast one azimuth's view gives way to the next one's where they differ.

@@ -23,7 +23,7 @@ pub struct CameraView {
     pub tan_half_fov: Vec2,
     /// Depth of the near plane.
     pub near: f32,
-    /// Picture size in pixels.
+    /// Image size in pixels.
     pub size: [usize; 2],
 }
 
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_framed_object_stays_inside_the_picture_from_everywhere_and_nearly_fills_it() {
+    fn the_framed_object_stays_inside_the_image_from_everywhere_and_nearly_fills_it() {
         for kind in ["sphere", "teapot", "skirt"] {
             let mesh = object(kind);
             for size in [[300, 200], [200, 300]] {

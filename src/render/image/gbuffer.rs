@@ -5,7 +5,7 @@
 //!   perpendicular; the frame's y is `normal × tangent`;
 //! - where the back of a two-sided surface shows, its normal is turned over;
 //! - a normal that leans away from the viewer (smooth normals do, at silhouettes) is bent towards the viewer, in the plane of
-//!   both, just until `n · o` is [`LEAST_COSINE`]: the least change that keeps the material's answer defined, so that no
+//!   both, just until `n · o` is [`MIN_COSINE`]: the least change that keeps the material's answer defined, so that no
 //!   black fringe appears.
 
 use glam::Vec3;
@@ -16,7 +16,7 @@ use super::raster::{NOTHING, Sample};
 use crate::render::{CameraView, ObjectMesh};
 
 /// Smallest cosine between a shading normal and the direction to the viewer (88.85°).
-pub const LEAST_COSINE: f32 = 0.02;
+pub const MIN_COSINE: f32 = 0.02;
 
 /// One entry a sample in every array, row by row. Where `triangles` is [`NOTHING`] the others are zero.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -80,14 +80,14 @@ fn resolve(mesh: &ObjectMesh, view: &CameraView, sample: &Sample) -> (Vec3, Vec3
     (position, normal, perpendicular(mix(&mesh.tangents), normal))
 }
 
-/// The unit vector nearest to the unit `normal` whose cosine with the unit `viewer` is at least [`LEAST_COSINE`].
+/// The unit vector nearest to the unit `normal` whose cosine with the unit `viewer` is at least [`MIN_COSINE`].
 pub fn bent_towards(normal: Vec3, viewer: Vec3) -> Vec3 {
     let cosine = normal.dot(viewer);
-    if cosine >= LEAST_COSINE {
+    if cosine >= MIN_COSINE {
         return normal;
     }
     let across = (normal - viewer * cosine).try_normalize().unwrap_or_else(|| viewer.any_orthonormal_vector());
-    viewer * LEAST_COSINE + across * (1.0 - LEAST_COSINE * LEAST_COSINE).sqrt()
+    viewer * MIN_COSINE + across * (1.0 - MIN_COSINE * MIN_COSINE).sqrt()
 }
 
 /// The part of `tangent` perpendicular to the unit `normal`, of unit length; any perpendicular where there is none.
@@ -120,7 +120,7 @@ mod tests {
             for k in covered {
                 let (n, t) = (buffer.normals[k], buffer.tangents[k]);
                 let viewer = (view.eye - buffer.positions[k]).normalize();
-                assert!(n.dot(viewer) >= LEAST_COSINE - 1e-5, "{kind}");
+                assert!(n.dot(viewer) >= MIN_COSINE - 1e-5, "{kind}");
                 assert!(
                     (n.length() - 1.0).abs() < 1e-5 && (t.length() - 1.0).abs() < 1e-5 && n.dot(t).abs() < 1e-5,
                     "{kind}"
@@ -148,7 +148,7 @@ mod tests {
         let viewer = Vec3::Z;
         let away = Vec3::new(0.8, 0.0, -0.6);
         let bent = bent_towards(away, viewer);
-        assert!((bent.dot(viewer) - LEAST_COSINE).abs() < 1e-6 && bent.y == 0.0 && bent.x > 0.0);
+        assert!((bent.dot(viewer) - MIN_COSINE).abs() < 1e-6 && bent.y == 0.0 && bent.x > 0.0);
         let facing = Vec3::new(0.0, 0.6, 0.8);
         assert_eq!(bent_towards(facing, viewer), facing);
     }

@@ -2,7 +2,7 @@
 
 pub mod camera;
 pub mod gbuffer;
-pub mod picture;
+pub mod image_file;
 pub mod raster;
 pub mod render;
 pub mod shading;

@@ -9,7 +9,7 @@ use crate::base::{InputError, Result};
 use crate::effective::Reflectance;
 use crate::render::shadow::Occluder;
 use crate::render::shadow::shadow_cache::ShadowCache;
-use crate::render::{CameraView, DirectionalLight, GBuffer, ObjectMesh, Picture};
+use crate::render::{CameraView, DirectionalLight, GBuffer, Image, ObjectMesh};
 use crate::scene;
 
 /// Most samples (pixels times samples a pixel) of one picture; the G-buffer takes 56 bytes for each at its peak.
@@ -34,7 +34,7 @@ pub struct RenderInput<'a> {
 
 /// Milliseconds a stage took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct StageTimes {
+pub struct RenderTimes {
     /// Of visibility and product, where a device makes them with the picture.
     pub product_ms: f64,
     pub gbuffer_ms: f64,
@@ -44,8 +44,8 @@ pub struct StageTimes {
 
 #[derive(Debug, Clone, Default)]
 pub struct Rendered {
-    pub picture: Picture,
-    pub times: StageTimes,
+    pub image: Image,
+    pub times: RenderTimes,
     /// Points at which the material was evaluated.
     pub points: usize,
 }
@@ -64,15 +64,15 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
         .map(|occluder| occluder.visible(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
     let after_shadows = Instant::now();
     let radiance = shading::radiance(&points, input.lights, visible.as_ref(), view.eye, input.reflectance);
-    let picture = shading::gather(&points, &radiance, &view, input.background);
+    let image = shading::gather(&points, &radiance, &view, input.background);
     let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
-    let times = StageTimes {
+    let times = RenderTimes {
         product_ms: 0.0,
         gbuffer_ms: ms(start, after_gbuffer),
         shadows_ms: ms(after_gbuffer, after_shadows),
         shading_ms: ms(after_shadows, Instant::now()),
     };
-    Ok(Rendered { picture, times, points: points.len() })
+    Ok(Rendered { image, times, points: points.len() })
 }
 
 pub(crate) fn check_size([width, height]: [usize; 2], samples_per_side: usize) -> Result<()> {

@@ -48,7 +48,7 @@ fn front() -> scene::Camera {
     scene::Camera { azimuth_deg: 0.0, elevation_deg: 0.0, ..scene::Camera::default() }
 }
 
-fn picture(
+fn image(
     mesh: &ObjectMesh,
     lights: &[DirectionalLight],
     reflectance: &dyn Reflectance,
@@ -85,9 +85,9 @@ fn a_lambertian_sphere_has_its_closed_form_radiance() {
     let mesh = object("sphere");
     let direction = Vec3::new(0.48, 0.64, 0.6);
     let lights = [DirectionalLight { direction, irradiance: Vec3::new(PI, 2.0 * PI, 0.0) }];
-    let rendered = picture(&mesh, &lights, &Lambertian, &front());
+    let rendered = image(&mesh, &lights, &Lambertian, &front());
     let mut checked = 0;
-    for (k, pixel) in rendered.picture.pixels.iter().enumerate() {
+    for (k, pixel) in rendered.image.pixels.iter().enumerate() {
         let Some(normal) = sphere_normal(&front(), &mesh, k) else {
             continue;
         };
@@ -105,9 +105,9 @@ fn the_highlight_of_a_mirror_like_sphere_lies_where_the_half_vector_is_the_norma
     let mesh = object("sphere");
     let direction = Vec3::new(0.6, 0.48, 0.64);
     let lights = [DirectionalLight { direction, irradiance: Vec3::ONE }];
-    let rendered = picture(&mesh, &lights, &Brushed { alpha: [0.05, 0.05] }, &front());
+    let rendered = image(&mesh, &lights, &Brushed { alpha: [0.05, 0.05] }, &front());
     let brightest =
-        (0..128 * 128).max_by(|&a, &b| rendered.picture.pixels[a].x.total_cmp(&rendered.picture.pixels[b].x)).unwrap();
+        (0..128 * 128).max_by(|&a, &b| rendered.image.pixels[a].x.total_cmp(&rendered.image.pixels[b].x)).unwrap();
     let normal = sphere_normal(&front(), &mesh, brightest).unwrap();
     let eye = CameraView::new(&front(), &mesh, [128, 128]).unwrap().eye;
     let half = (direction + (eye - normal).normalize()).normalize();
@@ -120,8 +120,8 @@ fn an_anisotropic_highlight_on_a_sphere_stretches_along_tile_y_where_that_is_wid
     let mesh = object("sphere");
     let lights = [DirectionalLight { direction: Vec3::Z, irradiance: Vec3::ONE }];
     let extent = |alpha| {
-        let rendered = picture(&mesh, &lights, &Brushed { alpha }, &front());
-        let lit = |k: usize| rendered.picture.pixels[k].x > 0.4 * rendered.picture.pixels[64 * 128 + 64].x;
+        let rendered = image(&mesh, &lights, &Brushed { alpha }, &front());
+        let lit = |k: usize| rendered.image.pixels[k].x > 0.4 * rendered.image.pixels[64 * 128 + 64].x;
         let wide = (0..128).filter(|x| lit(64 * 128 + x)).count();
         let tall = (0..128).filter(|y| lit(y * 128 + 64)).count();
         (wide, tall)
@@ -142,27 +142,27 @@ fn edges_are_averaged_in_linear_radiance_and_coverage_matches_the_disc() {
     let mesh = object("sphere");
     let lights = [DirectionalLight { direction: Vec3::Z, irradiance: Vec3::ONE }];
     let camera = scene::Camera { distance: 40.0, fov_deg: 3.5, ..front() };
-    let rendered = picture(&mesh, &lights, &White, &camera);
-    let sum: f32 = rendered.picture.pixels.iter().map(|p| p.x).sum();
+    let rendered = image(&mesh, &lights, &White, &camera);
+    let sum: f32 = rendered.image.pixels.iter().map(|p| p.x).sum();
     // The rim seen under perspective: angular radius asin(1/40).
     let radius = 64.0 * (1f32 / 40.0).asin().tan() / 1.75f32.to_radians().tan();
     assert!((sum / (PI * radius * radius) - 1.0).abs() < 0.01, "{sum}");
-    assert!(rendered.picture.pixels.iter().any(|p| p.x > 0.1 && p.x < 0.9));
+    assert!(rendered.image.pixels.iter().any(|p| p.x > 0.1 && p.x < 0.9));
 }
 
 #[test]
-fn one_and_several_threads_give_the_same_picture() {
+fn one_and_several_threads_give_the_same_image() {
     let mesh = object("cup");
     let lights = lights::build(&scene::Light::default(), Path::new(".")).unwrap().directional;
     let with_threads = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
-        pool.install(|| picture(&mesh, &lights, &Lambertian, &scene::Camera::default()).picture)
+        pool.install(|| image(&mesh, &lights, &Lambertian, &scene::Camera::default()).image)
     };
     assert_eq!(with_threads(1), with_threads(3));
 }
 
 #[test]
-fn sizes_that_make_no_picture_are_errors() {
+fn sizes_that_make_no_image_are_errors() {
     let mesh = object("sphere");
     for (size, samples_per_side) in [([0, 4], 1), ([4, 4], 0), ([1 << 20, 1 << 20], 2), ([usize::MAX, 2], 1)] {
         let camera = front();
@@ -232,7 +232,7 @@ fn contact_sheet_of_every_object_when_asked_for() {
                 best.times.shading_ms,
                 mesh.warnings
             );
-            best.picture.write(&folder.join(format!("{name}_{look}.png")), &tone_map).unwrap();
+            best.image.write(&folder.join(format!("{name}_{look}.png")), &tone_map).unwrap();
         }
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::shading_points::ShadingPoints;
 use crate::effective::Reflectance;
 use crate::render::shadow::Visible;
-use crate::render::{CameraView, DirectionalLight, Picture};
+use crate::render::{CameraView, DirectionalLight, Image};
 
 /// Points a task works on.
 const CHUNK: usize = 256;
@@ -75,7 +75,7 @@ impl Background {
 }
 
 /// The picture: points averaged within their pixels over the background, in linear radiance.
-pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &Background) -> Picture {
+pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &Background) -> Image {
     let [width, height] = view.size;
     let mut coverage = vec![0f32; width * height];
     let mut pixels = vec![Vec3::ZERO; width * height];
@@ -88,5 +88,5 @@ pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, back
             *pixel += background.at(k, view.size) * (1.0 - covered);
         }
     }
-    Picture { width, height, pixels }
+    Image { width, height, pixels }
 }

@@ -14,7 +14,7 @@ struct WideNode {
     high: [Vec4; 3],
     /// Inner: the node inside. Leaf: its first four triangles.
     first: [u32; WIDTH],
-    /// Fours of triangles of a leaf; 0 for an inner node.
+    /// F32x8Array of triangles of a leaf; 0 for an inner node.
     fours: [u32; WIDTH],
     /// A bit a box.
     used: u32,
@@ -35,7 +35,7 @@ pub(crate) struct WideBvh {
 }
 
 /// Steps of directions are no smaller: their inverse is finite, so that no box is lost to a product of zero and infinity.
-const LEAST: f32 = 1e-20;
+const MIN: f32 = 1e-20;
 
 impl WideBvh {
     pub(crate) fn new(bvh: &Bvh) -> Self {
@@ -96,7 +96,7 @@ impl WideBvh {
             return true;
         }
         let axes = [origin.x, origin.y, origin.z].map(Vec4::splat);
-        let inverse = direction.to_array().map(|d| Vec4::splat(1.0 / if d.abs() < LEAST { LEAST } else { d }));
+        let inverse = direction.to_array().map(|d| Vec4::splat(1.0 / if d.abs() < MIN { MIN } else { d }));
         let mut stack = [0_u32; (WIDTH - 1) * (MAX_DEPTH + 4)];
         let mut depth = usize::from(!self.nodes.is_empty());
         while depth > 0 {

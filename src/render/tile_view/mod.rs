@@ -14,9 +14,9 @@ use std::sync::Arc;
 use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{DirectionalLight, Picture};
+use super::{DirectionalLight, Image};
 use crate::base::{Cancel, Error, Result};
-use crate::effective::SumMaterial;
+use crate::effective::Material;
 use crate::geometry::{PeriodicGrid, TileMesh};
 use crate::math::directions::from_angles;
 
@@ -61,9 +61,9 @@ pub enum Look {
 
 /// The materials by slot, as [`crate::pipeline::Pipeline::sum_materials`] gives them.
 #[derive(Debug, Clone, Copy)]
-pub struct Wearing<'a> {
+pub struct ShadedMaterials<'a> {
     pub material_of_slot: &'a [usize],
-    pub materials: &'a [SumMaterial],
+    pub materials: &'a [Material],
 }
 
 impl TileView {
@@ -127,14 +127,14 @@ impl CloseUp {
     ///
     /// # Errors
     /// [`Error::Cancelled`].
-    pub fn picture(
+    pub fn image(
         &self,
         view: &TileView,
         look: &Look,
-        wearing: Wearing<'_>,
+        wearing: ShadedMaterials<'_>,
         background: Vec3,
         cancel: &Cancel,
-    ) -> Result<Picture> {
+    ) -> Result<Image> {
         let [width, height] = view.size;
         if width == 0 || height == 0 || width.saturating_mul(height) > 1 << 25 {
             return Err(Error::failed(format!("a picture of {width} x {height} pixels")));
@@ -153,6 +153,6 @@ impl CloseUp {
             }
         });
         cancel.check()?;
-        Ok(Picture { width, height, pixels })
+        Ok(Image { width, height, pixels })
     }
 }

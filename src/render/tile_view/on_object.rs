@@ -4,12 +4,12 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{CloseUp, Wearing};
+use super::{CloseUp, ShadedMaterials};
 use crate::base::{Cancel, Result};
 use crate::geometry::Hit;
 use crate::math::directions::half_vector;
 use crate::render::image::shading_points::ShadingPoints;
-use crate::render::{CameraView, GBuffer, ObjectMesh, Picture, RenderInput};
+use crate::render::{CameraView, GBuffer, Image, ObjectMesh, RenderInput};
 
 /// A tile's shorter side, in radii of the object: small enough that the whole object shows none.
 pub const TILE_RADII: f32 = 0.012;
@@ -37,9 +37,9 @@ impl CloseUp {
     /// A camera that cannot be, or [`crate::base::Error::Cancelled`].
     pub fn blend_into(
         &self,
-        picture: &mut Picture,
+        image: &mut Image,
         input: &RenderInput,
-        wearing: Wearing<'_>,
+        wearing: ShadedMaterials<'_>,
         cancel: &Cancel,
     ) -> Result<()> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
@@ -81,7 +81,7 @@ impl CloseUp {
             .collect();
         cancel.check()?;
         for (&pixel, (weight, radiance)) in points.pixels.iter().zip(shaded) {
-            let place = &mut picture.pixels[pixel as usize];
+            let place = &mut image.pixels[pixel as usize];
             *place = place.lerp(radiance, weight);
         }
         Ok(())
@@ -97,7 +97,7 @@ impl CloseUp {
     }
 
     /// `f_r (n·i)+ V(i)` of a point [1/sr].
-    fn lit(&self, hit: &Hit, i: Vec3, o: Vec3, wearing: Wearing<'_>) -> Vec3 {
+    fn lit(&self, hit: &Hit, i: Vec3, o: Vec3, wearing: ShadedMaterials<'_>) -> Vec3 {
         let (normal, geometric) = self.normals(hit, o);
         let slot = usize::from(self.mesh.slot_at(hit.triangle as usize, hit.position.truncate()));
         let material = wearing.material_of_slot.get(slot).and_then(|index| wearing.materials.get(*index));

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::{CloseUp, Look, Wearing};
-use crate::effective::SumMaterial;
+use super::{CloseUp, Look, ShadedMaterials};
+use crate::effective::Material;
 use crate::geometry::Hit;
 use crate::math::directions::{from_angles, half_vector};
 
@@ -12,23 +12,23 @@ const LIFT: f32 = 1e-4;
 
 /// Materials with the colours that clay takes from them.
 pub(super) struct Palette<'a> {
-    wearing: Wearing<'a>,
+    wearing: ShadedMaterials<'a>,
     clay: Vec<Vec3>,
 }
 
 impl<'a> Palette<'a> {
-    pub(super) fn new(wearing: Wearing<'a>) -> Self {
+    pub(super) fn new(wearing: ShadedMaterials<'a>) -> Self {
         Self { wearing, clay: wearing.materials.iter().map(clay_of).collect() }
     }
 
-    fn material(&self, slot: u16) -> Option<(usize, &'a SumMaterial)> {
+    fn material(&self, slot: u16) -> Option<(usize, &'a Material)> {
         let index = *self.wearing.material_of_slot.get(usize::from(slot))?;
         Some((index, self.wearing.materials.get(index)?))
     }
 }
 
 /// The hue of a material as a matte colour: what it reflects at moderate angles, scaled to a clay's brightness.
-fn clay_of(material: &SumMaterial) -> Vec3 {
+fn clay_of(material: &Material) -> Vec3 {
     let i = from_angles(0.6, 0.0);
     let seen = [(0.6, std::f32::consts::PI), (0.3, 0.5), (0.9, 2.0)];
     let sum: Vec3 =

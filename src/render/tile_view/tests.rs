@@ -61,36 +61,35 @@ fn the_mean_over_a_tile_is_what_the_effective_brdf_says() {
     let brdf = pipeline.effective(&loaded).unwrap().brdf;
     let (material_of_slot, materials) = pipeline.sum_materials(&loaded).unwrap();
     let tile = CloseUp::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
-    let wearing = Wearing { material_of_slot: &material_of_slot, materials: &materials };
+    let wearing = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
     for (i, azimuth, elevation) in [(from_angles(0.5, 1.0), 0.4_f32, 1.0_f32), (from_angles(1.0, 3.0), 0.1, 0.8)] {
         let o = from_angles(std::f32::consts::FRAC_PI_2 - elevation, azimuth);
         let light = DirectionalLight { direction: i, irradiance: Vec3::ONE };
         // Grooves run along y: any picture whose columns hold whole periods along the view's right axis will do; a large
         // one averages the rest out.
         let view = TileView { azimuth, elevation, center: Vec2::ZERO, span: 37.0, size: [420, 420] };
-        let picture =
-            tile.picture(&view, &Look::Materials(vec![light]), wearing, Vec3::ZERO, &Cancel::default()).unwrap();
-        let mean = picture.pixels.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>() / picture.pixels.len() as f64;
+        let image = tile.image(&view, &Look::Materials(vec![light]), wearing, Vec3::ZERO, &Cancel::default()).unwrap();
+        let mean = image.pixels.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>() / image.pixels.len() as f64;
         let expected = brdf.eval(i, o).as_dvec3();
         assert!((mean - expected).length() < 0.02 * expected.length(), "{mean} {expected}");
     }
 }
 
 #[test]
-fn a_cancelled_picture_is_an_error_and_clay_takes_the_hue() {
+fn a_cancelled_image_is_an_error_and_clay_takes_the_hue() {
     let tile = wavy();
-    let red = SumMaterial { brdf: Brdf { terms: vec![Term::Lambertian { albedo: Vec3::X }] }, color: Vec3::ONE };
-    let wearing = Wearing { material_of_slot: &[0], materials: std::slice::from_ref(&red) };
+    let red = Material { brdf: Brdf { terms: vec![Term::Lambertian { albedo: Vec3::X }] }, color: Vec3::ONE };
+    let wearing = ShadedMaterials { material_of_slot: &[0], materials: std::slice::from_ref(&red) };
     let cancel = Cancel::default();
-    let picture = tile.picture(&from_above(16), &Look::Clay, wearing, Vec3::ZERO, &cancel).unwrap();
-    assert!(picture.pixels.iter().all(|p| p.x > 0.05 && p.y < 1e-4 && p.z < 1e-4));
+    let image = tile.image(&from_above(16), &Look::Clay, wearing, Vec3::ZERO, &cancel).unwrap();
+    assert!(image.pixels.iter().all(|p| p.x > 0.05 && p.y < 1e-4 && p.z < 1e-4));
     cancel.set();
-    let picture = tile.picture(&from_above(16), &Look::Clay, wearing, Vec3::ZERO, &cancel);
-    assert!(matches!(picture, Err(Error::Cancelled)));
+    let image = tile.image(&from_above(16), &Look::Clay, wearing, Vec3::ZERO, &cancel);
+    assert!(matches!(image, Err(Error::Cancelled)));
 }
 
 #[test]
-fn coming_closer_the_tiles_show_and_the_picture_keeps_its_brightness() {
+fn coming_closer_the_tiles_show_and_the_image_keeps_its_brightness() {
     use crate::render::image::shading::Background;
     use crate::render::render;
     use crate::render::{RenderInput, object};
@@ -103,7 +102,7 @@ fn coming_closer_the_tiles_show_and_the_picture_keeps_its_brightness() {
     let mut pipeline = Pipeline::new();
     let brdf = pipeline.effective(&loaded).unwrap().brdf;
     let (material_of_slot, materials) = pipeline.sum_materials(&loaded).unwrap();
-    let wearing = Wearing { material_of_slot: &material_of_slot, materials: &materials };
+    let wearing = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
     let tile = CloseUp::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
     let object = scene::Object { kind: "sphere".to_owned(), path: None };
     let mesh = object::build(&object, std::path::Path::new("")).unwrap();
@@ -122,15 +121,15 @@ fn coming_closer_the_tiles_show_and_the_picture_keeps_its_brightness() {
             samples_per_side: 1,
             background: &Background::default(),
         };
-        let far = render(&input).unwrap().picture;
+        let far = render(&input).unwrap().image;
         let mut near = far.clone();
         tile.blend_into(&mut near, &input, wearing, &Cancel::default()).unwrap();
         assert_eq!(near != far, changes, "{fov_deg}");
-        let mean = |picture: &Picture| picture.pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / 57600.0;
+        let mean = |image: &Image| image.pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / 57600.0;
         assert!((mean(&near) / mean(&far) - 1.0).abs() < 0.05, "{} {}", mean(&near), mean(&far));
-        let spread = |picture: &Picture| {
-            let m = mean(picture);
-            picture.pixels.iter().map(|p| (f64::from(p.x) - m).powi(2)).sum::<f64>()
+        let spread = |image: &Image| {
+            let m = mean(image);
+            image.pixels.iter().map(|p| (f64::from(p.x) - m).powi(2)).sum::<f64>()
         };
         assert!(!changes || spread(&near) > 4.0 * spread(&far), "the tiles' own contrast shows");
     }

@@ -16,7 +16,7 @@ const MAX_TEXELS: u64 = 1 << 26;
 /// Maps are averaged down to at most this width; lights need no more.
 const KEPT_WIDTH: usize = 1024;
 /// No light is brighter (the sun's disc is 2·10⁹ W/(sr m²)); sums over a map and a picture stay far inside an f32.
-const LARGEST_RADIANCE: f32 = 1e18;
+const MAX_RADIANCE: f32 = 1e18;
 
 fn broken(path: &Path, what: impl Display, expected: &str) -> Error {
     InputError::new("light.environment", what, expected).in_file(path).into()
@@ -64,7 +64,7 @@ fn cleaned(mut map: LatLongMap) -> Environment {
     let mut bad = 0usize;
     for texel in &mut map.texels {
         // A comparison that NaN fails.
-        let clean = texel.map(|value| if (0.0..=LARGEST_RADIANCE).contains(&value) { value } else { 0.0 });
+        let clean = texel.map(|value| if (0.0..=MAX_RADIANCE).contains(&value) { value } else { 0.0 });
         // A NaN is unequal to itself, so this counts it too.
         bad += usize::from(clean != *texel);
         *texel = clean;
@@ -73,7 +73,7 @@ fn cleaned(mut map: LatLongMap) -> Environment {
     if bad > 0 {
         let all = map.texels.len();
         warnings.push(format!(
-            "{bad} of the environment's {all} texels are negative, NaN, or above {LARGEST_RADIANCE:e} and count as black there"
+            "{bad} of the environment's {all} texels are negative, NaN, or above {MAX_RADIANCE:e} and count as black there"
         ));
     }
     Environment { map: reduced(map), warnings }

@@ -5,16 +5,16 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::facet_groups::Patch;
+use super::facet_groups::NormalCluster;
 use crate::brdf::LobeAngles;
 use crate::effective::{FacetSum, Group};
 use crate::math::simd;
 use crate::math::simd::LightPairs;
-use crate::visibility::{Horizons, Visibility};
+use crate::visibility::{HorizonMap, Visibility};
 
 /// What is known of each run of facets with one normal before any direction is asked for.
 #[derive(Debug, Clone)]
-pub(crate) struct FewNormals {
+pub(crate) struct ClusteredSum {
     runs: usize,
     /// `[azimuth][run]`: elevations [rad] up to which no facet and from which on every facet sees a direction.
     reach: Vec<[f32; 2]>,
@@ -24,22 +24,22 @@ pub(crate) struct FewNormals {
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub sum: &'a FacetSum,
-    pub horizons: &'a Horizons,
+    pub horizons: &'a HorizonMap,
     pub o: Vec3,
     /// Of all facets, the area times the visibility along `o`.
     pub areas: &'a [f32],
 }
 
 /// Runs of one normal with their groups; black groups have none.
-fn runs(sum: &FacetSum) -> impl Iterator<Item = (&Group, &Patch)> {
+fn runs(sum: &FacetSum) -> impl Iterator<Item = (&Group, &NormalCluster)> {
     let lit = sum.groups().iter().filter(|group| !group.is_black);
     lit.flat_map(|group| group.patches.iter().flatten().map(move |patch| (group, patch)))
 }
 
-impl FewNormals {
+impl ClusteredSum {
     /// `None` where normals are many, colours vary over facets of one material, or visibility is not held as horizons.
     pub(crate) fn of(sum: &FacetSum, visibility: &Visibility) -> Option<Self> {
-        let Visibility::Horizons(horizons) = visibility else { return None };
+        let Visibility::HorizonMap(horizons) = visibility else { return None };
         let ranges: Vec<Range<usize>> =
             sum.has_few_normals().then(|| runs(sum).map(|(_, patch)| patch.range.clone()).collect())?;
         Some(Self { runs: ranges.len(), reach: horizons.reach(&ranges) })
@@ -47,9 +47,9 @@ impl FewNormals {
 
     /// `a_v f̄` of each light into `out`.
     pub(crate) fn sums(&self, view: View, lights: &[Vec3], pairs: &mut LightPairs, mut out: impl FnMut(usize, DVec3)) {
-        for (part, lights) in lights.chunks(LightPairs::MOST).enumerate() {
+        for (part, lights) in lights.chunks(LightPairs::MAX).enumerate() {
             pairs.set(lights, view.o);
-            let mut totals = [DVec3::ZERO; LightPairs::MOST];
+            let mut totals = [DVec3::ZERO; LightPairs::MAX];
             for (run, (group, patch)) in runs(view.sum).enumerate() {
                 if patch.normal.dot(view.o) > 0.0 {
                     let seen = self.seen(view, (run, patch), pairs, lights.len());
@@ -57,7 +57,7 @@ impl FewNormals {
                 }
             }
             for (k, (total, light)) in totals.into_iter().zip(lights).enumerate() {
-                out(part * LightPairs::MOST + k, if light.z > 0.0 { total } else { DVec3::ZERO });
+                out(part * LightPairs::MAX + k, if light.z > 0.0 { total } else { DVec3::ZERO });
             }
         }
     }
@@ -66,15 +66,15 @@ impl FewNormals {
     fn seen(
         &self,
         view: View,
-        (run, patch): (usize, &Patch),
+        (run, patch): (usize, &NormalCluster),
         pairs: &LightPairs,
         lights: usize,
-    ) -> [f64; LightPairs::MOST] {
+    ) -> [f64; LightPairs::MAX] {
         let areas = &view.areas[patch.range.clone()];
         let along =
             |azimuth: f32, elevation: f32| view.horizons.seen_along([azimuth, elevation], patch.range.clone(), areas);
         let mut all = None;
-        let mut seen = [0.0; LightPairs::MOST];
+        let mut seen = [0.0; LightPairs::MAX];
         for (k, seen) in seen.iter_mut().enumerate().take(lights) {
             let (azimuth, elevation) = (pairs.azimuths[k], pairs.elevations[k]);
             if patch.normal.dot(pairs.light(k)) <= 0.0 {
@@ -97,12 +97,12 @@ impl FewNormals {
 const ABOVE_ALL: f32 = 4.0;
 
 /// Adds what facets of one normal reflect of each light.
-fn add(group: &Group, normal: Vec3, pairs: &LightPairs, seen: &[f64], totals: &mut [DVec3; LightPairs::MOST]) {
+fn add(group: &Group, normal: Vec3, pairs: &LightPairs, seen: &[f64], totals: &mut [DVec3; LightPairs::MAX]) {
     if seen.iter().all(|&seen| seen == 0.0) {
         return;
     }
     let color = group.color.as_dvec3();
-    let mut values = [0.0; LightPairs::MOST];
+    let mut values = [0.0; LightPairs::MAX];
     for (lobe, term) in &group.lobes {
         simd::light_lobes(*lobe, pairs, normal, &mut values);
         for (k, (seen, total)) in seen.iter().zip(&mut *totals).enumerate().filter(|(_, (seen, _))| **seen > 0.0) {
@@ -124,7 +124,7 @@ fn add(group: &Group, normal: Vec3, pairs: &LightPairs, seen: &[f64], totals: &m
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effective::Form;
+    use crate::effective::Representation;
     use crate::math::directions::from_angles;
     use crate::pipeline::Pipeline;
 
@@ -132,8 +132,8 @@ mod tests {
     fn sums_for_many_lights_are_the_plain_sums_whether_a_light_is_high_low_or_between() {
         let loaded = crate::scene::open("fig4b_bicolor_cup", &["quality.preset=draft".to_owned()]).unwrap();
         let outcome = Pipeline::new().effective(&loaded).unwrap();
-        let Form::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-        assert!(FewNormals::of(&direct.sum, &direct.visibility).is_some());
+        let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+        assert!(ClusteredSum::of(&direct.sum, &direct.visibility).is_some());
         let facets = direct.sum.facet_count();
         let seen = |d: Vec3| {
             let mut v = vec![0.0; facets];

@@ -7,7 +7,7 @@ pub const FINEST: f64 = 13.0;
 /// Facets of the coarsest.
 const COARSEST_FACETS: f64 = 16.0;
 /// With fewer, single pairs near the horizon hold most of the error, and other pairs miss them.
-const LEAST_AZIMUTHS: f64 = 24.0;
+const MIN_AZIMUTHS: f64 = 24.0;
 /// From here on the narrower penumbra of `fine` pays.
 const FINE_FACETS: usize = 24_000;
 
@@ -19,7 +19,7 @@ const FINE_FACETS: usize = 24_000;
 pub fn rung(x: f64, overhangs: bool) -> Candidate {
     let x = if x.is_finite() { x.clamp(0.0, FINEST) } else { 0.0 };
     let facets = (COARSEST_FACETS * x.exp2()).round();
-    let azimuths = (40.0 * (facets / 2048.0).powf(0.3)).max(LEAST_AZIMUTHS) * if overhangs { 1.5 } else { 1.0 };
+    let azimuths = (40.0 * (facets / 2048.0).powf(0.3)).max(MIN_AZIMUTHS) * if overhangs { 1.5 } else { 1.0 };
     let azimuths = 2 * (0.5 * azimuths).round() as usize;
     let facets = facets as usize;
     Candidate {

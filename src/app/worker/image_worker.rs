@@ -11,11 +11,11 @@ use crate::render::image::tone_map::ToneMap;
 use crate::render::tile_view::CloseUp;
 use crate::scene::{Camera, LoadedScene};
 
-use super::made::{Grade, Image, Made, PictureAnswer, PictureJob};
+use super::made::{DisplayImage, Grade, ImageAnswer, ImageJob, Made};
 use super::on_device::{DeviceDrafts, as_preset};
 use super::runner::Desk;
 use super::shared::{Shared, SmallScale, lock, small_scale};
-use super::studio::{Close, Shot, Studio, Worn};
+use super::studio::{Close, ImageStudio, Shot, Worn};
 use super::tone::color_image;
 
 /// A first picture should be there after this many milliseconds.
@@ -25,7 +25,7 @@ const STEPS_MS: [f64; 2] = [300.0, 2000.0];
 /// The last one; where the view's own size would take longer, it is smaller (an exported picture never is).
 const FINAL_MS: f64 = 8000.0;
 /// Most pixels of a picture, on the processor and on a graphics processor; a larger view shows it enlarged.
-const MOST_PIXELS: [f64; 2] = [768.0 * 768.0, 3840.0 * 2160.0];
+const MAX_PIXELS: [f64; 2] = [768.0 * 768.0, 3840.0 * 2160.0];
 /// A draft that takes longer than this is given up for a newer edit; quicker ones are all shown, so that the picture follows.
 const PATIENCE: Duration = Duration::from_millis(700);
 /// How often refinement looks whether the draft is there.
@@ -42,7 +42,7 @@ const LONGEST: f64 = 4096.0;
 pub struct Photographer {
     shared: Arc<Shared>,
     pipeline: Pipeline,
-    studio: Studio,
+    studio: ImageStudio,
     /// The tile, while pictures are so close that it shows.
     close: Option<(SmallScale, Close)>,
     /// Milliseconds a pixel, of the draft's and of the refined BRDF.
@@ -57,8 +57,8 @@ const FIRST_COST: f64 = 2e-2;
 
 impl Photographer {
     pub fn new(shared: Arc<Shared>, cache: &Cache) -> Self {
-        let (mut pipeline, studio) = (Pipeline::new(), Studio::default());
-        pipeline.keep_in(cache.clone());
+        let (mut pipeline, studio) = (Pipeline::new(), ImageStudio::default());
+        pipeline.set_cache(cache.clone());
         Self {
             shared,
             pipeline,
@@ -71,17 +71,17 @@ impl Photographer {
     }
 
     /// A picture at once: with the refined BRDF where it is known, else with a draft.
-    pub fn draft(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
+    pub fn draft(&mut self, job: &ImageJob, desk: &Desk<ImageJob>, answer: &dyn Fn(ImageAnswer)) {
         let shared = self.shared.clone();
         let _drafting = shared.drafting(job.version);
         let done = self.toned(job).and_then(|toned| match toned {
             Some(made) => Ok(made),
             None => self.drafted(job, &desk.cancel.after(PATIENCE)),
         });
-        tell(job, done.map(|made| answer(PictureAnswer::Made(Box::new(made)))), answer);
+        tell(job, done.map(|made| answer(ImageAnswer::Made(Box::new(made)))), answer);
     }
 
-    fn drafted(&mut self, job: &PictureJob, cancel: &Cancel) -> Result<Made> {
+    fn drafted(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<Made> {
         self.pipeline.cancel_with(cancel.clone());
         self.choose_device(job, false);
         self.studio.prepare(&job.loaded)?;
@@ -97,13 +97,13 @@ impl Photographer {
     }
 
     /// A draft whose visibility and product a graphics processor makes with the picture, as fine as it is fast.
-    fn drafted_on_device(&mut self, job: &PictureJob, cancel: &Cancel) -> Result<Option<Made>> {
+    fn drafted_on_device(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<Option<Made>> {
         if !self.studio.is_fast() || self.studio.is_close(&camera(&job.loaded), job.size) {
             return Ok(None);
         }
         let Some(tile) = self.on_device.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
         let size = self.affordable(job.size, 0, DRAFT_MS);
-        let made = match self.shoot(job, Worn::Unseen(&tile), 0, size, 1, cancel) {
+        let made = match self.shoot(job, Worn::GpuTile(&tile), 0, size, 1, cancel) {
             Ok(made) => made,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
             // The device does not do it, or failed at it.
@@ -120,7 +120,7 @@ impl Photographer {
     }
 
     /// Sees to it that no device is opened that is of no use, and, unless there is time, none before the window told.
-    fn choose_device(&mut self, job: &PictureJob, has_time: bool) {
+    fn choose_device(&mut self, job: &ImageJob, has_time: bool) {
         let devices = self.shared.devices.get();
         if let Some(devices) = devices {
             if let Some(name) = &devices.only_software {
@@ -139,7 +139,7 @@ impl Photographer {
     }
 
     /// The scene's own quality, once the hand rests; given up when newer work is there.
-    pub fn refine(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) {
+    pub fn refine(&mut self, job: &ImageJob, desk: &Desk<ImageJob>, answer: &dyn Fn(ImageAnswer)) {
         let mut is_newest = desk.is_newest_after(REST);
         // Both want all cores, and the draft is what the hand waits for.
         while is_newest && !self.shared.is_drafted(job.version) {
@@ -150,7 +150,7 @@ impl Photographer {
         }
     }
 
-    fn refined(&mut self, job: &PictureJob, desk: &Desk<PictureJob>, answer: &dyn Fn(PictureAnswer)) -> Result<()> {
+    fn refined(&mut self, job: &ImageJob, desk: &Desk<ImageJob>, answer: &dyn Fn(ImageAnswer)) -> Result<()> {
         if self.is_toned(job) {
             return Ok(());
         }
@@ -159,12 +159,12 @@ impl Photographer {
         let mut outcome = match self.shared.known(&job.loaded) {
             Some(outcome) => outcome.without_times(),
             None => {
-                answer(PictureAnswer::Doing(job.version, "Refining the material"));
+                answer(ImageAnswer::Doing(job.version, "Refining the material"));
                 self.pipeline.effective(&job.loaded)?
             }
         };
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
-        answer(PictureAnswer::Doing(job.version, "Refining the picture"));
+        answer(ImageAnswer::Doing(job.version, "Refining the picture"));
         self.studio.prepare(&job.loaded)?;
         let mut shown = 0;
         for budget in STEPS_MS {
@@ -177,7 +177,7 @@ impl Photographer {
                 made.grade = Grade::Refining;
                 outcome.times = Vec::new();
                 shown = pixels;
-                answer(PictureAnswer::Made(Box::new(made)));
+                answer(ImageAnswer::Made(Box::new(made)));
             }
         }
         let full = self.affordable(job.size, 1, FINAL_MS);
@@ -185,14 +185,14 @@ impl Photographer {
         made.grade = Grade::Final;
         made.warnings.clone_from(&outcome.health().warnings);
         // What stays on the device is made anew in other tones.
-        let last = made.picture.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, made.clone()));
+        let last = made.radiance.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, made.clone()));
         *lock(&self.shared.last) = last;
-        answer(PictureAnswer::Made(Box::new(made)));
+        answer(ImageAnswer::Made(Box::new(made)));
         Ok(())
     }
 
     /// Whether the last full picture shows this but for its tones.
-    fn is_toned(&self, job: &PictureJob) -> bool {
+    fn is_toned(&self, job: &ImageJob) -> bool {
         lock(&self.shared.last).as_ref().is_some_and(|(last, size, _)| {
             let (mut like_last, before) = ((*job.loaded).clone(), camera(last));
             let now = camera(&job.loaded);
@@ -204,14 +204,14 @@ impl Photographer {
     }
 
     /// The last full picture in other tones, where nothing else changed.
-    fn toned(&mut self, job: &PictureJob) -> Result<Option<Made>> {
+    fn toned(&mut self, job: &ImageJob) -> Result<Option<Made>> {
         if !self.is_toned(job) {
             return Ok(None);
         }
         let start = Instant::now();
         let Some((last, _, made)) = &mut *lock(&self.shared.last) else { return Ok(None) };
-        let Some(picture) = &made.picture else { return Ok(None) };
-        made.image = Image::Pixels(Arc::new(color_image(picture, &ToneMap::new(&camera(&job.loaded))?)));
+        let Some(radiance) = &made.radiance else { return Ok(None) };
+        made.image = DisplayImage::Pixels(Arc::new(color_image(radiance, &ToneMap::new(&camera(&job.loaded))?)));
         made.version = job.version;
         made.stages = vec![("tone", ms(start))];
         made.latency_ms = ms(job.asked);
@@ -221,7 +221,7 @@ impl Photographer {
 
     fn shoot(
         &mut self,
-        job: &PictureJob,
+        job: &ImageJob,
         worn: Worn,
         which: usize,
         size: [usize; 2],
@@ -239,13 +239,13 @@ impl Photographer {
         let shot = Shot { camera: &camera, material: worn, size, samples_per_side, settle, backend: &self.backend };
         let close = self.close.as_ref().map(|(_, close)| close);
         let shown = if close.is_none() { self.studio.show(&shot, &tone_map, cancel)? } else { None };
-        let (picture, image, times, table_ms, tone) = match shown {
-            Some(shown) => (None, Image::OnDevice(shown.image), shown.times, shown.table_ms, None),
+        let (radiance, image, times, table_ms, tone) = match shown {
+            Some(shown) => (None, DisplayImage::OnDevice(shown.image), shown.times, shown.table_ms, None),
             None => {
                 let (rendered, table_ms) = self.studio.shoot(&shot, close, cancel)?;
                 let start = Instant::now();
-                let image = Image::Pixels(Arc::new(color_image(&rendered.picture, &tone_map)));
-                (Some(Arc::new(rendered.picture)), image, rendered.times, table_ms, Some(ms(start)))
+                let image = DisplayImage::Pixels(Arc::new(color_image(&rendered.image, &tone_map)));
+                (Some(Arc::new(rendered.image)), image, rendered.times, table_ms, Some(ms(start)))
             }
         };
         let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
@@ -261,7 +261,7 @@ impl Photographer {
         ];
         let (plan, preset, times, notes, brdf) = match worn {
             Worn::Known(of) => (&of.plan, of.settings.preset, &of.times, &of.notes, Some(of.brdf.clone())),
-            Worn::Unseen(of) => (&of.plan, of.settings.preset, &of.times, &of.notes, None),
+            Worn::GpuTile(of) => (&of.plan, of.settings.preset, &of.times, &of.notes, None),
         };
         let mut stages = times.clone();
         stages.extend(large.into_iter().filter(|(_, ms)| *ms > 0.005));
@@ -271,7 +271,7 @@ impl Photographer {
         Ok(Made {
             version: job.version,
             grade: Grade::Draft,
-            picture,
+            radiance,
             image,
             brdf,
             stages,
@@ -300,7 +300,7 @@ impl Photographer {
 
     /// The largest size, the view's shape kept, that `budget_ms` is likely to pay for.
     fn affordable(&self, size: [usize; 2], which: usize, budget_ms: f64) -> [usize; 2] {
-        let full = fitting(size, MOST_PIXELS[usize::from(self.studio.is_fast())]);
+        let full = fitting(size, MAX_PIXELS[usize::from(self.studio.is_fast())]);
         let pixels = (full[0] * full[1]) as f64;
         let scale = (budget_ms / self.cost[which] / pixels).sqrt();
         // Few sizes, so that the picture does not breathe while the hand moves.
@@ -319,10 +319,10 @@ fn fitting(size: [usize; 2], most: f64) -> [usize; 2] {
 }
 
 /// Says why there is no picture; work that was given up is none to speak of.
-fn tell(job: &PictureJob, done: Result<()>, answer: &dyn Fn(PictureAnswer)) {
+fn tell(job: &ImageJob, done: Result<()>, answer: &dyn Fn(ImageAnswer)) {
     match done {
         Ok(()) | Err(Error::Cancelled) => {}
-        Err(error) => answer(PictureAnswer::Failed(job.version, error.to_string())),
+        Err(error) => answer(ImageAnswer::Failed(job.version, error.to_string())),
     }
 }
 

@@ -2,8 +2,8 @@
 //! (`src/filtering/sampled.rs`), but that facets which share a normal are picked as others are.
 
 use super::direct::{SOFTWARE_FACETS, Shared, Sum, pieces};
-use super::seen::Seen;
-use super::table_of_sum::{Shape, Step, columns_of, workgroups};
+use super::tabulate::{Step, TableShape, columns_of, workgroups};
+use super::visibility::GpuVisibility;
 use super::{GpuShading, MAX_GROUPS, Variant};
 use crate::effective::shading_table::columns::{Column, Part};
 use crate::effective::{FacetSum, share_of};
@@ -25,7 +25,7 @@ type Pick = [u32; 2];
 /// Which facets of a group, and what is summed over them.
 pub(crate) struct OfGroup<'a> {
     pub(crate) sum: &'a FacetSum,
-    pub(crate) seen: &'a Seen<'a>,
+    pub(crate) seen: &'a GpuVisibility<'a>,
     pub(crate) shared: &'a Shared,
     pub(crate) columns: &'a [Column],
     pub(crate) group: usize,
@@ -57,7 +57,7 @@ impl GpuShading {
         &mut self,
         gpu: &Gpu,
         of: &OfGroup,
-        shape: Shape,
+        shape: TableShape,
         [angles, values]: [&wgpu::Buffer; 2],
     ) -> Result<Vec<Step>, GpuError> {
         let OfGroup { sum, seen, shared, columns, group, .. } = *of;

@@ -9,14 +9,14 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Shape, kept};
+use super::{TileShape, kept};
 use crate::base::{Cancel, Result};
 use crate::cache::Cache;
-use crate::effective::{EffectiveBrdf, Form, Interpolation, Nodes, PairTable};
+use crate::effective::{EffectiveBrdf, Interpolation, Nodes, Representation, ShadingTable};
 use crate::geometry::mirror_planes;
-use crate::math::directions::UpperPairs;
-use crate::metrics::{Errors, Pair, picture_pairs, upper_errors};
-use crate::plan::{PICTURE_CHECK_PAIRS, Settings};
+use crate::math::directions::HemispherePairGrid;
+use crate::metrics::{Errors, Pair, image_pairs, upper_errors};
+use crate::plan::{IMAGE_CHECK_PAIRS, Settings};
 use crate::scene::Switch;
 use crate::visibility::Visibility;
 
@@ -45,7 +45,7 @@ const TRIED_FROM: usize = 60_000;
 
 /// The effective BRDF as pictures read it.
 #[derive(Debug, Clone)]
-pub struct Pictured {
+pub struct ShadingBrdf {
     /// A table, or the BRDF itself.
     pub brdf: Arc<EffectiveBrdf>,
     /// What the table's error against the BRDF stays below; absent where the BRDF itself is read and none was tried.
@@ -61,26 +61,26 @@ pub(super) type Earlier = (Arc<EffectiveBrdf>, bool);
 
 /// Makes the table of one effective BRDF, once.
 #[derive(Debug)]
-pub(super) struct Pictures {
+pub(super) struct Images {
     exact: Arc<EffectiveBrdf>,
-    grids: Vec<UpperPairs>,
+    grids: Vec<HemispherePairGrid>,
     interpolation: Interpolation,
     /// The tile, whose mirror planes spare part of a table; absent where nothing shall be spared.
-    mirrored: Option<Arc<Shape>>,
+    mirrored: Option<Arc<TileShape>>,
     tolerance: (f64, f64),
     seed: u64,
     earlier: Mutex<Option<Earlier>>,
     cache: Cache,
     /// Tables that were made, and read.
     tables: [AtomicUsize; 2],
-    made: Mutex<Option<Pictured>>,
+    made: Mutex<Option<ShadingBrdf>>,
 }
 
-impl Pictures {
+impl Images {
     /// `wanted`: whether the plan expects a table to pay.
     pub(super) fn new(
         exact: Arc<EffectiveBrdf>,
-        shape: &Arc<Shape>,
+        shape: &Arc<TileShape>,
         settings: &Settings,
         wanted: bool,
         earlier: Option<Earlier>,
@@ -89,9 +89,9 @@ impl Pictures {
         Self {
             exact,
             mirrored: (settings.effects.mirror_symmetry != Switch::Off).then(|| shape.clone()),
-            grids: if wanted { settings.picture_grids.clone() } else { Vec::new() },
+            grids: if wanted { settings.image_grids.clone() } else { Vec::new() },
             interpolation: settings.interpolation,
-            tolerance: settings.picture_tolerance,
+            tolerance: settings.image_tolerance,
             seed: settings.seed,
             earlier: Mutex::new(earlier),
             cache: cache.clone(),
@@ -114,18 +114,18 @@ impl Pictures {
     }
 
     /// The table, made now if it was not yet.
-    pub(super) fn get(&self, cancel: &Cancel) -> Result<Pictured> {
+    pub(super) fn get(&self, cancel: &Cancel) -> Result<ShadingBrdf> {
         let mut made = lock(&self.made);
         if let Some(made) = &*made {
-            return Ok(Pictured { ms: 0.0, ..made.clone() });
+            return Ok(ShadingBrdf { ms: 0.0, ..made.clone() });
         }
         let start = Instant::now();
         let (brdf, errors) = self.make(cancel)?;
         let [tables_made, read] = self.tables.each_ref().map(|count| count.load(Ordering::Relaxed));
         let was_kept = read > 0 && tables_made == 0;
-        let pictured = Pictured { brdf, errors, ms: start.elapsed().as_secs_f64() * 1e3, was_kept };
-        *made = Some(pictured.clone());
-        Ok(pictured)
+        let shading_brdf = ShadingBrdf { brdf, errors, ms: start.elapsed().as_secs_f64() * 1e3, was_kept };
+        *made = Some(shading_brdf.clone());
+        Ok(shading_brdf)
     }
 
     fn make(&self, cancel: &Cancel) -> Result<(Arc<EffectiveBrdf>, Option<Errors>)> {
@@ -135,10 +135,10 @@ impl Pictures {
         }
         let check = Check::new(&self.exact, self.seed);
         let (mut reused, failed) = self.reused();
-        if let Form::Direct(direct) = self.exact.direct_form() {
+        if let Representation::Direct(direct) = self.exact.direct_form() {
             for step in THINNED {
-                let Some(thinned) = direct.thinned(step) else { break };
-                let brdf = self.exact.with_direct_form(Form::Direct(thinned));
+                let Some(strided_subset) = direct.strided_subset(step) else { break };
+                let brdf = self.exact.with_direct_form(Representation::Direct(strided_subset));
                 let errors = check.errors(&brdf);
                 if self.is_close(errors) {
                     return Ok((Arc::new(brdf), Some(errors)));
@@ -175,16 +175,18 @@ impl Pictures {
         Ok((self.exact.clone(), least))
     }
 
-    fn holding(&self, table: PairTable) -> EffectiveBrdf {
-        self.exact.with_direct_form(Form::Table(table.read(self.interpolation)))
+    fn holding(&self, table: ShadingTable) -> EffectiveBrdf {
+        self.exact.with_direct_form(Representation::Table(table.read(self.interpolation)))
     }
 
     /// A table on this grid, if a trial of some of its nodes is close enough; from fewer facets where that is no worse.
-    fn attempt(&self, grid: UpperPairs, check: &Check, cancel: &Cancel) -> Result<Attempt> {
+    fn attempt(&self, grid: HemispherePairGrid, check: &Check, cancel: &Cancel) -> Result<Attempt> {
         let mirrors = self.mirrored.as_ref().map_or([false; 2], |shape| mirror_planes(&shape.mesh));
         let summed = match self.exact.direct_form() {
             // Of maps no part can be picked.
-            Form::Direct(direct) if !matches!(*direct.visibility, Visibility::Maps(_)) => direct.sum.facet_count(),
+            Representation::Direct(direct) if !matches!(*direct.visibility, Visibility::Maps(_)) => {
+                direct.sum.facet_count()
+            }
             _ => 0,
         };
         let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
@@ -219,9 +221,9 @@ impl Pictures {
         errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1
     }
 
-    fn tabulate(&self, nodes: Nodes, cancel: &Cancel) -> Result<Option<PairTable>> {
+    fn tabulate(&self, nodes: Nodes, cancel: &Cancel) -> Result<Option<ShadingTable>> {
         match self.exact.direct_form() {
-            Form::Direct(direct) => {
+            Representation::Direct(direct) => {
                 let table = kept::table(&self.cache, direct, nodes, cancel)?;
                 Ok(table.map(|(table, was_kept)| {
                     self.tables[usize::from(was_kept)].fetch_add(1, Ordering::Relaxed);
@@ -230,17 +232,19 @@ impl Pictures {
             }
             form => {
                 let sums = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| form.sums(lights, o, |k, sum| out[k] = sum);
-                PairTable::resample(sums, nodes, cancel).map(Some)
+                ShadingTable::resample(sums, nodes, cancel).map(Some)
             }
         }
     }
 
     /// The earlier table, where it serves; and whether none was close enough to the same lobes before.
-    fn reused(&self) -> (Option<PairTable>, bool) {
+    fn reused(&self) -> (Option<ShadingTable>, bool) {
         let Some((earlier, same_lobes)) = lock(&self.earlier).take() else { return (None, false) };
         match (earlier.direct_form(), self.exact.direct_form()) {
-            (Form::Table(table), Form::Direct(direct)) => (table.reused(&direct.sum, same_lobes), false),
-            (Form::Table(_), _) => (None, false),
+            (Representation::Table(table), Representation::Direct(direct)) => {
+                (table.reused(&direct.sum, same_lobes), false)
+            }
+            (Representation::Table(_), _) => (None, false),
             _ => (None, same_lobes),
         }
     }
@@ -248,7 +252,7 @@ impl Pictures {
 
 /// What came of a grid.
 enum Attempt {
-    Made(PairTable),
+    Made(ShadingTable),
     /// A table's error would be this.
     TooFar(Errors),
     /// No grid serves.
@@ -263,7 +267,7 @@ struct Check {
 
 impl Check {
     fn new(exact: &EffectiveBrdf, seed: u64) -> Self {
-        let mut check = Self { pairs: picture_pairs(PICTURE_CHECK_PAIRS, seed ^ 0x7ab1e), exact: Vec::new() };
+        let mut check = Self { pairs: image_pairs(IMAGE_CHECK_PAIRS, seed ^ 0x7ab1e), exact: Vec::new() };
         check.exact = check.values(exact);
         check
     }

@@ -15,7 +15,7 @@ use glam::{Mat3, Vec3};
 ///
 /// Node index is `((θ_h · azimuths + φ_h) · turn + φ_d) · difference + θ_d`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct UpperPairs {
+pub struct HemispherePairGrid {
     /// Rings of θ_h, both ends included.
     pub rings: usize,
     /// Azimuths φ_h.
@@ -26,7 +26,7 @@ pub struct UpperPairs {
     pub difference: usize,
 }
 
-impl UpperPairs {
+impl HemispherePairGrid {
     /// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²` with this `k`: there shadows and cosines change fastest.
     pub const CROWDING: f32 = 0.75;
 
@@ -102,11 +102,11 @@ impl UpperPairs {
         (lifted(frame * (along + across)), lifted(frame * (along - across)))
     }
 
-    /// Places of the pairs (light `k`, `o`) on the axes of the grid, in steps; all directions above the horizon.
-    pub fn places(&self, lights: [&[f32]; 3], o: Vec3, out: &mut Places) {
-        crate::math::simd::pair_places(lights, o, Self::CROWDING, &mut out.columns);
+    /// GridCoordinates of the pairs (light `k`, `o`) on the axes of the grid, in steps; all directions above the horizon.
+    pub fn places(&self, lights: [&[f32]; 3], o: Vec3, out: &mut GridCoordinates) {
+        crate::math::simd::pair_grid_coordinates(lights, o, Self::CROWDING, &mut out.columns);
         let scales = [(self.rings - 1) as f32, self.azimuths as f32, self.turn as f32, (self.difference - 1) as f32];
-        let n = lights[0].len().min(Places::MOST);
+        let n = lights[0].len().min(GridCoordinates::MAX);
         for (column, scale) in out.columns.iter_mut().zip(scales) {
             for at in &mut column[..n] {
                 *at *= scale;
@@ -117,19 +117,19 @@ impl UpperPairs {
 
 /// Where pairs stand on the four axes of a grid, in its steps; and `i·h`.
 #[derive(Debug, Clone)]
-pub struct Places {
-    columns: [[f32; Places::MOST]; 5],
+pub struct GridCoordinates {
+    columns: [[f32; GridCoordinates::MAX]; 5],
 }
 
-impl Default for Places {
+impl Default for GridCoordinates {
     fn default() -> Self {
-        Self { columns: [[0.0; Self::MOST]; 5] }
+        Self { columns: [[0.0; Self::MAX]; 5] }
     }
 }
 
-impl Places {
+impl GridCoordinates {
     /// Most pairs at a time.
-    pub const MOST: usize = crate::math::simd::LANES;
+    pub const MAX: usize = crate::math::simd::LANES;
 
     /// θ_h, φ_h, φ_d, θ_d of pair `k`, in steps.
     pub fn at(&self, k: usize) -> [f32; 4] {
@@ -137,7 +137,7 @@ impl Places {
     }
 
     /// θ_h, φ_h, φ_d, θ_d in steps, and `i·h`, of all pairs.
-    pub fn columns(&self) -> &[[f32; Self::MOST]; 5] {
+    pub fn columns(&self) -> &[[f32; Self::MAX]; 5] {
         &self.columns
     }
 
@@ -150,10 +150,10 @@ impl Places {
 mod tests {
     use super::*;
 
-    const GRID: UpperPairs = UpperPairs { rings: 9, azimuths: 12, turn: 6, difference: 7 };
+    const GRID: HemispherePairGrid = HemispherePairGrid { rings: 9, azimuths: 12, turn: 6, difference: 7 };
 
     fn places(i: Vec3, o: Vec3) -> ([f32; 4], f32) {
-        let mut places = Places::default();
+        let mut places = GridCoordinates::default();
         GRID.places([&[i.x], &[i.y], &[i.z]], o, &mut places);
         (places.at(0), places.i_dot_h(0))
     }

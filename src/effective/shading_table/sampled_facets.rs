@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use crate::brdf::LobeAngles;
-use crate::effective::direct::facet_groups::Patch;
+use crate::effective::direct::facet_groups::NormalCluster;
 use crate::effective::{Direct, FacetSum, Group};
 use crate::math::simd;
 use crate::math::simd::{LANES, PairVectors, total};
@@ -16,7 +16,7 @@ use crate::math::simd::{LANES, PairVectors, total};
 const EVENLY: f32 = 0.25;
 
 /// Facets that a group or a normal keeps at least.
-const FEWEST: f64 = 16.0;
+const MIN: f64 = 16.0;
 
 /// What is certain, in whole numbers: their sums have no rounding, and the twin of this on a device (`pick_facets.wgsl`) may
 /// add them up in any order. A chance of a hundredth is known to a thousandth of itself; what a pick stands for is told by the
@@ -29,7 +29,7 @@ const ROUNDS: usize = 2;
 /// How many of a run of facets are picked, where `count` are of `all`.
 pub(crate) fn share_of(run: usize, count: usize, all: usize) -> f64 {
     let run = run as f64;
-    (count as f64 * run / all.max(1) as f64).max(FEWEST).min(run)
+    (count as f64 * run / all.max(1) as f64).max(MIN).min(run)
 }
 
 impl Direct {
@@ -43,7 +43,7 @@ impl Direct {
         let lit = self.sum.groups().iter().filter(|group| !group.is_black);
         let facets: usize = lit.map(|group| group.range.len()).sum();
         let share = |range: &Range<usize>| share_of(range.len(), count, facets);
-        let mut picks = Picks::default();
+        let mut picks = SampledFacets::default();
         let groups = self.sum.groups().iter().map(|group| {
             let first = picks.facets.len();
             let patches = match &group.patches {
@@ -51,10 +51,10 @@ impl Direct {
                 Some(patches) => Some(
                     patches
                         .iter()
-                        .map(|Patch { range, normal }| {
+                        .map(|NormalCluster { range, normal }| {
                             let chance = in_whole_numbers((share(range) / range.len().max(1) as f64) as f32);
                             let range = picks.walk(range.clone(), std::iter::repeat(chance));
-                            Patch { range, normal: *normal }
+                            NormalCluster { range, normal: *normal }
                         })
                         .collect(),
                 ),
@@ -74,13 +74,13 @@ impl Direct {
 
 /// Facets in ascending order, and what each stands for.
 #[derive(Default)]
-struct Picks {
+struct SampledFacets {
     facets: Vec<usize>,
     weights: Vec<f32>,
 }
 
-impl Picks {
-    /// Picks of a run of facets those at which the sum of the chances passes a multiple of [`CERTAIN`]; where they stand.
+impl SampledFacets {
+    /// SampledFacets of a run of facets those at which the sum of the chances passes a multiple of [`CERTAIN`]; where they stand.
     fn walk(&mut self, range: Range<usize>, chances: impl Iterator<Item = u32>) -> Range<usize> {
         let first = self.facets.len();
         let mut walked = CERTAIN / 2;
@@ -164,7 +164,7 @@ impl FacetSum {
     }
 
     /// Facets that stand for all; where those of each group stand, and their runs of one normal.
-    fn sampled(&self, picks: &Picks, groups: Vec<(Range<usize>, Option<Vec<Patch>>)>) -> Self {
+    fn sampled(&self, picks: &SampledFacets, groups: Vec<(Range<usize>, Option<Vec<NormalCluster>>)>) -> Self {
         let facets = || picks.facets.iter().zip(&picks.weights);
         let areas = facets().map(|(&s, weight)| self.facet(s).1 * weight).collect();
         let normals = [0, 1, 2].map(|axis| picks.facets.iter().map(|&s| self.facet(s).0[axis]).collect());

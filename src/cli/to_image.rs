@@ -5,21 +5,20 @@ use std::time::Instant;
 
 use crate::base::{Cancel, Error};
 use crate::effective::Black;
-use crate::gpu::render::picture;
 use crate::gpu::{Gpu, GpuError, GpuRenderer, Tier};
 use crate::pipeline::{Outcome, Pipeline};
-use crate::render::Stage;
+use crate::render::RenderScene;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
 use crate::scene::LoadedScene;
 use anyhow::Result;
 
-use super::render::Route;
+use super::render::RenderPath;
 
 /// All that lies between an edit and its picture.
-pub struct ToPicture {
-    stage: Stage,
+pub struct ToImage {
+    stage: RenderScene,
     /// With the device, absent where the CPU makes pictures.
     renderer: Option<(Arc<Gpu>, GpuRenderer, wgpu::TextureView)>,
     size: [usize; 2],
@@ -27,14 +26,14 @@ pub struct ToPicture {
     pub form: String,
 }
 
-impl ToPicture {
+impl ToImage {
     pub fn new(loaded: &LoadedScene, outcome: &Outcome, size: [usize; 2]) -> Result<Self> {
-        let mut stage = Stage::new(loaded)?;
-        let gpu = Route::device(outcome)?;
+        let mut stage = RenderScene::new(loaded)?;
+        let gpu = RenderPath::device(outcome)?;
         let renderer = match gpu {
             Some(gpu) => {
                 let renderer = GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref()).map_err(Error::from)?;
-                let image = picture::image(&gpu, size).map_err(Error::from)?;
+                let image = crate::gpu::render::image::image(&gpu, size).map_err(Error::from)?;
                 let view = image.create_view(&wgpu::TextureViewDescriptor::default());
                 Some((Arc::new(gpu), renderer, view))
             }
@@ -72,7 +71,7 @@ impl ToPicture {
             }
             (None, renderer) => {
                 let outcome = pipeline.effective(loaded)?;
-                let reads = outcome.for_pictures(&cancel)?;
+                let reads = outcome.shading_brdf(&cancel)?;
                 *form = reads.brdf.form.describe();
                 let input = stage.input(&*reads.brdf, *size, 1, &background);
                 let mut times = outcome.times;

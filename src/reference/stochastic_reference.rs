@@ -16,7 +16,7 @@ const SETS: usize = 128;
 
 /// A noisy evaluation of the reference, different at each direction and for each seed.
 #[derive(Debug)]
-pub struct Glimpse<'r> {
+pub struct StochasticReference<'r> {
     reference: &'r Reference<'r>,
     facets: Facets,
     origins: Vec<Vec3>,
@@ -27,17 +27,17 @@ pub struct Glimpse<'r> {
 impl Reference<'_> {
     /// The reference for one noisy picture; `None` where paths between facets are followed, which takes too long.
     /// Once cancelled it is black, and quick.
-    pub fn glimpse(&self, seed: u64, cancel: &Cancel) -> Option<Glimpse<'_>> {
+    pub fn stochastic_reference(&self, seed: u64, cancel: &Cancel) -> Option<StochasticReference<'_>> {
         if self.bounces > 0 {
             return None;
         }
         let facets = FacetSampler::new(self.mesh).sample(self.mesh, FACETS * SETS, SampleShift::from_seed(seed));
         let origins = lifted_origins(&facets, self.mesh.size);
-        Some(Glimpse { reference: self, facets, origins, seed, cancel: cancel.clone() })
+        Some(StochasticReference { reference: self, facets, origins, seed, cancel: cancel.clone() })
     }
 }
 
-impl Reflectance for Glimpse<'_> {
+impl Reflectance for StochasticReference<'_> {
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
         let mut sums = vec![DVec3::ZERO; lights.len()];
         let mut seen = 0.0;
@@ -58,7 +58,7 @@ impl Reflectance for Glimpse<'_> {
     }
 }
 
-impl Glimpse<'_> {
+impl StochasticReference<'_> {
     /// Adds facet `s` to the sums; returns its visible area.
     fn add(&self, s: usize, lights: &[Vec3], o: Vec3, sums: &mut [DVec3]) -> f64 {
         let (normal, triangle) = (self.facets.normals[s], self.facets.triangles[s]);
@@ -102,10 +102,10 @@ mod tests {
                 let part = 1.0 / (seeds.end - seeds.start) as f32;
                 let mut means = vec![Vec3::ZERO; pairs.len()];
                 for seed in seeds {
-                    let glimpse = reference.glimpse(seed, &Cancel::default()).unwrap();
+                    let stochastic_reference = reference.stochastic_reference(seed, &Cancel::default()).unwrap();
                     for (mean, pair) in means.iter_mut().zip(&pairs) {
                         let mut value = [Vec3::ZERO];
-                        glimpse.eval_lights(&[pair.i], pair.o, &mut value);
+                        stochastic_reference.eval_lights(&[pair.i], pair.o, &mut value);
                         *mean += value[0] * part;
                     }
                 }

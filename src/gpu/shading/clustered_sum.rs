@@ -1,5 +1,5 @@
-//! Passes over runs of facets with one normal: their visible areas, and one lobe each. The twin of `FewNormals`
-//! (`src/filtering/few_normals.rs`): the device finds, too, which elevations are above or below all that a run sees.
+//! Passes over runs of facets with one normal: their visible areas, and one lobe each. The twin of `ClusteredSum`
+//! (`src/filtering/clustered_sum.rs`): the device finds, too, which elevations are above or below all that a run sees.
 
 use std::ops::Range;
 
@@ -7,8 +7,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::direct::{Shared, Sum, pieces};
-use super::seen::Seen;
-use super::table_of_sum::{Making, Nodes, Step, workgroups};
+use super::tabulate::{Making, Nodes, Step, workgroups};
+use super::visibility::GpuVisibility;
 use super::{GpuShading, Padded, TintRow, padded, tint_file};
 use crate::effective::{FacetSum, Tint};
 use crate::gpu::{Gpu, GpuError};
@@ -117,7 +117,7 @@ impl Patches {
 }
 
 /// Files that tell how much of a patch a direction sees, where facets see so.
-pub(crate) fn reach_file(seen: &Seen) -> &'static str {
+pub(crate) fn reach_file(seen: &GpuVisibility) -> &'static str {
     match seen.file() {
         "visibility_unblocked" => "reach_unblocked",
         "visibility_horizons" => "reach_horizons",
@@ -130,7 +130,7 @@ impl GpuShading {
     pub(crate) fn patches(
         &mut self,
         gpu: &Gpu,
-        (sum, seen, shared): (&FacetSum, &Seen, &Shared),
+        (sum, seen, shared): (&FacetSum, &GpuVisibility, &Shared),
         patches: &Patches,
     ) -> Result<(wgpu::Buffer, &'static str, Option<Making>), GpuError> {
         let blank = Sum::blank(sum, seen);

@@ -6,25 +6,25 @@ use glam::Vec3;
 
 use crate::base::Cancel;
 use crate::brdf::{Brdf, Term};
-use crate::effective::{Direct, EffectiveBrdf, FacetSum, Form, Interpolation, Nodes, PairTable, SumMaterial};
+use crate::effective::{Direct, EffectiveBrdf, FacetSum, Interpolation, Material, Nodes, Representation, ShadingTable};
 use crate::geometry::Facets;
-use crate::gpu::shading::seen::Seen;
 use crate::gpu::shading::tests::{
-    FLAT, GROOVES, LOBES, PYRAMIDS, SHADING_TOLERANCE, Studio, distances, effective, open, open_gpu, radiance,
+    FLAT, GROOVES, LOBES, PYRAMIDS, SHADING_TOLERANCE, TestScene, distances, effective, open, open_gpu, radiance,
 };
+use crate::gpu::shading::visibility::GpuVisibility;
 use crate::gpu::shading::{GpuMaterial, GpuShading};
 use crate::gpu::{Gpu, GpuError};
-use crate::math::directions::{UpperPairs, from_angles};
+use crate::math::directions::{HemispherePairGrid, from_angles};
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::{CameraView, GBuffer};
 use crate::visibility::Visibility;
 
-const GRID: UpperPairs = UpperPairs { rings: 5, azimuths: 10, turn: 4, difference: 6 };
+const GRID: HemispherePairGrid = HemispherePairGrid { rings: 5, azimuths: 10, turn: 4, difference: 6 };
 
-/// Horizons, and a normal for every facet.
+/// HorizonMap, and a normal for every facet.
 const RIPPLES: &str = "{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.2 }";
 
-/// Slices: threads over threads.
+/// OcclusionIntervals: threads over threads.
 const WEAVE: &str = "{ kind = \"weave\", pattern = \"plain\" }";
 
 /// Numbers of a table, relative to themselves and the mean of their column. Both sides sum single precision, and round
@@ -37,7 +37,7 @@ fn tabulated(
     gpu: &Gpu,
     shading: &mut GpuShading,
     brdf: &EffectiveBrdf,
-    of: (UpperPairs, [bool; 2], Interpolation),
+    of: (HemispherePairGrid, [bool; 2], Interpolation),
     shadowed: bool,
 ) -> Result<GpuMaterial, GpuError> {
     let (grid, mirrors, interpolation) = of;
@@ -51,8 +51,9 @@ fn tabulated_at(
     of: (Nodes, Interpolation),
     shadowed: bool,
 ) -> Result<GpuMaterial, GpuError> {
-    let Form::Direct(direct) = &brdf.form else { panic!("no sum over facets") };
-    let (pass, table) = shading.tabulated(gpu, (&direct.sum, &Seen::Held(&direct.visibility)), of, shadowed)?;
+    let Representation::Direct(direct) = &brdf.form else { panic!("no sum over facets") };
+    let (pass, table) =
+        shading.tabulated(gpu, (&direct.sum, &GpuVisibility::Held(&direct.visibility)), of, shadowed)?;
     Ok(GpuMaterial { making: Some(table), ..GpuMaterial::of(vec![pass], brdf.base_area) })
 }
 
@@ -89,8 +90,9 @@ fn worst(cpu: &[f32], device: &[f32], width: usize) -> f32 {
 
 /// Both tables of a sum, and how many columns there are.
 fn assert_same_table(what: &str, gpu: &Gpu, brdf: &EffectiveBrdf, mirrors: [bool; 2]) -> usize {
-    let Form::Direct(direct) = &brdf.form else { panic!("{what}: not direct") };
-    let table = PairTable::build(direct, Nodes { mirrors, ..Nodes::all(GRID) }, &Cancel::default()).unwrap().unwrap();
+    let Representation::Direct(direct) = &brdf.form else { panic!("{what}: not direct") };
+    let table =
+        ShadingTable::build(direct, Nodes { mirrors, ..Nodes::all(GRID) }, &Cancel::default()).unwrap().unwrap();
     let mut shading = GpuShading::new(gpu).unwrap();
     let material = tabulated(gpu, &mut shading, brdf, (GRID, mirrors, Interpolation::Cubic), false).unwrap();
     let [values, areas] = made(gpu, &material);
@@ -103,10 +105,10 @@ fn assert_same_table(what: &str, gpu: &Gpu, brdf: &EffectiveBrdf, mirrors: [bool
 }
 
 fn maps_of(brdf: &EffectiveBrdf) -> EffectiveBrdf {
-    let Form::Direct(direct) = &brdf.form else { panic!("not direct") };
-    let Visibility::Slices(slices) = direct.visibility.as_ref() else { panic!("not slices") };
+    let Representation::Direct(direct) = &brdf.form else { panic!("not direct") };
+    let Visibility::OcclusionIntervals(slices) = direct.visibility.as_ref() else { panic!("not slices") };
     let maps = Arc::new(Visibility::Maps(slices.maps(12)));
-    EffectiveBrdf { form: Form::Direct(Direct::new(direct.sum.clone(), maps)), base_area: brdf.base_area }
+    EffectiveBrdf { form: Representation::Direct(Direct::new(direct.sum.clone(), maps)), base_area: brdf.base_area }
 }
 
 /// More facets than one dispatch takes on software Vulkan, in two groups, unblocked; runs of ten have one normal.
@@ -135,7 +137,7 @@ fn scattered_in_runs(brdfs: [&str; 2], colored: bool, run_of: impl Fn(usize) -> 
     let material = |brdf| crate::pipeline::Pipeline::new().sum_materials(&open(FLAT, brdf, "direct")).unwrap().1;
     let materials: Vec<_> = brdfs.iter().map(|brdf| material(brdf).remove(0)).collect();
     let sum = FacetSum::new(&facets, &[0, 1], &materials);
-    let form = Form::Direct(Direct::new(sum.into(), Visibility::Unblocked { facets: FACETS }.into()));
+    let form = Representation::Direct(Direct::new(sum.into(), Visibility::Unblocked { facets: FACETS }.into()));
     EffectiveBrdf { form, base_area: 1.0 }
 }
 
@@ -144,8 +146,8 @@ fn the_device_makes_the_table_of_the_cpu_for_every_lobe_and_visibility() {
     let Some(gpu) = open_gpu() else { return };
     for lobe in LOBES {
         let brdf = effective(&open(RIPPLES, lobe, "direct"));
-        let Form::Direct(direct) = &brdf.form else { panic!("{lobe}: not direct") };
-        assert!(matches!(*direct.visibility, Visibility::Horizons(_)));
+        let Representation::Direct(direct) = &brdf.form else { panic!("{lobe}: not direct") };
+        assert!(matches!(*direct.visibility, Visibility::HorizonMap(_)));
         assert_eq!(assert_same_table(&format!("ripples, {lobe}"), &gpu, &brdf, [false; 2]), 1);
     }
     let two = format!("[{}, {}]", LOBES[4], LOBES[0]);
@@ -189,15 +191,15 @@ fn facets_of_few_normals_have_the_areas_that_the_cpu_sees_of_each() {
 fn areas_of_few_normals_stand_beside_lobes_of_many_a_channel_each_where_colours_differ() {
     let Some(gpu) = open_gpu() else { return };
     let ripples = effective(&open(RIPPLES, LOBES[0], "direct"));
-    let Form::Direct(ripples) = &ripples.form else { panic!("not direct") };
-    let Visibility::Horizons(horizons) = ripples.visibility.as_ref() else { panic!("no horizons") };
+    let Representation::Direct(ripples) = &ripples.form else { panic!("not direct") };
+    let Visibility::HorizonMap(horizons) = ripples.visibility.as_ref() else { panic!("no horizons") };
     let two = format!("[{}, {}]", LOBES[4], LOBES[0]);
     for (colored, columns) in [(false, 4), (true, 8)] {
         let mut brdf = scattered_of_few_normals([&two, &two], colored);
-        let Form::Direct(direct) = &mut brdf.form else { panic!("not direct") };
+        let Representation::Direct(direct) = &mut brdf.form else { panic!("not direct") };
         // They see what facets of ripples see.
         let picked: Vec<usize> = (0..direct.sum.facet_count()).map(|k| k % horizons.facets()).collect();
-        *direct = Direct::new(direct.sum.clone(), Visibility::Horizons(horizons.picked(&picked)).into());
+        *direct = Direct::new(direct.sum.clone(), Visibility::HorizonMap(horizons.picked(&picked)).into());
         assert_eq!(assert_same_table(&format!("a mix, coloured {colored}"), &gpu, &brdf, [false; 2]), columns);
     }
 }
@@ -219,16 +221,16 @@ fn the_device_picks_the_facets_that_the_cpu_picks_for_each_half_vector() {
         ("a black lobe", scattered_in_runs([black, LOBES[4]], false, each), [false; 2], true),
         ("three lobes beside one", scattered_in_runs([&three, LOBES[4]], false, each), [false; 2], false),
     ] {
-        let Form::Direct(direct) = &brdf.form else { panic!("{what}: not direct") };
+        let Representation::Direct(direct) = &brdf.form else { panic!("{what}: not direct") };
         let table = |facets| {
             let nodes = Nodes { mirrors, facets, ..Nodes::all(GRID) };
-            (nodes, PairTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap())
+            (nodes, ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap())
         };
         let ((nodes, picked), (_, all)) = (table(Some(300)), table(None));
         let mut shading = GpuShading::new(&gpu).unwrap();
         let material = tabulated_at(&gpu, &mut shading, &brdf, (nodes, Interpolation::Cubic), false).unwrap();
         let [values, _] = made(&gpu, &material);
-        let numbers = |table: &PairTable| bytemuck::cast_slice::<_, f32>(table.values()).to_vec();
+        let numbers = |table: &ShadingTable| bytemuck::cast_slice::<_, f32>(table.values()).to_vec();
         let (cpu, all) = (numbers(&picked), numbers(&all));
         let off = |a: &[f32], b: &[f32]| {
             let square = |values: &mut dyn Iterator<Item = f32>| values.map(|v| f64::from(v * v)).sum::<f64>().sqrt();
@@ -257,7 +259,7 @@ fn nodes_that_are_mirror_images_are_copied_as_the_cpu_copies_them() {
 #[test]
 fn a_table_of_the_device_shades_as_the_same_table_uploaded() {
     let Some(gpu) = open_gpu() else { return };
-    let Studio { mesh, occluder, lights, camera } = Studio::of("cup");
+    let TestScene { mesh, occluder, lights, camera } = TestScene::of("cup");
     let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
     let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
     let visible = occluder.as_ref().map(|o| o.visible(&mesh, &points, &lights, view.eye, None)).unwrap();
@@ -268,9 +270,9 @@ fn a_table_of_the_device_shades_as_the_same_table_uploaded() {
         (scattered([LOBES[4], LOBES[0]], true), Interpolation::Linear),
         (scattered_of_few_normals([&two, LOBES[4]], true), Interpolation::Cubic),
     ] {
-        let Form::Direct(direct) = &brdf.form else { panic!("not direct") };
-        let table = PairTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
-        let uploaded = EffectiveBrdf { form: Form::Table(table.read(interpolation)), ..brdf };
+        let Representation::Direct(direct) = &brdf.form else { panic!("not direct") };
+        let table = ShadingTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
+        let uploaded = EffectiveBrdf { form: Representation::Table(table.read(interpolation)), ..brdf };
         let materials = [
             shading.material(&gpu, &uploaded, true).unwrap(),
             tabulated(&gpu, &mut shading, &brdf, (GRID, [false; 2], interpolation), true).unwrap(),
@@ -302,7 +304,7 @@ fn what_the_device_cannot_tabulate_is_refused_with_the_reason() {
     let many = format!("[{}]", [LOBES[0]; 11].join(", "));
     assert!(refused(&scattered([&many, LOBES[0]], true)).contains("too many parts"));
     let white = crate::gpu::shading::tests::White::default();
-    let material = SumMaterial { brdf: Brdf { terms: vec![Term::Measured(Arc::new(white))] }, color: Vec3::ONE };
+    let material = Material { brdf: Brdf { terms: vec![Term::Measured(Arc::new(white))] }, color: Vec3::ONE };
     // Nine normals are summed; one is an area, and the query asks the measured BRDF.
     for tilt in [0.1, 0.0] {
         let mut facets = Facets::default();
@@ -314,7 +316,7 @@ fn what_the_device_cannot_tabulate_is_refused_with_the_reason() {
             facets.slots.push(0);
         }
         let sum = FacetSum::new(&facets, &[0], std::slice::from_ref(&material));
-        let form = Form::Direct(Direct::new(sum.into(), Visibility::Unblocked { facets: 9 }.into()));
+        let form = Representation::Direct(Direct::new(sum.into(), Visibility::Unblocked { facets: 9 }.into()));
         assert!(refused(&EffectiveBrdf { form, base_area: 1.0 }).contains("measured"));
     }
 }
@@ -331,7 +333,7 @@ fn a_dispatch_has_a_thread_for_each_number_or_is_refused() {
 #[test]
 fn a_black_tile_has_a_table_without_columns_and_shades_black() {
     let Some(gpu) = open_gpu() else { return };
-    let Studio { mesh, lights, camera, .. } = Studio::of("sphere");
+    let TestScene { mesh, lights, camera, .. } = TestScene::of("sphere");
     let view = CameraView::new(&camera, &mesh, [16, 16]).unwrap();
     let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
     let brdf = scattered(["{ kind = \"lambertian\", albedo = 0.0 }"; 2], false);
@@ -353,12 +355,12 @@ fn the_table_of_a_height_field_is_timed() {
         let mut loaded = open(RIPPLES, LOBES[4], "direct");
         loaded.scene.quality.facets = Some(facets);
         let brdf = effective(&loaded);
-        let Form::Direct(direct) = &brdf.form else { panic!("not direct") };
-        let grid = UpperPairs { rings, azimuths, turn, difference };
+        let Representation::Direct(direct) = &brdf.form else { panic!("not direct") };
+        let grid = HemispherePairGrid { rings, azimuths, turn, difference };
         // The first run compiles.
         for _ in 0..2 {
             let start = std::time::Instant::now();
-            let table = PairTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
+            let table = ShadingTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
             let on_cpu = start.elapsed();
             let start = std::time::Instant::now();
             let material =

@@ -10,13 +10,13 @@ use crate::base::{Error, InputError, Result, replace_file};
 
 /// Linear RGB radiance, row 0 at the top.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Picture {
+pub struct Image {
     pub width: usize,
     pub height: usize,
     pub pixels: Vec<Vec3>,
 }
 
-impl Picture {
+impl Image {
     /// Tone-mapped sRGB bytes, three a pixel.
     pub fn to_srgb(&self, tone_map: &ToneMap) -> Vec<u8> {
         self.pixels.iter().flat_map(|p| tone_map.apply(*p).to_array().map(srgb_byte)).collect()
@@ -72,8 +72,8 @@ mod tests {
 
     const PLAIN: ToneMap = ToneMap { curve: ToneCurve::Plain, gain: 1.0 };
 
-    fn small() -> Picture {
-        Picture { width: 2, height: 1, pixels: vec![Vec3::new(0.0, 0.214_041_14, 1.0), Vec3::new(7.5, -1.0, 1e-4)] }
+    fn small() -> Image {
+        Image { width: 2, height: 1, pixels: vec![Vec3::new(0.0, 0.214_041_14, 1.0), Vec3::new(7.5, -1.0, 1e-4)] }
     }
 
     #[test]

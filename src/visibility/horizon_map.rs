@@ -19,23 +19,23 @@ use crate::math::simd;
 /// Between azimuths the horizon itself is interpolated (not yes/no), which is why few azimuths do (DESIGN.md, Sec. 4).
 /// Visibility ends in a ramp of `ramp` radians, so that what is computed from it is continuous.
 #[derive(Debug, Clone)]
-pub struct Horizons {
+pub struct HorizonMap {
     pub(super) azimuths: usize,
     pub(super) facets: usize,
     pub(super) ramp: f32,
-    /// `[azimuth][facet]`; [`Horizons::FREE`] where nothing blocks, [`Horizons::BLOCKED`] where all is.
+    /// `[azimuth][facet]`; [`HorizonMap::FREE`] where nothing blocks, [`HorizonMap::BLOCKED`] where all is.
     pub(super) elevations: Vec<f32>,
     /// Walks that ended before all was known.
-    pub(super) cut_short: usize,
+    pub(super) truncated: usize,
 }
 
-impl Horizons {
+impl HorizonMap {
     /// A horizon so low that the soft step never reaches above 0.
     const FREE: f32 = -0.02;
     /// A horizon so high that the soft step never reaches the zenith.
     pub(super) const BLOCKED: f32 = FRAC_PI_2 + 0.02;
 
-    /// Slices the mesh along every azimuth, for every facet: exact in elevation.
+    /// OcclusionIntervals the mesh along every azimuth, for every facet: exact in elevation.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
@@ -45,7 +45,7 @@ impl Horizons {
         })
     }
 
-    /// Walks the samples of a height-field: the same horizons as [`Horizons::scan`], several times faster.
+    /// Walks the samples of a height-field: the same horizons as [`HorizonMap::scan`], several times faster.
     pub fn march(heights: &HeightGrid, tile_size: glam::Vec2, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let march = HeightMarch::new(heights, tile_size);
         Self::fill_rows(facets.len(), azimuths, ramp, |along, row| {
@@ -59,9 +59,9 @@ impl Horizons {
     fn fill_rows(facets: usize, azimuths: usize, ramp: f32, fill: impl Fn(Vec3, &mut [f32]) -> usize + Sync) -> Self {
         let mut slopes = vec![0.0; facets * azimuths];
         let rows = slopes.par_chunks_mut(facets.max(1)).enumerate();
-        let cut_short =
+        let truncated =
             rows.map(|(azimuth, row)| fill(from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32), row)).sum();
-        Self { cut_short, ..Self::from_slopes(facets, azimuths, ramp, slopes) }
+        Self { truncated, ..Self::from_slopes(facets, azimuths, ramp, slopes) }
     }
 
     /// From slopes (tangents) of the horizons, `[azimuth][facet]`.
@@ -76,7 +76,7 @@ impl Horizons {
                 slope.atan()
             };
         });
-        Self { azimuths, facets, ramp: Self::soft(ramp), elevations, cut_short: 0 }
+        Self { azimuths, facets, ramp: Self::soft(ramp), elevations, truncated: 0 }
     }
 
     /// A width of the soft step [rad] that is one.
@@ -103,8 +103,8 @@ impl Horizons {
     }
 
     /// Part of the walks that ended before all was known: something may block directions low over the horizon, unseen.
-    pub fn cut_short(&self) -> f64 {
-        self.cut_short as f64 / self.elevations.len().max(1) as f64
+    pub fn truncated(&self) -> f64 {
+        self.truncated as f64 / self.elevations.len().max(1) as f64
     }
 
     pub fn bytes(&self) -> usize {
@@ -130,11 +130,11 @@ impl Horizons {
     pub fn picked(&self, facets: &[usize]) -> Self {
         let rows = (0..self.azimuths).map(|azimuth| self.row(azimuth));
         let elevations = rows.flat_map(|row| facets.iter().map(|&facet| row[facet])).collect();
-        let Self { azimuths, ramp, cut_short, .. } = *self;
-        Self { azimuths, facets: facets.len(), ramp, elevations, cut_short }
+        let Self { azimuths, ramp, truncated, .. } = *self;
+        Self { azimuths, facets: facets.len(), ramp, elevations, truncated }
     }
 
-    /// `Σ w v(direction)` over a run of facets with weights `w`: [`Horizons::fill`] and a sum at once. Azimuth in turns.
+    /// `Σ w v(direction)` over a run of facets with weights `w`: [`HorizonMap::fill`] and a sum at once. Azimuth in turns.
     pub(crate) fn seen_along(&self, [azimuth, elevation]: [f32; 2], range: Range<usize>, weights: &[f32]) -> f64 {
         let [(from, _), (to, blend)] = self.taps(azimuth);
         let row = |azimuth: usize| &self.row(azimuth)[range.clone()];

@@ -1,5 +1,5 @@
 //! Points gathered into pixels on wgpu: the twin of [`gather`](crate::render::image::shading::gather) and of [`ToneMap`], into linear
-//! radiance that is read back or into the image that a screen shows (`shaders/picture.wgsl`).
+//! radiance that is read back or into the image that a screen shows (`shaders/image.wgsl`).
 
 use std::ops::Range;
 
@@ -33,9 +33,9 @@ pub fn image(gpu: &Gpu, [width, height]: [usize; 2]) -> Result<wgpu::Texture, Gp
     gpu.checked("making room for a picture", || Ok(gpu.device.create_texture(&description)))
 }
 
-/// `picture.wgsl`, compiled.
+/// `image.wgsl`, compiled.
 #[derive(Debug)]
-pub(super) struct GpuPictures {
+pub(super) struct GpuImages {
     points: wgpu::BindGroupLayout,
     /// Of linear radiance, and of images.
     outputs: [wgpu::BindGroupLayout; 2],
@@ -93,7 +93,7 @@ impl Params {
     }
 }
 
-impl GpuPictures {
+impl GpuImages {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let module = gpu.module("picture")?;
         let layout = |label, bindings: &[wgpu::BindingType]| gpu.layout(label, wgpu::ShaderStages::COMPUTE, bindings);

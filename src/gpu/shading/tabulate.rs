@@ -1,6 +1,6 @@
 //! A table for pictures that the device makes of a sum over facets: nothing is read back, and nobody waits.
 //!
-//! The twin of [`PairTable::build`]. One dispatch adds one lobe, or the area that is seen, over some facets to its columns, a
+//! The twin of [`ShadingTable::build`]. One dispatch adds one lobe, or the area that is seen, over some facets to its columns, a
 //! thread a node; the last one fills in mirror images and the ends of θ_d. Where part of the facets are to be picked for each
 //! half vector, `picked.rs` has the steps.
 
@@ -10,20 +10,20 @@ use bytemuck::{Pod, Zeroable};
 
 use super::column_terms::ColumnTerms;
 use super::direct::{SOFTWARE_FACETS, Shared, Sum, pieces};
-use super::picked::OfGroup;
-use super::seen::Seen;
+use super::sampled_facets::OfGroup;
 use super::table::Held;
+use super::visibility::GpuVisibility;
 use super::{GpuShading, MAX_GROUPS, Padded, Pass, THREADS, Variant, padded};
 use crate::effective::shading_table::columns::{Column, Part, Weight};
-use crate::effective::{FacetSum, Interpolation, PairTable};
+use crate::effective::{FacetSum, Interpolation, ShadingTable};
 use crate::gpu::{Gpu, GpuError, Tier};
-use crate::math::directions::{PolarGrid, UpperPairs};
+use crate::math::directions::{HemispherePairGrid, PolarGrid};
 
 /// Lobes of one dispatch: slow devices take a fifth of a second. A submission holds no more than its renderer allows.
-const MOST_LOBES: u64 = 1 << 30;
+const MAX_LOBES: u64 = 1 << 30;
 
 /// Facets of which some are picked, in one dispatch.
-const MOST_TO_PICK_FROM: usize = 1 << 19;
+const MAX_TO_PICK_FROM: usize = 1 << 19;
 
 /// `Nodes` in `table_nodes.wgsl`.
 #[repr(C)]
@@ -124,13 +124,13 @@ impl Making {
 
 /// Which table: its grid, the planes that mirror the tile, and how many columns.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shape {
-    pub(crate) grid: UpperPairs,
+pub(crate) struct TableShape {
+    pub(crate) grid: HemispherePairGrid,
     pub(crate) mirrors: [bool; 2],
     fours: usize,
 }
 
-impl Shape {
+impl TableShape {
     fn rows(self) -> usize {
         self.grid.half_vectors() * self.grid.turn
     }
@@ -140,15 +140,15 @@ impl Shape {
     }
 
     pub(crate) fn nodes(self, columns: &[u32]) -> Nodes {
-        let UpperPairs { rings, azimuths, turn, difference } = self.grid;
+        let HemispherePairGrid { rings, azimuths, turn, difference } = self.grid;
         let place = |k: usize| columns.get(k).copied().unwrap_or_default();
         Nodes {
             pairs: [rings, azimuths, turn, difference].map(|n| n as u32),
             columns: [place(0), place(1), place(2)],
             column_count: columns.len() as u32,
             width: 4 * self.fours as u32,
-            crowding: UpperPairs::CROWDING,
-            lowest: UpperPairs::LOWEST,
+            crowding: HemispherePairGrid::CROWDING,
+            lowest: HemispherePairGrid::LOWEST,
             ..Nodes::zeroed()
         }
     }
@@ -170,7 +170,7 @@ impl Shape {
             return SOFTWARE_FACETS;
         }
         let nodes = self.grid.originals(self.mirrors) as u64;
-        (MOST_LOBES / nodes.max(1)).max(SOFTWARE_FACETS as u64) as usize
+        (MAX_LOBES / nodes.max(1)).max(SOFTWARE_FACETS as u64) as usize
     }
 }
 
@@ -204,7 +204,7 @@ impl GpuShading {
     pub(super) fn tabulated(
         &mut self,
         gpu: &Gpu,
-        (sum, seen): (&FacetSum, &Seen),
+        (sum, seen): (&FacetSum, &GpuVisibility),
         (nodes, interpolation): (crate::effective::Nodes, Interpolation),
         shadowed: bool,
     ) -> Result<(Pass, Making), GpuError> {
@@ -212,8 +212,8 @@ impl GpuShading {
         let columns = Column::of(sum).ok_or_else(|| refused("the sum has too many parts for a table to pay"))?;
         let weights: Vec<Weight> = columns.iter().map(|column| column.weight(sum)).collect();
         let terms = ColumnTerms::of(&weights)?;
-        let shape = Shape { grid, mirrors: Weight::mirrors(&weights, mirrors), fours: terms.fours };
-        let directions = PairTable::area_grid();
+        let shape = TableShape { grid, mirrors: Weight::mirrors(&weights, mirrors), fours: terms.fours };
+        let directions = ShadingTable::area_grid();
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
         let values = gpu.buffer("table", 4 * shape.numbers() as u64, usage)?;
         let areas = gpu.buffer("projected areas", 4 * directions.len() as u64, usage)?;
@@ -230,7 +230,7 @@ impl GpuShading {
     fn area_steps(
         &mut self,
         gpu: &Gpu,
-        (sum, seen, shared): (&FacetSum, &Seen, &Shared),
+        (sum, seen, shared): (&FacetSum, &GpuVisibility, &Shared),
         directions: PolarGrid,
         areas: &wgpu::Buffer,
     ) -> Result<Vec<Step>, GpuError> {
@@ -254,13 +254,13 @@ impl GpuShading {
     fn column_steps(
         &mut self,
         gpu: &Gpu,
-        (sum, seen, shared): (&FacetSum, &Seen, &Shared),
+        (sum, seen, shared): (&FacetSum, &GpuVisibility, &Shared),
         (columns, picked): (&[Column], Option<usize>),
-        shape: Shape,
+        shape: TableShape,
         values: &wgpu::Buffer,
     ) -> Result<Vec<Step>, GpuError> {
         // Less than half of them spares something; and to pick from very many is too much for a dispatch.
-        let picked = picked.filter(|&count| sum.facet_count() >= 2 * count && sum.facet_count() <= MOST_TO_PICK_FROM);
+        let picked = picked.filter(|&count| sum.facet_count() >= 2 * count && sum.facet_count() <= MAX_TO_PICK_FROM);
         let angles = gpu.upload("angles", &shape.angles(), wgpu::BufferUsages::STORAGE)?;
         let see = seen.file();
         let layouts = [self.nodes.clone(), self.facets.clone()];
@@ -321,5 +321,5 @@ impl GpuShading {
 }
 
 #[cfg(test)]
-#[path = "table_of_sum_tests.rs"]
+#[path = "tabulate_tests.rs"]
 mod tests;

@@ -2,17 +2,17 @@
 
 use super::{For, Pipeline, Prepared, StageTimes};
 use crate::base::Result;
-use crate::effective::{FacetSum, Heights, Maps, Nodes, Sight, Sliced, UnseenSum};
+use crate::effective::{FacetSum, GpuTileInput, GpuVisibilityInput, Heights, Maps, Nodes, Sliced};
 use crate::geometry::PeriodicGrid;
 use crate::geometry::mirror_planes_in;
-use crate::math::directions::UpperPairs;
-use crate::plan::{Plan, Preset, Route, Settings, Sighting};
+use crate::math::directions::HemispherePairGrid;
+use crate::plan::{Plan, Preset, Settings, VisibilityAlgorithm, VisibilityMethod};
 use crate::scene::{LoadedScene, Switch};
 
 /// What is known of a tile without its visibility.
 #[derive(Debug)]
-pub struct Unseen {
-    pub sum: UnseenSum,
+pub struct GpuTile {
+    pub sum: GpuTileInput,
     pub plan: Plan,
     pub settings: Settings,
     /// Of the stages that ran.
@@ -41,8 +41,8 @@ const FEW_FACETS: usize = 700;
 const FEW_NORMALS: usize = 16;
 
 /// Whether normals are few, and seen along horizons.
-fn is_few(sum: &FacetSum, route: Route) -> bool {
-    sum.has_few_normals() && matches!(route, Route::HeightMarch | Route::HorizonScan)
+fn is_few(sum: &FacetSum, route: VisibilityAlgorithm) -> bool {
+    sum.has_few_normals() && matches!(route, VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan)
 }
 
 impl Pipeline {
@@ -51,7 +51,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// As [`Pipeline::effective`].
-    pub fn unseen(&mut self, loaded: &LoadedScene) -> Result<Option<Unseen>> {
+    pub fn unseen(&mut self, loaded: &LoadedScene) -> Result<Option<GpuTile>> {
         let mut times = StageTimes::new();
         let few = self.few_facets(loaded, &mut times)?;
         let is_thin = few.is_some();
@@ -67,34 +67,45 @@ impl Pipeline {
             return Ok(None);
         }
         // What is thin is exact between nodes, too.
-        let grid = settings.picture_grids.last().filter(|_| plan.try_picture_table && !is_thin).map(|grid| {
-            UpperPairs { rings: grid.rings.min(HALF_VECTORS[0]), azimuths: grid.azimuths.min(HALF_VECTORS[1]), ..*grid }
-        });
+        let grid =
+            settings.image_grids.last().filter(|_| plan.try_shading_table && !is_thin).map(|grid| HemispherePairGrid {
+                rings: grid.rings.min(HALF_VECTORS[0]),
+                azimuths: grid.azimuths.min(HALF_VECTORS[1]),
+                ..*grid
+            });
         let [of_horizons, of_slices] = AZIMUTHS.map(|most| if grid.is_some() { most } else { usize::MAX });
         let of_horizons = settings.horizon_azimuths.min(of_horizons);
         let of_slices = settings.slice_azimuths.min(of_slices);
         let (mesh, facets) = (&prepared.shape.mesh, prepared.facets.clone());
         let sight = match (plan.route, &mesh.height_grid) {
-            (Route::HeightMarch, Some(samples)) => Sight::Heights(Heights {
+            (VisibilityAlgorithm::HeightMarch, Some(samples)) => GpuVisibilityInput::Heights(Heights {
                 samples: samples.clone(),
                 tile_size: mesh.size,
                 facets,
                 azimuths: of_horizons,
                 ramp: settings.penumbra,
             }),
-            (Route::GpuMaps | Route::CpuMaps, _) if settings.sighting == Sighting::Maps => {
-                Sight::Maps(Box::new(Maps {
+            (VisibilityAlgorithm::GpuMaps | VisibilityAlgorithm::CpuMaps, _)
+                if settings.sighting == VisibilityMethod::Maps =>
+            {
+                GpuVisibilityInput::Maps(Box::new(Maps {
                     mesh: mesh.clone(),
                     facets,
                     grid: settings.map_grid,
                     resolution: settings.map_resolution,
                 }))
             }
-            (Route::HorizonScan | Route::Slices | Route::GpuMaps | Route::CpuMaps, _) => {
-                let overhangs = plan.route != Route::HorizonScan;
+            (
+                VisibilityAlgorithm::HorizonScan
+                | VisibilityAlgorithm::OcclusionIntervals
+                | VisibilityAlgorithm::GpuMaps
+                | VisibilityAlgorithm::CpuMaps,
+                _,
+            ) => {
+                let overhangs = plan.route != VisibilityAlgorithm::HorizonScan;
                 let cells = || Ok(PeriodicGrid::new(mesh));
                 let grid = self.cells.get("cells", prepared.shape_version, &mut times, &self.cancel, cells)?.0;
-                Sight::Slices(Box::new(Sliced {
+                GpuVisibilityInput::OcclusionIntervals(Box::new(Sliced {
                     grid,
                     facets,
                     azimuths: if overhangs { of_slices } else { of_horizons },
@@ -102,13 +113,13 @@ impl Pipeline {
                     overhangs,
                 }))
             }
-            _ => Sight::Seen(self.seen(&prepared, &mut times)?.0),
+            _ => GpuVisibilityInput::Seen(self.seen(&prepared, &mut times)?.0),
         };
         let Prepared { shape, settings, sum, plan, shape_version, .. } = prepared;
         let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORED_FROM);
         let mirrors = if is_large && settings.effects.mirror_symmetry != Switch::Off {
             let cells = match &sight {
-                Sight::Slices(of) => Some(&*of.grid),
+                GpuVisibilityInput::OcclusionIntervals(of) => Some(&*of.grid),
                 _ => None,
             };
             let find = || Ok(mirror_planes_in(&shape.mesh, cells));
@@ -118,8 +129,8 @@ impl Pipeline {
         };
         let base_area = f64::from(shape.mesh.base_area());
         let nodes = grid.map(|grid| Nodes { mirrors, facets: Some(PICKED), ..Nodes::all(grid) });
-        let sum = UnseenSum { sum, sight, base_area, nodes, interpolation: settings.interpolation };
-        Ok(Some(Unseen { sum, notes: shape.mesh.notes.clone(), plan, settings, times }))
+        let sum = GpuTileInput { sum, sight, base_area, nodes, interpolation: settings.interpolation };
+        Ok(Some(GpuTile { sum, notes: shape.mesh.notes.clone(), plan, settings, times }))
     }
 
     /// Where normals are few and seen along horizons, few facets and what comes of them; more where one material has a small share.
@@ -134,7 +145,7 @@ impl Pipeline {
             if is_few(sum, plan.route) && sum.distinct_normals().is_some_and(|normals| normals <= FEW_NORMALS) {
                 return Ok(Some(prepared));
             }
-            let is_seen_so = matches!(plan.route, Route::HeightMarch | Route::HorizonScan);
+            let is_seen_so = matches!(plan.route, VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan);
             if !is_seen_so || sum.colors_vary() || settings.facets < most {
                 break;
             }

@@ -8,22 +8,22 @@ use rayon::prelude::*;
 
 use super::scan::{BlockedSlopes, scan_all};
 use super::slicer::Slicer;
-use super::{Horizons, PackedVisibility, SoftMaps};
+use super::{HorizonMap, PackedVisibility, SoftMaps};
 use crate::geometry::Facets;
 use crate::geometry::{PeriodicGrid, lifted_origins};
 use crate::math::directions::{PolarGrid, from_angles};
 use crate::math::simd;
-use crate::math::simd::Fours;
+use crate::math::simd::F32x8Array;
 
 /// All blocked elevations of every facet along a number of azimuths, exact there.
 ///
 /// Between azimuths the horizon itself is interpolated, which is smooth; whether something hangs above it is blended
 /// (yes/no from either side).
 #[derive(Debug, Clone)]
-pub struct Slices {
-    pub(crate) horizons: Horizons,
+pub struct OcclusionIntervals {
+    pub(crate) horizons: HorizonMap,
     /// By azimuth.
-    pub(crate) hanging: Vec<Hanging>,
+    pub(crate) hanging: Vec<Overhangs>,
     /// Where between two azimuths a facet changes over from one's view to the other's.
     pub(crate) switch: Vec<f32>,
 }
@@ -31,15 +31,15 @@ pub struct Slices {
 /// What hangs above the facets along one azimuth: blocked intervals of elevations [rad] above the horizon, in the order of
 /// their facets.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Hanging {
+pub(crate) struct Overhangs {
     pub(crate) facets: Vec<u32>,
     pub(crate) low: Vec<f32>,
     pub(crate) high: Vec<f32>,
-    /// [`Slices::switch`] of the facet.
+    /// [`OcclusionIntervals::switch`] of the facet.
     switch: Vec<f32>,
 }
 
-impl Hanging {
+impl Overhangs {
     /// Facet, low and high of each interval, in the order of facets.
     pub(crate) fn new(intervals: impl Iterator<Item = (u32, f32, f32)>, switch: &[f32]) -> Self {
         let mut hanging = Self::default();
@@ -89,8 +89,8 @@ const NOWHERE: u32 = u32::MAX;
 /// 2³² over the golden ratio.
 const GOLDEN: u32 = 2_654_435_769;
 
-impl Slices {
-    /// Cells and triangles that one slice looks at on average, from a few of them: what [`Slices::scan`] will cost.
+impl OcclusionIntervals {
+    /// Cells and triangles that one slice looks at on average, from a few of them: what [`OcclusionIntervals::scan`] will cost.
     pub fn work(grid: &PeriodicGrid, facets: &Facets) -> f64 {
         const FACETS: usize = 48;
         const AZIMUTHS: usize = 5;
@@ -101,41 +101,41 @@ impl Slices {
             let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
             let slicer = slicer.turned(along);
             for facet in (0..looked_at).map(|k| k * facets.len() / looked_at) {
-                slicer.scan::<Fours>(origins[facet], facets.normals[facet], facets.triangles[facet], &mut blocked);
+                slicer.scan::<F32x8Array>(origins[facet], facets.normals[facet], facets.triangles[facet], &mut blocked);
             }
         }
         blocked.work as f64 / (FACETS * AZIMUTHS) as f64
     }
 
-    /// Slices the mesh along every azimuth, for every facet. Visibility ends in ramps of `ramp` radians.
+    /// OcclusionIntervals the mesh along every azimuth, for every facet. Visibility ends in ramps of `ramp` radians.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         // The golden ratio's multiples fill [0, 1] evenly, for neighbours too.
         let switch: Vec<f32> =
             (0..facets.len() as u32).map(|k| k.wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0).collect();
-        let scanned: Vec<(Vec<f32>, Hanging, usize)> = (0..azimuths)
+        let scanned: Vec<(Vec<f32>, Overhangs, usize)> = (0..azimuths)
             .into_par_iter()
             .map(|azimuth| {
                 let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
                 let (mut row, mut above) = (vec![0.0; facets.len()], Vec::new());
-                let cut_short = scan_all(&slicer.turned(along), facets, &origins, &mut |facet, blocked| {
+                let truncated = scan_all(&slicer.turned(along), facets, &origins, &mut |facet, blocked| {
                     row[facet as usize] = blocked.ground;
                     above.extend(blocked.floating_unfaced().map(|(low, high)| {
-                        (facet, low.atan(), if high == f32::INFINITY { Horizons::BLOCKED } else { high.atan() })
+                        (facet, low.atan(), if high == f32::INFINITY { HorizonMap::BLOCKED } else { high.atan() })
                     }));
                 });
                 above.sort_by_key(|interval| interval.0);
-                (row, Hanging::new(above.into_iter(), &switch), cut_short)
+                (row, Overhangs::new(above.into_iter(), &switch), truncated)
             })
             .collect();
-        let (mut rows, mut hanging, mut cut_short) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
+        let (mut rows, mut hanging, mut truncated) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
         for (row, above, short) in scanned {
             rows.extend(row);
             hanging.push(above);
-            cut_short += short;
+            truncated += short;
         }
-        let mut horizons = Horizons::from_slopes(facets.len(), azimuths, ramp, rows);
-        horizons.cut_short = cut_short;
+        let mut horizons = HorizonMap::from_slopes(facets.len(), azimuths, ramp, rows);
+        horizons.truncated = truncated;
         Self { horizons, hanging, switch }
     }
 

@@ -1,30 +1,30 @@
 //! What facets see, on the device: uploaded as the CPU found it, or to be made there.
 
 use super::direct::Sum;
-use crate::gpu::{Gpu, GpuError, GpuHorizons, GpuMaps};
+use crate::gpu::{Gpu, GpuError, GpuHorizonMap, GpuMaps};
 use crate::math::directions::PolarGrid;
-use crate::visibility::{Horizons, Slices, SoftMaps, Visibility};
+use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility};
 
 /// How facets on a device come to see.
 #[derive(Debug)]
-pub enum Seen<'a> {
+pub enum GpuVisibility<'a> {
     /// The CPU saw for them.
     Held(&'a Visibility),
-    /// Horizons that the device is to make, and the width of the soft step there [rad].
-    Marched(GpuHorizons, f32),
-    /// Slices that the device is to make, and the width of the soft step there [rad].
-    Sliced(GpuHorizons, f32),
+    /// HorizonMap that the device is to make, and the width of the soft step there [rad].
+    Marched(GpuHorizonMap, f32),
+    /// OcclusionIntervals that the device is to make, and the width of the soft step there [rad].
+    Sliced(GpuHorizonMap, f32),
     /// Maps that the device is to draw, and what their directions are.
     Drawn(GpuMaps, PolarGrid),
 }
 
-impl Seen<'_> {
+impl GpuVisibility<'_> {
     /// The shader that reads it.
     pub(crate) fn file(&self) -> &'static str {
         match self {
             Self::Held(Visibility::Unblocked { .. }) => "visibility_unblocked",
-            Self::Held(Visibility::Horizons(_)) | Self::Marched(..) => "visibility_horizons",
-            Self::Held(Visibility::Slices(_)) => "visibility_slices",
+            Self::Held(Visibility::HorizonMap(_)) | Self::Marched(..) => "visibility_horizons",
+            Self::Held(Visibility::OcclusionIntervals(_)) => "visibility_slices",
             Self::Sliced(..) => "visibility_hanging",
             Self::Held(Visibility::Maps(_)) | Self::Drawn(..) => "visibility_maps",
         }
@@ -35,12 +35,14 @@ impl Seen<'_> {
         let horizons = |azimuths: usize, ramp: f32| Sum { azimuths: azimuths as u32, sharpness: 1.0 / ramp, ..sum };
         match self {
             Self::Held(Visibility::Unblocked { .. }) => sum,
-            Self::Held(Visibility::Horizons(held)) => horizons(held.azimuths(), held.ramp()),
-            Self::Held(Visibility::Slices(held)) => horizons(held.horizons.azimuths(), held.horizons.ramp()),
+            Self::Held(Visibility::HorizonMap(held)) => horizons(held.azimuths(), held.ramp()),
+            Self::Held(Visibility::OcclusionIntervals(held)) => {
+                horizons(held.horizons.azimuths(), held.horizons.ramp())
+            }
             Self::Held(Visibility::Maps(SoftMaps { grid, .. })) | Self::Drawn(_, grid) => {
                 Sum { azimuths: grid.azimuths as u32, rings: grid.rings as u32, nodes: grid.len() as u32, ..sum }
             }
-            Self::Marched(made, ramp) | Self::Sliced(made, ramp) => horizons(made.azimuths, Horizons::soft(*ramp)),
+            Self::Marched(made, ramp) | Self::Sliced(made, ramp) => horizons(made.azimuths, HorizonMap::soft(*ramp)),
         }
     }
 
@@ -49,8 +51,8 @@ impl Seen<'_> {
         let usage = wgpu::BufferUsages::STORAGE;
         match self {
             Self::Held(Visibility::Unblocked { .. }) => gpu.upload::<u32>("visibility", &[], usage),
-            Self::Held(Visibility::Slices(slices)) => gpu.upload("slices", &slices_by_facet(slices), usage),
-            Self::Held(Visibility::Horizons(horizons)) => gpu.upload("horizons", &horizons_by_facet(horizons), usage),
+            Self::Held(Visibility::OcclusionIntervals(slices)) => gpu.upload("slices", &slices_by_facet(slices), usage),
+            Self::Held(Visibility::HorizonMap(horizons)) => gpu.upload("horizons", &horizons_by_facet(horizons), usage),
             Self::Held(Visibility::Maps(maps)) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
             Self::Marched(made, _) | Self::Sliced(made, _) => Ok(made.elevations.clone()),
             Self::Drawn(made, _) => Ok(made.bits.clone()),
@@ -58,13 +60,13 @@ impl Seen<'_> {
     }
 }
 
-fn horizons_by_facet(horizons: &Horizons) -> Vec<f32> {
+fn horizons_by_facet(horizons: &HorizonMap) -> Vec<f32> {
     let azimuths = horizons.azimuths();
     (0..horizons.facets() * azimuths).map(|k| horizons.elevation(k % azimuths, k / azimuths)).collect()
 }
 
-/// Horizons, starts of the hanging intervals, and the intervals (visibility_slices.wgsl).
-fn slices_by_facet(slices: &Slices) -> Vec<u32> {
+/// HorizonMap, starts of the hanging intervals, and the intervals (visibility_slices.wgsl).
+fn slices_by_facet(slices: &OcclusionIntervals) -> Vec<u32> {
     let mut words: Vec<u32> = horizons_by_facet(&slices.horizons).into_iter().map(f32::to_bits).collect();
     let (starts, intervals) = slices.hanging_by_facet();
     words.extend(starts);
