@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use biscale::base::Result;
-use biscale::brdf::{Brdf, Term};
-use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Material, Representation};
+use biscale::brdf::{Brdf, Material, Term};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Representation};
 use biscale::geometry;
 use biscale::geometry::families::heightfield;
 use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
@@ -161,8 +161,9 @@ fn sum_lines(bench: &Bench, field: &Arc<TileMesh>) -> Result<()> {
             color: Vec3::ONE,
         };
         let sum = FacetSum::new(&facets, &vec![0; field.slots.len()], &[material]);
-        let form = Representation::Direct(Direct::new(Arc::new(sum), Arc::new(Visibility::HorizonMap(horizons))));
-        EffectiveBrdf { form, base_area: f64::from(field.base_area()) }
+        let representation =
+            Representation::Direct(Direct::new(Arc::new(sum), Arc::new(Visibility::HorizonMap(horizons))));
+        EffectiveBrdf { representation, base_area: f64::from(field.base_area()) }
     };
     bench.line("facets: 64 pairs of the sum (height-field)", 1.0, &[1024, 4096, 16_384, 65_536], |n| {
         let (brdf, pairs) = (direct(n), mirror_biased_pairs(64, 1));
@@ -185,7 +186,7 @@ fn image(scene: &str, lights: usize, side: usize) -> Result<Work> {
     let loaded = biscale::scene::open(scene, &overrides)?;
     let shading_brdf = Pipeline::new().effective(&loaded)?.shading_brdf(&biscale::base::Cancel::default())?;
     let mut stage = RenderScene::new(&loaded)?;
-    stage.settle();
+    stage.cache_shadows();
     Ok(Box::new(move || {
         let background = Background::default();
         let rendered = render(&stage.input(&*shading_brdf.brdf, [side, side], 1, &background));

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use biscale::base::Cancel;
-use biscale::brdf::{Brdf, Term};
+use biscale::brdf::{Brdf, Material, Term, analytic_lobe};
 use biscale::effective::{
-    Direct, EffectiveBrdf, FacetSum, LowRank, Material, Nodes, Reflectance, Representation, RotatedBasis, RotatedLobe,
-    ShadingTable, analytic_lobe,
+    Direct, EffectiveBrdf, FacetSum, LowRank, Nodes, Reflectance, Representation, RotatedBasis, RotatedLobe,
+    ShadingTable,
 };
 use biscale::geometry;
 use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
@@ -160,11 +160,11 @@ fn main() -> Result<(), biscale::base::Error> {
         bench.line(&format!("factors with their basis, {name}"), facets.len(), "facet", build);
         let base_area = f64::from(field.base_area());
         let direct = Direct::new(Arc::new(sum), horizons.clone());
-        for (form_name, form) in
+        for (representation_name, representation) in
             [("direct", Representation::Direct(direct)), ("factors", Representation::LowRank(build()?))]
         {
-            let brdf = EffectiveBrdf { form, base_area };
-            bench.line(&format!("eval, {form_name}, {name}"), pairs.len(), "pair", || {
+            let brdf = EffectiveBrdf { representation, base_area };
+            bench.line(&format!("eval, {representation_name}, {name}"), pairs.len(), "pair", || {
                 pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).sum::<Vec3>()
             });
         }
@@ -180,7 +180,7 @@ fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -
         Direct::new(Arc::new(FacetSum::new(facets, &material_of_slot, &materials)), Arc::new(visibility))
     };
     let rod_sum = direct(rods, facets, sliced);
-    let grid = HemispherePairGrid { rings: 16, azimuths: 24, turn: 6, difference: 8 };
+    let grid = HemispherePairGrid { rings: 16, azimuths: 24, phi_d: 6, theta_d: 8 };
     let checked = image_pairs(64, 1);
     let all = Nodes::all(grid);
     for (name, nodes) in [
@@ -205,8 +205,9 @@ fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -
         settings.penumbra,
     );
     let groove_sum = direct(&grooves, &groove_facets, Visibility::HorizonMap(horizons));
-    let total = |form: &Representation, base_area: f64| {
-        let (brdf, mut out) = (EffectiveBrdf { form: form.clone(), base_area }, vec![Vec3::ZERO; lights.len()]);
+    let total = |representation: &Representation, base_area: f64| {
+        let (brdf, mut out) =
+            (EffectiveBrdf { representation: representation.clone(), base_area }, vec![Vec3::ZERO; lights.len()]);
         move |lights: &[Vec3]| {
             brdf.eval_lights(lights, o, &mut out);
             out.iter().sum::<Vec3>()
@@ -221,8 +222,8 @@ fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -
         lines.push(("a table, all at once (rods)", Representation::Table(table), true));
     }
     lines.push(("the sum, light by light (rods)", Representation::Direct(rod_sum), false));
-    for (name, form, at_once) in lines {
-        let mut eval = total(&form, f64::from(rods.base_area()));
+    for (name, representation, at_once) in lines {
+        let mut eval = total(&representation, f64::from(rods.base_area()));
         bench.line(name, lights.len(), "light", || {
             if at_once { eval(&lights) } else { lights.iter().map(|light| eval(std::slice::from_ref(light))).sum() }
         });

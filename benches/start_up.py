@@ -28,7 +28,7 @@ WINDOW = (1440, 900)
 MENU = (700, 12)
 OBJECT = [(426 + x, 462 + y) for x in (-90, -60, 60, 90) for y in (-90, -60, 60, 90)]
 EMPTY = (22, 22, 22)
-SAID = ["device and the interface's pipelines built", "first frame handed", "first picture made", "first picture handed"]
+SAID = ["device and the interface's pipelines built", "first frame presented", "first image rendered", "first image presented"]
 SAYS = "--start-times" in subprocess.run([BISCALE, "edit", "--help"], capture_output=True, text=True).stdout
 
 

@@ -182,7 +182,7 @@ fn a_flat_tile_has_the_small_scale_brdf_at_draft_and_standard() {
             let scene = open(r#"{ kind = "flat" }"#, brdf, preset);
             let mut pipeline = Pipeline::new();
             let got = evaluate(&pipeline.effective(&scene).unwrap().brdf, &pairs);
-            let material = &pipeline.sum_materials(&scene).unwrap().1[0];
+            let material = &pipeline.materials(&scene).unwrap().1[0];
             let want: Vec<Vec3> =
                 pairs.iter().map(|pair| material.color * material.brdf.f(Vec3::Z, pair.i, pair.o) / pair.o.z).collect();
             let errors = compare(&got, &want);
@@ -239,7 +239,7 @@ fn table_of_presets_scenes_and_brdfs_at_500_pairs() {
                     (reference(&mut pipeline, &scene, &pairs, &as_eval).0, "reference".to_owned())
                 } else {
                     let outcome = pipeline.effective(&scene).unwrap();
-                    (evaluate(&outcome.brdf, &pairs), outcome.brdf.form.describe())
+                    (evaluate(&outcome.brdf, &pairs), outcome.brdf.representation.describe())
                 };
                 let ms = start.elapsed().as_secs_f64() * 1e3;
                 let errors = compare(&got, &right);

@@ -1,9 +1,9 @@
 //! The low-rank form against the direct sum: it converges, and each of its interpolations has a measured price.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
-use biscale::brdf::{Brdf, LobeAngles, Term};
+use biscale::brdf::{Brdf, LobeAngles, Material, Term};
 use biscale::effective::{
-    BasisGrid, Direct, EffectiveBrdf, FacetSum, LowRank, LowRankSettings, Material, Representation, VisibilityRows,
+    BasisGrid, Direct, EffectiveBrdf, FacetSum, LowRank, LowRankSettings, Representation, VisibilityRows,
 };
 use biscale::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
 use biscale::math::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
@@ -70,8 +70,8 @@ fn the_factored_form_approaches_the_direct_sum_as_grids_and_ranks_grow() {
     {
         let material = Material { brdf: Brdf { terms: vec![term.clone()] }, color: Vec3::new(1.0, 0.5, 0.2) };
         let sum = FacetSum::new(&facets, &slots, std::slice::from_ref(&material));
-        let values = |form| -> Vec<Vec3> {
-            let brdf = EffectiveBrdf { form, base_area };
+        let values = |representation| -> Vec<Vec3> {
+            let brdf = EffectiveBrdf { representation, base_area };
             pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
         };
         let direct = values(Representation::Direct(Direct::new(Arc::new(sum), visibility.clone())));
@@ -81,21 +81,17 @@ fn the_factored_form_approaches_the_direct_sum_as_grids_and_ranks_grow() {
                 LowRank::build(&facets, &visibility, &slots, std::slice::from_ref(&material), &settings).unwrap();
             compare(&values(Representation::LowRank(factors)), &direct).rel_l2
         };
-        let coarse = error(
-            PolarGrid::new(6, 12),
-            HalfDifferenceGrid { rings: 12, azimuths: 24, difference: 6, turn: 4 },
-            0.99,
-            8,
-        );
+        let coarse =
+            error(PolarGrid::new(6, 12), HalfDifferenceGrid { rings: 12, azimuths: 24, theta_d: 6, phi_d: 4 }, 0.99, 8);
         let middle = error(
             PolarGrid::new(12, 24),
-            HalfDifferenceGrid { rings: 24, azimuths: 48, difference: 12, turn: 8 },
+            HalfDifferenceGrid { rings: 24, azimuths: 48, theta_d: 12, phi_d: 8 },
             0.999,
             24,
         );
         let fine = error(
             PolarGrid::new(20, 48),
-            HalfDifferenceGrid { rings: 32, azimuths: 64, difference: 16, turn: 12 },
+            HalfDifferenceGrid { rings: 32, azimuths: 64, theta_d: 16, phi_d: 12 },
             0.9999,
             48,
         );
@@ -148,10 +144,10 @@ fn price_of_p(
     grid: HalfDifferenceGrid,
 ) -> Vec<Vec3> {
     let node_pair = |node: usize| {
-        let (turn, rest) = (node % grid.turn, node / grid.turn);
-        let (difference, rest) = (rest % grid.difference, rest / grid.difference);
+        let (phi_d, rest) = (node % grid.phi_d, node / grid.phi_d);
+        let (theta_d, rest) = (rest % grid.theta_d, rest / grid.theta_d);
         let (azimuth, ring) = (rest % grid.azimuths, rest / grid.azimuths);
-        HalfDifferenceGrid::pair(grid.theta_h(ring), grid.phi_h(azimuth), grid.theta_d(difference), grid.phi_d(turn))
+        HalfDifferenceGrid::pair(grid.theta_h(ring), grid.phi_h(azimuth), grid.theta_d(theta_d), grid.phi_d(phi_d))
     };
     let one = |p: &Pair| {
         let nodes: Vec<(f32, (Vec3, Vec3))> =
@@ -190,14 +186,12 @@ fn table_of_what_each_interpolation_costs() {
                 let error = percent(price_of_u(&facets, &visibility, &term, &pairs, PolarGrid::new(rings, azimuths)));
                 eprintln!("{name:<10} cook-torrance {roughness}  U {rings}x{azimuths}: {error:.2} %");
             }
-            for [rings, azimuths, difference, turn] in
+            for [rings, azimuths, theta_d, phi_d] in
                 [[32, 64, 16, 8], [48, 96, 20, 10], [32, 64, 16, 16], [48, 96, 16, 16], [32, 64, 32, 20]]
             {
-                let grid = HalfDifferenceGrid { rings, azimuths, difference, turn };
+                let grid = HalfDifferenceGrid { rings, azimuths, theta_d, phi_d };
                 let error = percent(price_of_p(&facets, &visibility, &term, &pairs, grid));
-                eprintln!(
-                    "{name:<10} cook-torrance {roughness}  P {rings}x{azimuths}x{difference}x{turn}: {error:.2} %"
-                );
+                eprintln!("{name:<10} cook-torrance {roughness}  P {rings}x{azimuths}x{theta_d}x{phi_d}: {error:.2} %");
             }
         }
     }

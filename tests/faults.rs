@@ -264,7 +264,7 @@ fn a_device_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_goes_on() {
     let stage = RenderScene::new(&loaded).unwrap();
     let background = Background::default();
     let input = stage.input(&*outcome.brdf, [96, 96], 2, &background);
-    let mut renderer = GpuRenderer::wearing(&gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf).unwrap();
+    let mut renderer = GpuRenderer::with_material(&gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf).unwrap();
     renderer.render(&gpu, &input, &Cancel::default()).unwrap();
     // From another thread, while frames are drawn.
     let device = gpu.device.clone();

@@ -32,9 +32,9 @@ fn slices_and_maps_see_what_horizons_see() {
         made("fig8a_hammered", &[&set[..], &[&word]].concat())
     };
     let (horizons, slices, maps) = (with("auto"), with("slices"), with("maps"));
-    assert_eq!(horizons.plan.route, VisibilityAlgorithm::HeightMarch);
+    assert_eq!(horizons.plan.algorithm, VisibilityAlgorithm::HeightMarch);
     assert_eq!(
-        (slices.plan.route, maps.plan.route),
+        (slices.plan.algorithm, maps.plan.algorithm),
         (VisibilityAlgorithm::OcclusionIntervals, VisibilityAlgorithm::CpuMaps)
     );
     let (sliced, mapped) = (apart(&slices, &horizons), apart(&maps, &horizons));
@@ -51,8 +51,8 @@ fn more_bins_of_normals_are_nearer_to_the_normals_themselves_and_fewer_are_fewer
     for bins in [64, 512, 4096] {
         let word = format!("quality.normal_bins={bins}");
         let binned = made("fig8a_hammered", &[&set[..], &[&word]].concat());
-        let Representation::Direct(direct) = &binned.brdf.form else { panic!("not a sum") };
-        assert!(direct.sum.patch_count().is_some_and(|count| count < bins), "{bins}");
+        let Representation::Direct(direct) = &binned.brdf.representation else { panic!("not a sum") };
+        assert!(direct.sum.normal_count().is_some_and(|count| count < bins), "{bins}");
         let error = apart(&binned, &exact).0;
         assert!(error < 0.6 * last, "{bins}: {error} after {last}");
         last = error;
@@ -63,13 +63,13 @@ fn more_bins_of_normals_are_nearer_to_the_normals_themselves_and_fewer_are_fewer
 #[test]
 fn linear_interpolation_of_a_shading_table_is_farther_from_the_sum_than_cubic() {
     let sum = made("fig8a_hammered", &["quality.facets=1024", "quality.method=direct"]);
-    let Representation::Direct(direct) = &sum.brdf.form else { panic!("not a sum") };
-    let grid = HemispherePairGrid { rings: 16, azimuths: 24, turn: 6, difference: 8 };
+    let Representation::Direct(direct) = &sum.brdf.representation else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 16, azimuths: 24, phi_d: 6, theta_d: 8 };
     let table = ShadingTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
     let pairs = mirror_biased_pairs(200, 8);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
     let off = |interpolation: Interpolation| {
-        let table = sum.brdf.with_direct_form(Representation::Table(table.clone().read(interpolation)));
+        let table = sum.brdf.with_direct_representation(Representation::Table(table.clone().read(interpolation)));
         compare(&values(&table), &values(&sum.brdf)).rel_l2
     };
     let (cubic, linear) = (off(Interpolation::Cubic), off(Interpolation::Linear));

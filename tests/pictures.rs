@@ -32,7 +32,12 @@ fn images_of_the_papers_five_scenes_read_a_form_within_28_decibels_on_pairs_it_w
     for (scene, table) in [("plate", true), ("teapot", false), ("pillow", true), ("cup", false), ("skirt", true)] {
         let outcome = Pipeline::new().effective(&draft(&format!("table4_{scene}"))).unwrap();
         let read = shading_brdf(&outcome);
-        assert_eq!(matches!(read.form, Representation::Table(_)), table, "{scene}: {}", read.form.describe());
+        assert_eq!(
+            matches!(read.representation, Representation::Table(_)),
+            table,
+            "{scene}: {}",
+            read.representation.describe()
+        );
         let errors = compare(&values(&read, 4711), &values(&outcome.brdf, 4711));
         assert!(errors.psnr_db > 28.0, "{scene}: {:.1} dB {:.1} %", errors.psnr_db, errors.rel_l2 * 100.0);
     }
@@ -41,16 +46,16 @@ fn images_of_the_papers_five_scenes_read_a_form_within_28_decibels_on_pairs_it_w
 #[test]
 fn a_table_is_the_sum_itself_on_its_nodes() {
     let outcome = Pipeline::new().effective(&draft("table4_plate")).unwrap();
-    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-    let grid = HemispherePairGrid { rings: 6, azimuths: 8, turn: 4, difference: 5 };
+    let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 6, azimuths: 8, phi_d: 4, theta_d: 5 };
     let table = ShadingTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
-    let read = EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area };
+    let read = EffectiveBrdf { representation: Representation::Table(table), base_area: outcome.brdf.base_area };
     let peak = (0..grid.nodes()).map(|node| grid.pair(node)).map(|(i, o)| outcome.brdf.g(i, o).max_element());
     let peak = peak.fold(0.0, f32::max);
     for node in 0..grid.nodes() {
         // The last ring and the last step were lifted above the horizon.
-        if node / (grid.azimuths * grid.turn * grid.difference) + 1 == grid.rings
-            || node % grid.difference + 1 == grid.difference
+        if node / (grid.azimuths * grid.phi_d * grid.theta_d) + 1 == grid.rings
+            || node % grid.theta_d + 1 == grid.theta_d
         {
             continue;
         }
@@ -63,15 +68,15 @@ fn a_table_is_the_sum_itself_on_its_nodes() {
 #[test]
 fn a_table_made_for_some_pairs_answers_these_as_the_whole_table_does() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();
-    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-    let grid = HemispherePairGrid { rings: 7, azimuths: 12, turn: 6, difference: 5 };
+    let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 7, azimuths: 12, phi_d: 6, theta_d: 5 };
     let pairs = image_pairs(20, 99);
     for mirrors in [[false; 2], [true, false], [true; 2]] {
         let read = |read_by| {
             let nodes = Nodes { mirrors, read_by, ..Nodes::all(grid) };
             let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
             let black = table.values().iter().filter(|value| **value == glam::Vec4::ZERO).count();
-            (EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area }, black)
+            (EffectiveBrdf { representation: Representation::Table(table), base_area: outcome.brdf.base_area }, black)
         };
         let ((whole, none), (some, black)) = (read(None), read(Some(&pairs[..])));
         assert!(black > none, "{mirrors:?}: nothing was left out");
@@ -85,12 +90,12 @@ fn a_table_made_for_some_pairs_answers_these_as_the_whole_table_does() {
 fn a_table_from_few_facets_that_shine_at_each_half_vector_is_close_to_the_one_from_all() {
     for scene in ["table4_pillow", "fig6a_velvet_spread"] {
         let outcome = Pipeline::new().effective(&draft(scene)).unwrap();
-        let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-        let grid = HemispherePairGrid { rings: 12, azimuths: 16, turn: 6, difference: 6 };
+        let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };
+        let grid = HemispherePairGrid { rings: 12, azimuths: 16, phi_d: 6, theta_d: 6 };
         let read = |facets| {
             let nodes = Nodes { facets, ..Nodes::all(grid) };
             let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
-            EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area }
+            EffectiveBrdf { representation: Representation::Table(table), base_area: outcome.brdf.base_area }
         };
         let (all, few) = (read(None), read(Some(direct.sum.facet_count() / 4)));
         let (all, few) = (values(&all, 12), values(&few, 12));
@@ -111,11 +116,11 @@ fn a_table_from_few_facets_that_shine_at_each_half_vector_is_close_to_the_one_fr
 fn fewer_facets_and_trials_against_whole_tables_at_standard() {
     let pairs = image_pairs(512, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
-    let grid = HemispherePairGrid { rings: 24, azimuths: 48, turn: 8, difference: 12 };
+    let grid = HemispherePairGrid { rings: 24, azimuths: 48, phi_d: 8, theta_d: 12 };
     println!("scene                facets      trial     whole   rel. L2   PSNR");
     for scene in ["table4_pillow", "table4_skirt", "fig7a_shot_silk", "fig6a_velvet_spread"] {
         let outcome = Pipeline::new().effective(&open(scene, &["quality.backend=cpu"])).unwrap();
-        let Representation::Direct(direct) = outcome.brdf.direct_form() else { panic!("{scene}: not a sum") };
+        let Representation::Direct(direct) = outcome.brdf.direct_representation() else { panic!("{scene}: not a sum") };
         let exact = values(&outcome.brdf);
         for facets in [None, Some(direct.sum.facet_count() / 5)] {
             let made = |read_by| {
@@ -123,7 +128,7 @@ fn fewer_facets_and_trials_against_whole_tables_at_standard() {
                 let nodes = Nodes { facets, read_by, ..Nodes::all(grid) };
                 let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
                 let ms = start.elapsed().as_secs_f64() * 1e3;
-                (values(&outcome.brdf.with_direct_form(Representation::Table(table))), ms)
+                (values(&outcome.brdf.with_direct_representation(Representation::Table(table))), ms)
             };
             let ((tried, trial_ms), (whole, whole_ms)) = (made(Some(&pairs[..])), made(None));
             assert_eq!(tried, whole, "{scene}: a trial tells another error than the table");
@@ -143,13 +148,13 @@ fn trials_from_part_of_the_facets() {
     println!("scene                preset    facets picked  azimuths  nodes  rel. L2   PSNR");
     let fields = ["table4_plate", "fig8b_ripples", "fig8d_leather"];
     let overhangs = ["table4_pillow", "table4_skirt", "fig6a_velvet_spread"];
-    for (preset, [rings, azimuths, turn, difference]) in [("standard", [24, 48, 8, 12]), ("fine", [32, 64, 12, 16])] {
+    for (preset, [rings, azimuths, phi_d, theta_d]) in [("standard", [24, 48, 8, 12]), ("fine", [32, 64, 12, 16])] {
         for scene in fields.into_iter().chain(overhangs) {
             let set = ["quality.backend=cpu".to_owned(), format!("quality.preset={preset}")];
             let made = |set: &[String]| Pipeline::new().effective(&scene::open(scene, set).unwrap()).unwrap();
             let outcome = made(&set);
-            let unseen = Pipeline::new().unseen(&scene::open(scene, &set).unwrap()).unwrap().unwrap();
-            let few = match &unseen.sum.sight {
+            let unseen = Pipeline::new().gpu_tile(&scene::open(scene, &set).unwrap()).unwrap().unwrap();
+            let few = match &unseen.sum.visibility_input {
                 GpuVisibilityInput::Heights(heights) => heights.azimuths,
                 GpuVisibilityInput::OcclusionIntervals(slices) => slices.azimuths,
                 _ => panic!("{scene}: another route"),
@@ -157,21 +162,24 @@ fn trials_from_part_of_the_facets() {
             let as_device = made(&[&set[..], &[format!("quality.azimuths={few}")]].concat());
             let few = (few, unseen.sum.nodes.unwrap().grid);
             let settings = &outcome.settings;
-            let field = matches!(unseen.sum.sight, GpuVisibilityInput::Heights(_));
+            let field = matches!(unseen.sum.visibility_input, GpuVisibilityInput::Heights(_));
             let many = if field { settings.horizon_azimuths } else { settings.slice_azimuths };
-            let (exact, many) =
-                (values(&outcome.brdf), (many, HemispherePairGrid { rings, azimuths, turn, difference }));
+            let (exact, many) = (values(&outcome.brdf), (many, HemispherePairGrid { rings, azimuths, phi_d, theta_d }));
             let all = settings.facets;
             let mut cases = vec![(all, many), (3200, many), (1600, many), (1600, few), (800, few)];
             cases.dedup();
             for (count, (azimuths, grid)) in cases {
                 let of = if azimuths == few.0 { &as_device } else { &outcome };
-                let Representation::Direct(direct) = of.brdf.direct_form() else { panic!("{scene}: not a sum") };
+                let Representation::Direct(direct) = of.brdf.direct_representation() else {
+                    panic!("{scene}: not a sum")
+                };
                 let facets = (count < all).then_some(count);
                 let nodes = Nodes { facets, read_by: Some(&pairs[..]), ..Nodes::all(grid) };
                 let table = ShadingTable::build(direct, nodes, &Cancel::default()).unwrap().unwrap();
-                let errors =
-                    upper_errors(&values(&outcome.brdf.with_direct_form(Representation::Table(table))), &exact);
+                let errors = upper_errors(
+                    &values(&outcome.brdf.with_direct_representation(Representation::Table(table))),
+                    &exact,
+                );
                 let (percent, db) = (100.0 * errors.rel_l2, errors.psnr_db);
                 let nodes = grid.nodes();
                 println!(
@@ -199,7 +207,7 @@ fn few_facets_of_few_normals_as_devices_sum_them() {
                 let facets = facets.map(|facets| format!("quality.facets={facets}"));
                 scene::open(scene, &set.iter().cloned().chain(facets).collect::<Vec<_>>()).unwrap()
             };
-            let Some(unseen) = Pipeline::new().unseen(&open(None)).unwrap() else { break };
+            let Some(unseen) = Pipeline::new().gpu_tile(&open(None)).unwrap() else { break };
             if unseen.sum.nodes.is_some() {
                 break;
             }
@@ -221,12 +229,12 @@ fn few_facets_of_few_normals_as_devices_sum_them() {
 #[test]
 fn a_table_of_a_mirrored_tile_is_its_own_mirror_image_and_close_to_the_whole_one() {
     let outcome = Pipeline::new().effective(&draft("table4_skirt")).unwrap();
-    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
-    let grid = HemispherePairGrid { rings: 6, azimuths: 12, turn: 4, difference: 5 };
+    let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };
+    let grid = HemispherePairGrid { rings: 6, azimuths: 12, phi_d: 4, theta_d: 5 };
     let read = |mirrors: [bool; 2]| {
         let table =
             ShadingTable::build(direct, Nodes { mirrors, ..Nodes::all(grid) }, &Cancel::default()).unwrap().unwrap();
-        EffectiveBrdf { form: Representation::Table(table), base_area: outcome.brdf.base_area }
+        EffectiveBrdf { representation: Representation::Table(table), base_area: outcome.brdf.base_area }
     };
     let (whole, spared) = (read([false; 2]), read([true; 2]));
     let (mut error, mut power) = (0.0, 0.0);
@@ -274,7 +282,8 @@ fn a_colour_edit_keeps_the_table_and_leaves_what_a_fresh_start_makes() {
     let fresh = shading_brdf(&Pipeline::new().effective(&edited).unwrap());
     assert_eq!(values(&kept.brdf, 9), values(&fresh, 9));
     assert_ne!(values(&kept.brdf, 9), values(&first.brdf, 9));
-    let (Representation::Table(a), Representation::Table(b)) = (&first.brdf.form, &kept.brdf.form) else {
+    let (Representation::Table(a), Representation::Table(b)) = (&first.brdf.representation, &kept.brdf.representation)
+    else {
         panic!("no tables")
     };
     assert!(a.shares_values_with(b));
@@ -296,7 +305,7 @@ fn a_brdf_edit_where_normals_are_many_makes_the_table_anew() {
 #[test]
 fn a_thinned_sum_keeps_the_area_of_every_normal() {
     let outcome = Pipeline::new().effective(&draft("table4_teapot")).unwrap();
-    let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+    let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };
     let strided_subset = direct.strided_subset(10).unwrap();
     assert!(strided_subset.sum.facet_count() * 8 < direct.sum.facet_count());
     // From straight above all is seen: the projected area is that of the base.

@@ -1,13 +1,13 @@
-//! Every shader in `shaders/` parses and validates, whatever the machine: naga needs no adapter.
+//! Tests that every shader in `shaders/` parses and validates. naga needs no GPU.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it stands")]
 
-use std::collections::BTreeSet;
 use std::path::Path;
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-/// What naga says against a source, if anything. No optional capabilities: what passes here runs on every adapter.
-fn complaint(source: &str) -> Option<String> {
+/// Returns the error of naga for a source, if there is one. No optional capabilities are allowed, so that shaders run on every
+/// adapter.
+fn validation_error(source: &str) -> Option<String> {
     let module = match naga::front::wgsl::parse_str(source) {
         Ok(module) => module,
         Err(error) => return Some(error.emit_to_string(source)),
@@ -21,7 +21,7 @@ fn every_combination_of_effects_parses_and_validates() {
     let mut failures = Vec::new();
     let mut check = |name: &str, swaps: &[(&'static str, &'static str)]| {
         let found = match biscale::gpu::swapped_source(name, swaps) {
-            Ok(source) => complaint(&source),
+            Ok(source) => validation_error(&source),
             Err(error) => Some(error.to_string()),
         };
         failures.extend(found.map(|error| format!("{name} with {swaps:?}: {error}")));
@@ -33,39 +33,43 @@ fn every_combination_of_effects_parses_and_validates() {
                 check("shade_table", &[("shadows_none", shadows), ("tint_fixed", tint), ("column_tints", columns)]);
             }
         }
-        for see in [
+        for visibility in [
             "visibility_unblocked",
             "visibility_horizons",
-            "visibility_slices",
-            "visibility_hanging",
+            "visibility_intervals",
+            "visibility_packed_intervals",
             "visibility_maps",
         ] {
-            check("projected_area", &[("visibility_unblocked", see)]);
-            let reach = match see {
-                "visibility_unblocked" => "reach_unblocked",
-                "visibility_horizons" => "reach_horizons",
-                _ => "reach_unknown",
+            check("projected_area", &[("visibility_unblocked", visibility)]);
+            let bounds = match visibility {
+                "visibility_unblocked" => "bounds_unblocked",
+                "visibility_horizons" => "bounds_horizons",
+                _ => "bounds_unknown",
             };
-            let sees = [("visibility_unblocked", see), ("reach_unblocked", reach)];
-            check("projected_area", &[sees[0], sees[1], ("sum_areas", "sum_patch_areas")]);
+            let visibility_swaps = [("visibility_unblocked", visibility), ("bounds_unblocked", bounds)];
+            check("projected_area", &[visibility_swaps[0], visibility_swaps[1], ("sum_areas", "sum_cluster_areas")]);
             for (weights, tint) in [("weights_area", "tint_fresnel"), ("weights_rgb", "tint_fixed")] {
                 let swaps = [("shadows_none", shadows), ("weights_area", weights), ("tint_fixed", tint)];
-                check("shade_patches", &[&sees[..], &swaps].concat());
+                check("shade_clusters", &[&visibility_swaps[..], &swaps].concat());
             }
-            check("table_areas", &[("visibility_unblocked", see)]);
+            check("table_areas", &[("visibility_unblocked", visibility)]);
             for weights in ["weights_area", "weights_rgb"] {
-                let swaps =
-                    [("visibility_unblocked", see), ("weights_area", weights), ("sum_facets", "sum_seen_areas")];
+                let swaps = [
+                    ("visibility_unblocked", visibility),
+                    ("weights_area", weights),
+                    ("sum_facets", "sum_visible_areas"),
+                ];
                 check("table_of_sum", &swaps);
-                check("table_of_picks", &swaps[..2]);
+                check("table_of_subsets", &swaps[..2]);
             }
             for lobe in ["lobe_lambertian", "lobe_blinn_phong", "lobe_cook_torrance", "lobe_ward", "lobe_ggx"] {
                 for weights in ["weights_area", "weights_rgb"] {
-                    let swaps = [("visibility_unblocked", see), ("lobe_lambertian", lobe), ("weights_area", weights)];
+                    let swaps =
+                        [("visibility_unblocked", visibility), ("lobe_lambertian", lobe), ("weights_area", weights)];
                     check("table_of_sum", &swaps);
                     let swaps = [
                         ("shadows_none", shadows),
-                        ("visibility_unblocked", see),
+                        ("visibility_unblocked", visibility),
                         ("lobe_lambertian", lobe),
                         ("weights_area", weights),
                     ];
@@ -78,32 +82,32 @@ fn every_combination_of_effects_parses_and_validates() {
 }
 
 #[test]
-fn what_a_scene_does_not_call_for_is_not_in_the_shader() {
-    let flat = biscale::gpu::swapped_source("shade_direct", &[]).expect("known files");
+fn effects_that_a_scene_does_not_use_are_not_in_the_shader() {
+    let without = biscale::gpu::swapped_source("shade_direct", &[]).expect("known files");
     let all = [
         ("shadows_none", "shadows_bits"),
         ("visibility_unblocked", "visibility_horizons"),
         ("lobe_lambertian", "lobe_cook_torrance"),
     ];
-    let rich = biscale::gpu::swapped_source("shade_direct", &all).expect("known files");
-    for absent in ["fn turn_of", "horizons[", "exp(", "visible["] {
-        assert!(!flat.contains(absent) && rich.contains(absent), "{absent}");
+    let with = biscale::gpu::swapped_source("shade_direct", &all).expect("known files");
+    for absent in ["fn azimuth_in_turns", "horizons[", "exp(", "visible["] {
+        assert!(!without.contains(absent) && with.contains(absent), "{absent}");
     }
-    let horizons = [("visibility_unblocked", "visibility_horizons"), ("reach_unblocked", "reach_horizons")];
-    let [flat, hilly] = [&[][..], &horizons].map(|swaps| biscale::gpu::swapped_source("shade_patches", swaps));
-    let (flat, hilly) = (flat.expect("known files"), hilly.expect("known files"));
-    for absent in ["fn turn_of", "horizons[", "sight.elevation"] {
-        assert!(!flat.contains(absent) && hilly.contains(absent), "{absent}");
+    let horizons = [("visibility_unblocked", "visibility_horizons"), ("bounds_unblocked", "bounds_horizons")];
+    let [without, with] = [&[][..], &horizons].map(|swaps| biscale::gpu::swapped_source("shade_clusters", swaps));
+    let (without, with) = (without.expect("known files"), with.expect("known files"));
+    for absent in ["fn azimuth_in_turns", "horizons[", "taps.elevation"] {
+        assert!(!without.contains(absent) && with.contains(absent), "{absent}");
     }
     let tints = biscale::gpu::swapped_source("shade_table", &[]).expect("known files");
     let lobes = biscale::gpu::swapped_source("shade_table", &[("column_tints", "column_lobes")]).expect("known files");
-    for absent in ["struct Term", "fn see(", "exp(", "half_exponent"] {
+    for absent in ["struct Term", "fn lobe_angles(", "exp(", "half_exponent"] {
         assert!(!tints.contains(absent) && lobes.contains(absent), "{absent}");
     }
-    let areas = [("sum_facets", "sum_seen_areas")];
+    let areas = [("sum_facets", "sum_visible_areas")];
     let areas = biscale::gpu::swapped_source("table_of_sum", &areas).expect("known files");
     let lobes = biscale::gpu::swapped_source("table_of_sum", &[]).expect("known files");
-    for absent in ["fn lobe(", "fn tint(", "is_lit(seen)"] {
+    for absent in ["fn lobe(", "fn tint(", "is_lit(angles)"] {
         assert!(!areas.contains(absent) && lobes.contains(absent), "{absent}");
     }
 }
@@ -119,16 +123,21 @@ fn every_shader_parses_and_validates_with_its_imports() {
                 continue;
             }
         };
-        failures.extend(complaint(&source).map(|error| format!("{name}: {error}")));
+        failures.extend(validation_error(&source).map(|error| format!("{name}: {error}")));
     }
     assert!(failures.is_empty(), "{} shaders fail:\n{}", failures.len(), failures.join("\n"));
 }
 
 #[test]
-fn the_table_of_shaders_is_the_folder() {
+fn the_table_of_shaders_lists_every_file_in_the_folders() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let files = std::fs::read_dir(&folder).expect("shaders/ is there").map(|entry| entry.expect("readable").path());
-    let files: BTreeSet<_> = files.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
-    let table: BTreeSet<_> = biscale::gpu::SHADERS.iter().map(|(name, _)| format!("{name}.wgsl")).collect();
+    let entries = |folder: &Path| -> Vec<_> {
+        let entries = std::fs::read_dir(folder).expect("the folder exists");
+        entries.map(|entry| entry.expect("the folder is readable").path()).collect()
+    };
+    let files = entries(&folder).into_iter().flat_map(|folder| entries(&folder));
+    let mut files: Vec<_> = files.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
+    let mut table: Vec<_> = biscale::gpu::SHADERS.iter().map(|(name, _)| format!("{name}.wgsl")).collect();
+    (files.sort(), table.sort());
     assert_eq!(files, table);
 }

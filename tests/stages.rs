@@ -109,7 +109,7 @@ fn asking_for_mesh_or_materials_alone_leaves_nothing_stale_behind() {
         "tile.geometry.depth=0.3",
     ] {
         let scene = open(&[overrides]);
-        pipeline.sum_materials(&scene).unwrap();
+        pipeline.materials(&scene).unwrap();
         pipeline.mesh(&scene).unwrap();
         let one = pipeline.effective(&scene).unwrap().brdf.eval(directions.0, directions.1);
         let other = Pipeline::new().effective(&scene).unwrap().brdf.eval(directions.0, directions.1);

@@ -3,8 +3,8 @@
 
 use std::f32::consts::TAU;
 
-use biscale::brdf::{Brdf, Term};
-use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Material, Representation};
+use biscale::brdf::{Brdf, Material, Term};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Representation};
 use biscale::geometry::{FacetSampler, Facets, HeightGrid, PeriodicGrid, SampleShift, TileMesh, lifted_origins, sees};
 use biscale::math::directions::{PolarGrid, from_angles};
 use biscale::metrics::mirror_biased_pairs;
@@ -313,9 +313,9 @@ fn effective(mesh: &TileMesh, count: usize, term: Term, maps: bool) -> Effective
         Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, 48, 0.02))
     };
     let material = Material { brdf: Brdf { terms: vec![term] }, color: Vec3::ONE };
-    let form =
+    let representation =
         Representation::Direct(Direct::new(Arc::new(FacetSum::new(&facets, &[0], &[material])), Arc::new(visibility)));
-    EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
+    EffectiveBrdf { representation, base_area: f64::from(mesh.base_area()) }
 }
 
 #[test]

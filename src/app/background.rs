@@ -1,4 +1,4 @@
-//! What is asked of the workers and what comes back.
+//! Submission of jobs to the workers and handling of their results.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -12,65 +12,65 @@ use super::document::Snapshot;
 use super::editor::Editor;
 use super::messages::Level;
 use super::worker::{
-    AccuracyAnswer, AccuracyJob, Devices, ExportAnswer, ExportJob, Grade, ImageAnswer, ImageJob, Images, LobeJob,
-    LobeMade, Made, Thumbnail, ThumbnailJob, TileAnswer, TileJob, Worker, spawn_accuracy, spawn_autosave, spawn_export,
-    spawn_lobe, spawn_thumbnail, spawn_tile,
+    AccuracyJob, AccuracyResult, ExportJob, ExportResult, GpuShare, Grade, ImageJob, ImageResult, LobeJob, LobePlot,
+    PreviewWorkers, RenderedPreview, SceneThumbnail, ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy,
+    spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
 };
 
-/// What menu, toolbar and status line take of the window's height, points.
+/// Height of menu, toolbar and status line [points].
 const BARS: f32 = 79.0;
-/// Least time between recovery files.
+/// Minimum time between recovery files [s].
 const AUTOSAVE_SECS: f64 = 5.0;
 
-/// What workers send.
-enum Answer {
-    Image(ImageAnswer),
-    Tile(TileAnswer),
-    Lobe(Box<LobeMade>),
-    Thumbnail(Thumbnail),
-    Export(ExportAnswer),
-    Accuracy(AccuracyAnswer),
+/// A result that a worker reports.
+enum JobResult {
+    Image(ImageResult),
+    Tile(TileResult),
+    Lobe(Box<LobePlot>),
+    Thumbnail(SceneThumbnail),
+    Export(ExportResult),
+    Accuracy(AccuracyResult),
     Autosaved(Result<(), String>),
 }
 
-/// The workers, each absent where the system gave no thread, and what was asked of them last.
-pub struct Background {
-    pub images: Option<Images>,
+/// The workers and the jobs that were submitted last. A worker is absent if the system provides no thread for it.
+pub struct BackgroundJobs {
+    pub images: Option<PreviewWorkers>,
     tiles: Option<Worker<TileJob>>,
     lobes: Option<Worker<LobeJob>>,
     thumbnails: Option<Worker<ThumbnailJob>>,
     pub exports: Option<Worker<ExportJob>>,
     accuracy: Option<Worker<AccuracyJob>>,
     autosaver: Option<Worker<Snapshot>>,
-    /// The version that was kept last, and when the next may be.
+    /// The last version in the recovery file, and the earliest time of the next one.
     autosaved: (u64, f64),
-    answers: Receiver<Answer>,
-    /// What workers are given, for a version of the document.
+    results: Receiver<JobResult>,
+    /// A version of the document in the form that workers read.
     loaded: Option<(u64, Arc<LoadedScene>)>,
-    /// The first picture was shown, or there is none to wait for: what it does not need may be computed.
+    /// The first image is shown, or cannot be computed; from then on, other jobs are submitted.
     opened: bool,
-    /// Drafted, not asked to be refined yet.
+    /// A job whose refinement is not submitted yet.
     unrefined: Option<ImageJob>,
 }
 
-impl Background {
+impl BackgroundJobs {
     pub fn new(ctx: &Context, cache: &Cache) -> Self {
-        let (to_us, answers) = channel();
+        let (sender, results) = channel();
         let wake = ctx.clone();
-        let send = move |answer| {
-            // Nobody listens any more only when the editor is gone.
-            let _ = to_us.send(answer);
+        let send = move |result| {
+            // Sending fails only if the editor has ended.
+            let _ = sender.send(result);
             wake.request_repaint();
         };
         let (to_tile, to_lobe, to_gallery, to_export, to_save, to_chart) =
             (send.clone(), send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
-        let accuracy = spawn_accuracy(move |answer| to_chart(Answer::Accuracy(answer)));
-        let images = Images::spawn(cache, move |answer| send(Answer::Image(answer)));
-        let tiles = spawn_tile(move |answer| to_tile(Answer::Tile(answer)));
-        let thumbnails = spawn_thumbnail(move |made| to_gallery(Answer::Thumbnail(made)));
-        let exports = spawn_export(cache, move |answer| to_export(Answer::Export(answer)));
-        let autosaver = spawn_autosave(move |done| to_save(Answer::Autosaved(done)));
-        let lobes = spawn_lobe(move |made| to_lobe(Answer::Lobe(Box::new(made))));
+        let accuracy = spawn_accuracy(move |result| to_chart(JobResult::Accuracy(result)));
+        let images = PreviewWorkers::spawn(cache, move |result| send(JobResult::Image(result)));
+        let tiles = spawn_tile(move |result| to_tile(JobResult::Tile(result)));
+        let thumbnails = spawn_thumbnail(move |thumbnail| to_gallery(JobResult::Thumbnail(thumbnail)));
+        let exports = spawn_export(cache, move |result| to_export(JobResult::Export(result)));
+        let autosaver = spawn_autosave(move |done| to_save(JobResult::Autosaved(done)));
+        let lobes = spawn_lobe(move |plot| to_lobe(JobResult::Lobe(Box::new(plot))));
         Self {
             images,
             tiles,
@@ -80,14 +80,14 @@ impl Background {
             accuracy,
             autosaver,
             autosaved: (1, 0.0),
-            answers,
+            results,
             loaded: None,
             opened: false,
             unrefined: None,
         }
     }
 
-    /// Ends all threads: none may still use a graphics driver while the process takes it down.
+    /// Ends all threads, because no thread may use a graphics driver while the process unloads it.
     pub fn finish(self) {
         let longest = Duration::from_secs(4);
         self.images.into_iter().for_each(|workers| workers.finish(longest));
@@ -100,14 +100,15 @@ impl Background {
 }
 
 impl Editor {
-    /// Thumbnails are made while nothing else is to be done.
+    /// Submits thumbnails while no other job waits.
     pub(super) fn fill_gallery(&mut self) {
-        let rests = |made: &Made| made.grade >= Grade::Refining && made.version == self.document.version();
-        let idle = self.object.made.as_deref().is_some_and(rests) && self.exporting.is_none();
+        let is_refined =
+            |preview: &RenderedPreview| preview.grade >= Grade::Refining && preview.version == self.document.version();
+        let idle = self.object.preview.as_deref().is_some_and(is_refined) && self.exporting.is_none();
         let Some(worker) = &self.background.thumbnails else { return };
         if idle && self.settings.gallery {
             if let Some(job) = self.gallery.job() {
-                worker.ask(job);
+                worker.submit(job);
             }
         } else if self.gallery.is_waiting() {
             worker.cancel();
@@ -115,24 +116,24 @@ impl Editor {
         }
     }
 
-    /// Accuracy is measured once the picture is finished, while its panel is open.
+    /// Submits a measurement of accuracy when the image is final and the panel is open.
     pub(super) fn measure_accuracy(&mut self) {
         let version = self.document.version();
         let Some(worker) = &self.background.accuracy else { return };
         if self.accuracy.is_late(version) {
             worker.cancel();
         }
-        let finished = |made: &Made| made.grade == Grade::Final && made.version == version;
-        let idle = self.object.made.as_deref().is_some_and(finished) && self.exporting.is_none();
+        let is_final = |preview: &RenderedPreview| preview.grade == Grade::Final && preview.version == version;
+        let idle = self.object.preview.as_deref().is_some_and(is_final) && self.exporting.is_none();
         if let (true, Some((_, loaded))) = (idle, &self.background.loaded)
             && let Some(job) = self.accuracy.job(version, loaded)
         {
-            worker.ask(job);
+            worker.submit(job);
         }
     }
 
-    /// Unsaved work goes to the recovery file some seconds after it was done.
-    pub(super) fn keep_recovery(&mut self, ctx: &Context) {
+    /// Submits unsaved work for the recovery file, some seconds after the edit.
+    pub(super) fn update_recovery(&mut self, ctx: &Context) {
         let Some(recovery) = &self.recovery else { return };
         let (version, now) = (self.document.version(), ctx.time());
         if !self.document.has_work() || version == self.background.autosaved.0 {
@@ -146,7 +147,7 @@ impl Editor {
             return;
         }
         if let (Some(worker), Ok(snapshot)) = (&self.background.autosaver, recovery.prepare(&self.document)) {
-            worker.ask(snapshot);
+            worker.submit(snapshot);
         }
         self.background.autosaved = (version, now + AUTOSAVE_SECS);
     }
@@ -154,15 +155,15 @@ impl Editor {
     /// Writes the recovery file at once.
     ///
     /// # Errors
-    /// A place that cannot be written.
-    pub fn keep_now(&self) -> crate::base::Result<()> {
+    /// A folder that cannot be written.
+    pub fn write_recovery(&self) -> crate::base::Result<()> {
         match &self.recovery {
             Some(recovery) if self.document.has_work() => recovery.prepare(&self.document)?.write(),
             _ => Ok(()),
         }
     }
 
-    /// Before the window goes: nothing is left to recover.
+    /// Removes the recovery file and saves the settings before the window closes.
     pub fn close(&mut self) {
         if let Some(worker) = self.background.autosaver.take() {
             worker.finish(Duration::from_secs(4));
@@ -173,15 +174,15 @@ impl Editor {
         self.settings.save(self.folder.as_deref());
     }
 
-    /// What was found of graphics devices.
-    pub fn tell_devices(&self, devices: Devices) {
+    /// Reports the available GPUs to the workers.
+    pub fn share_gpu(&self, gpu_share: GpuShare) {
         if let Some(images) = &self.background.images {
-            images.tell_devices(devices);
+            images.share_gpu(gpu_share);
         }
     }
 
-    /// Asks for the first picture while there is no window yet, in the size that the object's view is going to have.
-    pub fn ask_early(&mut self) {
+    /// Submits the first image before the window opens, in the expected size of the object's view.
+    pub fn request_first_image(&mut self) {
         let settings = &self.settings;
         let gallery = if settings.gallery { settings.gallery_width } else { 0.0 };
         let panels = [gallery + settings.parameters_width + settings.side_width, BARS];
@@ -190,29 +191,29 @@ impl Editor {
         self.request_image();
     }
 
-    /// Asks the workers for what is shown, once for every state and size.
-    pub(super) fn request(&mut self, ctx: &Context) {
+    /// Submits the jobs of all visible views, once per state and size.
+    pub(super) fn submit_jobs(&mut self, ctx: &Context) {
         let Some(loaded) = self.request_image() else { return };
         if !self.background.opened {
-            let answered = self.object.made.is_some() || self.object.failed.is_some();
-            self.background.opened = answered || self.background.images.is_none();
+            let is_settled = self.object.preview.is_some() || self.object.failed.is_some();
+            self.background.opened = is_settled || self.background.images.is_none();
             if self.background.opened {
                 ctx.request_repaint();
             }
             return;
         }
         if let (Some(worker), Some(job)) = (&self.background.tiles, self.tile.job(&loaded, self.lobe.light)) {
-            worker.ask(job);
+            worker.submit(job);
         }
         if !self.tile.painting
-            && let (Some(worker), Some(made)) = (&self.background.lobes, &self.object.made)
-            && let Some(job) = made.brdf.as_ref().and_then(|brdf| self.lobe.job(brdf))
+            && let (Some(worker), Some(preview)) = (&self.background.lobes, &self.object.preview)
+            && let Some(job) = preview.brdf.as_ref().and_then(|brdf| self.lobe.job(brdf))
         {
-            worker.ask(job);
+            worker.submit(job);
         }
     }
 
-    /// Asks for the object's picture where it is not what was asked for last; gives the scene as workers have it.
+    /// Submits the object's image if version or size changed; returns the scene in the form that workers read.
     fn request_image(&mut self) -> Option<Arc<LoadedScene>> {
         let version = self.document.version();
         if self.background.loaded.as_ref().is_none_or(|(last, _)| *last != version) {
@@ -226,13 +227,13 @@ impl Editor {
             worker.refine(job);
         }
         let wanted = (version, self.size);
-        if self.object.asked != Some(wanted) {
-            self.object.asked = Some(wanted);
-            self.object.since.get_or_insert_with(Instant::now);
+        if self.object.requested != Some(wanted) {
+            self.object.requested = Some(wanted);
+            self.object.requested_at.get_or_insert_with(Instant::now);
             if let Some(worker) = &self.background.images {
-                let job = ImageJob { version, loaded: loaded.clone(), size: self.size, asked: Instant::now() };
+                let job = ImageJob { version, loaded: loaded.clone(), size: self.size, submitted: Instant::now() };
                 if opened {
-                    worker.ask(job);
+                    worker.submit(job);
                 } else {
                     worker.draft(job.clone());
                     self.background.unrefined = Some(job);
@@ -242,73 +243,75 @@ impl Editor {
         Some(loaded)
     }
 
-    pub(super) fn take_answers(&mut self, ctx: &Context) {
-        while let Ok(answer) = self.background.answers.try_recv() {
-            match answer {
-                Answer::Tile(TileAnswer::Made(made)) => {
+    pub(super) fn receive_results(&mut self, ctx: &Context) {
+        while let Ok(result) = self.background.results.try_recv() {
+            match result {
+                JobResult::Tile(TileResult::Rendered(rendered)) => {
                     self.messages.clear("tile");
-                    self.slots.clone_from(&made.tile.mesh.slots);
-                    self.tile.take(ctx, made);
+                    self.slots.clone_from(&rendered.tile.mesh.slots);
+                    self.tile.receive(ctx, rendered);
                 }
-                Answer::Tile(TileAnswer::Failed(text)) => self.messages.put(Level::Trouble, "tile", text),
-                Answer::Lobe(made) => self.lobe.take(ctx, made),
-                Answer::Thumbnail(made) => self.gallery.take(ctx, made),
-                Answer::Accuracy(answer) => self.accuracy.take(ctx, answer),
-                Answer::Export(answer) => self.take_export(answer),
-                Answer::Autosaved(Ok(())) => self.messages.clear("autosave"),
-                Answer::Autosaved(Err(text)) => {
+                JobResult::Tile(TileResult::Failed(text)) => self.messages.put(Level::Error, "tile", text),
+                JobResult::Lobe(plot) => self.lobe.receive(ctx, plot),
+                JobResult::Thumbnail(thumbnail) => self.gallery.receive(ctx, thumbnail),
+                JobResult::Accuracy(result) => self.accuracy.receive(ctx, result),
+                JobResult::Export(result) => self.receive_export(result),
+                JobResult::Autosaved(Ok(())) => self.messages.clear("autosave"),
+                JobResult::Autosaved(Err(text)) => {
                     let text = format!("No recovery file could be written ({text}). Save your work yourself.");
-                    self.messages.put(Level::Trouble, "autosave", text);
+                    self.messages.put(Level::Error, "autosave", text);
                 }
-                Answer::Image(answer) => self.take_image(ctx, answer),
+                JobResult::Image(result) => self.receive_image(ctx, result),
             }
         }
     }
 
-    pub(super) fn take_image(&mut self, ctx: &Context, answer: ImageAnswer) {
-        match answer {
-            ImageAnswer::Made(made) => {
-                self.messages.clear("picture");
-                match &made.trouble {
-                    Some(why) => self.device_failed(why),
-                    None => self.device_trouble = None,
+    pub(super) fn receive_image(&mut self, ctx: &Context, result: ImageResult) {
+        match result {
+            ImageResult::Rendered(preview) => {
+                self.messages.clear("image");
+                match &preview.gpu_error {
+                    Some(why) => self.report_gpu_failure(why),
+                    None => self.gpu_error = None,
                 }
-                self.object.take(ctx, made);
+                self.object.receive(ctx, preview);
             }
-            ImageAnswer::Doing(version, what) if version == self.document.version() => {
-                self.object.doing = Some(what);
+            ImageResult::Doing(version, what) if version == self.document.version() => {
+                self.object.activity = Some(what);
             }
-            ImageAnswer::Doing(..) => {}
-            ImageAnswer::Failed(version, _) if version < self.document.version() => {}
-            ImageAnswer::Failed(version, text) => {
+            ImageResult::Doing(..) => {}
+            ImageResult::Failed(version, _) if version < self.document.version() => {}
+            ImageResult::Failed(version, text) => {
                 self.object.fail(version);
-                self.messages.put(Level::Trouble, "picture", text);
+                self.messages.put(Level::Error, "image", text);
             }
-            ImageAnswer::Fault(text) => {
+            ImageResult::Fault(text) => {
                 self.object.fail(self.document.version());
-                let text = format!("A fault in the program while computing ({text}). Your document is kept; edit on.");
-                self.messages.put(Level::Trouble, "picture", text);
+                let text = format!(
+                    "A fault in the program while computing ({text}). Your document is kept; you can continue to edit."
+                );
+                self.messages.put(Level::Error, "image", text);
             }
         }
     }
 
-    /// Says once that pictures come from the processor now.
-    fn device_failed(&mut self, why: &str) {
-        if self.device_trouble.as_deref() != Some(why) {
-            self.device_trouble = Some(why.to_owned());
+    /// Reports a GPU failure once.
+    fn report_gpu_failure(&mut self, why: &str) {
+        if self.gpu_error.as_deref() != Some(why) {
+            self.gpu_error = Some(why.to_owned());
             let text = format!(
-                "The graphics device failed ({why}). Your document is kept; pictures are made on the processor. To try the \
-                 device again set Quality, Backend to Cpu and back to Auto."
+                "The GPU failed ({why}). Your document is kept, and the CPU renders the images. To try the GPU again, \
+                 set Quality, Backend to Cpu and back to Auto."
             );
-            self.messages.put(Level::Trouble, "device", text);
+            self.messages.put(Level::Error, "gpu", text);
         }
     }
 
-    /// Whether anything is being computed.
+    /// Returns true until the final image of the last request is shown.
     #[cfg(test)]
     pub fn is_busy(&self) -> bool {
-        self.object.made.as_ref().is_none_or(|made| {
-            made.grade != Grade::Final || Some(made.version) != self.object.asked.map(|(version, _)| version)
+        self.object.preview.as_ref().is_none_or(|preview| {
+            preview.grade != Grade::Final || Some(preview.version) != self.object.requested.map(|(version, _)| version)
         })
     }
 }

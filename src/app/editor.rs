@@ -1,4 +1,4 @@
-//! The editor: what is open, the views, the workers, and one frame of it all.
+//! The editor: the document, the views, the workers, and the order of work in one frame.
 
 use std::path::PathBuf;
 
@@ -7,36 +7,37 @@ use crate::scene::{MaterialSpec, Scene};
 use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
 
 use super::actions::{self, Action};
-use super::background::Background;
+use super::background::BackgroundJobs;
 use super::dialogs::Dialog;
-use super::document::{Document, Recovered, RecoveryFile, Settings};
+use super::document::{Document, EditorSettings, RecoveredDocument, RecoveryFile};
 use super::messages::{Level, Messages};
 use super::paint::Stroke;
 use super::panels::{self, materials};
 use super::theme;
 use super::views::gallery::Gallery;
-use super::views::hand::Hand;
 use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
+use super::views::pointer::Pointer;
 use super::views::tile::TileState;
 
-/// What a person reads at the first start, until it is closed.
+/// Message of the first start, shown until the user closes it.
 const WELCOME: &str = "welcome";
 const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (left) and change its surface and materials \
-                            (right). F1 has the first steps of usual tasks, and all shortcuts.";
+                            (right). F1 explains common tasks and lists all shortcuts.";
 
-/// Width of the smaller view, and what panels leave of the window's width to the large one, points.
+/// Minimum and maximum width of the smaller view [points].
 const SIDE: [f32; 2] = [240.0, 900.0];
+/// Minimum width of the large view [points].
 const MIN_VIEW: f32 = 260.0;
 
-/// Everything but the window.
+/// The state of the editor, independent of its window.
 pub struct Editor {
     pub document: Document,
-    pub settings: Settings,
-    /// Where settings and recovery files are; none in tests.
+    pub settings: EditorSettings,
+    /// Folder of settings and recovery files; absent in tests.
     pub folder: Option<PathBuf>,
     pub recovery: Option<RecoveryFile>,
-    /// Results of earlier runs; off in tests.
+    /// Results of earlier runs; disabled in tests.
     cache: Cache,
     pub messages: Messages,
     pub dialog: Option<Dialog>,
@@ -46,43 +47,45 @@ pub struct Editor {
     pub accuracy: panels::AccuracyState,
     /// The tile is in the large view.
     pub exchanged: bool,
+    /// The stroke that the user is drawing.
     pub(super) stroke: Option<Stroke>,
     pub title: String,
-    /// The window has the focus again, and others may have written the file meanwhile.
-    came_back: bool,
-    /// The window may go.
+    /// The window got the focus, so that another program may have changed the file.
+    got_focus: bool,
+    /// The window may close.
     pub leaving: bool,
-    pub(super) background: Background,
-    /// The part of an export that is done, and what is being done.
+    pub(super) background: BackgroundJobs,
+    /// The finished fraction of an export, and its current work.
     pub(super) exporting: Option<(f32, &'static str)>,
     pub gallery: Gallery,
     pub(super) slots: Vec<String>,
-    /// Pixels of the object view.
+    /// Size of the object view in pixels.
     pub(super) size: [usize; 2],
-    /// What the hand did on the tile in this frame.
-    pub(super) hand: Vec<Hand>,
+    /// Pointer input on the tile in this frame.
+    pub(super) pointer: Vec<Pointer>,
+    /// The action that the object view's toolbar started in this frame.
     pub(super) from_view: Option<Action>,
     pub(super) copied: Option<MaterialSpec>,
-    /// Why pictures are not made on the device any more, as it was said.
-    pub(super) device_trouble: Option<String>,
+    /// The GPU failure that was reported last.
+    pub(super) gpu_error: Option<String>,
 }
 
 impl Editor {
-    /// `folder`: where settings are kept; without one nothing is remembered. `cache`: where results are.
+    /// Creates an editor. `folder` stores the settings; without a folder they are not saved. `cache` stores results.
     pub fn new(ctx: &Context, document: Document, folder: Option<PathBuf>, cache: Cache) -> Self {
-        let settings = Settings::load(folder.as_deref());
+        let settings = EditorSettings::load(folder.as_deref());
         theme::install(ctx);
         ctx.set_theme(if settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
         ctx.set_zoom_factor(settings.zoom);
         let mut messages = Messages::default();
-        let background = Background::new(ctx, &cache);
+        let background = BackgroundJobs::new(ctx, &cache);
         if background.images.is_none() {
-            messages.put(Level::Trouble, "worker", "The system gave no thread to compute on: nothing will be drawn.");
+            messages.put(Level::Error, "worker", "The system provides no threads, so no image can be computed.");
         }
         if !settings.welcomed && folder.is_some() {
             messages.put(Level::Guide, WELCOME, WELCOME_TEXT);
         }
-        let recovered = folder.as_deref().map(Recovered::find).unwrap_or_default();
+        let recovered = folder.as_deref().map(RecoveredDocument::find).unwrap_or_default();
         let dialog = (!recovered.is_empty()).then_some(Dialog::Recover(recovered));
         Self {
             recovery: folder.as_deref().map(RecoveryFile::new),
@@ -100,25 +103,25 @@ impl Editor {
             exchanged: false,
             stroke: None,
             title: String::new(),
-            came_back: false,
+            got_focus: false,
             leaving: false,
             background,
             exporting: None,
             gallery: Gallery::default(),
             copied: None,
-            device_trouble: None,
+            gpu_error: None,
             size: [64, 64],
-            hand: Vec::new(),
+            pointer: Vec::new(),
             from_view: None,
         }
     }
 
-    /// Goes on in another window, with all its pictures to be made anew.
+    /// Moves to another window, in which all images are rendered again.
     pub fn move_to(&mut self, ctx: &Context) {
         theme::install(ctx);
         ctx.set_theme(if self.settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
         ctx.set_zoom_factor(self.settings.zoom);
-        std::mem::replace(&mut self.background, Background::new(ctx, &self.cache)).finish();
+        std::mem::replace(&mut self.background, BackgroundJobs::new(ctx, &self.cache)).finish();
         self.object.move_to(ctx);
         self.tile.move_to();
         self.lobe.move_to();
@@ -126,19 +129,19 @@ impl Editor {
         self.accuracy = panels::AccuracyState::default();
         self.exporting = None;
         self.title.clear();
-        let text = "The graphics device of the window was lost, so a new window was opened. Your document is as it was; \
-                    if this happens again, save, and update the graphics driver.";
-        self.messages.put(Level::Trouble, "window", text);
+        let text = "The window's GPU was lost, so a new window was opened. Your document is unchanged. If this happens \
+                    again, save, and update the graphics driver.";
+        self.messages.put(Level::Error, "window", text);
     }
 
-    /// After the window is gone.
+    /// Ends the workers after the window has closed.
     pub fn finish(self) {
         self.background.finish();
-        // What could not be kept is made again.
+        // A result that could not be stored is computed again by the next run.
         let _ = self.cache.finish();
     }
 
-    /// One frame in a window: title, files dropped, the way out.
+    /// Runs one frame in a window: dropped files, closing, title.
     pub fn window_frame(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         for file in ctx.input(|input| input.raw.dropped_files.clone()) {
@@ -146,12 +149,12 @@ impl Editor {
         }
         if ctx.input(|input| input.viewport().close_requested()) && !self.leaving {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-            self.perform(&ctx, Action::Quit);
+            self.execute(&ctx, Action::Quit);
         }
-        self.came_back |= ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
-        // Not over another question: the file is looked at once that is answered.
-        if self.came_back && self.dialog.is_none() {
-            self.came_back = false;
+        self.got_focus |= ctx.input(|input| input.events.contains(&egui::Event::WindowFocused(true)));
+        // An open dialog postpones the check of the file.
+        if self.got_focus && self.dialog.is_none() {
+            self.got_focus = false;
             if self.document.changed_on_disk() {
                 self.dialog = Some(Dialog::ChangedOnDisk { saving: false });
             }
@@ -172,10 +175,10 @@ impl Editor {
         }
     }
 
-    /// One frame.
+    /// Runs one frame without a window.
     pub fn frame(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
-        self.take_answers(&ctx);
+        self.receive_results(&ctx);
         let action = actions::pressed(&ctx);
         let from_menu = Panel::top("menu").show(ui, |ui| self.menu_ui(ui)).inner;
         Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
@@ -188,14 +191,14 @@ impl Editor {
             .show(ui, |ui| {
                 let painted = self.document.painted().clone();
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                    let effects = self.object.made.as_ref().map_or(&[][..], |made| &made.effects);
+                    let effects = self.object.preview.as_ref().map_or(&[][..], |preview| &preview.effects);
                     let version = self.document.version();
-                    let shown = panels::Shown { accuracy: &mut self.accuracy, effects, version };
+                    let shown = panels::PanelInputs { accuracy: &mut self.accuracy, effects, version };
                     panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots, shown)
                 })
             });
         self.settings.parameters_width = parameters.response.rect.width();
-        let asked = parameters.inner.inner;
+        let requests = parameters.inner.inner;
         let widest = (ui.available_width() - MIN_VIEW).clamp(SIDE[0], SIDE[1]);
         let side = Panel::right("side").default_size(self.settings.side_width).size_range(SIDE[0]..=widest);
         let side = side.show(ui, |ui| self.side_ui(ui, &mut scene)).response.rect.width();
@@ -212,39 +215,39 @@ impl Editor {
             self.settings.welcomed = true;
             self.settings.save(self.folder.as_deref());
         }
-        self.take_scene(scene);
-        self.take_asked(&ctx, asked);
+        self.apply_edit(scene);
+        self.apply_requests(&ctx, requests);
         if let Some(action) = self.from_view.take() {
-            self.perform(&ctx, action);
+            self.execute(&ctx, action);
         }
-        self.take_hand();
+        self.apply_pointer_events();
         self.brush_keys(&ctx);
-        self.take_pasted(&ctx);
+        self.paste_clipboard(&ctx);
         for action in action.into_iter().chain(from_menu).chain(from_gallery) {
-            self.perform(&ctx, action);
+            self.execute(&ctx, action);
         }
         self.dialogs(&ctx);
         if !ctx.input(|input| input.pointer.any_down()) && !ctx.text_edit_focused() {
             self.document.rest();
         }
-        self.request(&ctx);
-        self.keep_recovery(&ctx);
+        self.submit_jobs(&ctx);
+        self.update_recovery(&ctx);
         self.fill_gallery();
         self.measure_accuracy();
     }
 
-    /// Strokes come after the panels: what they edit is the scene as it is then.
-    fn take_hand(&mut self) {
-        for hand in std::mem::take(&mut self.hand) {
-            self.paint(hand);
+    /// Applies strokes after the panels, so that they edit the scene of this frame.
+    fn apply_pointer_events(&mut self) {
+        for pointer in std::mem::take(&mut self.pointer) {
+            self.paint(pointer);
         }
         if !self.tile.painting {
             self.end_stroke();
         }
     }
 
-    /// The scene as the panels and views left it, if it can be.
-    pub(super) fn take_scene(&mut self, scene: Scene) {
+    /// Takes the scene over that the panels and views edited, if it is valid.
+    pub(super) fn apply_edit(&mut self, scene: Scene) {
         if scene == **self.document.scene() {
             return;
         }
@@ -254,13 +257,13 @@ impl Editor {
                 self.slots = materials::slots_of(&scene);
                 self.document.edit(scene);
             }
-            Err(error) => self.messages.put(Level::Trouble, "edit", format!("Not taken over: {error}")),
+            Err(error) => self.messages.put(Level::Error, "edit", format!("Edit rejected: {error}")),
         }
     }
 
-    /// As from a menu.
+    /// Executes an action like a menu does.
     #[cfg(test)]
     pub fn action(&mut self, ctx: &Context, action: Action) {
-        self.perform(ctx, action);
+        self.execute(ctx, action);
     }
 }

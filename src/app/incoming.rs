@@ -1,4 +1,4 @@
-//! What comes in and goes out: files that were chosen or dropped, what the panels asked for, exports.
+//! Handling of chosen and dropped files, of requests from the panels, and of exports.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,12 +14,12 @@ use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
 use super::views::brushes::Layer;
-use super::worker::{ExportAnswer, ExportJob, TableChoice, What};
+use super::worker::{ExportJob, ExportKind, ExportResult, TableChoice};
 
 impl Editor {
-    /// What the panel asked for.
-    pub(super) fn take_asked(&mut self, ctx: &Context, asked: panels::Asked) {
-        if let Some(key) = asked.browse {
+    /// Applies the requests of the panels.
+    pub(super) fn apply_requests(&mut self, ctx: &Context, requests: panels::PanelRequests) {
+        if let Some(key) = requests.browse {
             let purpose = match key {
                 "mesh" => Purpose::TileMesh,
                 "object" => Purpose::ObjectMesh,
@@ -31,28 +31,28 @@ impl Editor {
             };
             self.browse(purpose, "");
         }
-        match asked.material {
-            Some(materials::Request::Browse { material, term }) => {
+        match requests.material {
+            Some(materials::MaterialRequest::Browse { material, term }) => {
                 self.browse(Purpose::Measured { material, term }, "")
             }
-            Some(materials::Request::Copy { material }) => self.copy_material(ctx, material),
-            Some(materials::Request::Paste { slot }) => self.paste_material(&slot),
+            Some(materials::MaterialRequest::Copy { material }) => self.copy_material(ctx, material),
+            Some(materials::MaterialRequest::Paste { slot }) => self.paste_material(&slot),
             None => {}
         }
-        if let Some(text) = asked.complaint {
-            self.messages.put(Level::Trouble, "edit", text);
+        if let Some(text) = requests.error {
+            self.messages.put(Level::Error, "edit", text);
         }
     }
 
-    /// A file was chosen.
-    pub(super) fn chosen(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
+    /// Uses the file that the user chose.
+    pub(super) fn use_file(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
         self.settings.files = path.parent().map(Path::to_owned);
         let mut scene = (**self.document.scene()).clone();
-        let near = self.near(&path);
+        let relative = self.relative_path(&path);
         match purpose {
-            Purpose::OpenScene => return self.perform_now(ctx, Action::OpenFile(path)),
+            Purpose::OpenScene => return self.execute_now(ctx, Action::OpenFile(path)),
             Purpose::SaveScene => return self.save(&path),
-            Purpose::Measured { material, term } => match materials::measured(&near) {
+            Purpose::Measured { material, term } => match materials::measured(&relative) {
                 Some(measured) => {
                     let name = scene.materials.get(material).map(|material| material.name.clone());
                     materials::set_term(&mut scene, material, term, measured);
@@ -60,21 +60,21 @@ impl Editor {
                 }
                 None => return self.unknown_file(&path),
             },
-            Purpose::Paint(Layer::Heights) => match surface::of_file(&near, &scene) {
+            Purpose::Paint(Layer::Heights) => match surface::of_file(&relative, &scene) {
                 Some(geometry) => scene.tile.geometry = geometry,
                 None => return self.unknown_file(&path),
             },
-            Purpose::TileMesh => match surface::of_file(&near, &scene) {
+            Purpose::TileMesh => match surface::of_file(&relative, &scene) {
                 Some(geometry) => scene.tile.geometry = geometry,
                 None => return self.unknown_file(&path),
             },
-            Purpose::Paint(Layer::Colors) => scene.tile.color_path = Some(near),
-            Purpose::Paint(Layer::Slots) => scene.tile.slot_path = Some(near),
+            Purpose::Paint(Layer::Colors) => scene.tile.color_path = Some(relative),
+            Purpose::Paint(Layer::Slots) => scene.tile.slot_path = Some(relative),
             Purpose::ObjectMesh => {
                 "mesh".clone_into(&mut scene.object.kind);
-                scene.object.path = Some(near);
+                scene.object.path = Some(relative);
             }
-            Purpose::Environment => scene.light.environment = near.to_string_lossy().into_owned(),
+            Purpose::Environment => scene.light.environment = relative.to_string_lossy().into_owned(),
             Purpose::SavePaint(layer) => return self.save_image(&path, layer),
             Purpose::ExportTable if path.extension().is_some_and(|ending| ending == "gltf" || ending == "mtlx") => {
                 self.dialog = Some(Dialog::Fit { path });
@@ -87,7 +87,7 @@ impl Editor {
             Purpose::ExportTable => {
                 match crate::export::check_ending(&path) {
                     Ok(()) => self.dialog = Some(Dialog::Table { path, choice: TableChoice::default() }),
-                    Err(error) => self.messages.put(Level::Trouble, "export", error.to_string()),
+                    Err(error) => self.messages.put(Level::Error, "export", error.to_string()),
                 }
                 return;
             }
@@ -99,21 +99,21 @@ impl Editor {
         self.try_edit(scene);
     }
 
-    /// A paint that was measured is shown as it was: no tint of the material before remains, and that is said.
+    /// Removes the colour of a material that became a measured paint, so that the paint looks as measured.
     fn as_measured(&mut self, scene: &mut crate::scene::Scene, material: usize, name: Option<&str>) {
         self.messages.clear("measured");
-        let Some(place) = scene.materials.get_mut(material) else { return };
-        let mut said = Vec::new();
-        if place.color != glam::Vec3::ONE {
-            place.color = glam::Vec3::ONE;
-            said.push("its colour is white now, so that the paint looks as it was measured");
+        let Some(target) = scene.materials.get_mut(material) else { return };
+        let mut notes = Vec::new();
+        if target.color != glam::Vec3::ONE {
+            target.color = glam::Vec3::ONE;
+            notes.push("its colour is white, so that the paint looks as measured");
         }
-        if place.brdf.as_ref().is_some_and(|brdf| brdf.terms().len() > 1) {
-            said.push("the other lobes of the material are still added to it (× removes one)");
+        if target.brdf.as_ref().is_some_and(|brdf| brdf.terms().len() > 1) {
+            notes.push("the other lobes of the material are still added to it (× removes one)");
         }
-        if !said.is_empty() {
-            let name = panels::fields::words(name.unwrap_or("default"));
-            self.messages.put(Level::Note, "measured", format!("{name}: {}.", said.join("; ")));
+        if !notes.is_empty() {
+            let name = panels::fields::display_name(name.unwrap_or("default"));
+            self.messages.put(Level::Note, "measured", format!("{name}: {}.", notes.join("; ")));
         }
     }
 
@@ -121,13 +121,13 @@ impl Editor {
         let checked: Result<()> = scene.validate();
         match checked {
             Ok(()) => self.document.edit(scene),
-            Err(error) => self.messages.put(Level::Trouble, "edit", error.to_string()),
+            Err(error) => self.messages.put(Level::Error, "edit", error.to_string()),
         }
         self.scene_changed();
     }
 
-    /// The path as the scene should name it: relative where the file lies under the scene's folder.
-    pub(super) fn near(&self, path: &Path) -> PathBuf {
+    /// The path as the scene stores it: relative if the file lies under the scene's folder.
+    pub(super) fn relative_path(&self, path: &Path) -> PathBuf {
         let base = &self.document.base_dir;
         match path.strip_prefix(base) {
             Ok(inside) if !base.as_os_str().is_empty() => inside.to_owned(),
@@ -137,63 +137,63 @@ impl Editor {
 
     pub(super) fn unknown_file(&mut self, path: &Path) {
         let text = format!(
-            "{}: found a file of another kind; scenes end in .toml, measured BRDFs in .binary or .bsdf, meshes in .obj, \
-             skies in .hdr or .exr, heights in .png.",
+            "{}: found an unknown kind of file; expected a scene (.toml), a measured BRDF (.binary, .bsdf, .npz), \
+             a mesh (.obj), an environment (.hdr, .exr) or an image (.png, .jpg, .tif).",
             path.display()
         );
-        self.messages.put(Level::Trouble, "open", text);
+        self.messages.put(Level::Error, "open", text);
     }
 
-    /// A file dropped on the window goes where its ending says.
+    /// Uses a file that was dropped on the window, depending on its extension.
     pub(super) fn dropped(&mut self, ctx: &Context, path: PathBuf) {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
         match ending.as_str() {
-            "toml" => self.perform(ctx, Action::OpenFile(path)),
+            "toml" => self.execute(ctx, Action::OpenFile(path)),
             "binary" | "bsdf" | "bin" | "npz" => {
                 let mut scene = (**self.document.scene()).clone();
                 if scene.materials.is_empty() {
                     scene.materials.push(materials::grey());
                 }
-                let near = self.near(&path);
+                let relative = self.relative_path(&path);
                 let at = scene.materials.iter().position(|material| material.name == "default").unwrap_or(0);
-                if let (Some(term), Some(place)) = (materials::measured(&near), scene.materials.get_mut(at)) {
-                    place.brdf = Some(BrdfSpec::One(term));
+                if let (Some(term), Some(target)) = (materials::measured(&relative), scene.materials.get_mut(at)) {
+                    target.brdf = Some(BrdfSpec::One(term));
                 }
                 self.as_measured(&mut scene, at, None);
                 self.try_edit(scene);
             }
-            "obj" => self.chosen(ctx, Purpose::TileMesh, path),
-            "hdr" | "exr" => self.chosen(ctx, Purpose::Environment, path),
-            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.chosen(ctx, Purpose::Paint(Layer::Heights), path),
+            "obj" => self.use_file(ctx, Purpose::TileMesh, path),
+            "hdr" | "exr" => self.use_file(ctx, Purpose::Environment, path),
+            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.use_file(ctx, Purpose::Paint(Layer::Heights), path),
             _ => self.unknown_file(&path),
         }
     }
 
-    pub(super) fn export(&mut self, path: PathBuf, what: What) {
+    pub(super) fn export(&mut self, path: PathBuf, kind: ExportKind) {
         if let Some(worker) = &self.background.exports {
             self.messages.clear("export");
             self.exporting = Some((0.0, "Starting"));
-            worker.ask(ExportJob { loaded: Arc::new(self.document.loaded()), path, what });
+            worker.submit(ExportJob { loaded: Arc::new(self.document.loaded()), path, kind });
         }
     }
 
-    pub(super) fn take_export(&mut self, answer: ExportAnswer) {
+    pub(super) fn receive_export(&mut self, answer: ExportResult) {
         match answer {
-            ExportAnswer::Progress(part, what) => {
+            ExportResult::Progress(fraction, task) => {
                 if let Some(exporting) = &mut self.exporting {
-                    *exporting = (part, what);
+                    *exporting = (fraction, task);
                 }
             }
-            ExportAnswer::Done(text) => {
+            ExportResult::Done(text) => {
                 self.exporting = None;
                 self.messages.put(Level::Note, "export", text);
             }
-            ExportAnswer::Failed(text) => {
+            ExportResult::Failed(text) => {
                 self.exporting = None;
-                self.messages.put(Level::Trouble, "export", format!("Not exported: {text}"));
+                self.messages.put(Level::Error, "export", format!("Not exported: {text}"));
             }
-            // Whoever gave it up took it off the status line; by now the next export may stand there.
-            ExportAnswer::Cancelled => {}
+            // The status line is cleared at the cancellation, and may already show the next export.
+            ExportResult::Cancelled => {}
         }
     }
 }

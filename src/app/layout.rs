@@ -1,4 +1,4 @@
-//! Where the views stand: gallery, object, tile, and under the smaller one the brush or the lobe.
+//! Layout of the views: gallery, object, tile, and the brush or lobe plot under the smaller view.
 
 use crate::effective::EffectiveBrdf;
 use crate::render::CameraView;
@@ -9,7 +9,7 @@ use super::actions::Action;
 use super::editor::Editor;
 use super::pick;
 use super::views::brushes;
-use super::views::tile::{self, Which};
+use super::views::tile::{self, TileMode};
 
 impl Editor {
     pub(super) fn gallery_ui(&mut self, ui: &mut Ui) -> Option<Action> {
@@ -33,37 +33,37 @@ impl Editor {
         self.pick();
     }
 
-    /// What the pointer is over tells the lobe view and the tile.
+    /// Passes the point under the pointer to the lobe plot and the tile view.
     fn pick(&mut self) {
-        let (Some(at), Some(made)) = (self.object.pointed, &self.object.made) else { return };
-        let Some((mesh, lights)) = &made.set else { return };
-        let size = made.image.size();
-        let Ok(view) = CameraView::new(&made.camera, mesh, size) else { return };
+        let (Some(at), Some(preview)) = (self.object.pick_position, &self.object.preview) else { return };
+        let Some((mesh, lights)) = &preview.lit_object else { return };
+        let size = preview.image.size();
+        let Ok(view) = CameraView::new(&preview.camera, mesh, size) else { return };
         let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
         if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
             self.lobe.viewer = Some(picked.viewer);
             self.lobe.light = picked.light.unwrap_or(self.lobe.light);
             let value = |brdf: &EffectiveBrdf| brdf.eval(self.lobe.light, picked.viewer).max_element();
-            let value = made.brdf.as_deref().map_or(0.0, value);
+            let value = preview.brdf.as_deref().map_or(0.0, value);
             self.tile.picked = Some((picked.viewer, 4.0 * value));
-            self.tile.show = Which::Contribution;
+            self.tile.show = TileMode::Contribution;
         }
     }
 
-    /// The tile with its toolbar; `below` is kept free.
+    /// Shows the tile with its toolbar; `below` stays free.
     pub(super) fn tile_ui(&mut self, ui: &mut Ui, scene: &Scene, below: f32) {
         ui.add_space(3.0);
         if let Some(on) = self.tile.toolbar(ui) {
             self.tile.set_painting(on);
         }
-        let size = if below > 0.0 { tile::fitting(ui, below) } else { ui.available_size() };
-        self.hand = self.tile.ui(ui, scene.tile.size, size);
+        let size = if below > 0.0 { tile::size_above(ui, below) } else { ui.available_size() };
+        self.pointer = self.tile.ui(ui, scene.tile.size, size);
     }
 
-    /// The smaller view, and under it the brush or the lobe.
+    /// Shows the smaller view, and under it the brush or the lobe plot.
     pub(super) fn side_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
         if self.exchanged {
-            let size = tile::fitting(ui, 300.0);
+            let size = tile::size_above(ui, 300.0);
             ui.allocate_ui(size, |ui| self.object_ui(ui, scene));
         } else {
             let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + 90.0 };
@@ -72,8 +72,8 @@ impl Editor {
         ui.add_space(6.0);
         if self.tile.painting {
             ScrollArea::vertical().show(ui, |ui| {
-                if let Some(asked) = brushes::ui(ui, &mut self.tile.brush, scene) {
-                    self.brush_asked(asked);
+                if let Some(request) = brushes::ui(ui, &mut self.tile.brush, scene) {
+                    self.apply_brush_request(request);
                 }
             });
         } else {

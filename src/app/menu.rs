@@ -7,7 +7,7 @@ use super::actions::{self, Action};
 use super::editor::Editor;
 
 impl Editor {
-    /// The bar; what was chosen from it.
+    /// Shows the bar and returns the chosen action.
     pub(super) fn menu_ui(&mut self, ui: &mut Ui) -> Option<Action> {
         let mut chosen = None;
         MenuBar::new().ui(ui, |ui| {
@@ -46,7 +46,7 @@ impl Editor {
                 }
             }
             if self.settings.recent.is_empty() {
-                ui.weak("Nothing yet");
+                ui.weak("No recent files");
             }
         });
         ui.menu_button("Open a shipped scene", |ui| {
@@ -72,21 +72,21 @@ impl Editor {
 
 fn items(ui: &mut Ui, list: &[Action], chosen: &mut Option<Action>) {
     for action in list {
-        if let Some(entry) = actions::of(action) {
+        if let Some(entry) = actions::entry_of(action) {
             item(ui, entry.name.to_owned(), entry, true, chosen);
         }
     }
 }
 
-/// Undo and redo with what they would move.
-fn named_item(ui: &mut Ui, action: Action, what: Option<&str>, chosen: &mut Option<Action>) {
-    if let Some(entry) = actions::of(&action) {
-        let name = what.map_or_else(|| entry.name.to_owned(), |what| format!("{}: {what}", entry.name));
-        item(ui, name, entry, what.is_some(), chosen);
+/// Adds Undo or Redo with the name of the edit; disabled without an edit.
+fn named_item(ui: &mut Ui, action: Action, edit: Option<&str>, chosen: &mut Option<Action>) {
+    if let Some(entry) = actions::entry_of(&action) {
+        let name = edit.map_or_else(|| entry.name.to_owned(), |edit| format!("{}: {edit}", entry.name));
+        item(ui, name, entry, edit.is_some(), chosen);
     }
 }
 
-fn item(ui: &mut Ui, name: String, entry: &actions::Entry, enabled: bool, chosen: &mut Option<Action>) {
+fn item(ui: &mut Ui, name: String, entry: &actions::ActionEntry, enabled: bool, chosen: &mut Option<Action>) {
     let mut button = Button::new(name);
     if let Some(keys) = &entry.keys {
         button = button.shortcut_text(ui.ctx().format_shortcut(keys));

@@ -1,47 +1,50 @@
-//! What went wrong and what to do, over the foot of the large view. Nothing moves when one comes or goes, so that no picture
-//! has to be made anew; notes go by themselves, troubles stay until they are closed or mended.
+//! Messages over the bottom of the large view. They do not resize the view, so that no image has to be rendered again.
+//!
+//! Notes disappear by themselves. Errors stay until the user closes them or their cause is gone.
 
 use eframe::egui::{self, Align2, Area, Color32, Context, Frame, Order, Rect, Response, Ui};
 
 use super::theme;
 
+/// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {
-    /// Goes once there was time to read it.
+    /// Disappears after the time that reading it takes.
     Note,
-    /// First steps: stays until it is closed.
+    /// First steps; stays until the user closes it.
     Guide,
-    Trouble,
+    /// Stays until the user closes it or its cause is gone.
+    Error,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 struct Message {
     level: Level,
-    /// A message of the same source replaces it; when the source is well again it goes.
+    /// A new message of the same source replaces this one, and a success of the source removes it.
     source: &'static str,
     text: String,
-    /// When it goes by itself [s, the interface's clock]; it starts when it is first seen.
+    /// Time at which a note disappears [s, interface clock]; absent until the note is visible.
     until: Option<f64>,
 }
 
 impl Message {
-    /// What it takes to notice and to read it.
+    /// Time to notice and to read the message [s].
     fn seconds(&self) -> f64 {
         6.0 + self.text.chars().count() as f64 / 15.0
     }
 }
 
-/// Messages that are seen at once; the others wait behind a button.
-const MAX_SEEN: usize = 3;
-/// A note under the pointer is being read: it stays this long after the pointer has gone [s].
-const LINGERS: f64 = 3.0;
+/// Maximum number of visible messages; a button shows the others.
+const MAX_VISIBLE: usize = 3;
+/// Time that a note stays after the pointer has left it [s].
+const AFTER_HOVER: f64 = 3.0;
 const MARGIN: f32 = 8.0;
 
-/// All that is to be read.
+/// The messages of the editor.
 #[derive(Debug, Default)]
 pub struct Messages {
     list: Vec<Message>,
-    /// All are seen.
+    /// All messages are visible.
     unfolded: bool,
 }
 
@@ -60,12 +63,12 @@ impl Messages {
         self.list.iter().map(|message| message.text.as_str()).collect()
     }
 
-    /// Shows them over the foot of `over`; the source of one that was closed.
+    /// Shows the messages over the bottom of `over`. Returns the source of a message that the user closed.
     pub fn ui(&mut self, ctx: &Context, over: Rect) -> Option<&'static str> {
         let now = ctx.time();
         self.list.retain(|message| message.until.is_none_or(|until| now < until));
-        let (seen, hidden) = self.seen();
-        if seen.is_empty() {
+        let (visible, hidden) = self.visible();
+        if visible.is_empty() {
             self.unfolded = false;
             return None;
         }
@@ -83,7 +86,7 @@ impl Messages {
                     self.unfolded = !self.unfolded;
                 }
             }
-            for at in seen {
+            for at in visible {
                 let message = &mut self.list[at];
                 let (shown, close) = line(ui, message);
                 if close {
@@ -93,7 +96,7 @@ impl Messages {
                     let full = now + message.seconds();
                     let until = message.until.get_or_insert(full);
                     if shown.contains_pointer() {
-                        *until = until.max(now + LINGERS);
+                        *until = until.max(now + AFTER_HOVER);
                     }
                     ctx.request_repaint_after_secs((*until - now) as f32 + 0.05);
                 }
@@ -104,15 +107,16 @@ impl Messages {
         Some(closed.source)
     }
 
-    /// Which are seen, in the order they came, and how many wait behind them: troubles and the newest go first.
-    fn seen(&self) -> (Vec<usize>, usize) {
+    /// Indices of the visible messages, in the order of arrival, and the number of hidden ones. Errors and the newest
+    /// messages have priority.
+    fn visible(&self) -> (Vec<usize>, usize) {
         let is_first = |at: &usize| !self.list[..*at].iter().any(|before| before.text == self.list[*at].text);
-        // Two workers may complain of one thing.
+        // Two workers may report the same error.
         let mut order: Vec<usize> = (0..self.list.len()).filter(is_first).collect();
         let all = order.len();
-        if !self.unfolded && all > MAX_SEEN {
-            order.sort_by_key(|&at| (self.list[at].level != Level::Trouble, std::cmp::Reverse(at)));
-            order.truncate(MAX_SEEN);
+        if !self.unfolded && all > MAX_VISIBLE {
+            order.sort_by_key(|&at| (self.list[at].level != Level::Error, std::cmp::Reverse(at)));
+            order.truncate(MAX_VISIBLE);
             order.sort_unstable();
         }
         let hidden = all - order.len();
@@ -120,11 +124,11 @@ impl Messages {
     }
 }
 
-/// One message, and whether it was closed.
+/// Shows one message; returns true if the user closed it.
 fn line(ui: &mut Ui, message: &Message) -> (Response, bool) {
     let color = match message.level {
         Level::Note | Level::Guide => theme::ACCENT,
-        Level::Trouble => theme::WARNING,
+        Level::Error => theme::WARNING,
     };
     let frame = Frame::new()
         .fill(ui.visuals().panel_fill.lerp_to_gamma(color, 0.22))
@@ -168,25 +172,25 @@ mod tests {
     }
 
     #[test]
-    fn notes_go_once_they_could_be_read_and_troubles_and_first_steps_stay() {
+    fn notes_disappear_after_their_reading_time_and_errors_and_first_steps_stay() {
         let mut harness = harness();
         harness.state_mut().put(Level::Note, "a", "Wrote a file.");
-        harness.state_mut().put(Level::Trouble, "b", "Not saved.");
+        harness.state_mut().put(Level::Error, "b", "Not saved.");
         harness.state_mut().put(Level::Guide, "c", "First steps.");
         harness.run_steps(4);
         assert_eq!(harness.state().texts().len(), 3);
-        // Nothing is painted until the note is to go.
+        // No frame is painted until the note disappears.
         let delay = harness.output().viewport_output[&ViewportId::ROOT].repaint_delay.as_secs_f64();
         assert!((1.0..10.0).contains(&delay), "{delay}");
-        // A quarter of a second each.
+        // Each step takes a quarter of a second.
         harness.run_steps(40);
         assert_eq!(harness.state().texts(), ["Not saved.", "First steps."]);
         let delay = harness.output().viewport_output[&ViewportId::ROOT].repaint_delay.as_secs_f64();
-        assert!(delay > 1e6, "at rest nothing is painted again: {delay}");
+        assert!(delay > 1e6, "without changes no frame is painted: {delay}");
     }
 
     #[test]
-    fn a_note_under_the_pointer_is_being_read_and_stays() {
+    fn a_note_under_the_pointer_stays() {
         let mut harness = harness();
         harness.state_mut().put(Level::Note, "a", "Wrote a file.");
         harness.run_steps(3);
@@ -199,22 +203,22 @@ mod tests {
     }
 
     #[test]
-    fn many_messages_are_few_lines_with_the_troubles_first_and_the_rest_behind_a_button() {
+    fn many_messages_are_few_lines_with_the_errors_first_and_the_rest_behind_a_button() {
         let mut harness = harness();
         for (source, text) in [("a", "one"), ("b", "two"), ("c", "three"), ("d", "four"), ("e", "one")] {
-            let level = if source == "a" { Level::Trouble } else { Level::Note };
+            let level = if source == "a" { Level::Error } else { Level::Note };
             harness.state_mut().put(level, source, text);
         }
         harness.run_steps(3);
-        let seen = |harness: &Harness<'_, Messages>| {
+        let visible = |harness: &Harness<'_, Messages>| {
             ["one", "two", "three", "four"].map(|text| harness.query_all_by_label(text).count())
         };
-        assert_eq!(seen(&harness), [1, 0, 1, 1]);
+        assert_eq!(visible(&harness), [1, 0, 1, 1]);
         harness.get_by_label("1 more").click();
         harness.run_steps(3);
-        assert_eq!(seen(&harness), [1, 1, 1, 1]);
+        assert_eq!(visible(&harness), [1, 1, 1, 1]);
         harness.get_by_label("Show fewer messages").click();
         harness.run_steps(3);
-        assert_eq!(seen(&harness), [1, 0, 1, 1]);
+        assert_eq!(visible(&harness), [1, 0, 1, 1]);
     }
 }

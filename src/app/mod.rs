@@ -1,16 +1,16 @@
-//! The desktop editor. It knows the library; the library does not know it.
+//! The desktop editor. It uses the library; the library does not depend on it.
 //!
 //! ```text
 //! panels, views ─▶ Document ─▶ workers (draft ─▶ refined) ─▶ views
 //! ```
-//! The interface never waits: workers answer over channels and wake it.
+//! The interface never waits: workers report results over channels and request a repaint.
 
 mod actions;
-mod answers;
 mod background;
 mod dialogs;
 mod document;
 mod editor;
+mod execute;
 mod incoming;
 mod layout;
 mod menu;
@@ -18,8 +18,8 @@ mod messages;
 mod paint;
 mod painting;
 mod panels;
-mod perform;
 mod pick;
+mod results;
 mod start_times;
 mod status;
 #[cfg(test)]

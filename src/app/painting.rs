@@ -1,4 +1,4 @@
-//! From the hand to strokes of the document.
+//! Painting: pointer input becomes strokes of the document.
 
 use std::path::Path;
 
@@ -12,14 +12,14 @@ use super::editor::Editor;
 use super::messages::Level;
 use super::paint::{self, Stroke, Tool};
 use super::panels::paints;
-use super::views::brushes::{BrushAsked, Layer};
-use super::views::hand::Hand;
+use super::views::brushes::{BrushRequest, Layer};
+use super::views::pointer::Pointer;
 
 impl Editor {
-    /// Takes what the hand did on the tile.
-    pub(super) fn paint(&mut self, hand: Hand) {
-        match hand {
-            Hand::Press(at, pressure) => {
+    /// Applies pointer input on the tile.
+    pub(super) fn paint(&mut self, pointer: Pointer) {
+        match pointer {
+            Pointer::Press(at, pressure) => {
                 if self.stroke.is_none() && !self.begin_stroke() {
                     return;
                 }
@@ -28,7 +28,7 @@ impl Editor {
                     self.document.show_stroke(stroke.images());
                 }
             }
-            Hand::Lifted => self.end_stroke(),
+            Pointer::Released => self.end_stroke(),
         }
     }
 
@@ -36,28 +36,28 @@ impl Editor {
         if let Some(stroke) = self.stroke.take() {
             let name = match self.tile.brush.tool {
                 Tool::Color => "Paint colour".to_owned(),
-                Tool::MaterialSpec => "Paint material".to_owned(),
+                Tool::Material => "Paint material".to_owned(),
                 tool => format!("Paint: {}", tool.name().to_lowercase()),
             };
             self.document.end_stroke(&name, &stroke.before);
         }
     }
 
-    /// Makes sure that there is an image to paint on; whether a stroke has begun.
+    /// Begins a stroke and creates the image to paint on if there is none. Returns false after an error.
     fn begin_stroke(&mut self) -> bool {
-        let ready = match self.tile.brush.tool {
-            Tool::Color => self.have_colors(),
-            Tool::MaterialSpec => self.have_slots(),
-            _ => self.have_heights(),
+        let is_ready = match self.tile.brush.tool {
+            Tool::Color => self.ensure_colors(),
+            Tool::Material => self.ensure_slots(),
+            _ => self.ensure_heights(),
         };
-        if ready {
+        if is_ready {
             self.messages.clear("paint");
             self.stroke = Some(Stroke::begin(self.document.painted()));
         }
-        ready
+        is_ready
     }
 
-    fn have_heights(&mut self) -> bool {
+    fn ensure_heights(&mut self) -> bool {
         let is_field = matches!(self.document.scene().tile.geometry, Geometry::Heightfield(_));
         if is_field && self.document.painted().heights.is_some() {
             return true;
@@ -66,16 +66,16 @@ impl Editor {
             match paint::heights_of(&self.document.loaded()) {
                 Ok(heights) => self.document.paint_heights("Begin to paint", heights, None),
                 Err(error) => {
-                    self.messages.put(Level::Trouble, "paint", error.to_string());
+                    self.messages.put(Level::Error, "paint", error.to_string());
                     return false;
                 }
             }
             return true;
         }
-        // Any other surface becomes a relief of its own shape.
-        let Some(made) = &self.tile.made else { return false };
+        // Any other surface becomes a height field of the same shape.
+        let Some(rendered) = &self.tile.rendered else { return false };
         let kind = self.document.scene().tile.geometry.kind();
-        let (heights, scale) = paint::relief_of(&made.tile);
+        let (heights, scale) = paint::relief_of(&rendered.tile);
         self.document.paint_heights("Turn into a relief", heights, Some(scale));
         let text = format!("The {kind} are now a relief to paint on. Undo brings their parameters back.");
         self.messages.put(Level::Note, "relief", text);
@@ -83,22 +83,22 @@ impl Editor {
         true
     }
 
-    fn have_colors(&mut self) -> bool {
+    fn ensure_colors(&mut self) -> bool {
         if self.document.painted().colors.is_some() {
             return true;
         }
         match paint::colors_of(&self.document.loaded()) {
             Ok(colors) => self.document.paint_colors("Begin to paint colours", Some(colors)),
             Err(error) => {
-                self.messages.put(Level::Trouble, "paint", error.to_string());
+                self.messages.put(Level::Error, "paint", error.to_string());
                 return false;
             }
         }
         true
     }
 
-    /// An image of slots, and the material that the brush paints.
-    fn have_slots(&mut self) -> bool {
+    /// Creates the image of slots, and the material that the brush paints, if they do not exist.
+    fn ensure_slots(&mut self) -> bool {
         let mut scene = (**self.document.scene()).clone();
         let added = paints::add_painted(&mut scene, self.tile.brush.slot);
         if self.document.painted().slots.is_some() && !added {
@@ -107,19 +107,19 @@ impl Editor {
         match paint::slots_of(&self.document.loaded()) {
             Ok(slots) => self.document.paint_slots("Begin to paint materials", scene, Some(slots)),
             Err(error) => {
-                self.messages.put(Level::Trouble, "paint", error.to_string());
+                self.messages.put(Level::Error, "paint", error.to_string());
                 return false;
             }
         }
         if added {
-            let name = crate::app::panels::fields::words(&painted_slot(self.tile.brush.slot));
+            let name = crate::app::panels::fields::display_name(&painted_slot(self.tile.brush.slot));
             let text = format!("\"{name}\" is a new material: its BRDF and colour are on the right, under Materials.");
             self.messages.put(Level::Note, "relief", text);
         }
         true
     }
 
-    /// [ and ] change the brush.
+    /// Changes the radius of the brush with the keys [ and ].
     pub(super) fn brush_keys(&mut self, ctx: &Context) {
         if self.tile.painting && !ctx.text_edit_focused() {
             let (smaller, larger) =
@@ -135,18 +135,18 @@ impl Editor {
         }
     }
 
-    pub(super) fn brush_asked(&mut self, asked: BrushAsked) {
+    pub(super) fn apply_brush_request(&mut self, request: BrushRequest) {
         use super::dialogs::Purpose;
-        match asked {
-            BrushAsked::Open(layer) => self.browse(Purpose::Paint(layer), ""),
-            BrushAsked::Save(layer) => self.browse(Purpose::SavePaint(layer), layer.file()),
-            BrushAsked::Clear(Layer::Heights) => {
+        match request {
+            BrushRequest::Open(layer) => self.browse(Purpose::Paint(layer), ""),
+            BrushRequest::Save(layer) => self.browse(Purpose::SavePaint(layer), layer.file()),
+            BrushRequest::Clear(Layer::Heights) => {
                 let size = self.document.painted().heights.as_ref().map_or(UVec2::splat(128), |image| image.size);
                 let plane = Pixels { size, values: vec![0.5; (size.x * size.y) as usize] };
                 self.document.paint_heights("Flatten all", plane, None);
             }
-            BrushAsked::Clear(Layer::Colors) => self.document.paint_colors("No colours", None),
-            BrushAsked::Clear(Layer::Slots) => {
+            BrushRequest::Clear(Layer::Colors) => self.document.paint_colors("No colours", None),
+            BrushRequest::Clear(Layer::Slots) => {
                 let scene = (**self.document.scene()).clone();
                 self.document.paint_slots("No painted materials", scene, None);
             }
@@ -154,7 +154,7 @@ impl Editor {
         self.scene_changed();
     }
 
-    /// Writes the painted images where they are asked for.
+    /// Writes one painted image to a file.
     pub(super) fn save_image(&mut self, path: &Path, layer: Layer) {
         let loaded = self.document.loaded();
         let written = match layer {
@@ -164,16 +164,16 @@ impl Editor {
         };
         match written {
             Ok(()) => self.messages.put(Level::Note, "save", format!("Saved {}.", path.display())),
-            Err(error) => self.messages.put(Level::Trouble, "save", error.to_string()),
+            Err(error) => self.messages.put(Level::Error, "save", error.to_string()),
         }
     }
 
-    /// A stroke along a way, as a hand would draw it: for tests and the driver.
+    /// Paints a stroke along a path.
     #[cfg(test)]
-    pub fn draw(&mut self, way: &[glam::Vec2]) {
-        for at in way {
-            self.paint(Hand::Press(*at, 1.0));
+    pub fn draw(&mut self, path: &[glam::Vec2]) {
+        for at in path {
+            self.paint(Pointer::Press(*at, 1.0));
         }
-        self.paint(Hand::Lifted);
+        self.paint(Pointer::Released);
     }
 }

@@ -1,15 +1,15 @@
-//! What is under the cursor on the object: the surface point, the viewer and the strongest light in its tangent frame.
+//! Picking on the object: view direction and strongest light, in the tangent frame of the point under the pointer.
 
 use crate::render::image::gbuffer::{bent_towards, perpendicular};
 use crate::render::{CameraView, DirectionalLight, ObjectMesh};
 use glam::{Vec2, Vec3};
 
-/// A point of the object as its material sees it.
+/// Directions at a point of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Picked {
-    /// To the viewer, tangent frame.
+    /// View direction in the tangent frame.
     pub viewer: Vec3,
-    /// To the light that gives the point most, tangent frame.
+    /// Direction of the light with the largest irradiance at the point, in the tangent frame.
     pub light: Option<Vec3>,
 }
 
@@ -20,7 +20,7 @@ pub fn pick(mesh: &ObjectMesh, lights: &[DirectionalLight], view: &CameraView, a
     let towards = (view.right * ndc.x - view.up * ndc.y - view.back).try_normalize()?;
     let mut nearest: Option<(f32, usize, [f32; 2])> = None;
     for triangle in 0..mesh.triangles.len() {
-        if let Some((t, weights)) = meet(view.eye, towards, mesh.corners(triangle), mesh.two_sided)
+        if let Some((t, weights)) = intersect(view.eye, towards, mesh.corners(triangle), mesh.two_sided)
             && nearest.is_none_or(|(best, ..)| t < best)
         {
             nearest = Some((t, triangle, weights));
@@ -37,16 +37,16 @@ pub fn pick(mesh: &ObjectMesh, lights: &[DirectionalLight], view: &CameraView, a
     let tangent = perpendicular(mix(&mesh.tangents), normal);
     let across = normal.cross(tangent);
     let local = |d: Vec3| Vec3::new(d.dot(tangent), d.dot(across), d.dot(normal));
-    let gives = |light: &DirectionalLight| light.irradiance.element_sum() * light.direction.dot(normal);
+    let irradiance = |light: &DirectionalLight| light.irradiance.element_sum() * light.direction.dot(normal);
     let light = lights
         .iter()
         .filter(|light| light.direction.dot(normal) > 0.0)
-        .max_by(|a, b| gives(a).total_cmp(&gives(b)))
+        .max_by(|a, b| irradiance(a).total_cmp(&irradiance(b)))
         .map(|light| local(light.direction));
     Some(Picked { viewer: local(-towards), light })
 }
 
-fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3], two_sided: bool) -> Option<(f32, [f32; 2])> {
+fn intersect(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3], two_sided: bool) -> Option<(f32, [f32; 2])> {
     let (ab, ac) = (b - a, c - a);
     let p = to.cross(ac);
     let determinant = ab.dot(p);
@@ -68,7 +68,7 @@ mod tests {
     use crate::scene;
 
     #[test]
-    fn the_middle_of_a_sphere_is_seen_along_its_normal_and_the_corner_shows_nothing() {
+    fn the_centre_of_a_sphere_is_viewed_along_its_normal_and_the_corner_shows_nothing() {
         let object = scene::Object { kind: "sphere".to_owned(), path: None };
         let mesh = object::build(&object, std::path::Path::new("")).unwrap();
         let view = CameraView::new(&scene::Camera::default(), &mesh, [200, 100]).unwrap();
@@ -76,7 +76,7 @@ mod tests {
         let picked = pick(&mesh, &[light], &view, Vec2::new(100.0, 50.0)).unwrap();
         assert!(picked.viewer.z > 0.999 && picked.light.unwrap().z > 0.999, "{picked:?}");
         assert_eq!(pick(&mesh, &[light], &view, Vec2::new(1.0, 1.0)), None);
-        // Near the silhouette the viewer is far from the normal, in the tangent frame's own units.
+        // Near the silhouette the view direction is far from the normal, and still a unit vector.
         let edge = pick(&mesh, &[], &view, Vec2::new(140.0, 50.0)).unwrap();
         assert!(edge.viewer.z < 0.75 && (edge.viewer.length() - 1.0).abs() < 1e-4 && edge.light.is_none(), "{edge:?}");
     }

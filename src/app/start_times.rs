@@ -1,69 +1,70 @@
-//! When the parts of a start-up were there: what `biscale edit --start-times` prints.
+//! Times of the start-up steps, which `biscale edit --start-times` prints.
 
 use std::time::Instant;
 
-use super::worker::Made;
+use super::worker::RenderedPreview;
 
-/// Says on standard error when things were there, where that was asked for.
+/// Prints the start-up times on standard error, if the option is set.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct StartTimes {
-    /// When the program started; nothing is said without it.
+    /// Start of the program; absent without the option.
     pub since: Option<Instant>,
 }
 
 impl StartTimes {
-    /// Something is there now.
-    pub fn note(self, what: &str) {
+    /// Prints the time at which a step has ended.
+    pub fn note(self, step: &str) {
         if let Some(since) = self.since {
-            eprintln!("{:>7.1} ms  {what}", since.elapsed().as_secs_f64() * 1e3);
+            eprintln!("{:>7.1} ms  {step}", since.elapsed().as_secs_f64() * 1e3);
         }
     }
 }
 
-/// Follows the first frames of a window until one with a picture of the object was handed to the screen.
+/// Times the first frames of a window, up to the first one with an image of the object.
 pub struct FirstFrames {
     times: StartTimes,
     frames: u32,
-    /// Whether a frame had a picture of the object.
-    shading_brdf: bool,
-    said: bool,
+    /// A frame had an image of the object.
+    has_image: bool,
+    is_reported: bool,
 }
 
 impl FirstFrames {
     pub fn new(times: StartTimes) -> Self {
-        Self { times, frames: 0, shading_brdf: false, said: false }
+        Self { times, frames: 0, has_image: false, is_reported: false }
     }
 
-    pub fn are_followed(&self) -> bool {
+    /// Returns true if the times are printed.
+    pub fn are_timed(&self) -> bool {
         self.times.since.is_some()
     }
 
-    /// Before a frame is laid out: by now the one before it was handed to the screen. Whether all is said.
+    /// Call before a frame is laid out, when the previous frame was presented. Returns true if all times are reported.
     pub fn before(&mut self) -> bool {
         match self.frames {
             0 => self.times.note("first frame begun"),
-            1 => self.times.note("first frame handed to the screen"),
+            1 => self.times.note("first frame presented"),
             _ => {}
         }
-        if self.shading_brdf && !self.said {
-            self.said = true;
-            self.times.note("first picture handed to the screen");
+        if self.has_image && !self.is_reported {
+            self.is_reported = true;
+            self.times.note("first image presented");
         }
-        self.shading_brdf
+        self.has_image
     }
 
-    /// Whether the next frame, which the editor may not need, is the one that says something.
-    pub fn is_told_by_the_next(&self) -> bool {
-        self.frames == 1 || self.shading_brdf
+    /// Returns true if the next frame reports a time, so that it has to be requested.
+    pub fn needs_next_frame(&self) -> bool {
+        self.frames == 1 || self.has_image
     }
 
-    /// After a frame was laid out.
-    pub fn after(&mut self, made: Option<&Made>) {
+    /// Call after a frame was laid out.
+    pub fn after(&mut self, preview: Option<&RenderedPreview>) {
         self.frames += 1;
-        if let (Some(made), false) = (made, self.shading_brdf) {
-            self.shading_brdf = true;
-            let stages: Vec<_> = made.stages.iter().map(|(name, ms)| format!("{name} {ms:.1}")).collect();
-            self.times.note(&format!("first picture made ({:.1} ms: {})", made.latency_ms, stages.join(", ")));
+        if let (Some(preview), false) = (preview, self.has_image) {
+            self.has_image = true;
+            let stages: Vec<_> = preview.stages.iter().map(|(name, ms)| format!("{name} {ms:.1}")).collect();
+            self.times.note(&format!("first image rendered ({:.1} ms: {})", preview.latency_ms, stages.join(", ")));
         }
     }
 }

@@ -1,10 +1,10 @@
-//! The status line: what was recomputed, how long it took, on what, and what is still being done.
+//! The status line: the stages that ran, their times, the processor that rendered, and the current activity.
 
 use eframe::egui::{self, RichText, Ui};
 
 use super::editor::Editor;
 use super::theme;
-use super::views::wheel::wheel;
+use super::views::spinner::spinner;
 use super::worker::Grade;
 
 impl Editor {
@@ -12,45 +12,45 @@ impl Editor {
         if let Some(images) = &self.background.images {
             images.stop();
         }
-        self.object.doing = None;
+        self.object.activity = None;
         self.object.stopped = Some(self.document.version());
     }
 
     pub(super) fn status_ui(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             let failed = self.object.failed == Some(self.document.version());
-            let Some(made) = self.object.made.clone() else {
+            let Some(preview) = self.object.preview.clone() else {
                 if failed {
-                    ui.label("No picture could be made: see the message");
+                    ui.label("No image could be computed: see the message");
                 } else {
-                    ui.label("Computing the first picture");
+                    ui.label("Computing the first image");
                 }
                 return;
             };
-            let waits = self.object.since.is_some();
-            match (waits, made.grade, self.object.doing) {
+            let is_pending = self.object.requested_at.is_some();
+            match (is_pending, preview.grade, self.object.activity) {
                 _ if failed => {
-                    ui.label("Shows the last picture that could be made: see the message");
+                    ui.label("Shows the last image that could be computed: see the message");
                 }
                 (false, Grade::Final, _) => {
                     let (dot, _) = ui.allocate_exact_size(egui::Vec2::splat(12.0), egui::Sense::hover());
                     ui.painter().circle_filled(dot.center(), 4.0, egui::Color32::from_rgb(96, 176, 96));
-                    ui.label(format!("Final, {} quality", made.preset));
+                    ui.label(format!("Final, {} quality", preview.preset));
                 }
                 (_, _, Some(doing)) => {
-                    wheel(ui, 13.0, ui.visuals().strong_text_color());
+                    spinner(ui, 13.0, ui.visuals().strong_text_color());
                     ui.label(doing);
-                    let stop = ui.small_button("Stop").on_hover_text("What is shown is good enough");
+                    let stop = ui.small_button("Stop").on_hover_text("Keep the current image and stop refining it");
                     if stop.clicked() {
                         self.stop_refining();
                     }
                 }
-                _ if self.object.stopped == Some(made.version) => {
-                    ui.label("Stopped before the final picture");
+                _ if self.object.stopped == Some(preview.version) => {
+                    ui.label("Stopped before the final image");
                 }
                 _ => {
-                    wheel(ui, 13.0, ui.visuals().strong_text_color());
-                    ui.label("Following");
+                    spinner(ui, 13.0, ui.visuals().strong_text_color());
+                    ui.label("Updating");
                 }
             }
             if let Some((part, what)) = self.exporting {
@@ -64,21 +64,21 @@ impl Editor {
                 }
             }
             ui.separator();
-            let stages: Vec<String> = made.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect();
-            let tip = format!("{}\n\n{}", stages.join("\n"), effects(&made));
-            let text = format!("{} after the edit", time(made.latency_ms));
+            let stages: Vec<String> = preview.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect();
+            let tip = format!("{}\n\n{}", stages.join("\n"), effects(&preview));
+            let text = format!("{} after the edit", time(preview.latency_ms));
             ui.label(text).on_hover_text(&tip);
             ui.separator();
             ui.add(egui::Label::new(RichText::new(stages.join(" · ")).weak()).truncate()).on_hover_text(tip);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.add(egui::Label::new(RichText::new(&made.device).weak()).truncate())
-                    .on_hover_text("Where the picture is shaded");
-                if !made.notes.is_empty() {
-                    ui.label(count(made.notes.len(), "note")).on_hover_text(made.notes.join("\n"));
+                ui.add(egui::Label::new(RichText::new(&preview.rendered_on).weak()).truncate())
+                    .on_hover_text("The processor that shades the image");
+                if !preview.notes.is_empty() {
+                    ui.label(count(preview.notes.len(), "note")).on_hover_text(preview.notes.join("\n"));
                 }
-                if !made.warnings.is_empty() {
-                    let text = RichText::new(count(made.warnings.len(), "warning")).color(theme::WARNING).strong();
-                    ui.label(text).on_hover_text(made.warnings.join("\n\n"));
+                if !preview.warnings.is_empty() {
+                    let text = RichText::new(count(preview.warnings.len(), "warning")).color(theme::WARNING).strong();
+                    ui.label(text).on_hover_text(preview.warnings.join("\n\n"));
                 }
             });
         });
@@ -97,10 +97,10 @@ fn time(ms: f64) -> String {
     }
 }
 
-/// Every effect, on or off, and why.
-fn effects(made: &super::worker::Made) -> String {
+/// Lists every effect with its state and reason.
+fn effects(preview: &super::worker::RenderedPreview) -> String {
     let line = |effect: &crate::plan::Effect| {
         format!("{}  {}: {}", if effect.on { "on" } else { "off" }, effect.name, effect.reason)
     };
-    made.effects.iter().map(line).collect::<Vec<_>>().join("\n")
+    preview.effects.iter().map(line).collect::<Vec<_>>().join("\n")
 }

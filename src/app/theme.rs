@@ -1,10 +1,10 @@
-//! How the editor looks: neutral greys, so that colours are judged right; one accent; even spacing.
+//! The look of the editor: neutral greys, so that users judge colours correctly, one accent colour, and even spacing.
 
 use eframe::egui::{
     Color32, Context, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Theme, Visuals, vec2,
 };
 
-/// The one colour that says "active".
+/// Colour of active elements.
 pub const ACCENT: Color32 = Color32::from_rgb(78, 142, 214);
 pub const WARNING: Color32 = Color32::from_rgb(222, 154, 60);
 
@@ -28,7 +28,7 @@ pub fn install(ctx: &Context) {
         style.spacing.combo_width = 120.0;
         style.spacing.menu_margin = Margin::same(6);
         style.interaction.tooltip_delay = 0.4;
-        // The view beside a panel's edge takes half of it.
+        // The view beside a panel's edge covers half of the handle.
         style.interaction.resize_grab_radius_side = 7.0;
         style.visuals.slider_trailing_fill = true;
     });

@@ -1,4 +1,4 @@
-//! Writing a file so that it holds either its old content or all of the new.
+//! Atomic replacement of files: a file has either its old content or all of the new content.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -7,35 +7,39 @@ use std::path::{Path, PathBuf};
 
 use super::{Error, InputError, Progress, Result, progress};
 
-/// Bytes that are written between two calls of the progress function.
-const BYTES_A_STEP: usize = 1 << 20;
+/// Number of bytes that are written between two calls of the progress function.
+const BYTES_PER_STEP: usize = 1 << 20;
 
-/// Writes `bytes` beside `path` and renames.
+/// Replaces the content of the file at `path`: writes `bytes` to a new file beside it and renames that file.
 ///
 /// # Errors
-/// A place that cannot be written; what was there stays.
+/// The place cannot be written. The old file then stays.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    replacing(path, |out| out.write_all(bytes))
+    write_atomically(path, |out| out.write_all(bytes))
 }
 
-/// [`replace_file`] of what takes long to write.
+/// Replaces a file like [`replace_file`], and reports progress.
 ///
 /// # Errors
-/// As [`replace_file`], and [`Error::Cancelled`] when `progress` says so.
+/// As [`replace_file`], and [`Error::Cancelled`] if `progress` returns false.
 pub(crate) fn replace_large_file(path: &Path, bytes: &[u8], progress: &Progress<'_>) -> Result<()> {
-    replacing(path, |out| {
-        for (k, chunk) in bytes.chunks(BYTES_A_STEP).enumerate() {
-            let part = (k * BYTES_A_STEP) as f32 / bytes.len() as f32;
-            progress::tell(progress, part).map_err(io::Error::other)?;
+    write_atomically(path, |out| {
+        for (k, chunk) in bytes.chunks(BYTES_PER_STEP).enumerate() {
+            let part = (k * BYTES_PER_STEP) as f32 / bytes.len() as f32;
+            progress::report(progress, part).map_err(io::Error::other)?;
             out.write_all(chunk)?;
         }
-        progress::tell(progress, 1.0).map_err(io::Error::other)
+        progress::report(progress, 1.0).map_err(io::Error::other)
     })
 }
 
-/// Opens a file beside `path`, lets `content` fill it, and renames it to `path`. Devices and pipes are written to.
-pub(crate) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T> {
-    // What `content` says in our own words stays so.
+/// Opens a file beside `path`, calls `content` to fill it, and renames it to `path`. Devices and pipes are written
+/// directly.
+///
+/// # Errors
+/// As [`replace_file`], and the errors of `content`.
+pub(crate) fn write_atomically<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T> {
+    // An error of this crate that `content` returns is passed on.
     let unwritable = |error: io::Error| {
         error.downcast::<Error>().unwrap_or_else(|error| {
             let full = matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
@@ -47,7 +51,7 @@ pub(crate) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
             error.in_file(path).into()
         })
     };
-    // Through a link, the file it leads to is replaced, not the link.
+    // If the path is a link, replace the file that it points to, not the link.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if let Ok(there) = fs::metadata(&target) {
         if there.is_dir() {
@@ -59,7 +63,7 @@ pub(crate) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
                 .into());
         }
         if !there.is_file() {
-            // A device or a pipe holds nothing to keep; a file in its place would be another thing.
+            // A device or a pipe has no content to preserve, and a file must not replace it.
             let mut device = BufWriter::new(File::options().write(true).open(&target).map_err(unwritable)?);
             let value = content(&mut device).map_err(unwritable)?;
             device.flush().map_err(unwritable)?;
@@ -74,18 +78,18 @@ pub(crate) fn replacing<T>(path: &Path, content: impl FnOnce(&mut dyn Write) -> 
     Ok(value)
 }
 
-/// Removed when it goes, unless it has been renamed by then.
+/// A temporary file, which is removed when this value is dropped unless the file has been renamed.
 struct Temporary(PathBuf);
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        // Gone already where all went well; else the first error is the one that matters.
+        // After success the file no longer exists here, and after a failure the first error is the one to report.
         let _ = fs::remove_file(&self.0);
     }
 }
 
-/// A new file beside `path`. Its name may be taken: by another thread, or by a process of the same number that was killed
-/// (in a container all have the same).
+/// Creates a new file beside `path`. A name may be taken by another thread, or by a killed process with the same id. In
+/// containers, ids repeat.
 fn open_beside(path: &Path) -> io::Result<(Temporary, File)> {
     const MAX_TRIES: u32 = 1000;
     let mut attempt = 0;

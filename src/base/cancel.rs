@@ -1,4 +1,4 @@
-//! Giving up work whose result nobody waits for any more.
+//! Cancellation of long operations.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,16 +6,16 @@ use std::time::{Duration, Instant};
 
 use super::{Error, Result};
 
-/// A flag that long work looks at between its parts. Clones share it; the default is never set by anyone else.
+/// A flag that a long operation checks between its steps. Clones share the flag.
 #[derive(Debug, Clone, Default)]
 pub struct Cancel {
     flag: Arc<AtomicBool>,
-    /// Before this the flag counts as not set.
+    /// Until this moment the flag counts as not set.
     not_before: Option<Instant>,
 }
 
 impl Cancel {
-    /// Asks the work to stop. What it returns after that is not to be used.
+    /// Sets the flag. The caller must not use what the operation returns after this.
     pub fn set(&self) {
         self.flag.store(true, Ordering::Relaxed);
     }
@@ -24,13 +24,15 @@ impl Cancel {
         self.flag.load(Ordering::Relaxed) && self.not_before.is_none_or(|moment| Instant::now() >= moment)
     }
 
-    /// The same flag for work that is only given up once it has taken `patience` from now on.
-    pub fn after(&self, patience: Duration) -> Self {
-        Self { flag: self.flag.clone(), not_before: Instant::now().checked_add(patience) }
+    /// Returns a clone for which the flag counts only after `delay` from now.
+    pub fn after(&self, delay: Duration) -> Self {
+        Self { flag: self.flag.clone(), not_before: Instant::now().checked_add(delay) }
     }
 
+    /// Returns an error if the flag is set.
+    ///
     /// # Errors
-    /// [`Error::Cancelled`] once the flag is set.
+    /// [`Error::Cancelled`].
     pub fn check(&self) -> Result<()> {
         if self.is_set() { Err(Error::Cancelled) } else { Ok(()) }
     }
@@ -41,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn patient_work_is_given_up_only_after_its_time_and_shares_the_flag() {
+    fn a_delayed_clone_shares_the_flag_and_is_cancelled_only_after_its_delay() {
         let cancel = Cancel::default();
         let (long, short) = (cancel.after(Duration::from_secs(3600)), cancel.after(Duration::ZERO));
         assert!(!short.is_set());

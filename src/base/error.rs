@@ -1,26 +1,28 @@
-//! One shape of error for everything a person hands in: where it is, what was found, what was expected.
+//! Errors of the library. Every error of the user's input states its place, what was found and what was expected.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What can go wrong in the library. `Input` is the caller's to mend (exit code 2), `Failed` is ours (exit code 1).
+/// An error of the library. The caller can correct `Input` (exit code 2); all others have exit code 1.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
+    /// The input is wrong.
     #[error("{0}")]
     Input(Box<InputError>),
+    /// An operation failed without a fault of the input.
     #[error("{0}")]
     Failed(String),
-    /// A graphics device failed at something that the CPU can do.
+    /// The GPU failed at a computation that the CPU can do.
     #[error("{0}")]
-    Device(crate::gpu::GpuError),
-    /// The caller asked for it ([`super::Cancel`]).
+    Gpu(super::GpuError),
+    /// The caller cancelled the operation ([`super::Cancel`]).
     #[error("cancelled")]
     Cancelled,
 }
 
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A complaint about something handed in.
+/// An error of the caller's input: file, place, what was found and what was expected.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct InputError {
     pub file: Option<PathBuf>,
@@ -28,7 +30,7 @@ pub struct InputError {
     pub place: String,
     pub found: String,
     pub expected: String,
-    /// A suggestion that would mend it.
+    /// A suggestion that would correct the input.
     pub hint: Option<String>,
 }
 
@@ -48,11 +50,11 @@ impl InputError {
     }
 }
 
-/// Characters of what was found that are said: decoders may list all they met.
-const MAX_SAID: usize = 400;
+/// Largest number of characters of the found text in a message; some decoders return very long texts.
+const MAX_FOUND_CHARS: usize = 400;
 
 fn brief(mut text: String) -> String {
-    if let Some((end, _)) = text.char_indices().nth(MAX_SAID) {
+    if let Some((end, _)) = text.char_indices().nth(MAX_FOUND_CHARS) {
         text.truncate(end);
         text.push('…');
     }
@@ -84,12 +86,12 @@ impl From<InputError> for Error {
 }
 
 impl Error {
-    /// A failure that is not the caller's doing.
+    /// Creates an error that is not a fault of the input.
     pub fn failed(what: impl fmt::Display) -> Self {
         Self::Failed(what.to_string())
     }
 
-    /// Names the file in a complaint that does not name one yet.
+    /// Adds the file to an input error that names no file.
     pub fn in_file(self, file: impl AsRef<Path>) -> Self {
         match self {
             Self::Input(mut error) if error.file.is_none() => {
@@ -100,11 +102,11 @@ impl Error {
         }
     }
 
-    /// The process exit code of the command line's contract.
+    /// The exit code of the process.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Input(_) => 2,
-            Self::Failed(_) | Self::Device(_) | Self::Cancelled => 1,
+            Self::Failed(_) | Self::Gpu(_) | Self::Cancelled => 1,
         }
     }
 }
@@ -114,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_found_is_said_briefly() {
+    fn long_found_texts_are_truncated() {
         let error = InputError::new("file.tif", "1, ".repeat(100_000), "an image");
         assert!(error.to_string().chars().count() < 600);
         assert!(InputError::new("a", "short", "b").to_string().contains("short"));

@@ -1,11 +1,13 @@
-//! Errors, cancellation, progress and files: the layer that everything else imports.
+//! Errors, cancellation, progress and files: the lowest layer, which all other modules may import.
 
 pub mod atomic_file;
 mod cancel;
 mod error;
+mod gpu_error;
 pub mod progress;
 
 pub use atomic_file::replace_file;
 pub use cancel::Cancel;
 pub use error::{Error, InputError, Result};
+pub use gpu_error::GpuError;
 pub use progress::Progress;

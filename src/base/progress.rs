@@ -1,50 +1,51 @@
-//! How far long work is, told to whoever waits for it, who may say in answer that it is to stop.
+//! Progress of long operations, reported to a function of the caller, which can stop the operation.
 
 use rayon::prelude::*;
 
 use super::{Error, Result};
 
-/// Is told the part that is done, 0 to 1, and returns whether to go on.
+/// Receives the completed fraction, 0 to 1, and returns false to stop the operation.
 pub type Progress<'a> = dyn Fn(f32) -> bool + 'a;
 
-/// Items between two calls of the progress function: of work in parallel, and of quick steps one after the other.
-const ITEMS_A_STEP: usize = 32;
-const QUICK_A_STEP: usize = 4096;
+/// Number of parallel items between two calls of the progress function.
+const ITEMS_PER_REPORT: usize = 32;
+/// Number of short sequential steps between two calls of the progress function.
+const STEPS_PER_REPORT: usize = 4096;
 
-/// Tells that `part` is done.
+/// Reports the completed fraction `part`.
 ///
 /// # Errors
-/// [`Error::Cancelled`] when `progress` says so.
-pub fn tell(progress: &Progress<'_>, part: f32) -> Result<()> {
+/// [`Error::Cancelled`] if `progress` returns false.
+pub fn report(progress: &Progress<'_>, part: f32) -> Result<()> {
     if progress(part) { Ok(()) } else { Err(Error::Cancelled) }
 }
 
-/// To be called before the `done`-th of `all` quick steps: tells of one in some thousands.
+/// Reports progress at regular intervals. The operation calls this function before the `done`-th of `all` short steps.
 ///
 /// # Errors
-/// As [`tell`].
+/// As [`report`].
 pub fn step(progress: &Progress<'_>, done: usize, all: usize) -> Result<()> {
-    if done.is_multiple_of(QUICK_A_STEP) { tell(progress, done as f32 / all.max(1) as f32) } else { Ok(()) }
+    if done.is_multiple_of(STEPS_PER_REPORT) { report(progress, done as f32 / all.max(1) as f32) } else { Ok(()) }
 }
 
-/// The progress of a part of the work: what is told of it stands between `from` and `to` of the whole.
+/// Returns the progress function of a part of the operation, which covers `from` to `to` of the whole.
 pub fn part<'a>(progress: &'a Progress<'_>, from: f32, to: f32) -> impl Fn(f32) -> bool + 'a {
-    // Rounding must not make it go back at the seam of two parts.
+    // Without the minimum, rounding could make progress decrease between two parts.
     move |part: f32| progress((from + part * (to - from)).min(to))
 }
 
-/// `work` of every index in parallel, in order.
+/// Calls `work` for every index in parallel and returns the results in order.
 ///
 /// # Errors
-/// As [`tell`].
+/// As [`report`].
 pub fn in_parallel<T: Send>(count: usize, progress: &Progress<'_>, work: impl Fn(usize) -> T + Sync) -> Result<Vec<T>> {
     let mut results = Vec::with_capacity(count);
     while results.len() < count {
-        tell(progress, results.len() as f32 / count as f32)?;
-        let end = (results.len() + ITEMS_A_STEP).min(count);
+        report(progress, results.len() as f32 / count as f32)?;
+        let end = (results.len() + ITEMS_PER_REPORT).min(count);
         results.par_extend((results.len()..end).into_par_iter().map(&work));
     }
-    tell(progress, 1.0)?;
+    report(progress, 1.0)?;
     Ok(results)
 }
 
@@ -55,19 +56,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_of_the_work_fill_the_whole_and_an_answer_of_no_stops_it_between_steps() {
-        let told = RefCell::new(Vec::new());
-        let tell = |part| {
-            told.borrow_mut().push(part);
+    fn parts_of_an_operation_cover_the_whole_and_a_refusal_stops_it_between_steps() {
+        let reported = RefCell::new(Vec::new());
+        let record = |part| {
+            reported.borrow_mut().push(part);
             true
         };
         for (from, to) in [(0.0, 0.25), (0.25, 1.0)] {
-            assert_eq!(in_parallel(50, &part(&tell, from, to), |k| k).unwrap(), (0..50).collect::<Vec<_>>());
+            assert_eq!(in_parallel(50, &part(&record, from, to), |k| k).unwrap(), (0..50).collect::<Vec<_>>());
         }
-        assert_eq!(*told.borrow(), [0.0, 0.16, 0.25, 0.25, 0.73, 1.0]);
-        let left = Cell::new(2);
-        let soon = |_| left.replace(left.get() - 1) > 0;
-        let done = (0..100_000).take_while(|&k| step(&soon, k, 100_000).is_ok()).count();
-        assert_eq!(done, 2 * QUICK_A_STEP);
+        assert_eq!(*reported.borrow(), [0.0, 0.16, 0.25, 0.25, 0.73, 1.0]);
+        let remaining = Cell::new(2);
+        let stop_soon = |_| remaining.replace(remaining.get() - 1) > 0;
+        let done = (0..100_000).take_while(|&k| step(&stop_soon, k, 100_000).is_ok()).count();
+        assert_eq!(done, 2 * STEPS_PER_REPORT);
     }
 }

@@ -1,4 +1,4 @@
-//! Directional albedo: how much of the light from a direction a BRDF sends back, for health reports.
+//! Directional albedo: the fraction of the light from one direction that a BRDF reflects, for health reports.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
@@ -6,16 +6,17 @@ use glam::{DVec3, Vec3};
 
 use super::{Brdf, LobeAngles};
 
-/// Range of `ln u/(1-u)`, `u` the fraction of the way from the normal to the half vector whose `o` is at the horizon:
-/// no lobe is narrower than 1e-7 rad, and nothing is left within 5e-5 of the horizon.
+/// Range of `ln u/(1-u)`. `u` is the angle of the half vector divided by the angle at which `o` is at the horizon.
+/// The range covers lobes as narrow as 1e-7 rad and ends 5e-5 (in `u`) before the horizon.
 const LOGIT_RANGE: [f64; 2] = [-16.0, 10.0];
 
 impl Brdf {
-    /// `∫ f_r(i,o) (n·o)+ dω_o` for light from `theta` [rad], by a fixed quadrature with `samples²` lookups; 96 leaves
-    /// 1e-3 for any roughness up to 85°. Above 1 the BRDF gains energy. 0 at and below the horizon.
+    /// `∫ f_r(i,o) (n·o)+ dω_o` for light from `theta` [rad], by a fixed quadrature with `samples²` lookups. With 96
+    /// samples the error is 1e-3 for any roughness up to 85°. A BRDF with an albedo above 1 gains energy. The albedo is
+    /// 0 at and below the horizon.
     ///
-    /// Half vectors, not directions, are summed, `dω_o = 4 (i·h) dω_h`, evenly on a scale that is logarithmic at both
-    /// ends, where a lobe of any width is a smooth bump and the horizon no kink.
+    /// The sum runs over half vectors, `dω_o = 4 (i·h) dω_h`. They are even on a scale that is logarithmic at both
+    /// ends. On this scale a lobe of any width is a smooth bump, and the integrand is smooth at the horizon.
     pub fn directional_albedo(&self, theta: f32, samples: usize) -> Vec3 {
         albedo_of(|angles| self.f_cos(angles), theta, samples)
     }
@@ -35,9 +36,9 @@ fn albedo_of(f_cos: impl Fn(&LobeAngles) -> Vec3, theta: f32, samples: usize) ->
     let step = (LOGIT_RANGE[1] - LOGIT_RANGE[0]) / samples as f64;
     let mut sum = DVec3::ZERO;
     for b in 0..samples {
-        // Half a turn: the other half mirrors it.
+        // Half of the azimuths: the other half mirrors them.
         let cos_phi = ((b as f64 + 0.5) * PI / samples as f64).cos();
-        // n·o = cosθ_i cos 2θ_h + sinθ_i cosφ sin 2θ_h is 0 here.
+        // At this angle, n·o = cosθ_i cos 2θ_h + sinθ_i cosφ sin 2θ_h is 0.
         let theta_h_max = FRAC_PI_4 + 0.5 * (sin_i * cos_phi).atan2(cos_i);
         for a in 0..samples {
             let u = 1.0 / (1.0 + (-(LOGIT_RANGE[0] + (a as f64 + 0.5) * step)).exp());
@@ -93,7 +94,7 @@ mod tests {
                 for term in [Term::CookTorrance { roughness, f0: Vec3::ONE }, Term::Ggx { roughness, f0: Vec3::ONE }] {
                     let found = albedo(term.clone(), degrees, 96);
                     assert!(found <= 1.002 && found > 0.2, "{term:?} {degrees}: {found}");
-                    // Nothing is lost while the lobe is far narrower than its distance to the horizon.
+                    // A lobe far narrower than its distance to the horizon loses no energy.
                     if roughness <= 0.001 && degrees <= 85.0 {
                         assert!(found > 0.998, "{term:?} {degrees}: {found}");
                     }

@@ -1,7 +1,7 @@
-//! The analytic lobes of DESIGN.md, Sec. 3: `f_r / tint · (n·i)(n·o)`, both cosines positive (the caller's check).
+//! Analytic lobes `f_r / tint · (n·i)(n·o)`. The caller ensures that both cosines are positive.
 //!
-//! The cosines are multiplied in before anything is divided: `F D G / (4 (n·i)(n·o))` becomes `D G / 4`, so that
-//! nothing grows without bound at the horizon. Every expression is symmetric in `n·i` and `n·o` to the bit.
+//! The cosines cancel before any division: `F D G / (4 (n·i)(n·o))` becomes `D G / 4`. The lobes are therefore bounded
+//! at the horizon. Every expression is symmetric in `n·i` and `n·o` to the bit.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -20,7 +20,8 @@ pub(super) fn blinn_phong(exponent: f32, angles: &LobeAngles) -> f32 {
     blinn_phong_without_cosines(exponent, angles) * (angles.n_dot_i * angles.n_dot_o)
 }
 
-/// `(e+8)/(8π) (n·h)^e`. A power of `n·h` itself would lose `e ε` near the mirror direction: 6 % at e = 10⁶.
+/// `(e+8)/(8π) (n·h)^e`. A power of the rounded `n·h` would have a relative error of `e ε` near the mirror direction,
+/// which is 6 % at e = 10⁶.
 #[inline]
 pub(super) fn blinn_phong_without_cosines(exponent: f32, angles: &LobeAngles) -> f32 {
     let power = exp_nonpositive((0.5 * exponent) * ln_cos_squared(angles.sin2_theta_h, angles.n_dot_h).min(0.0));
@@ -32,9 +33,10 @@ pub(super) fn blinn_phong_without_cosines(exponent: f32, angles: &LobeAngles) ->
 pub(super) fn cook_torrance(roughness: f32, angles: &LobeAngles) -> f32 {
     let m2 = roughness * roughness;
     let cos2 = angles.n_dot_h * angles.n_dot_h;
-    // exp(-tan²/m²) / (π m² cos⁴); where the exponential is 0, so is the lobe, however small cos⁴ is.
+    // exp(-tan²/m²) / (π m² cos⁴). If the exponential is 0, the lobe is 0 for any cos⁴.
     let exponential = exp_of_tangent(angles.sin2_theta_h, cos2 * m2);
-    // With an exponential above 0 the denominator is above 1e-8; the bound is for cosines no vectors have.
+    // If the exponential is positive, the denominator is above 1e-8. The bound is for cosines that no unit vectors
+    // have.
     let distribution = exponential / (PI * m2 * cos2 * cos2).max(1e-16);
     // min(1, 2 (n·h) min(n·i, n·o) / i·h) without dividing by an i·h that is 0 for opposite directions.
     let cavity = (2.0 * angles.n_dot_h * angles.n_dot_i.min(angles.n_dot_o)).max(0.0);
@@ -55,7 +57,7 @@ pub(super) fn ward(roughness: f32, angles: &LobeAngles) -> f32 {
 pub(super) fn ggx(roughness: f32, angles: &LobeAngles) -> f32 {
     let a2 = roughness * roughness;
     let (ni, no) = (angles.n_dot_i, angles.n_dot_o);
-    // α² / (π ((n·h)²(α²-1)+1)²) with 1 = cos² + sin²: no cancellation near the mirror direction (DESIGN.md, Sec. 9).
+    // α² / (π ((n·h)²(α²-1)+1)²) with 1 = cos² + sin², which avoids cancellation near the mirror direction.
     let spread = (angles.sin2_theta_h + a2 * angles.n_dot_h * angles.n_dot_h).max(1e-16);
     let distribution = FRAC_1_PI * (a2 / spread) / spread;
     // G2 = 2 ni no / (no √(α²+(1-α²)ni²) + ni √(α²+(1-α²)no²)).
@@ -66,7 +68,7 @@ pub(super) fn ggx(roughness: f32, angles: &LobeAngles) -> f32 {
     distribution * shadowing
 }
 
-/// `exp(-sin² / cos2_scaled)`; 0 where the denominator has underflown.
+/// `exp(-sin² / cos2_scaled)`; 0 if the denominator underflows.
 #[inline]
 fn exp_of_tangent(sin2: f32, cos2_scaled: f32) -> f32 {
     exp_nonpositive(-(sin2 / cos2_scaled.max(f32::MIN_POSITIVE)))

@@ -1,4 +1,4 @@
-//! The lobes against the formulas of DESIGN.md, Sec. 3, written out once more in f64, and against what must hold.
+//! Tests of the lobes against their textbook formulas in f64, and of their invariants.
 
 use std::f64::consts::PI;
 
@@ -9,14 +9,14 @@ use rand_chacha::ChaCha8Rng;
 use super::super::{Brdf, LobeAngles, Term};
 use crate::math::directions::half_vector;
 
-/// DESIGN.md, Sec. 3, word for word: `f_r` without its colour.
+/// `f_r` without its colour, by the textbook formulas.
 fn plain_f_r(term: &Term, ni: f64, no: f64, nh: f64, sin2: f64, ih: f64) -> f64 {
     let tan2 = sin2 / (nh * nh);
     match *term {
         Term::Lambertian { .. } => 1.0 / PI,
         Term::BlinnPhong { exponent, .. } => {
             let e = f64::from(exponent);
-            // (n·h)^e, from the sine where the cosine is 1 to the last bit.
+            // (n·h)^e, from the sine if the cosine rounds to 1.
             let ln_nh = if sin2 < 0.5 { 0.5 * (-sin2).ln_1p() } else { nh.ln() };
             (e + 8.0) / (8.0 * PI) * (e * ln_nh).exp()
         }
@@ -46,7 +46,7 @@ fn random_direction(rng: &mut ChaCha8Rng) -> Vec3 {
     Vec3::new(s * phi.cos(), s * phi.sin(), z).normalize_or(Vec3::Z)
 }
 
-/// Above the surface, half of them crowded towards the horizon or the normal.
+/// A random direction above the surface; half of them are concentrated at the horizon or the normal.
 fn random_above(rng: &mut ChaCha8Rng, n: Vec3) -> Vec3 {
     let mut v = random_direction(rng);
     if v.dot(n) < 0.0 {
@@ -60,7 +60,7 @@ fn random_above(rng: &mut ChaCha8Rng, n: Vec3) -> Vec3 {
     v.normalize_or(n)
 }
 
-/// Every kind, its parameter anywhere in its range on a log scale.
+/// One term of every kind, with a parameter that is uniform on a logarithmic scale.
 fn random_terms(rng: &mut ChaCha8Rng) -> [Term; 5] {
     let roughness = 10f32.powf(rng.random_range(-4.0..0.0));
     let exponent = 10f32.powf(rng.random_range(-1.0..6.0));
@@ -85,7 +85,7 @@ fn lobes_equal_the_formulas_in_f64_for_any_parameter_and_angle() {
         let n = random_direction(&mut rng);
         let (i, o) = (random_above(&mut rng, n), random_above(&mut rng, n));
         let mut angles = LobeAngles::new(n, i, o, half_vector(i, o));
-        // Half of them within the lobe, where the values are large.
+        // Half of the samples lie within the lobe, where the values are large.
         if rng.random() {
             let theta = std::f32::consts::FRAC_PI_2 * 10f32.powf(rng.random_range(-6.0..0.0));
             (angles.sin2_theta_h, angles.n_dot_h) = (theta.sin().powi(2), theta.cos());
@@ -98,7 +98,7 @@ fn lobes_equal_the_formulas_in_f64_for_any_parameter_and_angle() {
                 [angles.n_dot_i, angles.n_dot_o, angles.n_dot_h, angles.sin2_theta_h, angles.i_dot_h].map(f64::from);
             let exact = if angles.above() { plain_f_r(&term, ni, no, nh, sin2, ih) * ni * no } else { 0.0 };
             let found = f64::from(term.lobe_cos(&angles));
-            // Below 1e-30 exponentials end in 0, by design.
+            // The fast exponential returns 0 below 1e-30.
             assert!((found - exact).abs() <= 1e-4 * exact + 1e-30, "{term:?} {angles:?}: {found} for {exact}");
         }
     }
@@ -125,7 +125,7 @@ fn f_of_three_vectors_equals_the_formula_with_the_colour() {
             let brdf = Brdf { terms: vec![term.clone()] };
             let (exact, exact_cos) = (tint * f_r, tint * f_r * dn.dot(di) * dn.dot(dout));
             let (found, found_cos) = (brdf.f_r(n, i, o).as_dvec3(), brdf.f(n, i, o).as_dvec3());
-            // Cosines of 1e-3 in f32 have 1e-4 to give; the lobes' own error is the test above.
+            // A cosine of 1e-3 has a relative error of 1e-4 in f32; the test above measures the error of the lobes.
             assert!(
                 (found - exact).abs().max_element() <= 1e-3 * exact.max_element() + 1e-30,
                 "{term:?} {found} {exact}"
@@ -141,7 +141,7 @@ fn every_term_is_reciprocal_to_the_bit_finite_and_not_negative() {
     for k in 0..30_000 {
         let n = random_direction(&mut rng);
         let i = if k % 7 == 0 { random_direction(&mut rng) } else { random_above(&mut rng, n) };
-        // Among them exactly opposite, equal and mirrored directions.
+        // The pairs include exactly opposite, equal and mirrored directions.
         let o = match k % 5 {
             0 => -i,
             1 => i,

@@ -1,7 +1,7 @@
-//! The colours a BRDF is made of: orthonormal RGB directions, most energy first.
+//! Principal colours of a BRDF: orthonormal RGB directions in the order of decreasing energy.
 //!
-//! Sums over facets are done once per colour direction, so a BRDF costs as many as its colours need: one where every
-//! direction pair has the same hue, three at most. (Wu et al. 2011, Sec. 3.7 keeps one.)
+//! A sum over facets is evaluated once per colour direction. A BRDF with one hue for all direction pairs needs one, and
+//! no BRDF needs more than three. (Wu et al. 2011, Sec. 3.7 use one.)
 
 use glam::{DVec3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -9,21 +9,22 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use super::half_difference::{bin_angles, cosines};
 use super::{Brdf, LobeAngles};
 
-/// Where the BRDF is sampled: fine where lobes are sharp, azimuths that tell a mirror pair from a sideways one.
+/// Bins in `θ_h`, `θ_d` and `φ_d` at which the BRDF is sampled: dense in `θ_h` for sharp lobes, and several `φ_d`.
 const SAMPLED_BINS: [usize; 3] = [90, 30, 6];
 
 /// `f(i,o) ≈ Σ_k directions[k] (directions[k] · f(i,o))` over the first `k` directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColorBasis {
-    /// Orthonormal; each with a sum that is not negative.
+    /// Orthonormal directions; the sum of the components of each is not negative.
     pub directions: [Vec3; 3],
-    /// The fractions of `∫∫ |f|² dω_i dω_o` (cosines in) along each, decreasing, adding up to 1; all 0 for a black BRDF.
+    /// Fractions of `∫∫ |f|² dω_i dω_o` (with both cosines) along each direction. They decrease and add up to 1; a
+    /// black BRDF has zeros.
     pub energy: [f64; 3],
 }
 
 impl ColorBasis {
-    /// Of a BRDF at one normal, by a fixed quadrature over half and difference angles: the eigenvectors of the 3x3
-    /// Gram matrix of its colours.
+    /// Computes the basis of a BRDF by a fixed quadrature over half and difference angles. The directions are the
+    /// eigenvectors of the 3x3 Gram matrix of the BRDF's colours.
     pub fn of(brdf: &Brdf) -> Self {
         let mut gram = Matrix3::zeros();
         for h in 0..SAMPLED_BINS[0] {
@@ -39,14 +40,15 @@ impl ColorBasis {
         Self::from_gram(gram)
     }
 
-    /// How many directions keep `kept` (0 to 1) of the energy: 1 to 3. Kept energy is squared error: 0.9999 leaves 1 %.
-    pub fn count_for(&self, kept: f64) -> usize {
-        // Rounding in the Gram matrix is not a colour.
-        let wanted = kept - 1e-12;
+    /// Number of directions (1 to 3) that retain this fraction of the energy. Energy is squared: 0.9999 leaves an error
+    /// of 1 %.
+    pub fn count_for(&self, energy: f64) -> usize {
+        // Ignore rounding errors of the Gram matrix.
+        let wanted = energy - 1e-12;
         1 + usize::from(self.energy[0] < wanted) + usize::from(self.energy[0] + self.energy[1] < wanted)
     }
 
-    /// The coordinates of a colour along each direction.
+    /// Coordinates of a colour along each direction.
     pub fn project(&self, color: Vec3) -> [f32; 3] {
         self.directions.map(|direction| direction.dot(color))
     }
@@ -71,7 +73,7 @@ impl ColorBasis {
     }
 }
 
-/// The cosines at a bin's centre and its share of `dω_i dω_o = 4 (i·h) dω_h dω_d`, up to a constant.
+/// Cosines at a bin's centre, and the bin's part of `dω_i dω_o = 4 (i·h) dω_h dω_d` up to a constant.
 fn sample_point(bin: [usize; 3]) -> (LobeAngles, f64) {
     let angles = bin_angles(SAMPLED_BINS, bin.map(|k| k as f64));
     let (n_dot_i, n_dot_o) = cosines(angles);
@@ -116,7 +118,7 @@ mod tests {
 
     #[test]
     fn disjoint_colours_are_found_with_their_share_of_the_energy() {
-        // Red where green and blue are 0: the eigenvectors are the axes, the energies the lobes' own.
+        // The two colours share no channel, so the eigenvectors are the axes.
         let term = |specular| Term::Ward { roughness: 0.3, specular };
         let (red, green) = (term(Vec3::X * 2.0), Term::Lambertian { albedo: Vec3::Y });
         let alone = |term: &Term, c: usize| {
@@ -134,7 +136,7 @@ mod tests {
         let found = basis(vec![red.clone(), green.clone()]);
         let (r, g) = (alone(&red, 0), alone(&green, 1));
         assert!((found.energy[0] + found.energy[1] - 1.0).abs() < 1e-12 && found.energy[2] < 1e-12);
-        // The two lobes overlap, so the trace and determinant are what is known.
+        // The two lobes overlap, so only the trace and the determinant are known.
         assert!((found.energy[0] * found.energy[1]) <= r * g / (r + g).powi(2) + 1e-12);
         assert!(found.directions[2].z.abs() > 1.0 - 1e-6 && found.count_for(0.9999) == 2);
         assert_orthonormal(&found);
@@ -156,7 +158,8 @@ mod tests {
 
     #[test]
     fn the_sampled_energy_is_that_of_random_direction_pairs() {
-        // ∫∫ (cosθ_i cosθ_o / π)² dω_i dω_o = (2/3)² for a Lambertian; the weights leave out 4 · 2π · 4 · bin widths.
+        // ∫∫ (cosθ_i cosθ_o / π)² dω_i dω_o = (2/3)² for a Lambertian; the weights omit the factor 4 · 2π · 4 · bin
+        // widths.
         let [bins_h, bins_d, bins_phi] = SAMPLED_BINS;
         let lambertian = Term::Lambertian { albedo: Vec3::X };
         let mut sum = 0.0;
@@ -167,7 +170,7 @@ mod tests {
             sum += f64::from(lambertian.f_cos(&angles).x).powi(2) * weight;
         }
         use std::f64::consts::{FRAC_PI_2, PI};
-        // θ_h = (π/2) t²: dθ_h = 2 √(π/2) √θ_h dt. All φ_h (2π), φ_d four times a quarter turn.
+        // θ_h = (π/2) t², so dθ_h = 2 √(π/2) √θ_h dt. All φ_h give 2π, and φ_d covers four times [0, π/2].
         let widths = 2.0 * FRAC_PI_2.sqrt() / bins_h as f64 * FRAC_PI_2 / bins_d as f64 * FRAC_PI_2 / bins_phi as f64;
         let integral = sum * 4.0 * widths * 2.0 * PI * 4.0;
         assert!((integral / (4.0 / 9.0) - 1.0).abs() < 0.01, "{integral}");

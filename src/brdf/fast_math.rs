@@ -1,10 +1,10 @@
 //! Elementary functions without branches or library calls, so that loops over lobes vectorise.
-//! Each states its range and its error; the tests measure it.
+//! Each function documents its range and its error, and a test measures the error.
 
 /// `e^x` for `x <= 0`; 0 below -87. Relative error `2e-7 + 1e-7 |x|` (the rounding of `x / ln 2`).
 #[inline]
 pub(super) fn exp_nonpositive(x: f32) -> f32 {
-    /// Adding and taking away 1.5·2²³ rounds to an integer.
+    /// 1.5·2²³: adding and subtracting it rounds to an integer.
     const ROUND: f32 = 12_582_912.0;
     let t = x.max(-88.0) * std::f32::consts::LOG2_E;
     let shifted = t + ROUND;
@@ -15,13 +15,14 @@ pub(super) fn exp_nonpositive(x: f32) -> f32 {
         + y * (1.0
             + y * (1.0 / 2.0
                 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0 + y * (1.0 / 720.0 + y * (1.0 / 5040.0)))))));
-    // The low bits of the shifted number are k, within [-127, 0]; -127 makes the exponent bits 0: the number 0.
+    // The low bits of the shifted number are k, within [-127, 0]. For k = -127 the exponent bits are 0, which is the
+    // number 0.
     let biased = shifted.to_bits().wrapping_sub(ROUND.to_bits() - 127);
     let scale = f32::from_bits(biased << 23);
     if x < -87.0 { 0.0 } else { p * scale }
 }
 
-/// `ln cos²θ` from both `sin²θ` and `cosθ > 0`, each used where it is the exact one. Relative error 3e-7.
+/// `ln cos²θ` from both `sin²θ` and `cosθ > 0`; the more exact of the two is used. Relative error 3e-7.
 #[inline]
 pub(super) fn ln_cos_squared(sin2: f32, cos: f32) -> f32 {
     // ln x = k ln 2 + 2 atanh z with z = (m-1)/(m+1), m = x 2^-k in [1/√2, √2); near the pole 1 - sin² is m itself.
@@ -40,8 +41,8 @@ pub(super) fn ln_cos_squared(sin2: f32, cos: f32) -> f32 {
     k * std::f32::consts::LN_2 + 2.0 * z * series
 }
 
-/// `acos x / √(1-x)` for `0 <= x <= 1`: a minimax polynomial, relative error 1e-6 with rounding. Grouped so that few
-/// operations wait for one another: table lookups are as slow as their longest chain.
+/// `acos x / √(1-x)` for `0 <= x <= 1`: a minimax polynomial, relative error 1e-6 with rounding. The terms are grouped
+/// for a short dependency chain, because its length limits the speed of table lookups.
 #[inline]
 pub(super) fn acos_over_sqrt_one_minus(x: f32) -> f32 {
     let x2 = x * x;
@@ -51,7 +52,7 @@ pub(super) fn acos_over_sqrt_one_minus(x: f32) -> f32 {
     low + x2 * (middle + x2 * high)
 }
 
-/// `if condition { a } else { b }` that stays free of branches, so that both sides are computed and loops vectorise.
+/// Branch-free `if condition { a } else { b }`: both sides are computed, so loops vectorise.
 #[inline]
 fn select(condition: bool, a: f32, b: f32) -> f32 {
     let mask = u32::from(condition).wrapping_neg();
@@ -80,7 +81,7 @@ mod tests {
         for k in 1..100_000 {
             let theta = (f64::from(k) / 100_000.0).powi(4) * std::f64::consts::FRAC_PI_2;
             let (sin2, cos) = ((theta.sin().powi(2)) as f32, theta.cos() as f32);
-            // The arguments as f32 hold them.
+            // The exact result for the arguments rounded to f32.
             let exact = if sin2 < 0.5 { (-f64::from(sin2)).ln_1p() } else { 2.0 * f64::from(cos).ln() };
             let error = (f64::from(ln_cos_squared(sin2, cos)) - exact).abs();
             assert!(error <= 3e-7 * exact.abs(), "{theta}: {error} of {exact}");

@@ -1,4 +1,4 @@
-//! From the terms a scene writes to the terms that are evaluated, every number checked.
+//! Conversion of a scene's BRDF terms to terms that can be evaluated, with a check of every number.
 
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -9,15 +9,15 @@ use super::{Brdf, MeasuredCache, MeasuredKind, Term};
 use crate::base::{InputError, Result};
 use crate::scene::{BrdfSpec, TermSpec};
 
-/// Below this a lobe is a mirror that no f32 direction meets.
+/// Roughness. Below the minimum a lobe is narrower than the spacing of f32 directions.
 pub const ROUGHNESS_RANGE: RangeInclusive<f32> = 1e-4..=2.0;
-/// Blinn-Phong's exponent.
+/// Exponent of Blinn-Phong.
 pub const EXPONENT_RANGE: RangeInclusive<f32> = 0.0..=1e6;
-/// Albedo, specular colour and f0. Above 1 a material gains energy, which is allowed (and reported).
+/// Albedo, specular colour and f0. A material with values above 1 gains energy, which the health reports.
 pub const COLOR_RANGE: RangeInclusive<f32> = 0.0..=1e4;
 
 impl Brdf {
-    /// Measured files are found relative to `base_dir` and kept in `cache`.
+    /// Converts a scene's BRDF. Paths of files are relative to `base_dir`, and measured tables are stored in `cache`.
     pub fn from_specs(spec: &BrdfSpec, base_dir: &Path, cache: &mut MeasuredCache) -> Result<Self> {
         let terms = spec.terms();
         if terms.is_empty() {

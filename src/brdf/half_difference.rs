@@ -1,9 +1,10 @@
-//! The one table every measured BRDF is looked up in: half and difference angles (Rusinkiewicz 1998), spaced as MERL does.
+//! Table of a measured BRDF over half and difference angles (Rusinkiewicz 1998), with the spacing of MERL.
+//! All measured formats are converted to this table.
 //!
 //! With `h` the half vector and `d` the light's direction in `h`'s frame (`n` at azimuth π),
-//! `n·i = cosθ_h cosθ_d - sinθ_h sinθ_d cosφ_d` and `n·o` the same with a plus. Swapping `i` and `o` turns `φ_d` by π,
-//! mirroring in the plane of `n` and `h` negates it. The table holds the mean of a BRDF over both, so `cosφ_d` alone
-//! is enough and `φ_d` runs over [0, π/2].
+//! `n·i = cosθ_h cosθ_d - sinθ_h sinθ_d cosφ_d` and `n·o = cosθ_h cosθ_d + sinθ_h sinθ_d cosφ_d`. Swapping `i` and `o`
+//! adds π to `φ_d`, and mirroring in the plane of `n` and `h` negates it. The table stores the mean of a BRDF over both
+//! operations. It therefore depends on `|cosφ_d|` only, and `φ_d` covers [0, π/2].
 
 use std::f32::consts::FRAC_2_PI;
 use std::f64::consts::FRAC_PI_2;
@@ -16,34 +17,35 @@ use super::fast_math::acos_over_sqrt_one_minus;
 use super::{LobeAngles, Measured, MeasuredReport};
 use crate::cache::Key;
 
-/// Samples at bin centres, `θ_h` index `N √(θ_h / 90°)`, `θ_d` and `φ_d` evenly over [0, π/2].
+/// Samples at bin centres: `θ_h` has index `N √(θ_h / 90°)`, and `θ_d` and `φ_d` are even over [0, π/2].
 #[derive(Clone)]
 pub struct HalfDifferenceTable {
     name: String,
-    /// Bins in `θ_h`, `θ_d`, `φ_d`; i32 is what converts to f32 in one instruction.
+    /// Bins in `θ_h`, `θ_d`, `φ_d`; i32 converts to f32 in one instruction.
     shape: [i32; 3],
-    /// `[θ_d][θ_h][φ_d]`, `φ_d` fastest: the facets under one pair of directions share `θ_d`, so all they read is near; RGB [1/sr] and 1 where measured, all 0 where not.
+    /// `[θ_d][θ_h][φ_d]`, `φ_d` fastest. The facets of one direction pair share `θ_d`, so their reads are close in
+    /// memory. A valid sample is RGB [1/sr] and 1; an invalid one is 0.
     samples: Vec<Vec4>,
     report: MeasuredReport,
-    /// Made when first asked for: some milliseconds.
+    /// Computed at the first request.
     content: OnceLock<Key>,
 }
 
-/// Bins in `θ_h`, `θ_d`, `φ_d`: MERL's, folded to a quarter turn.
+/// Bins in `θ_h`, `θ_d`, `φ_d` of a MERL file, with `φ_d` folded to [0, π/2].
 pub(super) const MERL_SHAPE: [usize; 3] = [90, 90, 90];
 
-/// The angles of a bin's centre, radians. `bin` may be fractional: a position between centres.
+/// Angles [rad] of a bin's centre. A fractional `bin` is a position between centres.
 pub(super) fn bin_angles(shape: [usize; 3], bin: [f64; 3]) -> [f64; 3] {
     let at = |axis: usize| (bin[axis] + 0.5) / shape[axis] as f64;
     [at(0).powi(2) * FRAC_PI_2, at(1) * FRAC_PI_2, at(2) * FRAC_PI_2]
 }
 
-/// The bins in `θ_h` and `θ_d` of a row of `φ_d`.
+/// Bins in `θ_h` and `θ_d` of a row of `φ_d`.
 pub(super) fn row_bins(shape: [usize; 3], row: usize) -> [usize; 2] {
     [row % shape[0], row / shape[0]]
 }
 
-/// The two cosines `n·i`, `n·o` of half and difference angles.
+/// The cosines `n·i` and `n·o` of half and difference angles.
 pub(super) fn cosines([theta_h, theta_d, phi_d]: [f64; 3]) -> (f64, f64) {
     let common = theta_h.cos() * theta_d.cos();
     let apart = theta_h.sin() * theta_d.sin() * phi_d.cos();
@@ -51,8 +53,8 @@ pub(super) fn cosines([theta_h, theta_d, phi_d]: [f64; 3]) -> (f64, f64) {
 }
 
 impl HalfDifferenceTable {
-    /// `samples` as stored: rows of `φ_d` in the order of [`row_bins`], the fourth component 1 where valid and all 0 elsewhere.
-    /// Each axis has at least two bins.
+    /// Creates a table of `samples`: rows of `φ_d` in the order of [`row_bins`]. The fourth component of a valid sample
+    /// is 1; an invalid sample is 0. Each axis has at least two bins.
     pub(super) fn new(name: String, shape: [usize; 3], samples: Vec<Vec4>, report: MeasuredReport) -> Self {
         debug_assert!(shape.iter().all(|&n| n >= 2) && samples.len() == shape.iter().product::<usize>());
         let mut table = Self { name, shape: shape.map(|n| n as i32), samples, report, content: OnceLock::new() };
@@ -60,14 +62,14 @@ impl HalfDifferenceTable {
         table
     }
 
-    /// Records how far the table is from what it was made of.
+    /// Sets the error of the table against the file that it was resampled from.
     pub(super) fn with_resampling_error(mut self, error: f32) -> Self {
         self.report.resampling_error = error;
         self
     }
 
-    /// The bilinear corners `unit` (0 to 1) along an axis: lower index and weight of the upper one; constant beyond the
-    /// outer centres.
+    /// Linear interpolation along an axis at `unit` (0 to 1): index of the lower bin and weight of the upper one. The
+    /// table is constant beyond the outer centres.
     #[inline]
     fn tap(unit: f32, bins: i32) -> (i32, f32) {
         let position = (unit * bins as f32 - 0.5).max(0.0).min((bins - 1) as f32);
@@ -75,7 +77,7 @@ impl HalfDifferenceTable {
         (lower, position - lower as f32)
     }
 
-    /// Where in the table, whatever the angles: arithmetic only, no branch.
+    /// Finds the cell of any angles, with arithmetic only and no branch.
     #[inline]
     fn locate(&self, angles: &LobeAngles) -> Cell {
         let [bins_h, bins_d, bins_phi] = self.shape;
@@ -83,7 +85,7 @@ impl HalfDifferenceTable {
         let sin2_h = angles.sin2_theta_h.clamp(0.0, 1.0);
         let cos_d = angles.i_dot_h.clamp(0.0, 1.0);
         let sin2_d = 1.0 - cos_d * cos_d;
-        // Where either sine is 0 every azimuth is the same direction.
+        // If either sine is 0, every azimuth gives the same direction.
         let double_sines = 2.0 * (sin2_h * sin2_d).sqrt();
         let cosine_difference = (angles.n_dot_o - angles.n_dot_i).abs();
         let cos_phi = (cosine_difference / double_sines.max(f32::MIN_POSITIVE)).min(1.0);
@@ -95,7 +97,7 @@ impl HalfDifferenceTable {
         Cell { first: (d * bins_h + h) * bins_phi + p, t: [t_h, t_d, t_p] }
     }
 
-    /// The valid corners of a cell, their weights renormalised.
+    /// Interpolates the valid corners of a cell, with renormalized weights.
     #[inline]
     fn interpolate(&self, Cell { first, t: [t_h, t_d, t_p] }: Cell) -> Vec3 {
         let [bins_h, _, bins_phi] = self.shape;
@@ -107,7 +109,7 @@ impl HalfDifferenceTable {
     }
 }
 
-/// A cell of the table: its first corner, and how far along `θ_h`, `θ_d`, `φ_d` the others are mixed in.
+/// A cell of the table: the index of its first corner, and the weights of the upper corners along `θ_h`, `θ_d`, `φ_d`.
 #[derive(Clone, Copy, Default)]
 struct Cell {
     first: i32,
@@ -119,7 +121,7 @@ impl Measured for HalfDifferenceTable {
         if angles.above() { self.interpolate(self.locate(angles)) } else { Vec3::ZERO }
     }
 
-    /// Locates a block and then reads it, so that the arithmetic vectorises and reads do not wait for it.
+    /// Locates the cells of a block and then reads them, so that the arithmetic vectorises and reads overlap.
     fn f_r_many(&self, angles: &[LobeAngles], out: &mut [Vec3]) {
         const BLOCK: usize = 32;
         let mut cells = [Cell::default(); BLOCK];
@@ -128,7 +130,7 @@ impl Measured for HalfDifferenceTable {
                 *cell = self.locate(angles);
             }
             for ((out, &cell), angles) in out.iter_mut().zip(&cells).zip(angles) {
-                // A factor, not a branch: one that is mispredicted throws the reads under way away.
+                // A factor instead of a branch, because a misprediction would discard pending reads.
                 *out = self.interpolate(cell) * f32::from(u8::from(angles.above()));
             }
         }
@@ -151,7 +153,7 @@ impl Measured for HalfDifferenceTable {
 }
 
 impl std::fmt::Debug for HalfDifferenceTable {
-    /// Without the million samples.
+    /// Omits the samples.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         out.debug_struct("HalfDifferenceTable")
             .field("name", &self.name)
@@ -171,7 +173,7 @@ mod tests {
     use super::*;
     use crate::math::directions::{from_angles, half_vector};
 
-    /// Random values, a few percent of them invalid, in a small table.
+    /// A small table of random values, of which a few percent are invalid.
     fn random_table(rng: &mut ChaCha8Rng) -> HalfDifferenceTable {
         let shape = [7, 6, 5];
         let samples = (0..shape.iter().product::<usize>())
@@ -186,13 +188,13 @@ mod tests {
         HalfDifferenceTable::new("random".to_owned(), shape, samples, MeasuredReport::default())
     }
 
-    /// Half and difference angles by rotating the light's direction, in f64; `φ_d` in (-π, π].
+    /// Half and difference angles in f64, by rotating the light direction; `φ_d` in (-π, π].
     fn rotated_angles(i: Vec3, o: Vec3) -> [f64; 3] {
         let (i, o) = (i.as_dvec3(), o.as_dvec3());
         let h = (i + o) / (i + o).length();
         let (theta_h, phi_h) = (h.x.hypot(h.y).atan2(h.z), h.y.atan2(h.x));
-        let unturned = glam::DQuat::from_rotation_y(-theta_h) * (glam::DQuat::from_rotation_z(-phi_h) * i);
-        [theta_h, unturned.x.hypot(unturned.y).atan2(unturned.z), unturned.y.atan2(unturned.x)]
+        let rotated = glam::DQuat::from_rotation_y(-theta_h) * (glam::DQuat::from_rotation_z(-phi_h) * i);
+        [theta_h, rotated.x.hypot(rotated.y).atan2(rotated.z), rotated.y.atan2(rotated.x)]
     }
 
     #[test]
@@ -204,7 +206,7 @@ mod tests {
             let i = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
             let o = from_angles(rng.random_range(0.0..1.5), rng.random_range(0.0..TAU));
             let [theta_h, theta_d, phi_d] = rotated_angles(i, o);
-            // Folded: over the swap of i and o (+π) and the mirror image (negation).
+            // Fold the swap of i and o (+π) and the mirror image (negation).
             let folded = phi_d.abs().min(std::f64::consts::PI - phi_d.abs());
             let x = bins_h as f64 * (theta_h / FRAC_PI_2).sqrt() - 0.5;
             let y = bins_d as f64 * theta_d / FRAC_PI_2 - 0.5;
@@ -291,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn content_is_that_of_shape_and_samples_whatever_the_name() {
+    fn content_depends_on_shape_and_samples_and_not_on_the_name() {
         let samples = vec![Vec4::splat(0.5); 24];
         let table = |name: &str, shape, samples: &[Vec4]| {
             HalfDifferenceTable::new(name.to_owned(), shape, samples.to_vec(), MeasuredReport::default()).content()

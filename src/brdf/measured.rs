@@ -1,4 +1,4 @@
-//! What every measured BRDF has in common, and the store that keeps one from being read twice.
+//! The interface of measured BRDFs, and a cache of the files already read.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -11,41 +11,42 @@ use super::LobeAngles;
 use crate::base::{InputError, Result};
 use crate::cache::Key;
 
-/// A tabulated BRDF, already made reciprocal.
+/// A tabulated, reciprocal BRDF.
 pub trait Measured: std::fmt::Debug + Send + Sync {
-    /// `f_r` [1/sr]; finite and not negative; 0 where `n·i` or `n·o` is not positive.
+    /// `f_r` [1/sr], finite and not negative; 0 if `n·i` or `n·o` is not positive.
     fn f_r(&self, angles: &LobeAngles) -> Vec3;
-    /// [`Measured::f_r`] of many angles, bit for bit; faster. Fills as many as the shorter slice has.
+    /// Computes [`Measured::f_r`] of many angles, with the same bits but faster. Fills as many values as the shorter
+    /// slice has.
     fn f_r_many(&self, angles: &[LobeAngles], out: &mut [Vec3]) {
         for (out, angles) in out.iter_mut().zip(angles) {
             *out = self.f_r(angles);
         }
     }
-    /// Where it came from, for messages.
+    /// Name of the source, for messages.
     fn name(&self) -> &str;
-    /// All that its values depend on, as one number.
+    /// Hash of everything that the values depend on.
     fn content(&self) -> Key;
-    /// What reading it found.
+    /// Quality of the file.
     fn report(&self) -> &MeasuredReport;
 }
 
-/// How good a measured file was, for the health report.
+/// Quality of a measured file, for the health report.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MeasuredReport {
-    /// Samples in the file (RGB triples).
+    /// Number of samples (RGB triples) in the file.
     pub total: usize,
-    /// Samples left out: negative, NaN or infinite in some channel.
+    /// Number of invalid samples, with a channel that is negative, NaN or infinite.
     pub invalid_samples: usize,
-    /// Relative L2 of `f(i,o) - f(o,i)` before it was averaged away.
+    /// Relative L2 of `f(i,o) - f(o,i)` in the file; the table averages both.
     pub reciprocity_residual: f32,
-    /// Relative L2 of the table against exact evaluation of the file at random directions, cosine-weighted; 0 where
-    /// the table is the file.
+    /// Relative L2, cosine-weighted, of the table against exact evaluation of the file at random directions; 0 if the
+    /// table has the file's own samples.
     pub resampling_error: f32,
-    /// The largest directional albedo of any channel up to 80°: above 1 the material gains energy.
+    /// Largest directional albedo of any channel up to 80°; a material with an albedo above 1 gains energy.
     pub max_albedo: f32,
 }
 
-/// The kinds of measured file.
+/// Formats of measured files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MeasuredKind {
     Merl,
@@ -54,13 +55,13 @@ pub enum MeasuredKind {
     Npz,
 }
 
-/// Measured tables already read, by kind and file as it was then. It belongs to the caller.
+/// Measured tables already read, by kind, path, time and size of the file. The caller owns the cache.
 #[derive(Debug, Default)]
 pub struct MeasuredCache {
     tables: HashMap<FileKey, Arc<dyn Measured>>,
 }
 
-/// A file changed in between is another file.
+/// Identity of a file; a changed file has another time or size.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct FileKey {
     kind: MeasuredKind,
@@ -70,12 +71,12 @@ struct FileKey {
 }
 
 impl MeasuredCache {
-    /// The table of a file, read if it is new or has changed.
+    /// Returns the table of a file. The file is read if it is new or has changed.
     pub fn load(&mut self, kind: MeasuredKind, path: &Path) -> Result<Arc<dyn Measured>> {
         let metadata = std::fs::metadata(path)
             .map_err(|error| InputError::new("", error, "a measured BRDF that can be read").in_file(path))?;
         if !metadata.is_file() {
-            return Err(InputError::new("", "a folder or device", "a file").in_file(path).into());
+            return Err(InputError::new("", "a folder or a device file", "a file").in_file(path).into());
         }
         let key = FileKey { kind, path: path.to_owned(), modified: metadata.modified().ok(), len: metadata.len() };
         if let Some(table) = self.tables.get(&key) {

@@ -1,7 +1,7 @@
-//! MERL `.binary` files (Matusik et al. 2003), isotropic.
+//! Reader of MERL `.binary` files (Matusik et al. 2003), which are isotropic.
 //!
-//! Three int32 (90, 90, 180), then the R, G and B planes of f64, little-endian, index `φ_d + 180 (θ_d + 90 θ_h)`, the
-//! samples at bin centres, `φ_d` over [0, π), `θ_h` index `90 √(θ_h/90°)`.
+//! A file has three int32 (90, 90, 180), then the R, G and B planes in little-endian f64. The index in a plane is
+//! `φ_d + 180 (θ_d + 90 θ_h)`. Samples are at bin centres, `φ_d` covers [0, π), and `θ_h` has index `90 √(θ_h/90°)`.
 
 use std::fs::File;
 use std::io::Read;
@@ -19,15 +19,15 @@ pub(crate) const BINS_PHI: usize = 180;
 pub(crate) const PLANE: usize = BINS_H * BINS_D * BINS_PHI;
 const HEADER_BYTES: usize = 12;
 const FILE_BYTES: usize = HEADER_BYTES + 3 * 8 * PLANE;
-/// From stored numbers to 1/sr.
+/// Factors from stored numbers to 1/sr, per channel.
 pub(crate) const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
-/// Reads a file whole (35 MB) and keeps a third of it.
+/// Reads a file (35 MB) and converts it to a table.
 pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let unreadable = |error: std::io::Error| InputError::new("", error, "a MERL file that can be read").in_file(path);
     let file = File::open(path).map_err(unreadable)?;
     let len = file.metadata().map_err(unreadable)?.len();
-    // A wrong header says more than a wrong size, so as much as there is is read up to the size of a real one.
+    // A wrong header explains more than a wrong size, so a file of the wrong size is read as well.
     let mut bytes = Vec::with_capacity(len.min(FILE_BYTES as u64) as usize);
     file.take(FILE_BYTES as u64).read_to_end(&mut bytes).map_err(unreadable)?;
     check_header(&bytes, len).map_err(|error| error.in_file(path))?;
@@ -35,7 +35,7 @@ pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     Ok(table_from_planes(name, &bytes[HEADER_BYTES..]))
 }
 
-/// Dimensions and size; after it, the planes are whole.
+/// Checks dimensions and size. After this check, the planes are complete.
 fn check_header(bytes: &[u8], len: u64) -> std::result::Result<(), InputError> {
     let Some(header) = bytes.first_chunk::<HEADER_BYTES>() else {
         return Err(InputError::new("header", format!("{len} bytes"), format!("{FILE_BYTES} bytes (MERL .binary)")));
@@ -52,7 +52,7 @@ fn check_header(bytes: &[u8], len: u64) -> std::result::Result<(), InputError> {
             format!("{FILE_BYTES} bytes (90 x 90 x 180 x 3 f64)"),
         )
         .with_hint(if len < FILE_BYTES as u64 {
-            "the file is cut short"
+            "the file is truncated"
         } else {
             "the file has bytes after its data"
         }));
@@ -60,7 +60,8 @@ fn check_header(bytes: &[u8], len: u64) -> std::result::Result<(), InputError> {
     Ok(())
 }
 
-/// The mean over the swap of light and view, and the mirror image: `φ_d` and `π - φ_d`, whichever are valid.
+/// Converts the planes to a table. A sample is the mean of the valid ones at `φ_d` and `π - φ_d`, which averages over
+/// the swap of light and view and over mirror images.
 pub(crate) fn table_from_planes(name: String, planes: &[u8]) -> HalfDifferenceTable {
     let mut report = MeasuredReport { total: PLANE, ..MeasuredReport::default() };
     let mut samples = Vec::with_capacity(PLANE / 2);
@@ -92,9 +93,9 @@ pub(crate) fn table_from_planes(name: String, planes: &[u8]) -> HalfDifferenceTa
     HalfDifferenceTable::new(name, MERL_SHAPE, samples, report)
 }
 
-/// Squared cosines times solid angle of every folded bin: residuals are those of `f`, not of `f_r`.
+/// Squared cosines times solid angle of every folded bin, so that residuals are those of `f`, not of `f_r`.
 fn weights() -> impl Fn(usize, usize) -> f64 {
-    // One bin per axis is enough: the cosines are products of the axes' own.
+    // The cosines are sums of products of one factor per axis.
     let [h, d, phi]: [Vec<f64>; 3] = std::array::from_fn(|axis| {
         (0..MERL_SHAPE[axis]).map(|bin| bin_angles(MERL_SHAPE, [bin as f64; 3])[axis]).collect()
     });
@@ -114,19 +115,19 @@ fn weights() -> impl Fn(usize, usize) -> f64 {
     }
 }
 
-/// `None` where a channel is negative, NaN, infinite or beyond f32.
+/// The sample at an index; `None` if a channel is negative, NaN, infinite or above [`MAX_F_R`].
 fn sample_at(planes: &[u8], index: usize) -> Option<Vec3> {
     let channel = |c: usize| {
         let at = 8 * (c * PLANE + index);
         let value = f64::from_le_bytes(*planes.get(at..)?.first_chunk()?) * SCALES[c];
-        // A comparison that NaN fails.
-        (value >= 0.0 && value <= f64::from(MAX)).then_some(value as f32)
+        // The comparison is false for NaN.
+        (value >= 0.0 && value <= f64::from(MAX_F_R)).then_some(value as f32)
     };
     Some(Vec3::new(channel(0)?, channel(1)?, channel(2)?))
 }
 
-/// No reflectance is above this [1/sr]; sums of eight such still fit an f32, squared too.
-const MAX: f32 = 1e15;
+/// Largest valid value [1/sr]: the square of a sum of eight such values fits an f32.
+const MAX_F_R: f32 = 1e15;
 
 #[cfg(test)]
 #[path = "merl_tests.rs"]

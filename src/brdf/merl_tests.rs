@@ -81,10 +81,11 @@ fn a_tabulated_ggx_is_read_back_within_interpolation_error() {
 
 #[test]
 fn reciprocity_is_restored_and_its_lack_reported() {
-    // 1 + ε cosφ_d: the swap of light and view negates the cosine. RMS over φ_d of twice ε cosφ_d: √2 ε.
+    // For 1 + ε cosφ_d, the swap of light and view negates the cosine. The RMS over φ_d of 2 ε cosφ_d is √2 ε.
     let table = table_from_planes("skew".to_owned(), &file_of(|_, _, p| [1.0 + 0.1 * p.cos(); 3])[12..]);
     let residual = f64::from(table.report().reciprocity_residual);
-    // A little less: towards the horizon the cosines are smaller at φ_d = 0, where the difference is largest.
+    // The residual is a little smaller: near the horizon the weights are smaller at φ_d = 0, where the difference is
+    // largest.
     assert!((0.12..0.1415).contains(&residual), "{residual}");
     let angles = LobeAngles::new(Vec3::Z, from_angles(0.3, 0.0), from_angles(0.7, 2.0), Vec3::Z);
     let angles = LobeAngles { i_dot_h: 0.9, n_dot_h: 0.9, sin2_theta_h: 0.19, ..angles };
@@ -140,10 +141,7 @@ fn wrong_files_are_refused_with_what_was_found_and_expected() {
 fn the_paints_of_table_3_load_and_reflect_less_than_they_receive() {
     let folder = std::env::var_os("BISCALE_MERL").map_or_else(|| PathBuf::from("/tmp/merl"), PathBuf::from);
     let Ok(entries) = std::fs::read_dir(&folder) else {
-        eprintln!(
-            "SKIPPED: no MERL files in {} (../shared/tools/make_merl.py writes them; BISCALE_MERL names a folder)",
-            folder.display()
-        );
+        eprintln!("SKIPPED: no MERL files in {} (BISCALE_MERL names a folder)", folder.display());
         return;
     };
     for path in

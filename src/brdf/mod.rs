@@ -1,7 +1,8 @@
-//! Small-scale BRDFs: isotropic, per colour channel, evaluated at any normal (DESIGN.md, Sec. 3).
+//! Small-scale BRDFs: isotropic, per colour channel, evaluated at any normal.
 //!
-//! An analytic term is a scalar lobe times a colour, `f = tint(i·h) · lobe_cos`; a measured one is a table over half
-//! and difference angles, made reciprocal when it is read. [`Brdf::from_specs`] makes either from a scene.
+//! An analytic term is a scalar lobe times a colour, `f = tint(i·h) · lobe_cos`. A measured term is a table over half
+//! and difference angles, which is made reciprocal when the file is read. [`Brdf::from_specs`] creates both from a
+//! scene.
 
 mod albedo;
 mod analytic;
@@ -9,6 +10,7 @@ mod color_basis;
 mod fast_math;
 mod from_specs;
 mod half_difference;
+mod material;
 mod measured;
 pub(crate) mod merl;
 pub(crate) mod npz;
@@ -24,24 +26,25 @@ use glam::Vec3;
 pub use analytic::schlick_weight;
 pub use color_basis::ColorBasis;
 pub use half_difference::HalfDifferenceTable;
+pub use material::{Material, MaterialAssignment, analytic_lobe};
 pub use measured::{Measured, MeasuredCache, MeasuredKind, MeasuredReport};
 
 use crate::math::directions::half_vector;
 
-/// The cosines an isotropic BRDF depends on. `n·h`, `n·i`, `n·o` may be negative: then the BRDF is 0.
+/// Cosines that an isotropic BRDF depends on. If `n·h`, `n·i` or `n·o` is negative, the BRDF is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LobeAngles {
     pub n_dot_i: f32,
     pub n_dot_o: f32,
     pub n_dot_h: f32,
-    /// `|n×h|²`: exact near the mirror direction, where `1 - (n·h)²` cancels.
+    /// `|n×h|²`, which is exact near the mirror direction; `1 - (n·h)²` would cancel.
     pub sin2_theta_h: f32,
     pub i_dot_h: f32,
 }
 
 impl LobeAngles {
-    /// All unit vectors; `h` is [`crate::math::directions::half_vector`] of `i` and `o`. Swapping `i` and `o` swaps the two
-    /// cosines and leaves every other bit as it is.
+    /// Computes the cosines of unit vectors; `h` is [`crate::math::directions::half_vector`] of `i` and `o`. Swapping
+    /// `i` and `o` swaps `n·i` and `n·o` and changes no other bit.
     #[inline]
     pub fn new(n: Vec3, i: Vec3, o: Vec3, h: Vec3) -> Self {
         Self {
@@ -53,7 +56,7 @@ impl LobeAngles {
         }
     }
 
-    /// Whether both directions are above the surface: elsewhere every BRDF is 0.
+    /// Returns true if both directions are above the surface. Otherwise every BRDF is 0.
     #[inline]
     pub fn above(&self) -> bool {
         self.n_dot_i > 0.0 && self.n_dot_o > 0.0
@@ -66,8 +69,8 @@ pub struct Brdf {
     pub terms: Vec<Term>,
 }
 
-/// One term of a BRDF. Analytic terms are a scalar lobe times a colour that depends on `i·h` only ([`Term::tint`]),
-/// which no facet normal enters: sums over facets need one channel.
+/// One term of a BRDF. An analytic term is a scalar lobe times a colour that depends on `i·h` only ([`Term::tint`]).
+/// The colour does not depend on the facet's normal, so a sum over facets needs one channel.
 #[derive(Debug, Clone)]
 pub enum Term {
     Lambertian { albedo: Vec3 },
@@ -79,7 +82,8 @@ pub enum Term {
 }
 
 impl Term {
-    /// The measured table, where the term is one: the terms that [`Term::lobe_cos`] and [`Term::tint`] do not describe.
+    /// The table of a measured term, which [`Term::lobe_cos`] and [`Term::tint`] do not describe; `None` for analytic
+    /// terms.
     pub fn measured(&self) -> Option<&Arc<dyn Measured>> {
         match self {
             Self::Measured(table) => Some(table),
@@ -87,14 +91,14 @@ impl Term {
         }
     }
 
-    /// Whether the colour changes with `i·h` (Fresnel).
+    /// Returns true if the colour depends on `i·h` (Fresnel).
     pub fn has_fresnel(&self) -> bool {
         matches!(self, Self::CookTorrance { .. } | Self::Ggx { .. })
     }
 
-    /// The scalar lobe `f_r / tint · (n·i)+ (n·o)+` [1/sr]: finite, not negative, the same bits with `i` and `o`
-    /// swapped. A measured term has no scalar lobe; its luminance stands in (with a white tint) where only the shape
-    /// matters, and [`Term::f_cos`] is its value.
+    /// The scalar lobe `f_r / tint · (n·i)+ (n·o)+` [1/sr]. It is finite, not negative, and has the same bits if `i`
+    /// and `o` are swapped. A measured term has no scalar lobe: this function returns its luminance, and [`Term::tint`]
+    /// is white. Its exact value is [`Term::f_cos`].
     #[inline]
     pub fn lobe_cos(&self, angles: &LobeAngles) -> f32 {
         if !angles.above() {
@@ -110,8 +114,8 @@ impl Term {
         }
     }
 
-    /// [`Term::lobe_cos`] of many angles at once: the choice of model is made once, so that the loop vectorises.
-    /// Bit for bit what one call each gives. Fills as many as the shorter slice has.
+    /// Computes [`Term::lobe_cos`] of many angles with the same bits. The model is selected once, so the loop
+    /// vectorises. Fills as many values as the shorter slice has.
     pub fn lobe_cos_many(&self, angles: &[LobeAngles], out: &mut [f32]) {
         struct Fill<'a>(&'a [LobeAngles], &'a mut [f32]);
         impl LobeVisitor for Fill<'_> {
@@ -125,8 +129,8 @@ impl Term {
         self.visit_lobe(Fill(angles, out));
     }
 
-    /// Hands the visitor [`Term::lobe_cos`] as a function of this term's own kind, without a branch in it for the
-    /// analytic ones: loops written against it compile once a kind and vectorise.
+    /// Passes [`Term::lobe_cos`] to the visitor as a function specialized for this kind of term. For analytic terms it
+    /// has no branch. The visitor's loops are compiled once per kind and vectorise.
     pub fn visit_lobe<V: LobeVisitor>(&self, visitor: V) -> V::Output {
         fn above(
             lobe: impl Fn(&LobeAngles) -> f32 + Copy + Send + Sync,
@@ -148,8 +152,8 @@ impl Term {
         }
     }
 
-    /// The colour that multiplies [`Term::lobe_cos`]: albedo, specular colour, or Schlick's Fresnel
-    /// `f0 + (1-f0)(1-i·h)^5`; white for a measured term.
+    /// The colour that multiplies [`Term::lobe_cos`]: albedo, specular colour, or Schlick's Fresnel term
+    /// `f0 + (1-f0)(1-i·h)^5`. It is white for a measured term.
     #[inline]
     pub fn tint(&self, i_dot_h: f32) -> Vec3 {
         match *self {
@@ -170,7 +174,7 @@ impl Term {
         }
     }
 
-    /// `f_r` [1/sr]; the models whose `f_r` grows without bound at the horizon end at the largest f32.
+    /// `f_r` [1/sr]. Models whose `f_r` is unbounded at the horizon are limited to the largest f32.
     pub fn f_r(&self, angles: &LobeAngles) -> Vec3 {
         if !angles.above() {
             return Vec3::ZERO;
@@ -199,12 +203,12 @@ pub trait LobeVisitor {
 pub const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 impl Brdf {
-    /// `f = Σ f_r (n·i)+ (n·o)+` [1/sr] of unit vectors; 0 where either direction is not above the surface.
+    /// `f = Σ f_r (n·i)+ (n·o)+` [1/sr] of unit vectors; 0 if either direction is not above the surface.
     pub fn f(&self, n: Vec3, i: Vec3, o: Vec3) -> Vec3 {
         self.f_cos(&LobeAngles::new(n, i, o, half_vector(i, o)))
     }
 
-    /// `f_r` [1/sr] of unit vectors; 0 where either direction is not above the surface.
+    /// `f_r` [1/sr] of unit vectors; 0 if either direction is not above the surface.
     pub fn f_r(&self, n: Vec3, i: Vec3, o: Vec3) -> Vec3 {
         let angles = LobeAngles::new(n, i, o, half_vector(i, o));
         self.terms.iter().map(|term| term.f_r(&angles)).sum::<Vec3>().min(Vec3::splat(f32::MAX))

@@ -1,4 +1,4 @@
-//! Our own `.npz` exports, where they are isotropic: arrays of f32 stored in a ZIP archive.
+//! Reader of isotropic `.npz` exports of this program: arrays of f32 stored in a ZIP archive.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -9,9 +9,9 @@ use super::HalfDifferenceTable;
 use super::spherical::{SphericalTable, even_turn};
 use crate::base::{InputError, Result};
 
-/// The largest export has 2^25 pairs of two quantities.
+/// Largest file in bytes: the largest export has 2^25 pairs of two quantities.
 const MAX_FILE: u64 = 1 << 30;
-/// Relative L2 between azimuths up to which a table passes for isotropic.
+/// Largest relative L2 difference between azimuths of a table that counts as isotropic.
 const MAX_ANISOTROPY: f64 = 0.05;
 
 pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
@@ -65,7 +65,7 @@ fn table(bytes: &[u8]) -> std::result::Result<SphericalTable, InputError> {
     if anisotropy > MAX_ANISOTROPY {
         let found = format!("values that change by {:.0} % over {azimuths} azimuths", 100.0 * anisotropy);
         return Err(InputError::new("array \"brdf\"", found, "an isotropic table")
-            .with_hint("anisotropic BRDFs turn with the tangent, which small-scale facets do not have"));
+            .with_hint("anisotropic BRDFs depend on a tangent direction, which facets do not have"));
     }
     Ok(table)
 }
@@ -74,10 +74,10 @@ fn missing(name: &str) -> InputError {
     InputError::new("archive", format!("no array \"{name}\""), "an .npz that `biscale export` wrote")
 }
 
-/// The little-endian f32 members of an archive of stored members; others are passed over.
+/// The little-endian f32 arrays of an archive of stored members. Members of other types are skipped.
 fn arrays(bytes: &[u8]) -> std::result::Result<Arrays, InputError> {
     let broken =
-        |at: usize| InputError::new(format!("byte {at}"), "something else", "a ZIP member that is stored as it is");
+        |at: usize| InputError::new(format!("byte {at}"), "something else", "a ZIP member without compression");
     let half = |at: usize| bytes.get(at..at + 2).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]])));
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let mut arrays = Arrays::new();
@@ -95,7 +95,7 @@ fn arrays(bytes: &[u8]) -> std::result::Result<Arrays, InputError> {
             return Err(broken(at));
         };
         if method != 0 {
-            return Err(broken(at).with_hint("numpy.savez_compressed writes archives that are not read here"));
+            return Err(broken(at).with_hint("archives of numpy.savez_compressed are not supported"));
         }
         let name = String::from_utf8_lossy(name).trim_end_matches(".npy").to_owned();
         if let Some(array) = npy(data) {
@@ -106,7 +106,7 @@ fn arrays(bytes: &[u8]) -> std::result::Result<Arrays, InputError> {
     Ok(arrays)
 }
 
-/// Shape and numbers of a C-ordered array of little-endian f32.
+/// Shape and values of a C-ordered array of little-endian f32.
 fn npy(data: &[u8]) -> Option<(Vec<usize>, Vec<f32>)> {
     if !data.starts_with(b"\x93NUMPY\x01") {
         return None;
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_export_is_refused_without_a_panic() {
+    fn files_that_are_no_export_are_refused_without_a_panic() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npz");
         let attempt = |bytes: &[u8]| {

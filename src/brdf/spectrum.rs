@@ -1,4 +1,4 @@
-//! Between reflectance spectra and linear RGB (Rec. 709, D65), for files that hold wavelengths.
+//! Conversion between reflectance spectra and linear RGB (Rec. 709, D65), for files that store wavelengths.
 
 use glam::{DMat3, DVec3};
 
@@ -11,15 +11,15 @@ const D65: [f64; 41] = [
 const FIRST_NM: f64 = 380.0;
 const STEP_NM: f64 = 10.0;
 
-/// Wavelengths of the spectra that we write, nm.
+/// Wavelengths [nm] of the spectra that exports write.
 pub(crate) const WRITTEN_NM: [f64; 16] =
     [400.0, 420.0, 440.0, 460.0, 480.0, 500.0, 520.0, 540.0, 560.0, 580.0, 600.0, 620.0, 640.0, 660.0, 680.0, 700.0];
-/// Where blue ends and red begins, and the width of the passages, nm.
+/// Limits between the bands of blue, green and red, and the width of the transitions [nm].
 const BLUE_GREEN: f64 = 490.0;
 const GREEN_RED: f64 = 585.0;
-const PASSAGE: f64 = 30.0;
+const TRANSITION_WIDTH: f64 = 30.0;
 
-/// The colour matching functions of the CIE 1931 observer, as sums of Gaussians with two widths (Wyman et al. 2013).
+/// Colour matching functions of the CIE 1931 observer, as sums of Gaussians with two widths each (Wyman et al. 2013).
 fn observer(nm: f64) -> DVec3 {
     let lobe = |height: f64, middle: f64, below: f64, above: f64| {
         let t = (nm - middle) / if nm < middle { below } else { above };
@@ -38,8 +38,8 @@ fn daylight(nm: f64) -> f64 {
     D65[lower] + (D65[lower + 1] - D65[lower]) * (at - lower as f64)
 }
 
-/// What each wavelength (nm, increasing) adds to R, G and B: `rgb = Σ weight · reflectance`, white to white. The spectrum is
-/// linear between the wavelengths and constant beyond them.
+/// Weights of increasing wavelengths [nm]: `rgb = Σ weight · reflectance`. A reflectance of 1 gives white. The spectrum
+/// is linear between the wavelengths and constant beyond them.
 pub(crate) fn rgb_weights(wavelengths: &[f64]) -> Vec<DVec3> {
     let mut weights = vec![DVec3::ZERO; wavelengths.len()];
     let rgb_of_xyz = DMat3::from_cols(
@@ -67,11 +67,12 @@ pub(crate) fn rgb_weights(wavelengths: &[f64]) -> Vec<DVec3> {
     weights
 }
 
-/// Spectra at [`WRITTEN_NM`] of R, G and B of 1: three bands that add up to 1, mixed so that the colour comes back. Strongly
-/// saturated colours would need less than nothing somewhere and lose a little.
+/// Spectra at [`WRITTEN_NM`] of the primaries R, G and B. They are mixtures of three bands that add up to 1, and
+/// converting them to RGB gives the primaries again. Strongly saturated colours have slightly negative values at some
+/// wavelengths.
 pub(crate) fn spectra_of_primaries() -> [DVec3; WRITTEN_NM.len()] {
     let rise = |nm: f64, middle: f64| {
-        let t = ((nm - middle) / PASSAGE + 0.5).clamp(0.0, 1.0);
+        let t = ((nm - middle) / TRANSITION_WIDTH + 0.5).clamp(0.0, 1.0);
         t * t * (3.0 - 2.0 * t)
     };
     let bands = WRITTEN_NM.map(|nm| {
@@ -82,7 +83,7 @@ pub(crate) fn spectra_of_primaries() -> [DVec3; WRITTEN_NM.len()] {
     for (weight, band) in rgb_weights(&WRITTEN_NM).iter().zip(bands) {
         mixed += DMat3::from_cols(*weight * band.x, *weight * band.y, *weight * band.z);
     }
-    // A row of the inverse a band: how much of each primary it takes.
+    // One row of the inverse per band: the weights of the primaries in the band.
     let unmixed = mixed.inverse().transpose();
     bands.map(|band| unmixed * band)
 }
@@ -92,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn white_is_white_and_every_colour_comes_back_from_its_spectrum() {
+    fn white_stays_white_and_colours_survive_the_conversion_to_a_spectrum_and_back() {
         let weights = rgb_weights(&WRITTEN_NM);
         let primaries = spectra_of_primaries();
         for rgb in [DVec3::ONE, DVec3::new(0.8, 0.4, 0.2), DVec3::new(0.1, 0.3, 0.5)] {
@@ -105,15 +106,15 @@ mod tests {
     }
 
     #[test]
-    fn finer_wavelengths_see_the_same_colours() {
-        let ramp = |wavelengths: &[f64]| -> DVec3 {
+    fn finer_wavelengths_give_the_same_colours() {
+        let rising = |wavelengths: &[f64]| -> DVec3 {
             rgb_weights(wavelengths).iter().zip(wavelengths).map(|(weight, nm)| *weight * ((nm - 380.0) / 400.0)).sum()
         };
         let fine: Vec<f64> = (0..101).map(|k| 380.0 + 4.0 * f64::from(k)).collect();
         let coarse: Vec<f64> = (0..21).map(|k| 380.0 + 20.0 * f64::from(k)).collect();
-        assert!((ramp(&fine) - ramp(&coarse)).abs().max_element() < 1e-6);
+        assert!((rising(&fine) - rising(&coarse)).abs().max_element() < 1e-6);
         // A spectrum that rises with the wavelength is reddish.
-        let color = ramp(&fine);
+        let color = rising(&fine);
         assert!(color.x > color.y && color.y > color.z, "{color}");
     }
 }

@@ -1,4 +1,4 @@
-//! Nanoseconds a lookup: `cargo test --release --lib brdf::speed -- --ignored --nocapture`.
+//! Nanoseconds per BRDF evaluation: `cargo test --release --lib brdf::speed -- --ignored --nocapture`.
 
 use std::f32::consts::TAU;
 use std::hint::black_box;
@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{Brdf, LobeAngles, MeasuredCache, MeasuredKind, Term};
 use crate::math::directions::{from_angles, half_vector};
 
-/// Fastest of thirty runs, ns per item: what the code takes where others use the machine too.
+/// Time of the fastest of thirty runs, in nanoseconds per item; the minimum excludes other load on the machine.
 fn nanoseconds(items: usize, mut run: impl FnMut()) -> f64 {
     let mut times: Vec<f64> = (0..30)
         .map(|_| {
@@ -29,8 +29,8 @@ fn nanoseconds(items: usize, mut run: impl FnMut()) -> f64 {
 #[ignore = "measures speed"]
 fn nanoseconds_per_evaluation() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut direction = |most: f32| from_angles(rng.random_range(0.0..most), rng.random_range(0.0..TAU));
-    // 64 direction pairs, 512 normals each: as a sum over facets sees them; and everything at random.
+    let mut direction = |max_theta: f32| from_angles(rng.random_range(0.0..max_theta), rng.random_range(0.0..TAU));
+    // Angles as in a sum over facets, with 512 normals per direction pair, and random angles.
     let mut facets = Vec::new();
     for _ in 0..64 {
         let (i, o) = (direction(1.4), direction(1.4));

@@ -1,4 +1,4 @@
-//! Tables over `(theta_i, phi_i, theta_o, phi_o)` from files, made isotropic: UTIA's measurements and our own `.npz`.
+//! Tables over `(theta_i, phi_i, theta_o, phi_o)` from UTIA and `.npz` files, and their conversion to isotropic tables.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -7,15 +7,15 @@ use glam::{DVec3, Vec4};
 use super::half_difference::{bin_angles, cosines, row_bins};
 use super::{HalfDifferenceTable, MeasuredReport};
 
-/// No reflectance is above this [1/sr]: sums and squares of such still fit an f32.
-pub(super) const MAX: f64 = 1e15;
+/// Largest valid value [1/sr]: sums and squares of such values fit an f32.
+pub(super) const MAX_F_R: f64 = 1e15;
 
-/// Bins of the table that is looked up: such files are coarse, MERL's folded shape holds all they have.
+/// Bins in `θ_h`, `θ_d`, `φ_d` of the converted table; the files are coarser than these bins.
 const SHAPE: [usize; 3] = [90, 45, 30];
-/// `f_r` is taken at elevations up to this: beyond, the last one stands.
+/// Largest polar angle [rad] at which `f_r` is interpolated; larger angles take the value at this one.
 const HORIZON: f64 = 89.9 / 90.0 * FRAC_PI_2;
 
-/// `f_r` [1/sr]; azimuths run evenly from 0 over a full turn, the same number on both sides.
+/// A table of `f_r` [1/sr]. Azimuths are even from 0 over a full turn, and light and view have the same number of them.
 pub(super) struct SphericalTable {
     pub theta_i: Vec<f64>,
     pub theta_o: Vec<f64>,
@@ -24,7 +24,7 @@ pub(super) struct SphericalTable {
     pub values: Vec<DVec3>,
 }
 
-/// The mean over azimuths: `[theta_i][theta_o][phi_o - phi_i]`.
+/// Mean of a table over azimuths: `[theta_i][theta_o][phi_o - phi_i]`.
 struct Mean<'a> {
     table: &'a SphericalTable,
     values: Vec<DVec3>,
@@ -49,13 +49,13 @@ impl SphericalTable {
         Mean { table: self, values }
     }
 
-    /// Relative L2 between azimuths, both cosines in.
+    /// Relative L2 difference between azimuths of `f_r` times both cosines.
     pub(super) fn anisotropy(&self) -> f64 {
         let mean = self.mean();
         let (mut changed, mut power) = (0.0, 0.0);
         for (ti, theta_i) in self.theta_i.iter().enumerate() {
             for (to, theta_o) in self.theta_o.iter().enumerate() {
-                // Squared cosines and both solid angles; a ring at the pole counts a little.
+                // Squared cosines times both solid angles; the offset gives a ring at the pole a small weight.
                 let weight = (theta_i.cos() * theta_o.cos()).powi(2) * (theta_i.sin() + 0.05) * (theta_o.sin() + 0.05);
                 for pi in 0..self.azimuths {
                     for po in 0..self.azimuths {
@@ -70,8 +70,7 @@ impl SphericalTable {
         if power > 0.0 { (changed / power).sqrt() } else { 0.0 }
     }
 
-    /// The mean over azimuths, over the swap of light and viewer and over mirror images, as the table every measured BRDF
-    /// is looked up in.
+    /// Converts the table: the mean over azimuths, over the swap of light and viewer, and over mirror images.
     pub(super) fn resample(&self, name: String) -> HalfDifferenceTable {
         let mean = self.mean();
         let (mut difference, mut power) = (0.0, 0.0);
@@ -85,20 +84,20 @@ impl SphericalTable {
                     return Vec4::ZERO;
                 }
                 let (theta_i, theta_o) = (n_dot_i.min(1.0).acos(), n_dot_o.min(1.0).acos());
-                // From the angle between both directions.
+                // The azimuth between the directions follows from the angle between them.
                 let between = 2.0 * theta_d;
                 let sines = theta_i.sin() * theta_o.sin();
-                let turn = if sines > 1e-9 {
+                let azimuth = if sines > 1e-9 {
                     ((between.cos() - n_dot_i * n_dot_o) / sines).clamp(-1.0, 1.0).acos()
                 } else {
                     0.0
                 };
-                let there = 0.5 * (mean.at(theta_i, theta_o, turn) + mean.at(theta_i, theta_o, TAU - turn));
-                let back = 0.5 * (mean.at(theta_o, theta_i, turn) + mean.at(theta_o, theta_i, TAU - turn));
+                let there = 0.5 * (mean.at(theta_i, theta_o, azimuth) + mean.at(theta_i, theta_o, TAU - azimuth));
+                let back = 0.5 * (mean.at(theta_o, theta_i, azimuth) + mean.at(theta_o, theta_i, TAU - azimuth));
                 let weight = (n_dot_i * n_dot_o).powi(2);
                 difference += weight * (there - back).length_squared();
                 power += weight * there.length_squared();
-                (0.5 * (there + back)).clamp(DVec3::ZERO, DVec3::splat(MAX)).as_vec3().extend(1.0)
+                (0.5 * (there + back)).clamp(DVec3::ZERO, DVec3::splat(MAX_F_R)).as_vec3().extend(1.0)
             })
             .collect();
         let report = MeasuredReport {
@@ -112,12 +111,12 @@ impl SphericalTable {
 }
 
 impl Mean<'_> {
-    /// Bilinear in elevations, constant beyond the outer ones, linear and wrapped in azimuth.
-    fn at(&self, theta_i: f64, theta_o: f64, turn: f64) -> DVec3 {
+    /// Interpolates linearly in polar angles, constant beyond the outer ones, and linearly and periodically in azimuth.
+    fn at(&self, theta_i: f64, theta_o: f64, azimuth: f64) -> DVec3 {
         let (i, o) =
             (split(&self.table.theta_i, theta_i.min(HORIZON)), split(&self.table.theta_o, theta_o.min(HORIZON)));
         let n = self.table.azimuths;
-        let along = turn.rem_euclid(TAU) / TAU * n as f64;
+        let along = azimuth.rem_euclid(TAU) / TAU * n as f64;
         let (first, part) = (along.floor() as usize % n, along - along.floor());
         let value = |ti: usize, to: usize| {
             let row = (ti * self.table.theta_o.len() + to) * n;
@@ -128,7 +127,7 @@ impl Mean<'_> {
     }
 }
 
-/// The samples about a value of increasing ones, and the weight of the upper.
+/// Indices of the two samples around a value in increasing `values`, and the weight of the upper sample.
 fn split(values: &[f64], at: f64) -> (usize, usize, f64) {
     let upper = values.partition_point(|&value| value <= at);
     match upper {
@@ -138,7 +137,7 @@ fn split(values: &[f64], at: f64) -> (usize, usize, f64) {
     }
 }
 
-/// Whether `angles` are `count` even steps from 0 over a full turn.
+/// Returns true if `angles` are even steps from 0 over a full turn.
 pub(super) fn even_turn(angles: &[f64]) -> bool {
     let step = TAU / angles.len().max(1) as f64;
     angles.iter().enumerate().all(|(k, angle)| (angle - k as f64 * step).abs() < 1e-4 * PI)
@@ -166,14 +165,14 @@ mod tests {
     }
 
     #[test]
-    fn an_isotropic_reciprocal_table_comes_back_and_azimuths_that_differ_are_measured() {
+    fn an_isotropic_reciprocal_table_is_preserved_and_anisotropy_is_measured() {
         let isotropic = table(|ti, pi, to, po| 1.0 + 0.3 * ti.sin() * to.sin() * (pi - po).cos());
         assert!(isotropic.anisotropy() < 1e-9);
         let found = isotropic.resample("test".to_owned());
-        for (ti, to, turn) in [(0.2_f32, 0.6_f32, 0.4_f32), (1.0, 0.3, 2.0), (0.7, 0.7, 3.0)] {
-            let (i, o) = (from_angles(ti, 0.0), from_angles(to, turn));
+        for (ti, to, azimuth) in [(0.2_f32, 0.6_f32, 0.4_f32), (1.0, 0.3, 2.0), (0.7, 0.7, 3.0)] {
+            let (i, o) = (from_angles(ti, 0.0), from_angles(to, azimuth));
             let value = found.f_r(&LobeAngles::new(glam::Vec3::Z, i, o, half_vector(i, o)));
-            let expected = 1.0 + 0.3 * ti.sin() * to.sin() * turn.cos();
+            let expected = 1.0 + 0.3 * ti.sin() * to.sin() * azimuth.cos();
             assert!(
                 (value.x / expected - 1.0).abs() < 0.02 && (value.y * 2.0 - value.x).abs() < 1e-5,
                 "{value} {expected}"

@@ -1,15 +1,15 @@
-//! The content of a stage's inputs as one number.
+//! Hash keys of the inputs of a stage.
 
 use super::Build;
 
-/// Counts changes of what is kept and how it is written.
+/// Version of the file format and of the content of cached results.
 const FORMAT: u32 = 1;
 
-/// 256 bits (BLAKE3) of all that a result depends on.
+/// A BLAKE3 hash (256 bits) of everything that a result depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Key(pub(super) [u8; 32]);
 
-/// Gathers inputs, each under a name and with its length, so that no two lists of inputs run together to the same bytes.
+/// Hashes inputs, each with its name and length, so that different lists of inputs give different bytes.
 #[derive(Debug, Clone)]
 pub struct KeyBuilder(blake3::Hasher);
 
@@ -20,12 +20,17 @@ impl KeyBuilder {
         key
     }
 
+    /// The start of a key of a stage: its name and this build.
+    pub fn of_stage(name: &str) -> Self {
+        Self::new(name, &Build::of_this_program())
+    }
+
     #[cfg(test)]
     pub(crate) fn for_tests() -> Self {
         Self(blake3::Hasher::new())
     }
 
-    /// The bits of numbers or vectors: 0 and -0 differ.
+    /// Adds the bits of numbers or vectors; 0 and -0 differ.
     pub fn numbers<T: bytemuck::NoUninit>(&mut self, name: &str, numbers: &[T]) -> &mut Self {
         let bytes: &[u8] = bytemuck::cast_slice(numbers);
         for part in [name.as_bytes(), bytes] {
@@ -35,16 +40,21 @@ impl KeyBuilder {
         self
     }
 
-    /// Sizes and counts.
+    /// Adds sizes or counts.
     pub fn counts(&mut self, name: &str, counts: impl IntoIterator<Item = usize>) -> &mut Self {
         let counts: Vec<u64> = counts.into_iter().map(|count| count as u64).collect();
         self.numbers(name, &counts)
     }
 
-    /// What is there or not there.
+    /// Adds flags.
     pub fn flags(&mut self, name: &str, flags: impl IntoIterator<Item = bool>) -> &mut Self {
         let flags: Vec<u8> = flags.into_iter().map(u8::from).collect();
         self.numbers(name, &flags)
+    }
+
+    /// Adds the key of an input.
+    pub fn key(&mut self, name: &str, key: &Key) -> &mut Self {
+        self.numbers(name, &key.0)
     }
 
     pub fn finish(&self) -> Key {
@@ -53,7 +63,7 @@ impl KeyBuilder {
 }
 
 impl Key {
-    /// For tests and for parts of other keys: that of numbers alone.
+    /// Returns the key of numbers only, for tests and for parts of other keys.
     pub fn of_numbers<T: bytemuck::NoUninit>(numbers: &[T]) -> Self {
         Self(*blake3::hash(bytemuck::cast_slice(numbers)).as_bytes())
     }
@@ -72,13 +82,13 @@ mod tests {
     use super::*;
 
     fn key(kind: &str, inputs: impl FnOnce(&mut KeyBuilder)) -> Key {
-        let mut key = KeyBuilder::new(kind, &Build::of_this_program().unwrap());
+        let mut key = KeyBuilder::new(kind, &Build::of_this_program());
         inputs(&mut key);
         key.finish()
     }
 
     #[test]
-    fn inputs_do_not_run_together() {
+    fn different_inputs_have_different_keys() {
         let keys = [
             key("a", |_| {}),
             key("b", |_| {}),

@@ -1,11 +1,11 @@
-//! Results as bytes and back, bit for bit.
+//! Conversion of results to bytes and back, bit for bit.
 
 use bytemuck::AnyBitPattern;
 
-/// What can be kept. Numbers stand in the machine's own byte order: files of another machine have other keys.
+/// A result that can be cached. Numbers have the machine's byte order, because files of other machines have other keys.
 pub trait Stored: Sized {
     fn write(&self, out: &mut Writer);
-    /// `None` for bytes that are no such result.
+    /// Reads the result; `None` for bytes that are no such result.
     fn read(from: &mut Reader<'_>) -> Option<Self>;
 }
 
@@ -13,7 +13,7 @@ pub trait Stored: Sized {
 #[derive(Debug, Default)]
 pub struct Writer(Vec<u8>);
 
-/// So many zeros in a row are worth leaving out.
+/// Shortest run of zeros that [`Writer::sparse`] omits, in words.
 const RUN: usize = 16;
 
 impl Writer {
@@ -21,13 +21,13 @@ impl Writer {
         self.0.extend((count as u64).to_le_bytes());
     }
 
-    /// A length and the bits of numbers or vectors.
+    /// Writes a length and the bits of numbers or vectors.
     pub fn numbers<T: bytemuck::NoUninit>(&mut self, numbers: &[T]) {
         self.count(numbers.len());
         self.0.extend_from_slice(bytemuck::cast_slice(numbers));
     }
 
-    /// The same of words most of which may be zero: runs of zeros, and what stands between them.
+    /// Writes words of which most may be zero: lengths of the runs of zeros, and the words between the runs.
     pub fn sparse(&mut self, words: &[u32]) {
         self.count(words.len());
         let mut at = 0;
@@ -49,7 +49,7 @@ impl Writer {
     }
 }
 
-/// Reads what a [`Writer`] wrote; `None` at every step where the bytes end too soon.
+/// Reads the bytes of a [`Writer`]. Every function returns `None` if the bytes end too early.
 #[derive(Debug)]
 pub struct Reader<'a>(&'a [u8]);
 
@@ -71,9 +71,9 @@ impl<'a> Reader<'a> {
         Some(bytemuck::pod_collect_to_vec(bytes))
     }
 
-    /// At most `most` words.
-    pub fn sparse(&mut self, most: usize) -> Option<Vec<u32>> {
-        let length = self.count().filter(|length| *length <= most)?;
+    /// Reads words that [`Writer::sparse`] wrote; `None` for more than `max_words`.
+    pub fn sparse(&mut self, max_words: usize) -> Option<Vec<u32>> {
+        let length = self.count().filter(|length| *length <= max_words)?;
         let mut words = Vec::with_capacity(length);
         while words.len() < length {
             let zeros = self.count().filter(|zeros| *zeros <= length - words.len())?;
@@ -100,7 +100,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn sparse_words_come_back_and_runs_of_zeros_cost_little(
+        fn sparse_words_are_read_back_and_runs_of_zeros_take_little_space(
             parts in prop::collection::vec((0_usize..200, prop::collection::vec(any::<u32>(), 0..20)), 0..8)
         ) {
             let words: Vec<u32> = parts.into_iter().flat_map(|(zeros, between)| [vec![0; zeros], between].concat()).collect();
@@ -115,7 +115,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_read_without_a_fault(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn any_bytes_are_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let _ = Reader::new(&bytes).sparse(1000);
             let _ = Reader::new(&bytes).numbers::<f32>();
         }

@@ -1,4 +1,5 @@
-//! The files: a result each, named by its key, checked when read, the least recently used dropped first.
+//! Files of the cache: one per result, named by its key and checked when read. The least recently used are removed
+//! first.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -10,23 +11,25 @@ use super::Key;
 
 const MAGIC: &[u8; 16] = b"biscale cache 1\n";
 
-/// Magic, key, checksum.
+/// Size of magic, key and checksum, in bytes.
 const HEADER: usize = 16 + 32 + 32;
 
-const ENDING: &str = ".kept";
+/// Extension of a complete file.
+const COMPLETE: &str = ".kept";
+/// Extension of a file that is being written.
 const UNFINISHED: &str = ".part";
 
-/// What a program left unfinished so long ago is not being written any more.
+/// Age of an unfinished file after which no program is writing it.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// One result may take this part of all there is room for.
-const MAX_SHARE: u64 = 4;
+/// Divisor of the cache's size limit that gives the largest size of one result.
+const SHARES: u64 = 4;
 
-/// Tells those who tidy and back up that nothing here is of worth (<https://bford.info/cachedir/>).
+/// Name and content of the file that marks the folder as a cache for backup tools (<https://bford.info/cachedir/>).
 const TAG: (&str, &str) =
     ("CACHEDIR.TAG", "Signature: 8a477f597d28d172789f06886806bc55\n# Made by biscale. May be deleted.\n");
 
-/// How much is kept.
+/// Number and total size of cached files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Usage {
     pub files: usize,
@@ -36,11 +39,11 @@ pub struct Usage {
 #[derive(Debug)]
 pub(super) struct Store {
     folder: PathBuf,
-    largest: u64,
+    max_bytes: u64,
 }
 
-/// A file of ours.
-struct Found {
+/// A file of the cache.
+struct CachedFile {
     path: PathBuf,
     used: SystemTime,
     bytes: u64,
@@ -48,8 +51,8 @@ struct Found {
 }
 
 impl Store {
-    pub(super) fn new(folder: PathBuf, largest: u64) -> Self {
-        Self { folder, largest }
+    pub(super) fn new(folder: PathBuf, max_bytes: u64) -> Self {
+        Self { folder, max_bytes }
     }
 
     pub(super) fn folder(&self) -> &Path {
@@ -57,17 +60,17 @@ impl Store {
     }
 
     fn path(&self, key: &Key) -> PathBuf {
-        self.folder.join(key.name() + ENDING)
+        self.folder.join(key.name() + COMPLETE)
     }
 
-    /// What was written under a key. A file that is not whole is removed.
+    /// Reads the result of a key. A damaged file is removed.
     pub(super) fn read(&self, key: &Key) -> Option<Vec<u8>> {
         let path = self.path(key);
-        // Opened for writing only so that its time can be set; where that is forbidden it can still be read.
+        // The file is opened for writing so that its time can be set. Without that permission it is only read.
         let file = OpenOptions::new().read(true).append(true).open(&path).or_else(|_| File::open(&path)).ok()?;
         let length = file.metadata().ok()?.len();
         let mut bytes = Vec::new();
-        let whole = length <= self.largest && (&file).take(length + 1).read_to_end(&mut bytes).is_ok();
+        let whole = length <= self.max_bytes && (&file).take(length + 1).read_to_end(&mut bytes).is_ok();
         if !whole || !is_sound(&bytes, key) {
             self.remove(key);
             return None;
@@ -81,10 +84,10 @@ impl Store {
         let _ = fs::remove_file(self.path(key));
     }
 
-    /// Writes beside the place and renames: who reads meanwhile, or writes the same, meets a whole file.
+    /// Writes a new file and renames it, so that concurrent readers and writers see complete files only.
     pub(super) fn write(&self, key: &Key, payload: &[u8]) -> io::Result<()> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
-        if payload.len() as u64 > self.largest / MAX_SHARE {
+        if payload.len() as u64 > self.max_bytes / SHARES {
             return Ok(());
         }
         self.make_folder()?;
@@ -100,7 +103,7 @@ impl Store {
         if renamed.is_err() {
             let _ = fs::remove_file(&beside);
         }
-        self.keep_bound();
+        self.enforce_limit();
         renamed
     }
 
@@ -112,15 +115,15 @@ impl Store {
         Ok(())
     }
 
-    /// Drops what was not used for longest until the rest is within bounds.
-    fn keep_bound(&self) {
+    /// Removes the least recently used files until the rest is within the limit.
+    fn enforce_limit(&self) {
         let mut found = self.found();
         let mut bytes: u64 = found.iter().map(|file| file.bytes).sum();
         found.sort_by(|a, b| (a.used, &a.path).cmp(&(b.used, &b.path)));
         for file in found {
-            // Another process may be about to rename it.
+            // Another process may still rename an unfinished file.
             let is_abandoned = file.used.elapsed().is_ok_and(|age| age > ABANDONED);
-            let is_over = bytes > self.largest && !file.unfinished;
+            let is_over = bytes > self.max_bytes && !file.unfinished;
             if (is_over || file.unfinished && is_abandoned) && fs::remove_file(&file.path).is_ok() {
                 bytes -= file.bytes;
             }
@@ -133,27 +136,27 @@ impl Store {
     }
 
     pub(super) fn clear(&self) -> Usage {
-        let mut gone = Usage::default();
+        let mut removed = Usage::default();
         for file in self.found() {
             if fs::remove_file(&file.path).is_ok() {
-                gone = Usage { files: gone.files + 1, bytes: gone.bytes + file.bytes };
+                removed = Usage { files: removed.files + 1, bytes: removed.bytes + file.bytes };
             }
         }
-        gone
+        removed
     }
 
-    /// Only what has a name that we give: the folder may be anybody's.
-    fn found(&self) -> Vec<Found> {
+    /// Lists files with names of the cache, because the folder may contain other files.
+    fn found(&self) -> Vec<CachedFile> {
         let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
-        let ours = |name: &str| {
+        let is_cached_file = |name: &str| {
             let is_key = name.len() > 64 && name.as_bytes()[..64].iter().all(u8::is_ascii_hexdigit);
-            is_key && (&name[64..] == ENDING || name.ends_with(UNFINISHED))
+            is_key && (&name[64..] == COMPLETE || name.ends_with(UNFINISHED))
         };
         let of = |entry: fs::DirEntry| {
-            let name = entry.file_name().into_string().ok().filter(|name| ours(name))?;
-            let about = entry.metadata().ok().filter(fs::Metadata::is_file)?;
-            let used = about.modified().ok()?;
-            Some(Found { path: entry.path(), used, bytes: about.len(), unfinished: name.ends_with(UNFINISHED) })
+            let name = entry.file_name().into_string().ok().filter(|name| is_cached_file(name))?;
+            let metadata = entry.metadata().ok().filter(fs::Metadata::is_file)?;
+            let used = metadata.modified().ok()?;
+            Some(CachedFile { path: entry.path(), used, bytes: metadata.len(), unfinished: name.ends_with(UNFINISHED) })
         };
         entries.flatten().filter_map(of).collect()
     }
@@ -164,7 +167,7 @@ fn is_sound(bytes: &[u8], key: &Key) -> bool {
     header[..16] == *MAGIC && header[16..48] == key.0 && header[48..] == checksum(key, payload)
 }
 
-/// Of the key too: a file under another's name is damaged.
+/// Checksum of the key and the payload, so that a file with another key's name counts as damaged.
 fn checksum(key: &Key, payload: &[u8]) -> [u8; 32] {
     *blake3::keyed_hash(&key.0, payload).as_bytes()
 }

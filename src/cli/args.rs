@@ -217,7 +217,7 @@ pub struct ProfileArgs {
     #[arg(long)]
     pub edit: Option<Edit>,
     /// From the edit to the picture, which stays on the device where that makes it.
-    #[arg(long, requires = "edit")]
+    #[arg(long = "picture", requires = "edit")]
     pub image: bool,
     /// Width and height in pixels of that picture and of that of `--edit camera`.
     #[arg(long, default_value = "384x384", value_parser = super::parse_size)]

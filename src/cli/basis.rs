@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::time::Instant;
 
-use crate::brdf::{Brdf, ColorBasis, MeasuredCache, Term};
-use crate::effective::{RotatedBasis, RotatedLobe, analytic_lobe};
+use crate::brdf::{Brdf, ColorBasis, MeasuredCache, Term, analytic_lobe};
+use crate::effective::{RotatedBasis, RotatedLobe};
 use crate::plan::Settings;
 use anyhow::Result;
 use serde::Serialize;
@@ -100,7 +100,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
             rows: pairs,
             columns,
             full_mb: (pairs * columns * 8) as f64 / MIB,
-            kept_mb: bases.iter().map(RotatedBasis::kept_bytes).sum::<usize>() as f64 / MIB,
+            kept_mb: bases.iter().map(RotatedBasis::bytes).sum::<usize>() as f64 / MIB,
             rank: bases.iter().map(|basis| basis.rank).sum(),
             seconds,
             kept_energy: bases.iter().map(|basis| basis.kept_energy).fold(1.0, f64::min),

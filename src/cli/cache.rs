@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use crate::cache::{Cache, MAX, Usage, usual_folder};
+use crate::cache::{Cache, MAX_BYTES, Usage, default_folder};
 use anyhow::Result;
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ impl KeepingArgs {
 
 /// The person's cache.
 pub fn open() -> Cache {
-    usual_folder(|name| std::env::var_os(name)).map_or_else(Cache::off, |folder| Cache::at(&folder))
+    default_folder(|name| std::env::var_os(name)).map_or_else(Cache::off, |folder| Cache::at(&folder))
 }
 
 /// Waits for what is still being written, and says if it could not be.
@@ -45,7 +45,7 @@ pub fn run(args: &CacheArgs) -> Result<()> {
     let removed = if args.clear { cache.clear() } else { Usage::default() };
     let Usage { files, bytes } = cache.usage();
     let folder = cache.folder().map(|folder| folder.display().to_string());
-    let report = Report { folder, files, bytes, most_bytes: MAX, removed };
+    let report = Report { folder, files, bytes, most_bytes: MAX_BYTES, removed };
     if args.json {
         return print_json(&report);
     }
@@ -57,6 +57,6 @@ pub fn run(args: &CacheArgs) -> Result<()> {
     if args.clear {
         writeln!(out, "removed {} files, {} bytes", removed.files, removed.bytes)?;
     }
-    writeln!(out, "{folder}: {files} files, {bytes} bytes of at most {MAX}")?;
+    writeln!(out, "{folder}: {files} files, {bytes} bytes of at most {MAX_BYTES}")?;
     Ok(())
 }

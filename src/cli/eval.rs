@@ -9,7 +9,6 @@ use crate::diagnostics::Health;
 use crate::effective::Reflectance;
 use crate::math::directions::from_angles;
 use crate::metrics::Pair;
-use crate::pipeline::Pipeline;
 use crate::plan::{Preset, Settings};
 use crate::reference::ReferenceSettings;
 use anyhow::Result;
@@ -36,7 +35,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
     let settings = Settings::from_quality(&loaded.scene.quality);
     let cache = args.keeping.open();
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
     let health;
     let mut form = "reference sum".to_owned();
@@ -63,7 +62,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         let outcome = pipeline.effective(&loaded)?;
         args.scene.notes(&outcome);
         health = outcome.health().clone();
-        form = outcome.brdf.form.describe();
+        form = outcome.brdf.representation.describe();
         let values: Vec<Vec3> = pairs
             .par_iter()
             .map(|pair| {

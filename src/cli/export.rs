@@ -5,7 +5,6 @@ use std::path::Path;
 use crate::diagnostics::Health;
 use crate::export;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
-use crate::pipeline::Pipeline;
 use anyhow::Result;
 use serde::Serialize;
 
@@ -43,7 +42,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     }
     let loaded = args.scene.open()?;
     let cache = args.keeping.open();
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
     let outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
@@ -89,7 +88,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             resampling_rel_l2: reading.errors.rel_l2,
             resampling_psnr_db: reading.errors.psnr_db,
             anisotropy_lost: report.anisotropy_lost,
-            form: outcome.brdf.form.describe(),
+            form: outcome.brdf.representation.describe(),
             health: &health,
             reflectance: report.reflectances.rows(),
         });

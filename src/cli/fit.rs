@@ -6,7 +6,6 @@ use crate::base::{Error, InputError, replace_file};
 use crate::effective::Reflectance;
 use crate::fit;
 use crate::fit::{Fit, Model};
-use crate::pipeline::Pipeline;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
@@ -37,7 +36,7 @@ pub fn run(args: &FitArgs) -> Result<()> {
         kind(path)?;
     }
     let loaded = args.scene.open()?;
-    let outcome = Pipeline::new().effective(&loaded)?;
+    let outcome = crate::gpu::pipeline().effective(&loaded)?;
     args.scene.notes(&outcome);
     let mut fits = Vec::new();
     let mut reports = Vec::new();

@@ -10,6 +10,7 @@ pub mod materials;
 pub mod plan;
 pub mod profile;
 pub mod render;
+mod render_path;
 pub mod report;
 pub mod tile;
 mod to_image;

@@ -4,7 +4,6 @@ use std::io::Write;
 
 use crate::base::Cancel;
 use crate::diagnostics::Health;
-use crate::pipeline::Pipeline;
 use crate::render::RenderScene;
 use crate::report::{EffectCost, measure_effects};
 use anyhow::Result;
@@ -29,7 +28,7 @@ struct Report<'a> {
 
 pub fn run(args: &PlanArgs) -> Result<()> {
     let loaded = args.scene.open()?;
-    let mut pipeline = Pipeline::new();
+    let pipeline = crate::gpu::pipeline();
     let outcome = pipeline.effective(&loaded)?;
     let dropped_lights = RenderScene::new(&loaded)?.dropped_lights;
     let measured = if args.measure {

@@ -5,13 +5,12 @@ use std::io::Write;
 use std::time::Instant;
 
 use crate::base::{Error, InputError};
-use crate::pipeline::Pipeline;
 use crate::render::RenderScene;
 use anyhow::Result;
 use serde::Serialize;
 
 use super::print_json;
-use super::render::RenderPath;
+use super::render_path::RenderPath;
 use super::to_image::ToImage;
 use super::{Edit, ProfileArgs};
 
@@ -35,19 +34,19 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
         Some(Edit::Color) => Some(edited.scene.nudge_color().ok_or_else(|| nothing("material"))?),
         Some(Edit::Camera) | None => None,
     };
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = crate::gpu::pipeline();
     let mut outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
-    let mut shading_brdf = if args.image { Some(ToImage::new(&loaded, &outcome, args.size)?) } else { None };
-    let mut form = outcome.brdf.form.describe();
+    let mut to_image = if args.image { Some(ToImage::new(&loaded, &outcome, args.size)?) } else { None };
+    let mut form = outcome.brdf.representation.describe();
     let mut camera = if args.edit == Some(Edit::Camera) {
         let mut stage = RenderScene::new(&loaded)?;
-        let route = RenderPath::of(&stage, &outcome)?;
+        let path = RenderPath::of(&stage, &outcome)?;
         // A camera edit keeps what pictures read, and the shadows of the object.
-        stage.settle();
-        let shading_brdf = route.reads(&outcome)?;
-        form = shading_brdf.brdf.form.describe();
-        Some((stage, route, shading_brdf))
+        stage.cache_shadows();
+        let shading_brdf = path.shading_brdf(&outcome)?;
+        form = shading_brdf.brdf.representation.describe();
+        Some((stage, path, shading_brdf))
     } else {
         None
     };
@@ -55,14 +54,14 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     for run in 0..=args.repeat {
         let start = Instant::now();
         let times = match (&mut camera, args.edit) {
-            (None, Some(_)) if shading_brdf.is_some() => {
-                let Some(to_image) = &mut shading_brdf else { continue };
-                let times = to_image.make(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
-                form.clone_from(&to_image.form);
+            (None, Some(_)) if to_image.is_some() => {
+                let Some(to_image) = &mut to_image else { continue };
+                let times = to_image.run(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
+                form.clone_from(&to_image.representation);
                 times
             }
-            (Some((stage, route, shading_brdf)), _) => {
-                let times = route.show(stage, &shading_brdf.brdf, args.size)?;
+            (Some((stage, path, shading_brdf)), _) => {
+                let times = path.show(stage, &shading_brdf.brdf, args.size)?;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
             }
             (None, Some(_)) => {
@@ -71,7 +70,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
                 outcome.times.clone()
             }
             (None, None) => {
-                outcome = Pipeline::new().effective(&loaded)?;
+                outcome = crate::gpu::pipeline().effective(&loaded)?;
                 outcome.times.clone()
             }
         };

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use crate::base::{Error, InputError, replace_file};
 use crate::effective::EffectiveBrdf;
-use crate::pipeline::Pipeline;
 use crate::reference::ReferenceSettings;
 use crate::report::{Machine, Report, SceneReport, Thumbnail, ThumbnailRenderer, difference_png};
 use crate::scene;
@@ -172,13 +171,13 @@ fn in_order(all: Vec<Candidate>) -> Vec<Candidate> {
 /// Whether one horizon an azimuth does not tell what a facet sees.
 fn overhangs(loaded: &LoadedScene) -> bool {
     let settings = with_settings(loaded, &quality_scale::rung(0.0, false));
-    settings.and_then(|scene| Pipeline::new().effective(&scene)).is_ok_and(|outcome| outcome.plan.overhangs())
+    settings.and_then(|scene| crate::gpu::pipeline().effective(&scene)).is_ok_and(|outcome| outcome.plan.overhangs())
 }
 
 fn has_measured(loaded: &LoadedScene) -> bool {
-    let mut pipeline = Pipeline::new();
-    pipeline.sum_materials(loaded).is_ok_and(|(_, materials)| {
-        materials.iter().any(|material| material.brdf.terms.iter().any(|term| term.measured().is_some()))
+    let pipeline = crate::gpu::pipeline();
+    pipeline.materials(loaded).is_ok_and(|assignment| {
+        assignment.materials.iter().any(|material| material.brdf.terms.iter().any(|term| term.measured().is_some()))
     })
 }
 
@@ -189,7 +188,8 @@ fn thumbnails(loaded: &LoadedScene, bar: &ProgressBar) -> Result<Vec<Thumbnail>>
     let studio = ThumbnailRenderer::new(loaded)?;
     let image = |preset: &'static str, set: &[String]| -> Result<_> {
         let candidate = Candidate { family: Family::Preset, preset, set: set.to_vec() };
-        let brdf: std::sync::Arc<EffectiveBrdf> = Pipeline::new().effective(&with_settings(loaded, &candidate)?)?.brdf;
+        let brdf: std::sync::Arc<EffectiveBrdf> =
+            crate::gpu::pipeline().effective(&with_settings(loaded, &candidate)?)?.brdf;
         Ok(studio.image(&*brdf)?)
     };
     let facets = FINEST[usize::from(has_measured(loaded))];

@@ -2,7 +2,6 @@
 
 use crate::export::tile;
 use crate::export::tile::TileOptions;
-use crate::pipeline::Pipeline;
 use anyhow::Result;
 use glam::UVec2;
 
@@ -11,7 +10,7 @@ use super::{bar, print_json, showing};
 
 pub fn run(args: &TileArgs) -> Result<()> {
     let loaded = args.scene.open()?;
-    let mesh = Pipeline::new().mesh(&loaded)?;
+    let mesh = crate::gpu::pipeline().mesh(&loaded)?;
     let count = |[x, y]: [usize; 2]| UVec2::new(x as u32, y as u32);
     let options =
         TileOptions { repeat: count(args.repeat), scale: args.scale, base_mm: args.base, samples: count(args.samples) };

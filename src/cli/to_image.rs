@@ -1,98 +1,162 @@
-//! From an edit to its picture, as the editor goes: on the device in one submission, or on the CPU through a table.
+//! From an edit to its image, as the editor computes it: on the GPU in one submission, or on the CPU through a table.
 
-use std::sync::Arc;
-use std::time::Instant;
-
-use crate::base::{Cancel, Error};
-use crate::effective::Black;
-use crate::gpu::{Gpu, GpuError, GpuRenderer, Tier};
-use crate::pipeline::{Outcome, Pipeline};
-use crate::render::RenderScene;
-use crate::render::image::shading::Background;
-use crate::render::image::tone_map::ToneMap;
-use crate::render::render;
-use crate::scene::LoadedScene;
 use anyhow::Result;
 
-use super::render::RenderPath;
+use crate::base::Cancel;
+#[cfg(feature = "gpu")]
+use crate::base::Error;
+use crate::pipeline::{Outcome, Pipeline, StageTimes};
+use crate::render::image::render::RenderTimes;
+use crate::render::image::shading::Background;
+use crate::render::{RenderScene, render};
+use crate::scene::LoadedScene;
 
-/// All that lies between an edit and its picture.
+/// Everything between an edit and its image.
 pub struct ToImage {
-    stage: RenderScene,
-    /// With the device, absent where the CPU makes pictures.
-    renderer: Option<(Arc<Gpu>, GpuRenderer, wgpu::TextureView)>,
+    scene: RenderScene,
+    #[cfg(feature = "gpu")]
+    on_gpu: Option<on_gpu::Renderer>,
     size: [usize; 2],
-    /// What the last picture was made with.
-    pub form: String,
+    /// The representation that the last image was made with.
+    pub representation: String,
 }
 
 impl ToImage {
+    /// # Errors
+    /// The object or its lights cannot be used, or a GPU that was asked for.
     pub fn new(loaded: &LoadedScene, outcome: &Outcome, size: [usize; 2]) -> Result<Self> {
-        let mut stage = RenderScene::new(loaded)?;
-        let gpu = RenderPath::device(outcome)?;
-        let renderer = match gpu {
-            Some(gpu) => {
-                let renderer = GpuRenderer::new(&gpu, &stage.mesh, stage.occluder.as_ref()).map_err(Error::from)?;
-                let image = crate::gpu::render::image::image(&gpu, size).map_err(Error::from)?;
-                let view = image.create_view(&wgpu::TextureViewDescriptor::default());
-                Some((Arc::new(gpu), renderer, view))
-            }
-            None => {
-                // What the camera's first picture would make.
-                stage.settle();
-                None
-            }
+        let mut scene = RenderScene::new(loaded)?;
+        #[cfg(feature = "gpu")]
+        let on_gpu = on_gpu::Renderer::open(&scene, outcome, size)?;
+        #[cfg(feature = "gpu")]
+        let on_cpu = on_gpu.is_none();
+        #[cfg(not(feature = "gpu"))]
+        let on_cpu = {
+            super::render_path::refuse_gpu(outcome)?;
+            true
         };
-        Ok(Self { stage, renderer, size, form: String::new() })
+        if on_cpu {
+            // The first image of a camera edit would compute the same.
+            scene.cache_shadows();
+        }
+        Ok(Self {
+            scene,
+            #[cfg(feature = "gpu")]
+            on_gpu,
+            size,
+            representation: String::new(),
+        })
     }
 
-    pub fn make(&mut self, pipeline: &mut Pipeline, loaded: &LoadedScene) -> Result<Vec<(&'static str, f64)>> {
-        let (cancel, background) = (Cancel::default(), Background::default());
-        let Self { stage, renderer, size, form } = self;
-        let on_device = match renderer {
-            Some((gpu, ..)) if gpu.tier == Tier::Hardware || loaded.scene.quality.backend == "gpu" => {
-                pipeline.use_device(gpu.clone());
-                pipeline.unseen(loaded)?
-            }
-            _ => None,
-        };
-        let (mut times, large) = match (on_device, renderer) {
-            (Some(tile), Some((gpu, renderer, view))) => {
-                let start = Instant::now();
-                renderer.set_tile(gpu, &tile.sum).map_err(Error::from)?;
-                let upload = ("upload", start.elapsed().as_secs_f64() * 1e3);
-                let input = stage.input(&Black, *size, 1, &background);
-                let tone_map = ToneMap::new(&stage.camera)?;
-                let large = renderer.show(gpu, &input, &tone_map, view, &cancel)?;
-                *form = format!("{} facets, on {}", tile.sum.sum.facet_count(), gpu.description());
-                let mut times = tile.times;
-                times.extend([upload, ("visibility_and_product", large.product_ms)]);
-                (times, large)
-            }
-            (None, renderer) => {
-                let outcome = pipeline.effective(loaded)?;
-                let reads = outcome.shading_brdf(&cancel)?;
-                *form = reads.brdf.form.describe();
-                let input = stage.input(&*reads.brdf, *size, 1, &background);
-                let mut times = outcome.times;
-                times.push(("picture_table", reads.ms));
-                let worn = renderer.as_mut().map(|(gpu, renderer, view)| {
-                    let start = Instant::now();
-                    renderer.set_brdf(gpu, &reads.brdf).map(|()| (gpu, renderer, view, start.elapsed()))
-                });
-                let large = match worn {
-                    Some(Ok((gpu, renderer, view, upload))) => {
-                        times.push(("upload", upload.as_secs_f64() * 1e3));
-                        renderer.show(gpu, &input, &ToneMap::new(&stage.camera)?, view, &cancel)?
-                    }
-                    None | Some(Err(GpuError::Unsupported(_))) => render(&input)?.times,
-                    Some(Err(error)) => return Err(Error::from(error).into()),
-                };
-                (times, large)
-            }
-            (Some(_), None) => return Err(Error::failed("a tile for a device that is not there").into()),
-        };
-        times.extend([("g_buffer", large.gbuffer_ms), ("shadows", large.shadows_ms), ("shading", large.shading_ms)]);
+    /// Computes the image of a scene; milliseconds of the stages that ran.
+    ///
+    /// # Errors
+    /// As [`Pipeline::effective`], or a GPU that fails.
+    pub fn run(&mut self, pipeline: &mut Pipeline, loaded: &LoadedScene) -> Result<StageTimes> {
+        #[cfg(feature = "gpu")]
+        if let Some(renderer) = &mut self.on_gpu {
+            let (times, representation) = renderer.run(pipeline, loaded, &self.scene, self.size)?;
+            self.representation = representation;
+            return Ok(times);
+        }
+        let outcome = pipeline.effective(loaded)?;
+        let shading = outcome.shading_brdf(&Cancel::default())?;
+        self.representation = shading.brdf.representation.describe();
+        let background = Background::default();
+        let input = self.scene.input(&*shading.brdf, self.size, 1, &background);
+        let mut times = outcome.times;
+        times.push(("picture_table", shading.ms));
+        push_image_times(&mut times, &render(&input)?.times);
         Ok(times)
+    }
+}
+
+fn push_image_times(times: &mut StageTimes, image: &RenderTimes) {
+    times.extend([("g_buffer", image.gbuffer_ms), ("shadows", image.shadows_ms), ("shading", image.shading_ms)]);
+}
+
+#[cfg(feature = "gpu")]
+mod on_gpu {
+    //! The same on a GPU.
+
+    use std::sync::Arc;
+    use std::time::Instant;
+
+    use anyhow::Result;
+
+    use super::{Cancel, Error, push_image_times};
+    use crate::base::GpuError;
+    use crate::cli::render_path;
+    use crate::effective::Black;
+    use crate::gpu::{Gpu, GpuRenderer, Tier};
+    use crate::pipeline::{Outcome, Pipeline, StageTimes};
+    use crate::render::image::shading::Background;
+    use crate::render::image::tone_map::ToneMap;
+    use crate::render::{RenderScene, render};
+    use crate::scene::LoadedScene;
+
+    /// A GPU with the object, and the image that it writes.
+    pub struct Renderer {
+        gpu: Arc<Gpu>,
+        renderer: GpuRenderer,
+        view: wgpu::TextureView,
+    }
+
+    impl Renderer {
+        /// Opens the GPU that the scene's backend asks for; `None` if the CPU is to be used.
+        pub fn open(scene: &RenderScene, outcome: &Outcome, size: [usize; 2]) -> Result<Option<Self>> {
+            let Some(gpu) = render_path::on_gpu::open(outcome)? else { return Ok(None) };
+            let renderer = GpuRenderer::new(&gpu, &scene.mesh, scene.occluder.as_ref()).map_err(Error::from)?;
+            let image = crate::gpu::render::image::image(&gpu, size).map_err(Error::from)?;
+            let view = image.create_view(&wgpu::TextureViewDescriptor::default());
+            Ok(Some(Self { gpu: Arc::new(gpu), renderer, view }))
+        }
+
+        /// Times of the stages, and the representation that the image was made with.
+        pub fn run(
+            &mut self,
+            pipeline: &mut Pipeline,
+            loaded: &LoadedScene,
+            scene: &RenderScene,
+            size: [usize; 2],
+        ) -> Result<(StageTimes, String)> {
+            let (cancel, background) = (Cancel::default(), Background::default());
+            let tone_map = ToneMap::new(&scene.camera)?;
+            let Self { gpu, renderer, view } = self;
+            let computes_tile = gpu.tier == Tier::Hardware || loaded.scene.quality.backend == "gpu";
+            let tile = if computes_tile {
+                pipeline.set_gpu(gpu.clone());
+                pipeline.gpu_tile(loaded)?
+            } else {
+                None
+            };
+            if let Some(tile) = tile {
+                let start = Instant::now();
+                renderer.set_tile(gpu, &tile.input).map_err(Error::from)?;
+                let upload = ("upload", start.elapsed().as_secs_f64() * 1e3);
+                let input = scene.input(&Black, size, 1, &background);
+                let image = renderer.show(gpu, &input, &tone_map, view, &cancel)?;
+                let mut times = tile.times;
+                times.extend([upload, ("visibility_and_product", image.product_ms)]);
+                push_image_times(&mut times, &image);
+                return Ok((times, format!("{} facets, on {}", tile.input.sum.facet_count(), gpu.description())));
+            }
+            let outcome = pipeline.effective(loaded)?;
+            let shading = outcome.shading_brdf(&cancel)?;
+            let input = scene.input(&*shading.brdf, size, 1, &background);
+            let mut times = outcome.times;
+            times.push(("picture_table", shading.ms));
+            let start = Instant::now();
+            let image = match renderer.set_brdf(gpu, &shading.brdf) {
+                Ok(()) => {
+                    times.push(("upload", start.elapsed().as_secs_f64() * 1e3));
+                    renderer.show(gpu, &input, &tone_map, view, &cancel)?
+                }
+                Err(GpuError::Unsupported(_)) => render(&input)?.times,
+                Err(error) => return Err(Error::from(error).into()),
+            };
+            push_image_times(&mut times, &image);
+            Ok((times, shading.brdf.representation.describe()))
+        }
     }
 }

@@ -6,8 +6,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{FactorHealth, HealthInputs, MaterialHealth, MeasuredHealth, ResultHealth, SurfaceHealth, VisibilityInput};
-use crate::brdf::{Brdf, LUMINANCE, LobeAngles, Measured, Term};
-use crate::effective::{EffectiveBrdf, Material, Reflectance, Representation};
+use crate::brdf::{Brdf, LUMINANCE, LobeAngles, Material, Measured, Term};
+use crate::effective::{EffectiveBrdf, Reflectance, Representation};
 use crate::math::directions::{PolarGrid, from_angles};
 use crate::metrics::{Errors, mirror_biased_pairs};
 
@@ -96,18 +96,18 @@ fn half_width_of_table(table: &dyn Measured) -> Option<f32> {
         .flatten()
 }
 
-pub fn surface(evidence: &HealthInputs, lobe_deg: Option<f32>) -> SurfaceHealth {
-    let facets = &evidence.facets;
+pub fn surface(inputs: &HealthInputs, lobe_deg: Option<f32>) -> SurfaceHealth {
+    let facets = &inputs.facets;
     let mut health = SurfaceHealth {
         facets: facets.len(),
         triangles_left_out: facets.skipped_triangles,
-        has_holes: !evidence.closes_plane,
+        has_holes: !inputs.closes_plane,
         fewest_facets_seen: facets.len(),
         facets_in_a_lobe: lobe_deg.and_then(|degrees| facets_within(&facets.normals, degrees.to_radians())),
         ..SurfaceHealth::default()
     };
     let mut seen = vec![false; facets.len()];
-    match &evidence.sight {
+    match &inputs.visibility {
         VisibilityInput::Soft(visibility) => {
             health.walks_cut_short = visibility.truncated();
             let mut v = vec![0.0; facets.len()];
@@ -156,10 +156,10 @@ fn facets_within(normals: &[Vec3], width: f32) -> Option<usize> {
     counts.get(counts.len() / 10).copied()
 }
 
-pub fn result(brdf: &EffectiveBrdf, evidence: &HealthInputs, lobe_deg: Option<f32>) -> ResultHealth {
+pub fn result(brdf: &EffectiveBrdf, inputs: &HealthInputs, lobe_deg: Option<f32>) -> ResultHealth {
     let mut health = ResultHealth::default();
-    let geometric = evidence.facets.normals == evidence.facets.geometric_normals;
-    if evidence.closes_plane && geometric && !evidence.facets.is_empty() {
+    let geometric = inputs.facets.normals == inputs.facets.geometric_normals;
+    if inputs.closes_plane && geometric && !inputs.facets.is_empty() {
         let mut worst = 0.0;
         for (angles, direction) in views() {
             let error = (f64::from(brdf.relative_projected_area(direction) / direction.z) - 1.0).abs();
@@ -226,7 +226,7 @@ fn lights_around(azimuth: f32, grid: PolarGrid) -> (Vec<Vec3>, Vec<f32>) {
 }
 
 pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: usize) -> Option<FactorHealth> {
-    let (used, ranks, step) = match brdf.direct_form() {
+    let (used, ranks, step) = match brdf.direct_representation() {
         Representation::LowRank(factors) => {
             let step = std::f32::consts::FRAC_PI_2 / (factors.pairs.rings.max(2) - 1) as f32;
             (true, factors.channels.iter().map(|channel| channel.ranks.1).collect(), step)
@@ -245,7 +245,7 @@ pub fn factorization(brdf: &EffectiveBrdf, factored: Option<Errors>, max_rank: u
         used,
         relative_error,
         effective_digits: relative_error.filter(|error| *error > 0.0).map(|error| -error.log10()),
-        at_rank_limit: matches!(brdf.direct_form(), Representation::LowRank(_))
+        at_rank_limit: matches!(brdf.direct_representation(), Representation::LowRank(_))
             && ranks.iter().any(|&rank: &usize| rank >= max_rank),
         ranks,
         lobe_grid_step_deg: step.to_degrees(),
@@ -280,7 +280,7 @@ mod tests {
                 let (scene, name) = (scene::parse(&source).unwrap(), "test".to_owned());
                 let loaded = LoadedScene { scene, base_dir: PathBuf::new(), name, painted: Painted::default() };
                 let outcome = Pipeline::new().effective(&loaded).unwrap();
-                let materials = materials(&outcome.evidence.materials.1, &[]).1;
+                let materials = materials(&outcome.health_inputs.materials.materials, &[]).1;
                 let grid = grid_for(materials[0].narrowest_lobe_deg).unwrap();
                 let [albedo, exact] =
                     [grid, PolarGrid::new(96, 320)].map(|grid| largest_effective_albedo(&outcome.brdf, grid).0);

@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::effective::{EffectiveBrdf, Material};
+use crate::brdf::{Material, MaterialAssignment};
+use crate::effective::EffectiveBrdf;
 use crate::geometry::{Facets, TileMesh};
 use crate::metrics::Errors;
 use crate::visibility::{PackedVisibility, Visibility};
@@ -19,9 +20,8 @@ use crate::visibility::{PackedVisibility, Visibility};
 #[derive(Debug, Clone)]
 pub struct HealthInputs {
     pub facets: Arc<Facets>,
-    pub sight: VisibilityInput,
-    /// The material of each slot, and the materials.
-    pub materials: Arc<(Vec<usize>, Vec<Material>)>,
+    pub visibility: VisibilityInput,
+    pub materials: Arc<MaterialAssignment>,
     /// Names of the materials.
     pub names: Vec<String>,
     pub closes_plane: bool,
@@ -134,14 +134,14 @@ pub struct Limits {
 
 impl Health {
     /// Examines a result.
-    pub fn of(brdf: &EffectiveBrdf, evidence: &HealthInputs, factored: Option<Errors>, limits: Limits) -> Self {
-        let (measured, materials) = measure::materials(&evidence.materials.1, &evidence.names);
+    pub fn of(brdf: &EffectiveBrdf, inputs: &HealthInputs, factored: Option<Errors>, limits: Limits) -> Self {
+        let (measured, materials) = measure::materials(&inputs.materials.materials, &inputs.names);
         let lobe = materials.iter().filter_map(|material| material.narrowest_lobe_deg).reduce(f32::min);
         let conserving = materials.iter().all(|material| material.largest_albedo <= 1.0);
         let mut health = Self {
             warnings: Vec::new(),
-            surface: measure::surface(evidence, lobe),
-            result: measure::result(brdf, evidence, lobe),
+            surface: measure::surface(inputs, lobe),
+            result: measure::result(brdf, inputs, lobe),
             factorization: measure::factorization(brdf, factored, limits.max_rank),
             measured,
             materials,

@@ -1,4 +1,4 @@
-//! A sum over facets as a device takes it that makes visibility and product itself.
+//! The inputs from which a GPU computes visibility and the sum over facets.
 
 use std::sync::Arc;
 
@@ -9,44 +9,44 @@ use crate::geometry::{Facets, HeightGrid, PeriodicGrid, TileMesh};
 use crate::math::directions::PolarGrid;
 use crate::visibility::Visibility;
 
-/// Facets and their lobes, and how they come to see.
+/// Facets, their lobes, and the input of their visibility.
 #[derive(Debug)]
 pub struct GpuTileInput {
     pub sum: FacetSum,
-    pub sight: GpuVisibilityInput,
+    pub visibility_input: GpuVisibilityInput,
     /// Base area `A` of the tile.
     pub base_area: f64,
-    /// What a table for pictures is made of; absent where none is expected to pay.
+    /// Nodes of the shading table; `None` if no table is expected to pay.
     pub nodes: Option<Nodes<'static>>,
     pub interpolation: Interpolation,
 }
 
-/// How facets come to see.
+/// The input from which a GPU computes visibility, or the visibility itself.
 #[derive(Debug)]
 pub enum GpuVisibilityInput {
-    /// The CPU saw for them.
-    Seen(Arc<Visibility>),
-    /// By walking this height-field.
+    /// The CPU computed the visibility.
+    Computed(Arc<Visibility>),
+    /// The GPU marches over the samples of a height field.
     Heights(Heights),
-    /// By cutting the tile along azimuths.
+    /// The GPU slices the tile along azimuths.
     OcclusionIntervals(Box<Sliced>),
-    /// By drawing the tile from many directions.
+    /// The GPU renders shadow maps of the tile from many directions.
     Maps(Box<Maps>),
 }
 
-/// A tile that is cut in vertical slices.
+/// A tile that is intersected with vertical slices.
 #[derive(Debug)]
 pub struct Sliced {
     pub grid: Arc<PeriodicGrid>,
     pub facets: Arc<Facets>,
     pub azimuths: usize,
     /// Width of the soft step at a horizon [rad].
-    pub ramp: f32,
-    /// Whether anything may hang above a horizon.
+    pub transition_width: f32,
+    /// True if the tile may have overhangs.
     pub overhangs: bool,
 }
 
-/// A height-field, its tile and its facets.
+/// A height field, its tile and its facets.
 #[derive(Debug)]
 pub struct Heights {
     pub samples: HeightGrid,
@@ -54,15 +54,15 @@ pub struct Heights {
     pub facets: Arc<Facets>,
     pub azimuths: usize,
     /// Width of the soft step at a horizon [rad].
-    pub ramp: f32,
+    pub transition_width: f32,
 }
 
-/// A tile that is drawn from the nodes of a grid.
+/// A tile whose shadow maps are rendered from the nodes of a grid.
 #[derive(Debug)]
 pub struct Maps {
     pub mesh: TileMesh,
     pub facets: Arc<Facets>,
     pub grid: PolarGrid,
-    /// Texels a side.
+    /// Texels per side.
     pub resolution: u32,
 }

@@ -1,4 +1,4 @@
-//! From facets, visibility and BRDFs to the effective BRDF.
+//! The effective BRDF of a tile, computed from facets, visibility and small-scale BRDFs, and its representations.
 
 pub mod direct;
 mod effective_brdf;
@@ -13,8 +13,8 @@ use glam::Vec3;
 use crate::math::simd::cubic_weights;
 
 pub use direct::Direct;
-pub(crate) use direct::facet_groups::Group;
-pub use direct::facet_sum::{FacetSum, Material, analytic_lobe};
+pub(crate) use direct::facet_groups::FacetGroup;
+pub use direct::facet_sum::FacetSum;
 pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, Heights, Maps, Sliced};
@@ -23,19 +23,19 @@ pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
 
 pub use shading_table::content::TableContent;
-pub(crate) use shading_table::sampled_facets::share_of;
+pub(crate) use shading_table::sampled_facets::subset_size;
 pub use shading_table::{Nodes, ShadingTable};
 pub use tint::Tint;
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 
-/// What the large scale asks of a material: all it knows of the small scale.
+/// A reflectance that rendering can evaluate. Rendering knows nothing else of the small scale.
 pub trait Reflectance: Sync {
-    /// `out[k] = f̄(lights[k], o)` [1/sr], the light's cosine included; 0 where either is under the horizon.
-    /// Unit vectors in the tangent frame (x, y along the tile, z the surface normal).
+    /// Writes `out[k] = f̄(lights[k], o)` [1/sr], the light's cosine included; 0 if a direction is below the horizon.
+    /// Directions are unit vectors in the tangent frame (x, y along the tile, z the surface normal).
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
 }
 
-/// Reflects nothing: where a device shades, which holds a material of its own.
+/// A reflectance of zero, for renderings that a GPU shades with a material of its own.
 #[derive(Debug, Clone, Copy)]
 pub struct Black;
 
@@ -45,18 +45,18 @@ impl Reflectance for Black {
     }
 }
 
-/// How samples that stand evenly are read between them.
+/// Interpolation between evenly spaced samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Interpolation {
-    /// Catmull and Rom (1974).
+    /// Cubic (Catmull and Rom 1974).
     #[default]
     Cubic,
-    /// Half the reading, and kinks.
+    /// Linear: it reads half as many samples, and has kinks at them.
     Linear,
 }
 
 impl Interpolation {
-    /// Weights of four samples about a place `t` of the way from the second to the third.
+    /// Weights of four samples at the fraction `t` between the second and the third.
     fn weights(self, t: f32) -> [f32; 4] {
         match self {
             Self::Cubic => cubic_weights(t),

@@ -1,15 +1,15 @@
-//! Colours that stay out of tables.
+//! Colours that are not part of tables.
 
 use glam::Vec3;
 
 use crate::brdf::Term;
 
-/// What multiplies a tabulated scalar at the query.
+/// A coloured factor that multiplies a tabulated scalar at the query.
 #[derive(Debug, Clone)]
 pub enum Tint {
-    /// The tint of an analytic term, exact at the query's `i·h`, times a colour.
+    /// The tint of an analytic term, evaluated at the query's `i·h`, times a colour.
     Term(Term, Vec3),
-    /// A colour, or a colour direction of a measured BRDF times one.
+    /// A colour, or a colour times a colour direction of a measured BRDF.
     Fixed(Vec3),
 }
 

@@ -1,17 +1,17 @@
-//! ASTM E1392 text (`.astm`), as the Cornell measurements use it and libbsdf reads it: keywords, then a row a pair.
+//! ASTM E1392 text (`.astm`) as in the Cornell measurements and in libbsdf: keywords, then one row per pair.
 
 use std::io::{self, Write};
 
-use super::table::Table;
-use super::{ExportResolution, Job, Written};
+use super::table::ExportTable;
+use super::{ExportResolution, ExportTask, Written};
 
-/// 8 x 24 directions each: 37 thousand rows.
+/// The default of 8 x 24 directions each: 37 thousand rows.
 const DEFAULT_RESOLUTION: ExportResolution = ExportResolution { theta_i: 8, phi_i: 24, theta_o: 8, phi_o: 24 };
 
-pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
-    let grid = job.options.resolution.unwrap_or(DEFAULT_RESOLUTION).grid();
-    let table = Table::new(job.brdf, grid, job.progress)?;
-    let summary = job.summary().replace(['\n', '\r'], " ");
+pub fn write(task: &ExportTask<'_>, out: &mut dyn Write) -> io::Result<Written> {
+    let grid = task.options.resolution.unwrap_or(DEFAULT_RESOLUTION).grid();
+    let table = ExportTable::new(task.brdf, grid, task.progress)?;
+    let summary = task.summary().replace(['\n', '\r'], " ");
     writeln!(out, "TYPE BRDF")?;
     writeln!(out, "COMMENT {summary}")?;
     writeln!(out, "NUM_POINTS {}", table.grid.pairs())?;
@@ -26,6 +26,6 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
         "theta at the middles of equal steps from 0 to pi/2, phi at equal steps from 0.",
     ];
     let conventions = conventions.map(str::to_owned).to_vec();
-    let reading = table.resampling(job.brdf);
+    let reading = table.resampling(task.brdf);
     Ok(Written { pairs: table.grid.pairs(), reading, conventions, anisotropy_lost: None })
 }

@@ -1,15 +1,15 @@
-//! A table as text: `#` lines that describe it, a header, a row a pair.
+//! Tables as CSV: `#` lines with the description, a header, one row per pair.
 
 use std::io::{self, Write};
 
 use super::meta::Description;
-use super::table::Table;
+use super::table::ExportTable;
 
-/// The columns; angles in radians.
+/// Names of the columns; angles are in radians.
 pub const HEADER: &str = "theta_i,phi_i,theta_o,phi_o,r,g,b,g_r,g_g,g_b";
 
-/// Numbers are the shortest that read back as the same f32.
-pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) -> io::Result<()> {
+/// Writes the file. Each number is the shortest decimal that parses to the same f32.
+pub fn write(table: &ExportTable, description: &Description<'_>, out: &mut dyn Write) -> io::Result<()> {
     for line in description.lines()? {
         writeln!(out, "# {line}")?;
     }

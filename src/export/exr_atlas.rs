@@ -1,7 +1,8 @@
-//! A table as OpenEXR: an atlas with one small picture a light direction, whose pixels are viewing directions.
+//! Tables as OpenEXR: an atlas with one block per light direction, whose pixels are view directions.
 //!
-//! Pixel `(x, y)` is `x = pi Nφ_o + po`, `y = ti Nθ_o + to`. The first part, `brdf`, holds R, G, B of `f̄ / cos θ_i`; the
-//! second, `reciprocal_g`, those of `G`. The `comments` attribute of both is JSON with the axes in it.
+//! Entry `(ti, pi, to, po)` is pixel `x = pi Nφ_o + po`, `y = ti Nθ_o + to`. The first part, `brdf`, holds R, G, B of
+//! `f̄ / cos θ_i`. The second part, `reciprocal_g`, holds those of `G`. The `comments` attribute of both parts is JSON
+//! that includes the axes.
 
 use std::io::{self, Cursor, Write};
 
@@ -14,7 +15,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::meta::Description;
-use super::table::Table;
+use super::table::ExportTable;
 
 #[derive(Serialize)]
 struct Comments<'a> {
@@ -27,8 +28,8 @@ struct Comments<'a> {
     description: &'a Description<'a>,
 }
 
-/// f32 channels, losslessly compressed.
-pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) -> io::Result<()> {
+/// Writes both parts as f32 channels with lossless compression.
+pub fn write(table: &ExportTable, description: &Description<'_>, out: &mut dyn Write) -> io::Result<()> {
     let grid = &table.grid;
     let comments = Comments {
         layout: "pixel x = pi * len(phi_o) + po, y = ti * len(theta_o) + to; part brdf, then part reciprocal_g",
@@ -38,7 +39,7 @@ pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) 
         phi_o: &grid.view.phi,
         description,
     };
-    // OpenEXR text is Latin-1: JSON's own escapes carry the rest.
+    // OpenEXR text is Latin-1, so JSON escapes encode other characters.
     let comments = Text::new_or_none(ascii(&serde_json::to_string(&comments)?));
     let [ti, pi, to, po] = grid.shape();
     let size = Vec2(pi * po, ti * to);
@@ -51,9 +52,9 @@ pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) 
     out.write_all(bytes.get_ref())
 }
 
-/// R, G, B of `values` in the layout of the atlas.
+/// Returns R, G, B of `values` in the layout of the atlas.
 fn channels<'a>(
-    table: &'a Table,
+    table: &'a ExportTable,
     values: &'a [Vec3],
 ) -> SpecificChannels<impl Fn(Vec2<usize>) -> (f32, f32, f32) + Sync + 'a, RgbChannels> {
     let [_, pi, to, po] = table.grid.shape();
@@ -63,7 +64,7 @@ fn channels<'a>(
     })
 }
 
-/// JSON in ASCII: other characters, which stand in strings only, as `\uXXXX`.
+/// Encodes JSON in ASCII: other characters, which occur only in strings, become `\uXXXX`.
 fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {

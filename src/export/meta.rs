@@ -1,44 +1,44 @@
-//! What a table says about itself: conventions in plain words, where it comes from, how good it is.
+//! The description inside a table: conventions, origin and error.
 
 use serde::Serialize;
 
-use super::{Job, Reflectances};
+use super::{ExportTask, Reflectances};
 use crate::metrics::Errors;
 use crate::pipeline::Outcome;
 use crate::scene::LoadedScene;
 
-/// Who writes the tables.
+/// Name and version of this program.
 pub const PROGRAM: &str = concat!("biscale ", env!("CARGO_PKG_VERSION"));
-/// The frame of all directions.
+/// Definition of the frame of all directions.
 pub const FRAME: &str = "z up (the large-scale normal), x and y along the tile; theta from +z, phi from +x towards +y, in \
                          radians; i points to the light, o to the viewer";
 
-/// Where an exported table comes from.
+/// Origin of an exported table.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ExportMeta {
-    /// Name of the scene: a file's stem, or a shipped material.
+    /// Name of the scene: the stem of a file, or a shipped material.
     pub scene: String,
-    /// Quality preset, with the knobs that were turned by hand.
+    /// Quality preset and representation.
     pub quality: String,
     pub seed: u64,
     /// Extent of the tile in x and y, in `tile_unit`.
     pub tile_size: [f32; 2],
     pub tile_unit: String,
-    /// Whether the tile closes the plane; where it does not, `a_v` is measured ([`crate::geometry::TileMesh::closes_plane`]).
+    /// True if the tile has no holes ([`crate::geometry::TileMesh::closes_plane`]). Otherwise `a_v` is measured.
     pub closes_plane: bool,
-    /// Whether turning the tile changes nothing, so that three angles tell all.
+    /// True if rotating the tile about its normal changes nothing, so that three angles suffice.
     pub isotropic: bool,
-    /// Notes on the way from scene to table (snapped parameters, health).
+    /// Notes on the computation, such as snapped parameters and the health.
     pub notes: Vec<String>,
 }
 
 impl ExportMeta {
-    /// Of a scene that was just computed. `closes_plane`: whether its tile does.
+    /// Describes the outcome of a scene. `closes_plane` is true if its tile has no holes.
     pub fn of(loaded: &LoadedScene, outcome: &Outcome, closes_plane: bool) -> Self {
         let tile = &loaded.scene.tile;
         Self {
             scene: loaded.name.clone(),
-            quality: format!("{}; {}", outcome.settings.preset.name(), outcome.brdf.form.describe()),
+            quality: format!("{}; {}", outcome.settings.preset.name(), outcome.brdf.representation.describe()),
             seed: outcome.settings.seed,
             tile_size: tile.size.to_array(),
             tile_unit: tile.unit.clone(),
@@ -48,7 +48,7 @@ impl ExportMeta {
         }
     }
 
-    /// Whether the tile closes the plane, in words.
+    /// Returns `closes_plane` as text.
     pub(super) fn plane(&self) -> &'static str {
         if self.closes_plane {
             "the tile closes the plane: a_v(o) / A is cos(theta_o) but for sampling"
@@ -58,7 +58,7 @@ impl ExportMeta {
     }
 }
 
-/// Everything that is written beside the numbers. Nothing in it changes from run to run.
+/// Everything that is written beside the numbers. It is the same in every run.
 #[derive(Debug, Clone, Serialize)]
 pub struct Description<'a> {
     pub program: &'static str,
@@ -72,17 +72,17 @@ pub struct Description<'a> {
     pub meta: &'a ExportMeta,
     /// Base area `A` of the tile, in squared `tile_unit`.
     pub base_area: f64,
-    /// `‖read - eval‖ / ‖eval‖` of the bilinear reading, on `f̄`.
+    /// `‖read - eval‖ / ‖eval‖` of `f̄` under bilinear interpolation.
     pub resampling_rel_l2: f64,
-    /// Peak signal to noise of the same [dB]; null where there is no difference.
+    /// PSNR of the interpolation [dB]; null if there is no difference.
     pub resampling_psnr_db: f64,
-    /// Directional-hemispherical reflectances: `theta_i`, `phi_i` in degrees, R, G, B.
+    /// Directional-hemispherical reflectances: `theta_i`, `phi_i` in degrees, then R, G, B.
     pub reflectance: Vec<[f32; 5]>,
 }
 
 impl<'a> Description<'a> {
-    pub fn new(job: &Job<'a>, resampling: Errors) -> Self {
-        let meta = job.meta;
+    pub fn new(task: &ExportTask<'a>, resampling: Errors) -> Self {
+        let meta = task.meta;
         Self {
             program: PROGRAM,
             frame: FRAME,
@@ -94,25 +94,25 @@ impl<'a> Description<'a> {
                     pole to phi + pi, constant beyond the last theta",
             plane: meta.plane(),
             meta,
-            base_area: job.brdf.base_area,
+            base_area: task.brdf.base_area,
             resampling_rel_l2: resampling.rel_l2,
             resampling_psnr_db: resampling.psnr_db,
-            reflectance: Reflectances::of(job.brdf).rows(),
+            reflectance: Reflectances::of(task.brdf).rows(),
         }
     }
 
-    /// One JSON object; keys in the order above.
+    /// Returns one JSON object with the keys in the order of the fields.
     pub fn json(&self) -> std::io::Result<String> {
         Ok(serde_json::to_string(self)?)
     }
 
-    /// `key: value` of every field, a line each.
+    /// Returns one line `key: value` per field.
     pub fn lines(&self) -> std::io::Result<Vec<String>> {
         let value = serde_json::to_value(self)?;
         let fields = value.as_object().into_iter().flatten();
         Ok(fields
             .map(|(key, value)| match value {
-                // A line break would end the comment it stands in.
+                // A line break would end a comment.
                 serde_json::Value::String(text) => {
                     format!("{key}: {}", text.replace(['\n', '\r'], " "))
                 }

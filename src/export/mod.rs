@@ -1,8 +1,9 @@
-//! The effective BRDF as a table that other programs load, one file here a format. Same inputs, same bytes.
+//! Export of the effective BRDF as a table that other programs load; one module per format. The same input gives the
+//! same bytes.
 //!
-//! `.npz` (numpy), `.csv` and `.exr` hold everything there is on one grid ([`ExportMeta`] inside). The others are the
-//! formats of other programs, by their published layouts: RGL tensor files (Mitsuba, pbrt), MERL, Radiance, UTIA, ASTM. Each
-//! has a note in plain words beside it.
+//! `.npz` (numpy), `.csv` and `.exr` contain all quantities on one grid, and [`ExportMeta`]. The other formats follow
+//! the published layouts of other programs: RGL tensor files (Mitsuba, pbrt), MERL, Radiance, UTIA, ASTM. A text note
+//! is written beside each of those files.
 
 mod astm;
 mod csv;
@@ -34,66 +35,66 @@ pub use radiance::RadianceBasis;
 pub use sampler::ReadingError;
 
 use meta::Description;
-use table::Table;
+use table::ExportTable;
 
-/// What may be chosen about a table.
+/// Options of an exported table.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ExportOptions {
-    /// Sizes of the grids; each format has its own default. Formats whose grid is part of the layout do without.
+    /// Size of the grid; `None` selects the format's default. Formats with a fixed grid ignore it.
     pub resolution: Option<ExportResolution>,
-    /// What a Radiance `.xml` holds.
+    /// Basis of a Radiance `.xml`.
     pub radiance: RadianceBasis,
 }
 
-/// What was written, and how well the table stands for the function it was read from.
+/// The size of a written table and its error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportReport {
-    /// Pairs of directions in the table.
+    /// Number of direction pairs in the table.
     pub pairs: usize,
     pub bytes: u64,
-    /// What a program that reads the table gets against `eval`, on `f̄`, over a fixed set of pairs up to 85°.
+    /// Error of `f̄` as a program reads it from the table, over a fixed set of pairs up to 85° from the normal.
     pub reading: ReadingError,
-    /// The file of plain words beside the table; `None` where the table itself holds them.
+    /// Path of the text note beside the table; `None` if the table contains its description.
     pub note: Option<PathBuf>,
-    /// Relative L2 between azimuths of the tile, where the format is isotropic and cannot tell them apart.
+    /// Relative L2 between azimuths of the tile, if the format is isotropic and cannot represent them.
     pub anisotropy_lost: Option<f64>,
     pub reflectances: Reflectances,
 }
 
-/// What is being written: the function, where it comes from, what was asked for, and whom to tell the part that is done.
+/// Input of a format's writer: the function, its origin, the options and the progress.
 #[derive(Clone, Copy)]
-struct Job<'a> {
+struct ExportTask<'a> {
     brdf: &'a EffectiveBrdf,
     meta: &'a ExportMeta,
     options: &'a ExportOptions,
     progress: &'a Progress<'a>,
 }
 
-impl Job<'_> {
-    /// A line that says what the table is.
+impl ExportTask<'_> {
+    /// Returns a line that describes the table.
     fn summary(&self) -> String {
         let ExportMeta { scene, quality, .. } = self.meta;
         format!("{}: effective BRDF of {scene} ({quality})", meta::PROGRAM)
     }
 }
 
-/// What a format says of the file it wrote.
+/// Result of a format's writer.
 struct Written {
     pairs: usize,
     reading: ReadingError,
-    /// Sentences on how its numbers are to be read.
+    /// Sentences that define the layout and the units of the file.
     conventions: Vec<String>,
-    /// Relative L2 between azimuths, where the format cannot tell them apart.
+    /// Relative L2 between azimuths, if the format cannot represent them.
     anisotropy_lost: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
+enum ExportFormat {
     Npz,
     Csv,
     Exr,
     Rgl,
-    /// With spectra in place of RGB.
+    /// An RGL file with spectra instead of RGB.
     RglSpectral,
     Merl,
     Radiance,
@@ -101,19 +102,19 @@ enum Format {
     Astm,
 }
 
-/// Endings and what is written for them.
-const FORMATS: &[(&str, Format)] = &[
-    ("npz", Format::Npz),
-    ("csv", Format::Csv),
-    ("exr", Format::Exr),
-    ("bsdf", Format::Rgl),
-    ("binary", Format::Merl),
-    ("xml", Format::Radiance),
-    ("bin", Format::Utia),
-    ("astm", Format::Astm),
+/// File extensions and their formats.
+const FORMATS: &[(&str, ExportFormat)] = &[
+    ("npz", ExportFormat::Npz),
+    ("csv", ExportFormat::Csv),
+    ("exr", ExportFormat::Exr),
+    ("bsdf", ExportFormat::Rgl),
+    ("binary", ExportFormat::Merl),
+    ("xml", ExportFormat::Radiance),
+    ("bin", ExportFormat::Utia),
+    ("astm", ExportFormat::Astm),
 ];
 
-impl Format {
+impl ExportFormat {
     fn of(path: &Path) -> Result<Self> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         if name.ends_with("_spec.bsdf") {
@@ -131,34 +132,36 @@ impl Format {
         Err(InputError::new("output", found, expected).in_file(path).into())
     }
 
-    /// Whether everything there is to say is in the file itself.
+    /// Returns whether the file contains its description, so that it needs no note.
     fn describes_itself(self) -> bool {
         matches!(self, Self::Npz | Self::Csv | Self::Exr)
     }
 }
 
-/// The endings that [`write`] knows.
+/// Returns the file extensions that [`write`] supports.
 pub fn endings() -> impl Iterator<Item = &'static str> {
     FORMATS.iter().map(|(ending, _)| *ending)
 }
 
-/// Whether steps of theta and phi may be chosen for a file of this name; other formats bring their own grid.
+/// Returns whether the format of `path` lets the caller choose the steps of theta and phi.
 pub fn grid_is_free(path: &Path) -> bool {
-    Format::of(path).is_ok_and(|format| format.describes_itself() || format == Format::Astm)
+    ExportFormat::of(path).is_ok_and(|format| format.describes_itself() || format == ExportFormat::Astm)
 }
 
-/// Whether [`write`] knows the ending of `path`: to be asked before any long work.
+/// Checks that [`write`] supports the extension of `path`. Callers check it before a long computation.
 ///
 /// # Errors
-/// An ending that is not written, with the ones that are.
+/// An unsupported extension; the message lists the supported ones.
 pub fn check_ending(path: &Path) -> Result<()> {
-    Format::of(path).map(|_| ())
+    ExportFormat::of(path).map(|_| ())
 }
 
-/// Tabulates `brdf` and writes it by the ending of `path`, and a note in plain words beside it (`NAME.ENDING.txt`).
+/// Tabulates `brdf` and writes it in the format of the extension of `path`. Formats without a description get a text
+/// note beside the file (`NAME.EXTENSION.txt`).
 ///
 /// # Errors
-/// [`Error::Cancelled`] when `progress` says so, an unknown ending, a resolution out of range, a place that cannot be written. An old file stays whole then.
+/// [`Error::Cancelled`] if `progress` cancels, an unknown extension, a resolution out of range, or an unwritable path. An
+/// existing file then stays unchanged.
 pub fn write(
     brdf: &EffectiveBrdf,
     meta: &ExportMeta,
@@ -166,24 +169,24 @@ pub fn write(
     path: &Path,
     progress: &Progress<'_>,
 ) -> Result<ExportReport> {
-    let format = Format::of(path)?;
+    let format = ExportFormat::of(path)?;
     if let Some(resolution) = &options.resolution {
         resolution.check()?;
     }
-    let job = Job { brdf, meta, options, progress };
-    // The place is opened first, so that one that cannot be written is found before the long work.
-    let (written, bytes) = atomic_file::replacing(path, |out| {
-        let mut counted = Counted { inner: out, bytes: 0 };
+    let task = ExportTask { brdf, meta, options, progress };
+    // The file is opened first, so that an unwritable path is reported before the long computation.
+    let (written, bytes) = atomic_file::write_atomically(path, |out| {
+        let mut counted = CountingWriter { inner: out, bytes: 0 };
         let written = match format {
-            Format::Npz => on_grid(&job, &mut counted, npz::write)?,
-            Format::Csv => on_grid(&job, &mut counted, csv::write)?,
-            Format::Exr => on_grid(&job, &mut counted, exr_atlas::write)?,
-            Format::Rgl => rgl::write(&job, &mut counted, rgl::Colors::Rgb)?,
-            Format::RglSpectral => rgl::write(&job, &mut counted, rgl::Colors::Spectra)?,
-            Format::Merl => merl::write(&job, &mut counted)?,
-            Format::Radiance => radiance::write(&job, &mut counted)?,
-            Format::Utia => utia::write(&job, &mut counted)?,
-            Format::Astm => astm::write(&job, &mut counted)?,
+            ExportFormat::Npz => on_grid(&task, &mut counted, npz::write)?,
+            ExportFormat::Csv => on_grid(&task, &mut counted, csv::write)?,
+            ExportFormat::Exr => on_grid(&task, &mut counted, exr_atlas::write)?,
+            ExportFormat::Rgl => rgl::write(&task, &mut counted, rgl::Colors::Rgb)?,
+            ExportFormat::RglSpectral => rgl::write(&task, &mut counted, rgl::Colors::Spectra)?,
+            ExportFormat::Merl => merl::write(&task, &mut counted)?,
+            ExportFormat::Radiance => radiance::write(&task, &mut counted)?,
+            ExportFormat::Utia => utia::write(&task, &mut counted)?,
+            ExportFormat::Astm => astm::write(&task, &mut counted)?,
         };
         Ok((written, counted.bytes))
     })?;
@@ -197,37 +200,38 @@ pub fn write(
         reflectances,
     };
     if !format.describes_itself() {
-        let place = note_path(path);
-        replace_file(&place, note::text(&job, path, &written, &report.reflectances).as_bytes())?;
-        report.note = Some(place);
+        let note_path = note_path(path);
+        replace_file(&note_path, note::text(&task, path, &written, &report.reflectances).as_bytes())?;
+        report.note = Some(note_path);
     }
     Ok(report)
 }
 
-/// The place of the note on a table: `cup.bsdf.txt` beside `cup.bsdf`.
+/// Returns the path of the note on a table: `cup.bsdf.txt` beside `cup.bsdf`.
 pub fn note_path(path: &Path) -> PathBuf {
     let mut name = path.file_name().map_or_else(OsString::new, OsString::from);
     name.push(".txt");
     path.with_file_name(name)
 }
 
-/// A file that holds everything on one grid.
+/// Tabulates all quantities on one grid and writes them with `write`.
 fn on_grid(
-    job: &Job<'_>,
+    task: &ExportTask<'_>,
     out: &mut dyn Write,
-    write: impl Fn(&Table, &Description<'_>, &mut dyn Write) -> io::Result<()>,
+    write: impl Fn(&ExportTable, &Description<'_>, &mut dyn Write) -> io::Result<()>,
 ) -> io::Result<Written> {
-    let grid = job.options.resolution.unwrap_or_default().grid();
-    let table = Table::new(job.brdf, grid, job.progress)?;
-    let reading = table.resampling(job.brdf);
-    write(&table, &Description::new(job, reading.errors), out)?;
+    let grid = task.options.resolution.unwrap_or_default().grid();
+    let table = ExportTable::new(task.brdf, grid, task.progress)?;
+    let reading = table.resampling(task.brdf);
+    write(&table, &Description::new(task, reading.errors), out)?;
     Ok(Written { pairs: table.grid.pairs(), reading, conventions: Vec::new(), anisotropy_lost: None })
 }
 
-/// [`write`] for `.csv` into an open stream, such as standard output. A reader that hangs up early is no failure.
+/// Writes a `.csv` to an open stream, such as standard output. It is not an error if the reader closes the stream
+/// early.
 ///
 /// # Errors
-/// A resolution out of range, a stream that cannot be written.
+/// A resolution out of range, or a stream that cannot be written.
 pub fn write_csv(
     brdf: &EffectiveBrdf,
     meta: &ExportMeta,
@@ -239,8 +243,8 @@ pub fn write_csv(
         resolution.check()?;
     }
     let mut buffered = BufWriter::new(out);
-    let job = Job { brdf, meta, options, progress };
-    match on_grid(&job, &mut buffered, csv::write).and_then(|_| buffered.flush()) {
+    let task = ExportTask { brdf, meta, options, progress };
+    match on_grid(&task, &mut buffered, csv::write).and_then(|_| buffered.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Error::failed(format!("standard output: {error}")))
         }
@@ -248,13 +252,13 @@ pub fn write_csv(
     }
 }
 
-/// Counts what passes through.
-struct Counted<'a> {
+/// A writer that counts the bytes.
+struct CountingWriter<'a> {
     inner: &'a mut dyn Write,
     bytes: u64,
 }
 
-impl Write for Counted<'_> {
+impl Write for CountingWriter<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.inner.write(bytes)?;
         self.bytes += written as u64;

@@ -1,4 +1,4 @@
-//! The note beside a table, in plain words, and the reflectances that architects ask for.
+//! The text note beside a table, and directional-hemispherical reflectances.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::fmt::Write as _;
@@ -8,58 +8,59 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::meta::{FRAME, PROGRAM};
-use super::{Job, Written};
+use super::{ExportTask, Written};
 use crate::effective::{EffectiveBrdf, Reflectance};
 use crate::math::directions::from_angles;
 
-/// Directional-hemispherical reflectances: the part of the light from one direction that leaves again, a channel.
+/// Directional-hemispherical reflectances per channel: the fraction of the light from one direction that is reflected.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reflectances {
     /// `(theta_i, phi_i)` in degrees, and the reflectance.
     pub of_direction: Vec<([f32; 2], Vec3)>,
-    /// The same under even light from everywhere (bi-hemispherical), from the directions above.
+    /// Bi-hemispherical reflectance under uniform light, integrated over the directions above.
     pub diffuse: Vec3,
 }
 
-/// Directions that reflectances are listed for, degrees.
-const ELEVATIONS: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
-const AZIMUTHS: [f32; 2] = [0.0, 90.0];
-/// Rings and azimuths of the other side: 1° and 3°.
+/// Directions of the listed reflectances, degrees.
+const THETAS: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
+const PHIS: [f32; 2] = [0.0, 90.0];
+/// Cells of the integral over the hemisphere: steps of 1° in polar angle and 3° in azimuth.
 const RINGS: usize = 90;
-const STEPS: usize = 120;
+const AZIMUTHS: usize = 120;
 
 impl Reflectances {
-    /// By reciprocity the integral of `f̄(i, o)` over all `i` is what light from `o` gives away.
+    /// Computes the reflectances. By reciprocity, the integral of `f̄(i, o)` over all `i` is the reflectance for light
+    /// from `o`.
     pub fn of(brdf: &EffectiveBrdf) -> Self {
         let (lights, solid_angles) = hemisphere();
-        let of = |o: Vec3| -> Vec3 {
+        let reflectance = |o: Vec3| -> Vec3 {
             let mut values = vec![Vec3::ZERO; lights.len()];
             brdf.eval_lights(&lights, o, &mut values);
             let sum: DVec3 = values.iter().zip(&solid_angles).map(|(value, w)| value.as_dvec3() * *w).sum();
             sum.as_vec3()
         };
-        let directions: Vec<[f32; 2]> = ELEVATIONS
+        let directions: Vec<[f32; 2]> = THETAS
             .iter()
-            .flat_map(|&theta| AZIMUTHS.iter().map(move |&phi| [theta, phi]))
+            .flat_map(|&theta| PHIS.iter().map(move |&phi| [theta, phi]))
             .filter(|[theta, phi]| *theta > 0.0 || *phi == 0.0)
             .collect();
         let of_direction: Vec<_> = directions
             .into_par_iter()
-            .map(|[theta, phi]| ([theta, phi], of(from_angles(theta.to_radians(), phi.to_radians()))))
+            .map(|[theta, phi]| ([theta, phi], reflectance(from_angles(theta.to_radians(), phi.to_radians()))))
             .collect();
-        // Rings by their share of the projected hemisphere.
+        // Weights are proportional to the projected solid angle of a ring.
         let weight = |theta: f32| (2.0 * theta.to_radians()).sin() / if theta == 0.0 { 1.0 } else { 2.0 };
         let total: f32 = of_direction.iter().map(|([theta, _], _)| weight(*theta)).sum();
         let diffuse = of_direction.iter().map(|([theta, _], value)| *value * weight(*theta)).sum::<Vec3>() / total;
         Self { of_direction, diffuse }
     }
 
-    /// `theta_i`, `phi_i` in degrees, R, G, B of each direction.
+    /// Returns `theta_i`, `phi_i` in degrees and R, G, B of each direction.
     pub fn rows(&self) -> Vec<[f32; 5]> {
         self.of_direction.iter().map(|([theta, phi], value)| [*theta, *phi, value.x, value.y, value.z]).collect()
     }
 
-    /// A line a direction.
+    /// Returns one line of text per direction.
     pub fn lines(&self) -> Vec<String> {
         let line = |([theta, phi], value): &([f32; 2], Vec3)| {
             format!("theta {theta:>2}°, phi {phi:>2}°: {:.4} {:.4} {:.4}", value.x, value.y, value.z)
@@ -68,23 +69,23 @@ impl Reflectances {
     }
 }
 
-/// Directions at the middles of cells, and the solid angle of each.
-pub(super) fn hemisphere() -> (Vec<Vec3>, Vec<f64>) {
-    let cells = (0..RINGS).flat_map(|ring| (0..STEPS).map(move |step| (ring, step)));
+/// Returns the directions at the middles of cells, and the solid angle of each cell.
+fn hemisphere() -> (Vec<Vec3>, Vec<f64>) {
+    let cells = (0..RINGS).flat_map(|ring| (0..AZIMUTHS).map(move |step| (ring, step)));
     cells
         .map(|(ring, step)| {
             let edge = |k: usize| k as f32 / RINGS as f32 * FRAC_PI_2;
             let theta = 0.5 * (edge(ring) + edge(ring + 1));
-            let phi = (step as f32 + 0.5) / STEPS as f32 * TAU;
+            let phi = (step as f32 + 0.5) / AZIMUTHS as f32 * TAU;
             let band = f64::from(edge(ring)).cos() - f64::from(edge(ring + 1)).cos();
-            (from_angles(theta, phi), band * f64::from(TAU) / STEPS as f64)
+            (from_angles(theta, phi), band * f64::from(TAU) / AZIMUTHS as f64)
         })
         .unzip()
 }
 
-/// The note on a file.
-pub(super) fn text(job: &Job<'_>, path: &Path, written: &Written, reflectances: &Reflectances) -> String {
-    let meta = job.meta;
+/// Returns the text of the note on a file.
+pub(super) fn text(task: &ExportTask<'_>, path: &Path, written: &Written, reflectances: &Reflectances) -> String {
+    let meta = task.meta;
     let mut text = String::new();
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut put = |line: &str| {

@@ -1,17 +1,18 @@
-//! A table as `.npz`: a ZIP archive of `.npy` arrays, loaded by `numpy.load` (NumPy Enhancement Proposal 1).
+//! Tables as `.npz`: a ZIP archive of `.npy` arrays for `numpy.load` (NumPy Enhancement Proposal 1).
 
 use std::io::{self, Write};
 
 use super::meta::Description;
-use super::table::Table;
+use super::table::ExportTable;
 use super::zip::ZipWriter;
 
-/// Numbers are written in the byte order of the machine, and said to be.
+/// The machine's byte order, in which numbers are written, as a NumPy type prefix.
 const ORDER: char = if cfg!(target_endian = "big") { '>' } else { '<' };
 
-/// Arrays `theta_i`, `phi_i`, `theta_o`, `phi_o`, `brdf[ti,pi,to,po,3]`, `g[ti,pi,to,po,3]`, `projected_area[to,po]`, all
-/// f32; 0-d: `base_area`, `resampling_rel_l2` (f64), `seed` (u64), `meta` (JSON in unicode).
-pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) -> io::Result<()> {
+/// Writes the f32 arrays `theta_i`, `phi_i`, `theta_o`, `phi_o`, `brdf[ti,pi,to,po,3]`, `g[ti,pi,to,po,3]` and
+/// `projected_area[to,po]`, and the scalars `base_area`, `resampling_rel_l2` (f64), `seed` (u64) and `meta` (JSON in
+/// unicode).
+pub fn write(table: &ExportTable, description: &Description<'_>, out: &mut dyn Write) -> io::Result<()> {
     let mut zip = ZipWriter::new(out);
     let grid = &table.grid;
     let [ti, pi, to, po] = grid.shape();
@@ -35,12 +36,12 @@ pub fn write(table: &Table, description: &Description<'_>, out: &mut dyn Write) 
     zip.finish()
 }
 
-/// Adds `name.npy`: C order, `kind` without its byte order.
+/// Adds `name.npy` in C order; `kind` is the NumPy type without its byte order.
 fn array(zip: &mut ZipWriter<'_>, name: &str, kind: &str, shape: &[usize], data: &[u8]) -> io::Result<()> {
-    // Python tuples of one keep a comma; it does no harm in longer ones.
+    // A Python tuple of one element needs a trailing comma; longer tuples allow one.
     let shape: String = shape.iter().map(|length| format!("{length},")).collect();
     let mut header = format!("{{'descr': '{ORDER}{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
-    // Magic, version and length take 10 bytes; data starts at a multiple of 64, after a line break.
+    // Magic number, version and length take 10 bytes; the data must start at a multiple of 64, after a line break.
     while (10 + header.len() + 1) % 64 != 0 {
         header.push(' ');
     }

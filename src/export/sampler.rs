@@ -1,5 +1,4 @@
-//! What every format asks of the effective BRDF: many directions in parallel, with progress, and a check of what a reader
-//! of the finished table gets.
+//! Parallel evaluation of the effective BRDF for all formats, with progress, and the error of reading a table back.
 
 use std::io;
 
@@ -10,14 +9,15 @@ use crate::base::{Progress, progress};
 use crate::effective::EffectiveBrdf;
 use crate::metrics::{Errors, compare, mirror_biased_pairs};
 
-/// Pairs of the reading error, and the seed that fixes them.
+/// Number of pairs over which the reading error is measured.
 const CHECKED_PAIRS: usize = 400;
+/// Seed of these pairs.
 const CHECKED_SEED: u64 = 2011;
 
-/// [`progress::in_parallel`] where a file is being written.
+/// Calls [`progress::in_parallel`] and converts the error to [`io::Error`].
 ///
 /// # Errors
-/// [`crate::base::Error::Cancelled`], inside, when `progress` says so.
+/// An error that contains [`crate::base::Error::Cancelled`] if `progress` cancels.
 pub fn in_parallel<T: Send>(
     count: usize,
     progress: &Progress<'_>,
@@ -26,23 +26,24 @@ pub fn in_parallel<T: Send>(
     progress::in_parallel(count, progress, work).map_err(io::Error::other)
 }
 
-/// How far what a reader gets is from the function.
+/// The error of a table as a program reads it, against the effective BRDF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadingError {
-    /// `‖read - eval‖ / ‖eval‖` and PSNR on `f̄`, all channels.
+    /// `‖read - eval‖ / ‖eval‖` and PSNR of `f̄`, over all channels.
     pub errors: Errors,
-    /// Mean of `|read - eval|` over the mean of `eval`.
+    /// Mean of `|read - eval|` divided by the mean of `eval`.
     pub mean: f64,
 }
 
-/// Compares `read(i, o)`, an `f̄` as a program that loads the file gets it, with `eval`, over a fixed set of pairs up to 85°.
+/// Compares `read(i, o)` with `eval` over a fixed set of pairs up to 85° from the normal. `read` returns `f̄` as a
+/// program that loads the file interpolates it.
 pub fn reading_error(brdf: &EffectiveBrdf, read: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> ReadingError {
     let pairs = mirror_biased_pairs(CHECKED_PAIRS, CHECKED_SEED);
     let values: Vec<(Vec3, Vec3)> =
         pairs.par_iter().map(|pair| (read(pair.i, pair.o), brdf.eval(pair.i, pair.o))).collect();
-    let (found, exact): (Vec<Vec3>, Vec<Vec3>) = values.into_iter().unzip();
-    let sum = |of: &dyn Fn(usize) -> Vec3| (0..exact.len()).map(|k| f64::from(of(k).element_sum())).sum::<f64>();
+    let (tabulated, exact): (Vec<Vec3>, Vec<Vec3>) = values.into_iter().unzip();
+    let sum = |value: &dyn Fn(usize) -> Vec3| (0..exact.len()).map(|k| f64::from(value(k).element_sum())).sum::<f64>();
     let total = sum(&|k| exact[k]);
-    let mean = if total > 0.0 { sum(&|k| (found[k] - exact[k]).abs()) / total } else { 0.0 };
-    ReadingError { errors: compare(&found, &exact), mean }
+    let mean = if total > 0.0 { sum(&|k| (tabulated[k] - exact[k]).abs()) / total } else { 0.0 };
+    ReadingError { errors: compare(&tabulated, &exact), mean }
 }

@@ -1,33 +1,33 @@
-//! The effective BRDF on the grid of a table, and reading it back bilinearly.
+//! The effective BRDF tabulated on a grid, and its bilinear interpolation.
 
 use std::io;
 
 use glam::Vec3;
 
 use super::ReadingError;
-use super::grid::Grid;
+use super::grid::ExportGrid;
 use super::sampler::{in_parallel, reading_error};
 use crate::base::Progress;
 use crate::effective::{EffectiveBrdf, Reflectance};
 
-/// What a file holds.
+/// The quantities of an exported file.
 #[derive(Debug, Clone)]
-pub struct Table {
-    pub grid: Grid,
+pub struct ExportTable {
+    pub grid: ExportGrid,
     /// `f̄ / cos θ_i` [1/sr] of each pair, viewer fastest.
     pub brdf: Vec<Vec3>,
     /// `G = a_v(o) f̄ / A` [1/sr], in the same order.
     pub g: Vec<Vec3>,
-    /// `a_v(o) / A` of each viewing direction.
+    /// `a_v(o) / A` of each view direction.
     pub projected_area: Vec<f32>,
 }
 
-impl Table {
-    /// Evaluates all pairs: all lights of a view at once, views in parallel.
+impl ExportTable {
+    /// Evaluates all pairs: views in parallel, and all lights of a view at once.
     ///
     /// # Errors
-    /// As [`in_parallel`].
-    pub fn new(brdf: &EffectiveBrdf, grid: Grid, progress: &Progress<'_>) -> io::Result<Self> {
+    /// The errors of [`in_parallel`].
+    pub fn new(brdf: &EffectiveBrdf, grid: ExportGrid, progress: &Progress<'_>) -> io::Result<Self> {
         let (lights, views) = (grid.light.directions(), grid.view.directions());
         let mut table = Self {
             brdf: vec![Vec3::ZERO; grid.pairs()],
@@ -43,7 +43,7 @@ impl Table {
         for (view, (f_bar, area)) in columns.into_iter().enumerate() {
             for (light, value) in f_bar.into_iter().enumerate() {
                 let entry = light * views.len() + view;
-                // Midpoints keep the cosine away from zero.
+                // The grid has no direction at the horizon, so the cosine is not zero.
                 table.brdf[entry] = value / lights[light].z;
                 table.g[entry] = value * area;
             }
@@ -52,7 +52,8 @@ impl Table {
         Ok(table)
     }
 
-    /// `f̄(i, o)` as a program that loads the file would read it: the BRDF bilinearly in all four angles, times `cos θ_i`.
+    /// Returns `f̄(i, o)` as a program that loads the file computes it: the BRDF, bilinear in all four angles, times
+    /// `cos θ_i`.
     pub fn f_bar(&self, i: Vec3, o: Vec3) -> Vec3 {
         let views = self.grid.view.len();
         let view_taps = self.grid.view.taps(o);
@@ -65,7 +66,7 @@ impl Table {
         value * i.z
     }
 
-    /// What the grid costs: [`Table::f_bar`] against `eval`.
+    /// Measures the error of the grid: [`ExportTable::f_bar`] against `eval`.
     pub fn resampling(&self, brdf: &EffectiveBrdf) -> ReadingError {
         reading_error(brdf, |i, o| self.f_bar(i, o))
     }

@@ -1,16 +1,16 @@
-//! A ZIP archive of stored (uncompressed) members: all that an `.npz` needs. PKWARE APPNOTE 6.3, Sec. 4.3.
+//! ZIP archives of stored (uncompressed) members, for `.npz` files (PKWARE APPNOTE 6.3, Sec. 4.3).
 
 use std::io::{self, Write};
 
-/// 1980-01-01, the first date ZIP knows: archives of the same content are the same bytes.
+/// 1980-01-01, the first date of ZIP. A fixed date makes archives of the same content byte-identical.
 const DATE: u16 = 0x21;
-/// Version 2.0, as the maker (on Unix) and as what is needed to extract.
+/// Version 2.0, both made by (on Unix) and needed to extract.
 const VERSION: u16 = 20;
 const UNIX: u16 = 3 << 8;
-/// A plain file that everyone may read.
+/// Mode of a regular file that everyone may read.
 const MODE: u32 = 0o100_644 << 16;
 
-/// Writes members one after the other, and the directory at the end.
+/// Writes members one after the other and the directory at the end.
 pub struct ZipWriter<'a> {
     out: &'a mut dyn Write,
     offset: u64,
@@ -23,12 +23,12 @@ impl<'a> ZipWriter<'a> {
         Self { out, offset: 0, directory: Vec::new(), members: 0 }
     }
 
-    /// Adds a member whose content is `parts`, joined.
+    /// Adds a member whose content is the concatenation of `parts`.
     pub fn member(&mut self, name: &str, parts: &[&[u8]]) -> io::Result<()> {
         let size = narrow(parts.iter().map(|part| part.len() as u64).sum())?;
         let offset = narrow(self.offset)?;
         let name_length = u16::try_from(name.len()).map_err(io::Error::other)?;
-        // From "version needed" to "extra field length": the same in the local header and in the directory.
+        // These fields, from "version needed" to "extra field length", are the same in local header and directory.
         let mut common = Vec::with_capacity(26);
         for field in [VERSION, 0, 0, 0, DATE] {
             common.extend(field.to_le_bytes());
@@ -48,7 +48,7 @@ impl<'a> ZipWriter<'a> {
         self.directory.extend(b"PK\x01\x02");
         self.directory.extend((UNIX | VERSION).to_le_bytes());
         self.directory.extend(common);
-        // No comment, first disk, no internal attributes.
+        // Comment length, disk number and internal attributes are 0.
         self.directory.extend([0; 6]);
         self.directory.extend(MODE.to_le_bytes());
         self.directory.extend(offset.to_le_bytes());
@@ -77,12 +77,12 @@ impl<'a> ZipWriter<'a> {
     }
 }
 
-/// Sizes and offsets are 32 bits without ZIP64; the bound on pairs keeps tables below that.
+/// Converts a size or an offset to the 32 bits of ZIP without ZIP64. The bound on pairs keeps tables below 4 GiB.
 fn narrow(size: u64) -> io::Result<u32> {
-    u32::try_from(size).map_err(|_| io::Error::other("an archive of 4 GiB or more"))
+    u32::try_from(size).map_err(|_| io::Error::other("the archive has 4 GiB or more"))
 }
 
-/// CRC-32 (ISO 3309), the polynomial of ZIP and PNG, reflected.
+/// Computes the CRC-32 (ISO 3309) with the reflected polynomial of ZIP and PNG.
 fn crc32(parts: &[&[u8]]) -> u32 {
     let bytes = parts.iter().copied().flatten();
     !bytes.fold(!0, |crc: u32, &byte| CRC_OF_BYTE[usize::from((crc as u8) ^ byte)] ^ (crc >> 8))
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_of_a_member_stand_where_the_directory_says() {
+    fn the_directory_points_to_the_headers_of_members() {
         let mut bytes = Vec::new();
         let mut zip = ZipWriter::new(&mut bytes);
         zip.member("a", &[b"xyz"]).unwrap();

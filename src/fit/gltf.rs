@@ -8,9 +8,11 @@ use super::Fit;
 /// Reflectance at normal incidence of glTF's dielectrics.
 const DIELECTRIC_F0: f32 = 0.04;
 
-/// A glTF file with nothing but the material: a metal where the lobe carries more than the matte part.
+/// Returns a glTF file that contains only the material. The material is a metal if its specular lobe has more luminance
+/// than its diffuse part.
 ///
-/// A metal keeps no matte part, its edge is white, and sheen takes from the base what it reflects; `extras` hold all numbers.
+/// A glTF metal has no diffuse part and a white edge, and glTF's sheen attenuates the base layer. `extras` hold all
+/// numbers of the fit.
 pub fn gltf(fit: &Fit, name: &str) -> String {
     let weight = |k: usize| fit.weights.get(k).copied().unwrap_or_default();
     let (base, f0, sheen) = (weight(0), weight(1), weight(2));
@@ -60,7 +62,7 @@ pub fn gltf(fit: &Fit, name: &str) -> String {
             "extras": { "fit": weights, "alpha": fit.shape.roughness, "rotation": fit.shape.rotation, "edge": fit.shape.edge, "rel_l2": fit.errors.rel_l2 },
         }],
     });
-    // An empty list is against the schema.
+    // The schema forbids an empty list.
     if !used.is_empty() {
         file["extensionsUsed"] = json!(used);
     }

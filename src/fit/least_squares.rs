@@ -1,22 +1,23 @@
-//! Least squares of a few weights without negative ones, three channels at once.
+//! Non-negative least squares for a few weights and three colour channels.
 
 use glam::{DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 
-/// Sums of products of basis functions and targets.
-pub struct Normal {
+/// Normal equations: sums of products of basis functions and targets.
+pub struct NormalEquations {
     matrix: DMatrix<f64>,
-    /// A column a channel.
+    /// Right-hand sides, one column per channel.
     right: DMatrix<f64>,
+    /// Sums of squared targets, per channel.
     power: DVec3,
 }
 
-impl Normal {
+impl NormalEquations {
     pub fn new(count: usize) -> Self {
         Self { matrix: DMatrix::zeros(count, count), right: DMatrix::zeros(count, 3), power: DVec3::ZERO }
     }
 
-    /// One sample: values of the basis functions, and what they should add up to.
+    /// Adds one sample: values of the basis functions, and the target of their weighted sum.
     pub fn add(&mut self, basis: &[f64], target: DVec3) {
         for (row, a) in basis.iter().enumerate() {
             for (column, b) in basis.iter().enumerate() {
@@ -29,23 +30,24 @@ impl Normal {
         self.power += target * target;
     }
 
-    /// The weights, and the sum of squares that they leave.
+    /// Returns the weights and the residual sum of squares.
     pub fn solve(&self) -> (Vec<Vec3>, f64) {
         let count = self.matrix.nrows();
         let mut weights = vec![Vec3::ZERO; count];
-        let mut left = 0.0;
+        let mut residual = 0.0;
         for channel in 0..3 {
-            let (best, squares) = self.channel(channel);
-            left += squares;
+            let (best, squares) = self.solve_channel(channel);
+            residual += squares;
             for (weight, value) in weights.iter_mut().zip(best) {
                 weight[channel] = value as f32;
             }
         }
-        (weights, left)
+        (weights, residual)
     }
 
-    /// All subsets of at most four functions are few: the best one without negative weights is the answer.
-    fn channel(&self, channel: usize) -> (Vec<f64>, f64) {
+    /// Solves one channel by trying all subsets of the basis functions, of which there are at most four. The result is
+    /// the best subset without negative weights.
+    fn solve_channel(&self, channel: usize) -> (Vec<f64>, f64) {
         let count = self.matrix.nrows();
         let (mut best, mut least) = (vec![0.0; count], self.power[channel]);
         for subset in 1_u32..1 << count {
@@ -72,7 +74,7 @@ mod tests {
 
     #[test]
     fn weights_come_back_and_negative_ones_become_zero() {
-        let mut normal = Normal::new(3);
+        let mut normal = NormalEquations::new(3);
         for k in 0..50 {
             let t = f64::from(k) / 50.0;
             let basis = [1.0, t, t * t];
@@ -83,7 +85,7 @@ mod tests {
         assert!(
             (weights[0].x - 0.5).abs() < 1e-4 && (weights[1].x - 2.0).abs() < 1e-3 && (weights[2].x - 3.0).abs() < 1e-3
         );
-        // A falling line: no slope is better than a rising one.
+        // For a falling line, slope 0 is better than a positive slope.
         assert!(weights[1].y == 0.0 && (weights[0].y - 1.5).abs() < 0.05);
         assert!((weights[2].z - 1.0).abs() < 1e-4 && weights[0].z < 1e-4);
     }

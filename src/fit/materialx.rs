@@ -4,11 +4,12 @@ use glam::Vec3;
 
 use super::Fit;
 
-/// No index of refraction is larger than that of this f0.
+/// Bounds f0, and thereby the index of refraction.
 const MAX_F0: f32 = 0.98;
 
-/// `specular_color` scales a dielectric's whole Fresnel factor: it is the edge, and the index of refraction is the one whose f0
-/// is the fit's largest channel under it. A metal's edge is white.
+/// Returns a MaterialX document. `specular_color` scales the whole Fresnel factor of a dielectric, so it holds the
+/// fitted edge. The index of refraction is the one whose f0, times the edge, is the largest channel of the fitted f0. A
+/// metal's edge is white.
 pub fn materialx(fit: &Fit, name: &str) -> String {
     let weight = |k: usize| fit.weights.get(k).copied().unwrap_or_default();
     let (base, f0, fuzz) = (weight(0), weight(1).clamp(Vec3::ZERO, Vec3::splat(MAX_F0)), weight(2));
@@ -59,7 +60,7 @@ fn tangent_input() -> String {
     "    <input name=\"geometry_tangent\" type=\"vector3\" nodename=\"lobe_tangent\" />\n".to_owned()
 }
 
-/// The tangent along which the lobe is wide: that of the surface, turned about the normal.
+/// Returns nodes for the tangent along which the lobe is wide: the surface tangent, rotated about the normal.
 fn tangent_nodes(degrees: f32) -> String {
     format!(
         "  <tangent name=\"surface_tangent\" type=\"vector3\">\n    <input name=\"space\" type=\"string\" value=\"world\" />\n  </tangent>\n  \

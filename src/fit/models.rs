@@ -1,4 +1,5 @@
-//! The models: Lambertian and Cook-Torrance, as in Fig. 7 of Wu et al. 2011, and a GGX base as glTF and OpenPBR have it.
+//! The analytic models: Lambertian plus Cook-Torrance, as in Wu et al. 2011, Fig. 7, and a GGX base as in glTF and
+//! OpenPBR.
 
 use std::f64::consts::PI;
 
@@ -7,7 +8,7 @@ use glam::Vec3;
 use crate::brdf::{LobeAngles, Term, schlick_weight};
 use crate::math::directions::half_vector;
 
-/// What is fitted.
+/// The analytic model of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
     /// Lambertian plus Cook-Torrance (Beckmann, V-cavities, Schlick): weights are albedo and f0.
@@ -16,34 +17,34 @@ pub enum Model {
     Ggx,
 }
 
-/// What does not enter linearly.
+/// The nonlinear parameters of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LobeShape {
-    /// Width of the lobe along its own x and y: Beckmann's m, GGX's α.
+    /// Width of the lobe along its x and y: Beckmann's m, GGX's α.
     pub roughness: [f32; 2],
     /// Azimuth of the lobe's x from the tangent, radians.
     pub rotation: f32,
-    /// What the lobe's Fresnel factor rises to at grazing angles: 1 for a smooth interface, 0 where there is none.
+    /// Fresnel factor of the lobe at grazing angles: 1 for a smooth interface, 0 without one.
     pub edge: f32,
 }
 
-/// Values at a pair, the light's cosine included.
+/// Lobe values at a pair, including the light's cosine.
 pub struct Lobes {
-    /// What the weights multiply.
+    /// Values that the weights multiply.
     pub weighted: Vec<f64>,
-    /// What no weight multiplies: Fresnel's white edge, `edge lobe (1-i·h)^5`.
+    /// The value that no weight multiplies, the white edge of the Fresnel factor: `edge lobe (1-i·h)^5`.
     pub fixed: f64,
 }
 
-/// Bounds of the roughness: glTF and OpenPBR know none above 1.
+/// Bounds of the roughness; 1 is the maximum of glTF and OpenPBR.
 const ROUGHNESS: [f32; 2] = [0.02, 1.0];
-/// Roughness of the sheen, which is not searched.
+/// Roughness of the sheen, which is fixed.
 const SHEEN_ROUGHNESS: f64 = 0.5;
 
 impl Model {
     pub const ALL: [Self; 2] = [Self::CookTorrance, Self::Ggx];
 
-    /// What it is called.
+    /// Returns the model's name in output.
     pub fn name(self) -> &'static str {
         match self {
             Self::CookTorrance => "lambertian_cook_torrance",
@@ -51,7 +52,7 @@ impl Model {
         }
     }
 
-    /// Names of the weights.
+    /// Returns the names of the weights.
     pub fn weight_names(self) -> &'static [&'static str] {
         match self {
             Self::CookTorrance => &["albedo", "f0"],
@@ -63,8 +64,9 @@ impl Model {
         self.weight_names().len()
     }
 
-    /// Where searches start, with little edge and with much: the angle whose squared sine is the edge, the logarithm of the
-    /// roughness; for GGX that of the anisotropy's square root and its azimuth.
+    /// Returns the starting points of the search, with a small and a large edge. The parameters are the angle whose
+    /// squared sine is the edge and the logarithm of the roughness; GGX adds the logarithm of the square root of the
+    /// anisotropy and the azimuth.
     pub(super) fn starts(self) -> Vec<Vec<f64>> {
         let shapes: &[&[f64]] = match self {
             Self::CookTorrance => &[&[-2.3], &[-1.2], &[-0.4]],
@@ -78,8 +80,8 @@ impl Model {
         let bounded = |log: f64| (log.exp() as f32).clamp(ROUGHNESS[0], ROUGHNESS[1]);
         let edge = parameters.first().map_or(1.0, |angle| angle.sin().powi(2) as f32);
         match (self, parameters) {
-            (Self::Ggx, [_, log, ratio, turn]) => {
-                LobeShape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *turn as f32, edge }
+            (Self::Ggx, [_, log, ratio, azimuth]) => {
+                LobeShape { roughness: [bounded(log + ratio), bounded(log - ratio)], rotation: *azimuth as f32, edge }
             }
             _ => {
                 let roughness = bounded(parameters.get(1).copied().unwrap_or(-1.0));
@@ -88,38 +90,39 @@ impl Model {
         }
     }
 
-    /// Lobes at a pair above the horizon.
+    /// Evaluates the lobes at a pair above the horizon.
     pub(super) fn evaluate(self, shape: &LobeShape, i: Vec3, o: Vec3) -> Lobes {
         let h = half_vector(i, o);
         let fresnel = f64::from(schlick_weight(i.dot(h)));
         let edge = f64::from(shape.edge) * fresnel;
-        let matte = f64::from(i.z) / PI;
+        let diffuse = f64::from(i.z) / PI;
         match self {
             Self::CookTorrance => {
                 let angles = LobeAngles::new(Vec3::Z, i, o, h);
                 let term = Term::CookTorrance { roughness: shape.roughness[0], f0: Vec3::ONE };
-                // Both cosines in, the viewer's out again.
+                // `lobe_cos` includes both cosines; the division removes the viewer's.
                 let lobe = f64::from(term.lobe_cos(&angles)) / f64::from(o.z);
-                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel)], fixed: lobe * edge }
+                Lobes { weighted: vec![diffuse, lobe * (1.0 - fresnel)], fixed: lobe * edge }
             }
             Self::Ggx => {
                 let lobe = anisotropic_ggx(shape, i, o, h);
                 let sheen = sheen(i, o, h) * f64::from(i.z);
-                Lobes { weighted: vec![matte, lobe * (1.0 - fresnel), sheen], fixed: lobe * edge }
+                Lobes { weighted: vec![diffuse, lobe * (1.0 - fresnel), sheen], fixed: lobe * edge }
             }
         }
     }
 }
 
-/// `D G2 / (4 cosθ_o)` of anisotropic GGX with height-correlated Smith shadowing (Heitz 2014), the light's cosine included.
+/// Returns `D G2 / (4 cosθ_o)` of anisotropic GGX with height-correlated Smith shadowing (Heitz 2014); this includes
+/// the light's cosine.
 fn anisotropic_ggx(shape: &LobeShape, i: Vec3, o: Vec3, h: Vec3) -> f64 {
     let (sin, cos) = f64::from(shape.rotation).sin_cos();
-    let turned = |v: Vec3| {
+    let rotated = |v: Vec3| {
         let v = v.as_dvec3();
         glam::DVec3::new(cos * v.x + sin * v.y, cos * v.y - sin * v.x, v.z)
     };
     let [alpha_x, alpha_y] = shape.roughness.map(f64::from);
-    let (i, o, h) = (turned(i), turned(o), turned(h));
+    let (i, o, h) = (rotated(i), rotated(o), rotated(h));
     let stretched = (h.x / alpha_x).powi(2) + (h.y / alpha_y).powi(2) + h.z * h.z;
     let density = 1.0 / (PI * alpha_x * alpha_y * stretched * stretched);
     let lambda = |v: glam::DVec3| ((v.x * alpha_x).powi(2) + (v.y * alpha_y).powi(2) + v.z * v.z).sqrt();
@@ -127,7 +130,8 @@ fn anisotropic_ggx(shape: &LobeShape, i: Vec3, o: Vec3, h: Vec3) -> f64 {
     density * 0.5 * i.z / (o.z * lambda(i) + i.z * lambda(o))
 }
 
-/// The Charlie sheen (Estevez and Kulla 2017) as glTF's `KHR_materials_sheen` has it, with Neubelt's visibility.
+/// Returns the Charlie sheen (Estevez and Kulla 2017) as defined by glTF's `KHR_materials_sheen`, with Neubelt's
+/// visibility term.
 fn sheen(i: Vec3, o: Vec3, h: Vec3) -> f64 {
     let inverse = 1.0 / SHEEN_ROUGHNESS;
     let sine = f64::from((1.0 - h.z * h.z).max(0.0)).sqrt();
@@ -137,17 +141,17 @@ fn sheen(i: Vec3, o: Vec3, h: Vec3) -> f64 {
 }
 
 impl LobeShape {
-    /// glTF's and OpenPBR's roughness (the root of α) and anisotropy: α along the grain `α = r²`, glTF's
-    /// `α_t = mix(r², 1, anisotropy²)`; OpenPBR's `1 - α_b/α_t`.
+    /// Returns roughness and anisotropy in glTF's convention: the narrow α is `r²`, the wide α is
+    /// `mix(r², 1, anisotropy²)`.
     pub fn perceptual(&self) -> (f32, f32) {
         let [x, y] = self.roughness;
         let (wide, narrow) = (x.max(y), x.min(y));
         (narrow.sqrt(), ((wide - narrow) / (1.0 - narrow).max(1e-3)).clamp(0.0, 1.0).sqrt())
     }
 
-    /// Azimuth of the wide direction of the lobe, radians.
+    /// Returns the azimuth of the wide direction of the lobe, radians.
     pub fn wide_azimuth(&self) -> f32 {
-        let turn = if self.roughness[0] >= self.roughness[1] { 0.0 } else { std::f32::consts::FRAC_PI_2 };
-        self.rotation + turn
+        let offset = if self.roughness[0] >= self.roughness[1] { 0.0 } else { std::f32::consts::FRAC_PI_2 };
+        self.rotation + offset
     }
 }

@@ -1,4 +1,4 @@
-//! Does a mesh close the plane? Welds corners modulo the tile and looks at the edges.
+//! Test that a mesh closes the plane, by welding corners modulo the tile and counting edges.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -7,16 +7,17 @@ use glam::{DVec3, I64Vec3};
 
 use super::TileMesh;
 
-/// Corners nearer than this part of the tile are one corner.
+/// Distance, as a fraction of the tile, up to which corners are welded.
 const WELD: f64 = 2e-6;
 
-/// Is the mesh closed modulo the tile (every edge is passed as often one way as the other), and does it cover the plane
-/// once (signed projected area = base area)? Then every ray from above meets a side that reflects before any other.
+/// Returns whether the mesh is closed modulo the tile and covers the plane once. It is closed if triangles pass each
+/// edge equally often in both directions. It covers the plane once if the signed projected area equals the base area.
+/// Then each ray from above first meets a side that reflects.
 pub fn is_closed_sheet(mesh: &TileMesh) -> bool {
     open_edges(mesh) == 0 && (signed_projected_area(mesh) / f64::from(mesh.base_area()) - 1.0).abs() < 1e-3
 }
 
-/// `Σ A_t n_t·z`.
+/// Computes the signed projected area `Σ A_t n_t·z`.
 pub fn signed_projected_area(mesh: &TileMesh) -> f64 {
     let area = |triangle| {
         let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
@@ -25,20 +26,20 @@ pub fn signed_projected_area(mesh: &TileMesh) -> f64 {
     (0..mesh.triangles.len()).map(area).sum()
 }
 
-/// Number of edges that are passed more often one way than the other, after welding. Edges between the same corners that
-/// go round the tile differently are different edges.
+/// Counts the edges, after welding, that triangles pass more often in one direction than in the other. Edges between
+/// the same corners that cross tile borders differently are different edges.
 pub fn open_edges(mesh: &TileMesh) -> usize {
     let representatives = weld(mesh);
     let size = mesh.size.as_dvec2();
-    let place = |index: u32| mesh.positions[index as usize].as_dvec3().truncate();
+    let xy = |index: u32| mesh.positions[index as usize].as_dvec3().truncate();
     let mut balance: HashMap<(u32, u32, [i64; 2]), i32> = HashMap::new();
     for triangle in &mesh.triangles {
         for (from, to) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (triangle[a], triangle[b])) {
             let (a, b) = (representatives[from as usize], representatives[to as usize]);
-            let turns = ((place(to) - place(from) - (place(b) - place(a))) / size).round();
-            let turns = [turns.x as i64, turns.y as i64];
-            let forwards = (a, b, turns);
-            let backwards = (b, a, [-turns[0], -turns[1]]);
+            let crossings = ((xy(to) - xy(from) - (xy(b) - xy(a))) / size).round();
+            let crossings = [crossings.x as i64, crossings.y as i64];
+            let forwards = (a, b, crossings);
+            let backwards = (b, a, [-crossings[0], -crossings[1]]);
             *balance.entry(forwards.min(backwards)).or_default() += match forwards.cmp(&backwards) {
                 Ordering::Less => 1,
                 Ordering::Equal => 0,
@@ -49,7 +50,7 @@ pub fn open_edges(mesh: &TileMesh) -> usize {
     balance.values().filter(|count| **count != 0).count()
 }
 
-/// For every vertex the first one at the same place modulo the tile.
+/// For each vertex, the index of the first vertex at the same position modulo the tile.
 fn weld(mesh: &TileMesh) -> Vec<u32> {
     let size = mesh.size.as_dvec2();
     let (low, high) = mesh.z_range();
@@ -70,7 +71,7 @@ fn weld(mesh: &TileMesh) -> Vec<u32> {
     mesh.positions.iter().enumerate().map(&mut representative).collect()
 }
 
-/// For tests of closed families.
+/// Asserts that a mesh of a closed family closes the plane.
 #[cfg(test)]
 pub fn assert_closes_plane(mesh: &TileMesh) {
     assert_eq!(open_edges(mesh), 0, "open edges");
@@ -97,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_closes_itself_over_the_tiles_edge_and_a_gap_is_seen() {
+    fn a_plane_closes_over_the_tiles_edge_and_a_gap_is_found() {
         assert!(is_closed_sheet(&plane(1.0)));
         assert!(is_closed_sheet(&plane(1.0 + 1e-7)));
         assert_eq!(open_edges(&plane(0.99)), 2);
@@ -105,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_seen_from_behind_does_not_close() {
+    fn a_plane_that_faces_down_does_not_close() {
         let mut mesh = plane(1.0);
         mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         assert!(!is_closed_sheet(&mesh));

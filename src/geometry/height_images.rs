@@ -1,6 +1,6 @@
-//! The height-field images in `assets/`: how they are made, and that they are what this makes.
+//! Functions of the height images in `assets/`, and a test that the images match them.
 //!
-//! `cargo test --lib write_the_height_images -- --ignored` writes them anew.
+//! `cargo test --lib write_the_height_images -- --ignored` writes the images.
 
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -14,14 +14,14 @@ use super::image_file;
 
 const SIDE: u32 = 128;
 
-/// Height at a point of the unit square, any scale; both edges wrap.
+/// Height at a point of the unit square, at any scale. The function is periodic.
 type HeightFunction = Box<dyn Fn(Vec2) -> f32>;
 
 fn images() -> [(&'static str, HeightFunction); 4] {
     [("brushed", brushed()), ("hammered", hammered()), ("leather", leather()), ("ripples", ripples())]
 }
 
-/// Distances to the nearest and second nearest of random points, on the torus.
+/// Distances to the nearest and second nearest of the points, on the torus.
 fn nearest_two(points: &[Vec2], at: Vec2) -> (f32, f32) {
     points.iter().fold((f32::MAX, f32::MAX), |(first, second), point| {
         let offset = at - *point;
@@ -33,11 +33,11 @@ fn nearest_two(points: &[Vec2], at: Vec2) -> (f32, f32) {
 /// One random point in each cell of a lattice.
 fn scattered(side: u32, seed: u64) -> Vec<Vec2> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut place = |k: u32| {
+    let mut point = |k: u32| {
         let inside = Vec2::new(random.random(), random.random());
         (Vec2::new((k % side) as f32, (k / side) as f32) + inside) / side as f32
     };
-    (0..side * side).map(&mut place).collect()
+    (0..side * side).map(&mut point).collect()
 }
 
 /// Round dents that meet in ridges.
@@ -55,7 +55,7 @@ fn leather() -> HeightFunction {
     })
 }
 
-/// Waves along y whose crests wander.
+/// Waves along y with wandering crests.
 fn ripples() -> HeightFunction {
     Box::new(|at| {
         let bend = 0.05 * (TAU * at.y).sin() + 0.025 * (TAU * (2.0 * at.y + at.x) + 1.0).sin();
@@ -63,7 +63,7 @@ fn ripples() -> HeightFunction {
     })
 }
 
-/// Scratches along y: many waves across, few along.
+/// Scratches along y: many waves across them, few along them.
 fn brushed() -> HeightFunction {
     let mut random = ChaCha8Rng::seed_from_u64(13);
     let waves: Vec<[f32; 4]> = (0..60)
@@ -76,7 +76,7 @@ fn brushed() -> HeightFunction {
     Box::new(move |at| waves.iter().map(|w| w[3] * (TAU * (w[0] * at.x + w[1] * at.y) + w[2]).sin()).sum())
 }
 
-/// The image's 16-bit samples: the function at texel centres, stretched to the full range.
+/// The image's 16-bit samples: the function at texel centres, scaled to the full range.
 fn samples(height: &HeightFunction) -> Vec<u16> {
     let at = |k: u32| (Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) + 0.5) / SIDE as f32;
     let heights: Vec<f32> = (0..SIDE * SIDE).map(|k| height(at(k))).collect();
@@ -99,13 +99,13 @@ fn write_the_height_images() {
 }
 
 #[test]
-fn the_shipped_height_images_are_what_their_functions_make() {
+fn the_shipped_height_images_match_their_functions() {
     for (name, height) in images() {
         let shipped = image_file::read_heights(Path::new(""), Path::new(&format!("asset:{name}.png"))).unwrap();
         assert_eq!(shipped.size, glam::UVec2::splat(SIDE));
-        for (shipped, made) in shipped.values.iter().zip(samples(&height)) {
-            // Sines differ by a bit between platforms.
-            assert!((shipped * 65535.0 - f32::from(made)).abs() < 3.0, "{name}");
+        for (shipped, computed) in shipped.values.iter().zip(samples(&height)) {
+            // The results of `sin` differ slightly between platforms.
+            assert!((shipped * 65535.0 - f32::from(computed)).abs() < 3.0, "{name}");
         }
     }
 }

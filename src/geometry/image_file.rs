@@ -1,4 +1,5 @@
-//! Images that scenes name: heights (linear values) and colour weights (sRGB in integer formats, linear in float ones).
+//! Images of a scene: heights (linear values), colour weights (sRGB in integer formats, linear in float formats) and
+//! slots.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -12,15 +13,17 @@ use crate::base::{InputError, Result};
 pub use crate::scene::Pixels;
 use crate::scene::files;
 
+/// Maximum size of a file, in bytes.
 const MAX_FILE: u64 = 256 << 20;
-/// Pixels along a side, and in all.
-const LARGEST_SIDE: u32 = 4096;
+/// Maximum number of pixels along a side.
+const MAX_SIDE: u32 = 4096;
+/// Maximum number of pixels in total.
 const MAX_PIXELS: u64 = 1 << 22;
 
 /// Reads heights: the value of a grey image (0 to 1 for integer formats), the luminance of a coloured one.
 ///
 /// # Errors
-/// A file that is missing, no image, too large, or holds NaN or infinite values.
+/// Returns an error if the file is missing, is not an image, is too large, or contains NaN or infinite values.
 pub fn read_heights(base_dir: &Path, path: &Path) -> Result<Pixels<f32>> {
     let pixels = read(base_dir, path)?;
     Ok(Pixels { size: pixels.size, values: pixels.values.iter().map(|value| luminance(*value)).collect() })
@@ -29,7 +32,7 @@ pub fn read_heights(base_dir: &Path, path: &Path) -> Result<Pixels<f32>> {
 /// Reads linear colour weights.
 ///
 /// # Errors
-/// As [`read_heights`], and negative values.
+/// Returns an error as [`read_heights`] does, and for negative values.
 pub fn read_colors(base_dir: &Path, path: &Path) -> Result<Pixels<Vec3>> {
     let mut pixels = read(base_dir, path)?;
     if pixels.is_integer {
@@ -42,13 +45,13 @@ pub fn read_colors(base_dir: &Path, path: &Path) -> Result<Pixels<Vec3>> {
     Ok(Pixels { size: pixels.size, values: pixels.values })
 }
 
-/// Slots that an image may paint.
+/// Maximum number of slots that an image may paint.
 pub const MAX_SLOTS: u8 = 16;
 
-/// Reads painted slots: grey values, of 255 in integer formats.
+/// Reads painted slots. The grey value is the slot's number: the 8-bit value in integer formats.
 ///
 /// # Errors
-/// As [`read_heights`], and values above [`MAX_SLOTS`].
+/// Returns an error as [`read_heights`] does, and for values above [`MAX_SLOTS`].
 pub fn read_slots(base_dir: &Path, path: &Path) -> Result<Pixels<u8>> {
     let pixels = read(base_dir, path)?;
     let scale = if pixels.is_integer { 255.0 } else { 1.0 };
@@ -61,12 +64,12 @@ pub fn read_slots(base_dir: &Path, path: &Path) -> Result<Pixels<u8>> {
     Ok(Pixels { size: pixels.size, values: pixels.values.iter().map(|value| number(value) as u8).collect() })
 }
 
-/// Rec. 709; exact for greys.
+/// Rec. 709 luminance, exact for greys.
 fn luminance(color: Vec3) -> f32 {
     if color.x == color.y && color.y == color.z { color.x } else { color.dot(Vec3::new(0.2126, 0.7152, 0.0722)) }
 }
 
-/// IEC 61966-2-1.
+/// Converts an sRGB value to a linear one (IEC 61966-2-1).
 fn linear_from_srgb(value: f32) -> f32 {
     if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
@@ -83,10 +86,10 @@ struct RawImage {
 
 fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
     let bytes = files::read(base_dir, path, MAX_FILE)?;
-    let complain = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
+    let error_for = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
     let image =
-        if is_exr { read_exr(&bytes, path)? } else { decode(&bytes).map_err(|error| complain(error.to_string()))? };
+        if is_exr { read_exr(&bytes, path)? } else { decode(&bytes).map_err(|error| error_for(error.to_string()))? };
     check_size(image.size, path)?;
     if let Some(at) = image.values.iter().position(|value| !value.is_finite()) {
         return Err(InputError::new(pixel_name(at, image.size), image.values[at], "finite values")
@@ -98,8 +101,8 @@ fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
 
 fn check_size(size: UVec2, path: &Path) -> Result<()> {
     let pixels = u64::from(size.x) * u64::from(size.y);
-    if pixels == 0 || pixels > MAX_PIXELS || size.max_element() > LARGEST_SIDE {
-        let expected = format!("at most {MAX_PIXELS} pixels and {LARGEST_SIDE} on a side, at least one");
+    if pixels == 0 || pixels > MAX_PIXELS || size.max_element() > MAX_SIDE {
+        let expected = format!("at most {MAX_PIXELS} pixels and {MAX_SIDE} on a side, at least one");
         return Err(InputError::new("", format!("{} x {} pixels", size.x, size.y), expected).in_file(path).into());
     }
     Ok(())
@@ -108,8 +111,8 @@ fn check_size(size: UVec2, path: &Path) -> Result<()> {
 fn decode(bytes: &[u8]) -> image::ImageResult<RawImage> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
     let mut limits = Limits::default();
-    limits.max_image_width = Some(4 * LARGEST_SIDE);
-    limits.max_image_height = Some(4 * LARGEST_SIDE);
+    limits.max_image_width = Some(4 * MAX_SIDE);
+    limits.max_image_height = Some(4 * MAX_SIDE);
     limits.max_alloc = Some(1 << 30);
     reader.limits(limits);
     let image = reader.decode()?;
@@ -119,11 +122,11 @@ fn decode(bytes: &[u8]) -> image::ImageResult<RawImage> {
     Ok(RawImage { size, values, is_integer })
 }
 
-/// R, G and B of an EXR file, or its Y, or its only channel.
+/// Reads R, G and B of an EXR file, or its Y channel, or its only channel.
 fn read_exr(bytes: &[u8], path: &Path) -> Result<RawImage> {
-    let complain = |found: String| InputError::new("", found, "an EXR file with channels R, G, B or Y").in_file(path);
+    let error_for = |found: String| InputError::new("", found, "an EXR file with channels R, G, B or Y").in_file(path);
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
-        .map_err(|error| complain(error.to_string()))?;
+        .map_err(|error| error_for(error.to_string()))?;
     for header in &meta.headers {
         check_size(UVec2::new(header.layer_size.width() as u32, header.layer_size.height() as u32), path)?;
     }
@@ -134,7 +137,7 @@ fn read_exr(bytes: &[u8], path: &Path) -> Result<RawImage> {
         .first_valid_layer()
         .all_attributes()
         .from_buffered(Cursor::new(bytes))
-        .map_err(|error| complain(error.to_string()))?;
+        .map_err(|error| error_for(error.to_string()))?;
     let layer = image.layer_data;
     let size = UVec2::new(layer.size.width() as u32, layer.size.height() as u32);
     let channels = &layer.channel_data.list;
@@ -145,12 +148,12 @@ fn read_exr(bytes: &[u8], path: &Path) -> Result<RawImage> {
         _ if channels.len() == 1 => [&channels[0]; 3],
         _ => {
             let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
-            return Err(complain(format!("channels {}", names.join(", "))).into());
+            return Err(error_for(format!("channels {}", names.join(", "))).into());
         }
     };
     let count = size.x as usize * size.y as usize;
     if let Some(short) = chosen.iter().find(|channel| channel.sample_data.len() < count) {
-        return Err(complain(format!("{} samples in channel {}", short.sample_data.len(), short.name)).into());
+        return Err(error_for(format!("{} samples in channel {}", short.sample_data.len(), short.name)).into());
     }
     let value =
         |index: usize| Vec3::from_array(chosen.map(|channel| channel.sample_data.value_by_flat_index(index).to_f32()));
@@ -205,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_or_missing_is_named() {
+    fn errors_name_a_missing_file_and_a_file_that_is_no_image() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("text.png"), "not an image").unwrap();
         for (name, part) in [("text.png", "expected an image"), ("none.png", "none.png"), (".", "expected a file")] {

@@ -1,4 +1,4 @@
-//! From a geometry description to a periodic triangle mesh, and from the mesh to facets.
+//! Geometry of the small scale: from a description to a periodic triangle mesh, and from the mesh to facets.
 
 pub mod closure;
 pub mod facets;
@@ -18,10 +18,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use facets::{FacetSampler, Facets, SampleShift};
-pub use families::grooves::CrossSection;
-pub use families::pyramids::OnePyramid;
+pub use families::grooves::GrooveCrossSection;
+pub use families::pyramids::PyramidLayout;
 use families::{flat, grooves, heightfield, mesh_file, pyramids, rods, weave};
-pub use grid::{Hit, PeriodicGrid, lifted_origins, sees};
+pub use grid::{Hit, PeriodicGrid, is_facet_visible, lifted_origins};
 pub use symmetry::{mirror_planes, mirror_planes_in};
 pub(crate) use tile_mesh::SAME_NORMAL;
 pub use tile_mesh::{ColorField, HeightGrid, SlotField, TileMesh};
@@ -29,18 +29,18 @@ pub use tile_mesh::{ColorField, HeightGrid, SlotField, TileMesh};
 use crate::base::{InputError, Result};
 use crate::scene::{Geometry, Painted, Pixels, Tile};
 
-/// The mesh of a tile; `base_dir` is the scene file's folder, where relative paths start.
+/// Builds the mesh of a tile. Relative paths start in `base_dir`, the scene file's folder.
 ///
 /// # Errors
-/// A file that is missing or not what it should be.
+/// Returns an error if a file is missing or invalid, or if the mesh is too large.
 pub fn build(tile: &Tile, base_dir: &Path) -> Result<TileMesh> {
     build_painted(tile, base_dir, &Painted::default())
 }
 
-/// As [`build`], with images in memory in place of the files that the geometry names.
+/// Builds the mesh as [`build`] does, with images in memory instead of the files that the tile names.
 ///
 /// # Errors
-/// As [`build`].
+/// Returns the errors of [`build`].
 pub fn build_painted(tile: &Tile, base_dir: &Path, painted: &Painted) -> Result<TileMesh> {
     let size = tile.size;
     let mut mesh = match &tile.geometry {
@@ -56,11 +56,11 @@ pub fn build_painted(tile: &Tile, base_dir: &Path, painted: &Painted) -> Result<
         Geometry::Mesh(spec) => mesh_file::build(spec, size, base_dir)?,
     };
     let file = |path: &PathBuf| image_file::read_colors(base_dir, path);
-    if let Some(image) = chosen(&painted.colors, &tile.color_path, file)? {
+    if let Some(image) = painted_or_file(&painted.colors, &tile.color_path, file)? {
         mesh.color = ColorField::Image { size: image.size, texels: Arc::new(image.values) };
     }
     let file = |path: &PathBuf| image_file::read_slots(base_dir, path);
-    if let Some(image) = chosen(&painted.slots, &tile.slot_path, file)? {
+    if let Some(image) = painted_or_file(&painted.slots, &tile.slot_path, file)? {
         paint_slots(&mut mesh, image);
     }
     check_extent(&mesh).map_err(|error| match &tile.geometry {
@@ -70,8 +70,8 @@ pub fn build_painted(tile: &Tile, base_dir: &Path, painted: &Painted) -> Result<
     Ok(mesh)
 }
 
-/// What was painted in memory, else what the file holds, if one is named.
-fn chosen<T: Clone>(
+/// Returns the painted image in memory if there is one, else the file's image if the tile names a file.
+fn painted_or_file<T: Clone>(
     painted: &Option<Arc<Pixels<T>>>,
     path: &Option<PathBuf>,
     read: impl Fn(&PathBuf) -> Result<Pixels<T>>,
@@ -82,35 +82,36 @@ fn chosen<T: Clone>(
     }
 }
 
-/// Slots `paint_1` ... of an image over those of the surface.
+/// Adds the slots `paint_1` and following of an image over those of the surface.
 fn paint_slots(mesh: &mut TileMesh, image: Pixels<u8>) {
     let first = mesh.slots.len() as u16;
-    let most = image.values.iter().copied().max().unwrap_or(0);
-    mesh.slots.extend((1..=most).map(painted_slot));
+    let count = image.values.iter().copied().max().unwrap_or(0);
+    mesh.slots.extend((1..=count).map(painted_slot));
     mesh.painted_slots = Some(SlotField { size: image.size, texels: Arc::new(image.values), first });
 }
 
-/// The name of a slot that is painted: `paint_1` to `paint_16`.
+/// The name of a painted slot: `paint_1` to `paint_16`.
 pub fn painted_slot(number: u8) -> String {
     format!("paint_{number}")
 }
 
-/// Tile lengths that a mesh may reach up, down and sideways: beyond, an f32 cannot tell places within a tile apart at
-/// grazing angles (a height of 10⁴ tiles lands 6 10⁶ tiles away at 89.9°).
+/// Maximum extent of a mesh in each direction, in tile lengths. Beyond it, an f32 cannot resolve positions within a
+/// tile at grazing angles: at 89.9°, a height of 10⁴ tiles projects to a distance of 6 · 10⁶ tiles.
 const MAX_TILES: f32 = 1e4;
-/// Tiles that the bounding boxes of all triangles may cover together: each copy is listed by every cell that it reaches.
+/// Maximum number of tiles that the bounding boxes of all triangles cover together. It bounds the cell lists of the
+/// grid.
 const MAX_TILES_COVERED: f64 = 1e7;
 
-/// Is there something finite, near enough to the tile to compute with?
+/// Checks that all vertices are finite and near the tile, and that triangles do not reach over too many tiles.
 fn check_extent(mesh: &TileMesh) -> std::result::Result<(), InputError> {
-    let complain = |found: String, expected: String| Err(InputError::new("tile.geometry", found, expected));
+    let error_for = |found: String, expected: String| Err(InputError::new("tile.geometry", found, expected));
     let side = mesh.size.max_element();
     for (number, position) in mesh.positions.iter().enumerate() {
         let sideways = (position.truncate() / mesh.size).abs().max_element();
-        // Comparisons that NaN fails.
+        // NaN fails these comparisons.
         if !(sideways <= MAX_TILES && position.z.abs() <= MAX_TILES * side) {
             let found = format!("vertex {} at ({}, {}, {})", number + 1, position.x, position.y, position.z);
-            return complain(found, format!("finite coordinates within {MAX_TILES} tile lengths of the tile"));
+            return error_for(found, format!("finite coordinates within {MAX_TILES} tile lengths of the tile"));
         }
     }
     let covered = |triangle| {
@@ -120,7 +121,7 @@ fn check_extent(mesh: &TileMesh) -> std::result::Result<(), InputError> {
     };
     let tiles: f64 = (0..mesh.triangles.len()).map(covered).sum();
     if tiles > MAX_TILES_COVERED {
-        return complain(
+        return error_for(
             format!("triangles that reach over {tiles:.0} tiles together"),
             format!("at most {MAX_TILES_COVERED:.0}; coordinates are tile coordinates, from 0 to tile.size"),
         );

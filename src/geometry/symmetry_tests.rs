@@ -1,4 +1,4 @@
-//! Planes of tiles that are known, and the quick refusal against a look at all.
+//! Tests of mirror planes on tiles with known planes, and of the fast exclusion of candidates.
 
 use std::f32::consts::TAU;
 
@@ -8,39 +8,39 @@ use super::*;
 use crate::geometry::build;
 use crate::geometry::families::heightfield;
 
-fn of(toml: &str) -> TileMesh {
+fn mesh_of(toml: &str) -> TileMesh {
     let scene = crate::scene::parse(&format!("[tile]\ngeometry = {toml}\n")).unwrap();
     build(&scene.tile, std::path::Path::new("")).unwrap()
 }
 
 #[test]
-fn grooves_and_waves_have_the_planes_that_they_were_made_with() {
+fn grooves_and_waves_have_the_expected_mirror_planes() {
     let v = r#"{ kind = "grooves", profile = "v", count = 3, depth = 0.1, side_angle_deg = 40, rotation_deg = 0 }"#;
-    assert_eq!(mirror_planes(&of(v)), [true, true]);
+    assert_eq!(mirror_planes(&mesh_of(v)), [true, true]);
     let size = Vec2::ONE;
     let crooked = |at: Vec2| 0.1 * (TAU * (at.x + at.y)).cos() + 0.03 * (2.0 * TAU * at.x + 0.7).sin();
     let mesh = heightfield::from_function(UVec2::splat(32), size, crooked);
     assert_eq!(mirror_planes(&mesh), [false, false]);
-    // A saw along x, straight along y.
+    // A sawtooth along x that is constant along y.
     let mesh = heightfield::from_function(UVec2::splat(32), size, |at| 0.1 * at.x);
     assert_eq!(mirror_planes(&mesh), [false, true]);
 }
 
 #[test]
-fn a_plain_weave_has_both_planes_and_a_twill_has_not() {
-    assert_eq!(mirror_planes(&of(r#"{ kind = "weave", pattern = "plain" }"#)), [true, true]);
-    assert_ne!(mirror_planes(&of(r#"{ kind = "weave", pattern = "twill" }"#)), [true, true]);
+fn a_plain_weave_has_both_mirror_planes_and_a_twill_has_not() {
+    assert_eq!(mirror_planes(&mesh_of(r#"{ kind = "weave", pattern = "plain" }"#)), [true, true]);
+    assert_ne!(mirror_planes(&mesh_of(r#"{ kind = "weave", pattern = "twill" }"#)), [true, true]);
 }
 
 #[test]
 fn slots_that_differ_break_the_mirror() {
-    let mut mesh = of(
+    let mut mesh = mesh_of(
         r#"{ kind = "grooves", profile = "trapezoid", count = 2, depth = 0.1, side_angle_deg = 45, rotation_deg = 0 }"#,
     );
     assert_eq!(mirror_planes(&mesh), [true, true]);
     let marked = mesh.slots.len() as u16;
     mesh.slots.push("marked".to_owned());
-    // One wall of one groove is made of something else.
+    // The walls on one side of the grooves get another slot.
     let wall = (0..mesh.triangles.len()).find(|t| mesh.geometric_normal(*t).x.abs() > 0.5).unwrap();
     let normal = mesh.geometric_normal(wall);
     for triangle in 0..mesh.triangles.len() {
@@ -51,16 +51,16 @@ fn slots_that_differ_break_the_mirror() {
     assert!(!mirror_planes(&mesh)[0]);
 }
 
-fn bits(seen: &[SampledColumn]) -> Vec<[u32; 8]> {
-    let of = |s: &SampledColumn| {
+fn bits(hits: &[ColumnHit]) -> Vec<[u32; 8]> {
+    let words = |s: &ColumnHit| {
         let [x, y, z] = s.normal.to_array().map(f32::to_bits);
         let [r, g, b] = s.color.to_array().map(f32::to_bits);
         [s.height.to_bits(), x, y, z, r, g, b, u32::from(s.slot)]
     };
-    seen.iter().map(of).collect()
+    hits.iter().map(words).collect()
 }
 
-/// Height-fields with and without planes, of few samples and of many, on tiles of many sizes.
+/// Height fields with and without mirror planes, of few and of many samples, on tiles of many sizes.
 fn height_fields() -> Vec<TileMesh> {
     let mut meshes = Vec::new();
     for samples in [UVec2::new(1, 1), UVec2::new(2, 7), UVec2::new(300, 1), UVec2::new(64, 48), UVec2::new(16, 200)] {
@@ -76,37 +76,37 @@ fn height_fields() -> Vec<TileMesh> {
     }
     let mut moved = meshes[20].clone();
     moved.positions[3].x += 0.2;
-    let mut turned = meshes[20].clone();
-    turned.triangles.reverse();
-    meshes.extend([moved, turned]);
+    let mut reordered = meshes[20].clone();
+    reordered.triangles.reverse();
+    meshes.extend([moved, reordered]);
     meshes
 }
 
 #[test]
-fn part_of_a_height_field_shows_below_its_places_what_all_of_it_shows() {
-    let mut shown = 0;
+fn a_part_of_a_height_field_has_the_same_hits_as_the_whole() {
+    let mut compared = 0;
     for mesh in height_fields() {
-        let places = || (0..PLACES).step_by(5).map(|k| place(k, mesh.size)).chain([Vec2::ZERO, mesh.size]);
-        let Some((part, grid)) = below(&mesh, places()) else { continue };
-        let part = ColumnSamples { mesh: &part, grid: &grid, bottom: mesh.z_range().0 };
+        let points = || (0..POINTS).step_by(5).map(|k| sample_point(k, mesh.size)).chain([Vec2::ZERO, mesh.size]);
+        let Some((part, grid)) = part_below(&mesh, points()) else { continue };
+        let part = ColumnSampler { mesh: &part, grid: &grid, bottom: mesh.z_range().0 };
         let grid = PeriodicGrid::new(&mesh);
-        let all = ColumnSamples { mesh: &mesh, grid: &grid, bottom: mesh.z_range().0 };
-        for place in places() {
-            assert_eq!(bits(&part.down(place)), bits(&all.down(place)), "{place} of {}", mesh.size);
-            shown += 1;
+        let all = ColumnSampler { mesh: &mesh, grid: &grid, bottom: mesh.z_range().0 };
+        for point in points() {
+            assert_eq!(bits(&part.hits_below(point)), bits(&all.hits_below(point)), "{point} of {}", mesh.size);
+            compared += 1;
         }
     }
-    assert!(shown > 3000, "{shown}");
+    assert!(compared > 3000, "{compared}");
 }
 
 #[test]
-fn few_places_refuse_only_what_all_would_refuse() {
-    let mut refused = 0;
+fn few_points_exclude_only_candidates_that_all_points_exclude() {
+    let mut excluded = 0;
     for mesh in height_fields() {
         let sums = [0, 1].map(|axis| candidates(&mesh, axis));
-        let all = among(&mesh, &PeriodicGrid::new(&mesh), &sums);
+        let all = any_mirror_plane(&mesh, &PeriodicGrid::new(&mesh), &sums);
         assert_eq!(mirror_planes(&mesh), all, "{} of {} triangles", mesh.size, mesh.triangles.len());
-        refused += usize::from(is_refused(&mesh, &sums));
+        excluded += usize::from(are_excluded(&mesh, &sums));
     }
-    assert!(refused > 10, "{refused}");
+    assert!(excluded > 10, "{excluded}");
 }

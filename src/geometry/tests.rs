@@ -1,4 +1,4 @@
-//! Identities that hold for every family.
+//! Tests of identities that hold for every family.
 
 use std::path::Path;
 
@@ -20,8 +20,8 @@ fn built(geometry: Geometry) -> TileMesh {
     build(&tile(geometry), Path::new("")).unwrap()
 }
 
-/// Height of the highest surface above a point of the endless tiling, and whether it faces up.
-fn seen_from_above(mesh: &TileMesh, at: Vec2) -> Option<(f32, bool)> {
+/// Height of the highest surface at a point of the endless tiling, and whether it faces up.
+fn highest_surface(mesh: &TileMesh, at: Vec2) -> Option<(f32, bool)> {
     let mut best: Option<(f32, bool)> = None;
     for triangle in 0..mesh.triangles.len() {
         let [a, b, c] = mesh.corners(triangle);
@@ -46,7 +46,7 @@ fn seen_from_above(mesh: &TileMesh, at: Vec2) -> Option<(f32, bool)> {
 }
 
 #[test]
-fn a_ray_from_above_always_meets_a_side_that_reflects() {
+fn a_ray_from_above_always_meets_a_reflecting_side() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let rods = Rods { count: 30, lean_deg: 50.0, lean_azimuth_deg: 200.0, length: 1.5, ..Rods::default() };
     for geometry in [
@@ -58,13 +58,13 @@ fn a_ray_from_above_always_meets_a_side_that_reflects() {
         let mesh = built(geometry);
         for _ in 0..400 {
             let at = Vec2::new(random.random(), random.random()) * mesh.size;
-            assert!(matches!(seen_from_above(&mesh, at), Some((_, true))), "{at}: {:?}", seen_from_above(&mesh, at));
+            assert!(matches!(highest_surface(&mesh, at), Some((_, true))), "{at}: {:?}", highest_surface(&mesh, at));
         }
     }
 }
 
 #[test]
-fn facet_areas_sum_to_the_surface_and_every_array_is_as_long() {
+fn facet_areas_sum_to_the_surface_and_all_arrays_have_equal_length() {
     for kind in Geometry::kinds().iter().filter(|kind| !matches!(kind.kind, "mesh" | "heightfield")) {
         let mesh = built(Geometry::with_defaults(kind.kind).unwrap());
         let surface: f64 = (0..mesh.triangles.len()).map(|t| mesh.triangle_area(t)).sum();
@@ -114,7 +114,7 @@ fn noise_tile() -> TileMesh {
     })
 }
 
-/// Root mean square over passes of the relative error of `Σ ΔA (n·o)+`, against the sum over all triangles.
+/// Root mean square over passes of the error of `Σ ΔA (n·o)+`, relative to the sum over all triangles.
 fn error_of(mesh: &TileMesh, sample: impl Fn(u64) -> Facets) -> f64 {
     let (theta, phi) = (1.2, 0.4);
     let o = crate::math::directions::from_angles(theta, phi);
@@ -125,8 +125,7 @@ fn error_of(mesh: &TileMesh, sample: impl Fn(u64) -> Facets) -> f64 {
 }
 
 #[test]
-fn systematic_facets_beat_the_papers_random_ones() {
-    // Measured on noise: 0.0064 against 0.0123.
+fn systematic_facets_have_a_smaller_error_than_the_papers_random_ones() {
     let grooves = Grooves { rotation_deg: 30.0, profile: GrooveProfile::U, ..Grooves::default() };
     for (mesh, factor) in [(noise_tile(), 1.5), (built(Geometry::Grooves(grooves)), 3.0)] {
         let systematic = error_of(&mesh, |pass| Facets::sample(&mesh, 1000, pass));
@@ -135,29 +134,29 @@ fn systematic_facets_beat_the_papers_random_ones() {
     }
 }
 
-/// One sequence through all triangles fell in step with what repeats along a mesh: at some counts a strip along the upper
-/// edge of all walls had twice its facets, or none.
+/// Tests that each shape of triangle has a sequence of its own. One sequence through all triangles would correlate with
+/// the repetitions of the mesh and give a strip along the walls too many facets or none.
 #[test]
-fn strips_along_the_edges_of_many_like_triangles_get_their_part_at_any_count() {
+fn strips_along_the_edges_of_equal_triangles_get_their_share_of_facets_at_any_count() {
     let spec = Grooves { profile: GrooveProfile::Rectangular, depth: 0.5, ..Grooves::default() };
     let mesh = built(Geometry::Grooves(spec));
-    // Of the walls' upper edge; of the 5 tiles of surface, the walls are 4.
+    // Width of the strip along the walls' upper edge. The walls are 4 of the 5 tile areas of the surface.
     const STRIP: f32 = 0.04;
-    let mut worst = 0.0_f64;
+    let mut max_deviation = 0.0_f64;
     for count in (500..8000).step_by(4) {
         let facets = Facets::sample(&mesh, count, 1);
         let on_strip = |k: &usize| facets.normals[*k].x > 0.5 && facets.positions[*k].z > -0.5 * STRIP;
         let found = (0..count).filter(on_strip).count() as f64;
         let expected = count as f64 * 0.4 * f64::from(STRIP);
-        worst = worst.max((found - expected).abs() / expected.sqrt());
+        max_deviation = max_deviation.max((found - expected).abs() / expected.sqrt());
     }
-    // In units of what random points leave. The one sequence left 7.
-    assert!(worst < 2.5, "{worst}");
+    // In units of the standard deviation of random points.
+    assert!(max_deviation < 2.5, "{max_deviation}");
 }
 
 #[test]
 fn systematic_points_integrate_a_smooth_function_better_than_random_ones() {
-    // One square of two triangles: the mean of sin(πx) sin(πy) over it is 4/π².
+    // The mean of sin(πx) sin(πy) over the unit square is 4/π².
     let mesh = heightfield::from_function(UVec2::ONE, Vec2::ONE, |_| 0.0);
     let f = |p: &Vec3| f64::from((p.x * std::f32::consts::PI).sin() * (p.y * std::f32::consts::PI).sin());
     let exact = 4.0 / std::f64::consts::PI.powi(2);
@@ -177,7 +176,7 @@ fn systematic_points_integrate_a_smooth_function_better_than_random_ones() {
 }
 
 #[test]
-fn facets_use_interpolated_normals_where_the_mesh_has_them() {
+fn facets_use_interpolated_normals_if_the_mesh_has_them() {
     let mut mesh = built(Geometry::Flat(crate::scene::Flat::default()));
     mesh.corner_normals = Some(vec![[Vec3::X, Vec3::X, Vec3::Z]; mesh.triangles.len()]);
     let facets = Facets::sample(&mesh, 64, 0);
@@ -216,9 +215,9 @@ fn colour_images_weight_the_facets() {
 }
 
 #[test]
-fn painted_slots_cover_their_part_of_any_surface_and_leave_the_rest_its_own() {
+fn painted_slots_cover_their_part_of_any_surface_and_leave_the_rest_unchanged() {
     let folder = tempfile::tempdir().unwrap();
-    // Left half: the surface's own; right half: the second painted slot.
+    // The left half keeps the surface's slots; the right half gets the second painted slot.
     image::GrayImage::from_fn(4, 3, |x, _| image::Luma([if x < 2 { 0 } else { 2 }]))
         .save(folder.path().join("s.png"))
         .unwrap();
@@ -229,10 +228,10 @@ fn painted_slots_cover_their_part_of_any_surface_and_leave_the_rest_its_own() {
         let own = plain.slots.len();
         assert_eq!(mesh.slots[own..], ["paint_1", "paint_2"]);
         let facets = Facets::sample(&mesh, 2000, 0);
-        for (slot, place) in facets.slots.iter().zip(&facets.positions) {
-            assert_eq!(usize::from(*slot) == own + 1, place.x >= 0.5, "{slot} at {place}");
+        for (slot, position) in facets.slots.iter().zip(&facets.positions) {
+            assert_eq!(usize::from(*slot) == own + 1, position.x >= 0.5, "{slot} at {position}");
         }
-        // Beyond the edge the tile repeats.
+        // The tile repeats beyond its edge.
         assert_eq!(usize::from(mesh.slot_at(0, Vec2::new(-0.1, 7.3))), own + 1);
         assert!(usize::from(mesh.slot_at(0, Vec2::new(1.1, -0.1))) < own);
     }
@@ -259,7 +258,7 @@ fn any_family() -> impl Strategy<Value = (Table, [f32; 2])> {
                 table.insert("values".to_owned(), Value::Array(rows.to_vec()));
             }
             if name == "rods" {
-                // The count rules; a density of 10^6 would make every case a large one.
+                // The count is used instead, because a density of 10⁶ would make every case large.
                 table.remove("density");
             }
             table
@@ -277,7 +276,7 @@ proptest! {
         let closed = !matches!(geometry, Geometry::Rods(_));
         let mesh = match build(&Tile { size: size.into(), ..Tile::of(geometry) }, Path::new("")) {
             Ok(mesh) => mesh,
-            // Each parameter is in range, but the tile a tower.
+            // Each parameter is in range, but the tile may be too high.
             Err(error) => {
                 prop_assert!(error.to_string().contains("tile lengths"), "{}", error);
                 return Ok(());

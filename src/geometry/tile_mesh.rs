@@ -1,44 +1,46 @@
-//! One period of the small-scale surface as triangles.
+//! The triangle mesh of one period of the small-scale surface.
 
 use std::sync::Arc;
 
 use glam::{UVec2, Vec2, Vec3};
 
-/// Normals closer than this are one: rounding of coordinates, not shape.
+/// Difference per component up to which normals count as equal. It covers the rounding of coordinates.
 pub(crate) const SAME_NORMAL: f32 = 2e-5;
 
-/// One period of an endlessly repeated surface: x in `[0, size.x)`, y in `[0, size.y)`, z up. Triangles may reach
-/// over the tile's edge (their periodic copies come back in on the other side); they are never cut.
+/// One period of an endlessly repeated surface: x in `[0, size.x)`, y in `[0, size.y)`, z up. Triangles may reach over
+/// the tile's edge and are never cut; their periodic copies enter on the other side.
 #[derive(Debug, Clone, Default)]
 pub struct TileMesh {
-    /// Extent of the period in x and y, in tile units.
+    /// Size of the period in x and y, in tile units.
     pub size: Vec2,
     pub positions: Vec<Vec3>,
     /// Vertex indices, counter-clockwise seen from the side that reflects.
     pub triangles: Vec<[u32; 3]>,
-    /// Corner normals of each triangle, only where the source had them (`vn`); else normals are geometric.
+    /// Corner normals of each triangle if the source has them (`vn`), else `None`, and normals are geometric.
     pub corner_normals: Option<Vec<[Vec3; 3]>>,
-    /// Index into `slots`, per triangle.
+    /// Index into `slots` per triangle.
     pub triangle_slot: Vec<u16>,
     /// Names of the material slots.
     pub slots: Vec<String>,
     /// Colour weights that vary over the tile.
     pub color: ColorField,
-    /// Slots painted over those of the triangles.
+    /// Slots painted over the triangles' slots.
     pub painted_slots: Option<SlotField>,
-    /// Where the surface is a height-field: its samples.
+    /// Samples of the surface if it is a height field.
     pub height_grid: Option<HeightGrid>,
-    /// Every ray from above ends on a side that reflects: `a_v(o) = A cos θ_o` holds (with geometric normals).
+    /// True if each ray from above ends on a side that reflects. Then `a_v(o) = A cos θ_o` holds with geometric
+    /// normals.
     pub closes_plane: bool,
-    /// What a person should know about how the parameters were met (snapped rotations, rounded counts).
+    /// Notes for the user on parameters that the mesh does not meet exactly (snapped rotations, rounded counts).
     pub notes: Vec<String>,
 }
 
-/// MaterialSpec slots over the tile, seen from above.
+/// Material slots over the tile, seen from above.
 #[derive(Debug, Clone)]
 pub struct SlotField {
     pub size: UVec2,
-    /// Row 0 at y = 0; the texel that a place lies in counts. 0 leaves the triangle's slot, k is the slot `first + k - 1`.
+    /// Texels, row 0 at y = 0, without interpolation. The value 0 leaves the triangle's slot; k is slot `first + k -
+    /// 1`.
     pub texels: Arc<Vec<u8>>,
     /// Index of the slot `paint_1` in the mesh.
     pub first: u16,
@@ -53,7 +55,7 @@ pub enum ColorField {
     Image { size: UVec2, texels: Arc<Vec<Vec3>> },
 }
 
-/// Samples of a height-field: sample (i, j) sits at `((i+½)/w, (j+½)/h)` of the tile, row 0 at y = 0, wrapped.
+/// Samples of a height field. Sample (i, j) lies at `((i+½)/w, (j+½)/h)` of the tile, row 0 at y = 0, wrapped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightGrid {
     pub size: UVec2,
@@ -87,6 +89,7 @@ impl TileMesh {
         (b - a).cross(c - a).try_normalize().unwrap_or_default().as_vec3()
     }
 
+    /// Area of a triangle.
     #[inline]
     pub fn triangle_area(&self, triangle: usize) -> f64 {
         let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
@@ -100,22 +103,22 @@ impl TileMesh {
         if range.0 <= range.1 { range } else { (0.0, 0.0) }
     }
 
-    /// How many normals the triangles have, if no more than `most`; `None` where normals turn inside triangles, too.
-    pub fn distinct_normals(&self, most: usize) -> Option<usize> {
+    /// Number of distinct triangle normals; `None` if there are more than `max` or if normals vary inside triangles.
+    pub fn distinct_normals(&self, max: usize) -> Option<usize> {
         let mut found: Vec<Vec3> = Vec::new();
         for triangle in 0..self.triangles.len() {
             let normal = self.geometric_normal(triangle);
             if normal != Vec3::ZERO && !found.iter().any(|known| (*known - normal).abs().max_element() < SAME_NORMAL) {
                 found.push(normal);
             }
-            if found.len() > most {
+            if found.len() > max {
                 return None;
             }
         }
         self.corner_normals.is_none().then_some(found.len())
     }
 
-    /// Is it a single-valued surface without overhang, vertical walls allowed? Then light and view come only from above.
+    /// Returns whether the surface has one height at each (x, y), apart from vertical walls. Then it has no overhangs.
     pub fn is_height_field(&self) -> bool {
         let mut projected = 0.0;
         for triangle in 0..self.triangles.len() {
@@ -137,7 +140,7 @@ impl TileMesh {
 }
 
 impl SlotField {
-    /// The slot painted at tile coordinates `xy` of a tile of extent `size`, if any is.
+    /// The slot painted at tile coordinates `xy` of a tile of size `tile_size`, or `None` if there is none.
     fn at(&self, xy: Vec2, tile_size: Vec2) -> Option<u16> {
         let cell = (xy / tile_size * self.size.as_vec2()).floor();
         let wrapped = |at: f32, count: u32| (at as i64).rem_euclid(i64::from(count)) as usize;
@@ -148,7 +151,7 @@ impl SlotField {
 }
 
 impl ColorField {
-    /// Colour weight at tile coordinates `xy` of a tile of extent `size`.
+    /// Colour weight at tile coordinates `xy` of a tile of size `tile_size`.
     pub fn at(&self, xy: Vec2, tile_size: Vec2) -> Vec3 {
         match self {
             Self::Uniform => Vec3::ONE,

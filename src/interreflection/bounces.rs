@@ -1,16 +1,15 @@
-//! From rays between facets to the light that leaves the tile after one or more bounces.
+//! The light that leaves the tile after one or more bounces, computed from the rays between elements.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::mirrored::Images;
-use super::transport::NOTHING;
+use super::mirrored::MirroredNodes;
+use super::transport::NO_HIT;
 use super::{InterreflectionSettings, InterreflectionTable, Transport, mean_albedo};
 use crate::base::{Cancel, Result};
-use crate::brdf::{LobeAngles, Term};
-use crate::effective::Material;
+use crate::brdf::{LobeAngles, Material, Term};
 use crate::geometry::{Facets, TileMesh};
 use crate::math::directions::half_vector;
 use crate::math::linalg::gemm::multiply_transposed;
@@ -18,35 +17,35 @@ use crate::visibility::Visibility;
 
 /// Rays of one matrix product.
 const BLOCK: usize = 256;
-/// Blocks that are added up by one thread after the other: the sums do not depend on the number of threads.
+/// Parts of the elements whose sums are added in order, so that results do not depend on the number of threads.
 const PARTS: usize = 16;
-/// Cosines below this are taken as this: a ray along its own surface says nothing.
+/// Lower limit of the cosine that a lobe is divided by; it bounds the contribution of rays along their own surface.
 const MIN_COSINE: f32 = 1e-3;
 
-/// All that a bounce looks up.
-struct Scene<'a> {
+/// Everything that a bounce reads.
+struct Exchange<'a> {
     facets: &'a Facets,
     transport: &'a Transport,
-    /// MaterialSpec and colour of each element.
+    /// Material, colour and diffuse albedo of each element.
     materials: Vec<&'a Material>,
     colors: Vec<Vec3>,
     albedos: Vec<Vec3>,
     /// Node directions, and the visibility of every element (row) along them.
     nodes: Vec<Vec3>,
-    seen: Vec<f32>,
-    /// Viewers that are computed.
-    images: Images,
+    visibility: Vec<f32>,
+    /// View nodes that are computed.
+    mirrored: MirroredNodes,
     channels: usize,
 }
 
-/// `G` of the light between facets, from rays and visibility.
+/// Computes `G` of interreflection from rays and visibility.
 ///
-/// With `E₁(i)` the irradiance of a facet after one bounce, `B` one more matte bounce, and `D = ΔA ρ/π`:
-/// `G = 1/A [ Σ_rays ΔA π/K f_t f_s + E₁(o)ᵀ D (1 + B + B² + …) E₁(i) ]`, each `E₁` from half of the rays: a product of one
-/// estimate with itself would hold its variance.
+/// With `E₁(i)` the irradiance of a facet after one bounce, `B` the operator of one more diffuse bounce, and `D = ΔA
+/// ρ/π`: `G = 1/A [ Σ_rays ΔA π/K f_t f_s + E₁(o)ᵀ D (1 + B + B² + …) E₁(i) ]`. Each of the two `E₁` comes from half of
+/// the rays, because the product of one estimate with itself would be biased by its variance.
 ///
 /// # Errors
-/// It was cancelled.
+/// [`crate::base::Error::Cancelled`].
 pub fn gather(
     mesh: &TileMesh,
     facets: &Facets,
@@ -56,9 +55,9 @@ pub fn gather(
     settings: &InterreflectionSettings,
     cancel: &Cancel,
 ) -> Result<InterreflectionTable> {
-    let scene = Scene::new(facets, visibility, transport, material_of_slot, materials, settings);
-    let (count, nodes, channels) = (transport.facets.len(), scene.nodes.len(), scene.channels);
-    let viewers = scene.images.computed.len();
+    let exchange = Exchange::new(facets, visibility, transport, material_of_slot, materials, settings);
+    let (count, nodes, channels) = (transport.facets.len(), exchange.nodes.len(), exchange.channels);
+    let viewers = exchange.mirrored.computed.len();
     let mut g = vec![0.0_f64; channels * viewers * nodes];
     let mut halves = [vec![0.0_f32; count * nodes * channels], vec![0.0_f32; count * nodes * channels]];
     let [even, odd] = &mut halves;
@@ -67,7 +66,7 @@ pub fn gather(
         .par_chunks_mut(part * nodes * channels)
         .zip(odd.par_chunks_mut(part * nodes * channels))
         .enumerate()
-        .map(|(k, (even, odd))| if cancel.is_set() { Vec::new() } else { scene.one_bounce(k * part, [even, odd]) })
+        .map(|(k, (even, odd))| if cancel.is_set() { Vec::new() } else { exchange.one_bounce(k * part, [even, odd]) })
         .collect();
     cancel.check()?;
     for sum in &sums {
@@ -78,23 +77,23 @@ pub fn gather(
         let mut arriving = incident.clone();
         for _ in 2..settings.bounces {
             cancel.check()?;
-            arriving = scene.matte_bounce(&arriving);
+            arriving = exchange.diffuse_bounce(&arriving);
             incident.iter_mut().zip(&arriving).for_each(|(sum, new)| *sum += new);
         }
-        scene.leave(&halves[0], &incident, &mut g);
+        exchange.add_reflected(&halves[0], &incident, &mut g);
     }
     cancel.check()?;
     let scale = 1.0 / f64::from(mesh.base_area());
     let at = |o: usize, i: usize, c: usize| {
-        let (viewer, light) = scene.images.of(o, i);
+        let (viewer, light) = exchange.mirrored.original_of(o, i);
         (g[(c.min(channels - 1) * viewers + viewer) * nodes + light] * scale) as f32
     };
     let pairs = (0..nodes * nodes).map(|pair| (pair / nodes, pair % nodes));
     let raw: Vec<Vec3> = pairs.map(|(o, i)| Vec3::new(at(o, i, 0), at(o, i, 1), at(o, i, 2))).collect();
-    Ok(InterreflectionTable::new(settings.grid, &raw, transport.met()))
+    Ok(InterreflectionTable::new(settings.grid, &raw, transport.hit_fraction()))
 }
 
-impl<'a> Scene<'a> {
+impl<'a> Exchange<'a> {
     fn new(
         facets: &'a Facets,
         visibility: &Visibility,
@@ -105,12 +104,12 @@ impl<'a> Scene<'a> {
     ) -> Self {
         let nodes = settings.grid.directions();
         let elements = &transport.facets;
-        let of = |s: &u32| &all[material_of_slot[usize::from(facets.slots[*s as usize])]];
-        let materials: Vec<&Material> = elements.iter().map(of).collect();
+        let material = |s: &u32| &all[material_of_slot[usize::from(facets.slots[*s as usize])]];
+        let materials: Vec<&Material> = elements.iter().map(material).collect();
         let colors: Vec<Vec3> =
             elements.iter().zip(&materials).map(|(s, material)| facets.colors[*s as usize] * material.color).collect();
-        let plain: Vec<Vec3> = all.iter().map(|material| mean_albedo(&material.brdf, 8, 24)).collect();
-        let albedo = |s: &u32| plain[material_of_slot[usize::from(facets.slots[*s as usize])]];
+        let material_albedos: Vec<Vec3> = all.iter().map(|material| mean_albedo(&material.brdf, 8, 24)).collect();
+        let albedo = |s: &u32| material_albedos[material_of_slot[usize::from(facets.slots[*s as usize])]];
         let albedos: Vec<Vec3> =
             elements.iter().zip(&colors).map(|(s, color)| (albedo(s) * *color).min(Vec3::ONE)).collect();
         let rows: Vec<Vec<f32>> = nodes
@@ -121,50 +120,51 @@ impl<'a> Scene<'a> {
                 elements.iter().map(|&s| all[s as usize]).collect()
             })
             .collect();
-        let mut seen = vec![0.0; elements.len() * nodes.len()];
+        let mut transposed = vec![0.0; elements.len() * nodes.len()];
         for (node, row) in rows.iter().enumerate() {
             for (element, v) in row.iter().enumerate() {
-                seen[element * nodes.len() + node] = *v;
+                transposed[element * nodes.len() + node] = *v;
             }
         }
-        let achromatic = colors.iter().all(|color| has_no_hue(*color)) && materials.iter().all(|one| is_grey(one));
-        let images = Images::new(settings.grid, settings.mirrors);
+        let achromatic =
+            colors.iter().all(|color| has_no_hue(*color)) && materials.iter().all(|material| is_grey(material));
+        let mirrored = MirroredNodes::new(settings.grid, settings.mirrors);
         let channels = if achromatic { 1 } else { 3 };
-        Self { facets, transport, materials, colors, albedos, nodes, seen, images, channels }
+        Self { facets, transport, materials, colors, albedos, nodes, visibility: transposed, mirrored, channels }
     }
 
-    /// `f(away, node) / (n·away) · V(node)` of an element for some nodes: radiance sent along `away` for light of unit irradiance
-    /// from a node, or what a viewer at the node takes of light that comes along `-away`.
-    fn lobe(&self, element: usize, away: Vec3, of: impl ExactSizeIterator<Item = usize>, out: &mut [f32]) {
+    /// `f(away, node) / (n·away) · V(node)` of an element for some nodes: the radiance that it sends along `away` per
+    /// unit irradiance from a node or, for a viewer at the node, the weight of light that arrives along `-away`.
+    fn lobe(&self, element: usize, away: Vec3, at: impl ExactSizeIterator<Item = usize>, out: &mut [f32]) {
         let normal = self.facets.normals[self.transport.facets[element] as usize];
         let cosine = normal.dot(away);
         let count = self.nodes.len();
-        let seen = &self.seen[element * count..(element + 1) * count];
+        let visibility = &self.visibility[element * count..(element + 1) * count];
         let brdf = &self.materials[element].brdf;
         let scale = self.colors[element] / cosine.max(MIN_COSINE);
-        let wanted = of.len();
-        for (row, node) in of.enumerate() {
+        let rows = at.len();
+        for (row, node) in at.enumerate() {
             let to = self.nodes[node];
-            let visible = cosine > 0.0 && seen[node] > 0.0 && normal.dot(to) > 0.0;
+            let visible = cosine > 0.0 && visibility[node] > 0.0 && normal.dot(to) > 0.0;
             let value = if visible {
-                brdf.f_cos(&LobeAngles::new(normal, away, to, half_vector(away, to))) * scale * seen[node]
+                brdf.f_cos(&LobeAngles::new(normal, away, to, half_vector(away, to))) * scale * visibility[node]
             } else {
                 Vec3::ZERO
             };
             for c in 0..self.channels {
-                out[(c * wanted + row) * BLOCK] = value[c];
+                out[(c * rows + row) * BLOCK] = value[c];
             }
         }
     }
 
-    /// Adds up the rays of the elements from `first` on: `G` of one bounce (a matrix a channel), and the irradiance that each of
-    /// them receives from the even and the odd half of its rays.
+    /// Sums the rays of the elements from `first` on. Returns `G` of one bounce, a matrix per channel, and writes the
+    /// irradiance that each element receives through the even and the odd half of its rays.
     fn one_bounce(&self, first: usize, halves: [&mut [f32]; 2]) -> Vec<f64> {
         let (nodes, channels, rays) = (self.nodes.len(), self.channels, self.transport.rays);
-        let viewers = self.images.computed.len();
+        let viewers = self.mirrored.computed.len();
         let elements = halves[0].len() / (nodes * channels);
         let mut g = vec![0.0_f64; channels * viewers * nodes];
-        // A column a ray.
+        // One column per ray.
         let mut to_viewer = vec![0.0_f32; channels * viewers * BLOCK];
         let mut from_light = vec![0.0_f32; channels * nodes * BLOCK];
         let mut product = vec![0.0_f32; viewers * nodes];
@@ -186,13 +186,13 @@ impl<'a> Scene<'a> {
             let weight = self.transport.areas[at] * PI / rays as f32;
             for k in 0..rays {
                 let ray = at * rays + k;
-                let met = self.transport.hits[ray];
-                if met == NOTHING || self.is_black(at) || self.is_black(met as usize) {
+                let hit = self.transport.hits[ray];
+                if hit == NO_HIT || self.is_black(at) || self.is_black(hit as usize) {
                     continue;
                 }
                 let away = self.transport.directions[ray];
-                self.lobe(at, away, self.images.computed.iter().copied(), &mut to_viewer[filled..]);
-                self.lobe(met as usize, -away, 0..nodes, &mut from_light[filled..]);
+                self.lobe(at, away, self.mirrored.computed.iter().copied(), &mut to_viewer[filled..]);
+                self.lobe(hit as usize, -away, 0..nodes, &mut from_light[filled..]);
                 let half = &mut halves[k % 2][element * nodes * channels..(element + 1) * nodes * channels];
                 for (slot, sum) in half.iter_mut().enumerate() {
                     *sum += half_weight * from_light[slot * BLOCK + filled];
@@ -216,18 +216,18 @@ impl<'a> Scene<'a> {
         self.colors[element] == Vec3::ZERO
     }
 
-    /// Irradiance after one more reflection by matte surfaces.
-    fn matte_bounce(&self, arriving: &[f32]) -> Vec<f32> {
+    /// Irradiance after one more reflection by diffuse surfaces.
+    fn diffuse_bounce(&self, arriving: &[f32]) -> Vec<f32> {
         let (width, nodes, rays) = (self.nodes.len() * self.channels, self.nodes.len(), self.transport.rays);
         let mut next = vec![0.0_f32; arriving.len()];
         next.par_chunks_mut(width).enumerate().for_each(|(element, next)| {
-            for &met in &self.transport.hits[element * rays..(element + 1) * rays] {
-                if met == NOTHING {
+            for &hit in &self.transport.hits[element * rays..(element + 1) * rays] {
+                if hit == NO_HIT {
                     continue;
                 }
-                let from = &arriving[met as usize * width..(met as usize + 1) * width];
+                let from = &arriving[hit as usize * width..(hit as usize + 1) * width];
                 for (c, (next, from)) in next.chunks_mut(nodes).zip(from.chunks(nodes)).enumerate() {
-                    let weight = self.albedos[met as usize][c] / rays as f32;
+                    let weight = self.albedos[hit as usize][c] / rays as f32;
                     next.iter_mut().zip(from).for_each(|(next, from)| *next += weight * from);
                 }
             }
@@ -235,17 +235,17 @@ impl<'a> Scene<'a> {
         next
     }
 
-    /// Adds `E₁(o)ᵀ D E(i)`.
-    fn leave(&self, to_viewer: &[f32], incident: &[f32], g: &mut [f64]) {
+    /// Adds `E₁(o)ᵀ D E(i)` to `g`.
+    fn add_reflected(&self, to_viewer: &[f32], incident: &[f32], g: &mut [f64]) {
         let (nodes, width) = (self.nodes.len(), self.nodes.len() * self.channels);
-        let (count, viewers) = (self.transport.facets.len(), self.images.computed.len());
+        let (count, viewers) = (self.transport.facets.len(), self.mirrored.computed.len());
         let (mut a, mut b, mut product) =
             (vec![0.0_f32; viewers * count], vec![0.0_f32; nodes * count], vec![0.0_f32; viewers * nodes]);
         for c in 0..self.channels {
             for element in 0..count {
                 let weight = self.transport.areas[element] * self.albedos[element][c] * FRAC_1_PI;
                 let from = element * width + c * nodes;
-                for (row, viewer) in self.images.computed.iter().enumerate() {
+                for (row, viewer) in self.mirrored.computed.iter().enumerate() {
                     a[row * count + element] = weight * to_viewer[from + viewer];
                 }
                 for node in 0..nodes {
@@ -263,7 +263,7 @@ fn has_no_hue(color: Vec3) -> bool {
     color.max_element() - color.min_element() <= 1e-6 * color.max_element()
 }
 
-/// Does a material reflect all channels alike? A measured one is taken not to.
+/// Returns true if a material reflects all channels alike. Measured BRDFs count as coloured.
 pub fn is_grey(material: &Material) -> bool {
     has_no_hue(material.color)
         && material.brdf.terms.iter().all(|term| match term {

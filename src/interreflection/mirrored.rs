@@ -1,50 +1,52 @@
-//! Nodes of a polar grid under the mirror planes of a tile: one of each set of images is computed, the others follow.
+//! Nodes of a polar grid under the mirror planes of a tile. One of each set of mirror images is computed; the others
+//! follow.
 
 use crate::math::directions::PolarGrid;
 
-/// For each node the one that is computed in its place, and the reflection that takes the one to the other.
+/// For each node, the node that is computed in its place and the reflection that maps one to the other.
 #[derive(Debug, Clone)]
-pub(super) struct Images {
+pub(super) struct MirroredNodes {
     /// Nodes that are computed.
     pub computed: Vec<usize>,
     /// Position in `computed`, and the reflection, of each node.
-    place: Vec<(usize, Reflection)>,
+    originals: Vec<(usize, Reflection)>,
     grid: PolarGrid,
 }
 
-/// Mirrored in a plane x = const, in a plane y = const.
+/// Reflections in a plane x = const and in a plane y = const.
 type Reflection = [bool; 2];
 
-impl Images {
+impl MirroredNodes {
     pub fn new(grid: PolarGrid, planes: [bool; 2]) -> Self {
         let group: Vec<Reflection> = [[false, false], [true, false], [false, true], [true, true]]
             .into_iter()
             .filter(|[x, y]| (!x || planes[0]) && (!y || planes[1]))
             .collect();
         let mut computed = Vec::new();
-        let mut place = Vec::with_capacity(grid.len());
+        let mut originals = Vec::with_capacity(grid.len());
         for node in 0..grid.len() {
             let images = group.iter().map(|reflection| (image(grid, node, *reflection), *reflection));
-            // Ties are broken by the order of the group: the identity comes first.
+            // The order of the group breaks ties; the identity is its first element.
             let (lowest, reflection) =
                 images.fold((usize::MAX, [false; 2]), |best, found| if found.0 < best.0 { found } else { best });
             if lowest == node {
                 computed.push(node);
             }
-            // Images of a node come after it.
+            // The images of a node have higher indices, so `computed` already contains `lowest`.
             let at = computed.binary_search(&lowest).unwrap_or(0);
-            place.push((at, reflection));
+            originals.push((at, reflection));
         }
-        Self { computed, place, grid }
+        Self { computed, originals, grid }
     }
 
-    /// Where the value of `(row, column)` was computed: a position in `computed`, and a column.
-    pub fn of(&self, row: usize, column: usize) -> (usize, usize) {
-        let (at, reflection) = self.place[row];
+    /// The entry that has the value of `(row, column)`: a position in `computed`, and a column.
+    pub fn original_of(&self, row: usize, column: usize) -> (usize, usize) {
+        let (at, reflection) = self.originals[row];
         (at, image(self.grid, column, reflection))
     }
 }
 
+/// The mirror image of a node.
 fn image(grid: PolarGrid, node: usize, [x, y]: Reflection) -> usize {
     let n = grid.azimuths;
     let (ring, mut azimuth) = (node / n, node % n);
@@ -74,22 +76,23 @@ mod tests {
                 assert!((grid.direction(image(grid, node, planes)) - mirrored).length() < 1e-5);
             }
         }
-        let counts = [[false; 2], [true, false], [true, true]].map(|planes| Images::new(grid, planes).computed.len());
+        let counts =
+            [[false; 2], [true, false], [true, true]].map(|planes| MirroredNodes::new(grid, planes).computed.len());
         assert_eq!(counts, [60, 5 * 7, 5 * 4]);
     }
 
     #[test]
-    fn a_function_with_the_symmetry_is_rebuilt_from_what_was_computed() {
+    fn a_symmetric_function_is_rebuilt_from_its_computed_values() {
         let grid = PolarGrid::new(3, 8);
-        // Unchanged when both directions are mirrored together.
+        // Invariant when both directions are mirrored together.
         let f = |o: Vec3, i: Vec3| o.x * i.x + 0.3 * o.y * i.y + 0.1 * o.z * i.z * i.z;
         for planes in [[false; 2], [true, false], [false, true], [true, true]] {
-            let images = Images::new(grid, planes);
+            let mirrored = MirroredNodes::new(grid, planes);
             for row in 0..grid.len() {
                 for column in 0..grid.len() {
-                    let (at, image) = images.of(row, column);
-                    let made = f(grid.direction(images.computed[at]), grid.direction(image));
-                    assert!((made - f(grid.direction(row), grid.direction(column))).abs() < 1e-5);
+                    let (at, image) = mirrored.original_of(row, column);
+                    let rebuilt = f(grid.direction(mirrored.computed[at]), grid.direction(image));
+                    assert!((rebuilt - f(grid.direction(row), grid.direction(column))).abs() < 1e-5);
                 }
             }
         }

@@ -1,8 +1,10 @@
-//! Light that facets send to each other before it leaves the tile: what the paper leaves out (Wu et al. 2011, Sec. 6, Fig. 12).
+//! Interreflection: light that facets send to each other before it leaves the tile. The paper leaves it out (Wu et al.
+//! 2011, Sec. 6, Fig. 12).
 //!
-//! One bounce (light, facet, facet, viewer) takes both facets' own BRDFs. Of more bounces the first and the last facet keep
-//! theirs, and those between reflect as matte surfaces of the same albedo. What comes out is smooth, so a coarse
-//! table over light and viewer holds it; it is symmetric, as `G` is, and is added to what the facets reflect directly.
+//! One bounce (light, facet, facet, viewer) evaluates the BRDFs of both facets. With more bounces, the first and the
+//! last facet keep their BRDFs, and the facets between reflect as diffuse surfaces of the same albedo. The result is
+//! smooth, so a coarse table over light and view directions stores it. The table is symmetric, as `G` is, and its
+//! values are added to the direct reflection.
 
 mod bounces;
 mod mirrored;
@@ -21,34 +23,36 @@ pub use transport::Transport;
 use crate::brdf::Brdf;
 use crate::math::directions::PolarGrid;
 
-/// How finely facets exchange light.
+/// Resolution of the light exchange between facets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InterreflectionSettings {
-    /// Points of the surface that send and receive.
+    /// Number of surface points that send and receive light.
     pub elements: usize,
-    /// Directions that each looks into; even.
+    /// Rays per element; even.
     pub rays: usize,
-    /// Reflections between facets that are followed, at least one.
+    /// Reflections between facets that are computed; at least one.
     pub bounces: usize,
     /// Nodes of the table.
     pub grid: PolarGrid,
-    /// Planes x = const and y = const that mirror the tile: what they tell is not computed.
+    /// Planes x = const and y = const that map the tile to itself. Values that follow from this symmetry are not
+    /// computed.
     pub mirrors: [bool; 2],
 }
 
-/// The part of uniform light that a surface reflects: `∫ albedo(θ) 2 sin θ cos θ dθ`, at most 1; over so many rings, each a
-/// quadrature of `samples²` points.
+/// The fraction of uniform light that a surface reflects: `∫ albedo(θ) 2 sin θ cos θ dθ`, at most 1. The integral uses
+/// `rings` values of θ, with a quadrature of `samples²` points for each.
 pub fn mean_albedo(brdf: &Brdf, rings: usize, samples: usize) -> Vec3 {
     let ring = |k: usize| {
-        // Equal parts of sin²θ.
+        // Even steps of sin²θ.
         let sine = ((k as f32 + 0.5) / rings as f32).sqrt();
         brdf.directional_albedo(sine.asin(), samples)
     };
     ((0..rings).map(ring).sum::<Vec3>() / rings as f32).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
-/// What interreflection adds to the reflected light of a tile, as a part of it: surfaces of this albedo, of which `hidden` is the
-/// part of the hemisphere where they see each other. `Σ (ρ h)^k` is the mean over a tile under uniform light.
+/// Predicts the light that interreflection adds, relative to direct reflection, for facets of albedo `ρ` that see each
+/// other in the fraction `h` (`hidden`) of their hemisphere. It is `Σ (ρ h)^k`, the mean over a tile under uniform
+/// light.
 pub fn predicted_share(albedo: f64, hidden: f64) -> f64 {
     let once = (albedo * hidden).clamp(0.0, 0.999);
     once / (1.0 - once)

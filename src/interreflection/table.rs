@@ -1,34 +1,36 @@
-//! The part of `G` that comes from light between facets, on a coarse grid.
+//! The interreflected part of `G` on a coarse grid.
 
 use glam::{DVec3, Vec3};
 
 use crate::math::directions::PolarGrid;
 
-/// `G_indirect` at the nodes of a polar grid for both directions [1/sr]; symmetric.
+/// `G_indirect` [1/sr] at the nodes of a polar grid for both directions; symmetric.
 #[derive(Debug, Clone)]
 pub struct InterreflectionTable {
     pub grid: PolarGrid,
     /// Row `o`, column `i`.
     values: Vec<Vec3>,
-    /// Rays that met another facet, as a part of all.
-    pub met: f64,
+    /// Fraction of all rays that hit an element.
+    pub hit_fraction: f64,
 }
 
 impl InterreflectionTable {
-    /// From `G` at all pairs of nodes, row by row; what noise made unequal is made equal.
-    pub(super) fn new(grid: PolarGrid, raw: &[Vec3], met: f64) -> Self {
+    /// Makes a table from `G` at all pairs of nodes, row by row. The two values of a swapped pair, which differ by
+    /// noise, are averaged.
+    pub(super) fn new(grid: PolarGrid, raw: &[Vec3], hit_fraction: f64) -> Self {
         let n = grid.len();
         let values = (0..n * n).map(|at| 0.5 * (raw[at] + raw[at % n * n + at / n]).max(Vec3::ZERO)).collect();
-        Self { grid, values, met }
+        Self { grid, values, hit_fraction }
     }
 
-    /// Bytes held.
+    /// Size of the values in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.values.as_slice())
     }
 
-    /// `G_indirect(i, o)` of each light into `out` [1/sr]; 0 where either is at or under the horizon.
-    pub fn add(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) {
+    /// Calls `out` with the index and `G_indirect(i, o)` [1/sr] of each light; 0 if a direction is at or below the
+    /// horizon.
+    pub fn eval_lights(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) {
         let n = self.grid.len();
         let to_viewer = self.grid.taps(o);
         for (k, &i) in lights.iter().enumerate() {

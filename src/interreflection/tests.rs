@@ -32,7 +32,7 @@ fn effective(geometry: &str, brdf: &str, effects: &str) -> EffectiveBrdf {
     (*outcome.brdf).clone()
 }
 
-/// `∫ f̄(i, o) dω_i`: what a tile under uniform light of radiance one sends to the viewer.
+/// `∫ f̄(i, o) dω_i`: the radiance that a tile under uniform light of radiance one sends to the viewer.
 fn furnace(brdf: &EffectiveBrdf, o: Vec3) -> f64 {
     let grid = PolarGrid::new(24, 48);
     let add = |node: usize| f64::from(grid.solid_angle(node) * brdf.eval(grid.direction(node), o).x);
@@ -49,23 +49,23 @@ fn a_white_cavity_returns_what_it_receives_as_bounces_grow() {
     let direct = with("");
     let mut last = direct;
     for bounces in [1, 2, 8] {
-        let now = with(&format!("interreflection = \"on\"\nbounces = {bounces}"));
-        for (more, less) in now.iter().zip(last) {
-            assert!(*more > less, "{bounces}: {now:?} after {last:?}");
+        let sums = with(&format!("interreflection = \"on\"\nbounces = {bounces}"));
+        for (more, less) in sums.iter().zip(last) {
+            assert!(*more > less, "{bounces}: {sums:?} after {last:?}");
         }
-        last = now;
+        last = sums;
     }
     let all = with("interreflection = \"on\"\nbounces = 64");
     eprintln!("furnace: direct {direct:.3?}, eight bounces {last:.3?}, all {all:.3?}");
     for (some, all) in direct.iter().zip(all) {
-        assert!(*some < 0.8, "the cavity hides much: {some}");
+        assert!(*some < 0.8, "the cavity should block much of the light: {some}");
         assert!((all - 1.0).abs() < 0.03, "{all}");
     }
 }
 
 #[test]
 fn a_path_traced_white_cavity_returns_one_within_its_error_bars() {
-    // Lights uniform over the hemisphere: the mean of 2π f̄ is the integral.
+    // Lights are uniform over the hemisphere, so the mean of 2π f̄ is the integral.
     let o = from_angles(0.6, 0.5);
     let pairs: Vec<Pair> = (0..192)
         .map(|k| {
@@ -86,20 +86,20 @@ fn a_path_traced_white_cavity_returns_one_within_its_error_bars() {
         let variance = sum(|one| f64::from(one.standard_error.x).powi(2)) / (pairs.len() as f64).powi(2);
         (mean, variance.sqrt() * 2.0 * PI)
     };
-    let (few, _) = total(1);
+    let (one_bounce, _) = total(1);
     let (all, error) = total(40);
-    eprintln!("path traced: one bounce {few:.3}, forty {all:.3} ± {error:.3}");
-    assert!(few < 0.95 && all > few);
-    // Lights at fixed angles are a quadrature of their own: half a percent for it.
+    eprintln!("path traced: one bounce {one_bounce:.3}, forty {all:.3} ± {error:.3}");
+    assert!(one_bounce < 0.95 && all > one_bounce);
+    // Lights at fixed angles are a quadrature, too; half a percent covers its error.
     assert!((all - 1.0).abs() < 4.0 * error + 5e-3, "{all} ± {error}");
 }
 
 #[test]
-fn matrices_agree_with_path_tracing_for_matte_and_glossy_facets() {
+fn matrices_agree_with_path_tracing_for_diffuse_and_glossy_facets() {
     let pairs = mirror_biased_pairs(48, 9);
     let colored = r#"{ kind = "lambertian", albedo = [0.9, 0.5, 0.2] }"#;
     let glossy = r#"{ kind = "cook_torrance", roughness = 0.4, f0 = [0.9, 0.6, 0.3] }"#;
-    // Four normals: kinks between the table's nodes, the hardest case for it.
+    // Four normals give kinks between the table's nodes, the hardest case for the table.
     let pyramids = r#"{ kind = "pyramids", height = 0.5 }"#;
     for (geometry, brdf, bounces) in [(DEEP, colored, 3), (DEEP, glossy, 1), (pyramids, colored, 1)] {
         let scene = open(geometry, brdf, &format!("interreflection = \"on\"\nbounces = {bounces}"));
@@ -109,41 +109,41 @@ fn matrices_agree_with_path_tracing_for_matte_and_glossy_facets() {
         let right = Pipeline::new()
             .with_reference(&scene, |reference| reference.estimate(&pairs, &settings, |_, _| true))
             .unwrap();
-        let (mut off, mut noise, mut added, mut norm) = (0.0, 0.0, 0.0, 0.0);
+        let (mut error, mut noise, mut added, mut norm) = (0.0, 0.0, 0.0, 0.0);
         for (pair, right) in pairs.iter().zip(&right) {
             let got = outcome.brdf.eval(pair.i, pair.o).as_dvec3();
-            off += (got - right.f_bar.as_dvec3()).length_squared();
+            error += (got - right.f_bar.as_dvec3()).length_squared();
             noise += right.standard_error.as_dvec3().length_squared();
             added += (got - plain.eval(pair.i, pair.o).as_dvec3()).length_squared();
             norm += right.f_bar.as_dvec3().length_squared();
         }
-        let [off, noise, added] = [off, noise, added].map(|sum: f64| (sum / norm).sqrt());
-        eprintln!("{brdf}, {bounces} bounces: off {off:.4}, noise {noise:.4}, what bounces add {added:.4}");
-        assert!(added > 0.02, "a case without interreflection tells nothing: {added}");
+        let [error, noise, added] = [error, noise, added].map(|sum: f64| (sum / norm).sqrt());
+        eprintln!("{brdf}, {bounces} bounces: error {error:.4}, noise {noise:.4}, added by bounces {added:.4}");
+        assert!(added > 0.02, "a case without interreflection tests nothing: {added}");
         assert!(
-            (off * off - noise * noise).max(0.0).sqrt() < 0.02 + 0.13 * added,
-            "{brdf}: {off} of {added}, noise {noise}"
+            (error * error - noise * noise).max(0.0).sqrt() < 0.02 + 0.13 * added,
+            "{brdf}: error {error} of {added}, noise {noise}"
         );
     }
 }
 
 #[test]
-fn mirror_planes_spare_work_and_change_little() {
-    let knobs = "interreflection = \"on\"\nbounces = 2";
-    let mirrored = Pipeline::new().effective(&open(DEEP, WHITE, knobs)).unwrap();
+fn mirror_planes_save_work_and_change_little() {
+    let settings = "interreflection = \"on\"\nbounces = 2";
+    let mirrored = Pipeline::new().effective(&open(DEEP, WHITE, settings)).unwrap();
     assert_eq!(mirrored.plan.mirrors, [true, true]);
-    let all = effective(DEEP, WHITE, &format!("{knobs}\nmirror_symmetry = \"off\""));
-    let (mut off, mut norm) = (0.0, 0.0);
+    let all = effective(DEEP, WHITE, &format!("{settings}\nmirror_symmetry = \"off\""));
+    let (mut error, mut norm) = (0.0, 0.0);
     for pair in mirror_biased_pairs(60, 4) {
         let (a, b) = (mirrored.brdf.eval(pair.i, pair.o).as_dvec3(), all.eval(pair.i, pair.o).as_dvec3());
-        off += (a - b).length_squared();
+        error += (a - b).length_squared();
         norm += b.length_squared();
     }
-    assert!((off / norm).sqrt() < 0.02, "{}", (off / norm).sqrt());
+    assert!((error / norm).sqrt() < 0.02, "{}", (error / norm).sqrt());
 }
 
 #[test]
-fn light_between_facets_is_reciprocal_and_never_negative() {
+fn interreflection_is_reciprocal_and_never_negative() {
     let brdf = effective(DEEP, WHITE, "interreflection = \"on\"");
     for pair in mirror_biased_pairs(60, 4) {
         let (a, b) = (brdf.g(pair.i, pair.o), brdf.g(pair.o, pair.i));
@@ -152,7 +152,7 @@ fn light_between_facets_is_reciprocal_and_never_negative() {
 }
 
 #[test]
-fn stages_of_light_between_facets_run_only_where_it_was_asked_for_and_there_is_any() {
+fn stages_of_interreflection_run_only_if_it_is_on_and_facets_see_each_other() {
     let runs = |geometry: &str, effects: &str| {
         let mut pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, WHITE, effects)).unwrap();
@@ -167,7 +167,7 @@ fn stages_of_light_between_facets_run_only_where_it_was_asked_for_and_there_is_a
 }
 
 #[test]
-fn an_edit_of_colour_casts_no_ray_again() {
+fn a_colour_edit_does_not_cast_rays_again() {
     let mut pipeline = Pipeline::new();
     let mut loaded = open(DEEP, WHITE, "interreflection = \"on\"");
     pipeline.effective(&loaded).unwrap();

@@ -1,17 +1,17 @@
-//! Numbers that mean the same everywhere (DESIGN.md, Sec. 7).
+//! Error measures, defined once for all reports.
 
 use glam::Vec3;
 
-/// How far `f̄` is from a reference, all channels together.
+/// Difference of `f̄` from a reference, over all channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// `‖x-ref‖ / ‖ref‖`; 0 where both vanish.
+    /// `‖x-ref‖ / ‖ref‖`; 0 if there is no difference.
     pub rel_l2: f64,
-    /// `20 log10(max ref / rms(x-ref))` [dB]; infinite where there is no difference.
+    /// `20 log10(max ref / rms(x-ref))` [dB]; infinite if there is no difference.
     pub psnr_db: f64,
 }
 
-/// Compares `f̄` with a reference, pair by pair.
+/// Compares values of `f̄` with a reference of the same pairs.
 pub fn compare(values: &[Vec3], reference: &[Vec3]) -> Errors {
     let (mut difference, mut norm, mut peak) = (0.0_f64, 0.0_f64, 0.0_f64);
     for (x, r) in values.iter().zip(reference) {
@@ -27,10 +27,10 @@ pub fn compare(values: &[Vec3], reference: &[Vec3]) -> Errors {
     }
 }
 
-/// The errors that pairs like these are likely to stay below: the mean squared difference and twice its standard error.
+/// An upper bound of the errors of similar pairs: the mean squared difference plus twice its standard error.
 ///
-/// Differences of interpolated tables have a long tail. A check on a few hundred pairs that misses it would pass a form
-/// whose error is twice as large on the next ones.
+/// The errors of interpolated tables have a long tail. A few hundred pairs may contain none of the large errors.
+/// Without the standard error, such a check would accept a representation with twice the error on other pairs.
 pub fn upper_errors(values: &[Vec3], reference: &[Vec3]) -> Errors {
     let plain = compare(values, reference);
     let squares: Vec<f64> =
@@ -50,19 +50,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tenth_of_a_constant_is_ten_percent_and_twenty_decibels() {
+    fn a_tenth_of_a_constant_is_ten_percent_and_20_db() {
         let errors = compare(&[Vec3::splat(1.1); 7], &[Vec3::ONE; 7]);
         assert!((errors.rel_l2 - 0.1).abs() < 1e-6 && (errors.psnr_db - 20.0).abs() < 1e-4);
         assert_eq!(compare(&[Vec3::ONE], &[Vec3::ONE]).psnr_db, f64::INFINITY);
     }
 
     #[test]
-    fn equal_differences_leave_nothing_to_doubt_and_a_single_one_much() {
+    fn equal_differences_have_no_standard_error_and_a_single_one_has_a_large_one() {
         let reference = [Vec3::ONE; 100];
         let even = [Vec3::splat(1.1); 100];
         assert_eq!(upper_errors(&even, &reference).psnr_db.round(), compare(&even, &reference).psnr_db.round());
         assert!((upper_errors(&even, &reference).rel_l2 - 0.1).abs() < 1e-6);
-        // One of a hundred: mean 1/100, standard error 1/100 of its square; √3 in all.
+        // One of a hundred squares is 1: the mean and its standard error are both 1/100, so the factor is √3.
         let mut one = reference;
         one[7] = Vec3::splat(2.0);
         let ratio = upper_errors(&one, &reference).rel_l2 / compare(&one, &reference).rel_l2;

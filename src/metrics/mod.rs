@@ -1,4 +1,4 @@
-//! Error measures, and the direction pairs over which they are taken.
+//! Error measures, and the direction pairs over which they are computed.
 
 mod errors;
 mod pairs;

@@ -1,4 +1,4 @@
-//! Direction pairs that accuracy is measured over.
+//! Direction pairs for measurements of accuracy.
 
 use std::f32::consts::TAU;
 
@@ -11,14 +11,14 @@ use crate::math::directions::from_angles;
 /// A pair of unit directions in the small-scale frame.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pair {
-    /// Towards the light.
+    /// Direction towards the light.
     pub i: Vec3,
-    /// Towards the viewer.
+    /// Direction towards the viewer.
     pub o: Vec3,
 }
 
-/// `count` pairs as pictures ask for them: views by the area they cover (the cosine of their angle), lights from everywhere,
-/// every second one near the mirror direction of its view.
+/// Creates `count` pairs that are distributed as in images. Views have the density of projected area (the cosine of the
+/// polar angle). Lights are uniform in solid angle, and every second one is near the mirror direction of its view.
 pub fn image_pairs(count: usize, seed: u64) -> Vec<Pair> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut pairs = Vec::with_capacity(count);
@@ -37,12 +37,13 @@ pub fn image_pairs(count: usize, seed: u64) -> Vec<Pair> {
     pairs
 }
 
-/// `count` pairs up to 85° from the normal, uniform in solid angle, every second one near the mirror direction of its light.
+/// Creates `count` pairs up to 85° from the normal, uniform in solid angle. Every second view is near the mirror
+/// direction of its light.
 pub fn mirror_biased_pairs(count: usize, seed: u64) -> Vec<Pair> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let lowest = 85.0_f32.to_radians().cos();
+    let min_cosine = 85.0_f32.to_radians().cos();
     let direction = |rng: &mut ChaCha8Rng| {
-        let cosine: f32 = lowest + (1.0 - lowest) * rng.random::<f32>();
+        let cosine: f32 = min_cosine + (1.0 - min_cosine) * rng.random::<f32>();
         from_angles(cosine.acos(), TAU * rng.random::<f32>())
     };
     let mut pairs = Vec::with_capacity(count);
@@ -52,7 +53,7 @@ pub fn mirror_biased_pairs(count: usize, seed: u64) -> Vec<Pair> {
         if pairs.len() % 2 == 1 {
             let spread = Vec2::new(rng.random::<f32>() - 0.5, rng.random::<f32>() - 0.5) * 0.5;
             o = (Vec3::new(-i.x, -i.y, i.z) + spread.extend(0.0)).try_normalize().unwrap_or(Vec3::Z);
-            if o.z < lowest {
+            if o.z < min_cosine {
                 continue;
             }
         }

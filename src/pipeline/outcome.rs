@@ -1,64 +1,63 @@
-//! What the pipeline hands out.
+//! The results of the pipeline.
 
 use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
-use super::ShadingBrdf;
-use super::StageTimes;
-use super::images::Images;
+use super::shading::{Shading, ShadingBrdf};
+use super::stage::StageTimes;
 use crate::base::{Cancel, Result};
 use crate::diagnostics::{Health, HealthInputs, Limits};
 use crate::effective::{EffectiveBrdf, Reflectance};
 use crate::metrics::Errors;
 use crate::plan::{Plan, Settings};
 
-/// What the stages made of a scene.
+/// The effective BRDF of a scene, and how it was computed.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     pub brdf: Arc<EffectiveBrdf>,
     pub plan: Plan,
     pub settings: Settings,
-    /// What ran this time.
+    /// The stages that ran this time.
     pub times: StageTimes,
-    /// What the factored form's error against the direct sum stays below, where it was tried.
+    /// An upper bound of the errors of the low-rank representation against the direct sum, if it was tried.
     pub factored: Option<Errors>,
     pub notes: Vec<String>,
-    /// What the health is measured from.
-    pub evidence: HealthInputs,
-    /// The health, once it was asked for: see [`Outcome::health`].
+    /// The inputs of the health report.
+    pub health_inputs: HealthInputs,
+    /// The health report, once [`Outcome::health`] computed it.
     pub examined: Arc<OnceLock<Health>>,
-    pub(super) images: Arc<Images>,
+    pub(super) shading: Arc<Shading>,
 }
 
 impl Outcome {
-    /// The same, as whoever did not have to wait for it sees it.
+    /// The same outcome for a caller that did not wait for it: without times.
     pub fn without_times(self) -> Self {
         Self { times: StageTimes::new(), ..self }
     }
 
-    /// What pictures read instead of [`Outcome::brdf`]: a table of it where that pays and is close enough. The first call
-    /// makes it.
+    /// The representation that images read instead of [`Outcome::brdf`]: a table of it if that pays and is close enough. The
+    /// first call computes it.
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
     pub fn shading_brdf(&self, cancel: &Cancel) -> Result<ShadingBrdf> {
-        self.images.get(cancel)
+        self.shading.get(cancel)
     }
 
-    /// What [`Outcome::shading_brdf`] made, if it was asked before.
+    /// The result of [`Outcome::shading_brdf`], if it was computed.
     pub fn known_shading_brdf(&self) -> Option<Arc<EffectiveBrdf>> {
-        self.images.made()
+        self.shading.known()
     }
 
-    /// How sound the result is. Measured when first asked for: some hundredths of a second at draft.
+    /// The health of the result. The first call measures it: some hundredths of a second at draft.
     pub fn health(&self) -> &Health {
         let limits = limits(&self.settings);
-        self.examined.get_or_init(|| Health::of(&self.brdf, &self.evidence, self.factored, limits))
+        self.examined.get_or_init(|| Health::of(&self.brdf, &self.health_inputs, self.factored, limits))
     }
 }
 
-/// What an examination needs to know of the settings.
+/// The settings that the health report needs.
 pub(super) fn limits(settings: &Settings) -> Limits {
     Limits { max_rank: settings.max_rank, tolerance: settings.tolerance }
 }

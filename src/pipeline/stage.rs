@@ -1,61 +1,162 @@
-//! A stage of the pipeline: its last result, and what it was made from.
+//! Stages: pure functions from inputs to one output, identified by the key of everything that they depend on.
 
-use std::sync::Arc;
+use std::any::Any;
+use std::collections::HashMap;
+use std::ops::Deref;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use super::StageTimes;
-use crate::base::{Cancel, Result};
+use super::Env;
+use crate::base::Result;
+use crate::cache::{Cache, Key, KeyBuilder, Reader, Stored, Writer};
 
-/// Counts the results that a stage has made.
-pub(super) type Version = u64;
+/// Milliseconds of the stages that ran, in order. A stage whose result was known is not listed.
+pub type StageTimes = Vec<(&'static str, f64)>;
 
-/// A stage's last result and the key it was made from.
-///
-/// The key holds the versions of all upstream results it was made from. (A flag "upstream is new" will not do: whoever
-/// asks for the mesh or the materials alone, as the reference does, would swallow it.)
+/// A pure function of settings and of the results of earlier stages.
+pub trait Stage {
+    type Output: Send + Sync + 'static;
+    /// The name in times and JSON.
+    const NAME: &'static str;
+    /// How the output is stored on disk; `None` if it never is.
+    const CODEC: Option<Codec<Self::Output>> = None;
+
+    /// Adds the settings of this stage and the keys of its inputs. Files count by their content.
+    fn hash_into(&self, key: &mut KeyBuilder);
+
+    /// Computes the output. `env` never decides a result.
+    ///
+    /// # Errors
+    /// A file that cannot be used, a computation that fails, or [`crate::base::Error::Cancelled`].
+    fn run(&self, env: &Env) -> Result<Self::Output>;
+
+    /// Returns true if an output of this stage may be read from disk and written there.
+    fn is_portable(&self) -> bool {
+        true
+    }
+
+    /// Returns true if a stored output has the shape that the inputs call for.
+    fn accepts(&self, _: &Self::Output) -> bool {
+        true
+    }
+}
+
+/// The functions that write an output to disk and read it back, bit for bit.
+pub struct Codec<T> {
+    write: fn(&T, &mut Writer),
+    read: fn(&mut Reader<'_>) -> Option<T>,
+    /// The name in times of an output that was read.
+    cached_name: &'static str,
+}
+
+impl<T: Stored> Codec<T> {
+    pub const fn new(cached_name: &'static str) -> Self {
+        Self { write: T::write, read: T::read, cached_name }
+    }
+}
+
+/// A result and the key of everything that it depends on.
 #[derive(Debug)]
-pub(super) struct Stage<K, T> {
-    last: Option<(K, Arc<T>)>,
-    /// Counts the results made.
-    version: Version,
+pub struct Keyed<T> {
+    pub key: Key,
+    pub value: Arc<T>,
 }
 
-impl<K, T> Default for Stage<K, T> {
-    fn default() -> Self {
-        Self { last: None, version: 0 }
+impl<T> Clone for Keyed<T> {
+    fn clone(&self) -> Self {
+        Self { key: self.key, value: self.value.clone() }
     }
 }
 
-impl<K, T> Stage<K, T> {
-    /// How often the stage ran.
-    pub(super) fn runs(&self) -> u64 {
-        self.version
+impl<T> Deref for Keyed<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.value
     }
 }
 
-impl<K: PartialEq, T> Stage<K, T> {
-    /// The last result if `key` is the same, else a new one, timed; with its version.
-    pub(super) fn get(
-        &mut self,
-        name: &'static str,
-        key: K,
+/// The last result of each stage, by the stage's name.
+#[derive(Debug, Default)]
+pub(super) struct Memo(Mutex<HashMap<&'static str, Slot>>);
+
+#[derive(Debug)]
+struct Slot {
+    key: Key,
+    value: Arc<dyn Any + Send + Sync>,
+    runs: u64,
+}
+
+impl Memo {
+    fn get<T: Send + Sync + 'static>(&self, name: &'static str, key: Key) -> Option<Arc<T>> {
+        let slots = lock(&self.0);
+        let slot = slots.get(name).filter(|slot| slot.key == key)?;
+        slot.value.clone().downcast().ok()
+    }
+
+    fn put<T: Send + Sync + 'static>(&self, name: &'static str, key: Key, value: &Arc<T>) {
+        let mut slots = lock(&self.0);
+        let runs = slots.get(name).map_or(0, |slot| slot.runs) + 1;
+        slots.insert(name, Slot { key, value: value.clone(), runs });
+    }
+
+    /// How often a stage ran or was read from disk.
+    pub(super) fn runs(&self, name: &str) -> u64 {
+        lock(&self.0).get(name).map_or(0, |slot| slot.runs)
+    }
+
+    /// Returns the memoized output of a stage, or computes it. A cancelled stage is not stored.
+    pub(super) fn get_or_run<S: Stage>(
+        &self,
+        stage: &S,
+        env: &Env,
+        disk: &Cache,
         times: &mut StageTimes,
-        cancel: &Cancel,
-        make: impl FnOnce() -> Result<T>,
-    ) -> Result<(Arc<T>, Version)> {
-        if let Some((last, value)) = &self.last
-            && *last == key
-        {
-            return Ok((value.clone(), self.version));
+    ) -> Result<Keyed<S::Output>> {
+        let mut key = KeyBuilder::of_stage(S::NAME);
+        stage.hash_into(&mut key);
+        let key = key.finish();
+        if let Some(value) = self.get(S::NAME, key) {
+            return Ok(Keyed { key, value });
         }
-        cancel.check()?;
-        let start = Instant::now();
-        let value = Arc::new(make()?);
-        // A stage that was told to stop may have made anything.
-        cancel.check()?;
-        times.push((name, start.elapsed().as_secs_f64() * 1e3));
-        self.last = Some((key, value.clone()));
-        self.version += 1;
-        Ok((value, self.version))
+        let value = Arc::new(compute(stage, key, env, disk, times)?);
+        self.put(S::NAME, key, &value);
+        Ok(Keyed { key, value })
     }
+}
+
+/// Reads the output of a stage from disk, or runs the stage and stores the output if that took long enough.
+fn compute<S: Stage>(stage: &S, key: Key, env: &Env, disk: &Cache, times: &mut StageTimes) -> Result<S::Output> {
+    env.cancel.check()?;
+    let start = Instant::now();
+    let stored = S::CODEC.filter(|_| stage.is_portable()).map(|codec| (codec, disk.entry_of(key)));
+    if let Some((codec, entry)) = &stored
+        && let Some(value) = entry.read(codec.read).filter(|value| stage.accepts(value))
+    {
+        times.push((codec.cached_name, elapsed_ms(start)));
+        return Ok(value);
+    }
+    let value = stage.run(env)?;
+    // A cancelled stage may have returned anything.
+    env.cancel.check()?;
+    times.push((S::NAME, elapsed_ms(start)));
+    if let Some((codec, entry)) = &stored {
+        entry.store(start, &value, codec.write);
+    }
+    Ok(value)
+}
+
+/// Runs a stage whose output is not memoized, only cached on disk.
+pub(super) fn run_uncounted<S: Stage>(stage: &S, env: &Env, disk: &Cache, times: &mut StageTimes) -> Result<S::Output> {
+    let mut key = KeyBuilder::of_stage(S::NAME);
+    stage.hash_into(&mut key);
+    compute(stage, key.finish(), env, disk, times)
+}
+
+pub(super) fn elapsed_ms(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,270 +1,440 @@
-//! The decisions: every effect on or off, with a reason a person can read.
+//! The table of effects: one row per effect, physics first.
+//!
+//! A new effect is a row here and a switch in `[effects]` (`src/scene/effects.rs`).
 
-use serde::Serialize;
+use super::algorithm::{hidden_light, maps_ms, scan_ms};
+use super::context::Context;
+use super::{
+    Effect, EffectKind, FAINT_FRACTION, IMAGE_CHECK_PAIRS, Method, Preset, VisibilityAlgorithm, VisibilityMethod, is_on,
+};
+use crate::interreflection::predicted_share;
+use crate::scene::{Effects, Switch};
 
-use super::{Costs, Method, Preset, SceneFeatures, Settings, VisibilityAlgorithm, VisibilityMethod, decisions};
-
-/// One effect of the plan, as `biscale plan --json` prints it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Effect {
-    pub name: &'static str,
-    pub on: bool,
-    pub reason: String,
-    pub predicted_ms: f64,
-    /// `None` until the stage has run.
-    pub measured_ms: Option<f64>,
-    /// Did a person force it?
-    pub forced: bool,
-    /// Where it is off by itself: the relative L2 of `f̄` that turning it on changes at most.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bound: Option<f64>,
+/// An effect and the function that decides it.
+struct Row {
+    name: &'static str,
+    kind: EffectKind,
+    /// The field of `[effects]` that forces the effect; `None` if no such field exists.
+    switch: Option<fn(&mut Effects) -> &mut Switch>,
+    decide: fn(&Context<'_>, Switch) -> Decision,
 }
 
-/// Queries of the picture that the cost model has in mind: 384x384, 32 lights, a third of them lit and covered.
-pub(super) const IMAGE_QUERIES: f64 = 384.0 * 384.0 * 32.0 / 3.0;
-
-/// Pairs of directions on which what pictures read is held against the BRDF.
-pub const IMAGE_CHECK_PAIRS: usize = 512;
-
-/// What will be done.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    pub route: VisibilityAlgorithm,
-    /// Try the factored form first; it must pass its check against the direct sum.
-    pub try_low_rank: bool,
-    /// Add light that facets send to each other.
-    pub interreflection: bool,
-    /// Mirror planes that spare the other half of the directions.
-    pub mirrors: [bool; 2],
-    /// Try a table for pictures first; it must pass its check against the BRDF.
-    pub try_shading_table: bool,
-    pub effects: Vec<Effect>,
+/// The decision on one effect.
+struct Decision {
+    on: bool,
+    reason: String,
+    predicted_ms: f64,
+    /// An upper bound of the relative L2 of `f̄` that turning the effect on changes, if it is off by itself.
+    bound: Option<f64>,
 }
 
-impl Plan {
-    /// Does the route look for more than one horizon an azimuth?
-    pub fn overhangs(&self) -> bool {
-        matches!(
-            self.route,
-            VisibilityAlgorithm::OcclusionIntervals | VisibilityAlgorithm::CpuMaps | VisibilityAlgorithm::GpuMaps
-        )
+impl Decision {
+    fn new(on: bool, reason: impl Into<String>) -> Self {
+        Self { on, reason: reason.into(), predicted_ms: 0.0, bound: None }
     }
 
-    /// Is an effect on?
-    pub fn is_on(&self, name: &str) -> bool {
-        self.effects.iter().any(|effect| effect.name == name && effect.on)
+    fn costs(self, predicted_ms: f64) -> Self {
+        Self { predicted_ms, ..self }
     }
 
-    /// Notes how far the factored form was from the direct sum, and whether it was kept.
-    pub fn factored(&mut self, kept: bool, rel_l2: f64) {
-        for effect in &mut self.effects {
-            if effect.name == "low_rank" {
-                effect.on = kept;
-                let verdict = if kept { "kept" } else { "given up, summed directly" };
-                effect.reason.push_str(&format!("; it is {:.1} % from it: {verdict}", rel_l2 * 100.0));
-            }
+    fn changes_at_most(self, bound: f64) -> Self {
+        Self { bound: Some(bound), ..self }
+    }
+}
+
+/// The bound of an effect that only changes the order of a sum.
+const ROUNDING: f64 = 1e-4;
+/// The bound of taking normals as one that differ by rounding.
+const SAME_NORMALS: f64 = 1e-3;
+/// The bound of an effect that does not touch f̄.
+const UNCHANGED: f64 = 0.0;
+
+use EffectKind::{Method as ByMethod, Physics, Scene as OfScene};
+
+static ROWS: &[Row] = &[
+    Row { name: "visibility", kind: Physics, switch: Some(|effects| &mut effects.visibility), decide: visibility },
+    Row { name: "overhangs", kind: Physics, switch: None, decide: overhangs },
+    Row {
+        name: "interreflection",
+        kind: Physics,
+        switch: Some(|effects| &mut effects.interreflection),
+        decide: interreflection,
+    },
+    Row { name: "self_shadow", kind: Physics, switch: Some(|effects| &mut effects.self_shadow), decide: self_shadow },
+    Row { name: "anisotropy", kind: Physics, switch: Some(|effects| &mut effects.anisotropy), decide: anisotropy },
+    Row { name: "transmission", kind: Physics, switch: None, decide: transmission },
+    Row { name: "color_map_filtering", kind: Physics, switch: None, decide: color_map_filtering },
+    Row {
+        name: "material_groups",
+        kind: OfScene,
+        switch: Some(|effects| &mut effects.material_groups),
+        decide: material_groups,
+    },
+    Row {
+        name: "color_weights",
+        kind: OfScene,
+        switch: Some(|effects| &mut effects.color_weights),
+        decide: color_weights,
+    },
+    Row { name: "color_channels", kind: OfScene, switch: None, decide: color_channels },
+    Row {
+        name: "black_materials",
+        kind: OfScene,
+        switch: Some(|effects| &mut effects.black_materials),
+        decide: black_materials,
+    },
+    Row { name: "measured_brdf", kind: OfScene, switch: None, decide: measured_brdf },
+    Row { name: "projected_area", kind: OfScene, switch: None, decide: projected_area },
+    Row { name: "lights", kind: OfScene, switch: None, decide: lights },
+    Row {
+        name: "faint_lights",
+        kind: OfScene,
+        switch: Some(|effects| &mut effects.faint_lights),
+        decide: faint_lights,
+    },
+    Row { name: "low_rank", kind: ByMethod, switch: None, decide: low_rank },
+    Row {
+        name: "picture_table",
+        kind: ByMethod,
+        switch: Some(|effects| &mut effects.picture_table),
+        decide: shading_table,
+    },
+    Row { name: "exact_lobes", kind: ByMethod, switch: Some(|effects| &mut effects.exact_lobes), decide: exact_lobes },
+    Row {
+        name: "mirror_symmetry",
+        kind: ByMethod,
+        switch: Some(|effects| &mut effects.mirror_symmetry),
+        decide: mirror_symmetry,
+    },
+];
+
+/// Evaluates all rows.
+pub(super) fn decide_all(context: &Context<'_>) -> Vec<Effect> {
+    let mut forced = context.settings.effects.clone();
+    let mut decide = |row: &Row| {
+        let switch = row.switch.map_or(Switch::Auto, |field| *field(&mut forced));
+        let Decision { on, reason, predicted_ms, bound } = (row.decide)(context, switch);
+        Effect {
+            name: row.name,
+            kind: row.kind,
+            on,
+            reason,
+            predicted_ms,
+            measured_ms: None,
+            forced: switch != Switch::Auto,
+            bound: bound.filter(|_| !on && switch == Switch::Auto),
         }
-    }
-
-    /// Notes what a stage took beside what was predicted.
-    pub fn measured(&mut self, name: &str, ms: f64) {
-        for effect in &mut self.effects {
-            if effect.name == name {
-                effect.measured_ms = Some(ms);
-            }
-        }
-    }
-}
-
-/// Decides everything from what was found.
-pub fn decide(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> Plan {
-    let mut effects = Vec::new();
-    let mut note = |name, on, reason: String, predicted_ms: f64| {
-        effects.push(Effect { name, on, reason, predicted_ms, measured_ms: None, forced: false, bound: None });
     };
+    ROWS.iter().map(&mut decide).collect()
+}
+
+/// The names of all effects that a field of `[effects]` forces, in the order of the table.
+pub fn effect_names() -> impl Iterator<Item = &'static str> {
+    ROWS.iter().filter(|row| row.switch.is_some()).map(|row| row.name)
+}
+
+/// The field of `[effects]` that forces an effect; `None` if the effect has none.
+pub fn switch_mut<'a>(effects: &'a mut Effects, name: &str) -> Option<&'a mut Switch> {
+    let row = ROWS.iter().find(|row| row.name == name)?;
+    row.switch.map(|field| field(effects))
+}
+
+fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
+    let Context { features, settings, costs, algorithm, .. } = *context;
     let facets = settings.facets as f64;
-    let route = route(found, settings, costs);
-    let what = if settings.sighting == VisibilityMethod::Auto {
-        "surfaces overhang"
-    } else {
-        "asked for by quality.visibility"
+    let azimuths = settings.horizon_azimuths as f64;
+    let cause = match settings.visibility_method {
+        VisibilityMethod::Auto => "surfaces overhang",
+        _ => "asked for by quality.visibility",
     };
-    let (what, predicted) = match route {
-        VisibilityAlgorithm::None => (decisions::no_visibility(found, settings), 0.0),
+    let (reason, predicted_ms) = match algorithm {
+        VisibilityAlgorithm::None => (no_visibility(context, switch), 0.0),
         VisibilityAlgorithm::HeightMarch => (
-            format!("a height-field: horizons along {} azimuths, walking its samples", settings.horizon_azimuths),
-            facets * settings.horizon_azimuths as f64 * costs.march_ns * 1e-6 / costs.threads,
+            format!(
+                "height-field: a horizon map of {} azimuths from a walk over its samples",
+                settings.horizon_azimuths
+            ),
+            facets * azimuths * costs.march_ns * 1e-6 / costs.threads,
         ),
         VisibilityAlgorithm::HorizonScan => (
             format!(
-                "no overhangs: horizons along {} azimuths, slicing {} triangles",
-                settings.horizon_azimuths, found.triangles
+                "no overhangs: a horizon map of {} azimuths from slices through {} triangles",
+                settings.horizon_azimuths, features.triangles
             ),
-            facets * settings.horizon_azimuths as f64 * costs.scan_ns * 1e-6 / costs.threads,
+            facets * azimuths * costs.scan_ns * 1e-6 / costs.threads,
         ),
         VisibilityAlgorithm::OcclusionIntervals => (
             format!(
-                "{what}: all that blocks, slicing along {} azimuths (shadow maps: {:.0} ms)",
+                "{cause}: occlusion intervals along {} azimuths (shadow maps: {:.0} ms)",
                 settings.slice_azimuths,
-                maps_ms(found, settings, costs)
+                maps_ms(features, settings, costs)
             ),
-            scan_ms(found, settings, costs),
+            scan_ms(features, settings, costs),
         ),
         VisibilityAlgorithm::CpuMaps => (
             format!(
-                "{what}: {} toroidal shadow maps of {} texels a side (slicing: {:.0} ms)",
+                "{cause}: {} toroidal shadow maps of {} texels per side (occlusion intervals: {:.0} ms)",
                 settings.map_grid.len(),
                 settings.map_resolution,
-                scan_ms(found, settings, costs)
+                scan_ms(features, settings, costs)
             ),
-            maps_ms(found, settings, costs),
+            maps_ms(features, settings, costs),
         ),
         VisibilityAlgorithm::GpuMaps => (
-            format!("{what}, on the GPU: {} toroidal shadow maps", settings.map_grid.len()),
-            settings.map_grid.len() as f64 * found.triangles as f64 * 2e-6,
+            format!("{cause}: {} toroidal shadow maps on the GPU", settings.map_grid.len()),
+            settings.map_grid.len() as f64 * features.triangles as f64 * 2e-6,
         ),
     };
-    note("visibility", route != VisibilityAlgorithm::None, what, predicted);
+    let bound = if features.flat { ROUNDING } else { settings.tolerance };
+    Decision::new(algorithm != VisibilityAlgorithm::None, reason).costs(predicted_ms).changes_at_most(bound)
+}
 
-    let fill_ns =
-        if route == VisibilityAlgorithm::OcclusionIntervals { costs.slice_fill_ns } else { costs.facet_fill_ns };
-    let direct_query = (found.lobes as f64 * costs.lobe_ns + found.lookups as f64 * costs.lookup_ns + facets * fill_ns)
-        * 1e-6
-        / costs.threads;
-    let direct_ms = IMAGE_QUERIES * direct_query;
-    let low_rank_ms = 800.0 + IMAGE_QUERIES * costs.factor_query_ns * 1e-6 / costs.threads;
-    let allowed = !matches!(settings.preset, Preset::Reference | Preset::Wu2011);
-    let try_low_rank = match settings.method {
-        Method::Direct => false,
-        Method::LowRank => true,
-        // Sums of analytic lobes are quick enough for single pairs and export, and pictures read a table of them: factors
-        // pay where every term is a look-up. Few normals have sharp edges between them, which factors reach at the lobes'
-        // own grid at best (docs/accuracy.txt: 2.6 % on a V-groove).
-        Method::Auto => allowed && found.lookups > 0 && found.distinct_normals.is_none() && low_rank_ms < direct_ms,
+/// The reason why visibility is not computed.
+fn no_visibility(context: &Context<'_>, switch: Switch) -> String {
+    let features = context.features;
+    if switch == Switch::Off {
+        "left out as asked: every facet sees every direction that it faces".to_owned()
+    } else if features.flat {
+        "the tile is flat: every facet sees every direction".to_owned()
+    } else {
+        format!(
+            "shallow: no slope is steeper than {:.1}°, nothing above that is hidden, and {:.2} % of the light on a plane comes from below (allowed: {:.2} %)",
+            features.steepest.to_degrees(),
+            hidden_light(features) * 100.0,
+            25.0 * context.settings.tolerance
+        )
+    }
+}
+
+fn overhangs(context: &Context<'_>, _: Switch) -> Decision {
+    if context.features.height_field || context.features.flat {
+        Decision::new(false, "no overhangs: one horizon per azimuth describes what a facet sees")
+    } else {
+        Decision::new(true, "surfaces overhang: more than one horizon per azimuth")
+    }
+}
+
+/// A ray from facet to facet, and one lobe of it towards one node of the table [ns].
+const RAY_NS: f64 = 1500.0;
+const LOBE_NS: f64 = 60.0;
+
+/// Interreflection is on only if asked for. By default `f̄` is the paper's Eq. 7, which leaves it out and which other programs
+/// compute as well; the estimate says how much is missing.
+fn interreflection(context: &Context<'_>, switch: Switch) -> Decision {
+    let Context { features, settings, costs, interreflection: on, .. } = *context;
+    let hidden = context.hidden_directions();
+    let share = predicted_share(features.albedo, hidden);
+    let exchange = settings.interreflection();
+    let rays = (exchange.elements * exchange.rays) as f64;
+    let lobes = rays * hidden * 2.0 * exchange.grid.len() as f64;
+    let ms = (rays * RAY_NS + lobes * LOBE_NS) * 1e-6 / costs.threads;
+    let estimate = format!("estimated to add up to {:.0} % to what is reflected directly", share * 100.0);
+    let reason = if features.flat {
+        "the tile is flat: no facet sees another".to_owned()
+    } else if features.materials == 0 {
+        "nothing reflects".to_owned()
+    } else if settings.preset == Preset::Wu2011 {
+        "the paper leaves it out".to_owned()
+    } else if on {
+        format!("{estimate}; {} bounces from {} rays of {} facets", exchange.bounces, exchange.rays, exchange.elements)
+    } else if switch == Switch::Off || share <= settings.tolerance {
+        format!("{estimate}; left out, as in the paper")
+    } else {
+        format!(
+            "{estimate}, more than the tolerance of {:.1} %; left out, as in the paper's definition of f̄: ask with --effect interreflection=on ({ms:.0} ms)",
+            settings.tolerance * 100.0
+        )
     };
+    let decision = Decision::new(on, reason).costs(if on { ms } else { 0.0 });
+    // The estimate is no bound, unless there is nothing to add.
+    if features.flat { decision.changes_at_most(ROUNDING) } else { decision }
+}
+
+fn self_shadow(context: &Context<'_>, switch: Switch) -> Decision {
+    let features = context.features;
+    let reason = if !features.object_self_shadows {
+        "the object is convex: it cannot shadow itself".to_owned()
+    } else if features.lights == 0 {
+        "no light".to_owned()
+    } else {
+        format!("the object can shadow itself: rays to {} lights", features.lights)
+    };
+    let on = is_on(switch, features.object_self_shadows && features.lights > 0);
+    Decision::new(on, reason).changes_at_most(UNCHANGED)
+}
+
+fn anisotropy(context: &Context<'_>, switch: Switch) -> Decision {
+    let on = is_on(switch, !context.features.flat);
+    let reason = match (on, context.features.flat) {
+        (false, true) => "flat, and all BRDFs are isotropic: tables have three angles (.bsdf; .binary loses nothing)",
+        (false, false) => "treated as isotropic, as asked: tables have three angles (.bsdf)",
+        (true, _) => "the result may depend on the azimuth of the tile: four angles",
+    };
+    Decision::new(on, reason).changes_at_most(ROUNDING)
+}
+
+fn transmission(_: &Context<'_>, _: Switch) -> Decision {
+    Decision::new(false, "light through thin slabs (Dai et al. 2009): not asked for")
+}
+
+fn color_map_filtering(_: &Context<'_>, _: Switch) -> Decision {
+    Decision::new(false, "filtered colour maps (Heitz et al. 2013): not asked for")
+}
+
+fn material_groups(context: &Context<'_>, switch: Switch) -> Decision {
+    let features = context.features;
+    let reason = match (features.materials, features.black_materials) {
+        (n, 0) if n > 1 => format!("{n} materials, each summed over its own facets"),
+        (n, black) if n > 1 => format!("{n} materials, each summed over its own facets; {black} black and skipped"),
+        (_, 0) => "one material".to_owned(),
+        (_, black) => format!("one material that reflects; {black} black and skipped"),
+    };
+    Decision::new(is_on(switch, features.materials > 1), reason).changes_at_most(ROUNDING)
+}
+
+fn color_weights(context: &Context<'_>, switch: Switch) -> Decision {
+    let vary = context.features.colors_vary;
+    let reason = if vary {
+        "colour weights differ between facets of one material: three sums, one per channel"
+    } else {
+        "each material has one colour: one sum and a multiplication"
+    };
+    Decision::new(is_on(switch, vary), reason).changes_at_most(ROUNDING)
+}
+
+fn color_channels(context: &Context<'_>, _: Switch) -> Decision {
+    if context.features.grey {
+        Decision::new(false, "all materials are grey: interreflection is gathered in one channel")
+    } else {
+        Decision::new(true, "materials have colours: interreflection is gathered in three channels")
+    }
+}
+
+fn black_materials(context: &Context<'_>, switch: Switch) -> Decision {
+    let on = is_on(switch, false);
+    let reason = match (context.features.black_materials, on) {
+        (0, _) => "no material is black".to_owned(),
+        (n, true) => format!("{n} black materials are summed as asked"),
+        (n, false) => format!("{n} black materials reflect nothing: skipped"),
+    };
+    Decision::new(on, reason).changes_at_most(ROUNDING)
+}
+
+fn measured_brdf(context: &Context<'_>, _: Switch) -> Decision {
+    let on = context.features.lookups > 0;
+    Decision::new(on, if on { "a measured BRDF is looked up" } else { "all BRDFs are analytic" })
+}
+
+fn projected_area(context: &Context<'_>, _: Switch) -> Decision {
+    if context.features.closes_plane {
+        Decision::new(false, "the tile closes the plane: a_v = A cos θ, and the sum estimates it as well")
+    } else {
+        Decision::new(true, "the tile leaves holes: the measured projected area normalises")
+    }
+}
+
+fn lights(context: &Context<'_>, _: Switch) -> Decision {
+    let features = context.features;
+    let reason = match features.lights {
+        0 => "no light".to_owned(),
+        count => format!(
+            "{count} directional lights, {} of those listed below the horizon of the world",
+            features.lights_below
+        ),
+    };
+    Decision::new(features.lights > 0, reason)
+}
+
+fn faint_lights(_: &Context<'_>, switch: Switch) -> Decision {
+    let on = is_on(switch, false);
+    let reason = if on {
+        "lights that no part of the object faces, and the faintest lights, are shaded as asked".to_owned()
+    } else {
+        format!(
+            "lights that no part of the object faces, and the faintest with {:.1} ‰ of the power, are left out",
+            FAINT_FRACTION * 1e3
+        )
+    };
+    Decision::new(on, reason).changes_at_most(UNCHANGED)
+}
+
+fn low_rank(context: &Context<'_>, _: Switch) -> Decision {
+    let Context { settings, costs, try_low_rank: on, .. } = *context;
     let comparison = format!(
-        "a 384x384 picture with 32 lights is predicted at {direct_ms:.0} ms summed directly, {low_rank_ms:.0} ms factored"
+        "a 384x384 image with 32 lights is predicted at {:.0} ms summed directly, {:.0} ms factored",
+        context.direct_image_ms(costs.threads),
+        context.low_rank_image_ms(costs.threads)
     );
-    note(
-        "low_rank",
-        try_low_rank,
-        match settings.method {
-            Method::Auto if try_low_rank => {
+    let reason = match settings.method {
+        Method::Auto if on => format!(
+            "{comparison}; used if within {:.1} % and {:.0} dB of the direct sum",
+            settings.tolerance * 100.0,
+            settings.tolerance_db
+        ),
+        Method::Auto => comparison,
+        _ => "asked for by quality.method".to_owned(),
+    };
+    Decision::new(on, reason).costs(context.factorization_ms())
+}
+
+fn shading_table(context: &Context<'_>, _: Switch) -> Decision {
+    let Context { features, settings, costs, try_shading_table: on, .. } = *context;
+    let strided_subset = context.has_horizon_map() && features.distinct_normals.is_some();
+    let cost = context.table_cost();
+    // A strided subset of the facets takes no more time than its check.
+    let predicted_ms = if strided_subset {
+        IMAGE_CHECK_PAIRS as f64 * context.direct_query_ms()
+    } else {
+        cost.as_ref().map_or(0.0, |cost| cost.compute_ms)
+    };
+    let reason = match cost {
+        _ if features.flat => "a flat tile is its own BRDF".to_owned(),
+        None => "images evaluate the BRDF itself at this quality".to_owned(),
+        Some(cost) => {
+            let (percent, db) = (settings.image_tolerance.0 * 100.0, settings.image_tolerance.1);
+            let condition = format!("if within {percent:.0} % and {db:.0} dB of the sum");
+            let direct = format!(
+                "a 384x384 image with 32 lights is predicted at {:.0} ms summed directly",
+                context.direct_image_ms(costs.threads)
+            );
+            if strided_subset {
+                format!("{direct}; few distinct normals: a strided subset of the facets is summed {condition}")
+            } else {
                 format!(
-                    "{comparison}; kept if within {:.1} % and {:.0} dB of the direct sum",
-                    settings.tolerance * 100.0,
-                    settings.tolerance_db
+                    "{direct}, {:.0} ms from a table that takes {:.0} ms, once; used {condition}",
+                    cost.image_ms, cost.compute_ms
                 )
             }
-            Method::Auto => comparison,
-            _ => "asked for by quality.method".to_owned(),
-        },
-        if try_low_rank { 800.0 } else { 0.0 },
-    );
-    let horizons = matches!(route, VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan);
-    let try_shading_table = decisions::picture_table(found, settings, costs, horizons, direct_query, &mut note);
-    let forced = &settings.effects;
-    note(
-        "exact_lobes",
-        decisions::is_on(forced.exact_lobes, found.distinct_normals.is_some()),
-        match found.distinct_normals {
-            Some(count) => format!("{count} distinct normals: one exact lobe each, whatever the number of facets"),
-            None => "normals differ from facet to facet".to_owned(),
-        },
-        0.0,
-    );
-    note(
-        "color_weights",
-        decisions::is_on(forced.color_weights, found.colors_vary),
-        if found.colors_vary {
-            "colour weights differ between facets of one material: three sums, one a channel".to_owned()
-        } else {
-            "each material has one colour: one sum and a multiplication".to_owned()
-        },
-        0.0,
-    );
-    note(
-        "material_groups",
-        decisions::is_on(forced.material_groups, found.materials > 1),
-        match (found.materials, found.black_materials) {
-            (n, 0) if n > 1 => format!("{n} materials, each summed over its own facets"),
-            (n, black) if n > 1 => format!("{n} materials, each summed over its own facets; {black} black and skipped"),
-            (_, 0) => "one material".to_owned(),
-            (_, black) => format!("one material that reflects; {black} black and skipped"),
-        },
-        0.0,
-    );
-    note(
-        "measured_brdf",
-        found.lookups > 0,
-        if found.lookups > 0 { "a measured BRDF is looked up".to_owned() } else { "all BRDFs are analytic".to_owned() },
-        0.0,
-    );
-    note(
-        "projected_area",
-        !found.closes_plane,
-        if found.closes_plane {
-            "the tile closes the plane: a_v = A cos θ, and the sum's own estimate of it".to_owned()
-        } else {
-            "the tile leaves holes: the measured projected area normalises".to_owned()
-        },
-        0.0,
-    );
-    note(
-        "self_shadow",
-        decisions::is_on(forced.self_shadow, found.object_self_shadows && found.lights > 0),
-        if !found.object_self_shadows {
-            "the object is convex: it cannot shadow itself".to_owned()
-        } else if found.lights == 0 {
-            "no light".to_owned()
-        } else {
-            format!("the object can shadow itself: rays to {} lights", found.lights)
-        },
-        0.0,
-    );
-    let interreflection = decisions::interreflection(found, settings, costs, &mut note);
-    decisions::mirror_symmetry(found, settings, interreflection, try_shading_table, &mut note);
-    decisions::of_the_scene(found, settings, &mut note);
-    for (name, reason) in [
-        ("transmission", "light through thin slabs (Dai et al. 2009): not asked for"),
-        ("color_map_filtering", "filtered colour maps (Heitz et al. 2013): not asked for"),
-    ] {
-        note(name, false, reason.to_owned(), 0.0);
-    }
-    decisions::mark(&mut effects, found, settings);
-    let mirrors = decisions::mirrors(found, settings);
-    Plan { route, try_low_rank, try_shading_table, interreflection, mirrors, effects }
-}
-
-/// Slicing under overhangs: cells and triangles looked at, facet by facet.
-fn scan_ms(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> f64 {
-    let slices = settings.facets as f64 * settings.slice_azimuths as f64;
-    slices * found.scan_work * costs.slice_ns * 1e-6 / costs.threads
-}
-
-/// Shadow maps: triangles set up and texels covered, direction by direction.
-fn maps_ms(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> f64 {
-    let texels = f64::from(settings.map_resolution).powi(2) * found.area_ratio;
-    let direction = found.triangles as f64 * costs.triangle_ns + texels * costs.texel_ns;
-    settings.map_grid.len() as f64 * direction * 1e-6 / costs.threads
-}
-
-fn route(found: &SceneFeatures, settings: &Settings, costs: &Costs) -> VisibilityAlgorithm {
-    if !decisions::is_on(settings.effects.visibility, !found.flat && !decisions::is_shallow(found, settings)) {
-        VisibilityAlgorithm::None
-    } else {
-        let maps = if found.hardware_gpu { VisibilityAlgorithm::GpuMaps } else { VisibilityAlgorithm::CpuMaps };
-        match settings.sighting {
-            VisibilityMethod::OcclusionIntervals => VisibilityAlgorithm::OcclusionIntervals,
-            VisibilityMethod::Maps => maps,
-            VisibilityMethod::Auto if found.height_samples => VisibilityAlgorithm::HeightMarch,
-            VisibilityMethod::Auto if found.height_field => VisibilityAlgorithm::HorizonScan,
-            VisibilityMethod::Auto
-                if scan_ms(found, settings, costs) <= maps_ms(found, settings, costs) && !found.hardware_gpu =>
-            {
-                VisibilityAlgorithm::OcclusionIntervals
-            }
-            VisibilityMethod::Auto => maps,
         }
-    }
+    };
+    Decision::new(on, reason).costs(if on { predicted_ms } else { 0.0 })
+}
+
+fn exact_lobes(context: &Context<'_>, switch: Switch) -> Decision {
+    let normals = context.features.distinct_normals;
+    let reason = match normals {
+        Some(count) => format!("{count} distinct normals: one exact lobe each, for any number of facets"),
+        None => "normals differ from facet to facet".to_owned(),
+    };
+    Decision::new(is_on(switch, normals.is_some()), reason).changes_at_most(SAME_NORMALS)
+}
+
+/// Mirror planes are looked for when something is tabulated, so that a geometry edit does not wait for them.
+fn mirror_symmetry(context: &Context<'_>, switch: Switch) -> Decision {
+    let is_tabulated = context.interreflection || context.try_shading_table;
+    let planes = context.mirrors();
+    let is_known = switch == Switch::On || context.features.mirrors.is_some();
+    let on = is_tabulated && switch != Switch::Off && (!is_known || planes != [false; 2]);
+    let reason = match planes {
+        _ if !is_tabulated => "nothing is tabulated that it could save",
+        _ if switch == Switch::Off => "treated as having no mirror planes, as asked",
+        _ if !is_known => {
+            "if planes x = const or y = const mirror the tile, the shading table takes a half or a quarter of the time"
+        }
+        [true, true] => "mirrored in planes x = const and y = const: a quarter of the viewers is enough",
+        [false, false] => "no plane x = const or y = const mirrors the tile",
+        _ => "mirrored in one plane: half of the viewers is enough",
+    };
+    let decision = Decision::new(on, reason);
+    if context.interreflection { decision } else { decision.changes_at_most(ROUNDING) }
 }

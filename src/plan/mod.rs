@@ -1,12 +1,133 @@
-//! Which effects a scene calls for, why, and at what predicted cost.
+//! The plan: which effects a scene calls for, why, and at what predicted cost.
+//!
+//! Every effect is one row of the table in `effects.rs`: its name, its kind, the switch that forces it, and the function that
+//! decides it. [`Plan::new`] evaluates the rows.
 
-mod decisions;
+mod algorithm;
+mod context;
 mod effects;
-mod findings;
+mod features;
 mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use effects::{Effect, IMAGE_CHECK_PAIRS, Plan, decide};
-pub use findings::{Costs, SceneFeatures, VisibilityAlgorithm};
+use serde::Serialize;
+
+pub use algorithm::VisibilityAlgorithm;
+use context::Context;
+pub use context::IMAGE_CHECK_PAIRS;
+pub use effects::{effect_names, switch_mut};
+pub use features::{Costs, SceneFeatures};
 pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};
+
+use crate::scene::Switch;
+
+/// The part of the program that an effect belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EffectKind {
+    /// Light transport: leaving the effect out changes what is simulated.
+    Physics,
+    /// A property that is read off the scene.
+    Scene,
+    /// A way to compute the same result in less time.
+    Method,
+}
+
+/// One effect of the plan, as `biscale plan --json` prints it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    pub name: &'static str,
+    pub kind: EffectKind,
+    pub on: bool,
+    pub reason: String,
+    pub predicted_ms: f64,
+    /// Milliseconds of the stage; `None` until it has run.
+    pub measured_ms: Option<f64>,
+    /// Whether the user forced the effect on or off.
+    pub forced: bool,
+    /// If the effect is off by itself: an upper bound of the relative L2 of `f̄` that turning it on changes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<f64>,
+}
+
+/// The decisions for one scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    pub algorithm: VisibilityAlgorithm,
+    /// Try the low-rank representation first. It must pass its check against the direct sum.
+    pub try_low_rank: bool,
+    /// Add the light that facets send to each other.
+    pub interreflection: bool,
+    /// Mirror planes x = const and y = const that save part of the directions.
+    pub mirrors: [bool; 2],
+    /// Try a table for images first. It must pass its check against the BRDF.
+    pub try_shading_table: bool,
+    /// All effects, physics first.
+    pub effects: Vec<Effect>,
+}
+
+impl Plan {
+    /// Decides every effect of a scene.
+    pub fn new(features: &SceneFeatures, settings: &Settings, costs: &Costs) -> Self {
+        let context = Context::new(features, settings, costs);
+        Self {
+            algorithm: context.algorithm,
+            try_low_rank: context.try_low_rank,
+            interreflection: context.interreflection,
+            mirrors: context.mirrors(),
+            try_shading_table: context.try_shading_table,
+            effects: effects::decide_all(&context),
+        }
+    }
+
+    /// Returns true if the algorithm computes more than one horizon per azimuth.
+    pub fn overhangs(&self) -> bool {
+        matches!(
+            self.algorithm,
+            VisibilityAlgorithm::OcclusionIntervals | VisibilityAlgorithm::CpuMaps | VisibilityAlgorithm::GpuMaps
+        )
+    }
+
+    /// Returns true if an effect is on.
+    pub fn is_on(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name && effect.on)
+    }
+
+    /// Records the error of the low-rank representation against the direct sum, and whether it is used.
+    pub fn note_low_rank(&mut self, is_used: bool, rel_l2: f64) {
+        if let Some(effect) = self.effect_mut("low_rank") {
+            effect.on = is_used;
+            let verdict = if is_used { "used" } else { "not used, summed directly" };
+            effect
+                .reason
+                .push_str(&format!("; its error against the direct sum is {:.1} %: {verdict}", rel_l2 * 100.0));
+        }
+    }
+
+    /// Records the milliseconds of stages beside what was predicted for their effects.
+    pub fn note_times(&mut self, times: &[(&'static str, f64)]) {
+        for (stage, ms) in times {
+            let name = if *stage == "product" && self.try_low_rank { "low_rank" } else { stage };
+            if let Some(effect) = self.effect_mut(name) {
+                effect.measured_ms = Some(*ms);
+            }
+        }
+    }
+
+    fn effect_mut(&mut self, name: &str) -> Option<&mut Effect> {
+        self.effects.iter_mut().find(|effect| effect.name == name)
+    }
+}
+
+/// The part of the light that the lights which are left out as too faint hold together at most.
+pub const FAINT_FRACTION: f32 = 1e-3;
+
+/// The state of an effect: as forced, else as decided.
+fn is_on(switch: Switch, decided: bool) -> bool {
+    match switch {
+        Switch::Auto => decided,
+        Switch::On => true,
+        Switch::Off => false,
+    }
+}

@@ -73,7 +73,7 @@ pub struct Settings {
     pub map_resolution: u32,
     /// Width of the soft step at a horizon [rad].
     pub penumbra: f32,
-    pub sighting: VisibilityMethod,
+    pub visibility_method: VisibilityMethod,
     /// Bins of normals whose facets share one lobe; `None` for normals as they are.
     pub normal_bins: Option<usize>,
     pub method: Method,
@@ -106,8 +106,8 @@ pub struct Settings {
     pub effects: Effects,
 }
 
-const fn hemisphere_pair_grid(rings: usize, azimuths: usize, turn: usize, difference: usize) -> HemispherePairGrid {
-    HemispherePairGrid { rings, azimuths, turn, difference }
+const fn hemisphere_pair_grid(rings: usize, azimuths: usize, phi_d: usize, theta_d: usize) -> HemispherePairGrid {
+    HemispherePairGrid { rings, azimuths, phi_d, theta_d }
 }
 
 impl Settings {
@@ -154,9 +154,9 @@ impl Settings {
             _ => {}
         }
         match quality.visibility.as_deref() {
-            Some("slices") => settings.sighting = VisibilityMethod::OcclusionIntervals,
-            Some("maps") => settings.sighting = VisibilityMethod::Maps,
-            Some("auto") => settings.sighting = VisibilityMethod::Auto,
+            Some("slices") => settings.visibility_method = VisibilityMethod::OcclusionIntervals,
+            Some("maps") => settings.visibility_method = VisibilityMethod::Maps,
+            Some("auto") => settings.visibility_method = VisibilityMethod::Auto,
             _ => {}
         }
         match quality.interpolation.as_deref() {
@@ -194,14 +194,14 @@ impl Settings {
             map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
-            sighting: VisibilityMethod::Auto,
+            visibility_method: VisibilityMethod::Auto,
             normal_bins: None,
             method: Method::Auto,
             keep_m: 0.9995,
             keep_n: 0.9995,
             max_rank: 40,
             grid: PolarGrid::new(16, 36),
-            pairs: HalfDifferenceGrid { rings: 32, azimuths: 64, difference: 16, turn: 8 },
+            pairs: HalfDifferenceGrid { rings: 32, azimuths: 64, theta_d: 16, phi_d: 8 },
             normal_rings: 64,
             interpolation: Interpolation::Cubic,
             colors: None,
@@ -234,7 +234,7 @@ impl Settings {
                 keep_n: 0.999,
                 max_rank: 32,
                 grid: PolarGrid::new(12, 24),
-                pairs: HalfDifferenceGrid { rings: 24, azimuths: 48, difference: 12, turn: 6 },
+                pairs: HalfDifferenceGrid { rings: 24, azimuths: 48, theta_d: 12, phi_d: 6 },
                 normal_rings: 48,
                 tolerance: 0.12,
                 tolerance_db: 28.0,
@@ -254,7 +254,7 @@ impl Settings {
                 keep_n: 0.9999,
                 max_rank: 64,
                 grid: PolarGrid::new(24, 48),
-                pairs: HalfDifferenceGrid { rings: 48, azimuths: 96, difference: 20, turn: 10 },
+                pairs: HalfDifferenceGrid { rings: 48, azimuths: 96, theta_d: 20, phi_d: 10 },
                 normal_rings: 64,
                 tolerance: 0.015,
                 tolerance_db: 48.0,

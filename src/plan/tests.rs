@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 
-use super::{Costs, Preset, SceneFeatures, Settings, VisibilityAlgorithm, decide};
+use super::{Costs, EffectKind, Plan, Preset, SceneFeatures, Settings, VisibilityAlgorithm};
 use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::scene::{self, LoadedScene, Painted};
@@ -73,7 +73,9 @@ fn a_dropped_visibility_runs_no_stage_and_takes_no_memory() {
         let mut pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, BRDFS[0], effects)).unwrap();
         let runs = pipeline.runs().iter().find(|(name, _)| *name == "visibility").unwrap().1;
-        let crate::effective::Representation::Direct(direct) = &outcome.brdf.form else { panic!("summed directly") };
+        let crate::effective::Representation::Direct(direct) = &outcome.brdf.representation else {
+            panic!("summed directly")
+        };
         assert!(outcome.times.iter().any(|(name, _)| *name == "visibility") == (runs > 0));
         (runs, direct.visibility.bytes() > 0)
     };
@@ -110,7 +112,7 @@ fn forcing_effects_off_acts() {
     assert!(both.x > 1.2 * both.y && (one.x - one.y).abs() < 1e-6 || one.y == 0.0, "{both} {one}");
 }
 
-fn findings() -> SceneFeatures {
+fn features() -> SceneFeatures {
     SceneFeatures {
         flat: false,
         steepest: 0.05,
@@ -140,11 +142,11 @@ fn findings() -> SceneFeatures {
 #[test]
 fn the_plan_is_monotone_in_the_tolerance() {
     for degrees in [0.5_f32, 2.0, 4.0, 8.0, 15.0, 40.0] {
-        let found = SceneFeatures { steepest: degrees.to_radians(), ..findings() };
+        let features = SceneFeatures { steepest: degrees.to_radians(), ..features() };
         let mut last: Option<Vec<&str>> = None;
         for tolerance in [1e-4, 1e-3, 0.01, 0.04, 0.12, 0.5] {
             let settings = Settings { tolerance, ..Settings::of_preset(Preset::Standard) };
-            let plan = decide(&found, &settings, &Costs::default());
+            let plan = Plan::new(&features, &settings, &Costs::default());
             let on: Vec<&str> = plan.effects.iter().filter(|effect| effect.on).map(|effect| effect.name).collect();
             if let Some(last) = &last {
                 assert!(on.iter().all(|name| last.contains(name)), "{degrees}°, {tolerance}: {on:?} after {last:?}");
@@ -158,19 +160,51 @@ fn the_plan_is_monotone_in_the_tolerance() {
 fn a_loose_tolerance_drops_the_visibility_of_a_shallow_tile_and_says_why() {
     let plan = |tolerance| {
         let settings = Settings { tolerance, ..Settings::of_preset(Preset::Standard) };
-        decide(&findings(), &settings, &Costs::default())
+        Plan::new(&features(), &settings, &Costs::default())
     };
-    assert_eq!(plan(0.04).route, VisibilityAlgorithm::None);
+    assert_eq!(plan(0.04).algorithm, VisibilityAlgorithm::None);
     let effect = plan(0.04).effects[0].clone();
     assert!(!effect.on && effect.reason.contains("shallow") && effect.bound.is_some(), "{effect:?}");
-    assert_eq!(plan(0.001).route, VisibilityAlgorithm::HorizonScan);
+    assert_eq!(plan(0.001).algorithm, VisibilityAlgorithm::HorizonScan);
 }
 
 #[test]
 fn interreflection_is_estimated_but_never_on_by_itself() {
-    let found = SceneFeatures { area_ratio: 3.0, ..findings() };
-    let plan = decide(&found, &Settings::of_preset(Preset::Standard), &Costs::default());
+    let features = SceneFeatures { area_ratio: 3.0, ..features() };
+    let plan = Plan::new(&features, &Settings::of_preset(Preset::Standard), &Costs::default());
     let effect = plan.effects.iter().find(|effect| effect.name == "interreflection").unwrap();
     assert!(!plan.interreflection && !effect.on);
     assert!(effect.reason.contains("--effect interreflection=on"), "{}", effect.reason);
+}
+
+#[test]
+fn the_choice_between_direct_sum_and_factors_does_not_depend_on_the_number_of_cores() {
+    let settings = Settings::of_preset(Preset::Draft);
+    for lookups in [100, 400, 1000, 4000, 20_000] {
+        let measured = SceneFeatures { lookups, ..features() };
+        let choice =
+            |threads: f64| Plan::new(&measured, &settings, &Costs { threads, ..Costs::default() }).try_low_rank;
+        assert!([1.0, 2.0, 13.0, 59.0, 256.0].into_iter().all(|threads| choice(threads) == choice(4.0)), "{lookups}");
+    }
+}
+
+#[test]
+fn every_switch_of_the_scene_forces_one_row_of_the_table_and_physics_stands_first() {
+    let plan = Plan::new(&features(), &Settings::of_preset(Preset::Standard), &Costs::default());
+    assert!(plan.effects.is_sorted_by_key(|effect| effect.kind));
+    assert_eq!(plan.effects[0].kind, EffectKind::Physics);
+    let mut fields: Vec<&str> = scene::Effects::fields().iter().map(|field| field.key).collect();
+    fields.retain(|key| *key != "bounces");
+    fields.sort_unstable();
+    let mut names: Vec<&str> = super::effect_names().collect();
+    names.sort_unstable();
+    assert_eq!(names, fields);
+    for name in names {
+        let mut effects = scene::Effects::default();
+        *super::switch_mut(&mut effects, name).unwrap() = scene::Switch::Off;
+        let settings = Settings { effects, ..Settings::of_preset(Preset::Standard) };
+        let plan = Plan::new(&features(), &settings, &Costs::default());
+        let forced: Vec<&str> = plan.effects.iter().filter(|effect| effect.forced).map(|effect| effect.name).collect();
+        assert_eq!(forced, [name]);
+    }
 }

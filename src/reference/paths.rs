@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::effective::Material;
+use crate::brdf::Material;
 use crate::geometry::{Facets, Hit, PeriodicGrid, TileMesh};
 use crate::math::directions::from_angles;
 use crate::metrics::Pair;

@@ -5,7 +5,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::paths::Paths;
-use crate::effective::{FacetSum, Material};
+use crate::brdf::Material;
+use crate::effective::FacetSum;
 use crate::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh, lifted_origins};
 use crate::metrics::Pair;
 

@@ -1,4 +1,4 @@
-//! An object that carries the material, the lights on it, and the image of it.
+//! The large scale: the object that the tile covers, its lights, its shadows and images of it; and images of the tile.
 
 pub mod image;
 pub mod lighting;
@@ -9,9 +9,8 @@ pub mod tile_view;
 
 pub use image::camera::CameraView;
 pub use image::gbuffer::GBuffer;
-pub use image::image_file::Image;
+pub use image::pixels::Image;
 pub use image::render::{RenderInput, Rendered, render};
-pub use lighting::light_choice::FAINT_PART;
 pub use lighting::lights::DirectionalLight;
 pub use object::ObjectMesh;
 pub use scene::RenderScene;

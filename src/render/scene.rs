@@ -1,7 +1,7 @@
-//! What stays between pictures of a scene: the object, its lights and the camera.
+//! The large scale of a scene, ready to be rendered with any material.
 
 use super::image::shading::Background;
-use super::lighting::light_choice::worth_shading;
+use super::lighting::light_selection::significant_lights;
 use super::lighting::lights;
 use super::lighting::lights::Lights;
 use super::shadow::Occluder;
@@ -11,35 +11,37 @@ use crate::base::Result;
 use crate::effective::Reflectance;
 use crate::scene::{Camera, LoadedScene, Switch};
 
-/// The large scale of a scene, ready for any material.
+/// Object, lights, shadows and camera of a scene. Images of several materials share it.
 pub struct RenderScene {
     pub mesh: ObjectMesh,
-    /// `None` where nothing can be shadowed.
+    /// `None` if self-shadowing is off or impossible.
     pub occluder: Option<Occluder>,
     pub lights: Lights,
-    /// Lights left out: nothing faces them, or they are too faint to be seen.
+    /// Number of lights left out because no part of the object faces them or because they are too faint.
     pub dropped_lights: usize,
     pub camera: Camera,
-    shadows: Option<ShadowCache>,
+    shadow_cache: Option<ShadowCache>,
 }
 
 impl RenderScene {
+    /// Builds the object and the lights of a scene.
+    ///
     /// # Errors
     /// An object or an environment that cannot be used.
     pub fn new(loaded: &LoadedScene) -> Result<Self> {
         let mesh = object::build(&loaded.scene.object, &loaded.base_dir)?;
         let mut lights = lights::build(&loaded.scene.light, &loaded.base_dir)?;
         let effects = &loaded.scene.effects;
-        let all = lights.directional.len();
+        let total_lights = lights.directional.len();
         if effects.faint_lights != Switch::On {
-            lights.directional = worth_shading(&mesh, &lights.directional);
+            lights.directional = significant_lights(&mesh, &lights.directional);
         }
-        let dropped_lights = all - lights.directional.len();
+        let dropped_lights = total_lights - lights.directional.len();
         let occluder = match effects.self_shadow {
             Switch::Off => None,
             _ if lights.directional.is_empty() => None,
-            Switch::On => Some(Occluder::always(&mesh)),
-            Switch::Auto => Occluder::of(&mesh),
+            Switch::On => Some(Occluder::new(&mesh)),
+            Switch::Auto => Occluder::if_needed(&mesh),
         };
         Ok(Self {
             mesh,
@@ -47,17 +49,18 @@ impl RenderScene {
             lights,
             dropped_lights,
             camera: loaded.scene.camera.clone().unwrap_or_default(),
-            shadows: None,
+            shadow_cache: None,
         })
     }
 
-    /// Makes the shadow cache: pays where the camera moves on, or where a picture has more points than the object vertices.
-    pub fn settle(&mut self) {
+    /// Computes the shadow cache. It saves time if several images follow, or if an image has more shading points than
+    /// the object has vertices.
+    pub fn cache_shadows(&mut self) {
         let cache = |occluder: &Occluder| occluder.cache(&self.mesh, &self.lights.directional);
-        self.shadows = self.occluder.as_ref().map(cache);
+        self.shadow_cache = self.occluder.as_ref().map(cache);
     }
 
-    /// All that a picture of the object in one material depends on, `size` in pixels.
+    /// Collects the input of [`super::render`] for one material; `size` is in pixels.
     pub fn input<'a>(
         &'a self,
         reflectance: &'a dyn Reflectance,
@@ -68,7 +71,7 @@ impl RenderScene {
         RenderInput {
             mesh: &self.mesh,
             occluder: self.occluder.as_ref(),
-            shadow_cache: self.shadows.as_ref(),
+            shadow_cache: self.shadow_cache.as_ref(),
             lights: &self.lights.directional,
             camera: &self.camera,
             reflectance,

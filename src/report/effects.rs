@@ -10,8 +10,9 @@ use super::ThumbnailRenderer;
 use crate::base::{Cancel, Result};
 use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
+use crate::plan::{effect_names, switch_mut};
 use crate::render::Image;
-use crate::scene::{Effects, LoadedScene, Switch};
+use crate::scene::{LoadedScene, Switch};
 
 /// An effect forced on and off.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,23 +28,6 @@ pub struct EffectCost {
     /// CIE ΔE of the picture that it changes: mean, and the 95th of a hundred pixels.
     pub mean_delta_e: f64,
     pub high_delta_e: f64,
-}
-
-/// The switches of a scene, by name.
-pub fn switches(effects: &mut Effects) -> [(&'static str, &mut Switch); 11] {
-    [
-        ("visibility", &mut effects.visibility),
-        ("picture_table", &mut effects.picture_table),
-        ("exact_lobes", &mut effects.exact_lobes),
-        ("color_weights", &mut effects.color_weights),
-        ("material_groups", &mut effects.material_groups),
-        ("black_materials", &mut effects.black_materials),
-        ("interreflection", &mut effects.interreflection),
-        ("mirror_symmetry", &mut effects.mirror_symmetry),
-        ("anisotropy", &mut effects.anisotropy),
-        ("self_shadow", &mut effects.self_shadow),
-        ("faint_lights", &mut effects.faint_lights),
-    ]
 }
 
 /// A scene with an effect forced one way, timed again and again.
@@ -73,21 +57,17 @@ pub fn measure_effects(
     mut progress: impl FnMut(&str),
 ) -> Result<Vec<EffectCost>> {
     let mut all = Vec::new();
-    for k in 0..switches(&mut Effects::default()).len() {
+    for name in effect_names() {
         let forced = |switch: Switch| {
             let mut scene = loaded.clone();
-            let name = {
-                let mut list = switches(&mut scene.scene.effects);
-                let (name, place) = &mut list[k];
-                **place = switch;
-                *name
-            };
-            (name, scene)
+            if let Some(field) = switch_mut(&mut scene.scene.effects, name) {
+                *field = switch;
+            }
+            scene
         };
-        let (name, on) = forced(Switch::On);
         progress(name);
         let mut runners = Vec::with_capacity(3);
-        for scene in [on, forced(Switch::Auto).1, forced(Switch::Off).1] {
+        for scene in [Switch::On, Switch::Auto, Switch::Off].map(forced) {
             runners.push(Runner::new(scene, cancel)?);
         }
         // In turn: what else the machine does meets all three alike. The last run is of the scene's own facets.
@@ -116,8 +96,8 @@ pub fn measure_effects(
 impl Runner {
     fn new(scene: LoadedScene, cancel: &Cancel) -> Result<Self> {
         let studio = ThumbnailRenderer::new(&scene)?;
-        let mut pipeline = Pipeline::new();
-        pipeline.cancel_with(cancel.clone());
+        let mut pipeline = crate::gpu::pipeline();
+        pipeline.set_cancel(cancel.clone());
         let start = Instant::now();
         let outcome = pipeline.effective(&scene)?;
         let image = studio.image(&*outcome.shading_brdf(cancel)?.brdf)?;

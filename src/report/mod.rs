@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-pub use effects::{EffectCost, measure_effects, switches};
+pub use effects::{EffectCost, measure_effects};
 pub use thumbnails::{ThumbnailRenderer, difference_png, heat};
 
 use crate::tuning::sweep::Point;

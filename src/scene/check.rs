@@ -1,4 +1,4 @@
-//! Holds a scene as TOML against the catalogue: unknown keys and kinds, wrong types, values out of range.
+//! Checks a scene's TOML table against the catalogue: unknown keys and kinds, wrong types, values out of range.
 
 use std::fmt::Write as _;
 
@@ -9,16 +9,16 @@ use crate::base::InputError;
 
 /// One step into a document.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Step {
+pub enum PathStep {
     Key(String),
-    /// An entry of a list, with its `name` where it has one.
+    /// An entry of a list, with its `name` if it has one.
     Entry(usize, Option<String>),
 }
 
-/// The first thing that is wrong with a document.
+/// The first error in a document.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    pub path: Vec<Step>,
+    pub path: Vec<PathStep>,
     pub found: String,
     pub expected: String,
     pub hint: Option<String>,
@@ -26,15 +26,16 @@ pub struct Problem {
 }
 
 impl Problem {
-    pub fn new(path: &[Step], found: impl Into<String>, expected: impl Into<String>) -> Self {
+    pub fn new(path: &[PathStep], found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self { path: path.to_vec(), found: found.into(), expected: expected.into(), hint: None, is_unknown_key: false }
     }
 
-    /// A key that is unknown in the table at `depth` of the path, and known in the one around it, whose `fields` these are.
-    fn one_table_up(mut self, fields: &[Field], depth: usize) -> Self {
+    /// Adds a hint if the unknown key belongs to the enclosing table. `depth` is the position in the path of the table
+    /// with the unknown key, and `fields` are those of the enclosing table.
+    fn with_enclosing_table_hint(mut self, fields: &[Field], depth: usize) -> Self {
         if self.is_unknown_key
             && self.path.len() == depth + 1
-            && let Some(Step::Key(key)) = self.path.last()
+            && let Some(PathStep::Key(key)) = self.path.last()
             && fields.iter().any(|field| field.key == key)
         {
             let outer = path_text(&self.path[..depth - 1]);
@@ -43,7 +44,7 @@ impl Problem {
         self
     }
 
-    /// As an error; `line` is where in the file it stands, if it stands in a file.
+    /// Converts the problem to an error. `line` is its line in the scene file, if it comes from a file.
     pub fn into_error(self, line: Option<usize>) -> InputError {
         let field = path_text(&self.path);
         let place = match line {
@@ -59,17 +60,17 @@ impl Problem {
     }
 }
 
-/// `material.sides.brdf.roughness`, as `--set` takes it.
-pub fn path_text(path: &[Step]) -> String {
+/// The path as `--set` takes it, such as `material.sides.brdf.roughness`.
+pub fn path_text(path: &[PathStep]) -> String {
     let mut text = String::new();
     for step in path {
         if !text.is_empty() {
             text.push('.');
         }
         match step {
-            Step::Key(key) => text.push_str(key),
-            Step::Entry(_, Some(name)) => text.push_str(name),
-            Step::Entry(index, None) => {
+            PathStep::Key(key) => text.push_str(key),
+            PathStep::Entry(_, Some(name)) => text.push_str(name),
+            PathStep::Entry(index, None) => {
                 let _ = write!(text, "{index}");
             }
         }
@@ -77,7 +78,7 @@ pub fn path_text(path: &[Step]) -> String {
     text
 }
 
-/// The candidate that is most like `found`, if any is like enough to be meant.
+/// The candidate most similar to `found`, if its similarity suggests a typing error.
 pub fn nearest<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let score = |candidate: &str| strsim::jaro_winkler(&found.to_lowercase(), candidate);
     let best = candidates.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
@@ -89,15 +90,15 @@ fn did_you_mean<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) 
 }
 
 /// Checks a table against its fields.
-pub fn check_table(table: &Table, fields: &[Field], path: &mut Vec<Step>) -> Result<(), Problem> {
+pub fn check_table(table: &Table, fields: &[Field], path: &mut Vec<PathStep>) -> Result<(), Problem> {
     check_keys(table, fields, None, path)
 }
 
-fn check_keys(table: &Table, fields: &[Field], tag: Option<&str>, path: &mut Vec<Step>) -> Result<(), Problem> {
+fn check_keys(table: &Table, fields: &[Field], tag: Option<&str>, path: &mut Vec<PathStep>) -> Result<(), Problem> {
     let known = || tag.into_iter().chain(fields.iter().map(|field| field.key));
     for key in table.keys() {
         if !known().any(|name| name == key) {
-            path.push(Step::Key(key.clone()));
+            path.push(PathStep::Key(key.clone()));
             let mut problem = Problem::new(path, format!("unknown key `{key}`"), format!("one of {}", list(known())));
             problem.hint = did_you_mean(key, known());
             problem.is_unknown_key = true;
@@ -105,11 +106,12 @@ fn check_keys(table: &Table, fields: &[Field], tag: Option<&str>, path: &mut Vec
         }
     }
     for field in fields {
-        path.push(Step::Key(field.key.to_owned()));
+        path.push(PathStep::Key(field.key.to_owned()));
         match table.get(field.key) {
             Some(value) => {
                 let depth = path.len();
-                check_value(value, &field.shape, path).map_err(|problem| problem.one_table_up(fields, depth))?;
+                check_value(value, &field.shape, path)
+                    .map_err(|problem| problem.with_enclosing_table_hint(fields, depth))?;
             }
             None if field.required => {
                 let mut problem = Problem::new(path, "nothing", format!("`{}`: {}", field.key, field.doc));
@@ -125,7 +127,7 @@ fn check_keys(table: &Table, fields: &[Field], tag: Option<&str>, path: &mut Vec
     Ok(())
 }
 
-fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<Step>) -> Result<(), Problem> {
+fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<PathStep>) -> Result<(), Problem> {
     match *shape {
         FieldShape::Number { min, max, .. } => check_number(value, min, max, path),
         FieldShape::Integer { min, max } => match value {
@@ -170,7 +172,7 @@ fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<Step>) -> Resul
             let Value::Table(table) = value else {
                 return Err(Problem::new(path, show(value), "a table { kind = ..., ... }"));
             };
-            path.push(Step::Key("kind".to_owned()));
+            path.push(PathStep::Key("kind".to_owned()));
             let expected = format!("one of {}", list(names()));
             let Some(tag) = table.get("kind") else {
                 return Err(Problem::new(path, "nothing", expected));
@@ -201,17 +203,17 @@ fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<Step>) -> Resul
     }
 }
 
-fn check_entries(values: &[Value], of: &FieldShape, path: &mut Vec<Step>) -> Result<(), Problem> {
+fn check_entries(values: &[Value], of: &FieldShape, path: &mut Vec<PathStep>) -> Result<(), Problem> {
     for (index, value) in values.iter().enumerate() {
         let name = value.get("name").and_then(Value::as_str).filter(|name| !name.is_empty());
-        path.push(Step::Entry(index, name.map(str::to_owned)));
+        path.push(PathStep::Entry(index, name.map(str::to_owned)));
         check_value(value, of, path)?;
         path.pop();
     }
     Ok(())
 }
 
-fn check_number(value: &Value, min: f64, max: f64, path: &[Step]) -> Result<(), Problem> {
+fn check_number(value: &Value, min: f64, max: f64, path: &[PathStep]) -> Result<(), Problem> {
     let number = match value {
         Value::Integer(number) => *number as f64,
         Value::Float(number) => *number,
@@ -219,12 +221,12 @@ fn check_number(value: &Value, min: f64, max: f64, path: &[Step]) -> Result<(), 
             return Err(Problem::new(path, show(other), format!("a number from {min} to {max}")));
         }
     };
-    // Scenes hold f32: a value that rounds to the end of the range is at the end of the range.
+    // Scenes store f32, so a value that rounds to the end of the range is accepted.
     let in_range = number as f32 >= min as f32 && number as f32 <= max as f32;
     if in_range { Ok(()) } else { Err(Problem::new(path, show(value), format!("a number from {min} to {max}"))) }
 }
 
-fn check_text<'a>(value: &'a Value, expected: &str, path: &[Step]) -> Result<&'a str, Problem> {
+fn check_text<'a>(value: &'a Value, expected: &str, path: &[PathStep]) -> Result<&'a str, Problem> {
     value.as_str().ok_or_else(|| Problem::new(path, show(value), expected))
 }
 
@@ -244,7 +246,7 @@ fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// A value as a message shows it, cut where it is long.
+/// The value as text for a message; long texts are truncated.
 fn show(value: &Value) -> String {
     match value {
         Value::Array(values) => format!("a list of {} entries", values.len()),

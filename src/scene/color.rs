@@ -1,4 +1,4 @@
-//! Colours in scene files: a linear RGB triple, or one number for all three.
+//! Colours in scene files: a linear RGB triple, or one number for all three channels.
 
 use glam::Vec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -10,7 +10,7 @@ enum ScalarOrTriple {
     Triple([f32; 3]),
 }
 
-/// For `#[serde(with = "color")]`; a grey is written back as a triple, so that files look alike.
+/// Reads a colour, for `#[serde(with = "color")]`. A colour is always written as a triple, so that files look alike.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
     Ok(match ScalarOrTriple::deserialize(deserializer)? {
         ScalarOrTriple::Scalar(value) => Vec3::splat(value),

@@ -1,4 +1,4 @@
-//! Small edits that need no person: what `biscale profile --edit` moves.
+//! Small automatic edits for `biscale profile --edit`.
 
 use toml::{Table, Value};
 
@@ -6,20 +6,20 @@ use super::Scene;
 use super::{FieldShape, Geometry, Kind, TermSpec};
 
 impl Scene {
-    /// Moves the first numeric parameter of the geometry by 5 % and says which (`tile.geometry.depth`); `None` where
-    /// the family has none. A value at the end of its range goes the other way.
+    /// Changes the first numeric parameter of the geometry by 5 % and returns its path (`tile.geometry.depth`). Returns
+    /// `None` if the family has no such parameter. A value at the end of its range changes in the other direction.
     pub fn nudge_geometry(&mut self) -> Option<String> {
-        let (moved, key) = nudged(&self.tile.geometry, Geometry::kinds(), self.tile.geometry.kind())?;
-        self.tile.geometry = moved;
+        let (changed, key) = nudged(&self.tile.geometry, Geometry::kinds(), self.tile.geometry.kind())?;
+        self.tile.geometry = changed;
         Some(format!("tile.geometry.{key}"))
     }
 
-    /// Moves the first numeric BRDF parameter of the first material that has one by 5 % and says which.
+    /// Changes the first numeric BRDF parameter by 5 % and returns its path. It is that of the first material with one.
     pub fn nudge_brdf(&mut self) -> Option<String> {
         for material in &mut self.materials {
             for term in material.brdf.iter_mut().flat_map(|brdf| brdf.terms_mut()) {
-                if let Some((moved, key)) = nudged(term, TermSpec::kinds(), term.kind()) {
-                    *term = moved;
+                if let Some((changed, key)) = nudged(term, TermSpec::kinds(), term.kind()) {
+                    *term = changed;
                     return Some(format!("material.{}.brdf.{key}", material.name));
                 }
             }
@@ -27,7 +27,7 @@ impl Scene {
         None
     }
 
-    /// Makes the first material's colour 5 % darker and says which.
+    /// Makes the first material's colour 5 % darker and returns its path.
     pub fn nudge_color(&mut self) -> Option<String> {
         let material = self.materials.first_mut()?;
         material.color *= 0.95;
@@ -35,7 +35,8 @@ impl Scene {
     }
 }
 
-/// A copy with its first number (else its first colour, else its first whole number) moved, and that one's key.
+/// Copies the item, changes one parameter of the copy, and returns the copy and the parameter's key. The parameter is
+/// the first number, else the first colour, else the first whole number.
 fn nudged<T>(item: &T, kinds: Vec<Kind>, kind: &str) -> Option<(T, &'static str)>
 where
     T: serde::Serialize + serde::de::DeserializeOwned,
@@ -61,9 +62,9 @@ where
             Value::Integer(if number + by <= max { number + by } else { (number - by).max(min) })
         }
         (Value::Array(values), FieldShape::Color { max }) => {
-            let moved =
+            let changed =
                 values.iter().filter_map(Value::as_float).map(|number| Value::Float(step(number, 0.0, max, 1.0)));
-            Value::Array(moved.collect())
+            Value::Array(changed.collect())
         }
         _ => return None,
     };

@@ -1,16 +1,16 @@
-//! The `[effects]` table: what the plan decides by itself unless a person forces it.
+//! The `[effects]` table: effects that the plan decides unless the user forces them.
 
 use super::FieldShape;
 use super::schema::{scene_choice, scene_table};
 
 scene_choice! {
-    /// Whether an effect is computed.
+    /// State of an effect.
     Switch {
-        /// As the plan decides.
+        /// The plan decides.
         Auto = "auto",
-        /// In any case.
+        /// Always computed.
         On = "on",
-        /// In no case.
+        /// Never computed.
         Off = "off",
     }
 }
@@ -18,37 +18,37 @@ scene_choice! {
 const SWITCH: FieldShape = FieldShape::Choice(Switch::NAMES);
 
 scene_table! {
-    /// Effects, each as the plan decides or forced on or off.
+    /// Effects: the plan decides each one, or the user forces it on or off.
     Effects {
-        /// Facets hide each other from light and viewer.
+        /// Occlusion between facets, towards the light and the viewer.
         visibility: Switch = Switch::Auto, SWITCH, "";
-        /// One exact lobe for all facets that share a normal.
+        /// One exact lobe evaluation for all facets that share a normal.
         exact_lobes: Switch = Switch::Auto, SWITCH, "";
-        /// Colours that differ between the facets of one material; off takes their mean.
+        /// Colours that differ between the facets of one material; off uses their mean.
         color_weights: Switch = Switch::Auto, SWITCH, "";
-        /// Pictures read a table of the sum over facets, where it is close enough.
+        /// Shading table: images read a table of the sum over facets if it is accurate enough.
         picture_table: Switch = Switch::Auto, SWITCH, "";
-        /// Several materials; off gives all facets the one that covers most.
+        /// Several materials; off gives all facets the material that covers the largest area.
         material_groups: Switch = Switch::Auto, SWITCH, "";
-        /// Black materials are summed like any other.
+        /// Black materials are included in the sum.
         black_materials: Switch = Switch::Auto, SWITCH, "";
-        /// Light that facets send to each other. Auto is off: the paper's definition leaves it out.
+        /// Interreflection between facets. Auto means off, because the paper's definition excludes it.
         interreflection: Switch = Switch::Auto, SWITCH, "";
-        /// Reflections between facets that are followed, where they are.
+        /// Number of bounces that interreflection follows.
         bounces: usize = 4, FieldShape::Integer { min: 1, max: 64 }, "";
-        /// Planes that mirror the tile spare half of the directions; on takes the tile to have both.
+        /// Mirror planes of the tile halve the directions to compute; on assumes that the tile has both planes.
         mirror_symmetry: Switch = Switch::Auto, SWITCH, "";
-        /// The result turns with the tile; off tabulates it over three angles in place of four where a format can (.bsdf).
+        /// Dependence of the result on the tile's rotation; off exports `.bsdf` over three angles instead of four.
         anisotropy: Switch = Switch::Auto, SWITCH, "";
-        /// The object's shadows on itself.
+        /// Shadows that the object casts on itself.
         self_shadow: Switch = Switch::Auto, SWITCH, "";
-        /// Lights that no part of the object faces, or too faint to be seen.
+        /// Lights that no part of the object faces, and lights too faint to change a pixel.
         faint_lights: Switch = Switch::Auto, SWITCH, "";
     }
 }
 
 impl Effects {
-    /// Is nothing forced?
+    /// Returns true if no effect is forced.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }

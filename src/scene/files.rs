@@ -1,4 +1,4 @@
-//! Files that a scene names: on disk beside the scene, or `asset:name`, embedded in the binary.
+//! Files that a scene names: relative to the scene file, or `asset:name` for a file that is embedded in the binary.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use super::check;
 use super::shipped;
 use crate::base::{InputError, Result};
 
-/// The bytes of a file named in a scene whose folder is `base_dir`, at most `limit` of them.
+/// Reads a file that a scene names. The scene's folder is `base_dir`, and the file has at most `limit` bytes.
 ///
 /// # Errors
-/// A missing, unreadable or larger file; names the file.
+/// The file is missing, unreadable or too large. The error names the file.
 pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8]>> {
     if let Some(name) = path.to_str().and_then(|path| path.strip_prefix("asset:")) {
         return match shipped::asset(name) {
@@ -28,18 +28,21 @@ pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8
         };
     }
     let full = resolve(base_dir, path);
-    let complain = |found: String, expected: &str| InputError::new("", found, expected).in_file(&full);
-    let metadata = std::fs::metadata(&full).map_err(|error| complain(error.to_string(), "a file that can be read"))?;
+    let input_error = |found: String, expected: &str| InputError::new("", found, expected).in_file(&full);
+    let metadata =
+        std::fs::metadata(&full).map_err(|error| input_error(error.to_string(), "a file that can be read"))?;
     if !metadata.is_file() {
-        return Err(complain("a folder or device".to_owned(), "a file").into());
+        return Err(input_error("a folder or a device file".to_owned(), "a file").into());
     }
     if metadata.len() > limit {
-        return Err(complain(format!("{} bytes", metadata.len()), &format!("at most {limit} bytes")).into());
+        return Err(input_error(format!("{} bytes", metadata.len()), &format!("at most {limit} bytes")).into());
     }
-    std::fs::read(&full).map(Cow::Owned).map_err(|error| complain(error.to_string(), "a file that can be read").into())
+    std::fs::read(&full)
+        .map(Cow::Owned)
+        .map_err(|error| input_error(error.to_string(), "a file that can be read").into())
 }
 
-/// Where a path named in a scene points to on disk.
+/// Path on disk of a file that a scene names.
 pub fn resolve(base_dir: &Path, path: &Path) -> PathBuf {
     base_dir.join(path)
 }

@@ -1,4 +1,4 @@
-//! From a file, a shipped name or a text to a checked [`Scene`], and back.
+//! Loading a checked [`Scene`] from a file, a shipped name or a text, and writing it back.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use toml::Table;
 use toml::de::{DeTable, DeValue};
 
-use super::check::{self, Problem, Step};
+use super::check::{self, PathStep, Problem};
 use super::{Painted, Scene, overrides, shipped};
 use crate::base::{Error, InputError, Result};
 
-/// A scene with the folder that its relative paths start from.
+/// A scene and the folder of its relative paths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedScene {
     pub scene: Scene,
@@ -18,11 +18,11 @@ pub struct LoadedScene {
     pub base_dir: PathBuf,
     /// The file's stem or the shipped name, for titles.
     pub name: String,
-    /// Images that an editor holds in place of files.
+    /// Images in memory that replace files; the editor sets them.
     pub painted: Painted,
 }
 
-/// A scene file is text written by people: more than this is something else.
+/// Largest scene file in bytes. A larger file is not a scene.
 const MAX_FILE: u64 = 64 << 20;
 
 /// Opens `scene`, a file or the name of a shipped material, with `--set` overrides (`key.path=value`) applied.
@@ -59,46 +59,48 @@ pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
 
 /// Loads a scene file.
 pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScene> {
-    let complain = |found: String| Error::from(InputError::new("", found, "a scene file (TOML, UTF-8)").in_file(path));
-    let length = std::fs::metadata(path).map_err(|error| complain(error.to_string()))?.len();
+    let input_error =
+        |found: String| Error::from(InputError::new("", found, "a scene file (TOML, UTF-8)").in_file(path));
+    let length = std::fs::metadata(path).map_err(|error| input_error(error.to_string()))?.len();
     if length > MAX_FILE {
-        return Err(complain(format!("{length} bytes")));
+        return Err(input_error(format!("{length} bytes")));
     }
     let mut source = String::new();
-    // A pipe does not say how long it is.
-    let file = std::fs::File::open(path).map_err(|error| complain(error.to_string()))?;
-    file.take(MAX_FILE).read_to_string(&mut source).map_err(|error| complain(error.to_string()))?;
+    // A pipe reports no length, so reading is limited as well.
+    let file = std::fs::File::open(path).map_err(|error| input_error(error.to_string()))?;
+    file.take(MAX_FILE).read_to_string(&mut source).map_err(|error| input_error(error.to_string()))?;
     let scene = load_with_overrides(&source, overrides).map_err(|error| error.in_file(path))?;
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
     Ok(LoadedScene { scene, base_dir, name, painted: Painted::default() })
 }
 
-/// A scene from its text.
+/// Parses a scene from its text.
 pub fn parse(source: &str) -> Result<Scene> {
     load_with_overrides(source, &[])
 }
 
 impl Scene {
-    /// The scene with words `quality.key=value` applied to its settings.
+    /// Returns the scene with the overrides `quality.key=value` applied to its settings.
     ///
     /// # Errors
-    /// Words that are none, or values that a setting cannot take.
-    pub fn with_quality(&self, words: &[String]) -> Result<Self> {
-        let complain = |found: String| Error::from(InputError::new("quality", found, "settings of the quality table"));
-        let quality = Table::try_from(&self.quality).map_err(|error| complain(error.to_string()))?;
+    /// An override has another form, or a value that its setting cannot take.
+    pub fn with_quality(&self, overrides: &[String]) -> Result<Self> {
+        let input_error =
+            |found: String| Error::from(InputError::new("quality", found, "settings of the quality table"));
+        let quality = Table::try_from(&self.quality).map_err(|error| input_error(error.to_string()))?;
         let mut table = Table::new();
         table.insert("quality".to_owned(), toml::Value::Table(quality));
-        for word in words {
-            overrides::apply(&mut table, word)?;
+        for text in overrides {
+            overrides::apply(&mut table, text)?;
         }
-        let quality = table.remove("quality").ok_or_else(|| complain(String::new()))?;
-        let quality = quality.try_into().map_err(|error: toml::de::Error| complain(error.message().to_owned()))?;
+        let quality = table.remove("quality").ok_or_else(|| input_error(String::new()))?;
+        let quality = quality.try_into().map_err(|error: toml::de::Error| input_error(error.message().to_owned()))?;
         Ok(Self { quality, ..self.clone() })
     }
 }
 
-/// A scene from its text, with overrides applied to the text's table before it is checked.
+/// Parses a scene from its text. Overrides are applied to the text's table, which is then checked.
 pub fn load_with_overrides(source: &str, overrides: &[String]) -> Result<Scene> {
     let mut table: Table = toml::from_str(source).map_err(|error| syntax_error(source, &error))?;
     for text in overrides {
@@ -119,9 +121,9 @@ pub fn load_with_overrides(source: &str, overrides: &[String]) -> Result<Scene> 
         }
     };
     check::check_table(&table, &Scene::fields(), &mut Vec::new()).map_err(fail)?;
-    // The catalogue decides what is legal; what serde still refuses would be a gap in it.
+    // The catalogue defines the legal values. An error of serde after this check means a gap in the catalogue.
     let scene: Scene = table.try_into().map_err(|error: toml::de::Error| {
-        Error::from(InputError::new("", error.message(), "a scene as DESIGN.md, Sec. 6 describes it"))
+        Error::from(InputError::new("", error.message(), "a scene that the catalogue of keys describes"))
     })?;
     scene.check_relations().map_err(fail)?;
     Ok(scene)
@@ -137,21 +139,21 @@ fn line_at(source: &str, offset: usize) -> usize {
     1 + source.as_bytes()[..offset].iter().filter(|&&byte| byte == b'\n').count()
 }
 
-/// The line on which the deepest part of `path` that the text holds stands.
-fn line_of(source: &str, path: &[Step]) -> Option<usize> {
+/// The line of the deepest part of `path` that exists in the text.
+fn line_of(source: &str, path: &[PathStep]) -> Option<usize> {
     let document = DeTable::parse(source).ok()?;
     let mut offset = None;
     let mut table = Some(document.get_ref());
     let mut value: Option<&DeValue<'_>> = None;
     for step in path {
         let next = match step {
-            Step::Key(key) => {
+            PathStep::Key(key) => {
                 let found = table.or(value.and_then(DeValue::as_table))?.iter().find(|(name, _)| name.get_ref() == key);
                 let Some((name, next)) = found else { break };
                 offset = Some(name.span().start);
                 next
             }
-            Step::Entry(index, _) => {
+            PathStep::Entry(index, _) => {
                 let Some(next) = value.and_then(DeValue::as_array).and_then(|array| array.get(*index)) else {
                     break;
                 };
@@ -166,12 +168,12 @@ fn line_of(source: &str, path: &[Step]) -> Option<usize> {
 }
 
 impl Scene {
-    /// The scene as the text of a scene file.
+    /// Writes the scene as the text of a scene file.
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string(self).map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))
     }
 
-    /// Checks a scene that was made or changed in memory: ranges, names, and that fields go together.
+    /// Checks a scene that was created or changed in memory: ranges, names and relations between fields.
     pub fn validate(&self) -> Result<()> {
         let table =
             Table::try_from(self).map_err(|error| Error::failed(format!("cannot write the scene as TOML: {error}")))?;

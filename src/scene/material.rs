@@ -1,6 +1,6 @@
 //! The `[[material]]` tables: BRDF terms and colour.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -9,15 +9,15 @@ use super::color;
 use super::schema::number;
 use super::{Field, FieldShape, Kind};
 
-/// A material, assigned to the mesh slot of its name.
+/// A material for the mesh slot of the same name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
     pub name: String,
-    /// Without one, the BRDF of the material `default`: variants in colour need say no more.
+    /// `None` means the BRDF of the material `default`, so that a colour variant needs only a colour.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub brdf: Option<BrdfSpec>,
-    /// Multiplies the sum of the terms.
+    /// Factor on the sum of the terms.
     #[serde(default = "white", with = "color")]
     pub color: Vec3,
 }
@@ -27,16 +27,27 @@ fn white() -> Vec3 {
 }
 
 const TERM: FieldShape = FieldShape::Tagged(TermSpec::kinds);
-/// Colour weights and analytic parameters may gain energy, which is reported, not refused; beyond this it is a slip.
+/// Largest colour factor. Factors above 1 may gain energy, which the health reports; a larger one is taken for a
+/// mistake.
 const GAIN_LIMIT: f64 = 1000.0;
 
 impl MaterialSpec {
     pub fn fields() -> Vec<Field> {
         let brdf = FieldShape::AnyOf(&[TERM, FieldShape::List { of: &TERM, min: 1, max: 16 }]);
         vec![
-            Field::required("name", FieldShape::Text, "The mesh slot it is for; `default` is for all others."),
-            Field::new("brdf", "", brdf, None, "One term or a list of terms that are added."),
-            Field::new("color", "", FieldShape::Color { max: GAIN_LIMIT }, None, "Multiplies the BRDF."),
+            Field::required(
+                "name",
+                FieldShape::Text,
+                "Slot that the material is for; `default` is for all other slots.",
+            ),
+            Field::new(
+                "brdf",
+                "",
+                brdf,
+                None,
+                "One term, or a list of terms to add. Without it, the BRDF of the material `default`.",
+            ),
+            Field::new("color", "", FieldShape::Color { max: GAIN_LIMIT }, None, "Factor on the BRDF."),
         ]
     }
 }
@@ -65,7 +76,7 @@ impl BrdfSpec {
     }
 }
 
-/// A BRDF term as written in a scene (DESIGN.md, Sec. 3).
+/// A BRDF term as a scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum TermSpec {
@@ -132,37 +143,59 @@ impl TermSpec {
     pub fn kinds() -> Vec<Kind> {
         let color = |key, max, doc| Field::new(key, "", FieldShape::Color { max }, None, doc);
         let roughness = || {
-            Field::new("roughness", "", number(1e-4, 2.0), Some(f64::from(default_roughness())), "Width of the lobe.")
+            Field::new(
+                "roughness",
+                "",
+                number(1e-4, 2.0),
+                Some(f64::from(default_roughness())),
+                "Width of the lobe, used as α without squaring.",
+            )
         };
         let f0 = || color("f0", 1.0, "Reflectance at normal incidence (Schlick).");
-        let specular = || color("specular", GAIN_LIMIT, "Strength of the lobe.");
+        let specular = || color("specular", GAIN_LIMIT, "Factor on the lobe.");
         let exponent = Field::new(
             "exponent",
             "",
             FieldShape::Number { min: 0.0, max: 1e6, soft_max: 1000.0 },
             Some(f64::from(blinn_phong_exponent())),
-            "Sharpness of the lobe.",
+            "Exponent of the cosine; a larger one gives a narrower lobe.",
         );
         let path = |doc| Field::required("path", FieldShape::Path, doc);
         let kind = |kind, doc, fields| Kind { kind, doc, fields };
         vec![
             kind(
                 "lambertian",
-                "Ideally matte.",
-                vec![color("albedo", GAIN_LIMIT, "Part of the light that leaves again.")],
+                "Ideally diffuse reflection.",
+                vec![color("albedo", GAIN_LIMIT, "Fraction of the light that is reflected.")],
             ),
-            kind("blinn_phong", "A cosine power of the half angle.", vec![exponent, specular()]),
-            kind("cook_torrance", "Beckmann facets between V-cavities.", vec![roughness(), f0()]),
+            kind("blinn_phong", "A power of the cosine between normal and half vector.", vec![exponent, specular()]),
+            kind(
+                "cook_torrance",
+                "Beckmann microfacets with V-cavity shadowing and Schlick's Fresnel term.",
+                vec![roughness(), f0()],
+            ),
             kind("ward", "Ward's isotropic Gaussian lobe.", vec![roughness(), specular()]),
-            kind("ggx", "GGX facets with Smith's shadowing; roughness is not squared.", vec![roughness(), f0()]),
-            kind("merl", "A measured MERL table.", vec![path("The .binary file.")]),
-            kind("rgl", "A measured isotropic RGL material.", vec![path("The .bsdf file.")]),
-            kind("utia", "A measured UTIA material, averaged over azimuths.", vec![path("The .bin file.")]),
-            kind("npz", "An export of this program that is isotropic.", vec![path("The .npz file.")]),
+            kind("ggx", "GGX microfacets with Smith's shadowing and Schlick's Fresnel term.", vec![roughness(), f0()]),
+            kind("merl", "A measured BRDF from the MERL database.", vec![path("The .binary file.")]),
+            kind("rgl", "A measured isotropic BRDF from the RGL database.", vec![path("The .bsdf file.")]),
+            kind(
+                "utia",
+                "A measured BRDF from the UTIA database, averaged over azimuths.",
+                vec![path("The .bin file.")],
+            ),
+            kind("npz", "An isotropic `.npz` export of this program.", vec![path("The .npz file.")]),
         ]
     }
 
-    /// The name that stands in the file.
+    /// The name in the scene file.
+    /// The file of a measured BRDF; `None` for an analytic term.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Merl { path } | Self::Rgl { path } | Self::Utia { path } | Self::Npz { path } => Some(path),
+            _ => None,
+        }
+    }
+
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Lambertian { .. } => "lambertian",

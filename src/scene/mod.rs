@@ -1,5 +1,5 @@
-//! What a person edits: plain types that mirror the scene file, their defaults, and their validation.
-//! Lengths are in tile units, angles in degrees in fields that end in `_deg`, colour is linear RGB.
+//! The scene: plain types that mirror the scene file, their defaults, and their validation.
+//! Lengths are in tile units, fields that end in `_deg` are in degrees, and colours are linear RGB.
 //!
 //! [`open`] reads a file or a shipped name; the catalogue ([`Field`]) lists every key with its range and meaning.
 
@@ -18,6 +18,8 @@ pub mod shipped;
 mod tile;
 mod view;
 
+#[cfg(test)]
+mod catalogue_doc;
 #[cfg(test)]
 pub(crate) mod tests;
 
@@ -39,7 +41,7 @@ pub use tile::{
 };
 pub use view::{Camera, DirectionalSpec, Light, OBJECT_KINDS, Object, TONE_MAPS};
 
-use check::{Problem, Step};
+use check::{PathStep, Problem};
 
 use crate::base::{InputError, Result};
 
@@ -68,25 +70,25 @@ fn one() -> u32 {
     1
 }
 
-/// The material that a slot gets, everything looked up.
+/// The material of a slot after all lookups.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlotMaterial<'a> {
     /// Index into [`Scene::materials`]; `None` for the grey of a scene without materials.
     pub index: Option<usize>,
     pub name: &'a str,
     pub brdf: &'a BrdfSpec,
-    /// Multiplies the BRDF.
+    /// Factor on the BRDF.
     pub color: Vec3,
 }
 
-/// What everything is made of in a scene without materials.
+/// BRDF of a scene without materials.
 static GREY: LazyLock<BrdfSpec> = LazyLock::new(|| BrdfSpec::One(TermSpec::Lambertian { albedo: Vec3::splat(0.5) }));
 
 const DEFAULT_MATERIAL: &str = "default";
 const MATERIAL: FieldShape = FieldShape::Table(MaterialSpec::fields);
 
 impl Scene {
-    /// A scene that is all defaults but for its geometry.
+    /// A scene with this geometry and defaults for everything else.
     pub fn of(geometry: Geometry) -> Self {
         Self {
             version: 1,
@@ -105,20 +107,32 @@ impl Scene {
         let optional = |key, shape, doc| Field::new(key, "", shape, None, doc);
         vec![
             optional("version", FieldShape::Integer { min: 1, max: 1 }, "Version of the file format."),
-            Field::required("tile", FieldShape::Table(Tile::fields), "The small-scale surface."),
-            optional("material", FieldShape::List { of: &MATERIAL, min: 0, max: 4096 }, "Materials by slot name."),
+            Field::required(
+                "tile",
+                FieldShape::Table(Tile::fields),
+                "The tile: one period of the small-scale surface.",
+            ),
+            optional(
+                "material",
+                FieldShape::List { of: &MATERIAL, min: 0, max: 4096 },
+                "Materials, each for the slot of its name.",
+            ),
             optional("object", FieldShape::Table(Object::fields), "The large-scale object."),
-            optional("light", FieldShape::Table(Light::fields), "What lights it."),
-            optional("camera", FieldShape::Table(Camera::fields), "Where the picture is taken from."),
-            optional("quality", FieldShape::Table(Quality::fields), "How accurately."),
-            optional("effects", FieldShape::Table(Effects::fields), "Which effects are computed."),
+            optional("light", FieldShape::Table(Light::fields), "Lighting of the object."),
+            optional(
+                "camera",
+                FieldShape::Table(Camera::fields),
+                "The camera; without it, the object is framed automatically.",
+            ),
+            optional("quality", FieldShape::Table(Quality::fields), "Accuracy and backend."),
+            optional("effects", FieldShape::Table(Effects::fields), "Effects that are forced on or off."),
         ]
     }
 
     /// The material of a mesh slot: its own, else `default`, else (in a scene without materials) a grey Lambertian one.
     ///
     /// # Errors
-    /// There are materials, but none of the slot's name and no `default`.
+    /// The scene has materials, but none with the slot's name and no `default`.
     pub fn material_for_slot(&self, slot: &str) -> Result<SlotMaterial<'_>> {
         if self.materials.is_empty() {
             return Ok(SlotMaterial { index: None, name: DEFAULT_MATERIAL, brdf: &GREY, color: Vec3::ONE });
@@ -148,10 +162,10 @@ impl Scene {
         Ok(SlotMaterial { index: Some(index), name: &material.name, brdf, color: material.color })
     }
 
-    /// Rules that tie fields to each other, which the catalogue cannot say.
+    /// Checks rules that relate several fields, which the catalogue cannot express.
     fn check_relations(&self) -> std::result::Result<(), Problem> {
-        let key = |name: &str| Step::Key(name.to_owned());
-        let problem = |path: Vec<Step>, found: &str, expected: &str| Err(Problem::new(&path, found, expected));
+        let key = |name: &str| PathStep::Key(name.to_owned());
+        let problem = |path: Vec<PathStep>, found: &str, expected: &str| Err(Problem::new(&path, found, expected));
         let geometry = |name: &str| vec![key("tile"), key("geometry"), key(name)];
         match &self.tile.geometry {
             Geometry::Mesh(mesh) if mesh.path.as_os_str().is_empty() => {
@@ -178,7 +192,7 @@ impl Scene {
         }
         let mut names = HashSet::new();
         for (index, material) in self.materials.iter().enumerate() {
-            let path = |field: &str| vec![key("material"), Step::Entry(index, None), key(field)];
+            let path = |field: &str| vec![key("material"), PathStep::Entry(index, None), key(field)];
             if !names.insert(material.name.as_str()) {
                 return problem(path("name"), &format!("`{}` a second time", material.name), "each name once");
             }
@@ -192,7 +206,7 @@ impl Scene {
         }
         for (index, light) in self.light.directional.iter().enumerate() {
             if light.direction.try_normalize().is_none() {
-                let path = vec![key("light"), key("directional"), Step::Entry(index, None), key("direction")];
+                let path = vec![key("light"), key("directional"), PathStep::Entry(index, None), key("direction")];
                 return problem(path, "a vector without length", "a direction towards the light");
             }
         }

@@ -1,16 +1,16 @@
-//! `--set key.path=value`: changes to a scene's table before it is checked.
+//! Overrides `--set key.path=value`, applied to a scene's table before its check.
 
 use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::check::Step;
+use super::check::PathStep;
 use super::{Geometry, Kind, TermSpec};
 use crate::base::{Error, InputError, Result};
 
-/// Applies one override. Lists are indexed by number, by `name`, or by `*` for every entry; missing tables are made.
-/// The value is TOML, or else a bare text. A new `kind` drops the keys that only the old kind had; a `path` set on a
-/// BRDF without files makes it a measured one, by the file's ending.
+/// Applies one override. Lists are indexed by number, by `name`, or by `*` for every entry; missing tables are created.
+/// The value is TOML, or else a bare text. A new `kind` drops the keys that only the old kind has. A `path` turns an
+/// analytic BRDF into a measured one; the file's extension selects its kind.
 pub fn apply(root: &mut Table, text: &str) -> Result<()> {
     let (keys, mut value) = split(text)?;
     absolutize(keys.last().copied().unwrap_or_default(), &mut value);
@@ -23,24 +23,24 @@ pub fn apply(root: &mut Table, text: &str) -> Result<()> {
     })
 }
 
-/// Did this override set the place of a problem, something in it, or something around it?
-pub fn touches(text: &str, path: &[Step]) -> bool {
+/// Returns true if this override sets the place of a problem, a part of it, or a table that contains it.
+pub fn touches(text: &str, path: &[PathStep]) -> bool {
     let Ok((keys, _)) = split(text) else {
         return false;
     };
     !path.is_empty()
         && keys.iter().zip(path).all(|(key, step)| match step {
-            Step::Key(name) => name == key,
-            Step::Entry(index, name) => *key == "*" || key.parse() == Ok(*index) || name.as_deref() == Some(*key),
+            PathStep::Key(name) => name == key,
+            PathStep::Entry(index, name) => *key == "*" || key.parse() == Ok(*index) || name.as_deref() == Some(*key),
         })
 }
 
 fn split(text: &str) -> Result<(Vec<&str>, Value)> {
-    let complain = || InputError::new(format!("--set {text}"), format!("`{text}`"), "key.path=value");
-    let (key, value) = text.split_once('=').ok_or_else(complain)?;
+    let input_error = || InputError::new(format!("--set {text}"), format!("`{text}`"), "key.path=value");
+    let (key, value) = text.split_once('=').ok_or_else(input_error)?;
     let keys: Vec<&str> = key.trim().split('.').map(str::trim).collect();
     if keys.iter().any(|key| key.is_empty()) {
-        return Err(complain().into());
+        return Err(input_error().into());
     }
     Ok((keys, parse_value(value.trim())))
 }
@@ -50,7 +50,7 @@ fn parse_value(text: &str) -> Value {
     parsed.and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
-/// Files named on the command line are found from where the command runs, not only from the scene's folder.
+/// Makes paths absolute that exist relative to the working directory; other paths are relative to the scene's folder.
 fn absolutize(key: &str, value: &mut Value) {
     match value {
         Value::String(text) if matches!(key, "path" | "color_path" | "slot_path" | "environment") => {
@@ -69,10 +69,10 @@ fn absolutize(key: &str, value: &mut Value) {
     }
 }
 
-/// What was found, what was expected, and a hint.
-type Complaint = (String, String, Option<String>);
+/// An error as found text, expected text and hint.
+type OverrideError = (String, String, Option<String>);
 
-fn set_in_table(table: &mut Table, keys: &[&str], value: &Value) -> std::result::Result<(), Complaint> {
+fn set_in_table(table: &mut Table, keys: &[&str], value: &Value) -> std::result::Result<(), OverrideError> {
     let Some((&key, rest)) = keys.split_first() else {
         return Ok(());
     };
@@ -94,7 +94,7 @@ fn set_in_table(table: &mut Table, keys: &[&str], value: &Value) -> std::result:
     set_in_value(table.entry(key).or_insert_with(missing), rest, value)
 }
 
-fn set_in_value(place: &mut Value, keys: &[&str], value: &Value) -> std::result::Result<(), Complaint> {
+fn set_in_value(place: &mut Value, keys: &[&str], value: &Value) -> std::result::Result<(), OverrideError> {
     match place {
         Value::Table(table) => set_in_table(table, keys, value),
         Value::Array(entries) => set_in_list(entries, keys, value),
@@ -104,7 +104,7 @@ fn set_in_value(place: &mut Value, keys: &[&str], value: &Value) -> std::result:
     }
 }
 
-fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::result::Result<(), Complaint> {
+fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::result::Result<(), OverrideError> {
     let Some((&key, rest)) = keys.split_first() else {
         return Ok(());
     };
@@ -128,7 +128,7 @@ fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::r
     if let Some(entry) = entries.iter_mut().find(|entry| name_of(entry).as_deref() == Some(key)) {
         return set(entry);
     }
-    // A name close to one that is there is a slip; any other is a new material.
+    // A name similar to an existing one is a typing error; any other name creates a new material.
     let names: Vec<String> = entries.iter().filter_map(name_of).collect();
     if let Some(name) = names.iter().find(|name| strsim::damerau_levenshtein(name, key) <= 2) {
         return Err((
@@ -146,7 +146,7 @@ fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::r
     Ok(())
 }
 
-/// Where a table changes its kind, keys of the old kind would be unknown to the new one.
+/// Removes the keys that only the table's old kind has, because they would be unknown keys of the new kind.
 fn drop_keys_of_other_kinds(table: &mut Table, kind: &Value) {
     let find = |kinds: Vec<Kind>, name: &str| kinds.into_iter().find(|kind| kind.kind == name);
     for kinds in [Geometry::kinds, TermSpec::kinds] {
@@ -161,8 +161,9 @@ fn drop_keys_of_other_kinds(table: &mut Table, kind: &Value) {
     }
 }
 
-/// `brdf.kind` and `brdf.path` apply to a whole BRDF: a sum of terms becomes one term, an analytic one a measured one.
-fn set_brdf_file_or_kind(material: &mut Table, field: &str, value: &Value) -> std::result::Result<(), Complaint> {
+/// Sets `brdf.kind` or `brdf.path`, which apply to a whole BRDF: a sum of terms becomes one term, and an analytic term
+/// with a path becomes a measured one.
+fn set_brdf_file_or_kind(material: &mut Table, field: &str, value: &Value) -> std::result::Result<(), OverrideError> {
     let brdf = material.entry("brdf").or_insert_with(|| Value::Table(Table::new()));
     if !brdf.is_table() {
         *brdf = Value::Table(Table::new());
@@ -171,7 +172,7 @@ fn set_brdf_file_or_kind(material: &mut Table, field: &str, value: &Value) -> st
         return Ok(());
     };
     if field == "path" {
-        let measured = matches!(table.get("kind").and_then(Value::as_str), Some("merl" | "rgl"));
+        let measured = table.get("kind").and_then(Value::as_str).is_some_and(is_measured);
         let ending = value.as_str().and_then(|path| Path::new(path).extension()).and_then(|ending| ending.to_str());
         let by_ending = match ending {
             Some("bsdf") => Some("rgl"),
@@ -189,4 +190,10 @@ fn set_brdf_file_or_kind(material: &mut Table, field: &str, value: &Value) -> st
     }
     table.insert(field.to_owned(), value.clone());
     Ok(())
+}
+
+/// Returns true for the kinds of BRDF that read a file.
+fn is_measured(kind: &str) -> bool {
+    let reads_file = |term: &Kind| term.fields.iter().any(|field| field.key == "path");
+    TermSpec::kinds().iter().any(|term| term.kind == kind && reads_file(term))
 }

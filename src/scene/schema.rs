@@ -1,17 +1,17 @@
-//! The catalogue of scene keys: what each is called, its unit, range and meaning. Validation, the editor's sliders and
-//! the documentation read the same entries.
+//! The catalogue of scene keys: name, unit, range and meaning of each. Validation, the editor's sliders and the
+//! documentation read the same entries.
 
 /// One key of a scene file.
 #[derive(Debug, Clone)]
 pub struct Field {
     pub key: &'static str,
-    /// `tile units`, `degrees`, ... or empty.
+    /// Unit such as `tile units` or `degrees`, or empty.
     pub unit: &'static str,
     pub shape: FieldShape,
     /// Default of a numeric key.
     pub default: Option<f64>,
     pub required: bool,
-    /// One line for a tooltip.
+    /// One line that explains the key, for tooltips and the documentation.
     pub doc: &'static str,
 }
 
@@ -30,7 +30,7 @@ impl Field {
         Self { required: true, ..Self::new(key, "", shape, None, doc) }
     }
 
-    /// The key as a caption: `side_angle_deg` reads `Side angle`.
+    /// The key as a caption: `side_angle_deg` becomes `Side angle`.
     pub fn label(&self) -> String {
         let words = self.key.trim_end_matches("_deg").replace('_', " ");
         let mut letters = words.chars();
@@ -38,10 +38,10 @@ impl Field {
     }
 }
 
-/// What a key may hold. Ranges are inclusive.
+/// Type and range of a key's value. Ranges are inclusive.
 #[derive(Debug, Clone, Copy)]
 pub enum FieldShape {
-    /// Any number in `min..=max`; a slider ends at `soft_max`, beyond which values are legal but rarely meant.
+    /// Any number in `min..=max`. A slider ends at `soft_max`; larger values are legal but rarely useful.
     Number {
         min: f64,
         max: f64,
@@ -65,18 +65,18 @@ pub enum FieldShape {
     Path,
     Choice(&'static [&'static str]),
     Table(fn() -> Vec<Field>),
-    /// A table whose `kind` says which keys it has.
+    /// A table whose `kind` selects its keys.
     Tagged(fn() -> Vec<Kind>),
     List {
         of: &'static FieldShape,
         min: usize,
         max: usize,
     },
-    /// The first alternative of the value's TOML type decides.
+    /// Alternatives; the first one with the value's TOML type applies.
     AnyOf(&'static [FieldShape]),
 }
 
-/// One alternative of a tagged table: a geometry family, a BRDF model.
+/// One alternative of a tagged table: a geometry family or a BRDF model.
 #[derive(Debug, Clone)]
 pub struct Kind {
     pub kind: &'static str,
@@ -89,12 +89,12 @@ pub const fn number(min: f64, max: f64) -> FieldShape {
     FieldShape::Number { min, max, soft_max: max }
 }
 
-/// A length in tile units: any up to a hundred of the largest tiles, sliders end at `soft_max`.
+/// A length in tile units, at most a hundred times the largest tile size; sliders end at `soft_max`.
 pub const fn length(min: f64, soft_max: f64) -> FieldShape {
     FieldShape::Number { min, max: 1e8, soft_max }
 }
 
-/// The default of a field as the catalogue shows it: numbers have one, other types do not.
+/// Default of a field in the catalogue; only numbers have one.
 pub trait DefaultNumber {
     fn default_number(&self) -> Option<f64> {
         None
@@ -116,7 +116,7 @@ impl DefaultNumber for glam::Vec2 {}
 impl DefaultNumber for glam::Vec3 {}
 impl<T> DefaultNumber for Vec<T> {}
 
-/// Declares a table of a scene once: its serde struct, its defaults, and its catalogue entries (`Type::fields()`).
+/// Declares a scene table: its serde struct, its defaults and its catalogue entries (`Type::fields()`).
 macro_rules! scene_table {
     ($(#[doc = $struct_doc:literal])* $name:ident {
         $( #[doc = $doc:literal] $(#[$attribute:meta])* $field:ident: $type:ty = $default:expr, $shape:expr, $unit:literal; )*
@@ -148,7 +148,7 @@ macro_rules! scene_table {
 }
 pub(super) use scene_table;
 
-/// A field-less enum that reads and writes as its snake-case names, with the list of them as a [`FieldShape`].
+/// Declares a field-less enum that is read and written as the given names, and the list of these names.
 macro_rules! scene_choice {
     ($(#[doc = $enum_doc:literal])* $name:ident { $( #[doc = $doc:literal] $variant:ident = $text:literal, )* }) => {
         $(#[doc = $enum_doc])*

@@ -59,7 +59,7 @@ pub fn source(name: &str) -> Option<&'static str> {
     MATERIALS.iter().find(|(candidate, _)| *candidate == name).map(|(_, source)| *source)
 }
 
-/// What a shipped scene shows: the comment that its file begins with.
+/// Description of a shipped scene: the comment at the start of its file.
 pub fn description(name: &str) -> Option<String> {
     let lines = source(name)?.lines().map_while(|line| line.strip_prefix('#')).map(str::trim);
     Some(lines.collect::<Vec<_>>().join(" "))

@@ -1,10 +1,10 @@
-//! Scene files: defaults, errors, overrides, round trips.
+//! Tests of scene files: defaults, errors, overrides, round trips.
 
 use glam::Vec3;
 use proptest::prelude::*;
 use toml::{Table, Value};
 
-use super::check::{Step, check_table};
+use super::check::{PathStep, check_table};
 use super::*;
 
 const GROOVES: &str = "[tile]\ngeometry = { kind = \"grooves\" }\n";
@@ -46,7 +46,7 @@ fn integers_stand_for_floats_and_scalars_for_colours() {
 }
 
 #[test]
-fn the_example_of_the_design_loads() {
+fn a_scene_with_every_table_loads() {
     let text = r#"
 [tile]
 size = [1.0, 1.0]
@@ -88,7 +88,7 @@ fn unknown_keys_are_named_in_full_with_line_and_suggestion_at_every_level() {
             "[tile]\ngeometry = { kind = \"flat\" }\n[light]\ndirectional = [{ direction = [0,1,0], irradiance = 1, colour = 1 }]",
             ["line 4", "light.directional.0.colour", "irradiance"],
         ),
-        // Where it stood before it could lie over any surface.
+        // A key of the enclosing table.
         (
             "[tile.geometry]\nkind = \"heightfield\"\ncolor_path = \"colors.png\"",
             ["line 3", "tile.geometry.color_path", "`color_path` belongs one table up, in `[tile]`"],
@@ -153,7 +153,7 @@ fn fields_that_belong_together_are_checked_together() {
 }
 
 #[test]
-fn slots_get_their_own_material_else_default_else_an_error() {
+fn a_slot_has_its_own_material_or_the_default_or_is_an_error() {
     let scene = parse(GROOVES).unwrap();
     let grey = scene.material_for_slot("bottom").unwrap();
     assert_eq!((grey.index, grey.brdf.terms()), (None, &[TermSpec::Lambertian { albedo: Vec3::splat(0.5) }][..]));
@@ -175,7 +175,7 @@ const TWO_COLOURS: &str = "[tile]\ngeometry = { kind = \"grooves\" }\n\
     [[material]]\nname = \"sides\"\ncolor = [1, 1, 0]\n";
 
 #[test]
-fn overrides_reach_by_index_name_and_star_and_make_missing_tables() {
+fn overrides_index_by_number_name_and_star_and_create_missing_tables() {
     let scene = set(
         TWO_COLOURS,
         &[
@@ -202,7 +202,7 @@ fn overrides_reach_by_index_name_and_star_and_make_missing_tables() {
 }
 
 #[test]
-fn a_measured_paint_takes_the_place_of_an_analytic_stand_in_in_any_of_the_usual_ways() {
+fn overrides_replace_an_analytic_brdf_by_a_measured_one_in_several_ways() {
     let expected = TermSpec::Merl { path: "/paints/pearl.binary".into() };
     for overrides in [
         &["material.default.brdf.path=/paints/pearl.binary"][..],
@@ -223,6 +223,22 @@ fn a_measured_paint_takes_the_place_of_an_analytic_stand_in_in_any_of_the_usual_
     }
     let scene = set(TWO_COLOURS, &["material.default.brdf.path=x.bsdf"]).unwrap();
     assert_eq!(scene.materials[0].brdf.as_ref().unwrap().terms()[0].kind(), "rgl");
+}
+
+#[test]
+fn a_measured_brdf_keeps_its_kind_when_an_override_sets_another_path() {
+    for kind in TermSpec::kinds().into_iter().filter(|kind| kind.fields.iter().any(|field| field.required)) {
+        let source = format!(
+            "{GROOVES}[[material]]\nname = \"default\"\nbrdf = {{ kind = \"{}\", path = \"a.bin\" }}\n",
+            kind.kind
+        );
+        for file in ["b.bin", "b.npz", "b"] {
+            let scene = set(&source, &[&format!("material.default.brdf.path={file}")]).unwrap();
+            let terms = scene.materials[0].brdf.as_ref().unwrap().terms().to_vec();
+            let written = Table::try_from(&terms[0]).unwrap();
+            assert_eq!((terms[0].kind(), written["path"].as_str()), (kind.kind, Some(file)));
+        }
+    }
 }
 
 #[test]
@@ -270,7 +286,7 @@ fn unknown_scenes_suggest_the_nearest_shipped_name() {
 }
 
 #[test]
-fn files_keep_their_folder_and_errors_name_the_file() {
+fn a_loaded_scene_stores_its_folder_and_errors_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let scene = parse(TWO_COLOURS).unwrap();
@@ -284,7 +300,7 @@ fn files_keep_their_folder_and_errors_name_the_file() {
 }
 
 #[test]
-fn scenes_changed_in_memory_are_held_to_the_same_ranges() {
+fn scenes_changed_in_memory_are_checked_against_the_same_ranges() {
     let mut scene = parse(TWO_COLOURS).unwrap();
     scene.validate().unwrap();
     scene.tile.geometry = Geometry::Grooves(Grooves { depth: f32::NAN, ..Grooves::default() });
@@ -293,7 +309,7 @@ fn scenes_changed_in_memory_are_held_to_the_same_ranges() {
 }
 
 #[test]
-fn edits_move_the_first_numeric_parameter_by_five_percent() {
+fn edits_change_the_first_numeric_parameter_by_five_percent() {
     let mut scene = parse(TWO_COLOURS).unwrap();
     assert_eq!(scene.nudge_geometry().as_deref(), Some("tile.geometry.depth"));
     let Geometry::Grooves(grooves) = &scene.tile.geometry else { panic!() };
@@ -361,7 +377,7 @@ fn the_catalogue_lists_exactly_the_keys_that_serde_takes() {
     }
 }
 
-/// A value that the catalogue allows: ends of ranges, and between.
+/// A strategy for values that the catalogue allows, with the ends of ranges.
 pub(crate) fn value_of(shape: FieldShape) -> BoxedStrategy<Value> {
     let number = |min: f64, max: f64| {
         let inside = (0.0..=1.0).prop_map(move |t| (min + t * (max - min)) as f32);
@@ -417,12 +433,12 @@ proptest! {
 
     #[test]
     fn scenes_go_through_toml_and_back_exactly(table in table_of(Scene::fields())) {
-        prop_assert_eq!(check_table(&table, &Scene::fields(), &mut Vec::<Step>::new()), Ok(()));
+        prop_assert_eq!(check_table(&table, &Scene::fields(), &mut Vec::<PathStep>::new()), Ok(()));
         let scene: Scene = table.try_into().map_err(|error: toml::de::Error| TestCaseError::fail(error.to_string()))?;
         let text = scene.to_toml().map_err(|error| TestCaseError::fail(error.to_string()))?;
         let back: Scene = toml::from_str(&text).map_err(|error| TestCaseError::fail(format!("{error}\n{text}")))?;
         prop_assert_eq!(&back, &scene);
-        // Whatever relations it breaks, it breaks with an error.
+        // A broken relation between fields is an error, not a panic.
         let _ = parse(&text);
     }
 

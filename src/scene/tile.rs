@@ -15,13 +15,14 @@ pub struct Tile {
     /// Extent of the period in x and y, tile units.
     #[serde(default = "unit_square")]
     pub size: Vec2,
-    /// What a tile unit is called; only shown.
+    /// Name of the tile unit; it is displayed and changes no result.
     #[serde(default = "millimetre")]
     pub unit: String,
-    /// Linear colour weights over the tile, seen from above; they multiply the materials.
+    /// Image of linear colour weights over the tile, projected along z; they multiply the materials.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color_path: Option<PathBuf>,
-    /// Materials over the tile, seen from above: a grey value of k (of 255) is the slot `paint_k`, 0 the surface's own.
+    /// Image of slots over the tile, projected along z. The grey value k (of 255) selects the slot `paint_k`; 0 leaves
+    /// the surface's own slot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slot_path: Option<PathBuf>,
     pub geometry: Geometry,
@@ -48,18 +49,18 @@ impl Tile {
                 "tile units",
                 FieldShape::Vector { length: 2, min: 1e-6, max: 1e6 },
                 None,
-                "Extent of the period in x and y.",
+                "Extent of the tile in x and y.",
             ),
-            Field::new("unit", "", FieldShape::Text, None, "Name of the length unit."),
-            Field::new("color_path", "", FieldShape::Path, None, "An image of colour weights over the tile."),
+            Field::new("unit", "", FieldShape::Text, None, "Name of the tile unit."),
+            Field::new("color_path", "", FieldShape::Path, None, "Image of colour weights over the tile."),
             Field::new(
                 "slot_path",
                 "",
                 FieldShape::Path,
                 None,
-                "An image of materials over the tile: a grey of k (of 255) is the slot `paint_k`, 0 the surface's own.",
+                "Image of slots over the tile: grey value k (of 255) selects the slot `paint_k`, 0 the surface's own.",
             ),
-            Field::required("geometry", FieldShape::Tagged(Geometry::kinds), "The surface on the tile."),
+            Field::required("geometry", FieldShape::Tagged(Geometry::kinds), "Geometry of the surface."),
         ]
     }
 }
@@ -85,14 +86,22 @@ impl Geometry {
             kind("grooves", "Parallel grooves; slots `bottom` and `sides`.", Grooves::fields()),
             kind("pyramids", "Pyramids on a floor; slots `faces` and `floor`.", Pyramids::fields()),
             kind("rods", "Rods that stand on a floor; slots `rods` and `floor`.", Rods::fields()),
-            kind("weave", "Woven threads; slots `warp` (along y) and `weft` (along x).", Weave::fields()),
+            kind(
+                "weave",
+                "Woven threads; slots `warp` (along y), `weft` (along x) and, with its own backing, `backing`.",
+                Weave::fields(),
+            ),
             kind("heightfield", "Heights from an image or a list; slot `default`.", Heightfield::fields()),
-            kind("flat", "A plane, plain or in two slots `first` and `second`.", Flat::fields()),
-            kind("mesh", "An OBJ file; `usemtl` names are the slots.", MeshFile::fields()),
+            kind("flat", "A plane; slot `default` if plain, otherwise `first` and `second`.", Flat::fields()),
+            kind(
+                "mesh",
+                "A mesh from an OBJ file; its slots are the `usemtl` names, and `default` for faces before the first.",
+                MeshFile::fields(),
+            ),
         ]
     }
 
-    /// The name that stands in the file.
+    /// The name in the scene file.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Grooves(_) => "grooves",
@@ -135,30 +144,30 @@ scene_choice! {
 }
 
 scene_table! {
-    /// Parallel grooves (Wu et al. 2011, Fig. 4). Sides that would overlap meet at a ridge and steepen; what is left
-    /// between two openings is flat land at z = 0, which belongs to `sides`.
+    /// Parallel grooves (Wu et al. 2011, Fig. 4). Sides that would overlap meet at a ridge and become steeper. The flat
+    /// area at z = 0 that remains between two openings belongs to `sides`.
     Grooves {
-        /// How deep the grooves are.
+        /// Depth of the grooves.
         depth: f32 = 0.2, length(0.0, 1.0), "tile units";
-        /// Angle of the sides with the base plane; rectangular and U profiles do without.
+        /// Angle between the sides and the base plane; rectangular and U profiles ignore it.
         side_angle_deg: f32 = 60.0, number(1.0, 90.0), "degrees";
-        /// Width of the bottom (U: of the opening) as a part of the distance between grooves; V grooves have none.
+        /// Width of the bottom (U: of the opening), as a fraction of the distance between grooves; V grooves ignore it.
         bottom_width: f32 = 0.4, number(0.0, 0.95), "of the pitch";
-        /// Cross-section.
+        /// Cross-section of the grooves.
         profile: GrooveProfile = GrooveProfile::Trapezoid, FieldShape::Choice(GrooveProfile::NAMES), "";
-        /// Grooves across the tile.
+        /// Number of grooves across the tile.
         count: u32 = 4, FieldShape::Integer { min: 1, max: 64 }, "";
-        /// Turns the grooves, which run along y, about z; snaps to a direction in which the tile repeats.
+        /// Rotation about z of the grooves, which run along y; rounded to a direction in which the tile repeats.
         rotation_deg: f32 = 0.0, number(-180.0, 180.0), "degrees";
     }
 }
 
 scene_choice! {
-    /// How pyramids stand on the plane.
+    /// Arrangement of pyramids on the plane.
     Arrangement {
         /// Rows and columns.
         Square = "square",
-        /// Every second row shifted by half a spacing, rows closer by √3/2.
+        /// Every second row shifted by half a spacing, rows √3/2 of a spacing apart.
         Hex = "hex",
         /// Every second row shifted by half a spacing, like bricks.
         Staggered = "staggered",
@@ -168,47 +177,47 @@ scene_choice! {
 scene_table! {
     /// Pyramids on a floor (Wu et al. 2011, Fig. 5).
     Pyramids {
-        /// Height of the full pyramid, before its tip is cut.
+        /// Height of the full pyramid; truncation removes part of it.
         height: f32 = 0.15, length(0.0, 1.0), "tile units";
-        /// Size of the base as a part of the largest that fits its cell.
+        /// Size of the base, as a fraction of the largest base that fits the cell.
         base_size: f32 = 1.0, number(0.05, 1.0), "of the cell";
-        /// Part of the height that is cut off at the tip.
+        /// Fraction of the height that is cut off at the tip.
         truncation: f32 = 0.0, number(0.0, 0.95), "of the height";
-        /// Ratio of the runs of the faces towards +x and towards -x: moves the tip off the centre.
+        /// Ratio of the horizontal extents of the +x and -x faces; values other than 1 move the tip off the centre.
         face_ratio: f32 = 1.0, number(0.1, 10.0), "";
-        /// Distance between neighbours, rounded so that whole cells fit the tile.
+        /// Distance between neighbours, rounded so that a whole number of cells fits the tile.
         spacing: f32 = 0.25, length(1e-9, 1.0), "tile units";
-        /// Sides of the base.
+        /// Number of sides of the base.
         sides: u32 = 4, FieldShape::Integer { min: 3, max: 8 }, "";
-        /// How they stand.
+        /// Arrangement of the pyramids.
         arrangement: Arrangement = Arrangement::Square, FieldShape::Choice(Arrangement::NAMES), "";
-        /// Turns each pyramid about its axis.
+        /// Rotation of each pyramid about its axis.
         rotation_deg: f32 = 0.0, number(-180.0, 180.0), "degrees";
     }
 }
 
 scene_table! {
-    /// Tapered rods on a floor (the velvets of Wu et al. 2011, Fig. 6). They may lean over the tile's edge.
+    /// Tapered rods on a floor (the velvets of Wu et al. 2011, Fig. 6). Rods may extend over the tile's edge.
     Rods {
         /// Radius at the floor.
         radius: f32 = 0.02, length(1e-9, 0.2), "tile units";
         /// Length along the axis.
         length: f32 = 0.35, length(1e-9, 1.0), "tile units";
-        /// How much thinner the tip is than the foot: 0 a cylinder, 1 a point.
+        /// Reduction of the radius at the tip: 0 is a cylinder, 1 a cone.
         taper: f32 = 0.3, number(0.0, 1.0), "";
         /// Angle between the common axis and +z.
         lean_deg: f32 = 0.0, number(0.0, 80.0), "degrees";
-        /// Where the rods lean to, from +x towards +y.
+        /// Azimuth of the common axis, from +x towards +y.
         lean_azimuth_deg: f32 = 0.0, number(-360.0, 360.0), "degrees";
-        /// How far single rods stray from the common axis.
+        /// Largest angle between a rod and the common axis.
         spread_deg: f32 = 10.0, number(0.0, 80.0), "degrees";
-        /// Randomness of the places: 0 a lattice, 1 anywhere in a rod's own cell.
+        /// Randomness of the positions: 0 is a lattice, 1 anywhere in each rod's cell.
         jitter: f32 = 0.8, number(0.0, 1.0), "";
-        /// Randomness of the lengths, as a part of the length.
+        /// Randomness of the lengths, as a fraction of the length.
         length_variation: f32 = 0.1, number(0.0, 1.0), "";
-        /// Rods on the tile.
+        /// Number of rods on the tile.
         count: u32 = 100, FieldShape::Integer { min: 1, max: 4000 }, "";
-        /// Rods per squared tile unit; stands in for the count.
+        /// Number of rods per square tile unit; replaces the count.
         #[serde(skip_serializing_if = "Option::is_none")]
         density: Option<f32> = None, number(1e-3, 1e6), "per area";
         /// Seed of the random numbers.
@@ -217,7 +226,7 @@ scene_table! {
 }
 
 scene_choice! {
-    /// FieldShape of a thread across its run.
+    /// Cross-section of a thread.
     CrossSection {
         /// Round or oval yarn.
         Elliptic = "elliptic",
@@ -229,19 +238,19 @@ scene_choice! {
 }
 
 scene_choice! {
-    /// Usual float patterns.
+    /// Common weave patterns.
     FloatPattern {
         /// Over one, under one.
         Plain = "plain",
-        /// Over two, under two, shifted by one a row.
+        /// Over two, under two, shifted by one thread per row.
         Twill = "twill",
-        /// Warp over four, under one, steps of two: a warp-faced satin of five.
+        /// Warp over four, under one, shifted by two threads per row: a warp-faced satin of five.
         Satin = "satin",
     }
 }
 
-/// Which thread is on top where: a named pattern, or a matrix with a row per weft thread and a column per warp thread,
-/// 1 where the warp is on top.
+/// Thread that is on top at each crossing: a named pattern, or a matrix with one row per weft thread and one column per
+/// warp thread. The value 1 puts the warp on top.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum WeavePattern {
@@ -252,15 +261,15 @@ pub enum WeavePattern {
 impl super::schema::DefaultNumber for WeavePattern {}
 
 scene_choice! {
-    /// What lies under the gaps of a weave.
+    /// Sheet under the gaps of a weave.
     Backing {
-        /// Nothing: the tile has holes.
+        /// No sheet: the tile has holes.
         None = "none",
         /// A sheet in the slot `warp`.
         Warp = "warp",
         /// A sheet in the slot `weft`.
         Weft = "weft",
-        /// A sheet in a slot of its own, `backing`.
+        /// A sheet in its own slot `backing`.
         Own = "backing",
     }
 }
@@ -271,27 +280,28 @@ const WEAVE_PATTERN: FieldShape =
     FieldShape::AnyOf(&[FieldShape::Choice(FloatPattern::NAMES), FieldShape::List { of: &WEAVE_ROW, min: 1, max: 24 }]);
 
 scene_table! {
-    /// Woven threads (Wu et al. 2011, Fig. 7): warp threads run along y, weft threads along x, and touch where they cross.
+    /// Woven threads (Wu et al. 2011, Fig. 7): warp threads run along y, weft threads along x, and touch where they
+    /// cross.
     Weave {
-        /// Width of the warp threads as a part of their distance.
+        /// Width of the warp threads, as a fraction of their spacing.
         warp_width: f32 = 0.9, number(0.05, 1.0), "of the spacing";
-        /// Width of the weft threads as a part of their distance.
+        /// Width of the weft threads, as a fraction of their spacing.
         weft_width: f32 = 0.9, number(0.05, 1.0), "of the spacing";
         /// Thickness of the warp threads.
         warp_height: f32 = 0.08, length(1e-9, 0.5), "tile units";
         /// Thickness of the weft threads.
         weft_height: f32 = 0.08, length(1e-9, 0.5), "tile units";
-        /// Who bends: 0 only the weft, 1 only the warp.
+        /// Distribution of the bending between the threads: at 0 only the weft bends, at 1 only the warp.
         crimp: f32 = 0.5, number(0.0, 1.0), "";
-        /// Warp threads on the tile, rounded to whole repeats of the pattern.
+        /// Number of warp threads on the tile, rounded to whole repeats of the pattern.
         warp_count: u32 = 4, FieldShape::Integer { min: 1, max: 24 }, "";
-        /// Weft threads on the tile, rounded to whole repeats of the pattern.
+        /// Number of weft threads on the tile, rounded to whole repeats of the pattern.
         weft_count: u32 = 4, FieldShape::Integer { min: 1, max: 24 }, "";
-        /// FieldShape of a thread across its run.
+        /// Cross-section of the threads.
         cross_section: CrossSection = CrossSection::Elliptic, FieldShape::Choice(CrossSection::NAMES), "";
-        /// Which thread is on top: plain, twill, satin or a matrix of 0 and 1 (1: warp on top; a row per weft thread).
+        /// Thread on top: plain, twill, satin or a matrix of 0 and 1 (1: warp on top) with one row per weft thread.
         pattern: WeavePattern = WeavePattern::Named(FloatPattern::Plain), WEAVE_PATTERN, "";
-        /// What lies under the gaps: none, warp, weft or backing.
+        /// Slot of the sheet under the gaps: none (no sheet), warp, weft or backing.
         backing: Backing = Backing::Weft, FieldShape::Choice(Backing::NAMES), "";
     }
 }
@@ -300,28 +310,29 @@ const HEIGHT: FieldShape = FieldShape::Number { min: -1e6, max: 1e6, soft_max: 1
 const HEIGHT_ROW: FieldShape = FieldShape::List { of: &HEIGHT, min: 1, max: 4096 };
 
 scene_table! {
-    /// A height-field (Wu et al. 2011, Fig. 8) from an image or from values in the file. Image values are linear,
-    /// 0 to 1 for integer formats. Sample (column i, row j) sits at ((i+½)/w, (j+½)/h) of the tile, row 0 at y = 0.
+    /// A height field (Wu et al. 2011, Fig. 8) from an image or from values in the scene file. Image values are linear,
+    /// 0 to 1 for integer formats. Sample (column i, row j) lies at ((i+½)/w, (j+½)/h) of the tile, with row 0
+    /// at y = 0.
     Heightfield {
-        /// Height of the value 1.
+        /// Height that the value 1 stands for.
         height_scale: f32 = 1.0, FieldShape::Number { min: -1e8, max: 1e8, soft_max: 1.0 }, "tile units";
-        /// An image of heights: PNG of 8 or 16 bits, TIFF, HDR or EXR.
+        /// Image of heights: PNG of 8 or 16 bits, TIFF, HDR or EXR. Exactly one of `path` and `values` is required.
         #[serde(skip_serializing_if = "Option::is_none")]
         path: Option<PathBuf> = None, FieldShape::Path, "";
-        /// Heights row by row, in place of an image.
+        /// Heights row by row, instead of an image.
         #[serde(skip_serializing_if = "Option::is_none")]
         values: Option<Vec<Vec<f32>>> = None, FieldShape::List { of: &HEIGHT_ROW, min: 1, max: 4096 }, "";
     }
 }
 
 scene_choice! {
-    /// How a plane is divided into the slots `first` and `second`.
+    /// Division of a plane into the slots `first` and `second`.
     FlatPattern {
         /// One slot, `default`.
         Plain = "plain",
         /// Stripes along y.
         Stripes = "stripes",
-        /// Checks.
+        /// A checkerboard.
         Checks = "checks",
     }
 }
@@ -329,11 +340,11 @@ scene_choice! {
 scene_table! {
     /// A plane, plain or printed (cylinder #2 of Wu et al. 2011, Fig. 9).
     Flat {
-        /// Part of a stripe or check period that is `first`.
+        /// Fraction of a stripe or check period that has the slot `first`.
         ratio: f32 = 0.5, number(0.0, 1.0), "of the period";
-        /// Division into slots.
+        /// Division into slots; a plain plane has the slot `default`.
         pattern: FlatPattern = FlatPattern::Plain, FieldShape::Choice(FlatPattern::NAMES), "";
-        /// Periods across the tile.
+        /// Number of periods across the tile.
         count: u32 = 4, FieldShape::Integer { min: 1, max: 64 }, "";
     }
 }
@@ -341,7 +352,7 @@ scene_table! {
 scene_table! {
     /// A triangle mesh from an OBJ file, in tile coordinates.
     MeshFile {
-        /// The OBJ file; its `usemtl` names choose the materials.
+        /// Required. The OBJ file; its `usemtl` names select the materials.
         path: PathBuf = PathBuf::new(), FieldShape::Path, "";
     }
 }

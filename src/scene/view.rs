@@ -1,4 +1,4 @@
-//! What is seen, and how it is lit and looked at: `[object]`, `[light]`, `[camera]`.
+//! The tables `[object]`, `[light]` and `[camera]`.
 
 use std::path::PathBuf;
 
@@ -9,18 +9,18 @@ use super::color;
 use super::schema::{number, scene_table};
 use super::{Field, FieldShape};
 
-/// Objects that `object.kind` names; `mesh` reads `object.path`.
+/// Values of `object.kind`; `mesh` reads the file `object.path`.
 pub const OBJECT_KINDS: &[&str] = &["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh"];
 
-/// Tone maps that `camera.tone_map` names.
+/// Values of `camera.tone_map`.
 pub const TONE_MAPS: &[&str] = &["filmic", "plain"];
 
 scene_table! {
-    /// The large-scale object that wears the material.
+    /// The large-scale object that the tile covers.
     Object {
-        /// FieldShape: sphere, plate, cup, cylinder, pillow, skirt, teapot or mesh.
+        /// Shape: sphere, plate, cup, cylinder, pillow, skirt, teapot or mesh.
         kind: String = "sphere".to_owned(), FieldShape::Choice(OBJECT_KINDS), "";
-        /// The OBJ file of the kind `mesh`.
+        /// OBJ file; required if the kind is `mesh`.
         #[serde(skip_serializing_if = "Option::is_none")]
         path: Option<PathBuf> = None, FieldShape::Path, "";
     }
@@ -29,17 +29,17 @@ scene_table! {
 const LIGHT: FieldShape = FieldShape::Table(DirectionalSpec::fields);
 
 scene_table! {
-    /// What lights it.
+    /// Lighting of the object: an environment and directional lights.
     Light {
-        /// A built-in sky (studio, clear_sky, overcast_sky, sun, none) or a .hdr / .exr file.
+        /// Built-in environment (studio, clear_sky, overcast_sky, sun, none) or a .hdr or .exr file.
         environment: String = "studio".to_owned(), FieldShape::Text, "";
-        /// How many directional lights stand for the environment.
+        /// Number of directional lights that represent the environment.
         count: usize = 32, FieldShape::Integer { min: 0, max: 4096 }, "";
-        /// Turns the environment about the vertical.
+        /// Rotation of the environment about the vertical axis.
         rotation_deg: f32 = 0.0, number(-360.0, 360.0), "degrees";
-        /// Scales the environment's radiance.
+        /// Factor on the environment's radiance.
         intensity: f32 = 1.0, FieldShape::Number { min: 0.0, max: 1e6, soft_max: 10.0 }, "";
-        /// Further directional lights.
+        /// Additional directional lights.
         directional: Vec<DirectionalSpec> = Vec::new(), FieldShape::List { of: &LIGHT, min: 0, max: 4096 }, "";
     }
 }
@@ -48,7 +48,7 @@ scene_table! {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DirectionalSpec {
-    /// Towards the light, world frame, y up; any length but zero.
+    /// Direction towards the light in the world frame, y up; any length except zero.
     pub direction: Vec3,
     /// Irradiance on a surface that faces the light.
     #[serde(with = "color")]
@@ -59,7 +59,7 @@ impl DirectionalSpec {
     pub fn fields() -> Vec<Field> {
         let direction = FieldShape::Vector { length: 3, min: -1e6, max: 1e6 };
         vec![
-            Field::required("direction", direction, "Towards the light, y up; any length but zero."),
+            Field::required("direction", direction, "Direction towards the light, y up; any length except zero."),
             Field::required(
                 "irradiance",
                 FieldShape::Color { max: 1e9 },
@@ -70,21 +70,21 @@ impl DirectionalSpec {
 }
 
 scene_table! {
-    /// Where the picture is taken from; framed automatically where a scene has none.
+    /// The camera. A scene without this table is framed automatically.
     Camera {
-        /// Turns the camera about the vertical.
+        /// Azimuth of the camera about the vertical axis.
         azimuth_deg: f32 = 25.0, number(-360.0, 360.0), "degrees";
-        /// Height of the camera above the horizon.
+        /// Elevation of the camera above the horizon.
         elevation_deg: f32 = 20.0, number(-90.0, 90.0), "degrees";
-        /// Distance in radii of the object's bounding sphere; 0 frames the object.
+        /// Distance in radii of the object's bounding sphere; 0 fits the object into the image.
         distance: f32 = 0.0, FieldShape::Number { min: 0.0, max: 1e4, soft_max: 20.0 }, "radii";
-        /// Moves what is looked at across the picture: to the right and up.
+        /// Offset of the camera's target to the right and up, in radii of the bounding sphere.
         pan: Vec2 = Vec2::ZERO, FieldShape::Vector { length: 2, min: -100.0, max: 100.0 }, "radii";
-        /// Vertical field of view.
+        /// Field of view across the shorter side of the image.
         fov_deg: f32 = 30.0, number(1.0, 150.0), "degrees";
-        /// Exposure in stops.
+        /// Exposure in stops; each stop doubles the brightness.
         exposure_ev: f32 = 0.0, FieldShape::Number { min: -40.0, max: 40.0, soft_max: 8.0 }, "EV";
-        /// How radiance becomes a pixel: filmic or plain.
+        /// Tone map from radiance to pixel values: filmic or plain.
         tone_map: String = "filmic".to_owned(), FieldShape::Choice(TONE_MAPS), "";
     }
 }

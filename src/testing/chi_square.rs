@@ -1,7 +1,7 @@
-//! Pearson's χ² test, for tests of sampling: included by tests of the library and beside it.
+//! Pearson's χ² test, for tests of sampling. Unit tests and integration tests include this file.
 
-/// The chance that counts of a right routine stray from `expected` (parts of the whole) this far or farther. Cells that
-/// expect fewer than five are pooled.
+/// The probability that the counts of a correct routine differ from `expected` (relative frequencies) at least this
+/// much. Cells with fewer than five expected counts are pooled.
 pub fn p_value(counts: &[f64], expected: &[f64]) -> f64 {
     let total: f64 = counts.iter().sum();
     let parts: f64 = expected.iter().sum();
@@ -26,10 +26,11 @@ pub fn p_value(counts: &[f64], expected: &[f64]) -> f64 {
     upper_gamma(0.5 * f64::from(cells - 1), 0.5 * statistic)
 }
 
-/// [`p_value`] of values that should be standard normal, in twelve bins of half a deviation and more.
-#[allow(dead_code, reason = "of the two that include this file one has normal values")]
+/// Computes [`p_value`] of values that should be standard normal, in twelve bins that are half a standard deviation
+/// wide; the outer bins are unbounded.
+#[allow(dead_code, reason = "only one of the tests that include this file has normal values")]
 pub fn p_value_of_normal(values: &[f64]) -> f64 {
-    // Chances from Abramowitz and Stegun, Table 26.1.
+    // Probabilities from Abramowitz and Stegun, Table 26.1.
     let below = [0.006_209_7, 0.022_750_1, 0.066_807_2, 0.158_655_3, 0.308_537_5, 0.5];
     let cumulative: Vec<f64> = below.into_iter().chain(below[..5].iter().rev().map(|p| 1.0 - p)).collect();
     let mut expected: Vec<f64> = cumulative.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -42,7 +43,7 @@ pub fn p_value_of_normal(values: &[f64]) -> f64 {
     p_value(&counts, &expected)
 }
 
-/// The regularised upper incomplete gamma function `Q(a, x)`: by its series below `a + 1`, by Lentz' continued fraction
+/// The regularized upper incomplete gamma function `Q(a, x)`: its series below `a + 1`, and Lentz's continued fraction
 /// above (Press et al., Numerical Recipes, Sec. 6.2).
 fn upper_gamma(a: f64, x: f64) -> f64 {
     if x <= 0.0 || a <= 0.0 {
@@ -74,7 +75,7 @@ fn upper_gamma(a: f64, x: f64) -> f64 {
     h * scale
 }
 
-/// Stirling's series, shifted to where it is exact to 1e-14.
+/// `ln Γ(x)` by Stirling's series, shifted to arguments at which its error is below 1e-14.
 fn ln_gamma(x: f64) -> f64 {
     let (mut x, mut shift) = (x, 0.0);
     while x < 12.0 {
@@ -87,7 +88,7 @@ fn ln_gamma(x: f64) -> f64 {
 }
 
 #[test]
-fn p_values_are_those_of_the_tables() {
+fn p_values_agree_with_published_tables() {
     // The 5 % and 1 % points of χ² with 1, 10 and 100 degrees of freedom.
     for (degrees, five, one) in
         [(1.0, 3.841_459, 6.634_897), (10.0, 18.307_038, 23.209_251), (100.0, 124.342_113, 135.806_723)]

@@ -120,8 +120,8 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(loaded: &'a LoadedScene, cancel: &Cancel) -> Result<Self> {
-        let mut pipeline = Pipeline::new();
-        pipeline.cancel_with(cancel.clone());
+        let mut pipeline = crate::gpu::pipeline();
+        pipeline.set_cancel(cancel.clone());
         let outcome = pipeline.effective(&with_settings(loaded, &quality_scale::rung(0.0, false))?)?;
         let overhangs = outcome.plan.overhangs();
         let geometry_ms = outcome.times.iter().filter(|(name, _)| *name == "geometry").map(|(_, ms)| ms).sum();

@@ -11,7 +11,7 @@ use crate::base::Result;
 use crate::effective::Reflectance;
 use crate::math::directions::from_angles;
 use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
-use crate::pipeline::{Outcome, Pipeline};
+use crate::pipeline::Outcome;
 use crate::plan::Preset;
 use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
@@ -57,7 +57,7 @@ impl Truth {
         }
         let start = Instant::now();
         let (mut own, mut passes) = (0.0, 0);
-        let estimates = Pipeline::new().with_reference(scene, |reference| {
+        let estimates = crate::gpu::pipeline().with_reference(scene, |reference| {
             reference.estimate(&pairs, settings, |done, error| {
                 (own, passes) = (error, done);
                 progress(done, error)
@@ -149,7 +149,7 @@ pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Re
     let scene = with_settings(loaded, candidate)?;
     let mut moved = scene.clone();
     let edits = moved.scene.nudge_geometry().is_some();
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = crate::gpu::pipeline();
     let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
     let started = Instant::now();
     let mut outcome = pipeline.effective(&scene)?;
@@ -163,7 +163,7 @@ pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Re
         if edits {
             pipeline.effective(&moved)?;
         } else {
-            pipeline = Pipeline::new();
+            pipeline = crate::gpu::pipeline();
         }
         let start = Instant::now();
         outcome = pipeline.effective(&scene)?;
@@ -185,7 +185,7 @@ pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Re
         albedo_error: truth.albedo_error(&values),
         rel_l2_by_angle: truth.by_angle(&values),
         stages: times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),
-        form: outcome.brdf.form.describe(),
+        form: outcome.brdf.representation.describe(),
     };
     Ok((point, outcome))
 }

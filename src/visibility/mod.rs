@@ -1,7 +1,7 @@
-//! Which facets of the endlessly repeated tile does a direction see?
+//! Visibility of the facets of the endlessly repeated tile (V in Wu et al. 2011, Eq. 1).
 //!
-//! [`Visibility`] is what the rest of the program reads: soft visibility of every facet along any direction, held as
-//! horizons where nothing overhangs, as slices or as maps of bits where something does.
+//! [`Visibility`] is the interface to the rest of the program: soft visibility of every facet along any direction.
+//! Without overhangs it stores horizon maps. With overhangs it stores occlusion intervals or bit maps.
 
 pub(crate) mod height_march;
 mod horizon_map;
@@ -11,7 +11,7 @@ mod ray_cast;
 pub(crate) mod scan;
 mod shadow_map;
 #[cfg(test)]
-mod shadow_map_tests;
+pub(crate) mod shadow_map_tests;
 pub(crate) mod shadow_view;
 pub(crate) mod slicer;
 pub(crate) mod soft_maps;
@@ -31,7 +31,7 @@ pub use soft_maps::SoftMaps;
 /// Visibility of all facets along any direction.
 #[derive(Debug, Clone)]
 pub enum Visibility {
-    /// A flat tile: every facet sees everything.
+    /// A flat tile: nothing blocks any facet.
     Unblocked {
         facets: usize,
     },
@@ -44,44 +44,44 @@ impl Visibility {
     pub fn facets(&self) -> usize {
         match self {
             Self::Unblocked { facets } => *facets,
-            Self::HorizonMap(horizons) => horizons.facets(),
-            Self::OcclusionIntervals(slices) => slices.facets(),
+            Self::HorizonMap(horizon_map) => horizon_map.facets(),
+            Self::OcclusionIntervals(intervals) => intervals.facets(),
             Self::Maps(maps) => maps.packed.facet_count,
         }
     }
 
-    /// Part of the walks over the tile that ended before all was known ([`HorizonMap::truncated`]).
+    /// Fraction of the walks that were truncated ([`HorizonMap::truncated`]).
     pub fn truncated(&self) -> f64 {
         match self {
-            Self::HorizonMap(horizons) => horizons.truncated(),
-            Self::OcclusionIntervals(slices) => slices.horizons.truncated(),
+            Self::HorizonMap(horizon_map) => horizon_map.truncated(),
+            Self::OcclusionIntervals(intervals) => intervals.horizon_map.truncated(),
             Self::Unblocked { .. } | Self::Maps(_) => 0.0,
         }
     }
 
-    /// Bytes held.
+    /// Size in memory, in bytes.
     pub fn bytes(&self) -> usize {
         match self {
             Self::Unblocked { .. } => 0,
-            Self::HorizonMap(horizons) => horizons.bytes(),
-            Self::OcclusionIntervals(slices) => slices.bytes(),
+            Self::HorizonMap(horizon_map) => horizon_map.bytes(),
+            Self::OcclusionIntervals(intervals) => intervals.bytes(),
             Self::Maps(maps) => 4 * maps.packed.words.len(),
         }
     }
 
-    /// That of some of the facets, in ascending order; `None` for maps, which are packed.
-    pub(crate) fn picked(&self, facets: &[usize]) -> Option<Self> {
+    /// The visibility of some of the facets, in ascending order; `None` for bit maps.
+    pub(crate) fn subset(&self, facets: &[usize]) -> Option<Self> {
         match self {
             Self::Unblocked { .. } => Some(Self::Unblocked { facets: facets.len() }),
-            Self::HorizonMap(horizons) => Some(Self::HorizonMap(horizons.picked(facets))),
-            Self::OcclusionIntervals(slices) => Some(Self::OcclusionIntervals(slices.picked(facets))),
+            Self::HorizonMap(horizon_map) => Some(Self::HorizonMap(horizon_map.subset(facets))),
+            Self::OcclusionIntervals(intervals) => Some(Self::OcclusionIntervals(intervals.subset(facets))),
             Self::Maps(_) => None,
         }
     }
 
-    /// Writes the visibility in `[0, 1]` of a run of facets along `direction`; directions a facet does not face count as blocked or
-    /// not, as the route has it: its cosine decides them.
-    /// 0 at and under the horizon.
+    /// Writes the visibility in `[0, 1]` of a run of facets along `direction`, 0 at and below the horizon.
+    ///
+    /// For a direction that a facet does not face, the value depends on the algorithm. The caller must exclude it.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
         if direction.z <= 0.0 {
             out.fill(0.0);
@@ -89,8 +89,8 @@ impl Visibility {
         }
         match self {
             Self::Unblocked { .. } => out.fill(1.0),
-            Self::HorizonMap(horizons) => horizons.fill(direction, range, out),
-            Self::OcclusionIntervals(slices) => slices.fill(direction, range, out),
+            Self::HorizonMap(horizon_map) => horizon_map.fill(direction, range, out),
+            Self::OcclusionIntervals(intervals) => intervals.fill(direction, range, out),
             Self::Maps(maps) => maps.fill(direction, range, out),
         }
     }

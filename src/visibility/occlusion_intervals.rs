@@ -1,4 +1,4 @@
-//! Visibility under overhangs from vertical slices: a horizon for each azimuth, and what hangs above it.
+//! Visibility with overhangs from vertical slices: per azimuth, a horizon and the blocked intervals above it.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::ops::Range;
@@ -15,21 +15,20 @@ use crate::math::directions::{PolarGrid, from_angles};
 use crate::math::simd;
 use crate::math::simd::F32x8Array;
 
-/// All blocked elevations of every facet along a number of azimuths, exact there.
+/// All blocked elevations of every facet along a number of azimuths, exact at these azimuths.
 ///
-/// Between azimuths the horizon itself is interpolated, which is smooth; whether something hangs above it is blended
-/// (yes/no from either side).
+/// Between azimuths the horizon is interpolated, unless it jumps to another part of the surface. At such jumps, and for
+/// overhangs, each facet switches from one azimuth to the next over a soft step.
 #[derive(Debug, Clone)]
 pub struct OcclusionIntervals {
-    pub(crate) horizons: HorizonMap,
-    /// By azimuth.
-    pub(crate) hanging: Vec<Overhangs>,
-    /// Where between two azimuths a facet changes over from one's view to the other's.
+    pub(crate) horizon_map: HorizonMap,
+    /// Overhangs by azimuth.
+    pub(crate) overhangs: Vec<Overhangs>,
+    /// Fraction of the way between two azimuths at which a facet switches from one to the other.
     pub(crate) switch: Vec<f32>,
 }
 
-/// What hangs above the facets along one azimuth: blocked intervals of elevations [rad] above the horizon, in the order of
-/// their facets.
+/// Overhangs along one azimuth: blocked intervals of elevation [rad] above the horizon, in the order of their facets.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Overhangs {
     pub(crate) facets: Vec<u32>,
@@ -40,34 +39,35 @@ pub(crate) struct Overhangs {
 }
 
 impl Overhangs {
-    /// Facet, low and high of each interval, in the order of facets.
+    /// Collects intervals `(facet, low, high)`, which are in the order of facets.
     pub(crate) fn new(intervals: impl Iterator<Item = (u32, f32, f32)>, switch: &[f32]) -> Self {
-        let mut hanging = Self::default();
+        let mut overhangs = Self::default();
         for (facet, low, high) in intervals {
-            hanging.facets.push(facet);
-            hanging.low.push(low);
-            hanging.high.push(high);
-            hanging.switch.push(switch[facet as usize]);
+            overhangs.facets.push(facet);
+            overhangs.low.push(low);
+            overhangs.high.push(high);
+            overhangs.switch.push(switch[facet as usize]);
         }
-        hanging
+        overhangs
     }
 
-    /// Those of the facets that have a place, which is their new number.
-    fn picked(&self, places: &[u32]) -> Self {
+    /// The intervals of some of the facets: `new_indices` holds each facet's new index, or [`NOT_IN_SUBSET`].
+    fn subset(&self, new_indices: &[u32]) -> Self {
         let count = self.facets.len();
         let (mut facets, mut columns) = (vec![0; count], [(); 3].map(|()| vec![0.0; count]));
-        let mut kept = 0;
-        // Every interval is written, and stays where it counts: which ones do cannot be foreseen, so a branch would cost more.
+        let mut written = 0;
+        // Each interval is written; the next one overwrites it if its facet is not in the subset. A branch would be
+        // unpredictable and cost more.
         for k in 0..count {
-            let place = places[self.facets[k] as usize];
-            facets[kept] = place;
+            let new_index = new_indices[self.facets[k] as usize];
+            facets[written] = new_index;
             for (column, from) in columns.iter_mut().zip([&self.low, &self.high, &self.switch]) {
-                column[kept] = from[k];
+                column[written] = from[k];
             }
-            kept += usize::from(place != NOWHERE);
+            written += usize::from(new_index != NOT_IN_SUBSET);
         }
-        facets.truncate(kept);
-        columns.iter_mut().for_each(|column| column.truncate(kept));
+        facets.truncate(written);
+        columns.iter_mut().for_each(|column| column.truncate(written));
         let [low, high, switch] = columns;
         Self { facets, low, high, switch }
     }
@@ -76,41 +76,42 @@ impl Overhangs {
         self.facets.iter().zip(&self.low).zip(&self.high).map(|((facet, low), high)| (*facet, *low, *high))
     }
 
-    /// Where the intervals of a run of facets stand.
-    fn of(&self, facets: &Range<usize>) -> Range<usize> {
-        let place = |facet: usize| self.facets.partition_point(|&hanging| (hanging as usize) < facet);
-        place(facets.start)..place(facets.end)
+    /// The index range of the intervals of a run of facets.
+    fn range_of(&self, facets: &Range<usize>) -> Range<usize> {
+        let first = |facet: usize| self.facets.partition_point(|&other| (other as usize) < facet);
+        first(facets.start)..first(facets.end)
     }
 }
 
-/// The place of a facet that is not picked.
-const NOWHERE: u32 = u32::MAX;
+/// Marks a facet that is not in the subset.
+const NOT_IN_SUBSET: u32 = u32::MAX;
 
-/// 2³² over the golden ratio.
+/// 2³² divided by the golden ratio.
 const GOLDEN: u32 = 2_654_435_769;
 
 impl OcclusionIntervals {
-    /// Cells and triangles that one slice looks at on average, from a few of them: what [`OcclusionIntervals::scan`] will cost.
-    pub fn work(grid: &PeriodicGrid, facets: &Facets) -> f64 {
+    /// Estimates the mean number of steps per slice from a few slices, as a measure of the cost of
+    /// [`OcclusionIntervals::scan`].
+    pub fn mean_steps(grid: &PeriodicGrid, facets: &Facets) -> f64 {
         const FACETS: usize = 48;
         const AZIMUTHS: usize = 5;
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         let mut blocked = BlockedSlopes::default();
-        let looked_at = FACETS.min(facets.len());
+        let sampled = FACETS.min(facets.len());
         for azimuth in 0..AZIMUTHS {
             let along = from_angles(FRAC_PI_2, TAU * (azimuth as f32 + 0.3) / AZIMUTHS as f32).truncate();
-            let slicer = slicer.turned(along);
-            for facet in (0..looked_at).map(|k| k * facets.len() / looked_at) {
+            let slicer = slicer.rotated(along);
+            for facet in (0..sampled).map(|k| k * facets.len() / sampled) {
                 slicer.scan::<F32x8Array>(origins[facet], facets.normals[facet], facets.triangles[facet], &mut blocked);
             }
         }
-        blocked.work as f64 / (FACETS * AZIMUTHS) as f64
+        blocked.steps as f64 / (FACETS * AZIMUTHS) as f64
     }
 
-    /// OcclusionIntervals the mesh along every azimuth, for every facet. Visibility ends in ramps of `ramp` radians.
-    pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, ramp: f32) -> Self {
+    /// Slices the mesh along every azimuth for every facet. Visibility has soft steps of `transition_width` radians.
+    pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
-        // The golden ratio's multiples fill [0, 1] evenly, for neighbours too.
+        // Multiples of the golden ratio fill [0, 1] evenly, also for consecutive facets.
         let switch: Vec<f32> =
             (0..facets.len() as u32).map(|k| k.wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0).collect();
         let scanned: Vec<(Vec<f32>, Overhangs, usize)> = (0..azimuths)
@@ -118,9 +119,9 @@ impl OcclusionIntervals {
             .map(|azimuth| {
                 let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
                 let (mut row, mut above) = (vec![0.0; facets.len()], Vec::new());
-                let truncated = scan_all(&slicer.turned(along), facets, &origins, &mut |facet, blocked| {
+                let truncated = scan_all(&slicer.rotated(along), facets, &origins, &mut |facet, blocked| {
                     row[facet as usize] = blocked.ground;
-                    above.extend(blocked.floating_unfaced().map(|(low, high)| {
+                    above.extend(blocked.floating_faced().map(|(low, high)| {
                         (facet, low.atan(), if high == f32::INFINITY { HorizonMap::BLOCKED } else { high.atan() })
                     }));
                 });
@@ -128,45 +129,47 @@ impl OcclusionIntervals {
                 (row, Overhangs::new(above.into_iter(), &switch), truncated)
             })
             .collect();
-        let (mut rows, mut hanging, mut truncated) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
-        for (row, above, short) in scanned {
+        let (mut rows, mut overhangs, mut truncated) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
+        for (row, above, row_truncated) in scanned {
             rows.extend(row);
-            hanging.push(above);
-            truncated += short;
+            overhangs.push(above);
+            truncated += row_truncated;
         }
-        let mut horizons = HorizonMap::from_slopes(facets.len(), azimuths, ramp, rows);
-        horizons.truncated = truncated;
-        Self { horizons, hanging, switch }
+        let mut horizon_map = HorizonMap::from_slopes(facets.len(), azimuths, transition_width, rows);
+        horizon_map.truncated = truncated;
+        Self { horizon_map, overhangs, switch }
     }
 
     pub fn facets(&self) -> usize {
-        self.horizons.facets()
+        self.horizon_map.facets()
     }
 
     pub fn bytes(&self) -> usize {
-        let intervals: usize = self.hanging.iter().map(|hanging| hanging.facets.len()).sum();
-        self.horizons.bytes() + intervals * size_of::<(u32, [f32; 3])>()
+        let intervals: usize = self.overhangs.iter().map(|overhangs| overhangs.facets.len()).sum();
+        self.horizon_map.bytes() + intervals * size_of::<(u32, [f32; 3])>()
     }
 
-    /// Writes the visibility in `[0, 1]` of a run of facets along `direction` (above the horizon); facing is not included.
+    /// Writes the visibility in `[0, 1]` of a run of facets along `direction`, which points above the horizon. Facing
+    /// is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
         let (azimuth, elevation) = simd::azimuth_and_elevation(direction);
-        let [(from, _), (to, blend)] = self.horizons.taps(azimuth);
-        let sharpness = 1.0 / self.horizons.ramp();
-        let row = |azimuth: usize| &self.horizons.row(azimuth)[range.clone()];
+        let [(from, _), (to, blend)] = self.horizon_map.taps(azimuth);
+        let sharpness = 1.0 / self.horizon_map.transition_width();
+        let row = |azimuth: usize| &self.horizon_map.row(azimuth)[range.clone()];
         simd::stepped_visibility(row(from), row(to), &self.switch[range.clone()], blend, elevation, sharpness, out);
-        // What each interval covers in whole vectors first: there are many for each facet.
-        const MOST: usize = 256;
-        let mut covered = [0.0; MOST];
+        // Blocks of intervals are computed as whole vectors first, because each facet has many intervals.
+        const MAX_INTERVALS: usize = 256;
+        let mut covered = [0.0; MAX_INTERVALS];
         for (azimuth, side) in [(from, 0.0), (to, 1.0)] {
-            let (hanging, run) = (&self.hanging[azimuth], self.hanging[azimuth].of(&range));
-            for first in run.clone().step_by(MOST) {
-                let part = first..(first + MOST).min(run.end);
+            let overhangs = &self.overhangs[azimuth];
+            let run = overhangs.range_of(&range);
+            for first in run.clone().step_by(MAX_INTERVALS) {
+                let part = first..(first + MAX_INTERVALS).min(run.end);
                 let covered = &mut covered[..part.len()];
-                let (low, high) = (&hanging.low[part.clone()], &hanging.high[part.clone()]);
-                let turn = (&hanging.switch[part.clone()], blend, side);
-                simd::interval_cover(low, high, turn, elevation, sharpness, covered);
-                for (facet, covered) in hanging.facets[part].iter().zip(covered) {
+                let (low, high) = (&overhangs.low[part.clone()], &overhangs.high[part.clone()]);
+                let switch = (&overhangs.switch[part.clone()], blend, side);
+                simd::interval_cover(low, high, switch, elevation, sharpness, covered);
+                for (facet, covered) in overhangs.facets[part].iter().zip(covered) {
                     let out = &mut out[*facet as usize - range.start];
                     *out = (*out - *covered).max(0.0);
                 }
@@ -174,36 +177,37 @@ impl OcclusionIntervals {
         }
     }
 
-    /// Those of some of the facets, in ascending order.
-    pub(crate) fn picked(&self, facets: &[usize]) -> Self {
-        let mut places = vec![NOWHERE; self.facets()];
-        for (place, &facet) in facets.iter().enumerate() {
-            places[facet] = place as u32;
+    /// The occlusion intervals of some of the facets, in ascending order.
+    pub(crate) fn subset(&self, facets: &[usize]) -> Self {
+        let mut new_indices = vec![NOT_IN_SUBSET; self.facets()];
+        for (new_index, &facet) in facets.iter().enumerate() {
+            new_indices[facet] = new_index as u32;
         }
         Self {
-            horizons: self.horizons.picked(facets),
-            hanging: self.hanging.iter().map(|hanging| hanging.picked(&places)).collect(),
+            horizon_map: self.horizon_map.subset(facets),
+            overhangs: self.overhangs.iter().map(|overhangs| overhangs.subset(&new_indices)).collect(),
             switch: facets.iter().map(|&facet| self.switch[facet]).collect(),
         }
     }
 
-    /// What hangs over each facet along each azimuth, the azimuths of a facet side by side: where the intervals
-    /// `(low, high)` [rad] of each begin (one more entry than facets x azimuths), and the intervals.
-    pub(crate) fn hanging_by_facet(&self) -> (Vec<u32>, Vec<(f32, f32)>) {
+    /// Overhangs by facet, then azimuth. The first array holds the start of each list and the end of the last one, the
+    /// second the intervals `(low, high)` [rad].
+    pub(crate) fn overhangs_by_facet(&self) -> (Vec<u32>, Vec<(f32, f32)>) {
         let (mut starts, mut intervals) = (vec![0], Vec::new());
         for facet in 0..self.facets() {
-            for azimuth in 0..self.horizons.azimuths() {
-                let hanging = &self.hanging[azimuth];
-                intervals.extend(hanging.of(&(facet..facet + 1)).map(|k| (hanging.low[k], hanging.high[k])));
+            for azimuth in 0..self.horizon_map.azimuths() {
+                let overhangs = &self.overhangs[azimuth];
+                let run = overhangs.range_of(&(facet..facet + 1));
+                intervals.extend(run.map(|k| (overhangs.low[k], overhangs.high[k])));
                 starts.push(intervals.len() as u32);
             }
         }
         (starts, intervals)
     }
 
-    /// The same as yes/no maps of `rings` rings on the slices' own azimuths: exact at the nodes.
+    /// Converts to bit maps on a polar grid of `rings` rings and the same azimuths. The bits are exact at the nodes.
     pub fn maps(&self, rings: usize) -> SoftMaps {
-        let (facets, azimuths) = (self.facets(), self.horizons.azimuths());
+        let (facets, azimuths) = (self.facets(), self.horizon_map.azimuths());
         let grid = PolarGrid::new(rings, azimuths);
         let mut packed = PackedVisibility::new(facets, grid.len());
         for ring in 0..grid.ring_count() {
@@ -211,11 +215,11 @@ impl OcclusionIntervals {
             for azimuth in 0..azimuths {
                 let node = ring * azimuths + azimuth;
                 for facet in 0..facets {
-                    if elevation > self.horizons.elevation(azimuth, facet) {
+                    if elevation > self.horizon_map.elevation(azimuth, facet) {
                         packed.set_visible(node, facet);
                     }
                 }
-                for (facet, low, high) in self.hanging[azimuth].iter() {
+                for (facet, low, high) in self.overhangs[azimuth].iter() {
                     if low <= elevation && elevation <= high {
                         packed.set_blocked(node, facet as usize);
                     }

@@ -1,6 +1,6 @@
-//! Yes/no visibility, one bit a facet and direction.
+//! Binary visibility, one bit per facet and direction.
 
-/// Row `d` holds the bits of direction `d`, facet `s` in bit `s % 32` of word `s / 32`.
+/// Binary visibility. Row `d` holds the bits of direction `d`, facet `s` in bit `s % 32` of word `s / 32`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PackedVisibility {
     pub facet_count: usize,

@@ -1,36 +1,40 @@
-//! Toroidal shadow maps on the CPU: the twin of [`crate::gpu::visibility::maps`], and the same algorithm texel by texel.
+//! Toroidal shadow maps on the CPU (Wu et al. 2011, Sec. 3.3). The twin on the GPU, `shaders/shadow_map.wgsl`, runs the
+//! same algorithm texel by texel.
 //!
-//! One map a direction holds the endlessly repeated tile at once (see [`super::shadow_view`]): each texel is one ray and
-//! keeps the highest point on it and the triangle that lies there. A facet then asks the four rays around its own.
-//! Depth biases are not needed, because the triangle is known: a ray's hit `P` on triangle k blocks a facet at `p`
-//! only if `P` is in front of the facet's plane *and* the facet's ray meets triangle k's plane in front of `p`. A convex
-//! surface never fulfils the first with its own neighbourhood, a concave one never the second, however steep they are
-//! to the ray. Where the four disagree the facet is at a silhouette and their bilinear weights decide.
+//! One map per direction covers the endlessly repeated tile (see [`super::shadow_view`]). Each texel is one ray and
+//! stores its highest hit and the triangle of that hit. A facet tests the four rays around its own. If they disagree,
+//! the facet is at a silhouette, and the bilinear weights decide.
+//!
+//! Depth biases are not needed, because the triangle is known. A hit `P` on triangle k blocks a facet at `p` if both
+//! conditions hold: `P` is in front of the facet's plane, and the facet's ray meets the plane of triangle k in front of
+//! `p`. The neighbourhood of a facet never meets the first condition if it is convex, nor the second if it is concave.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::PackedVisibility;
-use super::shadow_view::{ShadowView, affordable, extent};
+use super::shadow_view::{ShadowView, affordable_resolution, max_coordinate};
 use crate::geometry::{Facets, TileMesh};
 
-/// Which facets each direction sees, from toroidal shadow maps of `resolution` texels along a square tile's side.
+/// Computes the visibility of all facets along all directions from toroidal shadow maps; `resolution` is the number of
+/// texels along the side of a square tile.
 ///
-/// A facet is seen where its geometric normal turns to the direction and nothing of the tiling lies before it; triangles
-/// block on both sides. Directions at or under the horizon see nothing. Deterministic for any number of threads.
+/// A facet is visible if its geometric normal faces the direction and nothing of the tiling lies in front of it.
+/// Triangles block on both sides. No facet is visible from a direction at or below the horizon. The result does not
+/// depend on the number of threads.
 pub fn visibility_maps_cpu(mesh: &TileMesh, facets: &Facets, directions: &[Vec3], resolution: u32) -> PackedVisibility {
     let mut visibility = PackedVisibility::new(facets.len(), directions.len());
     if facets.is_empty() {
         return visibility;
     }
-    let resolution = affordable(mesh, resolution);
+    let resolution = affordable_resolution(mesh, resolution);
     let normals: Vec<Vec3> = (0..mesh.triangles.len()).map(|k| mesh.geometric_normal(k)).collect();
-    let extent = extent(mesh);
+    let max_coordinate = max_coordinate(mesh);
     let words = visibility.words_per_row();
     visibility.words.par_chunks_mut(words).zip(directions).for_each_init(
         ShadowMap::default,
         |map, (row, &direction)| {
-            if let Some(view) = ShadowView::new(mesh.size, extent, direction, resolution) {
+            if let Some(view) = ShadowView::new(mesh.size, max_coordinate, direction, resolution) {
                 map.draw(mesh, &view);
                 map.test(facets, &normals, &view, row);
             }
@@ -39,11 +43,11 @@ pub fn visibility_maps_cpu(mesh: &TileMesh, facets: &Facets, directions: &[Vec3]
     visibility
 }
 
-/// Scratch of one direction, reused for the next.
+/// Buffers for one direction, reused for the next.
 #[derive(Debug, Default)]
 struct ShadowMap {
-    /// Per texel: bits of the height above the mesh's lowest point (they order as the numbers do), then triangle + 1;
-    /// 0 where no surface is. The larger wins, ties by triangle, whatever the order of drawing.
+    /// Each texel holds the bits of the height above the mesh's lowest point, then the triangle's index plus 1, or 0 if
+    /// there is no surface. The maximum is stored, so the order of drawing does not matter.
     texels: Vec<u64>,
     /// Vertices in texel coordinates, and their heights above the lowest point.
     vertices: Vec<Vec3>,
@@ -63,7 +67,7 @@ impl ShadowMap {
         }
     }
 
-    /// Sets the bits of the facets that the direction sees.
+    /// Sets the bits of the facets that are visible from the direction.
     fn test(&self, facets: &Facets, normals: &[Vec3], view: &ShadowView, row: &mut [u32]) {
         for (s, (&p, &n)) in facets.positions.iter().zip(&facets.geometric_normals).enumerate() {
             if n.dot(view.direction) > 0.0 && self.blocked_weight(p, n, normals, view) < 0.5 {
@@ -72,7 +76,7 @@ impl ShadowMap {
         }
     }
 
-    /// Bilinear weight of the rays around `p` on which something lies before the facet.
+    /// Sums the bilinear weights of the rays around `p` on which something blocks the facet.
     fn blocked_weight(&self, p: Vec3, n: Vec3, normals: &[Vec3], view: &ShadowView) -> f32 {
         let at = view.texel(p);
         let base = at.floor();
@@ -88,14 +92,14 @@ impl ShadowMap {
             let Some(&n_k) = (texel as u32).checked_sub(1).and_then(|k| normals.get(k as usize)) else {
                 continue;
             };
-            // From p to the hit: a step on the base plane, then up along the direction.
+            // The offset from p to the hit: a step on the base plane, then a step along the direction.
             let step = Vec2::new(dx as f32, dy as f32) - f;
             let across = step.x * view.plane_from_texel[0] + step.y * view.plane_from_texel[1];
             let up = f32::from_bits((texel >> 32) as u32) - (p.z - self.lowest);
-            let before_facet = n.truncate().dot(across) + up * n_dot_w;
+            let front_of_facet = n.truncate().dot(across) + up * n_dot_w;
             let facing = n_k.dot(view.direction) * per_height;
-            let plane_before_p = (n_k.truncate().dot(across) + up * facing) * facing.signum();
-            if before_facet > view.tolerance && plane_before_p > view.tolerance {
+            let plane_in_front = (n_k.truncate().dot(across) + up * facing) * facing.signum();
+            if front_of_facet > view.tolerance && plane_in_front > view.tolerance {
                 let (wx, wy) = (if dx == 1 { f.x } else { 1.0 - f.x }, if dy == 1 { f.y } else { 1.0 - f.y });
                 weight += wx * wy;
             }
@@ -108,7 +112,8 @@ fn wrap(texel: i32, size: u32) -> usize {
     texel.rem_euclid(size as i32) as usize
 }
 
-/// Draws one triangle (x, y in texels, z its height) over the torus: every texel whose centre it covers, edges included.
+/// Draws one triangle (x and y in texels, z the height) over the torus, into each texel that has its centre in the
+/// triangle or on an edge.
 fn draw_triangle(texels: &mut [u64], [columns, rows]: [u32; 2], corners: [Vec3; 3], tag: u32) {
     let [a, b, c] = corners;
     let (ab, ac) = (b - a, c - a);
@@ -116,7 +121,7 @@ fn draw_triangle(texels: &mut [u64], [columns, rows]: [u32; 2], corners: [Vec3; 
     if area == 0.0 || !area.is_finite() {
         return;
     }
-    // Height over the map: a plane. Edge-on triangles make it steep, so heights are clamped to the corners'.
+    // The height is linear over the map. It is clamped to the corners' range because edge-on triangles are steep.
     let slope_x = (ab.z * ac.y - ac.z * ab.y) / area;
     let slope_y = (ac.z * ab.x - ab.z * ac.x) / area;
     let (z_lo, z_hi) = (a.z.min(b.z).min(c.z), a.z.max(b.z).max(c.z));
@@ -145,7 +150,7 @@ fn draw_triangle(texels: &mut [u64], [columns, rows]: [u32; 2], corners: [Vec3; 
     }
 }
 
-/// An edge as x over y, its ends in order of y.
+/// An edge as a function x(y), with its ends in order of y.
 struct Edge {
     low: Vec2,
     high: Vec2,
@@ -159,7 +164,7 @@ impl Edge {
         Self { low, high, x_per_y: if rise > 0.0 { (high.x - low.x) / rise } else { 0.0 } }
     }
 
-    /// Widens a row's span to where the edge crosses it.
+    /// Widens the span of the row at `y` to its crossing with the edge.
     fn widen(&self, y: f32, left: &mut f32, right: &mut f32) {
         if y < self.low.y || y > self.high.y {
             return;

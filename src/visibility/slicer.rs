@@ -1,17 +1,17 @@
-//! What do the triangles of a cell cover in a vertical half-plane? SimdF32x8 at a time, as slopes seen from a point.
+//! Slopes that the triangles of a cell cover in a vertical half plane, as seen from a point, eight triangles at a time.
 
 use glam::{IVec2, Vec2, Vec3};
 
-use super::scan::Known;
+use super::scan::KnownSlopes;
 use crate::geometry::Facets;
 use crate::geometry::PeriodicGrid;
 use crate::geometry::grid::cell_lists::CellEntry;
 use crate::math::simd::{F32x8Array, SimdF32x8};
 
-/// Triangles worked on together.
+/// Number of triangles per block.
 pub(crate) const WIDTH: usize = 8;
 
-/// SimdF32x8 entries of a cell, where the tile copy of the cell has them. Lanes beyond a cell's entries lie lower than all.
+/// Eight entries of a cell, in the coordinates of the cell's tile copy. Lanes without an entry are below any height.
 #[derive(Debug, Clone)]
 struct Block {
     x: [F32x8Array; 3],
@@ -21,7 +21,7 @@ struct Block {
     z_max: F32x8Array,
 }
 
-/// A periodic grid made ready for vertical slices.
+/// A periodic grid with its triangles in blocks, for vertical slices.
 #[derive(Debug)]
 pub(crate) struct Slicer<'a> {
     grid: &'a PeriodicGrid,
@@ -41,40 +41,41 @@ impl<'a> Slicer<'a> {
         Self { grid, starts, blocks }
     }
 
-    /// Ready for slices along the unit plane direction `along`.
-    pub fn turned(&self, along: Vec2) -> TurnedSlicer<'_> {
-        let (extents, blocks) = self.blocks.iter().map(|block| block.turned(along)).unzip();
-        TurnedSlicer { grid: self.grid, along, starts: &self.starts, extents, blocks }
+    /// Prepares slices along the unit plane direction `along`.
+    pub fn rotated(&self, along: Vec2) -> RotatedSlicer<'_> {
+        let (bounds, blocks) = self.blocks.iter().map(|block| block.rotated(along)).unzip();
+        RotatedSlicer { grid: self.grid, along, starts: &self.starts, bounds, blocks }
     }
 }
 
-/// SimdF32x8 triangles of a cell by their distances across the slices: where each begins, bends and ends, and how its edges run
-/// along a slice and up from there.
+/// Eight triangles of a cell, with their corners in order of distance across the slices, and the edges between these as
+/// functions of that distance.
 #[derive(Debug, Clone)]
-pub(crate) struct TurnedBlock {
+pub(crate) struct RotatedBlock {
     first: F32x8Array,
     middle: F32x8Array,
-    /// From the first corner to the last; to the middle one; and from there to the last.
+    /// Edges from the first corner to the last, from the first to the middle one, and from the middle one to the last.
     edges: [Edge; 3],
 }
 
-/// What tells whether a slice meets eight triangles at all: kept apart, so that more of it stays at hand.
+/// Bounds of eight triangles, for a test whether a slice meets them. They are stored apart so that more fit in caches.
 #[derive(Debug, Clone)]
-pub(crate) struct Extent {
+pub(crate) struct BlockBounds {
     first: F32x8Array,
     last: F32x8Array,
     z_min: F32x8Array,
     z_max: F32x8Array,
 }
 
-impl Extent {
-    /// The height that nothing here, and nothing in later blocks of the cell, rises above.
+impl BlockBounds {
+    /// The highest z of this block and of the later blocks of the cell.
     #[inline(always)]
     pub fn highest(&self) -> f32 {
         self.z_max.0[0].x
     }
 
-    /// Lanes that a slice at a distance `across` meets, and that reach above the height `floor` and below `ceiling`: a bit each.
+    /// Bit mask of the lanes that a slice at a distance `across` meets and that reach above the height `floor` and
+    /// below `ceiling`.
     #[inline(always)]
     pub fn meets<E: SimdF32x8>(&self, across: f32, [floor, ceiling]: [f32; 2]) -> u32 {
         let at = E::splat(across);
@@ -84,27 +85,27 @@ impl Extent {
     }
 }
 
-/// SimdF32x8 edges, from the corner that comes first across the slices: so that neighbours agree about the edge they share.
+/// Eight edges. Each begins at the corner that comes first across the slices, so neighbours compute the same edge.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     along: F32x8Array,
     up: F32x8Array,
-    /// Growth of both with the distance across.
+    /// Derivatives of both with the distance across.
     rates: [F32x8Array; 2],
 }
 
-/// A grid seen in slices of one direction.
+/// A grid prepared for slices along one direction.
 #[derive(Debug)]
-pub(crate) struct TurnedSlicer<'a> {
+pub(crate) struct RotatedSlicer<'a> {
     pub grid: &'a PeriodicGrid,
     pub along: Vec2,
     starts: &'a [u32],
-    extents: Vec<Extent>,
-    blocks: Vec<TurnedBlock>,
+    bounds: Vec<BlockBounds>,
+    blocks: Vec<RotatedBlock>,
 }
 
-impl TurnedSlicer<'_> {
-    /// The facets in an order in which neighbours walk over much the same cells.
+impl RotatedSlicer<'_> {
+    /// Orders the facets so that consecutive ones walk over nearly the same cells.
     pub fn order(&self, facets: &Facets) -> Vec<u32> {
         let width = self.grid.cell_size.min_element();
         let mut order: Vec<(i32, u32)> = (0..facets.len() as u32)
@@ -114,38 +115,38 @@ impl TurnedSlicer<'_> {
         order.into_iter().map(|(_, facet)| facet).collect()
     }
 
-    /// The triangles of a cell, eight by eight: their places among all, and where they lie.
-    pub fn blocks(&self, cell: usize) -> (usize, &[Extent]) {
+    /// The blocks of a cell: the index of the first one, and the bounds of all.
+    pub fn blocks(&self, cell: usize) -> (usize, &[BlockBounds]) {
         let (first, end) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);
-        (first, &self.extents[first..end])
+        (first, &self.bounds[first..end])
     }
 
-    /// SimdF32x8 triangles by their place.
+    /// The block with an index.
     #[inline(always)]
-    pub fn block(&self, place: usize) -> &TurnedBlock {
-        &self.blocks[place]
+    pub fn block(&self, index: usize) -> &RotatedBlock {
+        &self.blocks[index]
     }
 
-    /// What the lanes of a cell's blocks are.
+    /// The entries of a cell, which are the lanes of its blocks.
     pub fn entries(&self, cell: usize) -> &[CellEntry] {
         self.grid.entries(cell)
     }
 
-    /// A point as blocks see it: its distances across the slices and along them, and its height.
-    pub fn seen(&self, point: Vec3) -> Vec3 {
+    /// Slice coordinates of a point: distance across the slices, distance along them, and height.
+    pub fn in_slice(&self, point: Vec3) -> Vec3 {
         Vec3::new(self.along.perp_dot(point.truncate()), self.along.dot(point.truncate()), point.z)
     }
 }
 
-/// The slopes that eight triangles cover. Lanes outside the mask hold nothing.
-pub(crate) struct Cut<E> {
+/// Slopes that eight triangles cover. Lanes outside the mask are undefined.
+pub(crate) struct CoveredSlopes<E> {
     low: E,
     high: E,
     lanes: u32,
 }
 
-impl<E: SimdF32x8> Cut<E> {
-    /// Lanes that are cut, with their slopes `(low, high)`.
+impl<E: SimdF32x8> CoveredSlopes<E> {
+    /// Lanes that cover slopes, as `(lane, low, high)`.
     #[inline(always)]
     pub fn lanes(self) -> impl Iterator<Item = (usize, f32, f32)> {
         let (low, high) = (self.low.to_array(), self.high.to_array());
@@ -179,7 +180,7 @@ impl Block {
         block
     }
 
-    fn turned(&self, direction: Vec2) -> (Extent, TurnedBlock) {
+    fn rotated(&self, direction: Vec2) -> (BlockBounds, RotatedBlock) {
         let [dx, dy] = direction.to_array().map(F32x8Array::splat);
         let mut corners: [Corner; 3] = std::array::from_fn(|k| Corner {
             across: dx * self.y[k] - dy * self.x[k],
@@ -192,13 +193,13 @@ impl Block {
                 (Corner::select(swapped, corners[b], corners[a]), Corner::select(swapped, corners[a], corners[b]));
         }
         let [first, middle, last] = corners;
-        let extent = Extent { first: first.across, last: last.across, z_min: self.z_min, z_max: self.z_max };
-        let block = TurnedBlock {
+        let bounds = BlockBounds { first: first.across, last: last.across, z_min: self.z_min, z_max: self.z_max };
+        let block = RotatedBlock {
             first: first.across,
             middle: middle.across,
             edges: [Edge::between(first, last), Edge::between(first, middle), Edge::between(middle, last)],
         };
-        (extent, block)
+        (bounds, block)
     }
 }
 
@@ -221,17 +222,17 @@ impl Edge {
     fn between(from: Corner, to: Corner) -> Self {
         let width = to.across - from.across;
         let zero = F32x8Array::splat(0.0);
-        // Edges without width are never met.
+        // A slice never meets an edge without width.
         let inverse = F32x8Array::select(zero.less(width), F32x8Array::splat(1.0) / width, zero);
         Self { along: from.along, up: from.up, rates: [(to.along - from.along) * inverse, (to.up - from.up) * inverse] }
     }
 }
 
-impl TurnedBlock {
-    /// What [`slice`] says of eight triangles, of which those are `met`, from a point with distances across and along and a
-    /// height. Lanes that tell nothing new are left out.
+impl RotatedBlock {
+    /// Computes the slopes that the lanes `met` cover as seen from `origin`, in slice coordinates. Lanes within the
+    /// known slopes are left out.
     #[inline(always)]
-    pub fn cut<E: SimdF32x8>(&self, origin: Vec3, met: u32, known: Known) -> Cut<E> {
+    pub fn covered_slopes<E: SimdF32x8>(&self, origin: Vec3, met: u32, known: KnownSlopes) -> CoveredSlopes<E> {
         let [at, along, up] = origin.to_array().map(E::splat);
         let [long, before, after] = &self.edges;
         let (first, middle) = (E::of(&self.first), E::of(&self.middle));
@@ -248,7 +249,7 @@ impl TurnedBlock {
         ];
         let zero = E::splat(0.0);
         let ahead = x.map(|x| zero.less(x));
-        // Where a segment begins behind the point, it passes above or below: at distance 0 its slope is infinite.
+        // A segment that begins behind the point passes above or below it, so its slope at distance 0 is infinite.
         let [p, q] = [z[1] * x[0], z[0] * x[1]];
         let [over, under] = [f32::INFINITY, f32::NEG_INFINITY].map(E::splat);
         let slopes = [
@@ -258,7 +259,7 @@ impl TurnedBlock {
         let (low, high) = (slopes[0].min(slopes[1]).max(zero), slopes[0].max(slopes[1]));
         let beyond = E::either(low.less(E::splat(known.low)), E::splat(known.high).less(high));
         let new = E::both(E::splat(known.ground).less(high), beyond);
-        Cut { low, high, lanes: met & E::bits(E::both(E::either(ahead[0], ahead[1]), new)) }
+        CoveredSlopes { low, high, lanes: met & E::bits(E::both(E::either(ahead[0], ahead[1]), new)) }
     }
 }
 

@@ -3,20 +3,20 @@ use rand::{RngExt as _, SeedableRng as _};
 use super::*;
 use crate::geometry::TileMesh;
 use crate::geometry::families::heightfield;
-use crate::math::simd::{InSimdF32x8, eight};
+use crate::math::simd::{SimdTask, with_simd_f32x8};
 
-/// Nothing known, nothing left out.
-const NOTHING: Known = Known { ground: 0.0, low: f32::INFINITY, high: f32::NEG_INFINITY };
+/// No known slopes: no lane is left out.
+const NOTHING: KnownSlopes = KnownSlopes { ground: 0.0, low: f32::INFINITY, high: f32::NEG_INFINITY };
 const ANYWHERE: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
-/// The slopes that a triangle covers in the vertical half-plane from a point: its corners are seen from there, as distances
-/// across the plane, along it and up; none below the horizon.
+/// Computes the slopes that a triangle covers in the vertical half plane from the origin, for corners in slice
+/// coordinates; `None` if all are below the horizon.
 fn slice([a, b, c]: [Vec3; 3]) -> Option<(f32, f32)> {
     let side = |p: Vec3| p.x >= 0.0;
     if side(a) == side(b) && side(b) == side(c) {
         return None;
     }
-    // The corner alone on its side; the two edges from it cross the plane.
+    // The apex is alone on its side, so both of its edges cross the plane.
     let (apex, p, q) = if side(b) == side(c) {
         (a, b, c)
     } else if side(a) == side(c) {
@@ -55,39 +55,40 @@ fn waves() -> TileMesh {
 }
 
 #[test]
-fn eight_triangles_at_once_are_cut_as_one_by_one_ahead_behind_and_overhead() {
-    are_cut_as_one_by_one::<F32x8Array>();
-    eight(CutInEights);
+fn eight_triangles_at_once_cover_the_same_slopes_as_one_by_one() {
+    assert_equal_to_one_by_one::<F32x8Array>();
+    with_simd_f32x8(EightAtOnce);
 }
 
-struct CutInEights;
+struct EightAtOnce;
 
-impl InSimdF32x8 for CutInEights {
+impl SimdTask for EightAtOnce {
     type Output = ();
 
     fn with<E: SimdF32x8>(self) {
-        are_cut_as_one_by_one::<E>();
+        assert_equal_to_one_by_one::<E>();
     }
 }
 
-fn are_cut_as_one_by_one<E: SimdF32x8>() {
+fn assert_equal_to_one_by_one<E: SimdF32x8>() {
     let mesh = waves();
     let grid = PeriodicGrid::new(&mesh);
     let slicer = Slicer::new(&grid);
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-    let (mut seen, mut over) = (0, 0);
+    let (mut compared, mut overhead) = (0, 0);
     for _ in 0..400 {
         let mut random = || rng.random::<f32>();
         let along = Vec2::from_angle(6.3 * random());
-        let turned = slicer.turned(along);
-        let eye = turned.seen(Vec3::new(random(), 0.8 * random(), 0.6 * random() - 0.3));
+        let rotated = slicer.rotated(along);
+        let eye = rotated.in_slice(Vec3::new(random(), 0.8 * random(), 0.6 * random() - 0.3));
         for cell in 0..grid.z_max.len() {
-            let (first, extents) = turned.blocks(cell);
-            for (k, extent) in extents.iter().enumerate() {
-                let cut = turned.block(first + k).cut::<E>(eye, extent.meets::<E>(eye.x, ANYWHERE), NOTHING);
-                let found: Vec<_> = cut.lanes().collect();
-                for (lane, &entry) in turned.entries(cell)[WIDTH * k..].iter().take(WIDTH).enumerate() {
-                    let corners = grid.copy_corners(entry, IVec2::ZERO).map(|corner| turned.seen(corner) - eye);
+            let (first, bounds) = rotated.blocks(cell);
+            for (k, bounds) in bounds.iter().enumerate() {
+                let covered =
+                    rotated.block(first + k).covered_slopes::<E>(eye, bounds.meets::<E>(eye.x, ANYWHERE), NOTHING);
+                let found: Vec<_> = covered.lanes().collect();
+                for (lane, &entry) in rotated.entries(cell)[WIDTH * k..].iter().take(WIDTH).enumerate() {
+                    let corners = grid.copy_corners(entry, IVec2::ZERO).map(|corner| rotated.in_slice(corner) - eye);
                     let found = found.iter().find(|found| found.0 == lane).map(|&(_, low, high)| (low, high));
                     match (found, slice(corners)) {
                         (None, None) => {}
@@ -95,10 +96,10 @@ fn are_cut_as_one_by_one<E: SimdF32x8>() {
                             let near = |a: f32, b: f32| a == b || (a - b).abs() <= 2e-3 * (1.0 + a.abs());
                             assert!(near(low, want_low), "{low} {want_low}");
                             assert!(near(high, want_high) || high.min(want_high) > 300.0, "{high} {want_high}");
-                            seen += 1;
-                            over += u32::from(high == f32::INFINITY);
+                            compared += 1;
+                            overhead += u32::from(high == f32::INFINITY);
                         }
-                        // What only just rises over the horizon, or is only just met.
+                        // Triangles that barely rise above the horizon, or that the slice barely meets.
                         (Some((low, high)), None) | (None, Some((low, high))) => {
                             assert!(high < 1e-3 || high - low < 1e-3, "{low} {high}");
                         }
@@ -107,23 +108,25 @@ fn are_cut_as_one_by_one<E: SimdF32x8>() {
             }
         }
     }
-    assert!(seen > 1000 && over > 20, "{seen} {over}");
+    assert!(compared > 1000 && overhead > 20, "{compared} {overhead}");
 }
 
 #[test]
-fn what_is_known_hides_only_lanes_within_it() {
+fn known_slopes_hide_only_the_lanes_within_them() {
     let mesh = waves();
     let grid = PeriodicGrid::new(&mesh);
     let slicer = Slicer::new(&grid);
-    let turned = slicer.turned(Vec2::from_angle(0.4));
-    let eye = turned.seen(Vec3::new(0.3, 0.2, -0.2));
-    let known = Known { ground: 0.2, low: 0.5, high: 1.0 };
+    let rotated = slicer.rotated(Vec2::from_angle(0.4));
+    let eye = rotated.in_slice(Vec3::new(0.3, 0.2, -0.2));
+    let known = KnownSlopes { ground: 0.2, low: 0.5, high: 1.0 };
     let (mut hidden, mut shown) = (0, 0);
     for cell in 0..grid.z_max.len() {
-        let (first, extents) = turned.blocks(cell);
-        for (k, extent) in extents.iter().enumerate() {
-            let met = extent.meets::<F32x8Array>(eye.x, ANYWHERE);
-            let lanes = |known| turned.block(first + k).cut::<F32x8Array>(eye, met, known).lanes().collect::<Vec<_>>();
+        let (first, bounds) = rotated.blocks(cell);
+        for (k, bounds) in bounds.iter().enumerate() {
+            let met = bounds.meets::<F32x8Array>(eye.x, ANYWHERE);
+            let lanes = |known| {
+                rotated.block(first + k).covered_slopes::<F32x8Array>(eye, met, known).lanes().collect::<Vec<_>>()
+            };
             let some = lanes(known);
             for lane in lanes(NOTHING) {
                 let (_, low, high) = lane;

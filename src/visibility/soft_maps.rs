@@ -1,4 +1,4 @@
-//! Yes/no visibility on a polar grid, blended between its nodes: for surfaces with overhangs.
+//! Binary visibility on a polar grid, blended between the nodes, for surfaces with overhangs.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use super::PackedVisibility;
 use crate::math::directions::PolarGrid;
 use crate::math::simd;
 
-/// Bits on the nodes of a polar grid.
+/// Binary visibility at the nodes of a polar grid.
 #[derive(Debug, Clone)]
 pub struct SoftMaps {
     pub grid: PolarGrid,

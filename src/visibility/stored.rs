@@ -1,40 +1,14 @@
-//! Visibility as it is kept between runs, and as an input of what is.
+//! Storage of [`Visibility`] in the disk cache, and its contribution to the keys of later stages.
 
 use super::occlusion_intervals::Overhangs;
 use super::{HorizonMap, OcclusionIntervals, PackedVisibility, SoftMaps, Visibility};
-use crate::cache::{KeyBuilder, Reader, Stored, Writer};
+use crate::cache::{Reader, Stored, Writer};
 use crate::math::directions::PolarGrid;
 
-impl Visibility {
-    /// All that the visibilities of facets depend on.
-    pub(crate) fn hash_into(&self, key: &mut KeyBuilder) {
-        match self {
-            Self::Unblocked { facets } => key.counts("unblocked", [*facets]),
-            Self::HorizonMap(horizons) => identify_horizons(horizons, key),
-            Self::OcclusionIntervals(slices) => {
-                identify_horizons(&slices.horizons, key);
-                for Overhangs { facets, low, high, .. } in &slices.hanging {
-                    key.numbers("above", facets).numbers("from", low).numbers("to", high);
-                }
-                key.numbers("switch", &slices.switch)
-            }
-            Self::Maps(SoftMaps { grid, packed }) => {
-                key.counts("maps", [grid.rings, grid.azimuths, packed.facet_count, packed.direction_count]);
-                key.numbers("bits", &packed.words)
-            }
-        };
-    }
-}
-
-fn identify_horizons<'a>(horizons: &HorizonMap, key: &'a mut KeyBuilder) -> &'a mut KeyBuilder {
-    key.counts("horizons", [horizons.azimuths, horizons.facets]).numbers("ramp", &[horizons.ramp]);
-    key.numbers("elevations", &horizons.elevations)
-}
-
-/// What stands first.
+/// Tags of the variants, at the start of the stored data.
 const UNBLOCKED: usize = 0;
-const HORIZONS: usize = 1;
-const SLICES: usize = 2;
+const HORIZON_MAP: usize = 1;
+const INTERVALS: usize = 2;
 const MAPS: usize = 3;
 
 impl Stored for Visibility {
@@ -44,15 +18,15 @@ impl Stored for Visibility {
                 out.count(UNBLOCKED);
                 out.count(*facets);
             }
-            Self::HorizonMap(horizons) => {
-                out.count(HORIZONS);
-                write_horizons(horizons, out);
+            Self::HorizonMap(horizon_map) => {
+                out.count(HORIZON_MAP);
+                write_horizon_map(horizon_map, out);
             }
-            Self::OcclusionIntervals(slices) => {
-                out.count(SLICES);
-                write_horizons(&slices.horizons, out);
-                out.numbers(&slices.switch);
-                for Overhangs { facets, low, high, .. } in &slices.hanging {
+            Self::OcclusionIntervals(intervals) => {
+                out.count(INTERVALS);
+                write_horizon_map(&intervals.horizon_map, out);
+                out.numbers(&intervals.switch);
+                for Overhangs { facets, low, high, .. } in &intervals.overhangs {
                     out.numbers(facets);
                     out.numbers(low);
                     out.numbers(high);
@@ -70,22 +44,22 @@ impl Stored for Visibility {
     fn read(from: &mut Reader<'_>) -> Option<Self> {
         Some(match from.count()? {
             UNBLOCKED => Self::Unblocked { facets: from.count()? },
-            HORIZONS => Self::HorizonMap(read_horizons(from)?),
-            SLICES => {
-                let horizons = read_horizons(from)?;
-                let switch: Vec<f32> = from.numbers().filter(|switch: &Vec<f32>| switch.len() == horizons.facets)?;
-                let hanging = (0..horizons.azimuths).map(|_| {
+            HORIZON_MAP => Self::HorizonMap(read_horizon_map(from)?),
+            INTERVALS => {
+                let horizon_map = read_horizon_map(from)?;
+                let switch: Vec<f32> = from.numbers().filter(|switch: &Vec<f32>| switch.len() == horizon_map.facets)?;
+                let overhangs = (0..horizon_map.azimuths).map(|_| {
                     let (facets, low, high): (Vec<u32>, Vec<f32>, Vec<f32>) =
                         (from.numbers()?, from.numbers()?, from.numbers()?);
                     let fits = facets.is_sorted()
-                        && facets.last().is_none_or(|last| (*last as usize) < horizons.facets)
+                        && facets.last().is_none_or(|last| (*last as usize) < horizon_map.facets)
                         && [low.len(), high.len()] == [facets.len(); 2];
                     let intervals =
                         facets.into_iter().zip(low).zip(high).map(|((facet, low), high)| (facet, low, high));
                     fits.then(|| Overhangs::new(intervals, &switch))
                 });
-                let hanging = hanging.collect::<Option<_>>()?;
-                Self::OcclusionIntervals(OcclusionIntervals { horizons, hanging, switch })
+                let overhangs = overhangs.collect::<Option<_>>()?;
+                Self::OcclusionIntervals(OcclusionIntervals { horizon_map, overhangs, switch })
             }
             MAPS => {
                 let [rings, azimuths] = [from.count()?, from.count()?];
@@ -102,16 +76,16 @@ impl Stored for Visibility {
     }
 }
 
-fn write_horizons(horizons: &HorizonMap, out: &mut Writer) {
-    [horizons.azimuths, horizons.facets, horizons.truncated].into_iter().for_each(|count| out.count(count));
-    out.numbers(&[horizons.ramp]);
-    out.numbers(&horizons.elevations);
+fn write_horizon_map(horizon_map: &HorizonMap, out: &mut Writer) {
+    [horizon_map.azimuths, horizon_map.facets, horizon_map.truncated].into_iter().for_each(|count| out.count(count));
+    out.numbers(&[horizon_map.transition_width]);
+    out.numbers(&horizon_map.elevations);
 }
 
-fn read_horizons(from: &mut Reader<'_>) -> Option<HorizonMap> {
+fn read_horizon_map(from: &mut Reader<'_>) -> Option<HorizonMap> {
     let [azimuths, facets, truncated] = [from.count()?, from.count()?, from.count()?];
-    let ramp = from.numbers()?.first().copied()?;
+    let transition_width = from.numbers()?.first().copied()?;
     let elevations: Vec<f32> = from.numbers()?;
     let fits = azimuths > 0 && azimuths.checked_mul(facets)? == elevations.len();
-    fits.then_some(HorizonMap { azimuths, facets, ramp, elevations, truncated })
+    fits.then_some(HorizonMap { azimuths, facets, transition_width, elevations, truncated })
 }

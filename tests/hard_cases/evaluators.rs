@@ -5,10 +5,9 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock, Mutex};
 
 use biscale::base::Cancel;
-use biscale::diagnostics::{VisibilityInput, Health, HealthInputs, Limits};
-use biscale::effective::{
-    EffectiveBrdf, Material, MaterialFactors, Representation, VisibleFacets, Wu2011, Wu2011Settings,
-};
+use biscale::brdf::Material;
+use biscale::diagnostics::{Health, HealthInputs, Limits, VisibilityInput};
+use biscale::effective::{EffectiveBrdf, MaterialFactors, Representation, VisibleFacets, Wu2011, Wu2011Settings};
 use biscale::geometry::Facets;
 use biscale::math::directions::ParaboloidMap;
 use biscale::pipeline::Pipeline;
@@ -41,7 +40,7 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
     }
     let loaded = open(case, "direct", folder);
     let mesh = pipeline.mesh(&loaded).unwrap();
-    let assigned = pipeline.sum_materials(&loaded).unwrap();
+    let assigned = pipeline.materials(&loaded).unwrap();
     let mut facets = Facets::sample_wu2011(&mesh, 1500, 1);
     facets.sort_for_sums();
     let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
@@ -52,7 +51,7 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
     let factors: Vec<_> = assigned.1.iter().map(|material| factors(case, material, &settings)).collect();
     let tables = Wu2011::from_factors(&tile, &assigned.0, &assigned.1, &factors, &settings)
         .unwrap_or_else(|error| panic!("{}, wu2011: {error}", case.name));
-    let brdf = Arc::new(EffectiveBrdf { form: Representation::Wu2011(tables), base_area });
+    let brdf = Arc::new(EffectiveBrdf { representation: Representation::Wu2011(tables), base_area });
     let evidence = HealthInputs {
         facets: Arc::new(facets),
         sight: VisibilityInput::Packed(Arc::new(visibility)),

@@ -49,7 +49,7 @@ pub fn same_image(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
     let background = Background::default();
     let input = stage.input(&*outcome.brdf, [side; 2], 1, &background);
     let cpu = render(&input).unwrap().image.pixels;
-    let mut renderer = match GpuRenderer::wearing(gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf) {
+    let mut renderer = match GpuRenderer::with_material(gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf) {
         Ok(renderer) => renderer,
         Err(error) => return eprintln!("SKIPPED: {name}: {error}"),
     };

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use biscale::brdf::{Brdf, Term};
-use biscale::effective::{Direct, EffectiveBrdf, FacetSum, LowRank, Material, Representation};
+use biscale::brdf::{Brdf, Material, Term};
+use biscale::effective::{Direct, EffectiveBrdf, FacetSum, LowRank, Representation};
 use biscale::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh};
 use biscale::metrics::mirror_biased_pairs;
 use biscale::plan::{Preset, Settings};
@@ -78,8 +78,8 @@ fn evaluators(mesh: &TileMesh, facets: &Facets) -> [(&'static str, EffectiveBrdf
     let factors = LowRank::build(facets, &visibility, &slots, &materials, &settings).unwrap();
     let sum = Arc::new(FacetSum::new(facets, &slots, &materials));
     [
-        ("direct", EffectiveBrdf { form: Representation::Direct(Direct::new(sum, visibility)), base_area }),
-        ("low rank", EffectiveBrdf { form: Representation::LowRank(factors), base_area }),
+        ("direct", EffectiveBrdf { representation: Representation::Direct(Direct::new(sum, visibility)), base_area }),
+        ("low rank", EffectiveBrdf { representation: Representation::LowRank(factors), base_area }),
     ]
 }
 

@@ -1,4 +1,4 @@
-//! What a table or a picture is to be like, before it is written.
+//! Export dialogs: settings of a table, image, fit or tile before the file is written.
 
 use std::path::Path;
 
@@ -9,68 +9,68 @@ use eframe::egui::{self, Context, DragValue, Grid, Ui};
 use crate::app::theme;
 use crate::app::worker::TableChoice;
 
-/// What a dialog answers.
+/// The button that ended an export dialog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Answer {
+pub enum ExportDecision {
     Export,
     Cancel,
 }
 
-fn footer(ui: &mut Ui, can: bool, answer: &mut Option<Answer>) {
+fn footer(ui: &mut Ui, valid: bool, decision: &mut Option<ExportDecision>) {
     ui.add_space(8.0);
     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-        let export = ui.add_enabled(can, egui::Button::new("Export"));
-        if export.clicked() || can && ui.input(|input| input.key_pressed(egui::Key::Enter)) {
-            *answer = Some(Answer::Export);
+        let export = ui.add_enabled(valid, egui::Button::new("Export"));
+        if export.clicked() || valid && ui.input(|input| input.key_pressed(egui::Key::Enter)) {
+            *decision = Some(ExportDecision::Export);
         }
         if ui.button("Cancel").clicked() {
-            *answer = Some(Answer::Cancel);
+            *decision = Some(ExportDecision::Cancel);
         }
     });
 }
 
-/// How fine a table is.
-pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<Answer> {
+/// Draws the dialog of a table export, with its resolution.
+pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<ExportDecision> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-    asked(ctx, "Export the BRDF as a table", path, |ui| {
+    export_dialog(ctx, "Export the BRDF as a table", path, |ui| {
         match ending.as_str() {
             _ if crate::export::grid_is_free(path) => grid_ui(ui, choice),
             "bsdf" => rgl_ui(ui, choice),
             "xml" => radiance_ui(ui, choice),
-            _ => drop(ui.label("This format brings its own grid of directions.")),
+            _ => drop(ui.label("This format has a fixed grid of directions.")),
         }
         let checked = choice.resolution(path).map_or(Ok(()), |resolution| resolution.check());
         if let Err(error) = &checked {
             ui.colored_label(theme::WARNING, error.to_string());
         }
         if !matches!(ending.as_str(), "npz" | "csv" | "exr") {
-            ui.weak("A note in plain words is written beside it: what the numbers are, and how well it reads.");
+            ui.weak("A text file beside it describes the conventions and the error of the table.");
         }
-        ui.weak("At the scene's quality, not the draft's. Progress and Cancel are in the status line.");
+        ui.weak("The export uses the scene's quality. Progress and Cancel are in the status line.");
         checked.is_ok()
     })
 }
 
-/// Steps of a grid that is free.
+/// Draws the resolution of a format whose grid is free.
 fn grid_ui(ui: &mut Ui, choice: &mut TableChoice) {
     let TableChoice { theta, phi, .. } = choice;
     Grid::new("table").num_columns(2).show(ui, |ui| {
-        let label = ui.label("Steps from the normal to the horizon");
+        let label = ui.label("Polar steps (normal to horizon)");
         ui.add(DragValue::new(theta).range(2..=180)).labelled_by(label.id);
         ui.end_row();
-        let label = ui.label("Steps around");
+        let label = ui.label("Azimuth steps");
         ui.add(DragValue::new(phi).range(4..=720)).labelled_by(label.id);
         ui.end_row();
     });
     let pairs = (*theta * *phi) as f64 * (*theta * *phi) as f64;
     let (millions, megabytes) = (pairs / 1e6, pairs * 24.0 / 1e6);
-    ui.label(format!("{millions:.1} million pairs of directions, about {megabytes:.0} MB as .npz"));
-    ui.weak("Glossy materials ask for more steps.");
+    ui.label(format!("{millions:.1} million direction pairs, about {megabytes:.0} MB as .npz"));
+    ui.weak("Glossy materials need more steps.");
 }
 
-/// Sizes of an RGL file.
+/// Draws the sizes of an RGL file.
 fn rgl_ui(ui: &mut Ui, choice: &mut TableChoice) {
-    ui.radio_value(&mut choice.rgl, None, "As fine as the material asks for, up to the large one");
+    ui.radio_value(&mut choice.rgl, None, "Automatic: from the material, up to the large size");
     for (name, sizes) in [
         ("Small: 9 x 24 slices of 24 x 24, about 3 MB", [9, 24, 24, 24]),
         ("Medium: 13 x 48 slices of 36 x 36, about 20 MB", [13, 48, 36, 36]),
@@ -78,17 +78,17 @@ fn rgl_ui(ui: &mut Ui, choice: &mut TableChoice) {
     ] {
         ui.radio_value(&mut choice.rgl, Some(sizes), name);
     }
-    ui.weak("A name that ends in _spec.bsdf gets spectra in place of RGB, for Mitsuba's spectral modes.");
+    ui.weak("A name that ends in _spec.bsdf stores spectra instead of RGB, for the spectral modes of Mitsuba.");
 }
 
-/// The basis of a Radiance file.
+/// Draws the basis of a Radiance file.
 fn radiance_ui(ui: &mut Ui, choice: &mut TableChoice) {
-    ui.radio_value(&mut choice.radiance, RadianceBasis::Klems, "Klems' 145 x 145 patches");
+    ui.radio_value(&mut choice.radiance, RadianceBasis::Klems, "Klems basis, 145 x 145 patches");
     let tree = RadianceBasis::TensorTree;
-    ui.radio_value(&mut choice.radiance, tree, "Tensor tree, for what is sharp or anisotropic");
+    ui.radio_value(&mut choice.radiance, tree, "Tensor tree, for glossy or anisotropic materials");
     if choice.radiance == RadianceBasis::TensorTree {
         ui.horizontal(|ui| {
-            ui.label("Cells along a side");
+            ui.label("Cells per side");
             for side in [16, 32, 64] {
                 ui.radio_value(&mut choice.tree, side, side.to_string());
             }
@@ -96,35 +96,35 @@ fn radiance_ui(ui: &mut Ui, choice: &mut TableChoice) {
     }
 }
 
-/// Size of a picture.
-pub fn image_ui(ctx: &Context, path: &Path, width: &mut usize, height: &mut usize) -> Option<Answer> {
-    asked(ctx, "Export the picture", path, |ui| {
+/// Draws the dialog of an image export, with its size.
+pub fn image_ui(ctx: &Context, path: &Path, width: &mut usize, height: &mut usize) -> Option<ExportDecision> {
+    export_dialog(ctx, "Export the image", path, |ui| {
         ui.horizontal(|ui| {
             ui.label("Pixels");
             ui.name_inputs("Width", |ui| ui.add(DragValue::new(width).range(16..=4096)));
             ui.label("×");
             ui.name_inputs("Height", |ui| ui.add(DragValue::new(height).range(16..=4096)));
         });
-        ui.weak(".png is as you see it; .exr holds linear radiance.");
+        ui.weak(".png stores the displayed colours. .exr stores linear radiance.");
         true
     })
 }
 
-/// What a fit is.
-pub fn fit_ui(ctx: &Context, path: &Path) -> Option<Answer> {
-    asked(ctx, "Export a few parameters", path, |ui| {
+/// Draws the dialog of an exported fit.
+pub fn fit_ui(ctx: &Context, path: &Path) -> Option<ExportDecision> {
+    export_dialog(ctx, "Export a fit", path, |ui| {
         ui.label(
-            "A rough metal or plastic with a matte part is fitted to the material; what it loses is said afterwards.",
+            "The file holds the parameters of a rough metal or plastic with a diffuse part. A message gives the error.",
         );
-        ui.weak("For all of the material export a table.");
+        ui.weak("Export a table to keep the whole BRDF.");
         true
     })
 }
 
-/// How much of the tile, and how large.
-pub fn tile_ui(ctx: &Context, path: &Path, options: &mut TileOptions) -> Option<Answer> {
+/// Draws the dialog of a tile export, with repetitions and scale.
+pub fn tile_ui(ctx: &Context, path: &Path, options: &mut TileOptions) -> Option<ExportDecision> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-    asked(ctx, "Export the tile", path, |ui| {
+    export_dialog(ctx, "Export the tile", path, |ui| {
         let [mut across, mut along] = options.repeat.to_array();
         ui.horizontal(|ui| {
             ui.label("Tiles");
@@ -135,16 +135,16 @@ pub fn tile_ui(ctx: &Context, path: &Path, options: &mut TileOptions) -> Option<
         options.repeat = glam::UVec2::new(across, along);
         if matches!(ending.as_str(), "stl" | "svg" | "pdf") {
             ui.horizontal(|ui| {
-                let label = ui.label("Enlarged by");
+                let label = ui.label("Scale");
                 let drag = DragValue::new(&mut options.scale).range(0.01..=10_000.0).speed(0.2).max_decimals(2);
                 ui.add(drag).labelled_by(label.id);
-                ui.weak("a tile of 1 mm by 40 is 4 cm");
+                ui.weak("with 40, a tile of 1 mm becomes 4 cm");
             });
         }
         if matches!(ending.as_str(), "stl" | "png") {
             let mut side = options.samples.x;
             ui.horizontal(|ui| {
-                let label = ui.label("Samples along a tile");
+                let label = ui.label("Samples per side");
                 ui.add(DragValue::new(&mut side).range(2..=2048)).labelled_by(label.id);
             });
             options.samples = glam::UVec2::splat(side);
@@ -153,19 +153,24 @@ pub fn tile_ui(ctx: &Context, path: &Path, options: &mut TileOptions) -> Option<
     })
 }
 
-/// A dialog about a file to be written; `body` says whether it can be.
-fn asked(ctx: &Context, title: &str, path: &Path, body: impl FnOnce(&mut Ui) -> bool) -> Option<Answer> {
-    let mut answer = None;
+/// Draws the frame of an export dialog. `body` returns whether the settings are valid.
+fn export_dialog(
+    ctx: &Context,
+    title: &str,
+    path: &Path,
+    body: impl FnOnce(&mut Ui) -> bool,
+) -> Option<ExportDecision> {
+    let mut decision = None;
     let modal = egui::Modal::new(egui::Id::unique(title)).show(ctx, |ui| {
         ui.set_width(440.0);
         ui.heading(title);
         ui.label(path.display().to_string());
         ui.add_space(6.0);
-        let can = body(ui);
-        footer(ui, can, &mut answer);
+        let valid = body(ui);
+        footer(ui, valid, &mut decision);
     });
-    if modal.should_close() && answer.is_none() {
-        answer = Some(Answer::Cancel);
+    if modal.should_close() && decision.is_none() {
+        decision = Some(ExportDecision::Cancel);
     }
-    answer
+    decision
 }

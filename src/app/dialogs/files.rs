@@ -1,4 +1,4 @@
-//! A file dialog of our own: a typed path and a list beside it. It needs no portal and works the same everywhere.
+//! A file dialog with a typed path and a list. It needs no desktop portal and works the same on every system.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use eframe::egui::{self, Key, RichText, ScrollArea, Ui};
 
 use crate::app::views::brushes::Layer;
 
-/// What a file is chosen for.
+/// Purpose for which the user chooses a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Purpose {
     OpenScene,
@@ -44,7 +44,7 @@ impl Purpose {
             Self::SavePaint(Layer::Slots) => "Save the painted materials",
             Self::ExportTable => "Export the material",
             Self::ExportTile => "Export the tile",
-            Self::ExportImage => "Export the picture",
+            Self::ExportImage => "Export the image",
         }
     }
 
@@ -73,15 +73,16 @@ impl Purpose {
 pub struct FileDialog {
     pub purpose: Purpose,
     folder: PathBuf,
-    /// What stands in the text field: a name in the folder or any path.
+    /// Text field: a name in the folder, or any path.
     pub typed: String,
-    /// Folders, then files, of `folder`.
+    /// Names in `folder`, folders first. The flag marks folders.
     entries: Vec<(String, bool)>,
+    /// True if the list shows all files, not only those with a matching ending.
     all: bool,
-    trouble: Option<String>,
-    /// The file that would be written over, asked about once.
-    over: Option<PathBuf>,
-    fresh: bool,
+    error: Option<String>,
+    /// The existing file that the next confirmation overwrites.
+    overwrite: Option<PathBuf>,
+    needs_focus: bool,
 }
 
 impl FileDialog {
@@ -94,21 +95,21 @@ impl FileDialog {
             typed: name.to_owned(),
             entries: Vec::new(),
             all: false,
-            trouble: None,
-            over: None,
-            fresh: true,
+            error: None,
+            overwrite: None,
+            needs_focus: true,
         };
         dialog.list();
         dialog
     }
 
     fn list(&mut self) {
-        self.trouble = None;
+        self.error = None;
         self.entries.clear();
         let listing = match std::fs::read_dir(&self.folder) {
             Ok(listing) => listing,
             Err(error) => {
-                self.trouble = Some(format!("{}: {error}", self.folder.display()));
+                self.error = Some(format!("{}: {error}", self.folder.display()));
                 return;
             }
         };
@@ -125,7 +126,7 @@ impl FileDialog {
         self.entries.sort_by_key(|(name, is_folder)| (!is_folder, name.to_lowercase()));
     }
 
-    /// Shows it. `Some(Some(path))` is a choice, `Some(None)` is leaving without one.
+    /// Draws the dialog. Returns `Some(Some(path))` for a choice and `Some(None)` if the user cancels.
     pub fn ui(&mut self, ctx: &egui::Context) -> Option<Option<PathBuf>> {
         let mut result = None;
         let modal = egui::Modal::new(egui::Id::unique("files")).show(ctx, |ui| {
@@ -143,7 +144,7 @@ impl FileDialog {
     fn body(&mut self, ui: &mut Ui) -> Option<Option<PathBuf>> {
         let mut go_to = None;
         ui.horizontal(|ui| {
-            if ui.button("Up").on_hover_text("The folder above").clicked() {
+            if ui.button("Up").on_hover_text("Open the parent folder").clicked() {
                 go_to = self.folder.parent().map(Path::to_owned);
             }
             if ui.button("Home").clicked() {
@@ -178,7 +179,7 @@ impl FileDialog {
         if let Some(folder) = go_to {
             self.folder = folder;
             self.list();
-            self.fresh = true;
+            self.needs_focus = true;
         }
         let field = ui.horizontal(|ui| {
             let label = ui.label(if self.purpose.saves() { "Name or path" } else { "Path" });
@@ -188,16 +189,16 @@ impl FileDialog {
         if let Some(formats) = super::formats::of(&self.purpose) {
             super::formats::ui(ui, formats, &mut self.typed);
         }
-        if self.fresh {
+        if self.needs_focus {
             field.inner.request_focus();
-            self.fresh = false;
+            self.needs_focus = false;
         }
         if field.inner.changed() {
-            self.over = None;
+            self.overwrite = None;
         }
         chosen |= field.inner.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
-        if let Some(trouble) = &self.trouble {
-            ui.colored_label(super::super::theme::WARNING, trouble);
+        if let Some(error) = &self.error {
+            ui.colored_label(super::super::theme::WARNING, error);
         }
         let mut left = false;
         ui.horizontal(|ui| {
@@ -205,12 +206,12 @@ impl FileDialog {
                 self.list();
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let word = match (&self.over, self.purpose.saves()) {
-                    (Some(_), _) => "Replace it",
+                let label = match (&self.overwrite, self.purpose.saves()) {
+                    (Some(_), _) => "Replace",
                     (None, true) => "Save",
                     (None, false) => "Open",
                 };
-                chosen |= ui.button(word).clicked();
+                chosen |= ui.button(label).clicked();
                 left = ui.button("Cancel").clicked();
             });
         });
@@ -220,11 +221,11 @@ impl FileDialog {
         if chosen { self.choose().map(Some) } else { None }
     }
 
-    /// What is typed as a path, if it can be used; a folder is entered.
+    /// Returns the typed path if it is usable. A folder is opened in the list instead.
     fn choose(&mut self) -> Option<PathBuf> {
         let typed = self.typed.trim();
         if typed.is_empty() {
-            self.trouble = Some("Type a name, or choose one from the list.".to_owned());
+            self.error = Some("Type a name, or choose one from the list.".to_owned());
             return None;
         }
         let mut path = self.folder.join(typed);
@@ -232,14 +233,14 @@ impl FileDialog {
             self.folder = path;
             self.typed.clear();
             self.list();
-            self.fresh = true;
+            self.needs_focus = true;
             return None;
         }
         if !self.purpose.saves() {
             if path.is_file() {
                 return Some(path);
             }
-            self.trouble = Some(format!("{}: there is no such file.", path.display()));
+            self.error = Some(format!("{}: the file does not exist.", path.display()));
             return None;
         }
         if path.extension().is_none()
@@ -247,9 +248,9 @@ impl FileDialog {
         {
             path.set_extension(ending);
         }
-        if path.exists() && self.over.as_ref() != Some(&path) {
-            self.trouble = Some(format!("{} exists.", path.display()));
-            self.over = Some(path);
+        if path.exists() && self.overwrite.as_ref() != Some(&path) {
+            self.error = Some(format!("{} already exists.", path.display()));
+            self.overwrite = Some(path);
             return None;
         }
         Some(path)

@@ -1,4 +1,4 @@
-//! The formats of a file in a person's words: what to choose for which program.
+//! Export formats with the programs that read them.
 
 use std::path::Path;
 
@@ -6,22 +6,22 @@ use eframe::egui::{ComboBox, Ui};
 
 use super::Purpose;
 
-/// End of a file's name, what it is, who reads it.
+/// Ending of the file name, name of the format, programs that read it.
 pub type Format = (&'static str, &'static str, &'static str);
 
-/// Tables of the BRDF, then what is fitted to it.
+/// Formats of the material: tables of the BRDF, then fits.
 const MATERIALS: [Format; 11] = [
     (".npz", "NumPy arrays", "Python, and this program again"),
-    (".csv", "Text", "any program, a line a pair of directions"),
-    (".exr", "Image atlas", "shaders and viewers, an image a light"),
+    (".csv", "Text", "any program; one line per direction pair"),
+    (".exr", "Image atlas", "shaders and viewers; one image per light"),
     (".bsdf", "RGL tensor", "Mitsuba 3 (plugin `measured`), pbrt"),
     ("_spec.bsdf", "RGL tensor with spectra", "Mitsuba 3 in spectral mode"),
     (".binary", "MERL", "programs that read MERL files; isotropic"),
     (".xml", "Radiance", "Radiance, EnergyPlus, daylight programs"),
     (".bin", "UTIA", "programs that read UTIA files; anisotropic"),
     (".astm", "ASTM E1392", "archives of measurements"),
-    (".gltf", "glTF", "game engines, the web; a few parameters"),
-    (".mtlx", "MaterialX", "film and CAD programs; a few parameters"),
+    (".gltf", "glTF", "game engines, the web; a fit"),
+    (".mtlx", "MaterialX", "film and CAD programs; a fit"),
 ];
 
 const TILES: [Format; 5] = [
@@ -32,7 +32,7 @@ const TILES: [Format; 5] = [
     (".pdf", "Pattern to fold", "paper printers; grooves, pyramids, flat"),
 ];
 
-/// The formats among which a purpose chooses.
+/// Returns the formats of an export purpose.
 pub fn of(purpose: &Purpose) -> Option<&'static [Format]> {
     match purpose {
         Purpose::ExportTable => Some(&MATERIALS),
@@ -41,23 +41,23 @@ pub fn of(purpose: &Purpose) -> Option<&'static [Format]> {
     }
 }
 
-/// The longest ending of a name that is known.
+/// Returns the index of the format with the longest ending that matches a name.
 fn ending_of(formats: &[Format], name: &str) -> Option<usize> {
     let fits = |at: &usize| name.to_ascii_lowercase().ends_with(formats[*at].0);
     (0..formats.len()).filter(fits).max_by_key(|at| formats[*at].0.len())
 }
 
-/// A choice of formats; the name gets the ending of the one that is chosen.
+/// Draws the choice of a format. Choosing one changes the ending of the name.
 pub fn ui(ui: &mut Ui, formats: &[Format], name: &mut String) {
     let now = ending_of(formats, name);
-    let words = |at: usize| format!("{} ({})", formats[at].1, formats[at].0);
+    let label_of = |at: usize| format!("{} ({})", formats[at].1, formats[at].0);
     ui.horizontal(|ui| {
         let label = ui.label("Format");
-        let shown = now.map_or_else(|| "Choose, or type an ending".to_owned(), words);
-        let combo = ComboBox::from_id_salt("format").selected_text(shown).width(220.0).height(400.0);
+        let selected = now.map_or_else(|| "Choose, or type an ending".to_owned(), label_of);
+        let combo = ComboBox::from_id_salt("format").selected_text(selected).width(220.0).height(400.0);
         let response = combo.show_ui(ui, |ui| {
             for (at, (_, _, readers)) in formats.iter().enumerate() {
-                let text = format!("{}: {readers}", words(at));
+                let text = format!("{}: {readers}", label_of(at));
                 if ui.selectable_label(now == Some(at), text).clicked() {
                     *name = with_ending(formats, name, at);
                 }
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_format_that_export_writes_is_offered_and_taken() {
+    fn every_export_format_is_offered_and_accepted() {
         for ending in crate::export::endings() {
             assert!(MATERIALS.iter().any(|(known, ..)| *known == format!(".{ending}")), "{ending}");
         }

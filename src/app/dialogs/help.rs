@@ -1,4 +1,4 @@
-//! Help: the first steps of usual tasks, and every shortcut.
+//! The help window: first steps of common tasks, and all shortcuts.
 
 use eframe::egui::{self, Context, Grid, RichText, ScrollArea};
 
@@ -7,38 +7,42 @@ use crate::app::actions;
 const TASKS: [(&str, &str); 7] = [
     (
         "Make a blue velvet",
-        "Search the gallery for \"velvet\" and click one. In the panel, Materials, turn the colour of \"Default\" to blue, and that of \
-         \"Floor\" to a darker one; Surface has the spread, the lean and the number of the fibres.",
+        "Search the gallery for \"velvet\" and click a scene. Under Materials, set the colour of \"Default\" to \
+         blue and that of \"Floor\" to a darker blue. Under Surface, change the fibres: \
+         spread, lean and number.",
     ),
     (
         "Paint a relief",
-        "Press P. The first stroke turns any surface into a relief of its shape. Brushes, size and strength are under the tile; \
-         [ and ] change the size. The relief is saved beside the scene as an image.",
+        "Press P. The first stroke turns any surface into a height field of its shape. Brushes, size and \
+         strength are below the tile, and [ and ] change the size. Saving the scene \
+         writes the heights beside it as an image.",
     ),
     (
-        "Paint what it is made of",
-        "Press P and choose Material: the first stroke makes \"Paint 1\", which stands under Materials like all others. Colour \
-         multiplies what is there. Both lie over any surface and are saved beside the scene.",
+        "Paint materials and colours",
+        "Press P and choose Material. The first stroke creates the material \"Paint 1\", which appears under \
+         Materials. Colour multiplies the material below it. Both work on any surface and are saved beside the scene.",
     ),
     (
-        "Use a measured paint",
+        "Use a measured BRDF",
         "Drop a MERL .binary or an RGL .bsdf file on the window, or choose \"Measured\" as the BRDF of a material.",
     ),
     (
-        "Take it to another renderer",
-        "File, Export the material: Format says who reads which. For Mitsuba 3 take RGL (.bsdf); a note beside the file says in \
-         words what it holds.",
+        "Use the material in another renderer",
+        "Choose File, Export the material. Format lists the programs that read each format. For Mitsuba 3, choose \
+         RGL (.bsdf). A text file beside it describes the conventions.",
     ),
-    ("Compare two versions", "Press B to keep what you see as A, edit on, and drag the line between A and now."),
+    (
+        "Compare two versions",
+        "Press B to store the current image as A, and continue editing. Drag the line between A and the current image.",
+    ),
     (
         "Look around",
-        "Drag turns the object, the middle button moves it, the wheel comes closer, until the tiles \
-         themselves show; a double click frames it. Shift-drag or \
-         the right button turns the light.",
+        "Drag to turn the object, and drag with the middle button to move it. Scroll to zoom, until single tiles are \
+         visible. Double-click to frame the object. Shift-drag or drag with the right button to turn the light.",
     ),
 ];
 
-/// The window; whether it stays open.
+/// Draws the window. Returns whether it stays open.
 pub fn help_ui(ctx: &Context) -> bool {
     let mut open = true;
     egui::Window::new("Help")

@@ -1,4 +1,4 @@
-//! Windows over the editor: files, questions, help.
+//! Dialogs of the editor: files, questions, help.
 
 pub mod export;
 mod files;
@@ -14,29 +14,29 @@ pub use files::{FileDialog, Purpose};
 pub use help::help_ui;
 
 use super::actions::Action;
-use super::document::Recovered;
+use super::document::RecoveredDocument;
 use super::worker::TableChoice;
 
-/// The one that is open.
+/// The open dialog.
 #[derive(Debug)]
 pub enum Dialog {
     Files(FileDialog),
-    /// Unsaved changes stand before this action.
+    /// The question about unsaved changes before this action.
     Unsaved(Action),
     Help,
     About,
-    /// What a crash left behind.
-    Recover(Vec<Recovered>),
-    /// The file was written by someone else; noticed while saving, or on coming back to the window.
+    /// Documents that a crash left behind.
+    Recover(Vec<RecoveredDocument>),
+    /// Another program changed the open file. The editor checks when it saves and when the window gets the focus.
     ChangedOnDisk {
         saving: bool,
     },
-    /// Table export: where to, and how fine.
+    /// Export of a table.
     Table {
         path: PathBuf,
         choice: TableChoice,
     },
-    /// Export of a few parameters that are fitted.
+    /// Export of a fit.
     Fit {
         path: PathBuf,
     },
@@ -51,9 +51,9 @@ pub enum Dialog {
     },
 }
 
-/// A question with its answers. The first is what Enter means; leaving is `None`-less: it returns the last.
+/// Draws a question. Returns the index of the chosen answer; closing the dialog chooses the last one.
 pub fn question(ctx: &Context, title: &str, text: &str, answers: &[&str]) -> Option<usize> {
-    let mut answer = None;
+    let mut chosen = None;
     let modal = egui::Modal::new(egui::Id::unique(("question", title))).show(ctx, |ui| {
         ui.set_width(420.0);
         ui.heading(title);
@@ -61,15 +61,15 @@ pub fn question(ctx: &Context, title: &str, text: &str, answers: &[&str]) -> Opt
         ui.label(text);
         ui.add_space(10.0);
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            for (at, word) in answers.iter().enumerate() {
-                if ui.button(*word).clicked() {
-                    answer = Some(at);
+            for (at, label) in answers.iter().enumerate() {
+                if ui.button(*label).clicked() {
+                    chosen = Some(at);
                 }
             }
         });
     });
-    if modal.should_close() && answer.is_none() {
-        answer = Some(answers.len() - 1);
+    if modal.should_close() && chosen.is_none() {
+        chosen = Some(answers.len() - 1);
     }
-    answer
+    chosen
 }

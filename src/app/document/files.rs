@@ -1,4 +1,4 @@
-//! Saving: the scene, the painted images beside it, and paths that keep pointing where they did.
+//! Saving a document: the scene, the painted images beside it, and paths that stay valid.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,37 +10,37 @@ use glam::Vec3;
 
 use super::{Change, Document};
 
-/// A file as it was at some time.
+/// Modification time and length of a file, to detect changes by other programs.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Stamp {
+pub struct FileStamp {
     modified: Option<SystemTime>,
     length: u64,
 }
 
-impl Stamp {
+impl FileStamp {
     pub fn of(path: &Path) -> Option<Self> {
-        let there = std::fs::metadata(path).ok()?;
-        Some(Self { modified: there.modified().ok(), length: there.len() })
+        let metadata = std::fs::metadata(path).ok()?;
+        Some(Self { modified: metadata.modified().ok(), length: metadata.len() })
     }
 }
 
 impl Document {
-    /// Whether someone else has written the file since it was read or saved here.
+    /// Returns true if another program has written the file since the editor read or saved it.
     pub fn changed_on_disk(&self) -> bool {
-        let now = self.path.as_deref().and_then(Stamp::of);
-        now.is_some() && now != self.stamp
+        let current = self.path.as_deref().and_then(FileStamp::of);
+        current.is_some() && current != self.stamp
     }
 
-    /// Takes the file on disk as seen: it is not asked about again, and what is open is not what is saved there.
+    /// Accepts the changed file on disk, so that the editor does not ask again. The document becomes unsaved.
     pub fn accept_disk(&mut self) {
-        self.stamp = self.path.as_deref().and_then(Stamp::of);
+        self.stamp = self.path.as_deref().and_then(FileStamp::of);
         self.saved = None;
     }
 
-    /// Writes everything to `path`, images first, so that the scene never names one that is not there.
+    /// Writes the document to `path`. Images are written first, so that the scene never names a missing file.
     ///
     /// # Errors
-    /// A scene that is not valid, or a place that cannot be written; the document stays as it is then.
+    /// Returns an error if the scene is invalid or the path cannot be written. The document is then unchanged.
     pub fn save_as(&mut self, path: &Path) -> Result<()> {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
@@ -59,7 +59,7 @@ impl Document {
             self.push("Save as", vec![Change::Scene { before, after }]);
         }
         (self.base_dir, self.name) = (folder, stem);
-        self.stamp = Stamp::of(&path);
+        self.stamp = FileStamp::of(&path);
         self.path = Some(path);
         self.saved = Some(self.history.state());
         self.history.close();
@@ -67,7 +67,7 @@ impl Document {
         Ok(())
     }
 
-    /// Painted images are called after the scene.
+    /// Names the painted images after the scene.
     fn name_images(&self, scene: &mut Scene, stem: &str) {
         if let (Geometry::Heightfield(field), Some(_)) = (&mut scene.tile.geometry, &self.state.painted.heights) {
             field.path = Some(PathBuf::from(format!("{stem}_heights.exr")));
@@ -97,10 +97,10 @@ impl Document {
     }
 }
 
-/// Heights by the file's ending: `.exr` keeps every bit, `.png` has 16 bits between 0 and 1.
+/// Writes heights. `.exr` stores them exactly, and `.png` has 16 bits between 0 and 1.
 ///
 /// # Errors
-/// Another ending, or a place that cannot be written.
+/// Returns an error if the ending is unknown or the path cannot be written.
 pub fn write_heights(image: &Pixels<f32>, path: &Path) -> Result<()> {
     let bytes = match ending(path).as_deref() {
         Some("png") => {
@@ -114,7 +114,7 @@ pub fn write_heights(image: &Pixels<f32>, path: &Path) -> Result<()> {
     crate::base::replace_file(path, &bytes)
 }
 
-/// Linear colours by the file's ending: `.exr` as they are, `.png` as sRGB of 8 bits.
+/// Writes linear colours. `.exr` stores them linearly, and `.png` as 8-bit sRGB.
 ///
 /// # Errors
 /// As [`write_heights`].
@@ -132,7 +132,7 @@ pub fn write_colors(image: &Pixels<Vec3>, path: &Path) -> Result<()> {
     crate::base::replace_file(path, &bytes)
 }
 
-/// Slots as a grey `.png` of 8 bits.
+/// Writes slots as a grey `.png` with 8 bits.
 ///
 /// # Errors
 /// As [`write_heights`].
@@ -173,7 +173,7 @@ fn exr(values: &[Vec3], size: glam::UVec2, path: &Path) -> Result<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// Every file that a scene names, to be changed.
+/// Returns mutable references to all file paths of a scene.
 pub fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
     let mut found: Vec<&mut PathBuf> = Vec::new();
     match &mut scene.tile.geometry {
@@ -194,7 +194,7 @@ pub fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
     found
 }
 
-/// The measured files of a material.
+/// Returns mutable references to the measured files of a material.
 fn measured_paths(material: &mut MaterialSpec) -> impl Iterator<Item = &mut PathBuf> {
     material.brdf.iter_mut().flat_map(BrdfSpec::terms_mut).filter_map(|term| match term {
         TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => {
@@ -204,33 +204,33 @@ fn measured_paths(material: &mut MaterialSpec) -> impl Iterator<Item = &mut Path
     })
 }
 
-/// Names a material's files so that any scene finds them.
+/// Makes the file paths of a material absolute, so that scenes in other folders find them.
 pub fn make_absolute(material: &mut MaterialSpec, base_dir: &Path) {
     for path in measured_paths(material) {
-        let there = base_dir.join(&*path);
-        if there.is_file() {
-            *path = std::path::absolute(&there).unwrap_or(there);
+        let file = base_dir.join(&*path);
+        if file.is_file() {
+            *path = std::path::absolute(&file).unwrap_or(file);
         }
     }
 }
 
-/// Relative paths that led somewhere from `old` lead there from `new`.
+/// Changes relative paths so that they name the same files from folder `new` as from folder `old`.
 fn rebase(scene: &mut Scene, old: &Path, new: &Path) {
-    let moved = |path: &Path| -> Option<PathBuf> {
+    let moved_path = |path: &Path| -> Option<PathBuf> {
         let is_asset = path.to_str().is_some_and(|text| text.starts_with("asset:"));
-        let there = old.join(path);
-        if path.is_absolute() || is_asset || !there.exists() {
+        let file = old.join(path);
+        if path.is_absolute() || is_asset || !file.exists() {
             return None;
         }
-        let there = std::path::absolute(&there).unwrap_or(there);
-        Some(there.strip_prefix(new).map(Path::to_owned).unwrap_or(there))
+        let file = std::path::absolute(&file).unwrap_or(file);
+        Some(file.strip_prefix(new).map(Path::to_owned).unwrap_or(file))
     };
     for path in paths(scene) {
-        if let Some(to) = moved(path) {
+        if let Some(to) = moved_path(path) {
             *path = to;
         }
     }
-    if let Some(to) = moved(Path::new(&scene.light.environment)) {
+    if let Some(to) = moved_path(Path::new(&scene.light.environment)) {
         scene.light.environment = to.to_string_lossy().into_owned();
     }
 }

@@ -1,4 +1,4 @@
-//! Undo and redo: named entries, memory bounded. Brush strokes are kept as the image tiles they touched.
+//! Undo and redo with named entries and bounded memory. A brush stroke stores only the image patches that it changed.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -6,14 +6,14 @@ use std::sync::Arc;
 use crate::scene::{Painted, Pixels, Scene};
 use glam::Vec3;
 
-/// What one entry changed, with both sides of it.
+/// A change of one entry, with the values before and after it.
 #[derive(Debug, Clone)]
 pub enum Change {
     Scene {
         before: Arc<Scene>,
         after: Arc<Scene>,
     },
-    /// The whole image came, went or changed its size.
+    /// The image was added, removed or resized.
     HeightImage {
         before: Option<Arc<Pixels<f32>>>,
         after: Option<Arc<Pixels<f32>>>,
@@ -26,14 +26,14 @@ pub enum Change {
         before: Option<Arc<Pixels<u8>>>,
         after: Option<Arc<Pixels<u8>>>,
     },
-    Heights(Vec<ScenePatch<f32>>),
-    Colors(Vec<ScenePatch<Vec3>>),
-    Slots(Vec<ScenePatch<u8>>),
+    Heights(Vec<ImagePatch<f32>>),
+    Colors(Vec<ImagePatch<Vec3>>),
+    Slots(Vec<ImagePatch<u8>>),
 }
 
-/// A rectangle of an image, before and after.
+/// A rectangle of an image before and after a change.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ScenePatch<T> {
+pub struct ImagePatch<T> {
     pub x: usize,
     pub y: usize,
     pub width: usize,
@@ -41,22 +41,22 @@ pub struct ScenePatch<T> {
     pub after: Vec<T>,
 }
 
-/// Side of the patches that a stroke is cut into.
-const PATCH: usize = 16;
+/// Side of an image patch [texels].
+const PATCH_SIDE: usize = 16;
 
-impl<T: Copy + PartialEq> ScenePatch<T> {
-    /// The patches in which two images of one size differ.
+impl<T: Copy + PartialEq> ImagePatch<T> {
+    /// Returns the patches in which two images of the same size differ.
     pub fn between(before: &Pixels<T>, after: &Pixels<T>) -> Vec<Self> {
         let (width, height) = (after.size.x as usize, after.size.y as usize);
         let mut patches = Vec::new();
         if before.size != after.size {
             return patches;
         }
-        for y in (0..height).step_by(PATCH) {
-            for x in (0..width).step_by(PATCH) {
-                let columns = PATCH.min(width - x);
+        for y in (0..height).step_by(PATCH_SIDE) {
+            for x in (0..width).step_by(PATCH_SIDE) {
+                let columns = PATCH_SIDE.min(width - x);
                 let cut = |image: &Pixels<T>| -> Vec<T> {
-                    let rows = y..(y + PATCH).min(height);
+                    let rows = y..(y + PATCH_SIDE).min(height);
                     rows.flat_map(|row| image.values[row * width + x..row * width + x + columns].to_vec()).collect()
                 };
                 let (old, new) = (cut(before), cut(after));
@@ -70,16 +70,16 @@ impl<T: Copy + PartialEq> ScenePatch<T> {
 
     fn apply(&self, image: &mut Pixels<T>, values: &[T]) {
         let width = image.size.x as usize;
-        for (row, values) in values.chunks(self.width.max(1)).enumerate() {
-            let start = (self.y + row) * width + self.x;
-            if let Some(place) = image.values.get_mut(start..start + values.len()) {
-                place.copy_from_slice(values);
+        for (y, values) in values.chunks(self.width.max(1)).enumerate() {
+            let start = (self.y + y) * width + self.x;
+            if let Some(row) = image.values.get_mut(start..start + values.len()) {
+                row.copy_from_slice(values);
             }
         }
     }
 }
 
-/// The part of a document that history moves.
+/// The part of a document that undo and redo change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     pub scene: Arc<Scene>,
@@ -87,7 +87,7 @@ pub struct State {
 }
 
 impl Change {
-    /// Brings `state` to the side after this change (`forward`) or before it.
+    /// Applies this change to `state` (`forward`) or reverts it.
     fn apply(&self, state: &mut State, forward: bool) {
         match self {
             Self::Scene { before, after } => state.scene = if forward { after } else { before }.clone(),
@@ -116,7 +116,7 @@ impl Change {
     }
 }
 
-fn apply_patches<T: Copy + PartialEq>(image: &mut Option<Arc<Pixels<T>>>, patches: &[ScenePatch<T>], forward: bool) {
+fn apply_patches<T: Copy + PartialEq>(image: &mut Option<Arc<Pixels<T>>>, patches: &[ImagePatch<T>], forward: bool) {
     if let Some(image) = image {
         let image = Arc::make_mut(image);
         for patch in patches {
@@ -139,9 +139,9 @@ fn scene_bytes(scene: &Scene) -> usize {
 struct Entry {
     name: String,
     changes: Vec<Change>,
-    /// Names the state after this entry.
+    /// Identifier of the state after this entry.
     state: u64,
-    /// Further edits of the same name join it.
+    /// True if further edits of the same name join this entry.
     open: bool,
     bytes: usize,
 }
@@ -151,7 +151,7 @@ struct Entry {
 pub struct History {
     undo: VecDeque<Entry>,
     redo: Vec<Entry>,
-    /// The state before the first entry.
+    /// Identifier of the state before the first entry.
     base: u64,
     next: u64,
     bytes: usize,
@@ -159,27 +159,27 @@ pub struct History {
 }
 
 impl History {
-    /// `budget`: bytes that entries may hold; the oldest are forgotten.
+    /// Makes an empty history. If the entries exceed `budget` bytes, the oldest are dropped.
     pub fn new(budget: usize) -> Self {
         Self { undo: VecDeque::new(), redo: Vec::new(), base: 0, next: 1, bytes: 0, budget }
     }
 
-    /// A number for the present state: the same again after undo and redo.
+    /// Returns the identifier of the current state. Undo followed by redo gives the same identifier.
     pub fn state(&self) -> u64 {
         self.undo.back().map_or(self.base, |entry| entry.state)
     }
 
-    /// Notes what was done. An edit of a scene joins the entry before it if that has its name and is still open.
+    /// Adds an entry. A scene edit joins the last entry if that is open and has the same name.
     pub fn push(&mut self, name: &str, changes: Vec<Change>) {
-        self.forget_redo();
+        self.clear_redo();
         let state = self.next;
         self.next += 1;
         if let ([Change::Scene { after, .. }], Some(last)) = (changes.as_slice(), self.undo.back_mut())
             && last.open
             && last.name == name
-            && let [Change::Scene { after: place, .. }] = last.changes.as_mut_slice()
+            && let [Change::Scene { after: joined, .. }] = last.changes.as_mut_slice()
         {
-            *place = after.clone();
+            *joined = after.clone();
             last.state = state;
             return;
         }
@@ -194,7 +194,7 @@ impl History {
         }
     }
 
-    /// What follows is an entry of its own.
+    /// Closes the last entry, so that the next edit starts a new one.
     pub fn close(&mut self) {
         if let Some(last) = self.undo.back_mut() {
             last.open = false;
@@ -220,7 +220,7 @@ impl History {
         Some(name)
     }
 
-    fn forget_redo(&mut self) {
+    fn clear_redo(&mut self) {
         self.redo.clear();
     }
 
@@ -232,13 +232,13 @@ impl History {
         self.redo.last().map(|entry| entry.name.as_str())
     }
 
-    /// Entries that can be undone.
+    /// Number of entries that can be undone.
     #[cfg(test)]
     pub fn len(&self) -> usize {
         self.undo.len()
     }
 
-    /// Bytes that undoable entries hold.
+    /// Bytes of the entries that can be undone.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.bytes

@@ -1,5 +1,5 @@
-//! Images painted over the tile: heights, colour weights, material slots. Each is named in the scene and is an entry of the
-//! history whenever it comes, goes or is painted on.
+//! Images painted over the tile: heights, colour weights, material slots. The scene names each image. Adding, removing
+//! and painting an image are history entries.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,10 +7,10 @@ use std::sync::Arc;
 use crate::scene::{Geometry, Heightfield, Painted, Pixels, Scene};
 use glam::Vec3;
 
-use super::{Change, Document, ScenePatch};
+use super::{Change, Document, ImagePatch};
 
 impl Document {
-    /// Painted images go where the person chose another file in their place.
+    /// Drops painted images that the user replaced by another file.
     pub(super) fn dropped_images(&mut self, before: &Scene, after: &Scene) -> Vec<Change> {
         let mut changes = Vec::new();
         let painted = &mut self.state.painted;
@@ -33,7 +33,7 @@ impl Document {
         changes
     }
 
-    /// Heights that are painted on stand where the scene's image stood; the geometry becomes a height-field.
+    /// Replaces the heights by a painted image. The geometry becomes a height field.
     pub fn paint_heights(&mut self, name: &str, heights: Pixels<f32>, height_scale: Option<f32>) {
         let mut scene = (*self.state.scene).clone();
         let mut field = match scene.tile.geometry {
@@ -48,7 +48,7 @@ impl Document {
         self.push_image(name, scene, Change::HeightImage { before, after });
     }
 
-    /// Colours painted over the tile, or none.
+    /// Sets or removes the painted colours.
     pub fn paint_colors(&mut self, name: &str, colors: Option<Pixels<Vec3>>) {
         let mut scene = (*self.state.scene).clone();
         scene.tile.color_path = colors.as_ref().map(|_| self.image_file("colors.exr"));
@@ -57,7 +57,7 @@ impl Document {
         self.push_image(name, scene, Change::ColorImage { before, after });
     }
 
-    /// Materials painted over the tile, or none. `scene` has the materials that they are.
+    /// Sets or removes the painted materials. `scene` contains them.
     pub fn paint_slots(&mut self, name: &str, mut scene: Scene, slots: Option<Pixels<u8>>) {
         scene.tile.slot_path = slots.as_ref().map(|_| self.image_file("materials.png"));
         let after = slots.map(Arc::new);
@@ -65,9 +65,9 @@ impl Document {
         self.push_image(name, scene, Change::SlotImage { before, after });
     }
 
-    /// The file of a painted image, beside the scene.
-    fn image_file(&self, what: &str) -> PathBuf {
-        PathBuf::from(format!("{}_{what}", self.name))
+    /// Returns the file name of a painted image, beside the scene.
+    fn image_file(&self, suffix: &str) -> PathBuf {
+        PathBuf::from(format!("{}_{suffix}", self.name))
     }
 
     fn push_image(&mut self, name: &str, scene: Scene, image: Change) {
@@ -81,31 +81,31 @@ impl Document {
         self.push(name, changes);
     }
 
-    /// Shows a stroke while it is drawn; [`Document::end_stroke`] makes it an entry.
+    /// Displays a stroke while the user draws it. [`Document::end_stroke`] adds it to the history.
     pub fn show_stroke(&mut self, painted: Painted) {
         self.state.painted = painted;
         self.version += 1;
     }
 
-    /// The stroke that led from `before` to what is shown is one entry.
+    /// Adds the stroke that led from `before` to the current images as one entry.
     pub fn end_stroke(&mut self, name: &str, before: &Painted) {
-        let now = &self.state.painted;
+        let current = &self.state.painted;
         let mut changes = Vec::new();
-        changes.extend(patches(&before.heights, &now.heights).map(Change::Heights));
-        changes.extend(patches(&before.colors, &now.colors).map(Change::Colors));
-        changes.extend(patches(&before.slots, &now.slots).map(Change::Slots));
+        changes.extend(patches(&before.heights, &current.heights).map(Change::Heights));
+        changes.extend(patches(&before.colors, &current.colors).map(Change::Colors));
+        changes.extend(patches(&before.slots, &current.slots).map(Change::Slots));
         if !changes.is_empty() {
             self.push(name, changes);
         }
     }
 }
 
-/// Where two images differ, if they do.
+/// Returns the patches in which two images differ; `None` if they are equal.
 fn patches<T: Copy + PartialEq>(
     before: &Option<Arc<Pixels<T>>>,
     after: &Option<Arc<Pixels<T>>>,
-) -> Option<Vec<ScenePatch<T>>> {
+) -> Option<Vec<ImagePatch<T>>> {
     let (Some(before), Some(after)) = (before, after) else { return None };
-    let found = if Arc::ptr_eq(before, after) { Vec::new() } else { ScenePatch::between(before, after) };
+    let found = if Arc::ptr_eq(before, after) { Vec::new() } else { ImagePatch::between(before, after) };
     (!found.is_empty()).then_some(found)
 }

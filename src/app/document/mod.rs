@@ -1,4 +1,4 @@
-//! What is being edited: a scene, the images painted over its files, where it is saved, and its history. No window here.
+//! The edited document: a scene, painted images, file paths and history. This module is independent of the window.
 
 mod files;
 mod history;
@@ -14,52 +14,52 @@ use crate::base::Result;
 use crate::scene;
 use crate::scene::{LoadedScene, Painted, Scene};
 
-use files::Stamp;
+use files::FileStamp;
 pub use files::{make_absolute, write_colors, write_heights, write_slots};
-pub use history::{Change, ScenePatch};
-pub use recovery::{Recovered, RecoveryFile, Snapshot};
-pub use settings::Settings;
+pub use history::{Change, ImagePatch};
+pub use recovery::{RecoveredDocument, RecoveryFile, Snapshot};
+pub use settings::EditorSettings;
 
 use history::{History, State};
 
-/// Bytes of undo that a document keeps.
+/// Maximum memory of a document's history [bytes].
 const HISTORY_BYTES: usize = 64 << 20;
 
-/// A scene with all that belongs to it while it is open.
+/// An open scene with its painted images, paths and history.
 #[derive(Debug)]
 pub struct Document {
     state: State,
     history: History,
-    /// Where relative paths of the scene start.
+    /// Folder that relative paths of the scene refer to.
     pub base_dir: PathBuf,
-    /// Where it was opened from or saved to.
+    /// File of the scene, if it has one.
     pub path: Option<PathBuf>,
-    /// The file's stem or the shipped name.
+    /// Stem of the file, or the name of the shipped scene.
     pub name: String,
-    /// The state that is on disk.
+    /// Identifier of the saved state.
     saved: Option<u64>,
-    /// What was there at first.
+    /// The state when the document was opened.
     opened: State,
-    /// The file as it was last read or written.
-    stamp: Option<Stamp>,
+    /// Stamp of the file when it was last read or written.
+    stamp: Option<FileStamp>,
     version: u64,
 }
 
 impl Document {
-    /// A document of a loaded scene; `path` is its file, if it has one of its own.
+    /// Makes a document of a loaded scene. `path` is its file, if it has one.
     pub fn new(loaded: LoadedScene, path: Option<PathBuf>) -> Self {
         let LoadedScene { scene, base_dir, name, painted } = loaded;
-        let stamp = path.as_deref().and_then(Stamp::of);
+        let stamp = path.as_deref().and_then(FileStamp::of);
         let history = History::new(HISTORY_BYTES);
         let saved = Some(history.state());
         let state = State { scene: Arc::new(scene), painted };
         Self { opened: state.clone(), state, history, base_dir, path, name, saved, stamp, version: 1 }
     }
 
-    /// Opens a scene file, or a shipped scene by name (which has no file of its own).
-    pub fn open(what: &str) -> Result<Self> {
-        let loaded = scene::open(what, &[])?;
-        let path = Path::new(what);
+    /// Opens a scene file, or a shipped scene by name. A shipped scene has no file.
+    pub fn open(path_or_name: &str) -> Result<Self> {
+        let loaded = scene::open(path_or_name, &[])?;
+        let path = Path::new(path_or_name);
         Ok(Self::new(loaded, path.is_file().then(|| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))))
     }
 
@@ -71,7 +71,7 @@ impl Document {
         &self.state.painted
     }
 
-    /// What the stages work on.
+    /// Returns the scene as the stages of the pipeline read it.
     pub fn loaded(&self) -> LoadedScene {
         LoadedScene {
             scene: (*self.state.scene).clone(),
@@ -81,12 +81,12 @@ impl Document {
         }
     }
 
-    /// Counts versions on from another document's.
+    /// Sets the version, so that it follows the versions of the previous document.
     pub fn start_at(&mut self, version: u64) {
         self.version = version;
     }
 
-    /// Grows with every change.
+    /// Version of the document, which grows with every change.
     pub fn version(&self) -> u64 {
         self.version
     }
@@ -95,20 +95,20 @@ impl Document {
         self.saved != Some(self.history.state())
     }
 
-    /// Whether something would be missed. Who only turned a shipped scene and its light has nothing to save.
+    /// Returns true if closing the document would lose work. Turning a shipped scene or its light is not work.
     pub fn has_work(&self) -> bool {
-        self.is_dirty() && (self.path.is_some() || self.saved.is_none() || !self.is_as_opened_but_for_the_view())
+        self.is_dirty() && (self.path.is_some() || self.saved.is_none() || !self.is_unchanged_except_view())
     }
 
-    fn is_as_opened_but_for_the_view(&self) -> bool {
-        let mut turned = (*self.opened.scene).clone();
-        turned.camera.clone_from(&self.state.scene.camera);
-        turned.light.rotation_deg = self.state.scene.light.rotation_deg;
-        turned == *self.state.scene && self.opened.painted == self.state.painted
+    fn is_unchanged_except_view(&self) -> bool {
+        let mut original = (*self.opened.scene).clone();
+        original.camera.clone_from(&self.state.scene.camera);
+        original.light.rotation_deg = self.state.scene.light.rotation_deg;
+        original == *self.state.scene && self.opened.painted == self.state.painted
     }
 
-    /// Takes the scene as the person left it, under the name of what differs. Edits of one control are one entry until
-    /// [`Document::rest`].
+    /// Applies an edited scene. The name of the history entry is the first difference. Consecutive edits of one control
+    /// form one entry until [`Document::rest`].
     pub fn edit(&mut self, scene: Scene) {
         if *self.state.scene != scene {
             let name = naming::name_of_edit(&self.state.scene, &scene);
@@ -116,7 +116,7 @@ impl Document {
         }
     }
 
-    /// As [`Document::edit`], under a name of its own.
+    /// Applies an edited scene under the given entry name.
     pub fn edit_as(&mut self, name: &str, scene: Scene) {
         let after = Arc::new(scene);
         let before = std::mem::replace(&mut self.state.scene, after.clone());
@@ -126,7 +126,7 @@ impl Document {
         self.version += 1;
     }
 
-    /// The hand rests: what follows is an entry of its own. (Views turned one after the other stay one.)
+    /// Ends the current entry when the pointer is released. Consecutive view changes stay one entry.
     pub fn rest(&mut self) {
         if self.history.undo_name() != Some("Move the view") {
             self.history.close();
@@ -134,14 +134,14 @@ impl Document {
     }
 
     pub fn undo(&mut self) -> Option<String> {
-        self.moved_in_history(|history, state| history.undo(state))
+        self.step_history(|history, state| history.undo(state))
     }
 
     pub fn redo(&mut self) -> Option<String> {
-        self.moved_in_history(|history, state| history.redo(state))
+        self.step_history(|history, state| history.redo(state))
     }
 
-    fn moved_in_history(&mut self, step: impl FnOnce(&mut History, &mut State) -> Option<String>) -> Option<String> {
+    fn step_history(&mut self, step: impl FnOnce(&mut History, &mut State) -> Option<String>) -> Option<String> {
         let name = step(&mut self.history, &mut self.state)?;
         self.version += 1;
         Some(name)

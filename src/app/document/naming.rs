@@ -1,9 +1,9 @@
-//! What an edit is called: the first place in which two scenes differ, in words.
+//! Names of history entries: the first setting in which two scenes differ.
 
 use crate::scene::Scene;
 use toml::{Table, Value};
 
-/// The name of the edit from `old` to `new`: `Depth`, `Roughness of "sides"`, `Turn the view`.
+/// Returns the name of the edit from `old` to `new`: `Depth`, `Roughness of "sides"`, `Move the view`.
 pub fn name_of_edit(old: &Scene, new: &Scene) -> String {
     if old.camera != new.camera {
         return "Move the view".to_owned();
@@ -18,12 +18,12 @@ pub fn name_of_edit(old: &Scene, new: &Scene) -> String {
     let tables = (Table::try_from(old), Table::try_from(new));
     let (Ok(old), Ok(new)) = tables else { return "Edit".to_owned() };
     let mut path = Vec::new();
-    difference(&Value::Table(old), &Value::Table(new), &mut path);
-    words(&path)
+    first_difference(&Value::Table(old), &Value::Table(new), &mut path);
+    caption_of(&path)
 }
 
-/// Goes down to the first difference; entries of lists are called by their `name`.
-fn difference(old: &Value, new: &Value, path: &mut Vec<String>) {
+/// Appends the path of the first difference. List entries appear by their `name`.
+fn first_difference(old: &Value, new: &Value, path: &mut Vec<String>) {
     match (old, new) {
         (Value::Table(old), Value::Table(new)) => {
             let keys = old.keys().chain(new.keys().filter(|key| !old.contains_key(*key)));
@@ -32,7 +32,7 @@ fn difference(old: &Value, new: &Value, path: &mut Vec<String>) {
                     (Some(a), Some(b)) if a == b => {}
                     (Some(a), Some(b)) => {
                         path.push(key.clone());
-                        return difference(a, b, path);
+                        return first_difference(a, b, path);
                     }
                     _ => return path.push(key.clone()),
                 }
@@ -46,14 +46,14 @@ fn difference(old: &Value, new: &Value, path: &mut Vec<String>) {
                 if let Some(name) = b.get("name").and_then(Value::as_str) {
                     path.push(format!("\"{name}\""));
                 }
-                difference(a, b, path);
+                first_difference(a, b, path);
             }
         }
         _ => {}
     }
 }
 
-fn words(path: &[String]) -> String {
+fn caption_of(path: &[String]) -> String {
     let Some(last) = path.iter().rev().find(|step| !step.starts_with('"')) else {
         return "Edit".to_owned();
     };

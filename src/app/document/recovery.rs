@@ -1,4 +1,4 @@
-//! The recovery file: what was not saved, kept beside the settings until the document is saved or closed.
+//! The recovery file: a copy of unsaved work, stored beside the settings until the document is saved or closed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Document;
 
-/// What a recovery needs to know besides the scene.
+/// Contents of the recovery file besides the painted images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Header {
     name: String,
@@ -23,7 +23,7 @@ struct Header {
     scene: String,
 }
 
-/// The place of this process' recovery file. Removed when it goes: what is left behind was left by a crash.
+/// The recovery file of this process. Dropping it removes the file, so a remaining file stems from a crash.
 #[derive(Debug)]
 pub struct RecoveryFile {
     stem: PathBuf,
@@ -34,10 +34,10 @@ impl RecoveryFile {
         Self { stem: folder.join(format!("recovery-{}", std::process::id())) }
     }
 
-    /// Everything needed to write, apart from the document: may go to another thread.
+    /// Copies the document into a snapshot, which another thread can write.
     ///
     /// # Errors
-    /// A scene that cannot be written as text.
+    /// Returns an error if the scene cannot be written as text.
     pub fn prepare(&self, document: &Document) -> Result<Snapshot> {
         let painted = document.painted();
         let header = Header {
@@ -52,7 +52,7 @@ impl RecoveryFile {
         Ok(Snapshot { stem: self.stem.clone(), header, painted: painted.clone() })
     }
 
-    /// Nothing is unsaved any more.
+    /// Removes the file, because nothing is unsaved.
     pub fn clear(&self) {
         discard(&self.stem);
     }
@@ -66,7 +66,7 @@ impl Drop for RecoveryFile {
     }
 }
 
-/// A document at one moment.
+/// A copy of a document at one time.
 #[derive(Debug)]
 pub struct Snapshot {
     stem: PathBuf,
@@ -75,8 +75,10 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// Writes the snapshot.
+    ///
     /// # Errors
-    /// A place that cannot be written; what was recovered before stays.
+    /// Returns an error if the folder cannot be written. The previous snapshot then remains.
     pub fn write(&self) -> Result<()> {
         if let Some(folder) = self.stem.parent() {
             fs::create_dir_all(folder).map_err(Error::failed)?;
@@ -95,23 +97,23 @@ impl Snapshot {
     }
 }
 
-/// What a process that is gone left behind.
+/// A document that an ended process left behind.
 #[derive(Debug, Clone)]
-pub struct Recovered {
+pub struct RecoveredDocument {
     stem: PathBuf,
     pub name: String,
     header: Header,
 }
 
-impl Recovered {
-    /// What lies in `folder` from processes that do not live any more.
+impl RecoveredDocument {
+    /// Finds the recovery files of ended processes in `folder`.
     pub fn find(folder: &Path) -> Vec<Self> {
         let files = fs::read_dir(folder).into_iter().flatten().flatten();
         let stems = files.filter_map(|file| {
             let path = file.path();
             let stem = path.file_name()?.to_str()?.strip_suffix(".toml")?;
             let process: u32 = stem.strip_prefix("recovery-")?.parse().ok()?;
-            (process != std::process::id() && !lives(process)).then(|| path.with_file_name(stem))
+            (process != std::process::id() && !is_running_editor(process)).then(|| path.with_file_name(stem))
         });
         let open = |stem: PathBuf| {
             let text = fs::read_to_string(with(&stem, ".toml")).ok()?;
@@ -121,10 +123,10 @@ impl Recovered {
         stems.filter_map(open).collect()
     }
 
-    /// The document as it was; it counts as unsaved.
+    /// Restores the document, which counts as unsaved.
     ///
     /// # Errors
-    /// A recovery file that is damaged.
+    /// Returns an error if the recovery file is damaged.
     pub fn restore(&self) -> Result<Document> {
         let scene = scene::parse(&self.header.scene)?;
         let image = |suffix: &str| with(&self.stem, suffix);
@@ -160,21 +162,21 @@ fn with(stem: &Path, suffix: &str) -> PathBuf {
 
 fn discard(stem: &Path) {
     for suffix in [".toml", "_heights.exr", "_colors.exr", "_materials.png"] {
-        // Not there is as good as gone.
+        // A missing file is not an error.
         let _ = fs::remove_file(with(stem, suffix));
     }
 }
 
-/// Whether an editor of this number is there; where that cannot be asked, it is taken as gone. One that has ended and that
-/// nobody has taken note of yet is gone, and so is one whose number another program has now.
-fn lives(process: u32) -> bool {
-    let stat = |of: &str| fs::read_to_string(format!("/proc/{of}/stat")).ok();
-    let (Some(its), Some(ours)) = (stat(&process.to_string()), stat("self")) else { return false };
-    let (Some(its), Some(ours)) = (name_and_state(&its), name_and_state(&ours)) else { return false };
-    its.0 == ours.0 && !matches!(its.1, 'Z' | 'X')
+/// Returns true if the process is a running editor. A zombie process does not count, and neither does another program
+/// that has the same process id. Returns false on systems without `/proc`.
+fn is_running_editor(process: u32) -> bool {
+    let stat = |id: &str| fs::read_to_string(format!("/proc/{id}/stat")).ok();
+    let (Some(other), Some(own)) = (stat(&process.to_string()), stat("self")) else { return false };
+    let (Some(other), Some(own)) = (name_and_state(&other), name_and_state(&own)) else { return false };
+    other.0 == own.0 && !matches!(other.1, 'Z' | 'X')
 }
 
-/// Of a line of `/proc/*/stat`: `4194 (bi) scale) S ...`.
+/// Parses name and state from a line of `/proc/*/stat`, such as `4194 (bi) scale) S ...`.
 fn name_and_state(stat: &str) -> Option<(&str, char)> {
     let (name, rest) = stat.split_once('(')?.1.rsplit_once(')')?;
     Some((name, rest.trim_start().chars().next()?))
@@ -185,15 +187,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn this_process_lives_and_one_that_ended_or_is_another_program_does_not() {
+    fn this_process_is_a_running_editor_and_an_ended_or_other_process_is_not() {
         assert_eq!(name_and_state("4194 (bi) scale) S 1 4194"), Some(("bi) scale", 'S')));
         if cfg!(target_os = "linux") {
-            assert!(lives(std::process::id()));
+            assert!(is_running_editor(std::process::id()));
             let mut other = std::process::Command::new("sleep").arg("60").spawn().unwrap();
-            assert!(!lives(other.id()), "not an editor");
+            assert!(!is_running_editor(other.id()), "another program is not an editor");
             other.kill().unwrap();
             other.wait().unwrap();
         }
-        assert!(!lives(4_194_399));
+        assert!(!is_running_editor(4_194_399));
     }
 }

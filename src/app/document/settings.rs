@@ -1,32 +1,33 @@
-//! What the editor remembers between runs: theme, recent files, sizes. One small file, written beside and renamed.
+//! Settings that the editor stores between runs, in one file that is replaced atomically.
 
 use std::path::{Path, PathBuf};
 
 use crate::base::replace_file;
 use serde::{Deserialize, Serialize};
 
-const RECENT: usize = 10;
+/// Maximum number of recent files.
+const MAX_RECENT: usize = 10;
 
-/// Everything remembered. Unknown or broken files give the defaults: settings are never a reason not to start.
+/// The stored settings. A missing or damaged file gives the defaults, so that the editor always starts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Settings {
+pub struct EditorSettings {
     pub dark: bool,
     /// Scale of the whole interface.
     pub zoom: f32,
     pub window: [f32; 2],
     pub recent: Vec<PathBuf>,
-    /// Where a file was chosen last.
+    /// Folder of the last chosen file.
     pub files: Option<PathBuf>,
     pub gallery: bool,
     pub gallery_width: f32,
     pub parameters_width: f32,
     pub side_width: f32,
-    /// Whether the first-steps card has been closed.
+    /// True once the user has closed the first-steps card.
     pub welcomed: bool,
 }
 
-impl Default for Settings {
+impl Default for EditorSettings {
     fn default() -> Self {
         Self {
             dark: true,
@@ -43,8 +44,8 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
-    /// The person's folder for such things, by the habit of the system.
+impl EditorSettings {
+    /// Returns the user's folder for application state, by the convention of the system.
     pub fn folder() -> Option<PathBuf> {
         let var = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
         let base = if cfg!(windows) {
@@ -65,7 +66,7 @@ impl Settings {
         settings
     }
 
-    /// Failure is silent: what is lost is a convenience.
+    /// Writes the settings. Errors are ignored, because only conveniences are lost.
     pub fn save(&self, folder: Option<&Path>) {
         if let (Some(folder), Ok(text)) = (folder, toml::to_string(self)) {
             let _ = std::fs::create_dir_all(folder);
@@ -76,6 +77,6 @@ impl Settings {
     pub fn add_recent(&mut self, path: &Path) {
         self.recent.retain(|other| other != path);
         self.recent.insert(0, path.to_owned());
-        self.recent.truncate(RECENT);
+        self.recent.truncate(MAX_RECENT);
     }
 }

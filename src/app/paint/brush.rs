@@ -1,11 +1,11 @@
-//! One dab of a brush.
+//! Brushes and the dabs that they paint.
 
 use crate::geometry::image_file;
 use crate::scene::Pixels;
 use glam::{IVec2, Vec2, Vec3};
 use std::path::Path;
 
-/// What a dab does.
+/// Effect of a dab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tool {
     Raise,
@@ -15,24 +15,16 @@ pub enum Tool {
     Noise,
     Stamp,
     Color,
-    MaterialSpec,
+    Material,
 }
 
 impl Tool {
-    pub const ALL: [Self; 8] = [
-        Self::Raise,
-        Self::Lower,
-        Self::Smooth,
-        Self::Flatten,
-        Self::Noise,
-        Self::Stamp,
-        Self::Color,
-        Self::MaterialSpec,
-    ];
+    pub const ALL: [Self; 8] =
+        [Self::Raise, Self::Lower, Self::Smooth, Self::Flatten, Self::Noise, Self::Stamp, Self::Color, Self::Material];
 
-    /// Whether it changes what the surface wears, not its shape.
-    pub fn prints(self) -> bool {
-        matches!(self, Self::Color | Self::MaterialSpec)
+    /// Returns true for tools that change colour or material, not shape.
+    pub fn changes_material(self) -> bool {
+        matches!(self, Self::Color | Self::Material)
     }
 
     pub fn name(self) -> &'static str {
@@ -44,7 +36,7 @@ impl Tool {
             Self::Noise => "Noise",
             Self::Stamp => "Stamp",
             Self::Color => "Colour",
-            Self::MaterialSpec => "Material",
+            Self::Material => "Material",
         }
     }
 
@@ -52,33 +44,33 @@ impl Tool {
         match self {
             Self::Raise => "Pulls the surface up",
             Self::Lower => "Pushes the surface down",
-            Self::Smooth => "Evens out what is rough",
-            Self::Flatten => "Brings everything to the height at which the stroke began",
+            Self::Smooth => "Smooths rough places",
+            Self::Flatten => "Moves the surface towards the height at which the stroke began",
             Self::Noise => "Roughens the surface",
             Self::Stamp => "Prints a pattern",
             Self::Color => "Paints colour weights, which multiply the materials",
-            Self::MaterialSpec => "Gives the places it passes over a material of their own",
+            Self::Material => "Paints a separate material",
         }
     }
 }
 
-/// All that a brush is.
+/// The settings of a brush.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Brush {
     pub tool: Tool,
-    /// Radius as a part of the tile.
+    /// Radius as a fraction of the tile.
     pub radius: f32,
-    /// 0 to 1.
+    /// Strength, 0 to 1.
     pub strength: f32,
-    /// 0 a hard edge, 1 soft from the middle on.
+    /// 0 is a hard edge; 1 falls off from the centre.
     pub falloff: f32,
-    /// Whether strokes go on at the opposite edge.
+    /// Strokes continue at the opposite edge of the tile.
     pub wrap: bool,
     /// Linear RGB.
     pub color: Vec3,
-    /// The material: 0 the surface's own, k the slot `paint_k`.
+    /// Painted material: 0 for the surface's own one, k for the slot `paint_k`.
     pub slot: u8,
-    /// The pattern of the stamp: a shipped image.
+    /// Pattern of the stamp, the name of a shipped image.
     pub stamp: &'static str,
 }
 
@@ -98,7 +90,7 @@ impl Default for Brush {
 }
 
 impl Brush {
-    /// Part of the full effect at a distance in radii.
+    /// Fraction of the full effect at a distance in radii.
     fn weight(&self, distance: f32) -> f32 {
         let hard = 1.0 - self.falloff.clamp(0.0, 1.0);
         if distance >= 1.0 {
@@ -111,20 +103,20 @@ impl Brush {
         t * t * (3.0 - 2.0 * t)
     }
 
-    /// Calls `touch(index, weight, offset in radii)` for every texel under a dab at `at` (parts of the tile).
-    pub(super) fn under(&self, size: glam::UVec2, at: Vec2, mut touch: impl FnMut(usize, f32, Vec2)) {
+    /// Calls `touch(index, weight, offset in radii)` for every texel under a dab at `at` (in fractions of the tile).
+    pub(super) fn for_texels(&self, size: glam::UVec2, at: Vec2, mut touch: impl FnMut(usize, f32, Vec2)) {
         let (width, height) = (size.x as i32, size.y as i32);
         if !at.is_finite() || width == 0 || height == 0 {
             return;
         }
         let center = at * size.as_vec2() - 0.5;
-        let reach = self.radius.clamp(1e-3, 0.5) * size.as_vec2();
-        let (low, high) = ((center - reach).ceil().as_ivec2(), (center + reach).floor().as_ivec2());
-        // A brush is at most as wide as the tile: no texel is met twice.
+        let radius = self.radius.clamp(1e-3, 0.5) * size.as_vec2();
+        let (low, high) = ((center - radius).ceil().as_ivec2(), (center + radius).floor().as_ivec2());
+        // A brush is at most as wide as the tile, so no texel is visited twice.
         let high = high.min(low + IVec2::new(width - 1, height - 1));
         for y in low.y..=high.y {
             for x in low.x..=high.x {
-                let offset = (Vec2::new(x as f32, y as f32) - center) / reach;
+                let offset = (Vec2::new(x as f32, y as f32) - center) / radius;
                 let weight = self.weight(offset.length());
                 let inside = x >= 0 && y >= 0 && x < width && y < height;
                 if weight > 0.0 && (self.wrap || inside) {
@@ -134,7 +126,7 @@ impl Brush {
         }
     }
 
-    /// A dab on heights. `level`: what flattening brings them to; `bounds`: what they stay within; `pressure`: 0 to 1.
+    /// Paints a dab on heights. `level` is the target of flattening, `bounds` limits the heights, `pressure` is 0 to 1.
     pub fn dab(&self, image: &mut Pixels<f32>, at: Vec2, level: f32, bounds: (f32, f32), pressure: f32) {
         let before = if self.tool == Tool::Smooth { image.values.clone() } else { Vec::new() };
         let (width, height) = (image.size.x as usize, image.size.y as usize);
@@ -142,7 +134,7 @@ impl Brush {
         let amount = self.strength.clamp(0.0, 1.0) * pressure.clamp(0.0, 1.0);
         let stamp = (self.tool == Tool::Stamp).then(|| Stamp::of(self.stamp));
         let values = &mut image.values;
-        self.under(image.size, at, |index, weight, offset| {
+        self.for_texels(image.size, at, |index, weight, offset| {
             let value = &mut values[index];
             let by = amount * weight;
             *value = match self.tool {
@@ -155,26 +147,26 @@ impl Brush {
                     let print = stamp.as_ref().map_or(0.5, |stamp| stamp.at(offset));
                     *value + (print - 0.5) * (0.4 * range * by)
                 }
-                Tool::Color | Tool::MaterialSpec => *value,
+                Tool::Color | Tool::Material => *value,
             }
             .clamp(bounds.0, bounds.1);
         });
     }
 
-    /// A dab of colour.
+    /// Paints a dab of colour.
     pub fn dab_color(&self, image: &mut Pixels<Vec3>, at: Vec2, pressure: f32) {
         let amount = self.strength.clamp(0.0, 1.0) * pressure.clamp(0.0, 1.0);
         let values = &mut image.values;
-        self.under(image.size, at, |index, weight, _| {
+        self.for_texels(image.size, at, |index, weight, _| {
             values[index] = values[index].lerp(self.color, amount * weight);
         });
     }
 
-    /// A dab of material: a place has one, so the edge is hard.
+    /// Paints a dab of material. Its edge is hard, because a texel has exactly one material.
     pub fn dab_slot(&self, image: &mut Pixels<u8>, at: Vec2) {
         let values = &mut image.values;
         let hard = Self { falloff: 0.0, ..self.clone() };
-        hard.under(image.size, at, |index, _, _| values[index] = self.slot);
+        hard.for_texels(image.size, at, |index, _, _| values[index] = self.slot);
     }
 }
 
@@ -185,7 +177,7 @@ fn mean_around(values: &[f32], width: usize, height: usize, index: usize) -> f32
     (0..9).map(|k| values[row(k / 3) * width + column(k % 3)]).sum::<f32>() / 9.0
 }
 
-/// A number in `[0, 1)` that looks random (a multiplicative hash).
+/// A pseudo-random number in `[0, 1)` from a multiplicative hash.
 fn hash(seed: u32) -> f32 {
     let mut x = seed.wrapping_mul(0x9E37_79B9) ^ 0x85EB_CA6B;
     x ^= x >> 15;
@@ -194,7 +186,7 @@ fn hash(seed: u32) -> f32 {
     (x >> 8) as f32 / (1 << 24) as f32
 }
 
-/// A shipped pattern.
+/// A shipped pattern; `None` if it cannot be read.
 struct Stamp(Option<Pixels<f32>>);
 
 impl Stamp {

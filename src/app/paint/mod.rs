@@ -1,4 +1,4 @@
-//! Painting on images that wrap: brushes for heights and for colours. Plain data in and out.
+//! Painting on images that wrap: brushes for heights, colours and materials. The module does not use the interface.
 
 mod brush;
 mod stroke;
@@ -12,11 +12,12 @@ use crate::geometry::image_file;
 use crate::scene::{Geometry, LoadedScene, Pixels};
 use glam::{UVec2, Vec3};
 
-/// Samples a side of new heights (Wu et al. 2011, Sec. 5: 128), and of new colours and materials, whose edges show.
+/// Side of a new image of heights in pixels (128 in Wu et al. 2011, Sec. 5).
 const NEW_SIDE: u32 = 128;
+/// Side of a new image of colours or materials in pixels; larger, because their edges are visible.
 const NEW_PRINT_SIDE: u32 = 256;
 
-/// The heights that painting begins from: those of the scene, or a plane in the middle of the range.
+/// The heights at the start of painting: those of the scene, or a plane in the middle of the range.
 ///
 /// # Errors
 /// The scene's image cannot be read.
@@ -39,7 +40,7 @@ pub fn heights_of(loaded: &LoadedScene) -> crate::base::Result<Pixels<f32>> {
     }
 }
 
-/// The colours that painting begins from: those of the scene, or white.
+/// The colours at the start of painting: those of the scene, or white.
 ///
 /// # Errors
 /// The scene's image cannot be read.
@@ -51,7 +52,7 @@ pub fn colors_of(loaded: &LoadedScene) -> crate::base::Result<Pixels<Vec3>> {
     }
 }
 
-/// The slots that painting begins from: those of the scene, or the surface's own.
+/// The slots at the start of painting: those of the scene, or the surface's own.
 ///
 /// # Errors
 /// The scene's image cannot be read.
@@ -67,12 +68,12 @@ fn blank<T: Clone>(side: u32, value: T) -> Pixels<T> {
     Pixels { size: UVec2::splat(side), values: vec![value; (side * side) as usize] }
 }
 
-/// Any surface as heights from 0 to 1, seen from above, and the height of 1.
-pub fn relief_of(tile: &crate::render::tile_view::CloseUp) -> (Pixels<f32>, f32) {
+/// Converts any surface to heights from 0 to 1, viewed from above. Also returns the height that 1 represents.
+pub fn relief_of(tile: &crate::render::tile_view::TileScene) -> (Pixels<f32>, f32) {
     let size = UVec2::splat(NEW_SIDE);
     let (low, high) = tile.mesh.z_range();
     let range = high - low;
-    // Room above and below to paint, also where the surface is shallow.
+    // The range leaves room for painting above and below the surface, even for a shallow one.
     let scale = (1.6 * range).max(0.15 * tile.mesh.size.min_element());
     let middle = 0.5 * (low + high);
     let values = tile.heights(size).iter().map(|z| (0.5 + (z - middle) / scale).clamp(0.0, 1.0)).collect();

@@ -1,4 +1,4 @@
-//! A stroke: dabs along the way of the hand, from an image to an image.
+//! Strokes: dabs along the path of the pointer.
 
 use std::sync::Arc;
 
@@ -7,13 +7,13 @@ use glam::{Vec2, Vec3};
 
 use super::brush::{Brush, Tool};
 
-/// Dabs are this many radii apart.
+/// Distance between dabs in radii.
 const SPACING: f32 = 0.25;
 
-/// A stroke while it is drawn.
+/// A stroke that the user is drawing.
 #[derive(Debug)]
 pub struct Stroke {
-    /// What was there before.
+    /// The images at the start of the stroke.
     pub before: Painted,
     heights: Option<Arc<Pixels<f32>>>,
     colors: Option<Arc<Pixels<Vec3>>>,
@@ -24,7 +24,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// Begins on the images that are there.
+    /// Begins a stroke on these images.
     pub fn begin(before: &Painted) -> Self {
         let heights = before.heights.clone();
         let (low, high) = heights
@@ -42,7 +42,8 @@ impl Stroke {
         }
     }
 
-    /// The hand is at `at` (parts of the tile; not wrapped, so that a way across the edge is short).
+    /// Continues the stroke to `at`, in fractions of the tile. Positions are not wrapped, so that a path across an edge
+    /// is short.
     pub fn move_to(&mut self, brush: &Brush, at: Vec2, pressure: f32) {
         if !at.is_finite() {
             return;
@@ -54,28 +55,28 @@ impl Stroke {
             return;
         };
         let step = (SPACING * brush.radius).max(1e-3);
-        let way = at - last;
-        // A jump over many tiles is no stroke.
-        let count = ((way.length() / step) as usize).min(400);
+        let path = at - last;
+        // The number of dabs is limited, because a jump over many tiles is not a stroke.
+        let count = ((path.length() / step) as usize).min(400);
         for k in 1..=count {
-            self.dab(brush, last + way * (k as f32 * step / way.length()), pressure);
+            self.dab(brush, last + path * (k as f32 * step / path.length()), pressure);
         }
         if count > 0 {
-            self.last = Some(last + way * (count as f32 * step / way.length()));
+            self.last = Some(last + path * (count as f32 * step / path.length()));
         }
     }
 
     fn dab(&mut self, brush: &Brush, at: Vec2, pressure: f32) {
         match (brush.tool, &mut self.heights, &mut self.colors, &mut self.slots) {
             (Tool::Color, _, Some(image), _) => brush.dab_color(Arc::make_mut(image), at, pressure),
-            (Tool::MaterialSpec, _, _, Some(image)) => brush.dab_slot(Arc::make_mut(image), at),
-            (Tool::Color | Tool::MaterialSpec, ..) => {}
+            (Tool::Material, _, _, Some(image)) => brush.dab_slot(Arc::make_mut(image), at),
+            (Tool::Color | Tool::Material, ..) => {}
             (_, Some(image), ..) => brush.dab(Arc::make_mut(image), at, self.level, self.bounds, pressure),
             _ => {}
         }
     }
 
-    /// The images as the stroke left them.
+    /// The images after the stroke.
     pub fn images(&self) -> Painted {
         Painted { heights: self.heights.clone(), colors: self.colors.clone(), slots: self.slots.clone() }
     }

@@ -1,4 +1,4 @@
-//! Brushes on small images.
+//! Tests of brushes on small images.
 
 use std::sync::Arc;
 
@@ -12,9 +12,9 @@ fn flat() -> Painted {
     Painted { heights, ..Painted::default() }
 }
 
-fn stroke(brush: &Brush, painted: &Painted, way: &[Vec2]) -> Pixels<f32> {
+fn stroke(brush: &Brush, painted: &Painted, path: &[Vec2]) -> Pixels<f32> {
     let mut stroke = Stroke::begin(painted);
-    way.iter().for_each(|at| stroke.move_to(brush, *at, 1.0));
+    path.iter().for_each(|at| stroke.move_to(brush, *at, 1.0));
     (*stroke.images().heights.unwrap()).clone()
 }
 
@@ -30,16 +30,16 @@ fn raise_raises_inside_the_radius_and_nothing_outside() {
 }
 
 #[test]
-fn a_stroke_over_the_edge_goes_on_at_the_other_side_only_with_wrap() {
-    let way = [Vec2::new(0.9, 0.5), Vec2::new(1.1, 0.5)];
-    let wrapped = stroke(&Brush { radius: 0.05, ..Brush::default() }, &flat(), &way);
-    let cut = stroke(&Brush { radius: 0.05, wrap: false, ..Brush::default() }, &flat(), &way);
+fn a_stroke_over_the_edge_continues_at_the_other_side_only_with_wrap() {
+    let path = [Vec2::new(0.9, 0.5), Vec2::new(1.1, 0.5)];
+    let wrapped = stroke(&Brush { radius: 0.05, ..Brush::default() }, &flat(), &path);
+    let cut = stroke(&Brush { radius: 0.05, wrap: false, ..Brush::default() }, &flat(), &path);
     assert!(wrapped.values[16 * 32 + 1] > 0.5 && cut.values[16 * 32 + 1] == 0.5);
     assert!(cut.values[16 * 32 + 30] > 0.5);
 }
 
 #[test]
-fn smoothing_keeps_the_mean_inside_and_lessens_the_spread() {
+fn smoothing_reduces_the_spread_of_heights() {
     let mut painted = flat();
     let rough = Arc::make_mut(painted.heights.as_mut().unwrap());
     rough.values.iter_mut().enumerate().for_each(|(k, v)| *v = if (k + k / 32) % 2 == 0 { 0.4 } else { 0.6 });
@@ -53,8 +53,8 @@ fn smoothing_keeps_the_mean_inside_and_lessens_the_spread() {
 fn every_tool_keeps_heights_finite_and_within_bounds() {
     for tool in Tool::ALL {
         let brush = Brush { tool, strength: 1.0, radius: 0.4, ..Brush::default() };
-        let way: Vec<Vec2> = (0..60).map(|k| Vec2::splat(k as f32 * 0.05 - 0.7)).collect();
-        let after = stroke(&brush, &flat(), &way);
+        let path: Vec<Vec2> = (0..60).map(|k| Vec2::splat(k as f32 * 0.05 - 0.7)).collect();
+        let after = stroke(&brush, &flat(), &path);
         assert!(after.values.iter().all(|v| (0.0..=1.0).contains(v)), "{tool:?}");
     }
 }
@@ -73,12 +73,12 @@ fn a_colour_stroke_moves_towards_the_colour_and_leaves_heights() {
 }
 
 #[test]
-fn a_material_stroke_gives_whole_places_its_slot_with_a_hard_edge_and_the_own_slot_wipes_it() {
+fn a_material_stroke_sets_its_slot_with_a_hard_edge_and_slot_zero_erases_it() {
     let side = 32;
     let slots = Some(Arc::new(Pixels { size: UVec2::splat(side), values: vec![0; (side * side) as usize] }));
     let painted = Painted { slots, ..flat() };
     let run = |painted: &Painted, slot: u8| {
-        let brush = Brush { tool: Tool::MaterialSpec, slot, radius: 0.2, strength: 0.0, ..Brush::default() };
+        let brush = Brush { tool: Tool::Material, slot, radius: 0.2, strength: 0.0, ..Brush::default() };
         let mut stroke = Stroke::begin(painted);
         stroke.move_to(&brush, Vec2::splat(0.5), 0.3);
         stroke.images()

@@ -1,4 +1,4 @@
-//! Accuracy against time: a slider from faster to finer, a chart of the scene at hand, and the comparison with the reference.
+//! Accuracy against time: a slider over quality levels, a chart of the open scene, and a comparison with a reference.
 
 use std::sync::Arc;
 
@@ -11,98 +11,101 @@ use eframe::egui::{
 };
 
 use super::fields;
-use crate::app::worker::{AccuracyAnswer, AccuracyJob, Point};
+use crate::app::worker::{AccuracyJob, AccuracyPoint, AccuracyResult};
 
-/// What the panel holds between frames.
+/// State of the panel between frames.
 #[derive(Default)]
 pub struct AccuracyState {
-    /// The panel is unfolded: only then anything is measured.
+    /// True while the panel is unfolded. The chart is measured only then.
     pub open: bool,
-    /// The reference goes on refining.
+    /// True if the worker keeps refining the reference.
     pub comparing: bool,
-    /// Each effect is to be forced on and off.
+    /// True while a measurement of each effect, on and off, is requested or running.
     pub measuring: bool,
-    /// What that gave, for a version of the document.
+    /// Costs of the effects, and the document version that they belong to.
     pub costs: Option<(u64, Vec<EffectCost>)>,
-    asked: Option<(u64, bool, bool)>,
-    rungs: Vec<Point>,
-    present: Option<(u64, Point)>,
-    /// Its picture, mean ΔE, and the noise of that.
+    /// Version, `comparing` and `measuring` of the last request.
+    requested: Option<(u64, bool, bool)>,
+    levels: Vec<AccuracyPoint>,
+    current: Option<(u64, AccuracyPoint)>,
+    /// Document version, difference image, mean ΔE, and the noise in that mean.
     difference: Option<(u64, TextureHandle, f32, Option<f32>)>,
-    doing: Option<&'static str>,
-    trouble: Option<String>,
+    activity: Option<&'static str>,
+    error: Option<String>,
 }
 
 impl AccuracyState {
-    /// The job for a version of the document whose picture is finished, where it is not what was asked for last.
+    /// Returns the job for a document version whose image is final, unless that job is the last request.
     pub fn job(&mut self, version: u64, loaded: &Arc<LoadedScene>) -> Option<AccuracyJob> {
         let wanted = (version, self.comparing, self.measuring);
-        if !(self.open || self.measuring) || self.asked == Some(wanted) {
+        if !(self.open || self.measuring) || self.requested == Some(wanted) {
             return None;
         }
-        self.asked = Some(wanted);
-        self.trouble = None;
+        self.requested = Some(wanted);
+        self.error = None;
         let (chart, compare, effects) = (self.open, self.comparing, self.measuring);
         Some(AccuracyJob { version, loaded: loaded.clone(), chart, compare, effects })
     }
 
-    /// Whether work that was asked for is under way for another state than this one.
+    /// Returns true if the running job belongs to another document version, or if nothing needs it any longer.
     pub fn is_late(&mut self, version: u64) -> bool {
-        let late = self.doing.is_some()
-            && (!(self.open || self.measuring) || self.asked.is_some_and(|(asked, ..)| asked != version));
+        let late = self.activity.is_some()
+            && (!(self.open || self.measuring) || self.requested.is_some_and(|(requested, ..)| requested != version));
         if late {
-            self.doing = None;
-            self.asked = None;
+            self.activity = None;
+            self.requested = None;
         }
         late
     }
 
-    pub fn take(&mut self, ctx: &Context, answer: AccuracyAnswer) {
-        match answer {
-            AccuracyAnswer::Doing(what) => self.doing = Some(what),
-            AccuracyAnswer::Rungs(rungs) => self.rungs = rungs,
-            AccuracyAnswer::Present(version, point) => self.present = Some((version, point)),
-            AccuracyAnswer::Difference(version, shown) => {
+    pub fn receive(&mut self, ctx: &Context, result: AccuracyResult) {
+        match result {
+            AccuracyResult::Doing(what) => self.activity = Some(what),
+            AccuracyResult::Levels(levels) => self.levels = levels,
+            AccuracyResult::Current(version, point) => self.current = Some((version, point)),
+            AccuracyResult::Difference(version, shown) => {
                 let texture = ctx.load_texture("difference", shown.image, TextureOptions::NEAREST);
                 self.difference = Some((version, texture, shown.mean, shown.noise));
             }
-            AccuracyAnswer::Effects(version, costs) => {
+            AccuracyResult::Effects(version, costs) => {
                 self.measuring = false;
-                // What was asked for is done: the rest of it goes on.
-                self.asked = self.asked.map(|(version, comparing, _)| (version, comparing, false));
+                // Only the effects are measured. The rest of the job continues.
+                self.requested = self.requested.map(|(version, comparing, _)| (version, comparing, false));
                 self.costs = Some((version, costs));
             }
-            AccuracyAnswer::Done(version) => {
-                if self.asked.is_some_and(|(asked, ..)| asked == version) {
-                    self.doing = None;
+            AccuracyResult::Done(version) => {
+                if self.requested.is_some_and(|(requested, ..)| requested == version) {
+                    self.activity = None;
                 }
             }
-            AccuracyAnswer::Failed(text) => {
-                (self.doing, self.trouble, self.measuring) = (None, Some(text), false);
+            AccuracyResult::Failed(text) => {
+                (self.activity, self.error, self.measuring) = (None, Some(text), false);
             }
         }
     }
 
-    /// Whether the chart has the present settings and all it compares them with.
+    /// Returns true if the chart shows the current settings and at least five quality levels.
     #[cfg(test)]
     pub fn is_measured(&self, version: u64) -> bool {
-        self.doing.is_none() && self.rungs.len() >= 5 && self.present.is_some_and(|(measured, _)| measured == version)
+        self.activity.is_none()
+            && self.levels.len() >= 5
+            && self.current.is_some_and(|(measured, _)| measured == version)
     }
 }
 
-/// The panel; the slider turns the scene's knobs.
+/// Draws the panel. The slider changes the scene's settings.
 pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[Effect], version: u64) {
     state.open = true;
     let overhangs = effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
     let settings = Settings::of(scene);
-    let mut rung = quality_scale::position(settings.facets);
-    let tip = "Walks along settings that balance facets and directions: time against error.";
+    let mut level = quality_scale::position(settings.facets);
+    let tip = "Quality levels: each balances the numbers of facets and of directions. Finer takes longer.";
     let changed = fields::row(ui, "Faster - finer", tip, |ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);
-        ui.add(Slider::new(&mut rung, 0.0..=quality_scale::FINEST).show_value(false)).changed()
+        ui.add(Slider::new(&mut level, 0.0..=quality_scale::FINEST).show_value(false)).changed()
     });
     if changed {
-        let candidate = quality_scale::rung(rung, overhangs);
+        let candidate = quality_scale::rung(level, overhangs);
         let plain = Quality {
             preset: candidate.preset.to_owned(),
             seed: scene.quality.seed,
@@ -114,10 +117,10 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
             *scene = walked;
         }
     }
-    let now = state.present.filter(|(measured, _)| *measured == version).map(|(_, point)| point);
-    let words = match now {
+    let current = state.current.filter(|(measured, _)| *measured == version).map(|(_, point)| point);
+    let text = match current {
         Some(point) => format!(
-            "{} facets: {:.1} ± {:.1} dB, {:.2} ± {:.2} %, {}",
+            "{} facets: PSNR {:.1} ± {:.1} dB, relative L2 {:.2} ± {:.2} %, {}",
             point.facets,
             point.compared.psnr_db,
             point.compared.psnr_db_error,
@@ -127,20 +130,20 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
         ),
         None => format!("{} facets", settings.facets),
     };
-    ui.label(words);
-    chart(ui, &state.rungs, now.as_ref());
+    ui.label(text);
+    chart(ui, &state.levels, current.as_ref());
     ui.horizontal(|ui| {
         ui.toggle_value(&mut state.comparing, "Compare with reference").on_hover_text(
-            "Refines the reference in the background: error bars narrow, and a picture shows the difference",
+            "Refines a reference in the background. The error bars narrow, and an image shows the difference",
         );
-        if let Some(doing) = state.doing {
+        if let Some(activity) = state.activity {
             ui.spinner();
-            ui.weak(doing);
+            ui.weak(activity);
         }
     });
-    if let Some(point) = now.filter(|_| state.comparing) {
+    if let Some(point) = current.filter(|_| state.comparing) {
         ui.weak(format!(
-            "The reference's own error: {:.2} % after {} passes",
+            "Standard error of the reference: {:.2} % after {} passes",
             point.compared.own * 100.0,
             4 * point.compared.batches
         ));
@@ -150,17 +153,17 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
         && state.comparing
     {
         let side = ui.available_width().min(220.0);
-        ui.add(egui::Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text("Difference picture"));
-        let words = match noise {
+        ui.add(egui::Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text("Difference image"));
+        let text = match noise {
             Some(noise) => {
-                format!("Difference to the reference: ΔE {mean:.2} on average, of which its noise {noise:.2}")
+                format!("Difference from the reference: mean ΔE {mean:.2}, of which noise {noise:.2}")
             }
-            None => format!("Difference to 65,536 facets: ΔE {mean:.2} on average"),
+            None => format!("Difference from 65,536 facets: mean ΔE {mean:.2}"),
         };
-        ui.weak(format!("{words}; white is 10, 2 is just seen"));
+        ui.weak(format!("{text}. White is ΔE 10. ΔE 2 is just visible"));
     }
-    if let Some(trouble) = &state.trouble {
-        ui.colored_label(ui.visuals().error_fg_color, trouble);
+    if let Some(error) = &state.error {
+        ui.colored_label(ui.visuals().error_fg_color, error);
     }
 }
 
@@ -168,32 +171,33 @@ fn milliseconds(ms: f64) -> String {
     if ms < 1000.0 { format!("{ms:.1} ms") } else { format!("{:.2} s", ms * 1e-3) }
 }
 
-/// Decibels over milliseconds, time on a logarithmic scale.
-fn chart(ui: &mut Ui, rungs: &[Point], now: Option<&Point>) {
+/// Draws PSNR [dB] against time [ms, logarithmic].
+fn chart(ui: &mut Ui, levels: &[AccuracyPoint], current: Option<&AccuracyPoint>) {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), 150.0), Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Accuracy chart"));
     let painter = ui.painter().with_clip_rect(area);
     painter.rect_filled(area, 4.0, ui.visuals().extreme_bg_color);
     let weak = ui.visuals().weak_text_color();
     let small = FontId::proportional(9.5);
-    let all: Vec<&Point> = rungs.iter().chain(now).filter(|point| point.compared.psnr_db.is_finite()).collect();
+    let all: Vec<&AccuracyPoint> =
+        levels.iter().chain(current).filter(|point| point.compared.psnr_db.is_finite()).collect();
     if all.is_empty() {
-        painter.text(area.center(), Align2::CENTER_CENTER, "measured once the picture is finished", small, weak);
+        painter.text(area.center(), Align2::CENTER_CENTER, "Measured once the image is final", small, weak);
         return;
     }
-    let range = |pick: fn(&Point) -> f64, margin: f64| {
+    let range = |value: fn(&AccuracyPoint) -> f64, margin: f64| {
         let (low, high) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| {
-            (low.min(pick(point)), high.max(pick(point)))
+            (low.min(value(point)), high.max(value(point)))
         });
         (low - margin, high + margin)
     };
-    let log = |point: &Point| point.ms.max(1e-3).log10();
+    let log = |point: &AccuracyPoint| point.ms.max(1e-3).log10();
     let (x0, x1) = range(log, 0.2);
     let (y0, y1) = range(|point| point.compared.psnr_db, 3.0);
     let inner = area.shrink2(vec2(10.0, 14.0));
     let px = |x: f64| inner.left() + ((x - x0) / (x1 - x0)) as f32 * inner.width();
     let py = |y: f64| inner.bottom() - ((y - y0) / (y1 - y0)) as f32 * inner.height();
-    let at = |point: &Point| pos2(px(log(point)), py(point.compared.psnr_db));
+    let at = |point: &AccuracyPoint| pos2(px(log(point)), py(point.compared.psnr_db));
     let grid = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
     for decade in x0.ceil() as i32..=x1.floor() as i32 {
         let x = px(f64::from(decade));
@@ -207,8 +211,8 @@ fn chart(ui: &mut Ui, rungs: &[Point], now: Option<&Point>) {
         let text = format!("{} dB", ten * 10);
         painter.text(pos2(area.left() + 3.0, y - 1.0), Align2::LEFT_BOTTOM, text, small.clone(), weak);
     }
-    // What nothing beats in both.
-    let mut front: Vec<&Point> = all.clone();
+    // The Pareto front: no other point is both faster and more accurate.
+    let mut front: Vec<&AccuracyPoint> = all.clone();
     front.sort_by(|a, b| a.ms.total_cmp(&b.ms));
     let mut best = f64::NEG_INFINITY;
     front.retain(|point| {
@@ -218,22 +222,29 @@ fn chart(ui: &mut Ui, rungs: &[Point], now: Option<&Point>) {
     });
     let blue = Color32::from_rgb(86, 160, 233);
     painter.add(egui::Shape::line(front.iter().map(|point| at(point)).collect(), Stroke::new(1.5, blue)));
-    for point in rungs.iter().filter(|point| point.compared.psnr_db.is_finite()) {
+    for point in levels.iter().filter(|point| point.compared.psnr_db.is_finite()) {
         bars(&painter, at(point), point, (y0, y1), inner.height(), blue);
         painter.circle_filled(at(point), 3.0, blue);
     }
-    if let Some(point) = now.filter(|point| point.compared.psnr_db.is_finite()) {
+    if let Some(point) = current.filter(|point| point.compared.psnr_db.is_finite()) {
         let orange = Color32::from_rgb(230, 140, 30);
         bars(&painter, at(point), point, (y0, y1), inner.height(), orange);
         painter.circle_filled(at(point), 5.0, orange);
     }
     response.on_hover_text(
-        "Decibels over the time from a geometry edit to the effective BRDF. Blue: from faster to finer. Orange: now.",
+        "PSNR against the time from a geometry edit to the effective BRDF. Blue: quality levels. Orange: this scene.",
     );
 }
 
-/// One standard error up and down.
-fn bars(painter: &egui::Painter, at: egui::Pos2, point: &Point, (y0, y1): (f64, f64), height: f32, color: Color32) {
+/// Draws an error bar of one standard error up and down.
+fn bars(
+    painter: &egui::Painter,
+    at: egui::Pos2,
+    point: &AccuracyPoint,
+    (y0, y1): (f64, f64),
+    height: f32,
+    color: Color32,
+) {
     let half = ((point.compared.psnr_db_error / (y1 - y0)) as f32 * height).min(height);
     painter.line_segment([at - vec2(0.0, half), at + vec2(0.0, half)], Stroke::new(1.0, color));
 }

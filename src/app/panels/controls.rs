@@ -1,4 +1,4 @@
-//! One control for every shape that a value of the catalogue has.
+//! Controls for the value shapes of the scene catalogue.
 
 use std::cell::Cell;
 
@@ -6,10 +6,10 @@ use crate::scene::{Field, FieldShape, Kind};
 use eframe::egui::{self, DragValue, Slider, SliderClamping, Ui};
 use toml::Value;
 
-use super::fields::{Around, caption, suffix, words};
+use super::fields::{PanelContext, caption, display_name, suffix};
 use super::matrix;
 
-/// Notes in `wrong` when what is typed is no finite number; the value stays what it was then.
+/// Makes a drag value reject text that is not a finite number, and set `wrong` if the user types such text.
 fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
     drag.custom_parser(move |text| {
         let plain: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
@@ -19,15 +19,15 @@ fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
     })
 }
 
-/// Width of numbers beside sliders.
-const NUMBER: f32 = 76.0;
+/// Width of the number beside a slider [points].
+const NUMBER_WIDTH: f32 = 76.0;
 
-/// A control for a value of a shape.
-pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field: &Field, around: &mut Around) {
+/// Draws the control of a value with the given shape.
+pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field: &Field, context: &mut PanelContext) {
     let wrong = Cell::new(false);
     match *shape {
         FieldShape::Number { min, max, soft_max } => {
-            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, around), &wrong);
+            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, context), &wrong);
         }
         FieldShape::Integer { min, max } => integer_ui(ui, value, (min, max), &wrong),
         FieldShape::Color { max } => color_ui(ui, value, max, &wrong),
@@ -36,11 +36,11 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field
         FieldShape::Path => {
             text_ui(ui, value, 66.0, file_name);
             if ui.button("…").on_hover_text("Choose a file").clicked() {
-                around.browse = Some(field.key);
+                context.browse = Some(field.key);
             }
         }
         FieldShape::Choice(names) => choice_ui(ui, value, names, field.key),
-        FieldShape::AnyOf(shapes) => any_of_ui(ui, value, shapes, field, around),
+        FieldShape::AnyOf(shapes) => any_of_ui(ui, value, shapes, field, context),
         FieldShape::List { .. } if matrix::is_matrix(value) => matrix::ui(ui, value),
         FieldShape::List { .. } => {
             let entries = value.as_array().map_or(0, Vec::len);
@@ -50,34 +50,35 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field
     }
     if wrong.get() {
         let name = caption(field);
-        around.complaint = Some(format!("{name} keeps its value: what was typed is not a number. Type one like 0.25."));
+        context.error =
+            Some(format!("{name} keeps its value, because the text is not a number. Type a number such as 0.25."));
     }
 }
 
-/// Sliders of ranges that span decades move by factors.
+/// Returns true if a range spans decades, so that its slider is logarithmic.
 fn is_logarithmic(min: f64, soft_max: f64) -> bool {
     min >= 0.0 && soft_max / min.max(1e-4) > 500.0
 }
 
 fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f64), suffix: &str, wrong: &Cell<bool>) {
     let Some(before) = number(value) else { return };
-    // What f32 made of a short decimal reads short again.
+    // Displays 0.1 that was stored as f32 as 0.1, not as 0.10000000149.
     let mut now = tidy(before);
     let soft_min = if min < -10.0 * soft_max { -soft_max } else { min };
     let range = soft_min..=soft_max.max(now);
     let log = is_logarithmic(soft_min, soft_max) && soft_max > 2.0;
-    ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);
+    ui.spacing_mut().slider_width = (ui.available_width() - NUMBER_WIDTH - 8.0).max(40.0);
     let slider = Slider::new(&mut now, range).show_value(false).clamping(SliderClamping::Never).logarithmic(log);
     ui.add(slider);
     let (speed, digits) = ((soft_max - soft_min).min(100.0) / 400.0, decimals(now));
     let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(digits).suffix(suffix);
-    ui.add_sized([NUMBER, ui.spacing().interact_size.y], finite(drag, wrong));
+    ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
     if now.is_finite() && now != tidy(before) {
         *value = Value::Float(now.clamp(min, max));
     }
 }
 
-/// Three digits that say something.
+/// Returns the decimals that show three significant digits.
 fn decimals(value: f64) -> usize {
     match value.abs() {
         v if v >= 100.0 => 0,
@@ -92,12 +93,12 @@ fn integer_ui(ui: &mut Ui, value: &mut Value, (min, max): (i64, i64), wrong: &Ce
     let Some(mut now) = value.as_integer() else { return };
     let before = now;
     if max - min <= 5000 {
-        ui.spacing_mut().slider_width = (ui.available_width() - NUMBER - 8.0).max(40.0);
+        ui.spacing_mut().slider_width = (ui.available_width() - NUMBER_WIDTH - 8.0).max(40.0);
         let slider = Slider::new(&mut now, min..=max).show_value(false).logarithmic(min >= 0 && max > 200);
         ui.add(slider);
     }
     let drag = DragValue::new(&mut now).range(min..=max).speed(0.2);
-    ui.add_sized([NUMBER, ui.spacing().interact_size.y], finite(drag, wrong));
+    ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
     if now != before {
         *value = Value::Integer(now);
     }
@@ -110,7 +111,7 @@ fn color_ui(ui: &mut Ui, value: &mut Value, max: f64, wrong: &Cell<bool>) {
         *channel = number(value).unwrap_or(0.0) as f32;
     }
     let before = rgb;
-    // The picker knows 0 to 1; beyond that the colour keeps its brightness as a factor.
+    // The colour picker covers 0 to 1. A brighter colour keeps its brightness as a factor.
     let gain = rgb.iter().copied().fold(1.0, f32::max);
     let mut shown = rgb.map(|channel| channel / gain);
     if ui.color_edit_button_rgb(&mut shown).on_hover_text("Linear RGB").changed() {
@@ -139,15 +140,15 @@ fn vector_ui(ui: &mut Ui, value: &mut Value, (min, max): (f64, f64), wrong: &Cel
     }
 }
 
-/// Text is taken over when it is finished, so that no half-typed path is ever looked for.
-/// `beside` is kept free for what follows in the row.
-fn text_ui(ui: &mut Ui, value: &mut Value, beside: f32, shown: impl Fn(&str) -> String) {
+/// Draws a text field. The value changes when the user ends typing, so that no half-typed path is opened.
+/// `reserved` is the width left for the rest of the row [points].
+fn text_ui(ui: &mut Ui, value: &mut Value, reserved: f32, shown: impl Fn(&str) -> String) {
     let Some(text) = value.as_str() else { return };
     let id = ui.next_auto_id().with("draft");
     let edited = ui.memory(|memory| memory.has_focus(id));
     let draft = ui.data_mut(|data| data.get_temp::<String>(id)).filter(|_| edited);
     let mut draft = draft.unwrap_or_else(|| if edited { text.to_owned() } else { shown(text) });
-    let width = (ui.available_width() - beside - 10.0).max(60.0);
+    let width = (ui.available_width() - reserved - 10.0).max(60.0);
     let response = ui.add(egui::TextEdit::singleline(&mut draft).id(id).desired_width(width));
     if response.has_focus() && edited {
         ui.data_mut(|data| data.insert_temp(id, draft));
@@ -160,7 +161,7 @@ fn text_ui(ui: &mut Ui, value: &mut Value, beside: f32, shown: impl Fn(&str) -> 
     response.on_hover_text(value.as_str().unwrap_or_default());
 }
 
-/// Of a long path the file's name is what tells.
+/// Returns the file name of a path, because the whole path is too long for a row.
 fn file_name(path: &str) -> String {
     let name = std::path::Path::new(path).file_name();
     name.map_or_else(|| path.to_owned(), |name| name.to_string_lossy().into_owned())
@@ -168,18 +169,18 @@ fn file_name(path: &str) -> String {
 
 fn choice_ui(ui: &mut Ui, value: &mut Value, names: &[&str], key: &str) {
     let now = value.as_str().unwrap_or_default().to_owned();
-    let combo = egui::ComboBox::from_id_salt((key, "choice")).selected_text(words(&now));
+    let combo = egui::ComboBox::from_id_salt((key, "choice")).selected_text(display_name(&now));
     combo.width(ui.available_width().min(180.0)).show_ui(ui, |ui| {
         for name in names {
-            if ui.selectable_label(*name == now, words(name)).clicked() {
+            if ui.selectable_label(*name == now, display_name(name)).clicked() {
                 *value = Value::String((*name).to_owned());
             }
         }
     });
 }
 
-/// Named patterns, or a matrix where there is one.
-fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[FieldShape], field: &Field, around: &mut Around) {
+/// Draws the named choice or matrix of a weave pattern, and the first shape of any other field.
+fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[FieldShape], field: &Field, context: &mut PanelContext) {
     let names = shapes.iter().find_map(|shape| match shape {
         FieldShape::Choice(names) => Some(*names),
         _ => None,
@@ -188,13 +189,13 @@ fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[FieldShape], field: &Fiel
         Some(names) => matrix::pattern_ui(ui, value, names, field.key),
         None => {
             if let Some(first) = shapes.first() {
-                value_ui(ui, value, first, field, around);
+                value_ui(ui, value, first, field, context);
             }
         }
     }
 }
 
-/// What an optional field begins with when it is set by hand.
+/// Returns the value that an optional field gets when the user sets it.
 pub(super) fn starting_value(shape: &FieldShape) -> Option<Value> {
     Some(match *shape {
         FieldShape::Number { min, soft_max, .. } => {
@@ -207,13 +208,13 @@ pub(super) fn starting_value(shape: &FieldShape) -> Option<Value> {
     })
 }
 
-/// A kind of a tagged table, chosen by name with its text beside.
+/// Draws the choice of a tagged table's kind, with tooltips from the catalogue. Returns a newly chosen kind.
 pub fn kind_ui(ui: &mut Ui, label: &str, now: &str, kinds: &[Kind]) -> Option<&'static str> {
     let mut chosen = None;
-    let combo = egui::ComboBox::from_id_salt(("kind", label)).selected_text(words(now)).height(400.0);
+    let combo = egui::ComboBox::from_id_salt(("kind", label)).selected_text(display_name(now)).height(400.0);
     combo.width((ui.available_width() - 30.0).min(200.0)).show_ui(ui, |ui| {
         for kind in kinds {
-            if ui.selectable_label(kind.kind == now, words(kind.kind)).on_hover_text(kind.doc).clicked()
+            if ui.selectable_label(kind.kind == now, display_name(kind.kind)).on_hover_text(kind.doc).clicked()
                 && kind.kind != now
             {
                 chosen = Some(kind.kind);
@@ -227,7 +228,7 @@ fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|number| number as f64))
 }
 
-/// The shortest decimal that is the same f32.
+/// Rounds to the shortest decimal that gives the same f32.
 fn tidy(value: f64) -> f64 {
     (value as f32).to_string().parse().unwrap_or(value)
 }

@@ -1,4 +1,4 @@
-//! Widgets from the scene catalogue: a field's shape decides its control; its range, unit and text come along.
+//! Rows of captions and controls for fields of the scene catalogue, with range, unit and tooltip.
 
 use crate::scene::{Field, FieldShape};
 use eframe::egui::{self, Align, Layout, RichText, Ui};
@@ -6,34 +6,34 @@ use toml::Table;
 
 use super::controls::{starting_value, value_ui};
 
-/// Width of captions beside controls.
-const CAPTION: f32 = 104.0;
+/// Width of the captions [points].
+const CAPTION_WIDTH: f32 = 104.0;
 
-/// What panels know of the document around the table they edit.
+/// The document's unit, and the requests that the rows of a panel collect.
 #[derive(Debug, Clone, Default)]
-pub struct Around {
-    /// What a tile unit is called.
+pub struct PanelContext {
+    /// Name of the tile unit.
     pub unit: String,
-    /// A file was asked for: the key of the field.
+    /// Key of the field for which the user requests a file.
     pub browse: Option<&'static str>,
-    /// What is wrong with a value that was typed.
-    pub complaint: Option<String>,
+    /// Message about an invalid value.
+    pub error: Option<String>,
 }
 
-/// Controls for all fields of a table but `skip`. The table holds what the person left.
-pub fn table_ui(ui: &mut Ui, table: &mut Table, fields: &[Field], skip: &[&str], around: &mut Around) {
+/// Draws controls for all fields of a table except `skip`, and writes edits into the table.
+pub fn table_ui(ui: &mut Ui, table: &mut Table, fields: &[Field], skip: &[&str], context: &mut PanelContext) {
     for field in fields.iter().filter(|field| !skip.contains(&field.key)) {
-        field_ui(ui, table, field, around);
+        field_ui(ui, table, field, context);
     }
 }
 
-/// One field's caption and control.
-pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, around: &mut Around) {
+/// Draws the caption and the control of one field.
+pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, context: &mut PanelContext) {
     let value = table.get(field.key).cloned();
     let is_optional = value.is_none() || field.default.is_none() && matches!(field.shape, FieldShape::Path);
     if let Some(mut value) = value {
-        let keep = caption_row(ui, field, around, |ui, around| {
-            value_ui(ui, &mut value, &field.shape, field, around);
+        let keep = caption_row(ui, field, context, |ui, context| {
+            value_ui(ui, &mut value, &field.shape, field, context);
             let droppable = is_optional && matches!(field.key, "color_path" | "slot_path");
             !(droppable && ui.small_button("×").on_hover_text("Use none").clicked())
         });
@@ -43,15 +43,15 @@ pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, around: &mut Arou
             table.remove(field.key);
         }
     } else if let Some(start) = starting_value(&field.shape) {
-        caption_row(ui, field, around, |ui, around| match field.shape {
+        caption_row(ui, field, context, |ui, context| match field.shape {
             FieldShape::Path => {
                 if ui.button("Choose…").on_hover_text(field.doc).clicked() {
-                    around.browse = Some(field.key);
+                    context.browse = Some(field.key);
                 }
             }
             _ => {
                 let button = ui.add(egui::Button::new(RichText::new("automatic").weak()).frame(false));
-                if button.on_hover_text("Click to set by hand").clicked() {
+                if button.on_hover_text("Click to set a value").clicked() {
                     table.insert(field.key.to_owned(), start.clone());
                 }
             }
@@ -59,17 +59,17 @@ pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, around: &mut Arou
     }
 }
 
-/// A caption with the field's text as tooltip, and a control that fills the rest of the row.
+/// Draws a caption with the field's documentation as tooltip, and a control that fills the rest of the row.
 pub fn caption_row<R>(
     ui: &mut Ui,
     field: &Field,
-    around: &mut Around,
-    control: impl FnOnce(&mut Ui, &mut Around) -> R,
+    context: &mut PanelContext,
+    control: impl FnOnce(&mut Ui, &mut PanelContext) -> R,
 ) -> R {
-    row(ui, &caption(field), &tooltip(field, around), |ui| control(ui, around))
+    row(ui, &caption(field), &tooltip(field, context), |ui| control(ui, context))
 }
 
-/// The field's name as a person would say it.
+/// Returns the field's caption.
 pub(super) fn caption(field: &Field) -> String {
     match field.key {
         "path" => "File".to_owned(),
@@ -84,69 +84,70 @@ pub(super) fn caption(field: &Field) -> String {
     }
 }
 
-/// A row of any caption and control. It is as wide as the panel, whatever the control asks for: panels never grow by
-/// themselves.
+/// Draws a row of a caption and a control. The row is as wide as the panel, so a wide control never widens the panel.
 pub fn row<R>(ui: &mut Ui, caption: &str, tip: &str, control: impl FnOnce(&mut Ui) -> R) -> R {
     let height = ui.spacing().interact_size.y;
-    let place = egui::Rect::from_min_size(ui.cursor().min, egui::vec2(ui.available_width(), height));
-    let builder = egui::UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center));
-    let mut line = ui.new_child(builder);
+    let row_rect = egui::Rect::from_min_size(ui.cursor().min, egui::vec2(ui.available_width(), height));
+    let builder = egui::UiBuilder::new().max_rect(row_rect).layout(Layout::left_to_right(Align::Center));
+    let mut row = ui.new_child(builder);
     let captioned =
-        line.allocate_ui_with_layout(egui::vec2(CAPTION, height), Layout::left_to_right(Align::Center), |ui| {
-            ui.set_min_width(CAPTION);
+        row.allocate_ui_with_layout(egui::vec2(CAPTION_WIDTH, height), Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(CAPTION_WIDTH);
             ui.add(egui::Label::new(caption).truncate())
         });
     let label = if tip.is_empty() { captioned.inner } else { captioned.inner.on_hover_text(tip) };
-    let result = line.label_inputs_by(label.id, control);
-    let used = line.min_rect().height().max(height);
-    ui.allocate_rect(egui::Rect::from_min_size(place.min, egui::vec2(place.width(), used)), egui::Sense::hover());
+    let result = row.label_inputs_by(label.id, control);
+    let used = row.min_rect().height().max(height);
+    ui.allocate_rect(egui::Rect::from_min_size(row_rect.min, egui::vec2(row_rect.width(), used)), egui::Sense::hover());
     result
 }
 
-fn tooltip(field: &Field, around: &Around) -> String {
+fn tooltip(field: &Field, context: &PanelContext) -> String {
     let mut text = field.doc.to_owned();
     if !field.unit.is_empty() {
-        text.push_str(&format!("\nIn {}.", unit_words(field.unit, around)));
+        text.push_str(&format!("\nIn {}.", unit_name(field.unit, context)));
     }
     match field.shape {
-        FieldShape::Number { min, max, .. } => text.push_str(&format!("\n{} to {}.", short(min), short(max))),
+        FieldShape::Number { min, max, .. } => {
+            text.push_str(&format!("\n{} to {}.", format_number(min), format_number(max)))
+        }
         FieldShape::Integer { min, max } if max < i64::MAX => text.push_str(&format!("\n{min} to {max}.")),
         _ => {}
     }
     if let Some(default) = field.default {
-        text.push_str(&format!("\nUsually {}.", short(default)));
+        text.push_str(&format!("\nDefault: {}.", format_number(default)));
     }
     text
 }
 
-fn unit_words(unit: &str, around: &Around) -> String {
-    if unit == "tile units" && !around.unit.is_empty() { around.unit.clone() } else { unit.to_owned() }
+fn unit_name(unit: &str, context: &PanelContext) -> String {
+    if unit == "tile units" && !context.unit.is_empty() { context.unit.clone() } else { unit.to_owned() }
 }
 
-/// A number as a person writes it.
-pub fn short(value: f64) -> String {
+/// Formats a number with up to four decimals, without trailing zeros.
+pub fn format_number(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-pub(super) fn suffix(unit: &str, around: &Around) -> String {
+pub(super) fn suffix(unit: &str, context: &PanelContext) -> String {
     match unit {
         "degrees" => "°".to_owned(),
-        "tile units" if !around.unit.is_empty() => format!(" {}", around.unit),
+        "tile units" if !context.unit.is_empty() => format!(" {}", context.unit),
         "EV" => " EV".to_owned(),
         _ => String::new(),
     }
 }
 
-/// `cook_torrance` as a person reads it.
-pub fn words(name: &str) -> String {
+/// Returns the displayed form of a key: `cook_torrance` becomes `Cook-Torrance`.
+pub fn display_name(name: &str) -> String {
     match name {
         "merl" => return "Measured (MERL)".to_owned(),
         "rgl" => return "Measured (RGL)".to_owned(),
         "utia" => return "Measured (UTIA)".to_owned(),
         "npz" => return "Table (.npz)".to_owned(),
         "ggx" => return "GGX".to_owned(),
-        "heightfield" => return "Height-field".to_owned(),
+        "heightfield" => return "Height field".to_owned(),
         "blinn_phong" => return "Blinn-Phong".to_owned(),
         "cook_torrance" => return "Cook-Torrance".to_owned(),
         "v" | "u" => return format!("{}-shaped", name.to_uppercase()),

@@ -1,4 +1,4 @@
-//! Materials slot by slot: which BRDF, its parameters, its colour.
+//! The materials of each slot: BRDF model, parameters and colour.
 
 use std::path::Path;
 
@@ -8,19 +8,19 @@ use glam::Vec3;
 use toml::Table;
 
 use super::controls;
-use super::fields::{self, Around};
+use super::fields::{self, PanelContext};
 
 const DEFAULT: &str = "default";
 
-/// What a click here asks of the editor.
+/// A request of the panel to the editor.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Request {
-    /// A measured file for a term of a material.
+pub enum MaterialRequest {
+    /// Choose a measured file for a term of a material.
     Browse {
         material: usize,
         term: usize,
     },
-    /// The clipboard's material over this slot's.
+    /// Replace the material of a slot by the copied one.
     Paste {
         slot: String,
     },
@@ -29,8 +29,8 @@ pub enum Request {
     },
 }
 
-/// Controls of every slot of the surface, the default first.
-pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], around: &mut Around) -> Option<Request> {
+/// Draws the controls of every slot of the surface, the default first.
+pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], context: &mut PanelContext) -> Option<MaterialRequest> {
     let mut request = None;
     if scene.materials.is_empty() {
         scene.materials.push(grey());
@@ -40,17 +40,17 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], around: &mut Around)
     names
         .extend(scene.materials.iter().map(|m| m.name.clone()).filter(|name| !slots.contains(name) && name != DEFAULT));
     let has_own = |slot: &String| scene.materials.iter().any(|material| material.name == *slot);
-    let wearers: Vec<String> = slots.iter().filter(|slot| *slot != DEFAULT && !has_own(slot)).cloned().collect();
+    let inheriting: Vec<String> = slots.iter().filter(|slot| *slot != DEFAULT && !has_own(slot)).cloned().collect();
     for slot in names {
         let index = scene.materials.iter().position(|material| material.name == slot);
         let is_used = slot == DEFAULT || slots.contains(&slot);
-        let asked = ui
+        let from_slot = ui
             .push_id(&slot, |ui| match index {
-                Some(index) => own_ui(ui, scene, index, (is_used, &wearers), around),
+                Some(index) => own_ui(ui, scene, index, (is_used, &inheriting), context),
                 None => inherited_ui(ui, scene, &slot),
             })
             .inner;
-        request = request.or(asked);
+        request = request.or(from_slot);
         ui.add_space(2.0);
     }
     request
@@ -61,13 +61,13 @@ pub fn grey() -> MaterialSpec {
     MaterialSpec { name: DEFAULT.to_owned(), brdf, color: Vec3::ONE }
 }
 
-/// A slot that looks like the default.
-fn inherited_ui(ui: &mut Ui, scene: &mut Scene, slot: &str) -> Option<Request> {
+/// Draws a slot that uses the default material.
+fn inherited_ui(ui: &mut Ui, scene: &mut Scene, slot: &str) -> Option<MaterialRequest> {
     let mut request = None;
-    fields::row(ui, &fields::words(slot), "This part of the surface wears the default material.", |ui| {
+    fields::row(ui, &fields::display_name(slot), "This part of the surface uses the default material.", |ui| {
         ui.weak("as default");
         if ui.button("Paste").on_hover_text("Use the copied material here").clicked() {
-            request = Some(Request::Paste { slot: slot.to_owned() });
+            request = Some(MaterialRequest::Paste { slot: slot.to_owned() });
         }
         if ui.button("Customize").on_hover_text("Give this part of the surface a material of its own").clicked() {
             scene.materials.push(MaterialSpec { name: slot.to_owned(), brdf: None, color: Vec3::ONE });
@@ -76,30 +76,30 @@ fn inherited_ui(ui: &mut Ui, scene: &mut Scene, slot: &str) -> Option<Request> {
     request
 }
 
-/// A material of its own. `wearers`: the parts of the surface that have none and wear the default.
+/// Draws the material of one slot. `inheriting` are the slots without a material, which use the default.
 fn own_ui(
     ui: &mut Ui,
     scene: &mut Scene,
     index: usize,
-    (is_used, wearers): (bool, &[String]),
-    around: &mut Around,
-) -> Option<Request> {
+    (is_used, inheriting): (bool, &[String]),
+    context: &mut PanelContext,
+) -> Option<MaterialRequest> {
     let name = scene.materials[index].name.clone();
     let is_default = name == DEFAULT;
-    let mut title = fields::words(&name);
-    if is_default && !wearers.is_empty() {
-        title.push_str(&format!(" ({})", wearers.join(", ")));
+    let mut title = fields::display_name(&name);
+    if is_default && !inheriting.is_empty() {
+        title.push_str(&format!(" ({})", inheriting.join(", ")));
     } else if !is_used {
         title.push_str(" (not on this surface)");
     }
     let mut request = None;
     egui::CollapsingHeader::new(RichText::new(title).strong()).id_salt("material").default_open(true).show(ui, |ui| {
         let material = &mut scene.materials[index];
-        color_ui(ui, material, around);
+        color_ui(ui, material, context);
         request = match &mut material.brdf {
-            Some(brdf) => brdf_ui(ui, brdf, index, around),
+            Some(brdf) => brdf_ui(ui, brdf, index, context),
             None => {
-                fields::row(ui, "BRDF", "The default material's, in this colour.", |ui| {
+                fields::row(ui, "BRDF", "The BRDF of the default material, multiplied by this colour.", |ui| {
                     ui.weak("as default");
                     if ui.button("Change").clicked() {
                         material.brdf = grey().brdf;
@@ -117,11 +117,11 @@ fn own_ui(
     request
 }
 
-fn color_ui(ui: &mut Ui, material: &mut MaterialSpec, around: &mut Around) {
+fn color_ui(ui: &mut Ui, material: &mut MaterialSpec, context: &mut PanelContext) {
     let Some(field) = MaterialSpec::fields().into_iter().find(|field| field.key == "color") else { return };
     if let Ok(mut table) = Table::try_from(&*material) {
         let before = table.clone();
-        fields::field_ui(ui, &mut table, &field, around);
+        fields::field_ui(ui, &mut table, &field, context);
         if table != before
             && let Ok(changed) = table.try_into::<MaterialSpec>()
         {
@@ -130,8 +130,8 @@ fn color_ui(ui: &mut Ui, material: &mut MaterialSpec, around: &mut Around) {
     }
 }
 
-/// The terms of a BRDF: model, parameters, and terms added to it.
-fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Around) -> Option<Request> {
+/// Draws the terms of a BRDF with their models and parameters.
+fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, context: &mut PanelContext) -> Option<MaterialRequest> {
     let mut request = None;
     let mut terms = brdf.terms().to_vec();
     let before = terms.clone();
@@ -144,13 +144,13 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
             let caption = if at == 0 { "BRDF" } else { "+ BRDF" };
             let chosen = fields::row(ui, caption, doc, |ui| {
                 let chosen = controls::kind_ui(ui, "BRDF", term.kind(), &kinds);
-                if count > 1 && ui.small_button("×").on_hover_text("Remove this term of the sum").clicked() {
+                if count > 1 && ui.small_button("×").on_hover_text("Remove this term").clicked() {
                     removed = Some(at);
                 }
                 chosen
             });
             match chosen {
-                Some("merl" | "rgl" | "utia" | "npz") => request = Some(Request::Browse { material, term: at }),
+                Some("merl" | "rgl" | "utia" | "npz") => request = Some(MaterialRequest::Browse { material, term: at }),
                 Some(kind) => *term = converted(term, kind),
                 None => {}
             }
@@ -158,16 +158,16 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
                 (kinds.iter().find(|kind| kind.kind == term.kind()), Table::try_from(&*term))
             {
                 let before = table.clone();
-                let mut inside = Around { unit: around.unit.clone(), ..Around::default() };
+                let mut inside = PanelContext { unit: context.unit.clone(), ..PanelContext::default() };
                 fields::table_ui(ui, &mut table, &kind.fields, &[], &mut inside);
-                around.complaint = around.complaint.take().or(inside.complaint);
+                context.error = context.error.take().or(inside.error);
                 if inside.browse.is_some() {
-                    request = Some(Request::Browse { material, term: at });
+                    request = Some(MaterialRequest::Browse { material, term: at });
                 }
                 if table != before
                     && let Ok(changed) = table.try_into::<TermSpec>()
                 {
-                    *term = of_its_file(changed);
+                    *term = with_kind_of_file(changed);
                 }
             }
         });
@@ -177,7 +177,7 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
     }
     let add = ui.horizontal(|ui| {
         ui.add_space(2.0);
-        ui.button("Add a lobe").on_hover_text("A further BRDF, added to this one").clicked()
+        ui.button("Add a lobe").on_hover_text("Add a second term to this BRDF").clicked()
     });
     if add.inner && terms.len() < 16 {
         terms.push(TermSpec::Ggx { roughness: 0.2, f0: Vec3::splat(0.04) });
@@ -191,7 +191,7 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, around: &mut Aroun
     request
 }
 
-/// Another model with what carries over: roughness and colour.
+/// Changes the model of a term, and keeps its roughness and colour if both models have them.
 fn converted(term: &TermSpec, kind: &str) -> TermSpec {
     let color = match term {
         TermSpec::Lambertian { albedo } => Some(*albedo),
@@ -215,17 +215,17 @@ fn converted(term: &TermSpec, kind: &str) -> TermSpec {
     }
 }
 
-/// Copy, paste, remove; whether it is to be removed.
-fn actions_ui(ui: &mut Ui, material: &MaterialSpec, index: usize, is_default: bool) -> (Option<Request>, bool) {
+/// Draws the buttons of a material. Returns a request, and whether the user removes the material.
+fn actions_ui(ui: &mut Ui, material: &MaterialSpec, index: usize, is_default: bool) -> (Option<MaterialRequest>, bool) {
     let mut request = None;
     let mut remove = false;
     ui.horizontal(|ui| {
         ui.add_space(2.0);
         if ui.button("Copy").on_hover_text("Copy this material as text (TOML)").clicked() {
-            request = Some(Request::Copy { material: index });
+            request = Some(MaterialRequest::Copy { material: index });
         }
-        if ui.button("Paste").on_hover_text("Replace it by the copied material").clicked() {
-            request = Some(Request::Paste { slot: material.name.clone() });
+        if ui.button("Paste").on_hover_text("Replace this material by the copied one").clicked() {
+            request = Some(MaterialRequest::Paste { slot: material.name.clone() });
         }
         if !is_default && ui.button("Use default").on_hover_text("Remove this material").clicked() {
             remove = true;
@@ -234,8 +234,8 @@ fn actions_ui(ui: &mut Ui, material: &MaterialSpec, index: usize, is_default: bo
     (request, remove)
 }
 
-/// A measured term whose file was typed is of the kind that the file's ending says.
-fn of_its_file(term: TermSpec) -> TermSpec {
+/// Sets the kind of a measured term from the ending of its file, which the user may have typed.
+fn with_kind_of_file(term: TermSpec) -> TermSpec {
     match &term {
         TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => {
             measured(path).unwrap_or(term)
@@ -244,7 +244,7 @@ fn of_its_file(term: TermSpec) -> TermSpec {
     }
 }
 
-/// The measured term that a file holds, by its ending.
+/// Returns the measured term for a file, selected by the file's ending.
 pub fn measured(path: &Path) -> Option<TermSpec> {
     match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
         "binary" => Some(TermSpec::Merl { path: path.to_owned() }),
@@ -255,7 +255,7 @@ pub fn measured(path: &Path) -> Option<TermSpec> {
     }
 }
 
-/// Puts a term into a material; a material without a BRDF gets one.
+/// Sets a term of a material. A material without a BRDF gets one.
 pub fn set_term(scene: &mut Scene, material: usize, term: usize, with: TermSpec) {
     if scene.materials.is_empty() {
         scene.materials.push(grey());
@@ -263,15 +263,15 @@ pub fn set_term(scene: &mut Scene, material: usize, term: usize, with: TermSpec)
     let Some(material) = scene.materials.get_mut(material) else { return };
     match &mut material.brdf {
         Some(brdf) => {
-            if let Some(place) = brdf.terms_mut().get_mut(term) {
-                *place = with;
+            if let Some(old) = brdf.terms_mut().get_mut(term) {
+                *old = with;
             }
         }
         none => *none = Some(BrdfSpec::One(with)),
     }
 }
 
-/// The slots of a scene, as far as they are known without its mesh: the family's own, and painted ones that have a material.
+/// Returns the slots that are known without the mesh: those of the family, and painted slots that have a material.
 pub fn slots_of(scene: &Scene) -> Vec<String> {
     let names: &[&str] = match &scene.tile.geometry {
         Geometry::Grooves(_) => &["bottom", "sides"],

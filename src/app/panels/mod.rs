@@ -1,10 +1,10 @@
-//! The parameter panel: sections over one scene, generated from the catalogue.
+//! The parameter panel: sections for one scene, generated from the catalogue.
 
 pub mod accuracy;
 mod controls;
 mod effects;
 pub mod fields;
-pub mod look;
+pub mod large_scale;
 pub mod materials;
 mod matrix;
 pub mod paints;
@@ -15,42 +15,50 @@ use crate::scene::{Painted, Scene};
 use eframe::egui::{self, RichText, Ui};
 
 pub use accuracy::AccuracyState;
-pub use fields::Around;
+pub use fields::PanelContext;
 
-/// What the panel asks for.
+/// Requests of the panel to the editor.
 #[derive(Debug, Default)]
-pub struct Asked {
-    /// A file for the field of this key.
+pub struct PanelRequests {
+    /// Key of the field for which the user requests a file.
     pub browse: Option<&'static str>,
-    pub material: Option<materials::Request>,
-    pub complaint: Option<String>,
+    pub material: Option<materials::MaterialRequest>,
+    /// Message about an invalid value.
+    pub error: Option<String>,
 }
 
-/// What is shown now, for the sections that measure it.
-pub struct Shown<'a> {
+/// State of the displayed image, for the sections that measure it.
+pub struct PanelInputs<'a> {
     pub accuracy: &'a mut AccuracyState,
-    /// The plan of the picture.
+    /// The plan of the displayed image.
     pub effects: &'a [Effect],
     /// Version of the document.
     pub version: u64,
 }
 
-/// All sections. `scene` is left as the person wants it.
-pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, slots: &[String], shown: Shown<'_>) -> Asked {
-    let mut around = Around { unit: scene.tile.unit.clone(), ..Around::default() };
+/// Draws all sections and writes the edits into `scene`.
+pub fn ui(
+    ui: &mut Ui,
+    scene: &mut Scene,
+    painted: &Painted,
+    name: &str,
+    slots: &[String],
+    inputs: PanelInputs<'_>,
+) -> PanelRequests {
+    let mut context = PanelContext { unit: scene.tile.unit.clone(), ..PanelContext::default() };
     let mut material = None;
-    // Whatever a row asks for, the panel keeps the width it was given.
+    // A wide row must not widen the panel.
     ui.set_max_width(ui.available_width());
-    section(ui, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut around));
-    section(ui, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut around));
-    section(ui, "Object", true, |ui| look::object_ui(ui, scene, &mut around));
-    section(ui, "Light", true, |ui| look::light_ui(ui, &mut scene.light, &mut around));
-    section(ui, "Camera", false, |ui| look::camera_ui(ui, scene, &mut around));
-    section(ui, "Quality", false, |ui| look::quality_ui(ui, &mut scene.quality, &mut around));
-    shown.accuracy.open = false;
-    section(ui, "Accuracy", false, |ui| accuracy::ui(ui, scene, shown.accuracy, shown.effects, shown.version));
-    section(ui, "Effects", false, |ui| effects::ui(ui, scene, shown.effects, shown.accuracy, shown.version));
-    Asked { browse: around.browse, material, complaint: around.complaint }
+    section(ui, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut context));
+    section(ui, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut context));
+    section(ui, "Object", true, |ui| large_scale::object_ui(ui, scene, &mut context));
+    section(ui, "Light", true, |ui| large_scale::light_ui(ui, &mut scene.light, &mut context));
+    section(ui, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));
+    section(ui, "Quality", false, |ui| large_scale::quality_ui(ui, &mut scene.quality, &mut context));
+    inputs.accuracy.open = false;
+    section(ui, "Accuracy", false, |ui| accuracy::ui(ui, scene, inputs.accuracy, inputs.effects, inputs.version));
+    section(ui, "Effects", false, |ui| effects::ui(ui, scene, inputs.effects, inputs.accuracy, inputs.version));
+    PanelRequests { browse: context.browse, material, error: context.error }
 }
 
 fn section(ui: &mut Ui, title: &str, open: bool, body: impl FnOnce(&mut Ui)) {

@@ -1,4 +1,4 @@
-//! Materials that are painted over the tile, in the slots `paint_1` and on.
+//! Materials that the user paints on the tile, in the slots `paint_1`, `paint_2` and so on.
 
 use crate::geometry::image_file::MAX_SLOTS;
 use crate::geometry::painted_slot;
@@ -7,11 +7,11 @@ use glam::Vec3;
 
 use super::materials::grey;
 
-/// Colours that painted materials begin with: none is like its neighbour.
+/// Initial colours of painted materials. Neighbouring entries differ clearly.
 const PAINTS: [[f32; 3]; 6] =
     [[0.05, 0.2, 0.6], [0.75, 0.45, 0.05], [0.55, 0.05, 0.05], [0.1, 0.4, 0.1], [0.6, 0.6, 0.55], [0.3, 0.08, 0.4]];
 
-/// Makes sure that the scene has the material of a painted slot; whether it was missing.
+/// Adds the material of a painted slot if the scene lacks it. Returns true if it was added.
 pub fn add_painted(scene: &mut Scene, number: u8) -> bool {
     let name = painted_slot(number);
     if number == 0 || scene.materials.iter().any(|material| material.name == name) {
@@ -26,7 +26,7 @@ pub fn add_painted(scene: &mut Scene, number: u8) -> bool {
     true
 }
 
-/// The painted slots that a scene has materials for.
+/// Returns the painted slots for which the scene has materials.
 pub fn painted(scene: &Scene) -> Vec<u8> {
     (1..=MAX_SLOTS).filter(|k| scene.materials.iter().any(|material| material.name == painted_slot(*k))).collect()
 }

@@ -1,4 +1,4 @@
-//! The small-scale surface: family, parameters, extent.
+//! The panel of the small-scale surface: family, parameters, extent.
 
 use std::path::{Path, PathBuf};
 
@@ -7,41 +7,41 @@ use eframe::egui::Ui;
 use toml::{Table, Value};
 
 use super::controls;
-use super::fields::{self, Around};
+use super::fields::{self, PanelContext};
 
-/// Heights that a height-field begins with.
+/// Initial image of a height field.
 const FIRST_HEIGHTS: &str = "asset:leather.png";
 
-/// Controls of the tile; `name` is the document's, for files that will be painted.
-pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, around: &mut Around) {
-    around.unit.clone_from(&scene.tile.unit);
+/// Draws the controls of the tile. `name` is the document's name, which painted files contain.
+pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, context: &mut PanelContext) {
+    context.unit.clone_from(&scene.tile.unit);
     let kinds = Geometry::kinds();
     let now = scene.tile.geometry.kind();
     let doc = kinds.iter().find(|kind| kind.kind == now).map_or("", |kind| kind.doc);
     let chosen = fields::row(ui, "Surface", doc, |ui| controls::kind_ui(ui, "surface", now, &kinds));
     if let Some(kind) = chosen {
-        match starting(kind, painted, name) {
+        match initial_geometry(kind, painted, name) {
             Some(geometry) => scene.tile.geometry = geometry,
-            // A mesh begins with its file.
-            None => around.browse = Some("mesh"),
+            // A mesh needs a file first.
+            None => context.browse = Some("mesh"),
         }
     }
     if let Some(kind) = kinds.iter().find(|kind| kind.kind == scene.tile.geometry.kind())
         && let Ok(mut table) = Table::try_from(&scene.tile.geometry)
     {
         let before = table.clone();
-        fields::table_ui(ui, &mut table, &kind.fields, &[], around);
+        fields::table_ui(ui, &mut table, &kind.fields, &[], context);
         if table != before
             && let Ok(geometry) = table.try_into::<Geometry>()
         {
             scene.tile.geometry = geometry;
         }
     }
-    tile_ui(ui, &mut scene.tile, around);
+    tile_ui(ui, &mut scene.tile, context);
 }
 
-/// The family with parameters that show something at once.
-fn starting(kind: &str, painted: &Painted, name: &str) -> Option<Geometry> {
+/// Returns a family with initial parameters; `None` for a mesh, which needs a file.
+fn initial_geometry(kind: &str, painted: &Painted, name: &str) -> Option<Geometry> {
     match kind {
         "mesh" => None,
         "heightfield" => {
@@ -53,7 +53,7 @@ fn starting(kind: &str, painted: &Painted, name: &str) -> Option<Geometry> {
     }
 }
 
-/// The family that a dropped or chosen file is for: an OBJ mesh, or an image of heights.
+/// Returns the geometry for a dropped or chosen file: an OBJ mesh, or an image of heights.
 pub fn of_file(path: &Path, scene: &Scene) -> Option<Geometry> {
     let ending = path.extension()?.to_str()?.to_ascii_lowercase();
     match ending.as_str() {
@@ -70,11 +70,11 @@ pub fn of_file(path: &Path, scene: &Scene) -> Option<Geometry> {
     }
 }
 
-fn tile_ui(ui: &mut Ui, tile: &mut Tile, around: &mut Around) {
+fn tile_ui(ui: &mut Ui, tile: &mut Tile, context: &mut PanelContext) {
     let Ok(mut table) = Table::try_from(&*tile) else { return };
     let geometry = table.remove("geometry").unwrap_or(Value::Boolean(false));
     let before = table.clone();
-    // Images are opened where they are painted; here stand those that there are.
+    // The paint panel opens images. This panel lists only those that the tile has.
     let is_shown = |field: &Field| match field.key {
         "geometry" => false,
         "color_path" | "slot_path" => table.contains_key(field.key),
@@ -82,7 +82,7 @@ fn tile_ui(ui: &mut Ui, tile: &mut Tile, around: &mut Around) {
     };
     let fields: Vec<_> = Tile::fields().into_iter().filter(is_shown).collect();
     ui.add_space(4.0);
-    fields::table_ui(ui, &mut table, &fields, &[], around);
+    fields::table_ui(ui, &mut table, &fields, &[], context);
     if table != before {
         table.insert("geometry".to_owned(), geometry);
         if let Ok(changed) = table.try_into::<Tile>()

@@ -1,4 +1,4 @@
-//! GridCoordinates that cannot be written, disks that are full, and files that others write too.
+//! Paths that cannot be written, full disks, and files that other programs change.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use crate::app::actions::Action;
 use crate::app::dialogs::Dialog;
 use crate::app::document::RecoveryFile;
 use crate::app::editor::Editor;
-use crate::app::worker::{TableChoice, What};
+use crate::app::worker::{ExportKind, TableChoice};
 
 type Window = Harness<'static, Option<Editor>>;
 
@@ -22,13 +22,13 @@ fn set_lights(harness: &mut Window, count: usize) {
     editor(harness).document.edit(scene);
 }
 
-/// Frames until the messages are as wanted.
-fn until(harness: &mut Window, wanted: impl Fn(&str) -> bool) {
+/// Runs frames until `condition` accepts the texts of all messages.
+fn run_until(harness: &mut Window, condition: impl Fn(&str) -> bool) {
     let start = Instant::now();
     loop {
         harness.step();
         let texts = editor(harness).messages.texts().join("; ");
-        if wanted(&texts) {
+        if condition(&texts) {
             return;
         }
         assert!(start.elapsed() < Duration::from_secs(60), "{texts}");
@@ -36,7 +36,7 @@ fn until(harness: &mut Window, wanted: impl Fn(&str) -> bool) {
     }
 }
 
-/// A file of this name on a disk that is full; absent where the system has no such device.
+/// Makes a file on a full disk; `None` if the system has no `/dev/full`.
 fn on_full_disk(folder: &Path, name: &str) -> Option<std::path::PathBuf> {
     let path = folder.join(name);
     #[cfg(target_os = "linux")]
@@ -45,7 +45,7 @@ fn on_full_disk(folder: &Path, name: &str) -> Option<std::path::PathBuf> {
 }
 
 #[test]
-fn a_full_disk_is_said_to_be_full_while_saving_and_exporting_and_the_document_stays_unsaved() {
+fn a_full_disk_is_reported_while_saving_and_exporting_and_the_document_stays_unsaved() {
     let folder = tempfile::tempdir().unwrap();
     let (Some(scene), Some(table)) = (on_full_disk(folder.path(), "a.toml"), on_full_disk(folder.path(), "a.csv"))
     else {
@@ -60,28 +60,28 @@ fn a_full_disk_is_said_to_be_full_while_saving_and_exporting_and_the_document_st
     let document = &editor(&mut harness).document;
     assert!(document.is_dirty() && document.path.is_none() && *document.scene() == before);
     let choice = TableChoice { theta: 2, phi: 4, ..TableChoice::default() };
-    editor(&mut harness).export(table, What::Table(choice));
-    until(&mut harness, |texts| texts.contains("Not exported") && texts.matches("a full disk").count() == 2);
+    editor(&mut harness).export(table, ExportKind::Table(choice));
+    run_until(&mut harness, |texts| texts.contains("Not exported") && texts.matches("a full disk").count() == 2);
     assert!(editor(&mut harness).exporting.is_none());
 }
 
 #[test]
-fn a_recovery_file_that_finds_no_room_is_a_message_until_one_could_be_written() {
+fn a_recovery_file_that_cannot_be_written_is_reported_until_one_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let name = format!("recovery-{}.toml", std::process::id());
-    let Some(place) = on_full_disk(folder.path(), &name) else { return eprintln!("SKIPPED: no /dev/full") };
+    let Some(path) = on_full_disk(folder.path(), &name) else { return eprintln!("SKIPPED: no /dev/full") };
     let mut harness = harness(quick());
     editor(&mut harness).recovery = Some(RecoveryFile::new(folder.path()));
     set_lights(&mut harness, 3);
-    until(&mut harness, |texts| texts.contains("No recovery file") && texts.contains("a full disk"));
-    std::fs::remove_file(&place).unwrap();
+    run_until(&mut harness, |texts| texts.contains("No recovery file") && texts.contains("a full disk"));
+    std::fs::remove_file(&path).unwrap();
     set_lights(&mut harness, 2);
-    until(&mut harness, |texts| !texts.contains("No recovery file"));
-    assert!(std::fs::read_to_string(place).unwrap().contains("count = 2"));
+    run_until(&mut harness, |texts| !texts.contains("No recovery file"));
+    assert!(std::fs::read_to_string(path).unwrap().contains("count = 2"));
 }
 
 #[test]
-fn a_file_that_another_program_wrote_is_noticed_on_coming_back_to_the_window() {
+fn a_file_that_another_program_changed_is_noticed_when_the_window_gets_the_focus() {
     let folder = tempfile::tempdir().unwrap();
     for is_dirty in [false, true] {
         let path = folder.path().join("shared.toml");
@@ -94,14 +94,14 @@ fn a_file_that_another_program_wrote_is_noticed_on_coming_back_to_the_window() {
             set_lights(&mut harness, 3);
         }
         let ours = editor(&mut harness).document.scene().clone();
-        let come_back = |harness: &mut Window| {
+        let refocus = |harness: &mut Window| {
             harness.event(Event::WindowFocused(false));
             harness.step();
             harness.event(Event::WindowFocused(true));
             harness.run_steps(2);
             harness.query_by_label_contains("was changed by another program").is_some()
         };
-        assert!(come_back(&mut harness));
+        assert!(refocus(&mut harness));
         assert_eq!(harness.query_by_label_contains("drops the changes you have not saved").is_some(), is_dirty);
         harness.get_by_label("Later").click();
         harness.run_steps(2);
@@ -109,17 +109,17 @@ fn a_file_that_another_program_wrote_is_noticed_on_coming_back_to_the_window() {
             (editor(&mut harness).document.is_dirty(), editor(&mut harness).document.scene()),
             (is_dirty, &ours)
         );
-        assert!(come_back(&mut harness), "asked again");
+        assert!(refocus(&mut harness), "Later does not settle the question");
         harness.get_by_label("Keep mine").click();
         harness.run_steps(2);
-        // What is open is not what the file holds: that is unsaved work now.
+        // The open document differs from the file, so it is unsaved work.
         assert!(editor(&mut harness).document.is_dirty() && *editor(&mut harness).document.scene() == ours);
-        assert!(!come_back(&mut harness), "it has been answered");
+        assert!(!refocus(&mut harness), "the question is settled");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), theirs);
-        // Behind another window it waits for that to be closed.
+        // The question waits until another dialog is closed.
         std::fs::write(&path, theirs + "# once more\n").unwrap();
         editor(&mut harness).dialog = Some(Dialog::Help);
-        assert!(!come_back(&mut harness));
+        assert!(!refocus(&mut harness));
         editor(&mut harness).dialog = None;
         harness.run_steps(2);
         harness.get_by_label("Reload").click();
@@ -130,7 +130,7 @@ fn a_file_that_another_program_wrote_is_noticed_on_coming_back_to_the_window() {
 }
 
 #[test]
-fn a_place_that_cannot_be_written_says_so_and_the_document_stays_unsaved() {
+fn a_path_that_cannot_be_written_is_reported_and_the_document_stays_unsaved() {
     let mut harness = harness(quick());
     let mut scene = (**editor(&mut harness).document.scene()).clone();
     scene.light.count = 3;
@@ -143,7 +143,7 @@ fn a_place_that_cannot_be_written_says_so_and_the_document_stays_unsaved() {
 }
 
 #[test]
-fn a_file_that_another_program_wrote_is_asked_about_before_it_is_written_over() {
+fn a_file_that_another_program_changed_is_not_overwritten_without_a_question() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shared.toml");
     let mut harness = harness(quick());

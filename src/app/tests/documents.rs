@@ -1,4 +1,4 @@
-//! Documents alone: history, saving, recovery.
+//! Documents without a window: history, saving, recovery.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::quick;
-use crate::app::document::{Document, Recovered, RecoveryFile, Settings};
+use crate::app::document::{Document, EditorSettings, RecoveredDocument, RecoveryFile};
 use crate::app::paint::{Brush, Stroke, Tool, heights_of};
 
-/// Paints a stroke of a tool on what is there.
+/// Paints a stroke with a tool.
 fn stroke(document: &mut Document, tool: Tool) {
     if document.painted().heights.is_none() {
         let heights = heights_of(&document.loaded()).unwrap();
@@ -55,7 +55,7 @@ fn undo_to_the_start_and_redo_to_the_end_give_the_same_scenes() {
 }
 
 #[test]
-fn edits_of_one_control_are_one_entry_until_the_hand_rests() {
+fn edits_of_one_control_are_one_entry_until_the_pointer_is_released() {
     let mut document = quick();
     for depth in [0.3, 0.4, 0.5] {
         let mut scene = (**document.scene()).clone();
@@ -76,7 +76,7 @@ fn edits_of_one_control_are_one_entry_until_the_hand_rests() {
 }
 
 #[test]
-fn history_forgets_the_oldest_and_stays_within_its_memory() {
+fn history_drops_the_oldest_entries_and_stays_within_its_memory() {
     let mut document = quick();
     let noise = |seed: usize| (0..512 * 512).map(|k| ((k * 31 + seed) % 97) as f32 / 97.0).collect();
     for seed in 0..100 {
@@ -85,11 +85,11 @@ fn history_forgets_the_oldest_and_stays_within_its_memory() {
     assert!(document.history().bytes() <= 64 << 20);
     assert!((20..100).contains(&document.history().len()), "{}", document.history().len());
     while document.undo().is_some() {}
-    assert!(document.is_dirty(), "the first state was forgotten");
+    assert!(document.is_dirty(), "the first state was dropped");
 }
 
 #[test]
-fn what_is_saved_and_opened_again_is_the_same_with_its_painted_images() {
+fn a_saved_and_reopened_document_is_equal_with_its_painted_images() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("relief.toml");
     let mut document = quick();
@@ -113,7 +113,7 @@ fn what_is_saved_and_opened_again_is_the_same_with_its_painted_images() {
 }
 
 #[test]
-fn files_that_a_scene_names_are_found_after_it_is_saved_elsewhere() {
+fn files_of_a_scene_are_found_after_it_is_saved_in_another_folder() {
     let (old, new) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     std::fs::write(old.path().join("tile.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     std::fs::write(old.path().join("a.toml"), "[tile]\ngeometry = { kind = \"mesh\", path = \"tile.obj\" }\n").unwrap();
@@ -125,7 +125,7 @@ fn files_that_a_scene_names_are_found_after_it_is_saved_elsewhere() {
 }
 
 #[test]
-fn choosing_another_image_drops_the_painted_one_and_undo_brings_it_back() {
+fn choosing_another_image_drops_the_painted_one_and_undo_restores_it() {
     let mut document = quick();
     stroke(&mut document, Tool::Raise);
     let painted = document.painted().clone();
@@ -140,7 +140,7 @@ fn choosing_another_image_drops_the_painted_one_and_undo_brings_it_back() {
 }
 
 #[test]
-fn a_place_that_cannot_be_written_is_an_error_and_the_document_stays() {
+fn a_path_that_cannot_be_written_is_an_error_and_leaves_the_document_unchanged() {
     let mut document = quick();
     stroke(&mut document, Tool::Lower);
     let before = (document.scene().clone(), document.painted().clone());
@@ -151,59 +151,59 @@ fn a_place_that_cannot_be_written_is_an_error_and_the_document_stays() {
 }
 
 #[test]
-fn what_a_crash_left_behind_is_found_and_restored_once() {
+fn a_recovery_file_of_a_crash_is_found_and_restored_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut document = quick();
     stroke(&mut document, Tool::Raise);
     let recovery = RecoveryFile::new(folder.path());
     recovery.prepare(&document).unwrap().write().unwrap();
-    assert!(Recovered::find(folder.path()).is_empty(), "this process lives");
-    // As if another process, gone since, had written it.
+    assert!(RecoveredDocument::find(folder.path()).is_empty(), "this process is running");
+    // Renamed as if an ended process had written it.
     for file in std::fs::read_dir(folder.path()).unwrap().flatten() {
         let name = file.file_name().into_string().unwrap();
         let other = name.replace(&std::process::id().to_string(), "4194399");
         std::fs::rename(file.path(), folder.path().join(other)).unwrap();
     }
-    let found = Recovered::find(folder.path());
+    let found = RecoveredDocument::find(folder.path());
     assert_eq!(found.len(), 1);
     let restored = found[0].restore().unwrap();
     assert_eq!((restored.scene(), restored.painted()), (document.scene(), document.painted()));
     assert!(restored.is_dirty());
     found[0].discard();
-    assert!(Recovered::find(folder.path()).is_empty());
+    assert!(RecoveredDocument::find(folder.path()).is_empty());
 }
 
 #[path = "../../../tests/fuzz/mutate.rs"]
 mod mutate;
 
-/// Mutated recovery files: restored to a scene that is valid, or refused; how many of each.
+/// Restores mutated recovery files, and checks that each gives a valid scene or an error. Returns the counts of both.
 fn mutated_recoveries(seed: u64, done: impl Fn(usize) -> bool) -> [usize; 2] {
     let folder = tempfile::tempdir().unwrap();
     let document = quick();
-    // Removed when it goes.
+    // Removes its file when it is dropped.
     let recovery = RecoveryFile::new(folder.path());
     recovery.prepare(&document).unwrap().write().unwrap();
-    let here = folder.path().join(format!("recovery-{}.toml", std::process::id()));
-    let whole = std::fs::read(here).unwrap();
+    let own_file = folder.path().join(format!("recovery-{}.toml", std::process::id()));
+    let whole = std::fs::read(own_file).unwrap();
     let other = folder.path().join("recovery-4194399.toml");
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut counts = [0; 2];
     while !done(counts[0] + counts[1]) {
         std::fs::write(&other, mutate::mutated(&whole, &whole, true, &mut random)).unwrap();
-        let restored = Recovered::find(folder.path()).first().map(Recovered::restore);
-        let taken = matches!(&restored, Some(Ok(_)));
+        let restored = RecoveredDocument::find(folder.path()).first().map(RecoveredDocument::restore);
+        let accepted = matches!(&restored, Some(Ok(_)));
         if let Some(Ok(document)) = restored {
             document.scene().validate().unwrap();
         }
-        counts[usize::from(!taken)] += 1;
+        counts[usize::from(!accepted)] += 1;
     }
     counts
 }
 
 #[test]
 fn mutated_recovery_files_are_restored_or_refused_never_a_panic() {
-    let [taken, refused] = mutated_recoveries(1, |count| count >= 300);
-    assert!(taken > 0 && refused > 0, "{taken} {refused}");
+    let [accepted, refused] = mutated_recoveries(1, |count| count >= 300);
+    assert!(accepted > 0 && refused > 0, "{accepted} {refused}");
 }
 
 #[test]
@@ -211,20 +211,20 @@ fn mutated_recovery_files_are_restored_or_refused_never_a_panic() {
 fn mutated_recovery_files_for_as_long_as_asked() {
     let seconds = std::env::var("BISCALE_FUZZ_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(30.0);
     let start = std::time::Instant::now();
-    let [taken, refused] = mutated_recoveries(77, |_| start.elapsed().as_secs_f64() >= seconds);
-    println!("recovery       {:>9} executions in {seconds:>4} s, {taken:>8} accepted, no crash", taken + refused);
+    let [accepted, refused] = mutated_recoveries(77, |_| start.elapsed().as_secs_f64() >= seconds);
+    println!("recovery       {:>9} executions in {seconds:>4} s, {accepted:>8} accepted, no crash", accepted + refused);
 }
 
 #[test]
-fn settings_come_back_and_broken_ones_are_the_defaults() {
+fn settings_are_stored_and_damaged_ones_give_the_defaults() {
     let folder = tempfile::tempdir().unwrap();
-    let mut settings = Settings { dark: false, zoom: 1.5, ..Settings::default() };
+    let mut settings = EditorSettings { dark: false, zoom: 1.5, ..EditorSettings::default() };
     settings.add_recent(Path::new("/a.toml"));
     settings.add_recent(Path::new("/b.toml"));
     settings.add_recent(Path::new("/a.toml"));
     settings.save(Some(folder.path()));
-    assert_eq!(Settings::load(Some(folder.path())), settings);
+    assert_eq!(EditorSettings::load(Some(folder.path())), settings);
     assert_eq!(settings.recent, [Path::new("/a.toml"), Path::new("/b.toml")]);
     std::fs::write(folder.path().join("editor.toml"), "zoom = \"huge\"").unwrap();
-    assert_eq!(Settings::load(Some(folder.path())), Settings::default());
+    assert_eq!(EditorSettings::load(Some(folder.path())), EditorSettings::default());
 }

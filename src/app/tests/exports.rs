@@ -1,4 +1,4 @@
-//! Exports from their dialogs.
+//! Exports through their dialogs.
 
 use crate::export::tile::TileOptions;
 use eframe::egui::{Key, Modifiers};
@@ -6,10 +6,10 @@ use egui_kittest::kittest::Queryable;
 
 use super::{editor, harness, quick, settle};
 use crate::app::dialogs::{Dialog, Purpose};
-use crate::app::worker::{TableChoice, What};
+use crate::app::worker::{ExportKind, TableChoice};
 
 #[test]
-fn an_export_offers_formats_by_name_and_the_name_takes_the_ending() {
+fn the_export_dialog_offers_formats_and_a_choice_changes_the_ending() {
     let mut harness = harness(quick());
     harness.key_press_modifiers(Modifiers::COMMAND, Key::E);
     harness.run_steps(3);
@@ -23,7 +23,7 @@ fn an_export_offers_formats_by_name_and_the_name_takes_the_ending() {
 }
 
 #[test]
-fn an_export_takes_the_size_that_was_chosen_shows_its_progress_and_can_be_given_up() {
+fn an_export_uses_the_chosen_size_shows_its_progress_and_can_be_cancelled() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("small.bsdf");
     let mut harness = harness(quick());
@@ -40,26 +40,26 @@ fn an_export_takes_the_size_that_was_chosen_shows_its_progress_and_can_be_given_
     assert!(editor(&mut harness).exporting.is_none());
     let mut choice = TableChoice { theta: 2, phi: 4, ..TableChoice::default() };
     choice.rgl = Some([3, 4, 4, 4]);
-    editor(&mut harness).export(path.clone(), What::Table(choice));
+    editor(&mut harness).export(path.clone(), ExportKind::Table(choice));
     let start = std::time::Instant::now();
     while !path.exists() {
         harness.step();
         assert!(start.elapsed().as_secs() < 60, "{:?}", editor(&mut harness).messages.texts());
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
-    // Three elevations, four azimuths and the first again, of 4 x 4 samples: far below the small size.
+    // Three elevations and five azimuths (the first repeated) of 4 x 4 samples are far below the small size.
     assert!(std::fs::metadata(&path).unwrap().len() < 20_000);
 }
 
 #[test]
-fn a_large_solid_is_given_up_while_it_is_made_and_the_next_export_goes_on() {
+fn a_large_solid_is_cancelled_while_it_is_computed_and_the_next_export_runs() {
     let folder = tempfile::tempdir().unwrap();
     let [large, small] = ["large.stl", "small.obj"].map(|name| folder.path().join(name));
     std::fs::write(&large, "old").unwrap();
     let mut harness = harness(quick());
     settle(&mut harness);
     let options = TileOptions { samples: glam::UVec2::splat(2048), ..TileOptions::default() };
-    editor(&mut harness).export(large.clone(), What::Tile(options));
+    editor(&mut harness).export(large.clone(), ExportKind::Tile(options));
     let start = std::time::Instant::now();
     while editor(&mut harness).exporting.is_none_or(|(part, _)| part == 0.0) {
         harness.step();
@@ -69,16 +69,16 @@ fn a_large_solid_is_given_up_while_it_is_made_and_the_next_export_goes_on() {
     harness.get_by_label("Cancel").click();
     harness.run_steps(2);
     assert!(editor(&mut harness).exporting.is_none());
-    editor(&mut harness).export(small, What::Tile(TileOptions::default()));
+    editor(&mut harness).export(small, ExportKind::Tile(TileOptions::default()));
     while editor(&mut harness).exporting.is_some() {
         harness.step();
         assert!(start.elapsed().as_secs() < 60, "not exported");
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-    // One after the other: by now the first has come to its end, too.
+    // Exports run one after the other, so the first has ended, too.
     assert!(editor(&mut harness).messages.texts().join("; ").contains("small.obj"));
     assert_eq!(std::fs::read(&large).unwrap(), b"old");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left beside");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no partial file remains");
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn every_format_of_the_tile_and_of_fits_is_exported_from_its_dialog() {
     for ending in ["obj", "stl", "png", "svg", "pdf", "gltf", "mtlx"] {
         let path = folder.path().join(format!("a.{ending}"));
         let purpose = if ending.len() > 3 { Purpose::ExportTable } else { Purpose::ExportTile };
-        editor(&mut harness).chosen(&ctx, purpose, path.clone());
+        editor(&mut harness).use_file(&ctx, purpose, path.clone());
         harness.run_steps(2);
         harness.get_by_label("Export").click();
         let start = std::time::Instant::now();

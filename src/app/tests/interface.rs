@@ -1,4 +1,4 @@
-//! The interface through its accessible nodes, as a person with a keyboard or a screen reader uses it.
+//! The interface through its accessibility nodes, as a keyboard or a screen reader uses it.
 
 use crate::scene::{BrdfSpec, Geometry, TermSpec};
 use eframe::egui::{Key, Modifiers, Ui};
@@ -11,22 +11,22 @@ use crate::app::actions::{Action, ENTRIES};
 use crate::app::dialogs::Dialog;
 use crate::app::document::Document;
 use crate::app::editor::Editor;
-use crate::app::views::tile::Which;
+use crate::app::views::tile::TileMode;
 
 #[test]
-fn a_scene_opens_with_its_image_and_both_views_are_named() {
+fn a_scene_opens_with_its_image_and_all_views_have_names() {
     let mut harness = harness(quick());
     settle(&mut harness);
     for name in ["Object view", "Tile view", "Lobe view"] {
         assert!(harness.query_by_label(name).is_some(), "{name}");
     }
     assert!(editor(&mut harness).messages.texts().is_empty());
-    let made = editor(&mut harness).object.made.as_ref().unwrap();
-    assert!(made.radiance.as_ref().unwrap().pixels.iter().all(|p| p.is_finite()) && made.image.size()[0] > 100);
+    let preview = editor(&mut harness).object.preview.as_ref().unwrap();
+    assert!(preview.radiance.as_ref().unwrap().pixels.iter().all(|p| p.is_finite()) && preview.image.size()[0] > 100);
 }
 
 #[test]
-fn every_family_is_shown_edited_undone_and_redone() {
+fn every_family_is_displayed_edited_undone_and_redone() {
     let mut harness = harness(quick());
     for kind in ["pyramids", "rods", "weave", "flat", "grooves"] {
         let mut scene = (**editor(&mut harness).document.scene()).clone();
@@ -49,7 +49,7 @@ fn every_family_is_shown_edited_undone_and_redone() {
 }
 
 #[test]
-fn a_slider_moved_by_a_person_moves_the_scene_and_undo_says_what() {
+fn a_slider_edits_the_scene_and_the_undo_entry_names_the_edit() {
     let mut harness = harness(quick());
     let slider = harness.get_all_by_role(eframe::egui::Role::Slider).next().unwrap();
     slider.set_value_accesskit(0.5);
@@ -60,12 +60,12 @@ fn a_slider_moved_by_a_person_moves_the_scene_and_undo_says_what() {
 }
 
 #[test]
-fn a_stroke_turns_grooves_into_a_relief_and_undo_brings_them_back() {
+fn a_stroke_turns_grooves_into_a_height_field_and_undo_restores_them() {
     let mut harness = harness(quick());
     settle(&mut harness);
-    // The tile's own picture comes from another thread.
+    // The image of the tile comes from another thread.
     for _ in 0..500 {
-        if editor(&mut harness).tile.made.is_some() {
+        if editor(&mut harness).tile.rendered.is_some() {
             break;
         }
         std::thread::sleep(std::time::Duration::from_millis(10));
@@ -87,7 +87,7 @@ fn a_stroke_turns_grooves_into_a_relief_and_undo_brings_them_back() {
 }
 
 #[test]
-fn a_measured_file_that_is_not_one_is_a_message_and_the_document_is_kept() {
+fn a_damaged_measured_file_is_reported_and_the_document_stays_open() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("not.binary");
     std::fs::write(&path, "nothing").unwrap();
@@ -111,7 +111,7 @@ fn a_measured_file_that_is_not_one_is_a_message_and_the_document_is_kept() {
 }
 
 #[test]
-fn unsaved_changes_stand_before_quitting_and_are_not_lost_by_cancel() {
+fn quitting_asks_about_unsaved_changes_and_cancel_keeps_them() {
     let mut harness = harness(quick());
     let ctx = harness.ctx.clone();
     let mut scene = (**editor(&mut harness).document.scene()).clone();
@@ -153,7 +153,7 @@ fn save_and_open_through_actions_give_the_same_scene() {
 }
 
 #[test]
-fn a_scene_that_does_not_parse_is_a_message_and_what_is_open_stays() {
+fn a_scene_that_does_not_parse_is_reported_and_the_document_stays_open() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("broken.toml");
     std::fs::write(&path, "[tile]\ngeometry = { kind = \"groves\" }\n").unwrap();
@@ -179,22 +179,22 @@ fn a_material_is_copied_and_pasted_to_another_slot() {
 }
 
 #[test]
-fn picking_fills_the_lobe_view_and_letting_go_restores_the_tile() {
+fn picking_fills_the_lobe_view_and_ending_it_restores_the_tile() {
     let mut harness = harness(quick());
     settle(&mut harness);
     let ctx = harness.ctx.clone();
     editor(&mut harness).action(&ctx, Action::Pick);
-    let place = harness.get_by_label("Object view").rect().center();
-    harness.hover_at(place);
+    let center = harness.get_by_label("Object view").rect().center();
+    harness.hover_at(center);
     harness.run_steps(3);
     assert!(editor(&mut harness).lobe.viewer.is_some());
-    assert!(editor(&mut harness).tile.show == Which::Contribution);
+    assert!(editor(&mut harness).tile.show == TileMode::Contribution);
     editor(&mut harness).action(&ctx, Action::Pick);
-    assert!(editor(&mut harness).lobe.viewer.is_none() && editor(&mut harness).tile.show == Which::Clay);
+    assert!(editor(&mut harness).lobe.viewer.is_none() && editor(&mut harness).tile.show == TileMode::Clay);
 }
 
 #[test]
-fn nothing_is_repainted_when_nothing_changes() {
+fn the_editor_does_not_repaint_when_nothing_changes() {
     let mut harness = harness(quick());
     settle(&mut harness);
     for _ in 0..200 {
@@ -209,7 +209,7 @@ fn nothing_is_repainted_when_nothing_changes() {
 }
 
 #[test]
-fn no_two_actions_share_their_keys() {
+fn no_two_actions_share_a_shortcut() {
     let keys: Vec<_> = ENTRIES.iter().filter_map(|entry| entry.keys).collect();
     for (at, key) in keys.iter().enumerate() {
         assert!(!keys[..at].contains(key), "{key:?}");
@@ -217,10 +217,10 @@ fn no_two_actions_share_their_keys() {
 }
 
 #[test]
-fn the_accuracy_panel_measures_the_scene_and_its_slider_walks_from_faster_to_finer() {
+fn the_accuracy_panel_measures_the_scene_and_its_slider_sets_the_quality_level() {
     let mut harness = harness(quick());
     settle(&mut harness);
-    assert!(harness.query_by_label("Accuracy chart").is_none(), "nothing is measured unasked");
+    assert!(harness.query_by_label("Accuracy chart").is_none(), "the folded panel measures nothing");
     harness.get_by_label("Accuracy").click();
     harness.run_steps(4);
     let wait = |harness: &mut egui_kittest::Harness<'static, Option<crate::app::editor::Editor>>| {
@@ -251,7 +251,7 @@ fn the_accuracy_panel_measures_the_scene_and_its_slider_walks_from_faster_to_fin
 fn the_effects_panel_forces_an_effect_and_the_image_follows() {
     let mut harness = harness(quick());
     settle(&mut harness);
-    let before = editor(&mut harness).object.made.as_ref().unwrap().radiance.as_ref().unwrap().pixels.clone();
+    let before = editor(&mut harness).object.preview.as_ref().unwrap().radiance.as_ref().unwrap().pixels.clone();
     harness.set_size(eframe::egui::vec2(1400.0, 2600.0));
     harness.run_steps(2);
     settle(&mut harness);
@@ -263,27 +263,27 @@ fn the_effects_panel_forces_an_effect_and_the_image_follows() {
     editor(&mut harness).document.edit(scene);
     harness.run_steps(1);
     settle(&mut harness);
-    let made = editor(&mut harness).object.made.clone().unwrap();
-    let effect = made.effects.iter().find(|effect| effect.name == "visibility").unwrap();
+    let preview = editor(&mut harness).object.preview.clone().unwrap();
+    let effect = preview.effects.iter().find(|effect| effect.name == "visibility").unwrap();
     assert!(effect.forced && !effect.on);
-    assert_ne!(made.radiance.as_ref().unwrap().pixels, before);
+    assert_ne!(preview.radiance.as_ref().unwrap().pixels, before);
     harness.get_by_label("As planned").click();
     harness.run_steps(2);
     assert!(editor(&mut harness).document.scene().effects.is_default());
 }
 
 #[test]
-fn the_image_that_is_asked_for_before_the_window_has_the_size_of_its_view() {
+fn an_image_that_is_requested_before_the_window_opens_has_the_size_of_its_view() {
     let mut document = Some(quick());
     let mut harness = Harness::builder().with_size([1400.0, 1000.0]).allow_missing_glyphs().build_ui_state(
         move |ui: &mut Ui, state: &mut Option<(Editor, _)>| {
             let ctx = ui.ctx().clone();
             let (editor, _) = state.get_or_insert_with(|| {
                 let mut editor = Editor::new(&ctx, document.take().unwrap(), None, crate::cache::Cache::off());
-                // The harness leaves 8 points free on each side.
+                // The harness has a margin of 8 points on each side.
                 editor.settings.window = [1384.0, 984.0];
-                editor.ask_early();
-                let early = editor.object.asked;
+                editor.request_first_image();
+                let early = editor.object.requested;
                 (editor, early)
             });
             editor.window_frame(ui);
@@ -293,5 +293,5 @@ fn the_image_that_is_asked_for_before_the_window_has_the_size_of_its_view() {
     harness.run_steps(3);
     let (editor, early) = harness.state().as_ref().unwrap();
     assert!(early.is_some());
-    assert_eq!(editor.object.asked, *early);
+    assert_eq!(editor.object.requested, *early);
 }

@@ -1,4 +1,4 @@
-//! How long a slider takes to a new picture: numbers for the README, asked for by name.
+//! Latency from an edit to the new image: a measurement that runs only by name.
 
 use std::time::{Duration, Instant};
 
@@ -6,18 +6,18 @@ use super::{editor, harness};
 use crate::app::document::Document;
 use crate::app::worker::Grade;
 
-/// Longer than this nobody waits for the final picture.
-const PATIENCE: Duration = Duration::from_secs(45);
+/// Maximum wait for the final image.
+const MAX_WAIT: Duration = Duration::from_secs(45);
 
-/// Milliseconds to the first, the refined and the final picture; NaN for what did not come in time.
-fn after_an_edit(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
+/// Returns the median milliseconds to the draft, the refined and the final image; NaN for an image that came too late.
+fn latency_ms(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
     let mut harness = harness(Document::open(name).unwrap());
     let mut scene = (**editor(&mut harness).document.scene()).clone();
     scene.quality.backend = backend.to_owned();
     editor(&mut harness).document.edit(scene);
     harness.step();
     let opened = Instant::now();
-    while editor(&mut harness).is_busy() && opened.elapsed() < PATIENCE {
+    while editor(&mut harness).is_busy() && opened.elapsed() < MAX_WAIT {
         harness.step();
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -28,26 +28,28 @@ fn after_an_edit(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
         let start = Instant::now();
         editor(&mut harness).document.edit(scene);
         let version = editor(&mut harness).document.version();
-        let mut seen = [None; 3];
-        while seen[2].is_none() {
+        let mut arrival_ms = [None; 3];
+        while arrival_ms[2].is_none() {
             harness.step();
-            if let Some(made) = editor(&mut harness).object.made.as_ref().filter(|made| made.version == version) {
-                let at = match made.grade {
+            if let Some(preview) =
+                editor(&mut harness).object.preview.as_ref().filter(|preview| preview.version == version)
+            {
+                let at = match preview.grade {
                     Grade::Draft => 0,
                     Grade::Refining => 1,
                     Grade::Final => 2,
                 };
-                seen[at].get_or_insert(start.elapsed().as_secs_f64() * 1e3);
+                arrival_ms[at].get_or_insert(start.elapsed().as_secs_f64() * 1e3);
             }
-            if start.elapsed() > PATIENCE {
+            if start.elapsed() > MAX_WAIT {
                 break;
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-        times.push(seen);
+        times.push(arrival_ms);
     }
     let median = |at: usize| {
-        let mut found: Vec<f64> = times.iter().filter_map(|seen| seen[at]).collect();
+        let mut found: Vec<f64> = times.iter().filter_map(|arrival_ms| arrival_ms[at]).collect();
         found.sort_by(f64::total_cmp);
         found.get(found.len() / 2).copied().unwrap_or(f64::NAN)
     };
@@ -55,18 +57,18 @@ fn after_an_edit(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
 }
 
 #[test]
-#[ignore = "prints numbers of one scene, of all five with BISCALE_TABLE=1: cargo test --release --bin biscale latency -- --ignored --nocapture"]
+#[ignore = "one scene, or five with BISCALE_TABLE=1: cargo test --release --lib latency -- --ignored --nocapture"]
 fn latency_from_a_slider_on_the_scenes_of_table_4() {
     let _alone = super::alone();
     println!(
-        "scene            route  draft  refined (coarse)  final   [ms, median of 3 geometry edits; of 1 on the GPU]"
+        "scene            backend draft  refined (coarse)  final   [ms, median of 3 geometry edits; of 1 on the GPU]"
     );
     let all = std::env::var_os("BISCALE_TABLE").is_some();
     let scenes = ["table4_cup", "table4_plate", "table4_teapot", "table4_pillow", "table4_skirt"];
     for name in &scenes[..if all { 5 } else { 1 }] {
         for (backend, edits) in [("cpu", 3), ("gpu", 1)] {
-            let (draft, coarse, last) = after_an_edit(name, backend, edits);
-            println!("{name:<16} {backend:<5} {draft:>6.0} {coarse:>12.0} {last:>12.0}");
+            let (draft, coarse, last) = latency_ms(name, backend, edits);
+            println!("{name:<16} {backend:<7} {draft:>5.0} {coarse:>12.0} {last:>12.0}");
             assert!(draft.is_finite());
         }
     }

@@ -1,14 +1,14 @@
-//! The interface without a window: every frame runs as in one, and the workers really work.
+//! The editor without a window: frames run as in a window, with the same workers.
 
 mod disk;
 mod documents;
+mod errors;
 mod exports;
 mod interface;
 mod latency;
 mod newcomer;
 mod painting;
 mod soak;
-mod trouble;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -21,13 +21,13 @@ use egui_kittest::Harness;
 use super::document::Document;
 use super::editor::Editor;
 
-/// Held by tests that measure the process: its memory, or how long it makes a hand wait.
+/// Locks out other tests that measure this process: its memory, or its latency.
 fn alone() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A scene that is quick to compute.
+/// A scene that takes little time to compute.
 const QUICK: &str = r#"
 [tile]
 geometry = { kind = "grooves", count = 2 }
@@ -51,7 +51,7 @@ fn quick() -> Document {
     Document::new(scene::LoadedScene { scene, base_dir: "".into(), name: "quick".into(), painted }, None)
 }
 
-/// An editor on a document, in a window of this size.
+/// Opens an editor on a document in a harness.
 fn harness(document: Document) -> Harness<'static, Option<Editor>> {
     let mut document = Some(document);
     let mut harness = Harness::builder().with_size([1400.0, 1000.0]).allow_missing_glyphs().build_ui_state(
@@ -59,7 +59,7 @@ fn harness(document: Document) -> Harness<'static, Option<Editor>> {
             let ctx = ui.ctx().clone();
             let editor = editor.get_or_insert_with(|| {
                 let mut editor = Editor::new(&ctx, document.take().unwrap(), None, crate::cache::Cache::off());
-                // Thumbnails are not what is tested.
+                // Thumbnails would slow down the tests.
                 editor.settings.gallery = false;
                 editor
             });
@@ -75,7 +75,7 @@ fn editor<'a>(harness: &'a mut Harness<'static, Option<Editor>>) -> &'a mut Edit
     harness.state_mut().as_mut().unwrap()
 }
 
-/// Frames until the full picture of what is open is there.
+/// Runs frames until the final image of the open document is displayed.
 fn settle(harness: &mut Harness<'static, Option<Editor>>) {
     let start = Instant::now();
     loop {
@@ -83,7 +83,7 @@ fn settle(harness: &mut Harness<'static, Option<Editor>>) {
         if !editor(harness).is_busy() {
             return;
         }
-        assert!(start.elapsed() < Duration::from_secs(120), "no picture");
+        assert!(start.elapsed() < Duration::from_secs(120), "no image");
         std::thread::sleep(Duration::from_millis(10));
     }
 }

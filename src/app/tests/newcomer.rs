@@ -1,4 +1,4 @@
-//! What a person meets in the first hour: the gallery, a measured paint, names for a screen reader.
+//! First tasks of a new user: the gallery, a measured BRDF, names for a screen reader.
 
 use crate::export::tile::TileOptions;
 use crate::scene::{BrdfSpec, Geometry, TermSpec};
@@ -13,22 +13,22 @@ use crate::app::paint::Tool;
 use crate::app::worker::TableChoice;
 
 #[test]
-fn the_gallery_is_searched_by_words_and_says_when_nothing_is_found() {
+fn the_gallery_is_searched_by_words_and_reports_when_nothing_matches() {
     let mut harness = harness(quick());
     editor(&mut harness).settings.gallery = true;
-    editor(&mut harness).gallery.sought = "velvet UP".to_owned();
+    editor(&mut harness).gallery.search = "velvet UP".to_owned();
     harness.run_steps(3);
     assert!(harness.query_by_label("Velvet up").is_some() && harness.query_by_label("Pearl cup").is_none());
-    editor(&mut harness).gallery.sought = "spaceship".to_owned();
+    editor(&mut harness).gallery.search = "spaceship".to_owned();
     harness.run_steps(2);
-    assert!(harness.query_by_label("No scene is about \"spaceship\".").is_some());
+    assert!(harness.query_by_label("No scene matches \"spaceship\".").is_some());
     harness.get_by_label("Show all").click();
     harness.run_steps(3);
     assert!(harness.query_by_label("Velvet up").is_some() && harness.query_by_label("Default").is_some());
 }
 
 #[test]
-fn a_measured_paint_that_is_dropped_is_not_tinted_by_what_was_there_and_that_is_said() {
+fn a_dropped_measured_brdf_resets_the_colour_of_the_material_with_a_note() {
     let path = std::path::PathBuf::from("/nowhere/paint.bsdf");
     let mut harness = harness(quick());
     let ctx = harness.ctx.clone();
@@ -46,7 +46,7 @@ fn a_measured_paint_that_is_dropped_is_not_tinted_by_what_was_there_and_that_is_
 }
 
 #[test]
-fn help_is_closed_by_escape() {
+fn escape_closes_the_help() {
     let mut harness = harness(quick());
     harness.key_press(Key::F1);
     harness.run_steps(2);
@@ -119,7 +119,7 @@ fn every_control_of_every_panel_and_dialog_has_a_name() {
 }
 
 #[test]
-fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not() {
+fn a_material_is_pasted_from_another_editor_and_other_text_is_refused() {
     let mut harness = harness(quick());
     let text =
         "name = \"gold\"\ncolor = [1.0, 0.5, 0.1]\n[brdf]\nkind = \"ggx\"\nroughness = 0.1\nf0 = [0.9, 0.7, 0.3]\n";
@@ -139,7 +139,7 @@ fn a_material_comes_from_the_clipboard_of_another_editor_and_other_text_does_not
 }
 
 #[test]
-fn who_only_turned_a_shipped_scene_is_not_asked_to_save_it() {
+fn turning_a_shipped_scene_asks_for_no_save() {
     let mut harness = harness(quick());
     let ctx = harness.ctx.clone();
     let mut scene = (**editor(&mut harness).document.scene()).clone();
@@ -158,7 +158,7 @@ fn who_only_turned_a_shipped_scene_is_not_asked_to_save_it() {
 }
 
 #[test]
-fn a_measured_file_that_is_typed_is_of_the_kind_that_its_ending_says() {
+fn the_ending_of_a_typed_measured_file_selects_its_kind() {
     let mut document = quick();
     let mut scene = (**document.scene()).clone();
     scene.materials[0].brdf = Some(BrdfSpec::One(TermSpec::Merl { path: "gold.binary".into() }));

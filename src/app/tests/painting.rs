@@ -1,4 +1,4 @@
-//! Colours and materials painted over the tile, from the hand to the reflection.
+//! Painted colours and materials, from the pointer to the effective BRDF.
 
 use crate::pipeline::Pipeline;
 use crate::scene;
@@ -8,7 +8,7 @@ use glam::{UVec2, Vec2, Vec3};
 use super::{editor, harness, quick, settle};
 use crate::app::document::Document;
 use crate::app::paint::Tool;
-use crate::app::views::brushes::{BrushAsked, Layer};
+use crate::app::views::brushes::{BrushRequest, Layer};
 
 fn document(text: &str) -> Document {
     let scene = scene::parse(text).unwrap();
@@ -43,13 +43,13 @@ fn a_material_is_painted_on_any_surface_undone_to_the_start_and_redone_to_the_en
     settle(&mut harness);
     let editor = editor(&mut harness);
     editor.tile.set_painting(true);
-    editor.tile.brush.tool = Tool::MaterialSpec;
+    editor.tile.brush.tool = Tool::Material;
     editor.draw(&[Vec2::splat(0.3), Vec2::splat(0.6)]);
     editor.tile.brush.slot = 2;
     editor.draw(&[Vec2::new(0.7, 0.2)]);
     editor.tile.brush.tool = Tool::Color;
     editor.draw(&[Vec2::new(0.2, 0.8)]);
-    assert!(editor.document.scene().tile.geometry.kind() == "grooves", "the surface stays what it is");
+    assert!(editor.document.scene().tile.geometry.kind() == "grooves", "the geometry does not change");
     let names: Vec<&str> = editor.document.scene().materials.iter().map(|material| material.name.as_str()).collect();
     assert_eq!(names, ["default", "paint_1", "paint_2"]);
     let end = (editor.document.scene().clone(), editor.document.painted().clone());
@@ -65,14 +65,14 @@ fn a_material_is_painted_on_any_surface_undone_to_the_start_and_redone_to_the_en
         editor.document.redo().unwrap();
     }
     assert_eq!((editor.document.scene(), editor.document.painted()), (&end.0, &end.1));
-    editor.brush_asked(BrushAsked::Clear(Layer::Slots));
+    editor.apply_brush_request(BrushRequest::Clear(Layer::Slots));
     assert!(editor.document.painted().slots.is_none() && editor.document.scene().tile.slot_path.is_none());
     editor.document.undo();
     assert_eq!((editor.document.scene(), editor.document.painted()), (&end.0, &end.1));
-    // Who turns the light asks for no new tile: what is painted stays on it.
+    // Turning the light builds no new tile, and the painted slots stay known.
     let mut scene = (**editor.document.scene()).clone();
     scene.light.rotation_deg = 25.0;
-    editor.take_scene(scene);
+    editor.apply_edit(scene);
     assert!(["paint_1", "paint_2"].iter().all(|name| editor.slots.iter().any(|slot| slot == name)));
 }
 
@@ -84,7 +84,7 @@ fn painted_materials_are_saved_beside_the_scene_named_in_it_and_reopened_equal()
     settle(&mut harness);
     let editor = editor(&mut harness);
     editor.tile.set_painting(true);
-    editor.tile.brush.tool = Tool::MaterialSpec;
+    editor.tile.brush.tool = Tool::Material;
     editor.draw(&[Vec2::splat(0.4), Vec2::splat(0.9)]);
     editor.document.save_as(&path).unwrap();
     assert!(std::fs::read_to_string(&path).unwrap().contains("slot_path = \"moss_materials.png\""));

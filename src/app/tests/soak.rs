@@ -1,4 +1,4 @@
-//! Many random edits: no crash, no growth of memory, and the same picture as from nothing; and two editors at once.
+//! Many random edits without a crash or a memory leak, compared with a fresh pipeline; and two editors at once.
 
 use std::path::Path;
 use std::time::Instant;
@@ -11,11 +11,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{editor, harness, quick, settle};
 use crate::app::actions::Action;
-use crate::app::document::{Recovered, RecoveryFile, Settings};
+use crate::app::document::{EditorSettings, RecoveredDocument, RecoveryFile};
 use crate::app::paint::Tool;
-use crate::app::worker::{TableChoice, What};
+use crate::app::worker::{ExportKind, TableChoice};
 
-/// Changes something.
+/// Makes a random edit.
 fn edit(scene: &mut Scene, random: &mut impl Rng) {
     match random.random_range(0..9u32) {
         0 => {
@@ -40,34 +40,34 @@ fn edit(scene: &mut Scene, random: &mut impl Rng) {
     }
 }
 
-/// Steps between two comparisons with the same scene from nothing.
-const CHECK: usize = 200;
+/// Steps between two comparisons with a fresh pipeline.
+const COMPARISON_STEPS: usize = 200;
 
-/// The picture at rest is of what the document says, to the bit.
-fn compare_with_nothing_kept(harness: &mut egui_kittest::Harness<'static, Option<super::Editor>>) {
+/// Checks that the BRDF of the displayed image equals that of a fresh pipeline, bit for bit.
+fn compare_with_fresh_pipeline(harness: &mut egui_kittest::Harness<'static, Option<super::Editor>>) {
     settle(harness);
     let editor = editor(harness);
-    let afresh = Pipeline::new().effective(&editor.document.loaded()).unwrap().brdf;
-    let made = editor.object.made.as_ref().unwrap();
+    let fresh = Pipeline::new().effective(&editor.document.loaded()).unwrap().brdf;
+    let preview = editor.object.preview.as_ref().unwrap();
     for pair in crate::metrics::mirror_biased_pairs(64, 7) {
-        assert_eq!(made.brdf.as_ref().unwrap().eval(pair.i, pair.o), afresh.eval(pair.i, pair.o));
+        assert_eq!(preview.brdf.as_ref().unwrap().eval(pair.i, pair.o), fresh.eval(pair.i, pair.o));
     }
 }
 
-/// `edits` of them, and on for as many minutes as `BISCALE_SOAK_MINUTES` says.
+/// Makes at least `edits` random edits. The long test continues for `BISCALE_SOAK_MINUTES` minutes.
 fn soak(edits: usize, seed: u64) {
     let minutes: f64 = std::env::var("BISCALE_SOAK_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(0.0);
     let _alone = super::alone();
     let start = Instant::now();
-    let goes_on = |step: usize| step < edits || edits > 100 && start.elapsed().as_secs_f64() < 60.0 * minutes;
+    let continues = |step: usize| step < edits || edits > 100 && start.elapsed().as_secs_f64() < 60.0 * minutes;
     let folder = tempfile::tempdir().unwrap();
     let (saved, table) = (folder.path().join("a.toml"), folder.path().join("t.csv"));
     let (mut steps, mut undos, mut opens, mut exports) = (0, 0, 0, 0);
     let mut harness = harness(quick());
     let ctx = harness.ctx.clone();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut held = Vec::new();
-    while goes_on(steps) {
+    let mut resident = Vec::new();
+    while continues(steps) {
         steps += 1;
         match random.random_range(0..14u32) {
             0 => {
@@ -89,8 +89,10 @@ fn soak(edits: usize, seed: u64) {
                 opens += 1;
             }
             5 if editor(&mut harness).exporting.is_none() => {
-                editor(&mut harness)
-                    .export(table.clone(), What::Table(TableChoice { theta: 2, phi: 4, ..TableChoice::default() }));
+                editor(&mut harness).export(
+                    table.clone(),
+                    ExportKind::Table(TableChoice { theta: 2, phi: 4, ..TableChoice::default() }),
+                );
                 exports += 1;
             }
             _ => {
@@ -100,96 +102,96 @@ fn soak(edits: usize, seed: u64) {
             }
         }
         harness.step();
-        // What is on disk is whole at any time.
+        // Files on disk are complete at any time.
         if let Ok(text) = std::fs::read_to_string(&table) {
             assert_eq!(text.lines().filter(|line| !line.starts_with('#')).count(), 1 + 64, "{text}");
         }
         if let Ok(text) = std::fs::read_to_string(&saved) {
             crate::scene::parse(&text).unwrap();
         }
-        if steps % CHECK == 0 {
-            compare_with_nothing_kept(&mut harness);
-            held.extend(memory());
+        if steps % COMPARISON_STEPS == 0 {
+            compare_with_fresh_pipeline(&mut harness);
+            resident.extend(resident_bytes());
         }
     }
-    compare_with_nothing_kept(&mut harness);
-    if held.len() >= 8 {
-        let most = |part: &[u64]| part.iter().copied().fold(0, u64::max);
-        let quarter = held.len() / 4;
-        let (early, late) = (most(&held[quarter..2 * quarter]), most(&held[3 * quarter..]));
+    compare_with_fresh_pipeline(&mut harness);
+    if resident.len() >= 8 {
+        let max = |part: &[u64]| part.iter().copied().fold(0, u64::max);
+        let quarter = resident.len() / 4;
+        let (early, late) = (max(&resident[quarter..2 * quarter]), max(&resident[3 * quarter..]));
         eprintln!(
-            "{steps} steps, {undos} undos, {opens} opens, {exports} exports in {:.0} s, {} times the same as from nothing; \
-             resident: {} MB in the second quarter at most, {} MB in the last",
+            "{steps} steps, {undos} undos, {opens} opens, {exports} exports in {:.0} s, {} comparisons equal; \
+             resident: at most {} MB in the second quarter, {} MB in the last",
             start.elapsed().as_secs_f64(),
-            held.len() + 1,
+            resident.len() + 1,
             early >> 20,
             late >> 20
         );
-        // All families have been met by the first quarter; a leak goes on.
-        assert!(late < early + early / 4 + (32 << 20), "{held:?}");
+        // The first quarter covers all families, so only a leak grows later.
+        assert!(late < early + early / 4 + (32 << 20), "{resident:?}");
     }
     let texts = editor(&mut harness).messages.texts().join("; ");
     assert!(!texts.contains("fault"), "{texts}");
 }
 
-/// Bytes that this process holds in memory, where the system says so.
-fn memory() -> Option<u64> {
+/// Returns the resident memory of this process [bytes], if the system reports it.
+fn resident_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/statm").ok()?;
     let pages: u64 = text.split_whitespace().nth(1)?.parse().ok()?;
     Some(pages * 4096)
 }
 
 #[test]
-fn sixty_random_edits_end_in_the_image_of_the_same_scene_computed_afresh() {
+fn sixty_random_edits_give_the_brdf_of_a_fresh_pipeline() {
     soak(60, 1);
 }
 
 #[test]
-#[ignore = "minutes: 2,000 edits; asked for by name in release"]
+#[ignore = "minutes: 2,000 edits; runs by name in release"]
 fn two_thousand_random_edits_neither_crash_nor_grow() {
     soak(2000, 2);
 }
 
-/// What an editor writes into the folder that all share, again and again: settings of its own kind, and its recovery.
-/// `other_ended` tells whether the other program is gone: only then is its recovery to be found.
-fn keep_writing(folder: &Path, kind: &str, rounds: usize, mut other_ended: impl FnMut() -> bool) {
-    let ours = Settings { recent: vec![Path::new(kind).join("a.toml"); 10], ..Settings::default() };
+/// Repeatedly writes settings and a recovery file into the shared folder. `other_ended` returns true if the other
+/// program has ended; only then may its recovery file be found.
+fn write_repeatedly(folder: &Path, kind: &str, rounds: usize, mut other_ended: impl FnMut() -> bool) {
+    let ours = EditorSettings { recent: vec![Path::new(kind).join("a.toml"); 10], ..EditorSettings::default() };
     let recovery = RecoveryFile::new(folder);
     let document = quick();
     for _ in 0..rounds {
         ours.save(Some(folder));
         recovery.prepare(&document).unwrap().write().unwrap();
-        // Whoever wrote last: never half of both, nor the defaults that a broken file would give.
-        let recent = Settings::load(Some(folder)).recent;
+        // The file is that of one writer: neither a mixture, nor damaged, which would give the defaults.
+        let recent = EditorSettings::load(Some(folder)).recent;
         assert!(recent.len() == 10 && recent.iter().all(|path| *path == recent[0]), "{recent:?}");
-        assert!(Recovered::find(folder).is_empty() || other_ended(), "both live");
+        assert!(RecoveredDocument::find(folder).is_empty() || other_ended(), "both processes are running");
     }
-    // As one that crashes: its recovery stays.
+    // Simulates a crash: the recovery file stays.
     std::mem::forget(recovery);
 }
 
 const SHARED: &str = "BISCALE_TEST_SHARED_FOLDER";
 
 #[test]
-fn an_editor_that_is_told_of_a_shared_folder_writes_to_it() {
+fn an_editor_with_a_shared_folder_writes_to_it() {
     if let Some(folder) = std::env::var_os(SHARED) {
-        keep_writing(Path::new(&folder), "theirs", 200, || false);
+        write_repeatedly(Path::new(&folder), "theirs", 200, || false);
     }
 }
 
 #[test]
-fn two_programs_that_share_the_folder_of_the_editor_leave_its_files_whole() {
+fn two_programs_that_share_a_folder_leave_complete_files() {
     let folder = tempfile::tempdir().unwrap();
     let mut other = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "app::tests::soak::an_editor_that_is_told_of_a_shared_folder_writes_to_it"])
+        .args(["--exact", "app::tests::soak::an_editor_with_a_shared_folder_writes_to_it"])
         .env(SHARED, folder.path())
         .stdout(std::process::Stdio::null())
         .spawn()
         .unwrap();
-    keep_writing(folder.path(), "ours", 200, || other.try_wait().unwrap().is_some());
+    write_repeatedly(folder.path(), "ours", 200, || other.try_wait().unwrap().is_some());
     assert!(other.wait().unwrap().success());
-    // The other is gone: what it left is found, ours (which lives) is not.
-    let left = Recovered::find(folder.path());
+    // The recovery file of the ended program is found. That of this running process is not.
+    let left = RecoveredDocument::find(folder.path());
     if cfg!(target_os = "linux") {
         assert_eq!(left.len(), 1);
     }

@@ -1,4 +1,4 @@
-//! The brush, under the tile.
+//! The brush panel below the tile view.
 
 use crate::geometry::image_file::MAX_SLOTS;
 use crate::geometry::painted_slot;
@@ -6,10 +6,10 @@ use crate::scene::{Scene, shipped};
 use eframe::egui::{self, Slider, Ui};
 
 use crate::app::paint::{Brush, Tool};
-use crate::app::panels::fields::{row, words};
+use crate::app::panels::fields::{display_name, row};
 use crate::app::panels::paints;
 
-/// An image over the tile that is painted on.
+/// An image over the tile that the user paints on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layer {
     Heights,
@@ -18,7 +18,7 @@ pub enum Layer {
 }
 
 impl Layer {
-    /// What its file is called unless a person says otherwise.
+    /// Default name of the image's file.
     pub fn file(self) -> &'static str {
         match self {
             Self::Heights => "heights.png",
@@ -28,37 +28,37 @@ impl Layer {
     }
 }
 
-/// What is asked for here besides the brush.
+/// A request of the brush panel to the editor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BrushAsked {
+pub enum BrushRequest {
     Open(Layer),
     Save(Layer),
     Clear(Layer),
 }
 
-/// `scene` tells which materials there are to paint with.
-pub fn ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) -> Option<BrushAsked> {
+/// Draws the brush panel. `scene` lists the materials that the brush can paint.
+pub fn ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) -> Option<BrushRequest> {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 5.0;
-        let shape = Tool::ALL.iter().filter(|tool| !tool.prints());
+        let shape = Tool::ALL.iter().filter(|tool| !tool.changes_material());
         shape.for_each(|tool| tool_ui(ui, brush, *tool));
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 5.0;
-        Tool::ALL.iter().filter(|tool| tool.prints()).for_each(|tool| tool_ui(ui, brush, *tool));
+        Tool::ALL.iter().filter(|tool| tool.changes_material()).for_each(|tool| tool_ui(ui, brush, *tool));
     });
     shape_ui(ui, brush);
     match brush.tool {
         Tool::Color => color_ui(ui, brush),
-        Tool::MaterialSpec => material_ui(ui, brush, scene),
+        Tool::Material => material_ui(ui, brush, scene),
         Tool::Stamp => stamp_ui(ui, brush),
         _ => {}
     }
-    let asked = files_ui(ui, brush.tool);
-    ui.small("Right drag turns the tile, the wheel comes closer.");
-    asked
+    let request = files_ui(ui, brush.tool);
+    ui.small("Drag with the right button to turn the tile. Scroll to zoom.");
+    request
 }
 
 fn tool_ui(ui: &mut Ui, brush: &mut Brush, tool: Tool) {
@@ -67,25 +67,25 @@ fn tool_ui(ui: &mut Ui, brush: &mut Brush, tool: Tool) {
     }
 }
 
-/// Size, strength, edge.
+/// Draws the size, strength and softness of the brush.
 fn shape_ui(ui: &mut Ui, brush: &mut Brush) {
-    let percent = |ui: &mut Ui, caption: &str, tip: &str, value: &mut f32, most: f32| {
+    let percent = |ui: &mut Ui, caption: &str, tip: &str, value: &mut f32, max: f32| {
         row(ui, caption, tip, |ui| {
-            let mut shown = *value * 100.0;
+            let mut percentage = *value * 100.0;
             ui.spacing_mut().slider_width = (ui.available_width() - 70.0).max(40.0);
-            let slider = Slider::new(&mut shown, if most > 0.6 { 0.0 } else { 0.5 }..=most * 100.0);
+            let slider = Slider::new(&mut percentage, if max > 0.6 { 0.0 } else { 0.5 }..=max * 100.0);
             if ui.add(slider.suffix(" %").max_decimals(1)).changed() {
-                *value = shown / 100.0;
+                *value = percentage / 100.0;
             }
         });
     };
-    percent(ui, "Size", "Radius as a part of the tile ([ and ])", &mut brush.radius, 0.5);
-    // A place has one material, wholly.
-    if brush.tool != Tool::MaterialSpec {
-        percent(ui, "Strength", "How much a stroke does; a pen's pressure lessens it", &mut brush.strength, 1.0);
-        percent(ui, "Softness", "0: a hard edge. 100: soft from the middle on", &mut brush.falloff, 1.0);
+    percent(ui, "Size", "Radius as a fraction of the tile ([ and ])", &mut brush.radius, 0.5);
+    // Each texel has exactly one material, so strength and softness do not apply.
+    if brush.tool != Tool::Material {
+        percent(ui, "Strength", "Effect of a stroke. Light pen pressure reduces it", &mut brush.strength, 1.0);
+        percent(ui, "Softness", "0: a hard edge. 100: soft from the centre outwards", &mut brush.falloff, 1.0);
     }
-    row(ui, "Wrap", "Strokes go on at the opposite edge of the tile", |ui| {
+    row(ui, "Wrap", "Strokes continue at the opposite edge of the tile", |ui| {
         ui.checkbox(&mut brush.wrap, "around the edges")
     });
 }
@@ -99,16 +99,16 @@ fn color_ui(ui: &mut Ui, brush: &mut Brush) {
     });
 }
 
-/// Which material is painted: the surface's own, those that there are, or one more.
+/// Draws the choice of the painted material: the original one, an existing one, or a new one.
 fn material_ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) {
-    let there = paints::painted(scene);
-    // The first stroke makes the material.
-    let next = (1..=MAX_SLOTS).find(|slot| !there.contains(slot));
-    let name = |slot: u8| if slot == 0 { "The surface's own".to_owned() } else { words(&painted_slot(slot)) };
-    let shown = if Some(brush.slot) == next { format!("{} (new)", name(brush.slot)) } else { name(brush.slot) };
-    row(ui, "Material", "What the places that are painted wear; its BRDF is under Materials", |ui| {
-        egui::ComboBox::from_id_salt("paint material").selected_text(shown).width(150.0).show_ui(ui, |ui| {
-            for slot in std::iter::once(0).chain(there) {
+    let existing = paints::painted(scene);
+    // The first stroke creates the material.
+    let next = (1..=MAX_SLOTS).find(|slot| !existing.contains(slot));
+    let name = |slot: u8| if slot == 0 { "Original material".to_owned() } else { display_name(&painted_slot(slot)) };
+    let selected = if Some(brush.slot) == next { format!("{} (new)", name(brush.slot)) } else { name(brush.slot) };
+    row(ui, "Material", "Material of the painted places. Edit its BRDF under Materials", |ui| {
+        egui::ComboBox::from_id_salt("paint material").selected_text(selected).width(150.0).show_ui(ui, |ui| {
+            for slot in std::iter::once(0).chain(existing) {
                 ui.selectable_value(&mut brush.slot, slot, name(slot));
             }
             if let Some(next) = next {
@@ -119,7 +119,7 @@ fn material_ui(ui: &mut Ui, brush: &mut Brush, scene: &Scene) {
 }
 
 fn stamp_ui(ui: &mut Ui, brush: &mut Brush) {
-    row(ui, "Pattern", "What the stamp prints", |ui| {
+    row(ui, "Pattern", "Shape of the stamp", |ui| {
         egui::ComboBox::from_id_salt("stamp").selected_text(stem(brush.stamp)).show_ui(ui, |ui| {
             for (name, _) in shipped::ASSETS {
                 ui.selectable_value(&mut brush.stamp, *name, stem(name));
@@ -128,30 +128,32 @@ fn stamp_ui(ui: &mut Ui, brush: &mut Brush) {
     });
 }
 
-/// A shipped image as a person calls it.
+/// Returns the displayed name of a shipped image.
 fn stem(file: &str) -> String {
-    words(file.split('.').next().unwrap_or(file))
+    display_name(file.split('.').next().unwrap_or(file))
 }
 
-/// Images of the layer that the brush paints on.
-fn files_ui(ui: &mut Ui, tool: Tool) -> Option<BrushAsked> {
+/// Draws the buttons that open, save and clear the layer that the brush paints on.
+fn files_ui(ui: &mut Ui, tool: Tool) -> Option<BrushRequest> {
     let (layer, names, clear) = match tool {
-        Tool::Color => (Layer::Colors, "colours", ("No colours", "Remove what was painted")),
-        Tool::MaterialSpec => {
-            (Layer::Slots, "materials", ("No materials", "Every place wears the surface's own again"))
-        }
-        _ => (Layer::Heights, "heights", ("Flatten all", "Back to a plane")),
+        Tool::Color => (Layer::Colors, "colours", ("Clear colours", "Remove the painted colours")),
+        Tool::Material => (Layer::Slots, "materials", ("Clear materials", "Remove the painted materials")),
+        _ => (Layer::Heights, "heights", ("Flatten all", "Set all heights to a plane")),
     };
-    let mut asked = None;
+    let mut request = None;
     ui.horizontal_wrapped(|ui| {
-        let mut button = |name: String, tip: &str, what: BrushAsked| {
+        let mut button = |name: String, tip: &str, choice: BrushRequest| {
             if ui.button(name).on_hover_text(tip).clicked() {
-                asked = Some(what);
+                request = Some(choice);
             }
         };
-        button(format!("Open {names}…"), "An image to go on with", BrushAsked::Open(layer));
-        button(format!("Save {names}…"), "As an image, beside what the scene saves by itself", BrushAsked::Save(layer));
-        button(clear.0.to_owned(), clear.1, BrushAsked::Clear(layer));
+        button(format!("Open {names}…"), "Open an image to paint on", BrushRequest::Open(layer));
+        button(
+            format!("Save {names}…"),
+            "Save a copy as an image. Saving the scene also saves the painted images",
+            BrushRequest::Save(layer),
+        );
+        button(clear.0.to_owned(), clear.1, BrushRequest::Clear(layer));
     });
-    asked
+    request
 }

@@ -1,67 +1,67 @@
-//! The shipped scenes as small pictures to start from.
+//! The gallery: thumbnails of the shipped scenes.
 
 use std::collections::HashMap;
 
 use crate::scene::shipped;
 use eframe::egui::{self, Color32, Context, Rect, RichText, ScrollArea, Sense, TextureHandle, Ui, pos2, vec2};
 
-use crate::app::worker::{Thumbnail, ThumbnailJob};
+use crate::app::worker::{SceneThumbnail, ThumbnailJob};
 
 #[derive(Default)]
 pub struct Gallery {
-    /// `None` for a scene that could not be shown.
+    /// Thumbnails. `None` means that a scene could not be rendered.
     images: HashMap<&'static str, Option<TextureHandle>>,
-    asked: Option<&'static str>,
-    /// What is looked for among names and descriptions.
-    pub sought: String,
+    requested: Option<&'static str>,
+    /// Search text for names and descriptions.
+    pub search: String,
 }
 
 impl Gallery {
-    pub fn take(&mut self, ctx: &Context, made: Thumbnail) {
+    pub fn receive(&mut self, ctx: &Context, thumbnail: SceneThumbnail) {
         let options = egui::TextureOptions::LINEAR;
-        let texture = made.image.map(|image| ctx.load_texture(made.name, image, options));
-        self.images.insert(made.name, texture);
-        self.asked = None;
+        let texture = thumbnail.image.map(|image| ctx.load_texture(thumbnail.name, image, options));
+        self.images.insert(thumbnail.name, texture);
+        self.requested = None;
     }
 
-    /// The next picture that is missing, if none is being made.
+    /// Returns the job for the next missing thumbnail, unless one is being rendered.
     pub fn job(&mut self) -> Option<ThumbnailJob> {
-        if self.asked.is_some() {
+        if self.requested.is_some() {
             return None;
         }
         let name = shipped::names().find(|name| !self.images.contains_key(name))?;
-        self.asked = Some(name);
+        self.requested = Some(name);
         Some(ThumbnailJob { name })
     }
 
-    /// What was being made was given up.
+    /// Notes that the current job was cancelled.
     pub fn interrupted(&mut self) {
-        self.asked = None;
+        self.requested = None;
     }
 
     pub fn is_waiting(&self) -> bool {
-        self.asked.is_some()
+        self.requested.is_some()
     }
 
-    /// The pictures; the one that was clicked.
+    /// Draws the thumbnails and returns the clicked one.
     pub fn ui(&mut self, ui: &mut Ui, current: &str) -> Option<&'static str> {
         let mut chosen = None;
         ui.add_space(4.0);
         ui.label(RichText::new("Gallery").heading());
-        let hint = egui::TextEdit::singleline(&mut self.sought).hint_text("Search").desired_width(f32::INFINITY);
-        let field = ui.add(hint).on_hover_text("Words of a name or a description: velvet, groove, silver, Fig. 8");
+        let hint = egui::TextEdit::singleline(&mut self.search).hint_text("Search").desired_width(f32::INFINITY);
+        let field = ui.add(hint).on_hover_text("Words in a name or a description: velvet, groove, silver, Fig. 8");
         field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Search the gallery"));
         ui.add_space(2.0);
-        let found: Vec<_> = shipped::names().filter(|name| is_sought(name, &self.sought)).collect();
+        let found: Vec<_> = shipped::names().filter(|name| matches_search(name, &self.search)).collect();
         if found.is_empty() {
-            ui.weak(format!("No scene is about \"{}\".", self.sought.trim()));
+            ui.weak(format!("No scene matches \"{}\".", self.search.trim()));
             if ui.button("Show all").clicked() {
-                self.sought.clear();
+                self.search.clear();
             }
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             let columns = ((ui.available_width() + 6.0) / 118.0).floor().max(1.0);
-            // A little less: a row that is too wide by rounding would wrap.
+            // One point less, because a row that rounding makes too wide would wrap.
             let side = ((ui.available_width() - (columns - 1.0) * 6.0) / columns).floor() - 1.0;
             ui.horizontal_wrapped(|ui| {
                 for name in found {
@@ -101,19 +101,19 @@ impl Gallery {
     }
 }
 
-/// Whether a scene's name and description have all the words.
-fn is_sought(name: &str, sought: &str) -> bool {
+/// Returns true if a scene's name and description contain all words of the search text.
+fn matches_search(name: &str, search: &str) -> bool {
     let description = shipped::description(name).unwrap_or_default();
     let text = format!("{name} {} {description}", title(name)).to_lowercase();
-    sought.to_lowercase().split_whitespace().all(|word| text.contains(word))
+    search.to_lowercase().split_whitespace().all(|word| text.contains(word))
 }
 
-/// `fig6a_velvet_spread` as a caption: `Velvet spread`.
+/// Returns the caption of a scene: `Velvet spread` for `fig6a_velvet_spread`.
 pub fn title(name: &str) -> String {
     let rest = match name.split_once('_') {
         Some((first, rest)) if first.starts_with("fig") => rest.to_owned(),
         Some((first, rest)) if first.starts_with("table") => format!("{rest} ({first})"),
         _ => name.to_owned(),
     };
-    crate::app::panels::fields::words(&rest)
+    crate::app::panels::fields::display_name(&rest)
 }

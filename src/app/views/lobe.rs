@@ -1,4 +1,4 @@
-//! f̄ for one light: all viewers as a disc, and a cut through light and normal as a polar plot.
+//! Plots of f̄ for one light: all viewers on a disc, and a polar plot in the plane of light and normal.
 
 use std::sync::Arc;
 
@@ -7,17 +7,18 @@ use crate::math::directions::{from_angles, to_angles};
 use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, TextureHandle, Ui, pos2, vec2};
 use glam::Vec3;
 
-use crate::app::worker::{LobeJob, LobeMade, logarithmic};
+use crate::app::worker::{LobeJob, LobePlot, logarithmic};
 
-/// What the view holds between frames.
+/// State of the view between frames.
 pub struct LobeState {
-    /// To the light, tile frame.
+    /// Direction to the light, in the tile frame.
     pub light: Vec3,
     pub viewer: Option<Vec3>,
     pub log: bool,
     texture: Option<TextureHandle>,
-    made: Option<Box<LobeMade>>,
-    asked: Option<(*const EffectiveBrdf, Vec3, Option<Vec3>, bool)>,
+    plot: Option<Box<LobePlot>>,
+    /// BRDF, light, viewer and scale of the last request.
+    requested: Option<(*const EffectiveBrdf, Vec3, Option<Vec3>, bool)>,
 }
 
 impl Default for LobeState {
@@ -27,35 +28,35 @@ impl Default for LobeState {
             viewer: None,
             log: false,
             texture: None,
-            made: None,
-            asked: None,
+            plot: None,
+            requested: None,
         }
     }
 }
 
 impl LobeState {
-    /// The job for what is to be shown, where it is not what was asked for last.
+    /// Returns the job for the plot to display, unless it is the last request.
     pub fn job(&mut self, brdf: &Arc<EffectiveBrdf>) -> Option<LobeJob> {
         let wanted = (Arc::as_ptr(brdf), self.light, self.viewer, self.log);
-        if self.asked == Some(wanted) {
+        if self.requested == Some(wanted) {
             return None;
         }
-        self.asked = Some(wanted);
+        self.requested = Some(wanted);
         Some(LobeJob { brdf: brdf.clone(), light: self.light, viewer: self.viewer, log: self.log })
     }
 
-    pub fn take(&mut self, ctx: &egui::Context, made: Box<LobeMade>) {
+    pub fn receive(&mut self, ctx: &egui::Context, plot: Box<LobePlot>) {
         let options = egui::TextureOptions::LINEAR;
         match &mut self.texture {
-            Some(texture) => texture.set(made.image.clone(), options),
-            None => self.texture = Some(ctx.load_texture("lobe", made.image.clone(), options)),
+            Some(texture) => texture.set(plot.image.clone(), options),
+            None => self.texture = Some(ctx.load_texture("lobe", plot.image.clone(), options)),
         }
-        self.made = Some(made);
+        self.plot = Some(plot);
     }
 
-    /// Textures belong to a window; in another one they are made anew.
+    /// Drops what belongs to the old window, so that the new window loads it again.
     pub fn move_to(&mut self) {
-        (self.texture, self.asked) = (None, None);
+        (self.texture, self.requested) = (None, None);
     }
 
     pub fn ui(&mut self, ui: &mut Ui) {
@@ -63,9 +64,9 @@ impl LobeState {
         ui.horizontal(|ui| {
             ui.strong("Reflection");
             ui.weak(format!("light {:.0}° / {:.0}°", theta.to_degrees(), phi.to_degrees()))
-                .on_hover_text("Angle from the normal, and azimuth");
+                .on_hover_text("Polar angle and azimuth");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.toggle_value(&mut self.log, "Log").on_hover_text("Three decades instead of linear brightness");
+                ui.toggle_value(&mut self.log, "Log").on_hover_text("Logarithmic scale over three decades");
             });
         });
         let width = ui.available_width();
@@ -74,8 +75,8 @@ impl LobeState {
             self.disc_ui(ui, side);
             self.polar_ui(ui, vec2(width - side - 8.0, side));
         });
-        if let Some(made) = &self.made {
-            let caption = match (made.value, self.viewer) {
+        if let Some(plot) = &self.plot {
+            let caption = match (plot.value, self.viewer) {
                 (Some(value), Some(viewer)) => {
                     let (theta, phi) = to_angles(viewer);
                     format!(
@@ -87,13 +88,13 @@ impl LobeState {
                         phi.to_degrees()
                     )
                 }
-                _ => format!("peak {:.3} /sr; drag the light on the disc", made.most),
+                _ => format!("peak {:.3} /sr. Drag the light on the disc", plot.max),
             };
             ui.small(caption);
         }
     }
 
-    /// The hemisphere of viewers; the light is dragged on it.
+    /// Draws the hemisphere of viewers, on which the user drags the light.
     fn disc_ui(&mut self, ui: &mut Ui, side: f32) {
         let (area, response) = ui.allocate_exact_size(vec2(side, side), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Lobe view"));
@@ -119,7 +120,7 @@ impl LobeState {
             let inside = offset.clamp_length_max(0.995);
             self.light = inside.extend((1.0 - inside.length_squared()).max(0.0).sqrt());
         }
-        response.on_hover_text("Every viewer above the surface, seen from above. Drag the light.");
+        response.on_hover_text("All view directions above the surface, projected onto the disc. Drag the light.");
     }
 
     fn polar_ui(&self, ui: &mut Ui, size: egui::Vec2) {
@@ -135,8 +136,8 @@ impl LobeState {
         for angle in [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0] {
             painter.line_segment([origin, on_arc(origin, radius, angle)], grid);
         }
-        let Some(made) = &self.made else { return };
-        let shown = |value: Vec3| if self.log { logarithmic(value / made.most) } else { value / made.most };
+        let Some(plot) = &self.plot else { return };
+        let scaled = |value: Vec3| if self.log { logarithmic(value / plot.max) } else { value / plot.max };
         let dark = ui.visuals().dark_mode;
         let colors = if dark {
             [Color32::from_rgb(255, 96, 88), Color32::from_rgb(96, 214, 112), Color32::from_rgb(104, 152, 255)]
@@ -144,11 +145,11 @@ impl LobeState {
             [Color32::from_rgb(200, 40, 32), Color32::from_rgb(24, 140, 48), Color32::from_rgb(40, 80, 220)]
         };
         for (channel, color) in colors.into_iter().enumerate() {
-            let at = |(k, value): (usize, &Vec3)| on_arc(origin, radius * shown(*value)[channel], k as f32 - 90.0);
-            let line: Vec<Pos2> = made.cut.iter().enumerate().map(at).collect();
+            let at = |(k, value): (usize, &Vec3)| on_arc(origin, radius * scaled(*value)[channel], k as f32 - 90.0);
+            let line: Vec<Pos2> = plot.cut.iter().enumerate().map(at).collect();
             painter.add(egui::Shape::line(line, Stroke::new(1.6, color)));
         }
-        let light = to_angles(made.light).0.to_degrees();
+        let light = to_angles(plot.light).0.to_degrees();
         let tip = on_arc(origin, radius, -light);
         painter.line_segment([origin, tip], Stroke::new(1.0, Color32::from_rgb(255, 205, 90)));
         sun(ui, tip);
@@ -165,7 +166,7 @@ impl LobeState {
     }
 }
 
-/// A place on an arc about `origin`; 0° is up, positive to the right.
+/// Returns a point on an arc about `origin`. 0° is up, and positive angles are to the right.
 fn on_arc(origin: Pos2, radius: f32, degrees: f32) -> Pos2 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     origin + vec2(sin, -cos) * radius

@@ -1,10 +1,10 @@
-//! The views on both scales.
+//! The views of both scales, and the widgets that belong to them.
 
 pub mod brushes;
 pub mod gallery;
-pub mod hand;
 pub mod lobe;
 pub mod object;
+pub mod pointer;
+pub mod spinner;
 pub mod tile;
-pub mod wheel;
 pub mod wipe;

@@ -1,4 +1,4 @@
-//! The large view: the object, shaded by the effective BRDF. Drag turns it, the wheel comes closer.
+//! The object view, shaded by the effective BRDF. Dragging turns the object, and scrolling zooms.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -9,138 +9,139 @@ use eframe::egui::{
     pos2, vec2,
 };
 
-use super::wheel::wheel;
-use super::wipe::Kept;
+use super::spinner::spinner;
+use super::wipe::ComparisonImage;
 use crate::app::actions::Action;
-use crate::app::panels::fields::words;
-use crate::app::worker::{DeviceImage, DisplayImage, Grade, Made};
+use crate::app::panels::fields::display_name;
+use crate::app::worker::{DisplayImage, GpuImage, Grade, RenderedPreview};
 
-/// The camera comes no nearer than this many radii; the lens does the rest.
-const NEAREST: f32 = 2.2;
-/// What takes longer than this says so [s].
-const SLOW: f32 = 0.33;
-/// A lens narrower than this widens before the camera moves away.
-const NARROW: f32 = 14.0;
-/// What the view leaves to the edges of panels, points.
-const EDGE: f32 = 6.0;
+/// Minimum distance of the camera, in radii of the object. Zooming further narrows the field of view.
+const MIN_DISTANCE: f32 = 2.2;
+/// Delay before the view reports that an image is being computed [s].
+const PROGRESS_DELAY: f32 = 0.33;
+/// Below this field of view [degrees], zooming out widens it and does not move the camera.
+const NARROW_FOV: f32 = 14.0;
+/// Margin that the view leaves to the drag handles of the panels [points].
+const HANDLE_MARGIN: f32 = 6.0;
 
-/// What the view draws.
+/// The texture that the view draws.
 enum Texture {
     Uploaded(TextureHandle),
-    OnDevice(Arc<DeviceImage>),
+    OnGpu(Arc<GpuImage>),
 }
 
 impl Texture {
     fn id(&self) -> TextureId {
         match self {
             Self::Uploaded(texture) => texture.id(),
-            Self::OnDevice(image) => image.id,
+            Self::OnGpu(image) => image.id,
         }
     }
 
     fn size(&self) -> egui::Vec2 {
         match self {
             Self::Uploaded(texture) => texture.size_vec2(),
-            Self::OnDevice(image) => vec2(image.size[0] as f32, image.size[1] as f32),
+            Self::OnGpu(image) => vec2(image.size[0] as f32, image.size[1] as f32),
         }
     }
 }
 
-/// What the view holds between frames.
+/// State of the view between frames.
 #[derive(Default)]
 pub struct ObjectView {
     texture: Option<Texture>,
-    pub made: Option<Box<Made>>,
-    /// Version and size of the picture that was asked for last.
-    pub asked: Option<(u64, [usize; 2])>,
-    /// What the worker is at, for the status line.
-    pub doing: Option<&'static str>,
-    /// The version whose refinement was given up.
+    pub preview: Option<Box<RenderedPreview>>,
+    /// Version and size of the last request.
+    pub requested: Option<(u64, [usize; 2])>,
+    /// Current activity of the worker, for the status line.
+    pub activity: Option<&'static str>,
+    /// The version whose refinement was cancelled.
     pub stopped: Option<u64>,
-    /// The version of which no picture could be made.
+    /// The version that could not be rendered.
     pub failed: Option<u64>,
-    pub kept: Option<Kept>,
-    /// Where the wipe stands, 0 left to 1 right.
+    /// Image A, which the view compares with the current one.
+    pub comparison: Option<ComparisonImage>,
+    /// Position of the dividing line, from 0 (left) to 1 (right).
     pub wipe: f32,
-    /// When the picture that is awaited was asked for.
-    pub since: Option<Instant>,
-    /// Whether the pointer picks.
+    /// Time at which the pending image was requested.
+    pub requested_at: Option<Instant>,
+    /// True in pick mode.
     pub picking: bool,
-    /// What the pointer is over, in parts of the view, while it picks.
-    pub pointed: Option<egui::Vec2>,
+    /// Position of the pointer in pick mode, in fractions of the view.
+    pub pick_position: Option<egui::Vec2>,
 }
 
 impl ObjectView {
-    /// Shows a picture, unless what is shown is newer or better.
-    pub fn take(&mut self, ctx: &egui::Context, mut made: Box<Made>) {
-        // Of two pictures of one version a draft in the view's present shape is better than a full one in another.
-        let rank = |made: &Made| (made.version, self.has_shape(made), made.grade);
-        if self.made.as_ref().is_some_and(|shown| rank(shown) > rank(&made)) {
+    /// Displays an image, unless the displayed one is newer or better.
+    pub fn receive(&mut self, ctx: &egui::Context, mut preview: Box<RenderedPreview>) {
+        // For one version, a draft in the view's current aspect ratio is better than a final image in another one.
+        let rank = |preview: &RenderedPreview| (preview.version, self.has_shape(preview), preview.grade);
+        if self.preview.as_ref().is_some_and(|shown| rank(shown) > rank(&preview)) {
             return;
         }
-        (self.since, self.failed) = (None, None);
+        (self.requested_at, self.failed) = (None, None);
         let options = TextureOptions::LINEAR;
-        match (&mut self.texture, &made.image) {
+        match (&mut self.texture, &preview.image) {
             (Some(Texture::Uploaded(texture)), DisplayImage::Pixels(image)) => texture.set(image.clone(), options),
             (texture, DisplayImage::Pixels(image)) => {
                 *texture = Some(Texture::Uploaded(ctx.load_texture("object", image.clone(), options)));
             }
-            (texture, DisplayImage::OnDevice(image)) => *texture = Some(Texture::OnDevice(image.clone())),
+            (texture, DisplayImage::OnGpu(image)) => *texture = Some(Texture::OnGpu(image.clone())),
         }
-        if made.grade == Grade::Final {
-            self.doing = None;
+        if preview.grade == Grade::Final {
+            self.activity = None;
         }
-        // A was kept before it was finished: it gets the finished picture.
-        if let Some(kept) = &mut self.kept
-            && kept.version == made.version
-            && let Some(image) = made.image.pixels()
+        // If A was stored before its image was final, the final image replaces it.
+        if let Some(comparison) = &mut self.comparison
+            && comparison.version == preview.version
+            && let Some(image) = preview.image.pixels()
         {
-            kept.texture.set(image.clone(), options);
-            kept.image = image;
+            comparison.texture.set(image.clone(), options);
+            comparison.image = image;
         }
-        // Until the next one is known, plots show the last.
-        made.brdf = made.brdf.or_else(|| self.made.as_ref().and_then(|last| last.brdf.clone()));
-        self.made = Some(made);
+        // Plots show the last known BRDF until the next one arrives.
+        preview.brdf = preview.brdf.or_else(|| self.preview.as_ref().and_then(|last| last.brdf.clone()));
+        self.preview = Some(preview);
     }
 
-    /// No picture of this version comes: nothing is awaited any more.
+    /// Notes that a version cannot be rendered.
     pub fn fail(&mut self, version: u64) {
-        (self.doing, self.since, self.failed) = (None, None, Some(version));
+        (self.activity, self.requested_at, self.failed) = (None, None, Some(version));
     }
 
-    /// Whether a picture has the shape that was asked for last.
-    fn has_shape(&self, made: &Made) -> bool {
+    /// Returns true if an image has the requested aspect ratio.
+    fn has_shape(&self, preview: &RenderedPreview) -> bool {
         let ratio = |width: usize, height: usize| width as f32 / height.max(1) as f32;
-        self.asked.is_none_or(|(_, [width, height])| {
-            let [has_width, has_height] = made.image.size();
+        self.requested.is_none_or(|(_, [width, height])| {
+            let [has_width, has_height] = preview.image.size();
             let (has, wanted) = (ratio(has_width, has_height), ratio(width, height));
             (has / wanted - 1.0).abs() < 0.03
         })
     }
 
-    /// Textures belong to a window; in another one they are made anew.
+    /// Moves to another window. Textures belong to a window, so they are loaded again.
     pub fn move_to(&mut self, ctx: &egui::Context) {
-        (self.texture, self.asked, self.since) = (None, None, None);
-        if let Some(kept) = &mut self.kept {
-            kept.texture = ctx.load_texture("kept", kept.image.clone(), TextureOptions::LINEAR);
+        (self.texture, self.requested, self.requested_at) = (None, None, None);
+        if let Some(comparison) = &mut self.comparison {
+            comparison.texture = ctx.load_texture("comparison", comparison.image.clone(), TextureOptions::LINEAR);
         }
-        match self.made.as_ref().map(|made| &made.image) {
+        match self.preview.as_ref().map(|preview| &preview.image) {
             Some(DisplayImage::Pixels(image)) => {
                 let texture = ctx.load_texture("object", image.clone(), TextureOptions::LINEAR);
                 self.texture = Some(Texture::Uploaded(texture));
             }
-            // It went with the window.
-            Some(DisplayImage::OnDevice(_)) => self.made = None,
+            // The texture was lost with the old window.
+            Some(DisplayImage::OnGpu(_)) => self.preview = None,
             None => {}
         }
     }
 
-    /// Shows the picture and moves the scene's camera and light by what the hand does. Returns the pixels it covers.
+    /// Draws the image, and moves the scene's camera and light with the pointer. Returns the size in pixels.
     pub fn ui(&mut self, ui: &mut Ui, scene: &mut Scene) -> [usize; 2] {
         let size = ui.available_size().max(vec2(64.0, 64.0));
         let (id, area) = ui.allocate_space(size);
-        // The edges of the panels beside it can be had from here, too.
-        let response = ui.interact(area.shrink2(vec2(EDGE, 0.0)), id, Sense::click_and_drag());
+        // The margin keeps the edges of the neighbouring panels draggable.
+        let response = ui.interact(area.shrink2(vec2(HANDLE_MARGIN, 0.0)), id, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Object view"));
         ui.painter().rect_filled(area, 0.0, Color32::from_gray(22));
         if let Some(texture) = &self.texture {
@@ -148,17 +149,17 @@ impl ObjectView {
             let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
             painter.image(texture.id(), covered(area, texture.size()), uv, Color32::WHITE);
         } else if self.failed.is_none() {
-            self.first_ui(ui, area);
+            self.placeholder_ui(ui, area);
         }
-        self.waiting_ui(ui, area);
+        self.progress_ui(ui, area);
         self.wipe_ui(ui, area);
         let on_wipe =
-            self.kept.is_some() && response.interact_pointer_pos().is_some_and(|at| self.is_on_wipe(area, at));
+            self.comparison.is_some() && response.interact_pointer_pos().is_some_and(|at| self.is_on_wipe(area, at));
         if !on_wipe {
-            turn(ui, &response, scene, area, self.made.as_ref().map_or(4.0, |made| made.distance));
+            navigate(ui, &response, scene, area, self.preview.as_ref().map_or(4.0, |preview| preview.distance));
         }
         let picks = self.picking && !response.dragged();
-        self.pointed = response
+        self.pick_position = response
             .hover_pos()
             .filter(|_| picks)
             .map(|at| ((at - area.min) / area.size()).clamp(egui::Vec2::ZERO, egui::Vec2::splat(1.0)));
@@ -166,38 +167,37 @@ impl ObjectView {
         [pixels.x.round() as usize, pixels.y.round() as usize]
     }
 
-    /// Says that there is no picture yet, in still words: while the processor draws the window, too, every frame holds the
-    /// picture up.
-    fn first_ui(&self, ui: &Ui, area: Rect) {
-        let seconds = self.since.map_or(0.0, |since| since.elapsed().as_secs_f32());
+    /// Draws static text while no image exists. An animation would delay the image if the CPU also draws the window.
+    fn placeholder_ui(&self, ui: &Ui, area: Rect) {
+        let seconds = self.requested_at.map_or(0.0, |since| since.elapsed().as_secs_f32());
         let text = match seconds {
-            ..1.0 => "Computing the picture".to_owned(),
-            _ => format!("Computing the picture, {seconds:.0} s"),
+            ..1.0 => "Computing the image".to_owned(),
+            _ => format!("Computing the image, {seconds:.0} s"),
         };
         ui.ctx().request_repaint_after_secs(1.0 - seconds.fract());
         let font = egui::FontId::proportional(13.0);
         ui.painter().text(area.center(), egui::Align2::CENTER_CENTER, text, font, Color32::from_gray(150));
     }
 
-    /// Says that the first picture of an edit is still being computed, once that takes long.
-    fn waiting_ui(&self, ui: &mut Ui, area: Rect) {
-        let Some(since) = self.since.filter(|_| self.texture.is_some()) else { return };
-        let left = SLOW - since.elapsed().as_secs_f32();
+    /// Draws a progress note if the first image of an edit takes long.
+    fn progress_ui(&self, ui: &mut Ui, area: Rect) {
+        let Some(since) = self.requested_at.filter(|_| self.texture.is_some()) else { return };
+        let left = PROGRESS_DELAY - since.elapsed().as_secs_f32();
         if left > 0.0 {
             ui.ctx().request_repaint_after_secs(left);
             return;
         }
-        // Messages lie at the foot.
-        let place = Rect::from_min_size(area.left_top() + vec2(10.0, 8.0), vec2(170.0, 26.0));
-        ui.painter().rect_filled(place, 5.0, Color32::from_black_alpha(150));
-        let left = Rect::from_center_size(place.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0));
-        ui.scope_builder(egui::UiBuilder::new().max_rect(left), |ui| wheel(ui, 14.0, Color32::WHITE));
+        // The note is at the top, because messages are at the bottom.
+        let note = Rect::from_min_size(area.left_top() + vec2(10.0, 8.0), vec2(170.0, 26.0));
+        ui.painter().rect_filled(note, 5.0, Color32::from_black_alpha(150));
+        let left = Rect::from_center_size(note.left_center() + vec2(14.0, 0.0), vec2(14.0, 14.0));
+        ui.scope_builder(egui::UiBuilder::new().max_rect(left), |ui| spinner(ui, 14.0, Color32::WHITE));
         let text = format!("Computing, {:.0} s", since.elapsed().as_secs_f32());
         let font = egui::FontId::proportional(12.0);
-        ui.painter().text(place.left_center() + vec2(28.0, 0.0), egui::Align2::LEFT_CENTER, text, font, Color32::WHITE);
+        ui.painter().text(note.left_center() + vec2(28.0, 0.0), egui::Align2::LEFT_CENTER, text, font, Color32::WHITE);
     }
 
-    /// What is looked at and how, above the view.
+    /// Draws the toolbar above the view.
     pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene) -> Option<Action> {
         let mut action = None;
         ui.horizontal(|ui| {
@@ -205,21 +205,28 @@ impl ObjectView {
             ui.name_inputs("Object", |ui| object_ui(ui, scene));
             ui.name_inputs("Exposure", |ui| exposure_ui(ui, scene));
             ui.separator();
-            for (which, name, tip, on) in [
+            for (choice, name, tip, on) in [
                 (Action::Frame, "Frame", "Show the whole object (F)", false),
-                (Action::Snapshot, "A/B", "Keep this picture and compare with what follows (B)", self.kept.is_some()),
+                (
+                    Action::Snapshot,
+                    "A/B",
+                    "Store this image as A and compare later ones with it (B)",
+                    self.comparison.is_some(),
+                ),
                 (
                     Action::Pick,
                     "Pick",
-                    "Point at the object: how it reflects there, and what the facets add to it (I)",
+                    "Point at the object to see how it reflects there, and what each facet contributes (I)",
                     self.picking,
                 ),
             ] {
                 if ui.selectable_label(on, name).on_hover_text(tip).clicked() {
-                    action = Some(which);
+                    action = Some(choice);
                 }
             }
-            if self.kept.is_some() && ui.button("Back to A").on_hover_text("Undo all edits since A, as one").clicked() {
+            if self.comparison.is_some()
+                && ui.button("Back to A").on_hover_text("Undo all edits since A in one step").clicked()
+            {
                 action = Some(Action::BackToA);
             }
         });
@@ -228,10 +235,10 @@ impl ObjectView {
 }
 
 fn object_ui(ui: &mut Ui, scene: &mut Scene) {
-    let combo = egui::ComboBox::from_id_salt("object here").selected_text(words(&scene.object.kind)).width(90.0);
+    let combo = egui::ComboBox::from_id_salt("object here").selected_text(display_name(&scene.object.kind)).width(90.0);
     combo.show_ui(ui, |ui| {
         for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
-            if ui.selectable_label(scene.object.kind == *kind, words(kind)).clicked() {
+            if ui.selectable_label(scene.object.kind == *kind, display_name(kind)).clicked() {
                 (*kind).clone_into(&mut scene.object.kind);
                 scene.object.path = None;
             }
@@ -249,15 +256,16 @@ fn exposure_ui(ui: &mut Ui, scene: &mut Scene) {
     }
 }
 
-/// The rectangle that covers `area` with a picture of another shape, centred: a resized view keeps the object's shape.
+/// Returns the centred rectangle of an image that covers `area` without distortion.
 pub(super) fn covered(area: Rect, image: egui::Vec2) -> Rect {
     let scale = (area.width() / image.x.max(1.0)).max(area.height() / image.y.max(1.0));
     let rect = Rect::from_center_size(area.center(), image * scale);
     if (rect.width() - area.width()).abs() < 4.0 && (rect.height() - area.height()).abs() < 4.0 { area } else { rect }
 }
 
-/// Drag turns, the middle button moves, shift-drag or the right button turns the light, the wheel comes closer.
-fn turn(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f32) {
+/// Applies pointer input. Dragging turns the object, and the middle button moves it. Shift-drag or the right button
+/// turns the light, and scrolling zooms.
+fn navigate(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f32) {
     let delta = response.drag_delta();
     let shift = ui.input(|input| input.modifiers.shift);
     let light = response.dragged_by(PointerButton::Secondary) || response.dragged_by(PointerButton::Primary) && shift;
@@ -265,7 +273,7 @@ fn turn(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f
         scene.light.rotation_deg = wrapped(scene.light.rotation_deg + delta.x * 0.5);
     } else if response.dragged_by(PointerButton::Middle) && delta != egui::Vec2::ZERO {
         let camera = scene.camera.get_or_insert_default();
-        // What is under the hand stays under it: the view spans this many radii.
+        // The point under the pointer stays under it. The view spans this many radii.
         let span = 2.0 * distance * (0.5 * camera.fov_deg).to_radians().tan();
         camera.pan += glam::Vec2::new(-delta.x, delta.y) * span / area.width().min(area.height());
     } else if response.dragged_by(PointerButton::Primary) && delta != egui::Vec2::ZERO {
@@ -278,7 +286,7 @@ fn turn(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f
         let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
         let factor = (-scroll * 0.002).exp() / pinch;
         if factor != 1.0 {
-            closer(scene, factor, distance);
+            zoom(scene, factor, distance);
         }
     }
     if response.double_clicked() {
@@ -289,7 +297,7 @@ fn turn(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f
     }
 }
 
-/// Frames the object, from where it is looked at.
+/// Frames the object from the current direction.
 pub fn frame(scene: &mut Scene) {
     if let Some(camera) = &mut scene.camera {
         camera.distance = 0.0;
@@ -298,17 +306,17 @@ pub fn frame(scene: &mut Scene) {
     }
 }
 
-/// Comes closer by a factor, from where automatic framing had put the camera; near the object the lens narrows instead,
-/// until single tiles show.
-fn closer(scene: &mut Scene, factor: f32, distance: f32) {
+/// Scales the camera's distance by a factor. Near the object the field of view narrows instead, until single tiles are
+/// visible.
+fn zoom(scene: &mut Scene, factor: f32, distance: f32) {
     let camera = scene.camera.get_or_insert_default();
     let from = if camera.distance > 0.0 { camera.distance } else { distance };
-    let narrows = factor < 1.0 && from * factor < NEAREST || factor > 1.0 && camera.fov_deg < NARROW;
+    let narrows = factor < 1.0 && from * factor < MIN_DISTANCE || factor > 1.0 && camera.fov_deg < NARROW_FOV;
     if narrows {
         camera.fov_deg = (camera.fov_deg * factor).clamp(1.0, Camera::default().fov_deg.max(camera.fov_deg));
         camera.distance = from;
     } else {
-        camera.distance = (from * factor).clamp(NEAREST.min(from), 60.0);
+        camera.distance = (from * factor).clamp(MIN_DISTANCE.min(from), 60.0);
     }
 }
 

@@ -1,4 +1,4 @@
-//! The small view: the tile itself. Drag turns it, the wheel comes closer; in paint mode the hand paints.
+//! The tile view. Dragging turns the tile, scrolling zooms, and in paint mode the pointer paints.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
@@ -10,46 +10,46 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
-use super::hand::{self, Hand};
+use super::pointer::{self, Pointer};
 use crate::app::paint::Brush;
-use crate::app::worker::{Show, TileJob, TileMade};
+use crate::app::worker::{RenderedTile, TileDisplay, TileJob};
 
-/// What the picture of a tile depends on.
+/// Inputs of a tile image.
 type Inputs = (Tile, Vec<MaterialSpec>, Painted, Option<(Light, Option<Camera>)>);
 
-/// What the view holds between frames.
+/// State of the view between frames.
 pub struct TileState {
     azimuth: f32,
     elevation: f32,
     /// Tiles across.
     pub span: f32,
-    /// Centre, in parts of the tile.
+    /// Centre, in fractions of the tile.
     center: Vec2,
-    pub show: Which,
+    pub show: TileMode,
     pub facets: bool,
     pub painting: bool,
-    /// The hand is down, and how hard.
-    pressing: Option<f32>,
+    /// Pressure of the pointer; `None` while it is released.
+    pressure: Option<f32>,
     pub brush: Brush,
     texture: Option<TextureHandle>,
-    pub made: Option<Box<TileMade>>,
-    asked: Option<(TileView, Show, bool)>,
+    pub rendered: Option<Box<RenderedTile>>,
+    requested: Option<(TileView, TileDisplay, bool)>,
     inputs: Option<Inputs>,
     size: [usize; 2],
-    /// The picked viewer, and the f̄ that is shown bright.
+    /// The picked view direction, and the value of f̄ that is displayed as white.
     pub picked: Option<(Vec3, f32)>,
-    /// Before painting turned the view straight down.
+    /// The view to restore after painting, which looks straight down.
     before_paint: Option<(f32, f32, f32, Vec2)>,
 }
 
-/// What is shown, as the toolbar offers it.
+/// Display modes of the toolbar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Which {
+pub enum TileMode {
     Clay,
     Materials,
     Normals,
     Visibility,
-    /// What was picked on the object.
+    /// Contribution of each facet at the picked point of the object.
     Contribution,
 }
 
@@ -60,14 +60,14 @@ impl Default for TileState {
             elevation: 0.82,
             span: 1.7,
             center: Vec2::splat(0.5),
-            show: Which::Clay,
+            show: TileMode::Clay,
             facets: false,
             painting: false,
-            pressing: None,
+            pressure: None,
             brush: Brush::default(),
             texture: None,
-            made: None,
-            asked: None,
+            rendered: None,
+            requested: None,
             inputs: None,
             size: [0, 0],
             picked: None,
@@ -77,31 +77,31 @@ impl Default for TileState {
 }
 
 impl TileState {
-    /// The job for what is to be shown, where it is not what was asked for last. `direction` is the chosen one.
+    /// Returns the job for the image to display, unless it is the last request. `direction` points to the light.
     pub fn job(&mut self, loaded: &Arc<LoadedScene>, direction: Vec3) -> Option<TileJob> {
         if self.size[0] == 0 {
             return None;
         }
         let scene = &loaded.scene;
         let show = match self.show {
-            Which::Clay => Show::Clay,
-            Which::Materials => Show::Materials,
-            Which::Normals => Show::Normals,
-            Which::Visibility => Show::Visibility(direction),
-            Which::Contribution => match self.picked {
-                Some((viewer, scale)) => Show::Contribution(direction, viewer, scale),
-                None => Show::Visibility(direction),
+            TileMode::Clay => TileDisplay::Clay,
+            TileMode::Materials => TileDisplay::Materials,
+            TileMode::Normals => TileDisplay::Normals,
+            TileMode::Visibility => TileDisplay::Visibility(direction),
+            TileMode::Contribution => match self.picked {
+                Some((viewer, scale)) => TileDisplay::Contribution(direction, viewer, scale),
+                None => TileDisplay::Visibility(direction),
             },
         };
-        let lit = (self.show == Which::Materials).then(|| (scene.light.clone(), scene.camera.clone()));
+        let lit = (self.show == TileMode::Materials).then(|| (scene.light.clone(), scene.camera.clone()));
         let inputs = (scene.tile.clone(), scene.materials.clone(), loaded.painted.clone(), lit);
         let wanted = (self.view(scene.tile.size), show, self.facets);
-        if self.asked.as_ref() == Some(&wanted) && self.inputs.as_ref() == Some(&inputs) {
+        if self.requested.as_ref() == Some(&wanted) && self.inputs.as_ref() == Some(&inputs) {
             return None;
         }
         self.inputs = Some(inputs);
         let (view, show, facets) = wanted.clone();
-        self.asked = Some(wanted);
+        self.requested = Some(wanted);
         Some(TileJob { loaded: loaded.clone(), view, show, facets })
     }
 
@@ -115,21 +115,21 @@ impl TileState {
         }
     }
 
-    pub fn take(&mut self, ctx: &egui::Context, made: Box<TileMade>) {
+    pub fn receive(&mut self, ctx: &egui::Context, rendered: Box<RenderedTile>) {
         let options = egui::TextureOptions::LINEAR;
         match &mut self.texture {
-            Some(texture) => texture.set(made.image.clone(), options),
-            None => self.texture = Some(ctx.load_texture("tile", made.image.clone(), options)),
+            Some(texture) => texture.set(rendered.image.clone(), options),
+            None => self.texture = Some(ctx.load_texture("tile", rendered.image.clone(), options)),
         }
-        self.made = Some(made);
+        self.rendered = Some(rendered);
     }
 
-    /// Textures belong to a window; in another one they are made anew.
+    /// Drops what belongs to the old window, so that the new window loads it again.
     pub fn move_to(&mut self) {
-        (self.texture, self.asked, self.inputs) = (None, None, None);
+        (self.texture, self.requested, self.inputs) = (None, None, None);
     }
 
-    /// Turns paint mode on or off; painting looks straight down.
+    /// Turns paint mode on or off. Paint mode looks straight down.
     pub fn set_painting(&mut self, on: bool) {
         if on == self.painting {
             return;
@@ -143,8 +143,8 @@ impl TileState {
         }
     }
 
-    /// Shows the picture; what the hand did, in paint mode.
-    pub fn ui(&mut self, ui: &mut Ui, tile: Vec2, size: egui::Vec2) -> Vec<Hand> {
+    /// Draws the image. Returns the pointer input in paint mode.
+    pub fn ui(&mut self, ui: &mut Ui, tile: Vec2, size: egui::Vec2) -> Vec<Pointer> {
         let (area, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Tile view"));
         let pixels = area.size() * ui.pixels_per_point();
@@ -156,11 +156,11 @@ impl TileState {
         }
         self.facets_ui(ui, area, tile);
         let paints = self.painting && !ui.input(|input| input.modifiers.alt);
-        self.turn(ui, &response, tile, paints);
+        self.navigate(ui, &response, tile, paints);
         if paints { self.paint(ui, &response, area, tile) } else { Vec::new() }
     }
 
-    fn turn(&mut self, ui: &Ui, response: &Response, tile: Vec2, paints: bool) {
+    fn navigate(&mut self, ui: &Ui, response: &Response, tile: Vec2, paints: bool) {
         let delta = response.drag_delta();
         let turning = response.dragged_by(PointerButton::Primary) && !paints
             || response.dragged_by(PointerButton::Secondary) && paints;
@@ -171,7 +171,7 @@ impl TileState {
         {
             let view = self.view(tile);
             let [_, right, up] = view.axes();
-            let per_point = view.pixel() * ui.pixels_per_point();
+            let per_point = view.pixel_size() * ui.pixels_per_point();
             let moved = right.truncate() * -delta.x + up.truncate() * (delta.y / self.elevation.sin().max(0.1).powi(2));
             self.center += moved * per_point / tile;
             self.center -= self.center.floor();
@@ -187,18 +187,18 @@ impl TileState {
         }
     }
 
-    /// Where on the tile a place of the view is, in parts of the tile, not wrapped.
-    pub fn place(&self, area: Rect, at: Pos2, tile: Vec2) -> Option<Vec2> {
+    /// Returns the point of the tile at a screen position, in fractions of the tile and not wrapped.
+    pub fn tile_point(&self, area: Rect, at: Pos2, tile: Vec2) -> Option<Vec2> {
         let view = self.view(tile);
         let scale = view.size[0] as f32 / area.width().max(1.0);
         let pixel = Vec2::new(at.x - area.left(), at.y - area.top()) * scale;
-        let made = self.made.as_ref()?;
-        let hit = made.tile.hit(&view, pixel)?;
+        let rendered = self.rendered.as_ref()?;
+        let hit = rendered.tile.hit(&view, pixel)?;
         Some(hit.position.truncate() / tile)
     }
 
-    /// The brush's outline, and what the hand did since the last frame.
-    fn paint(&mut self, ui: &Ui, response: &Response, area: Rect, tile: Vec2) -> Vec<Hand> {
+    /// Draws the outline of the brush. Returns the pointer input since the last frame.
+    fn paint(&mut self, ui: &Ui, response: &Response, area: Rect, tile: Vec2) -> Vec<Pointer> {
         if let Some(at) = response.hover_pos().or(response.interact_pointer_pos()) {
             ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
             let shape = tile.min_element() / tile.max_element() * area.width().min(area.height());
@@ -206,17 +206,20 @@ impl TileState {
             ui.painter().circle_stroke(at, radius, egui::Stroke::new(1.5, Color32::from_white_alpha(220)));
             ui.painter().circle_stroke(at, radius + 1.0, egui::Stroke::new(1.0, Color32::from_black_alpha(160)));
         }
-        let strokes = hand::strokes(ui, area, &mut self.pressing);
-        let on_tile = |touch: hand::Touch| match touch {
-            hand::Touch::At(at, pressure) => self.place(area, at, tile).map(|place| Hand::Press(place, pressure)),
-            hand::Touch::Lifted => Some(Hand::Lifted),
+        let strokes = pointer::strokes(ui, area, &mut self.pressure);
+        let on_tile = |input: pointer::ScreenPointer| match input {
+            pointer::ScreenPointer::At(at, pressure) => {
+                self.tile_point(area, at, tile).map(|point| Pointer::Press(point, pressure))
+            }
+            pointer::ScreenPointer::Released => Some(Pointer::Released),
         };
         strokes.into_iter().filter_map(on_tile).collect()
     }
 
-    /// Centres and normals of a sample of facets.
+    /// Draws the centres and normals of a sample of facets.
     fn facets_ui(&self, ui: &Ui, area: Rect, tile: Vec2) {
-        let Some(facets) = self.made.as_ref().filter(|_| self.facets).and_then(|made| made.facets.clone()) else {
+        let Some(facets) = self.rendered.as_ref().filter(|_| self.facets).and_then(|rendered| rendered.facets.clone())
+        else {
             return;
         };
         let view = self.view(tile);
@@ -238,29 +241,29 @@ impl TileState {
         }
     }
 
-    /// What is shown and how, above the view.
+    /// Draws the toolbar above the view. Returns whether the user turned painting on or off.
     pub fn toolbar(&mut self, ui: &mut Ui) -> Option<bool> {
         let mut painting = None;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             ui.spacing_mut().button_padding.x = 5.0;
             if self.picked.is_some() {
-                let tip = "What each place adds to the reflection at the point that was picked on the object";
-                if ui.selectable_label(self.show == Which::Contribution, "Picked").on_hover_text(tip).clicked() {
-                    self.show = Which::Contribution;
+                let tip = "Contribution of each place to the reflection at the picked point of the object";
+                if ui.selectable_label(self.show == TileMode::Contribution, "Picked").on_hover_text(tip).clicked() {
+                    self.show = TileMode::Contribution;
                 }
             }
-            for (which, name, tip) in [
-                (Which::Clay, "Clay", "Matte, under one lamp: the shape is read best"),
-                (Which::Materials, "Real", "The materials under the scene's light"),
-                (Which::Normals, "Normals", "Where the surface faces, as colours"),
-                (Which::Visibility, "Seen", "Green: sees the light of the lobe view. Red: something is in the way"),
+            for (mode, name, tip) in [
+                (TileMode::Clay, "Clay", "Diffuse grey under one light, which shows the shape best"),
+                (TileMode::Materials, "Real", "The materials under the scene's light"),
+                (TileMode::Normals, "Normals", "Normals as colours"),
+                (TileMode::Visibility, "Visible", "Green: visible from the light of the lobe view. Red: occluded"),
             ] {
-                if ui.selectable_label(self.show == which, name).on_hover_text(tip).clicked() {
-                    self.show = which;
+                if ui.selectable_label(self.show == mode, name).on_hover_text(tip).clicked() {
+                    self.show = mode;
                 }
             }
-            ui.toggle_value(&mut self.facets, "Facets").on_hover_text("A sample of the facets that are summed over");
+            ui.toggle_value(&mut self.facets, "Facets").on_hover_text("A sample of the facets that the sum evaluates");
             ui.separator();
             let several = self.span > 2.0;
             if ui.selectable_label(several, "3×3").on_hover_text("Several tiles, or one").clicked() {
@@ -275,8 +278,8 @@ impl TileState {
     }
 }
 
-/// The width, and as much height as leaves room for what stands below.
-pub fn fitting(ui: &Ui, below: f32) -> egui::Vec2 {
+/// Returns the size of a view that leaves `below` points of height free.
+pub fn size_above(ui: &Ui, below: f32) -> egui::Vec2 {
     let available = ui.available_size();
     vec2(available.x.max(80.0), (available.y - below).clamp(80.0, 1.25 * available.x.max(80.0)))
 }

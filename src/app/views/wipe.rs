@@ -1,4 +1,4 @@
-//! Two pictures in one view: what was kept as A, left of a line that can be moved, and what is there now.
+//! Comparison of two images in one view: the stored image A left of a movable line, the current one right of it.
 
 use std::sync::Arc;
 
@@ -7,10 +7,10 @@ use eframe::egui::{self, Color32, ColorImage, CursorIcon, Pos2, Rect, Sense, Tex
 
 use super::object::{ObjectView, covered};
 
-/// A picture kept for comparison.
-pub struct Kept {
+/// An image that is stored for comparison.
+pub struct ComparisonImage {
     pub(super) image: Arc<ColorImage>,
-    /// Of the document.
+    /// Version of the document.
     pub(super) version: u64,
     pub texture: TextureHandle,
     pub scene: Arc<Scene>,
@@ -18,12 +18,18 @@ pub struct Kept {
 }
 
 impl ObjectView {
-    /// Keeps what is shown now beside what comes; false where it cannot be had from the device.
-    pub fn keep(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) -> bool {
-        let Some(made) = &self.made else { return true };
-        let Some(image) = made.image.pixels() else { return false };
-        let texture = ctx.load_texture("kept", image.clone(), TextureOptions::LINEAR);
-        self.kept = Some(Kept { image, version: made.version, texture, scene: scene.clone(), name: name.to_owned() });
+    /// Stores the current image for comparison. Returns false if it cannot be read back from the GPU.
+    pub fn store_comparison(&mut self, ctx: &egui::Context, scene: &Arc<Scene>, name: &str) -> bool {
+        let Some(preview) = &self.preview else { return true };
+        let Some(image) = preview.image.pixels() else { return false };
+        let texture = ctx.load_texture("comparison", image.clone(), TextureOptions::LINEAR);
+        self.comparison = Some(ComparisonImage {
+            image,
+            version: preview.version,
+            texture,
+            scene: scene.clone(),
+            name: name.to_owned(),
+        });
         self.wipe = 0.5;
         true
     }
@@ -32,21 +38,21 @@ impl ObjectView {
         (at.x - (area.left() + self.wipe * area.width())).abs() < 12.0
     }
 
-    /// What was kept, left of a line that can be moved.
+    /// Draws image A to the left of the movable line.
     pub(super) fn wipe_ui(&mut self, ui: &mut Ui, area: Rect) {
-        let Some(kept) = &self.kept else { return };
+        let Some(comparison) = &self.comparison else { return };
         let x = area.left() + self.wipe * area.width();
         let left = Rect::from_min_max(area.min, pos2(x, area.bottom()));
-        let shown = covered(area, kept.texture.size_vec2());
+        let shown = covered(area, comparison.texture.size_vec2());
         let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        ui.painter().with_clip_rect(left).image(kept.texture.id(), shown, uv, Color32::WHITE);
+        ui.painter().with_clip_rect(left).image(comparison.texture.id(), shown, uv, Color32::WHITE);
         ui.painter().vline(x, area.y_range(), egui::Stroke::new(1.5, Color32::from_white_alpha(200)));
         ui.painter().circle_filled(pos2(x, area.center().y), 7.0, Color32::from_white_alpha(220));
         let font = egui::FontId::proportional(12.0);
         let white = Color32::from_white_alpha(210);
         let at = pos2(x - 8.0, area.top() + 8.0);
-        ui.painter().text(at, egui::Align2::RIGHT_TOP, format!("A  {}", kept.name), font.clone(), white);
-        ui.painter().text(pos2(x + 8.0, area.top() + 8.0), egui::Align2::LEFT_TOP, "B  now", font, white);
+        ui.painter().text(at, egui::Align2::RIGHT_TOP, format!("A  {}", comparison.name), font.clone(), white);
+        ui.painter().text(pos2(x + 8.0, area.top() + 8.0), egui::Align2::LEFT_TOP, "B  current", font, white);
         let grip = Rect::from_min_max(pos2(x - 8.0, area.top()), pos2(x + 8.0, area.bottom()));
         let response =
             ui.interact(grip, ui.scope_id().with("wipe"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);

@@ -1,11 +1,11 @@
-//! Accuracy against time of the scene at hand: rungs from faster to finer and the present settings, held against a reference
-//! that refines in the background.
+//! Accuracy against time of the open scene. Quality levels and the scene's own settings are compared with a reference
+//! that is refined in the background.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use crate::base::{Error, Result};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Outcome, Pipeline};
 use crate::render::Image;
 use crate::report::{EffectCost, ThumbnailRenderer, heat, measure_effects};
 use crate::scene::{LoadedScene, Quality};
@@ -14,168 +14,193 @@ use crate::tuning::progressive::{Compared, ProgressiveReference};
 use crate::tuning::quality_scale;
 use eframe::egui::ColorImage;
 
-use super::runner::Desk;
+use super::runner::JobContext;
 
 /// A scene to measure.
 #[derive(Debug, Clone)]
 pub struct AccuracyJob {
     pub version: u64,
     pub loaded: Arc<LoadedScene>,
-    /// Measure the present settings and the rungs.
+    /// Measure the scene's settings and the quality levels.
     pub chart: bool,
-    /// Go on refining the reference, and make the difference picture.
+    /// Continue to refine the reference and render the difference image.
     pub compare: bool,
-    /// Force each effect on and off.
+    /// Measure each effect forced on and off.
     pub effects: bool,
 }
 
-/// A rung of the ladder on this machine.
+/// Time and error of one quality level on this machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub struct AccuracyPoint {
     pub facets: usize,
     pub ms: f64,
     pub compared: Compared,
 }
 
-/// What comes back.
+/// A report of the worker that measures accuracy.
 #[derive(Debug, Clone)]
-pub enum AccuracyAnswer {
+pub enum AccuracyResult {
     Doing(&'static str),
-    /// All rungs measured so far.
-    Rungs(Vec<Point>),
-    /// The present settings of a version of the document.
-    Present(u64, Point),
-    /// How far the picture of a version of the document is from the right one.
+    /// All quality levels measured so far.
+    Levels(Vec<AccuracyPoint>),
+    /// The settings of a version of the document.
+    Current(u64, AccuracyPoint),
+    /// Difference between the image of a version of the document and the reference image.
     Difference(u64, Difference),
-    /// What each effect costs and changes.
+    /// Cost and change of each effect.
     Effects(u64, Vec<EffectCost>),
     Done(u64),
     Failed(String),
 }
 
-/// ΔE between the present picture and a better one.
+/// ΔE between the current image and a more accurate one.
 #[derive(Debug, Clone)]
 pub struct Difference {
     pub image: Arc<ColorImage>,
     pub mean: f32,
-    /// What of it is the noise of the reference's picture; `None` against a far finer setting, which has none.
+    /// Part of the mean that is noise of the reference image; `None` if the finest level replaces the reference.
     pub noise: Option<f32>,
 }
 
-/// Rungs of the chart.
-const RUNGS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
-/// The rung that difference pictures are taken against where the reference is too slow for pictures.
+/// Quality levels of the chart.
+const LEVELS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
+/// Quality level that replaces the reference in difference images, if the reference is too slow for images.
 const FINEST: f64 = 12.0;
+/// Direction pairs of the reference.
 const PAIRS: usize = 96;
-/// Batches of the reference: for the chart, and when it is asked for.
+/// Batches of the reference for the chart, and for the comparison.
 const BATCHES: [usize; 2] = [2, 24];
-/// Noisy pictures of the reference that are averaged.
+/// Number of noisy reference images that are averaged.
 const IMAGES: u64 = 24;
 
-/// What stays between jobs: the reference and the rungs belong to a scene, whatever its settings.
+/// The worker's state. The reference and the levels belong to a scene, independent of its settings.
 #[derive(Default)]
-pub struct Accuracy {
+pub struct AccuracyWorker {
     key: Option<Box<LoadedScene>>,
     pipeline: Pipeline,
     reference: Option<ProgressiveReference>,
-    rungs: Vec<(f64, Point)>,
+    levels: Vec<(f64, AccuracyPoint)>,
 }
 
-impl Accuracy {
-    pub fn work(&mut self, job: &AccuracyJob, desk: &Desk<AccuracyJob>, answer: &dyn Fn(AccuracyAnswer)) {
-        match self.measure(job, desk, answer) {
-            Ok(()) => answer(AccuracyAnswer::Done(job.version)),
+impl AccuracyWorker {
+    pub fn work(&mut self, job: &AccuracyJob, context: &JobContext<AccuracyJob>, report: &dyn Fn(AccuracyResult)) {
+        match self.measure(job, context, report) {
+            Ok(()) => report(AccuracyResult::Done(job.version)),
             Err(Error::Cancelled) => {}
-            Err(error) => answer(AccuracyAnswer::Failed(error.to_string())),
+            Err(error) => report(AccuracyResult::Failed(error.to_string())),
         }
     }
 
-    fn measure(&mut self, job: &AccuracyJob, desk: &Desk<AccuracyJob>, answer: &dyn Fn(AccuracyAnswer)) -> Result<()> {
+    fn measure(
+        &mut self,
+        job: &AccuracyJob,
+        context: &JobContext<AccuracyJob>,
+        report: &dyn Fn(AccuracyResult),
+    ) -> Result<()> {
         let key = without_settings(&job.loaded);
         if self.key.as_deref() != Some(&key) {
             *self = Self { key: Some(Box::new(key)), ..Self::default() };
         }
-        self.pipeline.cancel_with(desk.cancel.clone());
+        self.pipeline.set_cancel(context.cancel.clone());
         if job.effects {
-            answer(AccuracyAnswer::Doing("Each effect on and off"));
-            let costs = measure_effects(&job.loaded, desk.cancel, |_| {})?;
-            answer(AccuracyAnswer::Effects(job.version, costs));
+            report(AccuracyResult::Doing("Each effect on and off"));
+            let costs = measure_effects(&job.loaded, context.cancel, |_| {})?;
+            report(AccuracyResult::Effects(job.version, costs));
         }
         if !job.chart {
             return Ok(());
         }
-        answer(AccuracyAnswer::Doing("Reference"));
+        report(AccuracyResult::Doing("Reference"));
         let mut reference = self.reference.take().unwrap_or_else(|| ProgressiveReference::new(PAIRS));
         while reference.batches < BATCHES[0] {
             reference.refine(&mut self.pipeline, &job.loaded)?;
-            desk.cancel.check()?;
+            context.cancel.check()?;
         }
         self.reference = Some(reference.clone());
         let outcome = self.pipeline.effective(&job.loaded)?;
-        let mut present = self.point(&job.loaded, &reference)?;
-        answer(AccuracyAnswer::Present(job.version, present));
-        let overhangs = outcome.plan.effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
-        for rung in RUNGS {
-            if self.rungs.iter().any(|(known, _)| *known == rung) {
+        let current = self.point(&job.loaded, &reference)?;
+        report(AccuracyResult::Current(job.version, current));
+        let overhangs = has_overhangs(&outcome);
+        for level in LEVELS {
+            if self.levels.iter().any(|(known, _)| *known == level) {
                 continue;
             }
-            desk.cancel.check()?;
-            answer(AccuracyAnswer::Doing("Faster and finer settings"));
-            let scene = with_settings(&job.loaded, &quality_scale::rung(rung, overhangs))?;
+            context.cancel.check()?;
+            report(AccuracyResult::Doing("Faster and finer settings"));
+            let scene = with_settings(&job.loaded, &quality_scale::rung(level, overhangs))?;
             let point = self.point(&scene, &reference)?;
-            self.rungs.push((rung, point));
-            answer(AccuracyAnswer::Rungs(self.rungs.iter().map(|(_, point)| *point).collect()));
+            self.levels.push((level, point));
+            report(AccuracyResult::Levels(self.levels.iter().map(|(_, point)| *point).collect()));
         }
-        answer(AccuracyAnswer::Rungs(self.rungs.iter().map(|(_, point)| *point).collect()));
-        if !job.compare {
-            return Ok(());
-        }
-        answer(AccuracyAnswer::Doing("Refining the reference"));
-        let studio = ThumbnailRenderer::new(&job.loaded)?;
-        let now = studio.image(&*outcome.brdf)?;
-        let mut right = MeanImage::default();
+        report(AccuracyResult::Levels(self.levels.iter().map(|(_, point)| *point).collect()));
+        if job.compare { self.compare(job, context, report, reference, &outcome, current) } else { Ok(()) }
+    }
+
+    /// Renders the difference from the mean of noisy reference images, and refines the reference between them.
+    fn compare(
+        &mut self,
+        job: &AccuracyJob,
+        context: &JobContext<AccuracyJob>,
+        report: &dyn Fn(AccuracyResult),
+        mut reference: ProgressiveReference,
+        outcome: &Outcome,
+        mut current: AccuracyPoint,
+    ) -> Result<()> {
+        report(AccuracyResult::Doing("Refining the reference"));
+        let thumbnails = ThumbnailRenderer::new(&job.loaded)?;
+        let current_image = thumbnails.image(&*outcome.brdf)?;
+        let mut mean = MeanImage::default();
         for seed in 0..IMAGES {
-            desk.cancel.check()?;
-            let drawn = self
-                .pipeline
-                .with_reference(&job.loaded, |reference| studio.reference_image(reference, seed, desk.cancel))??;
-            match drawn {
-                Some(drawn) => right.add(drawn),
-                // Paths between facets: against the finest setting instead.
+            context.cancel.check()?;
+            let sample = self.pipeline.with_reference(&job.loaded, |reference| {
+                thumbnails.reference_image(reference, seed, context.cancel)
+            })??;
+            match sample {
+                Some(sample) => mean.add(sample),
+                // With interreflection, the finest level replaces the reference.
                 None if seed == 0 => {
-                    let fine = with_settings(&job.loaded, &quality_scale::rung(FINEST, overhangs))?;
-                    let finest = studio.image(&*self.pipeline.effective(&fine)?.brdf)?;
-                    answer(AccuracyAnswer::Difference(job.version, difference(&studio, &now, &finest, None)));
+                    let settings = quality_scale::rung(FINEST, has_overhangs(outcome));
+                    let fine = with_settings(&job.loaded, &settings)?;
+                    let finest = thumbnails.image(&*self.pipeline.effective(&fine)?.brdf)?;
+                    report(AccuracyResult::Difference(
+                        job.version,
+                        difference(&thumbnails, &current_image, &finest, None),
+                    ));
                 }
                 None => {}
             }
-            if let Some((mean, noise)) = right.mean_and_noise(&studio) {
-                let shown = difference(&studio, &now, &mean, Some(noise));
-                answer(AccuracyAnswer::Difference(job.version, shown));
+            if let Some((mean_image, noise)) = mean.mean_and_noise(&thumbnails) {
+                let shown = difference(&thumbnails, &current_image, &mean_image, Some(noise));
+                report(AccuracyResult::Difference(job.version, shown));
             }
             if reference.batches < BATCHES[1] {
                 reference.refine(&mut self.pipeline, &job.loaded)?;
                 self.reference = Some(reference.clone());
-                present.compared = reference.compare(&outcome.brdf);
-                answer(AccuracyAnswer::Present(job.version, present));
+                current.compared = reference.compare(&outcome.brdf);
+                report(AccuracyResult::Current(job.version, current));
             }
         }
         Ok(())
     }
 
-    /// Errors of a scene at its settings, and the time of an edit that asks for other facets.
-    fn point(&mut self, scene: &LoadedScene, reference: &ProgressiveReference) -> Result<Point> {
+    /// Errors of a scene at its settings, and the time of an edit that requires new facets.
+    fn point(&mut self, scene: &LoadedScene, reference: &ProgressiveReference) -> Result<AccuracyPoint> {
         let mut moved = scene.clone();
         moved.scene.quality.seed ^= 1;
         self.pipeline.effective(&moved)?;
         let start = Instant::now();
         let outcome = self.pipeline.effective(scene)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(Point { facets: outcome.settings.facets, ms, compared: reference.compare(&outcome.brdf) })
+        Ok(AccuracyPoint { facets: outcome.settings.facets, ms, compared: reference.compare(&outcome.brdf) })
     }
 }
 
-/// What the reference and the rungs depend on: all but settings and camera.
+/// Returns true if the plan computes visibility with overhangs.
+fn has_overhangs(outcome: &Outcome) -> bool {
+    outcome.plan.effects.iter().any(|effect| effect.name == "overhangs" && effect.on)
+}
+
+/// The inputs of the reference and of the levels: the scene without settings, object, light and camera.
 fn without_settings(loaded: &LoadedScene) -> LoadedScene {
     let mut key = loaded.clone();
     key.scene.quality = Quality { seed: key.scene.quality.seed, ..Quality::default() };
@@ -186,7 +211,7 @@ fn without_settings(loaded: &LoadedScene) -> LoadedScene {
     key
 }
 
-/// Two means of every second picture each: how far they are apart tells their noise.
+/// Mean image, stored as the means of two halves of the samples. Their difference estimates the noise.
 #[derive(Default)]
 struct MeanImage {
     halves: [Option<Image>; 2],
@@ -194,26 +219,26 @@ struct MeanImage {
 }
 
 impl MeanImage {
-    fn add(&mut self, drawn: Image) {
+    fn add(&mut self, sample: Image) {
         let half = usize::from(self.counts[0] > self.counts[1]);
         self.counts[half] += 1;
         let part = 1.0 / self.counts[half] as f32;
         match &mut self.halves[half] {
             Some(mean) => {
-                for (mean, drawn) in mean.pixels.iter_mut().zip(&drawn.pixels) {
-                    *mean += (*drawn - *mean) * part;
+                for (mean, sample) in mean.pixels.iter_mut().zip(&sample.pixels) {
+                    *mean += (*sample - *mean) * part;
                 }
             }
-            empty => *empty = Some(drawn),
+            empty => *empty = Some(sample),
         }
     }
 
-    /// `None` before the second picture. The mean of both halves has half the noise of their difference.
-    fn mean_and_noise(&self, studio: &ThumbnailRenderer) -> Option<(Image, f32)> {
+    /// The mean and its noise; `None` with fewer than two samples. The mean has half the noise of the difference.
+    fn mean_and_noise(&self, thumbnails: &ThumbnailRenderer) -> Option<(Image, f32)> {
         let [Some(a), Some(b)] = &self.halves else { return None };
         let part = self.counts[1] as f32 / (self.counts[0] + self.counts[1]) as f32;
         let pixels = a.pixels.iter().zip(&b.pixels).map(|(a, b)| a.lerp(*b, part)).collect();
-        let noise = 0.5 * average(&studio.difference(a, b));
+        let noise = 0.5 * average(&thumbnails.difference(a, b));
         Some((Image { pixels, ..*a }, noise))
     }
 }
@@ -222,9 +247,9 @@ fn average(delta_e: &[f32]) -> f32 {
     delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32
 }
 
-fn difference(studio: &ThumbnailRenderer, now: &Image, right: &Image, noise: Option<f32>) -> Difference {
-    let delta_e = studio.difference(now, right);
-    Difference { image: Arc::new(image(now.width, now.height, &delta_e)), mean: average(&delta_e), noise }
+fn difference(thumbnails: &ThumbnailRenderer, current: &Image, reference: &Image, noise: Option<f32>) -> Difference {
+    let delta_e = thumbnails.difference(current, reference);
+    Difference { image: Arc::new(image(current.width, current.height, &delta_e)), mean: average(&delta_e), noise }
 }
 
 fn image(width: usize, height: usize, delta_e: &[f32]) -> ColorImage {

@@ -1,4 +1,4 @@
-//! Exports in the background: at the scene's own quality, with progress, and they can be given up.
+//! Exports in the background, at the scene's own quality, with progress and cancellation.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,38 +9,40 @@ use crate::export::tile::TileOptions;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use crate::fit::Model;
 use crate::geometry::TileMesh;
-use crate::pipeline::{Outcome, Pipeline};
+use crate::pipeline::Outcome;
 use crate::render::image::tone_map::ToneMap;
-use crate::render::tile_view::CloseUp;
+use crate::render::tile_view::TileScene;
 use crate::scene::LoadedScene;
 use crate::{export, fit};
 
-use super::runner::Desk;
-use super::studio::{Close, ImageStudio, Shot, Worn};
+use super::preview_renderer::{CloseUpTile, PreviewRenderer, RenderRequest, ShadedMaterial};
+use super::runner::JobContext;
 
+/// A file to export.
 #[derive(Debug, Clone)]
 pub struct ExportJob {
     pub loaded: Arc<LoadedScene>,
     pub path: PathBuf,
-    pub what: What,
+    pub kind: ExportKind,
 }
 
-/// What the dialog asks about a table.
+/// Settings of a table that the dialog offers.
 #[derive(Debug, Clone, Copy)]
 pub struct TableChoice {
-    /// Steps from the normal to the horizon, and around, for files whose grid is free.
+    /// Steps from the normal to the horizon, for files with a free grid.
     pub theta: usize,
+    /// Steps around the normal, for files with a free grid.
     pub phi: usize,
-    /// Of an RGL file: elevations and azimuths of slices, samples along both sides of one; by itself where absent.
+    /// Elevations and azimuths of the slices of an RGL file, and samples along both sides of a slice; optional.
     pub rgl: Option<[usize; 4]>,
-    /// What a Radiance file holds.
+    /// Basis of a Radiance file.
     pub radiance: RadianceBasis,
-    /// Cells along a side of a tensor tree.
+    /// Cells along each side of a tensor tree.
     pub tree: usize,
 }
 
 impl TableChoice {
-    /// The grid that a file of this name gets; absent where the format has its own.
+    /// The grid of a file with this name; absent if the format has a fixed grid.
     pub fn resolution(&self, path: &Path) -> Option<ExportResolution> {
         let of = |[theta_i, phi_i, theta_o, phi_o]: [usize; 4]| ExportResolution { theta_i, phi_i, theta_o, phi_o };
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
@@ -59,10 +61,11 @@ impl Default for TableChoice {
     }
 }
 
+/// Content of an exported file.
 #[derive(Debug, Clone)]
-pub enum What {
+pub enum ExportKind {
     Table(TableChoice),
-    /// A few parameters, glTF or MaterialX by the ending.
+    /// Parameters of an analytic model, as glTF or MaterialX depending on the file's extension.
     Fit,
     Tile(TileOptions),
     Image {
@@ -70,62 +73,62 @@ pub enum What {
     },
 }
 
-pub enum ExportAnswer {
-    /// The part that is done, 0 to 1, and what is being done.
+/// A report of the worker that exports.
+pub enum ExportResult {
+    /// The finished fraction, 0 to 1, and the current work.
     Progress(f32, &'static str),
     Done(String),
     Failed(String),
     Cancelled,
 }
 
-pub fn work(job: &ExportJob, cache: &Cache, desk: &Desk<ExportJob>, answer: &(dyn Fn(ExportAnswer) + Sync)) {
-    answer(match export(job, cache, desk.cancel, answer) {
-        Ok(text) => ExportAnswer::Done(text),
-        Err(Error::Cancelled) => ExportAnswer::Cancelled,
-        Err(error) => ExportAnswer::Failed(error.to_string()),
+pub fn work(job: &ExportJob, cache: &Cache, context: &JobContext<ExportJob>, report: &(dyn Fn(ExportResult) + Sync)) {
+    report(match export(job, cache, context.cancel, report) {
+        Ok(text) => ExportResult::Done(text),
+        Err(Error::Cancelled) => ExportResult::Cancelled,
+        Err(error) => ExportResult::Failed(error.to_string()),
     });
 }
 
-fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, answer: &(dyn Fn(ExportAnswer) + Sync)) -> Result<String> {
-    answer(ExportAnswer::Progress(0.0, "Computing the material"));
-    let mut pipeline = Pipeline::new();
-    pipeline.cancel_with(cancel.clone());
+fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, report: &(dyn Fn(ExportResult) + Sync)) -> Result<String> {
+    report(ExportResult::Progress(0.0, "Computing the material"));
+    let mut pipeline = crate::gpu::pipeline();
+    pipeline.set_cancel(cancel.clone());
     pipeline.set_cache(cache.clone());
-    // Each is told as a part of what it is called.
-    let telling = |what: &'static str| {
-        move |part: f32| {
-            answer(ExportAnswer::Progress(part, what));
+    let progress = |task: &'static str| {
+        move |fraction: f32| {
+            report(ExportResult::Progress(fraction, task));
             !cancel.is_set()
         }
     };
-    if let What::Tile(options) = &job.what {
-        return tile(job, &pipeline.mesh(&job.loaded)?, options, &telling("Writing the tile"));
+    if let ExportKind::Tile(options) = &job.kind {
+        return tile(job, &pipeline.mesh(&job.loaded)?, options, &progress("Writing the tile"));
     }
     let outcome = pipeline.effective(&job.loaded)?;
-    match job.what {
-        What::Tile(_) | What::Fit => fitted(job, &outcome, &telling("Fitting")),
-        What::Table(choice) => {
+    match job.kind {
+        ExportKind::Tile(_) | ExportKind::Fit => fitted(job, &outcome, &progress("Fitting")),
+        ExportKind::Table(choice) => {
             let meta = ExportMeta::of(&job.loaded, &outcome, pipeline.mesh(&job.loaded)?.closes_plane);
             let options = ExportOptions { resolution: choice.resolution(&job.path), radiance: choice.radiance };
-            let report = export::write(&outcome.brdf, &meta, &options, &job.path, &telling("Tabulating"))?;
+            let written = export::write(&outcome.brdf, &meta, &options, &job.path, &progress("Tabulating"))?;
             Ok(format!(
-                "Wrote {}: {} pairs; read back it is within {:.1} % of the material.",
+                "Wrote {}: {} pairs. Read back, the table differs from the material by {:.1} %.",
                 job.path.display(),
-                report.pairs,
-                100.0 * report.reading.errors.rel_l2
+                written.pairs,
+                100.0 * written.reading.errors.rel_l2
             ))
         }
-        What::Image { size } => {
-            answer(ExportAnswer::Progress(0.3, "Rendering"));
-            let tile = CloseUp::new(Arc::new(pipeline.mesh(&job.loaded)?));
-            let close = (tile, pipeline.sum_materials(&job.loaded)?);
+        ExportKind::Image { size } => {
+            report(ExportResult::Progress(0.3, "Rendering"));
+            let tile = TileScene::new(Arc::new(pipeline.mesh(&job.loaded)?));
+            let close = (tile, pipeline.materials(&job.loaded)?);
             image(&job.loaded, &outcome, size, &job.path, &close, cancel)?;
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
 }
 
-/// The GGX base with a matte part, which both formats hold.
+/// Fits the GGX base with a diffuse part, which both formats support.
 fn fitted(job: &ExportJob, outcome: &Outcome, progress: &Progress<'_>) -> Result<String> {
     let model = *Model::ALL.last().ok_or_else(|| Error::failed("no model to fit"))?;
     let fit = fit::fit(&outcome.brdf, model, progress)?;
@@ -133,7 +136,7 @@ fn fitted(job: &ExportJob, outcome: &Outcome, progress: &Progress<'_>) -> Result
     let text = if is_gltf { fit::gltf(&fit, &job.loaded.name) } else { fit::materialx(&fit, &job.loaded.name) };
     crate::base::replace_file(&job.path, text.as_bytes())?;
     Ok(format!(
-        "Wrote {}: {}; the few parameters are {:.1} % from the material ({:.1} dB). A table keeps all of it.",
+        "Wrote {}: {}. The fit differs from the material by {:.1} % (PSNR {:.1} dB); a table is more accurate.",
         job.path.display(),
         model.name(),
         100.0 * fit.errors.rel_l2,
@@ -151,15 +154,21 @@ fn image(
     outcome: &Outcome,
     size: [usize; 2],
     path: &Path,
-    close: &Close,
+    close: &CloseUpTile,
     cancel: &Cancel,
 ) -> Result<()> {
     let camera = loaded.scene.camera.clone().unwrap_or_default();
-    let mut studio = ImageStudio::default();
-    studio.prepare(loaded)?;
+    let mut renderer = PreviewRenderer::default();
+    renderer.prepare(loaded)?;
     let backend = loaded.scene.quality.backend.as_str();
-    let shot =
-        Shot { camera: &camera, material: Worn::Known(outcome), size, samples_per_side: 3, settle: true, backend };
-    let (rendered, _) = studio.shoot(&shot, Some(close), cancel)?;
+    let request = RenderRequest {
+        camera: &camera,
+        material: ShadedMaterial::Outcome(outcome),
+        size,
+        samples_per_side: 3,
+        build_caches: true,
+        backend,
+    };
+    let (rendered, _) = renderer.render(&request, Some(close), cancel)?;
     rendered.image.write(path, &ToneMap::new(&camera)?)
 }

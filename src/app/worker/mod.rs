@@ -1,18 +1,19 @@
-//! Work behind the interface: one thread for the object's picture, one for the tile and its plots, one for thumbnails.
+//! Background work of the editor, with one thread per task: draft, refined image, tile, lobe plot, thumbnails,
+//! accuracy, export, recovery file.
 
 mod accuracy;
-mod device;
 mod export;
+mod gpu_drafts;
+mod gpu_state;
 mod image_worker;
 mod lobe;
-mod made;
-mod on_device;
+mod preview_renderer;
+mod rendered_preview;
 mod runner;
 mod screen;
 mod shared;
-mod studio;
 mod thumbnail;
-mod tile;
+mod tile_image_worker;
 mod tone;
 
 use std::sync::Arc;
@@ -22,78 +23,84 @@ use crate::cache::Cache;
 
 use super::document::Snapshot;
 
-pub use accuracy::{AccuracyAnswer, AccuracyJob, Point};
+pub use accuracy::{AccuracyJob, AccuracyPoint, AccuracyResult};
+pub use export::{ExportJob, ExportKind, ExportResult, TableChoice};
 #[cfg(test)]
-pub use device::LOSE_DEVICE;
-pub use export::{ExportAnswer, ExportJob, TableChoice, What};
-pub use lobe::{LobeJob, LobeMade, logarithmic};
-pub use made::{DisplayImage, Grade, ImageAnswer, ImageJob, Made};
+pub use gpu_state::LOSE_GPU;
+pub use lobe::{LobeJob, LobePlot, logarithmic};
+pub use rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 pub use runner::Worker;
-pub use screen::{DeviceImage, Screen};
-pub use shared::Devices;
-pub use thumbnail::{Thumbnail, ThumbnailJob};
-pub use tile::{Show, TileAnswer, TileJob, TileMade};
+pub use screen::{GpuImage, Screen};
+pub use shared::GpuShare;
+pub use thumbnail::{SceneThumbnail, ThumbnailJob};
+pub use tile_image_worker::{RenderedTile, TileDisplay, TileJob, TileResult};
 
-/// The thread that draws the tile.
-pub fn spawn_tile(answer: impl Fn(TileAnswer) + Clone + Send + Sync + 'static) -> Option<Worker<TileJob>> {
-    let told = answer.clone();
-    let work = move |kept: &mut tile::Macro, job, desk: &runner::Desk<TileJob>| kept.work(job, desk, &answer);
-    let panicked = move |text: String| told(TileAnswer::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("tile", 0, tile::Macro::default, work, panicked).ok()
+/// Starts the thread that renders the tile.
+pub fn spawn_tile(report: impl Fn(TileResult) + Clone + Send + Sync + 'static) -> Option<Worker<TileJob>> {
+    let report_fault = report.clone();
+    let work = move |state: &mut tile_image_worker::TileImageWorker, job, context: &runner::JobContext<TileJob>| {
+        state.work(job, context, &report)
+    };
+    let panicked = move |text: String| report_fault(TileResult::Failed(format!("a fault in the program ({text})")));
+    Worker::spawn("tile", 0, tile_image_worker::TileImageWorker::default, work, panicked).ok()
 }
 
-/// The thread that plots lobes. Its faults show as a plot that does not follow; the picture's worker reports the cause.
-pub fn spawn_lobe(answer: impl Fn(LobeMade) + Clone + Send + Sync + 'static) -> Option<Worker<LobeJob>> {
-    let work = move |_: &mut (), job: LobeJob, desk: &runner::Desk<LobeJob>| lobe::work(&job, desk, &answer);
+/// Starts the thread that plots lobes. After a fault the plot does not follow; the image's worker reports the cause.
+pub fn spawn_lobe(report: impl Fn(LobePlot) + Clone + Send + Sync + 'static) -> Option<Worker<LobeJob>> {
+    let work =
+        move |_: &mut (), job: LobeJob, context: &runner::JobContext<LobeJob>| lobe::work(&job, context, &report);
     Worker::spawn("lobe", 0, || (), work, |_| {}).ok()
 }
 
-/// The threads that make pictures: one drafts, one refines. Each gets every job.
-pub struct Images {
+/// The threads that render the object: one drafts, one refines. Each receives every job.
+pub struct PreviewWorkers {
     draft: Worker<ImageJob>,
     refine: Worker<ImageJob>,
-    shared: Arc<shared::Shared>,
+    shared: Arc<shared::SharedState>,
 }
 
-impl Images {
-    /// `None` where the system gives no threads.
-    pub fn spawn(cache: &Cache, answer: impl Fn(ImageAnswer) + Clone + Send + Sync + 'static) -> Option<Self> {
-        let shared = Arc::new(shared::Shared::default());
-        let told_devices = shared.clone();
+impl PreviewWorkers {
+    /// Starts both threads; `None` if the system provides no threads.
+    pub fn spawn(cache: &Cache, report: impl Fn(ImageResult) + Clone + Send + Sync + 'static) -> Option<Self> {
+        let shared = Arc::new(shared::SharedState::default());
+        let workers_shared = shared.clone();
         let cache = cache.clone();
-        let start = move || image_worker::Photographer::new(shared.clone(), &cache);
-        let (draft, refine, told, told_too) = (answer.clone(), answer.clone(), answer.clone(), answer);
-        let draft_work = move |kept: &mut image_worker::Photographer, job: ImageJob, desk: &runner::Desk<ImageJob>| {
-            kept.draft(&job, desk, &draft);
-        };
-        let refine_work = move |kept: &mut image_worker::Photographer, job: ImageJob, desk: &runner::Desk<ImageJob>| {
-            kept.refine(&job, desk, &refine);
-        };
+        let start = move || image_worker::ImageWorker::new(shared.clone(), &cache);
+        let (draft, refine, draft_fault, refine_fault) = (report.clone(), report.clone(), report.clone(), report);
+        let draft_work =
+            move |state: &mut image_worker::ImageWorker, job: ImageJob, context: &runner::JobContext<ImageJob>| {
+                state.draft(&job, context, &draft);
+            };
+        let refine_work =
+            move |state: &mut image_worker::ImageWorker, job: ImageJob, context: &runner::JobContext<ImageJob>| {
+                state.refine(&job, context, &refine);
+            };
         let draft =
-            Worker::spawn("draft", 0, start.clone(), draft_work, move |text| told(ImageAnswer::Fault(text))).ok()?;
+            Worker::spawn("draft", 0, start.clone(), draft_work, move |text| draft_fault(ImageResult::Fault(text)))
+                .ok()?;
         let refine =
-            Worker::spawn("refine", 0, start, refine_work, move |text| told_too(ImageAnswer::Fault(text))).ok()?;
-        Some(Self { draft, refine, shared: told_devices })
+            Worker::spawn("refine", 0, start, refine_work, move |text| refine_fault(ImageResult::Fault(text))).ok()?;
+        Some(Self { draft, refine, shared: workers_shared })
     }
 
-    pub fn ask(&self, job: ImageJob) {
+    pub fn submit(&self, job: ImageJob) {
         self.refine(job.clone());
         self.draft(job);
     }
 
-    /// A draft only.
+    /// Submits a job for the draft only.
     pub fn draft(&self, job: ImageJob) {
-        self.draft.ask(job);
+        self.draft.submit(job);
     }
 
-    /// What a draft was asked of before.
+    /// Submits a job for refinement only, after its draft was submitted.
     pub fn refine(&self, job: ImageJob) {
-        self.refine.ask(job);
+        self.refine.submit(job);
     }
 
-    /// Tells what devices there are; only the first word counts.
-    pub fn tell_devices(&self, devices: Devices) {
-        let _ = self.shared.devices.set(devices);
+    /// Reports the available GPUs; only the first report counts.
+    pub fn share_gpu(&self, gpu_share: GpuShare) {
+        let _ = self.shared.gpu_share.set(gpu_share);
     }
 
     pub fn finish(self, longest: Duration) {
@@ -101,48 +108,54 @@ impl Images {
         self.refine.finish(longest);
     }
 
-    /// What is shown is good enough: no refinement.
+    /// Cancels refinement; the current image stays.
     pub fn stop(&self) {
         self.refine.cancel();
     }
 }
 
-/// The thread that makes thumbnails. One that fails stays a grey square.
-pub fn spawn_thumbnail(answer: impl Fn(Thumbnail) + Clone + Send + Sync + 'static) -> Option<Worker<ThumbnailJob>> {
-    let work = move |kept: &mut studio::ImageStudio, job: ThumbnailJob, desk: &runner::Desk<ThumbnailJob>| {
-        thumbnail::work(kept, &job, desk, &answer);
+/// Starts the thread that renders thumbnails. A thumbnail that fails stays a grey square.
+pub fn spawn_thumbnail(
+    report: impl Fn(SceneThumbnail) + Clone + Send + Sync + 'static,
+) -> Option<Worker<ThumbnailJob>> {
+    let work = move |state: &mut preview_renderer::PreviewRenderer,
+                     job: ThumbnailJob,
+                     context: &runner::JobContext<ThumbnailJob>| {
+        thumbnail::work(state, &job, context, &report);
     };
-    Worker::spawn("thumbnails", 1, studio::ImageStudio::default, work, |_| {}).ok()
+    Worker::spawn("thumbnails", 1, preview_renderer::PreviewRenderer::default, work, |_| {}).ok()
 }
 
-/// The thread that measures accuracy against time.
-pub fn spawn_accuracy(answer: impl Fn(AccuracyAnswer) + Clone + Send + Sync + 'static) -> Option<Worker<AccuracyJob>> {
-    let told = answer.clone();
-    let work = move |kept: &mut accuracy::Accuracy, job: AccuracyJob, desk: &runner::Desk<AccuracyJob>| {
-        kept.work(&job, desk, &answer);
-    };
-    let panicked = move |text: String| told(AccuracyAnswer::Failed(format!("a fault in the program ({text})")));
-    Worker::spawn("accuracy", 0, accuracy::Accuracy::default, work, panicked).ok()
+/// Starts the thread that measures accuracy against time.
+pub fn spawn_accuracy(report: impl Fn(AccuracyResult) + Clone + Send + Sync + 'static) -> Option<Worker<AccuracyJob>> {
+    let report_fault = report.clone();
+    let work =
+        move |state: &mut accuracy::AccuracyWorker, job: AccuracyJob, context: &runner::JobContext<AccuracyJob>| {
+            state.work(&job, context, &report);
+        };
+    let panicked = move |text: String| report_fault(AccuracyResult::Failed(format!("a fault in the program ({text})")));
+    Worker::spawn("accuracy", 0, accuracy::AccuracyWorker::default, work, panicked).ok()
 }
 
-/// The thread that exports.
+/// Starts the thread that writes exports.
 pub fn spawn_export(
     cache: &Cache,
-    answer: impl Fn(ExportAnswer) + Clone + Send + Sync + 'static,
+    report: impl Fn(ExportResult) + Clone + Send + Sync + 'static,
 ) -> Option<Worker<ExportJob>> {
-    let told = answer.clone();
+    let report_fault = report.clone();
     let cache = cache.clone();
-    let work =
-        move |_: &mut (), job: ExportJob, desk: &runner::Desk<ExportJob>| export::work(&job, &cache, desk, &answer);
-    let panicked = move |text: String| told(ExportAnswer::Failed(format!("a fault in the program ({text})")));
+    let work = move |_: &mut (), job: ExportJob, context: &runner::JobContext<ExportJob>| {
+        export::work(&job, &cache, context, &report)
+    };
+    let panicked = move |text: String| report_fault(ExportResult::Failed(format!("a fault in the program ({text})")));
     Worker::spawn("export", 0, || (), work, panicked).ok()
 }
 
-/// The thread that writes recovery files.
+/// Starts the thread that writes recovery files.
 pub fn spawn_autosave(done: impl Fn(Result<(), String>) + Clone + Send + Sync + 'static) -> Option<Worker<Snapshot>> {
-    let told = done.clone();
-    let work = move |_: &mut (), snapshot: Snapshot, _: &runner::Desk<Snapshot>| {
+    let report_fault = done.clone();
+    let work = move |_: &mut (), snapshot: Snapshot, _: &runner::JobContext<Snapshot>| {
         done(snapshot.write().map_err(|error| error.to_string()));
     };
-    Worker::spawn("autosave", 1, || (), work, move |text| told(Err(text))).ok()
+    Worker::spawn("autosave", 1, || (), work, move |text| report_fault(Err(text))).ok()
 }

@@ -1,4 +1,5 @@
-//! A thread that does the newest thing asked of it: older work is cancelled, a panic is reported and survived.
+//! A thread that runs the newest submitted job. A new job cancels older ones. After a panic, the thread reports it and
+//! continues.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,15 +9,15 @@ use std::time::{Duration, Instant};
 
 use crate::base::Cancel;
 
-/// What a worker hands to its work besides the job.
-pub struct Desk<'a, J> {
-    /// Set as soon as newer work is there.
+/// Context of a job: its cancel flag and the queue that it came from.
+pub struct JobContext<'a, J> {
+    /// Set as soon as a newer job is submitted.
     pub cancel: &'a Cancel,
     mailbox: &'a Mailbox<J>,
 }
 
-impl<J> Desk<'_, J> {
-    /// Waits a little for newer work; whether the present one is still the newest.
+impl<J> JobContext<'_, J> {
+    /// Waits up to `pause` for a newer job; returns true if the current job is still the newest.
     pub fn is_newest_after(&self, pause: Duration) -> bool {
         let state = self.mailbox.lock();
         let waited =
@@ -43,37 +44,40 @@ impl<J> Mailbox<J> {
     }
 }
 
-/// The handle of the thread. Dropping it cancels the work; the thread ends by itself at its next look at the flag.
+/// The handle of the thread. Dropping it cancels the work; the thread ends when it next checks the flag.
 pub struct Worker<J> {
     mailbox: Arc<Mailbox<J>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl<J: Send + 'static> Worker<J> {
-    /// `threads`: what it computes on, 0 for all cores. `start` makes what the work keeps between jobs (anew after a panic); `work` does a job; `panicked` is told.
+    /// Starts the thread.
+    ///
+    /// `threads` is the size of its thread pool, 0 for all cores. `start` creates the state that jobs share, and does so
+    /// again after a panic. `work` runs a job, and `panicked` receives the message of a panic.
     pub fn spawn<S: Send + 'static>(
         name: &str,
         threads: usize,
         start: impl Fn() -> S + Send + 'static,
-        work: impl Fn(&mut S, J, &Desk<J>) + Send + Sync + 'static,
+        work: impl Fn(&mut S, J, &JobContext<J>) + Send + Sync + 'static,
         panicked: impl Fn(String) + Send + 'static,
     ) -> std::io::Result<Self> {
         let state = State { job: None, running: None, closed: false };
         let mailbox = Arc::new(Mailbox { state: Mutex::new(state), changed: Condvar::new() });
         let inside = mailbox.clone();
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
-            let mut kept = start();
-            // A pool of its own: what others compute does not stand in its way.
+            let mut state = start();
+            // A separate pool, so that other workers do not block this one.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok();
             while let Some((job, cancel)) = next(&inside) {
-                let desk = Desk { cancel: &cancel, mailbox: &inside };
+                let context = JobContext { cancel: &cancel, mailbox: &inside };
                 let work = || match &pool {
-                    Some(pool) => pool.install(|| work(&mut kept, job, &desk)),
-                    None => work(&mut kept, job, &desk),
+                    Some(pool) => pool.install(|| work(&mut state, job, &context)),
+                    None => work(&mut state, job, &context),
                 };
                 if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
                     panicked(message(panic.as_ref()));
-                    kept = start();
+                    state = start();
                 }
                 inside.lock().running = None;
             }
@@ -81,8 +85,8 @@ impl<J: Send + 'static> Worker<J> {
         Ok(Self { mailbox, thread: Some(thread) })
     }
 
-    /// Asks for a job in place of all that was asked before.
-    pub fn ask(&self, job: J) {
+    /// Submits a job that replaces all earlier ones.
+    pub fn submit(&self, job: J) {
         let mut state = self.mailbox.lock();
         state.job = Some(job);
         if let Some(cancel) = &state.running {
@@ -91,7 +95,7 @@ impl<J: Send + 'static> Worker<J> {
         self.mailbox.changed.notify_all();
     }
 
-    /// Gives up all work and waits for the thread to end, no longer than this.
+    /// Cancels all work and waits at most `longest` for the thread to end.
     pub fn finish(mut self, longest: Duration) {
         self.close();
         let Some(thread) = self.thread.take() else { return };
@@ -100,12 +104,12 @@ impl<J: Send + 'static> Worker<J> {
             std::thread::sleep(Duration::from_millis(2));
         }
         if thread.is_finished() {
-            // A panic inside was reported already.
+            // A panic inside the thread was reported already.
             let _ = thread.join();
         }
     }
 
-    /// Gives up what is being done and what waits.
+    /// Cancels the running job and drops the waiting one.
     pub fn cancel(&self) {
         let mut state = self.mailbox.lock();
         state.job = None;
@@ -159,31 +163,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_worker_that_panics_says_so_and_does_the_next_job_with_a_fresh_state() {
-        let (to_us, answers) = mpsc::channel();
-        let told = to_us.clone();
+    fn a_worker_that_panics_reports_it_and_runs_the_next_job_with_a_fresh_state() {
+        let (sender, results) = mpsc::channel();
+        let report_fault = sender.clone();
         let worker = Worker::spawn(
             "test",
             1,
             || 0_u32,
-            move |kept: &mut u32, job: u32, _: &Desk<u32>| {
-                *kept += 1;
+            move |state: &mut u32, job: u32, _: &JobContext<u32>| {
+                *state += 1;
                 assert!(job != 7, "job seven fails");
-                let _ = to_us.send(format!("job {job}, {kept} since the start"));
+                let _ = sender.send(format!("job {job}, {state} since the start"));
             },
-            move |text| drop(told.send(format!("fault: {text}"))),
+            move |text| drop(report_fault.send(format!("fault: {text}"))),
         )
         .unwrap();
-        let ask = |job: u32| {
-            worker.ask(job);
-            answers.recv_timeout(Duration::from_secs(20)).unwrap()
+        let run = |job: u32| {
+            worker.submit(job);
+            results.recv_timeout(Duration::from_secs(20)).unwrap()
         };
-        assert_eq!(ask(1), "job 1, 1 since the start");
-        assert_eq!(ask(2), "job 2, 2 since the start");
-        assert!(ask(7).starts_with("fault: job seven fails"));
-        // What the panic left half done is gone.
-        assert_eq!(ask(3), "job 3, 1 since the start");
-        // A panic inside of the worker's own threads is one too.
+        assert_eq!(run(1), "job 1, 1 since the start");
+        assert_eq!(run(2), "job 2, 2 since the start");
+        assert!(run(7).starts_with("fault: job seven fails"));
+        // The state that the panic left is discarded.
+        assert_eq!(run(3), "job 3, 1 since the start");
+        // The thread that panicked can still be joined.
         worker.finish(Duration::from_secs(4));
     }
 }

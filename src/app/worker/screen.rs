@@ -1,4 +1,4 @@
-//! Images on the device that the window draws on: what is made there is shown without being read back.
+//! Images on the GPU on which the window draws: they are displayed without being read back.
 
 use std::sync::Arc;
 
@@ -7,77 +7,77 @@ use eframe::egui::mutex::RwLock;
 use eframe::egui::{ColorImage, TextureId};
 use eframe::egui_wgpu::Renderer;
 
-/// The window's device, and what draws the interface there.
+/// The window's GPU and the renderer of the interface.
 #[derive(Clone)]
 pub struct Screen {
     pub gpu: Arc<Gpu>,
     interface: Arc<RwLock<Renderer>>,
-    /// Whether this is a graphics processor.
-    pub is_fast: bool,
+    /// False for a software adapter.
+    pub is_hardware: bool,
 }
 
-/// An image that shaders write and the interface shows. Dropping it takes it off the interface.
-pub struct DeviceImage {
+/// An image that shaders write and the interface displays. Dropping it unregisters it from the interface.
+pub struct GpuImage {
     screen: Screen,
     texture: wgpu::Texture,
     pub view: wgpu::TextureView,
-    /// What the interface calls it.
+    /// The interface's identifier of the image.
     pub id: TextureId,
     pub size: [usize; 2],
 }
 
-/// Images in turn: the one that is shown is not the one that is written.
+/// Images that are reused; a displayed image is never the one that is written.
 #[derive(Default)]
-pub struct Turns(Vec<Arc<DeviceImage>>);
+pub struct ImagePool(Vec<Arc<GpuImage>>);
 
 impl Screen {
     pub fn new(gpu: Arc<Gpu>, interface: Arc<RwLock<Renderer>>) -> Self {
-        Self { is_fast: gpu.tier == Tier::Hardware, gpu, interface }
+        Self { is_hardware: gpu.tier == Tier::Hardware, gpu, interface }
     }
 
-    fn image(&self, size: [usize; 2]) -> Result<DeviceImage, GpuError> {
+    fn image(&self, size: [usize; 2]) -> Result<GpuImage, GpuError> {
         let texture = crate::gpu::render::image::image(&self.gpu, size)?;
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        self.gpu.checked("showing a picture", || {
+        self.gpu.checked("displaying an image", || {
             let filter = wgpu::FilterMode::Linear;
             let id = self.interface.write().register_native_texture(&self.gpu.device, &view, filter);
-            Ok(DeviceImage { screen: self.clone(), texture, view, id, size })
+            Ok(GpuImage { screen: self.clone(), texture, view, id, size })
         })
     }
 }
 
-impl DeviceImage {
-    /// Reads it back, for what outlives the window.
+impl GpuImage {
+    /// Reads the image back into CPU memory.
     ///
     /// # Errors
-    /// What the device refuses.
+    /// A GPU error.
     pub fn read(&self) -> Result<ColorImage, GpuError> {
         let bytes = self.screen.gpu.read_image(&self.texture)?;
         Ok(ColorImage::from_rgba_unmultiplied(self.size, &bytes))
     }
 }
 
-impl Drop for DeviceImage {
+impl Drop for GpuImage {
     fn drop(&mut self) {
         self.screen.interface.write().free_texture(&self.id);
     }
 }
 
-impl std::fmt::Debug for DeviceImage {
+impl std::fmt::Debug for GpuImage {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("DeviceImage").field("id", &self.id).field("size", &self.size).finish_non_exhaustive()
+        f.debug_struct("GpuImage").field("id", &self.id).field("size", &self.size).finish_non_exhaustive()
     }
 }
 
-impl Turns {
-    /// An image of this size that nobody looks at.
+impl ImagePool {
+    /// An image of this size that is not displayed.
     ///
     /// # Errors
-    /// What the device refuses.
-    pub fn next(&mut self, screen: &Screen, size: [usize; 2]) -> Result<Arc<DeviceImage>, GpuError> {
-        let serves = |image: &Arc<DeviceImage>| image.size == size && Arc::ptr_eq(&image.screen.gpu, &screen.gpu);
-        self.0.retain(serves);
-        // What was drawn with it before is in the queue ahead of what writes it.
+    /// A GPU error.
+    pub fn next(&mut self, screen: &Screen, size: [usize; 2]) -> Result<Arc<GpuImage>, GpuError> {
+        let fits = |image: &Arc<GpuImage>| image.size == size && Arc::ptr_eq(&image.screen.gpu, &screen.gpu);
+        self.0.retain(fits);
+        // Earlier draws of the image precede the next write in the queue.
         if let Some(free) = self.0.iter().find(|image| Arc::strong_count(image) == 1) {
             return Ok(free.clone());
         }

@@ -1,4 +1,4 @@
-//! What the two workers of pictures tell each other.
+//! State that the draft worker and the refining worker share.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,37 +7,37 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use crate::pipeline::Outcome;
 use crate::scene::{Effects, LoadedScene, MaterialSpec, Painted, Quality, Tile};
 
-use super::made::Made;
+use super::rendered_preview::RenderedPreview;
 use super::screen::Screen;
 
-/// What an effective BRDF depends on.
+/// Inputs of an effective BRDF.
 pub type SmallScale = (Tile, Vec<MaterialSpec>, Quality, Effects, PathBuf, Painted);
 
-/// A full picture and what it shows.
-pub type Finished = (Box<LoadedScene>, [usize; 2], Made);
+/// A final image with its scene and size.
+pub type FinishedPreview = (Box<LoadedScene>, [usize; 2], RenderedPreview);
 
-/// What both workers know: the last BRDF at a scene's own quality, the last full picture, and what devices there are.
+/// State of both workers: the last BRDF at a scene's own quality, the last final image, and the available GPUs.
 #[derive(Default)]
-pub struct Shared {
+pub struct SharedState {
     pub best: Mutex<Option<(SmallScale, Outcome)>>,
-    pub last: Mutex<Option<Finished>>,
-    /// Empty at first: a draft does not wait to find out.
-    pub devices: OnceLock<Devices>,
-    /// The newest version whose draft is done with.
+    pub last: Mutex<Option<FinishedPreview>>,
+    /// Empty until the window reports; a draft does not wait for it.
+    pub gpu_share: OnceLock<GpuShare>,
+    /// The newest version whose draft has ended.
     drafted: AtomicU64,
 }
 
-/// What the window knows of graphics devices.
+/// GPUs as the window found them.
 #[derive(Clone, Default)]
-pub struct Devices {
-    /// There is only this adapter, which is the processor in disguise.
+pub struct GpuShare {
+    /// Name of the only adapter, if it is a software adapter.
     pub only_software: Option<String>,
-    /// What the window draws on.
+    /// The GPU on which the window draws.
     pub screen: Option<Screen>,
 }
 
-impl Shared {
-    /// The BRDF at the scene's own quality, where it was the last.
+impl SharedState {
+    /// The BRDF at the scene's own quality, if it is the last that was computed.
     pub fn known(&self, loaded: &LoadedScene) -> Option<Outcome> {
         let best = lock(&self.best);
         best.as_ref().filter(|(key, _)| *key == small_scale(loaded)).map(|(_, outcome)| outcome.clone())
@@ -47,15 +47,16 @@ impl Shared {
         self.drafted.load(Ordering::Relaxed) >= version
     }
 
-    /// Notes, once it is dropped, that the draft of a version is done with, also where it failed.
-    pub fn drafting(&self, version: u64) -> Drafting<'_> {
-        Drafting(self, version)
+    /// Returns a guard that records the end of the version's draft when it is dropped, even if the draft failed.
+    pub fn draft_guard(&self, version: u64) -> DraftGuard<'_> {
+        DraftGuard(self, version)
     }
 }
 
-pub struct Drafting<'a>(&'a Shared, u64);
+/// Guard of a draft in progress.
+pub struct DraftGuard<'a>(&'a SharedState, u64);
 
-impl Drop for Drafting<'_> {
+impl Drop for DraftGuard<'_> {
     fn drop(&mut self) {
         self.0.drafted.fetch_max(self.1, Ordering::Relaxed);
     }

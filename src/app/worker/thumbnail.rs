@@ -1,60 +1,65 @@
-//! Small pictures of the shipped scenes, one at a time, while nothing else is computed.
+//! Thumbnails of the shipped scenes, one per job.
 
 use std::sync::Arc;
 
 use crate::base::Result;
-use crate::pipeline::Pipeline;
 use crate::render::image::tone_map::ToneMap;
 use crate::scene;
 use crate::scene::Quality;
 use eframe::egui::ColorImage;
 
-use super::runner::Desk;
-use super::studio::{ImageStudio, Shot, Worn};
+use super::preview_renderer::{PreviewRenderer, RenderRequest, ShadedMaterial};
+use super::runner::JobContext;
 use super::tone::color_image;
 
-/// Pixels of a side.
+/// Side of a thumbnail in pixels.
 pub const SIDE: usize = 112;
-/// Lights that stand for an environment here.
+/// Maximum number of directional lights that replace an environment.
 const LIGHTS: usize = 12;
 
+/// A shipped scene to render.
 #[derive(Debug, Clone)]
 pub struct ThumbnailJob {
     pub name: &'static str,
 }
 
-/// `image` is absent where the scene cannot be shown.
-pub struct Thumbnail {
+/// Thumbnail of a shipped scene; `image` is absent if the scene cannot be rendered.
+pub struct SceneThumbnail {
     pub name: &'static str,
     pub image: Option<Arc<ColorImage>>,
 }
 
-pub fn work(kept: &mut ImageStudio, job: &ThumbnailJob, desk: &Desk<ThumbnailJob>, answer: &dyn Fn(Thumbnail)) {
-    let image = render(kept, job.name, desk);
-    // What was given up is asked for again.
-    if !desk.cancel.is_set() {
-        answer(Thumbnail { name: job.name, image: image.ok().map(Arc::new) });
+pub fn work(
+    renderer: &mut PreviewRenderer,
+    job: &ThumbnailJob,
+    context: &JobContext<ThumbnailJob>,
+    report: &dyn Fn(SceneThumbnail),
+) {
+    let image = render(renderer, job.name, context);
+    // The gallery submits a cancelled thumbnail again.
+    if !context.cancel.is_set() {
+        report(SceneThumbnail { name: job.name, image: image.ok().map(Arc::new) });
     }
 }
 
-fn render(studio: &mut ImageStudio, name: &str, desk: &Desk<ThumbnailJob>) -> Result<ColorImage> {
+fn render(renderer: &mut PreviewRenderer, name: &str, context: &JobContext<ThumbnailJob>) -> Result<ColorImage> {
     let mut loaded = scene::open(name, &[])?;
     loaded.scene.quality =
         Quality { preset: "draft".to_owned(), backend: "cpu".to_owned(), facets: Some(1024), ..Quality::default() };
     loaded.scene.light.count = loaded.scene.light.count.min(LIGHTS);
-    let mut pipeline = Pipeline::new();
-    pipeline.cancel_with(desk.cancel.clone());
+    let mut pipeline = crate::gpu::pipeline();
+    pipeline.set_cancel(context.cancel.clone());
     let outcome = pipeline.effective(&loaded)?;
-    studio.prepare(&loaded)?;
+    renderer.prepare(&loaded)?;
     let camera = loaded.scene.camera.clone().unwrap_or_default();
-    let shot = Shot {
+    let request = RenderRequest {
         camera: &camera,
-        material: Worn::Known(&outcome),
+        material: ShadedMaterial::Outcome(&outcome),
         size: [SIDE, SIDE],
         samples_per_side: 2,
-        settle: false,
+        build_caches: false,
         backend: "cpu",
     };
-    let (rendered, _) = studio.shoot(&shot, None, desk.cancel)?;
+    let (rendered, _) = renderer.render(&request, None, context.cancel)?;
     Ok(color_image(&rendered.image, &ToneMap::new(&camera)?))
 }

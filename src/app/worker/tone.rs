@@ -1,14 +1,14 @@
-//! From linear radiance to a texture.
+//! Conversion of linear radiance to pixels of a texture.
 
 use crate::render::Image;
 use crate::render::image::tone_map::{ToneMap, srgb_byte};
 use eframe::egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
-/// sRGB bytes by display-linear value; fine enough that no byte is skipped but the darkest few.
+/// Size of the table from display-linear values to sRGB bytes. At this size, only a few dark bytes are skipped.
 const STEPS: usize = 4096;
 
-/// A picture as a screen shows it.
+/// Applies the tone map and converts to sRGB bytes.
 pub fn color_image(image: &Image, tone_map: &ToneMap) -> ColorImage {
     let table: Vec<u8> = (0..=STEPS).map(|k| srgb_byte(k as f32 / STEPS as f32)).collect();
     let byte = |value: f32| table[(value * STEPS as f32 + 0.5) as usize];

@@ -1,9 +1,9 @@
-//! RGL `.bsdf` files (Dupuy and Jakob 2018, "An adaptive parameterization for efficient material acquisition and
-//! rendering"), isotropic: evaluated by the published method, then resampled into the table that every measured
-//! BRDF is looked up in.
+//! Reader of isotropic RGL `.bsdf` files (Dupuy and Jakob 2018, "An adaptive parameterization for efficient material
+//! acquisition and rendering"). A file is evaluated by the published method and resampled into a
+//! [`HalfDifferenceTable`].
 //!
-//! With `u(θ, φ) = (√(2θ/π), (φ+π)/2π)`, `s` the inverse of the warp by the visible normals (`vndf` for this `θ_i`) at
-//! `u(h)`: `rgb(s) ndf(u(h)) / (4 sigma(u(i)))` is `f_r(i,o) cosθ_o`. Samples are on the vertices of each grid.
+//! Let `u(θ, φ) = (√(2θ/π), (φ+π)/2π)`, and `s` the inverse of the warp by the visible normals (`vndf` for this `θ_i`)
+//! at `u(h)`. Then `rgb(s) ndf(u(h)) / (4 sigma(u(i)))` is `f_r(i,o) cosθ_o`. Samples are on the vertices of each grid.
 
 pub(crate) mod table;
 pub(crate) mod tensor_file;
@@ -24,20 +24,20 @@ use crate::base::{InputError, Result};
 use table::RglTable;
 use tensor_file::TensorFile;
 
-/// `f_r` is `f` divided by cosines no smaller than this: nothing is measured beyond, and the quotient would only carry
-/// noise from the horizon into the neighbouring bins.
+/// Smallest cosine that `f` is divided by to get `f_r`. Smaller cosines are not measured, and the quotient would spread
+/// noise from the horizon to neighbouring bins.
 const MIN_COSINE: f64 = 0.01;
 
-/// Bins of the table. Against exact evaluation of the three files at hand, relative L2: MERL's 90 x 90 x 90 2.2 / 1.0 /
-/// 0.26 %, with 20 in `φ_d` 2.3 / 1.0 / 0.29 %, this 1.0 / 0.5 / 0.27 %.
+/// Bins in `θ_h`, `θ_d`, `φ_d` of the table. The health reports the resampling error that they leave; `cargo test --lib
+/// measured_files -- --nocapture` prints it for the test files.
 const SHAPE: [usize; 3] = [180, 90, 20];
 
-/// Relative L2 between azimuths up to which a file with many passes for isotropic: interpolation leaves some.
+/// Largest relative L2 difference between azimuths of a file that counts as isotropic; interpolation causes some.
 const MAX_ANISOTROPY: f32 = 0.05;
-/// Pairs that are turned to measure it.
-const CHECKED_TURNS: usize = 500;
+/// Number of direction pairs that measure the difference between azimuths.
+const CHECKED_ROTATIONS: usize = 500;
 
-/// Direction pairs that measure the resampling error.
+/// Number of direction pairs that measure the resampling error.
 const CHECKED_PAIRS: usize = 10_000;
 
 /// Reads, evaluates and resamples an isotropic file.
@@ -52,20 +52,20 @@ pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
 }
 
 impl RglTable {
-    /// Whether turning the surface changes little; files with one or two azimuths say nothing of others.
+    /// Checks that rotating the surface changes little. Files with one or two azimuths are isotropic by definition.
     ///
     /// # Errors
-    /// The change, where it is more than interpolation explains.
+    /// The values change by more than interpolation explains; the error states the change.
     fn check_isotropic(&self) -> std::result::Result<(), InputError> {
         if self.is_isotropic() {
             return Ok(());
         }
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut residual = Residual::default();
-        for _ in 0..CHECKED_TURNS {
+        for _ in 0..CHECKED_ROTATIONS {
             let mut direction = || from_square(rng.random(), rng.random());
             let (i, o) = (direction(), direction());
-            let values: Vec<DVec3> = (0..8).map(|k| self.eval_turned(i, o, f64::from(k) / 8.0)).collect();
+            let values: Vec<DVec3> = (0..8).map(|k| self.eval_rotated(i, o, f64::from(k) / 8.0)).collect();
             let mean = values.iter().sum::<DVec3>() / 8.0;
             values.iter().for_each(|value| residual.add(*value - mean, mean, 1.0));
         }
@@ -75,28 +75,29 @@ impl RglTable {
         }
         let found = format!("{} azimuths, over which values change by {:.0} %", self.phi_i.len(), 100.0 * change);
         Err(InputError::new("field \"phi_i\"", found, "an isotropic file (values that do not depend on the azimuth)")
-            .with_hint("anisotropic BRDFs turn with the tangent, which small-scale facets do not have"))
+            .with_hint("anisotropic BRDFs depend on a tangent direction, which facets do not have"))
     }
 
-    /// [`RglTable::eval`] of a pair turned about the normal by a part of a full turn.
-    fn eval_turned(&self, i: DVec3, o: DVec3, turn: f64) -> DVec3 {
-        let rotation = DQuat::from_rotation_z(turn * 2.0 * PI);
+    /// Computes [`RglTable::eval`] of a pair that is rotated about the normal by a fraction of a full turn.
+    fn eval_rotated(&self, i: DVec3, o: DVec3, fraction: f64) -> DVec3 {
+        let rotation = DQuat::from_rotation_z(fraction * 2.0 * PI);
         self.eval(rotation * i, rotation * o)
     }
 
-    /// `f(i,o)` and `f(o,i)`, both cosines in, each the mean with its mirror image, and over azimuths where a file has many.
+    /// Returns `f(i,o)` and `f(o,i)`, with both cosines. Each is the mean with its mirror image, and the mean over
+    /// azimuths if the file has more than two.
     fn both_ways(&self, i: DVec3, o: DVec3) -> [DVec3; 2] {
         let mirrored = |v: DVec3| DVec3::new(v.x, -v.y, v.z);
-        let turns = if self.is_isotropic() { 1 } else { 4 };
+        let rotations = if self.is_isotropic() { 1 } else { 4 };
         let all = |i: DVec3, o: DVec3| {
-            (0..turns).map(|k| self.eval_turned(i, o, f64::from(k) / f64::from(turns))).sum::<DVec3>()
-                / f64::from(turns)
+            (0..rotations).map(|k| self.eval_rotated(i, o, f64::from(k) / f64::from(rotations))).sum::<DVec3>()
+                / f64::from(rotations)
         };
         let one_way = |i: DVec3, o: DVec3| 0.5 * i.z * (all(i, o) + all(mirrored(i), mirrored(o)));
         [one_way(i, o), one_way(o, i)]
     }
 
-    /// The reciprocal table, and how far it is from the file.
+    /// Resamples the file into a reciprocal table and measures the table's error.
     fn resample(&self, name: String) -> HalfDifferenceTable {
         let [bins_h, bins_d, bins_phi] = SHAPE;
         let rows: Vec<(Vec<Vec4>, Residual)> = (0..bins_h * bins_d)
@@ -112,7 +113,7 @@ impl RglTable {
                             return Vec4::ZERO;
                         };
                         let [there, back] = self.both_ways(i, o);
-                        // dω_h dω_d, stretched as the bins are.
+                        // dω_h dω_d on the bins' non-uniform axes.
                         let [theta_h, theta_d, _] = angles;
                         residual.add(
                             there - back,
@@ -141,7 +142,7 @@ impl RglTable {
         table.with_resampling_error(error)
     }
 
-    /// Relative L2 of `f` at random pairs up to 85°, half of them near the mirror direction.
+    /// Relative L2 error of `f` at random pairs up to 85°, half of them near the mirror direction.
     fn resampling_error(&self, table: &HalfDifferenceTable) -> f32 {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let mut random = || from_square(rng.random(), rng.random());
@@ -173,19 +174,20 @@ fn from_square(a: f64, b: f64) -> DVec3 {
     DVec3::new(s * phi.cos(), s * phi.sin(), z)
 }
 
-/// Vectors with those half and difference angles, `h` in the xz plane; `None` unless both are above the surface.
+/// Light and view directions of half and difference angles, with `h` in the xz plane; `None` unless both are above the
+/// surface.
 fn directions(angles: [f64; 3]) -> Option<(DVec3, DVec3)> {
     let [theta_h, theta_d, phi_d] = angles;
     let (n_dot_i, n_dot_o) = cosines(angles);
     let h = DVec3::new(theta_h.sin(), 0.0, theta_h.cos());
-    // In h's frame x points away from n along the meridian.
+    // In the frame of h, x points away from n along the meridian.
     let x = DVec3::new(theta_h.cos(), 0.0, -theta_h.sin());
     let across = theta_d.sin() * (phi_d.cos() * x + phi_d.sin() * DVec3::Y);
     let (i, o) = (theta_d.cos() * h + across, theta_d.cos() * h - across);
     (n_dot_i > 0.0 && n_dot_o > 0.0).then_some((i, o))
 }
 
-/// A weighted relative L2 in the making.
+/// Accumulator of a weighted relative L2 difference.
 #[derive(Default)]
 struct Residual {
     difference: f64,
@@ -208,7 +210,7 @@ impl Residual {
     }
 }
 
-/// Stored triples with a negative channel.
+/// Number of stored triples with a negative channel.
 fn invalid_triples(rgb: &[f64], plane: usize) -> usize {
     let slices = rgb.chunks_exact(3 * plane);
     slices.map(|slice| (0..plane).filter(|&k| (0..3).any(|c| slice[c * plane + k] < 0.0)).count()).sum()

@@ -36,7 +36,7 @@ fn file_of(fields: &[FieldBytes]) -> Vec<u8> {
     bytes
 }
 
-/// A Lambertian of albedo (0.8, 0.4, 0.2) in the format: no warp, `rgb = 4 · albedo/π · cosθ_o`.
+/// Fields of a Lambertian of albedo (0.8, 0.4, 0.2): no warp, `rgb = 4 · albedo/π · cosθ_o`.
 fn lambertian_fields() -> Vec<FieldBytes> {
     let (slices, n) = (14_u64, 40_u64);
     let thetas: Vec<f64> = (0..slices).map(|k| k as f64 / (slices - 1) as f64 * FRAC_PI_2).collect();
@@ -48,7 +48,7 @@ fn lambertian_fields() -> Vec<FieldBytes> {
                     let theta_m = (x as f64 / (n - 1) as f64).powi(2) * FRAC_PI_2;
                     let phi_m = (y as f64 / (n - 1) as f64) * 2.0 * PI - PI;
                     let i_dot_m = theta_i.cos() * theta_m.cos() + theta_i.sin() * theta_m.sin() * phi_m.cos();
-                    // Not clamped at the horizon, so that bilinear interpolation across it stays smooth.
+                    // No clamp at the horizon, so that bilinear interpolation across it stays smooth.
                     rgb.push(4.0 * albedo / PI * (2.0 * i_dot_m * theta_m.cos() - theta_i.cos()));
                 }
             }
@@ -70,7 +70,7 @@ fn parse(fields: &[FieldBytes]) -> std::result::Result<RglTable, InputError> {
 }
 
 #[test]
-fn a_lambertian_in_the_format_reads_back_as_one() {
+fn a_lambertian_file_is_read_as_a_lambertian() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("grey.bsdf");
     std::fs::write(&path, file_of(&lambertian_fields())).unwrap();
@@ -87,7 +87,7 @@ fn a_lambertian_in_the_format_reads_back_as_one() {
 }
 
 #[test]
-fn without_the_jacobian_flag_values_are_stored_whole() {
+fn without_the_jacobian_flag_values_are_not_multiplied() {
     let mut fields = lambertian_fields();
     fields[6].data = vec![0];
     let (i, o) = (DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 0.6, 0.8));
@@ -96,7 +96,7 @@ fn without_the_jacobian_flag_values_are_stored_whole() {
 }
 
 #[test]
-fn half_and_difference_angles_become_the_vectors_that_have_them() {
+fn half_and_difference_angles_become_vectors_with_these_angles() {
     for angles in [[0.1, 0.2, 0.3], [0.7, 0.5, 1.2], [0.01, 1.2, 0.0], [0.4, 0.9, 1.5]] {
         let (i, o) = directions(angles).unwrap();
         let h = (i + o).normalize();
@@ -109,20 +109,20 @@ fn half_and_difference_angles_become_the_vectors_that_have_them() {
 
 #[test]
 fn anisotropic_files_are_refused_with_the_reason() {
-    let mut turned = lambertian_fields();
-    turned[0] = floats("phi_i", &[3], [-PI, 0.0, PI]);
+    let mut anisotropic = lambertian_fields();
+    anisotropic[0] = floats("phi_i", &[3], [-PI, 0.0, PI]);
     for at in [4, 5] {
-        let once = turned[at].data.clone();
-        turned[at].shape[0] = 3;
-        turned[at].data = once.repeat(3);
+        let once = anisotropic[at].data.clone();
+        anisotropic[at].shape[0] = 3;
+        anisotropic[at].data = once.repeat(3);
     }
-    // Half vectors of an anisotropic file do not turn with i: the same slices for all azimuths are no Lambertian.
-    let error = parse(&turned).unwrap().check_isotropic().unwrap_err().to_string();
+    // Half vectors of an anisotropic file are not relative to i, so equal slices for all azimuths are not a Lambertian.
+    let error = parse(&anisotropic).unwrap().check_isotropic().unwrap_err().to_string();
     assert!(error.contains("3 azimuths") && error.contains("isotropic"), "{error}");
 }
 
 #[test]
-fn spectra_become_the_colour_that_the_eye_sees_in_daylight() {
+fn spectra_become_their_colour_in_daylight() {
     // A reflectance of 0.5 at every wavelength is grey.
     let mut fields = lambertian_fields();
     let planes: Vec<u8> = fields[5].data.chunks(4 * 1600).step_by(3).flat_map(|plane| plane.repeat(5)).collect();
@@ -138,8 +138,8 @@ fn spectra_become_the_colour_that_the_eye_sees_in_daylight() {
 
 #[test]
 fn malformed_fields_are_refused_by_name() {
-    type Harm = fn(&mut Vec<FieldBytes>);
-    let cases: [(&str, Harm); 10] = [
+    type Damage = fn(&mut Vec<FieldBytes>);
+    let cases: [(&str, Damage); 10] = [
         ("theta_i", |f| f[1].data[4..8].fill(0)),
         ("theta_i", |f| f[1].data[0..4].copy_from_slice(&f32::NAN.to_le_bytes())),
         ("ndf", |f| f[2].shape = vec![1, 4]),
@@ -151,9 +151,9 @@ fn malformed_fields_are_refused_by_name() {
         ("rgb", |f| f[5].shape = vec![u64::MAX, 14, 3, 40, 40]),
         ("rgb", |f| f[5].kind = 7),
     ];
-    for (name, harm) in cases {
+    for (name, damage) in cases {
         let mut fields = lambertian_fields();
-        harm(&mut fields);
+        damage(&mut fields);
         let error = parse(&fields).err().unwrap().to_string();
         assert!(error.contains(&format!("field \"{name}\"")), "{name}: {error}");
     }
@@ -169,7 +169,7 @@ fn truncated_and_damaged_bytes_are_errors_not_panics() {
     for len in (0..contents).chain([whole.len() - 1]) {
         assert!(TensorFile::parse(whole[..len].to_vec()).is_err(), "{len}");
     }
-    // Whatever a byte of the contents becomes: an error or a BRDF, no panic, no huge allocation.
+    // Any changed byte of the table of contents gives an error or a BRDF, but no panic and no huge allocation.
     for at in 0..contents {
         for value in [0, 1, 0x7f, 0xff] {
             let mut bytes = whole.clone();
@@ -206,7 +206,7 @@ fn measured_files_reflect_less_than_they_receive_and_survive_resampling() {
 
 #[test]
 fn the_silk_film_is_most_nearly_reciprocal_with_the_other_directions_cosine() {
-    // The format's value is f_r cosθ_o: read as plain f_r, or as f_r cosθ_i, the smooth file is less reciprocal.
+    // The format stores f_r cosθ_o. Read as f_r or as f_r cosθ_i, the smooth file is less reciprocal.
     let folder = std::env::var_os("BISCALE_DATA")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     let path = folder.join("vch_silk_blue_rgb.bsdf");

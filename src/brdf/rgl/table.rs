@@ -1,4 +1,4 @@
-//! The fields of an RGL file, evaluated by the published method.
+//! Fields of an RGL file and their evaluation by the published method.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -9,18 +9,18 @@ use super::warp::{Between, Blend, Grid, Warp};
 use crate::base::InputError;
 use crate::brdf::spectrum::rgb_weights;
 
-/// The coordinate of an elevation on the unit square, `√(2θ/π)`.
+/// Coordinate of a polar angle on the unit square, `√(2θ/π)`.
 pub(crate) fn u_of_theta(theta: f64) -> f64 {
     (theta / FRAC_PI_2).sqrt()
 }
 
-/// The coordinate of an azimuth on the unit square, `(φ+π)/2π`, wrapped to [0, 1).
+/// Coordinate of an azimuth on the unit square, `(φ+π)/2π`, wrapped to [0, 1).
 pub(crate) fn u_of_phi(phi: f64) -> f64 {
-    let turn = (phi + PI) / TAU;
-    turn - turn.floor()
+    let fraction = (phi + PI) / TAU;
+    fraction - fraction.floor()
 }
 
-/// The unit vector at a place of the unit square.
+/// Unit vector at a point of the unit square.
 pub(crate) fn direction_of_u([x, y]: [f64; 2]) -> DVec3 {
     let (theta, phi) = (x * x * FRAC_PI_2, y * TAU - PI);
     DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
@@ -30,12 +30,12 @@ pub(crate) fn elevation(v: DVec3) -> f64 {
     v.x.hypot(v.y).atan2(v.z)
 }
 
-/// The place of a unit vector on the unit square.
+/// Point of a unit vector on the unit square.
 pub(crate) fn u_of_direction(v: DVec3) -> [f64; 2] {
     [u_of_theta(elevation(v)), u_of_phi(v.y.atan2(v.x))]
 }
 
-/// A file for exact evaluation. OcclusionIntervals run over `phi_i`, then `theta_i`.
+/// Fields of a file for exact evaluation. The slices are ordered by `phi_i`, then `theta_i`.
 pub(crate) struct RglTable {
     pub phi_i: Vec<f64>,
     pub theta_i: Vec<f64>,
@@ -44,11 +44,11 @@ pub(crate) struct RglTable {
     pub vndf: Warp,
     /// `[slice][channel][y][x]`; three channels.
     pub rgb: (Grid, Vec<f64>),
-    /// Whether values are stored divided by `ndf / (4 sigma)`.
+    /// True if the stored values are divided by `ndf / (4 sigma)`.
     pub jacobian: bool,
 }
 
-/// The name, shape and numbers of the colours: `rgb`, or `spectra` seen in daylight by the standard observer.
+/// Name, shape and values of the colours: `rgb`, or `spectra` converted to RGB for daylight.
 fn colors(file: &TensorFile) -> Result<(&'static str, [usize; 5], Vec<f64>), InputError> {
     if file.has("rgb") || !file.has("spectra") {
         let (shape, values) = file.floats("rgb")?;
@@ -121,20 +121,20 @@ impl RglTable {
         })
     }
 
-    /// One or two azimuths stand for all.
+    /// Returns true if the file has one or two azimuths, which then represent all.
     pub(crate) fn is_isotropic(&self) -> bool {
         self.phi_i.len() <= 2
     }
 
-    /// `f_r(i,o) cosθ_o` as the file has it, not reciprocal; 0 where interpolation leaves it negative. Unit vectors
-    /// above the surface; `i` is the side that has the slices.
+    /// `f_r(i,o) cosθ_o` as the file defines it, which is not reciprocal; negative interpolated values become 0. `i`
+    /// and `o` are unit vectors above the surface, and the slices are those of `i`.
     pub(crate) fn eval(&self, i: DVec3, o: DVec3) -> DVec3 {
         let Some(h) = (i + o).try_normalize() else {
             return DVec3::ZERO;
         };
         let (theta_i, phi_i) = (elevation(i), i.y.atan2(i.x));
-        let turn = if self.is_isotropic() { phi_i } else { 0.0 };
-        let u_h = [u_of_theta(elevation(h)), u_of_phi(h.y.atan2(h.x) - turn)];
+        let rotation = if self.is_isotropic() { phi_i } else { 0.0 };
+        let u_h = [u_of_theta(elevation(h)), u_of_phi(h.y.atan2(h.x) - rotation)];
         let phi =
             if self.is_isotropic() { Between { lower: 0, weight: 0.0 } } else { Between::find(&self.phi_i, phi_i) };
         let slice = Blend::new(phi, Between::find(&self.theta_i, theta_i), self.theta_i.len());
@@ -147,7 +147,7 @@ impl RglTable {
         if self.jacobian { value * self.jacobian(u_of_direction(i), u_h) } else { value }
     }
 
-    /// `ndf(u_h) / (4 sigma(u_i))`, and 0 where sigma is not positive.
+    /// `ndf(u_h) / (4 sigma(u_i))`, or 0 if sigma is not positive.
     pub(crate) fn jacobian(&self, u_i: [f64; 2], u_h: [f64; 2]) -> f64 {
         let sigma = self.sigma.0.eval(&self.sigma.1, u_i);
         let ndf = self.ndf.0.eval(&self.ndf.1, u_h);

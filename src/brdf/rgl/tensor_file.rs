@@ -1,7 +1,8 @@
-//! The container of RGL `.bsdf` files, read and written: named arrays.
+//! Reader and writer of the container of RGL `.bsdf` files, which stores named arrays.
 //!
-//! `tensor_file\0`, two version bytes (1, 0), u32 field count; per field u16 name length, name, u16 dimensions, u8 type,
-//! u64 offset from the start of the file, u64 per dimension; then the arrays, last dimension fastest. Little-endian.
+//! A file has `tensor_file\0`, two version bytes (1, 0) and the u32 field count. Each field has u16 name length, name,
+//! u16 dimensions, u8 type, u64 offset from the start of the file, and u64 per dimension. The arrays follow, with the
+//! last dimension fastest. Numbers are little-endian.
 
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -10,13 +11,13 @@ use std::path::Path;
 use crate::base::InputError;
 
 const MAGIC: &[u8; 12] = b"tensor_file\0";
-/// The largest published file (anisotropic, spectral) is 550 MB; isotropic RGB ones are under 1 MB.
+/// Largest file in bytes. Published isotropic RGB files have less than 1 MB.
 const MAX_FILE: u64 = 256 << 20;
-/// The published files have at most 12 fields of at most 5 dimensions.
+/// Largest number of fields and of dimensions; published files have at most 12 fields of at most 5 dimensions.
 const MAX_FIELDS: u32 = 256;
 const MAX_DIMENSIONS: u16 = 8;
 
-/// A file in memory, its table of contents checked against its size.
+/// A file in memory. Its table of contents has been checked against its size.
 pub(crate) struct TensorFile {
     bytes: Vec<u8>,
     fields: Vec<Field>,
@@ -29,7 +30,7 @@ struct Field {
     shape: Vec<usize>,
 }
 
-/// Element types that BRDF files use.
+/// Codes of the element types that BRDF files use.
 const U8: u8 = 1;
 const F32: u8 = 10;
 const F64: u8 = 11;
@@ -78,7 +79,7 @@ impl TensorFile {
         })
     }
 
-    /// The shape and the finite numbers of a field of `DIMENSIONS` dimensions.
+    /// Shape and finite values of a field with `DIMENSIONS` dimensions.
     pub(crate) fn floats<const DIMENSIONS: usize>(
         &self,
         name: &str,
@@ -105,7 +106,7 @@ impl TensorFile {
     }
 }
 
-/// Arrays on the way into a file.
+/// Arrays to write into a file.
 #[derive(Default)]
 pub(crate) struct TensorWriter {
     fields: Vec<(&'static str, u8, Vec<usize>, Vec<u8>)>,
@@ -119,12 +120,12 @@ impl TensorWriter {
         self.fields.push((name, F32, shape.to_vec(), bytes));
     }
 
-    /// Adds a list of bytes: text, or a flag.
+    /// Adds a list of bytes, which holds a text or a flag.
     pub(crate) fn bytes(&mut self, name: &'static str, bytes: &[u8]) {
         self.fields.push((name, U8, vec![bytes.len()], bytes.to_vec()));
     }
 
-    /// The table of contents, then the arrays, each at a multiple of 8 bytes.
+    /// Writes the table of contents, then the arrays, each at a multiple of 8 bytes.
     pub(crate) fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let entry = |name: &str, shape: &[usize]| 2 + name.len() + 2 + 1 + 8 + 8 * shape.len();
         let contents: usize = self.fields.iter().map(|(name, _, shape, _)| entry(name, shape)).sum();
@@ -151,7 +152,7 @@ impl TensorWriter {
     }
 }
 
-/// Where arrays start.
+/// Alignment of arrays in the file, in bytes.
 const ALIGNMENT: usize = 8;
 
 struct Reader<'a> {
@@ -179,7 +180,7 @@ impl Reader<'_> {
         Ok(array)
     }
 
-    /// One entry of the table of contents; after it, the array is known to lie within the file.
+    /// Reads one entry of the table of contents and checks that its array lies within the file.
     fn field(&mut self) -> Result<Field, InputError> {
         let name_len = u16::from_le_bytes(self.take("name length")?);
         let name = String::from_utf8_lossy(self.slice(usize::from(name_len), "field name")?).into_owned();

@@ -1,15 +1,15 @@
-//! Functions on the unit square given at the vertices of a grid, bilinear between them, one per direction of one side.
+//! Bilinear functions on the unit square, given at the vertices of a grid, with one slice per direction.
 
 use crate::base::InputError;
 
-/// A grid: `width` values along x (fastest), `height` along y, both at least 2.
+/// A grid of `width` values along x (fastest) and `height` values along y, both at least 2.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Grid {
     pub width: usize,
     pub height: usize,
 }
 
-/// A cell and the position in it.
+/// A cell and a position in it.
 #[derive(Clone, Copy)]
 struct Cell {
     column: usize,
@@ -41,7 +41,7 @@ impl Grid {
         Cell { column, row, x, y }
     }
 
-    /// Bilinear interpolation of `values`.
+    /// Interpolates `values` bilinearly.
     pub(crate) fn eval(self, values: &[f64], at: [f64; 2]) -> f64 {
         let Cell { column, row, x, y } = self.cell(at);
         let along = |row: usize| {
@@ -56,7 +56,7 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-/// A position between two samples of a parameter: the lower one, and the weight of the next.
+/// A position between two samples of a parameter: the index of the lower one and the weight of the upper one.
 #[derive(Clone, Copy)]
 pub(crate) struct Between {
     pub lower: usize,
@@ -64,7 +64,7 @@ pub(crate) struct Between {
 }
 
 impl Between {
-    /// Of strictly increasing `values`; constant beyond the ends.
+    /// Finds `value` among strictly increasing `values`; positions are constant beyond the ends.
     pub(crate) fn find(values: &[f64], value: f64) -> Self {
         let upper = values.partition_point(|&v| v <= value).clamp(1, values.len().max(2) - 1);
         match (values.get(upper - 1), values.get(upper)) {
@@ -74,7 +74,7 @@ impl Between {
     }
 }
 
-/// The slices of `(phi_i, theta_i)`, `theta_i` fastest, that a direction lies between, and their weights.
+/// The four slices of `(phi_i, theta_i)`, `theta_i` fastest, around a direction, and their weights.
 #[derive(Clone, Copy)]
 pub(crate) struct Blend {
     slices: [(usize, f64); 4],
@@ -85,7 +85,7 @@ impl Blend {
         let corner = |up: usize, right: usize| {
             let weight = |at: Between, step: usize| if step == 1 { at.weight } else { 1.0 - at.weight };
             let (weight_phi, weight_theta) = (weight(phi, up), weight(theta, right));
-            // A slice without weight may not exist: another stands in.
+            // A slice with weight 0 may not exist, so the lower one replaces it.
             let step = |step: usize, weight: f64| if weight > 0.0 { step } else { 0 };
             let slice = (phi.lower + step(up, weight_phi)) * thetas + theta.lower + step(right, weight_theta);
             (slice, weight_phi * weight_theta)
@@ -93,26 +93,27 @@ impl Blend {
         Self { slices: [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)] }
     }
 
-    /// One slice alone.
+    /// A blend of one slice only.
     #[cfg(test)]
     pub(crate) fn only(slice: usize) -> Self {
         Self { slices: [(slice, 1.0), (slice, 0.0), (slice, 0.0), (slice, 0.0)] }
     }
 
-    /// Interpolates what `of` gives for each slice.
+    /// Interpolates the values that `of` returns for the slices.
     pub(crate) fn mix(self, of: impl Fn(usize) -> f64) -> f64 {
         self.slices.iter().map(|&(slice, weight)| if weight > 0.0 { weight * of(slice) } else { 0.0 }).sum()
     }
 }
 
-/// Densities per slice, and the map from their domain to uniform numbers (Dupuy and Jakob 2018, Sec. 4): first the
-/// marginal over y, then x given y. Integrals are in grid units, every slice scaled to a total of 1.
+/// Densities per slice, and the map from their domain to uniform numbers (Dupuy and Jakob 2018, Sec. 4). The map
+/// inverts the marginal distribution over y, then that of x given y. Integrals are in grid units, and each slice has a
+/// total of 1.
 pub(crate) struct Warp {
     grid: Grid,
     density: Vec<f64>,
-    /// Integral along a row up to each column; its last column is the row's total.
+    /// Integral along a row up to each column; the last column is the row's total.
     along_row: Vec<f64>,
-    /// Integral over the rows up to each.
+    /// Integral over the rows up to each row.
     over_rows: Vec<f64>,
 }
 
@@ -122,7 +123,7 @@ impl Warp {
         Self { grid, density: Vec::new(), along_row: Vec::new(), over_rows: Vec::new() }
     }
 
-    /// `density`: slices of `grid`, one after the other, not negative, none all 0.
+    /// Creates a warp. `density` has consecutive slices of `grid`, none negative and none entirely 0.
     pub(crate) fn new(grid: Grid, mut density: Vec<f64>) -> Result<Self, InputError> {
         let mut along_row = vec![0.0; density.len()];
         let mut over_rows = Vec::with_capacity(density.len() / grid.width);
@@ -156,7 +157,7 @@ impl Warp {
         Ok(Self { grid, density, along_row, over_rows })
     }
 
-    /// The uniform numbers that the warp of the interpolated slice would take to `at`.
+    /// Returns the uniform numbers that the warp of the interpolated slice maps to `at`.
     pub(crate) fn invert(&self, slice: Blend, at: [f64; 2]) -> [f64; 2] {
         let Cell { column, row, x, y } = self.grid.cell(at);
         let Grid { width, height } = self.grid;
@@ -170,12 +171,12 @@ impl Warp {
             mix(&self.along_row, row, column) + part(a, b, x)
         });
         let row_total = lerp(total[0], total[1], y);
-        // Where a whole row is 0, every number is as good.
+        // In a row of zeros, any number is valid.
         let across = if row_total > 0.0 { lerp(partial[0], partial[1], y) / row_total } else { at[0] };
         [across.clamp(0.0, 1.0), (below + part(total[0], total[1], y)).clamp(0.0, 1.0)]
     }
 
-    /// Where the warp of one slice takes uniform numbers, and the density there per unit of the square.
+    /// Maps uniform numbers by the warp of one slice. Returns the point and the density there, per unit of the square.
     pub(crate) fn sample(&self, slice: usize, [s, t]: [f64; 2]) -> ([f64; 2], f64) {
         let Grid { width, height } = self.grid;
         let at = |row: usize, column: usize| (slice * height + row) * width + column;
@@ -194,17 +195,17 @@ impl Warp {
         let (a, b) = (density(low), density(low + 1));
         let x = part_inverse(a, b, wanted - along(low));
         let cells = ((width - 1) * (height - 1)) as f64;
-        let place = [(low as f64 + x) / (width - 1) as f64, (row as f64 + y) / (height - 1) as f64];
-        (place, lerp(a, b, x) * cells)
+        let point = [(low as f64 + x) / (width - 1) as f64, (row as f64 + y) / (height - 1) as f64];
+        (point, lerp(a, b, x) * cells)
     }
 }
 
-/// The integral of a linear function over the first part `t` of its cell.
+/// Integral of a linear function over the first fraction `t` of its cell.
 fn part(a: f64, b: f64, t: f64) -> f64 {
     t * (a + 0.5 * t * (b - a))
 }
 
-/// The `t` whose [`part`] is `integral`: the root `2 c / (a + √(a² + 2 c (b-a)))`, stable where `a` is nearly `b`.
+/// The `t` for which [`part`] is `integral`: the root `2 c / (a + √(a² + 2 c (b-a)))`, stable if `a` is nearly `b`.
 fn part_inverse(a: f64, b: f64, integral: f64) -> f64 {
     let below = a + (a * a + 2.0 * integral * (b - a)).max(0.0).sqrt();
     if below > 0.0 { (2.0 * integral / below).clamp(0.0, 1.0) } else { 0.0 }
@@ -216,7 +217,7 @@ mod tests {
 
     const GRID: Grid = Grid { width: 5, height: 4 };
 
-    /// Between the two slices.
+    /// A blend of the two slices.
     fn between(weight: f64) -> Blend {
         Blend::new(Between { lower: 0, weight: 0.0 }, Between { lower: 0, weight }, 2)
     }
@@ -243,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_density_warps_nothing_and_corners_stay() {
+    fn a_constant_density_is_the_identity_and_corners_stay() {
         let flat = Warp::new(GRID, vec![3.0; GRID.len()]).unwrap();
         let only = Blend::only(0);
         for at in [[0.0, 0.0], [0.2, 0.9], [0.77, 0.5], [1.0, 1.0]] {
@@ -287,7 +288,7 @@ mod tests {
                 let cell = |at: f64| ((at * SIDE as f64) as usize).min(SIDE - 1);
                 counts[cell(y) * SIDE + cell(x)] += 1.0;
             }
-            // Bilinear between nodes that cells do not straddle: the mean over a cell is its middle.
+            // No cell contains a node, and the density is bilinear, so the mean over a cell is the value at its centre.
             let at = |k: usize| (k as f64 + 0.5) / SIDE as f64;
             let values = &warp.density[slice * GRID.len()..(slice + 1) * GRID.len()];
             let expected: Vec<f64> =
@@ -306,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_are_found_between_and_held_beyond_the_ends() {
+    fn positions_are_found_between_samples_and_are_constant_beyond_the_ends() {
         let values = [0.0, 1.0, 4.0];
         for (value, lower, weight) in [(-1.0, 0, 0.0), (0.5, 0, 0.5), (1.0, 1, 0.0), (3.0, 1, 2.0 / 3.0), (9.0, 1, 1.0)]
         {

@@ -1,5 +1,6 @@
-//! The sum over a tile of few normals for many lights at once: one lobe a normal, worked out for all lights together, times
-//! the area that light and view both see. That area needs no sum where the light is above or below all horizons of a normal.
+//! The sum over a tile with few distinct normals, for many lights at once. One lobe per normal cluster, evaluated for
+//! all lights together, multiplies the area that is visible from light and view. That area needs no sum over facets if
+//! the light is above or below all horizons of the cluster.
 
 use std::ops::Range;
 
@@ -7,53 +8,61 @@ use glam::{DVec3, Vec3};
 
 use super::facet_groups::NormalCluster;
 use crate::brdf::LobeAngles;
-use crate::effective::{FacetSum, Group};
+use crate::effective::{FacetGroup, FacetSum};
 use crate::math::simd;
 use crate::math::simd::LightPairs;
 use crate::visibility::{HorizonMap, Visibility};
 
-/// What is known of each run of facets with one normal before any direction is asked for.
+/// Horizon bounds of all normal clusters, which are computed once for all directions.
 #[derive(Debug, Clone)]
 pub(crate) struct ClusteredSum {
-    runs: usize,
-    /// `[azimuth][run]`: elevations [rad] up to which no facet and from which on every facet sees a direction.
-    reach: Vec<[f32; 2]>,
+    clusters: usize,
+    /// `[azimuth][cluster]`: the elevations [rad] up to which a direction is visible from no facet, and from which on
+    /// it is visible from all.
+    horizon_bounds: Vec<[f32; 2]>,
 }
 
 /// One view of a tile.
 #[derive(Clone, Copy)]
-pub(crate) struct View<'a> {
+pub(crate) struct SumView<'a> {
     pub sum: &'a FacetSum,
-    pub horizons: &'a HorizonMap,
+    pub horizon_map: &'a HorizonMap,
     pub o: Vec3,
-    /// Of all facets, the area times the visibility along `o`.
+    /// Area times visibility along `o`, of all facets.
     pub areas: &'a [f32],
 }
 
-/// Runs of one normal with their groups; black groups have none.
-fn runs(sum: &FacetSum) -> impl Iterator<Item = (&Group, &NormalCluster)> {
-    let lit = sum.groups().iter().filter(|group| !group.is_black);
-    lit.flat_map(|group| group.patches.iter().flatten().map(move |patch| (group, patch)))
+/// Normal clusters of all reflecting groups, with their groups.
+fn clusters(sum: &FacetSum) -> impl Iterator<Item = (&FacetGroup, &NormalCluster)> {
+    let reflecting = sum.groups().iter().filter(|group| !group.is_black);
+    reflecting.flat_map(|group| group.clusters.iter().flatten().map(move |cluster| (group, cluster)))
 }
 
 impl ClusteredSum {
-    /// `None` where normals are many, colours vary over facets of one material, or visibility is not held as horizons.
+    /// Computes the horizon bounds. `None` if a reflecting group has no clusters, colours vary over the facets of one
+    /// slot, or visibility is not a horizon map.
     pub(crate) fn of(sum: &FacetSum, visibility: &Visibility) -> Option<Self> {
-        let Visibility::HorizonMap(horizons) = visibility else { return None };
+        let Visibility::HorizonMap(horizon_map) = visibility else { return None };
         let ranges: Vec<Range<usize>> =
-            sum.has_few_normals().then(|| runs(sum).map(|(_, patch)| patch.range.clone()).collect())?;
-        Some(Self { runs: ranges.len(), reach: horizons.reach(&ranges) })
+            sum.supports_clustered_sum().then(|| clusters(sum).map(|(_, cluster)| cluster.range.clone()).collect())?;
+        Some(Self { clusters: ranges.len(), horizon_bounds: horizon_map.horizon_bounds(&ranges) })
     }
 
-    /// `a_v f̄` of each light into `out`.
-    pub(crate) fn sums(&self, view: View, lights: &[Vec3], pairs: &mut LightPairs, mut out: impl FnMut(usize, DVec3)) {
+    /// Writes `a_v f̄` of each light to `out`.
+    pub(crate) fn sums(
+        &self,
+        view: SumView,
+        lights: &[Vec3],
+        pairs: &mut LightPairs,
+        mut out: impl FnMut(usize, DVec3),
+    ) {
         for (part, lights) in lights.chunks(LightPairs::MAX).enumerate() {
             pairs.set(lights, view.o);
             let mut totals = [DVec3::ZERO; LightPairs::MAX];
-            for (run, (group, patch)) in runs(view.sum).enumerate() {
-                if patch.normal.dot(view.o) > 0.0 {
-                    let seen = self.seen(view, (run, patch), pairs, lights.len());
-                    add(group, patch.normal, pairs, &seen[..lights.len()], &mut totals);
+            for (index, (group, cluster)) in clusters(view.sum).enumerate() {
+                if cluster.normal.dot(view.o) > 0.0 {
+                    let areas = self.visible_areas(view, (index, cluster), pairs, lights.len());
+                    add(group, cluster.normal, pairs, &areas[..lights.len()], &mut totals);
                 }
             }
             for (k, (total, light)) in totals.into_iter().zip(lights).enumerate() {
@@ -62,26 +71,28 @@ impl ClusteredSum {
         }
     }
 
-    /// The area of a run that each light and the view see.
-    fn seen(
+    /// The area of a cluster that is visible from each light and from the view.
+    fn visible_areas(
         &self,
-        view: View,
-        (run, patch): (usize, &NormalCluster),
+        view: SumView,
+        (index, cluster): (usize, &NormalCluster),
         pairs: &LightPairs,
         lights: usize,
     ) -> [f64; LightPairs::MAX] {
-        let areas = &view.areas[patch.range.clone()];
-        let along =
-            |azimuth: f32, elevation: f32| view.horizons.seen_along([azimuth, elevation], patch.range.clone(), areas);
+        let areas = &view.areas[cluster.range.clone()];
+        let along = |azimuth: f32, elevation: f32| {
+            view.horizon_map.visible_sum([azimuth, elevation], cluster.range.clone(), areas)
+        };
         let mut all = None;
-        let mut seen = [0.0; LightPairs::MAX];
-        for (k, seen) in seen.iter_mut().enumerate().take(lights) {
+        let mut visible = [0.0; LightPairs::MAX];
+        for (k, visible) in visible.iter_mut().enumerate().take(lights) {
             let (azimuth, elevation) = (pairs.azimuths[k], pairs.elevations[k]);
-            if patch.normal.dot(pairs.light(k)) <= 0.0 {
+            if cluster.normal.dot(pairs.light(k)) <= 0.0 {
                 continue;
             }
-            let [a, b] = view.horizons.taps(azimuth).map(|(azimuth, _)| self.reach[azimuth * self.runs + run]);
-            *seen = if elevation >= a[1].max(b[1]) {
+            let bounds = |(azimuth, _): (usize, f32)| self.horizon_bounds[azimuth * self.clusters + index];
+            let [a, b] = view.horizon_map.taps(azimuth).map(bounds);
+            *visible = if elevation >= a[1].max(b[1]) {
                 *all.get_or_insert_with(|| along(azimuth, ABOVE_ALL))
             } else if elevation <= a[0].min(b[0]) {
                 0.0
@@ -89,33 +100,33 @@ impl ClusteredSum {
                 along(azimuth, elevation)
             };
         }
-        seen
+        visible
     }
 }
 
-/// Higher than any horizon [rad].
+/// An elevation [rad] above every horizon.
 const ABOVE_ALL: f32 = 4.0;
 
-/// Adds what facets of one normal reflect of each light.
-fn add(group: &Group, normal: Vec3, pairs: &LightPairs, seen: &[f64], totals: &mut [DVec3; LightPairs::MAX]) {
-    if seen.iter().all(|&seen| seen == 0.0) {
+/// Adds the reflection of one cluster, with its visible area for each light, to `totals`.
+fn add(group: &FacetGroup, normal: Vec3, pairs: &LightPairs, areas: &[f64], totals: &mut [DVec3; LightPairs::MAX]) {
+    if areas.iter().all(|&area| area == 0.0) {
         return;
     }
     let color = group.color.as_dvec3();
     let mut values = [0.0; LightPairs::MAX];
     for (lobe, term) in &group.lobes {
         simd::light_lobes(*lobe, pairs, normal, &mut values);
-        for (k, (seen, total)) in seen.iter().zip(&mut *totals).enumerate().filter(|(_, (seen, _))| **seen > 0.0) {
-            *total += color * term.tint(pairs.i_dot_h[k]).as_dvec3() * (f64::from(values[k]) * seen);
+        for (k, (area, total)) in areas.iter().zip(&mut *totals).enumerate().filter(|(_, (area, _))| **area > 0.0) {
+            *total += color * term.tint(pairs.i_dot_h[k]).as_dvec3() * (f64::from(values[k]) * area);
         }
     }
     for table in &group.measured {
-        for (k, (seen, total)) in seen.iter().zip(&mut *totals).enumerate().filter(|(_, (seen, _))| **seen > 0.0) {
+        for (k, (area, total)) in areas.iter().zip(&mut *totals).enumerate().filter(|(_, (area, _))| **area > 0.0) {
             let h = Vec3::new(pairs.h[0][k], pairs.h[1][k], pairs.h[2][k]);
             let angles = LobeAngles::new(normal, pairs.light(k), pairs.o, h);
             if angles.n_dot_i > 0.0 && angles.n_dot_o > 0.0 {
                 let value = table.f_r(&angles) * (angles.n_dot_i * angles.n_dot_o);
-                *total += color * value.as_dvec3() * *seen;
+                *total += color * value.as_dvec3() * *area;
             }
         }
     }
@@ -132,18 +143,18 @@ mod tests {
     fn sums_for_many_lights_are_the_plain_sums_whether_a_light_is_high_low_or_between() {
         let loaded = crate::scene::open("fig4b_bicolor_cup", &["quality.preset=draft".to_owned()]).unwrap();
         let outcome = Pipeline::new().effective(&loaded).unwrap();
-        let Representation::Direct(direct) = &outcome.brdf.form else { panic!("not a sum") };
+        let Representation::Direct(direct) = &outcome.brdf.representation else { panic!("not a sum") };
         assert!(ClusteredSum::of(&direct.sum, &direct.visibility).is_some());
         let facets = direct.sum.facet_count();
-        let seen = |d: Vec3| {
+        let visibility = |d: Vec3| {
             let mut v = vec![0.0; facets];
             direct.visibility.fill(d, 0..facets, &mut v);
             v
         };
         let lights: Vec<Vec3> = (0..90_u8).map(|k| from_angles(f32::from(k) * 0.0174, f32::from(k) * 2.4)).collect();
         for o in [from_angles(0.2, 1.0), from_angles(0.9, 4.0), from_angles(1.4, 2.0)] {
-            let v_o = seen(o);
-            let plain: Vec<DVec3> = lights.iter().map(|&i| direct.sum.sum(i, o, &seen(i), &v_o)).collect();
+            let v_o = visibility(o);
+            let plain: Vec<DVec3> = lights.iter().map(|&i| direct.sum.sum(i, o, &visibility(i), &v_o)).collect();
             let peak = plain.iter().map(|sum| sum.max_element()).fold(0.0, f64::max);
             direct.sums(&lights, o, |k, sum| {
                 assert!((sum - plain[k]).abs().max_element() < 1e-5 * peak, "{k}: {sum} {}", plain[k]);

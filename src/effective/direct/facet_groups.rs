@@ -1,4 +1,4 @@
-//! Facets of a sum, grouped by material, and runs of one normal within a group.
+//! Facets of a sum, grouped by slot, and normal clusters within a group.
 
 use std::ops::Range;
 
@@ -8,37 +8,38 @@ use crate::brdf::{LobeAngles, Measured, Term};
 use crate::geometry::{Facets, SAME_NORMAL};
 use crate::math::simd::{Lobe, PairVectors};
 
-/// A run of facets with one material.
+/// Consecutive facets of one slot, which share a material.
 #[derive(Debug, Clone)]
-pub(crate) struct Group {
+pub(crate) struct FacetGroup {
     pub(crate) range: Range<usize>,
     pub(crate) color: Vec3,
     pub(crate) is_black: bool,
     pub(crate) lobes: Vec<(Lobe, Term)>,
     pub(crate) measured: Vec<std::sync::Arc<dyn Measured>>,
-    /// Areas times colour weights, where those differ between the facets of the group.
+    /// Areas times colour weights, if colour weights differ between the facets of the group.
     pub(crate) rgb_areas: Option<[Vec<f32>; 3]>,
-    /// Runs of facets with one normal, where there are few of them.
-    pub(crate) patches: Option<Vec<NormalCluster>>,
+    /// Normal clusters; `None` if each facet has a lobe of its own.
+    pub(crate) clusters: Option<Vec<NormalCluster>>,
 }
 
-/// A run of facets with one normal.
+/// Consecutive facets that share a normal.
 #[derive(Debug, Clone)]
 pub(crate) struct NormalCluster {
     pub(crate) range: Range<usize>,
     pub(crate) normal: Vec3,
 }
 
-/// A run must be this long on average for one lobe a run to pay.
-const FACETS_A_PATCH: usize = 8;
+/// Smallest mean number of facets per cluster at which one lobe per cluster pays.
+const FACETS_PER_CLUSTER: usize = 8;
 
-impl Group {
-    /// The same materials over other facets; `None` where they have colours of their own, or normals that matter.
-    pub(crate) fn over(&self, range: Range<usize>, patches: Vec<NormalCluster>) -> Option<Self> {
-        (self.is_black || self.rgb_areas.is_none() && self.patches.is_some()).then(|| Self {
+impl FacetGroup {
+    /// Returns the group's materials over other facets; `None` if the group has colour weights or reflects without
+    /// clusters.
+    pub(crate) fn over(&self, range: Range<usize>, clusters: Vec<NormalCluster>) -> Option<Self> {
+        (self.is_black || self.rgb_areas.is_none() && self.clusters.is_some()).then(|| Self {
             range,
             rgb_areas: None,
-            patches: self.patches.is_some().then_some(patches),
+            clusters: self.clusters.is_some().then_some(clusters),
             ..self.clone()
         })
     }
@@ -47,8 +48,8 @@ impl Group {
         let colors = &facets.colors[range.clone()];
         let uniform = colors.iter().all(|&color| color == Vec3::ONE);
         let rgb_areas = (!uniform).then(|| rgb_areas(facets, range.clone()));
-        let patches = patches(facets, range.clone());
-        let few = patches.len() * FACETS_A_PATCH <= range.len();
+        let clusters = normal_clusters(facets, range.clone());
+        let is_clustered = clusters.len() * FACETS_PER_CLUSTER <= range.len();
         Self {
             range,
             color: Vec3::ONE,
@@ -56,14 +57,14 @@ impl Group {
             lobes: Vec::new(),
             measured: Vec::new(),
             rgb_areas,
-            patches: few.then_some(patches),
+            clusters: is_clustered.then_some(clusters),
         }
     }
 }
 
-/// What facets of one normal reflect; `None` where it faces away.
-pub(crate) fn patch_value(group: &Group, patch: &NormalCluster, pair: &PairVectors) -> Option<Vec3> {
-    let angles = LobeAngles::new(patch.normal, pair.i, pair.o, pair.h);
+/// The value of all lobes of a group at the normal of a cluster; `None` if the normal faces away from light or view.
+pub(crate) fn cluster_value(group: &FacetGroup, cluster: &NormalCluster, pair: &PairVectors) -> Option<Vec3> {
+    let angles = LobeAngles::new(cluster.normal, pair.i, pair.o, pair.h);
     if angles.n_dot_i <= 0.0 || angles.n_dot_o <= 0.0 {
         return None;
     }
@@ -77,21 +78,23 @@ pub(crate) fn patch_value(group: &Group, patch: &NormalCluster, pair: &PairVecto
     Some(value)
 }
 
-/// Areas times colour weights.
+/// Areas times colour weights, one array per channel.
 pub(crate) fn rgb_areas(facets: &Facets, range: Range<usize>) -> [Vec<f32>; 3] {
     let pairs = || facets.colors[range.clone()].iter().zip(&facets.areas[range.clone()]);
     std::array::from_fn(|c| pairs().map(|(color, area)| color[c] * area).collect())
 }
 
-/// Runs of facets with one normal.
-pub(crate) fn patches(facets: &Facets, range: Range<usize>) -> Vec<NormalCluster> {
-    let mut patches: Vec<NormalCluster> = Vec::new();
+/// Divides facets into runs that share a normal.
+pub(crate) fn normal_clusters(facets: &Facets, range: Range<usize>) -> Vec<NormalCluster> {
+    let mut clusters: Vec<NormalCluster> = Vec::new();
     for s in range {
         let normal = facets.normals[s];
-        match patches.last_mut() {
-            Some(patch) if (patch.normal - normal).abs().max_element() < SAME_NORMAL => patch.range.end = s + 1,
-            _ => patches.push(NormalCluster { range: s..s + 1, normal }),
+        match clusters.last_mut() {
+            Some(cluster) if (cluster.normal - normal).abs().max_element() < SAME_NORMAL => {
+                cluster.range.end = s + 1;
+            }
+            _ => clusters.push(NormalCluster { range: s..s + 1, normal }),
         }
     }
-    patches
+    clusters
 }

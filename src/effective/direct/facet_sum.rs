@@ -1,90 +1,49 @@
-//! The plain sum over facets, `Σ_s ΔA_s V_s(i) V_s(o) f(n_s, i, o)` (Wu et al. 2011, Eq. 5 and 10), made fast:
-//! analytic lobes over contiguous normals, one lobe for all facets that share a normal, tints outside the loop.
+//! The sum over facets, `Σ_s ΔA_s V_s(i) V_s(o) f(n_s, i, o)` (Wu et al. 2011, Eq. 5 and 10). Analytic lobes run over
+//! contiguous normals, all facets that share a normal share one lobe, and tints are applied outside the loop.
 
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::facet_groups::{NormalCluster, patch_value, patches, rgb_areas};
-use crate::brdf::{Brdf, LobeAngles, Measured, Term};
-use crate::cache::KeyBuilder;
-use crate::effective::Group;
+use super::facet_groups::{FacetGroup, NormalCluster, cluster_value, normal_clusters, rgb_areas};
+use crate::brdf::{LobeAngles, Material, Measured, Term, analytic_lobe};
 use crate::geometry::Facets;
 use crate::math::simd;
-use crate::math::simd::{Lobe, PairVectors};
+use crate::math::simd::PairVectors;
 
-/// A material as the sum sees it.
-#[derive(Debug, Clone)]
-pub struct Material {
-    pub brdf: Brdf,
-    /// Multiplies the sum of the terms.
-    pub color: Vec3,
-}
-
-/// A term that reflects nothing, whatever the angles.
-fn is_zero(term: &Term) -> bool {
-    // A tint is a line in (1 - i·h)⁵.
-    !matches!(term, Term::Measured(_)) && term.tint(0.0) == Vec3::ZERO && term.tint(1.0) == Vec3::ZERO
-}
-
-impl Material {
-    /// Does it reflect nothing?
-    pub fn is_black(&self) -> bool {
-        self.color == Vec3::ZERO || self.brdf.terms.iter().all(is_zero)
-    }
-
-    /// Do two materials differ in nothing but their colour?
-    pub fn same_brdf(&self, other: &Self) -> bool {
-        // A tint is a line in (1 - i·h)⁵: two points tell it.
-        let tints = |material: &Self| -> Vec<[Vec3; 2]> {
-            material.brdf.terms.iter().map(|term| [0.0, 1.0].map(|i_dot_h| term.tint(i_dot_h))).collect()
-        };
-        self.same_lobes(other) && tints(self) == tints(other)
-    }
-
-    /// Do two materials differ in nothing but colours and tints? Then what was factored for one serves the other.
-    pub fn same_lobes(&self, other: &Self) -> bool {
-        let same = |a: &Term, b: &Term| match (a, b) {
-            (Term::Measured(a), Term::Measured(b)) => std::sync::Arc::ptr_eq(a, b),
-            _ => analytic_lobe(a).is_some_and(|lobe| Some(lobe) == analytic_lobe(b)),
-        };
-        let (a, b) = (&self.brdf.terms, &other.brdf.terms);
-        self.is_black() == other.is_black() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b))
-    }
-}
-
-/// Facets grouped by material, in arrays that the inner loops walk.
+/// Facets grouped by slot, in arrays that the inner loops read.
 #[derive(Debug, Clone)]
 pub struct FacetSum {
     normals: [Vec<f32>; 3],
     areas: Vec<f32>,
-    groups: Vec<Group>,
-    /// Black materials are summed too.
-    keep_black: bool,
+    groups: Vec<FacetGroup>,
+    /// True if groups of black materials are summed, too.
+    sums_black_groups: bool,
 }
 
 impl FacetSum {
-    /// Facets must be sorted by slot ([`Facets::sort_for_sums`]); `material_of_slot[slot]` indexes `materials`.
+    /// Makes a sum. Facets must be sorted by slot ([`Facets::sort_for_sums`]); `material_of_slot[slot]` indexes
+    /// `materials`.
     pub fn new(facets: &Facets, material_of_slot: &[usize], materials: &[Material]) -> Self {
         let component = |pick: fn(&Vec3) -> f32| facets.normals.iter().map(pick).collect();
         let mut sum = Self {
             normals: [component(|n| n.x), component(|n| n.y), component(|n| n.z)],
             areas: facets.areas.clone(),
             groups: Vec::new(),
-            keep_black: false,
+            sums_black_groups: false,
         };
         let mut start = 0;
         while start < facets.len() {
             let slot = facets.slots[start];
             let end = start + facets.slots[start..].iter().take_while(|&&other| other == slot).count();
-            sum.groups.push(Group::new(facets, start..end));
+            sum.groups.push(FacetGroup::new(facets, start..end));
             start = end;
         }
         sum.set_materials(facets, material_of_slot, materials);
         sum
     }
 
-    /// Swaps the materials and keeps the facets: all that an edit of a BRDF or a colour costs.
+    /// Replaces the materials of the same facets; an edit of a BRDF or a colour needs nothing else.
     pub fn set_materials(&mut self, facets: &Facets, material_of_slot: &[usize], materials: &[Material]) {
         for group in &mut self.groups {
             let material = &materials[material_of_slot[usize::from(facets.slots[group.range.start])]];
@@ -109,21 +68,24 @@ impl FacetSum {
         self.areas.len()
     }
 
-    pub(crate) fn keep_black(&mut self, keep: bool) {
-        self.keep_black = keep;
+    /// Sets whether groups of black materials are summed, too.
+    pub(crate) fn sum_black_groups(&mut self, enabled: bool) {
+        self.sums_black_groups = enabled;
     }
 
-    pub(crate) fn one_lobe_a_facet(&mut self) {
-        self.groups.iter_mut().for_each(|group| group.patches = None);
+    /// Evaluates one lobe per facet.
+    pub(crate) fn clear_clusters(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.clusters = None);
     }
 
-    /// One lobe a normal, however many there are.
+    /// Evaluates one lobe per normal cluster, regardless of the number of clusters.
     pub(crate) fn group_by_normal(&mut self, facets: &Facets) {
         for group in &mut self.groups {
-            group.patches = Some(patches(facets, group.range.clone()));
+            group.clusters = Some(normal_clusters(facets, group.range.clone()));
         }
     }
 
+    /// Sums each colour channel with its own weights.
     pub(crate) fn sum_each_channel(&mut self, facets: &Facets) {
         for group in &mut self.groups {
             group.rgb_areas = Some(rgb_areas(facets, group.range.clone()));
@@ -140,42 +102,42 @@ impl FacetSum {
         let pair = PairVectors::new(i, o);
         let mut total = DVec3::ZERO;
         for group in &self.groups {
-            let black = !self.keep_black && group.is_black;
-            if !black {
+            if self.sums_black_groups || !group.is_black {
                 total += group.color.as_dvec3() * self.group_sum(group, &pair, v_i, v_o);
             }
         }
         total
     }
 
-    /// Analytic terms that an evaluation touches, for the cost model: lobes times facets, and patches count once.
+    /// Number of analytic lobes that one query evaluates, for the cost model: one per term and facet, or per term and
+    /// cluster.
     pub fn lobe_count(&self) -> usize {
         self.groups
             .iter()
-            .map(|group| group.patches.as_ref().map_or(group.range.len(), Vec::len) * group.lobes.len().max(1))
+            .map(|group| group.clusters.as_ref().map_or(group.range.len(), Vec::len) * group.lobes.len().max(1))
             .sum()
     }
 
-    /// Facets that carry a measured BRDF.
+    /// Number of measured values that one query reads, for the cost model: one per measured term and facet or cluster.
     pub fn measured_count(&self) -> usize {
         self.groups
             .iter()
-            .map(|group| group.patches.as_ref().map_or(group.range.len(), Vec::len) * group.measured.len())
+            .map(|group| group.clusters.as_ref().map_or(group.range.len(), Vec::len) * group.measured.len())
             .sum()
     }
 
-    /// Do colour weights differ between facets of one material?
+    /// Returns true if colour weights differ between facets of one slot.
     pub fn colors_vary(&self) -> bool {
         self.groups.iter().any(|group| group.rgb_areas.is_some())
     }
 
-    /// Number of distinct normals, where they are few enough for one lobe each.
-    pub fn patch_count(&self) -> Option<usize> {
-        self.groups.iter().map(|group| group.patches.as_ref().map(Vec::len)).sum()
+    /// Number of normal clusters; `None` if a group has none.
+    pub fn normal_count(&self) -> Option<usize> {
+        self.groups.iter().map(|group| group.clusters.as_ref().map(Vec::len)).sum()
     }
 
-    /// The runs of facets, for twins of the sum on other devices.
-    pub(crate) fn groups(&self) -> &[Group] {
+    /// The groups of facets, for the GPU's twin of the sum.
+    pub(crate) fn groups(&self) -> &[FacetGroup] {
         &self.groups
     }
 
@@ -192,10 +154,11 @@ impl FacetSum {
         [&self.normals[0][range.clone()], &self.normals[1][range.clone()], &self.normals[2][range]]
     }
 
-    /// One measured BRDF over a group's facets, each channel with its own colour weights. Visibilities are those of all facets.
+    /// The sum of one measured BRDF over a group's facets, each channel with its own colour weights. `v_i` and `v_o`
+    /// are the visibilities of all facets.
     pub(crate) fn measured_sum(
         &self,
-        group: &Group,
+        group: &FacetGroup,
         table: &dyn Measured,
         pair: &PairVectors,
         v_i: &[f32],
@@ -211,8 +174,8 @@ impl FacetSum {
             angles.clear();
             weights.clear();
             for s in first..(first + MAX).min(end) {
-                let seen = v_i[s] * v_o[s];
-                if seen <= 0.0 {
+                let visible = v_i[s] * v_o[s];
+                if visible <= 0.0 {
                     continue;
                 }
                 let facet = LobeAngles::new(self.facet(s).0, pair.i, pair.o, pair.h);
@@ -221,7 +184,7 @@ impl FacetSum {
                         None => Vec3::splat(self.areas[s]),
                         Some([r, g, b]) => Vec3::new(r[s - start], g[s - start], b[s - start]),
                     };
-                    weights.push(weight * (facet.n_dot_i * facet.n_dot_o * seen));
+                    weights.push(weight * (facet.n_dot_i * facet.n_dot_o * visible));
                     angles.push(facet);
                 }
             }
@@ -231,9 +194,9 @@ impl FacetSum {
         total
     }
 
-    fn group_sum(&self, group: &Group, pair: &PairVectors, v_i_all: &[f32], v_o_all: &[f32]) -> DVec3 {
-        if let Some(patches) = &group.patches {
-            return patches.iter().map(|patch| self.patch_sum(group, patch, pair, v_i_all, v_o_all)).sum();
+    fn group_sum(&self, group: &FacetGroup, pair: &PairVectors, v_i_all: &[f32], v_o_all: &[f32]) -> DVec3 {
+        if let Some(clusters) = &group.clusters {
+            return clusters.iter().map(|cluster| self.cluster_sum(group, cluster, pair, v_i_all, v_o_all)).sum();
         }
         let range = group.range.clone();
         let (v_i, v_o) = (&v_i_all[range.clone()], &v_o_all[range.clone()]);
@@ -255,10 +218,17 @@ impl FacetSum {
         total
     }
 
-    fn patch_sum(&self, group: &Group, patch: &NormalCluster, pair: &PairVectors, v_i: &[f32], v_o: &[f32]) -> DVec3 {
-        let Some(value) = patch_value(group, patch, pair) else { return DVec3::ZERO };
-        let range = patch.range.clone();
-        let seen = match &group.rgb_areas {
+    fn cluster_sum(
+        &self,
+        group: &FacetGroup,
+        cluster: &NormalCluster,
+        pair: &PairVectors,
+        v_i: &[f32],
+        v_o: &[f32],
+    ) -> DVec3 {
+        let Some(value) = cluster_value(group, cluster, pair) else { return DVec3::ZERO };
+        let range = cluster.range.clone();
+        let area = match &group.rgb_areas {
             None => DVec3::splat(simd::masked_sum([&self.areas[range.clone()]], &v_i[range.clone()], &v_o[range])[0]),
             Some(rgb) => {
                 let inside = range.start - group.range.start..range.end - group.range.start;
@@ -266,59 +236,24 @@ impl FacetSum {
                 DVec3::from_array(simd::masked_sum([r, g, b], &v_i[range.clone()], &v_o[range]))
             }
         };
-        seen * value.as_dvec3()
+        area * value.as_dvec3()
     }
 
-    /// All that the sums of single lobes depend on: not colours and tints, which are multiplied on afterwards.
-    pub(crate) fn hash_into(&self, key: &mut KeyBuilder) {
-        for axis in &self.normals {
-            key.numbers("normals", axis);
-        }
-        key.numbers("areas", &self.areas).flags("black ones too", [self.keep_black]);
-        for group in &self.groups {
-            key.counts("group", [group.range.start, group.range.end]).flags("black", [group.is_black]);
-            for (lobe, _) in &group.lobes {
-                key.numbers("lobe", &lobe.numbers());
-            }
-            for table in &group.measured {
-                key.numbers("measured", table.content().bytes());
-            }
-            for areas in group.rgb_areas.iter().flatten() {
-                key.numbers("colored areas", areas);
-            }
-            key.flags("few normals", [group.patches.is_some()]);
-            for patch in group.patches.iter().flatten() {
-                key.counts("patch", [patch.range.start, patch.range.end]).numbers("normal", &[patch.normal]);
-            }
-        }
+    /// Number of normal clusters of the reflecting groups; `None` if one of these groups has none.
+    pub(crate) fn reflecting_normal_count(&self) -> Option<usize> {
+        let reflecting = self.groups.iter().filter(|group| !group.is_black);
+        reflecting.map(|group| group.clusters.as_ref().map(Vec::len)).sum()
     }
 
-    /// Normals of the groups that reflect, where each has few.
-    pub(crate) fn distinct_normals(&self) -> Option<usize> {
-        let lit = self.groups.iter().filter(|group| !group.is_black);
-        lit.map(|group| group.patches.as_ref().map(Vec::len)).sum()
+    /// Returns true if every reflecting group has normal clusters and uniform colour weights, as a clustered sum
+    /// requires.
+    pub(crate) fn supports_clustered_sum(&self) -> bool {
+        let is_clustered = |group: &FacetGroup| group.clusters.is_some() && group.rgb_areas.is_none();
+        self.groups.iter().all(|group| group.is_black || is_clustered(group))
     }
 
-    /// Whether every group has few normals and one colour: then `ClusteredSum` serves.
-    pub(crate) fn has_few_normals(&self) -> bool {
-        let few = |group: &Group| group.patches.is_some() && group.rgb_areas.is_none();
-        self.groups.iter().all(|group| group.is_black || few(group))
+    /// A sum over other facets with the same materials.
+    pub(crate) fn over(&self, normals: [Vec<f32>; 3], areas: Vec<f32>, groups: Vec<FacetGroup>) -> Self {
+        Self { normals, areas, groups, sums_black_groups: self.sums_black_groups }
     }
-
-    /// Other facets of the same materials.
-    pub(crate) fn over(&self, normals: [Vec<f32>; 3], areas: Vec<f32>, groups: Vec<Group>) -> Self {
-        Self { normals, areas, groups, keep_black: self.keep_black }
-    }
-}
-
-/// The inner-loop form of an analytic term; `None` for a measured one.
-pub fn analytic_lobe(term: &Term) -> Option<Lobe> {
-    Some(match *term {
-        Term::Lambertian { .. } => Lobe::Lambertian,
-        Term::BlinnPhong { exponent, .. } => Lobe::blinn_phong(exponent),
-        Term::CookTorrance { roughness, .. } => Lobe::cook_torrance(roughness),
-        Term::Ward { roughness, .. } => Lobe::ward(roughness),
-        Term::Ggx { roughness, .. } => Lobe::ggx(roughness),
-        Term::Measured(_) => return None,
-    })
 }

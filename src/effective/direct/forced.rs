@@ -1,26 +1,26 @@
-//! What a person forces on or off in the sum over facets.
+//! Effects of the sum over facets that `[effects]` forces on or off.
 
 use crate::effective::FacetSum;
 use crate::geometry::Facets;
 use crate::scene::{Effects, Switch};
 
 impl FacetSum {
-    /// Does as `effects` force; `facets` are those the sum was made of. Nothing is lost: one lobe a facet and one lobe a normal,
-    /// one sum and a sum a channel are the same numbers at different prices.
+    /// Applies the effects that are forced; `facets` are those that the sum is made of. The result is the same in all
+    /// cases: one lobe per facet or per cluster, and one sum or a sum per channel, differ in cost only.
     pub fn force(&mut self, facets: &Facets, effects: &Effects) {
         match effects.exact_lobes {
             Switch::Auto => {}
             Switch::On => self.group_by_normal(facets),
-            Switch::Off => self.one_lobe_a_facet(),
+            Switch::Off => self.clear_clusters(),
         }
         if effects.color_weights == Switch::On {
             self.sum_each_channel(facets);
         }
-        self.keep_black(effects.black_materials == Switch::On);
+        self.sum_black_groups(effects.black_materials == Switch::On);
     }
 }
 
-/// Each slot's mean colour in place of its facets' own.
+/// Replaces the colours of facets by the area-weighted mean colour of their slot.
 pub fn mean_colors(facets: &mut Facets) {
     let slots = facets.slots.iter().map(|slot| usize::from(*slot) + 1).max().unwrap_or(0);
     let mut sums = vec![(glam::Vec3::ZERO, 0.0_f32); slots];

@@ -1,4 +1,5 @@
-//! The effective BRDF as a live sum over facets: soft visibility, exact lobes, no table of the product.
+//! The effective BRDF as a sum over facets that is evaluated at the query: soft visibility, exact lobes, no tabulated
+//! product.
 
 pub(crate) mod clustered_sum;
 pub(crate) mod facet_groups;
@@ -11,18 +12,18 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use self::clustered_sum::{ClusteredSum, View};
+use self::clustered_sum::{ClusteredSum, SumView};
 use super::{FacetSum, VisibilityRows};
 use crate::math::simd::LightPairs;
 use crate::visibility::Visibility;
 
-/// Sums over facets at the query; exact in the lobes, interpolated only in the visibility.
+/// A sum over facets, evaluated at the query. Lobes are exact; only visibility is interpolated.
 #[derive(Debug, Clone)]
 pub struct Direct {
     pub sum: Arc<FacetSum>,
     pub visibility: Arc<Visibility>,
-    /// Where normals are few, which pictures use.
-    few: Option<Arc<ClusteredSum>>,
+    /// Horizon bounds for a clustered sum, if [`ClusteredSum::of`] supports the sum.
+    clustered: Option<Arc<ClusteredSum>>,
 }
 
 #[derive(Default)]
@@ -38,28 +39,28 @@ thread_local! {
 
 impl Direct {
     pub fn new(sum: Arc<FacetSum>, visibility: Arc<Visibility>) -> Self {
-        let few = ClusteredSum::of(&sum, &visibility).map(Arc::new);
-        Self { sum, visibility, few }
+        let clustered = ClusteredSum::of(&sum, &visibility).map(Arc::new);
+        Self { sum, visibility, clustered }
     }
 
-    /// Whether normals are so few that pictures sum over few facets.
-    pub fn has_few(&self) -> bool {
-        self.few.is_some()
+    /// Returns true if queries use a clustered sum.
+    pub fn has_clustered_sum(&self) -> bool {
+        self.clustered.is_some()
     }
 
-    /// Hands the visibilities along `i` and `o` of all facets to `work`.
-    pub(crate) fn with_seen<T>(&self, i: Vec3, o: Vec3, work: impl FnOnce(&[f32], &[f32]) -> T) -> T {
+    /// Calls `function` with the visibilities of all facets along `i` and `o`.
+    pub(crate) fn with_visibility<T>(&self, i: Vec3, o: Vec3, function: impl FnOnce(&[f32], &[f32]) -> T) -> T {
         SCRATCH.with_borrow_mut(|scratch| {
             let facets = self.sum.facet_count();
             scratch.v_i.resize(facets, 0.0);
             scratch.v_o.resize(facets, 0.0);
             self.visibility.fill(i, 0..facets, &mut scratch.v_i);
             self.visibility.fill(o, 0..facets, &mut scratch.v_o);
-            work(&scratch.v_i, &scratch.v_o)
+            function(&scratch.v_i, &scratch.v_o)
         })
     }
 
-    /// `a_v(o)` and, for each light, `Σ ΔA V V f = a_v f̄` into `out`.
+    /// Returns `a_v(o)` and writes `Σ ΔA V V f = a_v f̄` of each light to `out`.
     pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         SCRATCH.with_borrow_mut(|scratch| {
             let facets = self.sum.facet_count();
@@ -67,14 +68,14 @@ impl Direct {
             scratch.v_o.resize(facets, 0.0);
             self.visibility.fill(o, 0..facets, &mut scratch.v_o);
             let area = self.sum.projected_area(&scratch.v_o, o);
-            if let (Visibility::HorizonMap(horizons), Some(few), true) =
-                (&*self.visibility, &self.few, o.z > 0.0 && area > 0.0)
+            if let (Visibility::HorizonMap(horizon_map), Some(clustered), true) =
+                (&*self.visibility, &self.clustered, o.z > 0.0 && area > 0.0)
             {
                 for (v, area) in scratch.v_o.iter_mut().zip(self.sum.areas(0..facets)) {
                     *v *= area;
                 }
-                let view = View { sum: &self.sum, horizons, o, areas: &scratch.v_o };
-                few.sums(view, lights, &mut scratch.pairs, out);
+                let view = SumView { sum: &self.sum, horizon_map, o, areas: &scratch.v_o };
+                clustered.sums(view, lights, &mut scratch.pairs, out);
                 return area;
             }
             for (k, &i) in lights.iter().enumerate() {
@@ -89,8 +90,9 @@ impl Direct {
         })
     }
 
-    /// `f̄(i, o)` as it would be if visibility were read between the nodes of `rows`, with exact lobes; above the horizon.
-    pub(crate) fn seen_between(&self, rows: &VisibilityRows, i: Vec3, o: Vec3) -> Vec3 {
+    /// `f̄(i, o)` with exact lobes and with visibility interpolated between the nodes of `rows`, for directions above
+    /// the horizon.
+    pub(crate) fn eval_interpolated(&self, rows: &VisibilityRows, i: Vec3, o: Vec3) -> Vec3 {
         let (mut v_i, mut v_o) = (vec![0.0; rows.facets], vec![0.0; rows.facets]);
         rows.read(i, &mut v_i);
         rows.read(o, &mut v_o);

@@ -1,4 +1,5 @@
-//! The BVNDF in the metric of the rotated basis, by randomized SVD; N itself is never stored (Wu et al. 2011, Sec. 3.4).
+//! The BVNDF, matrix N, in the metric of the rotated basis, by random projection; N itself is never stored (Wu et al.
+//! 2011, Sec. 3.4).
 
 use glam::Vec3;
 use nalgebra::DMatrix;
@@ -21,7 +22,7 @@ pub struct VisibilityRows {
 }
 
 impl VisibilityRows {
-    /// Of a run of facets.
+    /// Evaluates the visibility of a run of facets.
     pub fn new(visibility: &Visibility, facets: std::ops::Range<usize>, grid: PolarGrid) -> Self {
         let mut rows = vec![0.0; grid.len() * facets.len()];
         rows.par_chunks_mut(facets.len().max(1))
@@ -30,7 +31,8 @@ impl VisibilityRows {
         Self { grid, facets: facets.len(), rows }
     }
 
-    /// Each facet's visibility along any direction, read between the nodes as the factored form reads it.
+    /// Interpolates each facet's visibility along any direction, as a query of [`LowRank`](crate::effective::LowRank)
+    /// does.
     pub fn read(&self, direction: Vec3, out: &mut [f32]) {
         out.fill(0.0);
         let taper = PolarGrid::horizon_taper(direction.z);
@@ -42,13 +44,13 @@ impl VisibilityRows {
         }
     }
 
-    /// The same, of a run of its facets.
+    /// The rows of a run of facets.
     pub fn part(&self, facets: std::ops::Range<usize>) -> Self {
         let rows = self.rows.chunks(self.facets.max(1)).flat_map(|row| row[facets.clone()].iter().copied()).collect();
         Self { grid: self.grid, facets: facets.len(), rows }
     }
 
-    /// Each facet's visibility times `(n·d)+`.
+    /// The rows times `(n·d)+` of each facet.
     pub fn with_cosines(&self, normals: &[Vec3]) -> Self {
         let grid = self.grid;
         let mut rows = self.rows.clone();
@@ -62,12 +64,16 @@ impl VisibilityRows {
     }
 }
 
-/// Random vectors used beyond the wanted rank.
+/// Number of random vectors beyond twice the largest rank.
 const EXTRA: usize = 20;
 
-/// The leading right vectors of N in the metric of the features: row-major `features x rank`.
+/// Computes the leading right vectors of N in the metric of the features, row-major `features x rank`, and the rank.
 ///
-/// Khatri-Rao projection `Q = Σ_s w_s (g·V_s)(h·V_s) x_s` with `count` random pairs `(g, h)`, weighted by √(solid angle).
+/// The Khatri-Rao projection is `Q = Σ_s w_s (g·V_s)(h·V_s) x_s` with random pairs `(g, h)`, weighted by √(solid
+/// angle).
+///
+/// # Errors
+/// A factorization that does not converge, or values that are not finite.
 pub fn leading_features(
     visibility: &VisibilityRows,
     weights: &[f32],
@@ -98,8 +104,8 @@ pub fn leading_features(
     let mut q = vec![0.0; count * feature_count];
     gemm::multiply_parallel(count, facets, feature_count, &mixed, features, &mut q);
     let sketch = DMatrix::<f64>::from_fn(count, feature_count, |k, f| f64::from(q[k * feature_count + f]));
-    let most = max_rank.min(feature_count);
-    let (_, vectors) = right_singular(&sketch, |values| rank_for(values, kept).min(most))?;
+    let limit = max_rank.min(feature_count);
+    let (_, vectors) = right_singular(&sketch, |values| rank_for(values, kept).min(limit))?;
     let rank = vectors.ncols();
     let leading = (0..feature_count)
         .flat_map(|f| {
@@ -112,19 +118,19 @@ pub fn leading_features(
     Ok((leading, rank))
 }
 
-/// A normal deviate by Box and Muller.
+/// A normally distributed number (Box and Muller).
 fn gaussian(rng: &mut ChaCha8Rng) -> f32 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     (radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()) as f32
 }
 
-/// `U_c(i,o) = Σ_s w_s y_c(s) V_s(i) V_s(o)` on all pairs of nodes: `[o][i][c]`, `c` contiguous. `y` is row-major
-/// `facets x columns`. A weighted Gram matrix a column, in blocks of views; symmetric in `i` and `o`.
+/// `U_c(i,o) = Σ_s w_s y_c(s) V_s(i) V_s(o)` on all pairs of nodes, `[o][i][c]` with `c` contiguous. `y` is row-major
+/// `facets x columns`. Each column is a weighted Gram matrix, symmetric in `i` and `o` and computed in blocks of views.
 pub fn visibility_table(visibility: &VisibilityRows, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
-    pair_table(&visibility.rows, visibility.grid.len(), weights, y, columns)
+    node_pair_table(&visibility.rows, visibility.grid.len(), weights, y, columns)
 }
 
-/// [`visibility_table`] at some pairs of nodes `(o, i)`; elsewhere it is 0.
+/// [`visibility_table`] with values at some pairs of nodes `(o, i)` only; all others are 0.
 pub fn visibility_at(
     visibility: &VisibilityRows,
     weights: &[f32],
@@ -137,13 +143,13 @@ pub fn visibility_at(
     let row = |node: usize| &visibility.rows[node * facets..][..facets];
     let mut sums = vec![0.0_f32; read.len() * columns];
     sums.par_chunks_mut((PAIRS * columns).max(1)).zip(read.par_chunks(PAIRS)).for_each(|(sums, read)| {
-        let mut seen = vec![0.0_f32; read.len() * facets];
-        for (seen, &(o, i)) in seen.chunks_mut(facets.max(1)).zip(read) {
-            for (((seen, v_o), v_i), w) in seen.iter_mut().zip(row(o)).zip(row(i)).zip(weights) {
-                *seen = v_o * v_i * w;
+        let mut visible = vec![0.0_f32; read.len() * facets];
+        for (visible, &(o, i)) in visible.chunks_mut(facets.max(1)).zip(read) {
+            for (((visible, v_o), v_i), w) in visible.iter_mut().zip(row(o)).zip(row(i)).zip(weights) {
+                *visible = v_o * v_i * w;
             }
         }
-        gemm::multiply(read.len(), facets, columns, &seen, y, sums);
+        gemm::multiply(read.len(), facets, columns, &visible, y, sums);
     });
     let mut table = vec![0.0_f32; nodes * nodes * columns];
     for (&(o, i), sums) in read.iter().zip(sums.chunks(columns.max(1))) {
@@ -152,12 +158,12 @@ pub fn visibility_at(
     table
 }
 
-/// [`visibility_table`] of dense rows `[node][facet]` over any set of directions.
-pub(crate) fn pair_table(rows: &[f32], nodes: usize, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
+/// [`visibility_table`] from dense rows `[node][facet]` over any set of directions.
+pub(crate) fn node_pair_table(rows: &[f32], nodes: usize, weights: &[f32], y: &[f32], columns: usize) -> Vec<f32> {
     const VIEWS: usize = 48;
     let facets = weights.len();
     let mut table = vec![0.0_f32; nodes * nodes * columns];
-    // Whole blocks right of the diagonal; the rest is mirrored afterwards.
+    // Blocks on and right of the diagonal are computed; the others mirror them.
     table.par_chunks_mut(VIEWS * nodes * columns).enumerate().for_each(|(block, table)| {
         let first = block * VIEWS;
         let views = (nodes - first).min(VIEWS);
@@ -191,7 +197,7 @@ pub(crate) fn pair_table(rows: &[f32], nodes: usize, weights: &[f32], y: &[f32],
 mod tests {
     use super::*;
 
-    /// Numbers in `[0, 1)` without structure; visibility of facets that nothing correlates.
+    /// Random numbers in `[0, 1)`: the visibility of uncorrelated facets.
     fn noise(count: usize, seed: u64) -> Vec<f32> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..count).map(|_| rng.random::<f32>()).collect()
@@ -211,7 +217,7 @@ mod tests {
 
     #[test]
     fn the_table_is_the_weighted_gram_matrix_in_mirrored_blocks_too() {
-        // 168 nodes: three whole blocks of views and a part of a fourth.
+        // 168 nodes are three whole blocks of views and part of a fourth.
         let (grid, facets, columns) = (PolarGrid::new(6, 24), 37, 3);
         let visibility = rows(grid, facets);
         let (weights, y) = (noise(facets, 6), noise(facets * columns, 7));
@@ -238,7 +244,7 @@ mod tests {
         }
     }
 
-    /// `‖N - N L Lᵀ‖² / ‖N‖²` with N built, over pairs of nodes weighted by solid angle.
+    /// `‖N - N L Lᵀ‖² / ‖N‖²` from an explicit N, over pairs of nodes weighted by solid angle.
     fn lost(
         visibility: &VisibilityRows,
         weights: &[f32],
@@ -256,8 +262,8 @@ mod tests {
                     .map(|f| {
                         (0..facets)
                             .map(|s| {
-                                let seen = visibility.rows[i * facets + s] * visibility.rows[o * facets + s];
-                                f64::from(weights[s] * seen * features[s * count + f])
+                                let visible = visibility.rows[i * facets + s] * visibility.rows[o * facets + s];
+                                f64::from(weights[s] * visible * features[s * count + f])
                             })
                             .sum()
                     })
@@ -277,7 +283,7 @@ mod tests {
         let (grid, facets, count) = (PolarGrid::new(4, 8), 60, 24);
         let visibility = rows(grid, facets);
         let weights = noise(facets, 8);
-        // Features that fall off, as those of a basis do.
+        // Features that decrease, as those of a basis do.
         let features: Vec<f32> = noise(facets * count, 9)
             .iter()
             .enumerate()
@@ -295,7 +301,7 @@ mod tests {
                 }
             }
             let lost = lost(&visibility, &weights, &features, count, &leading, rank);
-            // The sketch estimates N's energies; twice what was asked covers its noise.
+            // The sketch estimates N's energies; the factor two covers its noise.
             assert!(lost < 2.0 * (1.0 - kept), "{kept}: lost {lost} at rank {rank}");
         }
     }
@@ -305,7 +311,7 @@ mod tests {
         let (grid, facets) = (PolarGrid::new(4, 8), 40);
         let visibility = rows(grid, facets);
         let (weights, plain) = (noise(facets, 8), noise(facets * 3, 9));
-        // Sixty features spanned by three: more features than random vectors, the other branch.
+        // Sixty features spanned by three, and more features than random vectors, which is the other branch.
         let features: Vec<f32> = (0..facets)
             .flat_map(|s| {
                 (0..60).map({

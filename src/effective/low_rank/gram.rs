@@ -1,4 +1,4 @@
-//! Small factorizations that do not fail: f64 Gram matrices and symmetric eigenvectors, checked (DESIGN.md, Sec. 8).
+//! Small factorizations that do not fail: eigenvectors of Gram matrices in f64, with checked input.
 
 use nalgebra::DMatrix;
 
@@ -11,7 +11,10 @@ pub struct Eigen {
     pub vectors: DMatrix<f64>,
 }
 
-/// Factors a Gram matrix. Refuses values that are not finite; scales to a largest entry of one first.
+/// Factors a Gram matrix after scaling its largest entry to one.
+///
+/// # Errors
+/// Values that are not finite, or eigenvalues that do not converge.
 pub fn eigen(mut gram: DMatrix<f64>) -> Result<Eigen> {
     let n = gram.nrows();
     let scale = gram.iter().fold(0.0_f64, |max, x| max.max(x.abs()));
@@ -31,7 +34,7 @@ pub fn eigen(mut gram: DMatrix<f64>) -> Result<Eigen> {
     Ok(Eigen { values, vectors })
 }
 
-/// The smallest count of leading values that keeps the fraction `kept` of their sum; at least one.
+/// The smallest number of leading values that keeps the fraction `kept` of their sum; at least one.
 pub fn rank_for(values: &[f64], kept: f64) -> usize {
     let total: f64 = values.iter().sum();
     let mut sum = 0.0;
@@ -44,9 +47,10 @@ pub fn rank_for(values: &[f64], kept: f64) -> usize {
     values.len().max(1)
 }
 
-/// The leading right singular vectors of `a` (columns) and the squares of all its singular values, descending; `rank` says
-/// from these how many. A Gram matrix squares the condition: one step of orthogonal iteration, there and back, makes the
-/// vectors as good as those of a factorization of `a` itself (Halko et al. 2011, Alg. 4.4).
+/// Computes the squares of all singular values of `a`, descending, and its leading right singular vectors (columns).
+/// `rank` chooses their number from the squares. A Gram matrix squares the condition number, so one step of orthogonal
+/// iteration follows, which makes the vectors as accurate as those of a factorization of `a` itself (Halko et al. 2011,
+/// Alg. 4.4).
 pub fn right_singular(a: &DMatrix<f64>, rank: impl FnOnce(&[f64]) -> usize) -> Result<(Vec<f64>, DMatrix<f64>)> {
     let wide = a.nrows() < a.ncols();
     let solved = eigen(if wide { a * a.transpose() } else { a.transpose() * a })?;
@@ -55,13 +59,13 @@ pub fn right_singular(a: &DMatrix<f64>, rank: impl FnOnce(&[f64]) -> usize) -> R
         return Ok((solved.values, DMatrix::zeros(a.ncols(), 0)));
     }
     let first = solved.vectors.columns(0, rank).into_owned();
-    // Scaled: products of entries near the ends of what is finite stay there.
+    // The scale keeps products of very large or small entries in range.
     let scale = a.amax();
     let a = if scale > 0.0 { a / scale } else { a.clone() };
-    let there = |v: &DMatrix<f64>| (&a * v).qr().q();
+    let forward = |v: &DMatrix<f64>| (&a * v).qr().q();
     let back = |u: &DMatrix<f64>| (a.transpose() * u).qr().q();
     let right = if wide { back(&first) } else { first };
-    Ok((solved.values, back(&there(&right))))
+    Ok((solved.values, back(&forward(&right))))
 }
 
 #[cfg(test)]
@@ -76,8 +80,8 @@ mod tests {
         assert_eq!(rank_for(&solved.values, 0.999), 1);
     }
 
-    /// LAPACK's ratios of a symmetric factorization (its test DCHKST; DESIGN.md, Sec. 9): what is lost in rebuilding the
-    /// matrix, and how far the vectors are from orthonormal, both in units of rounding.
+    /// LAPACK's test ratios of a symmetric factorization (DCHKST): the error of the rebuilt matrix, and the deviation
+    /// of the vectors from orthonormal, both in units of rounding.
     fn ratios(gram: &DMatrix<f64>, solved: &Eigen) -> [f64; 2] {
         let n = gram.nrows();
         if n == 0 {
@@ -111,7 +115,7 @@ mod tests {
         u * s * v.transpose()
     }
 
-    /// Matrices that factorizations trip over, and their singular values where they were built from some.
+    /// Matrices that are hard to factorize, with their singular values if they were built from these.
     fn hard_matrices() -> Vec<(&'static str, DMatrix<f64>, Vec<f64>)> {
         let clustered: Vec<f64> =
             (0..24).map(|k| if k < 12 { 1.0 } else { 1e-6 } * (1.0 + 1e-14 * f64::from(k))).collect();
@@ -150,24 +154,24 @@ mod tests {
         }
     }
 
-    /// `‖A - U S V^T‖ / (‖A‖ max(m,n) ε)` and `‖I - V^T V‖ / (n ε)` of what the randomized factorizations end in, both ways
-    /// round. `U S` is `A V`, as they take it; values that are cut off may be missing, and no more.
+    /// Checks `‖A - U S V^T‖ / (‖A‖ max(m,n) ε)` and `‖I - V^T V‖ / (n ε)` of the last step of randomized
+    /// factorizations, for each matrix and its transpose. `U S` is `A V`, and only truncated values may be missing.
     #[test]
     fn right_vectors_stay_within_lapacks_ratios_on_hard_matrices_of_any_scale() {
-        for (name, matrix, made) in &hard_matrices() {
+        for (name, matrix, known) in &hard_matrices() {
             for scale in [1e-30, 1e-15, 1.0, 1e15, 1e30] {
                 for a in [matrix * scale, matrix.transpose() * scale] {
-                    // As the paper's preset cuts: what f32 entries cannot tell from none.
-                    let sound = |values: &[f64]| {
+                    // The truncation of the `wu2011` preset: values below the rounding of f32 entries.
+                    let significant = |values: &[f64]| {
                         let floor = 1e-10 * values.first().copied().unwrap_or(0.0);
                         values.iter().take_while(|value| **value > floor).count()
                     };
-                    let (values, v) = right_singular(&a, sound).unwrap();
+                    let (values, v) = right_singular(&a, significant).unwrap();
                     let (n, rank) = (a.ncols() as f64, v.ncols());
-                    assert_eq!(rank, sound(&values), "{name} times {scale:e}");
+                    assert_eq!(rank, significant(&values), "{name} times {scale:e}");
                     let skew = (v.transpose() * &v - DMatrix::identity(rank, rank)).norm();
-                    let cut = made.iter().skip(rank).map(|value| (value * scale).powi(2)).sum::<f64>().sqrt();
-                    let left = (&a - &a * &v * v.transpose()).norm() - cut;
+                    let truncated = known.iter().skip(rank).map(|value| (value * scale).powi(2)).sum::<f64>().sqrt();
+                    let left = (&a - &a * &v * v.transpose()).norm() - truncated;
                     let rounding = f64::EPSILON * n.max(a.nrows() as f64);
                     assert!(skew <= 50.0 * n * f64::EPSILON, "{name} times {scale:e}: skew {skew:e}");
                     let ratio = if a.norm() > 0.0 { left / (a.norm() * rounding) } else { 0.0 };

@@ -1,5 +1,5 @@
-//! The product with its factors kept apart until the query: `G(i,o) = Σ_c U_c(i,o) P_c(h,d)` (Wu et al. 2011, Eq. 12;
-//! DESIGN.md, Sec. 4, "Interpolate only what is smooth").
+//! The effective BRDF as low-rank factors that are multiplied at the query: `G(i,o) = Σ_c U_c(i,o) P_c(h,d)` (Wu et al.
+//! 2011, Eq. 12). Each factor is smooth in its own coordinates and is interpolated there.
 
 pub(crate) mod bvndf;
 pub(crate) mod gram;
@@ -11,42 +11,43 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use self::bvndf::{leading_features, visibility_at, visibility_table};
-use super::{BasisGrid, Material, RotatedBasis, RotatedLobe, Tint, VisibilityRows, analytic_lobe};
+use super::{BasisGrid, RotatedBasis, RotatedLobe, Tint, VisibilityRows};
 use crate::base::Result;
-use crate::brdf::{Brdf, ColorBasis, Term};
+use crate::brdf::{Brdf, ColorBasis, Material, Term, analytic_lobe};
 use crate::geometry::Facets;
 use crate::math::directions::{HalfDifferenceGrid, PolarGrid, half_vector};
 use crate::math::simd;
 use crate::math::simd::Lobe;
 use crate::visibility::Visibility;
 
-/// Resolution and truncation of the low-rank form.
+/// Resolution and truncation of low-rank factors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowRankSettings {
-    /// Directions of the visibility factor.
+    /// Directions of the visibility factors.
     pub directions: PolarGrid,
     pub basis: BasisGrid,
-    /// Energy of M that is kept.
+    /// Fraction of the energy of M that is kept.
     pub keep_m: f64,
-    /// Energy of N, in M's metric, that is kept.
+    /// Fraction of the energy of N, in M's metric, that is kept.
     pub keep_n: f64,
     pub max_rank: usize,
-    /// Colour directions of a measured BRDF; `None`: as many as keep `keep_color` of its energy.
+    /// Number of colour directions of a measured BRDF; `None` uses as many as keep the fraction `keep_color` of its
+    /// energy.
     pub colors: Option<usize>,
     pub keep_color: f64,
     pub seed: u64,
 }
 
-/// What a channel's tint is made of: a material and a term of it, by number, and a colour or colour direction that no edit
-/// of the material changes.
+/// The origin of a channel's tint: the indices of a material and its term, and a colour or colour direction that no
+/// edit of the material changes.
 #[derive(Debug, Clone, Copy)]
-struct Source {
+struct TintSource {
     material: usize,
     term: usize,
     along: Vec3,
 }
 
-impl Source {
+impl TintSource {
     fn tint(&self, materials: &[Material]) -> Tint {
         let material = &materials[self.material];
         let color = material.color * self.along;
@@ -60,13 +61,14 @@ impl Source {
 /// One scalar BRDF over one group of facets with one set of weights.
 #[derive(Debug, Clone)]
 pub struct Channel {
+    /// Visibility factors, `[o][i][column]`.
     pub(crate) u: Arc<Vec<f32>>,
-    /// `None` for a Lambertian lobe, whose cosines are in `u`.
+    /// Lobe factors, `[node of (h, d)][column]`; `None` for a Lambertian lobe, whose cosines are in `u`.
     pub(crate) p: Option<Arc<Vec<f32>>>,
     pub(crate) columns: usize,
     pub tint: Tint,
-    source: Source,
-    /// Rank of the basis that was used, and of N in its metric.
+    source: TintSource,
+    /// Rank of the basis, and rank of N in its metric.
     pub ranks: (usize, usize),
 }
 
@@ -81,22 +83,23 @@ pub struct LowRank {
 }
 
 impl Channel {
+    /// Size of the factors in bytes.
     pub fn bytes(&self) -> usize {
         4 * (self.u.len() + self.p.as_ref().map_or(0, |p| p.len()))
     }
 }
 
-/// A run of facets with one material, and what stands before its terms.
+/// Consecutive facets of one slot with their material and weights.
 #[derive(Debug)]
-struct Group {
+struct WeightedGroup {
     range: Range<usize>,
     material: usize,
-    /// Area times colour weight, and the colour that column stands for: one for equal colours, else three.
+    /// Area times colour weight, and the colour that multiplies it: one column for equal colours, else one per channel.
     columns: Vec<(Vec<f32>, Vec3)>,
 }
 
-/// Facets by slot, skipping black materials. Facets are sorted by slot.
-fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[Material]) -> Vec<Group> {
+/// Groups facets, which are sorted by slot, and leaves out black materials.
+fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[Material]) -> Vec<WeightedGroup> {
     let mut groups = Vec::new();
     let mut start = 0;
     while start < facets.len() {
@@ -117,14 +120,14 @@ fn groups(facets: &Facets, material_of_slot: &[usize], materials: &[Material]) -
                 .map(|c| (colors.iter().zip(areas).map(|(color, area)| color[c] * area).collect(), Vec3::AXES[c]))
                 .collect()
         };
-        groups.push(Group { range, material, columns });
+        groups.push(WeightedGroup { range, material, columns });
     }
     groups
 }
 
-/// What a channel is made from: all but its table over pairs of directions.
+/// A factored channel before its table over direction pairs is computed.
 #[derive(Debug)]
-struct Part {
+struct FactoredChannel {
     range: Range<usize>,
     /// Area times colour weight.
     weights: Vec<f32>,
@@ -133,30 +136,31 @@ struct Part {
     p: Option<Arc<Vec<f32>>>,
     columns: usize,
     tint: Tint,
-    source: Source,
+    source: TintSource,
     ranks: (usize, usize),
 }
 
-impl Part {
-    fn lambertian(range: Range<usize>, weights: Vec<f32>, source: Source, tint: Tint) -> Self {
+impl FactoredChannel {
+    /// A Lambertian lobe, which needs no basis.
+    fn lambertian(range: Range<usize>, weights: Vec<f32>, source: TintSource, tint: Tint) -> Self {
         Self { range, weights, y: None, p: None, columns: 1, tint, source, ranks: (1, 1) }
     }
 
-    /// Any lobe, through its rotated basis.
+    /// Factors any lobe through its rotated basis.
     fn factored(
         (range, rows, normals): (Range<usize>, &VisibilityRows, &[Vec3]),
         weights: Vec<f32>,
         basis: &RotatedBasis,
         settings: &LowRankSettings,
-        (source, tint): (Source, Tint),
+        (source, tint): (TintSource, Tint),
     ) -> Result<Self> {
         let count = basis.features();
         let mut features = vec![0.0; normals.len() * count];
         for (normal, row) in normals.iter().zip(features.chunks_mut(count.max(1))) {
             basis.write_features(*normal, row);
         }
-        let (kept, most, seed) = (settings.keep_n, settings.max_rank, settings.seed);
-        let (leading, rank) = leading_features(rows, &weights, &features, count, kept, most, seed)?;
+        let (kept, max_rank, seed) = (settings.keep_n, settings.max_rank, settings.seed);
+        let (leading, rank) = leading_features(rows, &weights, &features, count, kept, max_rank, seed)?;
         let mut y = vec![0.0; normals.len() * rank];
         crate::math::linalg::gemm::multiply_parallel(normals.len(), count, rank, &features, &leading, &mut y);
         let p = Some(Arc::new(basis.left_table(&leading, rank)));
@@ -164,6 +168,7 @@ impl Part {
         Ok(Self { range, weights, y: Some(y), p, columns: rank, tint, source, ranks })
     }
 
+    /// Tabulates the visibility factors at all pairs of nodes, or at the pairs in `read`.
     fn tabulated(&self, rows: &VisibilityRows, normals: &[Vec3], read: Option<&[(usize, usize)]>) -> Channel {
         let table = |rows: &VisibilityRows, y: &[f32]| match read {
             None => visibility_table(rows, &self.weights, y, self.columns),
@@ -171,7 +176,7 @@ impl Part {
         };
         let u = match &self.y {
             Some(y) => table(rows, y),
-            // `Σ w V(i)(n·i)+ V(o)(n·o)+ / π`, smooth on its own.
+            // `Σ w V(i)(n·i)+ V(o)(n·o)+ / π` is smooth.
             None => table(&rows.with_cosines(normals), &vec![std::f32::consts::FRAC_1_PI; self.weights.len()]),
         };
         let (p, columns, ranks) = (self.p.clone(), self.columns, self.ranks);
@@ -179,32 +184,33 @@ impl Part {
     }
 }
 
-/// Everything factored, and nothing yet tabulated over pairs of directions, which takes most of the time: the bases of all
-/// materials, and N of each group in their metric.
+/// All factors before tabulation over direction pairs, which takes most of the time: the bases of all materials, and N
+/// of each group in their metric.
 #[derive(Debug)]
-pub struct Factors<'a> {
-    facets: &'a Facets,
-    rows: &'a VisibilityRows,
+pub struct Factors {
+    facets: Arc<Facets>,
+    rows: Arc<VisibilityRows>,
     pairs: HalfDifferenceGrid,
-    parts: Vec<Part>,
+    channels: Vec<FactoredChannel>,
 }
 
-impl<'a> Factors<'a> {
-    /// `rows`: visibility of all facets on the nodes of the settings' directions.
+impl Factors {
+    /// Factors all materials and groups. `rows` is the visibility of all facets at the nodes of the settings'
+    /// directions.
     ///
     /// # Errors
-    /// A factorization that does not converge, or is handed values that are not finite.
+    /// A factorization that does not converge, or values that are not finite.
     pub fn new(
-        facets: &'a Facets,
-        rows: &'a VisibilityRows,
+        facets: Arc<Facets>,
+        rows: Arc<VisibilityRows>,
         material_of_slot: &[usize],
         materials: &[Material],
         settings: &LowRankSettings,
     ) -> Result<Self> {
-        let mut parts = Vec::new();
-        for group in groups(facets, material_of_slot, materials) {
-            let part = rows.part(group.range.clone());
-            let over = || (group.range.clone(), &part, &facets.normals[group.range.clone()]);
+        let mut channels = Vec::new();
+        for group in groups(&facets, material_of_slot, materials) {
+            let group_rows = rows.part(group.range.clone());
+            let over = || (group.range.clone(), &group_rows, &facets.normals[group.range.clone()]);
             for (k, term) in materials[group.material].brdf.terms.iter().enumerate() {
                 for (lobe, along) in &lobes_of(term, settings) {
                     let basis = match lobe {
@@ -212,29 +218,33 @@ impl<'a> Factors<'a> {
                         _ => Some(RotatedBasis::new(*lobe, settings.basis, settings.keep_m)?),
                     };
                     for (weights, column_color) in &group.columns {
-                        let source = Source { material: group.material, term: k, along: *along * *column_color };
+                        let source = TintSource { material: group.material, term: k, along: *along * *column_color };
                         let (weights, tint) = (weights.clone(), source.tint(materials));
                         match &basis {
-                            None => parts.push(Part::lambertian(group.range.clone(), weights, source, tint)),
+                            None => {
+                                let range = group.range.clone();
+                                channels.push(FactoredChannel::lambertian(range, weights, source, tint));
+                            }
                             // A lobe that is 0 at every node has no features.
                             Some(basis) if basis.features() == 0 => {}
                             Some(basis) => {
-                                parts.push(Part::factored(over(), weights, basis, settings, (source, tint))?)
+                                let tint = (source, tint);
+                                channels.push(FactoredChannel::factored(over(), weights, basis, settings, tint)?);
                             }
                         }
                     }
                 }
             }
         }
-        Ok(Self { facets, rows, pairs: settings.basis.pairs, parts })
+        Ok(Self { facets, rows, pairs: settings.basis.pairs, channels })
     }
 
-    /// The tables over all pairs of directions.
+    /// Tabulates over all direction pairs.
     pub fn tabulate(&self) -> LowRank {
         self.tabulated(None)
     }
 
-    /// Tables that hold only what these pairs `(i, o)` read.
+    /// Tabulates only the nodes that these pairs `(i, o)` read.
     pub fn tabulate_for(&self, pairs: impl Iterator<Item = (Vec3, Vec3)>) -> LowRank {
         let grid = self.rows.grid;
         let mut read: Vec<(usize, usize)> = pairs
@@ -248,25 +258,25 @@ impl<'a> Factors<'a> {
     }
 
     fn tabulated(&self, read: Option<&[(usize, usize)]>) -> LowRank {
-        let channels = self.parts.chunk_by(|a, b| a.range == b.range).flat_map(|parts| {
-            let range = parts[0].range.clone();
+        let channels = self.channels.chunk_by(|a, b| a.range == b.range).flat_map(|channels| {
+            let range = channels[0].range.clone();
             let rows = self.rows.part(range.clone());
-            parts
+            channels
                 .iter()
-                .map(|part| part.tabulated(&rows, &self.facets.normals[range.clone()], read))
+                .map(|channel| channel.tabulated(&rows, &self.facets.normals[range.clone()], read))
                 .collect::<Vec<_>>()
         });
         LowRank {
             directions: self.rows.grid,
             pairs: self.pairs,
             channels: channels.collect(),
-            projected_area: Arc::new(projected_area_table(self.facets, self.rows)),
+            projected_area: Arc::new(projected_area_table(&self.facets, &self.rows)),
         }
     }
 }
 
 impl LowRank {
-    /// [`Factors`], tabulated.
+    /// Computes [`Factors`] and tabulates them over all direction pairs.
     ///
     /// # Errors
     /// As [`Factors::new`].
@@ -278,7 +288,7 @@ impl LowRank {
         settings: &LowRankSettings,
     ) -> Result<Self> {
         let rows = VisibilityRows::new(visibility, 0..facets.len(), settings.directions);
-        Ok(Factors::new(facets, &rows, material_of_slot, materials, settings)?.tabulate())
+        Ok(Factors::new(Arc::new(facets.clone()), Arc::new(rows), material_of_slot, materials, settings)?.tabulate())
     }
 }
 
@@ -314,7 +324,7 @@ fn projected_area_table(facets: &Facets, visibility: &VisibilityRows) -> Vec<f32
 }
 
 impl LowRank {
-    /// The same factors under other colours. `materials` must have the lobes that these were built from
+    /// Replaces the colours of the factors. `materials` must have the lobes that these factors were built from
     /// ([`Material::same_lobes`]).
     pub fn recolored(&self, materials: &[Material]) -> Self {
         let mut recolored = self.clone();
@@ -324,7 +334,7 @@ impl LowRank {
         recolored
     }
 
-    /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
+    /// Returns `a_v(o)` and writes `a_v f̄` of each light to `out`.
     pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         if o.z <= 0.0 {
             (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
@@ -353,13 +363,14 @@ impl LowRank {
                 };
                 total += (channel.tint.at(i_dot_h) * value).as_dvec3();
             }
-            // Truncated factors may fall a little below zero; no BRDF does.
+            // Truncated factors may be slightly below zero; no BRDF is.
             let taper = PolarGrid::horizon_taper(i.z) * PolarGrid::horizon_taper(o.z);
             out(k, total.max(DVec3::ZERO) * f64::from(taper));
         }
         f64::from(relative * o.z)
     }
 
+    /// Size of all factors in bytes.
     pub fn bytes(&self) -> usize {
         self.channels.iter().map(Channel::bytes).sum()
     }

@@ -1,8 +1,9 @@
-//! The rotated-BRDF basis: M factored through the azimuthal DFT (Wu et al. 2011, Sec. 3.5; DESIGN.md, Sec. 4).
+//! The basis of rotated lobes: matrix M factored through a DFT over azimuths (Wu et al. 2011, Sec. 3.5).
 //!
-//! M's rows are the nodes of a [`HalfDifferenceGrid`], its columns all normals. Turning everything together changes
-//! nothing, so a DFT over `φ_h - φ_n` leaves one small block a frequency, whose singular vectors together are M's. Mirror
-//! symmetry of isotropic BRDFs makes every Gram matrix real. The right singular functions are `v(θ_n) e^{-imφ_n}`.
+//! The rows of M are the nodes of a [`HalfDifferenceGrid`], its columns all normals. A common rotation of directions
+//! and normal changes nothing, so a DFT over `φ_h - φ_n` gives one small block per frequency, and the singular vectors
+//! of all blocks are those of M. The mirror symmetry of isotropic BRDFs makes every Gram matrix real. The right
+//! singular functions are `v(θ_n) e^{-imφ_n}`.
 
 use std::f32::consts::{PI, TAU};
 
@@ -18,7 +19,7 @@ use crate::math::linalg::gemm;
 use crate::math::simd;
 use crate::math::simd::{Lobe, PairVectors};
 
-/// The scalar function of direction pair and normal that a basis stands for, cosines included.
+/// The scalar function of direction pair and normal that a basis represents, cosines included.
 #[derive(Debug, Clone, Copy)]
 pub enum RotatedLobe<'a> {
     Analytic(Lobe),
@@ -30,7 +31,7 @@ pub enum RotatedLobe<'a> {
 }
 
 impl RotatedLobe<'_> {
-    /// `f(n, i, o)` for each normal; all y components of the normals are zero.
+    /// Writes `f(n, i, o)` for each normal.
     fn values(&self, i: Vec3, o: Vec3, normals: [&[f32]; 3], out: &mut [f32]) {
         match *self {
             Self::Analytic(lobe) => simd::lobe_values(lobe, &PairVectors::new(i, o), normals, out),
@@ -53,51 +54,51 @@ impl RotatedLobe<'_> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BasisGrid {
     pub pairs: HalfDifferenceGrid,
-    /// Rings of normals over `0..=reach`.
+    /// Rings of normals over `0..=max_theta_n`.
     pub normal_rings: usize,
-    /// Whether normals reach below the horizon (overhangs): the whole sphere, else the upper half.
+    /// True if normals cover the whole sphere, as overhangs require; false if they cover the upper half.
     pub whole_sphere: bool,
-    /// Between rings of normals.
+    /// Interpolation between rings of normals.
     pub interpolation: Interpolation,
 }
 
 impl BasisGrid {
-    fn reach(&self) -> f32 {
+    fn max_theta_n(&self) -> f32 {
         if self.whole_sphere { PI } else { 0.5 * PI }
     }
 
     fn theta_n(&self, ring: usize) -> f32 {
-        (ring as f32 + 0.5) * self.reach() / self.normal_rings as f32
+        (ring as f32 + 0.5) * self.max_theta_n() / self.normal_rings as f32
     }
 
-    /// φ_d steps that mirror symmetry leaves: `0..=turn/2`.
-    fn half_turn(&self) -> usize {
-        self.pairs.turn / 2 + 1
+    /// Number of φ_d steps that mirror symmetry leaves: `0..=phi_d/2`.
+    fn stored_phi_d(&self) -> usize {
+        self.pairs.phi_d / 2 + 1
     }
 
     fn frequencies(&self) -> usize {
         self.pairs.azimuths / 2 + 1
     }
 
-    /// Rows of one block: `(θ_h, θ_d, half of φ_d)`.
+    /// Number of rows of one block: `(θ_h, θ_d, half of φ_d)`.
     fn block_rows(&self) -> usize {
-        self.pairs.rings * self.pairs.difference * self.half_turn()
+        self.pairs.rings * self.pairs.theta_d * self.stored_phi_d()
     }
 
-    /// Columns of M as a matrix over all normals.
+    /// Number of columns of M as a matrix over all normals.
     pub fn columns(&self) -> usize {
         self.normal_rings * self.pairs.azimuths
     }
 }
 
-/// One kept singular triple of a block, `m` fixed.
+/// One singular triple of a block, which has a fixed frequency `m`.
 #[derive(Debug, Clone)]
 struct Mode {
     frequency: usize,
     sigma: f32,
-    /// `v(θ_n)` with its column weight taken out, on the rings of normals.
+    /// `v(θ_n)` on the rings of normals, divided by its column weight.
     right: Vec<f32>,
-    /// `B v`: real and imaginary parts over the block's rows, row weights taken out.
+    /// Real and imaginary parts of `B v` over the block's rows, divided by row weights.
     left: [Vec<f32>; 2],
 }
 
@@ -106,16 +107,20 @@ struct Mode {
 pub struct RotatedBasis {
     pub grid: BasisGrid,
     modes: Vec<Mode>,
-    /// Rank as a real matrix: two for each function that turns, one for each that does not.
+    /// Rank as a real matrix: one for each function of frequency 0 or of the highest frequency, two for each of the
+    /// others.
     pub rank: usize,
-    /// Fraction of the squared Frobenius norm that is kept.
+    /// Fraction of the energy, the squared Frobenius norm, that is kept.
     pub kept_energy: f64,
-    /// Energy and multiplicity of every function found, descending.
+    /// Energy and multiplicity of every function, in descending order of energy.
     spectrum: Vec<(f64, usize)>,
 }
 
 impl RotatedBasis {
-    /// Tabulates and factors; keeps the fraction `kept` of the energy.
+    /// Tabulates and factors M, keeping the fraction `kept` of its energy.
+    ///
+    /// # Errors
+    /// A factorization that does not converge, or values that are not finite.
     pub fn new(lobe: RotatedLobe<'_>, grid: BasisGrid, kept: f64) -> Result<Self> {
         let blocks = transformed(lobe, grid);
         let factored: Vec<Vec<(f64, Mode)>> =
@@ -134,19 +139,19 @@ impl RotatedBasis {
         Ok(Self { grid, modes, rank, kept_energy, spectrum })
     }
 
-    /// The rank, as a real matrix, that another fraction of the energy would need.
+    /// The rank, as a real matrix, that another fraction of the energy requires.
     pub fn rank_at(&self, kept: f64) -> usize {
         let energies: Vec<f64> = self.spectrum.iter().map(|entry| entry.0).collect();
         self.spectrum.iter().take(rank_for(&energies, kept)).map(|entry| entry.1).sum()
     }
 
-    /// Number of real features a normal has.
+    /// Number of real features per normal.
     pub fn features(&self) -> usize {
         2 * self.modes.len()
     }
 
-    /// Bytes of the kept factors, as the paper counts them: rank columns over pairs and normals in f32.
-    pub fn kept_bytes(&self) -> usize {
+    /// Size of the factors in bytes, as the paper counts it: `rank` columns over pairs and normals in f32.
+    pub fn bytes(&self) -> usize {
         4 * self.rank * (self.grid.pairs.nodes() + self.grid.columns())
     }
 
@@ -154,10 +159,10 @@ impl RotatedBasis {
     pub fn write_features(&self, normal: Vec3, out: &mut [f32]) {
         let (theta, phi) = crate::math::directions::to_angles(normal);
         let rings = self.grid.normal_rings as i64;
-        let at = theta / self.grid.reach() * rings as f32 - 0.5;
+        let at = theta / self.grid.max_theta_n() * rings as f32 - 0.5;
         let base = at.floor();
         let weights = self.grid.interpolation.weights(at - base);
-        // A ring beyond the pole is the mirrored one half a turn on, where e^{-imφ} changes sign for odd m.
+        // A ring beyond the pole is the mirrored ring, rotated by half a turn, where e^{-imφ} changes sign for odd m.
         let taps: [(usize, bool); 4] = std::array::from_fn(|k| {
             let ring = base as i64 - 1 + k as i64;
             if ring < 0 {
@@ -199,17 +204,18 @@ impl RotatedBasis {
                 })
             })
             .collect();
-        let half_turn = grid.half_turn();
+        let stored_phi_d = grid.stored_phi_d();
         let mut table = vec![0.0_f32; grid.pairs.nodes() * columns];
-        let per_ring = azimuths * grid.pairs.difference * grid.pairs.turn * columns;
+        let per_ring = azimuths * grid.pairs.theta_d * grid.pairs.phi_d * columns;
         table.par_chunks_mut(per_ring).enumerate().for_each(|(ring, table)| {
             let mut spectrum = vec![0.0_f32; 2 * frequencies * columns];
-            let mut turned = vec![0.0_f32; azimuths * columns];
-            for difference in 0..grid.pairs.difference {
-                for turn in 0..grid.pairs.turn {
-                    // The other half of φ_d is the complex conjugate.
-                    let (stored, sign) = if turn < half_turn { (turn, 1.0) } else { (grid.pairs.turn - turn, -1.0) };
-                    let row = (ring * grid.pairs.difference + difference) * half_turn + stored;
+            let mut rotated = vec![0.0_f32; azimuths * columns];
+            for theta_d in 0..grid.pairs.theta_d {
+                for phi_d in 0..grid.pairs.phi_d {
+                    // The spectrum of the other half of φ_d is the complex conjugate.
+                    let (stored, sign) =
+                        if phi_d < stored_phi_d { (phi_d, 1.0) } else { (grid.pairs.phi_d - phi_d, -1.0) };
+                    let row = (ring * grid.pairs.theta_d + theta_d) * stored_phi_d + stored;
                     debug_assert!(row < rows);
                     spectrum.fill(0.0);
                     for (k, mode) in self.modes.iter().enumerate() {
@@ -227,11 +233,11 @@ impl RotatedBasis {
                             out_im[c] += im * w_cos[c] - re * w_sin[c];
                         }
                     }
-                    gemm::multiply(azimuths, 2 * frequencies, columns, &inverse, &spectrum, &mut turned);
+                    gemm::multiply(azimuths, 2 * frequencies, columns, &inverse, &spectrum, &mut rotated);
                     for azimuth in 0..azimuths {
-                        let node = (azimuth * grid.pairs.difference + difference) * grid.pairs.turn + turn;
+                        let node = (azimuth * grid.pairs.theta_d + theta_d) * grid.pairs.phi_d + phi_d;
                         table[node * columns..(node + 1) * columns]
-                            .copy_from_slice(&turned[azimuth * columns..(azimuth + 1) * columns]);
+                            .copy_from_slice(&rotated[azimuth * columns..(azimuth + 1) * columns]);
                     }
                 }
             }
@@ -245,7 +251,7 @@ impl Mode {
         if self.frequency == 0 || 2 * self.frequency == grid.pairs.azimuths { 1 } else { 2 }
     }
 
-    /// Weight of a frequency in the real series: 2 where `-m` is folded in.
+    /// Weight of a frequency in the real series: 2 if it includes `-m`.
     fn kappa(&self, grid: BasisGrid) -> f32 {
         self.multiplicity(grid) as f32
     }
@@ -265,21 +271,24 @@ fn transformed(lobe: RotatedLobe<'_>, grid: BasisGrid) -> Vec<f32> {
             })
         })
         .collect();
-    let half_turn = grid.half_turn();
+    let stored_phi_d = grid.stored_phi_d();
     let parts = 2 * grid.frequencies();
-    // One row of (θ_h, θ_d, φ_d) at a time: tabulate over φ_h, transform.
+    // Each row of (θ_h, θ_d, φ_d) is tabulated over φ_h and transformed.
     let spectra: Vec<Vec<f32>> = (0..rows)
         .into_par_iter()
         .map(|row| {
-            let (ring, difference, turn) =
-                (row / (grid.pairs.difference * half_turn), row / half_turn % grid.pairs.difference, row % half_turn);
+            let (ring, theta_d, phi_d) = (
+                row / (grid.pairs.theta_d * stored_phi_d),
+                row / stored_phi_d % grid.pairs.theta_d,
+                row % stored_phi_d,
+            );
             let mut values = vec![0.0_f32; azimuths * rings];
             for (b, values) in values.chunks_mut(rings).enumerate() {
                 let (i, o) = HalfDifferenceGrid::pair(
                     grid.pairs.theta_h(ring),
                     grid.pairs.phi_h(b),
-                    grid.pairs.theta_d(difference),
-                    grid.pairs.phi_d(turn),
+                    grid.pairs.theta_d(theta_d),
+                    grid.pairs.phi_d(phi_d),
                 );
                 lobe.values(i, o, [&x, &y, &z], values);
             }
@@ -297,19 +306,22 @@ fn transformed(lobe: RotatedLobe<'_>, grid: BasisGrid) -> Vec<f32> {
     blocks
 }
 
-/// The singular triples of one frequency's block, with the energy each holds in M.
+/// The singular triples of one frequency's block, with their energies in M.
 fn factor_block(blocks: &[f32], grid: BasisGrid, frequency: usize) -> Result<Vec<(f64, Mode)>> {
     let (rows, rings) = (grid.block_rows(), grid.normal_rings);
     let part = |k: usize| &blocks[(2 * frequency + k) * rows * rings..(2 * frequency + k + 1) * rows * rings];
     let (real, imaginary) = (part(0), part(1));
-    let half_turn = grid.half_turn();
+    let stored_phi_d = grid.stored_phi_d();
     // √ of the measure: sinθ_h (sinθ_d cosθ_d dθ_d) for pairs, sinθ_n for normals.
     let row_weight: Vec<f32> = (0..rows)
         .map(|row| {
-            let (ring, difference, turn) =
-                (row / (grid.pairs.difference * half_turn), row / half_turn % grid.pairs.difference, row % half_turn);
-            let folded = if turn == 0 || turn + 1 == half_turn { 1.0 } else { 2.0 };
-            (grid.pairs.theta_h(ring).sin() * grid.pairs.difference_measure(difference) * folded).sqrt()
+            let (ring, theta_d, phi_d) = (
+                row / (grid.pairs.theta_d * stored_phi_d),
+                row / stored_phi_d % grid.pairs.theta_d,
+                row % stored_phi_d,
+            );
+            let folded = if phi_d == 0 || phi_d + 1 == stored_phi_d { 1.0 } else { 2.0 };
+            (grid.pairs.theta_h(ring).sin() * grid.pairs.theta_d_measure(theta_d) * folded).sqrt()
         })
         .collect();
     let ring_weight: Vec<f32> = (0..rings).map(|ring| grid.theta_n(ring).sin().sqrt()).collect();
@@ -324,9 +336,9 @@ fn factor_block(blocks: &[f32], grid: BasisGrid, frequency: usize) -> Result<Vec
     let solved = eigen(gram)?;
     let largest = solved.values.first().copied().unwrap_or(0.0);
     let multiplicity = if frequency == 0 || 2 * frequency == grid.pairs.azimuths { 1.0 } else { 2.0 };
-    // Below this a Gram matrix of f32 entries holds rounding only.
+    // Smaller eigenvalues of a Gram matrix of f32 entries are rounding errors.
     let count = solved.values.iter().take_while(|&&value| value > largest * 1e-9 && value > 0.0).count();
-    // B v for all kept v at once.
+    // B v for all v at once.
     let mixing: Vec<f32> = (0..rings)
         .flat_map(|ring| {
             (0..count).map({
@@ -361,7 +373,7 @@ mod tests {
     #[test]
     fn features_times_left_functions_rebuild_the_rotated_brdf() {
         let grid = BasisGrid {
-            pairs: HalfDifferenceGrid { rings: 20, azimuths: 64, difference: 8, turn: 6 },
+            pairs: HalfDifferenceGrid { rings: 20, azimuths: 64, theta_d: 8, phi_d: 6 },
             normal_rings: 48,
             whole_sphere: false,
             interpolation: Interpolation::Cubic,
@@ -376,19 +388,14 @@ mod tests {
                 let (mut error, mut norm) = (0.0_f64, 0.0_f64);
                 for (node, &got) in table.iter().enumerate() {
                     let p = grid.pairs;
-                    let (turn, rest) = (node % p.turn, node / p.turn);
-                    let (difference, rest) = (rest % p.difference, rest / p.difference);
+                    let (phi_d, rest) = (node % p.phi_d, node / p.phi_d);
+                    let (theta_d, rest) = (rest % p.theta_d, rest / p.theta_d);
                     let (azimuth, ring) = (rest % p.azimuths, rest / p.azimuths);
-                    let (i, o) = HalfDifferenceGrid::pair(
-                        p.theta_h(ring),
-                        p.phi_h(azimuth),
-                        p.theta_d(difference),
-                        p.phi_d(turn),
-                    );
+                    let (i, o) =
+                        HalfDifferenceGrid::pair(p.theta_h(ring), p.phi_h(azimuth), p.theta_d(theta_d), p.phi_d(phi_d));
                     let mut want = [0.0];
                     lobe_values(lobe, &PairVectors::new(i, o), [&[normal.x], &[normal.y], &[normal.z]], &mut want);
-                    let weight =
-                        f64::from(p.theta_h(ring).sin() * p.theta_d(difference).sin() * p.theta_d(difference).cos());
+                    let weight = f64::from(p.theta_h(ring).sin() * p.theta_d(theta_d).sin() * p.theta_d(theta_d).cos());
                     error += weight * f64::from(got - want[0]).powi(2);
                     norm += weight * f64::from(want[0]).powi(2);
                 }

@@ -1,4 +1,4 @@
-//! What a pair table tabulates of a sum over facets, and what it leaves to the query.
+//! The columns that a shading table stores of a sum over facets, and their weights, which are evaluated at the query.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,29 +13,30 @@ use crate::math::simd::PairVectors;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column {
     pub(crate) group: usize,
-    pub(crate) part: Part,
-    /// Which colour weights of the facets; `None` where they are all the same.
+    pub(crate) kind: ColumnKind,
+    /// The colour channel whose weights are summed; `None` if the colour weights of all facets are equal.
     pub(crate) channel: Option<usize>,
 }
 
+/// The quantity that a column sums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    /// A lobe, by number, summed over all facets.
+pub(crate) enum ColumnKind {
+    /// A lobe, by index, summed over all facets.
     Lobe(usize),
-    /// A colour of a measured BRDF, summed over all facets.
+    /// A colour channel of a measured BRDF, summed over all facets.
     Measured { table: usize, color: usize },
-    /// The visible area of a run of facets with one normal.
+    /// The visible area of a normal cluster, by index.
     Area(usize),
 }
 
-/// More columns than these cost a query more than they save it.
+/// Largest number of columns of a table; with more, a query costs more than it saves.
 const MAX_COLUMNS: usize = 32;
 
-/// More normals than these are summed as if each facet had its own.
+/// Largest number of normal clusters of a group that get columns of visible area; with more, the columns are lobes.
 const MAX_NORMALS: usize = 8;
 
 impl Column {
-    /// The columns of a sum; `None` where there are too many.
+    /// The columns of a sum; `None` if there are too many.
     pub(crate) fn of(sum: &FacetSum) -> Option<Vec<Self>> {
         let mut columns = Vec::new();
         for (group, facets) in sum.groups().iter().enumerate() {
@@ -45,17 +46,17 @@ impl Column {
             let channels: &[Option<usize>] =
                 if facets.rgb_areas.is_some() { &[Some(0), Some(1), Some(2)] } else { &[None] };
             for &channel in channels {
-                let mut add = |part| columns.push(Self { group, part, channel });
-                match &facets.patches {
-                    Some(patches) if patches.len() <= MAX_NORMALS => {
-                        (0..patches.len()).for_each(|patch| add(Part::Area(patch)));
+                let mut add = |kind| columns.push(Self { group, kind, channel });
+                match &facets.clusters {
+                    Some(clusters) if clusters.len() <= MAX_NORMALS => {
+                        (0..clusters.len()).for_each(|cluster| add(ColumnKind::Area(cluster)));
                     }
                     _ => {
-                        (0..facets.lobes.len()).for_each(|lobe| add(Part::Lobe(lobe)));
+                        (0..facets.lobes.len()).for_each(|lobe| add(ColumnKind::Lobe(lobe)));
                         for table in 0..facets.measured.len() {
-                            // Colour weights of the facets are a colour's own already.
+                            // Colour weights that differ between facets already select one channel.
                             let colors = channel.map_or(0..3, |channel| channel..channel + 1);
-                            colors.for_each(|color| add(Part::Measured { table, color }));
+                            colors.for_each(|color| add(ColumnKind::Measured { table, color }));
                         }
                     }
                 }
@@ -64,16 +65,16 @@ impl Column {
         (columns.len() <= MAX_COLUMNS).then_some(columns)
     }
 
-    /// Those that it sums over.
+    /// The facets that a column sums over.
     pub(crate) fn facets(&self, sum: &FacetSum) -> Range<usize> {
         let group = &sum.groups()[self.group];
-        match (self.part, &group.patches) {
-            (Part::Area(patch), Some(patches)) => patches[patch].range.clone(),
+        match (self.kind, &group.clusters) {
+            (ColumnKind::Area(cluster), Some(clusters)) => clusters[cluster].range.clone(),
             _ => group.range.clone(),
         }
     }
 
-    /// The sums of columns at a pair of directions, from the visibilities along them.
+    /// Writes the sums of all columns for a pair of directions, from the visibilities along them.
     pub(crate) fn sums(
         columns: &[Self],
         sum: &FacetSum,
@@ -82,14 +83,14 @@ impl Column {
         v_o: &[f32],
         out: &mut [f32],
     ) {
-        // All colours of a measured BRDF come from one walk over the facets.
+        // One loop over the facets gives all channels of a measured BRDF.
         let mut last = None;
         for (column, out) in columns.iter().zip(out) {
             let Self { group, channel, .. } = *column;
-            *out = match column.part {
-                Part::Lobe(lobe) => sum.lobe_sum(group, lobe, channel, pair, v_i, v_o),
-                Part::Area(patch) => sum.visible_area(group, patch, channel, v_i, v_o),
-                Part::Measured { table, color } => {
+            *out = match column.kind {
+                ColumnKind::Lobe(lobe) => sum.lobe_sum(group, lobe, channel, pair, v_i, v_o),
+                ColumnKind::Area(cluster) => sum.visible_area(group, cluster, channel, v_i, v_o),
+                ColumnKind::Measured { table, color } => {
                     let colors = match last {
                         Some((of, colors)) if of == (group, table) => colors,
                         _ => {
@@ -104,15 +105,15 @@ impl Column {
         }
     }
 
-    /// What multiplies the column at a query.
+    /// The weight of the column.
     pub(crate) fn weight(&self, sum: &FacetSum) -> Weight {
         let group = &sum.groups()[self.group];
         let color = group.color * self.channel.map_or(Vec3::ONE, |channel| Vec3::AXES[channel]);
-        match self.part {
-            Part::Lobe(lobe) => Weight::Tint(Tint::Term(group.lobes[lobe].1.clone(), color)),
-            Part::Measured { color: of, .. } => Weight::Tint(Tint::Fixed(group.color * Vec3::AXES[of])),
-            Part::Area(patch) => Weight::Lobes {
-                normal: group.patches.as_ref().map_or(Vec3::Z, |patches| patches[patch].normal),
+        match self.kind {
+            ColumnKind::Lobe(lobe) => Weight::Tint(Tint::Term(group.lobes[lobe].1.clone(), color)),
+            ColumnKind::Measured { color: channel, .. } => Weight::Tint(Tint::Fixed(group.color * Vec3::AXES[channel])),
+            ColumnKind::Area(cluster) => Weight::Lobes {
+                normal: group.clusters.as_ref().map_or(Vec3::Z, |clusters| clusters[cluster].normal),
                 terms: group.lobes.iter().map(|(_, term)| term.clone()).collect(),
                 measured: group.measured.clone(),
                 color,
@@ -121,11 +122,11 @@ impl Column {
     }
 }
 
-/// What multiplies a column at a query.
+/// A factor that multiplies a column at the query.
 #[derive(Debug, Clone)]
 pub(crate) enum Weight {
     Tint(Tint),
-    /// All that facets of one normal reflect, times a colour.
+    /// All lobes at the normal of a cluster, times a colour.
     Lobes {
         normal: Vec3,
         terms: Vec<Term>,
@@ -139,9 +140,10 @@ impl Weight {
         matches!(self, Self::Lobes { .. })
     }
 
-    /// The planes of a tile that mirror its table: facets of one normal are not what their mirror image is.
-    pub(crate) fn mirrors(weights: &[Self], of_tile: [bool; 2]) -> [bool; 2] {
-        if weights.iter().any(Self::is_lobe) { [false; 2] } else { of_tile }
+    /// The mirror planes of a table, given those of its tile. A column of visible area has none, because the mirror
+    /// image of a cluster is another cluster.
+    pub(crate) fn mirrors(weights: &[Self], tile_mirrors: [bool; 2]) -> [bool; 2] {
+        if weights.iter().any(Self::is_lobe) { [false; 2] } else { tile_mirrors }
     }
 
     #[inline]
@@ -153,7 +155,7 @@ impl Weight {
     }
 }
 
-/// All that facets of one normal reflect.
+/// The value of all lobes at one normal.
 #[inline(never)]
 fn lobes(normal: Vec3, terms: &[Term], measured: &[Arc<dyn Measured>], pair: &PairVectors) -> Vec3 {
     let angles = LobeAngles::new(normal, pair.i, pair.o, pair.h);

@@ -1,4 +1,5 @@
-//! What of a table is kept between runs: all but what multiplies its columns, which the sum tells.
+//! The part of a shading table that is cached on disk: everything but the weights of its columns, which follow from the
+//! sum.
 
 use std::sync::Arc;
 
@@ -9,20 +10,21 @@ use crate::cache::{KeyBuilder, Reader, Stored, Writer};
 use crate::effective::{Direct, Interpolation, Nodes, ShadingTable};
 use crate::math::directions::HemispherePairGrid;
 
-/// The numbers of a table of a sum; they serve every sum of the same lobes, whatever its colours.
+/// The numbers of a shading table. They are valid for every sum with the same lobes, regardless of its colours.
 #[derive(Debug, Clone)]
 pub struct TableContent {
     values: Arc<Vec<Vec4>>,
     areas: Vec<f32>,
 }
 
-/// A larger table is none of ours.
+/// Largest number of words in a stored table; a file with more is not read.
 const MAX_WORDS: usize = 1 << 28;
 
 impl Nodes<'_> {
+    /// Hashes the grid and everything that selects and computes its nodes.
     pub(crate) fn hash_into(&self, key: &mut KeyBuilder) {
-        let HemispherePairGrid { rings, azimuths, turn, difference } = self.grid;
-        key.counts("grid", [rings, azimuths, turn, difference]).flags("mirrors", self.mirrors);
+        let HemispherePairGrid { rings, azimuths, phi_d, theta_d } = self.grid;
+        key.counts("grid", [rings, azimuths, phi_d, theta_d]).flags("mirrors", self.mirrors);
         key.counts("from facets", self.facets);
         if let Some(pairs) = self.read_by {
             let directions: Vec<[glam::Vec3; 2]> = pairs.iter().map(|pair| [pair.i, pair.o]).collect();
@@ -32,22 +34,24 @@ impl Nodes<'_> {
 }
 
 impl ShadingTable {
+    /// The numbers of the table, to be stored.
     pub fn content(&self) -> TableContent {
         TableContent { values: self.values.clone(), areas: self.areas.1.clone() }
     }
 
-    /// The table that [`ShadingTable::build`] made, for the same sum but for its colours; `None` for another sum or grid.
-    pub fn of_content(direct: &Direct, grid: HemispherePairGrid, content: TableContent) -> Option<Self> {
+    /// Makes the table that [`ShadingTable::build`] returned from its content, for a sum that may differ in colours.
+    /// `None` if the content does not fit the sum or grid.
+    pub fn from_content(direct: &Direct, grid: HemispherePairGrid, content: TableContent) -> Option<Self> {
         let weights: Vec<_> = Column::of(&direct.sum)?.iter().map(|column| column.weight(&direct.sum)).collect();
-        let fours = weights.len().div_ceil(4);
+        let vec4s = weights.len().div_ceil(4);
         let areas = Self::area_grid();
-        let nodes = grid.half_vectors() * grid.turn * (grid.difference + 2) * fours;
+        let nodes = grid.half_vectors() * grid.phi_d * (grid.theta_d + 2) * vec4s;
         (content.values.len() == nodes && content.areas.len() == areas.len()).then(|| Self {
             grid,
             interpolation: Interpolation::Cubic,
             weights,
-            of_sum: true,
-            fours,
+            is_of_sum: true,
+            vec4s,
             values: content.values,
             areas: Arc::new((areas, content.areas)),
         })
@@ -56,7 +60,7 @@ impl ShadingTable {
 
 impl Stored for TableContent {
     fn write(&self, out: &mut Writer) {
-        // Trials fill a tenth of their nodes.
+        // Most nodes of a trial table are zero.
         out.sparse(bytemuck::cast_slice(&self.values));
         out.numbers(&self.areas);
     }

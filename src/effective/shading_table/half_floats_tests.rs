@@ -1,4 +1,4 @@
-//! What half floats would change of a table: figures of docs/speed.md.
+//! The error that half floats would add to a shading table.
 
 use std::path::Path;
 
@@ -11,19 +11,19 @@ use crate::metrics::{image_pairs, upper_errors};
 use crate::pipeline::Pipeline;
 use crate::scene;
 
-/// A number as half a float holds it (IEEE 754 binary16), ties away from zero.
+/// A number rounded to a half float (IEEE 754 binary16), ties away from zero.
 fn as_half(x: f32) -> f32 {
     let quantum =
         if x.abs() < 2.0_f32.powi(-14) { 2.0_f32.powi(-24) } else { 2.0_f32.powf(x.abs().log2().floor() - 10.0) };
     (x / quantum).round() * quantum
 }
 
-/// The same table, each column scaled to 1 at most and held in half floats.
+/// Rounds a table to half floats, with each column scaled to at most 1.
 fn in_halves(table: &ShadingTable) -> ShadingTable {
     let mut values: Vec<Vec4> = table.values.to_vec();
-    for four in 0..table.fours {
-        let highest = values.iter().skip(four).step_by(table.fours).fold(Vec4::ZERO, |high, v| high.max(v.abs()));
-        for value in values.iter_mut().skip(four).step_by(table.fours) {
+    for vec4 in 0..table.vec4s {
+        let highest = values.iter().skip(vec4).step_by(table.vec4s).fold(Vec4::ZERO, |high, v| high.max(v.abs()));
+        for value in values.iter_mut().skip(vec4).step_by(table.vec4s) {
             for c in 0..4 {
                 if highest[c] > 0.0 {
                     value[c] = as_half(value[c] / highest[c]) * highest[c];
@@ -44,26 +44,31 @@ fn halves_are_those_of_ieee_754() {
 }
 
 #[test]
-#[ignore = "a table to be printed: cargo test --release --lib half_floats_would -- --ignored --nocapture"]
+#[ignore = "prints a table: cargo test --release --lib half_floats_would -- --ignored --nocapture"]
 fn half_floats_would_change_a_table_by_this() {
     let pairs = image_pairs(4096, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };
-    let grid = HemispherePairGrid { rings: 24, azimuths: 48, turn: 8, difference: 12 };
+    let grid = HemispherePairGrid { rings: 24, azimuths: 48, phi_d: 8, theta_d: 12 };
     println!("scene            table against the sum    in halves                 halves against the table");
     for name in ["table4_plate", "table4_pillow", "table4_skirt", "fig6a_velvet_spread"] {
         let mut loaded = scene::open(name, &[]).unwrap();
         loaded.scene.quality.preset = "draft".to_owned();
         loaded.base_dir = Path::new(".").to_owned();
         let outcome = Pipeline::new().effective(&loaded).unwrap();
-        let Representation::Direct(direct) = outcome.brdf.direct_form() else { panic!("{name}: not a sum") };
+        let Representation::Direct(direct) = outcome.brdf.direct_representation() else { panic!("{name}: not a sum") };
         let table = ShadingTable::build(direct, Nodes::all(grid), &Cancel::default()).unwrap().unwrap();
-        let halves = values(&outcome.brdf.with_direct_form(Representation::Table(in_halves(&table))));
+        let halves = values(&outcome.brdf.with_direct_representation(Representation::Table(in_halves(&table))));
         let (exact, whole) =
-            (values(&outcome.brdf), values(&outcome.brdf.with_direct_form(Representation::Table(table))));
-        let told = |a: &[Vec3], b: &[Vec3]| {
+            (values(&outcome.brdf), values(&outcome.brdf.with_direct_representation(Representation::Table(table))));
+        let errors_text = |a: &[Vec3], b: &[Vec3]| {
             let errors = upper_errors(a, b);
             format!("{:>7.3} % {:>5.1} dB", 100.0 * errors.rel_l2, errors.psnr_db)
         };
-        println!("{name:<20} {}    {}    {}", told(&whole, &exact), told(&halves, &exact), told(&halves, &whole));
+        println!(
+            "{name:<20} {}    {}    {}",
+            errors_text(&whole, &exact),
+            errors_text(&halves, &exact),
+            errors_text(&halves, &whole)
+        );
     }
 }

@@ -1,9 +1,10 @@
-//! A table of the sum for pictures, which ask millions of times: what depends on the facets is tabulated once over half and
-//! difference coordinates, what is known exactly at the query stays out of it.
+//! The shading table: the sum over facets tabulated over half and difference angles, for rendering, which evaluates
+//! millions of pairs. Factors that are known exactly at the query are not part of the table.
 //!
-//! `a_v f̄ = Σ_c w_c(i,o) T_c(i,o)`: a column `T_c` is the sum of one lobe over one group of facets, without its tint; or,
-//! where few normals occur, the visible area of the facets of one normal, whose lobe is then a part of the exact weight
-//! `w_c` (DESIGN.md, Sec. 4, "Interpolate only what is smooth"). Colours are in the weights: editing them keeps the table.
+//! `a_v f̄ = Σ_c w_c(i,o) T_c(i,o)`. A column `T_c` is the sum of one lobe over one group of facets, without its tint.
+//! On groups with few distinct normals it is the visible area of one normal cluster, whose lobe is part of the exact
+//! weight `w_c`, so that only smooth functions are interpolated. Colours are in the weights, so an edit of a colour
+//! keeps the table.
 
 pub(crate) mod columns;
 pub(crate) mod content;
@@ -25,79 +26,87 @@ use crate::math::simd::{PairVectors, RowGrid};
 use crate::math::{directions, simd};
 use crate::metrics::Pair;
 
-/// Columns of a table over pairs of directions, and what multiplies them.
+/// A table of columns over direction pairs, and the weights that multiply the columns.
 #[derive(Debug, Clone)]
 pub struct ShadingTable {
     pub grid: HemispherePairGrid,
-    /// Along θ_d; elsewhere it is linear.
+    /// Interpolation along θ_d; along the other axes it is linear.
     pub interpolation: Interpolation,
     weights: Vec<Weight>,
-    /// Whether the columns are those of a sum over facets, else the colours of another form.
-    of_sum: bool,
-    /// F32x8Array of columns a node.
-    fours: usize,
-    /// `[θ_h][φ_h][φ_d][θ_d][four]`. There is one step of θ_d more at either end than the grid has, so that a cubic has its
-    /// four nodes everywhere: the mirror image of the second before the first, a straight line after the last.
+    /// True if the columns are those of a sum over facets, false if they are the colours of another representation.
+    is_of_sum: bool,
+    /// Groups of four columns per node.
+    vec4s: usize,
+    /// `[θ_h][φ_h][φ_d][θ_d][vec4]`, with one more node of θ_d at either end than the grid has, so that a cubic has
+    /// four nodes everywhere. The node before the first mirrors the second; the one after the last extrapolates
+    /// linearly.
     values: Arc<Vec<Vec4>>,
     /// `a_v(o) / cos θ_o` on the nodes of a polar grid.
     areas: Arc<(PolarGrid, Vec<f32>)>,
 }
 
-/// Which nodes of a table are made, and from what.
+/// The grid of a shading table, and how its nodes are computed.
 #[derive(Debug, Clone, Copy)]
 pub struct Nodes<'a> {
     pub grid: HemispherePairGrid,
-    /// Planes x = const and y = const that mirror the tile: half or a quarter of the nodes are images of the others.
+    /// Planes x = const and y = const that map the tile to itself. With them, a half or a quarter of the nodes is
+    /// computed.
     pub mirrors: [bool; 2],
-    /// About how many facets each half vector's sums take, where those are fewer than all.
+    /// Approximate number of facets in the subset of each half vector; `None` sums over all facets.
     pub facets: Option<usize>,
-    /// Pairs that will be asked for: other nodes stay black. All, where it is absent.
+    /// Pairs that the table will be evaluated at; nodes that they do not read stay zero. `None` computes all nodes.
     pub read_by: Option<&'a [Pair]>,
 }
 
 impl Nodes<'_> {
-    /// Every node by itself, from all facets.
+    /// Computes every node from all facets.
     pub fn all(grid: HemispherePairGrid) -> Self {
         Self { grid, mirrors: [false; 2], facets: None, read_by: None }
     }
 }
 
-/// The eight rows of θ_d around a place, and the step of θ_d below it: what [`simd::row_sums`] reads.
-fn rows_around(grid: &HemispherePairGrid, [ring, azimuth, turn, step]: [f32; 4]) -> ([usize; 8], usize) {
+/// The eight rows of θ_d around a point of the grid, and the step of θ_d below it: the rows that [`simd::row_sums`]
+/// reads.
+fn rows_around(grid: &HemispherePairGrid, [ring, azimuth, phi_d, step]: [f32; 4]) -> ([usize; 8], usize) {
     let around = |at: f32, count: usize| {
         let low = (at as usize).min(count - 1);
         [low, if low + 1 == count { 0 } else { low + 1 }]
     };
     let ring = (ring as usize).min(grid.rings - 2);
-    let (azimuths, turns) = (around(azimuth, grid.azimuths), around(turn, grid.turn));
-    let row = |k: usize| ((ring + (k >> 2)) * grid.azimuths + azimuths[k >> 1 & 1]) * grid.turn + turns[k & 1];
-    (std::array::from_fn(row), (step as usize).min(grid.difference - 2))
+    let (azimuths, phi_ds) = (around(azimuth, grid.azimuths), around(phi_d, grid.phi_d));
+    let row = |k: usize| ((ring + (k >> 2)) * grid.azimuths + azimuths[k >> 1 & 1]) * grid.phi_d + phi_ds[k & 1];
+    (std::array::from_fn(row), (step as usize).min(grid.theta_d - 2))
 }
 
-/// Which nodes of a grid these pairs read, or the originals of which those are images.
-fn nodes_read(grid: &HemispherePairGrid, made_of: &[(usize, bool)], pairs: &[Pair]) -> Vec<bool> {
+/// Marks the nodes that these pairs read. For mirror images, it marks their originals.
+fn nodes_read(grid: &HemispherePairGrid, images: &[(usize, bool)], pairs: &[Pair]) -> Vec<bool> {
     let mut read = vec![false; grid.nodes()];
-    let mut places = GridCoordinates::default();
+    let mut coordinates = GridCoordinates::default();
     for Pair { i, o } in pairs {
-        grid.places([&[i.x], &[i.y], &[i.z]], *o, &mut places);
-        let (rows, low) = rows_around(grid, places.at(0));
+        grid.coordinates([&[i.x], &[i.y], &[i.z]], *o, &mut coordinates);
+        let (rows, low) = rows_around(grid, coordinates.at(0));
         for row in rows {
-            let (half_vector, turn) = (row / grid.turn, row % grid.turn);
-            let (image, turned) = made_of[half_vector % grid.azimuths];
-            let turn = if turned { (grid.turn - turn) % grid.turn } else { turn };
-            let row = (half_vector / grid.azimuths * grid.azimuths + image) * grid.turn + turn;
-            let steps = low.saturating_sub(1)..(low + 3).min(grid.difference);
-            read[row * grid.difference..][steps].fill(true);
+            let (half_vector, phi_d) = (row / grid.phi_d, row % grid.phi_d);
+            let (image, negated) = images[half_vector % grid.azimuths];
+            let phi_d = if negated { (grid.phi_d - phi_d) % grid.phi_d } else { phi_d };
+            let row = (half_vector / grid.azimuths * grid.azimuths + image) * grid.phi_d + phi_d;
+            let steps = low.saturating_sub(1)..(low + 3).min(grid.theta_d);
+            read[row * grid.theta_d..][steps].fill(true);
         }
     }
     read
 }
 
-/// Nodes of the projected area.
+/// Rings and azimuths of the grid of projected areas.
 const AREA_GRID: [usize; 2] = [30, 72];
 
 impl ShadingTable {
-    /// Sums over facets at the nodes that are asked for. `None` where the sum has too many parts for a table to pay.
+    /// Returns true if a table can hold a sum: if its columns are few enough.
+    pub(crate) fn can_hold(sum: &FacetSum) -> bool {
+        Column::of(sum).is_some()
+    }
+
+    /// Tabulates a sum over facets. `None` if the sum has too many columns for a table to pay.
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
@@ -107,18 +116,18 @@ impl ShadingTable {
         let mirrors = Weight::mirrors(&weights, nodes.mirrors);
         let (nodes, facets) = (Nodes { mirrors, ..nodes }, nodes.facets);
         let area = |o: Vec3| direct.sums(&[], o, |_, _| {});
-        let sampled = |h: Vec3| facets.and_then(|count| direct.about(h, count));
+        let sampled = |h: Vec3| facets.and_then(|count| direct.sampled_about(h, count));
         let table = Self::tabulate(nodes, weights, true, area, cancel, sampled, |sampled, i, o, sums| {
             let direct = sampled.as_ref().unwrap_or(direct);
             let pair = PairVectors::new(i, o);
-            direct.with_seen(i, o, |v_i, v_o| {
+            direct.with_visibility(i, o, |v_i, v_o| {
                 Column::sums(&columns, &direct.sum, &pair, v_i, v_o, sums);
             });
         });
         table.map(Some)
     }
 
-    /// A table of another form's values, colours and all.
+    /// Tabulates the values of another representation, colours included.
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
@@ -144,60 +153,61 @@ impl ShadingTable {
         )
     }
 
-    /// `prepare` is told each half vector, `fill` writes the columns of a pair about it, `area` tells `a_v(o)`.
+    /// Fills a table. `prepare` receives each half vector, `fill` writes the columns of a pair about it, and `area`
+    /// returns `a_v(o)`.
     fn tabulate<P>(
         Nodes { grid, mirrors, read_by, .. }: Nodes,
         weights: Vec<Weight>,
-        of_sum: bool,
+        is_of_sum: bool,
         area: impl Fn(Vec3) -> f64 + Sync,
         cancel: &Cancel,
         prepare: impl Fn(Vec3) -> P + Sync,
         fill: impl Fn(&P, Vec3, Vec3, &mut [f32]) + Sync,
     ) -> Result<Self> {
-        let (fours, stored) = (weights.len().div_ceil(4), grid.difference + 2);
-        let mut values = vec![Vec4::ZERO; grid.half_vectors() * grid.turn * stored * fours];
-        let (turn, half_vector) = (stored * fours, grid.turn * stored * fours);
-        let made_of: Vec<(usize, bool)> = (0..grid.azimuths).map(|azimuth| grid.image(azimuth, mirrors)).collect();
-        let read = read_by.map(|pairs| nodes_read(&grid, &made_of, pairs));
+        let (vec4s, stored) = (weights.len().div_ceil(4), grid.theta_d + 2);
+        let mut values = vec![Vec4::ZERO; grid.half_vectors() * grid.phi_d * stored * vec4s];
+        let (row_len, half_vector_len) = (stored * vec4s, grid.phi_d * stored * vec4s);
+        let images: Vec<(usize, bool)> = (0..grid.azimuths).map(|azimuth| grid.image(azimuth, mirrors)).collect();
+        let read = read_by.map(|pairs| nodes_read(&grid, &images, pairs));
         let is_read = |node: usize| read.as_ref().is_none_or(|read| read[node]);
-        let half_vectors = values.par_chunks_mut(half_vector).enumerate();
+        let half_vectors = values.par_chunks_mut(half_vector_len).enumerate();
         half_vectors.try_for_each(|(half_vector, nodes)| {
             cancel.check()?;
-            let first = half_vector * grid.turn * grid.difference;
-            if made_of[half_vector % grid.azimuths].0 != half_vector % grid.azimuths
-                || !(first..first + grid.turn * grid.difference).any(is_read)
+            let first = half_vector * grid.phi_d * grid.theta_d;
+            if images[half_vector % grid.azimuths].0 != half_vector % grid.azimuths
+                || !(first..first + grid.phi_d * grid.theta_d).any(is_read)
             {
                 return Ok(());
             }
             let (i, o) = grid.pair(first);
             let prepared = prepare(directions::half_vector(i, o));
-            let mut sums = vec![0.0; 4 * fours];
-            for (turn, row) in nodes.chunks_mut(stored * fours).enumerate() {
-                for step in 0..grid.difference {
-                    let node = first + turn * grid.difference + step;
+            let mut sums = vec![0.0; 4 * vec4s];
+            for (phi_d, row) in nodes.chunks_mut(row_len).enumerate() {
+                for step in 0..grid.theta_d {
+                    let node = first + phi_d * grid.theta_d + step;
                     if !is_read(node) {
                         continue;
                     }
                     let (i, o) = grid.pair(node);
                     fill(&prepared, i, o, &mut sums[..weights.len()]);
-                    for (node, sums) in row[(step + 1) * fours..].iter_mut().zip(sums.as_chunks::<4>().0) {
+                    for (node, sums) in row[(step + 1) * vec4s..].iter_mut().zip(sums.as_chunks::<4>().0) {
                         *node = Vec4::from_array(*sums);
                     }
                 }
-                for four in 0..fours {
-                    let at = |step: usize| step * fours + four;
+                for vec4 in 0..vec4s {
+                    let at = |step: usize| step * vec4s + vec4;
                     row[at(0)] = row[at(2)];
-                    row[at(grid.difference + 1)] = 2.0 * row[at(grid.difference)] - row[at(grid.difference - 1)];
+                    row[at(grid.theta_d + 1)] = 2.0 * row[at(grid.theta_d)] - row[at(grid.theta_d - 1)];
                 }
             }
             Ok::<_, crate::base::Error>(())
         })?;
-        for (azimuth, &(image, turned)) in made_of.iter().enumerate().filter(|(azimuth, (image, _))| image != azimuth) {
+        for (azimuth, &(image, negated)) in images.iter().enumerate().filter(|(azimuth, (image, _))| image != azimuth) {
             for ring in 0..grid.rings {
-                let place = |azimuth: usize| (ring * grid.azimuths + azimuth) * half_vector;
-                for step in 0..grid.turn {
-                    let from = place(image) + turn * if turned { (grid.turn - step) % grid.turn } else { step };
-                    values.copy_within(from..from + turn, place(azimuth) + turn * step);
+                let start = |azimuth: usize| (ring * grid.azimuths + azimuth) * half_vector_len;
+                for step in 0..grid.phi_d {
+                    let from = start(image) + row_len * if negated { (grid.phi_d - step) % grid.phi_d } else { step };
+                    values.copy_within(from..from + row_len, start(azimuth) + row_len * step);
                 }
             }
         }
@@ -207,73 +217,74 @@ impl ShadingTable {
             grid,
             interpolation: Interpolation::Cubic,
             weights,
-            of_sum,
-            fours,
+            is_of_sum,
+            vec4s,
             values: Arc::new(values),
             areas: Arc::new((directions, areas)),
         })
     }
 
-    /// The same table for another sum over the same facets seen alike, whose lobes may differ where `same_lobes` is not
-    /// told; `None` where the table does not serve it.
+    /// The table for another sum over the same facets with the same visibility. If `same_lobes` is false, the lobes of
+    /// the two sums may differ. `None` if the table's values do not fit the other sum.
     pub fn reused(&self, sum: &FacetSum, same_lobes: bool) -> Option<Self> {
         let weights: Vec<Weight> = Column::of(sum)?.iter().map(|column| column.weight(sum)).collect();
         let areas_only = |weights: &[Weight]| weights.iter().all(Weight::is_lobe);
-        let serves = self.of_sum
+        let fits = self.is_of_sum
             && weights.len() == self.weights.len()
             && (same_lobes || areas_only(&weights) && areas_only(&self.weights));
-        serves.then(|| Self { weights, ..self.clone() })
+        fits.then(|| Self { weights, ..self.clone() })
     }
 
-    /// The same, read in another way between its nodes.
+    /// Changes the interpolation along θ_d.
     pub fn read(self, interpolation: Interpolation) -> Self {
         Self { interpolation, ..self }
     }
 
-    /// Whether two tables differ in their weights only.
+    /// Returns true if two tables share their values, so that they differ in weights only.
     pub fn shares_values_with(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.values, &other.values)
     }
 
-    /// What multiplies each column at a query.
+    /// The weights that multiply the columns at the query.
     pub(crate) fn weights(&self) -> &[Weight] {
         &self.weights
     }
 
-    /// F32x8Array of columns a node, black ones after the last.
-    pub fn fours(&self) -> usize {
-        self.fours
+    /// Groups of four columns per node; columns after the last are zero.
+    pub fn vec4s_per_node(&self) -> usize {
+        self.vec4s
     }
 
-    /// `[θ_h][φ_h][φ_d][θ_d][four]`, with one step of θ_d more at either end than the grid has.
+    /// `[θ_h][φ_h][φ_d][θ_d][vec4]`, with one more node of θ_d at either end than the grid has.
     pub fn values(&self) -> &[Vec4] {
         &self.values
     }
 
-    /// Where a table knows the projected area.
+    /// The grid of projected areas.
     pub(crate) fn area_grid() -> PolarGrid {
         PolarGrid::new(AREA_GRID[0], AREA_GRID[1])
     }
 
-    /// `a_v(o) / cos θ_o` and the directions it stands on.
+    /// `a_v(o) / cos θ_o` and the grid of its directions.
     pub fn areas(&self) -> (&PolarGrid, &[f32]) {
         (&self.areas.0, &self.areas.1)
     }
 
+    /// Size of the table in bytes.
     pub fn bytes(&self) -> usize {
         16 * self.values.len() + 4 * self.areas.1.len()
     }
 
-    /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
+    /// Returns `a_v(o)` and writes `a_v f̄` of each light to `out`.
     pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         if o.z <= 0.0 {
             (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
             return 0.0;
         }
         let relative: f32 = self.areas.0.taps(o).iter().map(|&(node, w)| w * self.areas.1[node]).sum();
-        let mut places = GridCoordinates::default();
+        let mut coordinates = GridCoordinates::default();
         let mut components = [[0.0_f32; GridCoordinates::MAX]; 3];
-        let mut sums = vec![Vec4::ZERO; GridCoordinates::MAX.min(lights.len()) * self.fours];
+        let mut sums = vec![Vec4::ZERO; GridCoordinates::MAX.min(lights.len()) * self.vec4s];
         for (part, lights) in lights.chunks(GridCoordinates::MAX).enumerate() {
             for (k, light) in lights.iter().enumerate() {
                 for axis in 0..3 {
@@ -281,21 +292,21 @@ impl ShadingTable {
                 }
             }
             let [x, y, z] = components.each_ref().map(|column| &column[..lights.len()]);
-            self.grid.places([x, y, z], o, &mut places);
-            let sums = &mut sums[..lights.len() * self.fours];
+            self.grid.coordinates([x, y, z], o, &mut coordinates);
+            let sums = &mut sums[..lights.len() * self.vec4s];
             let cubic = self.interpolation == Interpolation::Cubic;
-            simd::row_sums(&self.values, self.rows(), places.columns(), lights.len(), cubic, sums);
-            for ((k, &i), sums) in lights.iter().enumerate().zip(sums.chunks(self.fours)) {
-                let sum = if i.z > 0.0 { self.weighted(i, o, places.i_dot_h(k), sums) } else { Vec3::ZERO };
+            simd::row_sums(&self.values, self.row_grid(), coordinates.columns(), lights.len(), cubic, sums);
+            for ((k, &i), sums) in lights.iter().enumerate().zip(sums.chunks(self.vec4s)) {
+                let sum = if i.z > 0.0 { self.weighted(i, o, coordinates.i_dot_h(k), sums) } else { Vec3::ZERO };
                 out(part * GridCoordinates::MAX + k, sum.as_dvec3());
             }
         }
         f64::from(relative * o.z)
     }
 
-    fn rows(&self) -> RowGrid {
-        let HemispherePairGrid { rings, azimuths, turn, difference } = self.grid;
-        RowGrid { rings, azimuths, turn, stored: difference + 2, fours: self.fours }
+    fn row_grid(&self) -> RowGrid {
+        let HemispherePairGrid { rings, azimuths, phi_d, theta_d } = self.grid;
+        RowGrid { rings, azimuths, phi_d, stored: theta_d + 2, vec4s: self.vec4s }
     }
 
     /// `Σ_c w_c T_c`
@@ -304,7 +315,7 @@ impl ShadingTable {
         let pair = PairVectors { i, o, h: (i + o) / (2.0 * i_dot_h).max(1e-20), i_dot_h };
         let mut total = Vec3::ZERO;
         for (sums, weights) in sums.iter().zip(self.weights.chunks(4)) {
-            // A cubic may swing below zero; no sum does.
+            // A cubic may be below zero; no sum is.
             for (sum, weight) in sums.max(Vec4::ZERO).to_array().into_iter().zip(weights) {
                 total += weight.at(&pair) * sum;
             }

@@ -1,5 +1,5 @@
-//! A sum over part of its facets for pairs of directions about one half vector: all that a glossy lobe lights up, and few of
-//! those whose share is small.
+//! A sum over a subset of its facets, for direction pairs about one half vector. The subset contains the facets that a
+//! glossy lobe lights, and few of the others.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -8,71 +8,73 @@ use glam::Vec3;
 
 use crate::brdf::LobeAngles;
 use crate::effective::direct::facet_groups::NormalCluster;
-use crate::effective::{Direct, FacetSum, Group};
+use crate::effective::{Direct, FacetGroup, FacetSum};
 use crate::math::simd;
 use crate::math::simd::{LANES, PairVectors, total};
 
-/// Part of the samples that goes to facets whatever they reflect: lobes grow wider as light and view move apart.
-const EVENLY: f32 = 0.25;
+/// Fraction of the samples that is distributed evenly over facets, because lobes grow wider as light and view move
+/// apart.
+const EVEN_FRACTION: f32 = 0.25;
 
-/// Facets that a group or a normal keeps at least.
+/// Smallest number of facets of a group or cluster in a subset.
 const MIN: f64 = 16.0;
 
-/// What is certain, in whole numbers: their sums have no rounding, and the twin of this on a device (`pick_facets.wgsl`) may
-/// add them up in any order. A chance of a hundredth is known to a thousandth of itself; what a pick stands for is told by the
-/// rounded one.
+/// The probability 1 as an integer. Sums of integer probabilities have no rounding, so the GPU's twin
+/// (`sample_facets.wgsl`) may add them in any order. A probability of 0.01 is rounded to about 0.1 % of itself; a
+/// facet's weight is the inverse of the rounded probability.
 const CERTAIN: u32 = 1 << 16;
 
-/// Rounds that leave to the others what those that are certain cannot use.
+/// Iterations that redistribute the excess of facets whose probability is limited to 1.
 const ROUNDS: usize = 2;
 
-/// How many of a run of facets are picked, where `count` are of `all`.
-pub(crate) fn share_of(run: usize, count: usize, all: usize) -> f64 {
+/// Expected number of facets that are drawn from a run, if `count` are drawn from `all`.
+pub(crate) fn subset_size(run: usize, count: usize, all: usize) -> f64 {
     let run = run as f64;
     (count as f64 * run / all.max(1) as f64).max(MIN).min(run)
 }
 
 impl Direct {
-    /// Some `count` facets with weights that keep every sum's expectation, each picked with a probability that follows what it
-    /// reflects of light that comes and goes along `h`, at even steps along that measure (systematic sampling). Where facets
-    /// of one normal share a lobe, each is as likely. `None` where it saves nothing.
-    pub(crate) fn about(&self, h: Vec3, count: usize) -> Option<Self> {
+    /// Draws about `count` facets, with weights that keep the expectation of every sum. The probability of a facet
+    /// follows its reflection of light along `h` back along `h`; facets are drawn at even steps of the summed
+    /// probability (systematic sampling). Facets of a cluster share a lobe, so their probabilities are equal. `None` if
+    /// the subset saves nothing.
+    pub(crate) fn sampled_about(&self, h: Vec3, count: usize) -> Option<Self> {
         if self.sum.facet_count() < 2 * count {
             return None;
         }
-        let lit = self.sum.groups().iter().filter(|group| !group.is_black);
-        let facets: usize = lit.map(|group| group.range.len()).sum();
-        let share = |range: &Range<usize>| share_of(range.len(), count, facets);
-        let mut picks = SampledFacets::default();
+        let reflecting = self.sum.groups().iter().filter(|group| !group.is_black);
+        let facets: usize = reflecting.map(|group| group.range.len()).sum();
+        let size = |range: &Range<usize>| subset_size(range.len(), count, facets);
+        let mut subset = SampledFacets::default();
         let groups = self.sum.groups().iter().map(|group| {
-            let first = picks.facets.len();
-            let patches = match &group.patches {
+            let first = subset.facets.len();
+            let clusters = match &group.clusters {
                 _ if group.is_black => None,
-                Some(patches) => Some(
-                    patches
+                Some(clusters) => Some(
+                    clusters
                         .iter()
                         .map(|NormalCluster { range, normal }| {
-                            let chance = in_whole_numbers((share(range) / range.len().max(1) as f64) as f32);
-                            let range = picks.walk(range.clone(), std::iter::repeat(chance));
+                            let probability = as_integer((size(range) / range.len().max(1) as f64) as f32);
+                            let range = subset.draw(range.clone(), std::iter::repeat(probability));
                             NormalCluster { range, normal: *normal }
                         })
                         .collect(),
                 ),
                 None => {
-                    let chances = chances(self.sum.shares(group, h), share(&group.range) as f32);
-                    picks.walk(group.range.clone(), chances.into_iter().map(in_whole_numbers));
+                    let probabilities = probabilities(self.sum.shares(group, h), size(&group.range) as f32);
+                    subset.draw(group.range.clone(), probabilities.into_iter().map(as_integer));
                     None
                 }
             };
-            (first..picks.facets.len(), patches)
+            (first..subset.facets.len(), clusters)
         });
         let groups: Vec<_> = groups.collect();
-        let visibility = self.visibility.picked(&picks.facets)?;
-        Some(Self::new(Arc::new(self.sum.sampled(&picks, groups)), Arc::new(visibility)))
+        let visibility = self.visibility.subset(&subset.facets)?;
+        Some(Self::new(Arc::new(self.sum.sampled(&subset, groups)), Arc::new(visibility)))
     }
 }
 
-/// Facets in ascending order, and what each stands for.
+/// Indices of the drawn facets, ascending, and their weights.
 #[derive(Default)]
 struct SampledFacets {
     facets: Vec<usize>,
@@ -80,32 +82,33 @@ struct SampledFacets {
 }
 
 impl SampledFacets {
-    /// SampledFacets of a run of facets those at which the sum of the chances passes a multiple of [`CERTAIN`]; where they stand.
-    fn walk(&mut self, range: Range<usize>, chances: impl Iterator<Item = u32>) -> Range<usize> {
+    /// Draws the facets of a run at which the sum of the probabilities passes a multiple of [`CERTAIN`]. Returns their
+    /// positions in the subset.
+    fn draw(&mut self, range: Range<usize>, probabilities: impl Iterator<Item = u32>) -> Range<usize> {
         let first = self.facets.len();
-        let mut walked = CERTAIN / 2;
-        for (facet, chance) in range.zip(chances) {
-            walked += chance;
-            if walked >= CERTAIN {
-                walked -= CERTAIN;
+        let mut summed = CERTAIN / 2;
+        for (facet, probability) in range.zip(probabilities) {
+            summed += probability;
+            if summed >= CERTAIN {
+                summed -= CERTAIN;
                 self.facets.push(facet);
-                self.weights.push(CERTAIN as f32 / chance as f32);
+                self.weights.push(CERTAIN as f32 / probability as f32);
             }
         }
         first..self.facets.len()
     }
 }
 
-/// A chance in `(0, 1]`, of [`CERTAIN`].
-fn in_whole_numbers(chance: f32) -> u32 {
-    (chance * CERTAIN as f32).round().clamp(1.0, CERTAIN as f32) as u32
+/// A probability in `(0, 1]` as an integer fraction of [`CERTAIN`].
+fn as_integer(probability: f32) -> u32 {
+    (probability * CERTAIN as f32).round().clamp(1.0, CERTAIN as f32) as u32
 }
 
-/// Chances in `(0, 1]` in proportion to `shares`, which add up to 1, so that about `count` are picked, and no more.
-fn chances(mut shares: Vec<f32>, count: f32) -> Vec<f32> {
+/// Probabilities in `(0, 1]` in proportion to `shares`, which sum to 1. Their sum is about `count`, and not more.
+fn probabilities(mut shares: Vec<f32>, count: f32) -> Vec<f32> {
     let mut scale = count;
     for _ in 0..ROUNDS {
-        let expected = sum(&shares, |share| least(scale * share, 1.0));
+        let expected = sum(&shares, |share| smaller(scale * share, 1.0));
         scale *= count / expected.max(1e-9);
     }
     for share in &mut shares {
@@ -114,11 +117,11 @@ fn chances(mut shares: Vec<f32>, count: f32) -> Vec<f32> {
     shares
 }
 
-fn least(a: f32, b: f32) -> f32 {
+fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The sum of what becomes of each value, in as many partial sums as fill vectors.
+/// The sum of `of(value)` over all values, in [`LANES`] partial sums, which the compiler vectorises.
 fn sum(values: &[f32], of: impl Fn(f32) -> f32) -> f32 {
     let mut lanes = [0.0; LANES];
     for values in values.chunks(LANES) {
@@ -130,11 +133,11 @@ fn sum(values: &[f32], of: impl Fn(f32) -> f32) -> f32 {
 }
 
 impl FacetSum {
-    /// What part each facet of a group has in what the group reflects of light along `h` back along `h`: the mean over its
-    /// lobes, some of it the same for all.
-    fn shares(&self, group: &Group, h: Vec3) -> Vec<f32> {
+    /// The share of each facet in a group's reflection of light along `h` back along `h`: the mean over the group's
+    /// lobes, plus a fraction that is equal for all facets.
+    fn shares(&self, group: &FacetGroup, h: Vec3) -> Vec<f32> {
         let count = group.range.len();
-        let mut shares = vec![EVENLY / count.max(1) as f32; count];
+        let mut shares = vec![EVEN_FRACTION / count.max(1) as f32; count];
         let parts = group.lobes.len() + group.measured.len();
         let mut values = vec![0.0; count];
         for part in 0..parts {
@@ -155,7 +158,7 @@ impl FacetSum {
                 *value *= area;
             }
             let total = sum(&values, |value| value);
-            let each = (1.0 - EVENLY) / parts as f32;
+            let each = (1.0 - EVEN_FRACTION) / parts as f32;
             for (share, value) in shares.iter_mut().zip(&values) {
                 *share += each * if total > 0.0 { value / total } else { 1.0 / count as f32 };
             }
@@ -163,18 +166,19 @@ impl FacetSum {
         shares
     }
 
-    /// Facets that stand for all; where those of each group stand, and their runs of one normal.
-    fn sampled(&self, picks: &SampledFacets, groups: Vec<(Range<usize>, Option<Vec<NormalCluster>>)>) -> Self {
-        let facets = || picks.facets.iter().zip(&picks.weights);
+    /// The sum over a subset; `groups` has the positions of each group's facets in the subset, and their normal
+    /// clusters.
+    fn sampled(&self, subset: &SampledFacets, groups: Vec<(Range<usize>, Option<Vec<NormalCluster>>)>) -> Self {
+        let facets = || subset.facets.iter().zip(&subset.weights);
         let areas = facets().map(|(&s, weight)| self.facet(s).1 * weight).collect();
-        let normals = [0, 1, 2].map(|axis| picks.facets.iter().map(|&s| self.facet(s).0[axis]).collect());
-        let groups = self.groups().iter().zip(groups).map(|(group, (range, patches))| {
+        let normals = [0, 1, 2].map(|axis| subset.facets.iter().map(|&s| self.facet(s).0[axis]).collect());
+        let groups = self.groups().iter().zip(groups).map(|(group, (range, clusters))| {
             let weighted = |areas: &Vec<f32>| -> Vec<f32> {
                 let of_group = facets().skip(range.start).take(range.len());
                 of_group.map(|(&s, weight)| areas[s - group.range.start] * weight).collect()
             };
             let rgb_areas = group.rgb_areas.as_ref().map(|rgb| rgb.each_ref().map(weighted));
-            Group { range, rgb_areas, patches, ..group.clone() }
+            FacetGroup { range, rgb_areas, clusters, ..group.clone() }
         });
         self.over(normals, areas, groups.collect())
     }
@@ -185,15 +189,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chances_add_up_to_the_count_and_never_exceed_certainty() {
+    fn probabilities_sum_to_the_count_and_never_exceed_one() {
         let raw: Vec<f32> = (0..1000).map(|k| if k % 100 == 0 { 50.0 } else { 1.0 }).collect();
         let total: f32 = raw.iter().sum();
         let shares: Vec<f32> = raw.iter().map(|share| share / total).collect();
-        let chances = chances(shares, 200.0);
-        let expected: f32 = chances.iter().sum();
+        let probabilities = probabilities(shares, 200.0);
+        let expected: f32 = probabilities.iter().sum();
         assert!((expected - 200.0).abs() < 1.0, "{expected}");
-        assert!(chances.iter().all(|&chance| chance > 0.0 && chance <= 1.0));
-        // What weighs fifty times as much is certain.
-        assert_eq!(chances[0], 1.0);
+        assert!(probabilities.iter().all(|&probability| probability > 0.0 && probability <= 1.0));
+        // A facet with fifty times the share of the others is certain.
+        assert_eq!(probabilities[0], 1.0);
     }
 }

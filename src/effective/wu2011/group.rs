@@ -1,4 +1,4 @@
-//! Facets of one material through N and the product (Wu et al. 2011, Sec. 3.7, "Multiple Materials").
+//! N and the product for the facets of one material (Wu et al. 2011, Sec. 3.7, "Multiple Materials").
 
 use std::sync::Arc;
 
@@ -7,11 +7,12 @@ use glam::DVec3;
 use super::product::{NodePairTable, product};
 use super::visible_normals::BinnedFacets;
 use crate::base::{Error, Result};
-use crate::effective::{Material, MaterialFactors, VisibleFacets, Wu2011Settings};
+use crate::brdf::Material;
+use crate::effective::{MaterialFactors, VisibleFacets, Wu2011Settings};
 use crate::geometry::Facets;
 use crate::math::directions::ParaboloidMap;
 
-/// One material's row, as in Table 3, and what the product made of it.
+/// Sizes, ranks and times of one material, as in Table 3 of the paper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaterialReport {
     /// Index into the materials.
@@ -19,28 +20,28 @@ pub struct MaterialReport {
     pub m_rows: usize,
     pub m_columns: usize,
     pub m_directions: usize,
-    /// Directions that the paper's sampling asks for; more than `m_directions` where the cap cut in.
+    /// Number of directions in the paper's sampling; it exceeds `m_directions` if the limit on the build time applies.
     pub wanted_m_directions: usize,
     pub m_rank: usize,
-    /// Power of M that was kept, measured over all of M (the lowest colour).
+    /// Fraction of the power of M that is kept, measured over all of M; the lowest of all colour directions.
     pub m_kept: f64,
     pub m_bytes: usize,
     pub m_seconds: f64,
-    /// Normal bins in use.
+    /// Number of normal bins that contain facets.
     pub n_columns: usize,
     pub n_rank: usize,
-    /// Power of the projected N that was kept.
+    /// Fraction of the power of the projected N that is kept.
     pub n_kept: f64,
 }
 
 /// `G` of the facets of one material.
 #[derive(Debug, Clone)]
-pub(super) struct Group {
+pub(super) struct MaterialTables {
     pub map: Arc<ParaboloidMap>,
     pub tables: Vec<NodePairTable>,
 }
 
-/// The facets of each material.
+/// The facet indices of each material.
 pub(super) fn group_facets(facets: &Facets, material_of_slot: &[usize], materials: usize) -> Result<Vec<Vec<usize>>> {
     let mut groups = vec![Vec::new(); materials];
     for (s, &slot) in facets.slots.iter().enumerate() {
@@ -50,7 +51,7 @@ pub(super) fn group_facets(facets: &Facets, material_of_slot: &[usize], material
     Ok(groups)
 }
 
-impl Group {
+impl MaterialTables {
     pub fn new(
         tile: &VisibleFacets<'_>,
         members: &[usize],
@@ -64,7 +65,7 @@ impl Group {
             .collect();
         let nearest: Vec<usize> = members.iter().map(|&s| factors.normals.nearest(facets.normals[s])).collect();
         let binned = BinnedFacets::new(directions, &visibility, &nearest, &factors.normals);
-        // Colour weights that all facets share are a multiplication; others take an N for each channel (Sec. 3.7).
+        // Colour weights that all facets share multiply the result; others need an N for each channel (Sec. 3.7).
         let shared = members.iter().all(|&s| facets.colors[s] == facets.colors[members[0]]);
         let masks = if shared { vec![facets.colors[members[0]].as_dvec3()] } else { DVec3::AXES.to_vec() };
         let mut tables = Vec::new();

@@ -1,4 +1,4 @@
-//! M, the pre-rotated BRDFs, factored in streamed blocks and never stored whole (Wu et al. 2011, Sec. 3.5 and 3.7).
+//! Matrix M of rotated lobes, factored in streamed blocks; M itself is never stored (Wu et al. 2011, Sec. 3.5 and 3.7).
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -11,44 +11,48 @@ use super::rows::{Rows, Sums};
 use super::rows_of;
 use super::sampling::Sampling;
 use crate::base::{InputError, Result};
-use crate::brdf::ColorBasis;
-use crate::effective::{Material, Wu2011Settings};
+use crate::brdf::{ColorBasis, Material};
+use crate::effective::Wu2011Settings;
 use crate::math::directions::{ParaboloidMap, ParaboloidSphere};
 
-/// The paper's ranks of M reach 95, more than the 50 rows it names for N: M is projected onto this many.
+/// Random rows that M is projected onto. The paper's ranks of M reach 95, more than the 50 rows that it names for N.
 const MATERIAL_PROJECTION_ROWS: usize = 160;
 
-/// Coefficients of `U_M` that are held at most: 2 GB.
+/// Largest number of coefficients of `U_M`; in f32 they take 2 GB.
 const MAX_COEFFICIENTS: usize = 1 << 29;
 
-/// M of one material: what is precomputed, and stays while the geometry is edited.
+/// The factors of M of one material. They are precomputed and do not depend on the geometry.
 #[derive(Debug)]
 pub struct MaterialFactors {
     pub(super) directions: Arc<ParaboloidMap>,
     pub(super) normals: ParaboloidSphere,
     pub(super) channels: Vec<ChannelFactors>,
-    /// Directions that the paper's sampling asks for, before the cap on the build time.
+    /// Number of directions in the paper's sampling, before the limit on the build time.
     pub wanted_directions: usize,
+    /// Build time [s].
     pub seconds: f64,
 }
 
 /// M along one colour direction: `M_kj ≈ mean_j + Σ_c coefficients_kc vectors_jc`.
 #[derive(Debug)]
 pub(super) struct ChannelFactors {
-    /// The colour direction that the scalar stands for.
+    /// The colour direction of the scalar values.
     pub color: Vec3,
     pub mean: Vec<f64>,
-    /// Row-major `columns x rank`, the normals' weights taken out.
+    /// Row-major `columns x rank`, divided by the weights of the normals.
     pub vectors: Vec<f64>,
     /// Row-major `rows x rank`.
     pub coefficients: Vec<f32>,
     pub rank: usize,
-    /// Part of the power of M - mean that is kept, measured over all of M.
+    /// Fraction of the power of M - mean that is kept, measured over all of M.
     pub kept: f64,
 }
 
 impl MaterialFactors {
-    /// Tabulates and factors a material; its `color` is left to the product.
+    /// Tabulates and factors the BRDF of a material; the product applies its `color`.
+    ///
+    /// # Errors
+    /// More coefficients than 2 GB, or a factorization that fails.
     pub fn new(material: &Material, settings: &Wu2011Settings) -> Result<Self> {
         let started = Instant::now();
         let wanted = Sampling::of(&material.brdf);
@@ -70,22 +74,22 @@ impl MaterialFactors {
         Ok(Self { directions, normals, channels, wanted_directions: wanted.directions, seconds })
     }
 
-    /// Rows of M: unordered pairs of directions.
+    /// Number of rows of M, which are unordered direction pairs.
     pub fn rows(&self) -> usize {
         rows_of(self.directions.len())
     }
 
-    /// Columns of M: normals of the whole sphere.
+    /// Number of columns of M, which are normals of the whole sphere.
     pub fn columns(&self) -> usize {
         self.normals.len()
     }
 
-    /// Rank of the approximation, all colours together.
+    /// Sum of the ranks of all colour directions.
     pub fn rank(&self) -> usize {
         self.channels.iter().map(|channel| channel.rank).sum()
     }
 
-    /// Bytes that are kept between edits of the geometry.
+    /// Size of the factors in bytes.
     pub fn bytes(&self) -> usize {
         self.channels.iter().map(|c| 4 * c.coefficients.len() + 8 * (c.vectors.len() + c.mean.len())).sum()
     }
@@ -132,7 +136,7 @@ impl ChannelFactors {
         Ok(Self { color: rows.along, mean, vectors: scaled(true), coefficients, rank, kept })
     }
 
-    /// `f` of the scalar back in colour: the direction times the material's colour.
+    /// The factor that turns a scalar value into a colour: the colour direction times the material's colour.
     pub fn tint(&self, material_color: Vec3) -> DVec3 {
         (self.color * material_color).as_dvec3()
     }

@@ -1,9 +1,11 @@
-//! The `wu2011` preset: the choices of Wu et al. 2011 as printed, to be compared with ours.
+//! The `wu2011` preset: the method of Wu et al. 2011 as published, for comparison.
 //!
-//! Paraboloid maps for all directions and normals; N on nearest normals, M in streamed blocks, both reduced by random
-//! projection, mean subtraction and a small SVD, weighted against the map's distortion; their product tabulated on M's
-//! pairs and interpolated bilinearly. What the paper leaves open: which mean is subtracted (here: over rows, the pairs), and
-//! the random rows for M, whose ranks exceed the 50 it names for N (here 160).
+//! All directions and normals are nodes of paraboloid maps. N uses nearest normals, and M is computed in streamed
+//! blocks. Both are reduced by random projection, mean subtraction and a small SVD, with weights that compensate for
+//! the map's distortion. Their product is tabulated on M's pairs and interpolated bilinearly.
+//!
+//! The paper leaves two choices open. The mean that is subtracted is here the mean over rows, which are the direction
+//! pairs. M is projected onto 160 random rows, because its ranks exceed the 50 rows that the paper names for N.
 
 mod group;
 mod material;
@@ -21,9 +23,9 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
-use self::group::{Group, group_facets};
-use super::Material;
+use self::group::{MaterialTables, group_facets};
 use crate::base::{Error, InputError, Result};
+use crate::brdf::Material;
 use crate::geometry::Facets;
 use crate::math::directions::{ParaboloidMap, Tap};
 use crate::visibility::PackedVisibility;
@@ -31,7 +33,7 @@ pub use group::MaterialReport;
 pub use material::MaterialFactors;
 pub use settings::Wu2011Settings;
 
-/// Facets and what they see at the directions of a paraboloid map.
+/// Facets and their visibility at the directions of a paraboloid map.
 #[derive(Debug, Clone, Copy)]
 pub struct VisibleFacets<'a> {
     pub facets: &'a Facets,
@@ -42,19 +44,19 @@ pub struct VisibleFacets<'a> {
     pub base_area: f64,
 }
 
-/// What was built and how long it took.
+/// Sizes, ranks and times of a build.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Wu2011Report {
     pub n_rows: usize,
     pub materials: Vec<MaterialReport>,
-    /// Everything but M, which is precomputed.
+    /// Time of everything but M, which is precomputed [s].
     pub product_seconds: f64,
 }
 
-/// The effective BRDF as the paper holds it.
+/// The effective BRDF in the paper's representation.
 #[derive(Debug, Clone)]
 pub struct Wu2011 {
-    groups: Vec<Group>,
+    groups: Vec<MaterialTables>,
     directions: ParaboloidMap,
     /// `a_v / A` at the directions of visibility (Eq. 10).
     projected_area: Vec<f32>,
@@ -62,7 +64,7 @@ pub struct Wu2011 {
     pub report: Wu2011Report,
 }
 
-/// Number of unordered pairs of `count` things; also the row of M at which the pairs `(0..=count, count)` start.
+/// Number of unordered pairs of `count` items; also the row of M at which the pairs `(0..=count, count)` start.
 fn rows_of(count: usize) -> usize {
     count * (count + 1) / 2
 }
@@ -77,7 +79,10 @@ fn pair_of_row(row: usize) -> (usize, usize) {
 }
 
 impl Wu2011 {
-    /// Factors the materials and forms the product. Facets as sorted by [`Facets::sort_for_sums`].
+    /// Factors the materials and computes the product. Facets must be sorted by [`Facets::sort_for_sums`].
+    ///
+    /// # Errors
+    /// Settings out of range, a slot without a material, or a factorization that fails.
     pub fn build(
         facets: &Facets,
         visibility: &PackedVisibility,
@@ -100,8 +105,11 @@ impl Wu2011 {
         Self::from_factors(&tile, material_of_slot, materials, &factors, settings)
     }
 
-    /// The product alone: what an edit of the geometry or of a colour costs. `factors[m]` is of `materials[m]`, and may be
-    /// missing where no facet has that material.
+    /// Computes the product from factored materials, as an edit of the geometry or of a colour requires. `factors[m]`
+    /// belongs to `materials[m]` and may be missing if no facet has that material.
+    ///
+    /// # Errors
+    /// As [`Wu2011::build`], and a visibility that does not fit the facets or directions.
     pub fn from_factors(
         tile: &VisibleFacets<'_>,
         material_of_slot: &[usize],
@@ -113,7 +121,7 @@ impl Wu2011 {
         let started = Instant::now();
         let VisibleFacets { facets, visibility, directions, base_area } = *tile;
         if visibility.facet_count != facets.len() || visibility.direction_count != directions.len() {
-            return Err(Error::failed("the visibility is of other facets or directions"));
+            return Err(Error::failed("the visibility belongs to other facets or directions"));
         }
         if !(base_area > 0.0 && base_area.is_finite()) {
             return Err(InputError::new("tile.size", base_area, "a tile with an area").into());
@@ -127,17 +135,17 @@ impl Wu2011 {
             let factors = factors
                 .get(material)
                 .and_then(Option::as_ref)
-                .ok_or_else(|| Error::failed("a material without factors"))?;
-            let (group, row) = Group::new(tile, members, &materials[material], factors, settings)?;
+                .ok_or_else(|| Error::failed("a material has no factors"))?;
+            let (group, row) = MaterialTables::new(tile, members, &materials[material], factors, settings)?;
             report.materials.push(MaterialReport { material, ..row });
             groups.push(group);
         }
         let projected_area = (0..directions.len())
             .map(|node| {
                 let o = directions.directions()[node];
-                let seen = (0..facets.len()).filter(|&s| visibility.is_visible(node, s));
+                let visible = (0..facets.len()).filter(|&s| visibility.is_visible(node, s));
                 let sum: f64 =
-                    seen.map(|s| f64::from(facets.normals[s].dot(o).max(0.0)) * f64::from(facets.areas[s])).sum();
+                    visible.map(|s| f64::from(facets.normals[s].dot(o).max(0.0)) * f64::from(facets.areas[s])).sum();
                 (sum / base_area) as f32
             })
             .collect();
@@ -145,7 +153,7 @@ impl Wu2011 {
         Ok(Self { groups, directions: directions.clone(), projected_area, base_area, report })
     }
 
-    /// `a_v(o)` and, for each light, `a_v f̄` into `out`.
+    /// Returns `a_v(o)` and writes `a_v f̄` of each light to `out`.
     pub fn sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         if o.z <= 0.0 {
             (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
@@ -160,19 +168,19 @@ impl Wu2011 {
                     total += group.tables.iter().map(|table| table.tint * table.eval(&light, view)).sum::<DVec3>();
                 }
             }
-            // Truncated factors may fall a little below zero; no BRDF does.
+            // Truncated factors may be slightly below zero; no BRDF is.
             out(k, total.max(DVec3::ZERO) * self.base_area);
         }
         let relative: f32 = self.directions.taps(o).iter().map(|&(node, w)| w * self.projected_area[node]).sum();
         f64::from(relative) * self.base_area
     }
 
-    /// Directions that values are read from.
+    /// Number of directions of visibility.
     pub fn direction_count(&self) -> usize {
         self.directions.len()
     }
 
-    /// Bytes of the tables that a query reads.
+    /// Size of the tables that a query reads, in bytes.
     pub fn bytes(&self) -> usize {
         let tables = self.groups.iter().flat_map(|group| &group.tables);
         4 * (tables.map(|table| table.values.len()).sum::<usize>() + self.projected_area.len())

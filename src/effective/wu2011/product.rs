@@ -1,4 +1,4 @@
-//! The product of N and M on M's directions (Wu et al. 2011, Eq. 12), a table over unordered pairs.
+//! The product of N and M on M's directions (Wu et al. 2011, Eq. 12) as a table over unordered pairs.
 
 use glam::DVec3;
 use nalgebra::DMatrix;
@@ -13,13 +13,13 @@ use crate::math::linalg::gemm;
 /// One scalar of `G` on the pairs of a map, and its colour.
 #[derive(Debug, Clone)]
 pub(super) struct NodePairTable {
-    /// At `o(o+1)/2 + i` for `i <= o`.
+    /// The value of `i <= o` is at `o(o+1)/2 + i`.
     pub values: Vec<f32>,
     pub tint: DVec3,
 }
 
 impl NodePairTable {
-    /// Bilinear in both directions.
+    /// Interpolates bilinearly in both directions.
     pub fn eval(&self, light: &[Tap; 4], view: &[Tap; 4]) -> f64 {
         let mut sum = 0.0;
         for &(o, w_o) in view {
@@ -32,8 +32,8 @@ impl NodePairTable {
     }
 }
 
-/// `Σ_j N_kj M_jk / area` on all pairs of M's directions, N interpolated linearly to them; `bins` are the columns of M that
-/// N's columns stand for.
+/// `Σ_j N_kj M_jk / area` on all pairs of M's directions, to which N is interpolated linearly. `bins` are the columns
+/// of M that correspond to N's columns.
 pub(super) fn product(
     n: &NormalFactors,
     n_map: &ParaboloidMap,
@@ -46,7 +46,7 @@ pub(super) fn product(
     let (width, rank) = (n.rank + 1, m.rank + 1);
     let nodes = n_map.len();
     let taps: Vec<[Tap; 4]> = m_map.directions().iter().map(|&d| n_map.taps(d)).collect();
-    // U_N interpolated in the light first: [light on M's map][view on N's map][c].
+    // U_N is interpolated in the light direction first: [light on M's map][view on N's map][c].
     let mut half = vec![0.0_f32; m_map.len() * nodes * n.rank];
     if n.rank > 0 {
         half.par_chunks_mut(nodes * n.rank).zip(&taps).for_each(|(out, taps)| {
@@ -85,7 +85,7 @@ pub(super) fn product(
     rows.concat()
 }
 
-/// `[mean_N, V_N]ᵀ [mean_M, V_M] / area` over the bins in use, row-major `(rank_N + 1) x (rank_M + 1)`.
+/// `[mean_N, V_N]ᵀ [mean_M, V_M] / area` over the bins that contain facets, row-major `(rank_N + 1) x (rank_M + 1)`.
 fn mixing(n: &NormalFactors, bins: &[usize], m: &ChannelFactors, area: f64) -> Vec<f32> {
     let of = |mean: f64, vectors: &[f64], rank: usize, row: usize, c: usize| {
         if c == 0 { mean } else { vectors[row * rank + c - 1] }

@@ -9,12 +9,12 @@ use rand_chacha::ChaCha8Rng;
 use crate::base::Result;
 use crate::effective::low_rank::gram::{rank_for, right_singular};
 
-/// Fills a block of R with independent N(0,1) values: the same seed and block give the same values, whatever thread asks.
+/// Fills a block of R with independent N(0,1) values, which depend on seed and block only.
 pub(super) fn fill_normal(seed: u64, block: u64, out: &mut [f32]) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(block);
     for pair in out.chunks_mut(2) {
-        // Box and Muller: a radius and an angle make two.
+        // Box and Muller: a radius and an angle give two values.
         let radius = (-2.0 * (1.0 - rng.random::<f32>()).ln()).sqrt();
         let (sin, cos) = (TAU * rng.random::<f32>()).sin_cos();
         pair[0] = radius * cos;
@@ -30,20 +30,21 @@ pub(super) struct RightVectors {
     pub rank: usize,
     /// Orthonormal columns, row-major `columns of P x rank`.
     pub vectors: Vec<f64>,
-    /// Part of the power of Q that they keep.
+    /// Fraction of the power of Q that they keep.
     pub kept: f64,
 }
 
-/// The fewest right singular vectors of `q` (l rows) that keep the part `keep` of its power, through its smaller Gram
-/// matrix. Power below the rounding of f32 entries, relative to `scale` (the power before the mean was taken off), is none.
+/// Computes the fewest right singular vectors of `q` (l rows) that keep the fraction `keep` of its power, from its
+/// smaller Gram matrix. Power below the rounding of f32 entries, relative to `scale`, counts as zero; `scale` is the
+/// power before the mean is subtracted.
 pub(super) fn right_vectors(q: &DMatrix<f64>, keep: f64, scale: f64) -> Result<RightVectors> {
-    let sound = |values: &[f64]| {
+    let significant = |values: &[f64]| {
         let floor = 1e-10 * scale.max(values.first().copied().unwrap_or(0.0));
         values.iter().take_while(|&&value| value > floor).count()
     };
-    let (values, right) = right_singular(q, |values| match sound(values) {
+    let (values, right) = right_singular(q, |values| match significant(values) {
         0 => 0,
-        sound => rank_for(&values[..sound], keep),
+        count => rank_for(&values[..count], keep),
     })?;
     let (rank, total) = (right.ncols(), values.iter().sum::<f64>());
     let vectors = right.transpose().as_slice().to_vec();
@@ -56,12 +57,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn normal_values_have_mean_zero_variance_one_and_are_the_same_again() {
+    fn normal_values_have_mean_zero_and_variance_one_and_are_reproducible() {
         let mut values = vec![0.0; 200_001];
         fill_normal(3, 5, &mut values);
         let mean = values.iter().sum::<f32>() / values.len() as f32;
         let variance = values.iter().map(|x| x * x).sum::<f32>() / values.len() as f32;
-        // Four standard errors: 4/√n and 4 √(2/n).
+        // The limits are four standard errors: 4/√n and 4 √(2/n).
         assert!(mean.abs() < 9e-3 && (variance - 1.0).abs() < 1.3e-2, "{mean} {variance}");
         let mut again = vec![0.0; 11];
         fill_normal(3, 5, &mut again);
@@ -94,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_but_rounding_has_rank_zero() {
+    fn a_matrix_of_rounding_errors_has_rank_zero() {
         let q = DMatrix::from_element(3, 5, 1e-9);
         assert_eq!(right_vectors(&q, 0.98, 1.0).unwrap().rank, 0);
         assert_eq!(right_vectors(&DMatrix::zeros(3, 5), 0.98, 0.0).unwrap().rank, 0);

@@ -1,4 +1,4 @@
-//! M row by row, made on the fly: what is summed over its rows is summed in a fixed order (Wu et al. 2011, Sec. 3.7).
+//! Rows of M, computed when they are needed. Sums over rows have a fixed order (Wu et al. 2011, Sec. 3.7).
 
 use std::sync::Arc;
 
@@ -7,20 +7,19 @@ use rayon::prelude::*;
 
 use super::projection::fill_normal;
 use super::{pair_of_row, rows_of};
-use crate::brdf::{Brdf, LobeAngles, Measured, Term};
-use crate::effective::analytic_lobe;
+use crate::brdf::{Brdf, LobeAngles, Measured, Term, analytic_lobe};
 use crate::math::directions::{ParaboloidMap, ParaboloidSphere};
 use crate::math::linalg::gemm;
 use crate::math::simd;
 use crate::math::simd::{Lobe, PairVectors};
 
-/// Rows of M at a time.
+/// Rows of M that are computed at a time.
 const BLOCK: usize = 64;
 
-/// Parts of the rows whose sums are kept apart and added in order: the same bits with any number of threads.
+/// Parts of the rows whose sums are added in order, so that results do not depend on the number of threads.
 const PARTS: usize = 16;
 
-/// M row by row: the cosine-weighted BRDF along a colour, at all normals.
+/// Computes rows of M: the cosine-weighted BRDF along a colour direction, at all normals.
 pub(super) struct Rows<'a> {
     lobes: Vec<(Lobe, &'a Term)>,
     measured: Vec<&'a Arc<dyn Measured>>,
@@ -31,7 +30,7 @@ pub(super) struct Rows<'a> {
     pub column_weights: Vec<f64>,
 }
 
-/// Room for one row.
+/// Buffers for one row.
 #[derive(Default)]
 struct Scratch {
     values: Vec<f32>,
@@ -45,9 +44,11 @@ pub(super) struct Sums {
     pub projected: Vec<f64>,
     /// `Rᵀ D_r 1`.
     pub ones: Vec<f64>,
-    /// `Σ w² M`, `Σ w² M²` a column, `Σ w²`.
+    /// `Σ w² M` per column.
     pub first: Vec<f64>,
+    /// `Σ w² M²` per column.
     pub second: Vec<f64>,
+    /// `Σ w²`.
     pub weight: f64,
 }
 
@@ -94,14 +95,15 @@ impl<'a> Rows<'a> {
         rows_of(self.directions.len())
     }
 
-    /// Power weight `w²` of a row: the solid angles of both directions, twice where the pair stands for two.
+    /// Power weight `w²` of a row: the product of both solid angles, doubled for a row that represents two ordered
+    /// pairs.
     pub fn weight(&self, row: usize) -> f32 {
         let (i, o) = pair_of_row(row);
         let both = self.directions.solid_angle(i) * self.directions.solid_angle(o);
         if i == o { both } else { 2.0 * both }
     }
 
-    /// One row of M.
+    /// Writes one row of M.
     fn write(&self, row: usize, scratch: &mut Scratch, out: &mut [f32]) {
         let (i, o) = pair_of_row(row);
         let pair = PairVectors::new(self.directions.directions()[i], self.directions.directions()[o]);
@@ -130,7 +132,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Calls `each(first row, rows of M)` for the blocks of one part, in order.
+    /// Calls `each(first row, values)` for the blocks of one part, in order.
     fn stream(&self, part: usize, mut each: impl FnMut(usize, &[f32])) {
         let columns = self.columns();
         let blocks = self.count().div_ceil(BLOCK);
@@ -146,7 +148,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Random projection onto `l` rows, and moments.
+    /// Projects M onto `l` random rows, and sums its moments.
     pub fn project(&self, l: usize, seed: u64) -> Sums {
         let parts: Vec<Sums> = (0..PARTS).into_par_iter().map(|part| self.project_part(part, l, seed)).collect();
         let mut total = Sums::zeros(l, self.columns());

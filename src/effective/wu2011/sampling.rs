@@ -1,5 +1,5 @@
-//! How finely M is sampled. The paper searches for the count that represents a BRDF to 2 % of its power (1 % for normals),
-//! hours for sharp ones; Table 3 lists what it found, and this rule reproduces that.
+//! The sampling density of M. The paper searches for the counts that represent a BRDF to 2 % of its power (1 % for
+//! normals), which takes hours for sharp lobes. The rule here reproduces the counts that Table 3 of the paper lists.
 
 use glam::Vec3;
 
@@ -9,15 +9,15 @@ use crate::brdf::{Brdf, LobeAngles, Measured, Term};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sampling {
     pub directions: usize,
-    /// Normals of one hemisphere; the paper's "column number" is twice that.
+    /// Number of normals of one hemisphere; the paper's "column number" is twice this.
     pub half_normals: usize,
 }
 
-/// Table 3: the largest sampling, which the paper clamps to itself, and the smallest, a Lambertian's.
+/// The largest sampling in Table 3, to which the paper clamps, and the smallest, that of a Lambertian BRDF.
 const FINEST: Sampling = Sampling { directions: 1857, half_normals: 3221 };
 const COARSEST: Sampling = Sampling { directions: 132, half_normals: 224 };
 
-/// Table 3's measured materials. Rows are unordered pairs of directions: 49,141 = 313·314/2.
+/// The measured materials of Table 3. The table lists rows, which are unordered direction pairs: 49,141 = 313·314/2.
 const MEASURED: [(&str, Sampling); 7] = [
     ("pearl-paint", Sampling { directions: 313, half_normals: 1021 }),
     ("silver-paint", Sampling { directions: 568, half_normals: 1884 }),
@@ -28,12 +28,13 @@ const MEASURED: [(&str, Sampling); 7] = [
     ("white-diffuse", Sampling { directions: 313, half_normals: 313 }),
 ];
 
-/// Entries of M, rows x columns, that stay within about ten seconds of two cores; measured tables cost ten times a lobe.
+/// Limits on the entries of M, rows x columns, which bound the build time. A measured value takes about ten times as
+/// long as an analytic lobe.
 const MAX_ANALYTIC_ENTRIES: f64 = 1.5e9;
 const MAX_MEASURED_ENTRIES: f64 = 1.5e8;
 
 impl Sampling {
-    /// What the paper would take: the finest that any term asks for.
+    /// The paper's sampling: the finest of all terms.
     pub fn of(brdf: &Brdf) -> Self {
         brdf.terms.iter().map(of_term).fold(COARSEST, |a, b| Self {
             directions: a.directions.max(b.directions),
@@ -41,7 +42,7 @@ impl Sampling {
         })
     }
 
-    /// Shrinks both images by one factor until M is within the cap.
+    /// Shrinks both maps by one factor until M is within the limit.
     pub fn capped(self, brdf: &Brdf) -> Self {
         let cap = if brdf.terms.iter().any(|term| term.measured().is_some()) {
             MAX_MEASURED_ENTRIES
@@ -49,15 +50,16 @@ impl Sampling {
             MAX_ANALYTIC_ENTRIES
         };
         let entries = 0.5 * (self.directions as f64).powi(2) * 2.0 * self.half_normals as f64;
-        // Counts go with the square of an image's side, entries with its sixth power.
+        // Counts are proportional to the square of a map's side, entries to its sixth power.
         let shrink = (cap / entries).min(1.0).cbrt();
         let scaled = |count: usize| ((count as f64 * shrink) as usize).max(1);
         Self { directions: scaled(self.directions), half_normals: scaled(self.half_normals) }
     }
 }
 
-/// Counts that fall with the square of the lobe's width go through the analytic rows of Table 3: Cook-Torrance 0.5 and 0.2
-/// (303 and 1857 directions, 756 normals a half), Ward 0.3 (568, 1884).
+/// The sampling of one term. Counts are inversely proportional to the square of the lobe's width and match the analytic
+/// rows of Table 3: Cook-Torrance 0.5 and 0.2 (303 and 1857 directions, 756 normals per hemisphere), Ward 0.3 (568,
+/// 1884).
 fn of_term(term: &Term) -> Sampling {
     match term {
         Term::Lambertian { .. } => COARSEST,
@@ -86,7 +88,8 @@ fn by_width(width: f32, directions: f32, half_normals: f32) -> Sampling {
     }
 }
 
-/// The tangent of the half angle at which a measured lobe, light and view together, has fallen to 1/e: Beckmann's m.
+/// The tangent of the half angle at which a measured lobe, for equal light and view, falls to 1/e of its peak; it
+/// corresponds to Beckmann's m.
 fn measured_width(table: &dyn Measured) -> f32 {
     let at = |theta: f32| {
         let (sin, cos) = theta.sin_cos();
@@ -109,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rule_goes_through_the_analytic_rows_of_table_3() {
+    fn the_rule_matches_the_analytic_rows_of_table_3() {
         let near = |found: (usize, usize), paper: (usize, usize)| {
             assert!(found.0.abs_diff(paper.0) <= 2 && found.1.abs_diff(paper.1) <= 2, "{found:?} {paper:?}");
         };
@@ -120,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirror_is_capped_and_a_diffuse_surface_is_not() {
+    fn a_mirror_is_limited_and_a_diffuse_surface_is_not() {
         let brdf = |term| Brdf { terms: vec![term] };
         let mirror = brdf(Term::Ggx { roughness: 1e-3, f0: Vec3::ONE });
         let capped = Sampling::of(&mirror).capped(&mirror);

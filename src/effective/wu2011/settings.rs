@@ -1,19 +1,19 @@
-//! Settings of the preset.
+//! Settings of the `wu2011` preset.
 
 use crate::base::{InputError, Result};
 
 /// Truncation and sampling; the defaults are the paper's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wu2011Settings {
-    /// Power of M that is kept.
+    /// Fraction of the power of M that is kept.
     pub keep_m: f64,
-    /// Power of N that is kept.
+    /// Fraction of the power of N that is kept.
     pub keep_n: f64,
-    /// Rows of the random projection of N; M is given at least 160.
+    /// Rows of the random projection of N; M has at least 160.
     pub projection_rows: usize,
-    /// Colour directions of a BRDF, 1 to 3.
+    /// Number of colour directions of a BRDF, 1 to 3.
     pub colors: usize,
-    /// Directions of M; `None`: by Table 3's rule, capped.
+    /// Number of directions of M; `None` applies the rule of Table 3 with a limit on the build time.
     pub m_directions: Option<usize>,
     pub seed: u64,
 }
@@ -25,29 +25,24 @@ impl Default for Wu2011Settings {
 }
 
 impl Wu2011Settings {
-    /// Directions of visibility that the paper uses at most (Sec. 6); the nearest map has 137.
+    /// Largest number of visibility directions in the paper (Sec. 6); the nearest map has 137.
     pub const VISIBILITY_DIRECTIONS: usize = 132;
 
     pub(super) fn check(&self) -> Result<()> {
-        let complaint =
-            |place: &str, found: String, expected: &str| Err(InputError::new(place, found, expected).into());
-        let part = |kept: f64| kept > 0.0 && kept <= 1.0;
-        if !part(self.keep_m) || !part(self.keep_n) {
-            return complaint(
-                "quality.keep",
-                format!("{}, {}", self.keep_m, self.keep_n),
-                "parts of the power in (0, 1]",
-            );
+        let error = |place: &str, found: String, expected: &str| Err(InputError::new(place, found, expected).into());
+        let is_fraction = |kept: f64| kept > 0.0 && kept <= 1.0;
+        if !is_fraction(self.keep_m) || !is_fraction(self.keep_n) {
+            return error("quality.keep", format!("{}, {}", self.keep_m, self.keep_n), "parts of the power in (0, 1]");
         }
         if !(1..=1000).contains(&self.projection_rows) {
-            return complaint("quality.projection_rows", self.projection_rows.to_string(), "1 to 1000");
+            return error("quality.projection_rows", self.projection_rows.to_string(), "1 to 1000");
         }
         if !(1..=3).contains(&self.colors) {
-            return complaint("quality.colors", self.colors.to_string(), "1 to 3");
+            return error("quality.colors", self.colors.to_string(), "1 to 3");
         }
         match self.m_directions {
             Some(count) if !(4..=2000).contains(&count) => {
-                complaint("quality.m_directions", count.to_string(), "4 to 2000")
+                error("quality.m_directions", count.to_string(), "4 to 2000")
             }
             _ => Ok(()),
         }

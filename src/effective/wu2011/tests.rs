@@ -1,4 +1,4 @@
-//! The preset against brute force, on tiny cases.
+//! The `wu2011` preset against brute force on small cases.
 
 use std::f32::consts::{PI, TAU};
 
@@ -11,7 +11,7 @@ use crate::geometry::{PeriodicGrid, TileMesh};
 use crate::math::directions::ParaboloidSphere;
 use crate::visibility::ray_cast;
 
-/// Nothing cut off: more random rows than a Lambertian M has columns (450).
+/// Settings without truncation: more random rows than the 450 columns of a Lambertian M.
 fn exact() -> Wu2011Settings {
     Wu2011Settings { keep_m: 1.0, keep_n: 1.0, projection_rows: 460, m_directions: Some(132), ..Default::default() }
 }
@@ -79,7 +79,7 @@ impl Sampled {
         Wu2011::build(&self.facets, &self.visibility, &self.map, 1.0, material_of_slot, materials, settings).unwrap()
     }
 
-    /// `Σ_s ΔA α V V f(nearest normal)` by the definition.
+    /// `Σ_s ΔA α V V f(nearest normal)` by definition.
     fn brute_force(&self, i: usize, o: usize, normals: &[Vec3], material_of: impl Fn(usize) -> Material) -> DVec3 {
         let (to_light, to_viewer) = (self.map.directions()[i], self.map.directions()[o]);
         (0..self.facets.len())
@@ -98,7 +98,7 @@ impl Sampled {
         self.facets.normals.iter().map(|&n| normals.direction(normals.nearest(n))).collect()
     }
 
-    /// Relative L2 over a selection of pairs of nodes.
+    /// Relative L2 over a subset of all pairs of nodes.
     fn error(&self, built: &Wu2011, truth: impl Fn(usize, usize) -> DVec3) -> f64 {
         let (mut difference, mut norm) = (0.0, 0.0);
         for o in (0..self.map.len()).step_by(7) {
@@ -134,14 +134,14 @@ fn a_flat_lambertian_tile_reflects_albedo_over_pi_times_cosine() {
         assert!((area - f64::from(o.z)).abs() < 1e-5);
         for (sum, light) in sums.iter().zip(lights) {
             let expected = DVec3::new(0.8, 0.4, 0.2) * f64::from(light.z / PI);
-            // Singular values below 1e-5 of the largest are dropped, and this is one column of 450.
+            // Singular values below 1e-5 of the largest are dropped, and only one column of 450 contributes.
             assert!((*sum / area - expected).length() < 5e-4, "{} {expected}", *sum / area);
         }
     }
 }
 
 #[test]
-fn with_nothing_cut_off_the_product_is_the_plain_binned_sum_at_the_nodes() {
+fn without_truncation_the_product_is_the_binned_sum_at_the_nodes() {
     let tile = sampled(&bumps(), 400);
     for material in [lambertian(), glossy()] {
         let built = tile.build(&[0, 0], std::slice::from_ref(&material), &exact());
@@ -173,11 +173,11 @@ fn the_papers_truncation_stays_within_its_stated_power() {
     for (material, paper) in [(lambertian(), 7), (glossy(), 17)] {
         let settings = Wu2011Settings { m_directions: Some(132), ..Default::default() };
         let m = MaterialFactors::new(&material, &settings).unwrap();
-        // The random projection is not quite optimal; its rank is near Table 3's.
+        // The random projection is not optimal; its rank is near that of Table 3.
         assert!(m.channels[0].kept > 0.97 && m.channels[0].kept <= 1.0 + 1e-6, "{}", m.channels[0].kept);
         assert!(m.rank() >= paper / 2 && m.rank() <= 3 * paper, "{} {paper}", m.rank());
     }
-    // N itself, rebuilt row by row from its factors.
+    // N is rebuilt row by row from its factors.
     let normals = ParaboloidSphere::new(ParaboloidMap::nearest_to(224));
     let nearest: Vec<usize> = tile.facets.normals.iter().map(|&n| normals.nearest(n)).collect();
     let visibility: Vec<f32> = (0..tile.map.len())
@@ -230,7 +230,7 @@ fn the_same_seed_gives_the_same_bits_with_any_number_of_threads() {
 }
 
 #[test]
-fn wrong_settings_are_complaints_and_under_the_horizon_is_dark() {
+fn wrong_settings_are_errors_and_values_below_the_horizon_are_zero() {
     let tile = sampled(&flat(), 50);
     let bad = [
         Wu2011Settings { keep_m: f64::NAN, ..exact() },

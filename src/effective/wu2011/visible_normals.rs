@@ -1,4 +1,5 @@
-//! N, the BVNDF on nearest normals, by random projection and mean subtraction; never stored (Wu et al. 2011, Sec. 3.4).
+//! Matrix N, the BVNDF on nearest normals, factored by random projection and mean subtraction. N itself is never stored
+//! (Wu et al. 2011, Sec. 3.4).
 
 use std::collections::BTreeMap;
 
@@ -13,36 +14,36 @@ use crate::effective::low_rank::bvndf;
 use crate::math::directions::{ParaboloidMap, ParaboloidSphere};
 use crate::math::linalg::gemm;
 
-/// One group of facets: visibility at the directions, weights, and the normal bin of each.
+/// The facets of one material: their visibility at the directions, and the normal bin of each.
 pub(super) struct BinnedFacets<'a> {
     pub directions: &'a ParaboloidMap,
     /// `[direction][facet]`, 0 or 1.
     pub visibility: &'a [f32],
-    /// The bins in use, as nodes of the map of normals.
+    /// The bins that contain facets, as nodes of the map of normals.
     pub bins: Vec<usize>,
     /// Position in `bins` of each facet's nearest normal.
     pub bin_of_facet: Vec<usize>,
-    /// `1/√Ω` of each bin: scaled by it, N is a density over the sphere of normals.
+    /// `1/√Ω` of each bin; with this factor, N is a density over the sphere of normals.
     pub bin_weights: Vec<f64>,
 }
 
-/// `N_kj ≈ mean_j + Σ_c table_kc vectors_jc`, on the bins in use.
+/// The factors of N on the bins that contain facets: `N_kj ≈ mean_j + Σ_c table_kc vectors_jc`.
 #[derive(Debug)]
 pub(super) struct NormalFactors {
     pub mean: Vec<f64>,
-    /// Row-major `bins x rank`, the normals' weights taken out.
+    /// Row-major `bins x rank`, divided by the weights of the bins.
     pub vectors: Vec<f64>,
     /// `U_N` on all ordered pairs of directions: `[o][i][c]`.
     pub table: Vec<f32>,
     pub rank: usize,
-    /// Part of the power of the projected N - mean that is kept.
+    /// Fraction of the power of the projected N - mean that is kept.
     pub kept: f64,
 }
 
-/// Facets whose projections are worked out together.
+/// Facets whose projections are computed together.
 const FACETS: usize = 256;
 
-/// The stream of random numbers that N uses; M's blocks have the ones below.
+/// First stream of random numbers for N; the blocks of M use streams below it.
 const STREAM: u64 = 1 << 40;
 
 impl<'a> BinnedFacets<'a> {
@@ -69,7 +70,7 @@ impl<'a> BinnedFacets<'a> {
         self.bin_of_facet.len()
     }
 
-    /// Adds up a quantity of the facets over the bins.
+    /// Sums a weighted quantity of the facets into the bins.
     fn binned(&self, weights: &[f32], of_facet: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut sums = vec![0.0; self.bins.len()];
         for (s, &bin) in self.bin_of_facet.iter().enumerate() {
@@ -78,20 +79,23 @@ impl<'a> BinnedFacets<'a> {
         sums
     }
 
-    /// Factors N for one set of facet weights (areas, or areas times a colour weight; Eq. 11).
+    /// Factors N for one set of facet weights, which are areas or areas times a colour weight (Eq. 11).
+    ///
+    /// # Errors
+    /// A factorization that does not converge, or values that are not finite.
     pub fn factor(&self, weights: &[f32], settings: &Wu2011Settings) -> Result<NormalFactors> {
         let (l, bins) = (settings.projection_rows, self.bins.len());
         let nodes = self.directions.len();
         let random = self.weighted_random(l, settings.seed);
         let projected = self.project(&random, l);
         let total: f64 = (0..nodes).map(|node| f64::from(self.directions.solid_angle(node))).sum();
-        // Mean over all pairs, by solid angle: (Σ_i Ω_i V_i)² of each facet.
+        // The mean over all pairs, weighted by solid angle: (Σ_i Ω_i V_i)² of each facet.
         let mean_visibility: Vec<f64> = (0..self.facets())
             .map(|s| {
-                let seen = |node: usize| {
+                let visible = |node: usize| {
                     f64::from(self.directions.solid_angle(node) * self.visibility[node * self.facets() + s])
                 };
-                ((0..nodes).map(seen).sum::<f64>() / total).powi(2)
+                ((0..nodes).map(visible).sum::<f64>() / total).powi(2)
             })
             .collect();
         let mean = self.binned(weights, |s| mean_visibility[s]);
@@ -99,7 +103,7 @@ impl<'a> BinnedFacets<'a> {
         let mut q = DMatrix::zeros(l, bins);
         let mut power_with_mean = 0.0;
         for k in 0..l {
-            // Rᵀ D_r 1: what the row of ones projects to.
+            // Rᵀ D_r 1, the projection of a row of ones.
             let ones: f64 = random[k * nodes * nodes..(k + 1) * nodes * nodes].iter().map(|&x| f64::from(x)).sum();
             let row = self.binned(weights, |s| f64::from(projected[s * l + k]));
             for j in 0..bins {
@@ -125,7 +129,7 @@ impl<'a> BinnedFacets<'a> {
                 .flat_map(|&bin| weighted(bin))
                 .map(|(j, c)| (d[j] * right.vectors[j * rank + c]) as f32)
                 .collect();
-            table = bvndf::pair_table(self.visibility, nodes, weights, &y, rank);
+            table = bvndf::node_pair_table(self.visibility, nodes, weights, &y, rank);
             for row in table.chunks_mut(rank) {
                 row.iter_mut().zip(&offset).for_each(|(u, o)| *u = (f64::from(*u) - o) as f32);
             }
@@ -134,8 +138,8 @@ impl<'a> BinnedFacets<'a> {
         Ok(NormalFactors { mean, vectors, table, rank, kept: right.kept })
     }
 
-    /// R with the rows' weights `√(Ω_i Ω_o)` (twice under the root for pairs that stand for two) on the triangle `i <= o` of
-    /// a square matrix for each of the `l` columns: `[k][o][i]`.
+    /// R times the rows' weights `√(Ω_i Ω_o)`, or `√(2 Ω_i Ω_o)` for pairs that represent two ordered pairs. Each of
+    /// the `l` columns is the triangle `i <= o` of a square matrix: `[k][o][i]`.
     fn weighted_random(&self, l: usize, seed: u64) -> Vec<f32> {
         let nodes = self.directions.len();
         let rows = rows_of(nodes);
@@ -159,14 +163,14 @@ impl<'a> BinnedFacets<'a> {
         projected.par_chunks_mut(FACETS * l).enumerate().for_each(|(block, out)| {
             let count = out.len() / l;
             let first = block * FACETS;
-            let seen: Vec<f32> = (0..nodes)
+            let visible: Vec<f32> = (0..nodes)
                 .flat_map(|node| self.visibility[node * facets + first..node * facets + first + count].iter().copied())
                 .collect();
-            let mut turned = vec![0.0_f32; nodes * count];
+            let mut product = vec![0.0_f32; nodes * count];
             for k in 0..l {
-                gemm::multiply(nodes, nodes, count, &random[k * nodes * nodes..], &seen, &mut turned);
+                gemm::multiply(nodes, nodes, count, &random[k * nodes * nodes..], &visible, &mut product);
                 let mut sums = vec![0.0_f32; count];
-                for (t, v) in turned.chunks(count).zip(seen.chunks(count)) {
+                for (t, v) in product.chunks(count).zip(visible.chunks(count)) {
                     for ((sum, t), v) in sums.iter_mut().zip(t).zip(v) {
                         *sum += t * v;
                     }

@@ -1,4 +1,4 @@
-//! Klems' full basis: nine rings of patches of about equal projected solid angle, 145 in all.
+//! Klems' full basis: nine rings of patches of about equal projected solid angle, 145 patches in all.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -7,11 +7,11 @@ use std::io;
 use glam::{DVec3, Vec3};
 
 use super::super::sampler::{in_parallel, reading_error};
-use super::super::{Job, Written};
+use super::super::{ExportTask, Written};
 use super::{Content, rgb, xyz};
 use crate::effective::Reflectance;
 
-/// Middle and upper bound of each ring in degrees, and its patches. The first patch of a ring is centred on azimuth 0.
+/// Middle and upper bound of each ring in degrees, and its number of patches. The first patch is centred on azimuth 0.
 const RINGS: [(u32, u32, usize); 9] = [
     (0, 5, 1),
     (10, 15, 8),
@@ -24,11 +24,12 @@ const RINGS: [(u32, u32, usize); 9] = [
     (80, 90, 12),
 ];
 const PATCHES: usize = 145;
-/// Directions along each side of a patch: of the incident light, and of what leaves.
+/// Directions along each side of a patch of incident light.
 const INCIDENT: usize = 3;
+/// Directions along each side of a patch of leaving light.
 const LEAVING: usize = 5;
 
-/// A patch: bounds in radians.
+/// Bounds of a patch in radians.
 #[derive(Debug, Clone, Copy)]
 struct KlemsPatch {
     theta: [f64; 2],
@@ -36,7 +37,7 @@ struct KlemsPatch {
 }
 
 impl KlemsPatch {
-    /// All of them, in the order of the format.
+    /// Returns all patches in the order of the format.
     fn all() -> Vec<Self> {
         let mut lower = 0;
         let mut patches = Vec::with_capacity(PATCHES);
@@ -49,7 +50,7 @@ impl KlemsPatch {
         patches
     }
 
-    /// `side²` directions of equal projected solid angle.
+    /// Returns `side²` directions that represent equal projected solid angles.
     fn directions(&self, side: usize) -> Vec<DVec3> {
         let [low, high] = self.theta.map(|theta| theta.sin().powi(2));
         let along = |range: [f64; 2], k: usize| range[0] + (range[1] - range[0]) * (k as f64 + 0.5) / side as f64;
@@ -62,14 +63,14 @@ impl KlemsPatch {
             .collect()
     }
 
-    /// The patch of a direction.
-    fn of(direction: DVec3) -> usize {
+    /// Returns the index of the patch that contains a direction.
+    fn index_of(direction: DVec3) -> usize {
         let theta = direction.x.hypot(direction.y).atan2(direction.z).to_degrees();
         let mut first = 0;
         for (_, upper, count) in RINGS {
             if theta <= f64::from(upper) {
-                let turn = direction.y.atan2(direction.x) / TAU * count as f64 + 0.5;
-                return first + turn.floor().rem_euclid(count as f64) as usize;
+                let patch = direction.y.atan2(direction.x) / TAU * count as f64 + 0.5;
+                return first + patch.floor().rem_euclid(count as f64) as usize;
             }
             first += count;
         }
@@ -77,21 +78,22 @@ impl KlemsPatch {
     }
 }
 
-/// Radiance numbers incident patches by where the light goes to, not by where it comes from.
+/// Returns the direction towards the light for an incident direction of the format. Radiance numbers incident patches
+/// by the direction that the light travels in.
 fn source_of(direction: DVec3) -> DVec3 {
     DVec3::new(-direction.x, -direction.y, direction.z)
 }
 
-pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
+pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
     let patches = KlemsPatch::all();
     let leaving: Vec<Vec3> =
         patches.iter().flat_map(|patch| patch.directions(LEAVING)).map(|direction| direction.as_vec3()).collect();
-    // Reciprocal, so that one incident direction sees all that leave at once.
-    let columns: Vec<Vec<DVec3>> = in_parallel(PATCHES, job.progress, |incident| {
+    // By reciprocity, one call evaluates all leaving directions for one incident direction.
+    let columns: Vec<Vec<DVec3>> = in_parallel(PATCHES, task.progress, |incident| {
         let mut sums = vec![DVec3::ZERO; PATCHES];
         for direction in patches[incident].directions(INCIDENT) {
             let mut values = vec![Vec3::ZERO; leaving.len()];
-            job.brdf.eval_lights(&leaving, source_of(direction).as_vec3(), &mut values);
+            task.brdf.eval_lights(&leaving, source_of(direction).as_vec3(), &mut values);
             for (sum, (values, leaving)) in
                 sums.iter_mut().zip(values.chunks(LEAVING * LEAVING).zip(leaving.chunks(LEAVING * LEAVING)))
             {
@@ -111,15 +113,15 @@ pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
         channels.iter_mut().for_each(|(_, text)| text.push('\n'));
     }
     let read = |i: Vec3, o: Vec3| {
-        let column = &columns[KlemsPatch::of(source_of(o.as_dvec3()))];
-        rgb(xyz(column[KlemsPatch::of(i.as_dvec3())].as_vec3())) * i.z
+        let column = &columns[KlemsPatch::index_of(source_of(o.as_dvec3()))];
+        rgb(xyz(column[KlemsPatch::index_of(i.as_dvec3())].as_vec3())) * i.z
     };
     let conventions = vec![
         "Klems full basis: 145 incident (columns) by 145 leaving (rows) patches, each the mean over its patch.".to_owned(),
         "Incident patches are numbered by the direction that the light travels in, as WINDOW does: phi turned by 180 degrees.".to_owned(),
         "Patches are 10 degrees wide: highlights narrower than that are spread over them; hemispherical totals stay.".to_owned(),
     ];
-    let reading = reading_error(job.brdf, read);
+    let reading = reading_error(task.brdf, read);
     let written = Written { pairs: PATCHES * PATCHES, reading, conventions, anisotropy_lost: None };
     let zeros = format!("{}\n", "0\t".repeat(PATCHES)).repeat(PATCHES);
     Ok((Content { definition: definition(), basis: BASIS, channels, black: zeros }, written))
@@ -148,12 +150,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn patches_hold_their_directions_and_fill_the_projected_hemisphere() {
+    fn patches_contain_their_directions_and_fill_the_projected_hemisphere() {
         let patches = KlemsPatch::all();
         assert_eq!(patches.len(), PATCHES);
         let mut total = 0.0;
         for (k, patch) in patches.iter().enumerate() {
-            assert!(patch.directions(4).into_iter().all(|direction| KlemsPatch::of(direction) == k), "{k}");
+            assert!(patch.directions(4).into_iter().all(|direction| KlemsPatch::index_of(direction) == k), "{k}");
             let [low, high] = patch.theta.map(|theta| theta.sin().powi(2));
             total += 0.5 * (high - low) * (patch.phi[1] - patch.phi[0]);
         }

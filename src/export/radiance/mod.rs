@@ -1,7 +1,7 @@
 //! Radiance's BSDF in XML (the format of LBNL's WINDOW): a Klems matrix or a tensor tree, in CIE X, Y and Z.
 //!
-//! Radiance's z points into the room, and WINDOW calls the side that faces it the back: light that arrives from our z and
-//! leaves there again is its "Reflection Back".
+//! In Radiance, z points into the room, and WINDOW calls this side the back. Reflection on the tile's +z side is
+//! therefore "Reflection Back".
 
 mod klems;
 mod tensor_tree;
@@ -10,32 +10,32 @@ use std::io::{self, Write};
 
 use glam::Vec3;
 
-use super::{Job, Written};
+use super::{ExportTask, Written};
 
-/// How directions are divided.
+/// Division of the hemisphere into directions.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum RadianceBasis {
-    /// Klems' 145 patches a hemisphere.
+    /// Klems' 145 patches per hemisphere.
     #[default]
     Klems,
-    /// Shirley and Chiu's equal-area squares, finer where values change.
+    /// Shirley and Chiu's equal-area squares, finer where values vary.
     TensorTree,
 }
 
-/// What the two kinds have apart.
+/// The parts of a file that depend on the basis.
 struct Content {
-    /// Of the definition of the data.
+    /// XML of the data definition.
     definition: String,
-    /// Names of the bases in a block of data.
+    /// XML that names the bases in a block of data.
     basis: &'static str,
-    /// The lit side: names and values of its three channels.
+    /// Names and values of the three channels of the reflecting side.
     channels: [(&'static str, String); 3],
-    /// The other side, which reflects nothing.
+    /// Values of the other side, which is black.
     black: String,
 }
 
-/// CIE X, Y, Z of linear RGB with Rec. 709 primaries, X and Z scaled so that a white surface stays neutral: Radiance's own
-/// white is that of equal energy.
+/// Converts linear RGB with Rec. 709 primaries to CIE X, Y, Z. X and Z are scaled so that a white surface stays
+/// neutral, because Radiance's white point is equal energy.
 fn xyz(rgb: Vec3) -> Vec3 {
     let rows = [
         Vec3::new(0.412_390_8, 0.357_584_3, 0.180_480_8),
@@ -45,22 +45,22 @@ fn xyz(rgb: Vec3) -> Vec3 {
     Vec3::from_array(rows.map(|row| row.dot(rgb) / row.element_sum()))
 }
 
-/// Back to RGB, for the reading error.
+/// Converts back to RGB, for the reading error.
 fn rgb(xyz: Vec3) -> Vec3 {
     let matrix = glam::Mat3::from_cols(self::xyz(Vec3::X), self::xyz(Vec3::Y), self::xyz(Vec3::Z));
     matrix.inverse() * xyz
 }
 
-pub fn write(job: &Job<'_>, out: &mut dyn Write) -> io::Result<Written> {
-    let (content, mut written) = match job.options.radiance {
-        RadianceBasis::Klems => klems::tabulate(job)?,
-        RadianceBasis::TensorTree => tensor_tree::tabulate(job)?,
+pub fn write(task: &ExportTask<'_>, out: &mut dyn Write) -> io::Result<Written> {
+    let (content, mut written) = match task.options.radiance {
+        RadianceBasis::Klems => klems::tabulate(task)?,
+        RadianceBasis::TensorTree => tensor_tree::tabulate(task)?,
     };
-    let [x, y] = job.meta.tile_size;
+    let [x, y] = task.meta.tile_size;
     writeln!(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>")?;
     writeln!(out, "<WindowElement xmlns=\"http://windows.lbl.gov\">")?;
     writeln!(out, "<WindowElementType>System</WindowElementType>\n<Optical>\n<Layer>")?;
-    writeln!(out, "<Material>\n<Name>{}</Name>", escaped(&job.meta.scene))?;
+    writeln!(out, "<Material>\n<Name>{}</Name>", escaped(&task.meta.scene))?;
     writeln!(out, "<Manufacturer>{}</Manufacturer>", super::meta::PROGRAM)?;
     writeln!(
         out,
@@ -97,7 +97,7 @@ fn block(out: &mut dyn Write, channel: &str, direction: &str, basis: &str, value
     writeln!(out, "</WavelengthDataBlock>\n</WavelengthData>")
 }
 
-/// Text that may stand between tags.
+/// Escapes text for XML content.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -1,5 +1,5 @@
-//! A tensor tree of rank 4 (Ward et al. 2012): incident and leaving directions on Shirley and Chiu's square, each cell of
-//! equal projected solid angle; branches whose values hardly differ end in one.
+//! A tensor tree of rank 4 (Ward et al. 2012): incident and leaving directions on Shirley and Chiu's square, in cells
+//! of equal projected solid angle. A branch with nearly equal values is stored as one value.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::fmt::Write as _;
@@ -8,19 +8,21 @@ use std::io;
 use glam::{DVec3, Vec3};
 
 use super::super::sampler::{in_parallel, reading_error};
-use super::super::{ExportResolution, Job, Written};
+use super::super::{ExportResolution, ExportTask, Written};
 use super::{Content, rgb, xyz};
 use crate::effective::{EffectiveBrdf, Reflectance};
 
-/// Cells along a side, where no resolution is asked for, and the fewest and most: powers of 2.
+/// Default number of cells along a side, a power of 2.
 const SIDE: usize = 32;
+/// Bounds of the number of cells along a side, powers of 2.
 const SIDES: [usize; 2] = [8, 64];
-/// A branch ends where its values differ from their mean by less than this part of the mean of all.
+/// Bounds the deviation of a branch's values from their mean if it is stored as one value, relative to the mean of all
+/// values.
 const TOLERANCE: f64 = 0.02;
-/// u' and v' of what has no colour.
+/// u' and v' of black.
 const EQUAL_ENERGY: [f32; 2] = [4.0 / 19.0, 9.0 / 19.0];
 
-/// The disk's point of a point of the unit square (Shirley and Chiu 1997).
+/// Maps a point of the unit square to the disk (Shirley and Chiu 1997).
 fn disk_of_square([x, y]: [f64; 2]) -> [f64; 2] {
     let (a, b) = (2.0 * x - 1.0, 2.0 * y - 1.0);
     let (radius, angle) = if a > -b {
@@ -35,7 +37,7 @@ fn disk_of_square([x, y]: [f64; 2]) -> [f64; 2] {
     [radius * angle.cos(), radius * angle.sin()]
 }
 
-/// The inverse of [`disk_of_square`].
+/// Inverts [`disk_of_square`].
 fn square_of_disk([x, y]: [f64; 2]) -> [f64; 2] {
     let radius = x.hypot(y);
     let mut angle = y.atan2(x);
@@ -59,40 +61,41 @@ fn direction(square: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, (1.0 - x * x - y * y).max(1e-6).sqrt())
 }
 
-/// Cells along a side for what was asked for: about as many directions.
+/// Returns the number of cells along a side for a requested resolution: about the same number of directions.
 fn side_of(resolution: Option<ExportResolution>) -> usize {
     let Some(resolution) = resolution else { return SIDE };
     let side = ((resolution.theta_i * resolution.phi_i) as f64).sqrt();
-    let [fewest, most] = SIDES;
-    (1_usize << side.log2().round().max(0.0) as u32).clamp(fewest, most)
+    let [min, max] = SIDES;
+    (1_usize << side.log2().round().max(0.0) as u32).clamp(min, max)
 }
 
-/// The cell of a direction, x slower.
+/// Returns the cell of a direction, y fastest.
 fn cell(side: usize, x: f64, y: f64) -> usize {
     let [x, y] = square_of_disk([x, y]).map(|at| ((at * side as f64) as usize).min(side - 1));
     x * side + y
 }
 
-/// The middle of part `part` (of `parts`²) of a cell, as a direction.
+/// Returns the direction at the middle of part `part` (of `parts²`) of a cell.
 fn part_of_cell(side: usize, cell: usize, part: usize, parts: usize) -> DVec3 {
     let at = |k: usize, part: usize| ((k * parts + part) as f64 + 0.5) / (side * parts) as f64;
     direction([at(cell / side, part / parts), at(cell % side, part % parts)])
 }
 
-/// Means over the cells that light of one incident cell leaves into, CIE X, Y and Z. Totals are as good as these are means:
-/// near the horizon a cell is 10° high.
+/// Returns the mean BRDF from one incident cell to each leaving cell, as CIE X, Y and Z. The values are means over
+/// parts of the cells, because a cell near the horizon is 10° high and the totals must be accurate.
 fn one_incident(brdf: &EffectiveBrdf, side: usize, incident: usize) -> Vec<Vec3> {
-    // Each part of the incident cell with another part of each leaving one: all are met, at a quarter of the pairs.
+    // Each part of the incident cell is paired with one part of each leaving cell: all parts occur, in a quarter of the
+    // pairs.
     let parts = if side > SIDE { 1 } else { 2 };
     let mut sums = vec![Vec3::ZERO; side * side];
     let mut values = sums.clone();
     for part in 0..parts * parts {
-        // Incident directions are those that the light travels in.
-        let travels = part_of_cell(side, incident, part, parts).as_vec3();
-        let source = Vec3::new(-travels.x, -travels.y, travels.z);
-        let turned = |cell: usize| (part + 2 * (cell / side) + cell % side + 3 * incident) % (parts * parts);
+        // The format's incident directions are those that the light travels in.
+        let travel = part_of_cell(side, incident, part, parts).as_vec3();
+        let source = Vec3::new(-travel.x, -travel.y, travel.z);
+        let paired_part = |cell: usize| (part + 2 * (cell / side) + cell % side + 3 * incident) % (parts * parts);
         let leaving: Vec<Vec3> =
-            (0..side * side).map(|cell| part_of_cell(side, cell, turned(cell), parts).as_vec3()).collect();
+            (0..side * side).map(|cell| part_of_cell(side, cell, paired_part(cell), parts).as_vec3()).collect();
         brdf.eval_lights(&leaving, source, &mut values);
         for ((sum, value), o) in sums.iter_mut().zip(&values).zip(&leaving) {
             *sum += *value / o.z;
@@ -101,19 +104,19 @@ fn one_incident(brdf: &EffectiveBrdf, side: usize, incident: usize) -> Vec<Vec3>
     sums.into_iter().map(|sum| xyz(sum / (parts * parts) as f32).max(Vec3::ZERO)).collect()
 }
 
-/// Values of a channel, `[incident x][incident y][leaving x][leaving y]`.
-struct Grid {
+/// The values of a channel, `[incident x][incident y][leaving x][leaving y]`.
+struct TensorTree {
     side: usize,
     values: Vec<f32>,
     tolerance: f64,
 }
 
-impl Grid {
+impl TensorTree {
     fn at(&self, index: [usize; 4]) -> f32 {
         self.values[index.iter().fold(0, |at, k| at * self.side + k)]
     }
 
-    /// Writes the branch at `corner` of `side` cells a dimension, and returns its mean where it is flat.
+    /// Writes the branch at `corner` with `side` cells per dimension; its mean alone if its values are nearly equal.
     fn branch(&self, corner: [usize; 4], side: usize, out: &mut String) {
         let (mean, spread) = self.mean_and_spread(corner, side);
         if side == 1 || spread <= self.tolerance {
@@ -123,13 +126,13 @@ impl Grid {
         out.push('{');
         let half = side / 2;
         if half == 1 {
-            // The finest level stands as a list, first dimension slowest.
+            // The finest level is a list with the first dimension slowest.
             for k in 0..16_usize {
                 let step = [k >> 3 & 1, k >> 2 & 1, k >> 1 & 1, k & 1];
                 let _ = write!(out, " {:.4e}", self.at(std::array::from_fn(|d| corner[d] + step[d])));
             }
         } else {
-            // Branches run with the first dimension fastest.
+            // Branches are in the order with the first dimension fastest.
             for k in 0..16_usize {
                 self.branch(std::array::from_fn(|d| corner[d] + half * (k >> d & 1)), half, out);
             }
@@ -157,11 +160,11 @@ impl Grid {
     }
 }
 
-pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
-    let side = side_of(job.options.resolution);
-    let brdf = job.brdf;
-    let rows: Vec<Vec<Vec3>> = in_parallel(side * side, job.progress, |incident| one_incident(brdf, side, incident))?;
-    // Chromaticity in place of X and Z: that is what Radiance reads from trees.
+pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
+    let side = side_of(task.options.resolution);
+    let brdf = task.brdf;
+    let rows: Vec<Vec<Vec3>> = in_parallel(side * side, task.progress, |incident| one_incident(brdf, side, incident))?;
+    // Radiance reads chromaticity instead of X and Z from tensor trees.
     let chromaticity = |value: &Vec3| {
         let sum = value.x + 15.0 * value.y + 3.0 * value.z;
         if sum > 0.0 { [4.0 * value.x / sum, 9.0 * value.y / sum] } else { EQUAL_ENERGY }
@@ -170,7 +173,7 @@ pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
         let values: Vec<f32> = rows.iter().flatten().map(of).collect();
         let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
         let mut text = String::new();
-        Grid { side, values, tolerance: TOLERANCE * mean }.branch([0; 4], side, &mut text);
+        TensorTree { side, values, tolerance: TOLERANCE * mean }.branch([0; 4], side, &mut text);
         text.push('\n');
         text
     };
@@ -190,7 +193,7 @@ pub fn tabulate(job: &Job<'_>) -> io::Result<(Content, Written)> {
         "Incident directions are those that the light travels in (its x and y), as Radiance has them.".to_owned(),
         format!("Branches whose values differ from their mean by less than {TOLERANCE} of the mean of all end in one."),
     ];
-    let reading = reading_error(job.brdf, read);
+    let reading = reading_error(task.brdf, read);
     let written = Written { pairs: side.pow(4), reading, conventions, anisotropy_lost: None };
     let definition = "<IncidentDataStructure>TensorTree4</IncidentDataStructure>\n".to_owned();
     Ok((Content { definition, basis: BASIS, channels, black: "{0}\n".to_owned() }, written))
@@ -203,7 +206,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_square_becomes_the_disk_and_comes_back() {
+    fn the_map_from_square_to_disk_is_inverted() {
         for k in 0..400 {
             let square = [f64::from(k % 20) / 20.0 + 0.013, f64::from(k / 20) / 20.0 + 0.021];
             let disk = disk_of_square(square);
@@ -214,11 +217,11 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_powers_of_two_near_what_is_asked_for_and_hold_their_parts() {
-        let asked = |theta: usize, phi: usize| {
+    fn sides_are_powers_of_two_near_the_requested_ones_and_cells_contain_their_parts() {
+        let side = |theta: usize, phi: usize| {
             side_of(Some(ExportResolution { theta_i: theta, phi_i: phi, theta_o: 1, phi_o: 1 }))
         };
-        assert_eq!([side_of(None), asked(16, 64), asked(64, 64), asked(1, 1), asked(500, 500)], [32, 32, 64, 8, 64]);
+        assert_eq!([side_of(None), side(16, 64), side(64, 64), side(1, 1), side(500, 500)], [32, 32, 64, 8, 64]);
         for k in 0..8 * 8 {
             assert!((0..4).all(|part| {
                 let d = part_of_cell(8, k, part, 2);
@@ -228,18 +231,18 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_tree_is_one_number_and_one_odd_cell_opens_its_branch_alone() {
+    fn a_constant_tree_is_one_number_and_a_different_cell_splits_only_its_branch() {
         let mut values = vec![1.0; SIDE.pow(4)];
         let text = |values: &Vec<f32>| {
             let mut text = String::new();
-            Grid { side: SIDE, values: values.clone(), tolerance: 0.01 }.branch([0; 4], SIDE, &mut text);
+            TensorTree { side: SIDE, values: values.clone(), tolerance: 0.01 }.branch([0; 4], SIDE, &mut text);
             text
         };
         assert_eq!(text(&values), "{1.0000e0}");
         values[0] = 2.0;
-        let opened = text(&values);
-        assert_eq!(opened.matches('{').count(), opened.matches('}').count());
-        // Four levels of sixteen, of which one opens, and sixteen numbers at the end.
-        assert_eq!(opened.matches("e0").count(), 15 * 4 + 16);
+        let split = text(&values);
+        assert_eq!(split.matches('{').count(), split.matches('}').count());
+        // Four levels of sixteen branches, one of which is split, and sixteen numbers at the finest level.
+        assert_eq!(split.matches("e0").count(), 15 * 4 + 16);
     }
 }

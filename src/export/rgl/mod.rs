@@ -1,8 +1,9 @@
-//! RGL tensor files (Dupuy and Jakob 2018), anisotropic, or of three angles where the plan knows that turning the tile changes
-//! nothing: `.bsdf`, read by Mitsuba 3's `measured`, pbrt-v4 and brdf-loader.
+//! RGL tensor files (Dupuy and Jakob 2018): `.bsdf`, read by Mitsuba 3's `measured`, pbrt-v4 and brdf-loader. A file is
+//! anisotropic, or covers three angles if the scene's plan finds the tile isotropic.
 //!
-//! `i` of the format, the side with the slices, is our viewer; its value is the BRDF times the cosine of the other side,
-//! which is exactly `f̄`. Samples lie on half vectors, where lobes stand still, crowded by a warp where normals are.
+//! The format's `i`, the direction with the slices, is the view direction here. The format's value is the BRDF times
+//! the cosine of the other direction, which is exactly `f̄`. Samples lie on half vectors, because lobes depend little
+//! on the other angles there. A warp makes the samples dense where normals are frequent.
 
 mod slices;
 
@@ -12,19 +13,19 @@ use glam::{DVec3, Vec3};
 
 use super::ReadingError;
 use super::sampler::{in_parallel, reading_error};
-use super::{ExportResolution, Job, Written};
+use super::{ExportResolution, ExportTask, Written};
 use crate::brdf::rgl::table::RglTable;
 use crate::brdf::rgl::tensor_file::TensorWriter;
 use crate::brdf::rgl::warp::Warp;
 use crate::brdf::spectrum::{WRITTEN_NM, spectra_of_primaries};
 use slices::{Sizes, Slice, one_slice, planes};
 
-/// Elevations and azimuths of the viewer, samples along both axes of a warp: 3, 20 and 105 MB.
+/// Polar angles and azimuths of the viewer, then samples along both axes of a warp: files of 3, 20 and 105 MB.
 const RESOLUTIONS: [[usize; 4]; 3] = [[9, 24, 24, 24], [13, 48, 36, 36], [19, 72, 56, 56]];
-/// The first of them that reads with this mean error is taken: below 1 % at other pairs, too.
-const GOOD_ENOUGH: f64 = 0.008;
+/// Bounds the mean reading error; the first resolution within it is used.
+const MAX_MEAN_ERROR: f64 = 0.008;
 
-/// A table in memory as a reader has it, and its slices as they are stored.
+/// A table as a program reads it, and its slices as stored.
 struct Tabulated {
     sizes: Sizes,
     table: RglTable,
@@ -33,9 +34,9 @@ struct Tabulated {
 }
 
 impl Tabulated {
-    fn new(job: &Job<'_>, resolution: &ExportResolution) -> io::Result<Self> {
-        let Job { brdf, progress, .. } = *job;
-        let sizes = Sizes::new(resolution, job.meta.isotropic);
+    fn new(task: &ExportTask<'_>, resolution: &ExportResolution) -> io::Result<Self> {
+        let ExportTask { brdf, progress, .. } = *task;
+        let sizes = Sizes::new(resolution, task.meta.isotropic);
         let planes = planes(brdf, &sizes);
         let count = sizes.phis * sizes.thetas;
         let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice))?;
@@ -47,21 +48,21 @@ impl Tabulated {
         Ok(Self { sizes, table, slices, reading })
     }
 
-    /// Of the size asked for, else the smallest of a few that reads well.
-    fn chosen(job: &Job<'_>, resolutions: &[[usize; 4]]) -> io::Result<Self> {
-        if let Some(resolution) = &job.options.resolution {
-            return Self::new(job, resolution);
+    /// Tabulates at the requested resolution, or at the first of `resolutions` whose error is small enough.
+    fn with_resolution(task: &ExportTask<'_>, resolutions: &[[usize; 4]]) -> io::Result<Self> {
+        if let Some(resolution) = &task.options.resolution {
+            return Self::new(task, resolution);
         }
         let cost = |sizes: &[usize; 4]| sizes.iter().product::<usize>() as f32;
         let all: f32 = resolutions.iter().map(cost).sum();
-        let (mut before, mut last) = (0.0, None);
+        let (mut done, mut last) = (0.0, None);
         for sizes in resolutions {
             let [theta_i, phi_i, theta_o, phi_o] = *sizes;
-            let progress = |part: f32| (job.progress)((before + part * cost(sizes)) / all);
-            let step = Job { progress: &progress, ..*job };
+            let progress = |part: f32| (task.progress)((done + part * cost(sizes)) / all);
+            let step = ExportTask { progress: &progress, ..*task };
             let tabulated = Self::new(&step, &ExportResolution { theta_i, phi_i, theta_o, phi_o })?;
-            before += cost(sizes);
-            if tabulated.reading.mean <= GOOD_ENOUGH {
+            done += cost(sizes);
+            if tabulated.reading.mean <= MAX_MEAN_ERROR {
                 return Ok(tabulated);
             }
             last = Some(tabulated);
@@ -74,25 +75,25 @@ fn widened(slices: &[Slice], of: impl Fn(&Slice) -> &Vec<f32>) -> Vec<f64> {
     slices.iter().flat_map(|slice| of(slice).iter().map(|&value| f64::from(value))).collect()
 }
 
-/// What a file holds; one may not hold both.
+/// Colour representation of a file; a file may not contain both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colors {
     Rgb,
-    /// For spectral renderers: smooth spectra that look like the RGB values in daylight.
+    /// Smooth spectra that match the RGB values in daylight, for spectral renderers.
     Spectra,
 }
 
-/// Writes a file.
-pub fn write(job: &Job<'_>, out: &mut dyn Write, colors: Colors) -> io::Result<Written> {
-    // Spectra take five times the room: the largest size is left to those who ask for it.
+/// Writes a file and returns its conventions and error.
+pub fn write(task: &ExportTask<'_>, out: &mut dyn Write, colors: Colors) -> io::Result<Written> {
+    // Spectra take five times the space, so the largest size is used only on request.
     let sizes = if colors == Colors::Rgb { &RESOLUTIONS[..] } else { &RESOLUTIONS[..2] };
-    let Tabulated { sizes, table, slices, reading } = Tabulated::chosen(job, sizes)?;
+    let Tabulated { sizes, table, slices, reading } = Tabulated::with_resolution(task, sizes)?;
     let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<f32>>();
     let Sizes { thetas, phis, samples, vndf, ndf } = sizes;
     let joined = |of: fn(&Slice) -> &Vec<f32>| slices.iter().flat_map(of).copied().collect::<Vec<f32>>();
     let per_slice = [phis, thetas, samples.height, samples.width];
     let mut file = TensorWriter::default();
-    file.bytes("description", job.summary().as_bytes());
+    file.bytes("description", task.summary().as_bytes());
     file.floats("phi_i", &[phis], &narrow(&table.phi_i));
     file.floats("theta_i", &[thetas], &narrow(&table.theta_i));
     file.floats("sigma", &[ndf.height, ndf.width], &narrow(&table.sigma.1));
@@ -114,12 +115,12 @@ pub fn write(job: &Job<'_>, out: &mut dyn Write, colors: Colors) -> io::Result<W
     Ok(Written {
         pairs: thetas * phis * samples.len(),
         reading,
-        conventions: conventions(colors, job.meta.isotropic),
+        conventions: conventions(colors, task.meta.isotropic),
         anisotropy_lost: None,
     })
 }
 
-/// `[slice][wavelength][place]` of slices of RGB planes.
+/// Converts the RGB planes of slices to `[slice][wavelength][sample]`.
 fn spectra(slices: &[Slice], plane: usize) -> Vec<f32> {
     let primaries = spectra_of_primaries();
     let mut values = Vec::with_capacity(slices.len() * primaries.len() * plane);

@@ -10,26 +10,26 @@ use crate::brdf::rgl::tensor_file::TensorFile;
 use crate::brdf::{LobeAngles, Measured};
 use crate::math::directions::{from_angles, half_vector};
 
-/// What Mitsuba and the others do with a file, as `src/brdf/rgl` has it.
+/// Reads a file as Mitsuba does; `src/brdf/rgl` implements this reader.
 #[test]
 fn a_bsdf_reads_back_as_the_function_and_has_a_note_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bsdf");
     let brdf = corrugated();
     let size = ExportResolution { theta_i: 9, phi_i: 24, theta_o: 24, phi_o: 24 };
-    let report = write(&brdf, &meta(), &sized(size), &path, &silent).unwrap();
+    let report = write(&brdf, &meta(), &sized(size), &path, &never_cancel).unwrap();
     let file = TensorFile::read(&path).unwrap();
     assert!(file.has("luminance") && file.has("description") && !file.has("spectra"));
     let table = RglTable::from_fields(&file).unwrap();
     assert_eq!((table.phi_i.len(), table.theta_i.len(), table.jacobian), (25, 9, true));
     let reading = sampler::reading_error(&brdf, |i, o| table.eval(o.as_dvec3(), i.as_dvec3()).as_vec3());
-    // Rounding to f32 is all that lies between the file and what was said of it.
+    // The reported error differs from the file's error only by the rounding to f32.
     assert!((reading.mean - report.reading.mean).abs() < 1e-4, "{reading:?} {:?}", report.reading);
     assert!(reading.mean < 0.06, "{reading:?}");
     let note = std::fs::read_to_string(report.note.unwrap()).unwrap();
     assert!(note.contains("Scene: a \"quoted\" näme and a line") && note.contains("half vector"), "{note}");
-    let image = crate::brdf::rgl::load(&path).unwrap_err().to_string();
-    assert!(image.contains("24 azimuths") || image.contains("25 azimuths"), "{image}");
+    let error = crate::brdf::rgl::load(&path).unwrap_err().to_string();
+    assert!(error.contains("24 azimuths") || error.contains("25 azimuths"), "{error}");
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn a_flat_tile_comes_back_as_a_small_scale_brdf_through_every_format_that_loads(
     for name in ["a.bsdf", "a.binary", "a.bin", "a.npz"] {
         let path = folder.path().join(name);
         let size = ExportResolution { theta_i: 9, phi_i: 24, theta_o: 24, phi_o: 24 };
-        let report = write(&flat(), &meta(), &sized(size), &path, &silent).unwrap();
+        let report = write(&flat(), &meta(), &sized(size), &path, &never_cancel).unwrap();
         assert!(report.anisotropy_lost.unwrap_or(0.0) < 1e-4);
         let table = match path.extension().and_then(|ending| ending.to_str()) {
             Some("bsdf") => crate::brdf::rgl::load(&path),
@@ -57,20 +57,20 @@ fn a_flat_tile_comes_back_as_a_small_scale_brdf_through_every_format_that_loads(
 }
 
 #[test]
-fn what_does_not_turn_with_the_tile_is_tabulated_over_three_angles() {
+fn an_isotropic_tile_is_tabulated_over_three_angles() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bsdf");
     let tile = Scene::of(Geometry::Flat(Flat::default())).tile;
     let glossy = Term::CookTorrance { roughness: 0.3, f0: Vec3::new(0.9, 0.6, 0.3) };
     let brdf = brdf_of(&geometry::build(&tile, Path::new("")).unwrap(), glossy);
     let size = ExportResolution { theta_i: 13, phi_i: 48, theta_o: 36, phi_o: 36 };
-    let three = write(&brdf, &ExportMeta { isotropic: true, ..meta() }, &sized(size), &path, &silent).unwrap();
+    let three = write(&brdf, &ExportMeta { isotropic: true, ..meta() }, &sized(size), &path, &never_cancel).unwrap();
     let table = RglTable::from_fields(&TensorFile::read(&path).unwrap()).unwrap();
     assert!(table.is_isotropic() && table.phi_i == [0.0]);
     assert!(three.reading.mean < 0.02, "{:?}", three.reading);
     assert!(std::fs::read_to_string(three.note.unwrap()).unwrap().contains("isotropic"));
     assert!(crate::brdf::rgl::load(&path).is_ok());
-    let four = write(&brdf, &meta(), &sized(size), &path, &silent).unwrap();
+    let four = write(&brdf, &meta(), &sized(size), &path, &never_cancel).unwrap();
     assert_eq!(three.pairs * 49, four.pairs);
     assert!(three.reading.mean < 1.5 * four.reading.mean + 1e-3, "{:?} {:?}", three.reading, four.reading);
 }
@@ -89,7 +89,7 @@ fn utia_and_astm_hold_the_brdf_in_their_orders() {
     let folder = tempfile::tempdir().unwrap();
     let brdf = corrugated();
     let path = folder.path().join("a.bin");
-    write(&brdf, &meta(), &ExportOptions::default(), &path, &silent).unwrap();
+    write(&brdf, &meta(), &ExportOptions::default(), &path, &never_cancel).unwrap();
     let numbers: Vec<f64> =
         std::fs::read(&path).unwrap().as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
     assert_eq!(numbers.len(), 3 * 6 * 48 * 6 * 48);
@@ -102,7 +102,7 @@ fn utia_and_astm_hold_the_brdf_in_their_orders() {
         assert!((numbers[at] as f32 / value[channel] - 1.0).abs() < 1e-3, "{} {value}", numbers[at]);
     }
     let path = folder.path().join("a.astm");
-    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
+    write(&brdf, &meta(), &small(), &path, &never_cancel).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(text.contains("NUM_POINTS 960\nVARS theta_i,phi_i,theta_s,phi_s,R,G,B\n"));
     let rows = text.lines().skip_while(|line| !line.starts_with("VARS")).skip(1);
@@ -113,15 +113,15 @@ fn utia_and_astm_hold_the_brdf_in_their_orders() {
 }
 
 #[test]
-fn radiance_files_hold_every_value_and_balance_their_tags() {
+fn radiance_files_contain_every_value_and_balance_their_tags() {
     let folder = tempfile::tempdir().unwrap();
     for basis in [RadianceBasis::Klems, RadianceBasis::TensorTree] {
         let path = folder.path().join("a.xml");
         let options = ExportOptions { radiance: basis, ..ExportOptions::default() };
-        write(&flat(), &meta(), &options, &path, &silent).unwrap();
+        write(&flat(), &meta(), &options, &path, &never_cancel).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         let (opened, closed) = (text.matches('<').count(), text.matches("</").count());
-        assert_eq!(opened, 2 * closed + 1, "all but the declaration come in pairs");
+        assert_eq!(opened, 2 * closed + 1, "all tags except the declaration come in pairs");
         let data: Vec<&str> =
             text.split("<ScatteringData>").skip(1).filter_map(|rest| rest.split("</ScatteringData>").next()).collect();
         assert_eq!(data.len(), 4);

@@ -1,4 +1,4 @@
-//! `.npz`, `.csv` and `.exr`: everything on one grid, and reading between its nodes.
+//! Tests of `.npz`, `.csv` and `.exr`, and of interpolation between the nodes of the grid.
 
 use std::collections::HashMap;
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::*;
 use crate::math::directions::from_angles;
 
-/// `.npy` members of an `.npz` by name: (header, data), found through the directory, CRCs checked.
+/// Returns the `.npy` members of an `.npz` by name as (header, data), found through the directory.
 fn read_npz(bytes: &[u8]) -> HashMap<String, (String, Vec<u8>)> {
     let half = |at: usize| usize::from(u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap()));
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
@@ -36,11 +36,11 @@ fn floats(data: &[u8]) -> Vec<f32> {
 }
 
 #[test]
-fn an_npz_holds_what_eval_says_at_every_pair() {
+fn an_npz_contains_the_value_of_eval_at_every_pair() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.npz");
     let brdf = corrugated();
-    let report = write(&brdf, &meta(), &small(), &path, &silent).unwrap();
+    let report = write(&brdf, &meta(), &small(), &path, &never_cancel).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     assert_eq!((report.pairs, report.bytes), (4 * 6 * 5 * 8, bytes.len() as u64));
     let members = read_npz(&bytes);
@@ -69,11 +69,11 @@ fn an_npz_holds_what_eval_says_at_every_pair() {
 }
 
 #[test]
-fn a_csv_has_a_header_and_a_row_a_pair() {
+fn a_csv_has_a_header_and_a_row_per_pair() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.CSV");
     let brdf = corrugated();
-    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
+    write(&brdf, &meta(), &small(), &path, &never_cancel).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines().skip_while(|line| line.starts_with('#'));
     assert_eq!(lines.next(), Some("theta_i,phi_i,theta_o,phi_o,r,g,b,g_r,g_g,g_b"));
@@ -87,7 +87,7 @@ fn a_csv_has_a_header_and_a_row_a_pair() {
     assert_eq!((rows, lines.next()), (4 * 6 * 5 * 8, None));
     assert!(text.contains("# scene: a \"quoted\" näme and a line\n"), "{text:.2000}");
     let mut streamed = Vec::new();
-    write_csv(&brdf, &meta(), &small(), &mut streamed, &silent).unwrap();
+    write_csv(&brdf, &meta(), &small(), &mut streamed, &never_cancel).unwrap();
     assert_eq!(streamed, text.as_bytes());
 }
 
@@ -96,7 +96,7 @@ fn an_exr_is_an_atlas_of_both_quantities() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let brdf = corrugated();
-    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
+    write(&brdf, &meta(), &small(), &path, &never_cancel).unwrap();
     let image = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
     let names: Vec<String> =
         image.layer_data.iter().map(|layer| layer.attributes.layer_name.as_ref().unwrap().to_string()).collect();
@@ -119,10 +119,10 @@ fn an_exr_is_an_atlas_of_both_quantities() {
 }
 
 #[test]
-fn a_flat_lambertian_tile_is_albedo_over_pi_and_resamples_without_error() {
+fn a_flat_lambertian_tile_is_albedo_over_pi_and_interpolates_without_error() {
     let grid = SMALL.grid();
     let brdf = flat();
-    let table = Table::new(&brdf, grid, &silent).unwrap();
+    let table = ExportTable::new(&brdf, grid, &never_cancel).unwrap();
     let value = Vec3::new(1.0, 0.5, 0.25) * 0.8 * FRAC_1_PI;
     for (k, (brdf, g)) in table.brdf.iter().zip(&table.g).enumerate() {
         assert!(close(*brdf, value));
@@ -133,8 +133,8 @@ fn a_flat_lambertian_tile_is_albedo_over_pi_and_resamples_without_error() {
 }
 
 #[test]
-fn bilinear_reading_hits_the_nodes_and_is_continuous_across_pole_and_seam() {
-    let table = Table::new(&corrugated(), SMALL.grid(), &silent).unwrap();
+fn bilinear_interpolation_reproduces_the_nodes_and_is_continuous_across_pole_and_seam() {
+    let table = ExportTable::new(&corrugated(), SMALL.grid(), &never_cancel).unwrap();
     let (lights, views) = (table.grid.light.directions(), table.grid.view.directions());
     for (k, value) in table.brdf.iter().enumerate() {
         let (i, o) = (lights[k / 40], views[k % 40]);
@@ -149,11 +149,11 @@ fn bilinear_reading_hits_the_nodes_and_is_continuous_across_pole_and_seam() {
 }
 
 #[test]
-fn a_finer_grid_resamples_better_and_the_report_says_so() {
+fn a_finer_grid_reports_a_smaller_error() {
     let brdf = corrugated();
     let error = |rings| {
         let resolution = ExportResolution { theta_i: rings, phi_i: 2 * rings, theta_o: rings, phi_o: 2 * rings };
-        Table::new(&brdf, resolution.grid(), &silent).unwrap().resampling(&brdf).errors.rel_l2
+        ExportTable::new(&brdf, resolution.grid(), &never_cancel).unwrap().resampling(&brdf).errors.rel_l2
     };
     // Shadow edges are kinks, so halving the step halves the error; a smooth function would quarter it.
     let (coarse, fine) = (error(6), error(12));
@@ -165,7 +165,7 @@ fn numpy_loads_an_npz() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.npz");
     let brdf = corrugated();
-    write(&brdf, &meta(), &small(), &path, &silent).unwrap();
+    write(&brdf, &meta(), &small(), &path, &never_cancel).unwrap();
     let script = "import sys, json\n\
         try: import numpy\n\
         except ImportError: sys.exit(77)\n\
@@ -177,15 +177,15 @@ fn numpy_loads_an_npz() {
         assert numpy.allclose(g, z['g'], rtol=1e-4, atol=1e-7)\n\
         print(*z['brdf'][3, 1, 2, 5])\n";
     let Ok(run) = std::process::Command::new("python3").args(["-c", script]).arg(&path).output() else {
-        return eprintln!("SKIPPED: no python3 to load the .npz with");
+        return eprintln!("SKIPPED: python3, which loads the .npz, is missing");
     };
     if run.status.code() == Some(77) {
-        return eprintln!("SKIPPED: no numpy to load the .npz with");
+        return eprintln!("SKIPPED: numpy, which loads the .npz, is missing");
     }
-    let said = String::from_utf8(run.stdout).unwrap();
-    let complaint = String::from_utf8_lossy(&run.stderr);
-    assert!(run.status.success(), "{complaint}");
-    let loaded: Vec<f32> = said.split_whitespace().map(|number| number.parse().unwrap()).collect();
+    let stdout = String::from_utf8(run.stdout).unwrap();
+    let stderr = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{stderr}");
+    let loaded: Vec<f32> = stdout.split_whitespace().map(|number| number.parse().unwrap()).collect();
     let (_, value, _) = expected(&brdf, &SMALL)[((3 * 6 + 1) * 5 + 2) * 8 + 5];
-    assert!(close(Vec3::from_slice(&loaded), value), "{said} {value}");
+    assert!(close(Vec3::from_slice(&loaded), value), "{stdout} {value}");
 }

@@ -1,4 +1,4 @@
-//! Files read back against the function they were written from: what all formats share here, each kind in its file.
+//! Tests that compare written files with the effective BRDF. This module holds what all formats share.
 
 mod formats;
 mod grids;
@@ -10,8 +10,8 @@ use std::sync::Arc;
 use glam::{UVec2, Vec2, Vec3};
 
 use super::*;
-use crate::brdf::{Brdf, Term};
-use crate::effective::{Direct, FacetSum, Material, Representation};
+use crate::brdf::{Brdf, Material, Term};
+use crate::effective::{Direct, FacetSum, Representation};
 use crate::geometry;
 use crate::geometry::families::heightfield;
 use crate::geometry::{Facets, TileMesh};
@@ -29,7 +29,7 @@ fn small() -> ExportOptions {
     sized(SMALL)
 }
 
-fn silent(_: f32) -> bool {
+fn never_cancel(_: f32) -> bool {
     true
 }
 
@@ -42,11 +42,11 @@ fn brdf_of(mesh: &TileMesh, term: Term) -> EffectiveBrdf {
     };
     let materials = [Material { brdf: Brdf { terms: vec![term] }, color: Vec3::new(1.0, 0.5, 0.25) }];
     let sum = FacetSum::new(&facets, &[0], &materials);
-    let form = Representation::Direct(Direct::new(Arc::new(sum), Arc::new(visibility)));
-    EffectiveBrdf { form, base_area: f64::from(mesh.base_area()) }
+    let representation = Representation::Direct(Direct::new(Arc::new(sum), Arc::new(visibility)));
+    EffectiveBrdf { representation, base_area: f64::from(mesh.base_area()) }
 }
 
-/// A corrugated tile: anisotropic, so that mixed-up axes show.
+/// A corrugated tile. It is anisotropic, so that exchanged axes fail a test.
 fn corrugated() -> EffectiveBrdf {
     let wave =
         |at: Vec2| 0.15 * (std::f32::consts::TAU * at.x).sin() + 0.05 * (std::f32::consts::TAU * (at.x + at.y)).cos();
@@ -54,7 +54,7 @@ fn corrugated() -> EffectiveBrdf {
     brdf_of(&mesh, Term::CookTorrance { roughness: 0.5, f0: Vec3::new(0.9, 0.6, 0.3) })
 }
 
-/// A flat Lambertian tile, albedo 0.8: `f̄ / cos θ_i` is albedo times colour over π everywhere.
+/// A flat Lambertian tile with albedo 0.8: `f̄ / cos θ_i` is albedo times colour over π everywhere.
 fn flat() -> EffectiveBrdf {
     let tile = Scene::of(Geometry::Flat(Flat::default())).tile;
     brdf_of(&geometry::build(&tile, Path::new("")).unwrap(), Term::Lambertian { albedo: Vec3::splat(0.8) })
@@ -73,7 +73,7 @@ fn meta() -> ExportMeta {
     }
 }
 
-/// Every pair of the small grid with `(f̄/cos θ_i, G)` straight from the function, viewer fastest.
+/// Returns every pair of the grid with `(f̄/cos θ_i, G)` of the function itself, viewer fastest.
 fn expected(brdf: &EffectiveBrdf, resolution: &ExportResolution) -> Vec<([f32; 4], Vec3, Vec3)> {
     let theta = |a: usize, n: usize| (a as f32 + 0.5) * FRAC_PI_2 / n as f32;
     let phi = |b: usize, n: usize| 2.0 * PI * b as f32 / n as f32;
@@ -102,13 +102,13 @@ fn close(a: Vec3, b: Vec3) -> bool {
 }
 
 #[test]
-fn files_are_the_same_bytes_again_with_any_number_of_threads() {
+fn files_have_the_same_bytes_with_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["a.npz", "a.csv", "a.exr"] {
         let path = folder.path().join(name);
         let bytes = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| write(&corrugated(), &meta(), &small(), &path, &silent)).unwrap();
+            pool.install(|| write(&corrugated(), &meta(), &small(), &path, &never_cancel)).unwrap();
             std::fs::read(&path).unwrap()
         };
         assert!(bytes(1) == bytes(3), "{name}");
@@ -116,19 +116,19 @@ fn files_are_the_same_bytes_again_with_any_number_of_threads() {
 }
 
 #[test]
-fn progress_goes_from_nothing_to_all() {
-    let told = std::cell::RefCell::new(Vec::new());
-    let tell = |part| {
-        told.borrow_mut().push(part);
+fn progress_runs_from_0_to_1() {
+    let reports = std::cell::RefCell::new(Vec::new());
+    let record = |done| {
+        reports.borrow_mut().push(done);
         true
     };
-    Table::new(&flat(), SMALL.grid(), &tell).unwrap();
-    let told = told.into_inner();
-    assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted());
+    ExportTable::new(&flat(), SMALL.grid(), &record).unwrap();
+    let reports = reports.into_inner();
+    assert!(reports.first() == Some(&0.0) && reports.last() == Some(&1.0) && reports.is_sorted());
 }
 
 #[test]
-fn a_table_that_is_given_up_replaces_nothing_and_leaves_nothing_beside() {
+fn a_cancelled_table_replaces_nothing_and_leaves_no_temporary_file() {
     let folder = tempfile::tempdir().unwrap();
     for (ending, _) in FORMATS {
         let path = folder.path().join(format!("table.{ending}"));
@@ -141,17 +141,17 @@ fn a_table_that_is_given_up_replaces_nothing_and_leaves_nothing_beside() {
 }
 
 #[test]
-fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
+fn an_unwritable_table_is_an_input_error_and_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("folder.npz")).unwrap();
     let old = folder.path().join("old.npz");
     std::fs::write(&old, b"old").unwrap();
     let attempt = |name: &str, resolution: &ExportResolution| {
-        let error = write(&flat(), &meta(), &sized(*resolution), &folder.path().join(name), &silent).unwrap_err();
+        let error = write(&flat(), &meta(), &sized(*resolution), &folder.path().join(name), &never_cancel).unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
         error.to_string()
     };
-    for (name, says) in [
+    for (name, expected) in [
         ("a.jpg", ".binary, .xml"),
         ("a.jpg", "the ending .jpg"),
         ("a", "without an ending"),
@@ -159,7 +159,7 @@ fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
         ("folder.npz", "a folder"),
     ] {
         let error = attempt(name, &SMALL);
-        assert!(error.contains(says) && error.contains(name), "{error}");
+        assert!(error.contains(expected) && error.contains(name), "{error}");
     }
     assert!(attempt("old.npz", &ExportResolution { theta_o: 0, ..SMALL }).contains("theta_o"));
     assert!(attempt("old.npz", &ExportResolution { phi_i: usize::MAX, ..SMALL }).contains("phi_i"));
@@ -171,15 +171,15 @@ fn what_cannot_be_written_is_the_callers_error_and_leaves_nothing() {
 }
 
 #[test]
-fn a_failure_while_writing_leaves_the_old_file_whole() {
+fn a_failure_while_writing_leaves_the_old_file_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let old = folder.path().join("old.npz");
     std::fs::write(&old, b"old").unwrap();
-    let full = atomic_file::replacing(&old, |out| {
+    let result = atomic_file::write_atomically(&old, |out| {
         out.write_all(b"half of the new")?;
         Err::<(), _>(io::Error::other("disk full"))
     });
-    let error = full.unwrap_err();
+    let error = result.unwrap_err();
     assert!(error.exit_code() == 2 && error.to_string().contains("old.npz: output: found disk full"), "{error}");
     assert_eq!(std::fs::read(&old).unwrap(), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -188,7 +188,7 @@ fn a_failure_while_writing_leaves_the_old_file_whole() {
 }
 
 #[test]
-fn a_reader_that_hangs_up_is_no_failure() {
+fn a_reader_that_closes_the_stream_early_is_no_failure() {
     struct Closed;
     impl Write for Closed {
         fn write(&mut self, _: &[u8]) -> io::Result<usize> {
@@ -198,5 +198,5 @@ fn a_reader_that_hangs_up_is_no_failure() {
             Ok(())
         }
     }
-    assert!(write_csv(&flat(), &meta(), &small(), &mut Closed, &silent).is_ok());
+    assert!(write_csv(&flat(), &meta(), &small(), &mut Closed, &never_cancel).is_ok());
 }

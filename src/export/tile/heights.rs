@@ -1,4 +1,4 @@
-//! SampledHeights of the surface seen from above, and a 16-bit picture of them.
+//! Sampled heights of the surface as visible from above, and a 16-bit image of them.
 
 use glam::{DVec2, UVec2};
 
@@ -6,20 +6,20 @@ use super::TileOptions;
 use crate::base::{Error, Progress, Result, progress};
 use crate::geometry::TileMesh;
 
-/// SampledHeights at regular places of one period, tile units.
+/// Heights at regularly spaced points of one period, in tile units.
 pub struct SampledHeights {
     pub count: UVec2,
-    /// Row by row, y upwards.
+    /// Heights row by row, y upwards.
     pub values: Vec<f64>,
-    /// GridCoordinates that no triangle covers: they take the lowest height.
+    /// Number of points that no triangle covers; they have the lowest height.
     pub holes: usize,
 }
 
 impl SampledHeights {
-    /// The highest triangle over `((i + shift)/nx, (j + shift)/ny)` of the tile.
+    /// Samples the highest triangle over each point `((i + shift)/nx, (j + shift)/ny)` of the tile.
     ///
     /// # Errors
-    /// [`Error::Cancelled`] when `progress` says so.
+    /// [`Error::Cancelled`] if `progress` cancels.
     pub fn from_above(mesh: &TileMesh, count: UVec2, shift: f64, progress: &Progress<'_>) -> Result<Self> {
         let step = mesh.size.as_dvec2() / count.as_dvec2();
         let mut values = vec![f64::NEG_INFINITY; (count.x * count.y) as usize];
@@ -43,8 +43,8 @@ impl SampledHeights {
                         continue;
                     }
                     let (x, y) = (i.rem_euclid(i64::from(count.x)), j.rem_euclid(i64::from(count.y)));
-                    let place = &mut values[(y * i64::from(count.x) + x) as usize];
-                    *place = place.max(u * a.z + v * b.z + w * c.z);
+                    let height = &mut values[(y * i64::from(count.x) + x) as usize];
+                    *height = height.max(u * a.z + v * b.z + w * c.z);
                 }
             }
         }
@@ -54,18 +54,19 @@ impl SampledHeights {
         Ok(Self { count, values, holes })
     }
 
-    /// Of the surface repeated without end.
+    /// Returns a height of the periodic surface.
     pub fn at(&self, i: u32, j: u32) -> f64 {
         self.values[((j % self.count.y) * self.count.x + i % self.count.x) as usize]
     }
 
-    /// The lowest and the highest.
+    /// Returns the lowest and the highest value.
     pub fn range(&self) -> (f64, f64) {
         self.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)))
     }
 }
 
-/// 16 bits, 0 the lowest and 65535 the highest height, row 0 at y = 0: as the geometry `heightfield` reads it.
+/// Returns a PNG with 16 bits and notes on it. 0 is the lowest and 65535 the highest height, and row 0 is at y = 0. The
+/// geometry `heightfield` reads this file.
 pub fn png(
     mesh: &TileMesh,
     options: &TileOptions,
@@ -78,7 +79,7 @@ pub fn png(
     let [width, height] = (options.samples * options.repeat).to_array();
     let mut pixels = Vec::with_capacity(2 * (width * height) as usize);
     for j in 0..height {
-        progress::tell(progress, 0.5 + 0.25 * j as f32 / height as f32)?;
+        progress::report(progress, 0.5 + 0.25 * j as f32 / height as f32)?;
         for i in 0..width {
             let value = ((heights.at(i, j) - low) * scale).round() as u16;
             pixels.extend(value.to_ne_bytes());

@@ -1,4 +1,4 @@
-//! The tile's triangles as OBJ, in tile coordinates: it loads again as the geometry `mesh`.
+//! The tile's triangles as OBJ in tile coordinates. The geometry `mesh` reads this file.
 
 use std::fmt::Write as _;
 

@@ -1,5 +1,5 @@
-//! The tile itself: as a mesh (`.obj`), as a solid to print (`.stl`), as heights (`.png`), and as a pattern to cut, fold and
-//! glue (`.svg`, `.pdf`; Wu et al. 2011, Fig. 9).
+//! Export of the tile itself: a mesh (`.obj`), a solid to print (`.stl`), heights (`.png`), or a pattern to cut, fold
+//! and glue (`.svg`, `.pdf`; Wu et al. 2011, Fig. 9).
 
 mod heights;
 mod mesh;
@@ -17,16 +17,16 @@ use crate::base::{InputError, Progress, Result};
 use crate::geometry::TileMesh;
 use crate::scene::{BrdfSpec, Scene, TermSpec, Tile};
 
-/// What may be chosen about the files of a tile.
+/// Options of a tile's files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TileOptions {
-    /// Periods in x and y.
+    /// Number of periods in x and y.
     pub repeat: UVec2,
-    /// Enlargement of what is made of matter: solid and pattern.
+    /// Enlargement of solid and pattern.
     pub scale: f32,
-    /// Thickness of the solid under its lowest point, millimetres; `None`: a tenth of its longer side.
+    /// Thickness of the solid below its lowest point, millimetres; `None` selects a tenth of the solid's longer side.
     pub base_mm: Option<f32>,
-    /// Samples of a period's heights in x and y.
+    /// Number of height samples per period in x and y.
     pub samples: UVec2,
 }
 
@@ -36,40 +36,45 @@ impl Default for TileOptions {
     }
 }
 
-/// Most periods, and most height samples of all of them together: a solid of 400 MB.
+/// Bounds the number of periods.
 const MAX_PERIODS: u32 = 10_000;
-const MOST_SAMPLES: u64 = 1 << 22;
-/// Most triangles of all periods together in an OBJ file: some hundred MB.
+/// Bounds the height samples of all periods together: a solid of 400 MB.
+const MAX_SAMPLES: u64 = 1 << 22;
+/// Bounds the triangles of all periods together in an OBJ file: some hundred MB.
 const MAX_TRIANGLES: u64 = 1 << 24;
 
 impl TileOptions {
     fn check(&self) -> Result<()> {
-        let complain = |place: &str, found: String, expected: String| InputError::new(place, found, expected).into();
+        let input_error = |place: &str, found: String, expected: String| InputError::new(place, found, expected).into();
         let periods = u64::from(self.repeat.x) * u64::from(self.repeat.y);
         if periods == 0 || periods > u64::from(MAX_PERIODS) {
-            return Err(complain("repeat", self.repeat.to_string(), format!("1 to {MAX_PERIODS} periods")));
+            return Err(input_error("repeat", self.repeat.to_string(), format!("1 to {MAX_PERIODS} periods")));
         }
         if !(self.scale > 0.0 && self.scale <= 1e6) {
-            return Err(complain("scale", self.scale.to_string(), "a positive number".to_owned()));
+            return Err(input_error("scale", self.scale.to_string(), "a positive number".to_owned()));
         }
         if self.base_mm.is_some_and(|base| !(base > 0.0 && base <= 1e4)) {
-            return Err(complain("base", format!("{:?}", self.base_mm), "a positive number of millimetres".to_owned()));
+            return Err(input_error(
+                "base",
+                format!("{:?}", self.base_mm),
+                "a positive number of millimetres".to_owned(),
+            ));
         }
         Ok(())
     }
 }
 
-/// Whether the heights that a solid or a picture takes are of a number that can be held.
+/// Checks the number of height samples of a solid or an image.
 fn check_samples(options: &TileOptions) -> Result<()> {
     let all = options.repeat.as_u64vec2() * options.samples.as_u64vec2();
-    if options.samples.min_element() < 2 || all.x.saturating_mul(all.y) > MOST_SAMPLES {
-        let expected = format!("2 to {MOST_SAMPLES} in all periods together");
+    if options.samples.min_element() < 2 || all.x.saturating_mul(all.y) > MAX_SAMPLES {
+        let expected = format!("2 to {MAX_SAMPLES} in all periods together");
         return Err(InputError::new("samples", options.samples, expected).into());
     }
     Ok(())
 }
 
-/// Whether an OBJ file's triangles are of a number that can be held.
+/// Checks the number of triangles of an OBJ file.
 fn check_triangles(mesh: &TileMesh, options: &TileOptions) -> Result<()> {
     let all = u64::from(options.repeat.x) * u64::from(options.repeat.y) * mesh.triangles.len() as u64;
     if all > MAX_TRIANGLES {
@@ -79,14 +84,14 @@ fn check_triangles(mesh: &TileMesh, options: &TileOptions) -> Result<()> {
     Ok(())
 }
 
-/// The part of the work that is done once the content is made and only to be written.
-const MADE: f32 = 0.7;
+/// Progress, 0 to 1, at which the content is complete and only has to be written.
+const CONTENT_PROGRESS: f32 = 0.7;
 
-/// Writes the tile of a scene by the ending of `path`, and returns what to know about the file.
+/// Writes the tile of a scene in the format of the extension of `path`, and returns notes on the file.
 ///
 /// # Errors
-/// An unknown ending, an option out of range, a geometry without a pattern, a place that cannot be written,
-/// [`crate::base::Error::Cancelled`] when `progress` says so. An old file stays whole then.
+/// An unknown extension, an option out of range, a geometry without a pattern, a path that cannot be written, or
+/// [`crate::base::Error::Cancelled`] if `progress` cancels. An existing file then stays unchanged.
 pub fn write(
     scene: &Scene,
     mesh: &TileMesh,
@@ -99,7 +104,7 @@ pub fn write(
     if matches!(ending.as_str(), "stl" | "png") {
         check_samples(options)?;
     }
-    let (making, writing) = (part(progress, 0.0, MADE), part(progress, MADE, 1.0));
+    let (making, writing) = (part(progress, 0.0, CONTENT_PROGRESS), part(progress, CONTENT_PROGRESS, 1.0));
     let drawing = part(&making, 0.5, 1.0);
     let sheet = || pattern::sheet(scene, options, millimetres(&scene.tile.unit)?, &part(&making, 0.0, 0.5));
     let (bytes, mut notes) = match ending.as_str() {
@@ -131,7 +136,7 @@ pub fn write(
     Ok(notes)
 }
 
-/// What is painted over the tile and has no place in a file that shows materials.
+/// Returns a note on the painted images that a file with materials cannot contain.
 fn left_out(tile: &Tile) -> Option<String> {
     let painted = match (&tile.color_path, &tile.slot_path) {
         (None, None) => return None,
@@ -142,7 +147,7 @@ fn left_out(tile: &Tile) -> Option<String> {
     Some(format!("{painted} left out: each face stands in the plain material of its own slot"))
 }
 
-/// Millimetres of a tile unit.
+/// Returns the millimetres per tile unit.
 fn millimetres(unit: &str) -> Result<f64> {
     Ok(match unit.trim().to_lowercase().as_str() {
         "mm" | "millimetre" | "millimeter" => 1.0,
@@ -155,16 +160,16 @@ fn millimetres(unit: &str) -> Result<f64> {
     })
 }
 
-/// A colour that stands for a slot's material on paper: what it reflects when seen from above, linear RGB.
+/// Returns the colour of a slot's material on paper: the sum of its terms' colours, linear RGB.
 fn paper_color(scene: &Scene, slot: &str) -> Result<Vec3> {
     let material = scene.material_for_slot(slot)?;
-    let of_term = |term: &TermSpec| match term {
+    let term_color = |term: &TermSpec| match term {
         TermSpec::Lambertian { albedo } => *albedo,
         TermSpec::BlinnPhong { specular, .. } | TermSpec::Ward { specular, .. } => *specular,
         TermSpec::CookTorrance { f0, .. } | TermSpec::Ggx { f0, .. } => *f0,
         TermSpec::Merl { .. } | TermSpec::Rgl { .. } | TermSpec::Utia { .. } | TermSpec::Npz { .. } => Vec3::splat(0.5),
     };
-    let sum: Vec3 = BrdfSpec::terms(material.brdf).iter().map(of_term).sum();
+    let sum: Vec3 = BrdfSpec::terms(material.brdf).iter().map(term_color).sum();
     Ok((sum * material.color).clamp(Vec3::ZERO, Vec3::ONE))
 }
 

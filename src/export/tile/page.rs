@@ -7,22 +7,22 @@ use glam::{DVec2, Vec3};
 use crate::base::{Progress, Result, progress};
 use crate::render::image::tone_map::srgb_byte;
 
-/// How an outline is drawn.
+/// Line style of an outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Line {
     None,
-    /// Along which to cut.
+    /// A line to cut along.
     Cut,
-    /// Fold away from you: a ridge.
+    /// A fold away from the reader: a ridge.
     Mountain,
-    /// Fold towards you: a valley.
+    /// A fold towards the reader: a valley.
     Valley,
-    /// Where something is glued on, or a measure.
+    /// A mark for gluing or measuring.
     Mark,
 }
 
 impl Line {
-    /// Dashes in millimetres; none for a full line.
+    /// Returns the dash lengths in millimetres; none for a solid line.
     fn dashes(self) -> &'static [f64] {
         match self {
             Self::Mountain => &[3.0, 1.0, 0.5, 1.0],
@@ -33,12 +33,13 @@ impl Line {
     }
 }
 
+/// A polygon or polyline of a page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PageShape {
-    /// Millimetres, y downwards.
+    /// Points in millimetres, y downwards.
     pub points: Vec<DVec2>,
     pub closed: bool,
-    /// Linear RGB.
+    /// Fill colour, linear RGB.
     pub fill: Option<Vec3>,
     pub line: Line,
 }
@@ -52,7 +53,7 @@ pub struct Page {
 const MARGIN_MM: f64 = 10.0;
 const LINE_MM: f64 = 0.15;
 const TEXT_MM: f64 = 3.0;
-/// Points (1/72 inch) of a millimetre.
+/// PDF points (1/72 inch) per millimetre.
 const POINTS_PER_MM: f64 = 72.0 / 25.4;
 
 impl Page {
@@ -68,7 +69,7 @@ impl Page {
         self.texts.push((at, text.into()));
     }
 
-    /// The corner of what is drawn and its extent, with a margin.
+    /// Returns the corner and the extent of the content, with a margin.
     pub fn bounds(&self) -> (DVec2, DVec2) {
         let points = self.shapes.iter().flat_map(|shape| &shape.points).copied();
         let text_ends = self
@@ -86,8 +87,10 @@ impl Page {
         (low - MARGIN_MM, high - low + 2.0 * MARGIN_MM)
     }
 
+    /// Returns the page as SVG.
+    ///
     /// # Errors
-    /// [`crate::base::Error::Cancelled`] when `progress` says so.
+    /// [`crate::base::Error::Cancelled`] if `progress` cancels.
     pub fn svg(&self, progress: &Progress<'_>) -> Result<Vec<u8>> {
         let (corner, size) = self.bounds();
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
@@ -121,18 +124,18 @@ impl Page {
             let _ =
                 writeln!(text, "<{name} points=\"{}\" fill=\"{fill}\" stroke=\"{stroke}\"{dashes}/>", points.join(" "));
         }
-        for (at, words) in &self.texts {
-            let words = words.replace('&', "&amp;").replace('<', "&lt;");
-            let _ = writeln!(text, "<text x=\"{:.3}\" y=\"{:.3}\">{words}</text>", at.x, at.y);
+        for (at, label) in &self.texts {
+            let label = label.replace('&', "&amp;").replace('<', "&lt;");
+            let _ = writeln!(text, "<text x=\"{:.3}\" y=\"{:.3}\">{label}</text>", at.x, at.y);
         }
         text.push_str("</g>\n</svg>\n");
         Ok(text.into_bytes())
     }
 
-    /// One page, PDF 1.4.
+    /// Returns the page as a PDF 1.4 file.
     ///
     /// # Errors
-    /// As [`Page::svg`].
+    /// The errors of [`Page::svg`].
     pub fn pdf(&self, progress: &Progress<'_>) -> Result<Vec<u8>> {
         let (corner, size) = self.bounds();
         // PDF's y points upwards.
@@ -162,10 +165,10 @@ impl Page {
                 (false, _) => "S\n",
             });
         }
-        for (place, words) in &self.texts {
+        for (position, label) in &self.texts {
             let plain: String =
-                words.chars().map(|c| if c.is_ascii() && !"()\\".contains(c) { c } else { ' ' }).collect();
-            let _ = writeln!(content, "BT /F 8.5 Tf 0 g {} Td ({plain}) Tj ET", at(*place));
+                label.chars().map(|c| if c.is_ascii() && !"()\\".contains(c) { c } else { ' ' }).collect();
+            let _ = writeln!(content, "BT /F 8.5 Tf 0 g {} Td ({plain}) Tj ET", at(*position));
         }
         let [width, height] = (size * POINTS_PER_MM).to_array();
         let objects = [
@@ -178,14 +181,14 @@ impl Page {
             format!("<< /Length {} >>\nstream\n{content}endstream", content.len()),
         ];
         let mut bytes = b"%PDF-1.4\n".to_vec();
-        let mut places = Vec::new();
+        let mut offsets = Vec::new();
         for (k, object) in objects.iter().enumerate() {
-            places.push(bytes.len());
+            offsets.push(bytes.len());
             bytes.extend(format!("{} 0 obj\n{object}\nendobj\n", k + 1).bytes());
         }
         let table = bytes.len();
         bytes.extend(format!("xref\n0 {}\n0000000000 65535 f \n", objects.len() + 1).bytes());
-        places.iter().for_each(|place| bytes.extend(format!("{place:010} 00000 n \n").bytes()));
+        offsets.iter().for_each(|offset| bytes.extend(format!("{offset:010} 00000 n \n").bytes()));
         bytes.extend(
             format!("trailer\n<< /Size {} /Root 1 0 R >>\nstartxref\n{table}\n%%EOF\n", objects.len() + 1).bytes(),
         );

@@ -1,24 +1,24 @@
-//! Patterns to cut, fold and glue: grooves as a strip of paper, pyramids as nets on a floor, planes as they are.
+//! Patterns to cut, fold and glue: a paper strip for grooves, nets and a floor for pyramids, a sheet for a flat tile.
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::page::{Line, Page};
 use super::{TileOptions, paper_color};
 use crate::base::{InputError, Progress, Result, progress};
-use crate::geometry::{self, CrossSection, OnePyramid};
+use crate::geometry::{self, GrooveCrossSection, PyramidLayout};
 use crate::scene::{Geometry, Scene, Tile};
 
-/// Width of a tab, millimetres, and how far its ends draw in.
+/// Width of a glue tab, millimetres.
 const TAB_MM: f64 = 6.0;
-/// Turns smaller than this are bent, not folded (cosine of 12°).
+/// Bounds the angle of an edge without a fold line: the cosine of 12°.
 const BEND_COSINE: f64 = 0.978;
-/// Nets on one sheet at most.
+/// Bounds the number of nets on one sheet.
 const MAX_NETS: usize = 200;
 
-/// The sheet of a scene's tile, `unit_mm` millimetres a tile unit.
+/// Draws the sheet of a scene's tile with `unit_mm` millimetres per tile unit, and returns it with notes.
 ///
 /// # Errors
-/// A geometry that does not unfold, too many nets, [`crate::base::Error::Cancelled`] when `progress` says so.
+/// A geometry that does not unfold, too many nets, or [`crate::base::Error::Cancelled`] if `progress` cancels.
 pub fn sheet(
     scene: &Scene,
     options: &TileOptions,
@@ -29,12 +29,12 @@ pub fn sheet(
     let size = scene.tile.size;
     match &scene.tile.geometry {
         Geometry::Grooves(spec) => {
-            let section = CrossSection::of(spec, size);
+            let section = GrooveCrossSection::of(spec, size);
             let colors = [paper_color(scene, "bottom")?, paper_color(scene, "sides")?];
             grooves(&section, options, scale, &colors, progress)
         }
         Geometry::Pyramids(spec) => {
-            let one = OnePyramid::of(spec, size);
+            let one = PyramidLayout::of(spec, size);
             let colors = [paper_color(scene, "faces")?, paper_color(scene, "floor")?];
             pyramids(&one, size.as_dvec2(), options, scale, &colors)
         }
@@ -46,9 +46,9 @@ pub fn sheet(
     }
 }
 
-/// Mountains point at the reader, so that the printed side is the one that is seen.
+/// Draws the strip of a groove tile. Ridges point towards the reader, so that the printed side is visible.
 fn grooves(
-    section: &CrossSection,
+    section: &GrooveCrossSection,
     options: &TileOptions,
     scale: f64,
     colors: &[Vec3; 2],
@@ -57,7 +57,7 @@ fn grooves(
     let length = section.length * f64::from(options.repeat.y) * scale;
     let periods = section.count * options.repeat.x as usize;
     let mut page = Page::default();
-    let (mut x, mut before) = (0.0, None::<DVec2>);
+    let (mut x, mut previous) = (0.0, None::<DVec2>);
     for period in 0..periods {
         progress::step(progress, period, periods)?;
         for pair in section.points.windows(2) {
@@ -69,14 +69,14 @@ fn grooves(
             let corners =
                 [DVec2::new(x, 0.0), DVec2::new(x + width, 0.0), DVec2::new(x + width, length), DVec2::new(x, length)];
             page.polygon(corners, Some(colors[usize::from(pair[0].1)]), Line::None);
-            if let Some(before) = before {
+            if let Some(previous) = previous {
                 let direction = along / width;
-                if before.dot(direction) < BEND_COSINE {
-                    let line = if before.perp_dot(direction) > 0.0 { Line::Valley } else { Line::Mountain };
+                if previous.dot(direction) < BEND_COSINE {
+                    let line = if previous.perp_dot(direction) > 0.0 { Line::Valley } else { Line::Mountain };
                     page.segment(DVec2::new(x, 0.0), DVec2::new(x, length), line);
                 }
             }
-            before = Some(along / width);
+            previous = Some(along / width);
             x += width;
         }
     }
@@ -84,7 +84,7 @@ fn grooves(
     page.polygon([corner(0.0, 0.0), corner(x, 0.0), corner(x, length), corner(0.0, length)], None, Line::Cut);
     tab(&mut page, corner(0.0, length), corner(0.0, 0.0));
     tab(&mut page, corner(x, 0.0), corner(x, length));
-    // Marks for the ground: where each period starts once it is folded.
+    // Marks for the base: the start of each period of the folded strip.
     let pitch = section.pitch * scale;
     let y = length + 2.0 * TAB_MM;
     for k in 0..=periods {
@@ -107,14 +107,14 @@ fn legend(page: &mut Page, at: DVec2) {
         (Line::Valley, "fold to a valley"),
         (Line::Mark, "glue here"),
     ];
-    for (k, (line, words)) in lines.into_iter().enumerate() {
+    for (k, (line, label)) in lines.into_iter().enumerate() {
         let at = at + DVec2::new(0.0, 5.0 * k as f64);
         page.segment(at, at + DVec2::new(15.0, 0.0), line);
-        page.text(at + DVec2::new(18.0, 1.0), words);
+        page.text(at + DVec2::new(18.0, 1.0), label);
     }
 }
 
-/// A tab on the left of the way from `from` to `to` as seen on the sheet (y downwards): its fold, and its outline.
+/// Draws a glue tab, its outline and its fold, on the left of the edge from `from` to `to` as viewed on the sheet.
 fn tab(page: &mut Page, from: DVec2, to: DVec2) {
     let along = to - from;
     let Some(direction) = along.try_normalize() else { return };
@@ -126,7 +126,7 @@ fn tab(page: &mut Page, from: DVec2, to: DVec2) {
 }
 
 fn pyramids(
-    one: &OnePyramid,
+    one: &PyramidLayout,
     size: DVec2,
     options: &TileOptions,
     scale: f64,
@@ -143,13 +143,13 @@ fn pyramids(
     let extent = size * periods * scale;
     let corner = |x: f64, y: f64| DVec2::new(x, y);
     page.polygon([corner(0.0, 0.0), corner(extent.x, 0.0), extent, corner(0.0, extent.y)], Some(colors[1]), Line::Cut);
-    // y of the tile points up, that of the sheet down.
-    let place = |p: DVec2| corner(p.x * scale, extent.y - p.y * scale);
+    // The tile's y points up, the sheet's y down.
+    let on_sheet = |p: DVec2| corner(p.x * scale, extent.y - p.y * scale);
     for y in 0..options.repeat.y {
         for x in 0..options.repeat.x {
             let shift = DVec2::new(f64::from(x), f64::from(y)) * size;
             for centre in &one.centres {
-                page.polygon(one.base.iter().map(|p| place(*p + *centre + shift)), None, Line::Mark);
+                page.polygon(one.base.iter().map(|p| on_sheet(*p + *centre + shift)), None, Line::Mark);
             }
         }
     }
@@ -167,14 +167,14 @@ fn pyramids(
     Ok((page, vec![format!("{count} nets and a floor of {:.2} x {:.2} mm with their places", extent.x, extent.y)]))
 }
 
-/// A pyramid laid out flat, y downwards: its side faces in a row that share edges, the cut tip on the first.
+/// The net of a pyramid, y downwards: a row of side faces that share edges, and the top face on the first.
 struct Net {
     faces: Vec<Vec<DVec2>>,
     top: Vec<DVec2>,
 }
 
 impl Net {
-    fn of(one: &OnePyramid, scale: f64) -> Self {
+    fn of(one: &PyramidLayout, scale: f64) -> Self {
         let corners = one.base.len();
         let foot = |k: usize| (one.base[k % corners] * scale).extend(0.0);
         let tip = |k: usize| (one.top[k % corners] * scale).extend(one.top_z * scale);
@@ -185,7 +185,7 @@ impl Net {
                 None => {
                     unfold(&solid, [foot(k), foot(k + 1)], [DVec2::ZERO, DVec2::new((foot(1) - foot(0)).length(), 0.0)])
                 }
-                // The edge that this face shares with the last one, as it lies already.
+                // The edge shared with the last face keeps its position.
                 Some(last) => unfold(&solid, [tip(k), foot(k)], [last[2], last[1]]),
             };
             faces.push(flat);
@@ -193,7 +193,7 @@ impl Net {
         let solid: Vec<DVec3> = (0..corners).map(tip).collect();
         let first = &faces[0];
         let top = if one.has_top { unfold(&solid, [tip(0), tip(1)], [first[3], first[2]]) } else { Vec::new() };
-        // On the sheet y points down.
+        // The sheet's y points down.
         let flipped = |points: Vec<DVec2>| points.into_iter().map(|p| DVec2::new(p.x, -p.y)).collect();
         Self { faces: faces.into_iter().map(flipped).collect(), top: flipped(top) }
     }
@@ -217,8 +217,8 @@ impl Net {
             } else {
                 tab(page, face[2], face[1]);
             }
-            let with_tip = k == 0 && !self.top.is_empty();
-            page.segment(face[2], face[3], if with_tip { Line::Mountain } else { Line::Cut });
+            let has_top = k == 0 && !self.top.is_empty();
+            page.segment(face[2], face[3], if has_top { Line::Mountain } else { Line::Cut });
         }
         if !self.top.is_empty() {
             let top = moved(&self.top);
@@ -230,7 +230,7 @@ impl Net {
     }
 }
 
-/// A flat polygon of space laid on the sheet (y upwards) so that its `edge` lies on `onto`, its inside on the left.
+/// Maps a planar polygon to the sheet (y upwards) so that its `edge` lies on `onto` and its inside is on the left.
 fn unfold(polygon: &[DVec3], edge: [DVec3; 2], onto: [DVec2; 2]) -> Vec<DVec2> {
     let along = (edge[1] - edge[0]).normalize_or_zero();
     let across = |p: DVec3| (p - edge[0]) - along * (p - edge[0]).dot(along);
@@ -243,24 +243,24 @@ fn unfold(polygon: &[DVec3], edge: [DVec3; 2], onto: [DVec2; 2]) -> Vec<DVec2> {
 }
 
 fn plane(scene: &Scene, options: &TileOptions, scale: f64, progress: &Progress<'_>) -> Result<(Page, Vec<String>)> {
-    // Images are not printed.
-    let bare = Tile { color_path: None, slot_path: None, ..scene.tile.clone() };
-    let mesh = geometry::build(&bare, std::path::Path::new(""))?;
+    // The pattern has no painted images.
+    let plain = Tile { color_path: None, slot_path: None, ..scene.tile.clone() };
+    let mesh = geometry::build(&plain, std::path::Path::new(""))?;
     let colors: Vec<Vec3> = mesh.slots.iter().map(|slot| paper_color(scene, slot)).collect::<Result<_>>()?;
     let size = mesh.size.as_dvec2();
     let extent = size * options.repeat.as_dvec2() * scale;
     let mut page = Page::default();
     for y in 0..options.repeat.y {
-        progress::tell(progress, y as f32 / options.repeat.y as f32)?;
+        progress::report(progress, y as f32 / options.repeat.y as f32)?;
         for x in 0..options.repeat.x {
             let shift = DVec2::new(f64::from(x), f64::from(y)) * size;
             for triangle in 0..mesh.triangles.len() {
-                let place = |p: Vec3| {
+                let on_sheet = |p: Vec3| {
                     let at = (p.as_dvec3().truncate() + shift) * scale;
                     DVec2::new(at.x, extent.y - at.y)
                 };
                 let color = colors[usize::from(mesh.triangle_slot[triangle])];
-                page.polygon(mesh.corners(triangle).map(place), Some(color), Line::None);
+                page.polygon(mesh.corners(triangle).map(on_sheet), Some(color), Line::None);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! A closed solid to print: the surface seen from above on a regular grid, four walls and a floor. Binary STL, millimetres.
+//! A closed solid to print, as binary STL in millimetres: the surface as visible from above, four walls and a floor.
 
 use glam::{DVec3, Vec3};
 
@@ -45,7 +45,7 @@ pub fn stl(
     Ok((bytes, notes))
 }
 
-/// Triangles in millimetres, outside counter-clockwise.
+/// Returns the triangles in millimetres, counter-clockwise as viewed from outside.
 pub(super) fn solid(
     heights: &SampledHeights,
     mesh: &TileMesh,
@@ -65,13 +65,13 @@ pub(super) fn solid(
     };
     let mut triangles = Vec::new();
     for j in 0..rows {
-        progress::tell(progress, j as f32 / rows as f32)?;
+        progress::report(progress, j as f32 / rows as f32)?;
         for i in 0..columns {
             let (a, b, c, d) = (top(i, j), top(i + 1, j), top(i + 1, j + 1), top(i, j + 1));
             triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
-    // Once around, counter-clockwise from above.
+    // The rim runs counter-clockwise as viewed from above.
     let south = (0..columns).map(|i| (i, 0));
     let east = (0..rows).map(|j| (columns, j));
     let north = (0..columns).map(|i| (columns - i, rows));

@@ -9,7 +9,7 @@ use crate::base::Error;
 use crate::geometry;
 use crate::scene::{Geometry, GrooveProfile, Grooves, Pyramids};
 
-fn silent(_: f32) -> bool {
+fn never_cancel(_: f32) -> bool {
     true
 }
 
@@ -33,9 +33,9 @@ fn v_grooves() -> Geometry {
 fn every_edge_of_the_printed_solid_is_shared_by_two_triangles_that_run_opposite_ways() {
     let (_, mesh) = scene_of(Geometry::Pyramids(Pyramids { truncation: 0.3, ..Pyramids::default() }));
     let options = TileOptions { samples: UVec2::new(12, 9), repeat: UVec2::new(2, 1), ..TileOptions::default() };
-    let heights = SampledHeights::from_above(&mesh, options.samples, 0.0, &silent).unwrap();
+    let heights = SampledHeights::from_above(&mesh, options.samples, 0.0, &never_cancel).unwrap();
     assert_eq!(heights.holes, 0);
-    let triangles = solid::solid(&heights, &mesh, &options, 10.0, &silent).unwrap();
+    let triangles = solid::solid(&heights, &mesh, &options, 10.0, &never_cancel).unwrap();
     let mut edges: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
     let key = |p: Vec3| p.to_array().map(f32::to_bits);
     let mut volume = 0.0;
@@ -55,41 +55,41 @@ fn every_edge_of_the_printed_solid_is_shared_by_two_triangles_that_run_opposite_
 #[test]
 fn heights_of_grooves_are_the_cross_section() {
     let (_, mesh) = scene_of(v_grooves());
-    let heights = SampledHeights::from_above(&mesh, UVec2::new(8, 2), 0.0, &silent).unwrap();
-    // Two V grooves a tile: 0 at the ridge, -0.25 in the middle, straight between.
+    let heights = SampledHeights::from_above(&mesh, UVec2::new(8, 2), 0.0, &never_cancel).unwrap();
+    // Two V grooves per tile: 0 at the ridge, -0.25 in the middle, linear between.
     for (i, expected) in [0.0, -0.125, -0.25, -0.125, 0.0, -0.125, -0.25, -0.125].into_iter().enumerate() {
         assert!((heights.at(i as u32, 1) - expected).abs() < 1e-6, "{i}: {}", heights.at(i as u32, 1));
     }
 }
 
 #[test]
-fn files_by_ending_and_complaints_about_the_rest() {
+fn every_extension_writes_a_file_and_invalid_input_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, mesh) = scene_of(v_grooves());
     let options = TileOptions { samples: UVec2::splat(16), ..TileOptions::default() };
     for ending in ["obj", "stl", "png", "svg", "pdf"] {
         let path = folder.path().join("tile").with_extension(ending);
-        assert!(!write(&scene, &mesh, &options, &path, &silent).unwrap().is_empty());
+        assert!(!write(&scene, &mesh, &options, &path, &never_cancel).unwrap().is_empty());
         assert!(std::fs::metadata(&path).unwrap().len() > 100, "{ending}");
     }
     let stl = std::fs::read(folder.path().join("tile.stl")).unwrap();
     let count = u32::from_le_bytes(stl[80..84].try_into().unwrap()) as usize;
     assert_eq!(stl.len(), 84 + 50 * count);
-    let complaint = |options: &TileOptions, name: &str| {
-        let error = write(&scene, &mesh, options, &folder.path().join(name), &silent).unwrap_err();
+    let input_error = |options: &TileOptions, name: &str| {
+        let error = write(&scene, &mesh, options, &folder.path().join(name), &never_cancel).unwrap_err();
         assert_eq!(error.exit_code(), 2);
         error.to_string()
     };
-    assert!(complaint(&options, "tile.gif").contains("the ending .gif"));
-    assert!(complaint(&TileOptions { scale: 0.0, ..options.clone() }, "tile.stl").contains("scale"));
+    assert!(input_error(&options, "tile.gif").contains("the ending .gif"));
+    assert!(input_error(&TileOptions { scale: 0.0, ..options.clone() }, "tile.stl").contains("scale"));
     assert!(
-        complaint(&TileOptions { samples: UVec2::splat(1 << 20), ..options.clone() }, "tile.stl").contains("samples")
+        input_error(&TileOptions { samples: UVec2::splat(1 << 20), ..options.clone() }, "tile.stl").contains("samples")
     );
-    assert!(complaint(&TileOptions { repeat: UVec2::ZERO, ..options.clone() }, "tile.obj").contains("repeat"));
+    assert!(input_error(&TileOptions { repeat: UVec2::ZERO, ..options.clone() }, "tile.obj").contains("repeat"));
     let mut other = scene.clone();
     other.tile.unit = "furlong".to_owned();
     assert!(
-        write(&other, &mesh, &options, &folder.path().join("tile.stl"), &silent)
+        write(&other, &mesh, &options, &folder.path().join("tile.stl"), &never_cancel)
             .unwrap_err()
             .to_string()
             .contains("tile.unit")
@@ -97,62 +97,65 @@ fn files_by_ending_and_complaints_about_the_rest() {
 }
 
 #[test]
-fn progress_of_every_format_goes_from_nothing_to_all_and_what_is_given_up_replaces_nothing() {
+fn progress_of_every_format_runs_from_0_to_1_and_a_cancelled_file_replaces_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, mesh) = scene_of(v_grooves());
     let options = TileOptions { samples: UVec2::splat(16), ..TileOptions::default() };
     for ending in ["obj", "stl", "png", "svg", "pdf"] {
         let path = folder.path().join(format!("tile.{ending}"));
-        let told = RefCell::new(Vec::new());
-        let tell = |part| {
-            told.borrow_mut().push(part);
+        let reports = RefCell::new(Vec::new());
+        let record = |done| {
+            reports.borrow_mut().push(done);
             true
         };
-        write(&scene, &mesh, &options, &path, &tell).unwrap();
-        let told = told.into_inner();
-        assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted(), "{ending}: {told:?}");
+        write(&scene, &mesh, &options, &path, &record).unwrap();
+        let reports = reports.into_inner();
+        assert!(
+            reports.first() == Some(&0.0) && reports.last() == Some(&1.0) && reports.is_sorted(),
+            "{ending}: {reports:?}"
+        );
         std::fs::write(&path, "old").unwrap();
-        // Given up at each of these places, the last of them with all bytes beside the old file.
-        for most in 0..told.len() {
-            let left = Cell::new(most);
-            let some = |_| left.get().checked_sub(1).map(|less| left.set(less)).is_some();
-            let error = write(&scene, &mesh, &options, &path, &some).unwrap_err();
-            assert!(matches!(error, Error::Cancelled), "{ending}, {most}: {error}");
-            assert_eq!(std::fs::read(&path).unwrap(), b"old", "{ending}, {most}");
+        // Cancelled at each report; at the last one, all bytes are already in the temporary file.
+        for allowed in 0..reports.len() {
+            let left = Cell::new(allowed);
+            let until = |_| left.get().checked_sub(1).map(|less| left.set(less)).is_some();
+            let error = write(&scene, &mesh, &options, &path, &until).unwrap_err();
+            assert!(matches!(error, Error::Cancelled), "{ending}, {allowed}: {error}");
+            assert_eq!(std::fs::read(&path).unwrap(), b"old", "{ending}, {allowed}");
         }
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5, "nothing is left beside");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5, "no temporary files are left");
 }
 
 #[test]
-fn an_obj_of_the_tile_loads_as_the_tile() {
+fn an_exported_obj_loads_as_the_same_tile() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, mesh) = scene_of(v_grooves());
-    write(&scene, &mesh, &TileOptions::default(), &folder.path().join("tile.obj"), &silent).unwrap();
-    let mut again = scene;
-    again.tile.geometry = Geometry::Mesh(crate::scene::MeshFile { path: "tile.obj".into() });
-    let back = geometry::build(&again.tile, folder.path()).unwrap();
-    assert_eq!(back.triangles.len(), mesh.triangles.len());
+    write(&scene, &mesh, &TileOptions::default(), &folder.path().join("tile.obj"), &never_cancel).unwrap();
+    let mut from_file = scene;
+    from_file.tile.geometry = Geometry::Mesh(crate::scene::MeshFile { path: "tile.obj".into() });
+    let loaded = geometry::build(&from_file.tile, folder.path()).unwrap();
+    assert_eq!(loaded.triangles.len(), mesh.triangles.len());
     let area = |mesh: &TileMesh| (0..mesh.triangles.len()).map(|k| mesh.triangle_area(k)).sum::<f64>();
-    assert!((area(&back) - area(&mesh)).abs() < 1e-5);
+    assert!((area(&loaded) - area(&mesh)).abs() < 1e-5);
 }
 
 #[test]
-fn a_pattern_keeps_the_area_of_what_it_unfolds() {
+fn a_pattern_has_the_area_of_the_surface_that_it_unfolds() {
     for (geometry, scale) in [
         (v_grooves(), 30.0),
         (Geometry::Pyramids(Pyramids { truncation: 0.4, face_ratio: 2.0, ..Pyramids::default() }), 80.0),
     ] {
         let (scene, mesh) = scene_of(geometry);
         let options = TileOptions { scale, ..TileOptions::default() };
-        let (page, _) = pattern::sheet(&scene, &options, 1.0, &silent).unwrap();
+        let (page, _) = pattern::sheet(&scene, &options, 1.0, &never_cancel).unwrap();
         let polygon_area = |points: &[DVec2]| {
             let twice: f64 = (0..points.len()).map(|k| points[k].perp_dot(points[(k + 1) % points.len()])).sum();
             0.5 * twice.abs()
         };
         let printed: f64 = page.shapes.iter().filter(|s| s.fill.is_some()).map(|s| polygon_area(&s.points)).sum();
         let slots: f64 = (0..mesh.triangles.len()).map(|k| mesh.triangle_area(k)).sum();
-        // The floor of pyramids is printed whole, also under them.
+        // The printed floor of pyramids includes the area under them.
         let under = if mesh.slots[0] == "faces" {
             let floor: f64 =
                 (0..mesh.triangles.len()).filter(|&k| mesh.triangle_slot[k] == 1).map(|k| mesh.triangle_area(k)).sum();
@@ -166,24 +169,24 @@ fn a_pattern_keeps_the_area_of_what_it_unfolds() {
 }
 
 #[test]
-fn images_over_the_tile_that_a_file_leaves_out_are_named_in_its_notes() {
+fn painted_images_that_a_file_leaves_out_are_named_in_its_notes() {
     let folder = tempfile::tempdir().unwrap();
     let (mut scene, mesh) = scene_of(v_grooves());
     let options = TileOptions { samples: UVec2::splat(16), ..TileOptions::default() };
     let notes = |scene: &Scene, ending: &str| {
         let path = folder.path().join("tile").with_extension(ending);
-        write(scene, &mesh, &options, &path, &silent).unwrap().join("; ")
+        write(scene, &mesh, &options, &path, &never_cancel).unwrap().join("; ")
     };
     for (colors, slots) in [(false, false), (true, false), (false, true), (true, true)] {
         scene.tile.color_path = colors.then(|| "colors.png".into());
         scene.tile.slot_path = slots.then(|| "slots.png".into());
         for ending in ["obj", "svg", "pdf", "stl", "png"] {
-            // A solid and a picture of heights are of no colour.
-            let shows = !matches!(ending, "stl" | "png");
+            // A solid and an image of heights have no colours.
+            let has_colors = !matches!(ending, "stl" | "png");
             let notes = notes(&scene, ending);
-            assert_eq!(notes.contains("tile.color_path"), colors && shows, "{ending}: {notes}");
-            assert_eq!(notes.contains("tile.slot_path"), slots && shows, "{ending}: {notes}");
-            assert_eq!(notes.contains("left out"), (colors || slots) && shows, "{ending}: {notes}");
+            assert_eq!(notes.contains("tile.color_path"), colors && has_colors, "{ending}: {notes}");
+            assert_eq!(notes.contains("tile.slot_path"), slots && has_colors, "{ending}: {notes}");
+            assert_eq!(notes.contains("left out"), (colors || slots) && has_colors, "{ending}: {notes}");
         }
     }
 }

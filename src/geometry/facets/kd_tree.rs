@@ -1,29 +1,30 @@
-//! Nearest neighbours among points of the periodic tile.
+//! A kd-tree for nearest neighbours among points of the periodic tile.
 
 use glam::{Vec2, Vec3};
 
-/// A balanced tree over points: the middle of each range splits it along the axis of its depth.
+/// A balanced tree over points. The median of each range splits it, along an axis that depends on the depth.
 pub struct KdTree {
-    /// Points and their numbers, in tree order.
+    /// Points and their indices, in tree order.
     nodes: Vec<(Vec3, u32)>,
     size: Vec2,
 }
 
 impl KdTree {
-    /// Points must lie in the tile; `size` is the period in x and y.
+    /// Builds the tree. Points must lie in the tile; `size` is the period in x and y.
     pub fn new(points: &[Vec3], size: Vec2) -> Self {
         let mut nodes: Vec<(Vec3, u32)> = points.iter().copied().zip(0..).collect();
         arrange(&mut nodes, 0);
         Self { nodes, size }
     }
 
-    /// Number of the point nearest to `query` modulo the tile; the lower number where two are equally near.
+    /// Index of the point nearest to `query` modulo the tile. Of two points at the same distance, the lower index is
+    /// returned.
     pub fn nearest(&self, query: Vec3) -> Option<u32> {
         let mut best = (f32::INFINITY, u32::MAX);
         search(&self.nodes, query, 0, &mut best);
         for step in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)] {
             let moved = query + (Vec2::new(step.0 as f32, step.1 as f32) * self.size).extend(0.0);
-            // Points lie in the tile: a copy of the query is at least as far from them as from the tile.
+            // A copy of the query is at least as far from all points as from the tile, because points lie in the tile.
             let nearest_in_tile = moved.truncate().clamp(Vec2::ZERO, self.size);
             if moved.truncate().distance_squared(nearest_in_tile) <= best.0 {
                 search(&self.nodes, moved, 0, &mut best);
@@ -71,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_is_that_of_a_search_through_all_copies() {
+    fn the_nearest_point_is_that_of_a_search_through_all_copies() {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let size = Vec2::new(1.0, 0.5);
         let mut point = || {

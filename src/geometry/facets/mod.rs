@@ -1,4 +1,4 @@
-//! Planar samples of the small-scale surface.
+//! Facets: planar samples of the small-scale surface (Wu et al. 2011, Sec. 3.2).
 
 pub(crate) mod kd_tree;
 pub(crate) mod normal_bins;
@@ -9,29 +9,29 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::TileMesh;
-use super::families::insides::Insides;
+use super::families::triangle_points::TrianglePoints;
 
-/// Facets or triangles that are worth a thread.
-pub(crate) const A_THREAD: usize = 2048;
+/// Minimum number of facets or triangles per parallel task.
+pub(crate) const MIN_ITEMS_PER_TASK: usize = 2048;
 
-/// Samples of the surface, one entry a facet in every array. Areas sum to the surface area of the tile.
+/// Samples of the surface, with one entry per facet in each array. Areas sum to the surface area of the tile.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Facets {
     /// Centres, wrapped into the tile in x and y.
     pub positions: Vec<Vec3>,
-    /// Unit normals that reflect: interpolated where the mesh has normals, else geometric.
+    /// Unit normals that reflect: interpolated if the mesh has vertex normals, else geometric.
     pub normals: Vec<Vec3>,
     /// Unit geometric normals.
     pub geometric_normals: Vec<Vec3>,
     /// Areas ΔA in squared tile units.
     pub areas: Vec<f32>,
-    /// MaterialSpec slot of each.
+    /// Material slot of each facet.
     pub slots: Vec<u16>,
     /// Colour weight of the tile's colour field at each centre.
     pub colors: Vec<Vec3>,
-    /// The triangle each lies on: a ray that leaves a facet ignores it.
+    /// Triangle of each facet. A ray from the facet ignores it.
     pub triangles: Vec<u32>,
-    /// Triangles of the mesh that have no area and were left out.
+    /// Number of triangles left out because they have no area.
     pub skipped_triangles: usize,
 }
 
@@ -44,35 +44,35 @@ impl Facets {
         self.positions.is_empty()
     }
 
-    /// `count` systematic samples; `seed` shifts them.
+    /// Takes `count` systematic samples; `seed` shifts them.
     pub fn sample(mesh: &TileMesh, count: usize, seed: u64) -> Self {
         FacetSampler::new(mesh).sample(mesh, count, SampleShift::from_seed(seed))
     }
 
-    /// Some of them, by their places.
-    pub fn picked(&self, places: &[usize]) -> Self {
-        fn of<T: Copy>(column: &[T], places: &[usize]) -> Vec<T> {
-            places.iter().map(|&place| column[place]).collect()
+    /// The facets with the given indices, in this order.
+    pub fn subset(&self, indices: &[usize]) -> Self {
+        fn entries<T: Copy>(column: &[T], indices: &[usize]) -> Vec<T> {
+            indices.iter().map(|&index| column[index]).collect()
         }
         Self {
-            positions: of(&self.positions, places),
-            normals: of(&self.normals, places),
-            geometric_normals: of(&self.geometric_normals, places),
-            areas: of(&self.areas, places),
-            slots: of(&self.slots, places),
-            colors: of(&self.colors, places),
-            triangles: of(&self.triangles, places),
+            positions: entries(&self.positions, indices),
+            normals: entries(&self.normals, indices),
+            geometric_normals: entries(&self.geometric_normals, indices),
+            areas: entries(&self.areas, indices),
+            slots: entries(&self.slots, indices),
+            colors: entries(&self.colors, indices),
+            triangles: entries(&self.triangles, indices),
             skipped_triangles: self.skipped_triangles,
         }
     }
 
-    /// Adds a facet at a point of a triangle; areas are filled in by the caller.
+    /// Adds a facet at a point of a triangle.
     pub(crate) fn push(&mut self, mesh: &TileMesh, triangle: u32, barycentric: Vec3, area: f32) {
         let index = triangle as usize;
-        let position = place(mesh, index, barycentric);
+        let position = point_in_tile(mesh, index, barycentric);
         let geometric = mesh.geometric_normal(index);
         self.positions.push(position);
-        self.normals.push(interpolated(mesh, index, barycentric).unwrap_or(geometric));
+        self.normals.push(interpolated_normal(mesh, index, barycentric).unwrap_or(geometric));
         self.geometric_normals.push(geometric);
         self.areas.push(area);
         self.slots.push(mesh.slot_at(index, position.truncate()));
@@ -81,21 +81,21 @@ impl Facets {
     }
 }
 
-/// The point of a triangle, in the tile.
-fn place(mesh: &TileMesh, triangle: usize, barycentric: Vec3) -> Vec3 {
+/// A point of a triangle, wrapped into the tile.
+fn point_in_tile(mesh: &TileMesh, triangle: usize, barycentric: Vec3) -> Vec3 {
     let [a, b, c] = mesh.corners(triangle);
     wrap(a * barycentric.x + b * barycentric.y + c * barycentric.z, mesh.size)
 }
 
-/// The normal between those of the corners, where the mesh has them.
-fn interpolated(mesh: &TileMesh, triangle: usize, barycentric: Vec3) -> Option<Vec3> {
+/// Interpolated normal at a point of a triangle; `None` if the mesh has no vertex normals or they cancel.
+fn interpolated_normal(mesh: &TileMesh, triangle: usize, barycentric: Vec3) -> Option<Vec3> {
     let [a, b, c] = mesh.corner_normals.as_ref()?[triangle];
     (a * barycentric.x + b * barycentric.y + c * barycentric.z).try_normalize()
 }
 
 /// Moves a position by whole tiles into `[0, size)`.
 fn wrap(position: Vec3, size: Vec2) -> Vec3 {
-    let into = |x: f32, size: f32| {
+    let wrapped_into = |x: f32, size: f32| {
         if (0.0..size).contains(&x) {
             return x;
         }
@@ -103,22 +103,23 @@ fn wrap(position: Vec3, size: Vec2) -> Vec3 {
         // A tiny negative x rounds to the size itself.
         if wrapped < size { wrapped } else { 0.0 }
     };
-    Vec3::new(into(position.x, size.x), into(position.y, size.y), position.z)
+    Vec3::new(wrapped_into(position.x, size.x), wrapped_into(position.y, size.y), position.z)
 }
 
-/// Shifts of a systematic sample, each in `[0, 1)`: the same surface sampled anew.
+/// Shifts of a systematic sample, each in `[0, 1)`. Each shift gives another sample of the same surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SampleShift {
-    /// Along the cumulative area, in strata.
+    /// Shift along the cumulative area, in strata.
     pub along: f32,
-    /// Of the points inside their triangles, on the unit torus.
+    /// Shift of the points inside their triangles, on the unit torus.
     pub inside: Vec2,
 }
 
 impl SampleShift {
-    /// The shift of pass `seed`: passes fill the unit cube evenly (an R3 sequence; Roberts 2018). Pass 0 is centred.
+    /// The shift of pass `seed`. Shifts of successive passes fill the unit cube evenly (R3 sequence; Roberts 2018).
+    /// Pass 0 is centred.
     pub fn from_seed(seed: u64) -> Self {
-        // 1/g, 1/g², 1/g³ of the real root g of x⁴ = x + 1.
+        // The steps are 1/g, 1/g² and 1/g³, with the positive root g of x⁴ = x + 1.
         let at = |step: f64| (0.5 + (seed % (1 << 40)) as f64 * step).fract() as f32;
         let below_one = |x: f32| x.min(1f32.next_down());
         Self {
@@ -128,7 +129,8 @@ impl SampleShift {
     }
 }
 
-/// The cumulative area of a mesh's triangles along a curve through normals and places: made once, sampled often.
+/// The cumulative area of a mesh's triangles along a Morton curve through normals and positions, from which facets are
+/// sampled.
 #[derive(Debug, Clone)]
 pub struct FacetSampler {
     order: Vec<u32>,
@@ -139,19 +141,19 @@ pub struct FacetSampler {
 
 impl FacetSampler {
     pub fn new(mesh: &TileMesh) -> Self {
-        let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(A_THREAD);
-        let found: Vec<Option<(u32, f64)>> = triangles.map(|triangle| stratum_and_area(mesh, triangle)).collect();
-        // The triangle's number decides between equals: the order is the same everywhere.
-        let keyed = |(triangle, found): (usize, &Option<(u32, f64)>)| {
-            found.map(|(stratum, _)| u64::from(stratum) << 32 | triangle as u64)
+        let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(MIN_ITEMS_PER_TASK);
+        let strata: Vec<Option<(u32, f64)>> = triangles.map(|triangle| stratum_and_area(mesh, triangle)).collect();
+        // Equal strata are in the order of triangles, so the order is deterministic.
+        let keyed = |(triangle, stratum): (usize, &Option<(u32, f64)>)| {
+            stratum.map(|(stratum, _)| u64::from(stratum) << 32 | triangle as u64)
         };
-        let mut keyed: Vec<u64> = found.iter().enumerate().filter_map(keyed).collect();
+        let mut keyed: Vec<u64> = strata.iter().enumerate().filter_map(keyed).collect();
         let skipped = mesh.triangles.len() - keyed.len();
         keyed.sort_unstable();
         let order: Vec<u32> = keyed.into_iter().map(|key| key as u32).collect();
         let mut sum = 0.0;
         let accumulate = |triangle: &u32| {
-            sum += found[*triangle as usize].map_or(0.0, |(_, area)| area);
+            sum += strata[*triangle as usize].map_or(0.0, |(_, area)| area);
             sum
         };
         let cumulative = order.iter().map(accumulate).collect();
@@ -163,44 +165,45 @@ impl FacetSampler {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    /// The triangle at a part `at` in `[0, 1)` of the cumulative area, and its position in the order.
+    /// The triangle at a fraction `at` in `[0, 1)` of the cumulative area.
     pub(crate) fn triangle_at(&self, at: f64) -> u32 {
         let k = self.cumulative.partition_point(|sum| *sum <= at * self.area());
         self.order[k.min(self.order.len() - 1)]
     }
 
-    /// Systematic samples: facet k lies on the triangle at `(k + shift)/count` of the cumulative area, at a point of
-    /// [`Insides`], and stands for `area/count`. Empty for a mesh without area.
+    /// Takes systematic samples. Facet k lies on the triangle at `(k + shift)/count` of the cumulative area, at a point
+    /// of [`TrianglePoints`], and represents the area `area/count`. The result is empty for a mesh without area.
     pub fn sample(&self, mesh: &TileMesh, count: usize, shift: SampleShift) -> Facets {
         let mut facets = Facets { skipped_triangles: self.skipped, ..Facets::default() };
         if self.order.is_empty() {
             return facets;
         }
-        let triangles = self.chosen(count, shift.along);
-        let insides = Insides::new(mesh, &triangles, shift.inside);
-        let each = || triangles.par_iter().with_min_len(A_THREAD).enumerate();
-        let at = |(s, triangle): (usize, &u32)| place(mesh, *triangle as usize, fold(insides.point(s)));
+        let triangles = self.triangles_of_facets(count, shift.along);
+        let points = TrianglePoints::new(mesh, &triangles, shift.inside);
+        let each = || triangles.par_iter().with_min_len(MIN_ITEMS_PER_TASK).enumerate();
+        let at = |(s, triangle): (usize, &u32)| point_in_tile(mesh, *triangle as usize, fold(points.point(s)));
         facets.positions = each().map(at).collect();
-        facets.geometric_normals = each().map(|(s, _)| insides.geometric_normal(s)).collect();
+        facets.geometric_normals = each().map(|(s, _)| points.geometric_normal(s)).collect();
         facets.normals = if mesh.corner_normals.is_some() {
             let normal = |(s, triangle): (usize, &u32)| {
-                interpolated(mesh, *triangle as usize, fold(insides.point(s)))
-                    .unwrap_or_else(|| insides.geometric_normal(s))
+                interpolated_normal(mesh, *triangle as usize, fold(points.point(s)))
+                    .unwrap_or_else(|| points.geometric_normal(s))
             };
             each().map(normal).collect()
         } else {
             facets.geometric_normals.clone()
         };
         facets.areas = vec![(self.area() / count as f64) as f32; count];
-        let places = || facets.positions.par_iter().with_min_len(A_THREAD).map(|position| position.truncate());
-        facets.slots = places().zip(&triangles).map(|(place, t)| mesh.slot_at(*t as usize, place)).collect();
-        facets.colors = places().map(|place| mesh.color.at(place, mesh.size)).collect();
+        let points =
+            || facets.positions.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(|position| position.truncate());
+        facets.slots = points().zip(&triangles).map(|(point, t)| mesh.slot_at(*t as usize, point)).collect();
+        facets.colors = points().map(|point| mesh.color.at(point, mesh.size)).collect();
         facets.triangles = triangles;
         facets
     }
 
     /// The triangle of each of `count` facets.
-    fn chosen(&self, count: usize, along: f32) -> Vec<u32> {
+    fn triangles_of_facets(&self, count: usize, along: f32) -> Vec<u32> {
         let (mut k, area) = (0, self.area());
         let next = |facet| {
             let target = (facet as f64 + f64::from(along)) / count as f64 * area;
@@ -213,41 +216,41 @@ impl FacetSampler {
     }
 }
 
-/// A triangle's place in the order and its area; none of one without area.
+/// A triangle's stratum and area, or `None` if it has no area or is not finite.
 fn stratum_and_area(mesh: &TileMesh, triangle: usize) -> Option<(u32, f64)> {
     let corners = mesh.corners(triangle);
     let normal = mesh.geometric_normal(triangle);
     let is_sound = corners.iter().all(|corner| corner.is_finite()) && normal != Vec3::ZERO;
     is_sound.then(|| {
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let place = wrap(centre, mesh.size).truncate() / mesh.size;
-        (stratum(normal, place), mesh.triangle_area(triangle))
+        let position = wrap(centre, mesh.size).truncate() / mesh.size;
+        (stratum(normal, position), mesh.triangle_area(triangle))
     })
 }
 
-/// The unit square folded onto barycentric coordinates.
+/// Folds a point of the unit square onto barycentric coordinates.
 pub(crate) fn fold(point: Vec2) -> Vec3 {
     let point = if point.x + point.y > 1.0 { Vec2::ONE - point } else { point };
     Vec3::new(1.0 - point.x - point.y, point.x, point.y)
 }
 
-/// Position along a Morton curve through normal and place together: a systematic selection along it samples evenly what
-/// lobes see (normals) and what shadows see (places). Place alone leaves three times the error on a glossy egg-crate. The
-/// rows of a height-field as they come are up to 1.9 times better where their stride is lucky (1.1 against 1.9 % for lobes
-/// behind shadow edges, 2,000 facets) and 3.5 times worse where it divides the row (8.2 against 2.4 %, 1,024 facets).
-fn stratum(normal: Vec3, place: Vec2) -> u32 {
-    let axes = [0.5 + 0.5 * normal.x, 0.5 + 0.5 * normal.y, place.x, place.y];
+/// Index along a Morton curve through normal and position. A systematic selection along this curve samples evenly the
+/// normals, which lobes depend on, and the positions, which shadows depend on. A curve through positions alone has a
+/// larger error on glossy surfaces. An order by the rows of a height field has a larger error if the stride of the
+/// selection divides the row.
+fn stratum(normal: Vec3, position: Vec2) -> u32 {
+    let axes = [0.5 + 0.5 * normal.x, 0.5 + 0.5 * normal.y, position.x, position.y];
     axes.iter().fold(0, |key, v| key << 1 | spread(((v * 256.0) as u32).min(255)))
 }
 
-/// The bits of a byte, each at the end of four.
+/// Spreads the bits of a byte to every fourth bit.
 fn spread(byte: u32) -> u32 {
     let halves = (byte | byte << 12) & 0x000f_000f;
     let pairs = (halves | halves << 6) & 0x0303_0303;
     (pairs | pairs << 3) & 0x1111_1111
 }
 
-/// `A cos θ_o` of a surface without shadows, from facets: for tests of sampling.
+/// Estimates `A cos θ_o` of a surface without shadows from facets, for tests of sampling.
 #[cfg(test)]
 pub(crate) fn unshadowed_projected_area(facets: &Facets, theta: f32, phi: f32) -> f64 {
     let o = crate::math::directions::from_angles(theta, phi).as_dvec3();

@@ -1,4 +1,4 @@
-//! Facets whose normals are nearly the same, made the same: one lobe then serves them all.
+//! Binning of facet normals: facets of one bin share a normal, so one lobe serves them all.
 
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
@@ -9,10 +9,11 @@ use crate::geometry::Facets;
 use crate::math::directions::to_angles;
 
 impl Facets {
-    /// Gives all facets of a slot within a bin their mean normal; about `bins` cells of equal size cover the sphere.
+    /// Sets the normals of all facets of a slot within a bin to their mean. About `bins` cells of equal size cover the
+    /// sphere.
     ///
-    /// Areas shrink by the length of the mean (some `Δθ²/8` of them, for bins `Δθ` wide), so that every bin keeps its projected
-    /// area in all directions.
+    /// Areas are multiplied by the length of the mean normal, which preserves the projected area of each bin in all
+    /// directions. The factor is about `1 - Δθ²/8` for bins of width `Δθ`.
     pub(crate) fn bin_normals(&mut self, bins: usize) {
         let step = (4.0 * PI / bins.max(1) as f32).sqrt();
         let mut sums: BTreeMap<(u16, u32, u32), (DVec3, f64)> = BTreeMap::new();
@@ -33,7 +34,7 @@ impl Facets {
     }
 }
 
-/// Rings of equal width, cut into cells about as long as they are wide.
+/// The bin of a normal: rings of equal width are divided into cells that are about as long as wide.
 fn cell(slot: u16, normal: Vec3, step: f32) -> (u16, u32, u32) {
     let (theta, phi) = to_angles(normal);
     let rings = (PI / step).ceil().max(1.0);
@@ -58,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn bins_keep_the_projected_area_and_leave_as_many_normals_as_asked() {
+    fn bins_preserve_the_projected_area_and_limit_the_number_of_normals() {
         let (exact, binned) = (facets(None), facets(Some(512)));
         let projected = |facets: &Facets| -> DVec3 {
             facets.normals.iter().zip(&facets.areas).map(|(n, area)| n.as_dvec3() * f64::from(*area)).sum()
@@ -69,7 +70,7 @@ mod tests {
         normals.dedup();
         assert!(normals.len() > 16 && normals.len() < 512, "{}", normals.len());
         let step = (4.0 * PI / 512.0).sqrt();
-        let furthest = exact.normals.iter().zip(&binned.normals).map(|(a, b)| a.angle_between(*b)).fold(0.0, f32::max);
-        assert!(furthest < 1.6 * step, "{furthest}");
+        let max_angle = exact.normals.iter().zip(&binned.normals).map(|(a, b)| a.angle_between(*b)).fold(0.0, f32::max);
+        assert!(max_angle < 1.6 * step, "{max_angle}");
     }
 }

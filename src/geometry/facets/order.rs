@@ -1,22 +1,22 @@
-//! Facets in the order that sums over them want: by material slot, then equal normals together.
+//! Order of facets for sums: by material slot, then by normal, so that equal normals are adjacent.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::A_THREAD;
+use super::MIN_ITEMS_PER_TASK;
 use crate::geometry::Facets;
 use crate::geometry::families::rounded::rounded;
 
 impl Facets {
-    /// Sorts by slot and normal; facets that share a normal become neighbours. Stable, so the order stays deterministic.
+    /// Sorts stably by slot and normal, so that facets that share a normal are adjacent.
     pub fn sort_for_sums(&mut self) {
         let keyed = |(s, (slot, normal)): (usize, (&u16, &Vec3))| (sum_key(*slot, *normal), s as u32);
-        let pairs = self.slots.par_iter().zip(&self.normals).with_min_len(A_THREAD);
+        let pairs = self.slots.par_iter().zip(&self.normals).with_min_len(MIN_ITEMS_PER_TASK);
         let mut order: Vec<(u64, u32)> = pairs.enumerate().map(keyed).collect();
-        // The facet's number decides between equals: as good as stable, and quicker.
+        // The facet's index breaks ties, which gives the order of a stable sort in less time.
         order.sort_unstable();
         fn permuted<T: Copy + Send + Sync>(values: &[T], order: &[(u64, u32)]) -> Vec<T> {
-            order.par_iter().with_min_len(A_THREAD).map(|&(_, s)| values[s as usize]).collect()
+            order.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(|&(_, s)| values[s as usize]).collect()
         }
         self.positions = permuted(&self.positions, &order);
         self.normals = permuted(&self.normals, &order);
@@ -28,7 +28,7 @@ impl Facets {
     }
 }
 
-/// Slot, z, y, x, the first of them first; 16 bits hold each, for normals are of unit length.
+/// Sort key of slot, z, y and x in this order, 16 bits each. Unit normals fit into 16 bits per component.
 fn sum_key(slot: u16, normal: Vec3) -> u64 {
     const STEPS: f32 = 4096.0;
     let [x, y, z] = (normal * STEPS).to_array().map(|v| u64::from(rounded(v).clamp(-0x8000, 0x7fff) as u16 ^ 0x8000));

@@ -1,4 +1,4 @@
-//! The paper's way to facets: random points, areas by nearest centre (Wu et al. 2011, Sec. 3.2).
+//! Facets as in the paper: random points, with areas from nearest centres (Wu et al. 2011, Sec. 3.2).
 
 use glam::Vec2;
 use rand::{RngExt, SeedableRng};
@@ -9,12 +9,13 @@ use super::fold;
 use super::kd_tree::KdTree;
 use crate::geometry::{FacetSampler, Facets, SampleShift, TileMesh};
 
-/// Points that vote on areas, for each facet.
+/// Number of voting points per facet.
 const VOTES_PER_FACET: usize = 64;
 
 impl Facets {
-    /// `count` facets at random points, triangles chosen by area; each stands for the part of the surface that is nearest
-    /// to its centre, found with 64 points a facet and a kd-tree. Areas sum to the tile's surface area.
+    /// Takes `count` facets at random points, with triangles chosen by area. Each facet represents the part of the
+    /// surface nearest to its centre, estimated with [`VOTES_PER_FACET`] points and a kd-tree. Areas sum to the tile's
+    /// surface area.
     pub fn sample_wu2011(mesh: &TileMesh, count: usize, seed: u64) -> Self {
         let sampler = FacetSampler::new(mesh);
         let mut facets = sampler.sample(mesh, 0, SampleShift::default());

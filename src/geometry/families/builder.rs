@@ -1,17 +1,18 @@
-//! Collects polygons into a [`TileMesh`], each moved by whole tiles so that its centre lies in the tile.
+//! A builder of a [`TileMesh`] from polygons.
 
 use glam::{DVec2, DVec3, Vec2};
 
 use crate::geometry::TileMesh;
 
-/// Positions are kept in f64 until a polygon is stored: copies that meet over the tile's edge agree to f32 rounding.
+/// Collects polygons and moves each by whole tiles so that its centre lies in the tile. Positions are f64 until a
+/// polygon is stored, so copies that meet over the tile's edge agree to f32 rounding.
 pub struct MeshBuilder {
     mesh: TileMesh,
     size: DVec2,
 }
 
 impl MeshBuilder {
-    /// `slots` name the materials; polygons refer to them by index.
+    /// Starts an empty mesh. Polygons refer to the slots by index.
     pub fn new(size: Vec2, slots: &[&str]) -> Self {
         let mesh = TileMesh {
             size,
@@ -22,7 +23,7 @@ impl MeshBuilder {
         Self { mesh, size: size.as_dvec2() }
     }
 
-    /// A convex polygon, counter-clockwise seen from the side that reflects, as a fan.
+    /// Adds a convex polygon as a triangle fan. Corners are counter-clockwise seen from the side that reflects.
     pub fn polygon(&mut self, corners: &[DVec3], slot: u16) {
         let centre = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
         let shift = (centre.truncate() / self.size).floor() * self.size;
@@ -38,6 +39,7 @@ impl MeshBuilder {
         self.mesh.notes.push(note);
     }
 
+    /// Marks the mesh as one that does not close the plane.
     pub fn leave_holes(&mut self) {
         self.mesh.closes_plane = false;
     }

@@ -1,4 +1,4 @@
-//! The plane, whole or divided into two slots.
+//! The plane, with one slot or divided between two.
 
 use glam::{DVec2, Vec2};
 
@@ -48,7 +48,7 @@ mod tests {
     use crate::geometry::closure::assert_closes_plane;
 
     #[test]
-    fn stripes_and_checks_share_the_area_as_asked() {
+    fn stripes_and_checks_share_the_area_by_the_ratio() {
         for (pattern, expected) in [(FlatPattern::Stripes, 0.3), (FlatPattern::Checks, 0.3 * 0.3 + 0.7 * 0.7)] {
             let mesh = build(&Flat { pattern, ratio: 0.3, ..Flat::default() }, Vec2::new(2.0, 1.0));
             let first: f64 = (0..mesh.triangles.len())
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plain_plane_has_the_slot_default_and_extreme_ratios_one_slot() {
+    fn a_plain_plane_has_the_slot_default_and_extreme_ratios_use_one_slot() {
         assert_eq!(build(&Flat::default(), Vec2::ONE).slots, ["default"]);
         for ratio in [0.0, 1.0] {
             let mesh = build(&Flat { pattern: FlatPattern::Stripes, ratio, ..Flat::default() }, Vec2::ONE);

@@ -1,4 +1,4 @@
-//! Parallel grooves of any direction in which the tile repeats.
+//! Parallel grooves along any direction in which the tile repeats.
 
 use std::f64::consts::PI;
 
@@ -10,10 +10,11 @@ use crate::scene::{GrooveProfile, Grooves};
 
 const BOTTOM: u16 = 0;
 const SIDES: u16 = 1;
-/// Facets of the half ellipse of a U groove.
+/// Number of segments of the half ellipse of a U groove.
 const ARC_SEGMENTS: usize = 24;
 
-/// Grooves as waves: `phase = m x / size.x + n y / size.y`, one groove a unit of phase. Whole m and n tile.
+/// Grooves as a wave: `phase = m x / size.x + n y / size.y`, with one groove per unit of phase. Whole m and n make it
+/// periodic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Wave {
     m: i64,
@@ -21,18 +22,18 @@ struct Wave {
     size: DVec2,
 }
 
-/// Grooves that cross one side of a tile at most.
+/// Maximum number of grooves that cross one side of the tile.
 const MAX_WAVES: f64 = 2048.0;
 
 impl Wave {
-    /// The wave nearest to `count` grooves across the tile, turned by `rotation_deg` from running along y.
+    /// The periodic wave nearest to `count` grooves across the tile, rotated by `rotation_deg` from the y axis.
     fn snapped(count: u32, rotation_deg: f32, size: Vec2) -> Self {
         let size = size.as_dvec2();
         let (sin, cos) = f64::from(rotation_deg).to_radians().sin_cos();
         let count = f64::from(count);
-        // Tiles a million times as long as wide would get a million grooves: those turn less.
-        let most = |waves: f64| waves.round().clamp(-MAX_WAVES, MAX_WAVES) as i64;
-        let (m, n) = (most(count * cos), most(count * sin * size.y / size.x));
+        // On a tile much longer than wide, the limit reduces the rotation instead of adding very many grooves.
+        let limited = |waves: f64| waves.round().clamp(-MAX_WAVES, MAX_WAVES) as i64;
+        let (m, n) = (limited(count * cos), limited(count * sin * size.y / size.x));
         Self { m: if (m, n) == (0, 0) { 1 } else { m }, n, size }
     }
 
@@ -51,24 +52,24 @@ impl Wave {
     }
 }
 
-/// A corner of the cross-section: phase within one period and height, and the slot of the segment that follows.
+/// A corner of the cross-section: phase within one period, height, and slot of the segment that follows.
 type ProfilePoint = (f64, f64, u16);
 
-/// The cross-section of grooves, for what is made of it besides the mesh.
+/// The cross-section of grooves, for exports of the tile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CrossSection {
-    /// Corners over one period, `(x, z)` in tile units, and the slot (`bottom`, `sides`) of the piece that follows.
+pub struct GrooveCrossSection {
+    /// Corners over one period, `(x, z)` in tile units, and the slot (`bottom` or `sides`) of the segment that follows.
     pub points: Vec<(DVec2, u16)>,
     /// Distance between grooves.
     pub pitch: f64,
-    /// Grooves on the tile, across their run.
+    /// Number of grooves on the tile.
     pub count: usize,
-    /// Length of each on the tile.
+    /// Length of each groove on the tile.
     pub length: f64,
 }
 
-impl CrossSection {
-    /// Of the grooves as they fit the tile.
+impl GrooveCrossSection {
+    /// The cross-section of the grooves as they fit the tile.
     pub fn of(spec: &Grooves, size: Vec2) -> Self {
         let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
         let pitch = wave.pitch();
@@ -82,8 +83,8 @@ impl CrossSection {
 pub fn build(spec: &Grooves, size: Vec2) -> TileMesh {
     let wave = Wave::snapped(spec.count, spec.rotation_deg, size);
     let mut builder = MeshBuilder::new(size, &["bottom", "sides"]);
-    let turned = (wave.rotation_deg() - f64::from(spec.rotation_deg) + 180.0).rem_euclid(360.0) - 180.0;
-    if turned.abs() > 0.05 || spec.rotation_deg != 0.0 {
+    let rotation_error_deg = (wave.rotation_deg() - f64::from(spec.rotation_deg) + 180.0).rem_euclid(360.0) - 180.0;
+    if rotation_error_deg.abs() > 0.05 || spec.rotation_deg != 0.0 {
         builder.note(format!(
             "grooves run at {:.2} degrees, {:.4} apart, so that the tile repeats (asked for: {} degrees)",
             wave.rotation_deg(),
@@ -95,7 +96,8 @@ pub fn build(spec: &Grooves, size: Vec2) -> TileMesh {
     builder.finish()
 }
 
-/// The cross-section over one period, from phase 0 to phase 1; the groove stands in the middle, land at z = 0.
+/// The cross-section over one period, from phase 0 to phase 1. The groove is in the middle, with land at z = 0 on both
+/// sides.
 fn profile(spec: &Grooves, pitch: f64) -> Vec<ProfilePoint> {
     let depth = f64::from(spec.depth);
     let bottom = match spec.profile {
@@ -113,7 +115,7 @@ fn profile(spec: &Grooves, pitch: f64) -> Vec<ProfilePoint> {
         points.extend((0..=ARC_SEGMENTS).map(|k| {
             let angle = PI * k as f64 / ARC_SEGMENTS as f64;
             let slot = if (ARC_SEGMENTS / 4..ARC_SEGMENTS * 3 / 4).contains(&k) { BOTTOM } else { SIDES };
-            // sin π is not quite 0.
+            // In floating point, sin π is not 0.
             let z = if k == ARC_SEGMENTS { 0.0 } else { -depth * angle.sin() };
             (0.5 - 0.5 * bottom * angle.cos(), z, slot)
         }));
@@ -127,27 +129,28 @@ fn profile(spec: &Grooves, pitch: f64) -> Vec<ProfilePoint> {
         ]);
     }
     points.push((1.0, 0.0, SIDES));
-    points.dedup_by(|next, kept| {
-        (next.0 - kept.0).abs() < 1e-12 && next.1 == kept.1 && {
-            kept.2 = next.2;
+    points.dedup_by(|next, previous| {
+        (next.0 - previous.0).abs() < 1e-12 && next.1 == previous.1 && {
+            previous.2 = next.2;
             true
         }
     });
     points
 }
 
-/// Sweeps the cross-section along the grooves over one period of the plane: a parallelogram spanned by the shortest
-/// period along the grooves and one across them, cut into pieces whose corners meet those of their neighbours.
+/// Sweeps the cross-section along the grooves over one period of the plane, a parallelogram. The shortest period along
+/// the grooves and one across them span it. It is cut into pieces, and their corners coincide with those of their
+/// neighbours.
 fn extrude(builder: &mut MeshBuilder, wave: &Wave, profile: &[ProfilePoint]) {
     let (grooves, a, b) = bezout(wave.m, wave.n);
     let mut along = DVec2::new((wave.n / grooves) as f64, -(wave.m / grooves) as f64) * wave.size;
-    // A lattice vector that climbs `grooves` units of phase: with `along` it spans one tile's area.
+    // A lattice vector over `grooves` units of phase. With `along`, it spans the area of one tile.
     let across = DVec2::new(a as f64, b as f64) * wave.size;
     if across.perp_dot(along) < 0.0 {
         along = -along;
     }
     let pieces = (along.length() / (0.25 * wave.size.min_element())).ceil().clamp(1.0, 4096.0);
-    // Shifting by whole pieces keeps corners on corners and makes the parallelogram nearly a rectangle.
+    // A shear by whole pieces keeps corners on corners and makes the parallelogram nearly a rectangle.
     let skew = (across.dot(along) / along.length_squared() * pieces).round() / pieces;
     let across = (across - skew * along) / grooves as f64;
     for groove in 0..grooves {
@@ -166,7 +169,7 @@ fn extrude(builder: &mut MeshBuilder, wave: &Wave, profile: &[ProfilePoint]) {
     }
 }
 
-/// `(g, a, b)` with `a m + b n = g`, g the greatest common divisor, positive.
+/// Returns `(g, a, b)` with `a m + b n = g` and the positive greatest common divisor g.
 fn bezout(m: i64, n: i64) -> (i64, i64, i64) {
     let (mut old, mut new) = ((m, 1, 0), (n, 0, 1));
     while new.0 != 0 {
@@ -204,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn rotated_grooves_still_tile_and_keep_the_base_area() {
+    fn rotated_grooves_are_periodic_and_preserve_the_base_area() {
         for (count, rotation_deg, size) in [
             (4, 30.0, Vec2::ONE),
             (7, -61.0, Vec2::new(1.0, 0.6)),
@@ -221,8 +224,8 @@ mod tests {
     }
 
     #[test]
-    fn a_u_groove_of_many_facets_nears_the_half_cylinder() {
-        // Opening 0.8, depth 0.4: a half circle of radius 0.4, arc 0.4 π, land 0.2.
+    fn the_area_of_a_u_groove_is_close_to_that_of_a_half_cylinder() {
+        // The opening of 0.8 and the depth of 0.4 give a half circle of radius 0.4: an arc of 0.4 π, and land of 0.2.
         let spec = Grooves { profile: GrooveProfile::U, depth: 0.4, bottom_width: 0.8, count: 1, ..Grooves::default() };
         let expected = 0.4 * PI + 0.2;
         assert!((area(&build(&spec, Vec2::ONE)) - expected).abs() < 2e-3 * expected);

@@ -1,4 +1,4 @@
-//! Height-fields from images or lists of values.
+//! Height fields from images or lists of values.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ pub fn build(spec: &Heightfield, size: Vec2, base_dir: &Path) -> Result<TileMesh
     Ok(from_grid(HeightGrid { size: pixels.size, heights: pixels.values }, size))
 }
 
-/// As [`build`], from heights in memory.
+/// Builds the mesh as [`build`] does, from heights in memory.
 pub fn build_painted(spec: &Heightfield, size: Vec2, painted: &Pixels<f32>) -> TileMesh {
     let heights = painted.values.iter().map(|height| height * spec.height_scale).collect();
     from_grid(HeightGrid { size: painted.size, heights }, size)
@@ -42,7 +42,8 @@ fn from_rows(rows: &[Vec<f32>]) -> Result<Pixels<f32>> {
     Ok(Pixels { size: UVec2::new(width as u32, rows.len() as u32), values: rows.concat() })
 }
 
-/// Two triangles a cell, between samples; the last row and column reach over the tile's edge to the first.
+/// Builds the mesh with two triangles per cell between samples. The last row and column reach over the tile's edge to
+/// the first.
 pub fn from_grid(grid: HeightGrid, size: Vec2) -> TileMesh {
     let positions: Vec<Vec3> = positions(&grid, size).collect();
     let triangles: Vec<[u32; 3]> = triangles(grid.size).collect();
@@ -70,7 +71,8 @@ fn positions(grid: &HeightGrid, size: Vec2) -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// The cell between samples (i, j) and (i + 1, j + 1) has the triangles `2 (j width + i)` and the next.
+/// Triangles of all cells. The cell between samples (i, j) and (i + 1, j + 1) has the triangles `2 (j width + i)` and
+/// the next.
 fn triangles(size: UVec2) -> impl Iterator<Item = [u32; 3]> {
     let index = move |i: u32, j: u32| j * (size.x + 1) + i;
     let cell = move |i, j| {
@@ -80,20 +82,20 @@ fn triangles(size: UVec2) -> impl Iterator<Item = [u32; 3]> {
     (0..size.y).flat_map(move |j| (0..size.x).flat_map(move |i| cell(i, j)))
 }
 
-/// Is it what [`from_grid`] makes of its samples, all of them finite?
-pub(super) fn is_made_of(mesh: &TileMesh, grid: &HeightGrid) -> bool {
+/// Returns whether the mesh equals that of [`from_grid`] for these samples, and all of them are finite.
+pub(super) fn is_mesh_of(mesh: &TileMesh, grid: &HeightGrid) -> bool {
     mesh.positions.iter().all(|position| position.is_finite())
         && positions(grid, mesh.size).eq(mesh.positions.iter().copied())
         && triangles(grid.size).eq(mesh.triangles.iter().copied())
 }
 
-/// A height-field from a function of tile coordinates: for tests and examples.
+/// Builds a height field from a function of tile coordinates, for tests and examples.
 pub fn from_function(samples: UVec2, size: Vec2, height: impl Fn(Vec2) -> f32) -> TileMesh {
     let at = |k: u32| Vec2::new((k % samples.x) as f32 + 0.5, (k / samples.x) as f32 + 0.5) / samples.as_vec2() * size;
     from_grid(HeightGrid { size: samples, heights: (0..samples.x * samples.y).map(|k| height(at(k))).collect() }, size)
 }
 
-/// GridCoordinates of the samples: `((i+½)/w, (j+½)/h)` of the tile.
+/// Position of a sample: `((i+½)/w, (j+½)/h)` of the tile, at its height.
 pub fn sample_position(grid: &HeightGrid, index: usize, size: Vec2) -> Vec3 {
     let (i, j) = (index % grid.size.x as usize, index / grid.size.x as usize);
     ((Vec2::new(i as f32, j as f32) + 0.5) * size / grid.size.as_vec2()).extend(grid.heights[index])
@@ -105,7 +107,7 @@ mod tests {
     use crate::geometry::closure::assert_closes_plane;
 
     #[test]
-    fn samples_sit_at_texel_centres_with_row_0_at_y_0() {
+    fn samples_lie_at_texel_centres_with_row_0_at_y_0() {
         let spec = Heightfield {
             values: Some(vec![vec![1.0, 2.0], vec![3.0, 4.0], vec![5.0, 6.0]]),
             height_scale: 0.5,
@@ -123,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn any_grid_closes_the_plane_without_overhang() {
+    fn any_grid_closes_the_plane_without_overhangs() {
         for samples in [UVec2::new(1, 1), UVec2::new(2, 5), UVec2::new(33, 17)] {
             let mesh = from_function(samples, Vec2::new(1.0, 0.7), |p| (p.x * 12.0).sin() * (p.y * 31.0).cos());
             assert_closes_plane(&mesh);

@@ -1,4 +1,4 @@
-//! A tile from an OBJ file, in tile coordinates.
+//! A tile mesh from an OBJ file in tile coordinates.
 
 use std::path::Path;
 
@@ -8,6 +8,7 @@ use crate::base::Result;
 use crate::geometry::{TileMesh, closure, obj};
 use crate::scene::{MeshFile, files};
 
+/// Maximum size of a file, in bytes.
 const MAX_FILE: u64 = 1 << 30;
 
 pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
@@ -21,7 +22,7 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         ..TileMesh::default()
     };
     if file.triangles.iter().flatten().any(|corner| corner.normal.is_some()) {
-        // Triangles with a corner that has no normal are flat: their corners get the geometric one.
+        // If a corner of a triangle has no normal, all its corners get the geometric normal.
         let shading = |triangle: &[obj::ObjCorner; 3]| -> [Vec3; 3] {
             let [a, b, c] = triangle.map(|corner| file.positions[corner.position as usize]);
             let flat = (b - a).as_dvec3().cross((c - a).as_dvec3()).try_normalize().unwrap_or_default().as_vec3();
@@ -69,14 +70,14 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_with_holes_says_so() {
+    fn a_mesh_with_holes_has_a_note() {
         let mesh = load("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").unwrap();
         assert!(!mesh.closes_plane);
         assert!(mesh.notes[0].contains("open edges"));
     }
 
     #[test]
-    fn normals_are_those_of_the_file_and_never_invented() {
+    fn corner_normals_come_only_from_the_file() {
         assert_eq!(load(PLANE).unwrap().corner_normals, None);
         let tilted = "vn 1 0 1\nusemtl a\nf 1//1 2//1 3//1\nf 1 3 4\n";
         let normals = load(&format!("{PLANE}{tilted}")).unwrap().corner_normals.unwrap();

@@ -1,4 +1,4 @@
-//! Pyramids on a floor that is cut out under them: a height-field without buried parts.
+//! Pyramids on a floor that is cut out under them, so that the mesh is a height field without hidden parts.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,7 +10,7 @@ use crate::scene::{Arrangement, Pyramids};
 
 const FACES: u16 = 0;
 const FLOOR: u16 = 1;
-/// Cells along each side of the tile at most.
+/// Maximum number of cells along each side of the tile.
 const MAX_CELLS: f64 = 64.0;
 
 pub fn build(spec: &Pyramids, size: Vec2) -> TileMesh {
@@ -48,30 +48,31 @@ pub fn build(spec: &Pyramids, size: Vec2) -> TileMesh {
     builder.finish()
 }
 
-/// One pyramid and where its like stand, for what is made of it besides the mesh. Tile units.
+/// The shape of the pyramids and their centres, for exports of the tile. Lengths are in tile units.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OnePyramid {
-    /// Corners of the base and of the cut tip about the centre, counter-clockwise.
+pub struct PyramidLayout {
+    /// Corners of the base about the centre, counter-clockwise.
     pub base: Vec<DVec2>,
+    /// Corners of the cut tip about the centre, counter-clockwise.
     pub top: Vec<DVec2>,
     pub top_z: f64,
-    /// Whether the tip is cut.
+    /// True if the tip is cut.
     pub has_top: bool,
     pub centres: Vec<DVec2>,
 }
 
-impl OnePyramid {
-    /// Of the pyramids as they fit the tile.
+impl PyramidLayout {
+    /// The layout of the pyramids as they fit the tile.
     pub fn of(spec: &Pyramids, size: Vec2) -> Self {
         let lattice = Lattice::new(spec, size);
         let Pyramid { base, top, top_z } = Pyramid::fitted(spec, &lattice.cell());
-        let places = (0..lattice.rows).flat_map(|row| (0..lattice.columns).map(move |column| (column, row)));
-        let centres = places.map(|(column, row)| lattice.centre(column, row)).collect();
+        let cells = (0..lattice.rows).flat_map(|row| (0..lattice.columns).map(move |column| (column, row)));
+        let centres = cells.map(|(column, row)| lattice.centre(column, row)).collect();
         Self { base, top, top_z, has_top: spec.truncation > 0.0, centres }
     }
 }
 
-/// Where the pyramids stand.
+/// The lattice of the pyramids' centres.
 struct Lattice {
     columns: usize,
     rows: usize,
@@ -88,7 +89,7 @@ impl Lattice {
         let shifted = spec.arrangement != Arrangement::Square;
         let row_spacing = if spec.arrangement == Arrangement::Hex { spacing * 0.75f64.sqrt() } else { spacing };
         let columns = (size.x / spacing).round().clamp(1.0, MAX_CELLS);
-        // Rows that are shifted by half come in pairs.
+        // Shifted rows need an even number of rows.
         let step = if shifted { 2.0 } else { 1.0 };
         let rows = ((size.y / row_spacing / step).round() * step).clamp(step, MAX_CELLS);
         let pitch = size / DVec2::new(columns, rows);
@@ -113,11 +114,12 @@ impl Lattice {
         DVec2::new(column as f64 + shift, row as f64 + 0.5) * self.pitch
     }
 
-    /// What belongs to one pyramid, about its centre, counter-clockwise. Corners of neighbours on an edge are corners too.
+    /// The cell of one pyramid about its centre, counter-clockwise. Corners of neighbours on an edge are corners of the
+    /// cell, too.
     fn cell(&self) -> Vec<DVec2> {
         let half = 0.5 * self.pitch;
         if self.hexagonal {
-            // The Voronoi cell: corners are circumcentres of neighbouring centres.
+            // The corners of the Voronoi cell are circumcentres of neighbouring centres.
             let tip = (half.x * half.x + self.pitch.y * self.pitch.y) / (2.0 * self.pitch.y);
             let shoulder = self.pitch.y - tip;
             return vec![
@@ -151,40 +153,41 @@ struct Pyramid {
 impl Pyramid {
     fn fitted(spec: &Pyramids, cell: &[DVec2]) -> Self {
         let sides = f64::from(spec.sides);
-        let turn = f64::from(spec.rotation_deg).to_radians();
-        // A face looks along +x where the pyramid is not turned.
+        let rotation = f64::from(spec.rotation_deg).to_radians();
+        // Without rotation, a face points along +x.
         let unit: Vec<DVec2> =
-            (0..spec.sides).map(|k| DVec2::from_angle(turn + (TAU * f64::from(k) - PI) / sides)).collect();
+            (0..spec.sides).map(|k| DVec2::from_angle(rotation + (TAU * f64::from(k) - PI) / sides)).collect();
         let scale = f64::from(spec.base_size) * largest_scale(&unit, cell);
         let base: Vec<DVec2> = unit.iter().map(|corner| *corner * scale).collect();
         let ratio = f64::from(spec.face_ratio);
         let inradius = scale * (PI / sides).cos();
-        let tip = DVec2::from_angle(turn) * inradius * (1.0 - ratio) / (1.0 + ratio);
+        let tip = DVec2::from_angle(rotation) * inradius * (1.0 - ratio) / (1.0 + ratio);
         let cut = f64::from(spec.truncation);
         let top = base.iter().map(|corner| tip.lerp(*corner, cut)).collect();
         Self { base, top, top_z: f64::from(spec.height) * (1.0 - cut) }
     }
 }
 
-/// How much `polygon` can grow about the origin and stay in the convex `cell`.
+/// The largest factor by which `polygon` can grow about the origin and stay in the convex `cell`.
 fn largest_scale(polygon: &[DVec2], cell: &[DVec2]) -> f64 {
     let scale = |k: usize| {
         let (from, to) = (cell[k], cell[(k + 1) % cell.len()]);
         let outward = -(to - from).perp();
-        let reach = polygon.iter().map(|corner| corner.dot(outward)).fold(0.0, f64::max);
-        from.dot(outward) / reach
+        let extent = polygon.iter().map(|corner| corner.dot(outward)).fold(0.0, f64::max);
+        from.dot(outward) / extent
     };
     (0..cell.len()).map(scale).fold(f64::INFINITY, f64::min)
 }
 
-/// Triangles between two convex loops, the inner in the outer, both counter-clockwise, corners to corners. The edges are
-/// merged by direction, as in the lateral surface of the convex hull of both at different heights: no triangle turns over.
+/// Triangulates the area between two convex loops, the inner one inside the outer one, both counter-clockwise. The
+/// edges are merged by direction, as in the lateral surface of the convex hull of the loops at different heights, so no
+/// triangle is flipped.
 fn annulus(outer: &[DVec2], inner: &[DVec2]) -> Vec<[DVec2; 3]> {
     let mut edges = Vec::new();
     for (is_inner, corners) in [(false, outer), (true, inner)] {
         for k in 0..corners.len() {
             let edge = corners[(k + 1) % corners.len()] - corners[k];
-            // Rounded, so that edges in line share their direction.
+            // The direction is rounded, so that collinear edges share it.
             let direction = (edge.to_angle().rem_euclid(TAU) * 1e9).round() as i64 % (TAU * 1e9) as i64;
             edges.push((direction, is_inner, k));
         }
@@ -204,9 +207,9 @@ fn annulus(outer: &[DVec2], inner: &[DVec2]) -> Vec<[DVec2; 3]> {
             at_outer = next;
         }
     }
-    // Where the outlines touch, the strip between them has no width.
-    let widest = outer.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max);
-    triangles.retain(|[a, b, c]| (*b - *a).perp_dot(*c - *a) > 1e-9 * widest);
+    // Triangles without area lie between parts of the outlines that touch.
+    let max_length_squared = outer.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max);
+    triangles.retain(|[a, b, c]| (*b - *a).perp_dot(*c - *a) > 1e-9 * max_length_squared);
     triangles
 }
 
@@ -220,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_of_sides_and_arrangement_closes_the_plane_without_overhang() {
+    fn every_number_of_sides_and_arrangement_closes_the_plane_without_overhangs() {
         for sides in 3..=8 {
             for arrangement in [Arrangement::Square, Arrangement::Hex, Arrangement::Staggered] {
                 for (rotation_deg, truncation, face_ratio) in [(0.0, 0.0, 1.0), (17.0, 0.4, 3.0), (45.0, 0.0, 0.2)] {
@@ -245,9 +248,9 @@ mod tests {
     fn square_pyramids_fill_the_plane_and_have_the_closed_form_area() {
         let spec = Pyramids { height: 0.2, ..Pyramids::default() };
         let mesh = build(&spec, Vec2::ONE);
-        // No floor is left, nor triangles without area in its place.
+        // The mesh has no floor and no triangles without area.
         assert_eq!(mesh.triangles.len(), 4 * 16);
-        // Four faces of base 1/4 and slant √(h² + (1/8)²) on each of 16 cells.
+        // Each of 16 cells has four faces with base 1/4 and slant height √(h² + (1/8)²).
         let slant = (0.2f64 * 0.2 + 0.125 * 0.125).sqrt();
         assert!((slot_area(&mesh, FACES) - 16.0 * 2.0 * 0.25 * slant).abs() < 1e-5);
         assert!(slot_area(&mesh, FLOOR) < 1e-6);
@@ -255,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn hexagons_fill_a_tile_made_for_them() {
+    fn hexagons_fill_a_tile_of_matching_size() {
         let spec = Pyramids { sides: 6, arrangement: Arrangement::Hex, spacing: 0.5, ..Pyramids::default() };
         let mesh = build(&spec, Vec2::new(1.0, 3f32.sqrt()));
         assert!(slot_area(&mesh, FLOOR) < 1e-4, "{}", slot_area(&mesh, FLOOR));

@@ -1,4 +1,4 @@
-//! Tapered rods that stand on a floor and may lean over the tile's edge.
+//! Tapered rods on a floor, which may lean over the tile's edge.
 
 use std::f64::consts::TAU;
 
@@ -12,9 +12,10 @@ use crate::scene::Rods;
 
 const RODS: u16 = 0;
 const FLOOR: u16 = 1;
+/// Maximum number of rods on the tile.
 const MAX_RODS: f64 = 4000.0;
-/// No rod lies flatter than this.
-const MAX_LEAN: f64 = 85.0;
+/// Maximum angle between a rod and the normal, in degrees.
+const MAX_LEAN_DEG: f64 = 85.0;
 
 pub fn build(spec: &Rods, size: Vec2) -> TileMesh {
     let mut builder = MeshBuilder::new(size, &["rods", "floor"]);
@@ -28,32 +29,32 @@ pub fn build(spec: &Rods, size: Vec2) -> TileMesh {
     let count = count as usize;
     let segments = if count > 500 { 8 } else { 12 };
     let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
-    for foot in places(count, size, f64::from(spec.jitter), &mut random) {
-        let axis = stray(spec, &mut random);
+    for foot in feet(count, size, f64::from(spec.jitter), &mut random) {
+        let axis = random_axis(spec, &mut random);
         let variation = f64::from(spec.length_variation) * (2.0 * random.random::<f64>() - 1.0);
         let length = f64::from(spec.length) * (1.0 + variation).max(0.05);
-        rod(&mut builder, foot, axis, length, spec, segments);
+        add_rod(&mut builder, foot, axis, length, spec, segments);
     }
     builder.finish()
 }
 
-/// One place in each cell of a lattice whose rows share the rods evenly.
-fn places(count: usize, size: DVec2, jitter: f64, random: &mut ChaCha8Rng) -> Vec<DVec2> {
+/// Feet of the rods, one in each cell of a lattice. Its rows share the rods evenly.
+fn feet(count: usize, size: DVec2, jitter: f64, random: &mut ChaCha8Rng) -> Vec<DVec2> {
     let rows = ((count as f64 * size.y / size.x).sqrt().round() as usize).clamp(1, count);
-    let mut places = Vec::with_capacity(count);
+    let mut feet = Vec::with_capacity(count);
     for row in 0..rows {
         let columns = (row + 1) * count / rows - row * count / rows;
         for column in 0..columns {
-            let stray = DVec2::new(random.random(), random.random()) - 0.5;
-            let cell = DVec2::new(column as f64, row as f64) + 0.5 + jitter * stray;
-            places.push(cell * size / DVec2::new(columns as f64, rows as f64));
+            let offset = DVec2::new(random.random(), random.random()) - 0.5;
+            let cell = DVec2::new(column as f64, row as f64) + 0.5 + jitter * offset;
+            feet.push(cell * size / DVec2::new(columns as f64, rows as f64));
         }
     }
-    places
+    feet
 }
 
-/// The common axis, moved by an angle of up to `spread_deg`, evenly over the disc of angles.
-fn stray(spec: &Rods, random: &mut ChaCha8Rng) -> DVec3 {
+/// The common axis, rotated by an angle of up to `spread_deg`, uniformly over the disc of angles.
+fn random_axis(spec: &Rods, random: &mut ChaCha8Rng) -> DVec3 {
     let (lean, azimuth) = (f64::from(spec.lean_deg).to_radians(), f64::from(spec.lean_azimuth_deg).to_radians());
     let axis = from_angles(lean, azimuth);
     let (angle, around) =
@@ -61,16 +62,20 @@ fn stray(spec: &Rods, random: &mut ChaCha8Rng) -> DVec3 {
     let (across, other) = axis.any_orthonormal_pair();
     let moved = axis * angle.cos() + (across * around.cos() + other * around.sin()) * angle.sin();
     let theta = moved.truncate().length().atan2(moved.z);
-    if theta > MAX_LEAN.to_radians() { from_angles(MAX_LEAN.to_radians(), moved.y.atan2(moved.x)) } else { moved }
+    if theta > MAX_LEAN_DEG.to_radians() {
+        from_angles(MAX_LEAN_DEG.to_radians(), moved.y.atan2(moved.x))
+    } else {
+        moved
+    }
 }
 
 fn from_angles(theta: f64, phi: f64) -> DVec3 {
     DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
 }
 
-/// The mantle and tip of one rod. Its foot ends in the floor: each line of the mantle is drawn out along the axis down to
-/// z = 0, so that nothing of a leaning rod hovers and little is buried.
-fn rod(builder: &mut MeshBuilder, foot: DVec2, axis: DVec3, length: f64, spec: &Rods, segments: usize) {
+/// Adds the side and the tip of one rod. Each line of the side is extended along the axis to z = 0, so that no part of
+/// a leaning rod floats above the floor and little is below it.
+fn add_rod(builder: &mut MeshBuilder, foot: DVec2, axis: DVec3, length: f64, spec: &Rods, segments: usize) {
     let foot = foot.extend(0.0);
     let (across, other) = axis.any_orthonormal_pair();
     let ring = |radius: f64, along: f64, k: usize| {
@@ -86,7 +91,7 @@ fn rod(builder: &mut MeshBuilder, foot: DVec2, axis: DVec3, length: f64, spec: &
         })
         .collect();
     let tip: Vec<DVec3> = (0..segments).map(|k| ring(tip_radius, length, k)).collect();
-    // `any_orthonormal_pair` is right-handed with the axis: the ring runs counter-clockwise seen from the tip.
+    // `any_orthonormal_pair` is right-handed with the axis, so the ring is counter-clockwise seen from the tip.
     let is_pointed = tip_radius < 1e-3 * radius;
     for k in 0..segments {
         let next = (k + 1) % segments;
@@ -119,48 +124,48 @@ mod tests {
         };
         let mesh = build(&spec, Vec2::ONE);
         let area: f64 = (2..mesh.triangles.len()).map(|t| mesh.triangle_area(t)).sum();
-        // A prism of 12 sides: perimeter 12 · 2 r sin(π/12), base 6 r² sin(π/6).
+        // A prism of 12 sides has the perimeter 12 · 2 r sin(π/12) and the base 6 r² sin(π/6).
         let expected = 24.0 * 0.1 * (TAU / 24.0).sin() * 0.5 + 6.0 * 0.01 * 0.5;
         assert!((area - expected).abs() < 1e-5, "{area} {expected}");
     }
 
     #[test]
-    fn axes_stray_evenly_over_the_disc_of_angles() {
+    fn axes_are_uniform_over_the_disc_of_angles() {
         let spec = Rods { spread_deg: 40.0, ..Rods::default() };
         let mut rng = ChaCha8Rng::seed_from_u64(6);
         let mut counts = vec![0.0; 10 * 20];
         for _ in 0..200_000 {
-            let axis = stray(&spec, &mut rng);
+            let axis = random_axis(&spec, &mut rng);
             let ring = (axis.z.acos().to_degrees() / 40.0).powi(2) * 10.0;
-            let turn = (axis.y.atan2(axis.x) / TAU + 1.0).fract() * 20.0;
-            counts[(ring as usize).min(9) * 20 + (turn as usize).min(19)] += 1.0;
+            let azimuth = (axis.y.atan2(axis.x) / TAU + 1.0).fract() * 20.0;
+            counts[(ring as usize).min(9) * 20 + (azimuth as usize).min(19)] += 1.0;
         }
         let p = crate::testing::chi_square::p_value(&counts, &[1.0; 200]);
         assert!(p > 0.01, "{p}");
     }
 
     #[test]
-    fn mantles_face_outwards_and_tips_upwards() {
+    fn sides_face_outwards_and_tips_upwards() {
         let spec = Rods { count: 9, lean_deg: 30.0, lean_azimuth_deg: 70.0, ..Rods::default() };
         let mesh = build(&spec, Vec2::ONE);
-        // Floor 1, and every rod projects to its foot's outline: tip and mantle upwards less mantle downwards.
+        // The floor has the projected area 1, and each rod that of its foot's outline.
         let foot = 6.0 * f64::from(spec.radius).powi(2) * 0.5 / 30f64.to_radians().cos();
         let expected = 1.0 + 9.0 * foot;
         assert!((signed_projected_area(&mesh) - expected).abs() < 0.1 * 9.0 * foot);
     }
 
     #[test]
-    fn the_same_seed_gives_the_same_rods_and_another_other_ones() {
+    fn the_same_seed_gives_the_same_rods_and_another_seed_gives_others() {
         let spec = Rods::default();
         assert_eq!(build(&spec, Vec2::ONE).positions, build(&spec, Vec2::ONE).positions);
         assert_ne!(build(&spec, Vec2::ONE).positions, build(&Rods { seed: 2, ..spec }, Vec2::ONE).positions);
     }
 
     #[test]
-    fn density_counts_by_area_and_no_spread_makes_parallel_rods() {
+    fn density_times_area_is_the_count_and_no_spread_makes_parallel_rods() {
         let spec = Rods { density: Some(50.0), spread_deg: 0.0, lean_deg: 40.0, ..Rods::default() };
         let mesh = build(&spec, Vec2::new(2.0, 1.0));
-        // A rod of 12 segments: 24 triangles of mantle, 10 of tip.
+        // A rod of 12 segments has 24 triangles of side and 10 of tip.
         assert_eq!(mesh.triangles.len(), 2 + 100 * 34);
         let axis = from_angles(40f64.to_radians(), 0.0).as_vec3();
         let tips = (0..100).map(|rod| mesh.geometric_normal(2 + rod * 34 + 30));

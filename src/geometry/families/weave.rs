@@ -11,9 +11,11 @@ use crate::scene::{Backing, CrossSection, FloatPattern, Weave, WeavePattern};
 const WARP: u16 = 0;
 const WEFT: u16 = 1;
 const BACKING: u16 = 2;
-/// Pieces of a thread between two crossings, and corners of a thread's cross-section.
+/// Number of segments of a thread between two crossings.
 const STEPS: usize = 8;
+/// Number of corners of a thread's cross-section.
 const CORNERS: usize = 16;
+/// Maximum number of threads in each direction.
 const MAX_THREADS: usize = 24;
 
 pub fn build(spec: &Weave, size: Vec2) -> TileMesh {
@@ -31,9 +33,9 @@ pub fn build(spec: &Weave, size: Vec2) -> TileMesh {
     let size = size.as_dvec2();
     let pitch = size / DVec2::new(warps as f64, wefts as f64);
     let (warp_height, weft_height) = (f64::from(spec.warp_height), f64::from(spec.weft_height));
-    // Centres at a crossing are half the sum of the heights apart: the threads touch.
-    let apart = 0.5 * (warp_height + weft_height);
-    let (warp_rise, weft_rise) = (apart * f64::from(spec.crimp), apart * (1.0 - f64::from(spec.crimp)));
+    // The distance of the threads' centres at a crossing is half the sum of their heights, so the threads touch.
+    let distance = 0.5 * (warp_height + weft_height);
+    let (warp_rise, weft_rise) = (distance * f64::from(spec.crimp), distance * (1.0 - f64::from(spec.crimp)));
     let is_warp_on_top = |warp: usize, weft: usize| pattern[weft % pattern.len()][warp % pattern[0].len()];
     let warp_section = section(spec.cross_section, f64::from(spec.warp_width) * pitch.x, warp_height);
     for warp in 0..warps {
@@ -65,7 +67,7 @@ pub fn build(spec: &Weave, size: Vec2) -> TileMesh {
     };
     match backing_slot {
         Some(slot) => {
-            let lowest = -(warp_rise + 0.5 * warp_height).max(weft_rise + 0.5 * weft_height) - 0.02 * apart;
+            let lowest = -(warp_rise + 0.5 * warp_height).max(weft_rise + 0.5 * weft_height) - 0.02 * distance;
             let corner = |x: f64, y: f64| DVec3::new(x * size.x, y * size.y, lowest);
             builder.polygon(&[corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)], slot);
         }
@@ -74,7 +76,7 @@ pub fn build(spec: &Weave, size: Vec2) -> TileMesh {
     builder.finish()
 }
 
-/// Rows by weft thread, columns by warp thread: is the warp on top?
+/// The pattern by `[weft][warp]` thread: true if the warp is on top.
 fn pattern(pattern: &WeavePattern) -> Vec<Vec<bool>> {
     let repeat = |period: usize, is_warp_on_top: fn(usize, usize) -> bool| {
         (0..period).map(|weft| (0..period).map(|warp| is_warp_on_top(warp, weft)).collect()).collect()
@@ -91,13 +93,13 @@ fn pattern(pattern: &WeavePattern) -> Vec<Vec<bool>> {
     }
 }
 
-/// The number of threads nearest to `count` that is a multiple of `period`, at least one repeat.
+/// The multiple of `period` nearest to `count` threads, at least one repeat.
 fn whole_repeats(count: u32, period: usize) -> usize {
     let repeats = (count as usize + period / 2) / period;
     repeats.clamp(1, (MAX_THREADS / period).max(1)) * period
 }
 
-/// Corners of a cross-section: x to the side, y up, from the right edge over the top.
+/// Corners of a cross-section, with x to the side and y up, from the right edge over the top.
 fn section(shape: CrossSection, width: f64, height: f64) -> Vec<DVec2> {
     let corner = |k: usize| {
         let (sin, cos) = (TAU * k as f64 / CORNERS as f64).sin_cos();
@@ -115,15 +117,17 @@ fn section(shape: CrossSection, width: f64, height: f64) -> Vec<DVec2> {
     (0..CORNERS).map(corner).collect()
 }
 
-/// A corner of a thread's mantle: place along the thread in crossings, height of its centre, corner of its cross-section.
+/// A corner of a thread's surface: coordinate along the thread in crossings, height of the centre, corner of the
+/// cross-section.
 type Corner = (f64, f64, DVec2);
 
-/// Hands out the quads of one thread's mantle; `heights` are those of its centre at the crossings, in order.
+/// Calls `quad` for each quad of one thread's surface. The `heights` are those of the thread's centre at the crossings,
+/// in order.
 fn thread(heights: &[f64], section: &[DVec2], mut quad: impl FnMut(Corner, Corner, Corner, Corner)) {
     let at = |step: usize| {
         let (crossing, t) = (step / STEPS, (step % STEPS) as f64 / STEPS as f64);
         let (from, to) = (heights[crossing % heights.len()], heights[(crossing + 1) % heights.len()]);
-        // Crossings are in the middle of their cells.
+        // A crossing is at the centre of its cell.
         (step as f64 / STEPS as f64 + 0.5, from + (to - from) * 0.5 * (1.0 - (PI * t).cos()))
     };
     for step in 0..heights.len() * STEPS {
@@ -171,17 +175,22 @@ mod tests {
     }
 
     #[test]
-    fn threads_touch_where_they_cross() {
+    fn threads_touch_at_crossings() {
         let spec = Weave { warp_height: 0.1, weft_height: 0.06, crimp: 0.3, ..Weave::default() };
         let mesh = build(&spec, Vec2::ONE);
-        // Warp 0 is over weft 0 at (1/8, 1/8).
-        let near = |slot: u16, top: bool| {
-            let at_crossing = |t: &usize| mesh.triangle_slot[*t] == slot;
-            let heights = (0..mesh.triangles.len()).filter(at_crossing).flat_map(|t| mesh.corners(t));
+        // Warp 0 passes over weft 0 at (1/8, 1/8).
+        let height_at_crossing = |slot: u16, top: bool| {
+            let has_slot = |t: &usize| mesh.triangle_slot[*t] == slot;
+            let heights = (0..mesh.triangles.len()).filter(has_slot).flat_map(|t| mesh.corners(t));
             let heights = heights.filter(|p| (p.x - 0.125).abs() < 1e-4 && (p.y - 0.125).abs() < 1e-4).map(|p| p.z);
-            // The backing shares the weft's slot but is nowhere near.
+            // The backing may share the weft's slot, but it is far below.
             heights.fold(if top { f32::MIN } else { f32::MAX }, |a, b| if top { a.max(b) } else { a.min(b) })
         };
-        assert!((near(WARP, false) - near(WEFT, true)).abs() < 1e-6, "{} {}", near(WARP, false), near(WEFT, true));
+        assert!(
+            (height_at_crossing(WARP, false) - height_at_crossing(WEFT, true)).abs() < 1e-6,
+            "{} {}",
+            height_at_crossing(WARP, false),
+            height_at_crossing(WEFT, true)
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Which triangles reach into each cell of a periodic grid.
+//! Lists of the triangles that reach into each cell of a periodic grid.
 
 use std::ops::Range;
 
@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use crate::geometry::families::rounded::floored;
 
-/// Triangles that are worth a thread.
-pub(crate) const A_THREAD: usize = 2048;
+/// Minimum number of triangles per parallel task.
+pub(crate) const MIN_ITEMS_PER_TASK: usize = 2048;
 
-/// A triangle copy that reaches into a cell: its index and how many tiles the copy is moved by.
+/// A triangle copy that reaches into a cell: the triangle's index and the copy's shift in tiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CellEntry {
     pub triangle: u32,
@@ -18,7 +18,7 @@ pub(crate) struct CellEntry {
 }
 
 impl CellEntry {
-    /// The triangle, and two halves with signs.
+    /// The triangle's index, and the shift as two signed 16-bit halves.
     pub fn words(self) -> [u32; 2] {
         let [x, y] = self.shift.map(|shift| u32::from(shift.cast_unsigned()));
         [self.triangle, x | y << 16]
@@ -28,11 +28,11 @@ impl CellEntry {
 /// The lists of all cells, one after the other.
 #[derive(Debug, PartialEq)]
 pub(crate) struct CellLists {
-    /// Of each cell, and the end of the last.
+    /// Index of each cell's first entry, and the end of the last cell.
     pub starts: Vec<u32>,
-    /// Those of a cell in the order of the triangles.
+    /// Entries by cell, each cell's in the order of the triangles.
     pub entries: Vec<CellEntry>,
-    /// Highest z in each cell, of the triangles' parts anywhere (a bound).
+    /// Bound of z in each cell: the highest z of its triangles, inside the cell or outside.
     pub z_max: Vec<f32>,
 }
 
@@ -50,19 +50,19 @@ struct Bounds {
 }
 
 impl CellLists {
-    /// The lists of the triangles `solid`, in this order. Each thread makes those of a band of rows: what a list holds, and in
-    /// which order, does not depend on how many there are.
+    /// Builds the lists of the triangles `solid`, in this order. Each task builds the lists of a band of rows. The
+    /// lists do not depend on the number of threads.
     pub fn new(corners: &[[Vec3; 3]], solid: &[u32], counts: IVec2, size: Vec2) -> Self {
         let cells = Cells { corners, counts, size };
         let bounds: Vec<Bounds> =
-            solid.par_iter().with_min_len(A_THREAD).map(|triangle| cells.bounds(*triangle)).collect();
-        let bands = if solid.len() < 2 * A_THREAD { 1 } else { 2 * rayon::current_num_threads() };
-        let rows_a_band = (counts.y as usize).div_ceil(bands);
-        let (a_band, cell_total) = (rows_a_band * counts.x as usize, (counts.x * counts.y) as usize);
-        let rows = |band: usize| (band * rows_a_band) as i32..((band + 1) * rows_a_band) as i32;
-        // Two passes: count, then fill.
+            solid.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(|triangle| cells.bounds(*triangle)).collect();
+        let bands = if solid.len() < 2 * MIN_ITEMS_PER_TASK { 1 } else { 2 * rayon::current_num_threads() };
+        let rows_per_band = (counts.y as usize).div_ceil(bands);
+        let (cells_per_band, cell_total) = (rows_per_band * counts.x as usize, (counts.x * counts.y) as usize);
+        let rows = |band: usize| (band * rows_per_band) as i32..((band + 1) * rows_per_band) as i32;
+        // The first pass counts entries, the second fills them in.
         let mut starts = vec![0_u32; cell_total + 1];
-        starts[1..].par_chunks_mut(a_band).enumerate().for_each(|(band, counts)| {
+        starts[1..].par_chunks_mut(cells_per_band).enumerate().for_each(|(band, counts)| {
             cells.for_each(&bounds, rows(band), |cell, _, _| counts[cell] += 1);
         });
         for cell in 0..cell_total {
@@ -75,10 +75,13 @@ impl CellLists {
             let count = (starts[starts.len() - 1] - starts[0]) as usize;
             rest.split_off_mut(..count).unwrap_or_default()
         };
-        let ends = (0..cell_total).step_by(a_band).map(|first| (first, (first + a_band).min(cell_total)));
+        let ends =
+            (0..cell_total).step_by(cells_per_band).map(|first| (first, (first + cells_per_band).min(cell_total)));
         let parts: Vec<&mut [CellEntry]> = ends.map(|(first, end)| &starts[first..=end]).map(split).collect();
-        let filled =
-            parts.into_par_iter().zip(z_max.par_chunks_mut(a_band)).zip(starts[..cell_total].par_chunks(a_band));
+        let filled = parts
+            .into_par_iter()
+            .zip(z_max.par_chunks_mut(cells_per_band))
+            .zip(starts[..cell_total].par_chunks(cells_per_band));
         filled.enumerate().for_each(|(band, ((entries, z_max), starts))| {
             let mut next: Vec<u32> = starts.iter().map(|start| start - starts[0]).collect();
             cells.for_each(&bounds, rows(band), |cell, triangle, shift| {
@@ -99,15 +102,15 @@ impl Cells<'_> {
     fn bounds(&self, triangle: u32) -> Bounds {
         let [a, b, c] = self.corners[triangle as usize].map(|p| p.truncate());
         let (low, high) = (a.min(b).min(c) / self.size, a.max(b).max(c) / self.size);
-        // A hair wider than the bounds: rounding must not lose a copy at a cell's edge.
+        // The slack ensures that rounding does not lose a copy at a cell's edge.
         let slack = Vec2::splat(1e-3);
         let cell = |at: Vec2| IVec2::new(floored(at.x), floored(at.y));
         Bounds { triangle, first: cell(low - slack), last: cell(high + slack) }
     }
 
-    /// Calls `visit(cell, triangle, shift)` for each cell of the rows that a copy of a triangle, moved by `shift` tiles, reaches
-    /// into; cells are counted from the first of the rows. A separating-axis test on the triangle's edges drops the corners of
-    /// its bounding box.
+    /// Calls `visit(cell, triangle, shift)` for each cell of the rows and each triangle copy, moved by `shift` tiles,
+    /// that reaches into it. Cell indices start at the first of the rows. A separating-axis test on the triangle's
+    /// edges excludes cells that only its bounding box reaches.
     fn for_each(&self, bounds: &[Bounds], rows: Range<i32>, mut visit: impl FnMut(usize, u32, IVec2)) {
         for Bounds { triangle, first, last } in bounds {
             let row = first.y.rem_euclid(self.counts.y);

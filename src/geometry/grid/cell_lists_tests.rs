@@ -1,4 +1,4 @@
-//! The lists of cells against the plain way to make them.
+//! Tests of the cell lists against a sequential implementation.
 
 use glam::{IVec2, UVec2, Vec2, Vec3};
 
@@ -6,13 +6,13 @@ use super::cell_lists::{CellEntry, CellLists};
 use crate::geometry::families::heightfield;
 use crate::geometry::{PeriodicGrid, TileMesh};
 
-/// One triangle after the other, one cell after the other.
-struct Plain {
+/// Lists that a sequential loop over triangles and cells builds.
+struct Sequential {
     solid: Vec<u32>,
     lists: CellLists,
 }
 
-fn plain(mesh: &TileMesh, cells: IVec2) -> Plain {
+fn sequential(mesh: &TileMesh, cells: IVec2) -> Sequential {
     let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
     let mut solid: Vec<(f32, u32)> = (0..corners.len() as u32)
         .filter(|&t| corners[t as usize].iter().all(|p| p.is_finite()) && mesh.triangle_area(t as usize) > 0.0)
@@ -33,7 +33,7 @@ fn plain(mesh: &TileMesh, cells: IVec2) -> Plain {
     let starts = [0].into_iter().chain(ends).collect();
     let z_max = lists.iter().map(|list| list.1).collect();
     let entries = lists.into_iter().flat_map(|list| list.0).collect();
-    Plain { solid: solid.into_iter().map(|(_, t)| t).collect(), lists: CellLists { starts, entries, z_max } }
+    Sequential { solid: solid.into_iter().map(|(_, t)| t).collect(), lists: CellLists { starts, entries, z_max } }
 }
 
 fn for_each_cell(corners: &[Vec2; 3], cells: IVec2, size: Vec2, mut visit: impl FnMut(usize, IVec2)) {
@@ -68,7 +68,8 @@ fn waves(samples: UVec2) -> TileMesh {
     heightfield::from_function(samples, Vec2::new(1.0, 0.7), |p| 0.1 * (p.x * 12.0).sin() * (p.y * 31.0).cos().round())
 }
 
-/// Whole, flat, of one triangle, with triangles that have no area or no place, and with some that reach over many tiles.
+/// Height fields of several sizes, a mesh with triangles that have no area, are not finite or reach over many tiles, a
+/// mesh of one triangle, and an empty mesh.
 fn meshes() -> Vec<TileMesh> {
     let mut broken = waves(UVec2::new(60, 60));
     for (k, position) in broken.positions.iter_mut().enumerate() {
@@ -89,12 +90,12 @@ fn meshes() -> Vec<TileMesh> {
 }
 
 #[test]
-fn cells_list_the_same_triangles_in_the_same_order_as_one_after_the_other_with_any_number_of_threads() {
+fn cell_lists_equal_those_of_a_sequential_loop_for_any_number_of_threads() {
     for mesh in meshes() {
         for threads in [1, 2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for grid in pool.install(|| [PeriodicGrid::new(&mesh), PeriodicGrid::for_slices(&mesh)]) {
-                let Plain { solid, lists } = plain(&mesh, grid.cells);
+                let Sequential { solid, lists } = sequential(&mesh, grid.cells);
                 let cells = 0..lists.z_max.len();
                 let expected = cells
                     .clone()
@@ -105,8 +106,8 @@ fn cells_list_the_same_triangles_in_the_same_order_as_one_after_the_other_with_a
                     mesh.triangles.len()
                 );
                 assert_eq!(grid.z_max, lists.z_max);
-                let made = CellLists::new(&grid.corners, &solid, grid.cells, grid.cell_size);
-                assert_eq!(made, lists);
+                let built = CellLists::new(&grid.corners, &solid, grid.cells, grid.cell_size);
+                assert_eq!(built, lists);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Rays through the endlessly repeated tile.
+//! Periodic grid of the tile's triangles, and rays through the endless tiling.
 
 pub(crate) mod cell_lists;
 #[cfg(test)]
@@ -9,4 +9,4 @@ pub(crate) mod ray_cast;
 
 pub use nearest::Hit;
 pub use periodic_grid::PeriodicGrid;
-pub use ray_cast::{lifted_origins, sees};
+pub use ray_cast::{is_facet_visible, lifted_origins};

@@ -1,15 +1,15 @@
-//! What a ray from above meets first in the infinite tiling: how the tile itself is looked at.
+//! First hits of rays in the endless tiling, for images of the tile and for interreflection.
 
 use glam::Vec3;
 
 use super::periodic_grid::CellWalk;
 use crate::geometry::PeriodicGrid;
 
-/// Where a ray met the surface.
+/// The point at which a ray meets the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     pub triangle: u32,
-    /// Not wrapped into the first tile.
+    /// Position, not wrapped into the first tile.
     pub position: Vec3,
     /// Weights of the triangle's second and third corner.
     pub barycentric: [f32; 2],
@@ -21,27 +21,27 @@ impl PeriodicGrid {
         self.top
     }
 
-    /// The first triangle along the downward direction `to` from `origin`; `None` where nothing is down to `bottom`.
+    /// The first hit along the downward direction `to` from `origin`, or `None` if there is none down to `bottom`.
     pub fn nearest(&self, origin: Vec3, to: Vec3, bottom: f32) -> Option<Hit> {
         if to.z >= 0.0 {
             return None;
         }
-        // Nothing is above the top: start there.
+        // Nothing is above the top, so the walk starts there.
         let start = ((self.top - origin.z) / to.z).max(0.0);
         let origin = origin + to * start;
-        let reach = (bottom - origin.z) / to.z;
+        let max_distance = (bottom - origin.z) / to.z;
         let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
         let mut best: Option<(f32, Hit)> = None;
         let nearest_allowed = -1e-6 * self.tile_size.max_element();
         for _ in 0..MAX_CELLS {
-            if walk.entered > reach {
+            if walk.entered > max_distance {
                 break;
             }
             let (cell, tile) = walk.cell();
-            if self.z_max[cell] >= origin.z + reach * to.z {
+            if self.z_max[cell] >= origin.z + max_distance * to.z {
                 for &entry in self.entries(cell) {
                     let corners = self.copy_corners(entry, tile);
-                    if let Some((t, v, w)) = meet(origin, to, corners)
+                    if let Some((t, v, w)) = intersect(origin, to, corners)
                         && t >= nearest_allowed
                         && best.is_none_or(|(nearest, _)| t < nearest)
                     {
@@ -61,24 +61,25 @@ impl PeriodicGrid {
         best.map(|(_, hit)| hit)
     }
 
-    /// The first triangle along any direction `to` from a point on the surface, `own` left aside where the point lies on it;
-    /// `bottom` is the lowest z of the tile. `None` where the ray leaves the tiling, or is all but level and far away.
+    /// The first hit along any direction `to` from a point on the surface. The triangle `own` is ignored if the point
+    /// lies on it. `bottom` is the lowest z of the tile. `None` if the ray leaves the tiling, or is nearly horizontal
+    /// and far away.
     pub fn first_hit(&self, origin: Vec3, to: Vec3, own: u32, bottom: f32) -> Option<Hit> {
         let speed = to.truncate().length();
         let end = if to.z > 0.0 { self.top } else { bottom };
         let slab = if to.z == 0.0 { f32::INFINITY } else { ((end - origin.z) / to.z).max(0.0) };
-        let far = if speed > 1e-8 { FARTHEST_TILES * self.tile_size.max_element() / speed } else { f32::INFINITY };
-        // A floor lies exactly at the bottom.
-        let reach = slab.min(far) * (1.0 + 1e-4) + 1e-5 * self.tile_size.max_element();
+        let limit = if speed > 1e-8 { MAX_TILES * self.tile_size.max_element() / speed } else { f32::INFINITY };
+        // The slack finds a floor that lies exactly at the bottom.
+        let max_distance = slab.min(limit) * (1.0 + 1e-4) + 1e-5 * self.tile_size.max_element();
         let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
         let mut best: Option<(f32, Hit)> = None;
-        while walk.entered <= reach {
+        while walk.entered <= max_distance {
             let (cell, tile) = walk.cell();
             let lowest = if to.z > 0.0 { origin.z + walk.entered * to.z } else { f32::NEG_INFINITY };
             if self.z_max[cell] >= lowest {
                 for &entry in self.entries(cell) {
                     let corners = self.copy_corners(entry, tile);
-                    if let Some((t, v, w)) = meet(origin, to, corners)
+                    if let Some((t, v, w)) = intersect(origin, to, corners)
                         && t > 0.0
                         && best.is_none_or(|(nearest, _)| t < nearest)
                         && !(entry.triangle == own && self.lies_on(origin, corners))
@@ -100,13 +101,14 @@ impl PeriodicGrid {
     }
 }
 
-/// Rays that travel farther without leaving the tiling are given up.
-const FARTHEST_TILES: f32 = 64.0;
-/// Cells that a ray walks through at most.
+/// Maximum horizontal distance of a ray, in tiles.
+const MAX_TILES: f32 = 64.0;
+/// Maximum number of cells that a ray visits.
 const MAX_CELLS: usize = 1 << 16;
 
-/// Distance along the ray and the weights of the second and third corner (Möller and Trumbore 1997), both sides.
-fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)> {
+/// Intersects a ray with a triangle from either side: distance along the ray and weights of the second and third corner
+/// (Möller and Trumbore 1997).
+fn intersect(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)> {
     let (ab, ac) = (b - a, c - a);
     let p = to.cross(ac);
     let determinant = ab.dot(p);
@@ -114,9 +116,9 @@ fn meet(origin: Vec3, to: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, f32, f32)>
     let v = offset.dot(p) / determinant;
     let q = offset.cross(ab);
     let w = to.dot(q) / determinant;
-    // A hair of overlap, so that no ray slips between neighbours.
+    // Triangles overlap slightly, so that no ray passes between neighbours.
     let inside = v >= -1e-5 && w >= -1e-5 && v + w <= 1.0 + 1e-5;
-    // Seen along its plane, whatever the unit of length; asked last, for roots take long.
+    // Excludes rays in the triangle's plane, for any unit of length. This test is last because square roots are slow.
     if !inside || determinant.abs() <= 1e-8 * ab.length() * ac.length() {
         return None;
     }

@@ -1,4 +1,4 @@
-//! Exact visibility of the infinite tiling: any-hit rays through the periodic grid. The reference of the other routes.
+//! Exact visibility in the endless tiling by any-hit rays, the reference of the visibility algorithms.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use super::periodic_grid::CellWalk;
 use crate::geometry::{Facets, PeriodicGrid};
 
 impl PeriodicGrid {
-    /// Is the way from `origin` along the upward direction `to` blocked by any triangle but `own`?
+    /// Returns whether any triangle but `own` blocks the ray from `origin` along the upward direction `to`.
     pub fn is_blocked(&self, origin: Vec3, to: Vec3, own: u32) -> bool {
         if to.z <= 0.0 {
             return true;
@@ -18,10 +18,10 @@ impl PeriodicGrid {
         if clearance <= 0.0 {
             return false;
         }
-        let reach = clearance / rise;
+        let max_distance = clearance / rise;
         let mut walk = CellWalk::new(self, origin.truncate(), plane);
         for _ in 0..MIN_CELLS + 16 * (self.cells.x + self.cells.y) {
-            if walk.entered > reach {
+            if walk.entered > max_distance {
                 return false;
             }
             let (cell, tile) = walk.cell();
@@ -33,7 +33,7 @@ impl PeriodicGrid {
                     }
                 }
             }
-            // Straight up: one cell holds all there is to meet.
+            // A vertical ray stays in one cell.
             if speed < 1e-12 {
                 return false;
             }
@@ -43,22 +43,22 @@ impl PeriodicGrid {
     }
 }
 
-/// Cells that a ray walks through, besides those of sixteen tiles, before it counts as free: one that all but follows the
-/// horizon would never end.
+/// Minimum of the number of cells that a ray visits, besides those of sixteen tiles, before it counts as unblocked. It
+/// bounds the time of nearly horizontal rays.
 const MIN_CELLS: i32 = 16_384;
 
 impl PeriodicGrid {
-    /// Is this copy of a facet's triangle the one it lies on? Other copies block it like any other surface.
+    /// Returns whether `origin` lies on this copy of its facet's triangle. Other copies block the facet.
     pub(crate) fn lies_on(&self, origin: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
         let normal = (b - a).cross(c - a);
         normal.dot(origin - a).abs() <= normal.length() * (10.0 * LIFT * self.tile_size.length())
     }
 }
 
-/// Does the ray meet the triangle ahead of its origin? Two-sided; edges are decided by the sign of exact edge functions
-/// of the sheared corners, which two neighbours compute from the same numbers, so no ray slips between them.
+/// Returns whether the ray meets the triangle, from either side, in front of its origin. The signs of exact edge
+/// functions of the sheared corners decide. Neighbours compute these from the same numbers, so no ray passes between.
 fn meets(origin: Vec3, to: Vec3, corners: [Vec3; 3]) -> bool {
-    // Shear so that the ray becomes the z axis (to.z > 0 always).
+    // The shear makes the ray the z axis (`to.z > 0` always).
     let shear = to.truncate() / to.z;
     let [a, b, c] = corners.map(|p| {
         let q = p - origin;
@@ -77,24 +77,24 @@ fn meets(origin: Vec3, to: Vec3, corners: [Vec3; 3]) -> bool {
     height > 0.0
 }
 
-/// Length by which rays start off their facet, in units of the tile's diagonal.
+/// Distance of ray origins from their facet, in units of the tile's diagonal.
 pub(crate) const LIFT: f32 = 2e-6;
 
-/// Where rays of a facet start: lifted off on the side that reflects, so that coplanar neighbours do not block it.
+/// Ray origin of a facet, lifted off the reflecting side so that coplanar neighbours do not block it.
 pub(crate) fn lifted_origin(facets: &Facets, facet: usize, tile_diagonal: f32) -> Vec3 {
     let geometric = facets.geometric_normals[facet];
     let side = if geometric.dot(facets.normals[facet]) < 0.0 { -geometric } else { geometric };
     facets.positions[facet] + side * (LIFT * tile_diagonal)
 }
 
-/// Does facet `s` see along `to`, facing included? Exact.
-pub fn sees(grid: &PeriodicGrid, facets: &Facets, facet: usize, to: Vec3) -> bool {
+/// Returns whether a facet is visible along `to`: it faces the direction, and nothing blocks it. Exact.
+pub fn is_facet_visible(grid: &PeriodicGrid, facets: &Facets, facet: usize, to: Vec3) -> bool {
     to.z > 0.0
         && facets.normals[facet].dot(to) > 0.0
         && !grid.is_blocked(lifted_origin(facets, facet, grid.tile_size.length()), to, facets.triangles[facet])
 }
 
-/// Ray origins of all facets.
+/// Ray origins of all facets, lifted off the reflecting side.
 pub fn lifted_origins(facets: &Facets, tile_size: glam::Vec2) -> Vec<Vec3> {
     let diagonal = tile_size.length();
     (0..facets.len()).map(|s| lifted_origin(facets, s, diagonal)).collect()

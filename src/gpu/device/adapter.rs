@@ -1,46 +1,47 @@
-//! Opening a device without a window, and keeping its errors from becoming panics.
+//! Opening a GPU without a window, and reporting its errors without panics.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::gpu::GpuError;
 
-/// What this machine can run, each tier a superset of the one before.
+/// The capabilities of a machine. Each tier is a superset of the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Tier {
     /// No adapter: everything runs on the CPU.
     None,
-    /// An adapter that is the CPU in disguise (lavapipe, WARP): right, but slower than our own CPU routes.
+    /// An adapter that runs on the CPU (lavapipe, WARP): correct, but slower than the CPU twins.
     Software,
-    /// A graphics processor.
+    /// A real GPU.
     Hardware,
 }
 
 impl Tier {
-    /// The tier of a machine on which [`Gpu::open`] gave this.
+    /// Returns the tier of a machine from the result of [`Gpu::open`].
     pub fn of(gpu: Option<&Gpu>) -> Self {
         gpu.map_or(Self::None, |gpu| gpu.tier)
     }
 }
 
-/// Bytes that one storage buffer may need: a batch of shadow maps, the corners of some millions of triangles.
+/// Largest requested size of a storage buffer in bytes: a batch of shadow maps, or the corners of millions of
+/// triangles.
 const WANTED_BUFFER_BYTES: u64 = 1 << 30;
 
-/// An open device. Cheap to pass by reference; pipelines borrow it and live beside it.
+/// An open GPU: the wgpu device, its queue, and the properties of the adapter.
 #[derive(Debug)]
 pub struct Gpu {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     /// Name, driver, kind and back end of the adapter.
     pub adapter: wgpu::AdapterInfo,
-    /// What was granted: what the buffers need, or what the adapter has where that is less.
+    /// Granted limits: the requested ones, or those of the adapter if they are lower.
     pub limits: wgpu::Limits,
     pub tier: Tier,
-    /// Whether a window draws on it, too.
+    /// Whether a window also draws with this device.
     pub(super) is_shared: bool,
     faults: Arc<Mutex<Faults>>,
 }
 
-/// What the device's handlers heard.
+/// Errors that the handlers of the device received.
 #[derive(Debug, Default)]
 struct Faults {
     lost: Option<String>,
@@ -48,7 +49,7 @@ struct Faults {
 }
 
 impl Faults {
-    fn lose(&mut self, reason: wgpu::DeviceLostReason, message: &str) {
+    fn mark_lost(&mut self, reason: wgpu::DeviceLostReason, message: &str) {
         self.lost.get_or_insert_with(|| format!("{reason:?}: {message}"));
     }
 }
@@ -70,7 +71,7 @@ impl Gpu {
         Self::from_adapter(&adapter)
     }
 
-    /// What a device that is to be a [`Gpu`] must be asked for.
+    /// Returns the description of the device that a [`Gpu`] needs.
     pub fn request(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let wanted = wgpu::Limits {
             max_storage_buffer_binding_size: WANTED_BUFFER_BYTES,
@@ -79,7 +80,7 @@ impl Gpu {
         };
         wgpu::DeviceDescriptor {
             label: Some("biscale"),
-            // Times of stages are told where the adapter has a clock.
+            // Stages are timed if the adapter has timestamps.
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: wanted.or_worse_values_from(&adapter.limits()),
             memory_hints: wgpu::MemoryHints::Performance,
@@ -92,26 +93,26 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&Self::request(adapter)))
             .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), reason: e.to_string() })?;
         let gpu = Self::new(device, queue, info, false);
-        let heard = gpu.faults.clone();
+        let faults = gpu.faults.clone();
         gpu.device.on_uncaptured_error(Arc::new(move |error| {
-            let mut heard = heard.lock().unwrap_or_else(PoisonError::into_inner);
-            heard.uncaptured.get_or_insert_with(|| error.to_string());
+            let mut faults = faults.lock().unwrap_or_else(PoisonError::into_inner);
+            faults.uncaptured.get_or_insert_with(|| error.to_string());
         }));
         Ok(gpu)
     }
 
-    /// The device that a window draws on: what is made here can be shown without being read back. The window hears of
-    /// uncaptured errors itself; `lost` is told when the device is gone.
-    pub fn of_window(
+    /// Wraps the device that a window draws with, so that results can be shown without being read back. The window
+    /// handles uncaptured errors itself. `lost` is called when the device is lost.
+    pub fn from_window(
         adapter: wgpu::AdapterInfo,
         device: wgpu::Device,
         queue: wgpu::Queue,
         lost: impl Fn() + Send + Sync + 'static,
     ) -> Self {
         let gpu = Self::new(device, queue, adapter, true);
-        let heard = gpu.faults.clone();
+        let faults = gpu.faults.clone();
         gpu.device.set_device_lost_callback(move |reason, message| {
-            heard.lock().unwrap_or_else(PoisonError::into_inner).lose(reason, &message);
+            faults.lock().unwrap_or_else(PoisonError::into_inner).mark_lost(reason, &message);
             lost();
         });
         gpu
@@ -119,9 +120,9 @@ impl Gpu {
 
     fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: wgpu::AdapterInfo, is_shared: bool) -> Self {
         let faults = Arc::new(Mutex::new(Faults::default()));
-        let heard = faults.clone();
+        let handler_faults = faults.clone();
         device.set_device_lost_callback(move |reason, message| {
-            heard.lock().unwrap_or_else(PoisonError::into_inner).lose(reason, &message);
+            handler_faults.lock().unwrap_or_else(PoisonError::into_inner).mark_lost(reason, &message);
         });
         let tier = match adapter.device_type {
             wgpu::DeviceType::Cpu => Tier::Software,
@@ -130,52 +131,53 @@ impl Gpu {
         Self { limits: device.limits(), device, queue, adapter, tier, is_shared, faults }
     }
 
-    /// The adapter and its driver on one line.
+    /// Returns the adapter and its driver on one line.
     pub fn description(&self) -> String {
         let info = &self.adapter;
         format!("{} ({:?}, {} {})", info.name, info.backend, info.driver, info.driver_info)
     }
 
-    /// Runs `work` (creating resources, submitting commands) and gives back the device's complaints as an error.
-    /// `during` names the work for the message: "drawing shadow maps".
+    /// Runs `work` (creating resources, submitting commands) and returns errors of the device. `during` names the work
+    /// for the message, such as "drawing shadow maps".
     pub fn checked<T>(&self, during: &str, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
-        self.fault()?;
+        self.take_fault()?;
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let done = work();
-        let complaints = [validation, memory, internal].map(|scope| pollster::block_on(scope.pop()));
-        // A lost device makes every call invalid: say that first. Lack of memory makes what follows invalid too.
-        self.fault()?;
+        let result = work();
+        let errors = [validation, memory, internal].map(|scope| pollster::block_on(scope.pop()));
+        // A lost device makes every call invalid, so the loss is reported first. Lack of memory also makes later calls
+        // invalid.
+        self.take_fault()?;
         let memory_first = |error: &wgpu::Error| !matches!(error, wgpu::Error::OutOfMemory { .. });
-        if let Some(error) = complaints.into_iter().flatten().min_by_key(memory_first) {
+        if let Some(error) = errors.into_iter().flatten().min_by_key(memory_first) {
             return Err(match error {
                 wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory(during.to_owned()),
                 other => GpuError::Refused { during: during.to_owned(), reason: other.to_string() },
             });
         }
-        done
+        result
     }
 
-    /// Whether the device was not lost.
-    pub(super) fn is_there(&self) -> Result<(), GpuError> {
-        let heard = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
-        heard.lost.clone().map_or(Ok(()), |reason| Err(GpuError::Lost(reason)))
+    /// Returns an error if the device was lost.
+    pub(super) fn check_not_lost(&self) -> Result<(), GpuError> {
+        let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        faults.lost.clone().map_or(Ok(()), |reason| Err(GpuError::Lost(reason)))
     }
 
-    /// Takes the device for lost, if it was not yet.
-    pub(super) fn lose(&self, reason: &str) -> GpuError {
-        let mut heard = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
-        GpuError::Lost(heard.lost.get_or_insert_with(|| reason.to_owned()).clone())
+    /// Marks the device as lost and returns the error.
+    pub(super) fn mark_lost(&self, reason: &str) -> GpuError {
+        let mut faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        GpuError::Lost(faults.lost.get_or_insert_with(|| reason.to_owned()).clone())
     }
 
-    /// What the handlers have heard since the device was opened, as an error; an uncaptured one is reported once.
-    fn fault(&self) -> Result<(), GpuError> {
-        let mut heard = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(reason) = &heard.lost {
+    /// Returns the errors that the handlers received, as an error. An uncaptured error is reported once.
+    fn take_fault(&self) -> Result<(), GpuError> {
+        let mut faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(reason) = &faults.lost {
             return Err(GpuError::Lost(reason.clone()));
         }
-        match heard.uncaptured.take() {
+        match faults.uncaptured.take() {
             Some(reason) => Err(GpuError::Refused { during: "an earlier submission".to_owned(), reason }),
             None => Ok(()),
         }
@@ -205,17 +207,17 @@ mod tests {
     }
 
     #[test]
-    fn an_invalid_request_is_an_error_and_the_device_lives_on() {
+    fn after_an_invalid_request_the_device_still_works() {
         let Some(gpu) = open() else { return };
         eprintln!("adapter: {}, tier {:?}", gpu.description(), gpu.tier);
-        let nonsense =
+        let invalid =
             wgpu::ShaderModuleDescriptor { label: None, source: wgpu::ShaderSource::Wgsl("fn main( {".into()) };
-        let refused = gpu.checked("testing", || Ok(gpu.device.create_shader_module(nonsense.clone())));
+        let refused = gpu.checked("testing", || Ok(gpu.device.create_shader_module(invalid.clone())));
         assert!(matches!(refused, Err(GpuError::Refused { .. })), "{refused:?}");
-        // The same outside an error scope: the default handler would panic here.
-        let _module = gpu.device.create_shader_module(nonsense);
+        // The same request outside of an error scope, where the default handler of wgpu would panic.
+        let _module = gpu.device.create_shader_module(invalid);
         assert!(matches!(gpu.checked("testing", || Ok(())), Err(GpuError::Refused { .. })));
-        gpu.checked("testing", || Ok(())).expect("reported once, the device works");
+        gpu.checked("testing", || Ok(())).expect("reported once, the GPU works");
     }
 
     #[test]

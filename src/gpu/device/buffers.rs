@@ -1,4 +1,4 @@
-//! Plain data to the device and back.
+//! Transfers of plain data to the GPU and back.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
@@ -8,18 +8,20 @@ use bytemuck::Pod;
 
 use crate::gpu::{Gpu, GpuError};
 
-/// How long to wait for the device before it is given up.
-const PATIENCE: Duration = Duration::from_secs(300);
+/// Time after which a wait for the GPU fails.
+const WAIT_TIMEOUT: Duration = Duration::from_secs(300);
 
-/// How often a device is asked that a window uses, too, once it takes longer than this.
-const GLANCE: Duration = Duration::from_micros(200);
-const FRAME: Duration = Duration::from_millis(3);
+/// Interval between polls of a device that is shared with a window.
+const POLL_INTERVAL: Duration = Duration::from_micros(200);
+/// Time during which a wait for a shared device polls without sleeping.
+const BUSY_POLL_TIME: Duration = Duration::from_millis(3);
 
-/// Enough for one element of any of our arrays: a binding holds at least one.
+/// Smallest buffer in bytes: one element of any array in a shader, because a binding holds at least one.
 const MIN_BYTES: u64 = 256;
 
 impl Gpu {
-    /// A buffer without contents (zeros), of `bytes` rounded up to a multiple of 4; never empty, as bindings cannot be.
+    /// Creates a zeroed buffer of `bytes`, rounded up to a multiple of 4. It is never empty, because bindings cannot
+    /// be.
     pub fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
         let size = bytes.max(MIN_BYTES).next_multiple_of(4);
         let bound = usage.intersects(wgpu::BufferUsages::STORAGE);
@@ -29,10 +31,10 @@ impl Gpu {
             return Err(GpuError::TooLarge { what: label.to_owned(), needed: size, allowed });
         }
         let description = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-        self.checked(&format!("making room for {label}"), || Ok(self.device.create_buffer(&description)))
+        self.checked(&format!("allocating {label}"), || Ok(self.device.create_buffer(&description)))
     }
 
-    /// A buffer that holds `data`; `COPY_DST` is added to the usage.
+    /// Creates a buffer that holds `data`; `COPY_DST` is added to the usage.
     pub fn upload<T: Pod>(&self, label: &str, data: &[T], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let buffer = self.buffer(label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
@@ -40,7 +42,7 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// Overwrites the start of a buffer. A size that is not a multiple of 4 is refused.
+    /// Overwrites the start of a buffer. The size must be a multiple of 4.
     pub fn write<T: Pod>(&self, buffer: &wgpu::Buffer, data: &[T]) -> Result<(), GpuError> {
         self.checked("uploading", || {
             self.queue.write_buffer(buffer, 0, bytemuck::cast_slice(data));
@@ -48,7 +50,7 @@ impl Gpu {
         })
     }
 
-    /// Waits for the device and copies a whole buffer (usage `COPY_SRC`) back.
+    /// Waits for the GPU and copies a whole buffer (usage `COPY_SRC`) back.
     pub fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
         let staging = self.buffer("read-back", buffer.size(), usage)?;
@@ -60,7 +62,7 @@ impl Gpu {
         })
     }
 
-    /// Waits for the device and copies an image of four bytes a pixel (usage `COPY_SRC`) back, row by row.
+    /// Waits for the GPU and copies an image of four bytes per pixel (usage `COPY_SRC`) back, row by row.
     pub fn read_image(&self, image: &wgpu::Texture) -> Result<Vec<u8>, GpuError> {
         let size = image.size();
         let row = 4 * size.width;
@@ -82,62 +84,62 @@ impl Gpu {
         Ok(rows.flat_map(|bytes| &bytes[..row as usize]).copied().collect())
     }
 
-    /// Waits until the device has done all that was submitted.
+    /// Waits until the GPU has finished all submitted work.
     pub fn wait(&self, during: &str) -> Result<(), GpuError> {
         let (sender, receiver) = mpsc::channel();
         self.queue.on_submitted_work_done(move || {
-            // Whoever waited may have lost patience.
+            // The waiting thread may have timed out.
             let _ = sender.send(());
         });
-        self.hear(&receiver, during)
+        self.receive(&receiver, during)
     }
 
-    /// Waits for what a callback of the device says.
-    fn hear<T>(&self, told: &mpsc::Receiver<T>, during: &str) -> Result<T, GpuError> {
+    /// Waits for the value that a callback of the device sends.
+    fn receive<T>(&self, receiver: &mpsc::Receiver<T>, during: &str) -> Result<T, GpuError> {
         let refused = |reason: String| GpuError::Refused { during: during.to_owned(), reason };
-        let timeout = || GpuError::Timeout { during: during.to_owned(), seconds: PATIENCE.as_secs() };
+        let timeout = || GpuError::Timeout { during: during.to_owned(), seconds: WAIT_TIMEOUT.as_secs() };
         if !self.is_shared {
-            if !self.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) })? {
+            if !self.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(WAIT_TIMEOUT) })? {
                 return Err(timeout());
             }
-            return told.try_recv().map_err(|e| refused(e.to_string()));
+            return receiver.try_recv().map_err(|e| refused(e.to_string()));
         }
-        // A wait inside the driver would hold up what the window submits meanwhile.
+        // A wait inside the driver would delay submissions of the window.
         let start = Instant::now();
-        while start.elapsed() < PATIENCE {
+        while start.elapsed() < WAIT_TIMEOUT {
             self.poll(wgpu::PollType::Poll)?;
-            match told.try_recv() {
-                Ok(answer) => return Ok(answer),
+            match receiver.try_recv() {
+                Ok(value) => return Ok(value),
                 Err(mpsc::TryRecvError::Empty) => {}
                 Err(error) => return Err(refused(error.to_string())),
             }
-            // A frame is worth some turns of a core; longer work is not.
-            if start.elapsed() < FRAME { std::thread::yield_now() } else { std::thread::sleep(GLANCE) }
+            // Polling without sleep costs a core, so only short work is waited for in this way.
+            if start.elapsed() < BUSY_POLL_TIME { std::thread::yield_now() } else { std::thread::sleep(POLL_INTERVAL) }
         }
         Err(timeout())
     }
 
-    /// Lets the device tell what it has done; whether it did in time. A device that is gone is an error here, where wgpu
-    /// panics.
+    /// Polls the device for finished work and returns whether it finished in time. A lost device is an error here,
+    /// while wgpu panics.
     ///
     /// # Errors
     /// [`GpuError::Lost`], [`GpuError::Refused`].
-    pub fn poll(&self, how: wgpu::PollType) -> Result<bool, GpuError> {
-        self.is_there()?;
-        match catch_unwind(AssertUnwindSafe(|| self.device.poll(how))) {
-            Ok(Ok(_)) => self.is_there().map(|()| true),
+    pub fn poll(&self, poll_type: wgpu::PollType) -> Result<bool, GpuError> {
+        self.check_not_lost()?;
+        match catch_unwind(AssertUnwindSafe(|| self.device.poll(poll_type))) {
+            Ok(Ok(_)) => self.check_not_lost().map(|()| true),
             Ok(Err(wgpu::PollError::Timeout)) => Ok(false),
             Ok(Err(other)) => Err(GpuError::Refused { during: "waiting".to_owned(), reason: other.to_string() }),
-            Err(_) => Err(self.lose("its driver gave it up")),
+            Err(_) => Err(self.mark_lost("its driver stopped")),
         }
     }
 
-    /// Waits for the device and copies a mappable buffer's contents out.
+    /// Waits for the GPU and returns the contents of a mappable buffer.
     pub fn map<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
         let refused = |reason: String| GpuError::Refused { during: "reading back".to_owned(), reason };
         let (sender, receiver) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |answer| drop(sender.send(answer)));
-        self.hear(&receiver, "reading back")?.map_err(|error| refused(error.to_string()))?;
+        staging.map_async(wgpu::MapMode::Read, .., move |value| drop(sender.send(value)));
+        self.receive(&receiver, "reading back")?.map_err(|error| refused(error.to_string()))?;
         let view = staging.get_mapped_range(..).map_err(|e| refused(e.to_string()))?;
         let values = bytemuck::pod_collect_to_vec(&view[..view.len() / size_of::<T>() * size_of::<T>()]);
         drop(view);
@@ -151,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_goes_up_comes_back() {
+    fn uploaded_data_reads_back_unchanged() {
         let gpu = match Gpu::open() {
             Ok(gpu) => gpu,
             Err(error) => return eprintln!("SKIPPED: {error}"),

@@ -1,15 +1,13 @@
-//! The graphics processor: one device without a window, plain WGSL shaders, buffers up and down.
+//! GPU access: opening a GPU, WGSL shaders, pipelines, and buffer transfers.
 //!
-//! What the machine has is decided once, as a [`Tier`], when [`Gpu::open`] is called; nothing else asks for features.
-//! Every stage that runs here has a twin on the CPU, and no failure here is a panic: [`GpuError`] says what happened and
-//! the caller falls back.
+//! [`Gpu::open`] determines the [`Tier`] of the machine once; no other code tests for features. No failure of the GPU
+//! is a panic: functions return a [`GpuError`], and the caller falls back to the CPU twin.
 
 mod adapter;
 mod buffers;
-mod error;
 pub mod pipelines;
 mod shaders;
 
+pub use crate::base::GpuError;
 pub use adapter::{Gpu, Tier};
-pub use error::GpuError;
 pub use shaders::{SHADERS, Swaps, shader_source, swapped_source};

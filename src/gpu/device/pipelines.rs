@@ -1,4 +1,4 @@
-//! Shader modules, bindings and pipelines in few words. Bindings are numbered in order.
+//! Creation of shader modules, bindings and pipelines. Bindings are numbered in order.
 
 use crate::gpu::{Gpu, GpuError, Swaps, swapped_source};
 
@@ -14,12 +14,12 @@ const fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
 }
 
 impl Gpu {
-    /// Compiles `shaders/name.wgsl` with its imports.
+    /// Compiles a shader with its imports.
     pub fn module(&self, name: &str) -> Result<wgpu::ShaderModule, GpuError> {
         self.swapped_module(name, &[])
     }
 
-    /// Compiles `shaders/name.wgsl` with its imports, some of them swapped ([`swapped_source`]).
+    /// Compiles a shader with its imports, some of them swapped ([`swapped_source`]).
     pub fn swapped_module(&self, name: &str, swaps: Swaps<'_>) -> Result<wgpu::ShaderModule, GpuError> {
         let description = wgpu::ShaderModuleDescriptor {
             label: Some(name),
@@ -28,7 +28,7 @@ impl Gpu {
         self.checked(&format!("compiling the shader {name}"), || Ok(self.device.create_shader_module(description)))
     }
 
-    /// The layout of one group of bindings, seen by `stages`.
+    /// Creates the layout of one group of bindings that `stages` can access.
     pub fn layout(
         &self,
         label: &str,
@@ -43,7 +43,7 @@ impl Gpu {
         self.checked(&format!("laying out {label}"), || Ok(self.device.create_bind_group_layout(&description)))
     }
 
-    /// A group of bindings in the order of its layout.
+    /// Creates a group of bindings in the order of its layout.
     pub fn group(
         &self,
         label: &str,
@@ -57,7 +57,7 @@ impl Gpu {
         self.checked(&format!("binding {label}"), || Ok(self.device.create_bind_group(&description)))
     }
 
-    /// The layout of pipelines that have these groups of bindings.
+    /// Creates the layout of pipelines that have these groups of bindings.
     pub fn pipeline_layout(&self, groups: &[&wgpu::BindGroupLayout]) -> Result<wgpu::PipelineLayout, GpuError> {
         let groups: Vec<_> = groups.iter().copied().map(Some).collect();
         let description =
@@ -65,7 +65,7 @@ impl Gpu {
         self.checked("laying out a pipeline", || Ok(self.device.create_pipeline_layout(&description)))
     }
 
-    /// A compute pipeline of one entry point.
+    /// Creates a compute pipeline of one entry point.
     pub fn compute_pipeline(
         &self,
         module: &wgpu::ShaderModule,
@@ -75,7 +75,7 @@ impl Gpu {
         self.compute_pipeline_with(module, entry_point, groups, &[])
     }
 
-    /// A compute pipeline of one entry point with some of the module's overridable constants set.
+    /// Creates a compute pipeline of one entry point with values for some of the module's overridable constants.
     pub fn compute_pipeline_with(
         &self,
         module: &wgpu::ShaderModule,

@@ -1,7 +1,7 @@
-//! Room on the device for one picture: its samples, and the points of a band of its rows.
+//! GPU buffers of one image: its samples, and the points of a band of its rows.
 //!
-//! Bands go through the same buffers one after the other, so that memory is bounded; what tells them apart is in small
-//! uniform blocks, all written before the submission.
+//! Bands use the same buffers in turn, so that memory is bounded. The parameters of each band are in small uniform
+//! blocks of its own, which are written before the submission.
 
 use std::ops::Range;
 
@@ -11,28 +11,28 @@ use super::image::GpuImages;
 use super::light_rays::{GpuLightRays, GpuOccluder};
 use crate::gpu::shading::{GpuShading, Light, MAX_POINTS};
 use crate::gpu::{Gpu, GpuError, Tier, shading};
-use crate::render::shadow::Visible;
+use crate::render::shadow::LightVisibility;
 
-/// Bytes of the buffers that bands share.
+/// Largest size of the buffers that bands share, in bytes.
 const BAND_BYTES: usize = 256 << 20;
-/// Threads that keep a graphics processor busy: so many points need no further slices of the lights.
-const BUSY: usize = 1 << 20;
-/// Lights of a slice. On software Vulkan never more: see `SOFTWARE_FACETS` in gpu_shading/direct.rs.
+/// Number of threads that keeps a GPU busy. Images with that many points need no slices of the lights.
+const BUSY_THREADS: usize = 1 << 20;
+/// Smallest number of lights per slice; on a software adapter also the largest (see `SOFTWARE_FACETS`).
 const MIN_SLICE: usize = 8;
 
-/// What the room is for.
+/// The properties of an image that determine its buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Need {
-    /// Pixels.
+pub(super) struct BufferSizes {
+    /// Width and height in pixels.
     pub size: [usize; 2],
     pub samples_per_side: usize,
     pub lights: usize,
-    /// The most points of a band, as far as work goes.
+    /// Largest number of points of a band, to bound its work.
     pub points: usize,
 }
 
 /// The parts of a renderer that bands are bound to.
-pub(super) struct Parts<'a> {
+pub(super) struct RendererParts<'a> {
     pub gbuffer: &'a GpuGBuffer,
     pub object: &'a GpuObject,
     pub rays: Option<&'a (GpuLightRays, GpuOccluder)>,
@@ -41,25 +41,25 @@ pub(super) struct Parts<'a> {
 }
 
 #[derive(Debug)]
-pub(super) struct Room {
-    pub need: Need,
+pub(super) struct RenderBuffers {
+    pub sizes: BufferSizes,
     pub samples: GpuSamples,
-    /// Lights that one thread adds up, and rows of radiance.
+    /// Lights per thread, and rows of radiance.
     pub slice: u32,
     pub slices: u32,
     pub words: u32,
     pub lights: wgpu::Buffer,
     pub radiance: wgpu::Buffer,
-    /// Points of the last band, and where their rays start.
+    /// Points of the last band, and the starts of their shadow rays.
     #[cfg(test)]
-    pub found: [wgpu::Buffer; 2],
-    /// Of the samples, the points and where their rays start.
+    pub points_and_origins: [wgpu::Buffer; 2],
+    /// Bindings of the samples, the points and the starts of shadow rays.
     pub to_points: wgpu::BindGroup,
     pub to_bits: Option<wgpu::BindGroup>,
     pub bands: Vec<Band>,
 }
 
-/// Rows of pixels.
+/// A band of rows of pixels.
 #[derive(Debug)]
 pub(super) struct Band {
     pub rows: Range<usize>,
@@ -72,46 +72,46 @@ pub(super) struct Band {
     pub pixels: wgpu::BindGroup,
 }
 
-impl Room {
-    pub fn new(gpu: &Gpu, need: Need, parts: &Parts) -> Result<Self, GpuError> {
+impl RenderBuffers {
+    pub fn new(gpu: &Gpu, sizes: BufferSizes, parts: &RendererParts) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let [width, height] = need.size;
-        let slots = need.samples_per_side * need.samples_per_side;
+        let [width, height] = sizes.size;
+        let slots = sizes.samples_per_side * sizes.samples_per_side;
         let shadowed = parts.rays.is_some();
-        let words = if shadowed { Visible::words_of(need.lights) } else { 0 };
-        let most_slices = need.lights.div_ceil(MIN_SLICE).max(1);
+        let words = if shadowed { LightVisibility::words_of(sizes.lights) } else { 0 };
+        let max_slices = sizes.lights.div_ceil(MIN_SLICE).max(1);
         let slices = match gpu.tier {
             Tier::Hardware => {
-                (BUSY / (width * height * slots).min(need.points.max(width * slots))).clamp(1, most_slices)
+                (BUSY_THREADS / (width * height * slots).min(sizes.points.max(width * slots))).clamp(1, max_slices)
             }
-            _ => most_slices,
+            _ => max_slices,
         };
-        let slice = need.lights.div_ceil(slices).max(1);
-        let slices = need.lights.div_ceil(slice).max(1);
+        let slice = sizes.lights.div_ceil(slices).max(1);
+        let slices = sizes.lights.div_ceil(slice).max(1);
         let bytes = size_of::<Point>() + 16 + 16 * slices + 4 * words + 4;
-        let a_row = width * slots;
-        if a_row > MAX_POINTS || slices > 65_535 {
-            let what = format!("{} lights on {width} pixels a row", need.lights);
+        let points_per_row = width * slots;
+        if points_per_row > MAX_POINTS || slices > 65_535 {
+            let what = format!("{} lights on {width} pixels per row", sizes.lights);
             return Err(GpuError::Unsupported(what));
         }
-        let rows = need.points.min(BAND_BYTES / bytes).min(MAX_POINTS) / a_row;
+        let rows = sizes.points.min(BAND_BYTES / bytes).min(MAX_POINTS) / points_per_row;
         let rows = rows.clamp(1, height);
-        let most = (rows * a_row) as u64;
+        let max_points = (rows * points_per_row) as u64;
 
-        let samples = GpuSamples::new(gpu, need.size.map(|side| side * need.samples_per_side))?;
-        let room = |label, bytes| gpu.buffer(label, bytes, Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
-        let lights = room("lights", (size_of::<Light>() * need.lights) as u64)?;
-        let points = room("shading points", size_of::<Point>() as u64 * most)?;
-        let origins = room("origins of rays", if shadowed { 16 * most } else { 0 })?;
-        let bits = room("light visibility", 4 * words as u64 * most)?;
-        let radiance = room("radiance", 16 * slices as u64 * most)?;
-        let scales = room("scales", 4 * most)?;
+        let samples = GpuSamples::new(gpu, sizes.size.map(|side| side * sizes.samples_per_side))?;
+        let buffer = |label, bytes| gpu.buffer(label, bytes, Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
+        let lights = buffer("lights", (size_of::<Light>() * sizes.lights) as u64)?;
+        let points = buffer("shading points", size_of::<Point>() as u64 * max_points)?;
+        let origins = buffer("origins of rays", if shadowed { 16 * max_points } else { 0 })?;
+        let bits = buffer("light visibility", 4 * words as u64 * max_points)?;
+        let radiance = buffer("radiance", 16 * slices as u64 * max_points)?;
+        let scales = buffer("scales", 4 * max_points)?;
         let to_bits = parts.rays.map(|(rays, occluder)| rays.rays(gpu, occluder, &origins, &bits)).transpose()?;
         let bands = (0..height).step_by(rows).map(|first| {
             let uniform = |label, bytes: usize| gpu.buffer(label, bytes as u64, Usage::UNIFORM | Usage::COPY_DST);
             let camera = uniform("camera", size_of::<Camera>())?;
             let params = uniform("parameters", size_of::<shading::Params>())?;
-            let image = uniform("picture", size_of::<image::Params>())?;
+            let image = uniform("image", size_of::<image::Params>())?;
             let rays = parts.rays.map(|(rays, _)| rays.points(gpu, [&params, &points, &lights]));
             let shading = [&params, &points, &lights, &bits, &radiance, &scales];
             Ok(Band {
@@ -129,7 +129,7 @@ impl Room {
         let to_points = parts.gbuffer.samples(gpu, &samples, &points, &origins)?;
         let [slice, slices, words] = [slice, slices, words].map(|n| n as u32);
         Ok(Self {
-            need,
+            sizes,
             samples,
             slice,
             slices,
@@ -137,21 +137,21 @@ impl Room {
             lights,
             radiance,
             #[cfg(test)]
-            found: [points, origins],
+            points_and_origins: [points, origins],
             to_points,
             to_bits,
             bands,
         })
     }
 
-    /// Points a pixel.
+    /// Returns the number of point slots per pixel.
     pub fn slots(&self) -> u32 {
-        (self.need.samples_per_side * self.need.samples_per_side) as u32
+        (self.sizes.samples_per_side * self.sizes.samples_per_side) as u32
     }
 
-    /// GridCoordinates for points in a band.
-    pub fn places(&self, band: &Band) -> u32 {
-        (band.rows.len() * self.need.size[0]) as u32 * self.slots()
+    /// Returns the number of point slots of a band.
+    pub fn point_slots(&self, band: &Band) -> u32 {
+        (band.rows.len() * self.sizes.size[0]) as u32 * self.slots()
     }
 }
 

@@ -1,12 +1,12 @@
-//! The G-buffer on wgpu and the points that are shaded of it: the twin of [`GBuffer`](crate::render::GBuffer) and
+//! The G-buffer and its shading points on the GPU: the twin of [`GBuffer`](crate::render::GBuffer) and
 //! [`ShadingPoints`](crate::render::image::shading_points::ShadingPoints), by the same rules.
 //!
-//! A raster pass writes only which triangle each sample shows; a compute pass meets each sample's ray with that
-//! triangle, interpolates, and lets samples share a point (`shaders/gbuffer.wgsl`). The two routes agree but at edges:
-//! there the triangle may be the neighbour, because adapters snap vertices to their own subpixels.
+//! A raster pass writes only the triangle of each sample. A compute pass intersects each sample's ray with that
+//! triangle, interpolates, and lets samples share a point (`gbuffer.wgsl`). GPU and CPU agree except at edges, where
+//! the triangle may be the neighbour, because GPUs snap vertices to their own subpixels.
 //!
-//! A pixel has room for a point a sample: nothing needs to be counted before it is shaded, and places that stay empty
-//! cost a look at their weight.
+//! A pixel has one slot per sample, so points need not be counted before shading. An empty slot costs only a test of
+//! its weight.
 
 use std::ops::Range;
 
@@ -22,40 +22,40 @@ use crate::render::{CameraView, ObjectMesh};
 const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// `gbuffer.wgsl`, compiled: build once, use for any object and camera.
+/// The compiled pipelines of `gbuffer.wgsl`, for any object and camera.
 #[derive(Debug)]
 pub(crate) struct GpuGBuffer {
     scene: wgpu::BindGroupLayout,
     samples: wgpu::BindGroupLayout,
-    /// Back faces dropped, and kept (two-sided surfaces).
+    /// Pipelines without and with back faces (two-sided surfaces).
     draw: [wgpu::RenderPipeline; 2],
     find_points: wgpu::ComputePipeline,
 }
 
-/// An object's mesh on the device; made once.
+/// The mesh of an object on the GPU.
 #[derive(Debug)]
 pub(crate) struct GpuObject {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     triangles: u32,
     two_sided: bool,
-    /// Where shadow rays start above the surface.
+    /// Distance of the starts of shadow rays above the surface.
     lift: f32,
 }
 
-/// Which triangle each sample of a picture shows.
+/// The triangle and the depth of each sample of an image.
 #[derive(Debug)]
 pub(crate) struct GpuSamples {
-    shown: wgpu::TextureView,
+    triangle_ids: wgpu::TextureView,
     depth: wgpu::TextureView,
 }
 
-/// A point as shaders see it.
+/// `Point` in `point.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub(crate) struct Point {
     pub position: Vec3,
-    /// Share of its pixel; 0 where there is nothing to shade.
+    /// Share of its pixel; 0 if the slot is empty.
     pub weight: f32,
     pub normal: Vec3,
     pub triangle: u32,
@@ -63,7 +63,7 @@ pub(crate) struct Point {
     pub pad: u32,
 }
 
-/// The camera on one band of a picture's rows.
+/// `Camera` in `gbuffer.wgsl`, for one band of rows.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct Camera {
@@ -74,7 +74,7 @@ pub(crate) struct Camera {
     up: Vec3,
     tan_half_fov_y: f32,
     back: Vec3,
-    least_cosine: f32,
+    min_cosine: f32,
     size: [u32; 2],
     first_row: u32,
     rows: u32,
@@ -110,11 +110,11 @@ impl GpuObject {
 }
 
 impl GpuSamples {
-    /// Room for pictures of so many samples across and down.
+    /// Creates textures for a number of samples across and down.
     pub fn new(gpu: &Gpu, [width, height]: [usize; 2]) -> Result<Self, GpuError> {
-        let (longer, most) = (width.max(height) as u64, u64::from(gpu.limits.max_texture_dimension_2d));
-        if longer > most {
-            return Err(GpuError::TooLarge { what: "a side of the picture".to_owned(), needed: longer, allowed: most });
+        let (side, max_side) = (width.max(height) as u64, u64::from(gpu.limits.max_texture_dimension_2d));
+        if side > max_side {
+            return Err(GpuError::TooLarge { what: "a side of the image".to_owned(), needed: side, allowed: max_side });
         }
         let target = |format, usage| {
             let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -129,25 +129,25 @@ impl GpuSamples {
             });
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
-        gpu.checked("making room for the G-buffer", || {
-            let shown = target(IDS, wgpu::TextureUsages::TEXTURE_BINDING);
-            Ok(Self { shown, depth: target(DEPTH, wgpu::TextureUsages::empty()) })
+        gpu.checked("allocating the G-buffer", || {
+            let triangle_ids = target(IDS, wgpu::TextureUsages::TEXTURE_BINDING);
+            Ok(Self { triangle_ids, depth: target(DEPTH, wgpu::TextureUsages::empty()) })
         })
     }
 }
 
 impl GpuGBuffer {
-    /// `shadowed`: whether points come with the places where their shadow rays start.
+    /// `shadowed`: whether the starts of shadow rays are computed for points.
     pub fn new(gpu: &Gpu, shadowed: bool) -> Result<Self, GpuError> {
         let module = gpu.module("gbuffer")?;
         let stages = wgpu::ShaderStages::VERTEX | wgpu::ShaderStages::COMPUTE;
         let scene = gpu.layout("object", stages, &[UNIFORM, READ, READ])?;
-        let shown = wgpu::BindingType::Texture {
+        let triangle_ids = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Uint,
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: false,
         };
-        let samples = gpu.layout("G-buffer", wgpu::ShaderStages::COMPUTE, &[shown, WRITE, WRITE])?;
+        let samples = gpu.layout("G-buffer", wgpu::ShaderStages::COMPUTE, &[triangle_ids, WRITE, WRITE])?;
         let draw = [Some(wgpu::Face::Back), None];
         let [culled, both] = draw.map(|cull| draw_pipeline(gpu, &module, &scene, cull));
         let constants = [("SHADOWED", f64::from(u8::from(shadowed)))];
@@ -167,11 +167,11 @@ impl GpuGBuffer {
         points: &wgpu::Buffer,
         origins: &wgpu::Buffer,
     ) -> Result<wgpu::BindGroup, GpuError> {
-        let shown = wgpu::BindingResource::TextureView(&samples.shown);
-        gpu.group("G-buffer", &self.samples, &[shown, points.as_entire_binding(), origins.as_entire_binding()])
+        let triangle_ids = wgpu::BindingResource::TextureView(&samples.triangle_ids);
+        gpu.group("G-buffer", &self.samples, &[triangle_ids, points.as_entire_binding(), origins.as_entire_binding()])
     }
 
-    /// Draws the object through the camera of a scene's group.
+    /// Records drawing the object with the camera of `scene`.
     pub fn draw(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -181,7 +181,7 @@ impl GpuGBuffer {
         timestamp_writes: Option<wgpu::RenderPassTimestampWrites>,
     ) {
         let color = wgpu::RenderPassColorAttachment {
-            view: &samples.shown,
+            view: &samples.triangle_ids,
             depth_slice: None,
             resolve_target: None,
             ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
@@ -203,7 +203,7 @@ impl GpuGBuffer {
         pass.draw(0..3 * object.triangles, 0..1);
     }
 
-    /// Finds the points of a band of pixels.
+    /// Records finding the points of a band of pixels.
     pub fn find_points(
         &self,
         pass: &mut wgpu::ComputePass,
@@ -218,7 +218,7 @@ impl GpuGBuffer {
     }
 }
 
-/// Draws triangles by number, nearest first with reversed depth.
+/// Creates the pipeline that draws the numbers of triangles, with reversed depth.
 fn draw_pipeline(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
@@ -246,7 +246,7 @@ fn draw_pipeline(
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module,
-            entry_point: Some("name_triangle"),
+            entry_point: Some("write_triangle_id"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             targets: &[Some(IDS.into())],
         }),
@@ -257,7 +257,7 @@ fn draw_pipeline(
 }
 
 impl Camera {
-    /// `rows`: of pixels.
+    /// `rows`: rows of pixels of the band.
     pub fn new(view: &CameraView, object: &GpuObject, samples_per_side: usize, rows: Range<usize>) -> Self {
         Self {
             eye: view.eye,
@@ -267,7 +267,7 @@ impl Camera {
             up: view.up,
             tan_half_fov_y: view.tan_half_fov.y,
             back: view.back,
-            least_cosine: MIN_COSINE,
+            min_cosine: MIN_COSINE,
             size: view.size.map(|side| (side * samples_per_side) as u32),
             first_row: rows.start as u32,
             rows: rows.len() as u32,

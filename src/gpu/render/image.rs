@@ -1,5 +1,5 @@
-//! Points gathered into pixels on wgpu: the twin of [`gather`](crate::render::image::shading::gather) and of [`ToneMap`], into linear
-//! radiance that is read back or into the image that a screen shows (`shaders/image.wgsl`).
+//! Gathering of points into pixels on the GPU: the twin of [`gather`](crate::render::image::shading::gather) and of
+//! [`ToneMap`]. The output is linear radiance that is read back, or an image for a screen (`image.wgsl`).
 
 use std::ops::Range;
 
@@ -11,17 +11,17 @@ use crate::gpu::{Gpu, GpuError};
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 
-/// What a screen shows: sRGB bytes, written by a shader.
+/// Format of an image for a screen: sRGB bytes, written by a shader.
 const IMAGE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// Room for what a screen shows: written by shaders, sampled, read back.
+/// Creates a texture for a screen, which shaders can write and sample, and which can be read back.
 ///
 /// # Errors
-/// What the device refuses.
+/// Errors of the GPU.
 pub fn image(gpu: &Gpu, [width, height]: [usize; 2]) -> Result<wgpu::Texture, GpuError> {
     use wgpu::TextureUsages as Usage;
     let description = wgpu::TextureDescriptor {
-        label: Some("picture"),
+        label: Some("image"),
         size: wgpu::Extent3d { width: width as u32, height: height as u32, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
@@ -30,28 +30,28 @@ pub fn image(gpu: &Gpu, [width, height]: [usize; 2]) -> Result<wgpu::Texture, Gp
         usage: Usage::STORAGE_BINDING | Usage::TEXTURE_BINDING | Usage::COPY_SRC,
         view_formats: &[],
     };
-    gpu.checked("making room for a picture", || Ok(gpu.device.create_texture(&description)))
+    gpu.checked("allocating an image", || Ok(gpu.device.create_texture(&description)))
 }
 
-/// `image.wgsl`, compiled.
+/// The compiled pipelines of `image.wgsl`.
 #[derive(Debug)]
 pub(super) struct GpuImages {
     points: wgpu::BindGroupLayout,
-    /// Of linear radiance, and of images.
+    /// Layouts of the outputs: linear radiance, and images.
     outputs: [wgpu::BindGroupLayout; 2],
     write: [wgpu::ComputePipeline; 2],
 }
 
-/// Where a picture goes.
+/// The output of rendering.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Output<'a> {
-    /// 16 bytes a pixel.
+    /// Linear radiance, 16 bytes per pixel.
     Radiance(&'a wgpu::Buffer),
     /// An image of [`IMAGE`] with the usage `STORAGE_BINDING`.
     Image(&'a wgpu::TextureView),
 }
 
-/// One band of a picture's rows.
+/// Parameters of one band of rows.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Params {
@@ -67,7 +67,7 @@ pub(super) struct Params {
 }
 
 impl Params {
-    /// `slots`: points a pixel; `slices`: rows of radiance.
+    /// `slots`: point slots per pixel; `slices`: rows of radiance.
     pub fn new(
         size: [usize; 2],
         rows: Range<usize>,
@@ -95,7 +95,7 @@ impl Params {
 
 impl GpuImages {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let module = gpu.module("picture")?;
+        let module = gpu.module("image")?;
         let layout = |label, bindings: &[wgpu::BindingType]| gpu.layout(label, wgpu::ShaderStages::COMPUTE, bindings);
         let image = wgpu::BindingType::StorageTexture {
             access: wgpu::StorageTextureAccess::WriteOnly,
@@ -110,7 +110,7 @@ impl GpuImages {
         Ok(Self { points, outputs, write })
     }
 
-    /// [`Params`], points and their radiance.
+    /// Binds [`Params`], points and their radiance.
     pub fn points(&self, gpu: &Gpu, bound: [&wgpu::Buffer; 3]) -> Result<wgpu::BindGroup, GpuError> {
         gpu.group("points of pixels", &self.points, &bound.map(wgpu::Buffer::as_entire_binding))
     }
@@ -122,7 +122,7 @@ impl GpuImages {
         }
     }
 
-    /// Writes a band of pixels to an output and its group.
+    /// Records writing a band of pixels to an output.
     pub fn write(
         &self,
         pass: &mut wgpu::ComputePass,

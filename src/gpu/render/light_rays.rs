@@ -1,4 +1,4 @@
-//! Shadow rays on wgpu: the twin of [`Occluder::visible`], through the same hierarchy (`shaders/light_rays.wgsl`).
+//! Shadow rays on the GPU: the twin of [`Occluder::visible_lights`], through the same hierarchy (`light_rays.wgsl`).
 //! One thread traces the rays of one point to 32 lights.
 
 use bytemuck::{Pod, Zeroable};
@@ -9,11 +9,11 @@ use crate::gpu::{Gpu, GpuError};
 use crate::render::shadow::{Occluder, bvh};
 
 const THREADS: u32 = 64;
-/// The stack in the shader.
+/// Size of the stack in the shader.
 const STACK: usize = 64;
 const _: () = assert!(bvh::MAX_DEPTH + 4 <= STACK);
 
-/// `light_rays.wgsl`, compiled: build once, use for any object.
+/// The compiled pipeline of `light_rays.wgsl`, for any object.
 #[derive(Debug)]
 pub(super) struct GpuLightRays {
     points: wgpu::BindGroupLayout,
@@ -21,7 +21,7 @@ pub(super) struct GpuLightRays {
     trace: wgpu::ComputePipeline,
 }
 
-/// An object's hierarchy on the device; made once per mesh.
+/// The bounding volume hierarchy of an object on the GPU.
 #[derive(Debug)]
 pub(super) struct GpuOccluder {
     nodes: wgpu::Buffer,
@@ -37,10 +37,10 @@ struct Node {
     count: u32,
 }
 
-/// A vector and padding to the 16 bytes WGSL gives it.
+/// A vector, padded to 16 bytes as in WGSL.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Padded {
+struct PaddedVec3 {
     v: Vec3,
     pad: u32,
 }
@@ -52,8 +52,8 @@ impl GpuOccluder {
             .map(|node| Node { low: node.bounds.low, first: node.first, high: node.bounds.high, count: node.count })
             .collect();
         let blockers = occluder.bvh.blockers.iter();
-        let blockers: Vec<[Padded; 3]> =
-            blockers.map(|b| [b.corner, b.edges[0], b.edges[1]].map(|v| Padded { v, pad: 0 })).collect();
+        let blockers: Vec<[PaddedVec3; 3]> =
+            blockers.map(|b| [b.corner, b.edges[0], b.edges[1]].map(|v| PaddedVec3 { v, pad: 0 })).collect();
         Ok(Self {
             nodes: gpu.upload("object hierarchy", &nodes, wgpu::BufferUsages::STORAGE)?,
             blockers: gpu.upload("object blockers", &blockers, wgpu::BufferUsages::STORAGE)?,
@@ -69,12 +69,13 @@ impl GpuLightRays {
         Ok(Self { trace: gpu.compute_pipeline(&module, "trace", &[&points, &rays])?, points, rays })
     }
 
-    /// Parameters of shading, points and lights.
+    /// Binds parameters of shading, points and lights.
     pub fn points(&self, gpu: &Gpu, bound: [&wgpu::Buffer; 3]) -> Result<wgpu::BindGroup, GpuError> {
         gpu.group("points of rays", &self.points, &bound.map(wgpu::Buffer::as_entire_binding))
     }
 
-    /// The object, where rays start, and one bit per point and light in the order of [`crate::render::shadow::Visible`]'s words.
+    /// Binds the object, the starts of rays, and one bit per point and light in the order of
+    /// [`crate::render::shadow::LightVisibility`]'s words.
     pub fn rays(
         &self,
         gpu: &Gpu,

@@ -1,9 +1,9 @@
-//! The picture on wgpu: the twin of [`render`](crate::render::render).
+//! Rendering on the GPU: the twin of [`render`](crate::render::render).
 //!
-//! G-buffer, points, light rays, shading and tones run on the device in one submission; what goes to a screen never leaves
-//! it. Only where the work is so much that a driver's watchdog or an impatient hand would mind is it cut into several.
+//! G-buffer, points, light rays, shading and tone mapping are one submission. An image for a screen stays on the GPU.
+//! Large work is split into several submissions, so that it stays below the timeout of drivers and can be cancelled.
 
-use super::band::{Band, Need, Parts, Room};
+use super::band::{Band, BufferSizes, RenderBuffers, RendererParts};
 use super::gbuffer::{Camera, GpuGBuffer, GpuObject};
 use super::image;
 use super::image::{GpuImages, Output};
@@ -19,41 +19,42 @@ use crate::render::image::tone_map::{ToneCurve, ToneMap};
 use crate::render::shadow::Occluder;
 use crate::render::{CameraView, Image, ObjectMesh, RenderInput, Rendered};
 
-/// Lobes or table rows of one submission: some tenths of a second for graphics processors that are not slow, about one for
-/// software.
-const WORK: u64 = 1 << 32;
-const SOFTWARE_WORK: u64 = 1 << 29;
+/// Largest work of one submission on a real GPU, in lobes or table rows. It keeps submissions below the timeout of
+/// drivers and bounds the delay of a cancellation.
+const MAX_WORK: u64 = 1 << 32;
+/// Largest work of one submission on a software adapter, in lobes or table rows.
+const SOFTWARE_MAX_WORK: u64 = 1 << 29;
 
-/// All that stays on the device while the camera turns. Made for one object; the BRDF may be exchanged.
+/// Pipelines and buffers that render one object. Camera, lights and BRDF may change.
 #[derive(Debug)]
 pub struct GpuRenderer {
     object: GpuObject,
     gbuffer: GpuGBuffer,
-    /// Absent where the object cannot shadow itself: then no pass knows of shadows.
+    /// `None` if the object cannot shadow itself; passes are then compiled without shadows.
     rays: Option<(GpuLightRays, GpuOccluder)>,
     shading: GpuShading,
-    /// Nothing is black.
+    /// `None` renders black.
     material: Option<GpuMaterial>,
-    /// Whether the device has made what the material reads.
-    is_made: bool,
+    /// Whether the GPU has computed the inputs of the material.
+    is_prepared: bool,
     march: Option<GpuHeightMarch>,
     slicer: Option<GpuSlicer>,
     maps: Option<GpuShadowMaps>,
     images: GpuImages,
-    /// For pictures like the last one.
-    pub(super) room: Option<Room>,
-    /// Lobes or table rows of one submission.
-    pub(super) at_once: u64,
+    /// Buffers for images like the last one.
+    pub(super) buffers: Option<RenderBuffers>,
+    /// Largest work of one submission in lobes or table rows.
+    pub(super) max_work: u64,
     clock: Option<Clock>,
     /// See [`Recorder::new`].
     pub(super) by_stage: bool,
 }
 
 impl GpuRenderer {
-    /// An object without a material, which is black.
+    /// Creates a renderer of an object without a material, which is black.
     ///
     /// # Errors
-    /// What the device refuses.
+    /// Errors of the GPU.
     pub fn new(gpu: &Gpu, mesh: &ObjectMesh, occluder: Option<&Occluder>) -> std::result::Result<Self, GpuError> {
         let rays = match occluder {
             Some(occluder) => Some((GpuLightRays::new(gpu)?, GpuOccluder::new(gpu, occluder)?)),
@@ -65,23 +66,23 @@ impl GpuRenderer {
             rays,
             shading: GpuShading::new(gpu)?,
             material: None,
-            is_made: false,
+            is_prepared: false,
             march: None,
             slicer: None,
             maps: None,
             images: GpuImages::new(gpu)?,
-            room: None,
-            at_once: if gpu.tier == Tier::Hardware { WORK } else { SOFTWARE_WORK },
+            buffers: None,
+            max_work: if gpu.tier == Tier::Hardware { MAX_WORK } else { SOFTWARE_MAX_WORK },
             clock: Clock::new(gpu)?,
             by_stage: gpu.tier != Tier::Hardware,
         })
     }
 
-    /// An object in a material.
+    /// Creates a renderer of an object with a material.
     ///
     /// # Errors
-    /// As [`GpuRenderer::new`] and [`GpuRenderer::set_brdf`].
-    pub fn wearing(
+    /// Those of [`GpuRenderer::new`] and [`GpuRenderer::set_brdf`].
+    pub fn with_material(
         gpu: &Gpu,
         mesh: &ObjectMesh,
         occluder: Option<&Occluder>,
@@ -92,39 +93,47 @@ impl GpuRenderer {
         Ok(renderer)
     }
 
-    /// Shades with another BRDF from now on; pipelines that were compiled before are kept.
+    /// Replaces the BRDF. Compiled pipelines are reused.
     ///
     /// # Errors
-    /// [`GpuError::Unsupported`] for a BRDF that only the CPU shades, and what the device refuses; the material before stays.
+    /// [`GpuError::Unsupported`] for a BRDF that only the CPU evaluates, and errors of the GPU. The material is then
+    /// unchanged.
     pub fn set_brdf(&mut self, gpu: &Gpu, brdf: &EffectiveBrdf) -> std::result::Result<(), GpuError> {
         self.material = Some(self.shading.material(gpu, brdf, self.rays.is_some())?);
-        self.is_made = false;
+        self.is_prepared = false;
         Ok(())
     }
 
-    /// Shades with a tile from now on, whose visibility and product the device makes in the submission of the next picture.
+    /// Replaces the BRDF by a tile. The GPU computes its visibility and its facet sum with the next image.
     ///
     /// # Errors
-    /// As [`GpuRenderer::set_brdf`].
+    /// Those of [`GpuRenderer::set_brdf`].
     pub fn set_tile(&mut self, gpu: &Gpu, tile: &GpuTileInput) -> std::result::Result<(), GpuError> {
-        let seen = match &tile.sight {
-            GpuVisibilityInput::Seen(visibility) => GpuVisibility::Held(visibility),
+        let visibility = match &tile.visibility_input {
+            GpuVisibilityInput::Computed(visibility) => GpuVisibility::Computed(visibility),
             GpuVisibilityInput::Heights(heights) => {
                 let march = match &mut self.march {
                     Some(march) => march,
                     none => none.insert(GpuHeightMarch::new(gpu)?),
                 };
-                let Heights { samples, tile_size, facets, azimuths, ramp } = heights;
-                GpuVisibility::Marched(march.horizons(gpu, samples, *tile_size, facets, *azimuths)?, *ramp)
+                let Heights { samples, tile_size, facets, azimuths, transition_width } = heights;
+                GpuVisibility::HorizonMap(
+                    march.horizon_map(gpu, samples, *tile_size, facets, *azimuths)?,
+                    *transition_width,
+                )
             }
             GpuVisibilityInput::OcclusionIntervals(of) => {
                 let slicer = match &mut self.slicer {
                     Some(slicer) => slicer,
                     none => none.insert(GpuSlicer::new(gpu)?),
                 };
-                let Sliced { grid, facets, azimuths, ramp, overhangs } = &**of;
-                let made = slicer.slices(gpu, grid, facets, *azimuths, *overhangs)?;
-                if *overhangs { GpuVisibility::Sliced(made, *ramp) } else { GpuVisibility::Marched(made, *ramp) }
+                let Sliced { grid, facets, azimuths, transition_width, overhangs } = &**of;
+                let computed = slicer.prepare(gpu, grid, facets, *azimuths, *overhangs)?;
+                if *overhangs {
+                    GpuVisibility::OcclusionIntervals(computed, *transition_width)
+                } else {
+                    GpuVisibility::HorizonMap(computed, *transition_width)
+                }
             }
             GpuVisibilityInput::Maps(of) => {
                 let maps = match &mut self.maps {
@@ -132,25 +141,25 @@ impl GpuRenderer {
                     none => none.insert(GpuShadowMaps::new(gpu)?),
                 };
                 let Maps { mesh, facets, grid, resolution } = &**of;
-                GpuVisibility::Drawn(maps.maps(gpu, mesh, facets, &grid.directions(), *resolution)?, *grid)
+                GpuVisibility::Maps(maps.maps(gpu, mesh, facets, &grid.directions(), *resolution)?, *grid)
             }
         };
-        self.material = Some(self.shading.tile(gpu, tile, seen, self.rays.is_some())?);
-        self.is_made = false;
+        self.material = Some(self.shading.tile(gpu, tile, visibility, self.rays.is_some())?);
+        self.is_prepared = false;
         Ok(())
     }
 
-    /// Renders the object that the renderer was made for and reads the picture back; `input.mesh` tells its bounds only,
-    /// `input.reflectance` and `input.shadow_cache` are not asked.
+    /// Renders the object of the renderer and reads the image back. Of `input.mesh` only the bounds are used;
+    /// `input.reflectance` and `input.shadow_cache` are not used.
     ///
     /// # Errors
-    /// A size or camera that cannot be, what the device refuses, or [`crate::base::Error::Cancelled`].
+    /// An invalid size or camera, errors of the GPU, or [`crate::base::Error::Cancelled`].
     pub fn render(&mut self, gpu: &Gpu, input: &RenderInput, cancel: &Cancel) -> Result<Rendered> {
         check_size(input.size, input.samples_per_side)?;
         let [width, height] = input.size;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let pixels = gpu.buffer("pixels", (16 * width * height) as u64, usage)?;
-        // Tones are not asked for.
+        // Linear radiance is not tone mapped.
         let tone_map = ToneMap { curve: ToneCurve::Plain, gain: 1.0 };
         let times = self.draw(gpu, input, &tone_map, Output::Radiance(&pixels), cancel)?;
         let rows: Vec<[f32; 4]> = gpu.read(&pixels)?;
@@ -160,10 +169,10 @@ impl GpuRenderer {
         Ok(Rendered { image: Image { width, height, pixels }, times, points })
     }
 
-    /// Renders as [`GpuRenderer::render`] does, into an image on the device that a screen shows; waits until it is there.
+    /// Renders like [`GpuRenderer::render`], into a texture for a screen, and waits until it has finished.
     ///
     /// # Errors
-    /// As [`GpuRenderer::render`].
+    /// Those of [`GpuRenderer::render`].
     pub fn show(
         &mut self,
         gpu: &Gpu,
@@ -186,150 +195,154 @@ impl GpuRenderer {
     ) -> Result<RenderTimes> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         let work = self.material.as_ref().map_or(1, |material| material.work(input.lights.len()).max(1));
-        let points = usize::try_from(self.at_once / work).unwrap_or(usize::MAX);
-        let need =
-            Need { size: input.size, samples_per_side: input.samples_per_side, lights: input.lights.len(), points };
-        let room = self.room(gpu, need)?;
+        let points = usize::try_from(self.max_work / work).unwrap_or(usize::MAX);
+        let sizes = BufferSizes {
+            size: input.size,
+            samples_per_side: input.samples_per_side,
+            lights: input.lights.len(),
+            points,
+        };
+        let buffers = self.buffers(gpu, sizes)?;
         let lights: Vec<Light> = input.lights.iter().map(Light::from).collect();
-        gpu.write(&room.lights, &lights)?;
-        for band in &room.bands {
-            let camera = Camera::new(&view, &self.object, need.samples_per_side, band.rows.clone());
+        gpu.write(&buffers.lights, &lights)?;
+        for band in &buffers.bands {
+            let camera = Camera::new(&view, &self.object, sizes.samples_per_side, band.rows.clone());
             let params = shading::Params {
                 eye: view.eye,
-                point_count: room.places(band),
-                light_count: need.lights as u32,
-                words_per_point: room.words,
-                slice: room.slice,
-                least_area: self.material.as_ref().map_or(0.0, GpuMaterial::least_area),
+                point_count: buffers.point_slots(band),
+                light_count: sizes.lights as u32,
+                words_per_point: buffers.words,
+                slice: buffers.slice,
+                min_area: self.material.as_ref().map_or(0.0, GpuMaterial::min_area),
             };
-            let counts = [room.slots(), room.slices];
-            let image = image::Params::new(need.size, band.rows.clone(), counts, input.background, tone_map);
+            let counts = [buffers.slots(), buffers.slices];
+            let image = image::Params::new(sizes.size, band.rows.clone(), counts, input.background, tone_map);
             band.write(gpu, camera, params, image)?;
         }
         let group = self.images.output(gpu, output)?;
-        let a_band = room.bands.first().map_or(1, |band| u64::from(room.places(band)) * work);
-        let together = (self.at_once / a_band.max(1)).max(1) as usize;
+        let work_per_band = buffers.bands.first().map_or(1, |band| u64::from(buffers.point_slots(band)) * work);
+        let bands_per_submission = (self.max_work / work_per_band.max(1)).max(1) as usize;
         let mut recorder = Recorder::new(gpu, self.clock.as_ref(), self.by_stage);
-        for (first, bands) in room.bands.chunks(together).enumerate() {
+        for (first, bands) in buffers.bands.chunks(bands_per_submission).enumerate() {
             cancel.check()?;
             if first == 0 {
-                self.record_whole(&mut recorder, &room, cancel)?;
+                self.record_preparation(&mut recorder, &buffers, cancel)?;
             }
             for band in bands {
-                self.record_band(&mut recorder, &room, band, (output, &group), a_band > self.at_once)?;
+                self.record_band(&mut recorder, &buffers, band, (output, &group), work_per_band > self.max_work)?;
             }
             recorder.submit()?;
         }
         let times = recorder.times();
-        (self.room, self.is_made) = (Some(room), true);
+        (self.buffers, self.is_prepared) = (Some(buffers), true);
         Ok(times)
     }
 
-    /// The room of the last picture where it serves, else a new one.
-    fn room(&mut self, gpu: &Gpu, need: Need) -> std::result::Result<Room, GpuError> {
-        match self.room.take().filter(|room| room.need == need) {
-            Some(room) => Ok(room),
+    /// Returns the buffers of the last image if they have the same sizes, else new ones.
+    fn buffers(&mut self, gpu: &Gpu, sizes: BufferSizes) -> std::result::Result<RenderBuffers, GpuError> {
+        match self.buffers.take().filter(|buffers| buffers.sizes == sizes) {
+            Some(buffers) => Ok(buffers),
             None => {
                 let Self { gbuffer, object, rays, shading, images, .. } = self;
-                Room::new(gpu, need, &Parts { gbuffer, object, rays: rays.as_ref(), shading, images })
+                RenderBuffers::new(gpu, sizes, &RendererParts { gbuffer, object, rays: rays.as_ref(), shading, images })
             }
         }
     }
 
-    /// What comes before all bands: the material where it is still to be made, and the samples.
-    fn record_whole(&self, recorder: &mut Recorder, room: &Room, cancel: &Cancel) -> Result<()> {
-        let unmade = self.material.as_ref().filter(|_| !self.is_made);
-        if let Some(maps) = unmade.and_then(GpuMaterial::maps) {
+    /// Records the work before all bands: the inputs of the material if they are not yet computed, and the samples.
+    fn record_preparation(&self, recorder: &mut Recorder, buffers: &RenderBuffers, cancel: &Cancel) -> Result<()> {
+        let unprepared = self.material.as_ref().filter(|_| !self.is_prepared);
+        if let Some(maps) = unprepared.and_then(GpuMaterial::maps) {
             for (submission, batches) in maps.batches().enumerate() {
                 if submission > 0 {
                     recorder.submit()?;
                     cancel.check()?;
                 }
                 for batch in batches {
-                    maps.draw(batch, &mut recorder.compute_pass(GpuPassKind::Product, &maps.cleared()));
-                    recorder.stage_ends(GpuPassKind::Product)?;
+                    maps.draw(batch, &mut recorder.compute_pass(GpuPassKind::Product, &maps.cleared_buffers()));
+                    recorder.end_stage(GpuPassKind::Product)?;
                 }
             }
         }
-        if let Some(horizons) = unmade.and_then(GpuMaterial::horizons) {
-            let mut held = 0;
+        if let Some(horizons) = unprepared.and_then(GpuMaterial::horizons) {
+            let mut recorded_work = 0;
             for run in 0..horizons.runs() {
-                if held > 0 && held + horizons.work(run) > self.at_once {
+                if recorded_work > 0 && recorded_work + horizons.work(run) > self.max_work {
                     recorder.submit()?;
                     cancel.check()?;
-                    held = 0;
+                    recorded_work = 0;
                 }
                 horizons.dispatch(&mut recorder.compute_pass(GpuPassKind::Product, &[]), run);
-                recorder.stage_ends(GpuPassKind::Product)?;
-                held += horizons.work(run);
+                recorder.end_stage(GpuPassKind::Product)?;
+                recorded_work += horizons.work(run);
             }
         }
-        if let Some(material) = unmade.filter(|material| material.is_to_be_made()) {
-            let parts = material.parts(self.at_once);
+        if let Some(material) = unprepared.filter(|material| material.needs_preparation()) {
+            let parts = material.parts(self.max_work);
             for (k, part) in parts.iter().enumerate() {
                 let cleared = if k == 0 { material.sums() } else { Vec::new() };
-                material.make(&mut recorder.compute_pass(GpuPassKind::Product, &cleared), part.clone());
-                recorder.stage_ends(GpuPassKind::Product)?;
+                material.prepare(&mut recorder.compute_pass(GpuPassKind::Product, &cleared), part.clone());
+                recorder.end_stage(GpuPassKind::Product)?;
                 if parts.len() > 1 {
                     recorder.submit()?;
                     cancel.check()?;
                 }
             }
         }
-        if let Some(band) = room.bands.first() {
+        if let Some(band) = buffers.bands.first() {
             let (encoder, writes) = recorder.render_pass(GpuPassKind::GBuffer);
-            self.gbuffer.draw(encoder, &room.samples, &band.scene, &self.object, writes);
+            self.gbuffer.draw(encoder, &buffers.samples, &band.scene, &self.object, writes);
         }
         Ok(())
     }
 
-    /// All that a band takes, from samples to pixels.
+    /// Records the work of a band, from samples to pixels.
     fn record_band(
         &self,
         recorder: &mut Recorder,
-        room: &Room,
+        buffers: &RenderBuffers,
         band: &Band,
         output: (Output, &wgpu::BindGroup),
         is_heavy: bool,
     ) -> std::result::Result<(), GpuError> {
-        let (points, pixels) = (room.places(band), [room.need.size[0], band.rows.len()].map(|n| n as u32));
+        let (points, pixels) = (buffers.point_slots(band), [buffers.sizes.size[0], band.rows.len()].map(|n| n as u32));
         let mut pass = recorder.compute_pass(GpuPassKind::GBuffer, &[]);
-        self.gbuffer.find_points(&mut pass, &band.scene, &room.to_points, pixels);
+        self.gbuffer.find_points(&mut pass, &band.scene, &buffers.to_points, pixels);
         drop(pass);
-        recorder.stage_ends(GpuPassKind::GBuffer)?;
-        let lit = room.need.lights > 0;
-        if let (true, Some((rays, _)), Some(group), Some(to_bits)) = (lit, &self.rays, &band.rays, &room.to_bits) {
+        recorder.end_stage(GpuPassKind::GBuffer)?;
+        let lit = buffers.sizes.lights > 0;
+        if let (true, Some((rays, _)), Some(group), Some(to_bits)) = (lit, &self.rays, &band.rays, &buffers.to_bits) {
             let mut pass = recorder.compute_pass(GpuPassKind::Shadows, &[]);
-            rays.trace(&mut pass, group, to_bits, [points, room.words]);
+            rays.trace(&mut pass, group, to_bits, [points, buffers.words]);
             drop(pass);
-            recorder.stage_ends(GpuPassKind::Shadows)?;
+            recorder.end_stage(GpuPassKind::Shadows)?;
         }
         let passes = self.material.as_ref().filter(|_| lit).map_or(0, GpuMaterial::passes);
-        // A row of pixels may be more than one submission holds.
-        let together = if is_heavy { 1 } else { passes.max(1) };
-        let mut pass = recorder.compute_pass(GpuPassKind::Shading, &[&room.radiance]);
-        for first in (0..passes).step_by(together) {
+        // The work of a single row of pixels may exceed that of a submission.
+        let passes_at_once = if is_heavy { 1 } else { passes.max(1) };
+        let mut pass = recorder.compute_pass(GpuPassKind::Shading, &[&buffers.radiance]);
+        for first in (0..passes).step_by(passes_at_once) {
             if let Some(material) = &self.material {
-                let some = first..(first + together).min(passes);
-                material.shade(&mut pass, some, &band.shading, [points, room.slices]);
+                let some = first..(first + passes_at_once).min(passes);
+                material.shade(&mut pass, some, &band.shading, [points, buffers.slices]);
             }
             if is_heavy {
                 drop(pass);
-                recorder.stage_ends(GpuPassKind::Shading)?;
+                recorder.end_stage(GpuPassKind::Shading)?;
                 recorder.submit()?;
                 pass = recorder.compute_pass(GpuPassKind::Shading, &[]);
             }
         }
         self.images.write(&mut pass, &band.pixels, output, pixels);
         drop(pass);
-        recorder.stage_ends(GpuPassKind::Shading)
+        recorder.end_stage(GpuPassKind::Shading)
     }
 }
 
-/// One picture on the device; for more than one, keep a [`GpuRenderer`].
+/// Renders one image on the GPU. For more than one image, use a [`GpuRenderer`].
 ///
 /// # Errors
-/// As [`GpuRenderer::wearing`] and [`GpuRenderer::render`].
+/// Those of [`GpuRenderer::with_material`] and [`GpuRenderer::render`].
 pub fn render_gpu(gpu: &Gpu, input: &RenderInput, brdf: &EffectiveBrdf) -> Result<Rendered> {
-    GpuRenderer::wearing(gpu, input.mesh, input.occluder, brdf)?.render(gpu, input, &Cancel::default())
+    GpuRenderer::with_material(gpu, input.mesh, input.occluder, brdf)?.render(gpu, input, &Cancel::default())
 }

@@ -1,15 +1,15 @@
-//! The stages of a picture as they are recorded, submitted and timed.
+//! Recording, submission and timing of the stages of an image.
 //!
-//! On a graphics processor all go in one submission, and the device's own clock tells what part of its time each took. On
-//! software, whose clock runs ahead of its work and which nobody hands a frame's budget, each stage is a submission.
+//! On a real GPU, all stages are one submission, and timestamps measure the share of each stage. On a software adapter,
+//! whose timestamps are not reliable, each stage is a submission of its own.
 
 use std::time::Instant;
 
 use crate::gpu::{Gpu, GpuError, Tier};
 use crate::render::image::render::RenderTimes;
 
-/// Passes of a submission that are timed; of more the first ones speak for all.
-const PASSES: u32 = 1024;
+/// Largest number of timed passes of a submission. If there are more, the first ones represent all.
+const MAX_TIMED_PASSES: u32 = 1024;
 
 /// Stages of [`RenderTimes`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub(super) enum GpuPassKind {
     Shading,
 }
 
-const STAGES: usize = 4;
+const STAGE_COUNT: usize = 4;
 
 /// Timestamps at the beginnings and ends of passes.
 #[derive(Debug)]
@@ -31,15 +31,18 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// `None` where the adapter has no timestamps, or is software.
+    /// Returns `None` if the adapter has no timestamps or is a software adapter.
     pub fn new(gpu: &Gpu) -> Result<Option<Self>, GpuError> {
         if gpu.tier != Tier::Hardware || !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return Ok(None);
         }
         use wgpu::BufferUsages as Usage;
-        let bytes = u64::from(2 * PASSES) * 8;
-        let description =
-            wgpu::QuerySetDescriptor { label: Some("stages"), ty: wgpu::QueryType::Timestamp, count: 2 * PASSES };
+        let bytes = u64::from(2 * MAX_TIMED_PASSES) * 8;
+        let description = wgpu::QuerySetDescriptor {
+            label: Some("stages"),
+            ty: wgpu::QueryType::Timestamp,
+            count: 2 * MAX_TIMED_PASSES,
+        };
         Ok(Some(Self {
             queries: gpu.checked("setting up a clock", || Ok(gpu.device.create_query_set(&description)))?,
             resolved: gpu.buffer("times", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC)?,
@@ -48,36 +51,36 @@ impl Clock {
     }
 }
 
-/// Records stages in order.
+/// Recorder of stages, in order.
 pub(super) struct Recorder<'a> {
     gpu: &'a Gpu,
     clock: Option<&'a Clock>,
     by_stage: bool,
     encoder: wgpu::CommandEncoder,
-    /// Of each timed pass of the submission that is recorded.
-    timed: Vec<GpuPassKind>,
-    begun: Instant,
-    /// Milliseconds of what was submitted.
-    spent: [f64; STAGES],
+    /// The stage of each timed pass of the current submission.
+    timed_stages: Vec<GpuPassKind>,
+    start: Instant,
+    /// Time per stage of finished submissions [ms].
+    times_ms: [f64; STAGE_COUNT],
 }
 
 impl<'a> Recorder<'a> {
-    /// `by_stage`: a submission for each stage.
+    /// `by_stage`: whether each stage is a submission of its own.
     pub fn new(gpu: &'a Gpu, clock: Option<&'a Clock>, by_stage: bool) -> Self {
-        let (encoder, timed, spent) = (encoder(gpu), Vec::new(), [0.0; STAGES]);
-        Self { gpu, clock, by_stage, encoder, timed, begun: Instant::now(), spent }
+        let (encoder, timed_stages, times_ms) = (encoder(gpu), Vec::new(), [0.0; STAGE_COUNT]);
+        Self { gpu, clock, by_stage, encoder, timed_stages, start: Instant::now(), times_ms }
     }
 
-    /// Where the next pass writes its times; `None` where it is not timed.
+    /// Returns the indices of the timestamps of the next pass; `None` if it is not timed.
     fn next_pass(&mut self, stage: GpuPassKind) -> Option<(&'a Clock, [u32; 2])> {
-        let (clock, k) = (self.clock?, self.timed.len() as u32);
-        (k < PASSES).then(|| {
-            self.timed.push(stage);
+        let (clock, k) = (self.clock?, self.timed_stages.len() as u32);
+        (k < MAX_TIMED_PASSES).then(|| {
+            self.timed_stages.push(stage);
             (clock, [2 * k, 2 * k + 1])
         })
     }
 
-    /// What a render pass of a stage is recorded with.
+    /// Returns the encoder and the timestamps for a render pass of a stage.
     pub fn render_pass(
         &mut self,
         stage: GpuPassKind,
@@ -90,7 +93,7 @@ impl<'a> Recorder<'a> {
         (&mut self.encoder, writes)
     }
 
-    /// A compute pass of a stage, after these buffers were set to zeros.
+    /// Clears buffers and begins a compute pass of a stage.
     pub fn compute_pass(&mut self, stage: GpuPassKind, cleared: &[&wgpu::Buffer]) -> wgpu::ComputePass<'_> {
         let timestamp_writes = self.next_pass(stage).map(|(clock, [begin, end])| wgpu::ComputePassTimestampWrites {
             query_set: &clock.queries,
@@ -103,58 +106,58 @@ impl<'a> Recorder<'a> {
         self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes })
     }
 
-    /// A stage, or a band's part of it, is recorded.
-    pub fn stage_ends(&mut self, stage: GpuPassKind) -> Result<(), GpuError> {
+    /// Ends a stage, or the part of a band in it.
+    pub fn end_stage(&mut self, stage: GpuPassKind) -> Result<(), GpuError> {
         if self.by_stage {
-            self.spent[stage as usize] += self.run()?;
+            self.times_ms[stage as usize] += self.submit_and_wait()?;
         }
         Ok(())
     }
 
-    /// Submits what is recorded and waits until it is done.
+    /// Submits the recorded work and waits until it has finished.
     pub fn submit(&mut self) -> Result<(), GpuError> {
         if self.by_stage {
             return Ok(());
         }
-        let count = 2 * self.timed.len() as u32;
+        let count = 2 * self.timed_stages.len() as u32;
         if let (Some(clock), true) = (self.clock, count > 0) {
             self.encoder.resolve_query_set(&clock.queries, 0..count, &clock.resolved, 0);
             self.encoder.copy_buffer_to_buffer(&clock.resolved, 0, &clock.read_back, 0, 8 * u64::from(count));
         }
-        let whole = self.run()?;
-        let mut parts = [0.0; STAGES];
+        let total_ms = self.submit_and_wait()?;
+        let mut parts = [0.0; STAGE_COUNT];
         if let Some(clock) = self.clock {
             let ticks: Vec<u64> = self.gpu.map(&clock.read_back)?;
-            for (stage, [begin, end]) in self.timed.iter().zip(ticks.as_chunks::<2>().0) {
+            for (stage, [begin, end]) in self.timed_stages.iter().zip(ticks.as_chunks::<2>().0) {
                 parts[*stage as usize] += end.saturating_sub(*begin) as f64;
             }
         }
-        self.timed.clear();
+        self.timed_stages.clear();
         let total: f64 = parts.iter().sum();
         if total > 0.0 {
-            (0..STAGES).for_each(|k| self.spent[k] += whole * parts[k] / total);
+            (0..STAGE_COUNT).for_each(|k| self.times_ms[k] += total_ms * parts[k] / total);
         } else {
-            // Without a clock nobody knows.
-            self.spent[GpuPassKind::Shading as usize] += whole;
+            // Without timestamps, all time counts as shading.
+            self.times_ms[GpuPassKind::Shading as usize] += total_ms;
         }
         Ok(())
     }
 
-    /// Milliseconds since the last run, once the device has done what is recorded.
-    fn run(&mut self) -> Result<f64, GpuError> {
+    /// Submits the recorded work, waits until it has finished, and returns the time since the last run [ms].
+    fn submit_and_wait(&mut self) -> Result<f64, GpuError> {
         let recorded = std::mem::replace(&mut self.encoder, encoder(self.gpu));
         self.gpu.checked("rendering", || {
             self.gpu.queue.submit([recorded.finish()]);
             Ok(())
         })?;
         self.gpu.wait("rendering")?;
-        let begun = std::mem::replace(&mut self.begun, Instant::now());
-        Ok((self.begun - begun).as_secs_f64() * 1e3)
+        let start = std::mem::replace(&mut self.start, Instant::now());
+        Ok((self.start - start).as_secs_f64() * 1e3)
     }
 
-    /// Of all that was submitted.
+    /// Returns the times of all submitted work.
     pub fn times(&self) -> RenderTimes {
-        let [product_ms, gbuffer_ms, shadows_ms, shading_ms] = self.spent;
+        let [product_ms, gbuffer_ms, shadows_ms, shading_ms] = self.times_ms;
         RenderTimes { product_ms, gbuffer_ms, shadows_ms, shading_ms }
     }
 }

@@ -1,4 +1,4 @@
-//! Both routes of the large scale on the same input.
+//! Tests of GPU rendering against its CPU twins on the same input.
 
 use std::path::Path;
 
@@ -12,11 +12,11 @@ use crate::effective::EffectiveBrdf;
 use crate::gpu::shading::{Light, Params};
 use crate::gpu::{Gpu, GpuRenderer};
 use crate::pipeline::Pipeline;
-use crate::render::image::raster::NOTHING;
+use crate::render::image::raster::NO_TRIANGLE;
 use crate::render::image::shading::Background;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::image::tone_map::{ToneCurve, ToneMap, srgb_byte};
-use crate::render::shadow::{Occluder, Visible, ray_origin};
+use crate::render::shadow::{LightVisibility, Occluder, ray_origin};
 use crate::render::{CameraView, DirectionalLight, GBuffer, ObjectMesh, RenderInput, object};
 use crate::scene;
 use crate::scene::LoadedScene;
@@ -37,7 +37,7 @@ fn view(mesh: &ObjectMesh, distance: f32, size: [usize; 2]) -> CameraView {
     CameraView::new(&camera(distance), mesh, size).unwrap()
 }
 
-/// Some diffuse material.
+/// Returns a diffuse material.
 fn brdf() -> EffectiveBrdf {
     let text = "[tile]\ngeometry = { kind = \"flat\" }\n[[material]]\nname = \"default\"\n\
                 brdf = { kind = \"lambertian\", albedo = 0.5 }\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\n";
@@ -50,10 +50,17 @@ fn brdf() -> EffectiveBrdf {
     Pipeline::new().effective(&loaded).unwrap().brdf.as_ref().clone()
 }
 
-/// What the device finds in a picture: the points of every sample's place, and where their rays start.
-fn found(gpu: &Gpu, mesh: &ObjectMesh, camera: &scene::Camera, size: [usize; 2], samples: usize) -> [Vec<Point>; 2] {
-    let (occluder, brdf) = (Occluder::always(mesh), brdf());
-    let mut renderer = GpuRenderer::wearing(gpu, mesh, Some(&occluder), &brdf).unwrap();
+/// Returns the points of all slots of an image on the GPU, and the points with the starts of their shadow rays as
+/// positions.
+fn points_and_lifted(
+    gpu: &Gpu,
+    mesh: &ObjectMesh,
+    camera: &scene::Camera,
+    size: [usize; 2],
+    samples: usize,
+) -> [Vec<Point>; 2] {
+    let (occluder, brdf) = (Occluder::new(mesh), brdf());
+    let mut renderer = GpuRenderer::with_material(gpu, mesh, Some(&occluder), &brdf).unwrap();
     let input = RenderInput {
         mesh,
         occluder: Some(&occluder),
@@ -66,7 +73,7 @@ fn found(gpu: &Gpu, mesh: &ObjectMesh, camera: &scene::Camera, size: [usize; 2],
         background: &Background::Wall,
     };
     renderer.render(gpu, &input, &Cancel::default()).unwrap();
-    let [points, origins] = &renderer.room.as_ref().unwrap().found;
+    let [points, origins] = &renderer.buffers.as_ref().unwrap().points_and_origins;
     let count = size[0] * size[1] * samples * samples;
     let mut points: Vec<Point> = gpu.read(points).unwrap();
     let origins: Vec<[f32; 4]> = gpu.read(origins).unwrap();
@@ -76,7 +83,7 @@ fn found(gpu: &Gpu, mesh: &ObjectMesh, camera: &scene::Camera, size: [usize; 2],
     [points.clone(), lifted.collect()]
 }
 
-/// Whether another triangle shows next to a sample: there subpixel snapping may choose either.
+/// Returns whether a neighbouring sample shows another triangle, so that subpixel snapping may choose either.
 fn is_at_edge(buffer: &GBuffer, k: usize) -> bool {
     let (x, y) = (k % buffer.width, k / buffer.width);
     let around = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
@@ -85,7 +92,7 @@ fn is_at_edge(buffer: &GBuffer, k: usize) -> bool {
 }
 
 #[test]
-fn both_routes_fill_the_same_g_buffer() {
+fn gpu_and_cpu_compute_the_same_g_buffer() {
     let Some(gpu) = open_gpu() else { return };
     for (kind, distance) in
         [("sphere", 0.0), ("plate", 0.0), ("cup", 0.0), ("skirt", 0.0), ("teapot", 0.0), ("skirt", 0.3)]
@@ -93,19 +100,19 @@ fn both_routes_fill_the_same_g_buffer() {
         let (mesh, size) = (object(kind), [300, 260]);
         let view = view(&mesh, distance, size);
         let cpu = GBuffer::new(&mesh, &view, 1);
-        let [device, lifted] = found(&gpu, &mesh, &camera(distance), size, 1);
-        assert_eq!(device.len(), cpu.triangles.len());
+        let [gpu_points, lifted] = points_and_lifted(&gpu, &mesh, &camera(distance), size, 1);
+        assert_eq!(gpu_points.len(), cpu.triangles.len());
         let (mut other_triangle, mut inside, mut covered) = (0, 0, 0);
         let (mut position, mut normal, mut tangent) = (Vec::new(), Vec::new(), Vec::new());
-        for (k, (point, lifted)) in device.iter().zip(&lifted).enumerate() {
-            covered += usize::from(cpu.triangles[k] != NOTHING);
-            let triangle = if point.weight > 0.0 { point.triangle } else { NOTHING };
+        for (k, (point, lifted)) in gpu_points.iter().zip(&lifted).enumerate() {
+            covered += usize::from(cpu.triangles[k] != NO_TRIANGLE);
+            let triangle = if point.weight > 0.0 { point.triangle } else { NO_TRIANGLE };
             if triangle != cpu.triangles[k] {
                 other_triangle += 1;
                 inside += usize::from(!is_at_edge(&cpu, k));
                 continue;
             }
-            if triangle == NOTHING {
+            if triangle == NO_TRIANGLE {
                 continue;
             }
             assert_eq!(point.weight, 1.0);
@@ -127,8 +134,8 @@ fn both_routes_fill_the_same_g_buffer() {
             other_triangle < covered / 100 && inside == 0,
             "{kind}: {other_triangle} of {covered}, {inside} not at edges"
         );
-        // Largest in 99 % of the samples, then of all: triangles seen edge-on magnify the subpixel snapping, and normals
-        // and tangents turn fast at the rim and at poles.
+        // Largest differences in 99 % of the samples, then in all. Triangles that are viewed edge-on magnify the
+        // subpixel snapping, and normals and tangents change fast at the rim and at poles.
         for (what, [most, worst], allowed) in
             [("position", position, [5e-4, 0.02]), ("normal", normal, [1e-3, 0.05]), ("tangent", tangent, [1e-3, 0.2])]
         {
@@ -138,45 +145,49 @@ fn both_routes_fill_the_same_g_buffer() {
 }
 
 #[test]
-fn both_routes_let_the_same_samples_share_a_point() {
+fn on_gpu_and_cpu_the_same_samples_share_a_point() {
     let Some(gpu) = open_gpu() else { return };
     for kind in ["sphere", "cup", "skirt"] {
         let (mesh, size, samples) = (object(kind), [150, 130], 2);
         let view = view(&mesh, 0.0, size);
         let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, samples), &view, samples);
-        let [device, _] = found(&gpu, &mesh, &camera(0.0), size, samples);
+        let [gpu_points, _] = points_and_lifted(&gpu, &mesh, &camera(0.0), size, samples);
         let pixels = size[0] * size[1];
         let (mut weights, mut firsts) = (vec![Vec::new(); pixels], vec![Vec3::ZERO; pixels]);
         for k in (0..points.len()).rev() {
             weights[points.pixels[k] as usize].push(points.weights[k]);
             firsts[points.pixels[k] as usize] = points.normals[k];
         }
-        let (mut shared, mut apart, mut differ) = (0, 0, 0);
+        let (mut shared, mut separate, mut differ) = (0, 0, 0);
         for pixel in 0..pixels {
-            let places: Vec<&Point> = (0..samples * samples).map(|k| &device[k * pixels + pixel]).collect();
-            let mut on_device: Vec<f32> = places.iter().map(|point| point.weight).filter(|&w| w > 0.0).collect();
-            on_device.reverse();
-            if on_device != weights[pixel] {
+            let slots: Vec<&Point> = (0..samples * samples).map(|k| &gpu_points[k * pixels + pixel]).collect();
+            let mut gpu_weights: Vec<f32> = slots.iter().map(|point| point.weight).filter(|&w| w > 0.0).collect();
+            gpu_weights.reverse();
+            if gpu_weights != weights[pixel] {
                 differ += 1;
                 continue;
             }
-            shared += usize::from(on_device == [1.0]);
-            apart += usize::from(on_device.len() > 1);
-            if let Some(first) = places.iter().find(|point| point.weight > 0.0) {
+            shared += usize::from(gpu_weights == [1.0]);
+            separate += usize::from(gpu_weights.len() > 1);
+            if let Some(first) = slots.iter().find(|point| point.weight > 0.0) {
                 assert!(first.normal.distance(firsts[pixel]) < 0.05, "{kind} {pixel}: {first:?} {}", firsts[pixel]);
             }
         }
-        eprintln!("{kind}: {shared} pixels of one point, {apart} of several, {differ} not alike");
-        // Silhouettes within a subpixel of a sample, and normals within rounding of the limit.
-        assert!(shared > 1000 && apart > 100 && differ * 100 < shared + apart, "{kind}: {shared} {apart} {differ}");
+        eprintln!("{kind}: {shared} pixels of one point, {separate} of several, {differ} differ");
+        // Differences come from silhouettes within a subpixel of a sample, and from normals within rounding of the
+        // limit.
+        assert!(
+            shared > 1000 && separate > 100 && differ * 100 < shared + separate,
+            "{kind}: {shared} {separate} {differ}"
+        );
     }
 }
 
 #[test]
-fn what_a_screen_shows_is_what_is_read_back_through_the_tone_map() {
+fn an_image_for_a_screen_is_the_tone_mapped_image_that_is_read_back() {
     let Some(gpu) = open_gpu() else { return };
     let (mesh, brdf, size) = (object("cup"), brdf(), [96, 64]);
-    let mut renderer = GpuRenderer::wearing(&gpu, &mesh, None, &brdf).unwrap();
+    let mut renderer = GpuRenderer::with_material(&gpu, &mesh, None, &brdf).unwrap();
     let texture = image::image(&gpu, size).unwrap();
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     for (curve, gain, background) in [
@@ -206,12 +217,12 @@ fn what_a_screen_shows_is_what_is_read_back_through_the_tone_map() {
             assert!(difference <= Some(1) && shown[3] == 255, "{k}: {bytes:?} {shown:?}");
             off += usize::from(difference == Some(1));
         }
-        // Only what lies within rounding of half a byte.
+        // Only values within rounding of half a byte differ.
         assert!(off * 50 < size[0] * size[1], "{off}");
     }
 }
 
-/// The device's answer for points of the CPU.
+/// Returns the visible lights that the GPU computes for points of the CPU.
 fn traced(
     gpu: &Gpu,
     mesh: &ObjectMesh,
@@ -219,25 +230,25 @@ fn traced(
     points: &ShadingPoints,
     lights: &[DirectionalLight],
     eye: Vec3,
-) -> Visible {
+) -> LightVisibility {
     use wgpu::BufferUsages as Usage;
-    let (rays, on_device) = (GpuLightRays::new(gpu).unwrap(), GpuOccluder::new(gpu, occluder).unwrap());
-    let words = Visible::words_of(lights.len()) as u32;
+    let (rays, gpu_occluder) = (GpuLightRays::new(gpu).unwrap(), GpuOccluder::new(gpu, occluder).unwrap());
+    let words = LightVisibility::words_of(lights.len()) as u32;
     let params = Params {
         eye,
         point_count: points.len() as u32,
         light_count: lights.len() as u32,
         words_per_point: words,
         slice: 8,
-        least_area: 0.0,
+        min_area: 0.0,
     };
-    let (mut places, mut origins) = (Vec::new(), Vec::new());
+    let (mut slots, mut origins) = (Vec::new(), Vec::new());
     for k in 0..points.len() {
         let (position, normal) = (points.positions[k], points.normals[k]);
-        places.push(Point { position, normal, weight: 1.0, ..Point::default() });
+        slots.push(Point { position, normal, weight: 1.0, ..Point::default() });
         origins.push(ray_origin(mesh, points.triangles[k] as usize, position, eye).0.extend(0.0));
     }
-    let lights_on_device: Vec<Light> = lights.iter().map(Light::from).collect();
+    let gpu_lights: Vec<Light> = lights.iter().map(Light::from).collect();
     let bits =
         gpu.buffer("bits", 4 * u64::from(words) * points.len() as u64, Usage::STORAGE | Usage::COPY_SRC).unwrap();
     let group = rays
@@ -245,27 +256,27 @@ fn traced(
             gpu,
             [
                 &gpu.upload("parameters", &[params], Usage::UNIFORM).unwrap(),
-                &gpu.upload("points", &places, Usage::STORAGE).unwrap(),
-                &gpu.upload("lights", &lights_on_device, Usage::STORAGE).unwrap(),
+                &gpu.upload("points", &slots, Usage::STORAGE).unwrap(),
+                &gpu.upload("lights", &gpu_lights, Usage::STORAGE).unwrap(),
             ],
         )
         .unwrap();
     let origins = gpu.upload("origins", &origins, Usage::STORAGE).unwrap();
-    let to_bits = rays.rays(gpu, &on_device, &origins, &bits).unwrap();
+    let to_bits = rays.rays(gpu, &gpu_occluder, &origins, &bits).unwrap();
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
     rays.trace(&mut pass, &group, &to_bits, [points.len() as u32, words]);
     drop(pass);
     gpu.queue.submit([encoder.finish()]);
-    let mut visible = Visible::none(points.len(), lights.len());
-    let answers: Vec<u32> = gpu.read(&bits).unwrap();
+    let mut visible = LightVisibility::none(points.len(), lights.len());
+    let words_read: Vec<u32> = gpu.read(&bits).unwrap();
     let count = visible.words.len();
-    visible.words.copy_from_slice(&answers[..count]);
+    visible.words.copy_from_slice(&words_read[..count]);
     visible
 }
 
 #[test]
-fn both_routes_see_the_same_lights() {
+fn gpu_and_cpu_compute_the_same_visible_lights() {
     let Some(gpu) = open_gpu() else { return };
     let lights: Vec<_> = (0..45)
         .map(|k| {
@@ -280,13 +291,13 @@ fn both_routes_see_the_same_lights() {
         let mesh = object(kind);
         let view = view(&mesh, 0.0, [150, 130]);
         let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
-        let occluder = Occluder::of(&mesh).unwrap();
-        let cpu = occluder.visible(&mesh, &points, &lights, view.eye, None);
-        let device = traced(&gpu, &mesh, &occluder, &points, &lights, view.eye);
-        let differ: u32 = cpu.words.iter().zip(&device.words).map(|(a, b)| (a ^ b).count_ones()).sum();
+        let occluder = Occluder::if_needed(&mesh).unwrap();
+        let cpu = occluder.visible_lights(&mesh, &points, &lights, view.eye, None);
+        let gpu_visible = traced(&gpu, &mesh, &occluder, &points, &lights, view.eye);
+        let differ: u32 = cpu.words.iter().zip(&gpu_visible.words).map(|(a, b)| (a ^ b).count_ones()).sum();
         let pairs = points.len() * lights.len();
         eprintln!("{kind}: {differ} of {pairs} rays differ");
-        // Rays that graze an edge or the horizon within rounding.
+        // Rays that graze an edge or the horizon within rounding may differ.
         assert!((differ as usize) < pairs / 5000, "{kind}: {differ} of {pairs}");
     }
 }

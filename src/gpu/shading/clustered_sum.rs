@@ -1,25 +1,25 @@
-//! Passes over runs of facets with one normal: their visible areas, and one lobe each. The twin of `ClusteredSum`
-//! (`src/filtering/clustered_sum.rs`): the device finds, too, which elevations are above or below all that a run sees.
+//! Passes over normal clusters: their visible areas, and one lobe each. The twin of `ClusteredSum` in `effective`. The
+//! GPU also computes the horizon bounds of each cluster.
 
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::direct::{Shared, Sum, pieces};
-use super::tabulate::{Making, Nodes, Step, workgroups};
+use super::direct::{FacetBuffers, Sum, pieces};
+use super::tabulate::{Nodes, Preparation, Step, workgroups};
 use super::visibility::GpuVisibility;
-use super::{GpuShading, Padded, TintRow, padded, tint_file};
+use super::{GpuShading, PaddedVec3, TintRow, padded, tint_shader};
 use crate::effective::{FacetSum, Tint};
 use crate::gpu::{Gpu, GpuError};
 
-/// A row of `patches.wgsl`.
+/// A row of `clusters.wgsl`.
 type Row = [u32; 4];
 
-/// Rows of a patch before those of its azimuths.
+/// Rows of a cluster before those of its azimuths.
 const HEAD: usize = 3;
 
-/// `Term` in `patches.wgsl`.
+/// `Term` in `clusters.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Term {
@@ -30,53 +30,58 @@ struct Term {
     pad: u32,
 }
 
-/// The runs of one normal of a sum, none longer than a pass may take.
-pub(crate) struct Patches {
-    /// Group, facets and normal of each; of the groups that reflect first.
-    runs: Vec<(usize, Range<usize>, Vec3)>,
-    lit: usize,
+/// The normal clusters of a sum, split so that each piece fits in one pass.
+pub(crate) struct ClusterPasses {
+    /// Facet group, facets and normal of each piece; pieces of groups that reflect come first.
+    pieces: Vec<(usize, Range<usize>, Vec3)>,
+    reflecting: usize,
 }
 
-impl Patches {
-    pub(crate) fn of(sum: &FacetSum, most: usize) -> Self {
+impl ClusterPasses {
+    pub(crate) fn of(sum: &FacetSum, max_facets: usize) -> Self {
         let of_groups = |black: bool| {
             let groups = sum.groups().iter().enumerate().filter(move |(_, group)| (group.color == Vec3::ZERO) == black);
             groups.flat_map(move |(k, group)| {
-                let patches = group.patches.iter().flatten();
-                patches.flat_map(move |run| pieces(run.range.clone(), most).map(move |range| (k, range, run.normal)))
+                let clusters = group.clusters.iter().flatten();
+                clusters.flat_map(move |cluster| {
+                    pieces(cluster.range.clone(), max_facets).map(move |range| (k, range, cluster.normal))
+                })
             })
         };
-        let mut runs: Vec<_> = of_groups(false).collect();
-        let lit = runs.len();
-        runs.extend(of_groups(true));
-        Self { runs, lit }
+        let mut pieces: Vec<_> = of_groups(false).collect();
+        let reflecting = pieces.len();
+        pieces.extend(of_groups(true));
+        Self { pieces, reflecting }
     }
 
-    /// Numbers of patches that hold `most` facets together, or of one patch; of those that reflect, or of all.
-    pub(crate) fn passes(&self, most: usize, all: bool) -> Vec<Range<usize>> {
+    /// Returns ranges of pieces for one pass each: at most `max_facets` facets, or one piece. `all`: whether pieces
+    /// that do not reflect are included.
+    pub(crate) fn passes(&self, max_facets: usize, all: bool) -> Vec<Range<usize>> {
         let mut passes: Vec<Range<usize>> = Vec::new();
-        let mut held = 0;
-        for (k, (_, facets, _)) in self.runs[..if all { self.runs.len() } else { self.lit }].iter().enumerate() {
+        let mut facet_count = 0;
+        for (k, (_, facets, _)) in
+            self.pieces[..if all { self.pieces.len() } else { self.reflecting }].iter().enumerate()
+        {
             match passes.last_mut() {
-                Some(pass) if held + facets.len() <= most => {
+                Some(pass) if facet_count + facets.len() <= max_facets => {
                     pass.end = k + 1;
-                    held += facets.len();
+                    facet_count += facets.len();
                 }
                 _ => {
                     passes.push(k..k + 1);
-                    held = facets.len();
+                    facet_count = facets.len();
                 }
             }
         }
         passes
     }
 
-    /// Facets of a run of patches.
-    pub(crate) fn facets(&self, patches: Range<usize>) -> u64 {
-        self.runs[patches].iter().map(|(_, facets, _)| facets.len() as u64).sum()
+    /// Returns the number of facets of a range of pieces.
+    pub(crate) fn facets(&self, clusters: Range<usize>) -> u64 {
+        self.pieces[clusters].iter().map(|(_, facets, _)| facets.len() as u64).sum()
     }
 
-    /// What `patches.wgsl` reads, reach yet to be found; and the file of its tints.
+    /// Returns the rows of `clusters.wgsl` without horizon bounds, and the shader of its tints.
     fn rows(&self, sum: &FacetSum, azimuths: usize) -> (Vec<Row>, &'static str) {
         let stride = HEAD + azimuths;
         let mut terms: Vec<Term> = Vec::new();
@@ -90,71 +95,73 @@ impl Patches {
             }));
         }
         let rows_of_term = size_of::<Term>() / size_of::<Row>();
-        let row_of = |term: usize| (stride * self.runs.len() + rows_of_term * term) as u32;
-        let mut rows: Vec<Row> = vec![[0; 4]; stride * self.runs.len()];
-        for (head, (group, facets, normal)) in rows.chunks_mut(stride).zip(&self.runs) {
-            let group_of = &sum.groups()[*group];
+        let row_of = |term: usize| (stride * self.pieces.len() + rows_of_term * term) as u32;
+        let mut rows: Vec<Row> = vec![[0; 4]; stride * self.pieces.len()];
+        for (head, (group, facets, normal)) in rows.chunks_mut(stride).zip(&self.pieces) {
+            let facet_group = &sum.groups()[*group];
             let area = facets.clone().map(|s| f64::from(sum.facet(s).1)).sum::<f64>() as f32;
-            let inside = facets.start - group_of.range.start..facets.end - group_of.range.start;
-            let whole = match &group_of.rgb_areas {
+            let in_group = facets.start - facet_group.range.start..facets.end - facet_group.range.start;
+            let total_weight = match &facet_group.rgb_areas {
                 Some(rgb) => Vec3::from(
-                    rgb.each_ref().map(|areas| areas[inside.clone()].iter().map(|&a| f64::from(a)).sum::<f64>() as f32),
+                    rgb.each_ref()
+                        .map(|areas| areas[in_group.clone()].iter().map(|&a| f64::from(a)).sum::<f64>() as f32),
                 ),
                 None => Vec3::splat(area),
             };
             let first = first_of_group[*group];
-            let [terms, end] = [first, first + group_of.lobes.len()].map(row_of);
+            let [terms, end] = [first, first + facet_group.lobes.len()].map(row_of);
             let [x, y, z] = normal.to_array().map(f32::to_bits);
             head[0] = [x, y, z, facets.start as u32];
             head[1] = [facets.end as u32, area.to_bits(), terms, end];
-            let [r, g, b] = whole.to_array().map(f32::to_bits);
+            let [r, g, b] = total_weight.to_array().map(f32::to_bits);
             head[2] = [r, g, b, 0];
         }
-        let file = tint_file(terms.iter().map(|term| &term.tint));
+        let tints = tint_shader(terms.iter().map(|term| &term.tint));
         rows.extend_from_slice(bytemuck::cast_slice(&terms));
-        (rows, file)
+        (rows, tints)
     }
 }
 
-/// Files that tell how much of a patch a direction sees, where facets see so.
-pub(crate) fn reach_file(seen: &GpuVisibility) -> &'static str {
-    match seen.file() {
-        "visibility_unblocked" => "reach_unblocked",
-        "visibility_horizons" => "reach_horizons",
-        _ => "reach_unknown",
+/// Returns the shader that bounds the visible facets of a cluster, for a kind of visibility.
+pub(crate) fn bounds_shader(visibility: &GpuVisibility) -> &'static str {
+    match visibility.shader_name() {
+        "visibility_unblocked" => "bounds_unblocked",
+        "visibility_horizons" => "bounds_horizons",
+        _ => "bounds_unknown",
     }
 }
 
 impl GpuShading {
-    /// The patches on the device, the file of their tints, and what the device has to make of them first.
-    pub(crate) fn patches(
+    /// Uploads the clusters. Returns their buffer, the shader of their tints, and the dispatch that computes horizon
+    /// bounds.
+    pub(crate) fn clusters(
         &mut self,
         gpu: &Gpu,
-        (sum, seen, shared): (&FacetSum, &GpuVisibility, &Shared),
-        patches: &Patches,
-    ) -> Result<(wgpu::Buffer, &'static str, Option<Making>), GpuError> {
-        let blank = Sum::blank(sum, seen);
-        let (rows, tints) = patches.rows(sum, blank.azimuths as usize);
-        let buffer = gpu.upload("patches", &rows, wgpu::BufferUsages::STORAGE)?;
-        if reach_file(seen) != "reach_horizons" || patches.runs.is_empty() {
+        (sum, visibility, buffers): (&FacetSum, &GpuVisibility, &FacetBuffers),
+        clusters: &ClusterPasses,
+    ) -> Result<(wgpu::Buffer, &'static str, Option<Preparation>), GpuError> {
+        let empty = Sum::empty(sum, visibility);
+        let (rows, tints) = clusters.rows(sum, empty.azimuths as usize);
+        let buffer = gpu.upload("clusters", &rows, wgpu::BufferUsages::STORAGE)?;
+        if bounds_shader(visibility) != "bounds_horizons" || clusters.pieces.is_empty() {
             return Ok((buffer, tints, None));
         }
-        let at = gpu.upload::<Padded>("directions", &[padded(Vec3::ZERO)], wgpu::BufferUsages::STORAGE)?;
-        // A buffer that is written is bound once.
-        let unbound = Shared { patches: at.clone(), ..shared.clone() };
-        let threads = patches.runs.len() * blank.azimuths as usize;
+        let directions = gpu.upload::<PaddedVec3>("directions", &[padded(Vec3::ZERO)], wgpu::BufferUsages::STORAGE)?;
+        // A buffer that is written must not be bound a second time.
+        let without_clusters = FacetBuffers { clusters: directions.clone(), ..buffers.clone() };
+        let threads = clusters.pieces.len() * empty.azimuths as usize;
         let layouts = [self.nodes.clone(), self.facets.clone()];
         let variant =
-            super::Variant { shader: "find_reach", entry_point: "find", swaps: Vec::new(), constants: Vec::new() };
+            super::Variant { shader: "horizon_bounds", entry_point: "find", swaps: Vec::new(), constants: Vec::new() };
         let step = Step {
             pipeline: self.pipeline_over(gpu, variant, &layouts.each_ref())?,
             groups: vec![
-                self.nodes_group(gpu, Nodes::zeroed(), &at, &buffer)?,
-                self.sum_group(gpu, &unbound, blank.over(&(0..patches.runs.len())))?,
+                self.nodes_group(gpu, Nodes::zeroed(), &directions, &buffer)?,
+                self.sum_group(gpu, &without_clusters, empty.over(&(0..clusters.pieces.len())))?,
             ],
             workgroups: workgroups(threads)?,
-            lobes: (threads * sum.facet_count() / patches.runs.len()) as u64,
+            lobes: (threads * sum.facet_count() / clusters.pieces.len()) as u64,
         };
-        Ok((buffer, tints, Some(Making::of(step))))
+        Ok((buffer, tints, Some(Preparation::of(step))))
     }
 }

@@ -1,12 +1,12 @@
-//! What multiplies the columns of a table: a tint, or the lobes of the facets of one normal.
+//! The weights of the columns of a table: tints, or the lobes of a normal cluster.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::{TintRow, tint_file};
-use crate::brdf::Term;
+use super::{TintRow, tint_shader};
+use crate::brdf::{Term, analytic_lobe};
+use crate::effective::Tint;
 use crate::effective::shading_table::columns::Weight;
-use crate::effective::{Tint, analytic_lobe};
 use crate::gpu::{Gpu, GpuError};
 
 /// `Term` in `column_lobes.wgsl`.
@@ -30,52 +30,54 @@ impl Row {
     }
 }
 
-/// The terms of all columns, as `column_lobes.wgsl` has them in order.
+/// The terms of all columns, in the order of `column_lobes.wgsl`.
 pub(crate) struct ColumnTerms {
     rows: Vec<Row>,
-    pub(crate) fours: usize,
+    pub(crate) vec4s: usize,
 }
 
 impl ColumnTerms {
+    /// Collects the terms of columns.
+    ///
     /// # Errors
-    /// [`GpuError::Unsupported`] where facets of one normal have a measured BRDF.
+    /// [`GpuError::Unsupported`] if a normal cluster has a measured BRDF.
     pub(crate) fn of(weights: &[Weight]) -> Result<Self, GpuError> {
-        let fours = weights.len().div_ceil(4);
-        let mut rows = vec![Row::default(); 4 * fours];
+        let vec4s = weights.len().div_ceil(4);
+        let mut rows = vec![Row::default(); 4 * vec4s];
         for (column, weight) in weights.iter().enumerate() {
             match weight {
                 Weight::Tint(tint) => rows[column].tint = TintRow::of(tint),
                 Weight::Lobes { measured: tables, .. } if !tables.is_empty() => return Err(measured()),
                 Weight::Lobes { normal, terms, color, .. } => {
-                    let mut place = column;
+                    let mut index = column;
                     for (k, term) in terms.iter().enumerate() {
                         if k > 0 {
-                            rows[place].next = rows.len() as u32;
-                            place = rows.len();
+                            rows[index].next = rows.len() as u32;
+                            index = rows.len();
                             rows.push(Row::default());
                         }
-                        rows[place] = Row::of_lobe(term, *normal, *color)?;
+                        rows[index] = Row::of_lobe(term, *normal, *color)?;
                     }
                 }
             }
         }
-        Ok(Self { rows, fours })
+        Ok(Self { rows, vec4s })
     }
 
-    /// Lobes that a query evaluates.
+    /// Returns the number of lobes that a query evaluates.
     pub(crate) fn lobes(&self) -> usize {
         self.rows.iter().filter(|row| row.lobe > 0).count()
     }
 
-    /// The files that read these and no others.
+    /// Returns the swaps for shaders that read these terms.
     pub(crate) fn swaps(&self) -> [(&'static str, &'static str); 2] {
         [
             ("column_tints", if self.lobes() > 0 { "column_lobes" } else { "column_tints" }),
-            ("tint_fixed", tint_file(self.rows.iter().map(|row| &row.tint))),
+            ("tint_fixed", tint_shader(self.rows.iter().map(|row| &row.tint))),
         ]
     }
 
-    pub(crate) fn on_device(&self, gpu: &Gpu) -> Result<wgpu::Buffer, GpuError> {
+    pub(crate) fn upload(&self, gpu: &Gpu) -> Result<wgpu::Buffer, GpuError> {
         let usage = wgpu::BufferUsages::STORAGE;
         if self.lobes() > 0 {
             return gpu.upload("columns", &self.rows, usage);
@@ -86,5 +88,5 @@ impl ColumnTerms {
 }
 
 fn measured() -> GpuError {
-    GpuError::Unsupported("measured BRDFs of facets of one normal are read on the CPU only".to_owned())
+    GpuError::Unsupported("measured BRDFs of normal clusters are evaluated on the CPU only".to_owned())
 }

@@ -1,17 +1,17 @@
-//! Passes of the live sum over facets: a projected area, then one pass a term of each group of facets, or one
-//! for all terms where normals are few.
+//! Passes of a direct sum over facets: projected areas first, then one pass per term of each facet group, or one pass
+//! for all terms of normal clusters.
 
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::clustered_sum::{Patches, reach_file};
-use super::tabulate::Making;
+use super::clustered_sum::{ClusterPasses, bounds_shader};
+use super::tabulate::Preparation;
 use super::visibility::GpuVisibility;
-use super::{GpuShading, Padded, Pass, Second, Variant, padded, shadow_swap};
+use super::{GpuShading, PaddedVec3, Pass, SecondGroup, Variant, padded, shadow_swap};
 use crate::brdf::Term;
-use crate::effective::{FacetSum, Group};
+use crate::effective::{FacetGroup, FacetSum};
 use crate::gpu::{Gpu, GpuError, Tier};
 use crate::math::simd::Lobe;
 
@@ -30,113 +30,125 @@ pub(crate) struct Sum {
     pub(crate) tint: Vec3,
     pub(crate) facet_count: u32,
     pub(crate) color: Vec3,
-    /// Of several passes over projected areas: 1 the first, 2 the last, 3 both.
-    pub(crate) place: u32,
+    /// Flags of a pass over projected areas: 1 for the first pass, 2 for the last, 3 for both.
+    pub(crate) area_pass: u32,
 }
 
-/// Facets of one pass on software Vulkan: llvmpipe leaves all loops of a thread, without a word, after 65,535 rounds
-/// together. SimdF32x8 lights, and eight things that hang over a facet, stay below that.
+/// Largest number of facets of one pass on software Vulkan. llvmpipe silently ends all loops of a thread after a total
+/// of 65,535 iterations. Eight lights, and eight overhangs of a facet, stay below that limit.
 pub(crate) const SOFTWARE_FACETS: usize = 512;
 
-/// And on others, where a pass over one row of pixels may be a submission.
+/// Largest number of facets of one pass on a real GPU, where a pass over one row of pixels may be a submission.
 const HARDWARE_FACETS: usize = 1024;
 
-/// The buffers that all passes read.
+/// The buffers that all passes over facets read.
 #[derive(Clone)]
-pub(crate) struct Shared {
+pub(crate) struct FacetBuffers {
     pub(crate) facets: wgpu::Buffer,
     pub(crate) visibility: wgpu::Buffer,
-    /// Or the facets that were picked.
-    pub(crate) patches: wgpu::Buffer,
+    /// Normal clusters, or the subsets of sampled facets.
+    pub(crate) clusters: wgpu::Buffer,
 }
 
 impl GpuShading {
-    /// The passes, and what the device has to make before the first.
+    /// Returns the passes, and the dispatches that must run before the first of them.
     pub(super) fn direct_passes(
         &mut self,
         gpu: &Gpu,
         sum: &FacetSum,
-        seen: &GpuVisibility,
+        visibility: &GpuVisibility,
         shadowed: bool,
-    ) -> Result<(Vec<Pass>, Option<Making>), GpuError> {
+    ) -> Result<(Vec<Pass>, Option<Preparation>), GpuError> {
         let groups = sum.groups();
         if groups.iter().any(|group| !group.measured.is_empty() && group.color != Vec3::ZERO) {
             return Err(GpuError::Unsupported(
                 "tables of measured BRDFs are summed over facets on the CPU only".to_owned(),
             ));
         }
-        let most = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { HARDWARE_FACETS };
-        let (see, reach) = (("visibility_unblocked", seen.file()), ("reach_unblocked", reach_file(seen)));
+        let max_facets = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { HARDWARE_FACETS };
+        let (visibility_swap, bounds_swap) =
+            (("visibility_unblocked", visibility.shader_name()), ("bounds_unblocked", bounds_shader(visibility)));
         let weights = |vary: bool| ("weights_area", if vary { "weights_rgb" } else { "weights_area" });
-        let blank = Sum::blank(sum, seen);
-        let mut shared = Shared::of(gpu, sum, seen)?;
-        let patches = Patches::of(sum, most);
-        let (on_device, tints, making) = self.patches(gpu, (sum, seen, &shared), &patches)?;
-        shared.patches = on_device;
-        let of_patches = |range: Range<usize>| (blank.over(&range), patches.facets(range));
+        let empty = Sum::empty(sum, visibility);
+        let mut buffers = FacetBuffers::of(gpu, sum, visibility)?;
+        let clusters = ClusterPasses::of(sum, max_facets);
+        let (cluster_buffer, tints, preparation) = self.clusters(gpu, (sum, visibility, &buffers), &clusters)?;
+        buffers.clusters = cluster_buffer;
+        let of_clusters = |range: Range<usize>| (empty.over(&range), clusters.facets(range));
 
-        let many = |group: &&Group| group.patches.is_none();
-        let of_facets = groups.iter().filter(many).flat_map(|group| pieces(group.range.clone(), most));
-        let of_facets = of_facets.map(|range| ("sum_areas", blank.over(&range), range.len() as u64));
-        let of_runs = patches.passes(most, true).into_iter().map(of_patches);
-        let of_runs = of_runs.map(|(sum, work)| ("sum_patch_areas", sum, work));
-        let areas: Vec<_> = of_facets.chain(of_runs).collect();
+        let is_unclustered = |group: &&FacetGroup| group.clusters.is_none();
+        let facet_sums = groups.iter().filter(is_unclustered).flat_map(|group| pieces(group.range.clone(), max_facets));
+        let facet_sums = facet_sums.map(|range| ("sum_areas", empty.over(&range), range.len() as u64));
+        let cluster_sums = clusters.passes(max_facets, true).into_iter().map(of_clusters);
+        let cluster_sums = cluster_sums.map(|(sum, work)| ("sum_cluster_areas", sum, work));
+        let areas: Vec<_> = facet_sums.chain(cluster_sums).collect();
         let mut passes = Vec::new();
-        for (k, (file, sum, work)) in areas.iter().enumerate() {
-            let place = u32::from(k == 0) + 2 * u32::from(k + 1 == areas.len());
-            let swaps = vec![see, reach, ("sum_areas", *file)];
+        for (k, (shader, sum, work)) in areas.iter().enumerate() {
+            let area_pass = u32::from(k == 0) + 2 * u32::from(k + 1 == areas.len());
+            let swaps = vec![visibility_swap, bounds_swap, ("sum_areas", *shader)];
             let variant = Variant { shader: "projected_area", entry_point: "measure", swaps, constants: Vec::new() };
             passes.push(Pass {
-                pipeline: self.pipeline(gpu, variant, Second::Facets)?,
-                group: self.sum_group(gpu, &shared, Sum { place, ..*sum })?,
+                pipeline: self.pipeline(gpu, variant, SecondGroup::Facets)?,
+                group: self.sum_group(gpu, &buffers, Sum { area_pass, ..*sum })?,
                 work: *work,
                 each_light: false,
             });
         }
 
         let mut planned = Vec::new();
-        for group in groups.iter().filter(many).filter(|group| group.color != Vec3::ZERO) {
+        for group in groups.iter().filter(is_unclustered).filter(|group| group.color != Vec3::ZERO) {
             for (lobe, term) in &group.lobes {
-                let (file, sum) = blank.of_lobe(*lobe);
+                let (lobe_shader, sum) = empty.with_lobe(*lobe);
                 let sum = Sum { tint: base_tint(term), color: group.color, ..sum };
-                let swaps =
-                    vec![shadow_swap(shadowed), see, ("lobe_lambertian", file), weights(group.rgb_areas.is_some())];
-                let passes = pieces(group.range.clone(), most).map(|range| (sum.over(&range), range.len() as u64));
+                let swaps = vec![
+                    shadow_swap(shadowed),
+                    visibility_swap,
+                    ("lobe_lambertian", lobe_shader),
+                    weights(group.rgb_areas.is_some()),
+                ];
+                let passes =
+                    pieces(group.range.clone(), max_facets).map(|range| (sum.over(&range), range.len() as u64));
                 planned.extend(passes.map(|(sum, work)| ("shade_direct", swaps.clone(), sum, work)));
             }
         }
-        let swaps = vec![shadow_swap(shadowed), see, reach, ("tint_fixed", tints), weights(sum.colors_vary())];
-        let of_runs = patches.passes(most, false).into_iter().map(of_patches);
-        planned.extend(of_runs.map(|(sum, work)| ("shade_patches", swaps.clone(), sum, work)));
+        let swaps = vec![
+            shadow_swap(shadowed),
+            visibility_swap,
+            bounds_swap,
+            ("tint_fixed", tints),
+            weights(sum.colors_vary()),
+        ];
+        let cluster_sums = clusters.passes(max_facets, false).into_iter().map(of_clusters);
+        planned.extend(cluster_sums.map(|(sum, work)| ("shade_clusters", swaps.clone(), sum, work)));
         for (shader, swaps, sum, work) in planned {
             let variant = Variant { shader, entry_point: "shade", swaps, constants: Vec::new() };
             passes.push(Pass {
-                pipeline: self.pipeline(gpu, variant, Second::Facets)?,
-                group: self.sum_group(gpu, &shared, sum)?,
+                pipeline: self.pipeline(gpu, variant, SecondGroup::Facets)?,
+                group: self.sum_group(gpu, &buffers, sum)?,
                 work,
                 each_light: true,
             });
         }
-        Ok((passes, making))
+        Ok((passes, preparation))
     }
 
-    pub(crate) fn sum_group(&self, gpu: &Gpu, shared: &Shared, sum: Sum) -> Result<wgpu::BindGroup, GpuError> {
+    pub(crate) fn sum_group(&self, gpu: &Gpu, buffers: &FacetBuffers, sum: Sum) -> Result<wgpu::BindGroup, GpuError> {
         let uniform = gpu.upload("sum", &[sum], wgpu::BufferUsages::UNIFORM)?;
-        let bound = [&uniform, &shared.facets, &shared.visibility, &shared.patches];
+        let bound = [&uniform, &buffers.facets, &buffers.visibility, &buffers.clusters];
         gpu.group("facets", &self.facets, &bound.map(|buffer| buffer.as_entire_binding()))
     }
 }
 
 impl Sum {
-    /// A sum over nothing of the facets, as they see.
-    pub(crate) fn blank(sum: &FacetSum, seen: &GpuVisibility) -> Self {
-        seen.with(Self { facet_count: sum.facet_count() as u32, ..Self::default() })
+    /// Returns a sum over no facets, with the parameters of the visibility.
+    pub(crate) fn empty(sum: &FacetSum, visibility: &GpuVisibility) -> Self {
+        visibility.with(Self { facet_count: sum.facet_count() as u32, ..Self::default() })
     }
 
-    /// The same with the constants of a lobe, and the file of that.
-    pub(crate) fn of_lobe(self, lobe: Lobe) -> (&'static str, Self) {
-        let (file, shape, scale) = lobe_file(lobe);
-        (file, Self { shape, scale, ..self })
+    /// Returns the shader of a lobe, and the sum with the constants of that lobe.
+    pub(crate) fn with_lobe(self, lobe: Lobe) -> (&'static str, Self) {
+        let (shader, shape, scale) = lobe_shader(lobe);
+        (shader, Self { shape, scale, ..self })
     }
 
     pub(crate) fn over(self, range: &Range<usize>) -> Self {
@@ -144,27 +156,27 @@ impl Sum {
     }
 }
 
-impl Shared {
-    /// Facets, what they see, and no patches.
-    pub(crate) fn of(gpu: &Gpu, sum: &FacetSum, seen: &GpuVisibility) -> Result<Self, GpuError> {
+impl FacetBuffers {
+    /// Uploads facets and visibility, without clusters.
+    pub(crate) fn of(gpu: &Gpu, sum: &FacetSum, visibility: &GpuVisibility) -> Result<Self, GpuError> {
         Ok(Self {
             facets: gpu.upload("facets", &facet_rows(sum), wgpu::BufferUsages::STORAGE)?,
-            visibility: seen.on_device(gpu)?,
-            patches: gpu.upload::<u32>("patches", &[], wgpu::BufferUsages::STORAGE)?,
+            visibility: visibility.upload(gpu)?,
+            clusters: gpu.upload::<u32>("clusters", &[], wgpu::BufferUsages::STORAGE)?,
         })
     }
 }
 
-/// A range in pieces of `most`; an empty one is a piece.
-pub(crate) fn pieces(range: Range<usize>, most: usize) -> impl Iterator<Item = Range<usize>> {
-    let count = range.len().div_ceil(most).max(1);
-    (0..count).map(move |k| range.start + k * most..(range.start + (k + 1) * most).min(range.end))
+/// Splits a range into pieces of at most `max_length`. An empty range is one piece.
+pub(crate) fn pieces(range: Range<usize>, max_length: usize) -> impl Iterator<Item = Range<usize>> {
+    let count = range.len().div_ceil(max_length).max(1);
+    (0..count).map(move |k| range.start + k * max_length..(range.start + (k + 1) * max_length).min(range.end))
 }
 
-/// Normal and area of each facet; where the colours of any differ, area times colour of each after that.
-fn facet_rows(sum: &FacetSum) -> Vec<Padded> {
+/// Returns normal and area of each facet. If colours differ, area times colour of each facet follow.
+fn facet_rows(sum: &FacetSum) -> Vec<PaddedVec3> {
     let facets = (0..sum.facet_count()).map(|s| sum.facet(s));
-    let mut rows: Vec<Padded> = facets.map(|(v, pad)| Padded { v, pad }).collect();
+    let mut rows: Vec<PaddedVec3> = facets.map(|(v, pad)| PaddedVec3 { v, pad }).collect();
     if sum.colors_vary() {
         for group in sum.groups() {
             for s in group.range.clone() {
@@ -179,8 +191,8 @@ fn facet_rows(sum: &FacetSum) -> Vec<Padded> {
     rows
 }
 
-/// The file of a lobe and its two constants.
-fn lobe_file(lobe: Lobe) -> (&'static str, f32, f32) {
+/// Returns the shader of a lobe and its two constants.
+fn lobe_shader(lobe: Lobe) -> (&'static str, f32, f32) {
     match lobe {
         Lobe::Lambertian => ("lobe_lambertian", 0.0, 0.0),
         Lobe::BlinnPhong { half_exponent, scale } => ("lobe_blinn_phong", half_exponent, scale),
@@ -190,7 +202,7 @@ fn lobe_file(lobe: Lobe) -> (&'static str, f32, f32) {
     }
 }
 
-/// The tint at `i·h = 1`.
+/// Returns the tint at `i·h = 1`.
 pub(crate) fn base_tint(term: &Term) -> Vec3 {
     term.tint(1.0)
 }

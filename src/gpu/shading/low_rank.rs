@@ -1,8 +1,9 @@
-//! The pass of the factored form: all channels in one, because the sum over them is what must not be negative.
+//! The shading pass of low-rank factors. One pass sums all channels, because only their sum is clamped to be
+//! non-negative.
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{GpuShading, Pass, Second, TintRow, Variant, shadow_swap, tint_file};
+use super::{GpuShading, Pass, SecondGroup, TintRow, Variant, shadow_swap, tint_shader};
 use crate::effective::{Channel, LowRank};
 use crate::gpu::{Gpu, GpuError};
 
@@ -19,7 +20,7 @@ struct Grids {
     pad: [u32; 3],
 }
 
-/// `Channel` in `shade_low_rank.wgsl`; places and columns count fours of values.
+/// `Channel` in `shade_low_rank.wgsl`; offsets and columns are in units of four values.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Row {
@@ -31,20 +32,21 @@ struct Row {
 }
 
 impl GpuShading {
-    pub(super) fn low_rank_pass(&mut self, gpu: &Gpu, form: &LowRank, shadowed: bool) -> Result<Pass, GpuError> {
+    pub(super) fn low_rank_pass(&mut self, gpu: &Gpu, low_rank: &LowRank, shadowed: bool) -> Result<Pass, GpuError> {
         let (mut u, mut p) = (Vec::new(), Vec::new());
-        let rows: Vec<Row> = form.channels.iter().map(|channel| add_channel(channel, &mut u, &mut p)).collect();
+        let rows: Vec<Row> = low_rank.channels.iter().map(|channel| add_channel(channel, &mut u, &mut p)).collect();
         let usage = wgpu::BufferUsages::STORAGE;
-        // The areas stand behind the factors P: adapters promise eight storage buffers, and this would be the ninth.
+        // The areas follow the factors P, because adapters guarantee only eight storage buffers.
         let first_area = (p.len() / 4) as u32;
-        p.extend_from_slice(&form.projected_area);
+        p.extend_from_slice(&low_rank.projected_area);
         p.resize(p.len().next_multiple_of(4), 0.0);
         let grids = Grids {
-            rings: form.directions.rings as u32,
-            azimuths: form.directions.azimuths as u32,
-            nodes: form.directions.len() as u32,
+            rings: low_rank.directions.rings as u32,
+            azimuths: low_rank.directions.azimuths as u32,
+            nodes: low_rank.directions.len() as u32,
             channel_count: rows.len() as u32,
-            pairs: [form.pairs.rings, form.pairs.azimuths, form.pairs.difference, form.pairs.turn].map(|n| n as u32),
+            pairs: [low_rank.pairs.rings, low_rank.pairs.azimuths, low_rank.pairs.theta_d, low_rank.pairs.phi_d]
+                .map(|n| n as u32),
             first_area,
             pad: [0; 3],
         };
@@ -58,12 +60,12 @@ impl GpuShading {
         let variant = Variant {
             shader: "shade_low_rank",
             entry_point: "shade",
-            swaps: vec![shadow_swap(shadowed), ("tint_fixed", tint_file(rows.iter().map(|row| &row.tint)))],
+            swaps: vec![shadow_swap(shadowed), ("tint_fixed", tint_shader(rows.iter().map(|row| &row.tint)))],
             constants: vec![("HAS_TABLES", has(1)), ("HAS_FACTORS", has(0))],
         };
         let resources: Vec<_> = bound.iter().map(wgpu::Buffer::as_entire_binding).collect();
         Ok(Pass {
-            pipeline: self.pipeline(gpu, variant, Second::Factors)?,
+            pipeline: self.pipeline(gpu, variant, SecondGroup::Factors)?,
             group: gpu.group("factors", &self.factors, &resources)?,
             work: rows.iter().map(|row| if row.is_table == 1 { 16 } else { 32 * u64::from(row.columns) }).sum(),
             each_light: true,
@@ -71,7 +73,7 @@ impl GpuShading {
     }
 }
 
-/// Appends a channel's tables, rows of columns padded to fours, and tells where they stand.
+/// Appends the tables of a channel, with rows padded to multiples of four columns, and returns their offsets.
 fn add_channel(channel: &Channel, u: &mut Vec<f32>, p: &mut Vec<f32>) -> Row {
     let [first_u, first_p] = [u.len(), p.len()].map(|at| (at / 4) as u32);
     let columns = channel.columns.div_ceil(4);

@@ -1,7 +1,9 @@
-//! Deferred shading on wgpu: the twin of [`shading::radiance`](crate::render::image::shading::radiance) with an [`EffectiveBrdf`].
+//! Deferred shading on the GPU: the twin of [`shading::radiance`](crate::render::image::shading::radiance) with an
+//! [`EffectiveBrdf`].
 //!
-//! A material becomes a list of compute passes over points and slices of the lights. Each pass is compiled for what it
-//! meets (a lobe, a kind of visibility, shadows or none): an effect that a scene does not call for leaves no instruction.
+//! A material becomes a list of compute passes over points and slices of the lights. Each pass is compiled for its
+//! lobe, its kind of visibility, and with or without shadows. Effects that a scene does not use therefore leave no
+//! instructions.
 
 mod clustered_sum;
 mod column_terms;
@@ -19,7 +21,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use self::tabulate::Making;
+use self::tabulate::Preparation;
 pub use self::visibility::GpuVisibility;
 use super::device::pipelines::{READ, UNIFORM, WRITE};
 use super::{Gpu, GpuError, GpuHorizonMap, GpuMaps, Swaps};
@@ -27,12 +29,12 @@ use crate::effective::{EffectiveBrdf, GpuTileInput, Representation, Tint};
 use crate::render::DirectionalLight;
 
 const THREADS: u32 = 64;
-/// The most workgroups of a dispatch along one axis.
+/// Largest number of workgroups of a dispatch along one axis.
 const MAX_GROUPS: usize = 65_535;
-/// The most points of one dispatch.
+/// Largest number of points of one dispatch.
 pub(crate) const MAX_POINTS: usize = MAX_GROUPS * THREADS as usize;
 
-/// The layouts of all shading passes, and the pipelines compiled so far: build once, use for any material.
+/// The layouts of all shading passes, and the pipelines compiled so far, for any material.
 #[derive(Debug)]
 pub struct GpuShading {
     points: wgpu::BindGroupLayout,
@@ -42,7 +44,7 @@ pub struct GpuShading {
     compiled: Vec<(Variant, wgpu::ComputePipeline)>,
 }
 
-/// What tells one pipeline from another.
+/// The identity of a compiled pipeline.
 #[derive(Debug, Clone, PartialEq)]
 struct Variant {
     shader: &'static str,
@@ -51,27 +53,29 @@ struct Variant {
     constants: Vec<(&'static str, f64)>,
 }
 
-/// An effective BRDF on the device.
+/// An effective BRDF on the GPU: the passes that shade with it, and the work before the first of them.
 #[derive(Debug)]
 pub struct GpuMaterial {
     passes: Vec<Pass>,
-    /// What the passes read and the device has to make first.
+    /// Visibility that the GPU must compute first: a horizon map or occlusion intervals.
     horizons: Option<GpuHorizonMap>,
+    /// Visibility that the GPU must compute first: shadow maps.
     maps: Option<GpuMaps>,
-    making: Option<Making>,
-    least_area: f32,
+    preparation: Option<Preparation>,
+    min_area: f32,
 }
 
 #[derive(Debug)]
 struct Pass {
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
-    /// Lobes or table rows of one point, and one light if there is a thread for each slice of those.
+    /// Lobes or table rows per point, and per light if `each_light` is set.
     work: u64,
+    /// Whether there is one thread per slice of the lights, not one per point.
     each_light: bool,
 }
 
-/// What all passes over the points of one band share.
+/// Parameters of all passes over the points of one band.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct Params {
@@ -79,15 +83,15 @@ pub(crate) struct Params {
     pub point_count: u32,
     pub light_count: u32,
     pub words_per_point: u32,
-    /// Lights that one thread adds up.
+    /// Lights per thread.
     pub slice: u32,
-    pub least_area: f32,
+    pub min_area: f32,
 }
 
-/// A light as shaders see it.
+/// `Light` in `shading_points.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct Light([Padded; 2]);
+pub(crate) struct Light([PaddedVec3; 2]);
 
 impl From<&DirectionalLight> for Light {
     fn from(light: &DirectionalLight) -> Self {
@@ -95,16 +99,16 @@ impl From<&DirectionalLight> for Light {
     }
 }
 
-/// A vector and padding to the 16 bytes WGSL gives it.
+/// A vector, padded to 16 bytes as in WGSL.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Padded {
+struct PaddedVec3 {
     v: Vec3,
     pad: f32,
 }
 
-fn padded(v: Vec3) -> Padded {
-    Padded { v, pad: 0.0 }
+fn padded(v: Vec3) -> PaddedVec3 {
+    PaddedVec3 { v, pad: 0.0 }
 }
 
 impl GpuShading {
@@ -119,62 +123,65 @@ impl GpuShading {
         })
     }
 
-    /// Uploads a BRDF and compiles what it needs. `shadowed`: points come with the lights they see.
+    /// Uploads a BRDF and compiles its passes. `shadowed`: whether points have bits for their visible lights.
     ///
     /// # Errors
-    /// [`GpuError::Unsupported`] for what only the CPU does (measured BRDFs that are not factored), and what devices refuse.
+    /// [`GpuError::Unsupported`] for representations that only the CPU evaluates, such as measured BRDFs in a
+    /// direct sum; and errors of the GPU.
     pub fn material(
         &mut self,
         gpu: &Gpu,
         brdf: &EffectiveBrdf,
         shadowed: bool,
     ) -> std::result::Result<GpuMaterial, GpuError> {
-        let passes = match &brdf.form {
+        let passes = match &brdf.representation {
             Representation::Direct(form) => {
-                let (passes, making) =
-                    self.direct_passes(gpu, &form.sum, &GpuVisibility::Held(&form.visibility), shadowed)?;
-                return Ok(GpuMaterial { making, ..GpuMaterial::of(passes, brdf.base_area) });
+                let (passes, preparation) =
+                    self.direct_passes(gpu, &form.sum, &GpuVisibility::Computed(&form.visibility), shadowed)?;
+                return Ok(GpuMaterial { preparation, ..GpuMaterial::of(passes, brdf.base_area) });
             }
             Representation::LowRank(form) => vec![self.low_rank_pass(gpu, form, shadowed)?],
             Representation::Interreflecting(..) => {
-                return Err(GpuError::Unsupported("light between facets is added on the CPU only".to_owned()));
+                return Err(GpuError::Unsupported("interreflection is added on the CPU only".to_owned()));
             }
             Representation::Table(table) => vec![self.table_pass(gpu, table, shadowed)?],
             Representation::Wu2011(_) => {
-                return Err(GpuError::Unsupported("the paper's own tables are read on the CPU only".to_owned()));
+                return Err(GpuError::Unsupported("the paper's own tables are evaluated on the CPU only".to_owned()));
             }
         };
         Ok(GpuMaterial::of(passes, brdf.base_area))
     }
 
-    /// A tile whose visibility and product the device makes where it can ([`GpuMaterial::make`]): a table of the sum where
-    /// that pays, else the sum itself.
+    /// Prepares a tile whose visibility and facet sum the GPU computes ([`GpuMaterial::prepare`]). It shades with a
+    /// table of the sum if that pays, else with the sum itself.
     ///
     /// # Errors
-    /// As [`GpuShading::material`].
+    /// Those of [`GpuShading::material`].
     pub fn tile(
         &mut self,
         gpu: &Gpu,
         tile: &GpuTileInput,
-        seen: GpuVisibility,
+        visibility: GpuVisibility,
         shadowed: bool,
     ) -> std::result::Result<GpuMaterial, GpuError> {
         let GpuTileInput { sum, nodes, interpolation, .. } = tile;
-        let table = nodes.map(|nodes| self.tabulated(gpu, (sum, &seen), (nodes, *interpolation), shadowed));
-        let (passes, making) = match table {
+        let table = nodes.map(|nodes| self.tabulated(gpu, (sum, &visibility), (nodes, *interpolation), shadowed));
+        let (passes, preparation) = match table {
             Some(Ok((pass, table))) => (vec![pass], Some(table)),
-            None | Some(Err(GpuError::Unsupported(_))) => self.direct_passes(gpu, sum, &seen, shadowed)?,
+            None | Some(Err(GpuError::Unsupported(_))) => self.direct_passes(gpu, sum, &visibility, shadowed)?,
             Some(Err(error)) => return Err(error),
         };
-        let (horizons, maps) = match seen {
-            GpuVisibility::Marched(horizons, _) | GpuVisibility::Sliced(horizons, _) => (Some(horizons), None),
-            GpuVisibility::Drawn(maps, _) => (None, Some(maps)),
-            GpuVisibility::Held(_) => (None, None),
+        let (horizons, maps) = match visibility {
+            GpuVisibility::HorizonMap(horizons, _) | GpuVisibility::OcclusionIntervals(horizons, _) => {
+                (Some(horizons), None)
+            }
+            GpuVisibility::Maps(maps, _) => (None, Some(maps)),
+            GpuVisibility::Computed(_) => (None, None),
         };
-        Ok(GpuMaterial { horizons, maps, making, ..GpuMaterial::of(passes, tile.base_area) })
+        Ok(GpuMaterial { horizons, maps, preparation, ..GpuMaterial::of(passes, tile.base_area) })
     }
 
-    /// [`Params`], points, lights, the bits of shadows, radiance and scales.
+    /// Binds [`Params`], points, lights, bits of visible lights, radiance and scales.
     pub(crate) fn points(
         &self,
         gpu: &Gpu,
@@ -187,17 +194,17 @@ impl GpuShading {
         &mut self,
         gpu: &Gpu,
         variant: Variant,
-        second: Second,
+        second_group: SecondGroup,
     ) -> std::result::Result<wgpu::ComputePipeline, GpuError> {
-        let layout = match second {
-            Second::Facets => &self.facets,
-            Second::Factors => &self.factors,
+        let layout = match second_group {
+            SecondGroup::Facets => &self.facets,
+            SecondGroup::Factors => &self.factors,
         };
         let groups = [self.points.clone(), layout.clone()];
         self.pipeline_over(gpu, variant, &groups.each_ref())
     }
 
-    /// A pipeline over these groups of bindings, from those compiled before if it is there.
+    /// Returns a pipeline over these groups of bindings; it is compiled at the first request.
     fn pipeline_over(
         &mut self,
         gpu: &Gpu,
@@ -215,68 +222,67 @@ impl GpuShading {
     }
 }
 
-/// What the second group of bindings holds.
+/// The contents of the second group of bindings.
 #[derive(Debug, Clone, Copy)]
-enum Second {
+enum SecondGroup {
     Facets,
     Factors,
 }
 
 impl GpuMaterial {
     fn of(passes: Vec<Pass>, base_area: f64) -> Self {
-        Self { passes, horizons: None, maps: None, making: None, least_area: (1e-12 * base_area) as f32 }
+        Self { passes, horizons: None, maps: None, preparation: None, min_area: (1e-12 * base_area) as f32 }
     }
 
-    /// Shadow maps that are to be drawn before [`GpuMaterial::make`].
+    /// Returns shadow maps that must be drawn before [`GpuMaterial::prepare`].
     pub(crate) fn maps(&self) -> Option<&GpuMaps> {
         self.maps.as_ref()
     }
 
-    /// What facets see, which is to be made before [`GpuMaterial::make`].
+    /// Returns horizons that must be computed before [`GpuMaterial::prepare`].
     pub(crate) fn horizons(&self) -> Option<&GpuHorizonMap> {
         self.horizons.as_ref()
     }
 
-    /// Whether [`GpuMaterial::make`] has anything to do.
-    pub(crate) fn is_to_be_made(&self) -> bool {
-        self.making.is_some()
+    /// Returns whether [`GpuMaterial::prepare`] has any dispatch.
+    pub(crate) fn needs_preparation(&self) -> bool {
+        self.preparation.is_some()
     }
 
-    /// Buffers that [`GpuMaterial::make`] adds to.
+    /// Returns the buffers to which [`GpuMaterial::prepare`] adds.
     pub(crate) fn sums(&self) -> Vec<&wgpu::Buffer> {
-        self.making.iter().flat_map(|making| &making.sums).collect()
+        self.preparation.iter().flat_map(|preparation| &preparation.sums).collect()
     }
 
-    /// Dispatches of [`GpuMaterial::make`] whose lobes are no more than these together.
-    pub(crate) fn parts(&self, most_lobes: u64) -> Vec<Range<usize>> {
-        self.making.as_ref().map_or_else(|| vec![Range::default()], |making| making.parts(most_lobes))
+    /// Returns the parts of [`GpuMaterial::prepare`], with at most `max_lobes` lobes each.
+    pub(crate) fn parts(&self, max_lobes: u64) -> Vec<Range<usize>> {
+        self.preparation.as_ref().map_or_else(|| vec![Range::default()], |preparation| preparation.parts(max_lobes))
     }
 
-    /// Records what the device has to make before the first shading with this material, all parts in order: the table of its
-    /// sum, or where few normals see alike.
-    /// Once is enough; twice makes the same again.
-    pub(crate) fn make(&self, compute: &mut wgpu::ComputePass, part: Range<usize>) {
-        if let Some(making) = &self.making {
-            making.dispatch(compute, part);
+    /// Records a part of the dispatches that must run before the first shading: they compute the table of the sum, or
+    /// horizon bounds. All parts are needed, in order. To run them again computes the same values.
+    pub(crate) fn prepare(&self, compute: &mut wgpu::ComputePass, part: Range<usize>) {
+        if let Some(preparation) = &self.preparation {
+            preparation.dispatch(compute, part);
         }
     }
 
-    /// Lobes and table rows of one point.
+    /// Returns the lobes and table rows per point.
     pub(crate) fn work(&self, lights: usize) -> u64 {
         self.passes.iter().map(|pass| pass.work * if pass.each_light { lights as u64 } else { 1 }).sum()
     }
 
-    /// A projected area [of the tile] below this shows nothing.
-    pub(crate) fn least_area(&self) -> f32 {
-        self.least_area
+    /// Returns the projected area [tile units²] below which a point is black.
+    pub(crate) fn min_area(&self) -> f32 {
+        self.min_area
     }
 
     pub(crate) fn passes(&self) -> usize {
         self.passes.len()
     }
 
-    /// Adds radiance towards the eye to the rows of a group's points, one for each slice of the lights; by some of the passes,
-    /// which must run in order.
+    /// Records some of the passes, which must run in order. They add radiance towards the eye to rows of points, one
+    /// row per slice of the lights.
     pub(crate) fn shade(
         &self,
         compute: &mut wgpu::ComputePass,
@@ -294,7 +300,7 @@ impl GpuMaterial {
     }
 }
 
-/// The import that shadows stand behind, and what stands in for it.
+/// Returns the swap for shadows.
 fn shadow_swap(shadowed: bool) -> (&'static str, &'static str) {
     ("shadows_none", if shadowed { "shadows_bits" } else { "shadows_none" })
 }
@@ -319,7 +325,7 @@ impl TintRow {
     }
 }
 
-/// Which tints these call for.
-fn tint_file<'a>(mut rows: impl Iterator<Item = &'a TintRow>) -> &'static str {
+/// Returns the shader of the tints that these rows need.
+fn tint_shader<'a>(mut rows: impl Iterator<Item = &'a TintRow>) -> &'static str {
     if rows.any(|row| row.follows > 0.0) { "tint_fresnel" } else { "tint_fixed" }
 }

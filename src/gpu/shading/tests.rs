@@ -1,4 +1,4 @@
-//! The same picture on both routes, for each form of the effective BRDF and each kind of visibility.
+//! Tests that GPU and CPU shade alike, for each representation of the effective BRDF and each kind of visibility.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -7,9 +7,9 @@ use glam::Vec3;
 
 use super::{GpuMaterial, GpuShading, Light, Params};
 use crate::base::Cancel;
-use crate::brdf::{Brdf, LobeAngles, Measured, MeasuredReport, Term};
+use crate::brdf::{Brdf, LobeAngles, Material, Measured, MeasuredReport, Term};
 use crate::effective::shading_table::columns::Weight;
-use crate::effective::{Direct, EffectiveBrdf, FacetSum, Interpolation, Material, Nodes, Representation, ShadingTable};
+use crate::effective::{Direct, EffectiveBrdf, FacetSum, Interpolation, Nodes, Representation, ShadingTable};
 use crate::gpu::render::gbuffer::Point;
 use crate::gpu::{Gpu, GpuError, GpuRenderer, render_gpu};
 use crate::math::directions::HemispherePairGrid;
@@ -19,19 +19,21 @@ use crate::render::image::shading::Background;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::lighting::lights;
 use crate::render::render;
-use crate::render::shadow::{Occluder, Visible};
+use crate::render::shadow::{LightVisibility, Occluder};
 use crate::render::{CameraView, DirectionalLight, GBuffer, Image, ObjectMesh, RenderInput, object};
 use crate::scene;
 use crate::scene::LoadedScene;
 use crate::visibility::Visibility;
 
-/// Shading of the same points: the largest distance, relative to the point's radiance and the mean. Single precision on
-/// either side, lobes that multiply the rounding of half vectors by up to 1/roughness². Measured on lavapipe: 5e-6.
+/// Largest difference in shading of the same points, relative to the radiance of the point plus the mean. Both sides
+/// use single precision, and lobes multiply the rounding of half vectors by up to 1/roughness². The tests print the
+/// differences.
 pub(crate) const SHADING_TOLERANCE: f32 = 5e-5;
-/// Pictures: 99 % of the pixels, and the mean. The G-buffers differ by up to 1e-3 in normals in 99 % of the samples
-/// (gpu_tests.rs), which lobes of width 0.2 turn into a percent; the rest are edges, where the adapter may show the
-/// neighbouring triangle.
+/// Largest difference of 99 % of the pixels of an image. The normals of the G-buffers differ by up to 1e-3 in 99 % of
+/// the samples (`render/tests.rs`), which lobes of width 0.2 magnify to a percent. The other pixels are at edges, where
+/// the GPU may show the neighbouring triangle.
 const PIXEL_TOLERANCE: f32 = 0.02;
+/// Largest difference of the means of two images.
 const MEAN_TOLERANCE: f32 = 2e-3;
 
 pub(crate) fn open_gpu() -> Option<Gpu> {
@@ -60,7 +62,7 @@ pub(crate) fn effective(loaded: &LoadedScene) -> EffectiveBrdf {
     Pipeline::new().effective(loaded).unwrap().brdf.as_ref().clone()
 }
 
-/// An object, its shadows and ten lights.
+/// An object, its occluder and ten lights.
 pub(crate) struct TestScene {
     pub(crate) mesh: ObjectMesh,
     pub(crate) occluder: Option<Occluder>,
@@ -72,7 +74,7 @@ impl TestScene {
     pub(crate) fn of(kind: &str) -> Self {
         let mesh = object::build(&scene::Object { kind: kind.to_owned(), path: None }, Path::new(".")).unwrap();
         let lights = lights::build(&scene::Light { count: 10, ..scene::Light::default() }, Path::new(".")).unwrap();
-        let occluder = Occluder::of(&mesh);
+        let occluder = Occluder::if_needed(&mesh);
         Self { mesh, occluder, lights: lights.directional, camera: scene::Camera::default() }
     }
 
@@ -96,11 +98,12 @@ impl TestScene {
     }
 }
 
-/// Both routes on an object: points of one G-buffer shaded by both, and both pictures, 64 x 64.
+/// Asserts that GPU and CPU agree on an object: in shading of the points of one G-buffer, and in images of 64 x 64
+/// pixels.
 fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     assert_same_shading(what, gpu, kind, brdf);
-    let (studio, background) = (TestScene::of(kind), Background::Uniform(Vec3::ZERO));
-    let input = studio.input(brdf, 64, &background);
+    let (test_scene, background) = (TestScene::of(kind), Background::Uniform(Vec3::ZERO));
+    let input = test_scene.input(brdf, 64, &background);
     let images = [render(&input).unwrap().image, render_gpu(gpu, &input, brdf).unwrap().image];
     assert_same_image(what, &images);
 }
@@ -109,24 +112,24 @@ fn assert_same_shading(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) 
     let TestScene { mesh, occluder, lights, camera } = TestScene::of(kind);
     let view = CameraView::new(&camera, &mesh, [64, 64]).unwrap();
     let points = ShadingPoints::new(&GBuffer::new(&mesh, &view, 1), &view, 1);
-    let visible = occluder.as_ref().map(|o| o.visible(&mesh, &points, &lights, view.eye, None));
+    let visible = occluder.as_ref().map(|o| o.visible_lights(&mesh, &points, &lights, view.eye, None));
     let mut shading = GpuShading::new(gpu).unwrap();
     let material = shading.material(gpu, brdf, visible.is_some()).unwrap();
     let cpu = shading::radiance(&points, &lights, visible.as_ref(), view.eye, brdf);
-    let device = radiance(gpu, &shading, &material, &points, &lights, visible.as_ref(), view.eye);
-    let (_, worst, _) = distances(&cpu, &device);
+    let gpu_radiance = radiance(gpu, &shading, &material, &points, &lights, visible.as_ref(), view.eye);
+    let (_, worst, _) = distances(&cpu, &gpu_radiance);
     eprint!("{what}: shading within {worst:.1e}; ");
     assert!(worst < SHADING_TOLERANCE, "{what}: shading of the same points differs by {worst}");
 }
 
-/// The device's answer for points of the CPU, by slices of eight lights.
+/// Returns the radiance that the GPU computes for points of the CPU, in slices of eight lights.
 pub(crate) fn radiance(
     gpu: &Gpu,
     shading: &GpuShading,
     material: &GpuMaterial,
     points: &ShadingPoints,
     lights: &[DirectionalLight],
-    visible: Option<&Visible>,
+    visible: Option<&LightVisibility>,
     eye: Vec3,
 ) -> Vec<Vec3> {
     use wgpu::BufferUsages as Usage;
@@ -135,24 +138,24 @@ pub(crate) fn radiance(
         eye,
         point_count: points.len() as u32,
         light_count: lights.len() as u32,
-        words_per_point: Visible::words_of(lights.len()) as u32,
+        words_per_point: LightVisibility::words_of(lights.len()) as u32,
         slice: 8,
-        least_area: material.least_area(),
+        min_area: material.min_area(),
     };
-    let place = |k: usize| Point {
+    let point = |k: usize| Point {
         position: points.positions[k],
         normal: points.normals[k],
         tangent: points.tangents[k],
         weight: 1.0,
         ..Point::default()
     };
-    let places: Vec<Point> = (0..points.len()).map(place).collect();
+    let point_rows: Vec<Point> = (0..points.len()).map(point).collect();
     let lights: Vec<Light> = lights.iter().map(Light::from).collect();
     let words = visible.map_or(Vec::new(), |visible| visible.words.clone());
     let rows = gpu.buffer("radiance", (16 * points.len() * slices) as u64, Usage::STORAGE | Usage::COPY_SRC).unwrap();
     let bound = [
         &gpu.upload("parameters", &[params], Usage::UNIFORM).unwrap(),
-        &gpu.upload("points", &places, Usage::STORAGE).unwrap(),
+        &gpu.upload("points", &point_rows, Usage::STORAGE).unwrap(),
         &gpu.upload("lights", &lights, Usage::STORAGE).unwrap(),
         &gpu.upload("bits", &words, Usage::STORAGE).unwrap(),
         &rows,
@@ -162,7 +165,7 @@ pub(crate) fn radiance(
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
     for part in material.parts(u64::MAX) {
-        material.make(&mut pass, part);
+        material.prepare(&mut pass, part);
     }
     material.shade(&mut pass, 0..material.passes(), &group, [points.len() as u32, slices as u32]);
     drop(pass);
@@ -172,7 +175,8 @@ pub(crate) fn radiance(
     (0..points.len()).map(sum).collect()
 }
 
-/// Distances relative to a value and the mean: of 99 %, the largest, and of the means.
+/// Returns differences relative to a value plus the mean: the largest of 99 % of the values, the largest of all, and
+/// that of the means.
 pub(crate) fn distances(cpu: &[Vec3], gpu: &[Vec3]) -> (f32, f32, f32) {
     let mean = |values: &[Vec3]| values.iter().sum::<Vec3>() / values.len() as f32;
     let level = mean(cpu).max_element();
@@ -200,7 +204,7 @@ pub(crate) const LOBES: [&str; 5] = [
 #[test]
 fn direct_sums_give_the_same_image_for_every_lobe_and_visibility() {
     let Some(gpu) = open_gpu() else { return };
-    let mut seen = [false; 4];
+    let mut tested = [false; 4];
     let [lambertian, phong, beckmann, _, ggx] = LOBES;
     for (geometry, kind, lobes) in [
         (FLAT, "sphere", vec![lambertian, beckmann]),
@@ -209,24 +213,31 @@ fn direct_sums_give_the_same_image_for_every_lobe_and_visibility() {
         (RODS, "sphere", LOBES.to_vec()),
     ] {
         for brdf in lobes {
-            let brdf_form = effective(&open(geometry, brdf, "direct"));
-            let Representation::Direct(direct) = &brdf_form.form else { panic!("{geometry} {brdf}: not direct") };
+            let effective_brdf = effective(&open(geometry, brdf, "direct"));
+            let Representation::Direct(direct) = &effective_brdf.representation else {
+                panic!("{geometry} {brdf}: not direct")
+            };
             if let Visibility::OcclusionIntervals(slices) = direct.visibility.as_ref() {
                 let maps = Visibility::Maps(slices.maps(12));
-                let form = Representation::Direct(Direct::new(direct.sum.clone(), Arc::new(maps)));
-                seen[3] = true;
-                assert_same(&format!("{geometry} {brdf}, maps"), &gpu, kind, &EffectiveBrdf { form, ..brdf_form });
+                let representation = Representation::Direct(Direct::new(direct.sum.clone(), Arc::new(maps)));
+                tested[3] = true;
+                assert_same(
+                    &format!("{geometry} {brdf}, maps"),
+                    &gpu,
+                    kind,
+                    &EffectiveBrdf { representation, ..effective_brdf },
+                );
             }
-            seen[match direct.visibility.as_ref() {
+            tested[match direct.visibility.as_ref() {
                 Visibility::Unblocked { .. } => 0,
                 Visibility::HorizonMap(_) => 1,
                 Visibility::OcclusionIntervals(_) => 2,
                 Visibility::Maps(_) => 3,
             }] = true;
-            assert_same(&format!("{geometry} {brdf}"), &gpu, kind, &brdf_form);
+            assert_same(&format!("{geometry} {brdf}"), &gpu, kind, &effective_brdf);
         }
     }
-    assert_eq!(seen, [true; 4], "kinds of visibility met");
+    assert_eq!(tested, [true; 4], "kinds of visibility tested");
 }
 
 #[test]
@@ -234,16 +245,16 @@ fn factors_give_the_same_image_for_tables_and_lobes() {
     let Some(gpu) = open_gpu() else { return };
     let sum = format!("[{}, {}]", LOBES[0], LOBES[4]);
     for (geometry, brdf) in [(GROOVES, LOBES[0]), (PYRAMIDS, LOBES[2]), (RODS, sum.as_str())] {
-        let brdf_form = effective(&open(geometry, brdf, "low_rank"));
-        assert!(matches!(brdf_form.form, Representation::LowRank(_)), "{geometry} {brdf}");
-        assert_same(&format!("{geometry} {brdf}"), &gpu, "cup", &brdf_form);
+        let effective_brdf = effective(&open(geometry, brdf, "low_rank"));
+        assert!(matches!(effective_brdf.representation, Representation::LowRank(_)), "{geometry} {brdf}");
+        assert_same(&format!("{geometry} {brdf}"), &gpu, "cup", &effective_brdf);
     }
 }
 
 #[test]
 fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_image() {
     let Some(gpu) = open_gpu() else { return };
-    // The colour of every facet is its own.
+    // Every facet has its own colour.
     let mut facets = crate::geometry::Facets::default();
     for k in 0..300 {
         let (theta, phi) = (0.9 * (k as f32 * 0.618).fract(), 2.4 * k as f32);
@@ -255,23 +266,23 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_image() {
     }
     let material = |brdf: &str| {
         let loaded = open(FLAT, brdf, "direct");
-        Pipeline::new().sum_materials(&loaded).unwrap().1
+        Pipeline::new().materials(&loaded).unwrap().materials
     };
     let form = |brdf: &str| EffectiveBrdf {
-        form: Representation::Direct(Direct::new(
+        representation: Representation::Direct(Direct::new(
             FacetSum::new(&facets, &[0], &material(brdf)).into(),
             Visibility::Unblocked { facets: 300 }.into(),
         )),
         base_area: 1.0,
     };
     let (first, second) = (form(LOBES[4]), form(&format!("[{}, {}]", LOBES[0], LOBES[2])));
-    let Representation::Direct(direct) = &first.form else { panic!("not direct") };
+    let Representation::Direct(direct) = &first.representation else { panic!("not direct") };
     assert!(direct.sum.colors_vary());
     assert_same("coloured facets, ggx", &gpu, "sphere", &first);
 
     let mesh = object::build(&scene::Object { kind: "sphere".to_owned(), path: None }, Path::new(".")).unwrap();
     let light = DirectionalLight { direction: Vec3::new(0.6, 0.48, 0.64), irradiance: Vec3::new(1.0, 2.0, 3.0) };
-    let mut renderer = GpuRenderer::wearing(&gpu, &mesh, None, &first).unwrap();
+    let mut renderer = GpuRenderer::with_material(&gpu, &mesh, None, &first).unwrap();
     renderer.set_brdf(&gpu, &second).unwrap();
     let input = RenderInput {
         mesh: &mesh,
@@ -284,29 +295,29 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_image() {
         samples_per_side: 2,
         background: &Background::Wall,
     };
-    let device = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
-    let images = [render(&input).unwrap().image, device];
+    let gpu_radiance = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
+    let images = [render(&input).unwrap().image, gpu_radiance];
     assert_same_image("coloured facets, lambertian and cook_torrance after ggx", &images);
     let none = RenderInput { lights: &[], ..input };
     let unlit = renderer.render(&gpu, &none, &Cancel::default()).unwrap().image;
     assert_same_image("no lights", &[render(&none).unwrap().image, unlit]);
 
-    // Six columns, which are two fours.
-    let Representation::Direct(direct) = &second.form else { panic!("not direct") };
+    // Six columns are two groups of four.
+    let Representation::Direct(direct) = &second.representation else { panic!("not direct") };
     let table = ShadingTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
-    assert_eq!(table.fours(), 2);
+    assert_eq!(table.vec4s_per_node(), 2);
     assert_same(
         "a table of coloured facets",
         &gpu,
         "cup",
-        &EffectiveBrdf { form: Representation::Table(table), base_area: 1.0 },
+        &EffectiveBrdf { representation: Representation::Table(table), base_area: 1.0 },
     );
 }
 
-const GRID: HemispherePairGrid = HemispherePairGrid { rings: 9, azimuths: 12, turn: 8, difference: 7 };
+const GRID: HemispherePairGrid = HemispherePairGrid { rings: 9, azimuths: 12, phi_d: 8, theta_d: 7 };
 
 #[test]
-fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_straight_lines() {
+fn tables_shade_the_same_points_alike_with_cubic_and_linear_interpolation() {
     let Some(gpu) = open_gpu() else { return };
     for (geometry, brdf, interpolation) in [
         (GROOVES, LOBES[4], Interpolation::Cubic),
@@ -314,31 +325,32 @@ fn tables_shade_the_same_points_alike_between_their_nodes_by_cubics_and_by_strai
         (RODS, LOBES[0], Interpolation::Cubic),
     ] {
         let exact = effective(&open(geometry, brdf, "direct"));
-        let Representation::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let Representation::Direct(direct) = &exact.representation else { panic!("{geometry} {brdf}: not direct") };
         let whole = |lights: &[Vec3], o: Vec3, out: &mut [glam::DVec3]| direct.sums(lights, o, |k, sum| out[k] = sum);
         for (what, table) in [
             ("its columns", ShadingTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap()),
             ("its colours", ShadingTable::resample(whole, Nodes::all(GRID), &Cancel::default()).unwrap()),
         ] {
-            let form = Representation::Table(table.read(interpolation));
-            // So coarse a table is too bright at the rim, where the two G-buffers show different pixels.
+            let representation = Representation::Table(table.read(interpolation));
+            // A table this coarse is too bright at the rim, where the two G-buffers differ, so only shading is
+            // compared.
             let what = format!("a table of {geometry} {brdf}, {what}");
-            assert_same_shading(&what, &gpu, "sphere", &EffectiveBrdf { form, base_area: exact.base_area });
+            assert_same_shading(&what, &gpu, "sphere", &EffectiveBrdf { representation, base_area: exact.base_area });
         }
     }
 }
 
 #[test]
-fn tables_of_areas_shade_with_the_lobes_of_their_normals_as_the_cpu_does() {
+fn tables_of_cluster_areas_shade_like_the_cpu() {
     let Some(gpu) = open_gpu() else { return };
     let all = format!("[{}]", LOBES.join(", "));
     let cases = LOBES.map(|lobe| (PYRAMIDS, lobe)).into_iter().chain([(GROOVES, all.as_str()), (FLAT, LOBES[4])]);
     for (geometry, brdf) in cases {
         let exact = effective(&open(geometry, brdf, "direct"));
-        let Representation::Direct(direct) = &exact.form else { panic!("{geometry} {brdf}: not direct") };
+        let Representation::Direct(direct) = &exact.representation else { panic!("{geometry} {brdf}: not direct") };
         let table = ShadingTable::build(direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
         assert!(table.weights().iter().all(Weight::is_lobe), "{geometry}");
-        let table = EffectiveBrdf { form: Representation::Table(table), base_area: exact.base_area };
+        let table = EffectiveBrdf { representation: Representation::Table(table), base_area: exact.base_area };
         assert_same_shading(&format!("areas of {geometry} {brdf}"), &gpu, "cup", &table);
     }
 }
@@ -364,7 +376,7 @@ impl Measured for White {
 #[test]
 fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let Some(gpu) = open_gpu() else { return };
-    // Enough of one normal for an area of its own.
+    // Enough facets of one normal for a normal cluster.
     let facets = crate::geometry::Facets {
         positions: vec![Vec3::ZERO; 8],
         normals: vec![Vec3::Z; 8],
@@ -376,7 +388,7 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let material =
         |color| Material { brdf: Brdf { terms: vec![Term::Measured(std::sync::Arc::new(White::default()))] }, color };
     let form = |color| EffectiveBrdf {
-        form: Representation::Direct(Direct::new(
+        representation: Representation::Direct(Direct::new(
             FacetSum::new(&facets, &[0], &[material(color)]).into(),
             Visibility::Unblocked { facets: 8 }.into(),
         )),
@@ -386,12 +398,12 @@ fn a_measured_brdf_summed_over_facets_is_refused_with_the_reason() {
     let refused = shading.material(&gpu, &form(Vec3::ONE), false).map(drop);
     let is_refused = |refused: &_| matches!(refused, Err(GpuError::Unsupported(reason)) if reason.contains("measured"));
     assert!(is_refused(&refused), "{refused:?}");
-    let Representation::Direct(direct) = form(Vec3::ONE).form else { panic!("not direct") };
+    let Representation::Direct(direct) = form(Vec3::ONE).representation else { panic!("not direct") };
     let table = ShadingTable::build(&direct, Nodes::all(GRID), &Cancel::default()).unwrap().unwrap();
     assert!(table.weights().iter().all(Weight::is_lobe), "areas");
-    let table = EffectiveBrdf { form: Representation::Table(table), base_area: 1.0 };
+    let table = EffectiveBrdf { representation: Representation::Table(table), base_area: 1.0 };
     let refused = shading.material(&gpu, &table, false).map(drop);
     assert!(is_refused(&refused), "{refused:?}");
-    // Black: it is never asked.
+    // A black material is never evaluated.
     shading.material(&gpu, &form(Vec3::ZERO), false).map(drop).unwrap();
 }

@@ -1,61 +1,72 @@
-//! What facets see, on the device: uploaded as the CPU found it, or to be made there.
+//! Visibility of facets on the GPU: uploaded from the CPU, or to be computed by the GPU.
 
 use super::direct::Sum;
 use crate::gpu::{Gpu, GpuError, GpuHorizonMap, GpuMaps};
 use crate::math::directions::PolarGrid;
 use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility};
 
-/// How facets on a device come to see.
+/// Visibility that a GPU sum reads.
 #[derive(Debug)]
 pub enum GpuVisibility<'a> {
-    /// The CPU saw for them.
-    Held(&'a Visibility),
-    /// HorizonMap that the device is to make, and the width of the soft step there [rad].
-    Marched(GpuHorizonMap, f32),
-    /// OcclusionIntervals that the device is to make, and the width of the soft step there [rad].
-    Sliced(GpuHorizonMap, f32),
-    /// Maps that the device is to draw, and what their directions are.
-    Drawn(GpuMaps, PolarGrid),
+    /// Visibility that the CPU computed.
+    Computed(&'a Visibility),
+    /// A horizon map that the GPU will compute, and its transition width [rad].
+    HorizonMap(GpuHorizonMap, f32),
+    /// Occlusion intervals that the GPU will compute, and their transition width [rad].
+    OcclusionIntervals(GpuHorizonMap, f32),
+    /// Shadow maps that the GPU will draw, and the grid of their directions.
+    Maps(GpuMaps, PolarGrid),
 }
 
 impl GpuVisibility<'_> {
-    /// The shader that reads it.
-    pub(crate) fn file(&self) -> &'static str {
+    /// Returns the name of the shader that reads this visibility.
+    pub(crate) fn shader_name(&self) -> &'static str {
         match self {
-            Self::Held(Visibility::Unblocked { .. }) => "visibility_unblocked",
-            Self::Held(Visibility::HorizonMap(_)) | Self::Marched(..) => "visibility_horizons",
-            Self::Held(Visibility::OcclusionIntervals(_)) => "visibility_slices",
-            Self::Sliced(..) => "visibility_hanging",
-            Self::Held(Visibility::Maps(_)) | Self::Drawn(..) => "visibility_maps",
+            Self::Computed(Visibility::Unblocked { .. }) => "visibility_unblocked",
+            Self::Computed(Visibility::HorizonMap(_)) | Self::HorizonMap(..) => "visibility_horizons",
+            Self::Computed(Visibility::OcclusionIntervals(_)) => "visibility_intervals",
+            Self::OcclusionIntervals(..) => "visibility_packed_intervals",
+            Self::Computed(Visibility::Maps(_)) | Self::Maps(..) => "visibility_maps",
         }
     }
 
-    /// A sum over facets that see so.
+    /// Returns `sum` with the parameters of this visibility.
     pub(crate) fn with(&self, sum: Sum) -> Sum {
-        let horizons = |azimuths: usize, ramp: f32| Sum { azimuths: azimuths as u32, sharpness: 1.0 / ramp, ..sum };
+        let horizons = |azimuths: usize, transition_width: f32| Sum {
+            azimuths: azimuths as u32,
+            sharpness: 1.0 / transition_width,
+            ..sum
+        };
         match self {
-            Self::Held(Visibility::Unblocked { .. }) => sum,
-            Self::Held(Visibility::HorizonMap(held)) => horizons(held.azimuths(), held.ramp()),
-            Self::Held(Visibility::OcclusionIntervals(held)) => {
-                horizons(held.horizons.azimuths(), held.horizons.ramp())
+            Self::Computed(Visibility::Unblocked { .. }) => sum,
+            Self::Computed(Visibility::HorizonMap(map)) => horizons(map.azimuths(), map.transition_width()),
+            Self::Computed(Visibility::OcclusionIntervals(intervals)) => {
+                horizons(intervals.horizon_map.azimuths(), intervals.horizon_map.transition_width())
             }
-            Self::Held(Visibility::Maps(SoftMaps { grid, .. })) | Self::Drawn(_, grid) => {
+            Self::Computed(Visibility::Maps(SoftMaps { grid, .. })) | Self::Maps(_, grid) => {
                 Sum { azimuths: grid.azimuths as u32, rings: grid.rings as u32, nodes: grid.len() as u32, ..sum }
             }
-            Self::Marched(made, ramp) | Self::Sliced(made, ramp) => horizons(made.azimuths, HorizonMap::soft(*ramp)),
+            Self::HorizonMap(computed, transition_width) | Self::OcclusionIntervals(computed, transition_width) => {
+                horizons(computed.azimuths, HorizonMap::clamped_width(*transition_width))
+            }
         }
     }
 
-    /// Side by side what neighbouring points read of one facet: they look along neighbouring directions.
-    pub(crate) fn on_device(&self, gpu: &Gpu) -> Result<wgpu::Buffer, GpuError> {
+    /// Uploads the visibility, or returns its buffer. The azimuths of a facet are adjacent, because neighbouring points
+    /// evaluate neighbouring directions.
+    pub(crate) fn upload(&self, gpu: &Gpu) -> Result<wgpu::Buffer, GpuError> {
         let usage = wgpu::BufferUsages::STORAGE;
         match self {
-            Self::Held(Visibility::Unblocked { .. }) => gpu.upload::<u32>("visibility", &[], usage),
-            Self::Held(Visibility::OcclusionIntervals(slices)) => gpu.upload("slices", &slices_by_facet(slices), usage),
-            Self::Held(Visibility::HorizonMap(horizons)) => gpu.upload("horizons", &horizons_by_facet(horizons), usage),
-            Self::Held(Visibility::Maps(maps)) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
-            Self::Marched(made, _) | Self::Sliced(made, _) => Ok(made.elevations.clone()),
-            Self::Drawn(made, _) => Ok(made.bits.clone()),
+            Self::Computed(Visibility::Unblocked { .. }) => gpu.upload::<u32>("visibility", &[], usage),
+            Self::Computed(Visibility::OcclusionIntervals(slices)) => {
+                gpu.upload("slices", &slices_by_facet(slices), usage)
+            }
+            Self::Computed(Visibility::HorizonMap(horizons)) => {
+                gpu.upload("horizons", &horizons_by_facet(horizons), usage)
+            }
+            Self::Computed(Visibility::Maps(maps)) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
+            Self::HorizonMap(computed, _) | Self::OcclusionIntervals(computed, _) => Ok(computed.elevations.clone()),
+            Self::Maps(computed, _) => Ok(computed.bits.clone()),
         }
     }
 }
@@ -65,10 +76,10 @@ fn horizons_by_facet(horizons: &HorizonMap) -> Vec<f32> {
     (0..horizons.facets() * azimuths).map(|k| horizons.elevation(k % azimuths, k / azimuths)).collect()
 }
 
-/// HorizonMap, starts of the hanging intervals, and the intervals (visibility_slices.wgsl).
+/// Returns horizons, starts of the overhangs and overhangs, as `visibility_intervals.wgsl` reads them.
 fn slices_by_facet(slices: &OcclusionIntervals) -> Vec<u32> {
-    let mut words: Vec<u32> = horizons_by_facet(&slices.horizons).into_iter().map(f32::to_bits).collect();
-    let (starts, intervals) = slices.hanging_by_facet();
+    let mut words: Vec<u32> = horizons_by_facet(&slices.horizon_map).into_iter().map(f32::to_bits).collect();
+    let (starts, intervals) = slices.overhangs_by_facet();
     words.extend(starts);
     words.extend(intervals.iter().flat_map(|&(low, high)| [low.to_bits(), high.to_bits()]));
     words

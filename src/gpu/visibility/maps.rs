@@ -1,10 +1,10 @@
-//! Toroidal shadow maps on wgpu: the twin of [`crate::visibility::shadow_map`], which says how they work.
+//! Toroidal shadow maps on the GPU: the twin of [`crate::visibility::shadow_map`], which describes the method.
 //!
-//! A compute pass draws the triangles, not the raster pipeline: the map is a torus, which only our own addressing wraps
-//! (a render target would need the triangles that cross its border drawn two to four times, or a margin folded back), and
-//! it decides coverage and ties as the CPU twin does. One thread draws one triangle for one direction; large triangles are
-//! cut into pieces first, so that no thread draws for long. Without 64-bit atomics a texel's height and triangle take
-//! two passes. Directions go through in batches of maps that fit the device's buffers.
+//! A compute pass draws the triangles, not the raster pipeline, because the map is a torus. A render target would need
+//! the triangles that cross its border drawn two to four times. The compute pass also decides coverage and ties as the
+//! CPU twin does. One thread draws one triangle for one direction. Large triangles are cut into pieces first, so that
+//! threads take similar times. Without 64-bit atomics, the height and the triangle of a texel take two passes.
+//! Directions are processed in batches of maps that fit the buffers of the GPU.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -14,21 +14,22 @@ use crate::geometry::{Facets, TileMesh};
 use crate::gpu::device::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
 use crate::visibility::PackedVisibility;
-use crate::visibility::shadow_view::{ShadowView, affordable, extent};
+use crate::visibility::shadow_view::{ShadowView, affordable_resolution, max_coordinate};
 
-/// Bytes of the maps of one batch: what a small card has to spare.
+/// Largest size of the maps of one batch in bytes, so that they fit on small GPUs.
 const BATCH_BYTES: u64 = 128 << 20;
-/// Triangles drawn by one batch.
+/// Largest number of triangles times directions of one batch.
 const BATCH_TRIANGLES: u64 = 8 << 20;
-/// And by one submission: fractions of a second, far from any driver's watchdog.
+/// Largest number of triangles times directions of one submission. It keeps submissions far below the timeout of
+/// drivers.
 const SUBMITTED_TRIANGLES: u64 = 64 << 20;
-/// Edges longer than this part of the tile are cut.
+/// Longest edge that is not cut, as a fraction of the tile.
 const LONGEST_EDGE: f32 = 1.0 / 16.0;
-/// No mesh is cut into more pieces than this beyond its own number of triangles.
+/// Largest number of pieces that cutting adds to the triangles of a mesh.
 const MAX_PIECES: usize = 1 << 18;
 const THREADS: u32 = 64;
 
-/// `shadow_map.wgsl`, compiled: build once, use for any number of tiles.
+/// The compiled pipelines of `shadow_map.wgsl`, for any number of tiles.
 #[derive(Debug)]
 pub struct GpuShadowMaps {
     layout: wgpu::BindGroupLayout,
@@ -37,7 +38,7 @@ pub struct GpuShadowMaps {
     test_facets: wgpu::ComputePipeline,
 }
 
-/// [`GpuShadowMaps::visibility`] with pipelines built for this one call.
+/// Computes [`GpuShadowMaps::visibility`] with pipelines that are compiled for this call only.
 pub fn visibility_maps_gpu(
     gpu: &Gpu,
     mesh: &TileMesh,
@@ -95,18 +96,19 @@ struct Facet {
     pad_n: u32,
 }
 
-/// Maps that submissions are to draw, and the visibility that they make.
+/// Shadow maps that submissions will draw, and the buffer of the resulting visibility.
 #[derive(Debug)]
 pub struct GpuMaps {
-    /// Heights, triangles, facets; and their workgroups.
+    /// The pipelines for heights, triangles and facets, with their numbers of workgroups.
     passes: [(wgpu::ComputePipeline, u32); 3],
-    /// With how many directions each has.
+    /// Bindings of each batch, and its number of directions.
     batches: Vec<(wgpu::BindGroup, u32)>,
     maps: [wgpu::Buffer; 2],
-    /// Bits of 32 facets, the directions side by side; zeros until they are made.
+    /// Each word holds the bits of 32 facets for one direction; the directions are adjacent. Zeros until the maps are
+    /// drawn.
     pub bits: wgpu::Buffer,
-    /// Batches that one submission may draw.
-    together: usize,
+    /// Number of batches that one submission may draw.
+    batches_per_submission: usize,
 }
 
 impl GpuShadowMaps {
@@ -122,8 +124,8 @@ impl GpuShadowMaps {
         })
     }
 
-    /// Which facets each direction sees, as [`crate::visibility::visibility_maps_cpu`] answers it but for rounding; any answer once
-    /// `cancel` is set.
+    /// Computes the facets that are visible from each direction, like [`crate::visibility::visibility_maps_cpu`] up to
+    /// rounding. The result is undefined once `cancel` is set.
     pub fn visibility(
         &self,
         gpu: &Gpu,
@@ -146,7 +148,7 @@ impl GpuShadowMaps {
                 gpu.queue.submit([encoder.finish()]);
                 Ok(())
             })?;
-            // A window may draw on the same device, and nobody may want the answer any more.
+            // Waits after each submission, because a window may draw on the same GPU and the caller may cancel.
             gpu.wait("drawing shadow maps")?;
             if cancel.is_set() {
                 return Ok(visibility);
@@ -162,10 +164,10 @@ impl GpuShadowMaps {
         Ok(visibility)
     }
 
-    /// Uploads the tile and its facets.
+    /// Uploads the tile and its facets, and prepares the batches.
     ///
     /// # Errors
-    /// What the device refuses.
+    /// Errors of the GPU.
     pub fn maps(
         &self,
         gpu: &Gpu,
@@ -175,17 +177,20 @@ impl GpuShadowMaps {
         resolution: u32,
     ) -> Result<GpuMaps, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let (extent, resolution) = (extent(mesh), affordable(mesh, resolution));
+        let (extent, resolution) = (max_coordinate(mesh), affordable_resolution(mesh, resolution));
         let views = directions.iter().enumerate();
         let views = views.filter_map(|(d, &w)| Some((d as u32, ShadowView::new(mesh.size, extent, w, resolution)?)));
         let (numbers, views): (Vec<u32>, Vec<ShadowView>) = views.filter(|_| !facets.is_empty()).unzip();
         let stride = views.iter().map(|view| view.texels() as u64).max().unwrap_or(1);
         let corners = cut_large_triangles(mesh);
         let words = facets.len().div_ceil(32);
-        let most = BATCH_BYTES.min(gpu.limits.max_storage_buffer_binding_size);
-        let drawn = BATCH_TRIANGLES / corners.len().max(1) as u64;
-        let most_groups = gpu.limits.max_compute_workgroups_per_dimension;
-        let batch = (most / (8 * stride)).min(drawn).clamp(1, u64::from(most_groups)).min(views.len().max(1) as u64);
+        let max_bytes = BATCH_BYTES.min(gpu.limits.max_storage_buffer_binding_size);
+        let max_directions = BATCH_TRIANGLES / corners.len().max(1) as u64;
+        let max_groups = gpu.limits.max_compute_workgroups_per_dimension;
+        let batch = (max_bytes / (8 * stride))
+            .min(max_directions)
+            .clamp(1, u64::from(max_groups))
+            .min(views.len().max(1) as u64);
 
         let (lowest, highest) = mesh.z_range();
         let params = Params {
@@ -200,9 +205,9 @@ impl GpuShadowMaps {
         };
         let normals: Vec<[f32; 4]> =
             (0..mesh.triangles.len()).map(|k| mesh.geometric_normal(k).extend(0.0).into()).collect();
-        let places = facets.positions.iter().zip(&facets.geometric_normals);
-        let places: Vec<Facet> =
-            places.map(|(p, n)| Facet { position: (*p).into(), pad_p: 0, normal: (*n).into(), pad_n: 0 }).collect();
+        let facet_rows = facets.positions.iter().zip(&facets.geometric_normals);
+        let facet_rows: Vec<Facet> =
+            facet_rows.map(|(p, n)| Facet { position: (*p).into(), pad_p: 0, normal: (*n).into(), pad_n: 0 }).collect();
         let gpu_views: Vec<View> = views.iter().map(gpu_view).collect();
         let map = |label| gpu.buffer(label, 4 * stride * batch, Usage::STORAGE | Usage::COPY_DST);
         let maps = [map("shadow maps (heights)")?, map("shadow maps (triangles)")?];
@@ -211,7 +216,7 @@ impl GpuShadowMaps {
             &gpu.upload("views", &gpu_views, Usage::STORAGE)?,
             &gpu.upload("triangles", &corners, Usage::STORAGE)?,
             &gpu.upload("triangle normals", &normals, Usage::STORAGE)?,
-            &gpu.upload("facets", &places, Usage::STORAGE)?,
+            &gpu.upload("facets", &facet_rows, Usage::STORAGE)?,
             &maps[0],
             &maps[1],
             &bits,
@@ -222,7 +227,7 @@ impl GpuShadowMaps {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             Ok((gpu.group("shadow maps", &self.layout, &bound)?, (views.len() - first).min(batch as usize) as u32))
         });
-        let groups = |items: u32| items.div_ceil(THREADS).clamp(1, most_groups);
+        let groups = |items: u32| items.div_ceil(THREADS).clamp(1, max_groups);
         Ok(GpuMaps {
             passes: [
                 (self.draw_heights.clone(), groups(params.corner_count)),
@@ -232,24 +237,26 @@ impl GpuShadowMaps {
             batches: batches.collect::<Result<_, GpuError>>()?,
             maps,
             bits,
-            together: (SUBMITTED_TRIANGLES / (batch * corners.len().max(1) as u64)).max(1) as usize,
+            batches_per_submission: (SUBMITTED_TRIANGLES / (batch * corners.len().max(1) as u64)).max(1) as usize,
         })
     }
 }
 
 impl GpuMaps {
-    /// Batches of directions, some for each submission.
+    /// Returns the batches of each submission.
     pub fn batches(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
         let count = self.batches.len();
-        (0..count).step_by(self.together).map(move |first| first..(first + self.together).min(count))
+        (0..count)
+            .step_by(self.batches_per_submission)
+            .map(move |first| first..(first + self.batches_per_submission).min(count))
     }
 
-    /// What must be zeros before each batch.
-    pub fn cleared(&self) -> Vec<&wgpu::Buffer> {
+    /// Returns the buffers that must be cleared before each batch.
+    pub fn cleared_buffers(&self) -> Vec<&wgpu::Buffer> {
         self.maps.iter().collect()
     }
 
-    /// Records one batch.
+    /// Records one batch into a compute pass.
     pub fn draw(&self, batch: usize, pass: &mut wgpu::ComputePass) {
         let (group, directions) = &self.batches[batch];
         for (pipeline, groups) in &self.passes {
@@ -273,12 +280,12 @@ fn gpu_view(view: &ShadowView) -> View {
     }
 }
 
-/// The mesh's triangles, those with long edges halved across the longest until none is left. Triangles that are not
-/// finite are left out: a shader's loop over one might not end.
+/// Returns the triangles of the mesh. Those with long edges are halved across the longest edge until none is left.
+/// Triangles that are not finite are omitted, because the loop of a shader over them might not end.
 fn cut_large_triangles(mesh: &TileMesh) -> Vec<Corners> {
     let longest = LONGEST_EDGE * mesh.size.min_element();
     let mut pieces = Vec::with_capacity(mesh.triangles.len());
-    let mut left_to_cut = MAX_PIECES;
+    let mut cuts_left = MAX_PIECES;
     let mut open = Vec::new();
     for triangle in 0..mesh.triangles.len() {
         open.push(mesh.corners(triangle));
@@ -287,9 +294,9 @@ fn cut_large_triangles(mesh: &TileMesh) -> Vec<Corners> {
         }
         while let Some([a, b, c]) = open.pop() {
             let (ab, bc, ca) = (a.distance_squared(b), b.distance_squared(c), c.distance_squared(a));
-            if ab.max(bc).max(ca) > longest * longest && left_to_cut > 0 {
-                left_to_cut -= 1;
-                // Turned so that the longest edge comes first.
+            if ab.max(bc).max(ca) > longest * longest && cuts_left > 0 {
+                cuts_left -= 1;
+                // Rotates the corners so that the longest edge comes first.
                 let [a, b, c] = if ab >= bc && ab >= ca {
                     [a, b, c]
                 } else if bc >= ca {

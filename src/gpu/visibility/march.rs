@@ -1,5 +1,5 @@
-//! HorizonMap of a height-field on wgpu: the twin of [`HorizonMap::march`](crate::visibility::HorizonMap::march), left on the device for
-//! whatever reads horizons there (`shaders/visibility_horizons.wgsl`).
+//! Horizon map of a height field on the GPU: the twin of [`HorizonMap::march`](crate::visibility::HorizonMap::march).
+//! The result stays on the GPU for shading (`visibility_horizons.wgsl`).
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -14,25 +14,26 @@ use crate::visibility::scan::FACING_MARGIN;
 
 pub(super) const THREADS: u32 = 64;
 
-/// `height_march.wgsl`, compiled: build once, use for any tile.
+/// The compiled pipeline of `height_march.wgsl`, for any tile.
 #[derive(Debug)]
 pub struct GpuHeightMarch {
     layout: wgpu::BindGroupLayout,
     march: wgpu::ComputePipeline,
 }
 
-/// A dispatch and its workgroups.
-pub(super) type Placing = (wgpu::ComputePipeline, wgpu::BindGroup, [u32; 2]);
+/// A pipeline, its bindings and the workgroups of its dispatch.
+pub(super) type Dispatch = (wgpu::ComputePipeline, wgpu::BindGroup, [u32; 2]);
 
-/// HorizonMap, or slices, that a submission is to make.
+/// A horizon map, or occlusion intervals, that a submission will compute.
 #[derive(Debug)]
 pub struct GpuHorizonMap {
-    /// What the runs read and is made before the first.
-    pub(super) first: Option<Placing>,
+    /// A dispatch before the first run, whose output the runs read.
+    pub(super) preparation: Option<Dispatch>,
     pub(super) pipeline: wgpu::ComputePipeline,
-    /// With facets' workgroups and azimuths of each.
+    /// Bindings of each run, with its numbers of workgroups along facets and of azimuths.
     pub(super) runs: Vec<(wgpu::BindGroup, [u32; 2])>,
-    /// Elevations [rad], the azimuths of a facet side by side, or what `visibility_hanging.wgsl` reads; zeros until it is made.
+    /// Elevations [rad], or the input of `visibility_packed_intervals.wgsl`; the azimuths of a facet are adjacent.
+    /// Zeros until they are computed.
     pub elevations: wgpu::Buffer,
     pub azimuths: usize,
 }
@@ -52,7 +53,7 @@ struct Params {
 
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Place {
+struct Facet {
     position: Vec3,
     pad_p: u32,
     normal: Vec3,
@@ -66,11 +67,11 @@ impl GpuHeightMarch {
         Ok(Self { march: gpu.compute_pipeline(&module, "march", &[&layout])?, layout })
     }
 
-    /// Uploads the height-field and its facets.
+    /// Uploads the height field and its facets, and prepares the dispatches.
     ///
     /// # Errors
-    /// What the device refuses.
-    pub fn horizons(
+    /// Errors of the GPU.
+    pub fn horizon_map(
         &self,
         gpu: &Gpu,
         heights: &HeightGrid,
@@ -89,14 +90,14 @@ impl GpuHeightMarch {
             first_azimuth: 0,
             pad: 0,
         };
-        let places = facets.positions.iter().zip(&facets.normals);
-        let places: Vec<Place> =
-            places.map(|(&position, &normal)| Place { position, pad_p: 0, normal, pad_n: 0 }).collect();
+        let facet_rows = facets.positions.iter().zip(&facets.normals);
+        let facet_rows: Vec<Facet> =
+            facet_rows.map(|(&position, &normal)| Facet { position, pad_p: 0, normal, pad_n: 0 }).collect();
         let elevations =
             gpu.buffer("horizons", (4 * facets.len() * azimuths) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
             &gpu.upload("heights", &heights.heights, Usage::STORAGE)?,
-            &gpu.upload("places of facets", &places, Usage::STORAGE)?,
+            &gpu.upload("facets", &facet_rows, Usage::STORAGE)?,
             &elevations,
             &gpu.upload("azimuths", &directions(azimuths), Usage::STORAGE)?,
         ];
@@ -105,52 +106,53 @@ impl GpuHeightMarch {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             gpu.group("height-field", &self.layout, &bound)
         })?;
-        Ok(GpuHorizonMap { first: None, pipeline: self.march.clone(), runs, elevations, azimuths })
+        Ok(GpuHorizonMap { preparation: None, pipeline: self.march.clone(), runs, elevations, azimuths })
     }
 }
 
-/// Unit vectors of the plane along so many azimuths, the CPU's own: built-in sines and cosines may be off by 2⁻¹¹, and an axis
-/// would be missed.
+/// Returns unit vectors of the plane along the azimuths. The CPU computes them, because sines and cosines of shaders
+/// may be off by 2⁻¹¹ and miss the axes.
 pub(super) fn directions(azimuths: usize) -> Vec<glam::Vec2> {
     let along = |azimuth: usize| from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
     (0..azimuths).map(along).collect()
 }
 
-/// Walks of one dispatch; few in tests, so that all take several.
-const WALKS: usize = if cfg!(test) { 1 << 10 } else { 1 << 21 };
+/// Largest number of walks of one dispatch; small in tests, so that every test takes several dispatches.
+const MAX_WALKS: usize = if cfg!(test) { 1 << 10 } else { 1 << 21 };
 
-/// What a walk counts for beside lobes: as many edges, or cells and triangles, where a tile is dense.
-const LOBES_A_WALK: u64 = 512;
+/// Work of a walk in lobes: the number of edges, or of cells and triangles, that a walk visits on a dense tile.
+const LOBES_PER_WALK: u64 = 512;
 
-/// Runs of azimuths for one dispatch each: the group that begins with an azimuth, its workgroups and how many azimuths.
+/// Splits azimuths into runs of one dispatch each. Returns the bindings of each run, its workgroups and its number of
+/// azimuths. `group` creates the bindings of the run that begins with an azimuth.
 pub(super) fn runs(
     facets: usize,
     azimuths: usize,
     group: impl Fn(u32) -> Result<wgpu::BindGroup, GpuError>,
 ) -> Result<Vec<(wgpu::BindGroup, [u32; 2])>, GpuError> {
-    let together = (WALKS / facets.max(1)).max(1);
+    let azimuths_per_run = (MAX_WALKS / facets.max(1)).max(1);
     let run = |first: usize| {
-        let count = together.min(azimuths - first) as u32;
+        let count = azimuths_per_run.min(azimuths - first) as u32;
         Ok((group(first as u32)?, [(facets as u32).div_ceil(THREADS), count]))
     };
-    (0..azimuths).step_by(together).map(run).collect()
+    (0..azimuths).step_by(azimuths_per_run).map(run).collect()
 }
 
 impl GpuHorizonMap {
-    /// Dispatches that make it.
+    /// Returns the number of dispatches that compute it.
     pub fn runs(&self) -> usize {
         self.runs.len()
     }
 
-    /// What one of them takes, in lobes.
+    /// Returns the work of one dispatch, in lobes.
     pub fn work(&self, run: usize) -> u64 {
         let [groups, azimuths] = self.runs[run].1.map(u64::from);
-        groups * u64::from(THREADS) * azimuths * LOBES_A_WALK
+        groups * u64::from(THREADS) * azimuths * LOBES_PER_WALK
     }
 
-    /// Encodes one of them, in order.
+    /// Records one dispatch. Dispatches must be recorded in order.
     pub fn dispatch(&self, pass: &mut wgpu::ComputePass, run: usize) {
-        if let (0, Some((pipeline, group, [columns, rows]))) = (run, &self.first) {
+        if let (0, Some((pipeline, group, [columns, rows]))) = (run, &self.preparation) {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, group, &[]);
             pass.dispatch_workgroups(*columns, *rows, 1);
@@ -162,7 +164,7 @@ impl GpuHorizonMap {
     }
 }
 
-/// Edges that a walk of `height_march.wgsl` crosses on average.
+/// Returns the mean number of edges that a walk of `height_march.wgsl` crosses.
 #[cfg(test)]
 pub(crate) fn crossings(
     gpu: &Gpu,
@@ -172,13 +174,13 @@ pub(crate) fn crossings(
     let mut march = GpuHeightMarch::new(gpu).unwrap();
     let module = gpu.module("height_march").unwrap();
     march.march = gpu.compute_pipeline_with(&module, "march", &[&march.layout], &[("COUNTING", 1.0)]).unwrap();
-    let made = march.horizons(gpu, heights, tile_size, facets, azimuths).unwrap();
+    let map = march.horizon_map(gpu, heights, tile_size, facets, azimuths).unwrap();
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    for run in 0..made.runs() {
-        made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
+    for run in 0..map.runs() {
+        map.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
     }
     gpu.queue.submit([encoder.finish()]);
-    let counts: Vec<f32> = gpu.read(&made.elevations).unwrap();
+    let counts: Vec<f32> = gpu.read(&map.elevations).unwrap();
     counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len() as f64
 }
 
@@ -189,7 +191,7 @@ mod tests {
     use super::*;
     use crate::visibility::HorizonMap;
 
-    /// Heights of some waves and a little noise, and facets at odd places on them.
+    /// Returns heights of some waves with a little noise, and facets at irregular positions on them.
     fn field(size: UVec2, relief: f32) -> (HeightGrid, Facets) {
         let noise = |k: u32| (k.wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
         let heights = (0..size.x * size.y).map(|k| {
@@ -214,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn both_routes_see_the_same_horizons() {
+    fn gpu_and_cpu_compute_the_same_horizons() {
         let gpu = match Gpu::open() {
             Ok(gpu) => gpu,
             Err(error) => return eprintln!("SKIPPED: {error}"),
@@ -225,24 +227,27 @@ mod tests {
         {
             let (grid, facets) = field(size, relief);
             let cpu = HorizonMap::march(&grid, Vec2::ONE, &facets, azimuths, 0.02);
-            let made = march.horizons(&gpu, &grid, Vec2::ONE, &facets, azimuths).unwrap();
+            let map = march.horizon_map(&gpu, &grid, Vec2::ONE, &facets, azimuths).unwrap();
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            assert!(made.runs() > 1);
-            for run in 0..made.runs() {
-                made.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
+            assert!(map.runs() > 1);
+            for run in 0..map.runs() {
+                map.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
             }
             gpu.queue.submit([encoder.finish()]);
-            let device: Vec<f32> = gpu.read(&made.elevations).unwrap();
+            let gpu_elevations: Vec<f32> = gpu.read(&map.elevations).unwrap();
             let mut off: Vec<f32> = (0..facets.len() * azimuths)
-                .map(|k| (device[k] - cpu.elevation(k % azimuths, k / azimuths)).abs())
+                .map(|k| (gpu_elevations[k] - cpu.elevation(k % azimuths, k / azimuths)).abs())
                 .collect();
             off.sort_by(f32::total_cmp);
             let [most, worst] = [off[off.len() * 995 / 1000], off[off.len() - 1]];
-            let free = device.iter().filter(|&&elevation| elevation < 0.0).count();
-            eprintln!("{size}: 99.5 % within {most:.1e}, largest {worst:.1e} rad; {free} of {} free", device.len());
-            assert!(free < device.len() / 2, "something blocks");
-            // Slopes come from the same crossings. One that lies within rounding of the facet is a quotient of two small
-            // numbers, or counts on one route only.
+            let free = gpu_elevations.iter().filter(|&&elevation| elevation < 0.0).count();
+            eprintln!(
+                "{size}: 99.5 % within {most:.1e}, largest {worst:.1e} rad; {free} of {} free",
+                gpu_elevations.len()
+            );
+            assert!(free < gpu_elevations.len() / 2, "something blocks");
+            // Slopes come from the same crossings. The slope of a crossing within rounding of the facet is a quotient
+            // of two small numbers, or only one side counts it.
             assert!(most < 1e-5 && worst < 0.1, "{size}: 99.5 % within {most}, largest {worst}");
         }
     }

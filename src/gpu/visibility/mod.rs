@@ -2,6 +2,8 @@
 
 mod maps;
 mod march;
+#[cfg(test)]
+mod shadow_map_tests;
 mod slices;
 
 pub use maps::{GpuMaps, GpuShadowMaps, visibility_maps_gpu};
@@ -10,4 +12,4 @@ pub(crate) use march::crossings;
 pub use march::{GpuHeightMarch, GpuHorizonMap};
 pub use slices::GpuSlicer;
 #[cfg(test)]
-pub(crate) use slices::tests::looks;
+pub(crate) use slices::tests::steps;

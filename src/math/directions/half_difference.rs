@@ -1,4 +1,5 @@
-//! Half and difference angles: where lobes stand still (Rusinkiewicz 1998), for all half vectors of the hemisphere.
+//! A grid over half and difference angles (Rusinkiewicz 1998), in which lobes keep their position, for all half vectors
+//! of the hemisphere.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -6,20 +7,20 @@ use glam::{Mat3, Vec3};
 
 use super::{from_angles, half_vector, to_angles};
 
-/// A grid over `(θ_h, φ_h, θ_d, φ_d)`; `d` is the light in the frame of `h` (z to `h`, x along increasing θ).
+/// A grid over `(θ_h, φ_h, θ_d, φ_d)`; `d` is the light in the frame of `h` (z along `h`, x along increasing θ).
 ///
-/// `φ_d` has period π: swapping light and view changes nothing. Polar angles stand on `0..=π/2`. Node index is
-/// `((θ_h · azimuths + φ_h) · difference + θ_d) · turn + φ_d`.
+/// `φ_d` has period π, because swapping light and view changes nothing. Polar angles cover `0..=π/2`. The node index is
+/// `((ring · azimuths + azimuth) · theta_d + step of θ_d) · phi_d + step of φ_d`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct HalfDifferenceGrid {
     /// Rings of θ_h, both ends included.
     pub rings: usize,
     /// Azimuths φ_h; even.
     pub azimuths: usize,
-    /// Steps of θ_d, both ends included.
-    pub difference: usize,
-    /// Steps of φ_d over half a turn; even.
-    pub turn: usize,
+    /// Nodes of θ_d, both ends included.
+    pub theta_d: usize,
+    /// Nodes of φ_d over half a turn; even.
+    pub phi_d: usize,
 }
 
 /// The frame of a half vector as columns x, y, z.
@@ -35,7 +36,7 @@ fn frame(theta_h: f32, phi_h: f32) -> Mat3 {
 
 impl HalfDifferenceGrid {
     pub fn nodes(&self) -> usize {
-        self.rings * self.azimuths * self.difference * self.turn
+        self.rings * self.azimuths * self.theta_d * self.phi_d
     }
 
     pub fn theta_h(&self, ring: usize) -> f32 {
@@ -46,31 +47,30 @@ impl HalfDifferenceGrid {
         TAU * azimuth as f32 / self.azimuths as f32
     }
 
-    /// Steps shrink towards grazing, `θ_d = π/2 (1 - (1-x)²)`: there, where `tan θ_d` counts the slope of a normal many
-    /// times over, masking and the facing cutoff turn a lobe off within a few degrees. With equal steps they leave half
-    /// as much error again (V-groove and pyramids, Cook-Torrance 0.2 and 0.5, `tests/factors.rs`).
+    /// θ_d of a step [rad]. Steps shrink towards grazing, `θ_d = π/2 (1 - (1-x)²)`, because masking and the horizon cut
+    /// a lobe off within a few degrees there: `tan θ_d` multiplies the slope of a normal.
     pub fn theta_d(&self, step: usize) -> f32 {
-        let left = 1.0 - step as f32 / (self.difference - 1) as f32;
+        let left = 1.0 - step as f32 / (self.theta_d - 1) as f32;
         FRAC_PI_2 * (1.0 - left * left)
     }
 
     /// `x` of [`HalfDifferenceGrid::theta_d`], in `[0, 1]`.
-    fn difference_at(theta_d: f32) -> f32 {
+    fn coordinate_of_theta_d(theta_d: f32) -> f32 {
         1.0 - (1.0 - (theta_d / FRAC_PI_2).clamp(0.0, 1.0)).sqrt()
     }
 
-    /// `sin θ_d cos θ_d dθ_d` of a step, up to a constant: its share of all pairs.
-    pub fn difference_measure(&self, step: usize) -> f32 {
+    /// `sin θ_d cos θ_d dθ_d` of a step, up to a constant factor: the measure of its pairs.
+    pub fn theta_d_measure(&self, step: usize) -> f32 {
         let theta_d = self.theta_d(step);
-        let left = 1.0 - step as f32 / (self.difference - 1) as f32;
+        let left = 1.0 - step as f32 / (self.theta_d - 1) as f32;
         theta_d.sin() * theta_d.cos().max(0.0) * left
     }
 
     pub fn phi_d(&self, step: usize) -> f32 {
-        PI * step as f32 / self.turn as f32
+        PI * step as f32 / self.phi_d as f32
     }
 
-    /// `(i, o)` of half and difference angles; either may lie under the horizon.
+    /// `(i, o)` of half and difference angles; either may be below the horizon.
     pub fn pair(theta_h: f32, phi_h: f32, theta_d: f32, phi_d: f32) -> (Vec3, Vec3) {
         let frame = frame(theta_h, phi_h);
         let d = from_angles(theta_d, phi_d);
@@ -95,12 +95,12 @@ impl HalfDifferenceGrid {
         };
         let (a, fa) = on(theta_h, FRAC_PI_2, self.rings);
         let (b, fb) = around(phi_h, TAU, self.azimuths);
-        let (c, fc) = on(Self::difference_at(theta_d), 1.0, self.difference);
-        let (d, fd) = around(phi_d, PI, self.turn);
+        let (c, fc) = on(Self::coordinate_of_theta_d(theta_d), 1.0, self.theta_d);
+        let (d, fd) = around(phi_d, PI, self.phi_d);
         std::array::from_fn(|k| {
             let [p, q, r, s] = [k >> 3 & 1, k >> 2 & 1, k >> 1 & 1, k & 1];
             let pick = |bit: usize, f: f32| if bit == 1 { f } else { 1.0 - f };
-            let node = ((a[p] * self.azimuths + b[q]) * self.difference + c[r]) * self.turn + d[s];
+            let node = ((a[p] * self.azimuths + b[q]) * self.theta_d + c[r]) * self.phi_d + d[s];
             (node, pick(p, fa) * pick(q, fb) * pick(r, fc) * pick(s, fd))
         })
     }
@@ -110,15 +110,15 @@ impl HalfDifferenceGrid {
 mod tests {
     use super::*;
 
-    const GRID: HalfDifferenceGrid = HalfDifferenceGrid { rings: 17, azimuths: 32, difference: 9, turn: 8 };
+    const GRID: HalfDifferenceGrid = HalfDifferenceGrid { rings: 17, azimuths: 32, theta_d: 9, phi_d: 8 };
 
     #[test]
     fn taps_of_a_node_are_that_node() {
         for (a, b, c, d) in [(3, 5, 2, 1), (8, 31, 4, 7), (12, 0, 6, 3)] {
             let (i, o) = HalfDifferenceGrid::pair(GRID.theta_h(a), GRID.phi_h(b), GRID.theta_d(c), GRID.phi_d(d));
-            let node = ((a * GRID.azimuths + b) * GRID.difference + c) * GRID.turn + d;
-            let own: f32 = GRID.taps(i, o).iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
-            assert!(own > 0.999, "{own}");
+            let node = ((a * GRID.azimuths + b) * GRID.theta_d + c) * GRID.phi_d + d;
+            let weight: f32 = GRID.taps(i, o).iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
+            assert!(weight > 0.999, "{weight}");
         }
     }
 

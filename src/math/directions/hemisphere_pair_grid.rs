@@ -1,49 +1,50 @@
-//! A grid over the pairs of directions of the upper hemisphere, and over no others: half and difference coordinates
-//! (Rusinkiewicz 1998) whose difference angle ends where light or view sets.
+//! A grid that contains exactly the direction pairs above the horizon: half and difference angles (Rusinkiewicz 1998)
+//! whose difference angle ends where light or view reaches the horizon.
 
 use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Vec3};
 
-/// A grid over `(θ_h, φ_h, φ_d, θ_d)`; `d` is the light in the frame of `h` (z to `h`, x along increasing θ).
+/// A grid over `(θ_h, φ_h, φ_d, θ_d)`; `d` is the light in the frame of `h` (z along `h`, x along increasing θ).
 ///
-/// - θ_h stands on `√(1 - cos θ_h)` in `[0, 1]`: the hemisphere in equal areas.
-/// - φ_d has period π: swapping light and view changes nothing.
-/// - θ_d ends at `θ_max`, `tan θ_max = 1 / (tan θ_h |cos φ_d|)`, where one of the two touches the horizon. It stands on
-///   `u = √((1 - cos θ_d) / (1 - cos θ_max))` in `[0, 1]`: no node is wasted under the horizon, no query is interpolated
-///   across it, and what falls to zero there does so on a node.
+/// - θ_h has the coordinate `√(1 - cos θ_h)` in `[0, 1]`, which divides the hemisphere into equal areas.
+/// - φ_d has period π, because swapping light and view changes nothing.
+/// - θ_d ends at `θ_max`, `tan θ_max = 1 / (tan θ_h |cos φ_d|)`, where light or view reaches the horizon. Its
+///   coordinate is `u = √((1 - cos θ_d) / (1 - cos θ_max))` in `[0, 1]`. So no node is below the horizon, no query is
+///   interpolated across it, and values that are zero at the horizon are zero at a node.
 ///
-/// Node index is `((θ_h · azimuths + φ_h) · turn + φ_d) · difference + θ_d`.
+/// The node index is `((ring · azimuths + azimuth) · phi_d + step of φ_d) · theta_d + step of θ_d`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct HemispherePairGrid {
     /// Rings of θ_h, both ends included.
     pub rings: usize,
-    /// Azimuths φ_h.
+    /// Azimuths φ_h over the full circle.
     pub azimuths: usize,
-    /// Steps of φ_d over half a turn; even, so that a node stands on the kink of `θ_max` at a right angle.
-    pub turn: usize,
-    /// Steps of θ_d, both ends included.
-    pub difference: usize,
+    /// Nodes of φ_d over half a turn; even, so that a node is at the kink of `θ_max` at a right angle.
+    pub phi_d: usize,
+    /// Nodes of θ_d, both ends included.
+    pub theta_d: usize,
 }
 
 impl HemispherePairGrid {
-    /// Steps of `u` shrink towards the horizon, `u = (1 + k) x - k x²` with this `k`: there shadows and cosines change fastest.
+    /// Constant `k` of `u = (1 + k) x - k x²` at even steps of `x`. Steps shrink towards the horizon, where shadows and
+    /// cosines change fastest.
     pub const CROWDING: f32 = 0.75;
 
-    /// Directions of nodes stay this far [sine] above the horizon.
-    pub const LOWEST: f32 = 2e-3;
+    /// Smallest sine of the elevation of a node's directions.
+    pub const MIN_SINE: f32 = 2e-3;
 
     pub fn nodes(&self) -> usize {
-        self.half_vectors() * self.turn * self.difference
+        self.half_vectors() * self.phi_d * self.theta_d
     }
 
-    /// Half vectors; the nodes of each are contiguous.
+    /// Number of half vectors; the nodes of each are contiguous.
     pub fn half_vectors(&self) -> usize {
         self.rings * self.azimuths
     }
 
-    /// The first azimuth φ_h that planes x = const and y = const (`mirrors`) turn one into, and whether φ_d changes its sign on
-    /// the way.
+    /// The lowest azimuth φ_h that an azimuth is mirrored to by the planes x = const and y = const (`mirrors`), and
+    /// whether φ_d changes its sign.
     pub fn image(&self, azimuth: usize, [in_x, in_y]: [bool; 2]) -> (usize, bool) {
         let n = self.azimuths;
         // x becomes -x: φ becomes π - φ; y becomes -y: φ becomes -φ.
@@ -58,7 +59,7 @@ impl HemispherePairGrid {
             .fold(itself, |best, image| if image.0 < best.0 { image } else { best })
     }
 
-    /// Nodes that are no images of others.
+    /// Number of nodes that are not mirror images of others.
     pub fn originals(&self, mirrors: [bool; 2]) -> usize {
         let azimuths = (0..self.azimuths).filter(|&azimuth| self.image(azimuth, mirrors).0 == azimuth).count();
         self.nodes() / self.azimuths * azimuths
@@ -70,17 +71,17 @@ impl HemispherePairGrid {
     }
 
     /// φ_d of a step [rad].
-    pub fn phi_d(&self, turn: usize) -> f32 {
-        PI * turn as f32 / self.turn as f32
+    pub fn phi_d(&self, step: usize) -> f32 {
+        PI * step as f32 / self.phi_d as f32
     }
 
     /// `(i, o)` of a node.
     pub fn pair(&self, node: usize) -> (Vec3, Vec3) {
-        let (step, rest) = (node % self.difference, node / self.difference);
-        let (turn, rest) = (rest % self.turn, rest / self.turn);
+        let (step, rest) = (node % self.theta_d, node / self.theta_d);
+        let (phi_d, rest) = (rest % self.phi_d, rest / self.phi_d);
         let (azimuth, ring) = (rest % self.azimuths, rest / self.azimuths);
         let s = ring as f32 / (self.rings - 1) as f32;
-        let cos_theta_h = (1.0 - s * s).max(Self::LOWEST);
+        let cos_theta_h = (1.0 - s * s).max(Self::MIN_SINE);
         let sin_theta_h = (1.0 - cos_theta_h * cos_theta_h).max(0.0).sqrt();
         let (sin_phi, cos_phi) = self.phi_h(azimuth).sin_cos();
         let frame = Mat3::from_cols(
@@ -88,24 +89,25 @@ impl HemispherePairGrid {
             Vec3::new(-sin_phi, cos_phi, 0.0),
             Vec3::new(sin_theta_h * cos_phi, sin_theta_h * sin_phi, cos_theta_h),
         );
-        let (sin_turn, cos_turn) = self.phi_d(turn).sin_cos();
-        let x = step as f32 / (self.difference - 1) as f32;
+        let (sin_phi_d, cos_phi_d) = self.phi_d(phi_d).sin_cos();
+        let x = step as f32 / (self.theta_d - 1) as f32;
         let u = x * (1.0 + Self::CROWDING - Self::CROWDING * x);
-        // 1 - cos θ_max = m² / (r (r + n)), which loses nothing where θ_max is small.
-        let (n, m) = (sin_theta_h * cos_turn.abs(), cos_theta_h);
+        // 1 - cos θ_max = m² / (r (r + n)), which does not cancel at small θ_max.
+        let (n, m) = (sin_theta_h * cos_phi_d.abs(), cos_theta_h);
         let r = n.hypot(m);
-        let versine = (u * u * m * m / (r * (r + n))).min(1.0 - Self::LOWEST);
+        let versine = (u * u * m * m / (r * (r + n))).min(1.0 - Self::MIN_SINE);
         let sin_theta_d = (versine * (2.0 - versine)).sqrt();
-        let across = Vec3::new(sin_theta_d * cos_turn, sin_theta_d * sin_turn, 0.0);
+        let across = Vec3::new(sin_theta_d * cos_phi_d, sin_theta_d * sin_phi_d, 0.0);
         let along = Vec3::Z * (1.0 - versine);
-        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(Self::LOWEST)).normalize_or(Vec3::Z);
+        let lifted = |d: Vec3| Vec3::new(d.x, d.y, d.z.max(Self::MIN_SINE)).normalize_or(Vec3::Z);
         (lifted(frame * (along + across)), lifted(frame * (along - across)))
     }
 
-    /// GridCoordinates of the pairs (light `k`, `o`) on the axes of the grid, in steps; all directions above the horizon.
-    pub fn places(&self, lights: [&[f32]; 3], o: Vec3, out: &mut GridCoordinates) {
+    /// Writes the coordinates of the pairs (light `k`, `o`) on the axes of the grid, in steps. All directions must be
+    /// above the horizon.
+    pub fn coordinates(&self, lights: [&[f32]; 3], o: Vec3, out: &mut GridCoordinates) {
         crate::math::simd::pair_grid_coordinates(lights, o, Self::CROWDING, &mut out.columns);
-        let scales = [(self.rings - 1) as f32, self.azimuths as f32, self.turn as f32, (self.difference - 1) as f32];
+        let scales = [(self.rings - 1) as f32, self.azimuths as f32, self.phi_d as f32, (self.theta_d - 1) as f32];
         let n = lights[0].len().min(GridCoordinates::MAX);
         for (column, scale) in out.columns.iter_mut().zip(scales) {
             for at in &mut column[..n] {
@@ -115,7 +117,7 @@ impl HemispherePairGrid {
     }
 }
 
-/// Where pairs stand on the four axes of a grid, in its steps; and `i·h`.
+/// Coordinates of pairs on the four axes of a grid, in steps, and their `i·h`.
 #[derive(Debug, Clone)]
 pub struct GridCoordinates {
     columns: [[f32; GridCoordinates::MAX]; 5],
@@ -128,7 +130,7 @@ impl Default for GridCoordinates {
 }
 
 impl GridCoordinates {
-    /// Most pairs at a time.
+    /// Largest number of pairs at a time.
     pub const MAX: usize = crate::math::simd::LANES;
 
     /// θ_h, φ_h, φ_d, θ_d of pair `k`, in steps.
@@ -150,34 +152,34 @@ impl GridCoordinates {
 mod tests {
     use super::*;
 
-    const GRID: HemispherePairGrid = HemispherePairGrid { rings: 9, azimuths: 12, turn: 6, difference: 7 };
+    const GRID: HemispherePairGrid = HemispherePairGrid { rings: 9, azimuths: 12, phi_d: 6, theta_d: 7 };
 
-    fn places(i: Vec3, o: Vec3) -> ([f32; 4], f32) {
-        let mut places = GridCoordinates::default();
-        GRID.places([&[i.x], &[i.y], &[i.z]], o, &mut places);
-        (places.at(0), places.i_dot_h(0))
+    fn coordinates(i: Vec3, o: Vec3) -> ([f32; 4], f32) {
+        let mut coordinates = GridCoordinates::default();
+        GRID.coordinates([&[i.x], &[i.y], &[i.z]], o, &mut coordinates);
+        (coordinates.at(0), coordinates.i_dot_h(0))
     }
 
     #[test]
-    fn every_node_lies_above_the_horizon_and_inside_nodes_are_found_where_they_are() {
+    fn every_node_is_above_the_horizon_and_has_the_coordinates_of_its_index() {
         for node in 0..GRID.nodes() {
             let (i, o) = GRID.pair(node);
             assert!(i.z > 1e-3 && o.z > 1e-3, "{node}: {i} {o}");
             assert!(i.is_normalized() && o.is_normalized());
-            let (step, rest) = (node % GRID.difference, node / GRID.difference);
-            let (turn, rest) = (rest % GRID.turn, rest / GRID.turn);
+            let (step, rest) = (node % GRID.theta_d, node / GRID.theta_d);
+            let (phi_d, rest) = (rest % GRID.phi_d, rest / GRID.phi_d);
             let (azimuth, ring) = (rest % GRID.azimuths, rest / GRID.azimuths);
-            // At the pole, where i = o, and at the lifted horizon coordinates are not unique or are moved.
-            if ring == 0 || ring + 1 == GRID.rings || step == 0 || step + 1 == GRID.difference {
+            // Coordinates are not unique at the pole and where i = o, and nodes at the horizon are lifted.
+            if ring == 0 || ring + 1 == GRID.rings || step == 0 || step + 1 == GRID.theta_d {
                 continue;
             }
-            let (at, i_dot_h) = places(i, o);
+            let (at, i_dot_h) = coordinates(i, o);
             let near = |a: f32, b: usize, period: usize| {
                 let d = (a - b as f32).abs();
                 d.min((period as f32 - d).abs()) < 2e-3
             };
             assert!((at[0] - ring as f32).abs() < 2e-3, "{node}: {at:?}");
-            assert!(near(at[1], azimuth, GRID.azimuths) && near(at[2], turn, GRID.turn), "{node}: {at:?}");
+            assert!(near(at[1], azimuth, GRID.azimuths) && near(at[2], phi_d, GRID.phi_d), "{node}: {at:?}");
             assert!((at[3] - step as f32).abs() < 4e-3, "{node}: {at:?} {step}");
             assert!((i_dot_h - i.dot((i + o).normalize())).abs() < 1e-5);
         }
@@ -186,18 +188,19 @@ mod tests {
     #[test]
     fn mirror_images_of_nodes_are_the_mirrored_pairs() {
         for (mirrors, azimuths) in [([true, false], 7), ([false, true], 7), ([true, true], 4), ([false, false], 12)] {
-            let mut made = std::collections::BTreeSet::new();
+            let mut originals = std::collections::BTreeSet::new();
             for azimuth in 0..GRID.azimuths {
-                let (image, turned) = GRID.image(azimuth, mirrors);
+                let (image, negated) = GRID.image(azimuth, mirrors);
                 assert_eq!(GRID.image(image, mirrors), (image, false), "an image is its own");
-                made.insert(image);
-                for (ring, turn, step) in [(3, 1, 4), (5, 3, 2), (2, 0, 3)] {
-                    let node = |azimuth: usize, turn: usize| {
-                        ((ring * GRID.azimuths + azimuth) * GRID.turn + turn) * GRID.difference + step
+                originals.insert(image);
+                for (ring, phi_d, step) in [(3, 1, 4), (5, 3, 2), (2, 0, 3)] {
+                    let node = |azimuth: usize, phi_d: usize| {
+                        ((ring * GRID.azimuths + azimuth) * GRID.phi_d + phi_d) * GRID.theta_d + step
                     };
-                    let (i, o) = GRID.pair(node(azimuth, turn));
-                    let (k, l) = GRID.pair(node(image, if turned { (GRID.turn - turn) % GRID.turn } else { turn }));
-                    // One of the mirrors that there are, or both, or none, takes one pair into the other, the two swapped or not.
+                    let (i, o) = GRID.pair(node(azimuth, phi_d));
+                    let image_phi_d = if negated { (GRID.phi_d - phi_d) % GRID.phi_d } else { phi_d };
+                    let (k, l) = GRID.pair(node(image, image_phi_d));
+                    // The allowed mirrors, singly or together, take one pair to the other, with or without a swap.
                     let close = |a: Vec3, b: Vec3| (a - b).abs().max_element() < 1e-5;
                     let found = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].into_iter().any(|[x, y]| {
                         let allowed = (x > 0.0 || mirrors[0]) && (y > 0.0 || mirrors[1]);
@@ -205,24 +208,24 @@ mod tests {
                         let same = close(flip(i), k) && close(flip(o), l) || close(flip(i), l) && close(flip(o), k);
                         allowed && same
                     });
-                    assert!(found, "{mirrors:?} {azimuth} {turn}");
+                    assert!(found, "{mirrors:?} {azimuth} {phi_d}");
                 }
             }
-            assert_eq!(made.len(), azimuths, "{mirrors:?}");
+            assert_eq!(originals.len(), azimuths, "{mirrors:?}");
         }
     }
 
     #[test]
-    fn every_pair_has_a_place_on_the_grid_and_its_mirror_image_the_same() {
+    fn every_pair_has_coordinates_on_the_grid_and_the_swapped_pair_has_the_same() {
         for k in 0..4000_u32 {
             let angle =
                 |j: u32| (k.wrapping_mul(2_654_435_761).wrapping_add(j.wrapping_mul(97_571)) % 9973) as f32 / 9973.0;
             let i = crate::math::directions::from_angles(angle(1) * 1.57, angle(2) * TAU);
             let o = crate::math::directions::from_angles(angle(3) * 1.57, angle(4) * TAU);
-            let (at, _) = places(i, o);
+            let (at, _) = coordinates(i, o);
             let last = [8.0, 12.0, 6.0, 6.0];
             assert!(at.iter().zip(last).all(|(at, last)| (0.0..=last).contains(at)), "{i} {o}: {at:?}");
-            let (swapped, _) = places(o, i);
+            let (swapped, _) = coordinates(o, i);
             for axis in 0..4 {
                 let d = (at[axis] - swapped[axis]).abs();
                 let wrapped = if axis == 2 { d.min(6.0 - d) } else { d };
@@ -232,10 +235,10 @@ mod tests {
     }
 
     #[test]
-    fn pairs_at_the_poles_and_at_the_very_horizon_have_finite_places() {
+    fn pairs_at_the_poles_and_at_the_horizon_have_finite_coordinates() {
         let flat = Vec3::new(1.0, 0.0, 1e-30).normalize();
         for (i, o) in [(Vec3::Z, Vec3::Z), (flat, flat), (flat, Vec3::new(-1.0, 0.0, 1e-30)), (Vec3::Z, flat)] {
-            let (at, i_dot_h) = places(i, o);
+            let (at, i_dot_h) = coordinates(i, o);
             assert!(at.iter().all(|at| at.is_finite()) && i_dot_h.is_finite(), "{i} {o}: {at:?}");
         }
     }

@@ -1,4 +1,5 @@
-//! Directions of the upper hemisphere: angles, polar grids, half vectors. Small-scale frame: z up, angles in radians.
+//! Directions of the upper hemisphere: angles, half vectors, and grids over directions and direction pairs. The frame
+//! is the tile frame (z up), and angles are in radians.
 
 mod half_difference;
 mod hemisphere_pair_grid;
@@ -26,10 +27,10 @@ pub fn to_angles(direction: Vec3) -> (f32, f32) {
     (theta, if phi < 0.0 { (phi + std::f32::consts::TAU).min(TAU_BELOW) } else { phi })
 }
 
-/// The largest f32 below 2π: an azimuth never rounds up to a full turn.
+/// The largest f32 below 2π. It keeps an azimuth from being rounded up to a full turn.
 const TAU_BELOW: f32 = std::f32::consts::TAU.next_down();
 
-/// `(i+o)/|i+o|`; +z where the two are opposite.
+/// `(i+o)/|i+o|`; +z if the two are opposite.
 pub fn half_vector(i: Vec3, o: Vec3) -> Vec3 {
     (i + o).try_normalize().unwrap_or(Vec3::Z)
 }

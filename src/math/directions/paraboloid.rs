@@ -1,5 +1,5 @@
-//! Paraboloid maps: a hemisphere on a square image, its non-empty pixels numbered (Brabec et al. 2002; Wu et al. 2011,
-//! Sec. 3.7).
+//! Paraboloid maps: a hemisphere on a square image whose non-empty pixels are numbered (Brabec et al. 2002; Wu et al.
+//! 2011, Sec. 3.7).
 
 use std::f32::consts::TAU;
 
@@ -7,11 +7,11 @@ use glam::{Vec2, Vec3};
 
 use super::Tap;
 
-/// Marks a pixel whose centre lies outside the unit disc.
+/// Marker of a pixel whose centre is outside the unit disc.
 const EMPTY: u32 = u32::MAX;
 
-/// The upper hemisphere on a square image: `(x, y) / (1 + z)` fills the unit disc. Pixels whose centres lie in the disc are
-/// the nodes, numbered row by row.
+/// The upper hemisphere on a square image: `(x, y) / (1 + z)` fills the unit disc. Pixels whose centres are in the disc
+/// are the nodes, numbered row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParaboloidMap {
     /// Pixels along a side of the image.
@@ -22,7 +22,7 @@ pub struct ParaboloidMap {
 }
 
 impl ParaboloidMap {
-    /// At least two pixels a side, at most 256.
+    /// Makes a map with 2 to 256 pixels per side.
     pub fn new(side: usize) -> Self {
         let side = side.clamp(2, 256);
         let mut map =
@@ -36,13 +36,14 @@ impl ParaboloidMap {
                 map.solid_angles.push(4.0 / (1.0 + r2).powi(2));
             }
         }
-        // What rim pixels lose and gain across the disc's edge is shared out: the weights sum to the hemisphere.
+        // Pixels at the rim are cut by the disc's edge, so all solid angles are scaled to sum to the hemisphere.
         let total: f32 = map.solid_angles.iter().sum();
         map.solid_angles.iter_mut().for_each(|omega| *omega *= TAU / total);
         map
     }
 
-    /// The map whose number of nodes is nearest to `count`: 137 (13 pixels a side) for the paper's 132 directions.
+    /// Makes the map whose number of nodes is nearest to `count`: 137 (13 pixels per side) for the paper's 132
+    /// directions.
     pub fn nearest_to(count: usize) -> Self {
         // A map of side n has about n² π/4 nodes.
         let around = (count as f64 * 4.0 / std::f64::consts::PI).sqrt() as usize;
@@ -66,13 +67,13 @@ impl ParaboloidMap {
         &self.directions
     }
 
-    /// Solid angle [sr] that a node stands for: the map's distortion; they sum to 2π.
+    /// Solid angle [sr] that a node represents, which follows the map's distortion; the sum over all nodes is 2π.
     pub fn solid_angle(&self, node: usize) -> f32 {
         self.solid_angles[node]
     }
 
-    /// Bilinear taps of a direction of the upper hemisphere; weights are in `[0,1]` and sum to one. Empty pixels at the rim
-    /// give their share to the others.
+    /// Bilinear taps of a direction of the upper hemisphere; weights are in `[0,1]` and sum to one. The weights of
+    /// empty pixels at the rim are distributed over the others.
     pub fn taps(&self, direction: Vec3) -> [Tap; 4] {
         let at = self.to_pixels(direction);
         let base = at.floor();
@@ -110,7 +111,7 @@ impl ParaboloidMap {
         Vec2::new(along(column), along(row))
     }
 
-    /// Position on the image in pixels, centres at whole numbers.
+    /// Position on the image in pixels; pixel centres have integer coordinates.
     fn to_pixels(&self, direction: Vec3) -> Vec2 {
         let disc = direction.truncate() / (1.0 + direction.z.max(0.0));
         (disc.clamp_length_max(1.0) + 1.0) * (0.5 * self.side as f32) - 0.5
@@ -136,14 +137,15 @@ impl ParaboloidMap {
     }
 }
 
-/// Two paraboloid maps back to back: the whole sphere, for normals. The lower half follows the upper one.
+/// The whole sphere, for normals, as two paraboloid maps back to back. Nodes of the lower half follow those of the
+/// upper half.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParaboloidSphere {
     half: ParaboloidMap,
 }
 
 impl ParaboloidSphere {
-    /// From the map of one half.
+    /// Makes a sphere from the map of one half.
     pub fn new(half: ParaboloidMap) -> Self {
         Self { half }
     }
@@ -162,7 +164,7 @@ impl ParaboloidSphere {
         }
     }
 
-    /// Solid angle [sr]; they sum to 4π.
+    /// Solid angle [sr] of a node; the sum over all nodes is 4π.
     pub fn solid_angle(&self, node: usize) -> f32 {
         self.half.solid_angle(node % self.half.len())
     }
@@ -197,18 +199,18 @@ mod tests {
                 (sum + map.solid_angle(node), cosine + map.solid_angle(node) * map.directions()[node].z)
             });
             assert!((sum - TAU).abs() < 1e-4);
-            // ∫ cosθ dω = π: the distortion is that of the map.
+            // ∫ cosθ dω = π holds only if the distortion is correct.
             assert!(side < 12 || (cosine - 0.5 * TAU).abs() < 0.06, "{side}: {cosine}");
         }
     }
 
     #[test]
-    fn taps_stand_on_the_nodes_and_stay_convex_out_to_the_horizon() {
+    fn taps_are_exact_at_the_nodes_and_convex_up_to_the_horizon() {
         for side in [2, 3, 13, 24] {
             let map = ParaboloidMap::new(side);
             for (node, &direction) in map.directions().iter().enumerate() {
-                let own: f32 = map.taps(direction).iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
-                assert!((own - 1.0).abs() < 1e-4, "{side} {node}");
+                let weight: f32 = map.taps(direction).iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
+                assert!((weight - 1.0).abs() < 1e-4, "{side} {node}");
             }
             for k in 0..2000 {
                 let taps = map.taps(from_angles(k as f32 / 1999.0 * 0.25 * TAU, k as f32 * 0.37));

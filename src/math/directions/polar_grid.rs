@@ -1,4 +1,4 @@
-//! Polar grids: rings of constant elevation, azimuths in each, bilinear between them, wrapped across the pole.
+//! Polar grids: rings of constant elevation with azimuths in each. Interpolation is bilinear and crosses the pole.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -6,17 +6,18 @@ use glam::Vec3;
 
 use super::{from_angles, to_angles};
 
-/// One node of an interpolation: index into the grid and weight.
+/// One node of an interpolation: its index in the grid and its weight.
 pub type Tap = (usize, f32);
 
-/// `θ_a = (a+½)(π/2)/(rings)` for all rings but the last, which stands at [`PolarGrid::HORIZON_DEG`]; `φ_b = 2πb/azimuths`.
+/// A grid with `θ_a = (a+½)(π/2)/(rings)` for all rings but the last, which is at [`PolarGrid::HORIZON_DEG`], and with
+/// `φ_b = 2πb/azimuths`.
 ///
-/// Node index is `ring * azimuths + azimuth`.
+/// The node index is `ring * azimuths + azimuth`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct PolarGrid {
-    /// Rings, the one at the horizon not counted.
+    /// Number of rings without the one at the horizon.
     pub rings: usize,
-    /// Azimuths a ring; even, so that the pole can be crossed.
+    /// Azimuths per ring; even, so that interpolation can cross the pole.
     pub azimuths: usize,
 }
 
@@ -24,7 +25,8 @@ pub struct PolarGrid {
 const INVERSE_HORIZON_COSINE: f32 = 572.9581;
 
 impl PolarGrid {
-    /// Where the last ring stands: a bidirectional quantity need not vanish at the horizon.
+    /// Polar angle of the last ring [degrees]. It is below 90° because a bidirectional quantity need not vanish at the
+    /// horizon.
     pub const HORIZON_DEG: f32 = 89.9;
 
     pub fn new(rings: usize, azimuths: usize) -> Self {
@@ -62,14 +64,14 @@ impl PolarGrid {
         (0..self.len()).map(|node| self.direction(node)).collect()
     }
 
-    /// What multiplies a bidirectional quantity read from the grid towards a direction of this height: between the last ring
-    /// and the horizon it falls to zero with the cosine. Held as it is at the last ring, divided by a projected area that
-    /// goes to zero, it would grow without bound.
+    /// Factor that multiplies a bidirectional quantity read from the grid at a direction with this z. Between the last
+    /// ring and the horizon it falls to zero with the cosine. Without it, a constant value divided by a projected area
+    /// that goes to zero would grow without bound.
     pub fn horizon_taper(z: f32) -> f32 {
         (z * INVERSE_HORIZON_COSINE).min(1.0)
     }
 
-    /// Solid angle [sr] that a node stands for; the horizon ring has none of its own.
+    /// Solid angle [sr] that a node represents; 0 for nodes of the horizon ring.
     pub fn solid_angle(&self, node: usize) -> f32 {
         let ring = node / self.azimuths;
         if ring >= self.rings {
@@ -84,7 +86,7 @@ impl PolarGrid {
         let (theta, phi) = to_angles(direction);
         let step = FRAC_PI_2 / self.rings as f32;
         let at = theta / step - 0.5;
-        // Inside the first ring the pole is crossed: ring -1 is ring 0 half a turn on.
+        // Inside the first ring, interpolation crosses the pole: ring -1 is ring 0, rotated by half a turn.
         let (lower, upper, t) = if at < 0.0 {
             (None, 0, at + 1.0)
         } else {
@@ -113,12 +115,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn taps_reproduce_a_constant_and_stand_on_the_nodes() {
+    fn taps_reproduce_a_constant_and_are_exact_at_the_nodes() {
         let grid = PolarGrid::new(8, 24);
         for node in 0..grid.len() {
             let taps = grid.taps(grid.direction(node));
-            let own: f32 = taps.iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
-            assert!((own - 1.0).abs() < 1e-3, "node {node}: {taps:?}");
+            let weight: f32 = taps.iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
+            assert!((weight - 1.0).abs() < 1e-3, "node {node}: {taps:?}");
         }
         for k in 0..500 {
             let theta = k as f32 / 500.0 * FRAC_PI_2;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 /// `c = a b` for row-major `a: m x k`, `b: k x n`, `c: m x n`; sequential.
 pub fn multiply(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c: &mut [f32]) {
     assert!(a.len() >= m * k && b.len() >= k * n && c.len() >= m * n, "slices hold the matrices");
-    // SAFETY: the lengths were just checked, and the strides are those of row-major matrices of these sizes.
+    // SAFETY: the assertion above checks the lengths, and the strides are those of row-major matrices of these sizes.
     unsafe {
         matrixmultiply::sgemm(
             m,
@@ -50,7 +50,7 @@ pub fn multiply_transposed(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c
     }
 }
 
-/// `c = a b` with the rows of `a` and `c` shared out among threads; every row's bits are those of [`multiply`].
+/// `c = a b` with the rows of `a` and `c` distributed over threads; every row has the same bits as from [`multiply`].
 pub fn multiply_parallel(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c: &mut [f32]) {
     const ROWS: usize = 64;
     if n == 0 || k == 0 {
@@ -67,7 +67,7 @@ pub fn multiply_parallel(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c: 
 pub fn gram(m: usize, n: usize, a: &[f32]) -> nalgebra::DMatrix<f64> {
     let wide: Vec<f64> = a[..m * n].iter().map(|&x| f64::from(x)).collect();
     let mut out = nalgebra::DMatrix::<f64>::zeros(n, n);
-    // SAFETY: `wide` holds m x n values read once as n x m and once as m x n; `out` is n x n, and symmetric.
+    // SAFETY: `wide` holds m x n values; they are read once as n x m and once as m x n. `out` is n x n and symmetric.
     unsafe {
         matrixmultiply::dgemm(
             n,

@@ -1,8 +1,8 @@
-//! The query of the low-rank form: two short gathers and a dot product.
+//! The query of low-rank factors: two short gathers and a dot product.
 
 use super::multiversion;
 
-/// Columns worked on at a time.
+/// Columns that are processed at a time.
 const WIDTH: usize = 16;
 
 multiversion! {
@@ -18,7 +18,10 @@ multiversion! {
                 for &(node, weight) in taps {
                     let at = node * columns + start;
                     if width == WIDTH {
-                        let row: &[f32; WIDTH] = match table[at..at + WIDTH].try_into() { Ok(row) => row, Err(_) => return };
+                        let row: &[f32; WIDTH] = match table[at..at + WIDTH].try_into() {
+                            Ok(row) => row,
+                            Err(_) => return,
+                        };
                         for l in 0..WIDTH {
                             sums[l] += weight * row[l];
                         }

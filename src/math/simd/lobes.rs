@@ -20,12 +20,12 @@ pub struct PairVectors {
 impl PairVectors {
     pub fn new(i: Vec3, o: Vec3) -> Self {
         let h = half_vector(i, o);
-        // The mean of the two, so that swapping i and o changes no bit.
+        // The mean of the two dot products, so that swapping i and o changes no bit.
         Self { i, o, h, i_dot_h: 0.5 * (i.dot(h) + o.dot(h)) }
     }
 }
 
-/// An analytic lobe with the constants of its inner loop worked out: `f_r (n·i)+ (n·o)+` without its tint.
+/// An analytic lobe, `f_r (n·i)+ (n·o)+` without its tint, with the constants of its inner loop precomputed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lobe {
     Lambertian,
@@ -55,7 +55,7 @@ impl Lobe {
         Self::Ggx { alpha2, scale: alpha2 / (2.0 * PI) }
     }
 
-    /// Which lobe, and its constants: equal for equal lobes only.
+    /// The lobe's kind and constants as numbers; they are equal for equal lobes only.
     pub(crate) fn numbers(&self) -> [f32; 3] {
         match *self {
             Self::Lambertian => [0.0; 3],
@@ -67,8 +67,8 @@ impl Lobe {
     }
 }
 
-/// What an inner loop sees of one facet. `n·h` and `|n×h|²` come from `|n-h|²`, which loses nothing near the mirror
-/// direction and is quadratic in the rounding of the normal's length.
+/// The angles of one facet that lobes depend on. `n·h` and `|n×h|²` come from `|n-h|²`, which does not cancel near the
+/// mirror direction and is quadratic in the rounding of the normal's length.
 #[derive(Clone, Copy)]
 struct LobeInput {
     n_dot_i: f32,
@@ -78,7 +78,7 @@ struct LobeInput {
 }
 
 #[inline(always)]
-fn see(pair: &PairVectors, x: f32, y: f32, z: f32) -> LobeInput {
+fn lobe_input(pair: &PairVectors, x: f32, y: f32, z: f32) -> LobeInput {
     let (i, o, h) = (pair.i, pair.o, pair.h);
     let (dx, dy, dz) = (x - h.x, y - h.y, z - h.z);
     let d2 = dx * dx + dy * dy + dz * dz;
@@ -92,15 +92,15 @@ fn see(pair: &PairVectors, x: f32, y: f32, z: f32) -> LobeInput {
 
 impl LobeInput {
     #[inline(always)]
-    fn lit(self) -> bool {
+    fn is_lit(self) -> bool {
         self.n_dot_i * self.n_dot_o > 0.0
     }
 }
 
 /// The value of a lobe at one facet, `f_r (n·i)+ (n·o)+` without its tint; swapping `i` and `o` changes no bit.
 ///
-/// A trait and not a closure: a closure cannot be made to inline, and one call a facet keeps the loop from vectorising
-/// (Blinn-Phong, whose power is long, ran twelve times slower that way).
+/// This is a trait because a closure cannot be marked `inline(always)`, and one call per facet would keep the compiler
+/// from vectorising the loop.
 trait Value: Copy {
     fn at(self, n: LobeInput) -> f32;
 }
@@ -116,7 +116,7 @@ impl Value for Lambertian {
     }
 }
 
-/// scale (n·h)^e (n·i)(n·o), the power as exp(e/2 ln(1-sin²)).
+/// scale (n·h)^e (n·i)(n·o), with the power computed as exp(e/2 ln(1-sin²)).
 #[derive(Clone, Copy)]
 struct BlinnPhong {
     half_exponent: f32,
@@ -131,7 +131,7 @@ impl Value for BlinnPhong {
     }
 }
 
-/// D G / 4, Beckmann and V-cavity; `masking` is 2/(i·h).
+/// D G / 4 with Beckmann's distribution and V-cavity masking; `masking` is 2/(i·h).
 #[derive(Clone, Copy)]
 struct CookTorrance {
     inverse_m2: f32,
@@ -164,7 +164,7 @@ impl Value for Ward {
     }
 }
 
-/// D G2 / 4 with the GGX denominator as sin² + α² cos², height-correlated Smith.
+/// D G2 / 4 with height-correlated Smith masking; the denominator of GGX is sin² + α² cos².
 #[derive(Clone, Copy)]
 struct Ggx {
     alpha2: f32,
@@ -188,15 +188,15 @@ fn masking(pair: &PairVectors) -> f32 {
     2.0 / pair.i_dot_h.max(1e-20)
 }
 
-/// Values of a lane of facets; 0 where a normal faces away from either direction (as the padding does).
+/// Values of a lane of facets; 0 if a normal faces away from either direction, as the padding does.
 #[inline(always)]
 fn lobe_lane(pair: &PairVectors, normals: [&[f32]; 3], at: usize, value: impl Value) -> [f32; LANES] {
     let [x, y, z] = [lane(normals[0], at), lane(normals[1], at), lane(normals[2], at)];
     let mut values = [0.0_f32; LANES];
     for l in 0..LANES {
-        let seen = see(pair, x[l], y[l], z[l]);
-        let f = value.at(seen);
-        values[l] = if seen.lit() { f } else { 0.0 };
+        let input = lobe_input(pair, x[l], y[l], z[l]);
+        let f = value.at(input);
+        values[l] = if input.is_lit() { f } else { 0.0 };
     }
     values
 }
@@ -243,9 +243,15 @@ multiversion! {
         let masking = masking(pair);
         match lobe {
             Lobe::Lambertian => sum(pair, normals, weights, v_i, v_o, Lambertian),
-            Lobe::BlinnPhong { half_exponent, scale } => sum(pair, normals, weights, v_i, v_o, BlinnPhong { half_exponent, scale }),
-            Lobe::CookTorrance { inverse_m2, scale } => sum(pair, normals, weights, v_i, v_o, CookTorrance { inverse_m2, scale, masking }),
-            Lobe::Ward { inverse_alpha2, scale } => sum(pair, normals, weights, v_i, v_o, Ward { inverse_alpha2, scale }),
+            Lobe::BlinnPhong { half_exponent, scale } => {
+                sum(pair, normals, weights, v_i, v_o, BlinnPhong { half_exponent, scale })
+            }
+            Lobe::CookTorrance { inverse_m2, scale } => {
+                sum(pair, normals, weights, v_i, v_o, CookTorrance { inverse_m2, scale, masking })
+            }
+            Lobe::Ward { inverse_alpha2, scale } => {
+                sum(pair, normals, weights, v_i, v_o, Ward { inverse_alpha2, scale })
+            }
             Lobe::Ggx { alpha2, scale } => sum(pair, normals, weights, v_i, v_o, Ggx { alpha2, scale }),
         }
     }
@@ -266,7 +272,9 @@ multiversion! {
         match lobe {
             Lobe::Lambertian => each(pair, normals, out, Lambertian),
             Lobe::BlinnPhong { half_exponent, scale } => each(pair, normals, out, BlinnPhong { half_exponent, scale }),
-            Lobe::CookTorrance { inverse_m2, scale } => each(pair, normals, out, CookTorrance { inverse_m2, scale, masking }),
+            Lobe::CookTorrance { inverse_m2, scale } => {
+                each(pair, normals, out, CookTorrance { inverse_m2, scale, masking })
+            }
             Lobe::Ward { inverse_alpha2, scale } => each(pair, normals, out, Ward { inverse_alpha2, scale }),
             Lobe::Ggx { alpha2, scale } => each(pair, normals, out, Ggx { alpha2, scale }),
         }
@@ -285,19 +293,23 @@ fn each_light<V: Value>(pairs: &LightPairs, n: Vec3, out: &mut [f32; LANES], val
             h: Vec3::new(hx[k], hy[k], hz[k]),
             i_dot_h: i_dot_h[k],
         };
-        let seen = see(&pair, n.x, n.y, n.z);
-        let f = value(masking(&pair)).at(seen);
-        out[k] = if seen.lit() { f } else { 0.0 };
+        let input = lobe_input(&pair, n.x, n.y, n.z);
+        let f = value(masking(&pair)).at(input);
+        out[k] = if input.is_lit() { f } else { 0.0 };
     }
 }
 
 multiversion! {
-    /// `out[k] = lobe(n, i_k, o)`: the values of [`lobe_values`] for one normal and many lights.
+    /// `out[k] = lobe(n, i_k, o)`: the same values as from [`lobe_values`], for one normal and many lights.
     pub fn light_lobes(lobe: Lobe, pairs: &LightPairs, normal: glam::Vec3, out: &mut [f32; super::LANES]) {
         match lobe {
             Lobe::Lambertian => each_light(pairs, normal, out, |_| Lambertian),
-            Lobe::BlinnPhong { half_exponent, scale } => each_light(pairs, normal, out, |_| BlinnPhong { half_exponent, scale }),
-            Lobe::CookTorrance { inverse_m2, scale } => each_light(pairs, normal, out, |masking| CookTorrance { inverse_m2, scale, masking }),
+            Lobe::BlinnPhong { half_exponent, scale } => {
+                each_light(pairs, normal, out, |_| BlinnPhong { half_exponent, scale })
+            }
+            Lobe::CookTorrance { inverse_m2, scale } => {
+                each_light(pairs, normal, out, |masking| CookTorrance { inverse_m2, scale, masking })
+            }
             Lobe::Ward { inverse_alpha2, scale } => each_light(pairs, normal, out, |_| Ward { inverse_alpha2, scale }),
             Lobe::Ggx { alpha2, scale } => each_light(pairs, normal, out, |_| Ggx { alpha2, scale }),
         }

@@ -1,12 +1,13 @@
 //! Branch-free f32 functions that vectorise.
 
-/// `e^x` for `x <= 0`, relative error below 3e-7; 0 under -60, so that no product of it is ever denormal (and slow).
+/// `e^x` for `x <= 0`, relative error below 3e-7. It is 0 below -60, so that products of it are never denormal, which
+/// would be slow.
 #[inline(always)]
 pub(crate) fn exp_negative(x: f32) -> f32 {
     let x = x.max(-70.0);
-    // Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low bits.
+    // Adding 1.5 * 2^23 rounds to the nearest integer, which is then in the low bits.
     const MAGIC: f32 = 12_582_912.0;
-    // ln 2 in two parts, the first so short that k times it is exact (Cody and Waite).
+    // ln 2 in two parts; the first is so short that its product with k is exact (Cody and Waite).
     const LN_2_HIGH: f32 = 355.0 / 512.0;
     const LN_2_LOW: f32 = -2.121_944_4e-4;
     let shifted = x * std::f32::consts::LOG2_E + MAGIC;
@@ -19,11 +20,11 @@ pub(crate) fn exp_negative(x: f32) -> f32 {
     if x < -60.0 { 0.0 } else { power * scale }
 }
 
-/// `ln(1 - s)` for `0 <= s < 1` with an error relative to `s` (not to 1): exact where huge exponents multiply it.
+/// `ln(1 - s)` for `0 <= s < 1`. Its error is relative to `s`, not to 1, because large exponents multiply the result.
 #[inline(always)]
 pub(crate) fn ln_one_minus(s: f32) -> f32 {
     let y = (1.0 - s).max(1e-30);
-    // What the subtraction rounded away.
+    // Rounding error of the subtraction.
     let lost = ((1.0 - y) - s) / y;
     // y = m 2^k with m in [2/3, 4/3).
     const TWO_THIRDS_BITS: i32 = 0x3f2a_aaab;
@@ -36,7 +37,7 @@ pub(crate) fn ln_one_minus(s: f32) -> f32 {
     series + k as f32 * std::f32::consts::LN_2 + lost
 }
 
-/// Weights of four even samples about a place `t` of the way from the second to the third (Catmull and Rom 1974).
+/// Weights of four evenly spaced samples at the fraction `t` between the second and the third (Catmull and Rom 1974).
 #[inline(always)]
 pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);

@@ -1,9 +1,9 @@
-//! Inner loops over facets, written so that the compiler vectorises them, with the widest instructions found at run time; and
-//! [`eight`] values at once for what it does not vectorise.
+//! Inner loops over facets that the compiler vectorises, compiled for several instruction sets and selected at run
+//! time. [`SimdF32x8`] computes with eight values at once in code that the compiler does not vectorise.
 //!
-//! Every function here has a plain twin elsewhere that the tests compare it with.
+//! Every function here has a scalar counterpart elsewhere; the tests compare the two.
 
-mod eight;
+mod f32x8;
 mod gather;
 mod lobes;
 mod math;
@@ -13,19 +13,23 @@ mod rows;
 mod tests;
 mod visibility;
 
-pub(crate) use eight::{F32x8Array, InSimdF32x8, SimdF32x8, eight};
+pub(crate) use f32x8::{F32x8Array, SimdF32x8, SimdTask, with_simd_f32x8};
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub(crate) use math::cubic_weights;
 pub use pairs::{LightPairs, azimuth_and_elevation, pair_grid_coordinates, pair_vectors};
 pub use rows::{RowGrid, row_sums};
 pub use visibility::{
-    SWITCH, blend_bits, ground_sum, ground_visibility, interval_cover, masked_sum, projected_area, stepped_visibility,
+    SWITCH_RATE, blend_bits, horizon_visibility, interval_cover, masked_sum, projected_area, stepped_visibility,
+    visible_sum,
 };
 
-/// Compiles a function for the baseline, AVX2 and AVX-512, and picks at run time.
+/// Compiles a function for the baseline, AVX2 and AVX-512, and selects one of the three at run time.
 macro_rules! multiversion {
-    ($(#[$doc:meta])* pub fn $name:ident $(<const $n:ident: usize>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block) => {
+    (
+        $(#[$doc:meta])*
+        pub fn $name:ident $(<const $n:ident: usize>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block
+    ) => {
         $(#[$doc])*
         pub fn $name $(<const $n: usize>)? ($($arg: $ty),*) $(-> $ret)? {
             #[inline(always)]
@@ -42,7 +46,7 @@ macro_rules! multiversion {
                 if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw")
                     && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl")
                 {
-                    // SAFETY: the features the function was compiled for were just found.
+                    // SAFETY: the condition checks all features that the function is compiled for.
                     return unsafe { avx512($($arg),*) };
                 }
                 if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
@@ -56,7 +60,7 @@ macro_rules! multiversion {
 }
 pub(crate) use multiversion;
 
-/// The instructions that these loops run with here: others round differently.
+/// Name of the instruction set that these loops use on this machine; another set rounds differently.
 pub fn instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     {
@@ -74,19 +78,19 @@ pub fn instructions() -> &'static str {
     "baseline"
 }
 
-/// Values worked on together: enough that the compiler keeps the loop over them and vectorises it.
+/// Values per lane, the chunk that an inner loop processes at once: enough that the compiler vectorises the loop.
 pub(crate) const LANES: usize = 64;
 
-/// Facets summed in f32 before the sum is carried over to f64: bounds the rounding error of a sum over any number.
+/// Facets that are summed in f32 before the sum is added to an f64. It bounds the rounding error of sums of any length.
 pub(crate) const BLOCK: usize = 1024;
 
-/// Starts of the lanes of each block of `n` values.
+/// For each block of `n` values, the first indices of its lanes.
 #[inline(always)]
 pub(crate) fn blocks(n: usize) -> impl Iterator<Item = impl Iterator<Item = usize>> {
     (0..n).step_by(BLOCK).map(move |start| (start..(start + BLOCK).min(n)).step_by(LANES))
 }
 
-/// The values of one lane; zeros beyond the end.
+/// The values of the lane that starts at `at`; zeros beyond the end.
 #[inline(always)]
 pub(crate) fn lane(values: &[f32], at: usize) -> [f32; LANES] {
     match values[at..].first_chunk::<LANES>() {
@@ -100,13 +104,14 @@ pub(crate) fn lane(values: &[f32], at: usize) -> [f32; LANES] {
     }
 }
 
-/// The sum of all lanes, a multiple of eight, by halves: one after the other each would wait for the last.
+/// The sum of `N` values, a multiple of eight, in eight independent partial sums. In one chain, each addition would
+/// wait for the previous one.
 #[inline(always)]
 pub(crate) fn total<const N: usize>(lanes: &[f32; N]) -> f64 {
     let mut sums = [0.0_f64; 8];
-    for eight in lanes.as_chunks::<8>().0 {
+    for chunk in lanes.as_chunks::<8>().0 {
         for l in 0..8 {
-            sums[l] += f64::from(eight[l]);
+            sums[l] += f64::from(chunk[l]);
         }
     }
     for l in 0..4 {

@@ -1,4 +1,4 @@
-//! Many pairs of directions at once: one view, and the lights that shine there.
+//! Many direction pairs at once: one view direction and many light directions.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{LANES, multiversion};
 
-/// Pairs of up to [`LANES`] lights with one view, each component by itself.
+/// Pairs of up to [`LANES`] lights with one view, one array per component.
 #[derive(Debug, Clone)]
 pub struct LightPairs {
     pub o: Vec3,
@@ -14,14 +14,14 @@ pub struct LightPairs {
     pub i: [[f32; LANES]; 3],
     pub h: [[f32; LANES]; 3],
     pub i_dot_h: [f32; LANES],
-    /// Of the lights: in turns from 0 to 1, and in radians.
+    /// Azimuths of the lights in turns, 0 to 1, and their elevations in radians.
     pub azimuths: [f32; LANES],
     pub elevations: [f32; LANES],
-    /// Lights, rounded up to whole steps of the inner loops; lights beyond the last are straight above.
+    /// Number of lights, rounded up to whole steps of the inner loops; lights beyond the last are at +z.
     padded: usize,
 }
 
-/// Steps of the inner loops over lights.
+/// Lights per step of the inner loops.
 const STEP: usize = 16;
 
 impl LightPairs {
@@ -33,7 +33,7 @@ impl LightPairs {
         Self { o, i: three, h: three, i_dot_h: empty, azimuths: empty, elevations: empty, padded: 0 }
     }
 
-    /// Takes up to [`LightPairs::MAX`] lights and a view.
+    /// Sets up to [`LightPairs::MAX`] lights and the view, and computes half vectors and angles.
     pub fn set(&mut self, lights: &[Vec3], o: Vec3) {
         let lights = &lights[..lights.len().min(LANES)];
         self.o = o;
@@ -63,7 +63,7 @@ impl Default for LightPairs {
 }
 
 multiversion! {
-    /// Half vectors and angles of the lights.
+    /// Computes half vectors and angles of the lights.
     pub fn pair_vectors(pairs: &mut LightPairs) {
         let (n, o) = (pairs.padded(), pairs.o);
         for k in 0..n {
@@ -86,15 +86,15 @@ multiversion! {
     }
 }
 
-/// Azimuth in turns and elevation [rad] of one direction above the horizon, as [`LightPairs`] has them, to the same bits.
+/// Azimuth in turns and elevation [rad] of one direction above the horizon, with the same bits as in [`LightPairs`].
 pub fn azimuth_and_elevation(d: Vec3) -> (f32, f32) {
     let half = upper_angle(d.y.abs(), d.x);
     let azimuth = ((if d.y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
     (azimuth, upper_angle(d.z.max(0.0), (d.x * d.x + d.y * d.y).sqrt()))
 }
 
-/// The angle of `(x, y)` in `[0, π]` for `y >= 0`, 0 at the origin; absolute error 1e-7 and rounding (Abramowitz and Stegun,
-/// 4.4.49).
+/// The angle of `(x, y)` in `[0, π]` for `y >= 0`, 0 at the origin. The absolute error is 1e-7 plus rounding
+/// (Abramowitz and Stegun, 4.4.49).
 #[inline(always)]
 fn upper_angle(y: f32, x: f32) -> f32 {
     let (longer, shorter) = (y.max(x.abs()), y.min(x.abs()));
@@ -107,14 +107,15 @@ fn upper_angle(y: f32, x: f32) -> f32 {
 }
 
 multiversion! {
-    /// Coordinates of the pairs (light `k`, `o`) on [`HemispherePairGrid`](crate::math::directions::HemispherePairGrid), each in `[0, 1]`:
-    /// `√(1 - cos θ_h)`, φ_h in turns, φ_d in half turns, the place of θ_d for the given crowding; and `i·h`.
+    /// Coordinates of the pairs (light `k`, `o`) on
+    /// [`HemispherePairGrid`](crate::math::directions::HemispherePairGrid), each in `[0, 1]`: `√(1 - cos θ_h)`, φ_h in
+    /// turns, φ_d in half turns, and the coordinate of θ_d for the given crowding. The fifth column is `i·h`.
     pub fn pair_grid_coordinates(lights: [&[f32]; 3], o: Vec3, crowding: f32, out: &mut [[f32; LANES]; 5]) {
         let [x, y, z] = lights;
         let n = x.len().min(y.len()).min(z.len()).min(LANES);
         let (x, y, z) = (&x[..n], &y[..n], &z[..n]);
-        let [ring, azimuth, turn, step, i_dot_h] = out;
-        let (ring, azimuth, turn) = (&mut ring[..n], &mut azimuth[..n], &mut turn[..n]);
+        let [ring, azimuth, phi_d, step, i_dot_h] = out;
+        let (ring, azimuth, phi_d) = (&mut ring[..n], &mut azimuth[..n], &mut phi_d[..n]);
         let (step, i_dot_h) = (&mut step[..n], &mut i_dot_h[..n]);
         for k in 0..n {
             let (hx, hy, hz) = (x[k] + o.x, y[k] + o.y, z[k] + o.z);
@@ -129,19 +130,19 @@ multiversion! {
             let dx = cosine * (ax * x[k] + ay * y[k]) - sine * z[k];
             let dy = ax * y[k] - ay * x[k];
             let dz = 0.5 * length;
-            // u² = (1 - cos θ_d) / (1 - cos θ_max), with sin θ_d taken out of both.
+            // u² = (1 - cos θ_d) / (1 - cos θ_max), with numerator and denominator divided by sin θ_d.
             let (n, m2) = (sine * dx.abs(), cosine * cosine * (dx * dx + dy * dy));
             let r = (n * n + m2).sqrt();
             let u = (r * (r + n) / ((1.0 + dz) * cosine * cosine)).min(1.0).sqrt();
             let c = 1.0 + crowding;
             let root = (c * c - 4.0 * crowding * u).max(0.0).sqrt();
-            // (c - root) / 2k without the difference.
+            // (c - root) / 2k in a form that does not cancel.
             step[k] = (2.0 * u / (c + root)).min(1.0);
             ring[k] = (sine * sine / (1.0 + cosine)).min(1.0).sqrt();
             let half = upper_angle(ay.abs(), ax);
             azimuth[k] = ((if ay < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
             let sign = if dy < 0.0 { -1.0 } else { 1.0 };
-            turn[k] = (upper_angle(dy * sign, dx * sign) * (1.0 / PI)).min(1.0);
+            phi_d[k] = (upper_angle(dy * sign, dx * sign) * (1.0 / PI)).min(1.0);
             i_dot_h[k] = dz.min(1.0);
         }
     }

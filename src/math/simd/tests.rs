@@ -1,4 +1,4 @@
-//! Every kernel against the plain sum that it replaces.
+//! Every kernel against a scalar loop.
 
 use glam::Vec3;
 
@@ -11,9 +11,11 @@ fn uniform(k: usize, start: f64) -> f32 {
     (start + k as f64 * 0.618_033_988_749_894_9).fract() as f32
 }
 
-fn directions(count: usize, start: f64, reach: f32) -> Vec<Vec3> {
+fn directions(count: usize, start: f64, max_theta: f32) -> Vec<Vec3> {
     (0..count)
-        .map(|k| from_angles(reach * uniform(k, start).sqrt(), std::f32::consts::TAU * uniform(k * k + 3 * k, start)))
+        .map(|k| {
+            from_angles(max_theta * uniform(k, start).sqrt(), std::f32::consts::TAU * uniform(k * k + 3 * k, start))
+        })
         .collect()
 }
 
@@ -21,7 +23,7 @@ fn split(normals: &[Vec3]) -> [Vec<f32>; 3] {
     std::array::from_fn(|axis| normals.iter().map(|n| n[axis]).collect())
 }
 
-/// Lobes over all parameters a scene may ask for, with the terms that define them.
+/// Lobes over the whole range of a scene's parameters, with the terms that define them.
 fn lobes() -> Vec<(Lobe, Term)> {
     let one = Vec3::ONE;
     let mut lobes = vec![(Lobe::Lambertian, Term::Lambertian { albedo: one })];
@@ -46,7 +48,7 @@ fn pairs() -> Vec<PairVectors> {
 
 #[test]
 fn lobe_values_and_sums_are_those_of_the_defining_terms() {
-    // 203 is no multiple of any lane; normals reach below the horizon, as those of overhangs do.
+    // 203 is no multiple of a lane. Some normals point below the horizon, like those of overhangs.
     let normals = directions(203, 0.3, 2.4);
     let parts = split(&normals);
     let parts = [&parts[0][..], &parts[1], &parts[2]];
@@ -139,11 +141,11 @@ fn blended_bits_are_the_weighted_bits_wherever_a_run_starts() {
 }
 
 #[test]
-fn ground_visibility_is_a_ramp_about_the_interpolated_horizon() {
+fn horizon_visibility_is_a_linear_transition_about_the_interpolated_horizon() {
     let (from, to) = ([0.2_f32; 3], [0.4_f32; 3]);
     let mut out = [f32::NAN; 3];
     for (elevation, want) in [(0.2, 0.0), (0.25, 0.0), (0.295, 0.25), (0.3, 0.5), (0.31, 1.0), (1.0, 1.0)] {
-        ground_visibility(&from, &to, 0.5, elevation, 50.0, &mut out);
+        horizon_visibility(&from, &to, 0.5, elevation, 50.0, &mut out);
         assert!(out.iter().all(|v| (v - want).abs() < 1e-4), "{elevation}: {out:?}");
     }
 }
@@ -165,7 +167,6 @@ fn sums_of_areas_are_those_of_double_precision() {
     }
 }
 
-/// In order, f32 loses 7e-4 over a million terms (DESIGN.md, Sec. 9).
 #[test]
 fn a_million_terms_lose_less_than_a_millionth() {
     let n = 1_000_000;
@@ -181,10 +182,11 @@ fn a_million_terms_lose_less_than_a_millionth() {
     assert!((got / want - 1.0).abs() < 1e-6, "{got} {want}");
 }
 
-/// Blinn-Phong once ran at 19 ns a facet, an order over the others: its loop was not vectorised.
+/// Prints the time per facet of each lobe. A lobe whose loop is not vectorised takes about ten times as long as the
+/// others.
 #[test]
-#[ignore = "prints nanoseconds a facet; meaningful on an idle machine only"]
-fn nanoseconds_a_facet() {
+#[ignore = "prints nanoseconds per facet; meaningful on an idle machine only"]
+fn nanoseconds_per_facet() {
     let n = 16_384;
     let parts = split(&directions(n, 0.3, 1.0));
     let parts = [&parts[0][..], &parts[1], &parts[2]];
@@ -198,7 +200,7 @@ fn nanoseconds_a_facet() {
                 start.elapsed().as_secs_f64() * 1e9 / n as f64
             })
             .fold(f64::INFINITY, f64::min);
-        eprintln!("{lobe:?}: {best:.2} ns a facet");
+        eprintln!("{lobe:?}: {best:.2} ns per facet");
     }
 }
 
@@ -215,7 +217,7 @@ fn lobes_of_many_lights_are_those_of_each_pair_by_itself() {
                 let mut alone = [0.0];
                 let [x, y, z] = [normal.x, normal.y, normal.z];
                 lobe_values(lobe, &PairVectors::new(i, o), [&[x], &[y], &[z]], &mut alone);
-                // Half vectors differ by rounding, which the sharpest lobes raise.
+                // Half vectors differ by rounding, which the sharpest lobes amplify.
                 assert!(
                     (together[k] - alone[0]).abs() <= 2e-3 * alone[0] + 1e-6,
                     "{lobe:?}: {} {}",
@@ -241,32 +243,32 @@ fn angles_of_lights_are_those_of_the_directions() {
 }
 
 #[test]
-fn readings_of_many_pairs_are_the_plain_blend_of_their_nodes_for_any_number_of_columns() {
+fn interpolated_rows_of_many_pairs_are_the_weighted_sums_of_their_nodes_for_any_number_of_columns() {
     use glam::Vec4;
-    for fours in [1, 2, 3] {
-        let grid = RowGrid { rings: 5, azimuths: 8, turn: 4, stored: 8, fours };
-        let values: Vec<Vec4> = (0..5 * 8 * 4 * 8 * fours)
+    for vec4s in [1, 2, 3] {
+        let grid = RowGrid { rings: 5, azimuths: 8, phi_d: 4, stored: 8, vec4s };
+        let values: Vec<Vec4> = (0..5 * 8 * 4 * 8 * vec4s)
             .map(|k| Vec4::from_array(std::array::from_fn(|c| uniform(4 * k + c, 0.3))))
             .collect();
-        // Both ends of each axis, and between.
+        // Both ends of each axis, and points between them.
         let count = 50;
         let spans = [4.0, 8.0, 4.0, 5.0, 1.0];
-        let place = |k: usize, axis: usize| match k {
+        let fraction = |k: usize, axis: usize| match k {
             0 => 0.0,
             1 => 1.0,
             k => uniform(k, 0.1 + 0.17 * axis as f64),
         };
-        let places = std::array::from_fn(|axis| std::array::from_fn(|k| spans[axis] * place(k, axis)));
+        let coordinates = std::array::from_fn(|axis| std::array::from_fn(|k| spans[axis] * fraction(k, axis)));
         for cubic in [false, true] {
-            let mut got = vec![Vec4::ZERO; count * fours];
-            row_sums(&values, grid, &places, count, cubic, &mut got);
-            for (k, got) in got.chunks(fours).enumerate() {
-                let [ring, azimuth, turn, step] = std::array::from_fn(|axis| places[axis][k]);
+            let mut got = vec![Vec4::ZERO; count * vec4s];
+            row_sums(&values, grid, &coordinates, count, cubic, &mut got);
+            for (k, got) in got.chunks(vec4s).enumerate() {
+                let [ring, azimuth, phi_d, step] = std::array::from_fn(|axis| coordinates[axis][k]);
                 let hat = |node: usize, at: f32| (1.0 - (node as f32 - at).abs()).max(0.0);
                 let round = |node: usize, at: f32, period: usize| hat(node, at) + hat(node + period, at);
                 let low = step.floor().min(4.0);
                 let along = |stored: usize| {
-                    // The node before the first stands in place 0 of what is stored.
+                    // Stored node 0 is the one before the grid's first node.
                     let d = (stored as f32 - 1.0 - low - (step - low)).abs();
                     match (cubic, d) {
                         (false, d) => (1.0 - d).max(0.0),
@@ -275,15 +277,15 @@ fn readings_of_many_pairs_are_the_plain_blend_of_their_nodes_for_any_number_of_c
                         (true, _) => 0.0,
                     }
                 };
-                let mut want = vec![Vec4::ZERO; fours];
+                let mut want = vec![Vec4::ZERO; vec4s];
                 for (at, value) in values.iter().enumerate() {
-                    let (four, node) = (at % fours, at / fours);
+                    let (vec4, node) = (at % vec4s, at / vec4s);
                     let (stored, row) = (node % 8, node / 8);
-                    let weight = hat(row / 32, ring) * round(row / 4 % 8, azimuth, 8) * round(row % 4, turn, 4);
-                    want[four] += *value * (weight * along(stored));
+                    let weight = hat(row / 32, ring) * round(row / 4 % 8, azimuth, 8) * round(row % 4, phi_d, 4);
+                    want[vec4] += *value * (weight * along(stored));
                 }
                 for (got, want) in got.iter().zip(&want) {
-                    assert!((*got - *want).abs().max_element() < 1e-5, "{fours} {cubic} {k}: {got} {want}");
+                    assert!((*got - *want).abs().max_element() < 1e-5, "{vec4s} {cubic} {k}: {got} {want}");
                 }
             }
         }
@@ -296,10 +298,10 @@ fn visible_areas_are_the_plain_sums_for_runs_of_any_length() {
         let row = |start: f64| -> Vec<f32> { (0..count).map(|k| uniform(k, start)).collect() };
         let (weights, from, to) = (row(0.1), row(0.4), row(0.7));
         for (blend, elevation) in [(0.0, 0.3), (0.6, 0.5), (0.3, 4.0), (0.5, -1.0)] {
-            let mut seen = vec![0.0; count];
-            ground_visibility(&from, &to, blend, elevation, 20.0, &mut seen);
-            let want: f64 = seen.iter().zip(&weights).map(|(v, w)| f64::from(*v) * f64::from(*w)).sum();
-            let got = ground_sum(&weights, &from, &to, blend, elevation, 20.0);
+            let mut visibility = vec![0.0; count];
+            horizon_visibility(&from, &to, blend, elevation, 20.0, &mut visibility);
+            let want: f64 = visibility.iter().zip(&weights).map(|(v, w)| f64::from(*v) * f64::from(*w)).sum();
+            let got = visible_sum(&weights, &from, &to, blend, elevation, 20.0);
             assert!((got - want).abs() < 2e-5 * want + 1e-6, "{count} facets: {got} {want}");
         }
     }

@@ -1,4 +1,4 @@
-//! Visibility of many facets along one direction, and sums over what is visible.
+//! Visibility of many facets along one direction, and sums over visible areas.
 
 use super::{BLOCK, LANES, blocks, lane, multiversion, total};
 
@@ -8,8 +8,9 @@ fn soft_step(x: f32) -> f32 {
 }
 
 multiversion! {
-    /// `out = 1` above the horizon interpolated between two azimuths, 0 below, with a ramp of `1/sharpness` radians.
-    pub fn ground_visibility(from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32, out: &mut [f32]) {
+    /// `out` is 1 above and 0 below the horizon that is interpolated between two azimuths, with a linear transition of
+    /// `1/sharpness` radians.
+    pub fn horizon_visibility(from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32, out: &mut [f32]) {
         for ((out, &from), &to) in out.iter_mut().zip(from).zip(to) {
             let horizon = from + (to - from) * blend;
             *out = soft_step((elevation - horizon) * sharpness);
@@ -17,19 +18,27 @@ multiversion! {
     }
 }
 
-/// HorizonMap further apart than this [rad] belong to different things: nothing lies between them.
+/// Difference of two horizons [rad] above which they belong to different parts of the surface and are not interpolated.
 const JUMP: f32 = 0.1;
 
-/// How fast one azimuth's view gives way to the next one's where they differ.
-pub const SWITCH: f32 = 6.0;
+/// Slope of the change from one azimuth's visibility to the next one's, per azimuth step, if their horizons differ.
+pub const SWITCH_RATE: f32 = 6.0;
 
 multiversion! {
-    /// As [`ground_visibility`], but where two horizons belong to different things a facet keeps the nearer azimuth's, and
-    /// changes over at its own place (`switch`, in `[0, 1]` between the azimuths): a blend would halve what a thin thing hides
-    /// along `i` and `o` at once.
-    pub fn stepped_visibility(from: &[f32], to: &[f32], switch: &[f32], blend: f32, elevation: f32, sharpness: f32, out: &mut [f32]) {
+    /// [`horizon_visibility`] without interpolation between horizons of different parts of the surface. There a facet
+    /// takes the visibility of one azimuth and changes to that of the next at its own point `switch`, in `[0, 1]`
+    /// between the azimuths. Interpolation would halve the shadow that a thin part casts along `i` and `o` at once.
+    pub fn stepped_visibility(
+        from: &[f32],
+        to: &[f32],
+        switch: &[f32],
+        blend: f32,
+        elevation: f32,
+        sharpness: f32,
+        out: &mut [f32],
+    ) {
         for (((out, &from), &to), &switch) in out.iter_mut().zip(from).zip(to).zip(switch) {
-            let changed = ((blend - switch) * SWITCH + 0.5).clamp(0.0, 1.0);
+            let changed = ((blend - switch) * SWITCH_RATE + 0.5).clamp(0.0, 1.0);
             let between = soft_step((elevation - (from + (to - from) * blend)) * sharpness);
             let (before, after) = (soft_step((elevation - from) * sharpness), soft_step((elevation - to) * sharpness));
             let either = before + (after - before) * changed;
@@ -39,12 +48,20 @@ multiversion! {
 }
 
 multiversion! {
-    /// How much each interval `(low, high)` of elevations takes off what its facet sees at an elevation, in `[0, 1]`, where
-    /// it belongs to the azimuth before (`side` 0) or after (1) and its facet changes over as in [`stepped_visibility`].
-    pub fn interval_cover(low: &[f32], high: &[f32], turn: (&[f32], f32, f32), elevation: f32, sharpness: f32, out: &mut [f32]) {
-        let (switch, blend, side) = turn;
+    /// The visibility, in `[0, 1]`, that each interval `(low, high)` of elevations removes from its facet at an
+    /// elevation. The interval belongs to the azimuth before (`side` 0) or after (1), and its facet changes as in
+    /// [`stepped_visibility`]. `transition` is `(switch, blend, side)`.
+    pub fn interval_cover(
+        low: &[f32],
+        high: &[f32],
+        transition: (&[f32], f32, f32),
+        elevation: f32,
+        sharpness: f32,
+        out: &mut [f32],
+    ) {
+        let (switch, blend, side) = transition;
         for (((out, &low), &high), &switch) in out.iter_mut().zip(low).zip(high).zip(switch) {
-            let changed = ((blend - switch) * SWITCH + 0.5).clamp(0.0, 1.0);
+            let changed = ((blend - switch) * SWITCH_RATE + 0.5).clamp(0.0, 1.0);
             let covered = soft_step((elevation - low) * sharpness) - soft_step((elevation - high) * sharpness);
             *out = (1.0 - (side - changed).abs()) * covered;
         }
@@ -52,10 +69,10 @@ multiversion! {
 }
 
 multiversion! {
-    /// Bits of four rows, weighted and summed: facet `first + k` into `out[k]`.
+    /// Writes the weighted sum of the bits of four rows for facet `first + k` to `out[k]`.
     pub fn blend_bits(rows: [&[u32]; 4], weights: [f32; 4], first: usize, out: &mut [f32]) {
         let word_at = |row: &[u32], k: usize| -> u32 {
-            // Words of facets from `first` on, whatever its place in a word.
+            // The bits of 32 facets from `first + k` on, which need not start at a word boundary.
             let (word, shift) = ((first + k) / 32, (first + k) % 32);
             let low = row[word] >> shift;
             if shift == 0 || word + 1 >= row.len() { low } else { low | row[word + 1] << (32 - shift) }
@@ -76,11 +93,12 @@ multiversion! {
     }
 }
 
-/// Facets that sums of visible areas take at a time: there is little work a facet, and runs are short.
+/// Facets that sums of visible areas process at a time; few, because runs are short.
 const WIDTH: usize = 16;
 
 multiversion! {
-    /// `Σ w a b`, f64 between blocks, for each of the weight columns: the visible area of facets that share a normal.
+    /// `Σ w a b` for each of the weight columns, with an f64 sum over blocks: the visible area of facets that share a
+    /// normal.
     pub fn masked_sum<const C: usize>(weights: [&[f32]; C], a: &[f32], b: &[f32]) -> [f64; C] {
         weights.map(|weights| {
             let mut sum = 0.0;
@@ -105,8 +123,8 @@ multiversion! {
 }
 
 multiversion! {
-    /// `Σ w v`, f64 between blocks, with `v` from [`ground_visibility`]: no row of it is written on the way.
-    pub fn ground_sum(weights: &[f32], from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32) -> f64 {
+    /// `Σ w v` with `v` as from [`horizon_visibility`], which is not stored, and with an f64 sum over blocks.
+    pub fn visible_sum(weights: &[f32], from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32) -> f64 {
         let mut sum = 0.0;
         for start in (0..weights.len()).step_by(BLOCK) {
             let end = (start + BLOCK).min(weights.len());
@@ -120,7 +138,8 @@ multiversion! {
                     lanes[l] += w[l] * soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
                 }
             }
-            // The rest as the end of sixteen that reach back, in whole vectors too: runs of few normals are short.
+            // The remainder is summed as the end of the last whole vector: runs are short, so it must be vectorised,
+            // too.
             let last = (w.last_chunk::<WIDTH>(), from.last_chunk::<WIDTH>(), to.last_chunk::<WIDTH>());
             if let (false, (Some(w), Some(from), Some(to))) = (w_tail.is_empty(), last) {
                 let counted = WIDTH - w_tail.len();
@@ -140,7 +159,7 @@ multiversion! {
 }
 
 multiversion! {
-    /// `Σ w v (n·d)+`: the visible projected area along `d` (Wu et al. 2011, Eq. 10), f64 between blocks.
+    /// `Σ w v (n·d)+`: the visible projected area along `d` (Wu et al. 2011, Eq. 10), with an f64 sum over blocks.
     pub fn projected_area(normals: [&[f32]; 3], weights: &[f32], v: &[f32], d: glam::Vec3) -> f64 {
         let mut sum = 0.0;
         for block in blocks(v.len()) {

@@ -1,4 +1,4 @@
-//! The camera: an orbit about the object, framed automatically, and its perspective projection.
+//! The camera: a perspective view that orbits the object and frames it automatically.
 
 use glam::{Vec2, Vec3};
 
@@ -6,12 +6,12 @@ use crate::base::{InputError, Result};
 use crate::render::ObjectMesh;
 use crate::scene;
 
-/// Room left around an object that is framed automatically.
+/// Size of the view relative to the object if it is framed automatically.
 const MARGIN: f32 = 1.08;
-/// Radius multiples in front of the eye that are cut away.
+/// Distance of the near plane from the eye, in radii of the object.
 const NEAR: f32 = 0.02;
 
-/// A perspective view, ready to project. `right`, `up` and `back` are orthonormal; pixels are square.
+/// A perspective view. `right`, `up` and `back` are orthonormal; pixels are square.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraView {
     pub eye: Vec3,
@@ -28,7 +28,7 @@ pub struct CameraView {
 }
 
 impl CameraView {
-    /// The view of a scene's camera. `fov_deg` spans the shorter side of the picture.
+    /// Computes the view of a scene's camera. `fov_deg` spans the shorter side of the image.
     pub fn new(camera: &scene::Camera, mesh: &ObjectMesh, size: [usize; 2]) -> Result<Self> {
         check(camera)?;
         let [width, height] = size.map(|n| n.max(1) as f32);
@@ -49,29 +49,30 @@ impl CameraView {
         Ok(Self { eye: center + back * distance, right, up, back, tan_half_fov, near: NEAR * radius, size })
     }
 
-    /// Coordinates of a world point along right, up and forwards from the eye.
+    /// Returns the coordinates of a world point along right, up and forwards from the eye.
     pub fn view_from_world(&self, point: Vec3) -> Vec3 {
         let offset = point - self.eye;
         Vec3::new(offset.dot(self.right), offset.dot(self.up), -offset.dot(self.back))
     }
 
-    /// Pixel coordinates (x to the right, y down, pixel centres at halves) of view coordinates in front of the eye.
+    /// Returns the pixel coordinates of view coordinates in front of the eye: x to the right, y down, pixel centres at
+    /// halves.
     pub fn pixel_from_view(&self, view: Vec3) -> Vec2 {
         let ndc = Vec2::new(view.x, -view.y) / (self.tan_half_fov * view.z);
         (ndc + 1.0) * 0.5 * Vec2::new(self.size[0] as f32, self.size[1] as f32)
     }
 
-    /// Extent of a pixel at unit depth.
+    /// Returns the extent of a pixel at unit depth.
     pub fn pixel_extent(&self) -> f32 {
         2.0 * self.tan_half_fov.y / self.size[1].max(1) as f32
     }
 }
 
-/// The distance from which the object, turned any way about the vertical through its centre, just fits: orbiting does not
-/// change it. With ρ, y the cylindrical coordinates of a vertex and e the elevation, its depth towards the eye is
-/// `ρ cos ψ cos e + y sin e`, so the worst azimuth ψ for each picture side has a closed form.
+/// Returns the distance from which the object just fits at any azimuth, so that orbiting does not change it. With the
+/// cylindrical coordinates ρ, y of a vertex and the elevation e, the vertex's depth towards the eye is
+/// `ρ cos ψ cos e + y sin e`. The worst azimuth ψ for each side of the image therefore has a closed form.
 fn framing_distance(mesh: &ObjectMesh, sin_elevation: f32, cos_elevation: f32, tan_half_fov: Vec2) -> f32 {
-    let needed = |p: &Vec3| {
+    let distance_for = |p: &Vec3| {
         let offset = *p - mesh.bounds.center;
         let rho = offset.x.hypot(offset.z);
         let sideways = offset.y * sin_elevation + rho * cos_elevation.hypot(1.0 / tan_half_fov.x);
@@ -81,27 +82,27 @@ fn framing_distance(mesh: &ObjectMesh, sin_elevation: f32, cos_elevation: f32, t
         });
         sideways.max(vertical[0]).max(vertical[1])
     };
-    mesh.positions.iter().map(needed).fold(mesh.bounds.radius * 1e-3, f32::max)
+    mesh.positions.iter().map(distance_for).fold(mesh.bounds.radius * 1e-3, f32::max)
 }
 
 fn check(camera: &scene::Camera) -> Result<()> {
-    let complain = |field: &str, value: f32, expected: &str| {
+    let input_error = |field: &str, value: f32, expected: &str| {
         Err(InputError::new(format!("camera.{field}"), value, expected).into())
     };
     if !camera.azimuth_deg.is_finite() {
-        return complain("azimuth_deg", camera.azimuth_deg, "a finite angle in degrees");
+        return input_error("azimuth_deg", camera.azimuth_deg, "a finite angle in degrees");
     }
     if !camera.elevation_deg.is_finite() {
-        return complain("elevation_deg", camera.elevation_deg, "a finite angle in degrees");
+        return input_error("elevation_deg", camera.elevation_deg, "a finite angle in degrees");
     }
     if !camera.pan.is_finite() {
         return Err(InputError::new("camera.pan", camera.pan, "finite numbers").into());
     }
     if !(camera.distance == 0.0 || (0.01..=1e4).contains(&camera.distance)) {
-        return complain("distance", camera.distance, "0 (automatic), or 0.01 to 10000 radii of the object");
+        return input_error("distance", camera.distance, "0 (automatic), or 0.01 to 10000 radii of the object");
     }
     if !(1.0..=150.0).contains(&camera.fov_deg) {
-        return complain("fov_deg", camera.fov_deg, "1 to 150 degrees");
+        return input_error("fov_deg", camera.fov_deg, "1 to 150 degrees");
     }
     Ok(())
 }
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn the_axes_are_right_handed_and_azimuth_zero_looks_along_minus_z() {
+    fn the_axes_are_right_handed_and_azimuth_zero_views_along_minus_z() {
         let camera = scene::Camera { azimuth_deg: 0.0, elevation_deg: 0.0, distance: 4.0, ..scene::Camera::default() };
         let view = CameraView::new(&camera, &object("sphere"), [100, 100]).unwrap();
         assert!((view.eye - Vec3::new(0.0, 0.0, 4.0)).length() < 1e-5);

@@ -1,41 +1,41 @@
-//! The G-buffer: what each sample of the picture shows, as plain arrays. The CPU's twin of the wgpu pass; rules:
+//! The G-buffer: triangle, position, normal and tangent of each image sample. It is the CPU twin of a GPU pass. Rules:
 //!
-//! - coverage as in [`super::raster`];
-//! - position, normal and tangent are interpolated perspective-correctly, then normal and tangent made unit and
-//!   perpendicular; the frame's y is `normal × tangent`;
-//! - where the back of a two-sided surface shows, its normal is turned over;
-//! - a normal that leans away from the viewer (smooth normals do, at silhouettes) is bent towards the viewer, in the plane of
-//!   both, just until `n · o` is [`MIN_COSINE`]: the least change that keeps the material's answer defined, so that no
-//!   black fringe appears.
+//! - Coverage is as in [`super::raster`].
+//! - Position, normal and tangent are interpolated perspective-correctly. Normal and tangent are then normalized and
+//!   made perpendicular. The frame's y is `normal × tangent`.
+//! - If the back of a two-sided surface is visible, its normal is flipped.
+//! - At silhouettes a smooth normal may point away from the viewer. Such a normal is bent towards the viewer, in the
+//!   plane of both, until `n · o` is [`MIN_COSINE`]. This is the least change that keeps the effective BRDF defined, so
+//!   that no black fringe appears.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::raster;
-use super::raster::{NOTHING, Sample};
+use super::raster::{NO_TRIANGLE, Sample};
 use crate::render::{CameraView, ObjectMesh};
 
-/// Smallest cosine between a shading normal and the direction to the viewer (88.85°).
+/// Smallest cosine between a shading normal and the view direction (88.85°).
 pub const MIN_COSINE: f32 = 0.02;
 
-/// One entry a sample in every array, row by row. Where `triangles` is [`NOTHING`] the others are zero.
+/// Arrays with one entry per sample, row by row. If a sample's triangle is [`NO_TRIANGLE`], its other entries are zero.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct GBuffer {
-    /// Samples across and down: the picture's size times the samples a side.
+    /// Samples per row: the image width times the samples per pixel side; `height` likewise.
     pub width: usize,
     pub height: usize,
     /// Index into the mesh's triangles.
     pub triangles: Vec<u32>,
     /// World positions.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals, world frame, on the viewer's side.
+    /// Unit shading normals in the world frame, on the viewer's side.
     pub normals: Vec<Vec3>,
     /// Unit tangents (tile x), perpendicular to the normals.
     pub tangents: Vec<Vec3>,
 }
 
 impl GBuffer {
-    /// Rasterises the mesh with `samples_per_side²` samples a pixel.
+    /// Rasterises the mesh with `samples_per_side²` samples per pixel.
     pub fn new(mesh: &ObjectMesh, view: &CameraView, samples_per_side: usize) -> Self {
         let [width, height] = view.size.map(|n| n * samples_per_side);
         let samples = raster::rasterize(mesh, view, width, height);
@@ -43,15 +43,15 @@ impl GBuffer {
         let mut buffer = Self {
             width,
             height,
-            triangles: vec![NOTHING; count],
+            triangles: vec![NO_TRIANGLE; count],
             positions: vec![Vec3::ZERO; count],
             normals: vec![Vec3::ZERO; count],
             tangents: vec![Vec3::ZERO; count],
         };
-        let places = (&mut buffer.triangles, &mut buffer.positions, &mut buffer.normals, &mut buffer.tangents);
-        (samples.par_iter(), places.0, places.1, places.2, places.3).into_par_iter().with_min_len(1024).for_each(
+        let arrays = (&mut buffer.triangles, &mut buffer.positions, &mut buffer.normals, &mut buffer.tangents);
+        (samples.par_iter(), arrays.0, arrays.1, arrays.2, arrays.3).into_par_iter().with_min_len(1024).for_each(
             |(sample, triangle, position, normal, tangent)| {
-                if sample.triangle != NOTHING {
+                if sample.triangle != NO_TRIANGLE {
                     *triangle = sample.triangle;
                     (*position, *normal, *tangent) = resolve(mesh, view, sample);
                 }
@@ -61,7 +61,7 @@ impl GBuffer {
     }
 }
 
-/// Position, normal and tangent of a covered sample.
+/// Returns position, normal and tangent of a covered sample.
 fn resolve(mesh: &ObjectMesh, view: &CameraView, sample: &Sample) -> (Vec3, Vec3, Vec3) {
     let triangle = mesh.triangles[sample.triangle as usize];
     let [v, w] = sample.barycentric;
@@ -80,7 +80,7 @@ fn resolve(mesh: &ObjectMesh, view: &CameraView, sample: &Sample) -> (Vec3, Vec3
     (position, normal, perpendicular(mix(&mesh.tangents), normal))
 }
 
-/// The unit vector nearest to the unit `normal` whose cosine with the unit `viewer` is at least [`MIN_COSINE`].
+/// Returns the unit vector nearest to the unit `normal` whose cosine with the unit `viewer` is at least [`MIN_COSINE`].
 pub fn bent_towards(normal: Vec3, viewer: Vec3) -> Vec3 {
     let cosine = normal.dot(viewer);
     if cosine >= MIN_COSINE {
@@ -90,7 +90,7 @@ pub fn bent_towards(normal: Vec3, viewer: Vec3) -> Vec3 {
     viewer * MIN_COSINE + across * (1.0 - MIN_COSINE * MIN_COSINE).sqrt()
 }
 
-/// The part of `tangent` perpendicular to the unit `normal`, of unit length; any perpendicular where there is none.
+/// Returns the normalized component of `tangent` perpendicular to the unit `normal`; any perpendicular if it vanishes.
 pub fn perpendicular(tangent: Vec3, normal: Vec3) -> Vec3 {
     let across = tangent - normal * tangent.dot(normal);
     if across.length_squared() > 1e-10 { across.normalize_or(Vec3::X) } else { normal.any_orthonormal_vector() }
@@ -115,7 +115,7 @@ mod tests {
             let (mesh, view) = view_of(kind);
             let buffer = GBuffer::new(&mesh, &view, 2);
             assert_eq!((buffer.width, buffer.height), (192, 192));
-            let covered: Vec<_> = (0..buffer.triangles.len()).filter(|&k| buffer.triangles[k] != NOTHING).collect();
+            let covered: Vec<_> = (0..buffer.triangles.len()).filter(|&k| buffer.triangles[k] != NO_TRIANGLE).collect();
             assert!(covered.len() > 6000, "{kind}: {}", covered.len());
             for k in covered {
                 let (n, t) = (buffer.normals[k], buffer.tangents[k]);
@@ -130,10 +130,10 @@ mod tests {
     }
 
     #[test]
-    fn a_sphere_shows_its_own_normals_but_at_the_rim() {
+    fn a_sphere_has_its_exact_normals_except_at_the_rim() {
         let (mesh, view) = view_of("sphere");
         let buffer = GBuffer::new(&mesh, &view, 1);
-        for k in (0..buffer.triangles.len()).filter(|&k| buffer.triangles[k] != NOTHING) {
+        for k in (0..buffer.triangles.len()).filter(|&k| buffer.triangles[k] != NO_TRIANGLE) {
             let radial = buffer.positions[k].normalize();
             let viewer = (view.eye - buffer.positions[k]).normalize();
             if radial.dot(viewer) > 0.1 {

@@ -1,8 +1,8 @@
-//! From an object, lights and a material to an image.
+//! Rendering on the CPU: G-buffer, shading points, shadows, shading, tone map.
 
 pub mod camera;
 pub mod gbuffer;
-pub mod image_file;
+pub mod pixels;
 pub mod raster;
 pub mod render;
 pub mod shading;

@@ -1,43 +1,43 @@
-//! Which triangle each sample of the picture shows. Rules, shared with the GPU:
+//! Rasterization: the visible triangle of each image sample. Rules, shared with the GPU:
 //!
-//! - sample (x, y) of a picture with `s` samples a pixel side sits at pixel coordinates `((x+½)/s, (y+½)/s)`;
-//! - vertices are snapped to 1/256 of a sample; edges are exact integers and the top-left rule decides ties, so
-//!   triangles that share an edge neither overlap nor leave a gap;
-//! - the nearest triangle wins; of equals, the first;
-//! - triangles turned away are dropped unless the surface is two-sided;
-//! - triangles are clipped at the camera's near plane.
+//! - Sample (x, y) of an image with `s` samples per pixel side is at pixel coordinates `((x+½)/s, (y+½)/s)`.
+//! - Vertices are snapped to 1/256 of a sample. Edge functions are exact integers, and the top-left rule decides ties.
+//!   Triangles that share an edge therefore neither overlap nor leave a gap.
+//! - The nearest triangle is visible; of equally near triangles, the first.
+//! - Back faces are culled unless the surface is two-sided.
+//! - Triangles are clipped at the camera's near plane.
 
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
 use crate::render::{CameraView, ObjectMesh};
 
-/// The triangle of a sample that shows none.
-pub const NOTHING: u32 = u32::MAX;
+/// The triangle index of a sample that no triangle covers.
+pub const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Snapping: parts of a sample.
+/// Snapped coordinates per sample.
 const SUBSTEPS: f64 = 256.0;
-/// Snapped coordinates are kept within this, so that products of differences fit in 63 bits.
-const LARGEST: f64 = (1i64 << 29) as f64;
-/// Rows a task works on.
+/// Bounds snapped coordinates, so that products of differences fit in 63 bits.
+const MAX_COORDINATE: f64 = (1i64 << 29) as f64;
+/// Rows per task.
 const BAND: usize = 16;
-/// Triangles a task projects.
+/// Triangles per projection task.
 const CHUNK: usize = 2048;
 
-/// What a sample shows.
+/// The visible triangle of a sample, and the point on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Index into the mesh's triangles, or [`NOTHING`].
+    /// Index into the mesh's triangles, or [`NO_TRIANGLE`].
     pub triangle: u32,
     /// Barycentric weights (perspective-correct) of the triangle's second and third corner.
     pub barycentric: [f32; 2],
-    /// One over the depth along the view direction; 0 where nothing shows.
+    /// One over the depth along the view direction; 0 if the sample is not covered.
     pub inverse_depth: f32,
 }
 
-const EMPTY: Sample = Sample { triangle: NOTHING, barycentric: [0.0; 2], inverse_depth: 0.0 };
+const EMPTY: Sample = Sample { triangle: NO_TRIANGLE, barycentric: [0.0; 2], inverse_depth: 0.0 };
 
-/// A triangle (or a clipped piece of one) on the picture, wound so that its area is positive with y down.
+/// A projected triangle, or a clipped piece of one, wound so that its area is positive with y down.
 struct Projected {
     triangle: u32,
     /// Snapped coordinates.
@@ -45,11 +45,11 @@ struct Projected {
     inverse_depths: [f32; 3],
     /// Barycentric coordinates of each corner in the mesh triangle.
     barycentric: [Vec3; 3],
-    /// Sample rows touched, half-open.
+    /// Half-open range of sample rows that the piece may cover.
     rows: [usize; 2],
 }
 
-/// Samples row by row, `width x height` of them: the picture's size times the samples a side.
+/// Returns `width x height` samples, row by row: the image size times the samples per pixel side.
 pub fn rasterize(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) -> Vec<Sample> {
     let projected = project(mesh, view, width, height);
     let mut bands = vec![Vec::new(); height.div_ceil(BAND)];
@@ -72,7 +72,7 @@ fn project(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) ->
     let scale = DVec2::new(width as f64 / view.size[0] as f64, height as f64 / view.size[1] as f64) * SUBSTEPS;
     let snap = |p: Vec3| {
         let at = view.pixel_from_view(p).as_dvec2() * scale;
-        at.to_array().map(|x| x.round().clamp(-LARGEST, LARGEST) as i64)
+        at.to_array().map(|x| x.round().clamp(-MAX_COORDINATE, MAX_COORDINATE) as i64)
     };
     let snapped: Vec<[i64; 2]> = in_view.iter().map(|p| snap(*p)).collect();
     let pieces_of = |(first, triangles): (usize, &[[u32; 3]])| {
@@ -83,13 +83,14 @@ fn project(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) ->
             if corners.iter().all(|p| p.z >= view.near) {
                 let corners = [(corners[0], Vec3::X), (corners[1], Vec3::Y), (corners[2], Vec3::Z)];
                 let snapped = triangle.map(|v| snapped[v as usize]);
-                pieces.extend(place(triangle_index, corners, snapped, mesh.two_sided, height));
+                pieces.extend(project_piece(triangle_index, corners, snapped, mesh.two_sided, height));
                 continue;
             }
             let polygon = clip_near(corners, view.near);
             for fan in 2..polygon.len() {
                 let corners = [polygon[0], polygon[fan - 1], polygon[fan]];
-                pieces.extend(place(triangle_index, corners, corners.map(|(p, _)| snap(p)), mesh.two_sided, height));
+                let snapped = corners.map(|(p, _)| snap(p));
+                pieces.extend(project_piece(triangle_index, corners, snapped, mesh.two_sided, height));
             }
         }
         pieces
@@ -98,8 +99,8 @@ fn project(mesh: &ObjectMesh, view: &CameraView, width: usize, height: usize) ->
     chunks.into_iter().flatten().collect()
 }
 
-/// Winds the piece, culls it, and finds its rows.
-fn place(
+/// Culls and winds a piece and computes its rows.
+fn project_piece(
     triangle: u32,
     mut corners: [(Vec3, Vec3); 3],
     mut snapped: [[i64; 2]; 3],
@@ -107,7 +108,7 @@ fn place(
     height: usize,
 ) -> Option<Projected> {
     let area = edge(snapped[0], snapped[1], snapped[2]);
-    // Counter-clockwise with y up is negative with y down: the side that faces us.
+    // Front faces are counter-clockwise with y up, so their area is negative with y down.
     if area == 0 || (area > 0 && !two_sided) {
         return None;
     }
@@ -129,7 +130,8 @@ fn place(
     })
 }
 
-/// The part of a triangle in front of the near plane as a convex polygon of (view position, barycentric coordinates).
+/// Returns the part of a triangle beyond the near plane as a convex polygon of (view position, barycentric
+/// coordinates).
 fn clip_near(corners: [Vec3; 3], near: f32) -> Vec<(Vec3, Vec3)> {
     let all = [(corners[0], Vec3::X), (corners[1], Vec3::Y), (corners[2], Vec3::Z)];
     let inside = corners.map(|p| p.z >= near);
@@ -149,12 +151,12 @@ fn clip_near(corners: [Vec3; 3], near: f32) -> Vec<(Vec3, Vec3)> {
     polygon
 }
 
-/// Twice the signed area of a, b, p; positive to the right of a→b with y down.
+/// Returns twice the signed area of a, b, p; positive to the right of a→b with y down.
 fn edge(a: [i64; 2], b: [i64; 2], p: [i64; 2]) -> i64 {
     (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 }
 
-/// 0 for edges that own the points exactly on them (top or left), else -1.
+/// Returns 0 for top and left edges, which cover the points exactly on them, and -1 for the others.
 fn bias(a: [i64; 2], b: [i64; 2]) -> i64 {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     if dy < 0 || (dy == 0 && dx > 0) { 0 } else { -1 }
@@ -176,7 +178,7 @@ fn fill(piece: &Projected, samples: &mut [Sample], width: usize, first_row: usiz
         let line = &mut samples[(row - first_row) * width..][columns.clone()];
         for sample in line {
             if (values[0] + biases[0]) | (values[1] + biases[1]) | (values[2] + biases[2]) >= 0 {
-                shade_sample(piece, values, area, sample);
+                depth_test(piece, values, area, sample);
             }
             for (value, step) in values.iter_mut().zip(steps) {
                 *value += step;
@@ -185,7 +187,8 @@ fn fill(piece: &Projected, samples: &mut [Sample], width: usize, first_row: usiz
     }
 }
 
-fn shade_sample(piece: &Projected, values: [i64; 3], area: f64, sample: &mut Sample) {
+/// Stores the piece in the sample if it is nearer than the stored one.
+fn depth_test(piece: &Projected, values: [i64; 3], area: f64, sample: &mut Sample) {
     let weights: [f32; 3] = std::array::from_fn(|k| (values[k] as f64 / area) as f32 * piece.inverse_depths[k]);
     let inverse_depth = weights[0] + weights[1] + weights[2];
     if inverse_depth > sample.inverse_depth {
@@ -202,7 +205,7 @@ mod tests {
     use crate::render::object::Bounds;
     use crate::scene;
 
-    /// A square [-1, 1]² in the plane z = 0, cut into `n x n` cells at awkward places, each two triangles.
+    /// A square [-1, 1]² in the plane z = 0, divided into `n x n` cells of different sizes, each of two triangles.
     fn square(n: usize, two_sided: bool) -> ObjectMesh {
         let mut mesh = ObjectMesh { two_sided, ..ObjectMesh::default() };
         for j in 0..=n {
@@ -229,14 +232,14 @@ mod tests {
     #[test]
     fn each_sample_inside_a_triangulated_square_is_covered_exactly_once() {
         let mesh = square(13, false);
-        // The square fills the picture and more: counted per triangle, no sample is empty and none is drawn twice.
+        // The square is larger than the image: exactly one triangle covers each sample.
         let view = facing(&mesh, 0.0, 1.5, [64, 64]);
         let projected = project(&mesh, &view, 64, 64);
         let mut hits = vec![0; 64 * 64];
         for piece in &projected {
             let mut alone = vec![EMPTY; 64 * 64];
             fill(piece, &mut alone, 64, 0);
-            alone.iter().zip(&mut hits).for_each(|(sample, hits)| *hits += usize::from(sample.triangle != NOTHING));
+            alone.iter().zip(&mut hits).for_each(|(sample, hits)| *hits += usize::from(sample.triangle != NO_TRIANGLE));
         }
         assert!(hits.iter().all(|&h| h == 1), "{:?}", hits.iter().max());
     }
@@ -249,9 +252,9 @@ mod tests {
         let outline = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
             .map(|[x, y]| view.pixel_from_view(view.view_from_world(Vec3::new(x, y, 0.0))));
         let area: f32 = (0..4).map(|k| 0.5 * outline[k].perp_dot(outline[(k + 1) % 4])).sum::<f32>().abs();
-        let covered = samples.iter().filter(|s| s.triangle != NOTHING).count() as f32;
+        let covered = samples.iter().filter(|s| s.triangle != NO_TRIANGLE).count() as f32;
         assert!((covered / area - 1.0).abs() < 0.01, "{covered} {area}");
-        for (k, sample) in samples.iter().enumerate().filter(|(_, s)| s.triangle != NOTHING) {
+        for (k, sample) in samples.iter().enumerate().filter(|(_, s)| s.triangle != NO_TRIANGLE) {
             let [a, b, c] = mesh.corners(sample.triangle as usize);
             let [v, w] = sample.barycentric;
             let in_view = view.view_from_world(a * (1.0 - v - w) + b * v + c * w);
@@ -263,11 +266,11 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_turned_away_shows_only_where_it_is_two_sided() {
-        for (two_sided, shown) in [(false, false), (true, true)] {
+    fn the_back_of_a_surface_is_visible_only_if_it_is_two_sided() {
+        for (two_sided, visible) in [(false, false), (true, true)] {
             let mesh = square(2, two_sided);
             let samples = rasterize(&mesh, &facing(&mesh, 180.0, 4.0, [40, 40]), 40, 40);
-            assert_eq!(samples.iter().any(|s| s.triangle != NOTHING), shown);
+            assert_eq!(samples.iter().any(|s| s.triangle != NO_TRIANGLE), visible);
         }
     }
 
@@ -275,12 +278,12 @@ mod tests {
     fn the_nearest_of_a_closed_object_faces_the_viewer_and_a_camera_inside_does_not_break() {
         let sphere = object::build(&scene::Object::default(), std::path::Path::new(".")).unwrap();
         let view = facing(&sphere, 10.0, 3.0, [80, 80]);
-        for sample in rasterize(&sphere, &view, 80, 80).iter().filter(|s| s.triangle != NOTHING) {
+        for sample in rasterize(&sphere, &view, 80, 80).iter().filter(|s| s.triangle != NO_TRIANGLE) {
             assert!(1.0 / sample.inverse_depth < 3.0);
         }
         let mut open = sphere;
         open.two_sided = true;
         let inside = rasterize(&open, &facing(&open, 10.0, 0.3, [80, 80]), 80, 80);
-        assert!(inside.iter().all(|s| s.triangle != NOTHING), "from inside the sphere is all around");
+        assert!(inside.iter().all(|s| s.triangle != NO_TRIANGLE), "from inside, the sphere covers every sample");
     }
 }

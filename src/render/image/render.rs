@@ -1,4 +1,4 @@
-//! From plain data to a picture: all stages in order, each timed.
+//! Rendering of one image on the CPU: all stages in order, each timed.
 
 use std::time::Instant;
 
@@ -12,45 +12,46 @@ use crate::render::shadow::shadow_cache::ShadowCache;
 use crate::render::{CameraView, DirectionalLight, GBuffer, Image, ObjectMesh};
 use crate::scene;
 
-/// Most samples (pixels times samples a pixel) of one picture; the G-buffer takes 56 bytes for each at its peak.
+/// Bounds the samples (pixels times samples per pixel) of one image; the G-buffer takes up to 56 bytes per sample.
 pub const MAX_SAMPLES: usize = 1 << 25;
 
-/// All that a picture depends on.
+/// Everything that an image depends on.
 pub struct RenderInput<'a> {
     pub mesh: &'a ObjectMesh,
-    /// Made once per mesh by [`Occluder::of`]; `None` leaves self-shadowing out.
+    /// Built once per mesh by [`Occluder::if_needed`]; `None` switches self-shadowing off.
     pub occluder: Option<&'a Occluder>,
-    /// From [`Occluder::cache`], where the camera moves about a scene that stays: most shadow rays are saved.
+    /// Optional cache from [`Occluder::cache`]; it replaces most shadow rays if only the camera changes between images.
     pub shadow_cache: Option<&'a ShadowCache>,
     pub lights: &'a [DirectionalLight],
     pub camera: &'a scene::Camera,
     pub reflectance: &'a dyn Reflectance,
     /// Width and height in pixels.
     pub size: [usize; 2],
-    /// Samples a pixel side; 1 leaves edges jagged.
+    /// Samples per pixel side; 1 leaves edges aliased.
     pub samples_per_side: usize,
     pub background: &'a Background,
 }
 
-/// Milliseconds a stage took.
+/// Time of each stage in milliseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RenderTimes {
-    /// Of visibility and product, where a device makes them with the picture.
+    /// Time of visibility and facet sum, if the GPU computes them together with the image; otherwise 0.
     pub product_ms: f64,
     pub gbuffer_ms: f64,
     pub shadows_ms: f64,
     pub shading_ms: f64,
 }
 
+/// A rendered image and its statistics.
 #[derive(Debug, Clone, Default)]
 pub struct Rendered {
     pub image: Image,
     pub times: RenderTimes,
-    /// Points at which the material was evaluated.
+    /// Number of points at which the material was evaluated.
     pub points: usize,
 }
 
-/// Renders on the CPU; the same input gives the same bits with any number of threads.
+/// Renders on the CPU. The same input gives the same bits with any number of threads.
 pub fn render(input: &RenderInput) -> Result<Rendered> {
     check_size(input.size, input.samples_per_side)?;
     let view = CameraView::new(input.camera, input.mesh, input.size)?;
@@ -59,11 +60,11 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
     let points = ShadingPoints::new(&buffer, &view, input.samples_per_side);
     drop(buffer);
     let after_gbuffer = Instant::now();
-    let visible = input
+    let visibility = input
         .occluder
-        .map(|occluder| occluder.visible(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
+        .map(|occluder| occluder.visible_lights(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
     let after_shadows = Instant::now();
-    let radiance = shading::radiance(&points, input.lights, visible.as_ref(), view.eye, input.reflectance);
+    let radiance = shading::radiance(&points, input.lights, visibility.as_ref(), view.eye, input.reflectance);
     let image = shading::gather(&points, &radiance, &view, input.background);
     let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
     let times = RenderTimes {

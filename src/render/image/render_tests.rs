@@ -1,4 +1,4 @@
-//! Pictures with known answers.
+//! Images compared with closed forms.
 
 use std::f32::consts::PI;
 use std::path::Path;
@@ -21,7 +21,7 @@ impl Reflectance for Lambertian {
     }
 }
 
-/// A Ward-like lobe that is narrow along tile x and wide along tile y (or the other way), on a dim base.
+/// A Ward-like lobe with a width along tile x and one along tile y, on a dim diffuse base.
 struct Brushed {
     alpha: [f32; 2],
 }
@@ -54,7 +54,7 @@ fn image(
     reflectance: &dyn Reflectance,
     camera: &scene::Camera,
 ) -> Rendered {
-    let occluder = Occluder::of(mesh);
+    let occluder = Occluder::if_needed(mesh);
     render(&RenderInput {
         mesh,
         occluder: occluder.as_ref(),
@@ -69,7 +69,7 @@ fn image(
     .unwrap()
 }
 
-/// The unit sphere's normal at the centre of a pixel, where it is hit.
+/// Returns the unit sphere's normal at the centre of a pixel, if the sphere is visible there.
 fn sphere_normal(camera: &scene::Camera, mesh: &ObjectMesh, pixel: usize) -> Option<Vec3> {
     let view = CameraView::new(camera, mesh, [128, 128]).unwrap();
     let ndc = glam::Vec2::new((pixel % 128) as f32 + 0.5, (pixel / 128) as f32 + 0.5) / 64.0 - 1.0;
@@ -115,8 +115,8 @@ fn the_highlight_of_a_mirror_like_sphere_lies_where_the_half_vector_is_the_norma
 }
 
 #[test]
-fn an_anisotropic_highlight_on_a_sphere_stretches_along_tile_y_where_that_is_wide() {
-    // Tile y runs up the meridians: narrow in x, wide in y must give a tall highlight.
+fn an_anisotropic_highlight_on_a_sphere_stretches_along_tile_y_if_the_lobe_is_wide_there() {
+    // Tile y runs up the meridians, so a lobe that is narrow in x and wide in y must give a tall highlight.
     let mesh = object("sphere");
     let lights = [DirectionalLight { direction: Vec3::Z, irradiance: Vec3::ONE }];
     let extent = |alpha| {
@@ -144,7 +144,7 @@ fn edges_are_averaged_in_linear_radiance_and_coverage_matches_the_disc() {
     let camera = scene::Camera { distance: 40.0, fov_deg: 3.5, ..front() };
     let rendered = image(&mesh, &lights, &White, &camera);
     let sum: f32 = rendered.image.pixels.iter().map(|p| p.x).sum();
-    // The rim seen under perspective: angular radius asin(1/40).
+    // Under perspective, the rim has the angular radius asin(1/40).
     let radius = 64.0 * (1f32 / 40.0).asin().tan() / 1.75f32.to_radians().tan();
     assert!((sum / (PI * radius * radius) - 1.0).abs() < 0.01, "{sum}");
     assert!(rendered.image.pixels.iter().any(|p| p.x > 0.1 && p.x < 0.9));
@@ -181,7 +181,8 @@ fn sizes_that_make_no_image_are_errors() {
     }
 }
 
-/// Contact sheets for the eye, and times: `BISCALE_PICTURES=/tmp/large cargo test --lib contact_sheet -- --nocapture`.
+/// Writes an image of every object for visual inspection, and prints times:
+/// `BISCALE_PICTURES=/tmp/large cargo test --lib contact_sheet -- --nocapture`.
 #[test]
 fn contact_sheet_of_every_object_when_asked_for() {
     let Some(folder) = std::env::var_os("BISCALE_PICTURES") else {
@@ -201,14 +202,14 @@ fn contact_sheet_of_every_object_when_asked_for() {
         let mesh = object(kind);
         let name = Path::new(kind).file_name().unwrap().to_string_lossy().replace('.', "_");
         let start = Instant::now();
-        let occluder = Occluder::of(&mesh);
+        let occluder = Occluder::if_needed(&mesh);
         let occluder_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
         let cached = std::env::var_os("BISCALE_SHADOW_CACHE").is_some();
         let cache = occluder.as_ref().filter(|_| cached).map(|occluder| occluder.cache(&mesh, &lights));
         let cache_ms = start.elapsed().as_secs_f64() * 1e3;
-        for (look, reflectance) in
-            [("matte", &Lambertian as &dyn Reflectance), ("brushed", &Brushed { alpha: [0.12, 0.4] })]
+        for (material, reflectance) in
+            [("lambertian", &Lambertian as &dyn Reflectance), ("brushed", &Brushed { alpha: [0.12, 0.4] })]
         {
             let input = RenderInput {
                 mesh: &mesh,
@@ -224,7 +225,7 @@ fn contact_sheet_of_every_object_when_asked_for() {
             let runs: Vec<_> = (0..5).map(|_| render(&input).unwrap()).collect();
             let best = runs.iter().min_by(|a, b| total(a).total_cmp(&total(b))).unwrap();
             eprintln!(
-                "{name} {look}: {} triangles, {} points, occluder {occluder_ms:.1} ms, cache {cache_ms:.1} ms, gbuffer {:.1}, shadows {:.1}, shading {:.1}; {:?}",
+                "{name} {material}: {} triangles, {} points, occluder {occluder_ms:.1} ms, cache {cache_ms:.1} ms, gbuffer {:.1}, shadows {:.1}, shading {:.1}; {:?}",
                 mesh.triangles.len(),
                 best.points,
                 best.times.gbuffer_ms,
@@ -232,7 +233,7 @@ fn contact_sheet_of_every_object_when_asked_for() {
                 best.times.shading_ms,
                 mesh.warnings
             );
-            best.image.write(&folder.join(format!("{name}_{look}.png")), &tone_map).unwrap();
+            best.image.write(&folder.join(format!("{name}_{material}.png")), &tone_map).unwrap();
         }
     }
 }

@@ -1,21 +1,21 @@
-//! Deferred shading: `Σ_k E_k f̄(i_k, o)` at every shading point, and the points gathered into the picture.
+//! Deferred shading: `Σ_k E_k f̄(i_k, o)` at every shading point, and the average of the points of each pixel.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::shading_points::ShadingPoints;
 use crate::effective::Reflectance;
-use crate::render::shadow::Visible;
+use crate::render::shadow::LightVisibility;
 use crate::render::{CameraView, DirectionalLight, Image};
 
-/// Points a task works on.
+/// Points per task.
 const CHUNK: usize = 256;
 
-/// Radiance towards the eye of each point. `visible` is absent where nothing is ever in the way.
+/// Returns the radiance of each point towards the eye. Without `visibility`, every light is visible.
 pub fn radiance(
     points: &ShadingPoints,
     lights: &[DirectionalLight],
-    visible: Option<&Visible>,
+    visibility: Option<&LightVisibility>,
     eye: Vec3,
     reflectance: &dyn Reflectance,
 ) -> Vec<Vec3> {
@@ -31,7 +31,7 @@ pub fn radiance(
             directions.clear();
             irradiances.clear();
             for (k, light) in lights.iter().enumerate() {
-                if visible.is_none_or(|visible| visible.sees(point, k)) && light.direction.dot(z) > 0.0 {
+                if visibility.is_none_or(|visibility| visibility.is_lit(point, k)) && light.direction.dot(z) > 0.0 {
                     directions.push(in_tangent(light.direction));
                     irradiances.push(light.irradiance);
                 }
@@ -48,7 +48,7 @@ pub fn radiance(
     radiance
 }
 
-/// What is behind the object.
+/// The background of an image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Background {
     /// A grey studio wall, lighter behind the object.
@@ -59,7 +59,7 @@ pub enum Background {
 }
 
 impl Background {
-    /// Radiance at the centre of a pixel.
+    /// Returns the radiance at the centre of a pixel.
     fn at(&self, pixel: usize, [width, height]: [usize; 2]) -> Vec3 {
         match self {
             Self::Uniform(radiance) => *radiance,
@@ -74,7 +74,7 @@ impl Background {
     }
 }
 
-/// The picture: points averaged within their pixels over the background, in linear radiance.
+/// Averages the points of each pixel over the background, in linear radiance.
 pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &Background) -> Image {
     let [width, height] = view.size;
     let mut coverage = vec![0f32; width * height];

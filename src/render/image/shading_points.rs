@@ -1,33 +1,33 @@
-//! Where the material is evaluated: one point a pixel inside smooth regions, one a sample at edges.
+//! The points at which the material is evaluated: one per pixel in smooth regions, one per sample at edges.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::gbuffer::perpendicular;
-use super::raster::NOTHING;
+use super::raster::NO_TRIANGLE;
 use crate::render::{CameraView, GBuffer};
 
-/// Samples of a pixel whose normals differ less (cosine of 2°) may share one evaluation.
-const SAME_NORMAL: f32 = 0.999_39;
-/// The same for tangents (5°), which turn fast about poles.
-const SAME_TANGENT: f32 = 0.996_2;
+/// Bounds the angle between normals of samples that share one evaluation: the cosine of 2°.
+const MIN_NORMAL_COSINE: f32 = 0.999_39;
+/// Bounds the angle between their tangents, which vary fast near poles: the cosine of 5°.
+const MIN_TANGENT_COSINE: f32 = 0.996_2;
 
-/// Points to shade, ordered by pixel; one entry a point in every array.
+/// Points to shade, ordered by pixel; every array has one entry per point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ShadingPoints {
-    /// Pixel of the picture each point belongs to.
+    /// Index of the pixel that a point belongs to.
     pub pixels: Vec<u32>,
-    /// Share of its pixel; the rest of a pixel is background.
+    /// Fraction of the pixel that a point covers; the rest of the pixel is background.
     pub weights: Vec<f32>,
     pub positions: Vec<Vec3>,
     pub normals: Vec<Vec3>,
     pub tangents: Vec<Vec3>,
-    /// Mesh triangle each lies on.
+    /// Index of the mesh triangle that a point lies on.
     pub triangles: Vec<u32>,
 }
 
 impl ShadingPoints {
-    /// Gathers a G-buffer of `samples_per_side²` samples a pixel of `view`.
+    /// Collects the shading points of a G-buffer with `samples_per_side²` samples per pixel of `view`.
     pub fn new(buffer: &GBuffer, view: &CameraView, samples_per_side: usize) -> Self {
         let [width, height] = view.size;
         let rows: Vec<Self> = (0..height)
@@ -65,15 +65,15 @@ impl ShadingPoints {
             return;
         };
         let share = 1.0 / samples.len() as f32;
-        if samples.len() > 1 && are_alike(buffer, view, samples) {
+        if samples.len() > 1 && can_share_evaluation(buffer, view, samples) {
             let mean = |values: &[Vec3]| samples.iter().map(|&k| values[k]).sum::<Vec3>() * share;
             let normal = mean(&buffer.normals).try_normalize().unwrap_or(buffer.normals[first]);
             let tangent = perpendicular(mean(&buffer.tangents), normal);
-            // A place on the surface, not the mean: across a concave edge that lies inside the object, in the dark.
+            // A sample's position, not their mean: across a concave edge the mean lies inside the object, in shadow.
             self.add(pixel, 1.0, buffer.positions[first], normal, tangent, buffer.triangles[first]);
             return;
         }
-        for &k in samples.iter().filter(|&&k| buffer.triangles[k] != NOTHING) {
+        for &k in samples.iter().filter(|&&k| buffer.triangles[k] != NO_TRIANGLE) {
             self.add(pixel, share, buffer.positions[k], buffer.normals[k], buffer.tangents[k], buffer.triangles[k]);
         }
     }
@@ -98,18 +98,18 @@ impl ShadingPoints {
     }
 }
 
-/// Whether all samples show the same piece of smooth surface: covered, normals and tangents alike, and no step in depth
-/// larger than the pixel's own extent there.
-fn are_alike(buffer: &GBuffer, view: &CameraView, samples: &[usize]) -> bool {
+/// Returns whether all samples lie on one smooth piece of surface. All must be covered, with similar normals and
+/// tangents, and the steps in depth must be at most the extent of the pixel there.
+fn can_share_evaluation(buffer: &GBuffer, view: &CameraView, samples: &[usize]) -> bool {
     let first = samples[0];
-    if samples.iter().any(|&k| buffer.triangles[k] == NOTHING) {
+    if samples.iter().any(|&k| buffer.triangles[k] == NO_TRIANGLE) {
         return false;
     }
     let (position, normal, tangent) = (buffer.positions[first], buffer.normals[first], buffer.tangents[first]);
     let step = view.pixel_extent() * (position - view.eye).length();
     samples[1..].iter().all(|&k| {
-        buffer.normals[k].dot(normal) >= SAME_NORMAL
-            && buffer.tangents[k].dot(tangent) >= SAME_TANGENT
+        buffer.normals[k].dot(normal) >= MIN_NORMAL_COSINE
+            && buffer.tangents[k].dot(tangent) >= MIN_TANGENT_COSINE
             && (buffer.positions[k] - position).dot(normal).abs() <= step
     })
 }

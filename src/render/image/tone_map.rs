@@ -1,26 +1,26 @@
-//! From linear radiance to what a screen shows: exposure, a tone curve, sRGB encoding.
+//! Tone mapping of linear radiance: exposure, a tone curve, sRGB encoding.
 
 use glam::Vec3;
 
 use crate::base::{InputError, Result};
 use crate::scene;
 
-/// How radiance above the screen's white is handled.
+/// Mapping of radiance to display values; it decides how radiance above 1 is displayed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ToneCurve {
-    /// A shoulder that brings radiance 8 to white and leaves the darks alone.
+    /// Compresses highlights so that radiance 8 becomes white, and keeps low radiance unchanged.
     Filmic,
-    /// Cut at 1.
+    /// Clamps at 1.
     Plain,
 }
 
-/// Names that `camera.tone_map` takes.
+/// Names that `camera.tone_map` accepts.
 pub const CURVES: [&str; 2] = ["filmic", "plain"];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToneMap {
     pub curve: ToneCurve,
-    /// Factor on radiance, `2^exposure_ev`.
+    /// Factor applied to radiance, `2^exposure_ev`.
     pub gain: f32,
 }
 
@@ -39,7 +39,7 @@ impl ToneMap {
         Ok(Self { curve, gain: camera.exposure_ev.exp2() })
     }
 
-    /// Display-linear RGB in [0, 1]; a NaN becomes black.
+    /// Returns display-linear RGB in [0, 1]; NaN becomes black.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
         let exposed = radiance * self.gain;
         match self.curve {
@@ -49,19 +49,19 @@ impl ToneMap {
     }
 }
 
-/// Our own rational curve `x (1 + p x) / (1 + q x + r x²)`, `p = 83/64`, `q = 3/4`, `r = 21/16`: the solution of
-/// `f'(0) = 1, f(1) = 3/4, f(8) = 1, f'(8) = 0`; it rises all the way from 0 to 8 and stays at 1 beyond.
+/// The rational curve `x (1 + p x) / (1 + q x + r x²)` with `p = 83/64`, `q = 3/4`, `r = 21/16`. It solves
+/// `f'(0) = 1, f(1) = 3/4, f(8) = 1, f'(8) = 0`. It increases from 0 to 8 and is 1 beyond.
 fn filmic(x: f32) -> f32 {
     let x = within(x, 8.0);
     x * (1.0 + 1.296_875 * x) / (1.0 + 0.75 * x + 1.3125 * x * x)
 }
 
-/// `x` cut to `0..=high`; a NaN is not above 0 and becomes 0.
+/// Clamps `x` to `0..=high`; NaN becomes 0, because it is not above 0.
 fn within(x: f32, high: f32) -> f32 {
     if x > 0.0 { x.min(high) } else { 0.0 }
 }
 
-/// The sRGB transfer function (IEC 61966-2-1) to 8 bits.
+/// Encodes linear light with the sRGB transfer function (IEC 61966-2-1) in 8 bits.
 pub fn srgb_byte(linear: f32) -> u8 {
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0 + 0.5) as u8

@@ -1,4 +1,4 @@
-//! The lights on an object: a few directional ones that stand for an environment, and those listed in the scene.
+//! The lights on an object: directional lights that represent an environment, and those listed in the scene.
 
 use std::path::Path;
 
@@ -9,23 +9,23 @@ use super::environment::Environment;
 use crate::base::{InputError, Result};
 use crate::scene;
 
-/// Most lights an environment may be split into.
+/// Maximum number of lights that an environment may be split into.
 pub const MAX_COUNT: usize = 4096;
 
-/// Light from one direction. Radiance towards the viewer is `Σ irradiance · f̄(direction, o)`: f̄ holds the cosine.
+/// Light from one direction. Radiance towards the viewer is `Σ irradiance · f̄(direction, o)`; f̄ includes the cosine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionalLight {
-    /// Unit, world frame, towards the light.
+    /// Unit vector towards the light, in the world frame.
     pub direction: Vec3,
     /// Irradiance on a surface that faces the light (radiance times solid angle), linear RGB.
     pub irradiance: Vec3,
 }
 
-/// The lights of a scene and the environment they stand for.
+/// The lights of a scene and the environment that they represent.
 #[derive(Debug, Clone, Default)]
 pub struct Lights {
     pub directional: Vec<DirectionalLight>,
-    /// The environment with its rotation and intensity applied to `directional`, not to its own texels.
+    /// Environment as loaded: rotation and intensity apply to `directional`, not to these texels.
     pub environment: Environment,
     pub warnings: Vec<String>,
 }
@@ -34,11 +34,11 @@ pub struct Lights {
 pub fn build(light: &scene::Light, base_dir: &Path) -> Result<Lights> {
     check(light)?;
     let environment = environment::load(&light.environment, base_dir)?;
-    Ok(of_environment(light, environment))
+    Ok(from_environment(light, environment))
 }
 
-/// As [`build`], for an environment that is loaded already (an edit of count, rotation or intensity).
-pub fn of_environment(light: &scene::Light, environment: Environment) -> Lights {
+/// Builds the lights from a loaded environment, after an edit of count, rotation or intensity.
+pub fn from_environment(light: &scene::Light, environment: Environment) -> Lights {
     let rotation = glam::Quat::from_rotation_y(light.rotation_deg.to_radians());
     let mut directional: Vec<_> = environment::split(&environment.map, light.count.min(MAX_COUNT))
         .into_iter()
@@ -51,7 +51,7 @@ pub fn of_environment(light: &scene::Light, environment: Environment) -> Lights 
     }));
     let mut warnings = environment.warnings.clone();
     if directional.is_empty() {
-        warnings.push("there is no light: the picture will be black".to_owned());
+        warnings.push("the scene has no light, so the image is black".to_owned());
     }
     Lights { directional, environment, warnings }
 }

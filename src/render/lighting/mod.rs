@@ -1,5 +1,5 @@
-//! Environments and the directional lights that stand for them.
+//! Environments and the directional lights that represent them.
 
 pub mod environment;
-pub mod light_choice;
+pub mod light_selection;
 pub mod lights;

@@ -1,19 +1,19 @@
-//! Objects of cloth: a pillow and a draped skirt.
+//! Cloth objects: a pillow and a skirt.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DQuat, DVec3};
 
-use super::parametric::{MeshBuilder, evenly};
+use super::parametric::{ObjectBuilder, evenly};
 use crate::render::ObjectMesh;
 
-/// A knife-edge pillow: two puffed panels sewn together along a square whose sides are drawn in, puckered at the seam,
-/// leaning back. Tile x and y run along the panel's sides.
+/// Builds a pillow that leans back: two puffed panels with a common square seam, whose sides curve inwards and pucker.
+/// Tile x and y run along the panel's sides.
 pub(super) fn pillow() -> ObjectMesh {
-    let mut builder = MeshBuilder::default();
+    let mut builder = ObjectBuilder::default();
     let samples = evenly(96);
     builder.add_patch(&samples, &samples, panel);
-    // The back is the front turned half about the vertical: same cut, and tile x still runs to its viewer's right.
+    // The back is the front rotated by 180° about the vertical, so that tile x runs to the right of its viewer, too.
     builder.add_patch(&samples, &samples, |u, v| {
         let p = panel(u, v);
         DVec3::new(-p.x, p.y, -p.z)
@@ -22,8 +22,8 @@ pub(super) fn pillow() -> ObjectMesh {
     builder.finish(false)
 }
 
-/// The front panel. Parameters run over [0, 1]; x and y over [-1, 1] through a sine, so that the puff's steep rise at the
-/// seam is smooth in the parameters.
+/// Returns a point of the front panel for parameters in [0, 1]. A sine maps them to x and y in [-1, 1], so that the
+/// steep rise of the panel at the seam is smooth in the parameters.
 fn panel(u: f64, v: f64) -> DVec3 {
     let (s, t) = ((2.0 * u - 1.0) * FRAC_PI_2, (2.0 * v - 1.0) * FRAC_PI_2);
     let (x, y) = (s.sin(), t.sin());
@@ -39,13 +39,13 @@ fn panel(u: f64, v: f64) -> DVec3 {
     DVec3::new(drawn_in(y, x), drawn_in(x, y), 0.44 * puff * (1.0 + 0.13 * puckers))
 }
 
-/// Folds around the skirt.
+/// Number of folds around the skirt.
 const FOLDS: f64 = 9.0;
 
-/// A skirt that hangs from a narrow waist: a cone whose folds deepen downwards and bulge where they face outwards; open
-/// at the waist and the hem, one sheet seen from both sides. Tile x runs around, tile y up.
+/// Builds a skirt: a cone whose folds deepen downwards and bulge where they face outwards. It is one two-sided sheet,
+/// open at the waist and the hem. Tile x runs around the axis, tile y upwards.
 pub(super) fn skirt() -> ObjectMesh {
-    let mut builder = MeshBuilder::default();
+    let mut builder = ObjectBuilder::default();
     builder.add_patch(&evenly(400), &evenly(64), drape);
     builder.finish(true)
 }
@@ -55,7 +55,7 @@ fn drape(u: f64, v: f64) -> DVec3 {
     // 0 at the waist, 1 at the hem.
     let fall = 1.0 - v;
     let below_band = ((fall - 0.05) / 0.95).max(0.0);
-    // Whole numbers of waves around, so that the sheet closes; the sines vary the folds' spacing.
+    // Integer numbers of waves around, so that the sheet closes; the sines vary the spacing of the folds.
     let phase =
         FOLDS * angle + 0.75 * (2.0 * angle + 1.0).sin() + 0.6 * (3.0 * angle + 2.2).sin() + 0.35 * (5.0 * angle).cos();
     let depth = (0.125 + 0.035 * (2.0 * angle + 0.7).cos() + 0.03 * (5.0 * angle + 1.0).sin()) * below_band.powf(1.25);

@@ -1,8 +1,9 @@
-//! Curves that objects are made of: natural cubic splines and polylines with rounded corners.
+//! Profile and path curves of objects: natural cubic splines and polylines with rounded corners.
 
 use glam::{DVec2, DVec3};
 
-/// A natural cubic spline (C²: highlights on it run without kinks) through points, parameterised by chord length on [0, 1].
+/// A natural cubic spline through points, parameterised by chord length on [0, 1]. It is C², so that highlights on its
+/// surfaces have no kinks.
 pub(super) struct Spline {
     points: Vec<DVec3>,
     /// Parameter of each point.
@@ -24,7 +25,7 @@ impl Spline {
         Self { points, knots, curvatures }
     }
 
-    /// The point at `t`, and a little beyond [0, 1] along the end pieces.
+    /// Returns the point at `t`; slightly outside [0, 1] the end pieces extrapolate.
     pub fn at(&self, t: f64) -> DVec3 {
         let last = self.points.len() - 2;
         let piece = self.knots.partition_point(|knot| *knot <= t).saturating_sub(1).min(last);
@@ -35,7 +36,7 @@ impl Spline {
         self.points[piece] * a + self.points[piece + 1] * b + bend
     }
 
-    /// Unit tangent at `t`.
+    /// Returns the unit tangent at `t`.
     pub fn tangent(&self, t: f64) -> DVec3 {
         (self.at(t + 1e-5) - self.at(t - 1e-5)).try_normalize().unwrap_or(DVec3::Y)
     }
@@ -91,16 +92,17 @@ pub(super) struct RoundedPolyline {
 }
 
 impl RoundedPolyline {
-    /// `corners`: `(x, y, rounding radius)`; the radius of the first and last is ignored. Neighbouring roundings must fit.
+    /// `corners` are `(x, y, rounding radius)`; the radii of the first and the last are ignored. Neighbouring arcs must
+    /// not overlap.
     pub fn new(corners: &[(f64, f64, f64)]) -> Self {
         let point = |corner: (f64, f64, f64)| DVec2::new(corner.0, corner.1);
         let mut pieces = Vec::new();
         let mut from = point(corners[0]);
         for three in corners.windows(3) {
             let corner = point(three[1]);
-            let (back, on) =
+            let (back, forward) =
                 ((point(three[0]) - corner).normalize_or_zero(), (point(three[2]) - corner).normalize_or_zero());
-            let turn = (-back).angle_to(on);
+            let turn = (-back).angle_to(forward);
             let radius = three[1].2;
             let cut = radius * (turn.abs() / 2.0).tan();
             let start = corner + back * cut;
@@ -108,7 +110,7 @@ impl RoundedPolyline {
             let inward = back.perp() * -turn.signum();
             let center = start + inward * radius;
             pieces.push(Piece::Arc { center, radius, start: (-inward).to_angle(), sweep: turn });
-            from = corner + on * cut;
+            from = corner + forward * cut;
         }
         pieces.push(Piece::Line { from, to: point(corners[corners.len() - 1]) });
         let total: f64 = pieces.iter().map(Piece::length).sum();
@@ -128,7 +130,8 @@ impl RoundedPolyline {
         self.pieces[k].at((t - start) / (self.ends[k] - start))
     }
 
-    /// Parameters that follow the arcs in steps of at most `max_turn` radians and the lines in `line_steps` each.
+    /// Returns parameters that divide each arc into steps of at most `max_turn` radians and each line into
+    /// `line_steps`.
     pub fn parameters(&self, max_turn: f64, line_steps: usize) -> Vec<f64> {
         let mut parameters = vec![0.0];
         let mut start = 0.0;

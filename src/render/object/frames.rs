@@ -1,40 +1,40 @@
-//! Tangent frames: perpendicular unit vectors, and normals and tangents averaged over a mesh that lacks them.
+//! Tangent frames: perpendicular unit vectors, and averaged normals and tangents for a mesh that has none.
 
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
 
-/// The part of `along` perpendicular to the unit `normal`, of unit length; any perpendicular where there is none.
+/// Returns the normalized component of `along` perpendicular to the unit `normal`; any perpendicular if it vanishes.
 pub(super) fn perpendicular(along: DVec3, normal: DVec3) -> DVec3 {
     let along = along.try_normalize().unwrap_or_default();
     let across = along - normal * along.dot(normal);
     if across.length_squared() > 1e-12 { across.normalize_or_zero() } else { normal.any_orthonormal_vector() }
 }
 
-/// Normals averaged over the triangles of each *place* (vertices split at a UV seam stay smooth), weighted by area.
+/// Averages normals over the triangles at each position, weighted by area. Vertices split at a UV seam stay smooth.
 pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let places = weld(positions);
+    let welded = weld(positions);
     let mut sums = vec![DVec3::ZERO; positions.len()];
     for triangle in triangles {
         let [a, b, c] = triangle.map(|k| positions[k as usize].as_dvec3());
         let area_vector = (b - a).cross(c - a);
         for &k in triangle {
-            sums[places[k as usize] as usize] += area_vector;
+            sums[welded[k as usize] as usize] += area_vector;
         }
     }
-    places.iter().map(|&place| sums[place as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3()).collect()
+    welded.iter().map(|&first| sums[first as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3()).collect()
 }
 
-/// For each vertex, the first vertex at exactly the same place.
+/// Returns, for each vertex, the first vertex at exactly the same position.
 pub(super) fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first_at = HashMap::with_capacity(positions.len());
-    // Adding zero makes -0 and 0 the same place.
+    // Adding zero turns -0 into 0.
     let key = |p: &Vec3| (*p + Vec3::ZERO).to_array().map(f32::to_bits);
     positions.iter().enumerate().map(|(k, p)| *first_at.entry(key(p)).or_insert(k as u32)).collect()
 }
 
-/// Tangents along ∂P/∂u averaged over the triangles of each vertex (weighted by area), and the number of triangles
-/// whose UVs are mirrored.
+/// Averages tangents along ∂P/∂u over the triangles of each vertex, weighted by area. Also returns the number of
+/// triangles with mirrored UVs.
 pub(super) fn tangents_from_uvs(
     positions: &[Vec3],
     normals: &[Vec3],
@@ -67,8 +67,8 @@ pub(super) fn tangents_from_uvs(
     (sums.iter().zip(normals).map(tangent).collect(), mirrored)
 }
 
-/// The horizontal tangent, so that tile y is the vertical projected on the surface: smooth but where the normal is
-/// vertical. For meshes without UVs.
+/// Returns the horizontal tangent, for meshes without UVs. Tile y is then the vertical direction projected onto the
+/// surface. The frame is smooth except where the normal is vertical.
 pub(super) fn around_vertical(normal: DVec3) -> DVec3 {
     let tangent = DVec3::Y.cross(normal);
     if tangent.length_squared() > 1e-12 { tangent.normalize_or_zero() } else { perpendicular(DVec3::X, normal) }
@@ -85,11 +85,11 @@ mod tests {
         let normals = smooth_normals(&positions, &[[0, 1, 2], [4, 2, 3], [0, 3, 1]]);
         let expected = Vec3::new(2.0, 2.0, 1.0) / 3.0;
         assert!((normals[0] - expected).length() < 1e-6);
-        assert_eq!(normals[0], normals[4], "split vertices share the normal of their place");
+        assert_eq!(normals[0], normals[4], "split vertices share the normal of their position");
     }
 
     #[test]
-    fn tangents_follow_u_also_where_the_uvs_are_mirrored() {
+    fn tangents_follow_u_also_if_the_uvs_are_mirrored() {
         let positions = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let normals = [Vec3::Z; 3];
         let uvs = [Vec2::ZERO, Vec2::new(0.0, 1.0), Vec2::new(-1.0, 0.0)];

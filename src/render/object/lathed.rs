@@ -1,14 +1,14 @@
-//! Objects turned on a lathe, and sweeps for their handles. Tile x runs around, tile y along the profile.
+//! Surfaces of revolution, and sweeps for their handles. Tile x runs around the axis, tile y along the profile.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DQuat, DVec2, DVec3};
 
 use super::curves::{RoundedPolyline, Spline};
-use super::parametric::{MeshBuilder, evenly};
+use super::parametric::{ObjectBuilder, evenly};
 use crate::render::ObjectMesh;
 
-/// Turns `profile(v) = (radius, y)` about the y axis; seen from outside, u runs to the right.
+/// Revolves `profile(v) = (radius, y)` about the y axis; u runs to the right as viewed from outside.
 pub(super) fn lathe(profile: impl Fn(f64) -> DVec2) -> impl Fn(f64, f64) -> DVec3 {
     move |u, v| {
         let (sin, cos) = (TAU * u).sin_cos();
@@ -17,37 +17,37 @@ pub(super) fn lathe(profile: impl Fn(f64) -> DVec2) -> impl Fn(f64, f64) -> DVec
     }
 }
 
-/// Sweeps an ellipse along a curve of the xy plane. `course(v)` gives the place on the curve and the scale there;
-/// `half_axes` are those in the curve's plane and across it.
+/// Sweeps an ellipse along a curve in the xy plane. `course(v)` returns the curve parameter and the scale of the
+/// ellipse. `half_axes` are in the curve's plane and across it.
 pub(super) fn sweep(path: &Spline, half_axes: [f64; 2], course: impl Fn(f64) -> DVec2) -> impl Fn(f64, f64) -> DVec3 {
     move |u, v| {
-        let DVec2 { x: place, y: scale } = course(v);
-        let side = DVec3::Z.cross(path.tangent(place));
+        let DVec2 { x: t, y: scale } = course(v);
+        let side = DVec3::Z.cross(path.tangent(t));
         let (sin, cos) = (TAU * u).sin_cos();
-        path.at(place) + (side * (half_axes[0] * cos) + DVec3::Z * (half_axes[1] * sin)) * scale
+        path.at(t) + (side * (half_axes[0] * cos) + DVec3::Z * (half_axes[1] * sin)) * scale
     }
 }
 
-/// The unit sphere.
+/// Builds the unit sphere.
 pub(super) fn sphere() -> ObjectMesh {
-    let mut builder = MeshBuilder::default();
+    let mut builder = ObjectBuilder::default();
     let meridian = |v: f64| DVec2::from_angle(PI * v - FRAC_PI_2);
     builder.add_patch(&evenly(96), &evenly(48), lathe(meridian));
     builder.finish(false)
 }
 
-/// An upright solid cylinder of radius 0.6 and height 1.6 with softened edges.
+/// Builds an upright closed cylinder of radius 0.6 and height 1.6 with rounded edges.
 pub(super) fn cylinder() -> ObjectMesh {
-    let mut builder = MeshBuilder::default();
+    let mut builder = ObjectBuilder::default();
     let profile = RoundedPolyline::new(&[(0.0, -0.8, 0.0), (0.6, -0.8, 0.025), (0.6, 0.8, 0.025), (0.0, 0.8, 0.0)]);
     builder.add_patch(&evenly(128), &profile.parameters(0.2, 8), lathe(|v| profile.at(v)));
     builder.finish(false)
 }
 
-/// A round plate on its edge as on a stand, leaning back: flat in the middle, a raised brim, a foot behind. The tile
-/// lies on it as on a sheet (x to the right), not around its middle.
+/// Builds a round plate that leans back on its edge: flat in the middle, with a raised brim and a foot ring behind.
+/// Tile x runs to the right everywhere, not around the axis.
 pub(super) fn plate() -> ObjectMesh {
-    let mut builder = MeshBuilder::default();
+    let mut builder = ObjectBuilder::default();
     let profile = RoundedPolyline::new(&[
         (0.0, -0.010, 0.0),
         (0.52, -0.010, 0.01),
@@ -67,9 +67,9 @@ pub(super) fn plate() -> ObjectMesh {
     builder.finish(false)
 }
 
-/// A mug: thin walls, a rounded lip, and a handle on its right.
+/// Builds a mug with thin walls, a rounded lip, and a handle on its right.
 pub(super) fn cup() -> ObjectMesh {
-    let mut builder = MeshBuilder::default();
+    let mut builder = ObjectBuilder::default();
     let profile = RoundedPolyline::new(&[
         (0.0, 0.02, 0.0),
         (0.34, 0.02, 0.015),

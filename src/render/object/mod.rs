@@ -1,4 +1,4 @@
-//! Large-scale objects: triangle meshes with smooth normals and a continuous tangent frame for the tile to follow.
+//! Large-scale objects: triangle meshes with smooth normals and a continuous tangent frame that the tile follows.
 
 mod cloth;
 mod curves;
@@ -15,30 +15,31 @@ use glam::Vec3;
 use crate::base::{InputError, Result};
 use crate::scene;
 
-/// Names that `object.kind` takes.
+/// Names that `object.kind` accepts.
 pub const KINDS: [&str; 8] = ["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh"];
 
-/// An object in its own world: y up, about two units in size (OBJ files are moved to the origin and scaled to radius 1).
+/// An object in the world frame: y up, about two units in size. OBJ files are centred and scaled to radius 1.
 ///
-/// The tangent frame of a vertex is `x = tangents[k]` (along ∂P/∂u), `z = normals[k]`, `y = z × x`: always
-/// right-handed, because a tile is a real surface and cannot be mirrored.
+/// The tangent frame of a vertex is `x = tangents[k]` (along ∂P/∂u), `z = normals[k]`, `y = z × x`. The frame is always
+/// right-handed, because a tile is a physical surface and cannot be mirrored.
 #[derive(Debug, Clone, Default)]
 pub struct ObjectMesh {
     pub positions: Vec<Vec3>,
-    /// Unit shading normals, towards the outside.
+    /// Unit shading normals that point outwards.
     pub normals: Vec<Vec3>,
     /// Unit tangents, perpendicular to the normals.
     pub tangents: Vec<Vec3>,
-    /// Vertex indices, counter-clockwise seen from outside.
+    /// Vertex indices, counter-clockwise as viewed from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Whether the surface is open, so that its back is seen too and wears the same material; a closed one culls it.
+    /// True if the surface is open, so that its back is visible and has the same material. Back faces of a closed
+    /// surface are culled.
     pub two_sided: bool,
     pub bounds: Bounds,
-    /// What a person should know about the mesh (no UVs, mirrored UVs, triangles without area).
+    /// Warnings about the mesh: no UVs, mirrored UVs, triangles without area.
     pub warnings: Vec<String>,
 }
 
-/// The centre of the bounding box, and the radius about it that holds every vertex.
+/// The centre of the bounding box, and the radius of the sphere about it that contains every vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     pub center: Vec3,
@@ -52,7 +53,7 @@ impl Default for Bounds {
 }
 
 impl Bounds {
-    /// Bounds of points; the unit ball at the origin for none.
+    /// Returns the bounds of points; the unit sphere at the origin if there are none.
     pub fn of(positions: &[Vec3]) -> Self {
         let Some(&first) = positions.first() else {
             return Self::default();
@@ -65,13 +66,13 @@ impl Bounds {
 }
 
 impl ObjectMesh {
-    /// Corner positions of a triangle.
+    /// Returns the corner positions of a triangle.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|index| self.positions[index as usize])
     }
 }
 
-/// Makes the object a scene asks for; paths are relative to `base_dir`.
+/// Builds the object of a scene; paths are relative to `base_dir`.
 pub fn build(object: &scene::Object, base_dir: &Path) -> Result<ObjectMesh> {
     if object.kind != "mesh"
         && let Some(path) = &object.path
@@ -90,7 +91,8 @@ pub fn build(object: &scene::Object, base_dir: &Path) -> Result<ObjectMesh> {
         "mesh" => match &object.path {
             Some(path) => obj::load(&base_dir.join(path)),
             None => {
-                Err(InputError::new("object.path", "nothing", "the path of an .obj file, as kind is \"mesh\"").into())
+                Err(InputError::new("object.path", "nothing", "the path of an .obj file, because kind is \"mesh\"")
+                    .into())
             }
         },
         unknown => Err(unknown_kind(unknown).into()),
@@ -136,14 +138,15 @@ mod tests {
 
     #[test]
     fn normals_and_tangents_are_continuous_across_the_seams_of_the_parameterisation() {
-        // Vertices that coincide must agree, but for the poles of a lathe (every tangent occurs) and creases between parts.
+        // Vertices that coincide must agree, except at the poles of a lathe (every tangent occurs) and at creases
+        // between parts.
         for kind in ["sphere", "cylinder", "skirt"] {
             let mesh = of_kind(kind);
-            let mut by_place = std::collections::HashMap::<[i64; 3], Vec<usize>>::new();
+            let mut by_position = std::collections::HashMap::<[i64; 3], Vec<usize>>::new();
             for (k, p) in mesh.positions.iter().enumerate() {
-                by_place.entry(p.to_array().map(|x| (f64::from(x) * 1e5).round() as i64)).or_default().push(k);
+                by_position.entry(p.to_array().map(|x| (f64::from(x) * 1e5).round() as i64)).or_default().push(k);
             }
-            let seams: Vec<_> = by_place.values().filter(|group| group.len() == 2).collect();
+            let seams: Vec<_> = by_position.values().filter(|group| group.len() == 2).collect();
             assert!(seams.len() > 20, "{kind}: {} seam vertices", seams.len());
             for group in seams {
                 let (a, b) = (group[0], group[1]);

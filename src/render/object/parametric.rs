@@ -5,23 +5,24 @@ use glam::{DQuat, DVec3, Vec3};
 use super::{Bounds, frames};
 use crate::render::ObjectMesh;
 
-/// Step of the central differences in parameter units; in f64 the error is about 1e-10.
+/// Step of the central differences in parameter units; the error in f64 is about 1e-10.
 const STEP: f64 = 1e-5;
-/// How far from a pole (where ∂P/∂u vanishes) its limiting frame is taken.
+/// Distance in parameter units from a pole, where ∂P/∂u vanishes, at which the pole's limiting frame is evaluated.
 const POLE_STEP: f64 = 1e-4;
 
-/// Collects patches into one object.
+/// Builds one object from parametric patches.
 #[derive(Default)]
-pub(super) struct MeshBuilder {
+pub(super) struct ObjectBuilder {
     positions: Vec<DVec3>,
     normals: Vec<DVec3>,
     tangents: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl MeshBuilder {
-    /// Adds the patch `surface(u, v)` sampled at `us` x `vs`; `∂P/∂u × ∂P/∂v` points outside. `surface` is asked a little
-    /// outside of the first and last u (wrapped patches are periodic there), never outside of the v.
+impl ObjectBuilder {
+    /// Adds the patch `surface(u, v)` sampled at `us` x `vs`; `∂P/∂u × ∂P/∂v` points outwards. `surface` is evaluated
+    /// up to one [`STEP`] beyond the first and last u, where wrapped patches are periodic. It is never evaluated beyond
+    /// the first and last v.
     pub fn add_patch(&mut self, us: &[f64], vs: &[f64], surface: impl Fn(f64, f64) -> DVec3) {
         let (Some(&v_first), Some(&v_last)) = (vs.first(), vs.last()) else {
             return;
@@ -57,7 +58,7 @@ impl MeshBuilder {
         }
     }
 
-    /// Skips triangles without area, which patches have at their poles.
+    /// Adds a triangle unless its area is zero, as at the poles of a patch.
     fn add_triangle(&mut self, triangle: [u32; 3]) {
         let [a, b, c] = triangle.map(|k| self.positions[k as usize]);
         if (b - a).cross(c - a).length() > 1e-12 {
@@ -65,14 +66,14 @@ impl MeshBuilder {
         }
     }
 
-    /// Turns everything added so far.
+    /// Rotates everything added so far.
     pub fn rotate(&mut self, rotation: DQuat) {
         for vectors in [&mut self.positions, &mut self.normals, &mut self.tangents] {
             vectors.iter_mut().for_each(|v| *v = rotation * *v);
         }
     }
 
-    /// Replaces the tangents by `axis` projected on the surface, for parts where a planar layout of the tile reads better.
+    /// Replaces the tangents by `axis` projected onto the surface, for a planar layout of the tile.
     pub fn lay_tangents_along(&mut self, axis: DVec3) {
         for (tangent, normal) in self.tangents.iter_mut().zip(&self.normals) {
             *tangent = frames::perpendicular(axis, *normal);
@@ -95,7 +96,7 @@ impl MeshBuilder {
     }
 }
 
-/// `count + 1` parameters from 0 to 1.
+/// Returns `count + 1` parameters evenly spaced from 0 to 1.
 pub(super) fn evenly(count: usize) -> Vec<f64> {
     (0..=count).map(|k| k as f64 / count as f64).collect()
 }

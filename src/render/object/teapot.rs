@@ -1,16 +1,17 @@
-//! Our own teapot: a turned body and lid, a swept spout and handle.
+//! A teapot: surfaces of revolution for body and lid, sweeps for spout and handle.
 
 use glam::DVec2;
 
 use super::curves::Spline;
 use super::lathed::{lathe, sweep};
-use super::parametric::{MeshBuilder, evenly};
+use super::parametric::{ObjectBuilder, evenly};
 use crate::render::ObjectMesh;
 
-/// A pot-bellied teapot, spout to the right. Its parts end inside each other, so that from outside it is closed.
+/// Builds a teapot with the spout to the right. Its parts end inside each other, so that it is closed as viewed from
+/// outside.
 pub(super) fn teapot() -> ObjectMesh {
-    let mut builder = MeshBuilder::default();
-    let turned = |spline: &Spline, v: f64| {
+    let mut builder = ObjectBuilder::default();
+    let profile = |spline: &Spline, v: f64| {
         let p = spline.at(v);
         DVec2::new(p.x.max(0.0), p.y)
     };
@@ -24,7 +25,7 @@ pub(super) fn teapot() -> ObjectMesh {
         [0.585, 0.04],
         [0.60, 0.12],
     ]);
-    builder.add_patch(&evenly(96), &evenly(24), lathe(|v| turned(&foot, v)));
+    builder.add_patch(&evenly(96), &evenly(24), lathe(|v| profile(&foot, v)));
     let belly = Spline::through(&[
         [0.50, 0.03],
         [0.66, 0.09],
@@ -38,7 +39,7 @@ pub(super) fn teapot() -> ObjectMesh {
         [0.545, 1.085],
         [0.53, 1.03],
     ]);
-    builder.add_patch(&evenly(112), &evenly(64), lathe(|v| turned(&belly, v)));
+    builder.add_patch(&evenly(112), &evenly(64), lathe(|v| profile(&belly, v)));
     let lid = Spline::through(&[
         [0.52, 1.01],
         [0.535, 1.075],
@@ -52,11 +53,11 @@ pub(super) fn teapot() -> ObjectMesh {
         [0.095, 1.45],
         [0.0, 1.472],
     ]);
-    builder.add_patch(&evenly(96), &evenly(56), lathe(|v| turned(&lid, v)));
+    builder.add_patch(&evenly(96), &evenly(56), lathe(|v| profile(&lid, v)));
 
     let spout_path =
         Spline::through(&[[0.68, 0.36], [0.98, 0.44], [1.20, 0.62], [1.34, 0.85], [1.50, 1.03], [1.62, 1.10]]);
-    // Place along the path and scale: down the outside, over the lip, and back into the dark.
+    // Path parameter and scale: up the outside, over the lip, and back down the inside.
     let spout_course = Spline::through(&[
         [0.0, 0.30],
         [0.20, 0.255],
@@ -98,13 +99,13 @@ mod tests {
     #[test]
     fn the_teapot_is_wider_with_spout_and_handle_than_its_belly_and_stands_on_its_foot() {
         let mesh = teapot();
-        let reach = |axis: fn(&glam::Vec3) -> f32| {
+        let extent = |axis: fn(&glam::Vec3) -> f32| {
             let values = mesh.positions.iter().map(axis);
             (values.clone().fold(f32::INFINITY, f32::min), values.fold(f32::NEG_INFINITY, f32::max))
         };
-        let (left, right) = reach(|p| p.x);
-        let (back, front) = reach(|p| p.z);
-        let (low, high) = reach(|p| p.y);
+        let (left, right) = extent(|p| p.x);
+        let (back, front) = extent(|p| p.z);
+        let (low, high) = extent(|p| p.y);
         assert!(right > 1.6 && left < -1.45, "{left} {right}");
         assert!((front - 0.99).abs() < 0.02 && (front + back).abs() < 1e-4, "{back} {front}");
         assert!((-0.05..0.0).contains(&low) && (1.4..1.55).contains(&high), "{low} {high}");

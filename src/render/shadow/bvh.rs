@@ -1,4 +1,4 @@
-//! A bounding-volume hierarchy over the object's triangles that answers one question: is anything in the way?
+//! A bounding-volume hierarchy over the object's triangles, for shadow rays.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use crate::render::ObjectMesh;
 
 const BINS: usize = 16;
 const LEAF_TRIANGLES: usize = 4;
-/// Deeper nodes become leaves, whatever they hold; bounds the traversal's stack.
+/// Bounds the depth of the hierarchy and thereby the traversal's stack; nodes at this depth become leaves.
 pub(crate) const MAX_DEPTH: usize = 60;
 
 #[derive(Debug, Clone, Copy)]
@@ -26,13 +26,13 @@ impl Bounds3 {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Whether a ray forwards from `origin` meets the box, by the slab test.
+    /// Returns whether a ray from `origin` meets the box, by the slab test.
     #[cfg(test)]
     fn is_entered(&self, origin: Vec3, inverse_direction: Vec3) -> bool {
         let (t_low, t_high) = ((self.low - origin) * inverse_direction, (self.high - origin) * inverse_direction);
         let enter = t_low.min(t_high).max_element().max(0.0);
         let leave = t_low.max(t_high).min_element();
-        // Rounding must not lose boxes that are flat, and a NaN (a ray within a slab's plane) counts as a hit.
+        // Rounding must not miss flat boxes, and NaN (a ray in a slab's plane) counts as a hit.
         let misses = enter > leave * 1.000_001;
         !misses
     }
@@ -44,15 +44,15 @@ impl Bounds3 {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Node {
+pub(crate) struct BvhNode {
     pub(crate) bounds: Bounds3,
-    /// Leaf: its first triangle. Inner node: its first child; the second follows it.
+    /// The first triangle of a leaf, or the first child of an inner node; the second child follows the first.
     pub(crate) first: u32,
-    /// Triangles of a leaf; 0 for an inner node.
+    /// Number of triangles of a leaf; 0 for an inner node.
     pub(crate) count: u32,
 }
 
-/// Triangle as a corner and two edges.
+/// A triangle as a corner and two edges.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Blocker {
     pub(crate) corner: Vec3,
@@ -61,7 +61,7 @@ pub(crate) struct Blocker {
 
 #[derive(Debug, Clone)]
 pub struct Bvh {
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Vec<BvhNode>,
     pub(crate) blockers: Vec<Blocker>,
 }
 
@@ -72,7 +72,7 @@ struct Item {
 }
 
 impl Bvh {
-    /// Splits by the surface-area heuristic over 16 bins a node.
+    /// Builds the hierarchy with the surface-area heuristic over 16 bins per node.
     pub fn new(mesh: &ObjectMesh) -> Self {
         let mut items: Vec<Item> = (0..mesh.triangles.len())
             .map(|triangle| {
@@ -80,12 +80,12 @@ impl Bvh {
                 Item { bounds, center: 0.5 * bounds.low + 0.5 * bounds.high, triangle }
             })
             .collect();
-        let mut nodes = vec![Node { bounds: Bounds3::EMPTY, first: 0, count: 0 }];
+        let mut nodes = vec![BvhNode { bounds: Bounds3::EMPTY, first: 0, count: 0 }];
         let mut open = vec![(0usize, 0usize, items.len(), 0usize)];
         while let Some((node, begin, end, depth)) = open.pop() {
             let slice = &mut items[begin..end];
             let bounds = slice.iter().fold(Bounds3::EMPTY, |sum, item| sum.with(item.bounds));
-            nodes[node] = Node { bounds, first: begin as u32, count: slice.len() as u32 };
+            nodes[node] = BvhNode { bounds, first: begin as u32, count: slice.len() as u32 };
             if slice.len() <= LEAF_TRIANGLES || depth >= MAX_DEPTH {
                 continue;
             }
@@ -93,7 +93,7 @@ impl Bvh {
             let child = nodes.len();
             nodes[node].first = child as u32;
             nodes[node].count = 0;
-            nodes.extend([Node { bounds, first: 0, count: 0 }; 2]);
+            nodes.extend([BvhNode { bounds, first: 0, count: 0 }; 2]);
             open.push((child, begin, middle, depth + 1));
             open.push((child + 1, middle, end, depth + 1));
         }
@@ -104,10 +104,10 @@ impl Bvh {
         Self { nodes, blockers: items.iter().map(blocker).collect() }
     }
 
-    /// Whether a ray from `origin` along the unit `direction` meets any triangle, from either side.
+    /// Returns whether a ray from `origin` along the unit `direction` meets any triangle, from either side.
     #[cfg(test)]
     pub fn is_blocked(&self, origin: Vec3, direction: Vec3) -> bool {
-        // Division by zero gives the infinities the slab test wants.
+        // Division by zero gives the infinities that the slab test needs.
         let inverse = direction.recip();
         let mut stack = [0u32; MAX_DEPTH + 4];
         let mut depth = usize::from(self.nodes[0].bounds.is_entered(origin, inverse));
@@ -133,7 +133,7 @@ impl Bvh {
 }
 
 impl Blocker {
-    /// Möller and Trumbore 1997.
+    /// Intersects a ray with the triangle (Möller and Trumbore 1997).
     #[cfg(test)]
     fn is_hit(&self, origin: Vec3, direction: Vec3) -> bool {
         let p = direction.cross(self.edges[1]);
@@ -153,7 +153,7 @@ impl Blocker {
     }
 }
 
-/// Reorders the items around the cheapest cut and returns where it is, strictly inside.
+/// Partitions the items at the cheapest cut and returns its index, which is strictly inside.
 fn partition(items: &mut [Item]) -> usize {
     let centers = items.iter().fold(Bounds3::EMPTY, |sum, item| sum.with_point(item.center));
     let extent = centers.high - centers.low;
@@ -162,7 +162,7 @@ fn partition(items: &mut [Item]) -> usize {
         return half;
     };
     let bin_of = |item: &Item| bin(item.center[axis], centers.low[axis], extent[axis]);
-    // Stable, so that the order of triangles does not depend on the sort.
+    // A stable sort makes the order of triangles well defined.
     items.sort_by_key(|item| bin_of(item) >= cut);
     let middle = items.partition_point(|item| bin_of(item) < cut);
     if middle == 0 || middle == items.len() { half } else { middle }
@@ -172,7 +172,7 @@ fn bin(center: f32, low: f32, extent: f32) -> usize {
     (((center - low) / extent * BINS as f32) as usize).min(BINS - 1)
 }
 
-/// Axis and first bin of the right side.
+/// Returns the axis of the cheapest cut and the first bin of its right side.
 fn cheapest_cut(items: &[Item], low: Vec3, extent: Vec3) -> Option<(usize, usize)> {
     let mut best = None;
     let mut best_cost = f32::INFINITY;
@@ -220,15 +220,15 @@ mod tests {
         for k in 0..300 {
             let origin = point(2.0) + mesh.bounds.center;
             let direction = if k % 10 == 0 { Vec3::Y } else { point(1.0).try_normalize().unwrap() };
-            let every = bvh.blockers.iter().any(|blocker| blocker.is_hit(origin, direction));
-            assert_eq!(bvh.is_blocked(origin, direction), every);
-            blocked += usize::from(every);
+            let expected = bvh.blockers.iter().any(|blocker| blocker.is_hit(origin, direction));
+            assert_eq!(bvh.is_blocked(origin, direction), expected);
+            blocked += usize::from(expected);
         }
         assert!((20..280).contains(&blocked), "{blocked}");
     }
 
     #[test]
-    fn triangles_that_all_lie_in_one_place_still_build() {
+    fn identical_triangles_build_a_hierarchy() {
         let mesh = ObjectMesh {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
             triangles: vec![[0, 1, 2]; 100],

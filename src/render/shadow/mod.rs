@@ -1,4 +1,4 @@
-//! Shadows of the object on itself: which lights each shading point sees.
+//! Self-shadowing of the object: the lights that are visible from each shading point.
 
 pub(crate) mod bvh;
 pub mod shadow_cache;
@@ -13,26 +13,26 @@ use self::wide_bvh::WideBvh;
 use super::image::shading_points::ShadingPoints;
 use super::{DirectionalLight, ObjectMesh};
 
-/// Rays start this many radii of the object above the surface.
+/// Height of the start of a ray above the surface, in radii of the object.
 pub(crate) const LIFT: f32 = 2e-4;
-/// A vertex may stand this many radii above a face's plane without counting as a dent.
-const FLAT: f32 = 2e-5;
-/// Vertices tested at once.
+/// Bounds the height of a vertex above a face's plane up to which a mesh counts as convex, in radii of the object.
+const CONVEX_TOLERANCE: f32 = 2e-5;
+/// Vertices per block of the convexity test.
 const BLOCK: usize = 256;
-/// Points whose rays are cast together.
-const NEIGHBOURS: usize = 64;
-/// Meshes for which the exact test of convexity is too long (triangles times vertices) count as concave.
+/// Points per task.
+const CHUNK: usize = 64;
+/// Bounds the work of the exact convexity test (triangles times vertices). Larger meshes count as concave.
 const MAX_TESTS: usize = 1_000_000_000;
 
-/// Whether any part of the object can stand between another part and a light. A convex object lit and seen from outside
-/// cannot shadow itself: no vertex is above the plane of any triangle (tested for every pair, up to rounding). Of an open
-/// surface the inside is seen too, so only a flat one passes.
+/// Returns whether one part of the object can block light from another part. A closed convex object cannot shadow
+/// itself: no vertex is above the plane of any triangle, which is tested for every pair, up to rounding. The inside of
+/// an open surface is visible, too, so an open surface cannot shadow itself only if it is flat.
 pub fn can_self_shadow(mesh: &ObjectMesh) -> bool {
     if mesh.triangles.len().saturating_mul(mesh.positions.len()) > MAX_TESTS {
         return true;
     }
-    let allowed = FLAT * mesh.bounds.radius;
-    // Coordinates apart and in blocks, so that the inner loop is plain arithmetic on whole vectors.
+    let allowed = CONVEX_TOLERANCE * mesh.bounds.radius;
+    // Separate coordinates in blocks, so that the compiler vectorizes the inner loop.
     let axes: [Vec<f32>; 3] = std::array::from_fn(|axis| mesh.positions.iter().map(|p| p[axis]).collect());
     (0..mesh.triangles.len()).into_par_iter().any(|triangle| {
         let [a, b, c] = mesh.corners(triangle);
@@ -51,21 +51,21 @@ pub fn can_self_shadow(mesh: &ObjectMesh) -> bool {
     })
 }
 
-/// One bit per point and light.
+/// One bit per shading point and light: 1 if the light is visible from the point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Visible {
+pub struct LightVisibility {
     words_per_point: usize,
-    /// Light `k` of a point is bit `k % 32` of its word `k / 32`.
+    /// Bits of the points; light `k` of a point is bit `k % 32` of the point's word `k / 32`.
     pub words: Vec<u32>,
 }
 
-impl Visible {
-    /// Words that a point's bits for so many lights take.
+impl LightVisibility {
+    /// Returns the number of words per point for this many lights.
     pub fn words_of(lights: usize) -> usize {
         lights.div_ceil(32).max(1)
     }
 
-    /// No point sees any light.
+    /// Creates bits that are all 0.
     pub fn none(points: usize, lights: usize) -> Self {
         let words_per_point = Self::words_of(lights);
         Self { words_per_point, words: vec![0; points * words_per_point] }
@@ -75,66 +75,66 @@ impl Visible {
         self.words_per_point
     }
 
-    pub fn sees(&self, point: usize, light: usize) -> bool {
+    pub fn is_lit(&self, point: usize, light: usize) -> bool {
         self.words[point * self.words_per_point + light / 32] >> (light % 32) & 1 == 1
     }
 }
 
-/// What is needed to shadow an object by itself; made once per mesh.
+/// The ray-casting structures for self-shadowing; built once per mesh.
 #[derive(Debug, Clone)]
 pub struct Occluder {
-    /// As the GPU walks it.
+    /// The hierarchy that the GPU traverses.
     pub(crate) bvh: Bvh,
     wide: WideBvh,
 }
 
 impl Occluder {
-    /// `None` where the object cannot shadow itself, which then costs nothing.
-    pub fn of(mesh: &ObjectMesh) -> Option<Self> {
-        can_self_shadow(mesh).then(|| Self::always(mesh))
+    /// Builds an occluder only if the object can shadow itself.
+    pub fn if_needed(mesh: &ObjectMesh) -> Option<Self> {
+        can_self_shadow(mesh).then(|| Self::new(mesh))
     }
 
-    /// One for any object, convex or not.
-    pub fn always(mesh: &ObjectMesh) -> Self {
+    /// Builds an occluder for any object, convex or not.
+    pub fn new(mesh: &ObjectMesh) -> Self {
         let bvh = Bvh::new(mesh);
         Self { wide: WideBvh::new(&bvh), bvh }
     }
 
-    /// Worth making where the camera moves about the same mesh and lights, and mostly already for one picture whose
-    /// shading points outnumber the mesh's vertices (measured: plate 385 ms with, 1140 without; bunny 1470 and 1025).
+    /// Computes a cache for one mesh and its lights. It saves time if several images follow, and usually for one image
+    /// if its shading points outnumber the vertices of the mesh.
     pub fn cache(&self, mesh: &ObjectMesh, lights: &[DirectionalLight]) -> ShadowCache {
         ShadowCache::new(mesh, &self.wide, lights, LIFT * mesh.bounds.radius)
     }
 
-    /// One bit per point and light: whether the light is above the point's shading horizon and nothing is in between.
-    /// `eye` tells the sides of a two-sided surface apart; `cache` is one of the same mesh and lights.
-    pub fn visible(
+    /// Computes the lights that are above each point's shading horizon and not blocked. `eye` selects the visible side
+    /// of a two-sided surface. `cache` must belong to the same mesh and lights.
+    pub fn visible_lights(
         &self,
         mesh: &ObjectMesh,
         points: &ShadingPoints,
         lights: &[DirectionalLight],
         eye: Vec3,
         cache: Option<&ShadowCache>,
-    ) -> Visible {
-        let mut visible = Visible::none(points.len(), lights.len());
+    ) -> LightVisibility {
+        let mut visible = LightVisibility::none(points.len(), lights.len());
         let words = visible.words_per_point();
-        visible.words.par_chunks_mut(words * NEIGHBOURS).enumerate().for_each(|(chunk, bits)| {
-            let first = chunk * NEIGHBOURS;
+        visible.words.par_chunks_mut(words * CHUNK).enumerate().for_each(|(chunk, bits)| {
+            let first = chunk * CHUNK;
             let starts: Vec<_> = (first..first + bits.len() / words)
                 .map(|point| {
                     let triangle = points.triangles[point] as usize;
                     (ray_origin(mesh, triangle, points.positions[point], eye), triangle, points.normals[point])
                 })
                 .collect();
-            // Light by light: rays side by side take the same way through the hierarchy.
+            // The loop over lights is outside, because neighbouring rays traverse the same nodes.
             for (light, towards) in lights.iter().enumerate() {
                 let mut last = 0;
                 for (&((origin, back), triangle, normal), bits) in starts.iter().zip(bits.chunks_mut(words)) {
-                    let seen = towards.direction.dot(normal) > 0.0
+                    let is_lit = towards.direction.dot(normal) > 0.0
                         && cache
-                            .and_then(|cache| cache.sees(triangle, back, light))
+                            .and_then(|cache| cache.is_lit(triangle, back, light))
                             .unwrap_or_else(|| !self.wide.is_blocked(origin, towards.direction, &mut last));
-                    bits[light / 32] |= u32::from(seen) << (light % 32);
+                    bits[light / 32] |= u32::from(is_lit) << (light % 32);
                 }
             }
         });
@@ -142,9 +142,10 @@ impl Occluder {
     }
 }
 
-/// Where shadow rays of a point start: lifted from the flat triangle to the curved surface that the vertex normals describe
-/// (Hanika 2021, "Hacking the Shadow Terminator"), so that the facets of a smooth object cast no steps on themselves.
-/// Also whether the back of the triangle is the side that faces the eye (shading normals cannot tell: they may lean away).
+/// Returns the origin of a point's shadow rays, and whether the back of the triangle faces the eye. The origin is
+/// lifted from the flat triangle to the curved surface that the vertex normals describe, so that the triangles of a
+/// smooth object cast no stepped shadows (Hanika 2021, "Hacking the Shadow Terminator"). Shading normals cannot decide
+/// the side, because they may point away from the eye.
 pub(crate) fn ray_origin(mesh: &ObjectMesh, triangle: usize, p: Vec3, eye: Vec3) -> (Vec3, bool) {
     let corners = mesh.corners(triangle);
     let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -207,20 +208,20 @@ mod tests {
     }
 
     #[test]
-    fn a_sphere_sees_every_light_above_its_smooth_horizon_even_when_coarse_and_not_skipped() {
+    fn every_light_above_the_smooth_horizon_of_a_coarse_sphere_is_visible_if_rays_are_cast() {
         let mesh = object("sphere");
-        let occluder = Occluder::always(&mesh);
+        let occluder = Occluder::new(&mesh);
         let points = points_on(&mesh, 2000);
         let lights: Vec<_> = [Vec3::X, Vec3::Y, Vec3::new(0.6, -0.48, 0.64)]
             .map(|direction| DirectionalLight { direction, irradiance: Vec3::ONE })
             .to_vec();
-        let visible = occluder.visible(&mesh, &points, &lights, Vec3::ZERO, None);
+        let visibility = occluder.visible_lights(&mesh, &points, &lights, Vec3::ZERO, None);
         for point in 0..points.len() {
             for (k, light) in lights.iter().enumerate() {
                 let above = light.direction.dot(points.normals[point]);
                 // A ray that grazes within a tenth of a degree may touch the polygons' edges.
                 if above.abs() > 2e-3 {
-                    assert_eq!(visible.sees(point, k), above > 0.0, "{above}");
+                    assert_eq!(visibility.is_lit(point, k), above > 0.0, "{above}");
                 }
             }
         }
@@ -229,7 +230,7 @@ mod tests {
     #[test]
     fn the_inside_of_a_cup_is_dark_from_the_side_and_lit_from_above() {
         let mesh = object("cup");
-        let occluder = Occluder::of(&mesh).unwrap();
+        let occluder = Occluder::if_needed(&mesh).unwrap();
         let bottom = (0..mesh.triangles.len()).find(|&k| {
             let p = mesh.corners(k).iter().sum::<Vec3>() / 3.0;
             (p.y - 0.06).abs() < 1e-3 && p.x.hypot(p.z) < 0.2
@@ -244,34 +245,34 @@ mod tests {
         };
         let light =
             |x: f32, y: f32| DirectionalLight { direction: Vec3::new(x, y, 0.0).normalize(), irradiance: Vec3::ONE };
-        let visible = occluder.visible(
+        let visibility = occluder.visible_lights(
             &mesh,
             &points,
             &[light(0.0, 1.0), light(1.0, 1.0), light(0.2, 1.0), light(0.0, -1.0)],
             Vec3::Y,
             None,
         );
-        assert_eq!([0, 1, 2, 3].map(|k| visible.sees(0, k)), [true, false, true, false]);
+        assert_eq!([0, 1, 2, 3].map(|k| visibility.is_lit(0, k)), [true, false, true, false]);
     }
 
     #[test]
-    fn the_cache_answers_as_the_rays_do() {
+    fn the_cache_agrees_with_cast_rays() {
         for kind in ["cup", "skirt", "teapot"] {
             let mesh = object(kind);
-            let occluder = Occluder::of(&mesh).unwrap();
+            let occluder = Occluder::if_needed(&mesh).unwrap();
             let camera = scene::Camera::default();
             let view = crate::render::CameraView::new(&camera, &mesh, [96, 96]).unwrap();
             let points = ShadingPoints::new(&crate::render::GBuffer::new(&mesh, &view, 1), &view, 1);
             let environment = crate::render::lighting::environment::load("studio", std::path::Path::new(".")).unwrap();
             let lights = crate::render::lighting::environment::split(&environment.map, 40);
             let cache = occluder.cache(&mesh, &lights);
-            let cast = occluder.visible(&mesh, &points, &lights, view.eye, None);
-            let cached = occluder.visible(&mesh, &points, &lights, view.eye, Some(&cache));
+            let cast = occluder.visible_lights(&mesh, &points, &lights, view.eye, None);
+            let cached = occluder.visible_lights(&mesh, &points, &lights, view.eye, Some(&cache));
             let wrong: u32 = cast.words.iter().zip(&cached.words).map(|(a, b)| (a ^ b).count_ones()).sum();
             let share = f64::from(wrong) / (points.len() * lights.len()) as f64;
             eprintln!("{kind}: {:.4} % of point-light pairs differ", 100.0 * share);
             assert!(share < 0.002, "{kind}: {share}");
-            assert_ne!(cached.words, Visible::none(points.len(), lights.len()).words);
+            assert_ne!(cached.words, LightVisibility::none(points.len(), lights.len()).words);
         }
     }
 }

@@ -1,8 +1,9 @@
-//! Shadows kept while the camera moves: per triangle and light, whether the neighbourhood is all lit or all in shadow.
+//! Shadows cached between images: per triangle and light, whether the neighbourhood is entirely lit or entirely in
+//! shadow.
 //!
-//! Rays are cast from the vertices once. Where a triangle's vertices and those of its neighbours agree, points on the triangle
-//! take their answer; elsewhere (at shadow edges, on large triangles) each point casts its own ray, so edges stay as sharp as
-//! without the cache.
+//! One ray per vertex and light is cast when the cache is built. If the vertices of a triangle and of its neighbours
+//! agree, their result applies to all points of the triangle. Elsewhere, at shadow edges and on large triangles, each
+//! point casts its own ray, so that shadow edges are as sharp as without the cache.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -10,19 +11,20 @@ use rayon::prelude::*;
 use super::wide_bvh::WideBvh;
 use crate::render::{DirectionalLight, ObjectMesh};
 
-/// Triangles with an edge longer than this many radii of the object may hide a shadow between their vertices.
-const LONGEST_EDGE: f32 = 0.12;
+/// Bounds the edges of a triangle whose result is cached, in radii of the object: a larger triangle may contain a
+/// shadow between its vertices.
+const MAX_EDGE: f32 = 0.12;
 
-/// Valid for one mesh and one list of lights.
+/// The cached shadows of one mesh and one list of lights.
 #[derive(Debug, Clone)]
 pub struct ShadowCache {
     words_per_triangle: usize,
-    /// The front, and the back where the surface is two-sided.
+    /// The front, and the back if the surface is two-sided.
     sides: Vec<Side>,
 }
 
-/// Bit `k % 32` of word `k / 32` of a triangle belongs to light `k`. Both are set only where all vertices are turned away from
-/// it, and nobody asks.
+/// Bits per triangle: bit `k % 32` of word `k / 32` belongs to light `k`. Both bits are set only if all vertices face
+/// away from the light; such a light is not looked up.
 #[derive(Debug, Clone)]
 struct Side {
     lit: Vec<u32>,
@@ -30,7 +32,7 @@ struct Side {
 }
 
 impl ShadowCache {
-    /// Casts a ray from every vertex to every light above its horizon, from `lift` above the surface.
+    /// Casts a ray from every vertex to every light above its horizon, starting `lift` above the surface.
     pub(crate) fn new(mesh: &ObjectMesh, bvh: &WideBvh, lights: &[DirectionalLight], lift: f32) -> Self {
         let words = lights.len().div_ceil(32).max(1);
         let facing: &[f32] = if mesh.two_sided { &[1.0, -1.0] } else { &[1.0] };
@@ -42,7 +44,7 @@ impl ShadowCache {
                 .map_init(
                     || vec![0; lights.len()],
                     |last, vertex| {
-                        // A vertex that a light is behind of has nothing against either answer.
+                        // A vertex that faces away from a light agrees with both results.
                         let (mut lit, mut dark) = (vec![u32::MAX; words], vec![u32::MAX; words]);
                         let normal = normal(vertex);
                         let origin = mesh.positions[vertex] + normal * lift;
@@ -64,8 +66,9 @@ impl ShadowCache {
         Self { words_per_triangle: words, sides: facing.iter().map(side).collect() }
     }
 
-    /// Whether points on this side of the triangle see the light; `None` where each must ask for itself.
-    pub(crate) fn sees(&self, triangle: usize, back: bool, light: usize) -> Option<bool> {
+    /// Returns whether the light is visible from all points on this side of the triangle; `None` if each point must
+    /// cast a ray.
+    pub(crate) fn is_lit(&self, triangle: usize, back: bool, light: usize) -> Option<bool> {
         let side = self.sides.get(usize::from(back))?;
         let (word, bit) = (triangle * self.words_per_triangle + light / 32, 1u32 << (light % 32));
         if side.lit[word] & bit != 0 {
@@ -78,7 +81,7 @@ impl ShadowCache {
     }
 }
 
-/// Per triangle, the bits that all vertices of the triangle and of its neighbours have; none for large triangles.
+/// Returns, per triangle, the bits that all vertices of the triangle and of its neighbours have; 0 for large triangles.
 fn agreed(mesh: &ObjectMesh, of_vertices: &[u32], words: usize) -> Vec<u32> {
     let shared = |bits: &[u32], triangle: &[u32; 3], word: usize| {
         triangle.iter().fold(u32::MAX, |all, &vertex| all & bits[vertex as usize * words + word])
@@ -92,7 +95,7 @@ fn agreed(mesh: &ObjectMesh, of_vertices: &[u32], words: usize) -> Vec<u32> {
             }
         }
     }
-    let longest = LONGEST_EDGE * mesh.bounds.radius;
+    let longest = MAX_EDGE * mesh.bounds.radius;
     let of_triangle = |k: usize| {
         let [a, b, c]: [Vec3; 3] = mesh.corners(k);
         let small = a.distance(b).max(b.distance(c)).max(c.distance(a)) <= longest;

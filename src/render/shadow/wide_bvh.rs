@@ -1,55 +1,57 @@
-//! The hierarchy as rays walk it on the CPU: four boxes, or four triangles, are tested at once.
+//! The hierarchy that the CPU traverses: each step tests four boxes or four triangles at once.
 
 use glam::{Vec3, Vec4};
 
 use super::bvh::{Blocker, Bvh, MAX_DEPTH};
 
-/// Boxes and triangles worked on together.
+/// Boxes or triangles per test.
 const WIDTH: usize = 4;
 
-/// Up to four boxes side by side, each with what it holds.
+/// Up to four boxes, each with its child.
 #[derive(Debug, Clone)]
 struct WideNode {
     low: [Vec4; 3],
     high: [Vec4; 3],
-    /// Inner: the node inside. Leaf: its first four triangles.
+    /// Index of the child node of a box, or of a leaf's first packet of triangles.
     first: [u32; WIDTH],
-    /// F32x8Array of triangles of a leaf; 0 for an inner node.
-    fours: [u32; WIDTH],
-    /// A bit a box.
+    /// Number of packets of a leaf; 0 for an inner node.
+    packets: [u32; WIDTH],
+    /// One bit per used box.
     used: u32,
 }
 
-/// Four triangles as corners and edges; what is missing has edges of no length, which nothing hits.
+/// Four triangles as corners and edges. Missing triangles have edges of length 0, which no ray hits.
 #[derive(Debug, Clone, Copy)]
-struct Four {
+struct TrianglePacket {
     corner: [Vec4; 3],
     edges: [[Vec4; 3]; 2],
 }
 
-/// Made from a [`Bvh`] of the same triangles, and answers as that does.
+/// A hierarchy with four children per node, built from a [`Bvh`] of the same triangles; its results equal those of the
+/// [`Bvh`].
 #[derive(Debug, Clone)]
 pub(crate) struct WideBvh {
     nodes: Vec<WideNode>,
-    fours: Vec<Four>,
+    packets: Vec<TrianglePacket>,
 }
 
-/// Steps of directions are no smaller: their inverse is finite, so that no box is lost to a product of zero and infinity.
-const MIN: f32 = 1e-20;
+/// Bounds the components of directions from below, so that their inverse is finite. Otherwise a product of zero and
+/// infinity could make a ray miss a box.
+const MIN_COMPONENT: f32 = 1e-20;
 
 impl WideBvh {
     pub(crate) fn new(bvh: &Bvh) -> Self {
-        let mut wide = Self { nodes: Vec::new(), fours: Vec::new() };
+        let mut wide = Self { nodes: Vec::new(), packets: Vec::new() };
         if !bvh.blockers.is_empty() {
             wide.add(bvh, 0);
         }
         wide
     }
 
-    /// Takes over a node and what is under it; returns its place.
+    /// Adds a node with its descendants and returns its index.
     fn add(&mut self, bvh: &Bvh, node: u32) -> u32 {
         let is_leaf = |node: u32| bvh.nodes[node as usize].count > 0;
-        // The largest inner node is opened until there are four.
+        // The largest inner node is replaced by its children until there are four nodes.
         let mut children = vec![node];
         while children.len() < WIDTH {
             let area = |node: u32| bvh.nodes[node as usize].bounds.half_area();
@@ -61,42 +63,43 @@ impl WideBvh {
             children[largest] = first;
             children.push(first + 1);
         }
-        let place = self.nodes.len();
+        let index = self.nodes.len();
         let bounds: [_; WIDTH] =
             std::array::from_fn(|k| bvh.nodes[children[k.min(children.len() - 1)] as usize].bounds);
-        let four = |pick: &dyn Fn(usize) -> f32| Vec4::from_array(std::array::from_fn(pick));
+        let four = |value_of: &dyn Fn(usize) -> f32| Vec4::from_array(std::array::from_fn(value_of));
         self.nodes.push(WideNode {
             low: std::array::from_fn(|axis| four(&|k| bounds[k].low[axis])),
             high: std::array::from_fn(|axis| four(&|k| bounds[k].high[axis])),
             first: [0; WIDTH],
-            fours: [0; WIDTH],
+            packets: [0; WIDTH],
             used: (1 << children.len()) - 1,
         });
         for (k, child) in children.into_iter().enumerate() {
-            let (first, fours) = if is_leaf(child) { self.add_leaf(bvh, child) } else { (self.add(bvh, child), 0) };
-            self.nodes[place].first[k] = first;
-            self.nodes[place].fours[k] = fours;
+            let (first, packets) = if is_leaf(child) { self.add_leaf(bvh, child) } else { (self.add(bvh, child), 0) };
+            self.nodes[index].first[k] = first;
+            self.nodes[index].packets[k] = packets;
         }
-        place as u32
+        index as u32
     }
 
     fn add_leaf(&mut self, bvh: &Bvh, node: u32) -> (u32, u32) {
-        let first = self.fours.len();
+        let first = self.packets.len();
         let node = &bvh.nodes[node as usize];
         let blockers = &bvh.blockers[node.first as usize..(node.first + node.count) as usize];
-        self.fours.extend(blockers.chunks(WIDTH).map(Four::new));
-        (first as u32, (self.fours.len() - first) as u32)
+        self.packets.extend(blockers.chunks(WIDTH).map(TrianglePacket::new));
+        (first as u32, (self.packets.len() - first) as u32)
     }
 
-    /// Whether a ray from `origin` along the unit `direction` meets any triangle, from either side. The triangles that were
-    /// last in the way of a ray nearby mostly are again: they are asked first, and noted in `last`; the answer does not
-    /// depend on it.
+    /// Returns whether a ray from `origin` along the unit `direction` meets any triangle, from either side. The packet
+    /// that blocked the previous ray is tested first, because it often blocks neighbouring rays, too. `last` stores its
+    /// index; the result does not depend on `last`.
     pub(crate) fn is_blocked(&self, origin: Vec3, direction: Vec3, last: &mut u32) -> bool {
-        if self.fours.get(*last as usize).is_some_and(|four| four.is_hit(origin, direction)) {
+        if self.packets.get(*last as usize).is_some_and(|packet| packet.is_hit(origin, direction)) {
             return true;
         }
         let axes = [origin.x, origin.y, origin.z].map(Vec4::splat);
-        let inverse = direction.to_array().map(|d| Vec4::splat(1.0 / if d.abs() < MIN { MIN } else { d }));
+        let inverse =
+            direction.to_array().map(|d| Vec4::splat(1.0 / if d.abs() < MIN_COMPONENT { MIN_COMPONENT } else { d }));
         let mut stack = [0_u32; (WIDTH - 1) * (MAX_DEPTH + 4)];
         let mut depth = usize::from(!self.nodes.is_empty());
         while depth > 0 {
@@ -109,19 +112,19 @@ impl WideBvh {
                 enter = enter.max(a.min(b));
                 leave = leave.min(a.max(b));
             }
-            // Rounding must not lose boxes that are flat.
+            // Rounding must not miss flat boxes.
             let mut entered = node.used & !enter.cmpgt(leave * 1.000_001).bitmask();
             while entered != 0 {
                 let k = entered.trailing_zeros() as usize;
                 entered &= entered - 1;
-                if node.fours[k] == 0 {
+                if node.packets[k] == 0 {
                     stack[depth] = node.first[k];
                     depth += 1;
                     continue;
                 }
-                for four in node.first[k]..node.first[k] + node.fours[k] {
-                    if self.fours[four as usize].is_hit(origin, direction) {
-                        *last = four;
+                for packet in node.first[k]..node.first[k] + node.packets[k] {
+                    if self.packets[packet as usize].is_hit(origin, direction) {
+                        *last = packet;
                         return true;
                     }
                 }
@@ -131,20 +134,21 @@ impl WideBvh {
     }
 }
 
-impl Four {
+impl TrianglePacket {
     fn new(blockers: &[Blocker]) -> Self {
-        let of = |pick: &dyn Fn(&Blocker) -> Vec3| {
+        let pack = |vector_of: &dyn Fn(&Blocker) -> Vec3| {
             [0, 1, 2].map(|axis| {
-                Vec4::from_array(std::array::from_fn(|k| blockers.get(k).map_or(0.0, |blocker| pick(blocker)[axis])))
+                let component = |k: usize| blockers.get(k).map_or(0.0, |blocker| vector_of(blocker)[axis]);
+                Vec4::from_array(std::array::from_fn(component))
             })
         };
         Self {
-            corner: of(&|blocker| blocker.corner),
-            edges: [of(&|blocker| blocker.edges[0]), of(&|blocker| blocker.edges[1])],
+            corner: pack(&|blocker| blocker.corner),
+            edges: [pack(&|blocker| blocker.edges[0]), pack(&|blocker| blocker.edges[1])],
         }
     }
 
-    /// Möller and Trumbore 1997, step by step as [`Blocker::is_hit`].
+    /// Intersects a ray with the triangles (Möller and Trumbore 1997), with the same operations as [`Blocker::is_hit`].
     fn is_hit(&self, origin: Vec3, direction: Vec3) -> bool {
         let direction = direction.to_array().map(Vec4::splat);
         let p = cross(direction, self.edges[1]);
@@ -178,7 +182,8 @@ mod tests {
     use crate::render::{ObjectMesh, object};
     use crate::scene;
 
-    /// Rays from about the object, some along the axes, with and without triangles that earlier rays met.
+    /// Compares both hierarchies over rays near the object, some along the axes, with and without a previous packet.
+    /// Returns the number of blocked rays.
     fn assert_same(mesh: &ObjectMesh) -> usize {
         let bvh = Bvh::new(mesh);
         let wide = WideBvh::new(&bvh);
@@ -189,17 +194,17 @@ mod tests {
         for k in 0..4000 {
             let origin = point(1.3 * mesh.bounds.radius) + mesh.bounds.center;
             let direction = if k % 10 == 0 { Vec3::AXES[k / 10 % 3] } else { point(1.0).normalize_or(Vec3::X) };
-            let every = bvh.is_blocked(origin, direction);
-            assert_eq!(wide.is_blocked(origin, direction, &mut last), every, "ray {k}");
+            let expected = bvh.is_blocked(origin, direction);
+            assert_eq!(wide.is_blocked(origin, direction, &mut last), expected, "ray {k}");
             let mut unknown = u32::MAX;
-            assert_eq!(wide.is_blocked(origin, direction, &mut unknown), every, "ray {k}, nothing known");
-            blocked += usize::from(every);
+            assert_eq!(wide.is_blocked(origin, direction, &mut unknown), expected, "ray {k}, no previous packet");
+            blocked += usize::from(expected);
         }
         blocked
     }
 
     #[test]
-    fn four_at_once_answer_as_one_by_one() {
+    fn tests_of_four_at_once_agree_with_tests_of_one() {
         for kind in ["teapot", "cup", "skirt", "plate", "sphere"] {
             let object = scene::Object { kind: kind.to_owned(), path: None };
             let blocked = assert_same(&object::build(&object, Path::new(".")).unwrap());
@@ -208,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn one_triangle_none_and_many_in_one_place_are_all_hierarchies() {
+    fn no_triangle_one_triangle_and_identical_triangles_build_hierarchies() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
         for count in [0, 1, 3, 100] {
             let triangles = vec![[0, 1, 2]; count];

@@ -1,58 +1,59 @@
-//! The zoom from the object to its tiles: where a tile is many pixels wide, its own geometry takes the effective BRDF's
-//! place. On average over a tile both are the same radiance, so the change has no step in brightness.
+//! The transition from the object to its tiles: where a tile is many pixels wide, its own geometry replaces the
+//! effective BRDF. Both have the same radiance on average over a tile, so the transition does not change the
+//! brightness.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{CloseUp, ShadedMaterials};
+use super::{ShadedMaterials, TileScene};
 use crate::base::{Cancel, Result};
 use crate::geometry::Hit;
 use crate::math::directions::half_vector;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::{CameraView, GBuffer, Image, ObjectMesh, RenderInput};
 
-/// A tile's shorter side, in radii of the object: small enough that the whole object shows none.
+/// A tile's shorter side, in radii of the object: so small that no tile is visible if the whole object fits the image.
 pub const TILE_RADII: f32 = 0.012;
-/// Pixels a tile at which its geometry begins to show, and at which nothing else does.
-const SHOWS: [f32; 2] = [10.0, 28.0];
+/// Size of a tile in pixels at which its geometry starts to blend in, and at which it replaces the effective BRDF.
+const BLEND_PIXELS: [f32; 2] = [10.0, 28.0];
 
-/// How far the tile's own geometry shows (0 to 1) where a tile is this many pixels wide.
+/// Returns the blend weight (0 to 1) of the tile's geometry for a tile of this size in pixels.
 fn weight(pixels: f32) -> f32 {
-    let t = ((pixels - SHOWS[0]) / (SHOWS[1] - SHOWS[0])).clamp(0.0, 1.0);
+    let t = ((pixels - BLEND_PIXELS[0]) / (BLEND_PIXELS[1] - BLEND_PIXELS[0])).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Whether the nearest tiles that an object can have in a view are large enough to show.
-pub fn shows(view: &CameraView, mesh: &ObjectMesh) -> bool {
+/// Returns whether the nearest tiles that an object can have in a view are large enough to be visible.
+pub fn tiles_are_visible(view: &CameraView, mesh: &ObjectMesh) -> bool {
     let radius = mesh.bounds.radius;
     let nearest = ((view.eye - mesh.bounds.center).length() - radius).max(view.near);
     weight(TILE_RADII * radius / (view.pixel_extent() * nearest)) > 0.0
 }
 
-impl CloseUp {
-    /// Blends the tile's own geometry into a picture that was made from `input` with one sample a pixel side or more.
-    /// Nothing is done (and nothing costs) where tiles are too small to be seen.
+impl TileScene {
+    /// Blends the tile's own geometry into an image rendered from `input`. It returns at once if no tile is large
+    /// enough to be visible.
     ///
     /// # Errors
-    /// A camera that cannot be, or [`crate::base::Error::Cancelled`].
+    /// An invalid camera, or [`crate::base::Error::Cancelled`].
     pub fn blend_into(
         &self,
         image: &mut Image,
         input: &RenderInput,
-        wearing: ShadedMaterials<'_>,
+        materials: ShadedMaterials<'_>,
         cancel: &Cancel,
     ) -> Result<()> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
-        if !shows(&view, input.mesh) {
+        if !tiles_are_visible(&view, input.mesh) {
             return Ok(());
         }
         let radius = input.mesh.bounds.radius;
         let buffer = GBuffer::new(input.mesh, &view, 1);
         let points = ShadingPoints::new(&buffer, &view, 1);
         let Some(anchor) = anchor(input, &view, &points) else { return Ok(()) };
-        let visible = input
+        let visibility = input
             .occluder
-            .map(|occluder| occluder.visible(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
+            .map(|occluder| occluder.visible_lights(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
         let scale = self.mesh.size.min_element() / (TILE_RADII * radius);
         let shaded: Vec<(f32, Vec3)> = (0..points.len())
             .into_par_iter()
@@ -67,42 +68,43 @@ impl CloseUp {
                 let y = z.cross(x);
                 let local = |d: Vec3| Vec3::new(d.dot(x), d.dot(y), d.dot(z));
                 let o = local((view.eye - position) / depth);
-                let Some(hit) = self.under(anchor.tile_coordinates(position) * scale, o) else {
+                let Some(hit) = self.visible_through(anchor.tile_coordinates(position) * scale, o) else {
                     return (weight, Vec3::ZERO);
                 };
-                let lit = input.lights.iter().enumerate().filter(|(k, light)| {
-                    light.direction.dot(z) > 0.0 && visible.as_ref().is_none_or(|visible| visible.sees(point, *k))
+                let visible_lights = input.lights.iter().enumerate().filter(|(k, light)| {
+                    light.direction.dot(z) > 0.0
+                        && visibility.as_ref().is_none_or(|visibility| visibility.is_lit(point, *k))
                 });
-                (
-                    weight,
-                    lit.map(|(_, light)| self.lit(&hit, local(light.direction), o, wearing) * light.irradiance).sum(),
-                )
+                let radiance = visible_lights
+                    .map(|(_, light)| self.reflected(&hit, local(light.direction), o, materials) * light.irradiance)
+                    .sum();
+                (weight, radiance)
             })
             .collect();
         cancel.check()?;
         for (&pixel, (weight, radiance)) in points.pixels.iter().zip(shaded) {
-            let place = &mut image.pixels[pixel as usize];
-            *place = place.lerp(radiance, weight);
+            let pixel = &mut image.pixels[pixel as usize];
+            *pixel = pixel.lerp(radiance, weight);
         }
         Ok(())
     }
 
-    /// What is seen along `o` through a place of the plane z = 0.
-    fn under(&self, place: Vec2, o: Vec3) -> Option<Hit> {
+    /// Returns the surface point that is visible from `o` through a point of the plane z = 0.
+    fn visible_through(&self, point: Vec2, o: Vec3) -> Option<Hit> {
         let o = Vec3::new(o.x, o.y, o.z.max(0.02)).try_normalize()?;
-        // Coordinates stay small, so that rays stay exact.
-        let inside = place - (place / self.mesh.size).floor() * self.mesh.size;
+        // Small coordinates keep rays accurate.
+        let inside = point - (point / self.mesh.size).floor() * self.mesh.size;
         let start = inside.extend(0.0) + o * ((self.grid.top() + 1e-4) / o.z);
         self.grid.nearest(start, -o, self.bottom)
     }
 
-    /// `f_r (n·i)+ V(i)` of a point [1/sr].
-    fn lit(&self, hit: &Hit, i: Vec3, o: Vec3, wearing: ShadedMaterials<'_>) -> Vec3 {
+    /// Returns `f_r (n·i)+ V(i)` of a point [1/sr].
+    fn reflected(&self, hit: &Hit, i: Vec3, o: Vec3, materials: ShadedMaterials<'_>) -> Vec3 {
         let (normal, geometric) = self.normals(hit, o);
         let slot = usize::from(self.mesh.slot_at(hit.triangle as usize, hit.position.truncate()));
-        let material = wearing.material_of_slot.get(slot).and_then(|index| wearing.materials.get(*index));
+        let material = materials.material_of_slot.get(slot).and_then(|index| materials.materials.get(*index));
         let Some(material) = material else { return Vec3::ZERO };
-        if normal.dot(i) <= 0.0 || !self.sees(hit, geometric, i) {
+        if normal.dot(i) <= 0.0 || !self.is_visible(hit, geometric, i) {
             return Vec3::ZERO;
         }
         let angles = crate::brdf::LobeAngles::new(normal, i, o, half_vector(i, o));
@@ -111,7 +113,7 @@ impl CloseUp {
     }
 }
 
-/// The vertex whose tangent plane tiles are laid out on: the one nearest to the middle of the picture.
+/// The vertex nearest to the middle of the image; tiles are laid out on its tangent plane.
 struct Anchor {
     origin: Vec3,
     x: Vec3,

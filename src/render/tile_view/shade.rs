@@ -1,46 +1,46 @@
-//! The radiance of one point of the tile.
+//! Shading of one visible point of the tile.
 
 use glam::Vec3;
 
-use super::{CloseUp, Look, ShadedMaterials};
-use crate::effective::Material;
+use super::{ShadedMaterials, TileScene, TileShading};
+use crate::brdf::Material;
 use crate::geometry::Hit;
 use crate::math::directions::{from_angles, half_vector};
 
-/// Rays start this part of the tile's size above the surface.
+/// Height of the start of a ray above the surface, as a fraction of the tile's size.
 const LIFT: f32 = 1e-4;
 
-/// Materials with the colours that clay takes from them.
+/// Materials with their colours in clay shading.
 pub(super) struct Palette<'a> {
-    wearing: ShadedMaterials<'a>,
+    materials: ShadedMaterials<'a>,
     clay: Vec<Vec3>,
 }
 
 impl<'a> Palette<'a> {
-    pub(super) fn new(wearing: ShadedMaterials<'a>) -> Self {
-        Self { wearing, clay: wearing.materials.iter().map(clay_of).collect() }
+    pub(super) fn new(materials: ShadedMaterials<'a>) -> Self {
+        Self { materials, clay: materials.materials.iter().map(clay_of).collect() }
     }
 
     fn material(&self, slot: u16) -> Option<(usize, &'a Material)> {
-        let index = *self.wearing.material_of_slot.get(usize::from(slot))?;
-        Some((index, self.wearing.materials.get(index)?))
+        let index = *self.materials.material_of_slot.get(usize::from(slot))?;
+        Some((index, self.materials.materials.get(index)?))
     }
 }
 
-/// The hue of a material as a matte colour: what it reflects at moderate angles, scaled to a clay's brightness.
+/// Returns the diffuse clay colour of a material: the hue that it reflects at moderate angles, at a fixed brightness.
 fn clay_of(material: &Material) -> Vec3 {
     let i = from_angles(0.6, 0.0);
-    let seen = [(0.6, std::f32::consts::PI), (0.3, 0.5), (0.9, 2.0)];
+    let views = [(0.6, std::f32::consts::PI), (0.3, 0.5), (0.9, 2.0)];
     let sum: Vec3 =
-        seen.iter().map(|&(theta, phi)| material.brdf.f_r(Vec3::Z, i, from_angles(theta, phi)).min(Vec3::ONE)).sum();
+        views.iter().map(|&(theta, phi)| material.brdf.f_r(Vec3::Z, i, from_angles(theta, phi)).min(Vec3::ONE)).sum();
     let hue = sum / sum.max_element().max(1e-6);
     let color = hue * material.color;
-    // A material that is nearly black stays dark; a strong one does not glow.
+    // Dark materials stay dark; bright ones are limited.
     color * (0.62 / color.max_element().max(0.62))
 }
 
-impl CloseUp {
-    /// Unit normals that reflect and that the triangle has, both towards the viewer.
+impl TileScene {
+    /// Returns the unit normal that reflects and the unit geometric normal, both on the viewer's side.
     pub fn normals(&self, hit: &Hit, to_viewer: Vec3) -> (Vec3, Vec3) {
         let index = hit.triangle as usize;
         let geometric = self.mesh.geometric_normal(index);
@@ -53,24 +53,24 @@ impl CloseUp {
         (smooth.unwrap_or(geometric) * side, geometric * side)
     }
 
-    /// Whether a point sees a direction above the horizon.
-    pub fn sees(&self, hit: &Hit, geometric: Vec3, to: Vec3) -> bool {
+    /// Returns whether a direction above the horizon is visible from a point.
+    pub fn is_visible(&self, hit: &Hit, geometric: Vec3, to: Vec3) -> bool {
         let origin = hit.position + geometric * (LIFT * self.mesh.size.max_element());
         to.z > 0.0 && geometric.dot(to) > 0.0 && !self.grid.is_blocked(origin, to, hit.triangle)
     }
 
-    pub(super) fn shade(&self, hit: &Hit, to_viewer: Vec3, look: &Look, palette: &Palette) -> Vec3 {
+    pub(super) fn shade(&self, hit: &Hit, to_viewer: Vec3, shading: &TileShading, palette: &Palette) -> Vec3 {
         let (normal, geometric) = self.normals(hit, to_viewer);
         let weight = self.mesh.color.at(hit.position.truncate(), self.mesh.size);
         let slot = self.mesh.slot_at(hit.triangle as usize, hit.position.truncate());
         let clay = palette.material(slot).map_or(Vec3::splat(0.5), |(index, _)| palette.clay[index]) * weight;
-        match look {
-            Look::Clay => clay * self.lamp(hit, normal, geometric),
-            Look::Materials(lights) => {
+        match shading {
+            TileShading::Clay => clay * self.clay_irradiance(hit, normal, geometric),
+            TileShading::Materials(lights) => {
                 let Some((_, material)) = palette.material(slot) else { return Vec3::ZERO };
                 let shade = |light: &crate::render::DirectionalLight| {
                     let i = light.direction;
-                    if normal.dot(i) <= 0.0 || !self.sees(hit, geometric, i) {
+                    if normal.dot(i) <= 0.0 || !self.is_visible(hit, geometric, i) {
                         return Vec3::ZERO;
                     }
                     let angles = crate::brdf::LobeAngles::new(normal, i, to_viewer, half_vector(i, to_viewer));
@@ -79,24 +79,24 @@ impl CloseUp {
                 };
                 lights.iter().map(shade).sum::<Vec3>() * material.color * weight
             }
-            Look::Contribution { i, o, scale } => {
+            TileShading::Contribution { i, o, scale } => {
                 let grey = Vec3::splat(0.05 + 0.1 * normal.z.max(0.0));
                 let Some((_, material)) = palette.material(slot) else { return grey };
                 if normal.dot(*i) <= 0.0 || normal.dot(*o) <= 0.0 {
                     return grey;
                 }
-                if !self.sees(hit, geometric, *i) || !self.sees(hit, geometric, *o) {
+                if !self.is_visible(hit, geometric, *i) || !self.is_visible(hit, geometric, *o) {
                     return grey;
                 }
                 let value = material.brdf.f(normal, *i, *o) * material.color * weight;
                 let heat = (value.dot(crate::brdf::LUMINANCE) / scale.max(1e-9)).sqrt().min(1.0);
                 grey + Vec3::new(heat, 0.55 * heat * heat, 0.2 * heat.powi(4))
             }
-            Look::Normals => (normal + 1.0) * 0.5,
-            Look::Visibility(to) => {
+            TileShading::Normals => (normal + 1.0) * 0.5,
+            TileShading::Visibility(to) => {
                 let tone = if geometric.dot(*to) <= 0.0 {
                     Vec3::splat(0.25)
-                } else if self.sees(hit, geometric, *to) {
+                } else if self.is_visible(hit, geometric, *to) {
                     Vec3::new(0.18, 0.72, 0.3)
                 } else {
                     Vec3::new(0.8, 0.16, 0.12)
@@ -106,11 +106,11 @@ impl CloseUp {
         }
     }
 
-    /// Irradiance over π of a lamp from the upper left with its shadow, a weak fill and a sky.
-    fn lamp(&self, hit: &Hit, normal: Vec3, geometric: Vec3) -> f32 {
+    /// Returns the irradiance over π of a shadowed light from the upper left, a weak fill light and a sky.
+    fn clay_irradiance(&self, hit: &Hit, normal: Vec3, geometric: Vec3) -> f32 {
         let key = Vec3::new(-0.68, 0.52, 0.517);
         let fill = Vec3::new(0.6, -0.2, 0.775);
-        let lit = if normal.dot(key) > 0.0 && self.sees(hit, geometric, key) { normal.dot(key) } else { 0.0 };
+        let lit = if normal.dot(key) > 0.0 && self.is_visible(hit, geometric, key) { normal.dot(key) } else { 0.0 };
         1.25 * lit + 0.16 * normal.dot(fill).max(0.0) + 0.14 * (0.5 + 0.5 * normal.z)
     }
 }

@@ -1,18 +1,18 @@
-//! The picture of a tile against closed forms and against the effective BRDF.
+//! Images of a tile compared with closed forms and with the effective BRDF.
 
 use std::sync::Arc;
 
 use glam::{UVec2, Vec2, Vec3};
 
 use super::*;
-use crate::brdf::{Brdf, Term};
+use crate::brdf::{Brdf, MaterialAssignment, Term};
 use crate::geometry::families::heightfield;
 use crate::pipeline::Pipeline;
 use crate::scene;
 
-fn wavy() -> CloseUp {
+fn wavy() -> TileScene {
     let mesh = heightfield::from_function(UVec2::splat(48), Vec2::ONE, |p| 0.1 * (p.x * std::f32::consts::TAU).sin());
-    CloseUp::new(Arc::new(mesh))
+    TileScene::new(Arc::new(mesh))
 }
 
 fn from_above(size: usize) -> TileView {
@@ -47,7 +47,7 @@ fn every_ray_meets_a_surface_that_closes_the_plane() {
 }
 
 #[test]
-fn the_mean_over_a_tile_is_what_the_effective_brdf_says() {
+fn the_mean_over_a_tile_is_the_radiance_of_the_effective_brdf() {
     let source = "[tile]\ngeometry = { kind = \"grooves\", profile = \"v\", count = 2, depth = 0.15 }\n\
         [[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.35, f0 = [0.9, 0.5, 0.2] }\n\
         [quality]\nbackend = \"cpu\"\nmethod = \"direct\"\npenumbra_deg = 0.1\n";
@@ -59,16 +59,16 @@ fn the_mean_over_a_tile_is_what_the_effective_brdf_says() {
     };
     let mut pipeline = Pipeline::new();
     let brdf = pipeline.effective(&loaded).unwrap().brdf;
-    let (material_of_slot, materials) = pipeline.sum_materials(&loaded).unwrap();
-    let tile = CloseUp::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
-    let wearing = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
+    let MaterialAssignment { material_of_slot, materials } = pipeline.materials(&loaded).unwrap();
+    let tile = TileScene::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
+    let shaded = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
     for (i, azimuth, elevation) in [(from_angles(0.5, 1.0), 0.4_f32, 1.0_f32), (from_angles(1.0, 3.0), 0.1, 0.8)] {
         let o = from_angles(std::f32::consts::FRAC_PI_2 - elevation, azimuth);
         let light = DirectionalLight { direction: i, irradiance: Vec3::ONE };
-        // Grooves run along y: any picture whose columns hold whole periods along the view's right axis will do; a large
-        // one averages the rest out.
+        // A large view averages over many periods of the grooves.
         let view = TileView { azimuth, elevation, center: Vec2::ZERO, span: 37.0, size: [420, 420] };
-        let image = tile.image(&view, &Look::Materials(vec![light]), wearing, Vec3::ZERO, &Cancel::default()).unwrap();
+        let image =
+            tile.image(&view, &TileShading::Materials(vec![light]), shaded, Vec3::ZERO, &Cancel::default()).unwrap();
         let mean = image.pixels.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>() / image.pixels.len() as f64;
         let expected = brdf.eval(i, o).as_dvec3();
         assert!((mean - expected).length() < 0.02 * expected.length(), "{mean} {expected}");
@@ -76,20 +76,20 @@ fn the_mean_over_a_tile_is_what_the_effective_brdf_says() {
 }
 
 #[test]
-fn a_cancelled_image_is_an_error_and_clay_takes_the_hue() {
+fn a_cancelled_image_is_an_error_and_clay_has_the_materials_hue() {
     let tile = wavy();
     let red = Material { brdf: Brdf { terms: vec![Term::Lambertian { albedo: Vec3::X }] }, color: Vec3::ONE };
-    let wearing = ShadedMaterials { material_of_slot: &[0], materials: std::slice::from_ref(&red) };
+    let shaded = ShadedMaterials { material_of_slot: &[0], materials: std::slice::from_ref(&red) };
     let cancel = Cancel::default();
-    let image = tile.image(&from_above(16), &Look::Clay, wearing, Vec3::ZERO, &cancel).unwrap();
+    let image = tile.image(&from_above(16), &TileShading::Clay, shaded, Vec3::ZERO, &cancel).unwrap();
     assert!(image.pixels.iter().all(|p| p.x > 0.05 && p.y < 1e-4 && p.z < 1e-4));
     cancel.set();
-    let image = tile.image(&from_above(16), &Look::Clay, wearing, Vec3::ZERO, &cancel);
+    let image = tile.image(&from_above(16), &TileShading::Clay, shaded, Vec3::ZERO, &cancel);
     assert!(matches!(image, Err(Error::Cancelled)));
 }
 
 #[test]
-fn coming_closer_the_tiles_show_and_the_image_keeps_its_brightness() {
+fn tiles_are_visible_up_close_and_the_image_keeps_its_brightness() {
     use crate::render::image::shading::Background;
     use crate::render::render;
     use crate::render::{RenderInput, object};
@@ -101,9 +101,9 @@ fn coming_closer_the_tiles_show_and_the_image_keeps_its_brightness() {
     let loaded = scene::LoadedScene { scene, base_dir: "".into(), name: "test".into(), painted };
     let mut pipeline = Pipeline::new();
     let brdf = pipeline.effective(&loaded).unwrap().brdf;
-    let (material_of_slot, materials) = pipeline.sum_materials(&loaded).unwrap();
-    let wearing = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
-    let tile = CloseUp::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
+    let MaterialAssignment { material_of_slot, materials } = pipeline.materials(&loaded).unwrap();
+    let shaded = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
+    let tile = TileScene::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
     let object = scene::Object { kind: "sphere".to_owned(), path: None };
     let mesh = object::build(&object, std::path::Path::new("")).unwrap();
     let light = |x, y, z| DirectionalLight { direction: Vec3::new(x, y, z).normalize(), irradiance: Vec3::splat(2.0) };
@@ -123,7 +123,7 @@ fn coming_closer_the_tiles_show_and_the_image_keeps_its_brightness() {
         };
         let far = render(&input).unwrap().image;
         let mut near = far.clone();
-        tile.blend_into(&mut near, &input, wearing, &Cancel::default()).unwrap();
+        tile.blend_into(&mut near, &input, shaded, &Cancel::default()).unwrap();
         assert_eq!(near != far, changes, "{fov_deg}");
         let mean = |image: &Image| image.pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / 57600.0;
         assert!((mean(&near) / mean(&far) - 1.0).abs() < 0.05, "{} {}", mean(&near), mean(&far));
@@ -131,6 +131,6 @@ fn coming_closer_the_tiles_show_and_the_image_keeps_its_brightness() {
             let m = mean(image);
             image.pixels.iter().map(|p| (f64::from(p.x) - m).powi(2)).sum::<f64>()
         };
-        assert!(!changes || spread(&near) > 4.0 * spread(&far), "the tiles' own contrast shows");
+        assert!(!changes || spread(&near) > 4.0 * spread(&far), "the tiles' own contrast is visible");
     }
 }

@@ -16,7 +16,7 @@ fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> TileMesh {
     }
 }
 
-/// A height-field of n x n samples as two triangles a cell, the last row and column joined to the next tile.
+/// A height field of n x n samples with two triangles per cell. The last row and column join the next tile.
 fn height_field(n: u32, height: impl Fn(f32, f32) -> f32) -> TileMesh {
     let at = |k: u32| (k as f32 + 0.5) / n as f32;
     let positions = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j)));
@@ -31,7 +31,7 @@ pub fn egg_crate(n: u32) -> TileMesh {
     height_field(n, move |x, y| 0.15 * wave(x) * wave(y))
 }
 
-/// Steeper than the egg-crate, with no symmetry.
+/// A height field without symmetry, steeper than the egg-crate.
 pub fn dunes(n: u32) -> TileMesh {
     let tau = std::f32::consts::TAU;
     height_field(n, move |x, y| {
@@ -41,7 +41,7 @@ pub fn dunes(n: u32) -> TileMesh {
     })
 }
 
-/// Four V-grooves of 45° along y: triangles as long as the tile.
+/// Four V-grooves of 45° along y, with triangles as long as the tile.
 pub fn v_grooves() -> TileMesh {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for k in 0..8u32 {
@@ -59,7 +59,8 @@ pub fn v_grooves() -> TileMesh {
     mesh(positions, triangles)
 }
 
-/// Nine leaning, closed, twelve-sided rods over a floor of two triangles; they overhang and cross the tile's edge.
+/// Nine leaning, closed rods with twelve sides over a floor of two triangles. The rods overhang and cross the tile's
+/// edge.
 pub fn rods() -> TileMesh {
     let mut positions = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
     let mut triangles = vec![[0, 1, 2], [0, 2, 3]];
@@ -70,8 +71,8 @@ pub fn rods() -> TileMesh {
         let base = positions.len() as u32;
         for end in [foot, top] {
             positions.extend((0..12).map(|side| {
-                let turn = std::f32::consts::TAU * side as f32 / 12.0;
-                end + 0.06 * Vec3::new(turn.cos(), turn.sin(), 0.0)
+                let angle = std::f32::consts::TAU * side as f32 / 12.0;
+                end + 0.06 * Vec3::new(angle.cos(), angle.sin(), 0.0)
             }));
         }
         positions.push(top);
@@ -98,4 +99,12 @@ pub fn pillar() -> TileMesh {
         }
     }
     mesh(positions, triangles)
+}
+
+/// [`pillar`] with one vertex that is not finite and one far outside the tile.
+pub fn broken_pillar() -> TileMesh {
+    let mut mesh = pillar();
+    mesh.positions[3] = Vec3::new(f32::NAN, 0.0, f32::INFINITY);
+    mesh.positions[9] = Vec3::new(-3.0, 5.0, -2.0);
+    mesh
 }

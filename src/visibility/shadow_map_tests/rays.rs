@@ -1,4 +1,4 @@
-//! The exact answer, by brute force.
+//! Exact visibility by ray casting in f64, the reference of the shadow map tests.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -6,12 +6,12 @@ use rayon::prelude::*;
 use crate::geometry::{Facets, TileMesh};
 use crate::visibility::PackedVisibility;
 
-/// Exact ray casting through explicit copies of the tile, in f64: a grid over the tile lists the triangles above each
-/// cell, and the ray walks its cells from tile to tile until it is above everything.
+/// Exact ray casting through explicit copies of the tile, in f64. A grid over the tile lists the triangles above each
+/// cell. A ray walks the cells from tile to tile until it is above all triangles.
 pub struct RayCaster<'a> {
     mesh: &'a TileMesh,
     cells: i64,
-    /// Per cell: triangle and the tile copy of it that overlaps.
+    /// Per cell: each triangle and the tile copy of it that overlaps the cell.
     lists: Vec<Vec<(u32, [i64; 2])>>,
 }
 
@@ -48,7 +48,7 @@ impl<'a> RayCaster<'a> {
                 let offset = (DVec2::new(shift[0] as f64, shift[1] as f64) * self.mesh.size.as_dvec2()).extend(0.0);
                 let [a, b, c] = self.mesh.corners(k as usize).map(|corner| corner.as_dvec3() + offset);
                 if let Some(hit) = moller_trumbore(p, w, a, b, c) {
-                    // The facet's own triangle, but not the copies of it further on, lies at distance 0 up to rounding.
+                    // Only the facet's own triangle, not its copies in other tiles, lies at distance 0 up to rounding.
                     let is_own = k == own && hit < 1e-5;
 
                     if hit > 1e-7 && !is_own {
@@ -88,7 +88,7 @@ impl<'a> RayCaster<'a> {
     }
 }
 
-/// Distance along `w` at which the ray from `p` meets the triangle, from either side.
+/// Distance along `w` from `p` to the triangle, from either side.
 fn moller_trumbore(p: DVec3, w: DVec3, a: DVec3, b: DVec3, c: DVec3) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
     let h = w.cross(ac);

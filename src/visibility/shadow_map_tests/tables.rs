@@ -1,4 +1,5 @@
-//! Tables to be printed by hand: `cargo test --release --lib shadow_map_tests::tables -- --ignored --nocapture`.
+//! Table of errors by resolution: `BISCALE_TABLE=1 cargo test --release --lib shadow_map_tests::tables -- --ignored
+//! --nocapture`.
 
 use std::time::Instant;
 
@@ -31,9 +32,9 @@ fn resolution_against_error() {
             let start = Instant::now();
             let maps = visibility_maps_cpu(&mesh, &facets, &directions, resolution);
             let seconds = start.elapsed().as_secs_f64();
-            let of = |keep: &dyn Fn(f32) -> bool| {
+            let error_percent = |is_in_band: &dyn Fn(f32) -> bool| {
                 let (mut differ, mut all) = (0.0, 0.0);
-                for (d, &w) in directions.iter().enumerate().filter(|(_, w)| keep(w.z.acos().to_degrees())) {
+                for (d, &w) in directions.iter().enumerate().filter(|(_, w)| is_in_band(w.z.acos().to_degrees())) {
                     for s in 0..facets.len() {
                         let weight = f64::from(facets.geometric_normals[s].dot(w).max(0.0));
                         all += weight;
@@ -42,7 +43,7 @@ fn resolution_against_error() {
                 }
                 100.0 * differ / all
             };
-            let [a, b, c] = bands.map(|(lo, hi)| of(&|theta| theta >= lo && theta < hi));
+            let [a, b, c] = bands.map(|(lo, hi)| error_percent(&|theta| theta >= lo && theta < hi));
             let all = 100.0 * disagreement(&facets, &directions, &maps, &exact);
             let per_direction = seconds / directions.len() as f64;
             println!(
@@ -58,51 +59,5 @@ fn resolution_against_error() {
             "{name}: exact a_v / (A cos θ) is off by at most {:.2} % with these facets",
             100.0 * worst.fold(0.0, f64::max)
         );
-    }
-}
-
-#[test]
-#[ignore = "a table of speed on both routes; run with --ignored --nocapture"]
-fn speed_of_both_routes() {
-    if std::env::var_os("BISCALE_TABLE").is_none() {
-        eprintln!("SKIPPED: a table of several minutes; set BISCALE_TABLE=1 to print it");
-        return;
-    }
-    let Some(gpu) = open_gpu() else { return };
-    println!("{}, tier {:?}", gpu.description(), gpu.tier);
-    let pipelines = GpuShadowMaps::new(&gpu).unwrap();
-    let directions = polar_directions(9, 32, 85.0);
-    for (name, mesh) in
-        [("egg-crate 128", meshes::egg_crate(128)), ("rods", meshes::rods()), ("V-grooves", meshes::v_grooves())]
-    {
-        let facets = sample(&mesh, 8000);
-        for resolution in [256, 512, 1024] {
-            let time = |run: &dyn Fn() -> PackedVisibility| {
-                run();
-                let mut times: Vec<f64> = (0..3)
-                    .map(|_| {
-                        let start = Instant::now();
-                        run();
-                        start.elapsed().as_secs_f64()
-                    })
-                    .collect();
-                times.sort_by(f64::total_cmp);
-                times[1]
-            };
-            let cpu = time(&|| visibility_maps_cpu(&mesh, &facets, &directions, resolution));
-            let device = time(&|| {
-                pipelines.visibility(&gpu, &mesh, &facets, &directions, resolution, &Cancel::default()).unwrap()
-            });
-            let triangles = 1e-6 * (mesh.triangles.len() * directions.len()) as f64;
-            let pairs = 1e-6 * (facets.len() * directions.len()) as f64;
-            for (route, seconds) in [("cpu", cpu), ("gpu", device)] {
-                println!(
-                    "{name:<14} {resolution:>5} {route}: {:>8.2} ms/direction, {:>8.3} Mtriangles/s, {:>7.2} M facet-direction pairs/s",
-                    1e3 * seconds / directions.len() as f64,
-                    triangles / seconds,
-                    pairs / seconds
-                );
-            }
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! Environments from files: Radiance `.hdr` and OpenEXR `.exr`, cleaned and reduced to what lights need.
+//! Environments from files: Radiance `.hdr` and OpenEXR `.exr`, cleaned and reduced to the resolution that lights need.
 
 use std::fmt::Display;
 use std::fs::File;
@@ -11,40 +11,41 @@ use image::ImageDecoder;
 use super::{Environment, LatLongMap};
 use crate::base::{Error, InputError, Result};
 
-/// Files with more texels are refused before memory for them is taken (0.8 GB).
+/// Bounds the texels of a file (0.8 GB); a larger file is refused before memory is allocated.
 const MAX_TEXELS: u64 = 1 << 26;
-/// Maps are averaged down to at most this width; lights need no more.
-const KEPT_WIDTH: usize = 1024;
-/// No light is brighter (the sun's disc is 2·10⁹ W/(sr m²)); sums over a map and a picture stay far inside an f32.
+/// Bounds the width and height of a loaded map, in texels. Larger maps are averaged down.
+const MAX_WIDTH: usize = 1024;
+/// Bounds the radiance of a texel, so that sums over a map or an image stay far inside the range of f32. The sun's disc
+/// has 2·10⁹ W/(sr m²).
 const MAX_RADIANCE: f32 = 1e18;
 
-fn broken(path: &Path, what: impl Display, expected: &str) -> Error {
-    InputError::new("light.environment", what, expected).in_file(path).into()
+fn file_error(path: &Path, found: impl Display, expected: &str) -> Error {
+    InputError::new("light.environment", found, expected).in_file(path).into()
 }
 
 fn check_size(path: &Path, width: u64, height: u64) -> Result<()> {
     if width == 0 || height == 0 || width.saturating_mul(height) > MAX_TEXELS {
-        return Err(broken(path, format!("{width} x {height} texels"), &format!("1 to {MAX_TEXELS} texels")));
+        return Err(file_error(path, format!("{width} x {height} texels"), &format!("1 to {MAX_TEXELS} texels")));
     }
     Ok(())
 }
 
 pub(super) fn load_hdr(path: &Path) -> Result<Environment> {
-    let expected = "a whole Radiance .hdr file";
-    let file = File::open(path).map_err(|error| broken(path, error, "a readable .hdr file"))?;
+    let expected = "a complete Radiance .hdr file";
+    let file = File::open(path).map_err(|error| file_error(path, error, "a readable .hdr file"))?;
     let decoder =
-        image::codecs::hdr::HdrDecoder::new(BufReader::new(file)).map_err(|error| broken(path, error, expected))?;
+        image::codecs::hdr::HdrDecoder::new(BufReader::new(file)).map_err(|error| file_error(path, error, expected))?;
     let (width, height) = decoder.dimensions();
     check_size(path, width.into(), height.into())?;
     let image =
-        image::DynamicImage::from_decoder(decoder).map_err(|error| broken(path, error, expected))?.into_rgb32f();
+        image::DynamicImage::from_decoder(decoder).map_err(|error| file_error(path, error, expected))?.into_rgb32f();
     let texels = image.into_raw().chunks_exact(3).map(Vec3::from_slice).collect();
     Ok(cleaned(LatLongMap { width: width as usize, height: height as usize, texels }))
 }
 
 pub(super) fn load_exr(path: &Path) -> Result<Environment> {
-    let expected = "a whole OpenEXR file with R, G and B channels";
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|error| broken(path, error, expected))?;
+    let expected = "a complete OpenEXR file with R, G and B channels";
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|error| file_error(path, error, expected))?;
     for header in &meta.headers {
         check_size(path, header.layer_size.x() as u64, header.layer_size.y() as u64)?;
     }
@@ -55,17 +56,17 @@ pub(super) fn load_exr(path: &Path) -> Result<Environment> {
             map.texels[at.y() * map.width + at.x()] = Vec3::new(r, g, b)
         },
     )
-    .map_err(|error| broken(path, error, expected))?;
+    .map_err(|error| file_error(path, error, expected))?;
     Ok(cleaned(image.layer_data.channel_data.pixels))
 }
 
-/// Sets texels that are not finite or negative to zero, channel by channel, with a warning, and reduces the map.
+/// Sets channels that are negative, not finite or too large to zero, with a warning, and reduces the map.
 fn cleaned(mut map: LatLongMap) -> Environment {
     let mut bad = 0usize;
     for texel in &mut map.texels {
-        // A comparison that NaN fails.
+        // NaN is outside every range.
         let clean = texel.map(|value| if (0.0..=MAX_RADIANCE).contains(&value) { value } else { 0.0 });
-        // A NaN is unequal to itself, so this counts it too.
+        // NaN is unequal to itself, so this counts NaN, too.
         bad += usize::from(clean != *texel);
         *texel = clean;
     }
@@ -79,10 +80,10 @@ fn cleaned(mut map: LatLongMap) -> Environment {
     Environment { map: reduced(map), warnings }
 }
 
-/// Averages blocks of texels, weighted by solid angle, so that the total stays the same.
+/// Averages blocks of texels, weighted by solid angle, so that the total is conserved.
 fn reduced(map: LatLongMap) -> LatLongMap {
-    // Sides that do not divide are cut into blocks that differ by a texel; each keeps its energy.
-    let block = map.width.div_ceil(KEPT_WIDTH).max(map.height.div_ceil(KEPT_WIDTH));
+    // If the blocks do not divide a side evenly, their sizes differ by one texel; each block conserves its energy.
+    let block = map.width.div_ceil(MAX_WIDTH).max(map.height.div_ceil(MAX_WIDTH));
     if block <= 1 {
         return map;
     }
@@ -147,7 +148,7 @@ mod tests {
         for name in ["a.hdr", "a.exr"] {
             let path = folder.path().join(name);
             assert_eq!(crate::render::lighting::environment::load(name, folder.path()).unwrap_err().exit_code(), 2);
-            std::fs::write(&path, b"not a picture at all").unwrap();
+            std::fs::write(&path, b"not an image at all").unwrap();
             assert_eq!(crate::render::lighting::environment::load(name, folder.path()).unwrap_err().exit_code(), 2);
             std::fs::write(&path, b"").unwrap();
             assert_eq!(crate::render::lighting::environment::load(name, folder.path()).unwrap_err().exit_code(), 2);

@@ -1,4 +1,4 @@
-//! Light from all around: latitude-longitude maps, built-in or from files, and the lights that stand for them.
+//! Environments: latitude-longitude maps, built in or from files, and their directional lights.
 
 mod files;
 mod procedural;
@@ -13,18 +13,18 @@ use crate::base::{InputError, Result};
 
 pub use self::split::split;
 
-/// Names that `light.environment` takes besides paths.
+/// Names that `light.environment` accepts besides paths.
 pub const BUILT_IN: [&str; 5] = ["studio", "clear_sky", "overcast_sky", "sun", "none"];
 
-/// A map and what was found wrong with it.
+/// A map and warnings about its texels.
 #[derive(Debug, Clone, Default)]
 pub struct Environment {
     pub map: LatLongMap,
     pub warnings: Vec<String>,
 }
 
-/// Radiance by direction: row 0 at the zenith (+y), the middle of a row at -z, and columns to the right turn towards +x
-/// (what someone at the origin who looks along -z sees). Empty means dark.
+/// Radiance by direction: row 0 is at the zenith (+y), the middle of a row is at -z, and columns to the right turn
+/// towards +x. An empty map is black.
 #[derive(Debug, Clone, Default)]
 pub struct LatLongMap {
     pub width: usize,
@@ -34,7 +34,7 @@ pub struct LatLongMap {
 }
 
 impl LatLongMap {
-    /// The map whose texel centres look up `radiance(direction)`.
+    /// Samples `radiance(direction)` at the texel centres.
     pub fn from_fn(width: usize, height: usize, radiance: impl Fn(DVec3) -> DVec3) -> Self {
         let mut map = Self { width, height, texels: Vec::with_capacity(width * height) };
         for row in 0..height {
@@ -45,27 +45,27 @@ impl LatLongMap {
         map
     }
 
-    /// Unit direction at continuous texel coordinates (texel centres at halves).
+    /// Returns the unit direction at continuous texel coordinates; texel centres are at halves.
     pub fn direction(&self, column: f64, row: f64) -> DVec3 {
         let (sin_theta, cos_theta) = (PI * row / self.height as f64).sin_cos();
         let (sin_phi, cos_phi) = (TAU * (column / self.width as f64 - 0.5)).sin_cos();
         DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
     }
 
-    /// Continuous texel coordinates of a unit direction.
+    /// Returns the continuous texel coordinates of a unit direction.
     pub fn texel_at(&self, direction: DVec3) -> (f64, f64) {
         let theta = direction.x.hypot(direction.z).atan2(direction.y);
         let phi = direction.x.atan2(-direction.z);
         ((phi / TAU + 0.5) * self.width as f64, theta / PI * self.height as f64)
     }
 
-    /// Solid angle of one texel of a row, exact \[sr\].
+    /// Returns the exact solid angle of one texel of a row \[sr\].
     pub fn solid_angle(&self, row: usize) -> f64 {
         let edge = |row: usize| (PI * row as f64 / self.height as f64).cos();
         TAU / self.width as f64 * (edge(row) - edge(row + 1))
     }
 
-    /// `∫ L dω` over all directions, per channel.
+    /// Returns `∫ L dω` over all directions, per channel.
     pub fn total(&self) -> DVec3 {
         let rows = self.texels.chunks_exact(self.width.max(1)).enumerate();
         rows.map(|(row, texels)| texels.iter().map(|t| t.as_dvec3()).sum::<DVec3>() * self.solid_angle(row)).sum()
@@ -77,7 +77,7 @@ pub fn luminance(rgb: DVec3) -> f64 {
     rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// A built-in environment by name, or a `.hdr` / `.exr` file (relative to `base_dir`).
+/// Loads a built-in environment by name, or a `.hdr` or `.exr` file relative to `base_dir`.
 pub fn load(name: &str, base_dir: &Path) -> Result<Environment> {
     let built_in = |map| Ok(Environment { map, warnings: Vec::new() });
     match name {

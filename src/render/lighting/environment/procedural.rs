@@ -1,4 +1,4 @@
-//! Built-in environments. Radiances are relative: a white Lambertian surface that faces the main light comes out near 1.
+//! Built-in environments. Radiances are relative: a white Lambertian surface that faces the main light has about 1.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,10 +8,10 @@ use super::{LatLongMap, luminance};
 
 const WIDTH: usize = 512;
 const HEIGHT: usize = 256;
-/// Where the sun of `clear_sky` and `sun` stands: high to the right, in front of the object.
+/// Direction towards the sun of `clear_sky` and `sun`: high to the right, in front of the object.
 const SUN_DIRECTION: DVec3 = DVec3::new(0.55, 0.62, 0.56);
 
-/// A rectangular light at infinity: a window in the gnomonic plane about `towards`.
+/// A rectangular light at infinity: a rectangle in the gnomonic plane about `towards`.
 struct SoftBox {
     towards: DVec3,
     /// Half extents across and up, as tangents of the angle.
@@ -20,7 +20,7 @@ struct SoftBox {
 }
 
 impl SoftBox {
-    /// Radiance seen along `direction`, with edges softened over a tenth of the half extents.
+    /// Returns the radiance along `direction`, with edges softened over a tenth of the half extents.
     fn at(&self, direction: DVec3) -> DVec3 {
         let axis = self.towards.normalize_or(DVec3::Y);
         let right = DVec3::Y.cross(axis).normalize_or(DVec3::X);
@@ -39,8 +39,8 @@ fn smooth_step(x: f64) -> f64 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// A photographer's studio: a large warm key box to the upper left in front, a tall cool strip to the right, a rim strip
-/// behind, an overhead bank, in a grey room that is darker below.
+/// A photographer's studio in a grey room that is darker below. A large warm key light is in front to the upper left, a
+/// tall cool strip to the right. Rim lights are behind the object, and a weak light is above.
 pub(super) fn studio() -> LatLongMap {
     let boxes = [
         SoftBox { towards: DVec3::new(-0.75, 0.75, 0.85), half: [0.36, 0.36], radiance: DVec3::new(5.9, 5.6, 5.2) },
@@ -55,8 +55,8 @@ pub(super) fn studio() -> LatLongMap {
     })
 }
 
-/// The CIE standard overcast sky, `L = L_z (1 + 2 sin γ)/3` (Moon and Spencer 1942), over a dim ground; the zenith
-/// radiance is such that the sky alone gives a horizontal surface an irradiance of π.
+/// The CIE standard overcast sky, `L = L_z (1 + 2 sin γ)/3` (Moon and Spencer 1942), over a dim ground. Its zenith
+/// radiance gives a horizontal surface an irradiance of π from the sky alone.
 pub(super) fn overcast_sky() -> LatLongMap {
     let zenith = 9.0 / 7.0;
     let tint = DVec3::new(0.97, 1.0, 1.05);
@@ -66,15 +66,15 @@ pub(super) fn overcast_sky() -> LatLongMap {
     })
 }
 
-/// 1 in the sky and `ground` below, blended over the texels at the horizon.
+/// Returns 1 in the sky and `ground` below, blended over the texels at the horizon.
 fn above_ground(direction: DVec3, ground: f64) -> f64 {
     let texel = PI / HEIGHT as f64;
     ground + (1.0 - ground) * (0.5 + direction.y / texel).clamp(0.0, 1.0)
 }
 
-/// The CIE standard clear sky (Kittler 1967; the luminance distribution of CIE S 003), coloured from horizon haze to
-/// zenith blue, with the sun in one texel: the sun gives a surface that faces it an irradiance of 2.6, the sky a
-/// horizontal one about 0.7.
+/// The CIE standard clear sky (Kittler 1967; luminance distribution of CIE S 003) with the sun in one texel. Its colour
+/// changes from haze at the horizon to blue at the zenith. The sun gives a surface that faces it an irradiance of 2.6.
+/// The sky gives a horizontal surface about 0.7.
 pub(super) fn clear_sky() -> LatLongMap {
     let sun = SUN_DIRECTION.normalize_or(DVec3::Y);
     let zenith_angle = sun.y.acos();
@@ -96,7 +96,7 @@ pub(super) fn clear_sky() -> LatLongMap {
     map
 }
 
-/// One sun in black space, irradiance π: a white Lambertian surface that faces it has radiance 1.
+/// A sun in black space with irradiance π: a white Lambertian surface that faces it has radiance 1.
 pub(super) fn sun() -> LatLongMap {
     let mut map = LatLongMap::from_fn(WIDTH, HEIGHT, |_| DVec3::ZERO);
     add_sun(&mut map, DVec3::splat(PI));

@@ -1,24 +1,24 @@
-//! Importance sampling of an environment: a few directional lights, each with the energy of its own region.
+//! Importance sampling of an environment: directional lights, each with the energy of its own region.
 //!
-//! The map is cut into rectangles, always the cut that takes away most of `Σ E |d - d̄|²`, the energy-weighted spread of
-//! directions within regions (the criterion of Viriyothai and Debevec 2009, taken greedily over all regions and cuts). The
-//! light of a region stands at the mean direction with the region's energy, so the total is conserved; a light source
-//! that is brighter than an average light is taken out first and stands exactly where it is. Deterministic.
+//! The map is cut into rectangles. Each step applies the cut that reduces `Σ E |d - d̄|²` most, the energy-weighted
+//! spread of directions within regions. This is the criterion of Viriyothai and Debevec 2009, applied greedily over all
+//! regions and cuts. A region's light has the region's mean direction and energy, so the total is conserved. Each texel
+//! with more energy than an average light becomes a light of its own first. The result is deterministic.
 
 use glam::{DVec3, Vec3};
 
 use super::{LatLongMap, luminance};
 use crate::render::DirectionalLight;
 
-/// Sums over a rectangle: energy, its first moment, and RGB energy.
+/// Sums over a rectangle: energy (luminance), its first moment, and RGB energy.
 #[derive(Clone, Copy, Default)]
-struct Moments {
+struct EnergyMoments {
     energy: f64,
     direction: DVec3,
     rgb: DVec3,
 }
 
-impl Moments {
+impl EnergyMoments {
     fn of(direction: DVec3, rgb: DVec3) -> Self {
         let energy = luminance(rgb);
         Self { energy, direction: direction * energy, rgb }
@@ -40,7 +40,7 @@ impl Moments {
         }
     }
 
-    /// `Σ E |d - d̄|²`, as `|d| = 1`.
+    /// Returns `Σ E |d - d̄|²`, using `|d| = 1`.
     fn spread(&self) -> f64 {
         if self.energy > 0.0 { (self.energy - self.direction.length_squared() / self.energy).max(0.0) } else { 0.0 }
     }
@@ -58,30 +58,30 @@ struct Region {
     rows: [usize; 2],
 }
 
-/// A region with its best cut: the spread the cut takes away, and the two halves.
-struct Candidate {
+/// A region with its best cut: the spread that the cut removes, and the two halves.
+struct RegionCut {
     region: Region,
     gain: f64,
     halves: [Region; 2],
 }
 
-/// At most `count` lights whose irradiances sum to `∫ L dω`; none for a black map.
+/// Returns at most `count` lights whose irradiances sum to `∫ L dω`; none for a black map.
 pub fn split(map: &LatLongMap, count: usize) -> Vec<DirectionalLight> {
     let total = luminance(map.total());
     if count == 0 || map.texels.is_empty() || total <= 0.0 {
         return Vec::new();
     }
     let mut lights = Vec::with_capacity(count);
-    let taken = brightest_texels(map, total / count as f64, count);
-    lights.extend(taken.iter().map(|&(_, moments)| moments.light()));
-    let sums = Sums::new(map, &taken.iter().map(|(texel, _)| *texel).collect::<Vec<_>>());
+    let brightest = brightest_texels(map, total / count as f64, count);
+    lights.extend(brightest.iter().map(|&(_, moments)| moments.light()));
+    let sums = SummedMoments::new(map, &brightest.iter().map(|(texel, _)| *texel).collect::<Vec<_>>());
     let whole = Region { columns: [0, map.width], rows: [0, map.height] };
     if count == lights.len() || sums.over(whole).energy <= total * 1e-12 {
         return lights;
     }
     let mut regions = vec![sums.best_cut(whole)];
     while lights.len() + regions.len() < count {
-        // The first of the largest: deterministic.
+        // The first of the largest, so that the result is deterministic.
         let Some(widest) = (0..regions.len()).reduce(|a, b| if regions[b].gain > regions[a].gain { b } else { a })
         else {
             break;
@@ -93,14 +93,13 @@ pub fn split(map: &LatLongMap, count: usize) -> Vec<DirectionalLight> {
         regions[widest] = sums.best_cut(one);
         regions.push(sums.best_cut(other));
     }
-    lights.extend(
-        regions.iter().map(|candidate| sums.over(candidate.region).light()).filter(|l| l.irradiance != Vec3::ZERO),
-    );
+    lights.extend(regions.iter().map(|cut| sums.over(cut.region).light()).filter(|l| l.irradiance != Vec3::ZERO));
     lights
 }
 
-/// Texels that alone hold more than an average light's energy (so fewer than `count`), leaving one light for the rest.
-fn brightest_texels(map: &LatLongMap, average: f64, count: usize) -> Vec<(usize, Moments)> {
+/// Returns the texels that alone hold more energy than an average light. At least one light is left for the other
+/// texels.
+fn brightest_texels(map: &LatLongMap, average: f64, count: usize) -> Vec<(usize, EnergyMoments)> {
     let mut found = Vec::new();
     for (row, texels) in map.texels.chunks_exact(map.width).enumerate() {
         let solid_angle = map.solid_angle(row);
@@ -108,7 +107,7 @@ fn brightest_texels(map: &LatLongMap, average: f64, count: usize) -> Vec<(usize,
             let rgb = texel.as_dvec3() * solid_angle;
             if luminance(rgb) > average {
                 let direction = map.direction(column as f64 + 0.5, row as f64 + 0.5);
-                found.push((row * map.width + column, Moments::of(direction, rgb)));
+                found.push((row * map.width + column, EnergyMoments::of(direction, rgb)));
             }
         }
     }
@@ -118,26 +117,26 @@ fn brightest_texels(map: &LatLongMap, average: f64, count: usize) -> Vec<(usize,
     found
 }
 
-/// Summed-area table of the moments, in f64.
-struct Sums {
+/// Summed-area table of energy moments, in f64.
+struct SummedMoments {
     stride: usize,
-    table: Vec<Moments>,
+    table: Vec<EnergyMoments>,
 }
 
-impl Sums {
-    fn new(map: &LatLongMap, without: &[usize]) -> Self {
+impl SummedMoments {
+    fn new(map: &LatLongMap, excluded_texels: &[usize]) -> Self {
         let stride = map.width + 1;
-        let mut left_out = vec![false; map.texels.len()];
-        without.iter().for_each(|&texel| left_out[texel] = true);
-        let mut table = vec![Moments::default(); stride * (map.height + 1)];
+        let mut is_excluded = vec![false; map.texels.len()];
+        excluded_texels.iter().for_each(|&texel| is_excluded[texel] = true);
+        let mut table = vec![EnergyMoments::default(); stride * (map.height + 1)];
         for row in 0..map.height {
             let solid_angle = map.solid_angle(row);
-            let mut in_row = Moments::default();
+            let mut in_row = EnergyMoments::default();
             for column in 0..map.width {
                 let texel = row * map.width + column;
-                if !left_out[texel] {
+                if !is_excluded[texel] {
                     let direction = map.direction(column as f64 + 0.5, row as f64 + 0.5);
-                    in_row = in_row.plus(Moments::of(direction, map.texels[texel].as_dvec3() * solid_angle));
+                    in_row = in_row.plus(EnergyMoments::of(direction, map.texels[texel].as_dvec3() * solid_angle));
                 }
                 table[(row + 1) * stride + column + 1] = table[row * stride + column + 1].plus(in_row);
             }
@@ -145,20 +144,20 @@ impl Sums {
         Self { stride, table }
     }
 
-    fn over(&self, region: Region) -> Moments {
+    fn over(&self, region: Region) -> EnergyMoments {
         let [left, right] = region.columns;
         let [top, bottom] = region.rows;
         let at = |row: usize, column: usize| self.table[row * self.stride + column];
         at(bottom, right).minus(at(top, right)).minus(at(bottom, left)).plus(at(top, left))
     }
 
-    fn best_cut(&self, region: Region) -> Candidate {
+    fn best_cut(&self, region: Region) -> RegionCut {
         let spread = self.over(region).spread();
-        let mut best = Candidate { region, gain: 0.0, halves: [region; 2] };
+        let mut best = RegionCut { region, gain: 0.0, halves: [region; 2] };
         let mut consider = |one: Region, other: Region| {
             let gain = spread - self.over(one).spread() - self.over(other).spread();
             if gain > best.gain {
-                best = Candidate { region, gain, halves: [one, other] };
+                best = RegionCut { region, gain, halves: [one, other] };
             }
         };
         for cut in region.columns[0] + 1..region.columns[1] {
@@ -208,10 +207,10 @@ mod tests {
         map.texels[row * 128 + column] = Vec3::new(9e4, 8e4, 6e4);
         let lights = split(&map, 16);
         let direction = map.direction(77.5, 20.5).as_vec3();
-        let own: Vec<_> = lights.iter().filter(|l| l.direction.dot(direction) > 0.999_999).collect();
-        assert_eq!(own.len(), 1);
+        let suns: Vec<_> = lights.iter().filter(|l| l.direction.dot(direction) > 0.999_999).collect();
+        assert_eq!(suns.len(), 1);
         let expected = DVec3::new(9e4, 8e4, 6e4) * map.solid_angle(row);
-        assert!((own[0].irradiance.as_dvec3() - expected).length() / expected.length() < 1e-6);
+        assert!((suns[0].irradiance.as_dvec3() - expected).length() / expected.length() < 1e-6);
         assert_eq!(lights.len(), 16);
     }
 

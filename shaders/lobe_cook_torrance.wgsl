@@ -1,9 +1,0 @@
-// The lobe of a sum over facets: Cook-Torrance.
-
-//!import facets
-//!import cook_torrance
-//!import tint_fresnel
-
-fn lobe(n: Seen, pair: Pair) -> f32 {
-    return cook_torrance(n, pair.i_dot_h, sum.shape, sum.scale);
-}

@@ -1,8 +1,0 @@
-// The lobe of a sum over facets: Lambertian.
-
-//!import lambertian
-//!import tint_fixed
-
-fn lobe(n: Seen, pair: Pair) -> f32 {
-    return lambertian(n);
-}

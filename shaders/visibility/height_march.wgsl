@@ -1,0 +1,141 @@
+// Horizons of a height field: the twin of src/visibility/height_march.rs, which describes the algorithm. One thread
+// walks from one facet along one azimuth.
+
+//!import angles
+
+struct Params {
+    // Columns and rows of the tile.
+    size: vec2u,
+    samples_from_tile: vec2f,
+    top: f32,
+    azimuths: u32,
+    facet_count: u32,
+    // FACING_MARGIN of src/visibility/scan.rs.
+    facing_margin: f32,
+    // The first azimuth of this dispatch.
+    first_azimuth: u32,
+    pad: u32,
+}
+
+struct Facet {
+    position: vec3f,
+    pad_p: u32,
+    normal: vec3f,
+    pad_n: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> heights: array<f32>;
+@group(0) @binding(2) var<storage, read> facets: array<Facet>;
+// Elevations [rad]; the azimuths of a facet are adjacent.
+@group(0) @binding(3) var<storage, read_write> horizons: array<f32>;
+// Unit vectors of the plane, one per azimuth.
+@group(0) @binding(4) var<storage, read> directions: array<vec2f>;
+
+// An elevation so low that the soft step ends below 0: HorizonMap::FREE.
+const FREE: f32 = -0.02;
+// The number of edges of one family that a walk may cross, in addition to those of sixteen tiles.
+const MIN_LINES: u32 = 8192u;
+// Slopes below this are not resolved.
+const MIN_SLOPE: f32 = 0.005;
+
+// If set, the output is the number of crossed edges, for tests.
+override COUNTING: bool = false;
+
+const COLUMNS: u32 = 0u;
+const ROWS: u32 = 1u;
+const DIAGONALS: u32 = 2u;
+
+fn wrapped(k: f32, n: u32) -> u32 {
+    let rest = k - f32(n) * floor((k + 0.5) / f32(n));
+    return min(u32(max(rest, 0.0)), n - 1u);
+}
+
+fn height_at(column: f32, row: f32) -> f32 {
+    return heights[wrapped(row, params.size.y) * params.size.x + wrapped(column, params.size.x)];
+}
+
+var<private> crossings: u32;
+
+// The highest slope at the crossings of one family of edges, and at least `min_slope`. `across` and `along` hold the
+// start and the speed of the walk, across the edges and along them.
+fn highest_slope(edges: u32, across: vec2f, along: vec2f, max_crossings: u32, z: f32, min_slope: f32) -> f32 {
+    var slope = min_slope;
+    let step = 1.0 / abs(across.y);
+    let sign_across = sign(across.y);
+    var first = select(ceil(across.x) - 1.0, floor(across.x) + 1.0, across.y > 0.0);
+    // A point on an edge does not block itself.
+    if (first - across.x) * sign_across < 1e-6 {
+        first += sign_across;
+    }
+    let begin = (first - across.x) * sign_across * step;
+    for (var k = 0u; k < max_crossings; k++) {
+        let distance = begin + step * f32(k);
+        if distance * max(slope, MIN_SLOPE) >= params.top - z {
+            break;
+        }
+        crossings++;
+        let line = first + sign_across * f32(k);
+        let position = along.x + along.y * distance;
+        let low = floor(position);
+        var column = line;
+        var row = low;
+        var next = vec2f(0.0, 1.0);
+        if edges == ROWS {
+            column = low;
+            row = line;
+            next = vec2f(1.0, 0.0);
+        } else if edges == DIAGONALS {
+            column = low;
+            row = low - line;
+            next = vec2f(1.0, 1.0);
+        }
+        let below = height_at(column, row);
+        let above = height_at(column + next.x, row + next.y);
+        slope = max(slope, (below + (above - below) * (position - low) - z) / distance);
+    }
+    return slope;
+}
+
+@compute @workgroup_size(64)
+fn march(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= params.facet_count {
+        return;
+    }
+    crossings = 0u;
+    let azimuth = params.first_azimuth + id.y;
+    let direction = directions[azimuth];
+    let start = facets[id.x].position;
+    let normal = facets[id.x].normal;
+    var slope = max(-(dot(normal.xy, direction) + params.facing_margin) / max(normal.z, 1e-6), 0.0);
+    if params.top > start.z {
+        let at = start.xy * params.samples_from_tile - 0.5;
+        let speed = direction * params.samples_from_tile;
+        let along_x = abs(direction.y) < 1e-6;
+        let along_y = abs(direction.x) < 1e-6;
+        // Along an axis, everything repeats after one tile, at a larger distance.
+        var max_crossings = MIN_LINES + 16u * (params.size.x + params.size.y);
+        if along_x {
+            max_crossings = params.size.x + 1u;
+        } else if along_y {
+            max_crossings = params.size.y + 1u;
+        }
+        let x = vec2f(at.x, speed.x);
+        let y = vec2f(at.y, speed.y);
+        if !along_y {
+            slope = highest_slope(COLUMNS, x, y, max_crossings, start.z, slope);
+        }
+        if !along_x {
+            slope = highest_slope(ROWS, y, x, max_crossings, start.z, slope);
+        }
+        let diagonal_speed = speed.x - speed.y;
+        if abs(diagonal_speed) >= 1e-6 * max(params.samples_from_tile.x, params.samples_from_tile.y) {
+            slope = highest_slope(DIAGONALS, vec2f(at.x - at.y, diagonal_speed), x, max_crossings, start.z, slope);
+        }
+    }
+    if COUNTING {
+        horizons[id.x * params.azimuths + azimuth] = f32(crossings);
+        return;
+    }
+    horizons[id.x * params.azimuths + azimuth] = select(FREE, angle_of(slope, 1.0), slope > 0.0);
+}

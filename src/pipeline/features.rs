@@ -1,0 +1,82 @@
+//! Properties of a scene on which the plan's decisions rest.
+
+use super::stage::Keyed;
+use super::stages::{EstimateScanWork, TileShape};
+use super::{Pipeline, StageTimes};
+use crate::base::Result;
+use crate::brdf::{Material, Term};
+use crate::effective::FacetSum;
+use crate::geometry::Facets;
+use crate::interreflection::mean_albedo;
+use crate::plan::{Backend, SceneFeatures, Settings, VisibilityMethod};
+use crate::scene::Scene;
+
+/// Everything that comes before the plan.
+pub(super) struct Surface<'a> {
+    pub scene: &'a Scene,
+    pub tile: &'a Keyed<TileShape>,
+    pub facets: &'a Keyed<Facets>,
+    pub sum: &'a FacetSum,
+    pub material_of_slot: &'a [usize],
+    pub materials: &'a [Material],
+    pub settings: &'a Settings,
+    /// Planes x = const and y = const that mirror the tile; `None` if they were not looked for.
+    pub mirrors: Option<[bool; 2]>,
+    /// Whether the cost of slicing under overhangs is wanted.
+    pub wants_scan_work: bool,
+}
+
+impl Pipeline {
+    pub(super) fn features(&self, surface: &Surface<'_>) -> Result<SceneFeatures> {
+        let Surface { scene, tile, facets, sum, materials, settings, .. } = *surface;
+        let needs_maps = !tile.flat && (!tile.height_field || settings.visibility_method != VisibilityMethod::Auto);
+        let gpu_allowed = needs_maps && settings.backend != Backend::Cpu;
+        let gpu = if gpu_allowed { self.env.gpu() } else { None };
+        // Software Vulkan draws shadow maps far slower than the CPU slices (the draft of the pillow: 78 s instead of 0.1 s), so
+        // that it is used only if both the GPU and maps are asked for.
+        let asked = settings.backend == Backend::Gpu && settings.visibility_method == VisibilityMethod::Maps;
+        let hardware_gpu = gpu.is_some_and(|gpu| asked || gpu.is_hardware());
+        let scan_work = if surface.wants_scan_work && needs_maps && !hardware_gpu {
+            *self.get(EstimateScanWork { tile, facets }, &mut StageTimes::new())?
+        } else {
+            0.0
+        };
+        let mut used: Vec<usize> =
+            facets.slots.iter().map(|slot| surface.material_of_slot[usize::from(*slot)]).collect();
+        used.sort_unstable();
+        used.dedup();
+        let black_materials = used.iter().filter(|index| materials[**index].is_black()).count();
+        let is_lambertian =
+            |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
+        Ok(SceneFeatures {
+            flat: tile.flat,
+            mirrors: surface.mirrors,
+            steepest: tile.steepest,
+            albedo: used.iter().map(|&k| albedo(&materials[k])).fold(0.0, f64::max),
+            grey: used.iter().all(|&k| crate::interreflection::is_grey(&materials[k])) && !sum.colors_vary(),
+            height_samples: tile.mesh.height_grid.is_some(),
+            height_field: tile.height_field,
+            closes_plane: tile.mesh.closes_plane,
+            hardware_gpu,
+            triangles: tile.mesh.triangles.len(),
+            scan_work,
+            area_ratio: facets.areas.iter().map(|area| f64::from(*area)).sum::<f64>()
+                / f64::from(tile.mesh.base_area()),
+            materials: used.len() - black_materials,
+            black_materials,
+            colors_vary: sum.colors_vary(),
+            lobes: sum.lobe_count(),
+            lookups: sum.measured_count(),
+            only_lambertian: used.iter().all(is_lambertian),
+            distinct_normals: sum.normal_count(),
+            object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
+            lights: scene.light.count + scene.light.directional.len(),
+            lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
+        })
+    }
+}
+
+/// The largest part of uniform light that a material reflects in any channel.
+fn albedo(material: &Material) -> f64 {
+    f64::from((mean_albedo(&material.brdf, 3, 12) * material.color).max_element()).min(1.0)
+}

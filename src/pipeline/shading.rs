@@ -1,0 +1,361 @@
+//! The representation that images read: a sum over a strided subset of the facets, a table, or f̄ itself. The first that is
+//! close enough is taken, when the first image asks.
+
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::Env;
+use super::stage::{Codec, Keyed, Stage, StageTimes, elapsed_ms, lock, run_uncounted};
+use super::stages::TileShape;
+use crate::base::{Cancel, Error, Result};
+use crate::cache::{Cache, Key, KeyBuilder};
+use crate::effective::{Direct, EffectiveBrdf, Interpolation, Nodes, Representation, ShadingTable, TableContent};
+use crate::geometry::mirror_planes;
+use crate::math::directions::HemispherePairGrid;
+use crate::metrics::{Errors, Pair, image_pairs, upper_errors};
+use crate::plan::{IMAGE_CHECK_PAIRS, Settings};
+use crate::scene::Switch;
+use crate::visibility::Visibility;
+
+/// Strides through the facets of tiles with few distinct normals, from coarse to fine. At these multiples the additive
+/// recurrence that placed the facets stays well spread.
+const STRIDES: [usize; 4] = [27, 17, 10, 3];
+
+/// If the error exceeds the tolerance by this factor, halving the grid step does not fix it.
+const HOPELESS: f64 = 2.5;
+
+/// A table may be computed from one facet in so many, drawn for each half vector by their lobes. Less than a fifth is tried
+/// only if at least `MANY` facets remain.
+const PARTS: [usize; 4] = [20, 10, 5, 2];
+const MANY: usize = 1600;
+
+/// The part for coarse tables of so many nodes, which are computed without a trial; from all facets if that is not close enough.
+const COARSE_PART: usize = 4;
+const COARSE: Range<usize> = 10_000..20_000;
+
+/// The factor by which fewer facets may raise the error of a table.
+const MAX_ERROR_GROWTH: f64 = 1.25;
+
+/// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
+const TRIAL_FROM: usize = 60_000;
+
+/// The effective BRDF as images read it.
+#[derive(Debug, Clone)]
+pub struct ShadingBrdf {
+    /// A table, a sum over fewer facets, or the BRDF itself.
+    pub brdf: Arc<EffectiveBrdf>,
+    /// An upper bound of the errors against the BRDF; absent if the BRDF itself is read and nothing else was tried.
+    pub errors: Option<Errors>,
+    /// Milliseconds that this call took.
+    pub ms: f64,
+    /// Whether all tables, tried or taken, were read from the disk cache.
+    pub was_cached: bool,
+}
+
+/// The last shading representation, which an edit of a colour can reuse.
+#[derive(Debug, Clone)]
+pub(super) struct LastShading {
+    /// The key of settings, facets and visibility.
+    surface: Key,
+    /// The key of the lobes of all materials and of their slots.
+    lobes: Key,
+    brdf: Arc<EffectiveBrdf>,
+}
+
+/// Keys of the inputs of an effective BRDF.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ShadingKeys {
+    /// Settings, facets and visibility.
+    pub surface: Key,
+    /// The lobes of all materials and their slots, without colours and tints.
+    pub lobes: Key,
+    pub facets: Key,
+    pub visibility: Key,
+}
+
+/// Computes the shading representation of one effective BRDF, once.
+#[derive(Debug)]
+pub(super) struct Shading {
+    exact: Arc<EffectiveBrdf>,
+    keys: ShadingKeys,
+    /// Grids of the table, from coarse to fine; none if the plan expects no table to pay.
+    grids: Vec<HemispherePairGrid>,
+    interpolation: Interpolation,
+    /// The tile, whose mirror planes save part of a table; absent if they are not to be used.
+    mirrored: Option<Arc<TileShape>>,
+    tolerance: (f64, f64),
+    seed: u64,
+    last: Arc<Mutex<Option<LastShading>>>,
+    disk: Cache,
+    computed: Mutex<Option<ShadingBrdf>>,
+}
+
+impl Shading {
+    pub(super) fn new(
+        exact: Arc<EffectiveBrdf>,
+        tile: &Keyed<TileShape>,
+        settings: &Settings,
+        wants_table: bool,
+        keys: ShadingKeys,
+        (last, disk): (&Arc<Mutex<Option<LastShading>>>, &Cache),
+    ) -> Self {
+        Self {
+            exact,
+            keys,
+            mirrored: (settings.effects.mirror_symmetry != Switch::Off).then(|| tile.value.clone()),
+            grids: if wants_table { settings.image_grids.clone() } else { Vec::new() },
+            interpolation: settings.interpolation,
+            tolerance: settings.image_tolerance,
+            seed: settings.seed,
+            last: last.clone(),
+            disk: disk.clone(),
+            computed: Mutex::new(None),
+        }
+    }
+
+    /// The representation, if it was computed and no other thread computes it.
+    pub(super) fn known(&self) -> Option<Arc<EffectiveBrdf>> {
+        self.computed.try_lock().ok()?.as_ref().map(|shading| shading.brdf.clone())
+    }
+
+    /// The representation; the first call computes it.
+    pub(super) fn get(&self, cancel: &Cancel) -> Result<ShadingBrdf> {
+        let mut computed = lock(&self.computed);
+        if let Some(known) = &*computed {
+            return Ok(ShadingBrdf { ms: 0.0, ..known.clone() });
+        }
+        let start = Instant::now();
+        let mut times = StageTimes::new();
+        let (brdf, errors) = self.first_close_enough(cancel, &mut times)?;
+        let was_cached = !times.is_empty() && times.iter().all(|(name, _)| *name == Tabulate::CACHED);
+        let shading = ShadingBrdf { brdf, errors, ms: elapsed_ms(start), was_cached };
+        *computed = Some(shading.clone());
+        *lock(&self.last) =
+            Some(LastShading { surface: self.keys.surface, lobes: self.keys.lobes, brdf: shading.brdf.clone() });
+        Ok(shading)
+    }
+
+    /// Walks the strategies from the cheapest: a strided subset of the facets, a table, f̄ itself.
+    fn first_close_enough(
+        &self,
+        cancel: &Cancel,
+        times: &mut StageTimes,
+    ) -> Result<(Arc<EffectiveBrdf>, Option<Errors>)> {
+        if self.grids.is_empty() {
+            return Ok((self.exact.clone(), None));
+        }
+        let check = Check::new(&self.exact, self.seed);
+        let (reused, has_failed) = self.reuse();
+        if let Some((brdf, errors)) = self.strided_subset(&check) {
+            return Ok((Arc::new(brdf), Some(errors)));
+        }
+        if has_failed {
+            return Ok((self.exact.clone(), None));
+        }
+        let (table, errors) = self.table(reused, &check, cancel, times)?;
+        Ok((table.map_or_else(|| self.exact.clone(), Arc::new), errors))
+    }
+
+    /// A sum over a strided subset of the facets, if it is close enough.
+    fn strided_subset(&self, check: &Check) -> Option<(EffectiveBrdf, Errors)> {
+        let Representation::Direct(direct) = self.exact.direct_representation() else { return None };
+        STRIDES.iter().map_while(|stride| direct.strided_subset(*stride)).find_map(|subset| {
+            let brdf = self.exact.with_direct_representation(Representation::Direct(subset));
+            let errors = check.errors(&brdf);
+            self.is_close(errors).then_some((brdf, errors))
+        })
+    }
+
+    /// The coarsest table that is close enough, and the errors of the last one that was tried.
+    fn table(
+        &self,
+        mut reused: Option<ShadingTable>,
+        check: &Check,
+        cancel: &Cancel,
+        times: &mut StageTimes,
+    ) -> Result<(Option<EffectiveBrdf>, Option<Errors>)> {
+        let mut last = None;
+        let known = reused.as_ref().map(|table| table.grid);
+        let first = self.grids.iter().position(|grid| Some(*grid) == known).unwrap_or(0);
+        for grid in &self.grids[first..] {
+            let attempt = match reused.take() {
+                Some(table) => Attempt::Table(table),
+                None => self.attempt(*grid, check, cancel, times)?,
+            };
+            let errors = match attempt {
+                Attempt::Table(table) => {
+                    let brdf = self.with_table(table);
+                    let errors = check.errors(&brdf);
+                    if self.is_close(errors) {
+                        return Ok((Some(brdf), Some(errors)));
+                    }
+                    errors
+                }
+                Attempt::TooFar(errors) => errors,
+                Attempt::Impossible => break,
+            };
+            last = Some(errors);
+            if errors.rel_l2 > HOPELESS * self.tolerance.0 {
+                break;
+            }
+        }
+        Ok((None, last))
+    }
+
+    fn with_table(&self, table: ShadingTable) -> EffectiveBrdf {
+        self.exact.with_direct_representation(Representation::Table(table.read(self.interpolation)))
+    }
+
+    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from fewer facets
+    /// if that is no worse.
+    fn attempt(
+        &self,
+        grid: HemispherePairGrid,
+        check: &Check,
+        cancel: &Cancel,
+        times: &mut StageTimes,
+    ) -> Result<Attempt> {
+        let mirrors = self.mirrored.as_ref().map_or([false; 2], |tile| mirror_planes(&tile.mesh));
+        let facets = match self.exact.direct_representation() {
+            // Facets that maps see cannot be subsampled.
+            Representation::Direct(direct) if !matches!(*direct.visibility, Visibility::Maps(_)) => {
+                direct.sum.facet_count()
+            }
+            _ => 0,
+        };
+        let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
+        let count = grid.originals(mirrors);
+        if count > TRIAL_FROM {
+            let mut trial = |facets: Option<usize>| -> Result<Option<Errors>> {
+                let trial = self.tabulate(Nodes { facets, read_by: Some(&check.pairs), ..nodes }, cancel, times)?;
+                Ok(trial.map(|trial| check.errors(&self.with_table(trial))))
+            };
+            let Some(best) = trial(None)? else { return Ok(Attempt::Impossible) };
+            if !self.is_close(best) {
+                return Ok(Attempt::TooFar(best));
+            }
+            for part in PARTS.into_iter().filter(|part| facets > 0 && (*part <= 5 || facets >= MANY * part)) {
+                let sampled = trial(Some(facets / part))?;
+                let is_as_good =
+                    |errors: Errors| self.is_close(errors) && errors.rel_l2 < MAX_ERROR_GROWTH * best.rel_l2;
+                if sampled.is_some_and(is_as_good) {
+                    nodes.facets = Some(facets / part);
+                    break;
+                }
+            }
+        } else if facets > 0 && COARSE.contains(&count) {
+            let part = Nodes { facets: Some(facets / COARSE_PART), ..nodes };
+            let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
+            if self.is_close(check.errors(&self.with_table(table.clone()))) {
+                return Ok(Attempt::Table(table));
+            }
+        }
+        Ok(self.tabulate(nodes, cancel, times)?.map_or(Attempt::Impossible, Attempt::Table))
+    }
+
+    fn is_close(&self, errors: Errors) -> bool {
+        errors.rel_l2 <= self.tolerance.0 && errors.psnr_db >= self.tolerance.1
+    }
+
+    /// A table on these nodes; `None` if no table can hold the sum.
+    fn tabulate(&self, nodes: Nodes<'_>, cancel: &Cancel, times: &mut StageTimes) -> Result<Option<ShadingTable>> {
+        match self.exact.direct_representation() {
+            Representation::Direct(direct) => {
+                if !ShadingTable::can_hold(&direct.sum) {
+                    return Ok(None);
+                }
+                let stage = Tabulate { direct, nodes, keys: self.keys };
+                let env = Env::with_cancel(cancel.clone());
+                let content = run_uncounted(&stage, &env, &self.disk, times)?;
+                Ok(ShadingTable::from_content(direct, nodes.grid, content))
+            }
+            representation => {
+                let sums =
+                    |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| representation.sums(lights, o, |k, sum| out[k] = sum);
+                ShadingTable::resample(sums, nodes, cancel).map(Some)
+            }
+        }
+    }
+
+    /// The last table, if it serves this BRDF; and whether no table was close enough for the same lobes.
+    fn reuse(&self) -> (Option<ShadingTable>, bool) {
+        let Some(last) = lock(&self.last).clone().filter(|last| last.surface == self.keys.surface) else {
+            return (None, false);
+        };
+        let same_lobes = last.lobes == self.keys.lobes;
+        match (last.brdf.direct_representation(), self.exact.direct_representation()) {
+            (Representation::Table(table), Representation::Direct(direct)) => {
+                (table.reused(&direct.sum, same_lobes), false)
+            }
+            (Representation::Table(_), _) => (None, false),
+            _ => (None, same_lobes),
+        }
+    }
+}
+
+/// The result of trying one grid.
+enum Attempt {
+    Table(ShadingTable),
+    /// A table would have these errors.
+    TooFar(Errors),
+    /// No grid serves.
+    Impossible,
+}
+
+/// Tabulates a direct sum. Colours and tints are no inputs.
+struct Tabulate<'a> {
+    direct: &'a Direct,
+    nodes: Nodes<'a>,
+    keys: ShadingKeys,
+}
+
+impl Tabulate<'_> {
+    const CACHED: &'static str = "cached_picture_table";
+}
+
+impl Stage for Tabulate<'_> {
+    type Output = TableContent;
+    const NAME: &'static str = "picture_table";
+    const CODEC: Option<Codec<TableContent>> = Some(Codec::new(Self::CACHED));
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        let ShadingKeys { lobes, facets, visibility, .. } = &self.keys;
+        key.key("lobes", lobes).key("facets", facets).key("visibility", visibility);
+        self.nodes.hash_into(key);
+    }
+
+    fn run(&self, env: &Env) -> Result<TableContent> {
+        let table = ShadingTable::build(self.direct, self.nodes, &env.cancel)?;
+        table.map(|table| table.content()).ok_or_else(|| Error::failed("no table can hold this sum"))
+    }
+
+    fn accepts(&self, content: &TableContent) -> bool {
+        ShadingTable::from_content(self.direct, self.nodes.grid, content.clone()).is_some()
+    }
+}
+
+/// Pairs of directions as images ask for them, and the BRDF there.
+struct Check {
+    pairs: Vec<Pair>,
+    exact: Vec<Vec3>,
+}
+
+impl Check {
+    fn new(exact: &EffectiveBrdf, seed: u64) -> Self {
+        let mut check = Self { pairs: image_pairs(IMAGE_CHECK_PAIRS, seed ^ 0x7ab1e), exact: Vec::new() };
+        check.exact = check.values(exact);
+        check
+    }
+
+    fn values(&self, brdf: &EffectiveBrdf) -> Vec<Vec3> {
+        self.pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect()
+    }
+
+    fn errors(&self, brdf: &EffectiveBrdf) -> Errors {
+        upper_errors(&self.values(brdf), &self.exact)
+    }
+}

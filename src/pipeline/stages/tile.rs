@@ -1,0 +1,171 @@
+//! The first stages: the tile's mesh, the materials of its slots, and its facets.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::hash_debug;
+use crate::base::Result;
+use crate::brdf::{Brdf, Material, MaterialAssignment};
+use crate::cache::{Key, KeyBuilder};
+use crate::effective::mean_colors;
+use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use crate::pipeline::Env;
+use crate::pipeline::stage::{Keyed, Stage, lock};
+use crate::plan::{Preset, Settings};
+use crate::scene::{BrdfSpec, Geometry, LoadedScene, Pixels, Switch, TermSpec};
+
+/// The mesh of a tile, and properties of it that later stages need.
+#[derive(Debug)]
+pub struct TileShape {
+    pub mesh: TileMesh,
+    pub flat: bool,
+    /// Nothing overhangs.
+    pub height_field: bool,
+    /// The largest angle between a surface normal and z [rad].
+    pub steepest: f32,
+}
+
+/// Builds the mesh of a scene's tile.
+pub struct BuildTile<'a> {
+    loaded: &'a LoadedScene,
+    files: Vec<Key>,
+}
+
+impl<'a> BuildTile<'a> {
+    pub fn new(loaded: &'a LoadedScene, env: &Env) -> Self {
+        let tile = &loaded.scene.tile;
+        let of_geometry = match &tile.geometry {
+            Geometry::Mesh(mesh) => Some(&mesh.path),
+            Geometry::Heightfield(field) => field.path.as_ref(),
+            _ => None,
+        };
+        let paths = [of_geometry, tile.color_path.as_ref(), tile.slot_path.as_ref()];
+        let files = paths.into_iter().flatten().map(|path| env.file_key(&loaded.base_dir, path)).collect();
+        Self { loaded, files }
+    }
+}
+
+impl Stage for BuildTile<'_> {
+    type Output = TileShape;
+    const NAME: &'static str = "geometry";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        fn hash_pixels<T: bytemuck::NoUninit>(key: &mut KeyBuilder, name: &str, pixels: Option<&Pixels<T>>) {
+            key.flags("painted", [pixels.is_some()]);
+            if let Some(pixels) = pixels {
+                key.numbers("size", &[pixels.size]).numbers(name, &pixels.values);
+            }
+        }
+        hash_debug(key, "tile", &self.loaded.scene.tile);
+        for file in &self.files {
+            key.key("file", file);
+        }
+        let painted = &self.loaded.painted;
+        hash_pixels(key, "heights", painted.heights.as_deref());
+        hash_pixels(key, "colors", painted.colors.as_deref());
+        hash_pixels(key, "slots", painted.slots.as_deref());
+    }
+
+    fn run(&self, _: &Env) -> Result<TileShape> {
+        let LoadedScene { scene, base_dir, painted, .. } = self.loaded;
+        let mesh = geometry::build_painted(&scene.tile, base_dir, painted)?;
+        let (low, high) = mesh.z_range();
+        let flat = high - low <= 1e-7 * mesh.size.max_element();
+        let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
+        let steepest = steepest(&mesh);
+        Ok(TileShape { mesh, flat, height_field, steepest })
+    }
+}
+
+/// If no surface faces down, a point that blocks a direction also blocks every lower direction: one horizon is enough.
+fn nothing_faces_down(mesh: &TileMesh) -> bool {
+    (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
+}
+
+/// The largest angle between a normal and z [rad].
+fn steepest(mesh: &TileMesh) -> f32 {
+    let normals = (0..mesh.triangles.len()).into_par_iter().with_min_len(2048).map(|t| mesh.geometric_normal(t));
+    let cosines = normals.filter(|normal| *normal != Vec3::ZERO).map(|normal| normal.z);
+    cosines.reduce(|| 1.0, f32::min).clamp(-1.0, 1.0).acos()
+}
+
+/// Loads the material of each slot of a mesh.
+pub struct LoadMaterials<'a> {
+    loaded: &'a LoadedScene,
+    slots: &'a [String],
+    files: Vec<Key>,
+}
+
+impl<'a> LoadMaterials<'a> {
+    pub fn new(loaded: &'a LoadedScene, slots: &'a [String], env: &Env) -> Self {
+        let specs = loaded.scene.materials.iter().filter_map(|material| material.brdf.as_ref());
+        let paths = specs.flat_map(BrdfSpec::terms).filter_map(TermSpec::path);
+        let files = paths.map(|path| env.file_key(&loaded.base_dir, path)).collect();
+        Self { loaded, slots, files }
+    }
+}
+
+impl Stage for LoadMaterials<'_> {
+    type Output = MaterialAssignment;
+    const NAME: &'static str = "materials";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        hash_debug(key, "materials", &self.loaded.scene.materials);
+        hash_debug(key, "slots", &self.slots);
+        for file in &self.files {
+            key.key("file", file);
+        }
+    }
+
+    fn run(&self, env: &Env) -> Result<MaterialAssignment> {
+        let mut assignment = MaterialAssignment::default();
+        let mut loaded: Vec<Option<usize>> = Vec::new();
+        for slot in self.slots {
+            let found = self.loaded.scene.material_for_slot(slot)?;
+            if let Some(at) = loaded.iter().position(|index| *index == found.index) {
+                assignment.material_of_slot.push(at);
+                continue;
+            }
+            let brdf = Brdf::from_specs(found.brdf, &self.loaded.base_dir, &mut lock(&env.measured))?;
+            assignment.materials.push(Material { brdf, color: found.color });
+            loaded.push(found.index);
+            assignment.material_of_slot.push(assignment.materials.len() - 1);
+        }
+        Ok(assignment)
+    }
+}
+
+/// Samples the facets of a tile, in the order that sums need.
+pub struct SampleFacets<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub settings: &'a Settings,
+}
+
+impl Stage for SampleFacets<'_> {
+    type Output = Facets;
+    const NAME: &'static str = "facets";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        let Settings { facets, normal_bins, seed, preset, effects, .. } = self.settings;
+        key.key("tile", &self.tile.key).counts("count", [*facets]).counts("bins", *normal_bins);
+        key.numbers("seed", &[*seed]);
+        key.flags("ways", [*preset == Preset::Wu2011, effects.color_weights == Switch::Off]);
+    }
+
+    fn run(&self, _: &Env) -> Result<Facets> {
+        let (mesh, settings) = (&self.tile.mesh, self.settings);
+        let mut facets = if settings.preset == Preset::Wu2011 {
+            Facets::sample_wu2011(mesh, settings.facets, settings.seed)
+        } else {
+            FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
+        };
+        if let Some(bins) = settings.normal_bins {
+            facets.bin_normals(bins);
+        }
+        facets.sort_for_sums();
+        if settings.effects.color_weights == Switch::Off {
+            mean_colors(&mut facets);
+        }
+        Ok(facets)
+    }
+}

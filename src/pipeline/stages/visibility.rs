@@ -1,0 +1,112 @@
+//! Visibility of the facets, by the algorithm that the plan chose.
+
+use crate::base::Result;
+use crate::cache::KeyBuilder;
+use crate::geometry::{Facets, PeriodicGrid};
+use crate::pipeline::Env;
+use crate::pipeline::stage::{Codec, Keyed, Stage};
+use crate::plan::{Settings, VisibilityAlgorithm};
+use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility, visibility_maps_cpu};
+
+use super::TileShape;
+
+/// Computes which directions each facet sees.
+pub struct ComputeVisibility<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub facets: &'a Keyed<Facets>,
+    pub algorithm: VisibilityAlgorithm,
+    pub settings: &'a Settings,
+}
+
+impl Stage for ComputeVisibility<'_> {
+    type Output = Visibility;
+    const NAME: &'static str = "visibility";
+    const CODEC: Option<Codec<Visibility>> = Some(Codec::new("cached_visibility"));
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        let settings = self.settings;
+        key.key("tile", &self.tile.key).key("facets", &self.facets.key);
+        key.counts("algorithm", [self.algorithm as usize]);
+        key.counts("azimuths", [settings.horizon_azimuths, settings.slice_azimuths]);
+        key.numbers("penumbra", &[settings.penumbra]);
+        key.counts("maps", [settings.map_grid.rings, settings.map_grid.azimuths]);
+        key.numbers("texels", &[settings.map_resolution]);
+    }
+
+    fn run(&self, env: &Env) -> Result<Visibility> {
+        let (mesh, facets, settings) = (&self.tile.mesh, &**self.facets, self.settings);
+        let grid = || PeriodicGrid::for_slices(mesh).cancelled_by(&env.cancel);
+        let (azimuths, width) = (settings.horizon_azimuths, settings.penumbra);
+        Ok(match (self.algorithm, &mesh.height_grid) {
+            (VisibilityAlgorithm::None, _) => Visibility::Unblocked { facets: facets.len() },
+            (VisibilityAlgorithm::HeightMarch, Some(heights)) => {
+                Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, facets, azimuths, width))
+            }
+            (VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan, _) => {
+                Visibility::HorizonMap(HorizonMap::scan(&grid(), facets, azimuths, width))
+            }
+            (VisibilityAlgorithm::OcclusionIntervals, _) => Visibility::OcclusionIntervals(OcclusionIntervals::scan(
+                &grid(),
+                facets,
+                settings.slice_azimuths,
+                width,
+            )),
+            (VisibilityAlgorithm::GpuMaps | VisibilityAlgorithm::CpuMaps, _) => {
+                let (grid, resolution) = (settings.map_grid, settings.map_resolution);
+                let directions = grid.directions();
+                let gpu = env.gpu().filter(|_| self.algorithm == VisibilityAlgorithm::GpuMaps);
+                // If the GPU fails, the CPU computes the same maps.
+                let packed = gpu
+                    .and_then(|gpu| gpu.visibility_maps(mesh, facets, &directions, resolution, &env.cancel).ok())
+                    .unwrap_or_else(|| visibility_maps_cpu(mesh, facets, &directions, resolution));
+                Visibility::Maps(SoftMaps { grid, packed })
+            }
+        })
+    }
+
+    /// Maps from a GPU belong to that GPU, and take little time.
+    fn is_portable(&self) -> bool {
+        self.algorithm != VisibilityAlgorithm::GpuMaps
+    }
+
+    fn accepts(&self, visibility: &Visibility) -> bool {
+        visibility.facets() == self.facets.len()
+    }
+}
+
+/// Estimates the work of one slice of the mesh: cells and triangles that it visits.
+pub struct EstimateScanWork<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub facets: &'a Keyed<Facets>,
+}
+
+impl Stage for EstimateScanWork<'_> {
+    type Output = f64;
+    const NAME: &'static str = "scan_work";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("tile", &self.tile.key).key("facets", &self.facets.key);
+    }
+
+    fn run(&self, _: &Env) -> Result<f64> {
+        Ok(OcclusionIntervals::mean_steps(&PeriodicGrid::for_slices(&self.tile.mesh), &self.facets))
+    }
+}
+
+/// Builds the grid of cells with which the GPU cuts the mesh.
+pub struct BuildCells<'a> {
+    pub tile: &'a Keyed<TileShape>,
+}
+
+impl Stage for BuildCells<'_> {
+    type Output = PeriodicGrid;
+    const NAME: &'static str = "cells";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("tile", &self.tile.key);
+    }
+
+    fn run(&self, _: &Env) -> Result<PeriodicGrid> {
+        Ok(PeriodicGrid::new(&self.tile.mesh))
+    }
+}

@@ -1,0 +1,67 @@
+//! The choice of the algorithm that computes visibility.
+
+use super::{Costs, SceneFeatures, Settings, VisibilityMethod, is_on};
+
+/// An algorithm that computes visibility.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VisibilityAlgorithm {
+    /// Nothing is computed: a flat tile blocks nothing.
+    None,
+    /// A walk over the samples of a height-field.
+    HeightMarch,
+    /// Slices through the mesh of a surface without overhangs.
+    HorizonScan,
+    /// Slices through a mesh with overhangs: horizons, and intervals above them.
+    OcclusionIntervals,
+    /// Toroidal shadow maps on the CPU.
+    CpuMaps,
+    /// Toroidal shadow maps on a GPU.
+    GpuMaps,
+}
+
+impl VisibilityAlgorithm {
+    /// The algorithm for a scene. Under overhangs it is the one with the lower predicted cost.
+    pub(super) fn choose(features: &SceneFeatures, settings: &Settings, costs: &Costs) -> Self {
+        if !is_on(settings.effects.visibility, !features.flat && !is_shallow(features, settings)) {
+            return Self::None;
+        }
+        let maps = if features.hardware_gpu { Self::GpuMaps } else { Self::CpuMaps };
+        match settings.visibility_method {
+            VisibilityMethod::OcclusionIntervals => Self::OcclusionIntervals,
+            VisibilityMethod::Maps => maps,
+            VisibilityMethod::Auto if features.height_samples => Self::HeightMarch,
+            VisibilityMethod::Auto if features.height_field => Self::HorizonScan,
+            VisibilityMethod::Auto
+                if scan_ms(features, settings, costs) <= maps_ms(features, settings, costs)
+                    && !features.hardware_gpu =>
+            {
+                Self::OcclusionIntervals
+            }
+            VisibilityMethod::Auto => maps,
+        }
+    }
+}
+
+/// The part of the light on a level plane that comes from lower than the steepest slope. Nothing above that is ever blocked.
+pub(super) fn hidden_light(features: &SceneFeatures) -> f64 {
+    f64::from(features.steepest).sin().powi(2)
+}
+
+/// Returns true if occlusion can be left out within a quarter of the tolerance: nothing overhangs and no slope is steep. A
+/// direction above the steepest slope sees all of a height-field.
+fn is_shallow(features: &SceneFeatures, settings: &Settings) -> bool {
+    features.height_field && features.closes_plane && hidden_light(features) <= 0.25 * settings.tolerance
+}
+
+/// Predicted milliseconds of slices under overhangs: cells and triangles visited per facet and azimuth.
+pub(super) fn scan_ms(features: &SceneFeatures, settings: &Settings, costs: &Costs) -> f64 {
+    let slices = settings.facets as f64 * settings.slice_azimuths as f64;
+    slices * features.scan_work * costs.slice_ns * 1e-6 / costs.threads
+}
+
+/// Predicted milliseconds of shadow maps: triangles set up and texels covered per direction.
+pub(super) fn maps_ms(features: &SceneFeatures, settings: &Settings, costs: &Costs) -> f64 {
+    let texels = f64::from(settings.map_resolution).powi(2) * features.area_ratio;
+    let direction = features.triangles as f64 * costs.triangle_ns + texels * costs.texel_ns;
+    settings.map_grid.len() as f64 * direction * 1e-6 / costs.threads
+}
