@@ -1,10 +1,19 @@
-//! biscale: what does a surface with tiny structures look like from far away?
+//! biscale computes how a surface with tiny structures looks from a distance: the effective BRDF of a small tile that is
+//! repeated without end.
 //!
 //! ```text
-//! Scene (TOML) ─▶ EffectPlan ─▶ TileMesh ─▶ Facets ─▶ Visibility ─▶ Bvndf ─┐
-//!                     │                                                     ├▶ EffectiveBrdf ─▶ picture | table | plots
-//!                     └────────────▶ small-scale Brdf ─▶ RotatedBasis ─────┘
+//! Scene (TOML) ─▶ Plan ─▶ TileMesh ─▶ Facets ─▶ Visibility ─┐
+//!                   │                                       ├▶ EffectiveBrdf ─▶ image | table | plots
+//!                   └───────────▶ small-scale BRDFs ────────┘
 //! ```
+//! - [`scene::open`] reads a scene, [`plan::Plan::new`] decides which effects it calls for,
+//! - [`geometry::build`] builds the tile's mesh, [`geometry::FacetSampler`] samples its facets,
+//! - [`visibility::HorizonMap`] and [`visibility::OcclusionIntervals`] compute what each facet sees,
+//! - [`effective::Direct`], [`effective::LowRank`] and [`effective::Wu2011`] represent the effective BRDF,
+//! - [`pipeline::Pipeline::effective`] runs all of these and recomputes only what an edit changed,
+//! - [`render::render`] renders an object, [`export`] writes tables, [`reference`] checks them by ray casting.
+//!
+//! Modules are declared from the lowest layer to the highest; a module imports only from the layers above its line.
 #![allow(
     rustdoc::broken_intra_doc_links,
     rustdoc::private_intra_doc_links,
@@ -12,29 +21,39 @@
 )]
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "directions in tests are known not to be zero"))]
 
-pub mod app;
 pub mod base;
-pub mod brdf;
-pub mod cache;
-pub mod cli;
-pub mod diagnostics;
-pub mod effective;
-pub mod export;
-pub mod fit;
-pub mod geometry;
-pub mod gpu;
-pub mod interreflection;
 pub mod math;
 pub mod metrics;
-pub mod pipeline;
-pub mod plan;
-pub mod reference;
-pub mod render;
-pub mod report;
+pub mod cache;
+
 pub mod scene;
+pub mod brdf;
+pub mod geometry;
+pub mod visibility;
+pub mod interreflection;
+pub mod effective;
+
+pub mod reference;
+pub mod diagnostics;
+
+pub mod plan;
+pub mod pipeline;
+
+pub mod render;
+pub mod gpu;
+
+pub mod export;
+#[cfg(feature = "fit")]
+pub mod fit;
+pub mod tuning;
+pub mod report;
+
+#[cfg(feature = "cli")]
+pub mod cli;
+#[cfg(feature = "editor")]
+pub mod app;
+
 #[cfg(test)]
 mod testing;
-pub mod tuning;
-pub mod visibility;
 
 pub use base::{Cancel, Error, InputError, Progress, Result};

@@ -52,7 +52,7 @@ struct Vertex {
 // The start of the shadow rays of each point.
 @group(1) @binding(2) var<storage, read_write> origins: array<vec4f>;
 
-// Whether the origins are used.
+// True if the origins are used.
 override SHADOWED: bool = true;
 
 // SAME_NORMAL and SAME_TANGENT of shading_points.rs.

@@ -49,7 +49,7 @@ fn is_hit(blocker: Blocker, origin: vec3f, direction: vec3f) -> bool {
     return v >= 0.0 && u + v <= 1.0 && dot(blocker.edge_2, q) * inverse > 0.0;
 }
 
-// Whether a ray meets a node's box, by the slab test. The margin keeps flat boxes despite rounding.
+// Returns true if a ray meets a node's box, by the slab test. The margin keeps flat boxes despite rounding.
 fn is_entered(index: u32, origin: vec3f, inverse: vec3f) -> bool {
     let t_low = (nodes[index].low - origin) * inverse;
     let t_high = (nodes[index].high - origin) * inverse;

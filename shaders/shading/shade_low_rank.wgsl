@@ -5,17 +5,17 @@
 //!import polar_grid
 //!import tint_row
 
-// Whether any channel is a plain table (Lambertian), and whether any has a factor P.
+// True if any channel is a plain table (Lambertian), and if any channel has a factor P.
 override HAS_TABLES: bool = true;
 override HAS_FACTORS: bool = true;
 
 struct Grids {
-    // Of visibility: rings, azimuths, nodes.
+    // The grid of visibility: rings, azimuths, nodes.
     rings: u32,
     azimuths: u32,
     nodes: u32,
     channel_count: u32,
-    // Of half and difference angles: rings and azimuths of h, steps of θ_d and φ_d.
+    // The grid of half and difference angles: rings and azimuths of h, steps of θ_d and φ_d.
     pairs: vec4u,
     // Offset in p_factors of a_v(o) / cos θ_o, with one value per node of the visibility grid.
     first_area: u32,

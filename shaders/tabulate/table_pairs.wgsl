@@ -37,7 +37,7 @@ struct Task {
     row: u32,
     step: u32,
     half_vector: u32,
-    // Whether there is nothing to do: beyond the last node, and at mirror images.
+    // True if there is nothing to do: beyond the last node, and at mirror images.
     is_none: bool,
 }
 

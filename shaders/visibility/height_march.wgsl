@@ -1,5 +1,5 @@
-// Horizons of a height field: the twin of src/visibility/height_march.rs, which describes the algorithm. One thread
-// walks from one facet along one azimuth.
+// Computes the horizons of a height field: the twin of src/visibility/height_march.rs, which describes the algorithm.
+// One thread walks from one facet along one azimuth.
 
 //!import angles
 

@@ -7,8 +7,8 @@ fn above(elevation: f32, edge: f32) -> f32 {
     return clamp((elevation - edge) * sum.sharpness + 0.5, 0.0, 1.0);
 }
 
-// Horizons that differ by more than JUMP [rad] belong to different surfaces. There visibility switches between the
-// azimuths over 1/SWITCH of their distance. Both constants are those of src/math/simd/visibility.rs.
+// If two horizons differ by more than JUMP [rad], they belong to different surfaces. There visibility switches between
+// the azimuths over 1/SWITCH of their distance. Both constants are those of src/math/simd/visibility.rs.
 const JUMP: f32 = 0.1;
 const SWITCH: f32 = 6.0;
 

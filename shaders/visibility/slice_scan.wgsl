@@ -1,5 +1,5 @@
-// Horizons and overhangs along vertical slices of the tiling: the twin of src/visibility/scan.rs and slicer.rs, which
-// describe the algorithm. One thread walks from one facet along one azimuth.
+// Computes horizons and overhangs along vertical slices of the tiling: the twin of src/visibility/scan.rs and
+// slicer.rs, which describe the algorithm. One thread walks from one facet along one azimuth.
 
 //!import angles
 //!import slice_entry
@@ -38,10 +38,10 @@ struct Facet {
 @group(0) @binding(3) var<storage, read> facets: array<Facet>;
 // Unit vectors of the plane, one per azimuth.
 @group(0) @binding(4) var<storage, read> directions: array<vec2f>;
-// Horizons [rad], or the input of visibility_packed_intervals.wgsl; the azimuths of a facet are adjacent.
+// Output: horizons [rad], or the input of visibility_packed_intervals.wgsl. The azimuths of a facet are adjacent.
 @group(0) @binding(5) var<storage, read_write> output: array<u32>;
 
-// Whether overhangs are stored apart from the horizon.
+// True if overhangs are stored apart from the horizon.
 override OVERHANGS: bool = false;
 // If set, the output is the number of steps plus 2²⁰ times the number of triangles cut, for tests.
 override COUNTING: bool = false;
@@ -176,7 +176,7 @@ fn cut(k: u32, distances: vec3f, along: vec2f, eye: vec3f) -> vec2f {
     return vec2f(min(slopes.x, slopes.y), max(slopes.x, slopes.y));
 }
 
-// Whether the facet lies on this copy of its triangle. Other copies block it as any other surface does.
+// Returns true if the facet lies on this copy of its triangle. Other copies block it as any other surface does.
 fn lies_on(origin: vec3f, entry: Entry) -> bool {
     let a = vec3f(entry.a, entry.heights.x);
     let normal = cross(vec3f(entry.b, entry.heights.y) - a, vec3f(entry.c, entry.heights.z) - a);

@@ -2,8 +2,8 @@
 
 //!import slice_blend
 
-// Horizons [rad], with the azimuths of a facet adjacent; the first overhang of each slice, and the end of all;
-// the low and high ends of the overhangs [rad].
+// The horizon of each slice [rad], with the azimuths of a facet adjacent; the index of the first overhang of each
+// slice, and the end of all; the low and high ends of the overhangs [rad].
 @group(1) @binding(2) var<storage, read> slices: array<u32>;
 
 fn horizon_of(slice: u32) -> f32 {

@@ -2,8 +2,8 @@
 
 //!import slice_blend
 
-// Of each slice its horizon [rad] and its overhangs; the azimuths of a facet are adjacent. Both ends of an overhang are
-// in 65,535ths of HorizonMap::BLOCKED; 0 follows the last overhang.
+// For each slice, its horizon [rad] and its overhangs; the azimuths of a facet are adjacent. Both ends of an overhang
+// are in 65,535ths of HorizonMap::BLOCKED; 0 follows the last overhang.
 @group(1) @binding(2) var<storage, read> slices: array<u32>;
 
 const STORED_OVERHANGS: u32 = 4u;

@@ -36,11 +36,11 @@ impl Editor {
     /// Passes the point under the pointer to the lobe plot and the tile view.
     fn pick(&mut self) {
         let (Some(at), Some(preview)) = (self.object.pick_position, &self.object.preview) else { return };
-        let Some((mesh, lights)) = &preview.lit_object else { return };
+        let Some(scene) = &preview.lit_object else { return };
         let size = preview.image.size();
-        let Ok(view) = CameraView::new(&preview.camera, mesh, size) else { return };
+        let Ok(view) = CameraView::new(&preview.camera, scene.mesh(), size) else { return };
         let pixel = glam::Vec2::new(at.x * size[0] as f32, at.y * size[1] as f32);
-        if let Some(picked) = pick::pick(mesh, lights, &view, pixel) {
+        if let Some(picked) = pick::pick(scene.mesh(), &scene.lights().directional, &view, pixel) {
             self.lobe.viewer = Some(picked.viewer);
             self.lobe.light = picked.light.unwrap_or(self.lobe.light);
             let value = |brdf: &EffectiveBrdf| brdf.eval(self.lobe.light, picked.viewer).max_element();

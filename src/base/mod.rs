@@ -1,9 +1,10 @@
-//! Errors, cancellation, progress and files: the lowest layer, which all other modules may import.
+//! Errors, cancellation, progress, files and OBJ files: the lowest layer, which all other modules may import.
 
 pub mod atomic_file;
 mod cancel;
 mod error;
 mod gpu_error;
+pub mod obj;
 pub mod progress;
 
 pub use atomic_file::replace_file;

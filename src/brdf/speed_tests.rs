@@ -1,4 +1,4 @@
-//! Nanoseconds per BRDF evaluation: `cargo test --release --lib brdf::speed -- --ignored --nocapture`.
+//! Nanoseconds per BRDF evaluation.
 
 use std::f32::consts::TAU;
 use std::hint::black_box;
@@ -26,7 +26,7 @@ fn nanoseconds(items: usize, mut run: impl FnMut()) -> f64 {
 }
 
 #[test]
-#[ignore = "measures speed"]
+#[ignore = "a measurement: cargo bench --bench measure -- brdf"]
 fn nanoseconds_per_evaluation() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut direction = |max_theta: f32| from_angles(rng.random_range(0.0..max_theta), rng.random_range(0.0..TAU));
@@ -68,10 +68,10 @@ fn nanoseconds_per_evaluation() {
         if let Some(table) = term.measured() {
             let mut out = vec![Vec3::ZERO; facets.len()];
             let many = nanoseconds(facets.len(), || table.f_r_many(black_box(&facets), &mut out));
-            eprintln!("{:<24} f_r_many {many:.1} ns", table.name());
+            println!("{:<24} f_r_many {many:.1} ns", table.name());
         }
         let basis = super::ColorBasis::of(&brdf);
-        eprintln!(
+        println!(
             "{:<24} lobe_cos_many {many:5.2} ns, f_cos {near:5.1} ns (facets) {far:5.1} ns (random)  colours {:?} {:?}",
             term.measured().map_or_else(
                 || format!("{term:?}").split(' ').next().unwrap_or_default().to_owned(),

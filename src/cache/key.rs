@@ -52,6 +52,11 @@ impl KeyBuilder {
         self.numbers(name, &flags)
     }
 
+    /// Adds a value that prints everything it depends on. Floats print every digit that tells them apart.
+    pub fn debug(&mut self, name: &str, value: &impl std::fmt::Debug) -> &mut Self {
+        self.numbers(name, format!("{value:?}").as_bytes())
+    }
+
     /// Adds the key of an input.
     pub fn key(&mut self, name: &str, key: &Key) -> &mut Self {
         self.numbers(name, &key.0)

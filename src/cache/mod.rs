@@ -32,8 +32,8 @@ pub use self::store::Usage;
 /// Largest total size of all files, in bytes.
 pub const MAX_BYTES: u64 = 512 << 20;
 
-/// Shortest computation whose result is written. Reading a result takes some milliseconds (`cargo test --release --lib
-/// costs_of_caching -- --ignored --nocapture`).
+/// Shortest computation whose result is written. Reading a result takes some milliseconds (`cargo bench --bench measure --
+/// cache-costs`).
 const MIN_DURATION: Duration = Duration::from_millis(100);
 
 /// A folder of results, or none. Clones share the folder. The default stores nothing.

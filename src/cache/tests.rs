@@ -250,7 +250,7 @@ fn a_read_only_file_is_read() {
 }
 
 #[test]
-#[ignore = "prints times: cargo test --release --lib costs_of_caching -- --ignored --nocapture"]
+#[ignore = "a measurement: cargo bench --bench measure -- cache-costs"]
 fn costs_of_caching() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::of_everything(folder.path(), MAX_BYTES);

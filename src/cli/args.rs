@@ -1,56 +1,58 @@
-//! The arguments of every subcommand.
+//! Arguments of the subcommands.
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-/// What does a surface with tiny structures look like from far away?
+/// Compute how a surface with tiny structures looks from far away.
 #[derive(Debug, Parser)]
 #[command(name = "biscale", version, about, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Opens the editor on this scene: a file, or the name of a shipped one.
+    /// Scene to open in the editor: a file, or the name of a shipped scene.
     pub scene: Option<String>,
 }
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Open the editor (also without this word).
+    /// Open the editor, as the program does without a command.
     Edit {
-        /// A scene file, or the name of a shipped material.
+        /// A scene file, or the name of a shipped scene.
         scene: Option<String>,
-        /// Say on standard error when the window, its device and the first picture were there, from the start of the program,
-        /// and quit.
+        /// Print on standard error the milliseconds from the start of the program to the window, the GPU and the first
+        /// image; then quit.
         #[arg(long)]
         start_times: bool,
     },
-    /// Shade the scene's object and write a picture (.png or linear .exr).
+    /// Render the scene's object as an image (.png or linear .exr).
     Render(RenderArgs),
-    /// Evaluate f̄ [1/sr] (the light's cosine included) at direction pairs of a CSV file.
+    /// Evaluate the effective BRDF [1/sr], with the light's cosine, at the direction pairs of a CSV file.
     Eval(EvalArgs),
-    /// Write the effective BRDF as a table, by the file's ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
+    /// Write the effective BRDF as a table. The ending selects the format: .npz .csv .exr .bsdf .binary .xml .bin
+    /// .astm.
     Export(ExportArgs),
-    /// Fit Lambertian + Cook-Torrance and a GGX base, say what they lose, and write glTF, MaterialX or a picture of it.
+    /// Fit Lambertian + Cook-Torrance and a GGX base, print their errors, and write glTF, MaterialX or an image.
     Fit(FitArgs),
-    /// Write the tile itself: .obj, .stl (closed, millimetres), .png (16-bit heights), .svg or .pdf (a pattern to fold).
+    /// Write the tile itself: .obj, .stl (closed, in millimetres), .png (16-bit heights), .svg or .pdf (a pattern to
+    /// fold).
     Tile(TileArgs),
-    /// List every effect: on or off, why, and what it costs.
+    /// List every effect: whether it is on, why, and its cost.
     Plan(PlanArgs),
-    /// Factor every material's rotated BRDF and list the sizes (Table 3 of Wu et al. 2011).
+    /// Factor the rotated BRDF of every material and list its size and rank (Table 3 of Wu et al. 2011).
     Basis(SceneArgs),
-    /// Time the stages from an edit to the effective BRDF (or the picture).
+    /// Time the stages from an edit to the effective BRDF or the image.
     Profile(ProfileArgs),
-    /// Measure accuracy against time: every knob, the presets, and combinations, against the reference.
+    /// Measure accuracy against time for every setting, the presets and combinations of settings.
     Report(ReportArgs),
-    /// Say what is kept on disk between runs, and where; or remove it.
+    /// Show the results that are cached on disk, and their folder; or remove them.
     Cache(CacheArgs),
-    /// List the materials that ship with the program.
+    /// List the scenes that ship with the program.
     Materials(MaterialsArgs),
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Quality {
+pub enum QualityArg {
     Draft,
     Standard,
     Fine,
@@ -59,7 +61,7 @@ pub enum Quality {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Backend {
+pub enum BackendArg {
     Auto,
     Gpu,
     Cpu,
@@ -67,33 +69,33 @@ pub enum Backend {
 
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A scene file, or the name of a shipped material (see `biscale materials`).
+    /// A scene file, or the name of a shipped scene (see `biscale materials`).
     pub scene: String,
-    /// Override any field: `--set material.default.brdf.roughness=0.3` (repeatable).
+    /// Override any field of the scene: `--set material.default.brdf.roughness=0.3` (repeatable).
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     pub set: Vec<String>,
     /// Preset of accuracy and cost.
     #[arg(long)]
-    pub quality: Option<Quality>,
+    pub quality: Option<QualityArg>,
     /// Force an effect of the plan on or off: `--effect interreflection=on` (repeatable).
     #[arg(long = "effect", value_name = "NAME=on|off|auto", value_parser = super::parse_effect)]
     pub effects: Vec<String>,
-    /// Choose the cheapest settings whose PSNR against a reference of the scene reaches so many decibels.
+    /// Choose the cheapest settings whose PSNR against a reference of the scene reaches X dB.
     #[arg(long, value_name = "X", value_parser = super::parse_positive)]
     pub target_db: Option<f64>,
-    /// Choose the best settings within so many milliseconds from an edit of the geometry to the effective BRDF.
+    /// Choose the best settings that take at most Y ms from an edit of the geometry to the effective BRDF.
     #[arg(long, value_name = "Y", value_parser = super::parse_positive, conflicts_with = "target_db")]
     pub budget_ms: Option<f64>,
-    /// Where to compute.
+    /// Processor that computes: the CPU or a GPU.
     #[arg(long)]
-    pub backend: Option<Backend>,
+    pub backend: Option<BackendArg>,
     /// Seed of all sampling.
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Machine-readable output on standard output.
+    /// Print a machine-readable report on standard output.
     #[arg(long)]
     pub json: bool,
-    /// No notes on standard error.
+    /// Print no notes and no progress on standard error.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -102,7 +104,8 @@ pub struct SceneArgs {
 pub struct PlanArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Also force each effect on and off: milliseconds, and what it changes in f̄ and in the picture.
+    /// Also force each effect on and off, and print its milliseconds and the change of the effective BRDF and of the
+    /// image.
     #[arg(long)]
     pub measure: bool,
 }
@@ -112,14 +115,14 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     #[command(flatten)]
-    pub keeping: KeepingArgs,
-    /// The picture to write: .png (tone-mapped) or .exr (linear).
+    pub caching: CachingArgs,
+    /// Image to write: .png (tone-mapped) or .exr (linear).
     #[arg(short, long)]
     pub output: PathBuf,
     /// Width and height in pixels.
     #[arg(long, default_value = "768x768", value_parser = super::parse_size)]
     pub size: [usize; 2],
-    /// Samples a pixel side at edges.
+    /// Samples per pixel side at edges.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=8))]
     pub samples: u8,
 }
@@ -129,14 +132,14 @@ pub struct EvalArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     #[command(flatten)]
-    pub keeping: KeepingArgs,
-    /// CSV with the header theta_i,phi_i,theta_o,phi_o (radians); `-` is standard input.
+    pub caching: CachingArgs,
+    /// CSV file with the header theta_i,phi_i,theta_o,phi_o (radians); `-` is standard input.
     #[arg(long)]
     pub pairs: PathBuf,
-    /// CSV to write; `-` is standard output.
+    /// CSV file to write; `-` is standard output.
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Also write the columns se_r,se_g,se_b: the standard error (at `reference`; zero elsewhere).
+    /// Also write the columns se_r,se_g,se_b: the standard error, which is zero unless the quality is `reference`.
     #[arg(long)]
     pub standard_error: bool,
 }
@@ -146,30 +149,31 @@ pub struct ExportArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     #[command(flatten)]
-    pub keeping: KeepingArgs,
-    /// The table to write; the ending chooses the format. `-` is standard output (CSV).
+    pub caching: CachingArgs,
+    /// Table to write. The ending selects the format. `-` is standard output (CSV).
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Steps of theta and phi for each direction; without it, what suits the format.
+    /// Steps of theta and phi for both directions. The default depends on the format.
     #[arg(long, value_name = "THETAxPHI", value_parser = super::parse_size)]
     pub resolution: Option<[usize; 2]>,
-    /// The same for the second direction alone (in .bsdf: samples along the two axes of each warp).
+    /// Steps of theta and phi for the second direction alone. In .bsdf: samples along the two axes of each warp.
     #[arg(long, value_name = "THETAxPHI", value_parser = super::parse_size)]
     pub resolution_o: Option<[usize; 2]>,
-    /// What a Radiance .xml holds: 145 x 145 patches, or a tensor tree for what is sharp or anisotropic.
-    #[arg(long, value_enum, default_value_t = Radiance::Klems)]
-    pub radiance: Radiance,
+    /// Content of a Radiance .xml: 145 x 145 patches, or a tensor tree for sharp or anisotropic BRDFs.
+    #[arg(long, value_enum, default_value_t = RadianceArg::Klems)]
+    pub radiance: RadianceArg,
 }
 
 #[derive(Debug, Args)]
 pub struct FitArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Files to write, by ending (repeatable): .gltf and .mtlx (the GGX base), .json (all numbers), .png or .exr (the object
-    /// in the effective BRDF, in the Cook-Torrance and in the GGX fit; under them the differences).
+    /// File to write (repeatable). The ending selects the content: .gltf and .mtlx (the GGX base), .json (all numbers),
+    /// .png or .exr (the object in the effective BRDF, in the Cook-Torrance and in the GGX fit; the differences are
+    /// below them).
     #[arg(short, long)]
     pub output: Vec<PathBuf>,
-    /// Width and height of each of the pictures.
+    /// Width and height in pixels of each part of the image.
     #[arg(long, default_value = "384x384", value_parser = super::parse_size)]
     pub size: [usize; 2],
 }
@@ -178,31 +182,31 @@ pub struct FitArgs {
 pub struct TileArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// The file to write; the ending chooses what.
+    /// File to write. The ending selects the format.
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Periods in x and y.
+    /// Number of periods in x and y.
     #[arg(long, default_value = "1x1", value_parser = super::parse_size)]
     pub repeat: [usize; 2],
-    /// Enlarges what is made of matter (.stl, .svg, .pdf): 20 makes a tile unit of 1 mm 20 mm long.
+    /// Scale of physical models (.stl, .svg, .pdf): with 20, a tile unit of 1 mm is 20 mm long.
     #[arg(long, default_value_t = 1.0)]
     pub scale: f32,
-    /// Thickness under the lowest point of the .stl, in millimetres; without it a tenth of the longer side.
+    /// Thickness under the lowest point of the .stl, in millimetres. The default is a tenth of the longer side.
     #[arg(long, value_name = "MM")]
     pub base: Option<f32>,
-    /// Samples of a period's heights (.stl, .png).
+    /// Height samples per period in x and y (.stl, .png).
     #[arg(long, default_value = "256x256", value_parser = super::parse_size)]
     pub samples: [usize; 2],
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Radiance {
+pub enum RadianceArg {
     Klems,
     TensorTree,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Edit {
+pub enum EditArg {
     Geometry,
     Brdf,
     Color,
@@ -213,16 +217,16 @@ pub enum Edit {
 pub struct ProfileArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// What is edited; without it everything is computed from nothing.
+    /// Parameter to edit. Without this option, every run computes everything.
     #[arg(long)]
-    pub edit: Option<Edit>,
-    /// From the edit to the picture, which stays on the device where that makes it.
+    pub edit: Option<EditArg>,
+    /// Time from the edit to the image. An image that the GPU computes stays on the GPU.
     #[arg(long = "picture", requires = "edit")]
     pub image: bool,
-    /// Width and height in pixels of that picture and of that of `--edit camera`.
+    /// Width and height in pixels of the image of `--picture` and of `--edit camera`.
     #[arg(long, default_value = "384x384", value_parser = super::parse_size)]
     pub size: [usize; 2],
-    /// Timed runs after one warm-up; medians are printed.
+    /// Number of timed runs after one warm-up run. The medians are printed.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
 }
@@ -232,47 +236,47 @@ pub struct ReportArgs {
     /// Scene files, or names of shipped materials.
     #[arg(required = true)]
     pub scenes: Vec<String>,
-    /// The folder for report.html, report.csv and report.json. A run that was broken off goes on from what is there.
+    /// Folder for report.html, report.csv and report.json. An interrupted run continues from the files in it.
     #[arg(short, long)]
     pub output: PathBuf,
     /// Override any field of each scene: `--set material.default.brdf.roughness=0.3` (repeatable).
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     pub set: Vec<String>,
-    /// Minutes a scene; presets are always measured.
+    /// Minutes per scene. The presets are always measured.
     #[arg(long, default_value_t = 5.0, value_parser = super::parse_minutes)]
     pub minutes: f64,
-    /// Direction pairs that errors are taken over.
+    /// Number of direction pairs over which errors are computed.
     #[arg(long, default_value_t = 500, value_parser = super::parse_count)]
     pub pairs: usize,
-    /// Settings with all knobs turned at once.
+    /// Number of candidates that vary all settings at once.
     #[arg(long, default_value_t = 40)]
     pub combinations: usize,
-    /// No progress and no notes on standard error.
+    /// Print no progress and no notes on standard error.
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// Of commands that keep what took long to make.
+/// Arguments of commands that use the cache.
 #[derive(Debug, Args)]
-pub struct KeepingArgs {
-    /// Make everything anew, and keep nothing of it (see `biscale cache`).
+pub struct CachingArgs {
+    /// Compute everything, and neither read nor write the cache (see `biscale cache`).
     #[arg(long)]
     pub no_cache: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct CacheArgs {
-    /// Remove all that was kept.
+    /// Remove all cached results.
     #[arg(long)]
     pub clear: bool,
-    /// Machine-readable output.
+    /// Print a machine-readable report.
     #[arg(long)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct MaterialsArgs {
-    /// Machine-readable output.
+    /// Print a machine-readable report.
     #[arg(long)]
     pub json: bool,
 }

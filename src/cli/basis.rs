@@ -1,4 +1,4 @@
-//! `biscale basis`: the rotated basis of each material, in the columns of the paper's Table 3.
+//! `biscale basis` prints size and rank of each material's rotated basis, in the columns of the paper's Table 3.
 
 use std::io::Write;
 use std::time::Instant;
@@ -32,14 +32,15 @@ struct Row {
     material: String,
     rows: usize,
     columns: usize,
-    /// M in f64, as the paper counts it.
+    /// Size of M with f64 elements, as the paper counts it.
     full_mb: f64,
-    kept_mb: f64,
+    #[serde(rename = "kept_mb")]
+    final_mb: f64,
     rank: usize,
     seconds: f64,
-    /// Energy (squared norm) that `rank` keeps.
+    /// Part of the energy (squared norm) that the factors of `rank` represent.
     kept_energy: f64,
-    /// Rank at 0.98² of the energy: 98 % of the norm, where the paper's Table 3 agrees.
+    /// Rank at 0.98² of the energy, which is 98 % of the norm. The ranks of the paper's Table 3 match this rule.
     rank_at_98_percent_norm: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     paper: Option<Paper>,
@@ -50,7 +51,8 @@ struct Paper {
     rows: usize,
     columns: usize,
     full_mb: f64,
-    kept_mb: f64,
+    #[serde(rename = "kept_mb")]
+    final_mb: f64,
     rank: usize,
     seconds: f64,
 }
@@ -61,8 +63,8 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     let mut cache = MeasuredCache::default();
     let mut rows = Vec::new();
     let specs: Vec<(String, crate::scene::BrdfSpec)> = if loaded.scene.materials.is_empty() {
-        let grey = loaded.scene.material_for_slot("default")?;
-        vec![(grey.name.to_owned(), grey.brdf.clone())]
+        let default = loaded.scene.material_for_slot("default")?;
+        vec![(default.name.to_owned(), default.brdf.clone())]
     } else {
         let spec = |material: &crate::scene::MaterialSpec| -> Result<_> {
             Ok((material.name.clone(), loaded.scene.material_for_slot(&material.name)?.brdf.clone()))
@@ -92,7 +94,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
                 rows: row.1,
                 columns: row.2,
                 full_mb: row.3,
-                kept_mb: row.4,
+                final_mb: row.4,
                 rank: row.5,
                 seconds: row.6,
             }),
@@ -100,7 +102,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
             rows: pairs,
             columns,
             full_mb: (pairs * columns * 8) as f64 / MIB,
-            kept_mb: bases.iter().map(RotatedBasis::bytes).sum::<usize>() as f64 / MIB,
+            final_mb: bases.iter().map(RotatedBasis::bytes).sum::<usize>() as f64 / MIB,
             rank: bases.iter().map(|basis| basis.rank).sum(),
             seconds,
             kept_energy: bases.iter().map(|basis| basis.kept_energy).fold(1.0, f64::min),
@@ -114,7 +116,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     writeln!(
         out,
         "{:<24} {:>9} {:>8} {:>10} {:>8} {:>6} {:>8} {:>9}   (the paper: rows, columns, MB, final MB, rank, seconds)",
-        "material", "rows", "columns", "full MB", "kept MB", "rank", "rank98", "seconds"
+        "material", "rows", "columns", "full MB", "final MB", "rank", "rank98", "seconds"
     )?;
     for row in rows {
         write!(
@@ -124,14 +126,14 @@ pub fn run(args: &SceneArgs) -> Result<()> {
             row.rows,
             row.columns,
             row.full_mb,
-            row.kept_mb,
+            row.final_mb,
             row.rank,
             row.rank_at_98_percent_norm,
             row.seconds
         )?;
         match row.paper {
             Some(p) => {
-                writeln!(out, "   ({} {} {} {} {} {})", p.rows, p.columns, p.full_mb, p.kept_mb, p.rank, p.seconds)?
+                writeln!(out, "   ({} {} {} {} {} {})", p.rows, p.columns, p.full_mb, p.final_mb, p.rank, p.seconds)?
             }
             None => writeln!(out)?,
         }

@@ -1,4 +1,4 @@
-//! `biscale cache`: what is kept between runs.
+//! `biscale cache` shows or removes the results that are cached on disk.
 
 use std::io::Write;
 
@@ -7,36 +7,37 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::print_json;
-use super::{CacheArgs, KeepingArgs};
+use super::{CacheArgs, CachingArgs};
 
-impl KeepingArgs {
-    /// The person's cache, unless they want none.
+impl CachingArgs {
+    /// Opens the user's cache, or none with `--no-cache`.
     pub fn open(&self) -> Cache {
         if self.no_cache { Cache::off() } else { open() }
     }
 }
 
-/// The person's cache.
+/// Opens the user's cache. It is off if there is no folder for it.
 pub fn open() -> Cache {
     default_folder(|name| std::env::var_os(name)).map_or_else(Cache::off, |folder| Cache::at(&folder))
 }
 
-/// Waits for what is still being written, and says if it could not be.
+/// Waits until the cache is written, and prints a note if writing failed.
 pub fn finish(cache: &Cache, quiet: bool) {
-    if let (Some(trouble), false) = (cache.finish(), quiet) {
-        eprintln!("note: nothing could be kept for the next time: {trouble}");
+    if let (Some(error), false) = (cache.finish(), quiet) {
+        eprintln!("note: the results could not be cached: {error}");
     }
 }
 
 #[derive(Serialize)]
 struct Report {
-    /// Null where nothing is kept.
+    /// Null if the cache is off.
     folder: Option<String>,
     files: usize,
     bytes: u64,
-    /// More than these are never kept.
-    most_bytes: u64,
-    /// What `--clear` removed.
+    /// Largest size of the folder.
+    #[serde(rename = "most_bytes")]
+    max_bytes: u64,
+    /// Files that `--clear` removed.
     removed: Usage,
 }
 
@@ -45,13 +46,13 @@ pub fn run(args: &CacheArgs) -> Result<()> {
     let removed = if args.clear { cache.clear() } else { Usage::default() };
     let Usage { files, bytes } = cache.usage();
     let folder = cache.folder().map(|folder| folder.display().to_string());
-    let report = Report { folder, files, bytes, most_bytes: MAX_BYTES, removed };
+    let report = Report { folder, files, bytes, max_bytes: MAX_BYTES, removed };
     if args.json {
         return print_json(&report);
     }
     let mut out = std::io::stdout().lock();
     let Some(folder) = report.folder else {
-        writeln!(out, "nothing is kept: BISCALE_CACHE is `off`, or there is no folder for it")?;
+        writeln!(out, "nothing is cached: BISCALE_CACHE is `off`, or there is no folder for the cache")?;
         return Ok(());
     };
     if args.clear {

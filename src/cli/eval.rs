@@ -1,4 +1,4 @@
-//! `biscale eval`: f̄ at the direction pairs of a file.
+//! `biscale eval` evaluates f̄ at the direction pairs of a file.
 
 use std::fmt::Write as _;
 use std::io::{Read, Write};
@@ -19,12 +19,12 @@ use serde::Serialize;
 use super::EvalArgs;
 use super::{cache, print_json};
 
-/// Longer lists are no lists of pairs.
+/// Largest size of a file of pairs [bytes]. A longer file is read up to this size.
 const MAX_FILE: u64 = 1 << 30;
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
 
-/// One line of the file.
+/// Angles of one line of the file [rad].
 struct Row {
     angles: [f64; 4],
 }
@@ -34,11 +34,11 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let rows = read(&args.pairs)?;
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
     let settings = Settings::from_quality(&loaded.scene.quality);
-    let cache = args.keeping.open();
+    let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
     let health;
-    let mut form = "reference sum".to_owned();
+    let mut representation = "reference sum".to_owned();
     let (values, errors) = if settings.preset == Preset::Reference {
         let reference = ReferenceSettings {
             facets: settings.reference_facets,
@@ -62,7 +62,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         let outcome = pipeline.effective(&loaded)?;
         args.scene.notes(&outcome);
         health = outcome.health().clone();
-        form = outcome.brdf.representation.describe();
+        representation = outcome.brdf.representation.describe();
         let values: Vec<Vec3> = pairs
             .par_iter()
             .map(|pair| {
@@ -91,21 +91,22 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     crate::base::replace_file(&args.output, text.as_bytes())?;
     if args.scene.json {
         let output = args.output.display().to_string();
-        return print_json(&Report { output, pairs: values.len(), form, health });
+        return print_json(&Report { output, pairs: values.len(), representation, health });
     }
     Ok(())
 }
 
-/// What `--json` prints where standard output does not hold the values themselves.
+/// JSON that `--json` prints if the values go to a file.
 #[derive(Serialize)]
 struct Report {
     output: String,
     pairs: usize,
-    form: String,
+    #[serde(rename = "form")]
+    representation: String,
     health: Health,
 }
 
-/// A bar on a terminal, nothing in a pipe.
+/// A progress bar over reference passes. It is drawn on terminals only.
 fn progress(passes: usize, quiet: bool) -> indicatif::ProgressBar {
     if quiet {
         return indicatif::ProgressBar::hidden();
@@ -123,7 +124,7 @@ impl Row {
     fn pair(&self) -> Pair {
         let [theta_i, phi_i, theta_o, phi_o] = self.angles;
         let direction = |theta: f64, phi: f64| -> Vec3 {
-            // Exactly at or under the horizon stays there, whatever the rounding of a cosine.
+            // Rounding must not lift a direction that is at or below the horizon.
             if theta.abs() >= std::f64::consts::FRAC_PI_2 {
                 return from_angles(theta as f32, phi as f32).with_z(0.0);
             }

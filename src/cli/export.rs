@@ -1,4 +1,4 @@
-//! `biscale export`: the effective BRDF as a table.
+//! `biscale export` writes the effective BRDF as a table.
 
 use std::path::Path;
 
@@ -8,40 +8,41 @@ use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use anyhow::Result;
 use serde::Serialize;
 
-use super::{ExportArgs, Radiance};
-use super::{bar, cache, print_json, showing};
+use super::{ExportArgs, RadianceArg};
+use super::{cache, print_json, progress_bar, progress_on};
 
-/// Relative L2 of reading a table back at which hardly anything of its lobes is right.
-const MAX_LOST: f64 = 0.5;
+/// Relative L2 of a table that is read back, above which its lobes are mostly wrong.
+const MAX_RESAMPLING_ERROR: f64 = 0.5;
 
 #[derive(Serialize)]
 struct Report<'a> {
     output: String,
-    /// The file of plain words beside it.
+    /// The text file beside the table.
     note: Option<String>,
     pairs: usize,
     bytes: u64,
     /// Mean of `|read - eval|` over the mean of `eval`.
     resampling_mean: f64,
     resampling_rel_l2: f64,
-    /// Null where the table reads without error.
+    /// Null if the table is read without error.
     resampling_psnr_db: f64,
-    /// Relative L2 between azimuths that an isotropic format has lost.
+    /// Relative L2 between the azimuths that an isotropic format averages.
     anisotropy_lost: Option<f64>,
-    form: String,
-    /// Directional-hemispherical: theta and phi in degrees, R, G, B.
+    #[serde(rename = "form")]
+    representation: String,
+    /// Directional-hemispherical reflectances: theta and phi in degrees, then R, G, B.
     reflectance: Vec<[f32; 5]>,
     health: &'a Health,
 }
 
 pub fn run(args: &ExportArgs) -> Result<()> {
-    let streams = args.output == Path::new("-");
-    if !streams {
-        // Before the long work.
+    let to_stdout = args.output == Path::new("-");
+    if !to_stdout {
+        // A wrong ending is rejected before the table is computed.
         export::check_ending(&args.output)?;
     }
     let loaded = args.scene.open()?;
-    let cache = args.keeping.open();
+    let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
     let outcome = pipeline.effective(&loaded)?;
@@ -50,14 +51,14 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let options = ExportOptions {
         resolution: resolution(args),
         radiance: match args.radiance {
-            Radiance::Klems => RadianceBasis::Klems,
-            Radiance::TensorTree => RadianceBasis::TensorTree,
+            RadianceArg::Klems => RadianceBasis::Klems,
+            RadianceArg::TensorTree => RadianceBasis::TensorTree,
         },
     };
-    let bar = bar("tabulating", args.scene.quiet);
-    let progress = showing(&bar);
-    if streams {
-        // Standard output holds the table itself then.
+    let bar = progress_bar("tabulating", args.scene.quiet);
+    let progress = progress_on(&bar);
+    if to_stdout {
+        // Standard output holds the table, so nothing else is printed there.
         export::write_csv(&outcome.brdf, &meta, &options, &mut std::io::stdout().lock(), &progress)?;
         bar.finish_and_clear();
         cache::finish(&cache, args.scene.quiet);
@@ -69,8 +70,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     cache::finish(&cache, args.scene.quiet);
     let reading = report.reading;
     let mut health = outcome.health().clone();
-    if !(0.0..=MAX_LOST).contains(&reading.errors.rel_l2) {
-        let warning = "the table misses most of the highlights: raise --resolution, or the roughness, or choose a format that follows \
+    if !(0.0..=MAX_RESAMPLING_ERROR).contains(&reading.errors.rel_l2) {
+        let warning = "the table misses most of the highlights: raise --resolution or the roughness, or choose a format that adapts to \
                        lobes (.bsdf, --radiance tensor-tree)"
             .to_owned();
         if !args.scene.quiet {
@@ -88,14 +89,15 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             resampling_rel_l2: reading.errors.rel_l2,
             resampling_psnr_db: reading.errors.psnr_db,
             anisotropy_lost: report.anisotropy_lost,
-            form: outcome.brdf.representation.describe(),
+            representation: outcome.brdf.representation.describe(),
             health: &health,
             reflectance: report.reflectances.rows(),
         });
     }
     if !args.scene.quiet {
         eprintln!(
-            "{} pairs, {} bytes; read back they differ from eval by {:.1} % in the mean, {:.1} % ({:.1} dB) in relative L2",
+            "{} pairs, {} bytes; the table differs from eval by {:.1} % in the mean and {:.1} % ({:.1} dB) in \
+             relative L2",
             report.pairs,
             report.bytes,
             100.0 * reading.mean,
@@ -104,20 +106,20 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         );
         if let Some(lost) = report.anisotropy_lost {
             eprintln!(
-                "the format is isotropic: {:.1} % (relative L2) between azimuths of the tile are lost",
+                "the format is isotropic: differences of {:.1} % (relative L2) between azimuths of the tile are lost",
                 100.0 * lost
             );
         }
         eprintln!("directional-hemispherical reflectance (R G B):");
         report.reflectances.lines().iter().for_each(|line| eprintln!("  {line}"));
         if let Some(note) = &report.note {
-            eprintln!("conventions and more in {}", note.display());
+            eprintln!("{} describes the conventions and the scene", note.display());
         }
     }
     Ok(())
 }
 
-/// What was asked for: `--resolution` for both sides, `--resolution-o` for the other one.
+/// The requested resolution: `--resolution` for both directions, `--resolution-o` for the second one alone.
 fn resolution(args: &ExportArgs) -> Option<ExportResolution> {
     let [theta, phi] = args.resolution.or(args.resolution_o)?;
     let [theta_o, phi_o] = args.resolution_o.unwrap_or([theta, phi]);

@@ -1,4 +1,4 @@
-//! `biscale fit`: the best few parameters for pipelines without tables, and what they lose.
+//! `biscale fit` approximates the effective BRDF by analytic models and prints their errors.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::FitArgs;
-use super::{bar, print_json, showing};
+use super::{print_json, progress_bar, progress_on};
 
 #[derive(Serialize)]
 struct Report {
@@ -24,9 +24,9 @@ struct Report {
     psnr_db: f64,
     roughness: [f32; 2],
     rotation_rad: f32,
-    /// Fresnel's factor of the lobe at grazing angles.
+    /// Fresnel factor of the lobe at grazing angles.
     edge: f32,
-    /// Linear RGB of each weight.
+    /// Weights by name, in linear RGB.
     weights: serde_json::Map<String, serde_json::Value>,
     seconds: f64,
 }
@@ -42,24 +42,25 @@ pub fn run(args: &FitArgs) -> Result<()> {
     let mut reports = Vec::new();
     for model in Model::ALL {
         let start = std::time::Instant::now();
-        let bar = bar("fitting", args.scene.quiet);
-        let found = fit::fit(&outcome.brdf, model, &showing(&bar));
+        let bar = progress_bar("fitting", args.scene.quiet);
+        let fitted = fit::fit(&outcome.brdf, model, &progress_on(&bar));
         bar.finish_and_clear();
-        let found = found?;
-        reports.push(report(&found, start.elapsed().as_secs_f64()));
-        fits.push(found);
+        let fitted = fitted?;
+        reports.push(report(&fitted, start.elapsed().as_secs_f64()));
+        fits.push(fitted);
     }
-    // What files for others hold is the last model, the GGX base.
+    // The files for other programs hold the last model, the GGX base.
     let Some(base) = fits.last() else { return Ok(()) };
     for path in &args.output {
         match kind(path)? {
-            Kind::Gltf => replace_file(path, fit::gltf(base, &loaded.name).as_bytes())?,
-            Kind::MaterialX => replace_file(path, fit::materialx(base, &loaded.name).as_bytes())?,
-            Kind::Json => replace_file(path, format!("{:#}\n", serde_json::to_value(&reports)?).as_bytes())?,
-            Kind::Image => {
-                let stage = RenderScene::new(&loaded)?;
+            OutputKind::Gltf => replace_file(path, fit::gltf(base, &loaded.name).as_bytes())?,
+            OutputKind::MaterialX => replace_file(path, fit::materialx(base, &loaded.name).as_bytes())?,
+            OutputKind::Json => replace_file(path, format!("{:#}\n", serde_json::to_value(&reports)?).as_bytes())?,
+            OutputKind::Image => {
+                let render_scene = RenderScene::new(&loaded)?;
                 let materials: [&dyn Reflectance; 3] = [&*outcome.brdf, &fits[0], &fits[1]];
-                side_by_side(&stage, &materials, args.size)?.write(path, &ToneMap::new(&stage.camera)?)?;
+                let tone_map = ToneMap::new(&render_scene.camera)?;
+                side_by_side(&render_scene, &materials, args.size)?.write(path, &tone_map)?;
             }
         }
     }
@@ -99,20 +100,21 @@ fn report(fit: &Fit, seconds: f64) -> Report {
     }
 }
 
-enum Kind {
+/// Content of an output file.
+enum OutputKind {
     Gltf,
     MaterialX,
     Json,
     Image,
 }
 
-fn kind(path: &Path) -> Result<Kind, Error> {
+fn kind(path: &Path) -> Result<OutputKind, Error> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     Ok(match ending.as_str() {
-        "gltf" => Kind::Gltf,
-        "mtlx" => Kind::MaterialX,
-        "json" => Kind::Json,
-        "png" | "exr" => Kind::Image,
+        "gltf" => OutputKind::Gltf,
+        "mtlx" => OutputKind::MaterialX,
+        "json" => OutputKind::Json,
+        "png" | "exr" => OutputKind::Image,
         other => {
             let expected = "a name that ends in .gltf, .mtlx, .json, .png or .exr";
             return Err(InputError::new("output", format!("the ending .{other}"), expected).in_file(path).into());
@@ -120,12 +122,12 @@ fn kind(path: &Path) -> Result<Kind, Error> {
     })
 }
 
-/// The object in each material, left to right, and under the fits their differences from the first.
-fn side_by_side(stage: &RenderScene, materials: &[&dyn Reflectance], size: [usize; 2]) -> Result<Image> {
+/// Renders the object in each material, from left to right. The differences from the first image are below them.
+fn side_by_side(render_scene: &RenderScene, materials: &[&dyn Reflectance], size: [usize; 2]) -> Result<Image> {
     let background = Background::Uniform(Vec3::ZERO);
     let mut images = Vec::new();
     for &reflectance in materials {
-        images.push(render(&stage.input(reflectance, size, 2, &background))?.image);
+        images.push(render(&render_scene.input(reflectance, size, 2, &background))?.image);
     }
     let [width, height] = size;
     let mut sheet = Image {

@@ -1,4 +1,4 @@
-//! `biscale materials`: what ships.
+//! `biscale materials` lists the scenes that ship with the program.
 
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! One file a subcommand; what they share stands here.
+//! Subcommands of the program, one file per subcommand, and the functions that they share.
 
 mod args;
 pub mod basis;
@@ -28,7 +28,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 pub use self::args::*;
 
-/// Runs a subcommand. `edit` belongs to the editor, which is a layer above.
+/// Runs a subcommand other than `edit`, which the layer above runs.
 ///
 /// # Errors
 /// The scene or another input cannot be used, or an output cannot be written.
@@ -55,19 +55,19 @@ impl SceneArgs {
         let mut set = self.set.clone();
         if let Some(quality) = self.quality {
             let name = match quality {
-                Quality::Draft => "draft",
-                Quality::Standard => "standard",
-                Quality::Fine => "fine",
-                Quality::Reference => "reference",
-                Quality::Wu2011 => "wu2011",
+                QualityArg::Draft => "draft",
+                QualityArg::Standard => "standard",
+                QualityArg::Fine => "fine",
+                QualityArg::Reference => "reference",
+                QualityArg::Wu2011 => "wu2011",
             };
             set.push(format!("quality.preset=\"{name}\""));
         }
         if let Some(backend) = self.backend {
             let name = match backend {
-                Backend::Auto => "auto",
-                Backend::Gpu => "gpu",
-                Backend::Cpu => "cpu",
+                BackendArg::Auto => "auto",
+                BackendArg::Gpu => "gpu",
+                BackendArg::Cpu => "cpu",
             };
             set.push(format!("quality.backend=\"{name}\""));
         }
@@ -76,32 +76,32 @@ impl SceneArgs {
         }
         set.extend(self.effects.iter().cloned());
         let loaded = scene::open(&self.scene, &set)?;
-        match self.goal() {
-            Some(goal) => self.choose(&loaded, goal),
+        match self.target() {
+            Some(target) => self.choose(&loaded, target),
             None => Ok(loaded),
         }
     }
 
-    fn goal(&self) -> Option<Target> {
-        self.target_db.map(Target::Decibels).or(self.budget_ms.map(Target::Milliseconds))
+    fn target(&self) -> Option<Target> {
+        self.target_db.map(Target::Psnr).or(self.budget_ms.map(Target::Milliseconds))
     }
 
-    /// The scene with settings that were chosen for a goal. What was asked and got is always said: without it nobody could
-    /// repeat the settings.
-    fn choose(&self, loaded: &LoadedScene, goal: Target) -> Result<LoadedScene> {
+    /// The scene with settings that reach a target. The summary is printed even with `--quiet`, because it holds the
+    /// options that repeat the choice.
+    fn choose(&self, loaded: &LoadedScene, target: Target) -> Result<LoadedScene> {
         let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
-        let chosen = choose(loaded, goal, &Cancel::default(), |doing| {
-            bar.set_message(doing.to_owned());
+        let chosen = choose(loaded, target, &Cancel::default(), |step| {
+            bar.set_message(step.to_owned());
             bar.tick();
         })?;
         bar.finish_and_clear();
-        eprintln!("{}", chosen.sentence());
+        eprintln!("{}", chosen.summary());
         Ok(chosen.scene)
     }
 
-    /// Says what a person should know about how the result was made.
+    /// Prints the notes and warnings of a result on standard error.
     pub fn notes(&self, outcome: &Outcome) {
-        // An examination costs some hundredths of a second: only where somebody reads it.
+        // The health takes some hundredths of a second to measure, so it is measured only if it is printed.
         if self.quiet {
             return;
         }
@@ -111,7 +111,7 @@ impl SceneArgs {
         self.warn(outcome.health());
     }
 
-    /// Says what is weak about a result, and what would mend it.
+    /// Prints the warnings of a health on standard error.
     pub fn warn(&self, health: &Health) {
         if !self.quiet {
             for warning in &health.warnings {
@@ -121,7 +121,7 @@ impl SceneArgs {
     }
 }
 
-/// `WIDTHxHEIGHT`.
+/// Parses `WIDTHxHEIGHT`.
 pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
     let complain = || format!("found `{text}`, expected two numbers like 384x384");
     let (a, b) = text.split_once(['x', 'X', '×']).ok_or_else(complain)?;
@@ -130,19 +130,19 @@ pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
     Ok([number(a)?, number(b)?])
 }
 
-/// How many direction pairs.
+/// Parses a number of direction pairs.
 pub fn parse_count(text: &str) -> std::result::Result<usize, String> {
     let count = text.parse::<usize>().ok().filter(|count| (16..=100_000).contains(count));
     count.ok_or_else(|| format!("found `{text}`, expected a number from 16 to 100000"))
 }
 
-/// Minutes, a fraction too.
+/// Parses minutes, which may be a fraction.
 pub fn parse_minutes(text: &str) -> std::result::Result<f64, String> {
     let minutes = text.parse::<f64>().ok().filter(|minutes| (0.0..=1e4).contains(minutes));
     minutes.ok_or_else(|| format!("found `{text}`, expected minutes from 0 to 10000"))
 }
 
-/// `NAME=on|off|auto` as the override it is. Factors are an effect of the plan too, and a knob of their own.
+/// Parses `NAME=on|off|auto` and returns it as an override. The effect `low_rank` becomes the setting `quality.method`.
 pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
     let complain = || format!("found `{text}`, expected NAME=on, NAME=off or NAME=auto");
     let (name, value) = text.split_once('=').ok_or_else(complain)?;
@@ -165,14 +165,14 @@ pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
     }
 }
 
-/// A number above zero.
+/// Parses a number above zero.
 pub fn parse_positive(text: &str) -> std::result::Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
     number.ok_or_else(|| format!("found `{text}`, expected a number above 0"))
 }
 
-/// A bar on a terminal, nothing in a pipe. `doing`: a word in front of it.
-pub fn bar(doing: &str, quiet: bool) -> ProgressBar {
+/// A progress bar with a label. It is drawn on terminals only.
+pub fn progress_bar(label: &str, quiet: bool) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();
     }
@@ -180,12 +180,12 @@ pub fn bar(doing: &str, quiet: bool) -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left") {
         bar.set_style(style);
     }
-    bar.set_message(doing.to_owned());
+    bar.set_message(label.to_owned());
     bar
 }
 
-/// What long work is given to show itself on a bar.
-pub fn showing(bar: &ProgressBar) -> impl Fn(f32) -> bool {
+/// A progress callback that moves a bar.
+pub fn progress_on(bar: &ProgressBar) -> impl Fn(f32) -> bool {
     |part: f32| {
         bar.set_position((part * 1000.0) as u64);
         true
@@ -200,7 +200,7 @@ pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     Ok(())
 }
 
-/// Did the reader of our output go away?
+/// Returns true if an error says that the reader of the output closed the pipe.
 pub fn is_broken_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)

@@ -1,26 +1,26 @@
-//! `biscale plan`: every effect, on or off, why, and on request what it costs and changes.
+//! `biscale plan` lists every effect: on or off, why, and on request its measured cost and influence.
 
 use std::io::Write;
 
 use crate::base::Cancel;
 use crate::diagnostics::Health;
+use crate::plan::EffectKind;
 use crate::render::RenderScene;
 use crate::report::{EffectCost, measure_effects};
 use anyhow::Result;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::PlanArgs;
-use super::print_json;
+use super::{PlanArgs, print_json};
 
 #[derive(Serialize)]
 struct Report<'a> {
     effects: &'a [crate::plan::Effect],
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<&'a [EffectCost]>,
-    /// How often each stage ran.
+    /// Number of runs of each stage.
     runs: std::collections::BTreeMap<&'static str, u64>,
-    /// Lights that were left out.
+    /// Number of faint lights that are left out.
     dropped_lights: usize,
     notes: &'a [String],
     health: &'a Health,
@@ -30,7 +30,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     let loaded = args.scene.open()?;
     let pipeline = crate::gpu::pipeline();
     let outcome = pipeline.effective(&loaded)?;
-    let dropped_lights = RenderScene::new(&loaded)?.dropped_lights;
+    let dropped_lights = RenderScene::new(&loaded)?.dropped_lights();
     let measured = if args.measure {
         let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         let costs = measure_effects(&loaded, &Cancel::default(), |name| {
@@ -55,15 +55,20 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     }
     let mut out = std::io::stdout().lock();
     writeln!(out, "{:<20} {:<7} {:>12} {:>12}  reason", "effect", "", "predicted", "measured")?;
+    let mut kind = None;
     for effect in &outcome.plan.effects {
+        if kind != Some(effect.kind) {
+            kind = Some(effect.kind);
+            writeln!(out, "{}", heading(effect.kind))?;
+        }
         let measured = effect.measured_ms.map_or("-".to_owned(), |ms| format!("{ms:.1} ms"));
         let predicted =
             if effect.predicted_ms > 0.0 { format!("{:.1} ms", effect.predicted_ms) } else { "-".to_owned() };
         let on = if effect.on { "on" } else { "off" };
         let forced = if effect.forced { "!" } else { "" };
         let bound = match effect.bound {
-            Some(bound) if bound >= 5e-4 => format!(" (on would change at most {:.1} %)", bound * 100.0),
-            Some(_) => " (on would change nothing)".to_owned(),
+            Some(bound) if bound >= 5e-4 => format!(" (turning it on changes at most {:.1} %)", bound * 100.0),
+            Some(_) => " (turning it on changes nothing)".to_owned(),
             None => String::new(),
         };
         writeln!(
@@ -81,7 +86,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
         writeln!(
             out,
             "\n{:<20} {:>10} {:>10} {:>10} {:>10} {:>8} {:>8}",
-            "edit and picture", "on, ms", "off, ms", "auto, ms", "change, %", "mean ΔE", "95 % ΔE"
+            "edit and image", "on, ms", "off, ms", "auto, ms", "change, %", "mean ΔE", "95 % ΔE"
         )?;
         for cost in measured {
             writeln!(
@@ -99,4 +104,13 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     }
     args.scene.notes(&outcome);
     Ok(())
+}
+
+/// Line above the effects of one kind.
+fn heading(kind: EffectKind) -> &'static str {
+    match kind {
+        EffectKind::Physics => "physics:",
+        EffectKind::Scene => "scene:",
+        EffectKind::Method => "method:",
+    }
 }

@@ -1,4 +1,4 @@
-//! `biscale profile`: milliseconds from an edit to the effective BRDF, or to the picture.
+//! `biscale profile` measures the milliseconds from an edit to the effective BRDF or to the image.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -12,41 +12,42 @@ use serde::Serialize;
 use super::print_json;
 use super::render_path::RenderPath;
 use super::to_image::ToImage;
-use super::{Edit, ProfileArgs};
+use super::{EditArg, ProfileArgs};
 
 #[derive(Serialize)]
 struct Report {
     stages: BTreeMap<&'static str, f64>,
     total_ms: f64,
-    /// What was moved.
+    /// Path of the edited parameter.
     #[serde(skip_serializing_if = "Option::is_none")]
     edited: Option<String>,
     runs: u32,
-    form: String,
+    #[serde(rename = "form")]
+    representation: String,
 }
 
 pub fn run(args: &ProfileArgs) -> Result<()> {
     let loaded = args.scene.open()?;
     let mut edited = loaded.clone();
-    let moved = match args.edit {
-        Some(Edit::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| nothing("tile.geometry"))?),
-        Some(Edit::Brdf) => Some(edited.scene.nudge_brdf().ok_or_else(|| nothing("material"))?),
-        Some(Edit::Color) => Some(edited.scene.nudge_color().ok_or_else(|| nothing("material"))?),
-        Some(Edit::Camera) | None => None,
+    let parameter = match args.edit {
+        Some(EditArg::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| no_parameter("tile.geometry"))?),
+        Some(EditArg::Brdf) => Some(edited.scene.nudge_brdf().ok_or_else(|| no_parameter("material"))?),
+        Some(EditArg::Color) => Some(edited.scene.nudge_color().ok_or_else(|| no_parameter("material"))?),
+        Some(EditArg::Camera) | None => None,
     };
     let mut pipeline = crate::gpu::pipeline();
     let mut outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
     let mut to_image = if args.image { Some(ToImage::new(&loaded, &outcome, args.size)?) } else { None };
-    let mut form = outcome.brdf.representation.describe();
-    let mut camera = if args.edit == Some(Edit::Camera) {
-        let mut stage = RenderScene::new(&loaded)?;
-        let path = RenderPath::of(&stage, &outcome)?;
-        // A camera edit keeps what pictures read, and the shadows of the object.
-        stage.cache_shadows();
+    let mut representation = outcome.brdf.representation.describe();
+    let mut camera = if args.edit == Some(EditArg::Camera) {
+        let mut render_scene = RenderScene::with(&pipeline, &loaded)?;
+        let path = RenderPath::of(&render_scene, &outcome)?;
+        // A camera edit changes neither the shading BRDF nor the shadows of the object.
+        render_scene.cache_shadows(&pipeline)?;
         let shading_brdf = path.shading_brdf(&outcome)?;
-        form = shading_brdf.brdf.representation.describe();
-        Some((stage, path, shading_brdf))
+        representation = shading_brdf.brdf.representation.describe();
+        Some((render_scene, path, shading_brdf))
     } else {
         None
     };
@@ -57,15 +58,15 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
             (None, Some(_)) if to_image.is_some() => {
                 let Some(to_image) = &mut to_image else { continue };
                 let times = to_image.run(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
-                form.clone_from(&to_image.representation);
+                representation.clone_from(&to_image.representation);
                 times
             }
-            (Some((stage, path, shading_brdf)), _) => {
-                let times = path.show(stage, &shading_brdf.brdf, args.size)?;
+            (Some((render_scene, path, shading_brdf)), _) => {
+                let times = path.show(render_scene, &shading_brdf.brdf, args.size)?;
                 vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
             }
             (None, Some(_)) => {
-                // To and fro: every run is an edit.
+                // Runs alternate between the two scenes, so that each run is an edit.
                 outcome = pipeline.effective(if run % 2 == 0 { &edited } else { &loaded })?;
                 outcome.times.clone()
             }
@@ -75,7 +76,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
             }
         };
         let total = start.elapsed().as_secs_f64() * 1e3;
-        // The first warms caches up.
+        // The first run is a warm-up.
         if run > 0 {
             runs.push((total, times));
         }
@@ -89,9 +90,9 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     let report = Report {
         stages: stages.into_iter().map(|(name, ms)| (name, median(ms))).collect(),
         total_ms: median(runs.iter().map(|run| run.0).collect()),
-        edited: moved,
+        edited: parameter,
         runs: args.repeat,
-        form,
+        representation,
     };
     if args.scene.json {
         return print_json(&report);
@@ -103,12 +104,16 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     for (name, ms) in &report.stages {
         writeln!(out, "{name:<12} {ms:>10.2} ms")?;
     }
-    writeln!(out, "{:<12} {:>10.2} ms   (median of {} runs; {})", "total", report.total_ms, report.runs, report.form)?;
+    writeln!(
+        out,
+        "{:<12} {:>10.2} ms   (median of {} runs; {})",
+        "total", report.total_ms, report.runs, report.representation
+    )?;
     Ok(())
 }
 
-fn nothing(place: &str) -> Error {
-    InputError::new(place, "no numeric parameter", "one that can be moved by 5 %").into()
+fn no_parameter(place: &str) -> Error {
+    InputError::new(place, "no numeric parameter", "a parameter that can be changed by 5 %").into()
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

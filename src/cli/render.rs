@@ -1,4 +1,4 @@
-//! `biscale render`: the scene's object as an image.
+//! `biscale render` writes an image of the scene's object.
 
 use anyhow::Result;
 use serde::Serialize;
@@ -17,9 +17,9 @@ struct Report<'a> {
     height: usize,
     lights: usize,
     points: usize,
-    /// Where it was shaded: `cpu`, or the adapter.
+    /// Processor that shaded: `cpu`, or the name of the adapter.
     device: String,
-    /// The form of the effective BRDF that was read.
+    /// Representation of the effective BRDF that was read.
     reads: String,
     stages: serde_json::Map<String, serde_json::Value>,
     health: &'a Health,
@@ -27,14 +27,14 @@ struct Report<'a> {
 
 pub fn run(args: &RenderArgs) -> Result<()> {
     let loaded = args.scene.open()?;
-    let render_scene = RenderScene::new(&loaded)?;
-    let tone_map = ToneMap::new(&render_scene.camera)?;
-    let cache = args.keeping.open();
+    let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
+    let render_scene = RenderScene::with(&pipeline, &loaded)?;
+    let tone_map = ToneMap::new(&render_scene.camera)?;
     let outcome = pipeline.effective(&loaded)?;
     if !args.scene.quiet {
-        for warning in render_scene.mesh.warnings.iter().chain(&render_scene.lights.warnings) {
+        for warning in render_scene.warnings() {
             eprintln!("note: {warning}");
         }
     }
@@ -61,7 +61,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             image: args.output.display().to_string(),
             width: args.size[0],
             height: args.size[1],
-            lights: render_scene.lights.directional.len(),
+            lights: render_scene.lights().directional.len(),
             points: rendered.points,
             device: path.describe(),
             reads: shading_brdf.brdf.representation.describe(),

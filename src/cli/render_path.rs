@@ -21,8 +21,8 @@ pub enum RenderPath {
 }
 
 impl RenderPath {
-    /// The processor that the scene's backend asks for. `gpu` is any adapter, or an error that gives the reason; `cpu` is the CPU;
-    /// `auto` is a GPU that is more than software and can shade this BRDF, else the CPU.
+    /// The processor that the scene's backend asks for. `gpu` is any adapter, or an error that gives the reason; `cpu`
+    /// is the CPU; `auto` is a hardware GPU if it can shade this BRDF, else the CPU.
     ///
     /// # Errors
     /// The backend is `gpu` and no adapter can be used.
@@ -40,7 +40,7 @@ impl RenderPath {
     /// Renders the object of a scene in one material.
     ///
     /// # Errors
-    /// The camera sees nothing that it could be framed by, or a GPU that was asked for fails.
+    /// The camera cannot frame the object, or a GPU that was asked for fails.
     pub fn render(
         &mut self,
         scene: &RenderScene,
@@ -57,7 +57,7 @@ impl RenderPath {
         }
     }
 
-    /// Renders as far as a screen needs it: an image on the GPU stays there.
+    /// Renders an image for a screen. An image that the GPU renders stays on the GPU.
     ///
     /// # Errors
     /// As [`RenderPath::render`].
@@ -81,7 +81,7 @@ impl RenderPath {
         }
     }
 
-    /// `cpu`, or the adapter.
+    /// `cpu`, or the name of the adapter.
     pub fn describe(&self) -> String {
         match self {
             Self::Cpu { .. } => "cpu".to_owned(),
@@ -91,7 +91,7 @@ impl RenderPath {
     }
 }
 
-/// Refuses the backend `gpu` in a program that was built without it.
+/// Returns an error if the scene asks for the backend `gpu`, which this build does not have.
 #[cfg(not(feature = "gpu"))]
 pub fn refuse_gpu(outcome: &Outcome) -> Result<()> {
     use crate::base::InputError;
@@ -121,14 +121,14 @@ pub mod on_gpu {
     use crate::render::image::tone_map::ToneMap;
     use crate::render::{RenderInput, RenderScene, Rendered, render};
 
-    /// A GPU and what it holds of the scene.
+    /// A GPU with the object and the shading BRDF of a scene.
     pub struct OnGpu {
         pub gpu: Gpu,
         renderer: GpuRenderer,
         shading_brdf: ShadingBrdf,
-        /// The image that a screen would show, and its size.
+        /// Size and texture of the image for a screen.
         image: Option<([usize; 2], wgpu::TextureView)>,
-        /// Whether the user asked for the GPU.
+        /// True if the user asked for the GPU.
         required: bool,
     }
 
@@ -137,7 +137,7 @@ pub mod on_gpu {
             let required = outcome.settings.backend == Backend::Gpu;
             let Some(gpu) = open(outcome)? else { return Ok(RenderPath::Cpu { refused: None }) };
             let renderer =
-                |brdf: &EffectiveBrdf| GpuRenderer::with_material(&gpu, &scene.mesh, scene.occluder.as_ref(), brdf);
+                |brdf: &EffectiveBrdf| GpuRenderer::with_material(&gpu, scene.mesh(), scene.occluder(), brdf);
             let table = outcome.shading_brdf(&Cancel::default())?;
             let built = match renderer(&table.brdf) {
                 Err(GpuError::Unsupported(_)) => {

@@ -1,4 +1,4 @@
-//! `biscale report`: accuracy against time.
+//! `biscale report` measures accuracy against time.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,44 +12,45 @@ use crate::scene;
 use crate::scene::LoadedScene;
 use crate::tuning::candidates::{Candidate, Family, candidates, with_settings};
 use crate::tuning::quality_scale;
-use crate::tuning::sweep::{Point, Truth, measure, reference_point};
+use crate::tuning::sweep::{ReferenceValues, SweepPoint, measure, reference_point};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
 use super::ReportArgs;
 
-/// What a run that was broken off has found so far, for the next one to go on from.
+/// Results of an interrupted run, from which the next run continues.
 #[derive(Debug, Serialize, Deserialize)]
-struct Progress {
+struct SavedProgress {
     machine: Machine,
-    scenes: BTreeMap<String, SceneProgress>,
+    scenes: BTreeMap<String, SavedScene>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
-struct SceneProgress {
-    /// All but the quality of the scene, and the number of pairs: what the truth and the points belong to.
+struct SavedScene {
+    /// Inputs of the reference and the points: the scene without its quality, and the number of pairs.
     key: String,
-    truth: Truth,
-    points: Vec<Point>,
+    #[serde(rename = "truth")]
+    reference: ReferenceValues,
+    points: Vec<SweepPoint>,
 }
 
 const PROGRESS_FILE: &str = "progress.json";
-/// Of a scene's time, what the reference may take.
+/// Largest part of a scene's time for the reference.
 const REFERENCE_SHARE: f64 = 0.35;
 
 pub fn run(args: &ReportArgs) -> Result<()> {
     let scenes: Vec<LoadedScene> =
         args.scenes.iter().map(|name| scene::open(name, &args.set)).collect::<crate::base::Result<_>>()?;
     std::fs::create_dir_all(&args.output).map_err(|error| {
-        Error::from(InputError::new("output", error, "a folder that can be made or written").in_file(&args.output))
+        Error::from(InputError::new("output", error, "a folder that can be created and written").in_file(&args.output))
     })?;
     let machine = Machine::here();
     let mut progress = resume(&args.output, &machine);
     let mut report = Report { machine, command: command_line(), scenes: Vec::new() };
     for loaded in &scenes {
         report.scenes.push(one_scene(args, loaded, &mut progress)?);
-        // A page after each scene: what is broken off is not lost.
+        // The page is written after each scene, so that an interrupted run leaves a page.
         write(&args.output, &report)?;
     }
     if !args.quiet {
@@ -58,17 +59,17 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     Ok(())
 }
 
-/// What stands in the folder from a run on the same machine and version.
-fn resume(folder: &Path, machine: &Machine) -> Progress {
-    let fresh = Progress { machine: machine.clone(), scenes: BTreeMap::new() };
+/// Results in the folder of an earlier run on the same machine with the same version.
+fn resume(folder: &Path, machine: &Machine) -> SavedProgress {
+    let empty = SavedProgress { machine: machine.clone(), scenes: BTreeMap::new() };
     std::fs::read(folder.join(PROGRESS_FILE))
         .ok()
-        .and_then(|bytes| serde_json::from_slice::<Progress>(&bytes).ok())
+        .and_then(|bytes| serde_json::from_slice::<SavedProgress>(&bytes).ok())
         .filter(|found| found.machine == *machine)
-        .unwrap_or(fresh)
+        .unwrap_or(empty)
 }
 
-fn save(folder: &Path, progress: &Progress) -> Result<()> {
+fn save(folder: &Path, progress: &SavedProgress) -> Result<()> {
     Ok(replace_file(&folder.join(PROGRESS_FILE), &serde_json::to_vec(progress)?)?)
 }
 
@@ -83,14 +84,14 @@ fn command_line() -> String {
     std::iter::once("biscale".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
 }
 
-/// What the truth and the points of a scene depend on.
+/// Inputs of the reference and of the points of a scene.
 fn key(loaded: &LoadedScene, pairs: usize) -> Result<String> {
     let mut scene = loaded.scene.clone();
     scene.quality = crate::scene::Quality { seed: scene.quality.seed, ..Default::default() };
     Ok(format!("{pairs} {}", serde_json::to_string(&scene)?))
 }
 
-fn one_scene(args: &ReportArgs, loaded: &LoadedScene, progress: &mut Progress) -> Result<SceneReport> {
+fn one_scene(args: &ReportArgs, loaded: &LoadedScene, progress: &mut SavedProgress) -> Result<SceneReport> {
     let bar = bar(args.quiet, &loaded.name);
     let started = Instant::now();
     let budget = Duration::from_secs_f64(args.minutes * 60.0);
@@ -98,41 +99,41 @@ fn one_scene(args: &ReportArgs, loaded: &LoadedScene, progress: &mut Progress) -
     let known = progress.scenes.remove(&loaded.name).filter(|known| known.key == key);
     let mut state = match known {
         Some(known) => known,
-        None => SceneProgress { key, truth: truth(args, loaded, budget, &bar)?, points: Vec::new() },
+        None => SavedScene { key, reference: reference(args, loaded, budget, &bar)?, points: Vec::new() },
     };
     let list = in_order(candidates(has_measured(loaded), overhangs(loaded), args.combinations));
     bar.set_length(list.len() as u64);
     let mut left_out = 0;
     for (k, candidate) in list.iter().enumerate() {
         bar.set_position(k as u64);
-        if state.points.iter().any(|point| point.settings == candidate.words()) {
+        if state.points.iter().any(|point| point.settings == candidate.cli_args()) {
             continue;
         }
         if started.elapsed() > budget && candidate.family != Family::Preset {
             left_out += 1;
             continue;
         }
-        bar.set_message(candidate.words());
-        state.points.push(measure(loaded, candidate, &state.truth)?.0);
+        bar.set_message(candidate.cli_args());
+        state.points.push(measure(loaded, candidate, &state.reference)?.0);
         progress.scenes.insert(loaded.name.clone(), state);
         save(&args.output, progress)?;
         state = match progress.scenes.remove(&loaded.name) {
             Some(state) => state,
-            None => return Err(Error::failed("a scene's progress was lost").into()),
+            None => return Err(Error::failed("the results of a scene are missing").into()),
         };
     }
-    bar.set_message("pictures");
+    bar.set_message("images");
     let thumbnails = thumbnails(loaded, &bar)?;
     bar.finish_and_clear();
     let mut points = state.points.clone();
-    points.push(reference_point(&loaded.name, &state.truth));
-    let truth = &state.truth;
+    let reference = &state.reference;
+    points.push(reference_point(&loaded.name, reference));
     let scene = SceneReport {
         name: loaded.name.clone(),
         pairs: args.pairs,
-        reference_error: truth.own,
-        reference_passes: truth.passes,
-        reference_seconds: truth.seconds,
+        reference_error: reference.std_error,
+        reference_passes: reference.passes,
+        reference_seconds: reference.seconds,
         points,
         thumbnails,
         left_out,
@@ -142,11 +143,11 @@ fn one_scene(args: &ReportArgs, loaded: &LoadedScene, progress: &mut Progress) -
     Ok(scene)
 }
 
-fn truth(args: &ReportArgs, loaded: &LoadedScene, budget: Duration, bar: &ProgressBar) -> Result<Truth> {
+fn reference(args: &ReportArgs, loaded: &LoadedScene, budget: Duration, bar: &ProgressBar) -> Result<ReferenceValues> {
     let start = Instant::now();
     let settings = ReferenceSettings { facets: 16_384, max_passes: 64, target: 2e-3, seed: 20_110_807 };
     bar.set_length(100);
-    Ok(Truth::new(loaded, args.pairs, &settings, |passes, error| {
+    Ok(ReferenceValues::new(loaded, args.pairs, &settings, |passes, error| {
         let spent = start.elapsed().as_secs_f64() / (budget.as_secs_f64() * REFERENCE_SHARE);
         bar.set_position((spent * 100.0).min(100.0) as u64);
         bar.set_message(format!("reference, {passes} passes, standard error {:.2} %", error * 100.0));
@@ -154,13 +155,15 @@ fn truth(args: &ReportArgs, loaded: &LoadedScene, budget: Duration, bar: &Progre
     })?)
 }
 
-/// Presets first, then knobs and combinations in turn: what time leaves out is a bit of each.
+/// Presets first, then single settings and combinations in turns, so that a time limit leaves out some of both.
 fn in_order(all: Vec<Candidate>) -> Vec<Candidate> {
-    let (mut presets, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|one| one.family == Family::Preset);
-    let (knobs, combinations): (Vec<_>, Vec<_>) = rest.into_iter().partition(|one| one.family != Family::Combination);
-    let (mut knobs, mut combinations) = (knobs.into_iter(), combinations.into_iter());
+    let (mut presets, rest): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|candidate| candidate.family == Family::Preset);
+    let (single, combinations): (Vec<_>, Vec<_>) =
+        rest.into_iter().partition(|candidate| candidate.family != Family::Combination);
+    let (mut single, mut combinations) = (single.into_iter(), combinations.into_iter());
     loop {
-        let next: Vec<Candidate> = knobs.next().into_iter().chain(combinations.next()).collect();
+        let next: Vec<Candidate> = single.next().into_iter().chain(combinations.next()).collect();
         if next.is_empty() {
             return presets;
         }
@@ -168,9 +171,9 @@ fn in_order(all: Vec<Candidate>) -> Vec<Candidate> {
     }
 }
 
-/// Whether one horizon an azimuth does not tell what a facet sees.
+/// Returns true if the surface overhangs, so that one horizon per azimuth does not describe its visibility.
 fn overhangs(loaded: &LoadedScene) -> bool {
-    let settings = with_settings(loaded, &quality_scale::rung(0.0, false));
+    let settings = with_settings(loaded, &quality_scale::candidate_at(0.0, false));
     settings.and_then(|scene| crate::gpu::pipeline().effective(&scene)).is_ok_and(|outcome| outcome.plan.overhangs())
 }
 
@@ -181,34 +184,39 @@ fn has_measured(loaded: &LoadedScene) -> bool {
     })
 }
 
-/// Facets of the finest picture: four times those of `fine`, fewer where each costs a look-up.
-const FINEST: [usize; 2] = [65_536, 16_384];
+/// Facets of the finest image: four times those of `fine`, and fewer for measured BRDFs, which read a table per facet.
+const FINEST_FACETS: [usize; 2] = [65_536, 16_384];
 
 fn thumbnails(loaded: &LoadedScene, bar: &ProgressBar) -> Result<Vec<Thumbnail>> {
-    let studio = ThumbnailRenderer::new(loaded)?;
+    let renderer = ThumbnailRenderer::new(loaded)?;
     let image = |preset: &'static str, set: &[String]| -> Result<_> {
         let candidate = Candidate { family: Family::Preset, preset, set: set.to_vec() };
         let brdf: std::sync::Arc<EffectiveBrdf> =
             crate::gpu::pipeline().effective(&with_settings(loaded, &candidate)?)?.brdf;
-        Ok(studio.image(&*brdf)?)
+        Ok(renderer.image(&*brdf)?)
     };
-    let facets = FINEST[usize::from(has_measured(loaded))];
-    bar.set_message("the finest picture");
+    let facets = FINEST_FACETS[usize::from(has_measured(loaded))];
+    bar.set_message("the finest image");
     let finest = image("fine", &[format!("quality.facets={facets}"), "quality.method=\"direct\"".to_owned()])?;
     let label = format!("direct sum of {facets} facets");
-    let mut all =
-        vec![Thumbnail { label, image: studio.png(&finest)?, difference: None, mean_delta_e: 0.0, high_delta_e: 0.0 }];
+    let mut all = vec![Thumbnail {
+        label,
+        image: renderer.png(&finest)?,
+        difference: None,
+        mean_delta_e: 0.0,
+        high_delta_e: 0.0,
+    }];
     for preset in ["draft", "standard", "wu2011"] {
-        bar.set_message(format!("picture at {preset}"));
+        bar.set_message(format!("image at {preset}"));
         let shown = image(preset, &[])?;
-        let mut delta_e = studio.difference(&shown, &finest);
+        let mut delta_e = renderer.difference(&shown, &finest);
         let difference = Some(difference_png(&delta_e)?);
         delta_e.sort_by(f32::total_cmp);
         let mean_delta_e = delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32;
         let high_delta_e = delta_e.get(delta_e.len() * 95 / 100).copied().unwrap_or(0.0);
         all.push(Thumbnail {
             label: preset.to_owned(),
-            image: studio.png(&shown)?,
+            image: renderer.png(&shown)?,
             difference,
             mean_delta_e,
             high_delta_e,
@@ -217,7 +225,7 @@ fn thumbnails(loaded: &LoadedScene, bar: &ProgressBar) -> Result<Vec<Thumbnail>>
     Ok(all)
 }
 
-/// A bar on a terminal, nothing in a pipe.
+/// A progress bar for one scene. It is drawn on terminals only.
 fn bar(quiet: bool, scene: &str) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();

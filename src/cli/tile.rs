@@ -1,4 +1,4 @@
-//! `biscale tile`: the tile itself, to print, to fold, or for other programs.
+//! `biscale tile` writes the tile itself, to print it, to fold it, or for other programs.
 
 use crate::export::tile;
 use crate::export::tile::TileOptions;
@@ -6,7 +6,7 @@ use anyhow::Result;
 use glam::UVec2;
 
 use super::TileArgs;
-use super::{bar, print_json, showing};
+use super::{print_json, progress_bar, progress_on};
 
 pub fn run(args: &TileArgs) -> Result<()> {
     let loaded = args.scene.open()?;
@@ -14,8 +14,8 @@ pub fn run(args: &TileArgs) -> Result<()> {
     let count = |[x, y]: [usize; 2]| UVec2::new(x as u32, y as u32);
     let options =
         TileOptions { repeat: count(args.repeat), scale: args.scale, base_mm: args.base, samples: count(args.samples) };
-    let bar = bar("writing", args.scene.quiet);
-    let notes = tile::write(&loaded.scene, &mesh, &options, &args.output, &showing(&bar));
+    let bar = progress_bar("writing", args.scene.quiet);
+    let notes = tile::write(&loaded.scene, &mesh, &options, &args.output, &progress_on(&bar));
     bar.finish_and_clear();
     let notes = notes?;
     if args.scene.json {

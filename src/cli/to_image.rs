@@ -1,4 +1,5 @@
-//! From an edit to its image, as the editor computes it: on the GPU in one submission, or on the CPU through a table.
+//! All stages from an edit to its image, as the editor computes it: on the GPU in one submission, or on the CPU with a
+//! shading table.
 
 use anyhow::Result;
 
@@ -11,19 +12,19 @@ use crate::render::image::shading::Background;
 use crate::render::{RenderScene, render};
 use crate::scene::LoadedScene;
 
-/// Everything between an edit and its image.
+/// Computes the image of an edited scene.
 pub struct ToImage {
     scene: RenderScene,
     #[cfg(feature = "gpu")]
     on_gpu: Option<on_gpu::Renderer>,
     size: [usize; 2],
-    /// The representation that the last image was made with.
+    /// Representation that the last image was rendered with.
     pub representation: String,
 }
 
 impl ToImage {
     /// # Errors
-    /// The object or its lights cannot be used, or a GPU that was asked for.
+    /// The object, its lights, or a GPU that was asked for cannot be used.
     pub fn new(loaded: &LoadedScene, outcome: &Outcome, size: [usize; 2]) -> Result<Self> {
         let mut scene = RenderScene::new(loaded)?;
         #[cfg(feature = "gpu")]
@@ -36,8 +37,8 @@ impl ToImage {
             true
         };
         if on_cpu {
-            // The first image of a camera edit would compute the same.
-            scene.cache_shadows();
+            // The object does not change, so its shadows are computed once.
+            scene.cache_shadows(&Pipeline::new())?;
         }
         Ok(Self {
             scene,
@@ -48,7 +49,7 @@ impl ToImage {
         })
     }
 
-    /// Computes the image of a scene; milliseconds of the stages that ran.
+    /// Computes the image of a scene and returns the milliseconds of the stages that ran.
     ///
     /// # Errors
     /// As [`Pipeline::effective`], or a GPU that fails.
@@ -77,7 +78,7 @@ fn push_image_times(times: &mut StageTimes, image: &RenderTimes) {
 
 #[cfg(feature = "gpu")]
 mod on_gpu {
-    //! The same on a GPU.
+    //! Images of edited scenes on a GPU.
 
     use std::sync::Arc;
     use std::time::Instant;
@@ -106,13 +107,13 @@ mod on_gpu {
         /// Opens the GPU that the scene's backend asks for; `None` if the CPU is to be used.
         pub fn open(scene: &RenderScene, outcome: &Outcome, size: [usize; 2]) -> Result<Option<Self>> {
             let Some(gpu) = render_path::on_gpu::open(outcome)? else { return Ok(None) };
-            let renderer = GpuRenderer::new(&gpu, &scene.mesh, scene.occluder.as_ref()).map_err(Error::from)?;
+            let renderer = GpuRenderer::new(&gpu, scene.mesh(), scene.occluder()).map_err(Error::from)?;
             let image = crate::gpu::render::image::image(&gpu, size).map_err(Error::from)?;
             let view = image.create_view(&wgpu::TextureViewDescriptor::default());
             Ok(Some(Self { gpu: Arc::new(gpu), renderer, view }))
         }
 
-        /// Times of the stages, and the representation that the image was made with.
+        /// Computes the image; returns the milliseconds of the stages and the representation that was rendered.
         pub fn run(
             &mut self,
             pipeline: &mut Pipeline,

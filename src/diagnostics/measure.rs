@@ -1,4 +1,4 @@
-//! The numbers of a [`super::Health`]: each examined on a few hundred directions, well under a second.
+//! The figures of a [`super::Health`]. Each is measured at a few hundred directions, within a second.
 
 use std::f32::consts::{PI, TAU};
 
@@ -11,21 +11,24 @@ use crate::effective::{EffectiveBrdf, Reflectance, Representation};
 use crate::math::directions::{PolarGrid, from_angles};
 use crate::metrics::{Errors, mirror_biased_pairs};
 
-/// Elevations of the directions that surfaces are looked at from [degrees], and azimuths of each.
-const ELEVATIONS_DEG: [f32; 6] = [5.0, 25.0, 45.0, 60.0, 70.0, 80.0];
+/// Angles of the examined directions from the normal [degrees].
+const POLAR_ANGLES_DEG: [f32; 6] = [5.0, 25.0, 45.0, 60.0, 70.0, 80.0];
+/// Azimuths of the examined directions per polar angle.
 const AZIMUTHS: usize = 8;
-/// Rings of lights over which albedos are summed, and the half width of lobes that need the most.
-const COARSEST: usize = 12;
-const FINEST: usize = 22;
+/// Fewest rings of lights over which albedos are summed.
+const MIN_RINGS: usize = 12;
+/// Most rings of lights over which albedos are summed.
+const MAX_RINGS: usize = 22;
+/// Half width of the narrowest lobe that `MAX_RINGS` resolve [degrees].
 const NARROWEST_DEG: f32 = 5.0;
-/// Pairs for reciprocity.
+/// Number of direction pairs for reciprocity.
 const PAIRS: usize = 96;
-/// Normals about which facets are counted.
+/// Number of normals about which facets are counted.
 const NORMALS: usize = 64;
 
-/// Directions with their angles in degrees, off the axes that tiles like to follow.
+/// Examined directions with their angles [degrees]. They avoid the axes, along which many tiles are aligned.
 fn views() -> impl Iterator<Item = ([f32; 2], Vec3)> {
-    ELEVATIONS_DEG.into_iter().flat_map(|theta| {
+    POLAR_ANGLES_DEG.into_iter().flat_map(|theta| {
         (0..AZIMUTHS).map(move |k| {
             let phi = 360.0 * (k as f32 + 0.37) / AZIMUTHS as f32;
             ([theta, phi], from_angles(theta.to_radians(), phi.to_radians()))
@@ -69,7 +72,8 @@ fn largest_albedo(brdf: &Brdf, color: Vec3) -> f32 {
         .fold(0.0, f32::max)
 }
 
-/// Angle between normal and half vector at which a lobe has fallen to about a third [rad]; `None` for one without a peak.
+/// Angle between normal and half vector at which a lobe falls to about a third of its peak [rad]; `None` for a lobe
+/// without a peak.
 fn half_width(term: &Term) -> Option<f32> {
     match term {
         Term::Lambertian { .. } => None,
@@ -90,7 +94,7 @@ fn half_width_of_table(table: &dyn Measured) -> Option<f32> {
     let steps: Vec<f32> = (0..180).map(|k| (0.25 + k as f32 * 0.25).to_radians()).collect();
     let peak = steps.iter().map(|&theta| at(theta)).fold(0.0, f32::max);
     let base = at(60.0_f32.to_radians()).min(peak);
-    // Matte ones have no peak to speak of above their base.
+    // The peak of a diffuse BRDF is hardly above its base.
     (peak > 3.0 * base.max(1e-6))
         .then(|| steps.into_iter().find(|&theta| at(theta) - base < (peak - base) / std::f32::consts::E))
         .flatten()
@@ -102,55 +106,56 @@ pub fn surface(inputs: &HealthInputs, lobe_deg: Option<f32>) -> SurfaceHealth {
         facets: facets.len(),
         triangles_left_out: facets.skipped_triangles,
         has_holes: !inputs.closes_plane,
-        fewest_facets_seen: facets.len(),
+        fewest_visible_facets: facets.len(),
         facets_in_a_lobe: lobe_deg.and_then(|degrees| facets_within(&facets.normals, degrees.to_radians())),
         ..SurfaceHealth::default()
     };
-    let mut seen = vec![false; facets.len()];
+    let mut visible = vec![false; facets.len()];
     match &inputs.visibility {
         VisibilityInput::Soft(visibility) => {
-            health.walks_cut_short = visibility.truncated();
+            health.truncated_searches = visibility.truncated();
             let mut v = vec![0.0; facets.len()];
             for (angles, direction) in views() {
                 visibility.fill(direction, 0..facets.len(), &mut v);
                 let mut count = 0;
-                for ((seen, v), normal) in seen.iter_mut().zip(&v).zip(&facets.normals) {
-                    let sees = *v > 0.5 && normal.dot(direction) > 0.0;
-                    *seen |= sees;
-                    count += usize::from(sees);
+                for ((visible, v), normal) in visible.iter_mut().zip(&v).zip(&facets.normals) {
+                    let is_visible = *v > 0.5 && normal.dot(direction) > 0.0;
+                    *visible |= is_visible;
+                    count += usize::from(is_visible);
                 }
-                if count < health.fewest_facets_seen {
-                    (health.fewest_facets_seen, health.fewest_seen_from_deg) = (count, angles);
+                if count < health.fewest_visible_facets {
+                    (health.fewest_visible_facets, health.fewest_visible_at_deg) = (count, angles);
                 }
             }
         }
         VisibilityInput::Packed(packed) => {
             for direction in 0..packed.direction_count {
-                for (facet, seen) in seen.iter_mut().enumerate() {
-                    *seen |= packed.is_visible(direction, facet);
+                for (facet, visible) in visible.iter_mut().enumerate() {
+                    *visible |= packed.is_visible(direction, facet);
                 }
             }
         }
     }
     let (mut hidden, mut all) = (0.0, 0.0);
-    for (area, seen) in facets.areas.iter().zip(&seen) {
+    for (area, visible) in facets.areas.iter().zip(&visible) {
         all += f64::from(*area);
-        hidden += if *seen { 0.0 } else { f64::from(*area) };
+        hidden += if *visible { 0.0 } else { f64::from(*area) };
     }
-    health.area_never_seen = if all > 0.0 { hidden / all } else { 0.0 };
+    health.area_never_visible = if all > 0.0 { hidden / all } else { 0.0 };
     health
 }
 
-/// How many facets stand within `width` of a facet's normal: what nine in ten facets have at least.
+/// Number of normals within the angle `width` [rad] of a facet's normal: the smallest number but for a tenth of the
+/// facets.
 fn facets_within(normals: &[Vec3], width: f32) -> Option<usize> {
-    let least = width.cos();
+    let min_cosine = width.cos();
     let upward: Vec<Vec3> = normals.iter().copied().filter(|normal| normal.z > 0.05).collect();
     let step = (upward.len() / NORMALS).max(1);
     let mut counts: Vec<usize> = upward
         .par_iter()
         .step_by(step)
-        // Very narrow lobes: the cosine alone cannot tell.
-        .map(|n| normals.iter().filter(|other| (**other - *n).length() < width || other.dot(*n) > least).count())
+        // For very narrow lobes the cosine is not precise enough, so the distance is tested as well.
+        .map(|n| normals.iter().filter(|other| (**other - *n).length() < width || other.dot(*n) > min_cosine).count())
         .collect();
     counts.sort_unstable();
     counts.get(counts.len() / 10).copied()
@@ -173,8 +178,8 @@ pub fn result(brdf: &EffectiveBrdf, inputs: &HealthInputs, lobe_deg: Option<f32>
         mirror_biased_pairs(PAIRS, 11).into_par_iter().map(|p| [brdf.g(p.i, p.o), brdf.g(p.o, p.i)]).collect();
     let (mut difference, mut power) = (0.0, 0.0);
     for [there, back] in &values {
-        let sound = |v: &Vec3| v.is_finite() && v.min_element() >= 0.0;
-        health.unsound_values += usize::from(!sound(there)) + usize::from(!sound(back));
+        let is_sound = |v: &Vec3| v.is_finite() && v.min_element() >= 0.0;
+        health.unsound_values += usize::from(!is_sound(there)) + usize::from(!is_sound(back));
         difference += (*there - *back).as_dvec3().length_squared();
         power += there.as_dvec3().length_squared();
     }
@@ -188,14 +193,14 @@ pub fn result(brdf: &EffectiveBrdf, inputs: &HealthInputs, lobe_deg: Option<f32>
     health
 }
 
-/// The coarsest grid of lights that resolves lobes of a half width.
+/// The coarsest grid of lights that resolves lobes of a half width; `None` if it would be too fine.
 fn grid_for(lobe_deg: Option<f32>) -> Option<PolarGrid> {
-    let needed = lobe_deg.map_or(0, |degrees| (FINEST as f32 * NARROWEST_DEG / degrees).ceil() as usize);
-    let rings = needed.max(COARSEST);
-    (rings <= FINEST).then(|| PolarGrid::new(rings, (13 * rings).div_ceil(4)))
+    let needed = lobe_deg.map_or(0, |degrees| (MAX_RINGS as f32 * NARROWEST_DEG / degrees).ceil() as usize);
+    let rings = needed.max(MIN_RINGS);
+    (rings <= MAX_RINGS).then(|| PolarGrid::new(rings, (13 * rings).div_ceil(4)))
 }
 
-/// `max_o ∫ f̄(i,o) dω_i` of a few viewers, any channel.
+/// The largest `∫ f̄(i,o) dω_i` of any channel over a few viewers, and the viewer (theta, phi) [degrees].
 fn largest_effective_albedo(brdf: &EffectiveBrdf, grid: PolarGrid) -> (f32, [f32; 2]) {
     let viewers: Vec<[f32; 2]> =
         [0.0_f32, 30.0, 60.0, 80.0].iter().flat_map(|&theta| [[theta, 20.0], [theta, 110.0]]).skip(1).collect();
@@ -213,13 +218,13 @@ fn largest_effective_albedo(brdf: &EffectiveBrdf, grid: PolarGrid) -> (f32, [f32
     largest.map_or((0.0, [0.0; 2]), |(albedo, at)| (*albedo, at))
 }
 
-/// The lights of a grid with their solid angles, four times as dense about one azimuth as on average: half vectors turn
-/// quickly there where the viewer is low.
+/// The lights of a grid with their solid angles. They are four times as dense at `azimuth` as on average, because half
+/// vectors vary fastest there if the viewer is low.
 fn lights_around(azimuth: f32, grid: PolarGrid) -> (Vec<Vec3>, Vec<f32>) {
     let lights = (0..grid.rings * grid.azimuths).map(|node| {
-        let turn = TAU * (node % grid.azimuths) as f32 / grid.azimuths as f32;
-        let density = 1.0 - 0.75 * turn.cos();
-        let phi = azimuth + turn - 0.75 * turn.sin();
+        let angle = TAU * (node % grid.azimuths) as f32 / grid.azimuths as f32;
+        let density = 1.0 - 0.75 * angle.cos();
+        let phi = azimuth + angle - 0.75 * angle.sin();
         (from_angles(grid.theta(node / grid.azimuths), phi), density * grid.solid_angle(node))
     });
     lights.unzip()
@@ -275,7 +280,8 @@ mod tests {
         ] {
             for geometry in ["{ kind = \"flat\" }", "{ kind = \"pyramids\", spacing = 0.25, height = 0.1 }"] {
                 let source = format!(
-                    "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\nfacets = 512\nmethod = \"direct\"\nbackend = \"cpu\"\n"
+                    "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = \
+                     {brdf}\n[quality]\nfacets = 512\nmethod = \"direct\"\nbackend = \"cpu\"\n"
                 );
                 let (scene, name) = (scene::parse(&source).unwrap(), "test".to_owned());
                 let loaded = LoadedScene { scene, base_dir: PathBuf::new(), name, painted: Painted::default() };

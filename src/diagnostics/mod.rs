@@ -1,7 +1,7 @@
-//! How sound a result is: what was left out, where it is weakest, and what a person can do about it.
+//! Health of a result: figures that show where the result is weak, and warnings with remedies.
 //!
-//! Every [`crate::pipeline::Outcome`] carries the [`HealthInputs`]; the [`Health`] is measured from it when first asked for, so
-//! that an editor's drafts do not wait for it.
+//! Every [`crate::pipeline::Outcome`] holds its [`HealthInputs`]. The [`Health`] is measured from them on first use, so
+//! that drafts of the editor do not wait for it.
 
 mod measure;
 mod warnings;
@@ -16,31 +16,32 @@ use crate::geometry::{Facets, TileMesh};
 use crate::metrics::Errors;
 use crate::visibility::{PackedVisibility, Visibility};
 
-/// What the stages leave for the examination.
+/// Results of the stages from which a health is measured.
 #[derive(Debug, Clone)]
 pub struct HealthInputs {
     pub facets: Arc<Facets>,
     pub visibility: VisibilityInput,
     pub materials: Arc<MaterialAssignment>,
-    /// Names of the materials.
+    /// Names of the materials, in their order.
     pub names: Vec<String>,
     pub closes_plane: bool,
 }
 
-/// What facets see.
+/// Visibility that a health is measured from.
 #[derive(Debug, Clone)]
 pub enum VisibilityInput {
     Soft(Arc<Visibility>),
-    /// Yes or no at fixed directions.
+    /// One bit per facet at fixed directions.
     Packed(Arc<PackedVisibility>),
 }
 
-/// What is known of one result. Part numbers are from 0 to 1; `None` where a number makes no sense or was not measured.
+/// Measured figures and warnings of one result. Fractions are from 0 to 1. A figure is `None` if it does not apply or
+/// was not measured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Health {
-    /// In words: what is weak and what would mend it. Empty where all is well.
+    /// Weaknesses of the result, each with a remedy. It is empty for a sound result.
     pub warnings: Vec<String>,
-    /// Measured BRDFs: samples left out and what was evened out.
+    /// Measured BRDFs, with their invalid samples and their asymmetry.
     pub measured: Vec<MeasuredHealth>,
     pub materials: Vec<MaterialHealth>,
     pub surface: SurfaceHealth,
@@ -48,92 +49,99 @@ pub struct Health {
     pub factorization: Option<FactorHealth>,
 }
 
-/// One measured BRDF.
+/// Health of one measured BRDF.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct MeasuredHealth {
     pub name: String,
     pub samples: usize,
-    /// Negative, NaN, infinite or marked as missing.
+    /// Number of samples that are negative, NaN, infinite or marked as missing.
     pub rejected: usize,
-    /// Relative L2 of `f(i,o) - f(o,i)` before it was averaged away.
+    /// Relative L2 of `f(i,o) - f(o,i)` in the file. The average of both is used.
     pub reciprocity_residual: f32,
     /// Relative L2 of the table against the file.
     pub resampling_error: f32,
 }
 
-/// One material of the tile.
+/// Health of one material of the tile.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct MaterialHealth {
     pub name: String,
-    /// The largest directional albedo of any channel up to 80°: above 1 the material gains energy.
+    /// Largest directional albedo of any channel up to 80°. The material creates energy if it exceeds 1.
     pub largest_albedo: f32,
-    /// Half width of its narrowest lobe [degrees]; `None` for a matte one.
+    /// Half width of the narrowest lobe [degrees]; `None` for a diffuse material.
     pub narrowest_lobe_deg: Option<f32>,
 }
 
-/// The surface and how it was sampled.
+/// Health of the surface and of its facets.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SurfaceHealth {
     pub facets: usize,
-    /// Triangles without area or with corners that are not finite.
+    /// Number of triangles without area or with corners that are not finite.
     pub triangles_left_out: usize,
-    /// Whether light can pass between triangles or around them.
+    /// True if light can pass between triangles or around them.
     pub has_holes: bool,
-    /// Part of the area that none of the directions examined sees.
-    pub area_never_seen: f64,
-    /// Fewest facets that a direction up to 80° sees, and that direction (theta, phi in degrees).
-    pub fewest_facets_seen: usize,
-    pub fewest_seen_from_deg: [f32; 2],
-    /// Facets within the narrowest lobe about a typical normal (the tenth part of all have fewer).
+    /// Part of the area that is visible from none of the examined directions.
+    #[serde(rename = "area_never_seen")]
+    pub area_never_visible: f64,
+    /// Smallest number of facets that are visible from a direction up to 80°.
+    #[serde(rename = "fewest_facets_seen")]
+    pub fewest_visible_facets: usize,
+    /// Direction with the fewest visible facets (theta, phi) [degrees].
+    #[serde(rename = "fewest_seen_from_deg")]
+    pub fewest_visible_at_deg: [f32; 2],
+    /// Number of facets within the narrowest lobe about a normal. A tenth of the normals have fewer.
     pub facets_in_a_lobe: Option<usize>,
-    /// Part of the walks for horizons that were cut short.
-    pub walks_cut_short: f64,
+    /// Part of the searches for horizons that end at their step limit.
+    #[serde(rename = "walks_cut_short")]
+    pub truncated_searches: f64,
 }
 
-/// The effective BRDF itself.
+/// Health of the effective BRDF.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ResultHealth {
-    /// The largest part of even light from everywhere that any examined viewer receives, any channel, and that viewer
-    /// (theta, phi in degrees); by reciprocity the directional albedo.
+    /// Largest directional albedo of any channel. By reciprocity it is measured as the part of uniform light that a
+    /// viewer receives.
     pub largest_albedo: Option<f32>,
+    /// Direction of that viewer (theta, phi) [degrees].
     pub largest_albedo_at_deg: [f32; 2],
-    /// The largest `|a_v / (A cos θ) - 1|` up to 80°, and where (degrees): where the sampling is weakest.
+    /// Largest `|a_v / (A cos θ) - 1|` up to 80°, which shows the error of the sampling.
     pub projected_area_error: Option<f64>,
+    /// Direction of that error (theta, phi) [degrees].
     pub worst_angle_deg: [f32; 2],
     /// Relative L2 of `G(i,o) - G(o,i)`.
     pub reciprocity_residual: f64,
-    /// Values that were not finite, or negative, among those examined. Never anything but 0, or there is a fault.
+    /// Number of examined values that are negative or not finite. It is 0 unless the program has a fault.
     pub unsound_values: usize,
 }
 
-/// Where factors hold the result, or were tried.
+/// Health of a factorization that was computed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct FactorHealth {
-    /// Whether the result is read from factors.
+    /// True if the result is evaluated from the factors.
     pub used: bool,
-    /// Relative L2 against the direct sum, an upper estimate; `None` where there is no direct sum to compare with.
+    /// Upper estimate of the relative L2 against the direct sum; `None` if there is no direct sum to compare with.
     pub relative_error: Option<f64>,
-    /// `-log10` of it: decimal digits that are right.
+    /// Number of correct decimal digits: `-log10` of the relative error.
     pub effective_digits: Option<f64>,
-    /// Ranks kept, a channel.
+    /// Number of factors per channel.
     pub ranks: Vec<usize>,
-    /// Whether a rank stands at its limit: then truncation, not the wanted energy, ended it.
+    /// True if a rank is at its limit, so that the limit ended the factorization instead of the energy.
     pub at_rank_limit: bool,
-    /// Step of the grid that lobes are read from [degrees].
+    /// Step of the grid of lobes [degrees].
     pub lobe_grid_step_deg: f32,
 }
 
-/// What the examination needs to know of the settings.
+/// Settings that warnings depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Largest rank of a factorization.
     pub max_rank: usize,
-    /// Relative L2 that factors may differ from the direct sum by.
+    /// Largest relative L2 between factors and the direct sum.
     pub tolerance: f64,
 }
 
 impl Health {
-    /// Examines a result.
+    /// Measures the health of a result.
     pub fn of(brdf: &EffectiveBrdf, inputs: &HealthInputs, factored: Option<Errors>, limits: Limits) -> Self {
         let (measured, materials) = measure::materials(&inputs.materials.materials, &inputs.names);
         let lobe = materials.iter().filter_map(|material| material.narrowest_lobe_deg).reduce(f32::min);
@@ -150,19 +158,19 @@ impl Health {
         health
     }
 
-    /// Of what has no effective BRDF to examine, as the reference sum: materials and mesh alone.
+    /// Measures the health of materials and mesh alone, because the reference has no effective BRDF to examine.
     pub fn of_input(mesh: &TileMesh, materials: &[Material], names: &[String], limits: Limits) -> Self {
         let (measured, materials) = measure::materials(materials, names);
         let left_out = (0..mesh.triangles.len()).filter(|&triangle| mesh.triangle_area(triangle) <= 0.0).count();
         let surface = SurfaceHealth {
             triangles_left_out: left_out,
             has_holes: !mesh.closes_plane,
-            fewest_facets_seen: usize::MAX,
+            fewest_visible_facets: usize::MAX,
             ..SurfaceHealth::default()
         };
         let mut health = Self { measured, materials, surface, ..Self::default() };
         health.warnings = warnings::of(&health, limits, false);
-        health.surface.fewest_facets_seen = 0;
+        health.surface.fewest_visible_facets = 0;
         health
     }
 }

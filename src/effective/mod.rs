@@ -23,6 +23,7 @@ pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
 
 pub use shading_table::content::TableContent;
+#[cfg(feature = "gpu")]
 pub(crate) use shading_table::sampled_facets::subset_size;
 pub use shading_table::{Nodes, ShadingTable};
 pub use tint::Tint;

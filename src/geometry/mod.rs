@@ -5,7 +5,6 @@ pub mod facets;
 pub mod families;
 pub mod grid;
 pub mod image_file;
-pub mod obj;
 mod symmetry;
 mod tile_mesh;
 

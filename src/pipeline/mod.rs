@@ -17,6 +17,7 @@ mod stages;
 #[cfg(test)]
 mod tests;
 
+use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
@@ -132,6 +133,11 @@ impl Pipeline {
             PaperTables::NAME,
         ];
         names.into_iter().map(|name| (name, self.memo.runs(name))).collect()
+    }
+
+    /// A key of a file's content. `path` is relative to `base_dir`, or `asset:` and a name.
+    pub fn file_key(&self, base_dir: &Path, path: &Path) -> Key {
+        self.env.file_key(base_dir, path)
     }
 
     fn tile(&self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Keyed<TileShape>> {
@@ -410,11 +416,11 @@ fn grouped(material_of_slot: &[usize], facets: &Facets, settings: &Settings) -> 
 fn shading_keys(inputs: &TileInputs, visibility: &Keyed<Visibility>) -> ShadingKeys {
     let TileInputs { settings, facets, materials, material_of_slot, .. } = inputs;
     let mut surface = KeyBuilder::of_stage("surface");
-    surface.numbers("settings", format!("{settings:?}").as_bytes());
+    surface.debug("settings", settings);
     surface.key("facets", &facets.key).key("visibility", &visibility.key);
     let mut lobes = KeyBuilder::of_stage("lobes");
     lobes.counts("material of slot", material_of_slot.iter().copied());
-    lobes.numbers("effects", format!("{:?}", settings.effects).as_bytes());
+    lobes.debug("effects", &settings.effects);
     for material in &materials.materials {
         material.hash_lobes_into(&mut lobes);
     }

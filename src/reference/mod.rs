@@ -1,4 +1,4 @@
-//! Ray-cast ground truth with its own standard error: the sum over facets, and paths between facets.
+//! The ray-cast reference with its standard error: the sum over facets, and paths between facets.
 
 mod paths;
 mod ray_cast;

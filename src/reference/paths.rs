@@ -1,5 +1,5 @@
-//! Light from facet to facet by path tracing, for the reference: random walks from the viewer, the light asked at every hit.
-//! Shares nothing with [`crate::interreflection`] but the rays.
+//! Interreflection of the reference by path tracing: random walks from the viewer, with the light evaluated at every
+//! hit. It shares only the ray casting with [`crate::interreflection`].
 
 use std::f32::consts::{PI, TAU};
 
@@ -12,11 +12,13 @@ use crate::geometry::{Facets, Hit, PeriodicGrid, TileMesh};
 use crate::math::directions::from_angles;
 use crate::metrics::Pair;
 
-/// Lifts a ray off the surface it starts on, in units of the tile's diagonal; as facets' rays are.
+/// Distance by which the origin of a ray is lifted off the surface, in units of the tile's diagonal. The rays of facets
+/// use the same distance.
 const LIFT: f32 = 2e-6;
-/// A cosine that is divided by is not taken smaller.
+/// Smallest cosine in a denominator.
 const MIN_COSINE: f32 = 1e-4;
 
+/// Traces the paths of one set of facets.
 #[derive(Debug)]
 pub(super) struct Paths<'a> {
     mesh: &'a TileMesh,
@@ -28,7 +30,7 @@ pub(super) struct Paths<'a> {
     bounces: usize,
 }
 
-/// A point that reflects.
+/// A point of a path that reflects.
 struct Vertex<'a> {
     origin: Vec3,
     geometric: Vec3,
@@ -50,7 +52,8 @@ impl<'a> Paths<'a> {
         Self { mesh, grid, material_of_slot, materials, normals, bottom: mesh.z_range().0, bounces }
     }
 
-    /// `Σ ΔA L (n·o)`: what reaches the viewer from the facets it sees (`v_o`) after one bounce or more, for unit irradiance.
+    /// `Σ ΔA L (n·o)` over the facets that are visible from the viewer (`v_o`). `L` is the radiance after one bounce or
+    /// more under unit irradiance.
     pub fn trace(&self, facets: &Facets, origins: &[Vec3], v_o: &[f32], pair: Pair, seed: u64) -> DVec3 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut total = DVec3::ZERO;
@@ -70,14 +73,14 @@ impl<'a> Paths<'a> {
                 material,
                 color: facets.colors[s] * material.color,
             };
-            // The cosine of the first vertex and the viewer stays in the sum.
-            let seen = facets.normals[s].dot(pair.o).max(0.0);
-            total += (self.walk(start, pair, &mut rng) * (facets.areas[s] * seen)).as_dvec3();
+            // The cosine between the first vertex and the viewer is a factor of the sum.
+            let cosine = facets.normals[s].dot(pair.o).max(0.0);
+            total += (self.walk(start, pair, &mut rng) * (facets.areas[s] * cosine)).as_dvec3();
         }
         total
     }
 
-    /// Radiance towards the viewer by light that was reflected elsewhere before.
+    /// Radiance towards the viewer due to light that other facets reflected first.
     fn walk(&self, mut at: Vertex<'a>, pair: Pair, rng: &mut ChaCha8Rng) -> Vec3 {
         let (mut towards, mut weight, mut radiance) = (pair.o, Vec3::ONE, Vec3::ZERO);
         for _ in 0..self.bounces {
@@ -139,7 +142,7 @@ fn cosine_direction(normal: Vec3, u: f32, v: f32) -> Vec3 {
 mod tests {
     use super::*;
 
-    /// Even on the disc below: the square of the sine and the azimuth are uniform.
+    // With the density cos θ / π, the squared sine and the azimuth are uniform.
     #[test]
     fn directions_of_paths_pass_the_chi_squared_test_for_the_cosine() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);

@@ -1,5 +1,5 @@
-//! The reference: the same integral with exact ray-cast visibility and exact BRDFs, in independent passes that give
-//! it a standard error.
+//! The reference: the effective BRDF with exact ray-cast visibility and exact BRDFs. Independent passes give its
+//! standard error.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -10,13 +10,14 @@ use crate::effective::FacetSum;
 use crate::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh, lifted_origins};
 use crate::metrics::Pair;
 
+/// Work and accuracy of a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceSettings {
-    /// Facets a pass.
+    /// Facets per pass.
     pub facets: usize,
-    /// At most this many independent passes; at least four are made.
+    /// Largest number of independent passes. At least four are computed.
     pub max_passes: usize,
-    /// Stops when the relative L2 of the standard errors falls below this.
+    /// Relative L2 of the standard errors at which the passes end.
     pub target: f64,
     pub seed: u64,
 }
@@ -27,7 +28,7 @@ impl Default for ReferenceSettings {
     }
 }
 
-/// With fewer, the spread of the passes says little about their mean.
+/// Smallest number of passes. The spread of fewer passes is a poor estimate of the error of their mean.
 const MIN_PASSES: usize = 4;
 
 /// `f̄` of one pair with its standard error, per channel [1/sr].
@@ -37,18 +38,18 @@ pub struct Estimate {
     pub standard_error: Vec3,
 }
 
-/// Everything the reference sum needs; facets are drawn anew for each pass.
+/// Inputs of the reference. Each pass draws its own facets.
 #[derive(Debug)]
 pub struct Reference<'a> {
     pub(super) mesh: &'a TileMesh,
     pub(super) grid: PeriodicGrid,
     pub(super) material_of_slot: Vec<usize>,
     pub(super) materials: Vec<Material>,
-    /// Reflections between facets that paths follow; 0 for the paper's definition.
+    /// Number of reflections between facets. The paper's definition has none.
     pub(super) bounces: usize,
 }
 
-/// Sums over the passes of one pair: of `S = Σ ΔA V V f` and `a_v`, and of their second moments.
+/// Sums over the passes of one pair: `S = Σ ΔA V V f`, `a_v`, and their second moments.
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
     s: DVec3,
@@ -65,7 +66,7 @@ impl Moments {
         }
         let n = passes as f64;
         let ratio = self.s / self.a;
-        // Variance of the ratio estimate: of S_p - ratio a_p, over n(n-1) and the mean a squared.
+        // Variance of the ratio estimate: that of S_p - ratio a_p, divided by n(n-1) and the squared mean of a.
         let residual = (self.ss - 2.0 * ratio * self.sa + ratio * ratio * self.aa).max(DVec3::ZERO);
         let error = (residual / (n * (n - 1.0).max(1.0))).map(f64::sqrt) / (self.a / n);
         Estimate { f_bar: ratio.as_vec3(), standard_error: error.as_vec3() }
@@ -83,13 +84,13 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// Follows light from facet to facet too.
+    /// Adds light that is reflected between facets up to `bounces` times.
     pub fn with_bounces(self, bounces: usize) -> Self {
         Self { bounces, ..self }
     }
 
-    /// Estimates `f̄` at each pair. `progress(passes done, relative L2 of the standard errors)` after each pass; it
-    /// returns whether to go on.
+    /// Estimates `f̄` at each pair. After each pass it calls `progress(passes, relative L2 of the standard errors)`,
+    /// which returns whether to continue.
     pub fn estimate(
         &self,
         pairs: &[Pair],
@@ -100,8 +101,8 @@ impl<'a> Reference<'a> {
         let mut estimates = vec![Estimate::default(); pairs.len()];
         let sampler = FacetSampler::new(self.mesh);
         for pass in 0..settings.max_passes.max(MIN_PASSES) {
-            // Shifts of one low-discrepancy sequence: the passes together are better than independent ones would be,
-            // so the standard error is, if anything, too large.
+            // The passes shift one low-discrepancy sequence. Together they are more accurate than independent passes,
+            // so the standard error is an upper estimate.
             let shift = SampleShift::from_seed(settings.seed.wrapping_mul(4096).wrapping_add(pass as u64));
             let mut facets = sampler.sample(self.mesh, settings.facets, shift);
             facets.sort_for_sums();
@@ -139,7 +140,7 @@ impl<'a> Reference<'a> {
         estimates
     }
 
-    /// `(Σ ΔA V V f, a_v)` of one set of facets.
+    /// Computes `(Σ ΔA V V f, a_v)` over one set of facets.
     fn one_pass(
         &self,
         facets: &Facets,
@@ -155,9 +156,10 @@ impl<'a> Reference<'a> {
         }
         for s in 0..facets.len() {
             let normal = facets.normals[s];
-            let clear = |to: Vec3| normal.dot(to) > 0.0 && !self.grid.is_blocked(origins[s], to, facets.triangles[s]);
-            v_o[s] = f32::from(clear(o));
-            v_i[s] = f32::from(v_o[s] > 0.0 && clear(i));
+            let is_visible =
+                |to: Vec3| normal.dot(to) > 0.0 && !self.grid.is_blocked(origins[s], to, facets.triangles[s]);
+            v_o[s] = f32::from(is_visible(o));
+            v_i[s] = f32::from(v_o[s] > 0.0 && is_visible(i));
         }
         (sum.sum(i, o, v_i, v_o), sum.projected_area(v_o, o))
     }

@@ -1,5 +1,5 @@
-//! The reference as pictures see it: each query sums over a few facets of its own, so that a whole picture takes seconds; the
-//! mean of many such pictures is the reference's.
+//! A noisy reference for images. Each query sums over few facets of its own, so that an image takes seconds. The mean
+//! of many such images converges to the image of the reference.
 
 use glam::{DVec3, Vec3};
 
@@ -8,13 +8,13 @@ use crate::base::Cancel;
 use crate::effective::Reflectance;
 use crate::geometry::{FacetSampler, Facets, SampleShift, lifted_origins};
 
-/// Facets that a query sums over. Where a tile leaves holes their visible area divides the sum: with fewer, the bias of that
-/// ratio (of the order of one over their number) shows.
+/// Number of facets per query. If a tile has holes, the sum is divided by the estimated visible area of the facets. The
+/// bias of that ratio is of the order of one over their number.
 const FACETS: usize = 256;
-/// Sets of facets to draw from.
+/// Number of sets of facets from which a query takes one.
 const SETS: usize = 128;
 
-/// A noisy evaluation of the reference, different at each direction and for each seed.
+/// A noisy evaluation of the reference. Its noise differs between directions and between seeds.
 #[derive(Debug)]
 pub struct StochasticReference<'r> {
     reference: &'r Reference<'r>,
@@ -25,8 +25,8 @@ pub struct StochasticReference<'r> {
 }
 
 impl Reference<'_> {
-    /// The reference for one noisy picture; `None` where paths between facets are followed, which takes too long.
-    /// Once cancelled it is black, and quick.
+    /// The reference for one noisy image; `None` with interreflection, which takes too long. After `cancel` is set, all
+    /// values are black.
     pub fn stochastic_reference(&self, seed: u64, cancel: &Cancel) -> Option<StochasticReference<'_>> {
         if self.bounces > 0 {
             return None;
@@ -40,37 +40,37 @@ impl Reference<'_> {
 impl Reflectance for StochasticReference<'_> {
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
         let mut sums = vec![DVec3::ZERO; lights.len()];
-        let mut seen = 0.0;
+        let mut visible_area = 0.0;
         if o.z > 0.0 && !self.cancel.is_set() {
-            // Facets are spread along the surface in order: every SETS-th is a stratified set.
+            // The facets follow the surface in order, so that every SETS-th facet makes a stratified set.
             let first = hash(o, self.seed) as usize % SETS;
             for s in (first..self.facets.len()).step_by(SETS) {
-                seen += self.add(s, lights, o, &mut sums);
+                visible_area += self.add(s, lights, o, &mut sums);
             }
         }
         if self.reference.mesh.closes_plane {
-            // Known, where all that is under the base is hidden: what is estimated would be noise in the divisor.
-            seen = f64::from(self.reference.mesh.base_area() * o.z.max(0.0)) / SETS as f64;
+            // The visible area of a tile without holes is known. An estimate would add noise to the divisor.
+            visible_area = f64::from(self.reference.mesh.base_area() * o.z.max(0.0)) / SETS as f64;
         }
         for (out, sum) in out.iter_mut().zip(sums) {
-            *out = if seen > 0.0 { (sum / seen).as_vec3() } else { Vec3::ZERO };
+            *out = if visible_area > 0.0 { (sum / visible_area).as_vec3() } else { Vec3::ZERO };
         }
     }
 }
 
 impl StochasticReference<'_> {
-    /// Adds facet `s` to the sums; returns its visible area.
+    /// Adds facet `s` to the sums and returns its visible projected area.
     fn add(&self, s: usize, lights: &[Vec3], o: Vec3, sums: &mut [DVec3]) -> f64 {
         let (normal, triangle) = (self.facets.normals[s], self.facets.triangles[s]);
         let grid = &self.reference.grid;
-        let clear = |to: Vec3| normal.dot(to) > 0.0 && !grid.is_blocked(self.origins[s], to, triangle);
-        if !clear(o) {
+        let is_visible = |to: Vec3| normal.dot(to) > 0.0 && !grid.is_blocked(self.origins[s], to, triangle);
+        if !is_visible(o) {
             return 0.0;
         }
         let material = &self.reference.materials[self.reference.material_of_slot[usize::from(self.facets.slots[s])]];
         let weight = material.color * self.facets.colors[s] * self.facets.areas[s];
         for (sum, &i) in sums.iter_mut().zip(lights) {
-            if i.z > 0.0 && clear(i) {
+            if i.z > 0.0 && is_visible(i) {
                 *sum += (material.brdf.f(normal, i, o) * weight).as_dvec3();
             }
         }
@@ -78,7 +78,7 @@ impl StochasticReference<'_> {
     }
 }
 
-/// Any two directions far apart in their bits.
+/// Hash of a direction. Directions that differ in few bits have unrelated hashes.
 fn hash(direction: Vec3, seed: u64) -> u64 {
     let mix = |state: u64, word: u64| (state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
     let state = direction.to_array().iter().fold(seed, |state, x| mix(state, u64::from(x.to_bits())));
@@ -93,7 +93,7 @@ mod tests {
     use crate::reference::ReferenceSettings;
 
     #[test]
-    fn the_mean_of_glimpses_is_the_reference() {
+    fn the_mean_of_stochastic_references_is_the_reference() {
         for name in ["fig4b_bicolor_cup", "fig8a_hammered", "fig6a_velvet_spread"] {
             let loaded = crate::scene::open(name, &[]).unwrap();
             let pairs = mirror_biased_pairs(24, 5);
@@ -118,15 +118,15 @@ mod tests {
                 )
             };
             let (exact, [a, b]) = Pipeline::new().with_reference(&loaded, estimate).unwrap();
-            let (mut off, mut noise, mut norm) = (0.0, 0.0, 0.0);
+            let (mut error, mut noise, mut norm) = (0.0, 0.0, 0.0);
             for (exact, (a, b)) in exact.iter().zip(a.iter().zip(&b)) {
-                off += exact.f_bar.distance_squared(0.5 * (*a + *b));
+                error += exact.f_bar.distance_squared(0.5 * (*a + *b));
                 noise += 0.25 * a.distance_squared(*b);
                 norm += exact.f_bar.length_squared();
             }
-            let (off, noise) = ((off / norm).sqrt(), (noise / norm).sqrt());
-            // 3 % for what interpolated normals change in the projected area, and for the reference's own error.
-            assert!(off < 2.5 * noise + 0.03 && noise < 0.25, "{name}: {off} with a noise of {noise}");
+            let (error, noise) = ((error / norm).sqrt(), (noise / norm).sqrt());
+            // 3 % allow for interpolated normals, which change the projected area, and for the error of the reference.
+            assert!(error < 2.5 * noise + 0.03 && noise < 0.25, "{name}: {error} with a noise of {noise}");
         }
     }
 }

@@ -5,6 +5,7 @@ pub mod lighting;
 pub mod object;
 mod scene;
 pub mod shadow;
+pub mod stages;
 pub mod tile_view;
 
 pub use image::camera::CameraView;

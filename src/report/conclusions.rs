@@ -1,12 +1,12 @@
-//! What the points say, in sentences.
+//! Sentences that summarize the points of a report. They are a part of `report.json`.
 
 use super::SceneReport;
 use super::svg::number;
 use crate::plan::Preset;
 use crate::tuning::candidates::Family;
-use crate::tuning::sweep::{Point, is_preset, pareto};
+use crate::tuning::sweep::{SweepPoint, is_preset, pareto};
 
-/// A sentence each.
+/// All sentences about a scene.
 pub fn of(scene: &SceneReport) -> Vec<String> {
     let mut all = Vec::new();
     let preset = |preset: Preset| scene.points.iter().find(|point| is_preset(point, preset));
@@ -18,7 +18,7 @@ pub fn of(scene: &SceneReport) -> Vec<String> {
                 number(point.ms),
                 point.psnr_db,
                 number(point.rel_l2 * 100.0),
-                point.form
+                point.representation
             ));
         }
     }
@@ -26,11 +26,12 @@ pub fn of(scene: &SceneReport) -> Vec<String> {
         all.extend(against_the_paper(scene, paper));
     }
     all.extend(crossing(scene).map(|crossing| crossing.sentence));
-    all.extend(best_knob(scene));
+    all.extend(most_influential_setting(scene));
     all
 }
 
-fn ours(scene: &SceneReport) -> Vec<&Point> {
+/// All points except the paper's own choices and the reference.
+fn ours(scene: &SceneReport) -> Vec<&SweepPoint> {
     scene
         .points
         .iter()
@@ -38,10 +39,10 @@ fn ours(scene: &SceneReport) -> Vec<&Point> {
         .collect()
 }
 
-/// The front at the time of the paper's own choices, and at their error.
-fn against_the_paper(scene: &SceneReport, paper: &Point) -> Option<String> {
+/// Compares the Pareto front with the paper's own choices, at their time and at their error.
+fn against_the_paper(scene: &SceneReport, paper: &SweepPoint) -> Option<String> {
     let ours = ours(scene);
-    let front: Vec<&Point> = pareto(&ours).into_iter().map(|k| ours[k]).collect();
+    let front: Vec<&SweepPoint> = pareto(&ours).into_iter().map(|k| ours[k]).collect();
     let as_fast = front.iter().rfind(|point| point.ms <= paper.ms);
     let as_good = front.iter().find(|point| point.rel_l2 <= paper.rel_l2);
     let better = as_fast.map(|point| format!("{:.1} dB better in no more time", point.psnr_db - paper.psnr_db));
@@ -57,31 +58,31 @@ fn against_the_paper(scene: &SceneReport, paper: &Point) -> Option<String> {
     })
 }
 
-/// Where factored and direct evaluation cost the same.
+/// Comparison of factored and direct evaluation, and the number of pairs for which both cost the same.
 pub struct Crossing<'a> {
-    pub direct: &'a Point,
-    pub low_rank: &'a Point,
+    pub direct: &'a SweepPoint,
+    pub low_rank: &'a SweepPoint,
     pub sentence: String,
 }
 
-/// Compares the two points of the knob `method`.
+/// Compares the two points that vary `method` alone.
 pub fn crossing(scene: &SceneReport) -> Option<Crossing<'_>> {
     let of = |method: &str| {
-        let knob = Family::Knob("method".to_owned());
-        scene.points.iter().find(|point| point.family == knob && point.settings.contains(method))
+        let family = Family::Setting("method".to_owned());
+        scene.points.iter().find(|point| point.family == family && point.settings.contains(method))
     };
     let (direct, low_rank) = (of("\"direct\"")?, of("\"low_rank\"")?);
-    let (dearer, cheaper) = (low_rank.ms - direct.ms, direct.query_us - low_rank.query_us);
-    let sentence = if cheaper <= 0.0 {
+    let (extra_ms, saved_us) = (low_rank.ms - direct.ms, direct.query_us - low_rank.query_us);
+    let sentence = if saved_us <= 0.0 {
         "Summing directly is cheaper for any number of direction pairs.".to_owned()
-    } else if dearer <= 0.0 {
+    } else if extra_ms <= 0.0 {
         "Factors are cheaper for any number of direction pairs.".to_owned()
     } else {
         format!(
             "Factors take {} ms longer to make and save {} µs a direction pair: they pay from {:.0} pairs on (one thread). They leave {} %, the direct sum {} %.",
-            number(dearer),
-            number(cheaper),
-            dearer * 1e3 / cheaper,
+            number(extra_ms),
+            number(saved_us),
+            extra_ms * 1e3 / saved_us,
             number(low_rank.rel_l2 * 100.0),
             number(direct.rel_l2 * 100.0)
         )
@@ -89,20 +90,21 @@ pub fn crossing(scene: &SceneReport) -> Option<Crossing<'_>> {
     Some(Crossing { direct, low_rank, sentence })
 }
 
-/// The knob whose range changes the error most.
-fn best_knob(scene: &SceneReport) -> Option<String> {
-    let mut knobs: Vec<(&str, f64, f64)> = Vec::new();
+/// Names the setting whose range changes the error most.
+fn most_influential_setting(scene: &SceneReport) -> Option<String> {
+    // Name, smallest and largest error.
+    let mut settings: Vec<(&str, f64, f64)> = Vec::new();
     for point in &scene.points {
-        let Family::Knob(name) = &point.family else { continue };
+        let Family::Setting(name) = &point.family else { continue };
         if name == "method" {
             continue;
         }
-        match knobs.iter_mut().find(|knob| knob.0 == name) {
-            Some(knob) => (knob.1, knob.2) = (knob.1.min(point.rel_l2), knob.2.max(point.rel_l2)),
-            None => knobs.push((name, point.rel_l2, point.rel_l2)),
+        match settings.iter_mut().find(|setting| setting.0 == name) {
+            Some(setting) => (setting.1, setting.2) = (setting.1.min(point.rel_l2), setting.2.max(point.rel_l2)),
+            None => settings.push((name, point.rel_l2, point.rel_l2)),
         }
     }
-    let most = knobs.into_iter().max_by(|a, b| (a.2 / a.1).total_cmp(&(b.2 / b.1)))?;
+    let most = settings.into_iter().max_by(|a, b| (a.2 / a.1).total_cmp(&(b.2 / b.1)))?;
     Some(format!(
         "The knob that matters most here is {}: over its range the error goes from {} % to {} %.",
         most.0,

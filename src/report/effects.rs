@@ -1,4 +1,5 @@
-//! What each effect of the plan costs and changes, measured on the scene: on, off, and the picture between.
+//! Measured cost and influence of each effect of the plan: milliseconds with the effect on and off, and the change of
+//! f̄ and of the image.
 
 use std::time::Instant;
 
@@ -14,26 +15,28 @@ use crate::plan::{effect_names, switch_mut};
 use crate::render::Image;
 use crate::scene::{LoadedScene, Switch};
 
-/// An effect forced on and off.
+/// Cost and influence of one effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectCost {
     pub name: &'static str,
-    /// From a geometry edit to `f̄`, and a small picture [ms].
+    /// Time from a geometry edit to `f̄` and a small image with the effect on [ms].
     pub on_ms: f64,
+    /// Time with the effect off [ms].
     pub off_ms: f64,
-    /// As the plan has it: one of the other two, and what differs is the noise of the clock.
+    /// Time with the plan's own choice [ms]. It differs from one of the other two by noise of the clock only.
     pub auto_ms: f64,
-    /// Relative L2 of `f̄` that it changes.
+    /// Relative L2 between `f̄` with and without the effect.
     pub rel_l2: f64,
-    /// CIE ΔE of the picture that it changes: mean, and the 95th of a hundred pixels.
+    /// Mean CIE ΔE between the images with and without the effect.
     pub mean_delta_e: f64,
+    /// 95th percentile of the CIE ΔE.
     pub high_delta_e: f64,
 }
 
-/// A scene with an effect forced one way, timed again and again.
+/// A scene with one state of an effect, which is timed several times.
 struct Runner {
     scene: LoadedScene,
-    studio: ThumbnailRenderer,
+    renderer: ThumbnailRenderer,
     pipeline: Pipeline,
     outcome: Outcome,
     image: Image,
@@ -41,22 +44,23 @@ struct Runner {
     times: Vec<f64>,
 }
 
-/// Times are medians of this many.
+/// Number of timed runs. The median is reported.
 const RUNS: u64 = 5;
-/// What takes longer than this the first time is timed once more only.
+/// Duration of a first run above which only one run is timed [ms].
 const SLOW_MS: f64 = 1500.0;
+/// Direction pairs for the change of `f̄`.
 const PAIRS: usize = 128;
 
-/// Measures every switch; `progress` hears its name.
+/// Measures every effect that can be forced. `progress` receives its name.
 ///
 /// # Errors
-/// As [`Pipeline::effective`], and an object or environment that cannot be used.
+/// As [`Pipeline::effective`], or the object or the environment cannot be used.
 pub fn measure_effects(
     loaded: &LoadedScene,
     cancel: &Cancel,
     mut progress: impl FnMut(&str),
 ) -> Result<Vec<EffectCost>> {
-    let mut all = Vec::new();
+    let mut costs = Vec::new();
     for name in effect_names() {
         let forced = |switch: Switch| {
             let mut scene = loaded.clone();
@@ -70,7 +74,8 @@ pub fn measure_effects(
         for scene in [Switch::On, Switch::Auto, Switch::Off].map(forced) {
             runners.push(Runner::new(scene, cancel)?);
         }
-        // In turn: what else the machine does meets all three alike. The last run is of the scene's own facets.
+        // The three take turns, so that other load on the machine affects them alike. The last run uses the scene's own
+        // seed.
         let slow = runners.iter().any(|runner| runner.first_ms > SLOW_MS);
         for run in (0..if slow { 1 } else { RUNS }).rev() {
             for runner in &mut runners {
@@ -78,9 +83,9 @@ pub fn measure_effects(
             }
         }
         let [on, auto, off] = &mut runners[..] else { continue };
-        let mut delta_e = on.studio.difference(&on.image, &off.image);
+        let mut delta_e = on.renderer.difference(&on.image, &off.image);
         delta_e.sort_by(f32::total_cmp);
-        all.push(EffectCost {
+        costs.push(EffectCost {
             name,
             on_ms: on.median_ms(),
             off_ms: off.median_ms(),
@@ -90,29 +95,29 @@ pub fn measure_effects(
             high_delta_e: f64::from(delta_e.get(delta_e.len() * 95 / 100).copied().unwrap_or(0.0)),
         });
     }
-    Ok(all)
+    Ok(costs)
 }
 
 impl Runner {
     fn new(scene: LoadedScene, cancel: &Cancel) -> Result<Self> {
-        let studio = ThumbnailRenderer::new(&scene)?;
+        let renderer = ThumbnailRenderer::new(&scene)?;
         let mut pipeline = crate::gpu::pipeline();
         pipeline.set_cancel(cancel.clone());
         let start = Instant::now();
         let outcome = pipeline.effective(&scene)?;
-        let image = studio.image(&*outcome.shading_brdf(cancel)?.brdf)?;
+        let image = renderer.image(&*outcome.shading_brdf(cancel)?.brdf)?;
         let first_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(Self { scene, studio, pipeline, outcome, image, first_ms, times: Vec::new() })
+        Ok(Self { scene, renderer, pipeline, outcome, image, first_ms, times: Vec::new() })
     }
 
-    /// Other facets each time: all that an edit of the geometry asks for; 0 are the scene's own.
+    /// Times an edit with other facets, so that all stages after the mesh run. Run 0 uses the scene's own seed.
     fn run(&mut self, run: u64, cancel: &Cancel) -> Result<()> {
-        let mut moved = self.scene.clone();
-        // Never the facets that were drawn last.
-        moved.scene.quality.seed ^= if self.times.is_empty() && run == 0 { 1 } else { run };
+        let mut edited = self.scene.clone();
+        // Facets that equal those of the last run would not be computed again.
+        edited.scene.quality.seed ^= if self.times.is_empty() && run == 0 { 1 } else { run };
         let start = Instant::now();
-        self.outcome = self.pipeline.effective(&moved)?;
-        self.image = self.studio.image(&*self.outcome.shading_brdf(cancel)?.brdf)?;
+        self.outcome = self.pipeline.effective(&edited)?;
+        self.image = self.renderer.image(&*self.outcome.shading_brdf(cancel)?.brdf)?;
         self.times.push(start.elapsed().as_secs_f64() * 1e3);
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! The page.
+//! The HTML page of a report.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use super::svg::{COLORS, Chart, LogAxis, escape, number, stacked_bars};
 use super::thumbnails::scale_strip;
 use super::{Report, SceneReport, conclusions};
 use crate::tuning::candidates::Family;
-use crate::tuning::sweep::{BANDS_DEG, Point, pareto};
+use crate::tuning::sweep::{BANDS_DEG, SweepPoint, pareto};
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --ink: #1b1f24; --soft: #59636e; --line: #d9dee4; --card: #fff; --page: #f5f6f8; }
@@ -31,8 +31,8 @@ pub fn page(report: &Report) -> String {
     let _ = write!(
         html,
         "<!doctype html><html lang='en'><meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>biscale: accuracy against time</title><style>{STYLE}</style><body>\
-         <h1>What accuracy costs in time</h1><p class='soft'>biscale {} on {} ({} threads). Made by <code>{}</code>. Times hold on that machine only; ratios travel better.</p>\
-         <p>Each dot is a setting: how long the program takes from an edit of the geometry to the effective BRDF, and how far that is from the reference (exact rays, exact BRDFs, no tables). Scenes: {}.</p>",
+         <h1>Accuracy against time</h1><p class='soft'>biscale {} on {} ({} threads). Made by <code>{}</code>. Times hold on that machine only.</p>\
+         <p>Each dot is one choice of settings. It shows the time from an edit of the geometry to the effective BRDF, and the error against the reference (exact rays, exact BRDFs, no tables). Scenes: {}.</p>",
         escape(&report.machine.version),
         escape(&report.machine.processor),
         report.machine.threads,
@@ -49,14 +49,14 @@ pub fn page(report: &Report) -> String {
 fn section(html: &mut String, scene: &SceneReport) {
     let _ = write!(
         html,
-        "<h2>{}</h2><p class='soft'>Reference: {} direction pairs up to 85°, {} passes in {} s; its own standard error is {} % relative L2, which no error below can be told apart from.{}</p>",
+        "<h2>{}</h2><p class='soft'>Reference: {} direction pairs up to 85°, {} passes in {} s; its standard error is {} % relative L2. Errors of this size or below cannot be distinguished from it.{}</p>",
         escape(&scene.name),
         scene.pairs,
         scene.reference_passes,
         number(scene.reference_seconds),
         number(scene.reference_error * 100.0),
         if scene.left_out > 0 {
-            format!(" {} settings were left out: the time was up.", scene.left_out)
+            format!(" {} settings were left out because the time was over.", scene.left_out)
         } else {
             String::new()
         }
@@ -67,14 +67,14 @@ fn section(html: &mut String, scene: &SceneReport) {
     }
     html.push_str("</ul><div class='grid-of'>");
     card(html, "Error against time", &error_against_time(scene));
-    card(html, "One knob at a time", &error_per_knob(scene));
+    card(html, "One setting at a time", &error_per_setting(scene));
     if let Some(chart) = crossing(scene) {
         card(html, "Direct sum or factors", &chart);
     }
     card(html, "Error by angle (the larger of the two, from the normal)", &error_by_angle(scene));
-    card(html, "Where the time goes", &stage_times(scene));
+    card(html, "Time of each stage", &stage_times(scene));
     if !scene.thumbnails.is_empty() {
-        card(html, "To the eye", &thumbnails(scene));
+        card(html, "Images", &thumbnails(scene));
     }
     html.push_str("</div>");
     table(html, scene);
@@ -84,32 +84,32 @@ fn card(html: &mut String, title: &str, body: &str) {
     let _ = write!(html, "<div class='card'><h3>{}</h3>{body}</div>", escape(title));
 }
 
-pub fn family_name(point: &Point) -> String {
+fn family_name(point: &SweepPoint) -> String {
     match &point.family {
         Family::Preset => "preset".to_owned(),
-        Family::Knob(name) => format!("knob {name}"),
-        Family::Ladder => "ladder".to_owned(),
+        Family::Setting(name) => format!("setting {name}"),
+        Family::QualityScale => "quality level".to_owned(),
         Family::Combination => "combination".to_owned(),
     }
 }
 
-fn title(point: &Point) -> String {
+fn title(point: &SweepPoint) -> String {
     format!(
         "{}: {} ms, {:.1} dB, {} %, {}",
         point.settings,
         number(point.ms),
         point.psnr_db,
         number(point.rel_l2 * 100.0),
-        point.form
+        point.representation
     )
 }
 
-/// Errors as drawn: percent, and never below a hundredth of one.
-fn percent(point: &Point) -> f64 {
+/// Relative L2 error in percent as it is drawn, at least 0.01.
+fn percent(point: &SweepPoint) -> f64 {
     (point.rel_l2 * 100.0).max(0.01)
 }
 
-fn axes(points: &[Point]) -> (LogAxis, LogAxis) {
+fn axes(points: &[SweepPoint]) -> (LogAxis, LogAxis) {
     (LogAxis::over(points.iter().map(|point| point.ms)), LogAxis::over(points.iter().map(percent)))
 }
 
@@ -117,42 +117,45 @@ fn error_against_time(scene: &SceneReport) -> String {
     let (x, y) = axes(&scene.points);
     let mut chart =
         Chart::new(x, "milliseconds from a geometry edit to the effective BRDF", y, "relative L2 error [%]");
-    let ours: Vec<&Point> =
+    let ours: Vec<&SweepPoint> =
         scene.points.iter().filter(|point| point.preset != "wu2011" && point.preset != "reference").collect();
     let front: Vec<(f64, f64)> = pareto(&ours).into_iter().map(|k| (ours[k].ms, percent(ours[k]))).collect();
     chart.line(&front, COLORS[4], false);
     for point in scene.points.iter().filter(|point| point.family != Family::Preset) {
         let color = match point.family {
             Family::Combination => COLORS[7],
-            Family::Ladder => COLORS[2],
+            Family::QualityScale => COLORS[2],
             _ => COLORS[0],
         };
         chart.dot(point.ms, percent(point), 3.5, color, &title(point));
     }
     for point in scene.points.iter().filter(|point| point.family == Family::Preset) {
         chart.dot(point.ms, percent(point), 6.0, COLORS[5], &title(point));
-        chart.words(point.ms, percent(point), COLORS[5], &point.preset);
+        chart.label(point.ms, percent(point), COLORS[5], &point.preset);
     }
     format!(
-        "{}<p class='soft'>Blue: one knob turned. Green: from faster to finer, as --target-db and --budget-ms choose. Grey: all knobs at once. Line: what nothing beats in both time and error.</p>",
+        "{}<p class='soft'>Blue: one setting varied. Green: quality levels, as --target-db and --budget-ms choose them. Grey: all settings varied at once. Line: no other point is both faster and more accurate.</p>",
         chart.finish()
     )
 }
 
-fn error_per_knob(scene: &SceneReport) -> String {
-    let knobs: Vec<&Point> = scene.points.iter().filter(|point| matches!(point.family, Family::Knob(_))).collect();
-    let (x, y) = axes(&knobs.iter().map(|point| (*point).clone()).collect::<Vec<_>>());
+fn error_per_setting(scene: &SceneReport) -> String {
+    let setting_of = |point: &SweepPoint| match &point.family {
+        Family::Setting(name) => Some(name.clone()),
+        _ => None,
+    };
+    let points: Vec<&SweepPoint> = scene.points.iter().filter(|point| setting_of(point).is_some()).collect();
+    let (x, y) = axes(&points.iter().map(|point| (*point).clone()).collect::<Vec<_>>());
     let mut chart = Chart::new(x, "milliseconds", y, "relative L2 error [%]");
     let mut names: Vec<String> = Vec::new();
-    for point in &knobs {
-        let name = family_name(point).replace("knob ", "");
+    for name in points.iter().filter_map(|point| setting_of(point)) {
         if !names.contains(&name) {
             names.push(name);
         }
     }
     for (k, name) in names.iter().enumerate() {
         let color = COLORS[k % COLORS.len()];
-        let line: Vec<&&Point> = knobs.iter().filter(|point| family_name(point) == format!("knob {name}")).collect();
+        let line: Vec<&&SweepPoint> = points.iter().filter(|point| setting_of(point).as_ref() == Some(name)).collect();
         chart.line(&line.iter().map(|point| (point.ms, percent(point))).collect::<Vec<_>>(), color, false);
         for point in &line {
             chart.dot(point.ms, percent(point), 3.5, color, &title(point));
@@ -168,27 +171,27 @@ fn error_per_knob(scene: &SceneReport) -> String {
 
 fn crossing(scene: &SceneReport) -> Option<String> {
     let crossing = conclusions::crossing(scene)?;
-    let ms = |point: &Point, pairs: f64| point.ms + pairs * point.query_us * 1e-3;
+    let ms = |point: &SweepPoint, pairs: f64| point.ms + pairs * point.query_us * 1e-3;
     let pairs: Vec<f64> = (4..=32).map(|k| 10_f64.powf(f64::from(k) * 0.25)).collect();
     let lines = [crossing.direct, crossing.low_rank].map(|p| pairs.iter().map(|&n| (n, ms(p, n))).collect::<Vec<_>>());
     let values = lines.iter().flatten().map(|point| point.1);
     let mut chart = Chart::new(
         LogAxis::over(pairs.iter().copied()),
-        "direction pairs asked for",
+        "direction pairs evaluated",
         LogAxis::over(values),
-        "milliseconds in all, one thread",
+        "total milliseconds, one thread",
     );
     for (line, (color, name)) in lines.iter().zip([(COLORS[0], "direct sum"), (COLORS[1], "factors")]) {
         chart.line(line, color, false);
         if let Some(&(x, y)) = line.get(line.len() - 6) {
-            chart.words(x, y, color, name);
+            chart.label(x, y, color, name);
         }
     }
     Some(format!("{}<p class='soft'>{}</p>", chart.finish(), escape(&crossing.sentence)))
 }
 
 fn error_by_angle(scene: &SceneReport) -> String {
-    let presets: Vec<&Point> = scene.points.iter().filter(|point| point.family == Family::Preset).collect();
+    let presets: Vec<&SweepPoint> = scene.points.iter().filter(|point| point.family == Family::Preset).collect();
     let mut rows = String::from("<table><tr><th>preset</th>");
     let mut from = 0.0;
     for end in BANDS_DEG {
@@ -204,7 +207,7 @@ fn error_by_angle(scene: &SceneReport) -> String {
         let _ = write!(rows, "<td>{} %</td></tr>", number(point.albedo_error * 100.0));
     }
     format!(
-        "{rows}</table><p class='soft'>Albedo: the largest error of the fraction of light reflected, for light at 10°, 45° and 75°.</p>"
+        "{rows}</table><p class='soft'>Albedo: the largest relative error of the directional albedo, for light at 10°, 45° and 75°.</p>"
     )
 }
 
@@ -221,7 +224,7 @@ fn stage_times(scene: &SceneReport) -> String {
 fn thumbnails(scene: &SceneReport) -> String {
     let mut html = String::from("<div class='thumbs'>");
     for thumb in &scene.thumbnails {
-        let _ = write!(html, "<figure><img alt='{0} picture' src='{1}'>", escape(&thumb.label), thumb.image);
+        let _ = write!(html, "<figure><img alt='{0} image' src='{1}'>", escape(&thumb.label), thumb.image);
         if let Some(difference) = &thumb.difference {
             let _ = write!(
                 html,
@@ -236,14 +239,14 @@ fn thumbnails(scene: &SceneReport) -> String {
         html.push_str("</figure>");
     }
     format!(
-        "{html}</div><p>{} <span class='soft'>(CIE 1976; about 2 is just seen side by side)</span></p>",
+        "{html}</div><p>{} <span class='soft'>(CIE 1976; a ΔE of about 2 is just visible side by side)</span></p>",
         scale_strip()
     )
 }
 
 fn table(html: &mut String, scene: &SceneReport) {
-    html.push_str("<details><summary>All settings</summary><table><tr><th>settings</th><th class='left'>tried as</th><th>ms</th><th>µs a pair</th><th>relative L2</th><th>PSNR</th><th class='left'>form</th></tr>");
-    let mut points: Vec<&Point> = scene.points.iter().collect();
+    html.push_str("<details><summary>All settings</summary><table><tr><th>settings</th><th class='left'>kind</th><th>ms</th><th>µs per pair</th><th>relative L2</th><th>PSNR</th><th class='left'>representation</th></tr>");
+    let mut points: Vec<&SweepPoint> = scene.points.iter().collect();
     points.sort_by(|a, b| a.ms.total_cmp(&b.ms));
     for point in points {
         let _ = write!(
@@ -255,7 +258,7 @@ fn table(html: &mut String, scene: &SceneReport) {
             number(point.query_us),
             number(point.rel_l2 * 100.0),
             point.psnr_db,
-            escape(&point.form)
+            escape(&point.representation)
         );
     }
     html.push_str("</table></details>");

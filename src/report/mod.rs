@@ -1,4 +1,4 @@
-//! Accuracy against time as a page that explains itself (`report.html`), a table (`report.csv`) and data (`report.json`).
+//! Reports of accuracy against time: a page (`report.html`), a table (`report.csv`) and data (`report.json`).
 
 mod conclusions;
 mod effects;
@@ -13,9 +13,10 @@ use serde::{Deserialize, Serialize};
 pub use effects::{EffectCost, measure_effects};
 pub use thumbnails::{ThumbnailRenderer, difference_png, heat};
 
-use crate::tuning::sweep::Point;
+use crate::tuning::candidates::Family;
+use crate::tuning::sweep::SweepPoint;
 
-/// Where the figures were taken: they hold nowhere else.
+/// Machine on which the times were measured.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     pub processor: String,
@@ -24,7 +25,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This one.
+    /// The machine that runs the program.
     pub fn here() -> Self {
         Self {
             processor: processor_name(),
@@ -34,39 +35,41 @@ impl Machine {
     }
 }
 
-/// The processor's name where the system tells it, else its architecture.
+/// Name of the processor on Linux, else its architecture.
 fn processor_name() -> String {
-    let told = if cfg!(target_os = "linux") { std::fs::read_to_string("/proc/cpuinfo").ok() } else { None };
-    told.as_deref()
+    let cpuinfo = if cfg!(target_os = "linux") { std::fs::read_to_string("/proc/cpuinfo").ok() } else { None };
+    cpuinfo.as_deref()
         .and_then(|text| text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':')))
         .map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }
 
-/// A picture at one setting, beside the finest one.
+/// Image at one setting, with its difference from the finest image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Thumbnail {
     pub label: String,
-    /// `data:` addresses of the picture and of its difference; the finest has none.
+    /// `data:` URL of the image.
     #[serde(rename = "picture")]
     pub image: String,
+    /// `data:` URL of the difference; `None` for the finest image.
     pub difference: Option<String>,
     pub mean_delta_e: f32,
-    /// Of 95 % of the pixels.
+    /// 95th percentile of ΔE over the pixels.
     pub high_delta_e: f32,
 }
 
-/// All that was found out about a scene.
+/// Results of one scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneReport {
     pub name: String,
-    /// Direction pairs, the reference's own relative error, its passes and seconds.
+    /// Number of direction pairs.
     pub pairs: usize,
+    /// Relative L2 of the standard errors of the reference.
     pub reference_error: f64,
     pub reference_passes: usize,
     pub reference_seconds: f64,
-    pub points: Vec<Point>,
+    pub points: Vec<SweepPoint>,
     pub thumbnails: Vec<Thumbnail>,
-    /// Settings that there was no time for.
+    /// Number of candidates that the time limit left out.
     pub left_out: usize,
 }
 
@@ -79,16 +82,16 @@ pub struct Report {
 }
 
 impl Report {
-    /// One self-contained page.
+    /// The report as one self-contained page.
     pub fn html(&self) -> String {
         html::page(self)
     }
 
-    /// A row a setting.
+    /// The report as a table with one row per candidate.
     pub fn csv(&self) -> String {
         let mut text = "scene,family,settings,ms,query_us,rel_l2,psnr_db,albedo_error,form\n".to_owned();
         for point in self.scenes.iter().flat_map(|scene| &scene.points) {
-            let family = html::family_name(point);
+            let family = csv_family(&point.family);
             let _ = writeln!(
                 text,
                 "{},{family},{},{:.3},{:.3},{:.6},{:.2},{:.6},{}",
@@ -99,15 +102,16 @@ impl Report {
                 point.rel_l2,
                 point.psnr_db,
                 point.albedo_error,
-                quoted(&point.form)
+                quoted(&point.representation)
             );
         }
         text
     }
 
-    /// `{"machine", "points": [{"scene", "settings", "ms", "rel_l2", "psnr_db", ...}], "scenes": [...]}`.
+    /// The report as JSON: `{"machine", "points": [{"scene", "settings", "ms", "rel_l2", "psnr_db", ...}], "scenes":
+    /// [...]}`.
     pub fn json(&self) -> serde_json::Value {
-        let points: Vec<&Point> = self.scenes.iter().flat_map(|scene| &scene.points).collect();
+        let points: Vec<&SweepPoint> = self.scenes.iter().flat_map(|scene| &scene.points).collect();
         let scenes: Vec<serde_json::Value> = self
             .scenes
             .iter()
@@ -124,6 +128,16 @@ impl Report {
             })
             .collect();
         serde_json::json!({"machine": self.machine, "command": self.command, "points": points, "scenes": scenes})
+    }
+}
+
+/// Column `family` of `report.csv`. Its words do not change between versions.
+fn csv_family(family: &Family) -> String {
+    match family {
+        Family::Preset => "preset".to_owned(),
+        Family::Setting(name) => format!("knob {name}"),
+        Family::QualityScale => "ladder".to_owned(),
+        Family::Combination => "combination".to_owned(),
     }
 }
 

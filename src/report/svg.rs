@@ -1,8 +1,9 @@
-//! Small charts as inline SVG: logarithmic axes, marks, lines, bars. No script, no style sheet of others.
+//! Small charts as inline SVG: logarithmic axes, dots, lines and bars. They need neither scripts nor other style
+//! sheets.
 
 use std::fmt::Write as _;
 
-/// A chart in pixels.
+/// Size and margins of a chart in pixels.
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 380.0;
 const LEFT: f64 = 64.0;
@@ -18,7 +19,7 @@ pub struct LogAxis {
 }
 
 impl LogAxis {
-    /// Wide enough for all values, ends on a half decade at the nearest.
+    /// An axis that contains all values and ends at half decades.
     pub fn over(values: impl IntoIterator<Item = f64>) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for value in values.into_iter().filter(|value| value.is_finite() && *value > 0.0) {
@@ -37,16 +38,16 @@ impl LogAxis {
         ((value.max(1e-300).log10() - self.low) / (self.high - self.low)).clamp(0.0, 1.0)
     }
 
-    /// 1, 2 and 5 times the powers of ten within.
+    /// Powers of ten on the axis, and 2 and 5 times them on short axes.
     fn ticks(&self) -> Vec<f64> {
         let mut ticks = Vec::new();
         let decades = (self.low.floor() as i32)..=(self.high.ceil() as i32);
-        let few = self.high - self.low > 3.0;
+        let is_long = self.high - self.low > 3.0;
         for decade in decades {
             for step in [1.0, 2.0, 5.0] {
                 let tick = step * 10_f64.powi(decade);
                 let inside = tick.log10() >= self.low - 1e-9 && tick.log10() <= self.high + 1e-9;
-                if inside && (step == 1.0 || !few) {
+                if inside && (step == 1.0 || !is_long) {
                     ticks.push(tick);
                 }
             }
@@ -107,7 +108,7 @@ impl Chart {
         HEIGHT - BOTTOM - self.y.at(y) * (HEIGHT - TOP - BOTTOM)
     }
 
-    /// A dot; `title` shows when the pointer rests on it.
+    /// Draws a dot. The browser shows `title` while the pointer is over the dot.
     pub fn dot(&mut self, x: f64, y: f64, radius: f64, color: &str, title: &str) {
         let _ = write!(
             self.body,
@@ -118,8 +119,8 @@ impl Chart {
         );
     }
 
-    /// Words beside a point.
-    pub fn words(&mut self, x: f64, y: f64, color: &str, text: &str) {
+    /// Writes text beside a point.
+    pub fn label(&mut self, x: f64, y: f64, color: &str, text: &str) {
         let (px, anchor) =
             if self.px(x) > WIDTH - 130.0 { (self.px(x) - 9.0, "end") } else { (self.px(x) + 9.0, "start") };
         let _ = write!(
@@ -130,6 +131,7 @@ impl Chart {
         );
     }
 
+    /// Draws a polyline.
     pub fn line(&mut self, points: &[(f64, f64)], color: &str, dashed: bool) {
         let path: Vec<String> = points.iter().map(|&(x, y)| format!("{:.1},{:.1}", self.px(x), self.py(y))).collect();
         let dash = if dashed { " stroke-dasharray='5 4'" } else { "" };
@@ -140,12 +142,13 @@ impl Chart {
         );
     }
 
+    /// Returns the SVG element.
     pub fn finish(self) -> String {
         format!("<svg viewBox='0 0 {WIDTH} {HEIGHT}' role='img'>{}</svg>", self.body)
     }
 }
 
-/// Stacked horizontal bars of milliseconds, a row each, with a legend.
+/// Stacked horizontal bars of milliseconds, one bar per row, with a legend.
 pub fn stacked_bars(rows: &[(String, Vec<(String, f64)>)]) -> String {
     let mut names: Vec<&str> = Vec::new();
     for (name, _) in rows.iter().flat_map(|row| &row.1) {
@@ -196,10 +199,10 @@ pub fn stacked_bars(rows: &[(String, Vec<(String, f64)>)]) -> String {
     format!("<svg viewBox='0 0 {WIDTH} {height}' role='img'>{body}</svg>")
 }
 
-/// Colours that stay apart for most eyes (after Okabe and Ito).
+/// Colours that people with colour vision deficiency can distinguish (after Okabe and Ito).
 pub const COLORS: [&str; 8] = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#8a7f00", "#666666"];
 
-/// Three digits that matter, no exponent.
+/// A number with three significant digits and without exponent.
 pub fn number(x: f64) -> String {
     if !x.is_finite() {
         return "∞".to_owned();
@@ -218,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_keep_three_digits_that_matter() {
+    fn numbers_keep_three_significant_digits() {
         assert_eq!([0.01234, 1.5, 12.34, 1234.6, 0.0].map(number), ["0.0123", "1.5", "12.3", "1235", "0"]);
     }
 

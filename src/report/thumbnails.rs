@@ -1,4 +1,4 @@
-//! The scene's picture at each preset, and how far it is to the eye from the finest one.
+//! Small images of a scene at different settings, and their ΔE from the finest image.
 
 use std::fmt::Write as _;
 
@@ -13,42 +13,43 @@ use crate::render::render;
 use crate::render::{Image, RenderScene};
 use crate::scene::LoadedScene;
 
-/// Pixels a side, and lights.
+/// Pixels per side.
 const SIZE: usize = 120;
+/// Largest number of lights.
 const LIGHTS: usize = 8;
 
-/// Renders a scene's object again and again with different materials.
+/// Renders a scene's object with different materials.
 pub struct ThumbnailRenderer {
-    stage: RenderScene,
+    render_scene: RenderScene,
     tone_map: ToneMap,
 }
 
 impl ThumbnailRenderer {
     /// # Errors
-    /// An object, an environment or a camera that cannot be used.
+    /// The object, the environment or the camera cannot be used.
     pub fn new(loaded: &LoadedScene) -> Result<Self> {
-        let mut few = loaded.clone();
-        few.scene.light.count = few.scene.light.count.min(LIGHTS);
-        let stage = RenderScene::new(&few)?;
-        let tone_map = ToneMap::new(&stage.camera)?;
-        Ok(Self { stage, tone_map })
+        let mut fewer_lights = loaded.clone();
+        fewer_lights.scene.light.count = fewer_lights.scene.light.count.min(LIGHTS);
+        let render_scene = RenderScene::new(&fewer_lights)?;
+        let tone_map = ToneMap::new(&render_scene.camera)?;
+        Ok(Self { render_scene, tone_map })
     }
 
     /// # Errors
-    /// A camera that sees nothing it could be framed by.
+    /// The camera cannot frame the object.
     pub fn image(&self, material: &dyn Reflectance) -> Result<Image> {
-        Ok(render(&self.stage.input(material, [SIZE, SIZE], 1, &Background::default()))?.image)
+        Ok(render(&self.render_scene.input(material, [SIZE, SIZE], 1, &Background::default()))?.image)
     }
 
-    /// As a PNG for a page.
+    /// The image as a PNG in a `data:` URL.
     ///
     /// # Errors
-    /// None in practice: the picture is small.
+    /// The image cannot be encoded.
     pub fn png(&self, image: &Image) -> Result<String> {
         data_url(image, &self.tone_map)
     }
 
-    /// The picture by the reference, noisy: the mean of many with other seeds is right. `None` where it takes too long.
+    /// A noisy image of the reference. The mean over many seeds converges to it. `None` if an image takes too long.
     ///
     /// # Errors
     /// As [`ThumbnailRenderer::image`], and [`crate::base::Error::Cancelled`].
@@ -61,27 +62,27 @@ impl ThumbnailRenderer {
         Ok(image)
     }
 
-    /// CIE 1976 ΔE of each pixel as it is shown.
+    /// CIE 1976 ΔE of each pixel after tone mapping.
     pub fn difference(&self, a: &Image, b: &Image) -> Vec<f32> {
         let lab = |p: &Vec3| lab(self.tone_map.apply(*p));
         a.pixels.iter().zip(&b.pixels).map(|(a, b)| lab(a).distance(lab(b))).collect()
     }
 }
 
-/// A picture of ΔE: black is none, white [`FULL_SCALE`] or more.
+/// An image of ΔE as a `data:` URL: black is 0, white is [`FULL_SCALE`] or more.
 ///
 /// # Errors
-/// None in practice: the picture is small.
+/// The image cannot be encoded.
 pub fn difference_png(delta_e: &[f32]) -> Result<String> {
     let pixels = delta_e.iter().map(|delta| heat(*delta)).collect();
     let plain = ToneMap { curve: crate::render::image::tone_map::ToneCurve::Plain, gain: 1.0 };
     data_url(&Image { width: SIZE, height: SIZE, pixels }, &plain)
 }
 
-/// ΔE that the difference pictures show as white; about 2 is just seen side by side.
+/// ΔE that difference images show as white. A ΔE of about 2 is just visible side by side.
 pub const FULL_SCALE: f32 = 10.0;
 
-/// A colour for a ΔE: black, purple, orange, and white for [`FULL_SCALE`] or more.
+/// The colour of a ΔE: black, purple, orange, and white for [`FULL_SCALE`] or more.
 pub fn heat(delta_e: f32) -> Vec3 {
     let x = (delta_e / FULL_SCALE).clamp(0.0, 1.0);
     Vec3::new(
@@ -91,7 +92,7 @@ pub fn heat(delta_e: f32) -> Vec3 {
     )
 }
 
-/// CIE L*a*b* (D65) of display-linear Rec. 709.
+/// Converts display-linear Rec. 709 to CIE L*a*b* (D65).
 fn lab(rgb: Vec3) -> Vec3 {
     let x = rgb.dot(Vec3::new(0.412_456, 0.357_576, 0.180_437)) / 0.950_47;
     let y = rgb.dot(Vec3::new(0.212_673, 0.715_152, 0.072_175));
@@ -121,7 +122,7 @@ fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// The scale of the difference pictures, as a strip.
+/// The colour scale of difference images as HTML.
 pub fn scale_strip() -> String {
     let mut cells = String::new();
     for k in 0..=10 {

@@ -1,3 +1,4 @@
 //! Helpers that unit tests of several modules share.
 
 pub mod chi_square;
+pub mod measured_data;

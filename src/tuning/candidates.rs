@@ -1,4 +1,4 @@
-//! Settings to try: presets, each knob alone, the ladder, and combinations that fill the space of all knobs.
+//! Candidates for sweeps: presets, each setting varied alone, quality levels, and combinations of all settings.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,25 +6,27 @@ use super::quality_scale;
 use crate::base::Result;
 use crate::scene::{LoadedScene, Quality};
 
-/// What a setting is tried for.
+/// Reason why a candidate is measured.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Family {
     Preset,
-    /// One knob alone, the others as `standard` has them.
-    Knob(String),
-    /// The line from faster to finer that `--target-db` and `--budget-ms` walk along.
-    Ladder,
-    /// All knobs at once, spread evenly over their ranges.
+    /// One setting varied alone; the others are those of `standard`.
+    #[serde(rename = "knob")]
+    Setting(String),
+    /// A quality level, as `--target-db` and `--budget-ms` choose them.
+    #[serde(rename = "ladder")]
+    QualityScale,
+    /// All settings varied at once, spread evenly over their ranges.
     Combination,
 }
 
-/// A setting to try: `--set` words on top of a preset.
+/// Settings to measure: overrides of a preset.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     pub family: Family,
     pub preset: &'static str,
-    /// `quality.key=value`.
+    /// Overrides `quality.key=value`.
     pub set: Vec<String>,
 }
 
@@ -33,15 +35,15 @@ impl Candidate {
         Self { family, preset, set }
     }
 
-    /// As the command line takes it.
-    pub fn words(&self) -> String {
-        let set: Vec<String> = self.set.iter().map(|word| format!("--set {word}")).collect();
+    /// Command-line options that select these settings.
+    pub fn cli_args(&self) -> String {
+        let set: Vec<String> = self.set.iter().map(|setting| format!("--set {setting}")).collect();
         [vec![format!("--quality {}", self.preset)], set].concat().join(" ")
     }
 }
 
-/// Knobs alone: key, values from coarse to fine, and the words that come with each.
-const KNOBS: &[(&str, &[&str], &[&str])] = &[
+/// Settings that are varied alone: key, values from coarse to fine, and the overrides that they require.
+const SETTINGS: &[(&str, &[&str], &[&str])] = &[
     ("facets", &["512", "1024", "2048", "4096", "8192", "24576"], &["quality.method=\"direct\""]),
     ("azimuths", &["12", "24", "36", "64", "96", "144"], &["quality.method=\"direct\""]),
     ("visibility", &["\"slices\"", "\"maps\""], &["quality.method=\"direct\""]),
@@ -55,32 +57,38 @@ const KNOBS: &[(&str, &[&str], &[&str])] = &[
     ("colors", &["1", "2", "3"], &["quality.method=\"low_rank\""]),
 ];
 
-/// Presets, each knob alone, the ladder, and `combinations` that fill the space of all knobs evenly, in the order in which they tell most.
+/// Presets, single settings, quality levels, and a number of `combinations` that cover the space of all settings
+/// evenly.
 pub fn candidates(measured_colors: bool, overhangs: bool, combinations: usize) -> Vec<Candidate> {
     let mut all: Vec<Candidate> = ["draft", "standard", "fine", "wu2011"]
         .into_iter()
         .map(|preset| Candidate::new(Family::Preset, preset, Vec::new()))
         .collect();
-    for (key, values, with) in KNOBS {
+    for (key, values, required) in SETTINGS {
         if *key == "colors" && !measured_colors {
             continue;
         }
         for value in *values {
-            let set = with.iter().map(|word| (*word).to_owned()).chain([format!("quality.{key}={value}")]).collect();
-            all.push(Candidate::new(Family::Knob((*key).to_owned()), "standard", set));
+            let set = required
+                .iter()
+                .map(|setting| (*setting).to_owned())
+                .chain([format!("quality.{key}={value}")])
+                .collect();
+            all.push(Candidate::new(Family::Setting((*key).to_owned()), "standard", set));
         }
     }
-    all.extend((1..=5).map(|k| quality_scale::rung(2.0 * f64::from(k), overhangs)));
+    all.extend((1..=5).map(|k| quality_scale::candidate_at(2.0 * f64::from(k), overhangs)));
     all.extend((0..combinations).map(combination));
     all
 }
 
-/// The k-th point of an additive recurrence in five dimensions (the powers of the root of `x⁶ = x + 1`), scaled to the knobs.
+/// The k-th point of an additive recurrence in five dimensions, scaled to the ranges of the settings. Its steps are the
+/// powers of the inverse root of `x⁶ = x + 1`.
 fn combination(k: usize) -> Candidate {
     const ROOT: f64 = 1.134_724_138_401_519_4;
     let at = |axis: i32| (0.5 + (k + 1) as f64 * ROOT.powi(-(axis + 1))).fract();
     let log = |from: f64, to: f64, x: f64| (from * (to / from).powf(x)).round();
-    let kept = |x: f64| 1.0 - 10_f64.powf(-1.0 - 3.0 * x);
+    let kept_energy = |x: f64| 1.0 - 10_f64.powf(-1.0 - 3.0 * x);
     let mut set = vec![
         format!("quality.facets={}", log(512.0, 24_576.0, at(0))),
         format!("quality.azimuths={}", log(12.0, 128.0, at(1))),
@@ -91,16 +99,16 @@ fn combination(k: usize) -> Candidate {
         let rings = log(8.0, 24.0, at(3));
         set.push("quality.method=\"low_rank\"".to_owned());
         set.push(format!("quality.grid=[{rings},{}]", 2.0 * rings));
-        set.push(format!("quality.keep_m={:.4}", kept(at(4))));
-        set.push(format!("quality.keep_n={:.4}", kept(at(2).mul_add(2.0, -1.0))));
+        set.push(format!("quality.keep_m={:.4}", kept_energy(at(4))));
+        set.push(format!("quality.keep_n={:.4}", kept_energy(at(2).mul_add(2.0, -1.0))));
     }
     Candidate::new(Family::Combination, "standard", set)
 }
 
-/// The scene with a candidate's settings; its seed and back end stay.
+/// The scene with a candidate's settings, and its own seed and backend.
 ///
 /// # Errors
-/// Words that are no settings.
+/// An override is not a valid setting.
 pub fn with_settings(loaded: &LoadedScene, candidate: &Candidate) -> Result<LoadedScene> {
     let mut scene = loaded.clone();
     scene.scene.quality = Quality {
@@ -118,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn combinations_spread_over_every_knob_and_are_settings() {
+    fn combinations_spread_over_every_setting_and_are_valid() {
         let facets: Vec<f64> = (0..40)
             .filter_map(|k| combination(k).set[0].strip_prefix("quality.facets=").and_then(|n| n.parse::<f64>().ok()))
             .collect();

@@ -4,5 +4,5 @@ pub mod candidates;
 pub mod choose;
 pub mod progressive;
 pub mod quality_scale;
-mod small_reference;
 pub mod sweep;
+mod target_reference;

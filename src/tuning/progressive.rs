@@ -1,4 +1,4 @@
-//! A reference that grows while one looks: batches of passes are averaged, and errors come with error bars.
+//! A reference that is refined in the background. Batches of passes are averaged, and errors have error bars.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -10,7 +10,7 @@ use crate::pipeline::Pipeline;
 use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
 
-/// The mean of all batches so far.
+/// Mean of the batches that were added.
 #[derive(Debug, Clone)]
 pub struct ProgressiveReference {
     pairs: Vec<Pair>,
@@ -19,21 +19,22 @@ pub struct ProgressiveReference {
     pub batches: usize,
 }
 
-/// How far `f̄` is from the reference, with one standard error of each figure.
+/// Errors of `f̄` against the reference, and the standard error of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Compared {
-    /// Relative L2; the reference's own noise taken out.
+pub struct ReferenceErrors {
+    /// Relative L2 without the part that the standard error of the reference explains.
     pub rel_l2: f64,
-    pub rel_l2_error: f64,
+    pub rel_l2_std_error: f64,
     pub psnr_db: f64,
-    pub psnr_db_error: f64,
-    /// Relative L2 of the reference's own standard errors.
-    pub own: f64,
+    pub psnr_std_error_db: f64,
+    /// Relative L2 of the standard errors of the reference.
+    pub std_error: f64,
     pub batches: usize,
 }
 
-/// Facets of a pass; a batch is four.
+/// Facets per pass.
 const FACETS: usize = 4096;
+/// Passes per batch.
 const PASSES: usize = 4;
 
 impl ProgressiveReference {
@@ -43,7 +44,7 @@ impl ProgressiveReference {
         Self { sums: zeros.clone(), variances: zeros, pairs, batches: 0 }
     }
 
-    /// Adds a batch.
+    /// Adds a batch of passes.
     ///
     /// # Errors
     /// As [`Pipeline::with_reference`].
@@ -61,37 +62,43 @@ impl ProgressiveReference {
         Ok(())
     }
 
-    /// `f̄` of a BRDF against the mean so far.
-    pub fn compare(&self, brdf: &EffectiveBrdf) -> Compared {
+    /// Compares `f̄` of a BRDF with the mean of the batches.
+    pub fn compare(&self, brdf: &EffectiveBrdf) -> ReferenceErrors {
         let values: Vec<Vec3> = self.pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect();
         let n = self.batches.max(1) as f64;
         let (mut squares, mut noise, mut spread, mut norm, mut peak) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
         for (value, (sum, variance)) in values.iter().zip(self.sums.iter().zip(&self.variances)) {
-            let (right, variance) = (*sum / n, *variance / (n * n));
-            let off = value.as_dvec3() - right;
-            squares += off.length_squared();
+            let (exact, variance) = (*sum / n, *variance / (n * n));
+            let difference = value.as_dvec3() - exact;
+            squares += difference.length_squared();
             noise += variance.element_sum();
             // Var (x - r)² = 4 (x - r)² σ² + 2 σ⁴.
-            spread += (4.0 * off * off * variance + 2.0 * variance * variance).element_sum();
-            norm += right.length_squared();
-            peak = peak.max(right.max_element());
+            spread += (4.0 * difference * difference * variance + 2.0 * variance * variance).element_sum();
+            norm += exact.length_squared();
+            peak = peak.max(exact.max_element());
         }
         if norm == 0.0 {
-            let none =
-                Compared { rel_l2: 0.0, rel_l2_error: 0.0, psnr_db: 0.0, psnr_db_error: 0.0, own: 0.0, batches: 0 };
-            return Compared { batches: self.batches, ..none };
+            let none = ReferenceErrors {
+                rel_l2: 0.0,
+                rel_l2_std_error: 0.0,
+                psnr_db: 0.0,
+                psnr_std_error_db: 0.0,
+                std_error: 0.0,
+                batches: 0,
+            };
+            return ReferenceErrors { batches: self.batches, ..none };
         }
-        let own = (noise / norm).sqrt();
-        let ours = ((squares - noise).max(0.1 * noise).min(squares) / norm).sqrt().max(1e-9);
-        let rel_l2_error = spread.sqrt() / norm / (2.0 * ours);
+        let std_error = (noise / norm).sqrt();
+        let rel_l2 = ((squares - noise).max(0.1 * noise).min(squares) / norm).sqrt().max(1e-9);
+        let rel_l2_std_error = spread.sqrt() / norm / (2.0 * rel_l2);
         let peak_db = 20.0 * (peak / (norm / (3 * values.len()) as f64).sqrt()).log10();
         let db = |x: f64| 20.0 * x.log10();
-        Compared {
-            rel_l2: ours,
-            rel_l2_error,
-            psnr_db: peak_db - db(ours),
-            psnr_db_error: db(1.0 + rel_l2_error / ours),
-            own,
+        ReferenceErrors {
+            rel_l2,
+            rel_l2_std_error,
+            psnr_db: peak_db - db(rel_l2),
+            psnr_std_error_db: db(1.0 + rel_l2_std_error / rel_l2),
+            std_error,
             batches: self.batches,
         }
     }
@@ -113,9 +120,12 @@ mod tests {
             reference.refine(&mut pipeline, &loaded).unwrap();
         }
         let last = reference.compare(&brdf);
-        assert!(last.own < 0.8 * first.own && last.rel_l2_error <= first.rel_l2_error, "{first:?} {last:?}");
         assert!(
-            (last.rel_l2 - first.rel_l2).abs() < 4.0 * first.rel_l2_error + 0.3 * last.rel_l2,
+            last.std_error < 0.8 * first.std_error && last.rel_l2_std_error <= first.rel_l2_std_error,
+            "{first:?} {last:?}"
+        );
+        assert!(
+            (last.rel_l2 - first.rel_l2).abs() < 4.0 * first.rel_l2_std_error + 0.3 * last.rel_l2,
             "{first:?} {last:?}"
         );
         assert_eq!(last.batches, 4);

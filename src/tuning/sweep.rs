@@ -1,4 +1,4 @@
-//! What each knob costs and buys: settings to try, and what each leaves of the truth in how many milliseconds.
+//! Sweeps over settings: the time of each candidate and its error against a reference.
 
 use std::time::Instant;
 
@@ -16,31 +16,36 @@ use crate::plan::Preset;
 use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
 
-/// Upper ends [rad] of the bands that errors are listed by: the larger of the two angles from the normal.
+/// Upper ends of the bands of angles for which errors are listed [degrees]. The larger of both angles from the normal
+/// counts.
 pub const BANDS_DEG: [f32; 4] = [30.0, 55.0, 70.0, 85.0];
 
-/// Directions that are asked for, and what is right there.
+/// Reference values at the direction pairs of a sweep.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Truth {
+pub struct ReferenceValues {
     pub pairs: Vec<Pair>,
     pub f_bar: Vec<Vec3>,
-    /// Relative L2 of the reference's own standard errors, and the same as a PSNR [dB].
-    pub own: f64,
-    pub own_db: f64,
-    /// Reference passes that were summed, and the seconds they took.
+    /// Relative L2 of the standard errors.
+    #[serde(rename = "own")]
+    pub std_error: f64,
+    /// PSNR of the standard errors [dB].
+    #[serde(rename = "own_db")]
+    pub std_error_db: f64,
+    /// Number of reference passes.
     pub passes: usize,
     pub seconds: f64,
-    /// Lights of the directional albedo, each with [`ALBEDO_VIEWS`] pairs at the end of `pairs`.
+    /// Index of the first pair for albedos. Each light has [`ALBEDO_VIEWS`] of them at the end of `pairs`.
     first_albedo: usize,
 }
 
-/// Angles of the lights whose reflected fraction is compared [degrees], and the directions it is summed over.
+/// Angles of the lights whose directional albedo is compared [degrees].
 const ALBEDO_LIGHTS_DEG: [f32; 3] = [10.0, 45.0, 75.0];
+/// View directions over which an albedo is summed.
 const ALBEDO_VIEWS: usize = 64;
 
-impl Truth {
-    /// The reference at `count` mirror-biased pairs and at those of the albedos. `progress(passes, own error)` says whether
-    /// to go on.
+impl ReferenceValues {
+    /// Computes the reference at `count` mirror-biased pairs and at the pairs of the albedos. `progress(passes,
+    /// standard error)` returns whether to continue.
     ///
     /// # Errors
     /// As [`Pipeline::effective`].
@@ -56,25 +61,26 @@ impl Truth {
             pairs.extend((0..ALBEDO_VIEWS).map(|k| Pair { i, o: cosine_direction(k) }));
         }
         let start = Instant::now();
-        let (mut own, mut passes) = (0.0, 0);
+        let (mut std_error, mut passes) = (0.0, 0);
         let estimates = crate::gpu::pipeline().with_reference(scene, |reference| {
             reference.estimate(&pairs, settings, |done, error| {
-                (own, passes) = (error, done);
+                (std_error, passes) = (error, done);
                 progress(done, error)
             })
         })?;
         let f_bar: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar).collect();
-        let off: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar + estimate.standard_error).collect();
-        let own_db = compare(&off, &f_bar).psnr_db.min(MAX_DB);
-        Ok(Self { pairs, f_bar, own, own_db, passes, seconds: start.elapsed().as_secs_f64(), first_albedo: count })
+        let upper: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar + estimate.standard_error).collect();
+        let std_error_db = compare(&upper, &f_bar).psnr_db.min(MAX_DB);
+        let seconds = start.elapsed().as_secs_f64();
+        Ok(Self { pairs, f_bar, std_error, std_error_db, passes, seconds, first_albedo: count })
     }
 
-    /// Errors over all pairs but the albedos'.
+    /// Errors over all pairs except those of the albedos.
     pub fn errors(&self, values: &[Vec3]) -> Errors {
         compare(&values[..self.first_albedo], &self.f_bar[..self.first_albedo])
     }
 
-    /// Relative L2 in each of [`BANDS_DEG`].
+    /// Relative L2 in each band of [`BANDS_DEG`].
     pub fn by_angle(&self, values: &[Vec3]) -> [f64; BANDS_DEG.len()] {
         let band = |pair: &Pair| {
             let angle = pair.i.z.min(pair.o.z).acos().to_degrees();
@@ -96,31 +102,32 @@ impl Truth {
         values[self.first_albedo..]
             .chunks(ALBEDO_VIEWS)
             .zip(self.f_bar[self.first_albedo..].chunks(ALBEDO_VIEWS))
-            .map(|(got, right)| {
-                let (got, right) = (total(got), total(right));
-                if right.length() > 0.0 { (got - right).length() / right.length() } else { got.length() }
+            .map(|(values, exact)| {
+                let (sum, exact) = (total(values), total(exact));
+                if exact.length() > 0.0 { (sum - exact).length() / exact.length() } else { sum.length() }
             })
             .fold(0.0, f64::max)
     }
 }
 
-/// The k-th of [`ALBEDO_VIEWS`] directions with a density of cos θ / π, so that their plain mean is the albedo's integral.
+/// The k-th of [`ALBEDO_VIEWS`] directions with the density cos θ / π. The mean over them estimates the integral of an
+/// albedo.
 fn cosine_direction(k: usize) -> Vec3 {
     let height = (k as f32 + 0.5) / ALBEDO_VIEWS as f32;
     from_angles(height.sqrt().asin(), k as f32 * 2.399_963_2)
 }
 
-/// What one setting costs and leaves.
+/// Time and errors of one candidate on one scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Point {
+pub struct SweepPoint {
     pub scene: String,
-    /// Words that repeat it on the command line.
+    /// Command-line options that select the settings.
     pub settings: String,
     pub family: Family,
     pub preset: String,
     /// Milliseconds from a geometry edit to the effective BRDF.
     pub ms: f64,
-    /// Microseconds one direction pair takes on one thread.
+    /// Microseconds per direction pair on one thread.
     pub query_us: f64,
     pub rel_l2: f64,
     pub psnr_db: f64,
@@ -128,24 +135,30 @@ pub struct Point {
     pub albedo_error: f64,
     pub rel_l2_by_angle: [f64; BANDS_DEG.len()],
     pub stages: Vec<(String, f64)>,
-    /// What holds the BRDF, in words.
-    pub form: String,
+    /// Representation of the effective BRDF.
+    #[serde(rename = "form")]
+    pub representation: String,
 }
 
-/// No difference at all, as a number that JSON can hold [dB].
+/// PSNR that stands for no difference, because JSON has no infinity [dB].
 const MAX_DB: f64 = 300.0;
 
-/// Most runs that a time is the median of, and the seconds after which there are no more.
-const RUNS: usize = 5;
+/// Largest number of timed runs. Their median is reported.
+const MAX_RUNS: usize = 5;
+/// Time after which no further run starts [s].
 const ENOUGH_SECONDS: f64 = 1.5;
-/// A first run longer than this is the only one.
+/// Duration of a first run above which it is the only run [s].
 const LONG_SECONDS: f64 = 2.0;
 
-/// Times a geometry edit at a candidate's settings and compares what comes out with the truth.
+/// Times a geometry edit at a candidate's settings and compares the result with the reference.
 ///
 /// # Errors
 /// As [`Pipeline::effective`].
-pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Result<(Point, Outcome)> {
+pub fn measure(
+    loaded: &LoadedScene,
+    candidate: &Candidate,
+    reference: &ReferenceValues,
+) -> Result<(SweepPoint, Outcome)> {
     let scene = with_settings(loaded, candidate)?;
     let mut moved = scene.clone();
     let edits = moved.scene.nudge_geometry().is_some();
@@ -155,11 +168,11 @@ pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Re
     let mut outcome = pipeline.effective(&scene)?;
     let first = started.elapsed().as_secs_f64();
     if first > LONG_SECONDS && candidate.preset != Preset::Wu2011.name() {
-        // What a warm-up could save is lost in this; not in the paper's hours before the first edit.
+        // A warm-up changes a long run little. The tables of `wu2011` are the exception: an edit reuses most of them.
         runs.push((first * 1e3, outcome.times.clone()));
     }
-    while runs.is_empty() || runs.len() < RUNS && started.elapsed().as_secs_f64() < ENOUGH_SECONDS {
-        // There and back again, timed on the way back: what is measured is this scene.
+    while runs.is_empty() || runs.len() < MAX_RUNS && started.elapsed().as_secs_f64() < ENOUGH_SECONDS {
+        // Only the edit back to this scene is timed.
         if edits {
             pipeline.effective(&moved)?;
         } else {
@@ -171,33 +184,33 @@ pub fn measure(loaded: &LoadedScene, candidate: &Candidate, truth: &Truth) -> Re
     }
     runs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (ms, times) = runs.swap_remove(runs.len() / 2);
-    let values: Vec<Vec3> = truth.pairs.par_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect();
-    let errors = truth.errors(&values);
-    let point = Point {
+    let values: Vec<Vec3> = reference.pairs.par_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect();
+    let errors = reference.errors(&values);
+    let point = SweepPoint {
         scene: loaded.name.clone(),
-        settings: candidate.words(),
+        settings: candidate.cli_args(),
         family: candidate.family.clone(),
         preset: candidate.preset.to_owned(),
         ms,
-        query_us: query_us(&outcome, truth),
+        query_us: query_us(&outcome, reference),
         rel_l2: errors.rel_l2,
         psnr_db: errors.psnr_db.min(MAX_DB),
-        albedo_error: truth.albedo_error(&values),
-        rel_l2_by_angle: truth.by_angle(&values),
+        albedo_error: reference.albedo_error(&values),
+        rel_l2_by_angle: reference.by_angle(&values),
         stages: times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),
-        form: outcome.brdf.representation.describe(),
+        representation: outcome.brdf.representation.describe(),
     };
     Ok((point, outcome))
 }
 
-/// Microseconds a pair on one thread, as a picture asks: all lights of one view together.
-fn query_us(outcome: &Outcome, truth: &Truth) -> f64 {
+/// Microseconds per pair on one thread. All lights of a view are evaluated together, as in rendering.
+fn query_us(outcome: &Outcome, reference: &ReferenceValues) -> f64 {
     const LIGHTS: usize = 8;
-    let lights: Vec<Vec3> = truth.pairs.iter().take(LIGHTS).map(|pair| pair.i).collect();
+    let lights: Vec<Vec3> = reference.pairs.iter().take(LIGHTS).map(|pair| pair.i).collect();
     let mut out = vec![Vec3::ZERO; lights.len()];
     let start = Instant::now();
     let mut views = 0;
-    for pair in truth.pairs.iter().take(64) {
+    for pair in reference.pairs.iter().take(64) {
         outcome.brdf.eval_lights(&lights, pair.o, &mut out);
         views += 1;
         if start.elapsed().as_secs_f64() > 0.1 {
@@ -207,8 +220,8 @@ fn query_us(outcome: &Outcome, truth: &Truth) -> f64 {
     start.elapsed().as_secs_f64() * 1e6 / (views * lights.len()).max(1) as f64
 }
 
-/// Is this one of the points that no other beats in both time and error?
-pub fn pareto(points: &[&Point]) -> Vec<usize> {
+/// Indices of the Pareto front in order of time: no other point is both faster and more accurate.
+pub fn pareto(points: &[&SweepPoint]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| points[a].ms.total_cmp(&points[b].ms).then(points[a].rel_l2.total_cmp(&points[b].rel_l2)));
     let mut best = f64::INFINITY;
@@ -220,26 +233,26 @@ pub fn pareto(points: &[&Point]) -> Vec<usize> {
     order
 }
 
-/// What the reference itself costs and leaves: all its passes, and its own standard error.
-pub fn reference_point(scene: &str, truth: &Truth) -> Point {
-    Point {
+/// Time and standard error of the reference itself.
+pub fn reference_point(scene: &str, reference: &ReferenceValues) -> SweepPoint {
+    SweepPoint {
         scene: scene.to_owned(),
         settings: "--quality reference".to_owned(),
         family: Family::Preset,
         preset: Preset::Reference.name().to_owned(),
-        ms: truth.seconds * 1e3,
-        query_us: truth.seconds * 1e6 / truth.pairs.len().max(1) as f64,
-        rel_l2: truth.own,
-        psnr_db: truth.own_db,
-        albedo_error: truth.own,
-        rel_l2_by_angle: [truth.own; BANDS_DEG.len()],
-        stages: vec![("reference".to_owned(), truth.seconds * 1e3)],
-        form: format!("{} passes over {} pairs, rays", truth.passes, truth.pairs.len()),
+        ms: reference.seconds * 1e3,
+        query_us: reference.seconds * 1e6 / reference.pairs.len().max(1) as f64,
+        rel_l2: reference.std_error,
+        psnr_db: reference.std_error_db,
+        albedo_error: reference.std_error,
+        rel_l2_by_angle: [reference.std_error; BANDS_DEG.len()],
+        stages: vec![("reference".to_owned(), reference.seconds * 1e3)],
+        representation: format!("{} passes over {} pairs, rays", reference.passes, reference.pairs.len()),
     }
 }
 
-/// Is this the point of a preset as it is?
-pub fn is_preset(point: &Point, preset: Preset) -> bool {
+/// Returns true if a point is a preset without overrides.
+pub fn is_preset(point: &SweepPoint, preset: Preset) -> bool {
     point.family == Family::Preset && point.preset == preset.name()
 }
 
@@ -247,8 +260,8 @@ pub fn is_preset(point: &Point, preset: Preset) -> bool {
 mod tests {
     use super::*;
 
-    fn point(ms: f64, rel_l2: f64) -> Point {
-        Point {
+    fn point(ms: f64, rel_l2: f64) -> SweepPoint {
+        SweepPoint {
             scene: String::new(),
             settings: String::new(),
             family: Family::Combination,
@@ -260,19 +273,19 @@ mod tests {
             albedo_error: 0.0,
             rel_l2_by_angle: [0.0; BANDS_DEG.len()],
             stages: Vec::new(),
-            form: String::new(),
+            representation: String::new(),
         }
     }
 
     #[test]
-    fn the_front_holds_what_nothing_beats_in_both_time_and_error() {
+    fn the_front_holds_the_points_that_no_other_beats_in_both_time_and_error() {
         let points = [point(3.0, 0.1), point(1.0, 0.5), point(2.0, 0.6), point(4.0, 0.1), point(9.0, 0.01)];
-        let points: Vec<&Point> = points.iter().collect();
+        let points: Vec<&SweepPoint> = points.iter().collect();
         assert_eq!(pareto(&points), [1, 0, 4]);
     }
 
     #[test]
-    fn the_mean_over_cosine_directions_of_a_constant_times_its_square_cosine_is_its_integral() {
+    fn the_mean_of_the_cosine_over_cosine_distributed_directions_is_two_thirds() {
         // ∫ cos θ · cos θ dω / π = 2/3.
         let mean = (0..ALBEDO_VIEWS).map(|k| f64::from(cosine_direction(k).z)).sum::<f64>() / ALBEDO_VIEWS as f64;
         assert!((mean - 2.0 / 3.0).abs() < 1e-3, "{mean}");

@@ -192,6 +192,7 @@ impl OcclusionIntervals {
 
     /// Overhangs by facet, then azimuth. The first array holds the start of each list and the end of the last one, the
     /// second the intervals `(low, high)` [rad].
+    #[cfg(feature = "gpu")]
     pub(crate) fn overhangs_by_facet(&self) -> (Vec<u32>, Vec<(f32, f32)>) {
         let (mut starts, mut intervals) = (vec![0], Vec::new());
         for facet in 0..self.facets() {

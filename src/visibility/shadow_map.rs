@@ -1,5 +1,5 @@
-//! Toroidal shadow maps on the CPU (Wu et al. 2011, Sec. 3.3). The twin on the GPU, `shaders/shadow_map.wgsl`, runs the
-//! same algorithm texel by texel.
+//! Toroidal shadow maps on the CPU (Wu et al. 2011, Sec. 3.3). The twin on the GPU,
+//! `shaders/visibility/shadow_map.wgsl`, runs the same algorithm texel by texel.
 //!
 //! One map per direction covers the endlessly repeated tile (see [`super::shadow_view`]). Each texel is one ray and
 //! stores its highest hit and the triangle of that hit. A facet tests the four rays around its own. If they disagree,

@@ -1,14 +1,14 @@
-//! The cases: a tile, a BRDF, and the files they name.
+//! Cases: a tile, a BRDF, and the files that they name.
 
-/// One hard scene.
+/// A tile and its BRDF.
 #[derive(Debug, Clone)]
 pub struct Case {
     pub family: &'static str,
     pub name: &'static str,
-    /// `[tile]` without its header.
+    /// The table `[tile]` without its header.
     pub tile: String,
     pub brdf: String,
-    /// The OBJ file `tile.obj`, where there is one.
+    /// The text of `tile.obj`, if the tile is a mesh.
     pub mesh: Option<String>,
 }
 
@@ -26,14 +26,14 @@ fn geometry(name: &'static str, tile: &str, mesh: Option<&str>) -> [Case; 2] {
     })
 }
 
-/// A family with a mesh: the OBJ's text.
+/// Returns the cases of a mesh, from the text of its OBJ file.
 fn obj(name: &'static str, mesh: &str) -> [Case; 2] {
     geometry(name, r#"geometry = { kind = "mesh", path = "tile.obj" }"#, Some(mesh))
 }
 
 const PLANE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 
-/// A box of side 0.5 that hangs or stands over the plane from `low` to `high`.
+/// Returns the plane and the corners of a box of side 0.5 above it, from `low` to `high`, with the given faces.
 fn on_plane(low: f32, high: f32, faces: &str) -> String {
     let ring = |z: f32| format!("v .25 .25 {z}\nv .75 .25 {z}\nv .75 .75 {z}\nv .25 .75 {z}\n");
     format!("{PLANE}{}{}{faces}", ring(low), ring(high))
@@ -42,7 +42,7 @@ fn on_plane(low: f32, high: f32, faces: &str) -> String {
 const BOX: &str = "f 5 8 7 6\nf 9 10 11 12\nf 5 6 10 9\nf 6 7 11 10\nf 7 8 12 11\nf 8 5 9 12\n";
 
 fn slivers() -> String {
-    // A ridge of triangles a thousand times as long as wide.
+    // Ridges of triangles that are a thousand times as long as wide.
     let mut text = String::new();
     for k in 0..=64 {
         let (y, z) = (f64::from(k) / 64.0, if k % 2 == 0 { 0.0 } else { 0.01 });

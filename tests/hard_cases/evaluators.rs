@@ -1,4 +1,4 @@
-//! The evaluators: everything that turns a scene into an effective BRDF, on the CPU at draft.
+//! Evaluators: every way to compute an effective BRDF, at `draft` on the CPU.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -14,7 +14,7 @@ use biscale::pipeline::Pipeline;
 use biscale::visibility::visibility_maps_cpu;
 
 use crate::cases::Case;
-use crate::lab::open;
+use crate::examination::open;
 
 pub struct Evaluator {
     pub name: &'static str,
@@ -22,25 +22,26 @@ pub struct Evaluator {
     pub health: Health,
 }
 
-/// Direct first. `m_directions` of the paper's basis (`None`: as many as the paper, half a minute for a narrow lobe).
+/// Returns all evaluators of a case, the direct sum first. The paper's basis has `m_directions`; with `None` it has its full
+/// number, which takes half a minute for a narrow lobe.
 pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evaluator> {
-    let mut pipeline = Pipeline::new();
-    let mut made = Vec::new();
+    let pipeline = Pipeline::new();
+    let mut evaluators = Vec::new();
     for (name, method) in [("direct", "direct"), ("low rank", "low_rank")] {
         let outcome = pipeline
             .effective(&open(case, method, folder))
             .unwrap_or_else(|error| panic!("{}, {name}: {error}", case.name));
         let health = outcome.health().clone();
-        made.push(Evaluator { name, brdf: outcome.brdf.clone(), health: health.clone() });
+        evaluators.push(Evaluator { name, brdf: outcome.brdf.clone(), health: health.clone() });
         if method == "direct" {
-            // What pictures read; the direct sum itself where a table would not do.
+            // A table, or the direct sum itself if the table misses its bound.
             let shading_brdf = outcome.shading_brdf(&Cancel::default()).unwrap();
-            made.push(Evaluator { name: "table", brdf: shading_brdf.brdf, health });
+            evaluators.push(Evaluator { name: "table", brdf: shading_brdf.brdf, health });
         }
     }
     let loaded = open(case, "direct", folder);
     let mesh = pipeline.mesh(&loaded).unwrap();
-    let assigned = pipeline.materials(&loaded).unwrap();
+    let materials = pipeline.materials(&loaded).unwrap();
     let mut facets = Facets::sample_wu2011(&mesh, 1500, 1);
     facets.sort_for_sums();
     let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
@@ -48,25 +49,25 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
     let settings = Wu2011Settings { m_directions, ..Wu2011Settings::default() };
     let base_area = f64::from(mesh.base_area());
     let tile = VisibleFacets { facets: &facets, visibility: &visibility, directions: &directions, base_area };
-    let factors: Vec<_> = assigned.1.iter().map(|material| factors(case, material, &settings)).collect();
-    let tables = Wu2011::from_factors(&tile, &assigned.0, &assigned.1, &factors, &settings)
+    let factors: Vec<_> = materials.materials.iter().map(|material| factors(case, material, &settings)).collect();
+    let tables = Wu2011::from_factors(&tile, &materials.material_of_slot, &materials.materials, &factors, &settings)
         .unwrap_or_else(|error| panic!("{}, wu2011: {error}", case.name));
     let brdf = Arc::new(EffectiveBrdf { representation: Representation::Wu2011(tables), base_area });
-    let evidence = HealthInputs {
+    let inputs = HealthInputs {
         facets: Arc::new(facets),
-        sight: VisibilityInput::Packed(Arc::new(visibility)),
-        names: vec!["default".to_owned(); assigned.1.len()],
-        materials: Arc::new(assigned),
+        visibility: VisibilityInput::Packed(Arc::new(visibility)),
+        names: vec!["default".to_owned(); materials.materials.len()],
+        materials: Arc::new(materials),
         closes_plane: mesh.closes_plane,
     };
-    let mut health = Health::of(&brdf, &evidence, None, Limits { max_rank: 64, tolerance: 0.12 });
-    // The paper's maps are yes or no on 137 directions: their area is 10 to 30 % off towards the horizon, as it says itself.
+    let mut health = Health::of(&brdf, &inputs, None, Limits { max_rank: 64, tolerance: 0.12 });
+    // The paper's maps have one bit per facet at 137 directions, so their projected area has a large error near the horizon.
     health.result.projected_area_error = None;
-    made.push(Evaluator { name: "wu2011", brdf, health });
-    made
+    evaluators.push(Evaluator { name: "wu2011", brdf, health });
+    evaluators
 }
 
-/// M of a BRDF, for all the cases that have it.
+/// Returns the factor M of a BRDF, which cases with the same BRDF share.
 fn factors(case: &Case, material: &Material, settings: &Wu2011Settings) -> Option<Arc<MaterialFactors>> {
     type Known = Mutex<HashMap<(String, Option<usize>), Arc<MaterialFactors>>>;
     static KNOWN: LazyLock<Known> = LazyLock::new(Mutex::default);
@@ -74,8 +75,8 @@ fn factors(case: &Case, material: &Material, settings: &Wu2011Settings) -> Optio
     if let Some(known) = KNOWN.lock().unwrap().get(&key) {
         return Some(known.clone());
     }
-    let made = MaterialFactors::new(material, settings).unwrap_or_else(|error| panic!("{}, M: {error}", case.name));
-    let made = Arc::new(made);
-    KNOWN.lock().unwrap().insert(key, made.clone());
-    Some(made)
+    let computed = MaterialFactors::new(material, settings).unwrap_or_else(|error| panic!("{}, M: {error}", case.name));
+    let computed = Arc::new(computed);
+    KNOWN.lock().unwrap().insert(key, computed.clone());
+    Some(computed)
 }

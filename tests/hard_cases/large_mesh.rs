@@ -41,7 +41,7 @@ fn values(folder: &Path) -> (Vec<Vec3>, bool) {
                 \"cook_torrance\", roughness = 0.5, f0 = 0.9 }\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\n";
     let scene = scene::parse(text).unwrap();
     let loaded = LoadedScene { scene, base_dir: folder.to_owned(), name: String::new(), painted: Painted::default() };
-    let mut pipeline = Pipeline::new();
+    let pipeline = Pipeline::new();
     let outcome = pipeline.effective(&loaded).unwrap();
     let found = mirror_biased_pairs(200, 9).iter().map(|p| outcome.brdf.eval(p.i, p.o)).collect();
     let health = outcome.health();

@@ -1,25 +1,26 @@
-//! Hard cases: angles, geometries, BRDFs, light and objects at the ends of what is legal, each with every evaluator, held to
-//! what must be true of any effective BRDF.
+//! Hard cases: directions, geometries, BRDFs, lights and objects at the limits of what a scene allows. Every evaluator must keep
+//! the invariants of an effective BRDF on each.
 //!
-//! `cargo test --release --test hard_cases -- --ignored --nocapture the_table` prints the worst deviation and its bound for
-//! every case and evaluator; docs/hard_cases.txt is what it last printed.
+//! `cargo bench --bench measure -- hard-cases` prints the worst deviation and its bound for every case and evaluator;
+//! `docs/measurements/hard_cases.md` holds the table.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::disallowed_methods,
-    reason = "a test may stop where it stands"
+    reason = "a failing test may panic"
 )]
 
 mod cases;
 mod continuity;
 mod evaluators;
-mod files;
-mod finer;
+mod examination;
+mod finer_presets;
 mod health;
 mod invariants;
-mod lab;
 mod large_mesh;
-mod large_scale;
+mod light_and_objects;
+mod measured_files;
+#[cfg(feature = "gpu")]
 mod on_gpu;
 mod refinement;
 mod statistics;

@@ -9,7 +9,7 @@ use biscale::render::render;
 use biscale::scene::LoadedScene;
 
 use crate::cases::{Case, brdfs, geometries};
-use crate::lab::open;
+use crate::examination::open;
 
 /// The hardest of each family that a picture shows.
 const CHOSEN: [&str; 8] = [
@@ -49,7 +49,7 @@ pub fn same_image(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
     let background = Background::default();
     let input = stage.input(&*outcome.brdf, [side; 2], 1, &background);
     let cpu = render(&input).unwrap().image.pixels;
-    let mut renderer = match GpuRenderer::with_material(gpu, &stage.mesh, stage.occluder.as_ref(), &outcome.brdf) {
+    let mut renderer = match GpuRenderer::with_material(gpu, stage.mesh(), stage.occluder(), &outcome.brdf) {
         Ok(renderer) => renderer,
         Err(error) => return eprintln!("SKIPPED: {name}: {error}"),
     };

@@ -98,14 +98,14 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
     state.open = true;
     let overhangs = effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
     let settings = Settings::of(scene);
-    let mut level = quality_scale::position(settings.facets);
+    let mut level = quality_scale::level_of_facets(settings.facets);
     let tip = "Quality levels: each balances the numbers of facets and of directions. Finer takes longer.";
     let changed = fields::row(ui, "Faster - finer", tip, |ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);
         ui.add(Slider::new(&mut level, 0.0..=quality_scale::FINEST).show_value(false)).changed()
     });
     if changed {
-        let candidate = quality_scale::rung(level, overhangs);
+        let candidate = quality_scale::candidate_at(level, overhangs);
         let plain = Quality {
             preset: candidate.preset.to_owned(),
             seed: scene.quality.seed,
@@ -123,9 +123,9 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
             "{} facets: PSNR {:.1} ± {:.1} dB, relative L2 {:.2} ± {:.2} %, {}",
             point.facets,
             point.compared.psnr_db,
-            point.compared.psnr_db_error,
+            point.compared.psnr_std_error_db,
             point.compared.rel_l2 * 100.0,
-            point.compared.rel_l2_error * 100.0,
+            point.compared.rel_l2_std_error * 100.0,
             milliseconds(point.ms)
         ),
         None => format!("{} facets", settings.facets),
@@ -144,7 +144,7 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
     if let Some(point) = current.filter(|_| state.comparing) {
         ui.weak(format!(
             "Standard error of the reference: {:.2} % after {} passes",
-            point.compared.own * 100.0,
+            point.compared.std_error * 100.0,
             4 * point.compared.batches
         ));
     }
@@ -245,6 +245,6 @@ fn bars(
     height: f32,
     color: Color32,
 ) {
-    let half = ((point.compared.psnr_db_error / (y1 - y0)) as f32 * height).min(height);
+    let half = ((point.compared.psnr_std_error_db / (y1 - y0)) as f32 * height).min(height);
     painter.line_segment([at - vec2(0.0, half), at + vec2(0.0, half)], Stroke::new(1.0, color));
 }

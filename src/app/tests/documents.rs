@@ -173,7 +173,7 @@ fn a_recovery_file_of_a_crash_is_found_and_restored_once() {
     assert!(RecoveredDocument::find(folder.path()).is_empty());
 }
 
-#[path = "../../../tests/fuzz/mutate.rs"]
+#[path = "../../../tests/program/fuzz/mutate.rs"]
 mod mutate;
 
 /// Restores mutated recovery files, and checks that each gives a valid scene or an error. Returns the counts of both.

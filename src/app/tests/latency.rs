@@ -57,7 +57,7 @@ fn latency_ms(name: &str, backend: &str, edits: usize) -> (f64, f64, f64) {
 }
 
 #[test]
-#[ignore = "one scene, or five with BISCALE_TABLE=1: cargo test --release --lib latency -- --ignored --nocapture"]
+#[ignore = "a measurement: cargo bench --bench measure -- latency; one scene without BISCALE_TABLE=1"]
 fn latency_from_a_slider_on_the_scenes_of_table_4() {
     let _alone = super::alone();
     println!(

@@ -10,7 +10,7 @@ use crate::render::Image;
 use crate::report::{EffectCost, ThumbnailRenderer, heat, measure_effects};
 use crate::scene::{LoadedScene, Quality};
 use crate::tuning::candidates::with_settings;
-use crate::tuning::progressive::{Compared, ProgressiveReference};
+use crate::tuning::progressive::{ProgressiveReference, ReferenceErrors};
 use crate::tuning::quality_scale;
 use eframe::egui::ColorImage;
 
@@ -34,7 +34,7 @@ pub struct AccuracyJob {
 pub struct AccuracyPoint {
     pub facets: usize,
     pub ms: f64,
-    pub compared: Compared,
+    pub compared: ReferenceErrors,
 }
 
 /// A report of the worker that measures accuracy.
@@ -127,7 +127,7 @@ impl AccuracyWorker {
             }
             context.cancel.check()?;
             report(AccuracyResult::Doing("Faster and finer settings"));
-            let scene = with_settings(&job.loaded, &quality_scale::rung(level, overhangs))?;
+            let scene = with_settings(&job.loaded, &quality_scale::candidate_at(level, overhangs))?;
             let point = self.point(&scene, &reference)?;
             self.levels.push((level, point));
             report(AccuracyResult::Levels(self.levels.iter().map(|(_, point)| *point).collect()));
@@ -159,7 +159,7 @@ impl AccuracyWorker {
                 Some(sample) => mean.add(sample),
                 // With interreflection, the finest level replaces the reference.
                 None if seed == 0 => {
-                    let settings = quality_scale::rung(FINEST, has_overhangs(outcome));
+                    let settings = quality_scale::candidate_at(FINEST, has_overhangs(outcome));
                     let fine = with_settings(&job.loaded, &settings)?;
                     let finest = thumbnails.image(&*self.pipeline.effective(&fine)?.brdf)?;
                     report(AccuracyResult::Difference(

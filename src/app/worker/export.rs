@@ -9,7 +9,7 @@ use crate::export::tile::TileOptions;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use crate::fit::Model;
 use crate::geometry::TileMesh;
-use crate::pipeline::Outcome;
+use crate::pipeline::{Outcome, Pipeline};
 use crate::render::image::tone_map::ToneMap;
 use crate::render::tile_view::TileScene;
 use crate::scene::LoadedScene;
@@ -122,7 +122,7 @@ fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, report: &(dyn Fn(Expo
             report(ExportResult::Progress(0.3, "Rendering"));
             let tile = TileScene::new(Arc::new(pipeline.mesh(&job.loaded)?));
             let close = (tile, pipeline.materials(&job.loaded)?);
-            image(&job.loaded, &outcome, size, &job.path, &close, cancel)?;
+            image(&pipeline, &job.loaded, &outcome, size, &job.path, &close, cancel)?;
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
@@ -150,6 +150,7 @@ fn tile(job: &ExportJob, mesh: &TileMesh, options: &TileOptions, progress: &Prog
 }
 
 fn image(
+    pipeline: &Pipeline,
     loaded: &LoadedScene,
     outcome: &Outcome,
     size: [usize; 2],
@@ -159,7 +160,7 @@ fn image(
 ) -> Result<()> {
     let camera = loaded.scene.camera.clone().unwrap_or_default();
     let mut renderer = PreviewRenderer::default();
-    renderer.prepare(loaded)?;
+    renderer.prepare(pipeline, loaded)?;
     let backend = loaded.scene.quality.backend.as_str();
     let request = RenderRequest {
         camera: &camera,
@@ -169,6 +170,6 @@ fn image(
         build_caches: true,
         backend,
     };
-    let (rendered, _) = renderer.render(&request, Some(close), cancel)?;
+    let (rendered, _) = renderer.render(pipeline, &request, Some(close), cancel)?;
     rendered.image.write(path, &ToneMap::new(&camera)?)
 }

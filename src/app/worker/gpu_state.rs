@@ -6,8 +6,7 @@ use crate::base::{Cancel, Error, Result};
 use crate::effective::{EffectiveBrdf, Representation};
 use crate::gpu::{Gpu, GpuError, GpuRenderer, Tier};
 use crate::pipeline::GpuTile;
-use crate::render::ObjectMesh;
-use crate::render::shadow::Occluder;
+use crate::render::RenderScene;
 
 use super::preview_renderer::{RenderRequest, ShadedMaterial};
 use super::screen::Screen;
@@ -23,11 +22,11 @@ pub enum GpuState {
     Lost(String),
     /// Name of a software adapter, used only if the backend is `gpu`.
     Software(String),
-    Open(OnGpu),
+    Open(OpenGpu),
 }
 
 /// An open GPU and its renderer.
-pub struct OnGpu {
+pub struct OpenGpu {
     gpu: Arc<Gpu>,
     is_hardware: bool,
     /// Renderer of the current object, with its current material.
@@ -54,8 +53,7 @@ impl RendererMaterial {
 /// Inputs of one image on the GPU.
 #[derive(Clone, Copy)]
 pub struct PreviewInput<'a> {
-    pub mesh: &'a ObjectMesh,
-    pub occluder: Option<&'a Occluder>,
+    pub scene: &'a RenderScene,
     pub request: &'a RenderRequest<'a>,
     pub screen: Option<&'a Screen>,
 }
@@ -141,7 +139,7 @@ impl GpuState {
         match gpu {
             // A software adapter is slower than this program's CPU code.
             Ok((gpu, false)) if !required => Self::Software(gpu.adapter.name.clone()),
-            Ok((gpu, is_hardware)) => Self::Open(OnGpu { gpu, is_hardware, renderer: None }),
+            Ok((gpu, is_hardware)) => Self::Open(OpenGpu { gpu, is_hardware, renderer: None }),
             Err(_) => Self::None("no graphics adapter".to_owned()),
         }
     }
@@ -167,7 +165,7 @@ impl GpuState {
     }
 }
 
-impl OnGpu {
+impl OpenGpu {
     /// Sets the requested material: as a shading table if one exists or pays off, else as a sum.
     ///
     /// Returns the milliseconds spent on the table, or `None` if the GPU does not shade this material.
@@ -203,14 +201,13 @@ impl OnGpu {
 
     /// Sets the material of the renderer; returns false if the GPU does not support it.
     fn set_renderer_material(&mut self, input: PreviewInput, material: RendererMaterial) -> Result<bool> {
-        let PreviewInput { mesh, occluder, .. } = input;
         if self.renderer.as_ref().is_some_and(|(_, last)| last.is_same(&material)) {
             return Ok(true);
         }
         let gpu = &self.gpu;
         let mut renderer = match self.renderer.take() {
             Some((renderer, _)) => renderer,
-            None => Box::new(GpuRenderer::new(gpu, mesh, occluder)?),
+            None => Box::new(GpuRenderer::new(gpu, input.scene.mesh(), input.scene.occluder())?),
         };
         let set = match &material {
             RendererMaterial::Brdf(brdf) => renderer.set_brdf(gpu, brdf),

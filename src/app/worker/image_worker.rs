@@ -85,7 +85,7 @@ impl ImageWorker {
     fn render_draft(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<RenderedPreview> {
         self.pipeline.set_cancel(cancel.clone());
         self.choose_backend(job, false);
-        self.renderer.prepare(&job.loaded)?;
+        self.renderer.prepare(&self.pipeline, &job.loaded)?;
         let (outcome, cost_index) = match self.shared.known(&job.loaded) {
             Some(outcome) => (outcome.without_times(), 1),
             None => match self.render_gpu_draft(job, cancel)? {
@@ -171,7 +171,7 @@ impl ImageWorker {
         };
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
         report(ImageResult::Doing(job.version, "Refining the image"));
-        self.renderer.prepare(&job.loaded)?;
+        self.renderer.prepare(&self.pipeline, &job.loaded)?;
         let mut rendered_pixels = 0;
         for budget in STEPS_MS {
             let step = self.affordable(job.size, 1, budget);
@@ -249,7 +249,7 @@ impl ImageWorker {
         let (radiance, image, times, table_ms, tone) = match shown {
             Some(shown) => (None, DisplayImage::OnGpu(shown.image), shown.times, shown.table_ms, None),
             None => {
-                let (rendered, table_ms) = self.renderer.render(&request, close, cancel)?;
+                let (rendered, table_ms) = self.renderer.render(&self.pipeline, &request, close, cancel)?;
                 let start = Instant::now();
                 let image = DisplayImage::Pixels(Arc::new(color_image(&rendered.image, &tone_map)));
                 (Some(Arc::new(rendered.image)), image, rendered.times, table_ms, Some(ms(start)))
@@ -285,7 +285,7 @@ impl ImageWorker {
             latency_ms: ms(job.submitted),
             rendered_on: self.renderer.rendered_on(),
             gpu_error: self.renderer.gpu_error(),
-            lit_object: self.renderer.lit_object(),
+            lit_object: self.renderer.scene().cloned(),
             camera: camera.clone(),
             distance: self.renderer.distance(&camera, size),
             notes,

@@ -118,12 +118,11 @@ impl PreviewWorkers {
 pub fn spawn_thumbnail(
     report: impl Fn(SceneThumbnail) + Clone + Send + Sync + 'static,
 ) -> Option<Worker<ThumbnailJob>> {
-    let work = move |state: &mut preview_renderer::PreviewRenderer,
-                     job: ThumbnailJob,
-                     context: &runner::JobContext<ThumbnailJob>| {
-        thumbnail::work(state, &job, context, &report);
-    };
-    Worker::spawn("thumbnails", 1, preview_renderer::PreviewRenderer::default, work, |_| {}).ok()
+    let work =
+        move |state: &mut thumbnail::ThumbnailWorker, job: ThumbnailJob, context: &runner::JobContext<ThumbnailJob>| {
+            thumbnail::work(state, &job, context, &report);
+        };
+    Worker::spawn("thumbnails", 1, thumbnail::ThumbnailWorker::default, work, |_| {}).ok()
 }
 
 /// Starts the thread that measures accuracy against time.

@@ -1,28 +1,20 @@
 //! Rendering of preview images. The renderer caches the object, lights, shadows and GPU state, and recomputes each only
 //! when its input changes.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use crate::base::{Cancel, Error, Result};
 use crate::brdf::MaterialAssignment;
 use crate::effective::{Black, EffectiveBrdf, Reflectance};
-use crate::pipeline::{GpuTile, Outcome};
+use crate::pipeline::{GpuTile, Outcome, Pipeline};
 use crate::render::image::render::RenderTimes;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
-use crate::render::lighting::environment::Environment;
-use crate::render::lighting::light_selection::significant_lights;
-use crate::render::lighting::lights::Lights;
-use crate::render::lighting::{environment, lights};
 use crate::render::render;
-use crate::render::shadow::Occluder;
-use crate::render::shadow::shadow_cache::ShadowCache;
 use crate::render::tile_view::{ShadedMaterials, TileScene, on_object};
-use crate::render::{CameraView, DirectionalLight, ObjectMesh, RenderInput, Rendered, object};
-use crate::scene;
-use crate::scene::{Camera, LoadedScene, Switch};
+use crate::render::{CameraView, RenderInput, RenderScene, Rendered};
+use crate::scene::{Camera, LoadedScene};
 use glam::Vec3;
 
 use super::gpu_state::{GpuState, PreviewInput};
@@ -31,21 +23,10 @@ use super::screen::{GpuImage, ImagePool, Screen};
 /// The object, lights and shadows of a scene, ready to be shaded.
 #[derive(Default)]
 pub struct PreviewRenderer {
-    object: Option<Object>,
-    environment: Option<((String, PathBuf), Environment)>,
-    lights: Option<((scene::Light, PathBuf, Switch), Lights)>,
-    /// Belongs to the object and the lights above.
-    shadows: Option<ShadowCache>,
+    scene: Option<RenderScene>,
     gpu: GpuState,
     screen: Option<Screen>,
     images: ImagePool,
-}
-
-struct Object {
-    /// The last part is the setting that forces shadows on or off.
-    key: (scene::Object, PathBuf, Switch),
-    mesh: Arc<ObjectMesh>,
-    occluder: Option<Occluder>,
 }
 
 /// An image on the window's GPU.
@@ -80,61 +61,37 @@ pub struct RenderRequest<'a> {
 }
 
 impl PreviewRenderer {
-    /// Rebuilds the object and the lights if the scene changed them.
-    pub fn prepare(&mut self, loaded: &LoadedScene) -> Result<()> {
-        let shadow = loaded.scene.effects.self_shadow;
-        let key = (loaded.scene.object.clone(), loaded.base_dir.clone(), shadow);
-        if self.object.as_ref().is_none_or(|object| object.key != key) {
-            let mesh = Arc::new(object::build(&key.0, &key.1)?);
-            let occluder = match key.2 {
-                Switch::Off => None,
-                Switch::On => Some(Occluder::new(&mesh)),
-                Switch::Auto => Occluder::if_needed(&mesh),
-            };
-            self.object = Some(Object { key, mesh, occluder });
-            self.lights = None;
-            self.shadows = None;
-            self.gpu.forget_object();
-        }
-        let key = (loaded.scene.light.environment.clone(), loaded.base_dir.clone());
-        if self.environment.as_ref().is_none_or(|(last, _)| *last != key) {
-            let environment = environment::load(&key.0, &key.1)?;
-            self.environment = Some((key, environment));
-            self.lights = None;
-        }
-        let key = (loaded.scene.light.clone(), loaded.base_dir.clone(), loaded.scene.effects.faint_lights);
-        if self.lights.as_ref().is_none_or(|(last, _)| *last != key)
-            && let Some((_, environment)) = &self.environment
-        {
-            let mut lights = lights::from_environment(&key.0, environment.clone());
-            if let (true, Some(object)) = (key.2 != Switch::On, &self.object) {
-                lights.directional = significant_lights(&object.mesh, &lights.directional);
+    /// Prepares the object and the lights of a scene. The pipeline recomputes only what the scene changed.
+    pub fn prepare(&mut self, pipeline: &Pipeline, loaded: &LoadedScene) -> Result<()> {
+        let mut scene = RenderScene::with(pipeline, loaded)?;
+        if let Some(last) = &self.scene {
+            scene.reuse_shadows(last);
+            if last.object_key() != scene.object_key() {
+                self.gpu.forget_object();
             }
-            self.lights = Some((key, lights));
-            self.shadows = None;
         }
+        self.scene = Some(scene);
         Ok(())
     }
 
     /// Warnings about the object and the lights.
     pub fn warnings(&self) -> Vec<String> {
-        let of_object = self.object.iter().flat_map(|object| &object.mesh.warnings);
-        of_object.chain(self.lights.iter().flat_map(|(_, lights)| &lights.warnings)).cloned().collect()
+        self.scene.iter().flat_map(RenderScene::warnings).cloned().collect()
     }
 
-    /// The object and its lights, for picking.
-    pub fn lit_object(&self) -> Option<(Arc<ObjectMesh>, Arc<Vec<DirectionalLight>>)> {
-        let lights = self.lights.as_ref().map(|(_, lights)| Arc::new(lights.directional.clone()))?;
-        Some((self.object.as_ref()?.mesh.clone(), lights))
+    /// The prepared object and lights, for picking.
+    pub fn scene(&self) -> Option<&RenderScene> {
+        self.scene.as_ref()
     }
 
     /// Distance from the camera to the object in the object's radii, with automatic framing resolved.
     pub fn distance(&self, camera: &Camera, size: [usize; 2]) -> f32 {
-        let of = |object: &Object| {
-            let view = CameraView::new(camera, &object.mesh, size).ok()?;
-            Some((view.eye - object.mesh.bounds.center).dot(view.back) / object.mesh.bounds.radius)
+        let of = |scene: &RenderScene| {
+            let view = CameraView::new(camera, scene.mesh(), size).ok()?;
+            let bounds = &scene.mesh().bounds;
+            Some((view.eye - bounds.center).dot(view.back) / bounds.radius)
         };
-        self.object.as_ref().and_then(of).unwrap_or(4.0)
+        self.scene.as_ref().and_then(of).unwrap_or(4.0)
     }
 
     /// Sets the GPU on which the window draws.
@@ -159,13 +116,10 @@ impl PreviewRenderer {
         tone_map: &ToneMap,
         cancel: &Cancel,
     ) -> Result<Option<GpuPreview>> {
-        let (Some(object), Some((_, lights)), Some(screen)) = (&self.object, &self.lights, &self.screen) else {
-            return Ok(None);
-        };
-        let occluder = object.occluder.as_ref();
-        let preview_input = PreviewInput { mesh: &object.mesh, occluder, request, screen: Some(screen) };
+        let (Some(scene), Some(screen)) = (&self.scene, &self.screen) else { return Ok(None) };
+        let preview_input = PreviewInput { scene, request, screen: Some(screen) };
         let background = Background::default();
-        let input = render_input(object, lights, request, &Black, &background);
+        let input = render_input(scene, request, &Black, &background);
         let images = &mut self.images;
         let shown = self.gpu.run(preview_input, cancel, |renderer, gpu| {
             if !std::ptr::eq(gpu, &*screen.gpu) {
@@ -186,31 +140,28 @@ impl PreviewRenderer {
     /// An invalid camera, or [`Error::Cancelled`].
     pub fn render(
         &mut self,
+        pipeline: &Pipeline,
         request: &RenderRequest,
         close: Option<&CloseUpTile>,
         cancel: &Cancel,
     ) -> Result<(Rendered, f64)> {
-        let (Some(object), Some((_, lights)), ShadedMaterial::Outcome(outcome)) =
-            (&self.object, &self.lights, request.material)
-        else {
+        let (Some(scene), ShadedMaterial::Outcome(outcome)) = (&mut self.scene, request.material) else {
             return Err(Error::failed("nothing was prepared"));
         };
-        let (occluder, background) = (object.occluder.as_ref(), Background::default());
-        let preview_input = PreviewInput { mesh: &object.mesh, occluder, request, screen: self.screen.as_ref() };
+        let background = Background::default();
+        let preview_input = PreviewInput { scene, request, screen: self.screen.as_ref() };
         let exact = Cancellable { brdf: &outcome.brdf, cancel };
-        let input = render_input(object, lights, request, &exact, &background);
+        let input = RenderInput { shadow_cache: None, ..render_input(scene, request, &exact, &background) };
         let on_gpu = self.gpu.run(preview_input, cancel, |renderer, gpu| renderer.render(gpu, &input, cancel))?;
         let (mut rendered, table_ms) = match on_gpu {
             Some(rendered) => rendered,
             None => {
-                if let (true, None, Some(occluder)) = (request.build_caches, &self.shadows, input.occluder) {
-                    self.shadows = Some(occluder.cache(&object.mesh, &lights.directional));
-                    cancel.check()?;
+                if request.build_caches && scene.shadow_cache().is_none() {
+                    scene.cache_shadows(pipeline)?;
                 }
                 let shading_brdf = outcome.shading_brdf(cancel)?;
                 let reflectance = Cancellable { brdf: &shading_brdf.brdf, cancel };
-                let shadow_cache = self.shadows.as_ref();
-                (render(&RenderInput { reflectance: &reflectance, shadow_cache, ..input })?, shading_brdf.ms)
+                (render(&render_input(scene, request, &reflectance, &background))?, shading_brdf.ms)
             }
         };
         cancel.check()?;
@@ -218,8 +169,8 @@ impl PreviewRenderer {
             let start = Instant::now();
             let materials =
                 ShadedMaterials { material_of_slot: &assignment.material_of_slot, materials: &assignment.materials };
-            let shadow_cache = self.shadows.as_ref();
-            tile.blend_into(&mut rendered.image, &RenderInput { shadow_cache, ..input }, materials, cancel)?;
+            let input = render_input(scene, request, &exact, &background);
+            tile.blend_into(&mut rendered.image, &input, materials, cancel)?;
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
         }
         Ok((rendered, table_ms))
@@ -227,11 +178,11 @@ impl PreviewRenderer {
 
     /// Returns true if the camera is so close that the tiles themselves are visible.
     pub fn is_close(&self, camera: &Camera, size: [usize; 2]) -> bool {
-        let of = |object: &Object| {
-            CameraView::new(camera, &object.mesh, size)
-                .is_ok_and(|view| on_object::tiles_are_visible(&view, &object.mesh))
+        let of = |scene: &RenderScene| {
+            CameraView::new(camera, scene.mesh(), size)
+                .is_ok_and(|view| on_object::tiles_are_visible(&view, scene.mesh()))
         };
-        self.object.as_ref().is_some_and(of)
+        self.scene.as_ref().is_some_and(of)
     }
 
     /// Returns true if images are rendered on a hardware GPU.
@@ -255,25 +206,15 @@ impl PreviewRenderer {
     }
 }
 
-/// Collects the inputs of an image. Without directional lights there are no shadows.
+/// Collects the inputs of an image.
 fn render_input<'a>(
-    object: &'a Object,
-    lights: &'a Lights,
+    scene: &'a RenderScene,
     request: &'a RenderRequest,
     reflectance: &'a dyn Reflectance,
     background: &'a Background,
 ) -> RenderInput<'a> {
-    RenderInput {
-        mesh: &object.mesh,
-        occluder: object.occluder.as_ref().filter(|_| !lights.directional.is_empty()),
-        shadow_cache: None,
-        lights: &lights.directional,
-        camera: request.camera,
-        reflectance,
-        size: request.size,
-        samples_per_side: request.samples_per_side,
-        background,
-    }
+    let input = scene.input(reflectance, request.size, request.samples_per_side, background);
+    RenderInput { camera: request.camera, ..input }
 }
 
 /// A BRDF that returns at once after a cancel, so that rendering ends soon; the image is then discarded.

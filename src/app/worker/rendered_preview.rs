@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::effective::EffectiveBrdf;
 use crate::plan::Effect;
-use crate::render::{DirectionalLight, Image, ObjectMesh};
+use crate::render::{Image, RenderScene};
 use crate::scene::{Camera, LoadedScene};
 use eframe::egui::ColorImage;
 
@@ -76,7 +76,7 @@ pub struct RenderedPreview {
     /// Reason why the GPU failed.
     pub gpu_error: Option<String>,
     /// The object and its lights.
-    pub lit_object: Option<(Arc<ObjectMesh>, Arc<Vec<DirectionalLight>>)>,
+    pub lit_object: Option<RenderScene>,
     pub camera: Camera,
     /// Distance from the camera to the object, in the object's radii.
     pub distance: f32,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::base::Result;
+use crate::pipeline::Pipeline;
 use crate::render::image::tone_map::ToneMap;
 use crate::scene;
 use crate::scene::Quality;
@@ -29,28 +30,40 @@ pub struct SceneThumbnail {
     pub image: Option<Arc<ColorImage>>,
 }
 
+/// The pipeline and the renderer of the thumbnails, which share one environment.
+pub struct ThumbnailWorker {
+    pipeline: Pipeline,
+    renderer: PreviewRenderer,
+}
+
+impl Default for ThumbnailWorker {
+    fn default() -> Self {
+        Self { pipeline: crate::gpu::pipeline(), renderer: PreviewRenderer::default() }
+    }
+}
+
 pub fn work(
-    renderer: &mut PreviewRenderer,
+    worker: &mut ThumbnailWorker,
     job: &ThumbnailJob,
     context: &JobContext<ThumbnailJob>,
     report: &dyn Fn(SceneThumbnail),
 ) {
-    let image = render(renderer, job.name, context);
+    let image = render(worker, job.name, context);
     // The gallery submits a cancelled thumbnail again.
     if !context.cancel.is_set() {
         report(SceneThumbnail { name: job.name, image: image.ok().map(Arc::new) });
     }
 }
 
-fn render(renderer: &mut PreviewRenderer, name: &str, context: &JobContext<ThumbnailJob>) -> Result<ColorImage> {
+fn render(worker: &mut ThumbnailWorker, name: &str, context: &JobContext<ThumbnailJob>) -> Result<ColorImage> {
     let mut loaded = scene::open(name, &[])?;
     loaded.scene.quality =
         Quality { preset: "draft".to_owned(), backend: "cpu".to_owned(), facets: Some(1024), ..Quality::default() };
     loaded.scene.light.count = loaded.scene.light.count.min(LIGHTS);
-    let mut pipeline = crate::gpu::pipeline();
+    let ThumbnailWorker { pipeline, renderer } = worker;
     pipeline.set_cancel(context.cancel.clone());
     let outcome = pipeline.effective(&loaded)?;
-    renderer.prepare(&loaded)?;
+    renderer.prepare(pipeline, &loaded)?;
     let camera = loaded.scene.camera.clone().unwrap_or_default();
     let request = RenderRequest {
         camera: &camera,
@@ -60,6 +73,6 @@ fn render(renderer: &mut PreviewRenderer, name: &str, context: &JobContext<Thumb
         build_caches: false,
         backend: "cpu",
     };
-    let (rendered, _) = renderer.render(&request, None, context.cancel)?;
+    let (rendered, _) = renderer.render(pipeline, &request, None, context.cancel)?;
     Ok(color_image(&rendered.image, &ToneMap::new(&camera)?))
 }

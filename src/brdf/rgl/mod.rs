@@ -29,7 +29,7 @@ use tensor_file::TensorFile;
 const MIN_COSINE: f64 = 0.01;
 
 /// Bins in `θ_h`, `θ_d`, `φ_d` of the table. The health reports the resampling error that they leave; `cargo test --lib
-/// measured_files -- --nocapture` prints it for the test files.
+/// measured_files -- --ignored --nocapture` prints it for the files in `BISCALE_DATA`.
 const SHAPE: [usize; 3] = [180, 90, 20];
 
 /// Largest relative L2 difference between azimuths of a file that counts as isotropic; interpolation causes some.

@@ -1,5 +1,4 @@
 use std::f64::consts::FRAC_PI_2;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::{Brdf, Term};
@@ -187,15 +186,11 @@ fn truncated_and_damaged_bytes_are_errors_not_panics() {
 }
 
 #[test]
+#[ignore = "needs measured data: BISCALE_DATA names a folder of RGL files"]
 fn measured_files_reflect_less_than_they_receive_and_survive_resampling() {
-    let folder = std::env::var_os("BISCALE_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let Some(folder) = crate::testing::measured_data::folder("BISCALE_DATA") else { return };
     for name in ["chm_orange_rgb", "irid_flake_paint1_rgb", "vch_silk_blue_rgb"] {
         let path = folder.join(name).with_extension("bsdf");
-        if !path.exists() {
-            eprintln!("SKIPPED: {} is not there (BISCALE_DATA names its folder)", path.display());
-            continue;
-        }
         let start = std::time::Instant::now();
         let table = load(&path).unwrap();
         eprintln!("{name} in {:.0} ms: {:?}", start.elapsed().as_secs_f64() * 1e3, table.report());
@@ -205,15 +200,11 @@ fn measured_files_reflect_less_than_they_receive_and_survive_resampling() {
 }
 
 #[test]
+#[ignore = "needs measured data: BISCALE_DATA names a folder with vch_silk_blue_rgb.bsdf"]
 fn the_silk_film_is_most_nearly_reciprocal_with_the_other_directions_cosine() {
     // The format stores f_r cosθ_o. Read as f_r or as f_r cosθ_i, the smooth file is less reciprocal.
-    let folder = std::env::var_os("BISCALE_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let Some(folder) = crate::testing::measured_data::folder("BISCALE_DATA") else { return };
     let path = folder.join("vch_silk_blue_rgb.bsdf");
-    if !path.exists() {
-        eprintln!("SKIPPED: {} is not there (BISCALE_DATA names its folder)", path.display());
-        return;
-    }
     let brdf = RglTable::from_fields(&TensorFile::read(&path).unwrap()).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut random = || {

@@ -1,6 +1,5 @@
 //! The columns that a shading table stores of a sum over facets, and their weights, which are evaluated at the query.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -66,7 +65,8 @@ impl Column {
     }
 
     /// The facets that a column sums over.
-    pub(crate) fn facets(&self, sum: &FacetSum) -> Range<usize> {
+    #[cfg(feature = "gpu")]
+    pub(crate) fn facets(&self, sum: &FacetSum) -> std::ops::Range<usize> {
         let group = &sum.groups()[self.group];
         match (self.kind, &group.clusters) {
             (ColumnKind::Area(cluster), Some(clusters)) => clusters[cluster].range.clone(),

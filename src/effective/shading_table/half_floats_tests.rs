@@ -44,7 +44,7 @@ fn halves_are_those_of_ieee_754() {
 }
 
 #[test]
-#[ignore = "prints a table: cargo test --release --lib half_floats_would -- --ignored --nocapture"]
+#[ignore = "a measurement: cargo bench --bench measure -- half-floats"]
 fn half_floats_would_change_a_table_by_this() {
     let pairs = image_pairs(4096, 12345);
     let values = |of: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| of.eval(pair.i, pair.o)).collect() };

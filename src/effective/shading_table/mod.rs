@@ -246,6 +246,7 @@ impl ShadingTable {
     }
 
     /// The weights that multiply the columns at the query.
+    #[cfg(feature = "gpu")]
     pub(crate) fn weights(&self) -> &[Weight] {
         &self.weights
     }

@@ -91,7 +91,7 @@ pub fn png(
         .map_err(|error| Error::failed(format!("PNG: {error}")))?;
     let mut notes =
         vec![format!("0 is z = {low} {unit}, 65535 is z = {high}: `height_scale = {}`", (high - low) as f32)];
-    notes.push("row 0 of the picture is y = 0; a sample is the middle of its pixel".to_owned());
+    notes.push("row 0 of the image is y = 0; a sample is the middle of its pixel".to_owned());
     if heights.holes > 0 {
         notes.push(format!(
             "{} of {} samples are holes and stand at the lowest height",

@@ -5,25 +5,30 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use crate::base::Result;
-use crate::geometry::{TileMesh, closure, obj};
+use crate::base::obj::{self, Grammar, ObjCorner, ObjFile, Rules};
+use crate::geometry::{TileMesh, closure};
 use crate::scene::{MeshFile, files};
 
 /// Maximum size of a file, in bytes.
 const MAX_FILE: u64 = 1 << 30;
 
+/// Rules for the OBJ files of tiles. A tile stores the slot of a triangle in 16 bits.
+const RULES: Rules = Rules { grammar: Grammar::Tolerant, max_elements: 1 << 26, max_materials: 1 << 16 };
+
 pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
     let bytes = files::read(base_dir, &spec.path, MAX_FILE)?;
-    let file = obj::parse(&bytes, &spec.path)?;
+    let file = obj::read(&String::from_utf8_lossy(&bytes), RULES).map_err(|error| error.in_file(&spec.path))?;
+    let (triangles, triangle_slot) = triangles(&file);
     let mut mesh = TileMesh {
         size,
-        triangles: file.triangles.iter().map(|triangle| triangle.map(|corner| corner.position)).collect(),
-        triangle_slot: file.triangle_material,
+        triangles: triangles.iter().map(|triangle| triangle.map(|corner| corner.position)).collect(),
+        triangle_slot,
         slots: file.materials,
         ..TileMesh::default()
     };
-    if file.triangles.iter().flatten().any(|corner| corner.normal.is_some()) {
+    if triangles.iter().flatten().any(|corner| corner.normal.is_some()) {
         // If a corner of a triangle has no normal, all its corners get the geometric normal.
-        let shading = |triangle: &[obj::ObjCorner; 3]| -> [Vec3; 3] {
+        let shading = |triangle: &[ObjCorner; 3]| -> [Vec3; 3] {
             let [a, b, c] = triangle.map(|corner| file.positions[corner.position as usize]);
             let flat = (b - a).as_dvec3().cross((c - a).as_dvec3()).try_normalize().unwrap_or_default().as_vec3();
             let own =
@@ -33,7 +38,7 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
                 _ => [flat; 3],
             }
         };
-        mesh.corner_normals = Some(file.triangles.iter().map(shading).collect());
+        mesh.corner_normals = Some(triangles.iter().map(shading).collect());
     }
     mesh.positions = file.positions;
     crate::geometry::check_extent(&mesh).map_err(|error| error.in_file(&spec.path))?;
@@ -49,42 +54,50 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
     Ok(mesh)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn load(text: &str) -> Result<TileMesh> {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("tile.obj"), text).unwrap();
-        build(&MeshFile { path: "tile.obj".into() }, Vec2::ONE, folder.path())
+/// Returns the triangles of all faces and the material slot of each.
+fn triangles(file: &ObjFile) -> (Vec<[ObjCorner; 3]>, Vec<u16>) {
+    let mut triangles = Vec::new();
+    let mut slots = Vec::new();
+    for face in &file.faces {
+        let corners = &file.corners[face.corners.clone()];
+        let outline: Vec<Vec3> = corners.iter().map(|corner| file.positions[corner.position as usize]).collect();
+        for triangle in triangulate(&outline) {
+            triangles.push(triangle.map(|k| corners[k]));
+            slots.push(face.material as u16);
+        }
     }
-
-    const PLANE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
-
-    #[test]
-    fn a_plane_with_a_closed_solid_above_it_closes_the_plane() {
-        let tetrahedron = "v .4 .4 .2\nv .6 .4 .2\nv .5 .6 .2\nv .5 .5 .5\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 7 5 8\n";
-        let mesh = load(&format!("{PLANE}{tetrahedron}")).unwrap();
-        assert!(mesh.closes_plane && !mesh.is_height_field(), "{:?}", mesh.notes);
-        assert!(load(PLANE).unwrap().is_height_field());
-    }
-
-    #[test]
-    fn a_mesh_with_holes_has_a_note() {
-        let mesh = load("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").unwrap();
-        assert!(!mesh.closes_plane);
-        assert!(mesh.notes[0].contains("open edges"));
-    }
-
-    #[test]
-    fn corner_normals_come_only_from_the_file() {
-        assert_eq!(load(PLANE).unwrap().corner_normals, None);
-        let tilted = "vn 1 0 1\nusemtl a\nf 1//1 2//1 3//1\nf 1 3 4\n";
-        let normals = load(&format!("{PLANE}{tilted}")).unwrap().corner_normals.unwrap();
-        let slanted = Vec3::new(0.5f32.sqrt(), 0.0, 0.5f32.sqrt());
-        let is = |expected: Vec3| {
-            normals.iter().filter(|corners| corners.iter().all(|n| (*n - expected).length() < 1e-6)).count()
-        };
-        assert_eq!((normals.len(), is(Vec3::Z), is(slanted)), (4, 3, 1));
-    }
+    (triangles, slots)
 }
+
+/// Triangulates a polygon by ear clipping. Cuts off the second corner if no ear is left (folded or degenerate outlines).
+fn triangulate(outline: &[Vec3]) -> Vec<[usize; 3]> {
+    let count = outline.len();
+    if count == 3 {
+        return vec![[0, 1, 2]];
+    }
+    // Newell's normal is twice the area vector of a closed outline.
+    let normal = (0..count).map(|k| outline[k].cross(outline[(k + 1) % count])).sum::<Vec3>();
+    let orientation =
+        |a: usize, b: usize, c: usize| (outline[b] - outline[a]).cross(outline[c] - outline[a]).dot(normal);
+    let mut remaining: Vec<usize> = (0..count).collect();
+    let mut triangles = Vec::with_capacity(count - 2);
+    while remaining.len() > 3 {
+        let size = remaining.len();
+        let is_ear = |k: &usize| {
+            let [a, b, c] = [remaining[(k + size - 1) % size], remaining[*k], remaining[(k + 1) % size]];
+            let contains =
+                |p: usize| orientation(a, b, p) >= 0.0 && orientation(b, c, p) >= 0.0 && orientation(c, a, p) >= 0.0;
+            orientation(a, b, c) > 0.0 && !remaining.iter().any(|&p| p != a && p != b && p != c && contains(p))
+        };
+        // The search starts at the second corner, so that convex polygons become the fan about their first corner.
+        let ear = (1..size).chain([0]).find(is_ear).unwrap_or(1);
+        triangles.push([remaining[(ear + size - 1) % size], remaining[ear], remaining[(ear + 1) % size]]);
+        remaining.remove(ear);
+    }
+    triangles.push([remaining[0], remaining[1], remaining[2]]);
+    triangles
+}
+
+#[cfg(test)]
+#[path = "mesh_file_tests.rs"]
+mod tests;

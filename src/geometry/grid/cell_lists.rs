@@ -19,6 +19,7 @@ pub(crate) struct CellEntry {
 
 impl CellEntry {
     /// The triangle's index, and the shift as two signed 16-bit halves.
+    #[cfg(feature = "gpu")]
     pub fn words(self) -> [u32; 2] {
         let [x, y] = self.shift.map(|shift| u32::from(shift.cast_unsigned()));
         [self.triangle, x | y << 16]

@@ -102,6 +102,7 @@ impl PeriodicGrid {
     }
 
     /// The index of each cell's first entry, with the end of the last cell, and the entries.
+    #[cfg(feature = "gpu")]
     pub(crate) fn all_entries(&self) -> (&[u32], &[CellEntry]) {
         (&self.starts, &self.entries)
     }

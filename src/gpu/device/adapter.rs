@@ -36,7 +36,7 @@ pub struct Gpu {
     /// Granted limits: the requested ones, or those of the adapter if they are lower.
     pub limits: wgpu::Limits,
     pub tier: Tier,
-    /// Whether a window also draws with this device.
+    /// True if a window also draws with this device.
     pub(super) is_shared: bool,
     faults: Arc<Mutex<Faults>>,
 }
@@ -214,7 +214,7 @@ mod tests {
             wgpu::ShaderModuleDescriptor { label: None, source: wgpu::ShaderSource::Wgsl("fn main( {".into()) };
         let refused = gpu.checked("testing", || Ok(gpu.device.create_shader_module(invalid.clone())));
         assert!(matches!(refused, Err(GpuError::Refused { .. })), "{refused:?}");
-        // The same request outside of an error scope, where the default handler of wgpu would panic.
+        // A second request outside of an error scope, where the default handler of wgpu would panic.
         let _module = gpu.device.create_shader_module(invalid);
         assert!(matches!(gpu.checked("testing", || Ok(())), Err(GpuError::Refused { .. })));
         gpu.checked("testing", || Ok(())).expect("reported once, the GPU works");

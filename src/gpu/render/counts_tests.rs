@@ -165,8 +165,8 @@ fn clustered_sum_cost(loaded: &LoadedScene, tile: &GpuTile) -> [f64; 2] {
         }
     };
     let render_scene = RenderScene::new(loaded).unwrap();
-    let view = CameraView::new(&render_scene.camera, &render_scene.mesh, [960, 540]).unwrap();
-    let points = ShadingPoints::new(&GBuffer::new(&render_scene.mesh, &view, 1), &view, 1);
+    let view = CameraView::new(&render_scene.camera, render_scene.mesh(), [960, 540]).unwrap();
+    let points = ShadingPoints::new(&GBuffer::new(render_scene.mesh(), &view, 1), &view, 1);
     let [mut operations, mut bytes] = [0.0; 2];
     let mut sum = |facets: usize, sides: f64| {
         operations += facets as f64 * (0.5 * ABOVE * sides + 2.0);
@@ -197,7 +197,7 @@ fn clustered_sum_cost(loaded: &LoadedScene, tile: &GpuTile) -> [f64; 2] {
             if group.color == Vec3::ZERO || view_parts.iter().all(|part| *part == VisiblePart::None) {
                 continue;
             }
-            for light in &render_scene.lights.directional {
+            for light in &render_scene.lights().directional {
                 let light_parts = frames.iter().map(|frame| {
                     let i = *frame * light.direction;
                     if i.z > 0.0 && cluster.normal.dot(i) > 0.0 { visible(i, index) } else { VisiblePart::None }
@@ -225,7 +225,7 @@ fn clustered_sum_cost(loaded: &LoadedScene, tile: &GpuTile) -> [f64; 2] {
             }
         }
     }
-    let pairs = (all.len() * render_scene.lights.directional.len()) as f64 / WARP as f64;
+    let pairs = (all.len() * render_scene.lights().directional.len()) as f64 / WARP as f64;
     [operations + other_operations, bytes].map(|count| count * PAIRS / pairs)
 }
 
@@ -239,7 +239,7 @@ enum VisiblePart {
 
 /// Prints the counts of operations, and the times on the CPU.
 #[test]
-#[ignore = "a table to be printed: cargo test --release --lib counts_of_an_edit -- --ignored --nocapture"]
+#[ignore = "a measurement: cargo bench --bench measure -- gpu-counts"]
 fn counts_of_an_edit() {
     let Some(gpu) = open_gpu() else { return };
     let TestScene { mesh, occluder, .. } = TestScene::of("cup");

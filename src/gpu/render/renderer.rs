@@ -35,7 +35,7 @@ pub struct GpuRenderer {
     shading: GpuShading,
     /// `None` renders black.
     material: Option<GpuMaterial>,
-    /// Whether the GPU has computed the inputs of the material.
+    /// True if the GPU has computed the inputs of the material.
     is_prepared: bool,
     march: Option<GpuHeightMarch>,
     slicer: Option<GpuSlicer>,

@@ -159,7 +159,7 @@ fn images_of_the_papers_five_scenes_that_the_gpu_computes_from_the_tile_match_th
         let tile = Pipeline::new().gpu_tile(&loaded).unwrap().unwrap();
         let render_scene = RenderScene::new(&loaded).unwrap();
         let cpu = render(&render_scene.input(&*reads, [160, 160], 1, &background)).unwrap().image;
-        let mut renderer = GpuRenderer::new(&gpu, &render_scene.mesh, render_scene.occluder.as_ref()).unwrap();
+        let mut renderer = GpuRenderer::new(&gpu, render_scene.mesh(), render_scene.occluder()).unwrap();
         renderer.set_tile(&gpu, &tile.input).unwrap();
         let input = render_scene.input(&Black, [160, 160], 1, &background);
         let gpu_image = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;

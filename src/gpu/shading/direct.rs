@@ -35,7 +35,7 @@ pub(crate) struct Sum {
 }
 
 /// Largest number of facets of one pass on software Vulkan. llvmpipe silently ends all loops of a thread after a total
-/// of 65,535 iterations. Eight lights, and eight overhangs of a facet, stay below that limit.
+/// of 65,535 iterations. A pass with 8 lights and 8 overhangs per facet stays below that limit.
 pub(crate) const SOFTWARE_FACETS: usize = 512;
 
 /// Largest number of facets of one pass on a real GPU, where a pass over one row of pixels may be a submission.

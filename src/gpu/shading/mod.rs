@@ -71,7 +71,7 @@ struct Pass {
     group: wgpu::BindGroup,
     /// Lobes or table rows per point, and per light if `each_light` is set.
     work: u64,
-    /// Whether there is one thread per slice of the lights, not one per point.
+    /// True if there is one thread per point and slice of the lights, not one per point.
     each_light: bool,
 }
 

@@ -353,10 +353,9 @@ fn a_black_tile_has_a_table_without_columns_and_shades_black() {
     assert!(!radiance.is_empty() && radiance.iter().all(|&radiance| radiance == Vec3::ZERO));
 }
 
-/// `cargo test --release --lib table_of_a_height_field_is_timed -- --ignored --nocapture`; facets and the first grids
-/// of `draft` and `standard`.
+/// Prints times of a table with the facets and the first grids of `draft` and `standard`.
 #[test]
-#[ignore = "prints times and checks nothing"]
+#[ignore = "a measurement: cargo bench --bench measure -- gpu-table"]
 fn the_table_of_a_height_field_is_timed() {
     let Some(gpu) = open_gpu() else { return };
     let mut shading = GpuShading::new(&gpu).unwrap();
@@ -385,7 +384,7 @@ fn the_table_of_a_height_field_is_timed() {
             gpu.wait("computing a table").unwrap();
             let (computed, facets, nodes, bytes) =
                 (start.elapsed(), direct.sum.facet_count(), grid.nodes(), table.bytes());
-            eprintln!(
+            println!(
                 "{nodes} nodes of {facets} facets, {bytes} bytes: CPU {on_cpu:.1?}; {}: uploaded in {set_up:.1?}, \
                  submitted in {submitted:.1?}, computed in {computed:.1?}",
                 gpu.description()

@@ -42,13 +42,12 @@ fn broken_meshes_and_no_facets_do_not_panic_on_the_gpu() {
     assert!(maps(&empty, &facets, &[Vec3::Z]).is_visible(0, 0));
 }
 
-/// Prints the speed of the CPU and of the GPU:
-/// `BISCALE_TABLE=1 cargo test --release --lib speed_of_the_cpu_and_of_the_gpu -- --ignored --nocapture`.
+/// Prints the speed of the CPU and of the GPU.
 #[test]
-#[ignore = "a table of speed on the CPU and the GPU; run with --ignored --nocapture"]
+#[ignore = "a measurement: cargo bench --bench measure -- map-speed"]
 fn speed_of_the_cpu_and_of_the_gpu() {
     if std::env::var_os("BISCALE_TABLE").is_none() {
-        eprintln!("SKIPPED: a table of several minutes; set BISCALE_TABLE=1 to print it");
+        eprintln!("SKIPPED: several minutes without BISCALE_TABLE=1");
         return;
     }
     let Some(gpu) = open_gpu() else { return };

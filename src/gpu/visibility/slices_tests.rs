@@ -117,7 +117,7 @@ fn covered(mesh: &TileMesh) -> f64 {
 
 /// Prints the steps and cuts per slice, and the share of slices with more than four overhangs.
 #[test]
-#[ignore = "a table to be printed: cargo test --release --lib steps_of_slices -- --ignored --nocapture"]
+#[ignore = "a measurement: cargo bench --bench measure -- slice-steps"]
 fn steps_of_slices() {
     let Some(gpu) = open_gpu() else { return };
     println!("scene                 cells  steps/slice  cuts  more than 4 overhangs  texels of maps at fine");

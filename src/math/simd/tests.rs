@@ -185,7 +185,7 @@ fn a_million_terms_lose_less_than_a_millionth() {
 /// Prints the time per facet of each lobe. A lobe whose loop is not vectorised takes about ten times as long as the
 /// others.
 #[test]
-#[ignore = "prints nanoseconds per facet; meaningful on an idle machine only"]
+#[ignore = "a measurement: cargo bench --bench measure -- lobes"]
 fn nanoseconds_per_facet() {
     let n = 16_384;
     let parts = split(&directions(n, 0.3, 1.0));
@@ -200,7 +200,7 @@ fn nanoseconds_per_facet() {
                 start.elapsed().as_secs_f64() * 1e9 / n as f64
             })
             .fold(f64::INFINITY, f64::min);
-        eprintln!("{lobe:?}: {best:.2} ns per facet");
+        println!("{lobe:?}: {best:.2} ns per facet");
     }
 }
 

@@ -12,8 +12,6 @@ use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage};
 use crate::visibility::Visibility;
 
-use super::hash_debug;
-
 /// Evaluates the visibility of all facets on the nodes of a grid.
 pub struct LookUpVisibility<'a> {
     pub facets: &'a Keyed<Facets>,
@@ -27,7 +25,7 @@ impl Stage for LookUpVisibility<'_> {
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.key("facets", &self.facets.key).key("visibility", &self.visibility.key);
-        hash_debug(key, "directions", &self.directions);
+        key.debug("directions", &self.directions);
     }
 
     fn run(&self, _: &Env) -> Result<VisibilityRows> {
@@ -52,7 +50,7 @@ impl Stage for Factorize<'_> {
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.key("facets", &self.facets.key).key("rows", &self.rows.key).key("lobes", &self.lobes);
-        hash_debug(key, "settings", self.settings);
+        key.debug("settings", self.settings);
     }
 
     fn run(&self, _: &Env) -> Result<Factors> {

@@ -9,7 +9,7 @@ use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage};
 use crate::visibility::Visibility;
 
-use super::{TileShape, hash_debug};
+use super::TileShape;
 
 /// Finds the planes x = const and y = const that mirror the tile.
 pub struct FindMirrorPlanes<'a> {
@@ -72,7 +72,7 @@ impl Stage for Interreflect<'_> {
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.key("transport", &self.transport.key).key("visibility", &self.visibility.key);
         key.key("materials", &self.assignment).counts("material of slot", self.material_of_slot.iter().copied());
-        hash_debug(key, "settings", self.settings);
+        key.debug("settings", self.settings);
     }
 
     fn run(&self, env: &Env) -> Result<InterreflectionTable> {

@@ -11,10 +11,3 @@ pub(super) use interreflection::{CastTransport, FindMirrorPlanes, Interreflect};
 pub(super) use paper::PaperTables;
 pub(super) use tile::{BuildTile, LoadMaterials, SampleFacets, TileShape};
 pub(super) use visibility::{BuildCells, ComputeVisibility, EstimateScanWork};
-
-use crate::cache::KeyBuilder;
-
-/// Adds anything that prints all that it depends on. Floats print every digit that tells them apart.
-fn hash_debug(key: &mut KeyBuilder, name: &str, value: &impl std::fmt::Debug) {
-    key.numbers(name, format!("{value:?}").as_bytes());
-}

@@ -3,7 +3,6 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::hash_debug;
 use crate::base::Result;
 use crate::brdf::{Brdf, Material, MaterialAssignment};
 use crate::cache::{Key, KeyBuilder};
@@ -56,7 +55,7 @@ impl Stage for BuildTile<'_> {
                 key.numbers("size", &[pixels.size]).numbers(name, &pixels.values);
             }
         }
-        hash_debug(key, "tile", &self.loaded.scene.tile);
+        key.debug("tile", &self.loaded.scene.tile);
         for file in &self.files {
             key.key("file", file);
         }
@@ -110,8 +109,8 @@ impl Stage for LoadMaterials<'_> {
     const NAME: &'static str = "materials";
 
     fn hash_into(&self, key: &mut KeyBuilder) {
-        hash_debug(key, "materials", &self.loaded.scene.materials);
-        hash_debug(key, "slots", &self.slots);
+        key.debug("materials", &self.loaded.scene.materials);
+        key.debug("slots", &self.slots);
         for file in &self.files {
             key.key("file", file);
         }

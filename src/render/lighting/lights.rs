@@ -56,7 +56,8 @@ pub fn from_environment(light: &scene::Light, environment: Environment) -> Light
     Lights { directional, environment, warnings }
 }
 
-fn check(light: &scene::Light) -> Result<()> {
+/// Refuses lights out of range.
+pub fn check(light: &scene::Light) -> Result<()> {
     if light.count > MAX_COUNT {
         return Err(InputError::new("light.count", light.count, format!("0 to {MAX_COUNT}")).into());
     }

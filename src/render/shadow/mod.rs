@@ -84,6 +84,7 @@ impl LightVisibility {
 #[derive(Debug, Clone)]
 pub struct Occluder {
     /// The hierarchy that the GPU traverses.
+    #[cfg(feature = "gpu")]
     pub(crate) bvh: Bvh,
     wide: WideBvh,
 }
@@ -97,7 +98,11 @@ impl Occluder {
     /// Builds an occluder for any object, convex or not.
     pub fn new(mesh: &ObjectMesh) -> Self {
         let bvh = Bvh::new(mesh);
-        Self { wide: WideBvh::new(&bvh), bvh }
+        Self {
+            wide: WideBvh::new(&bvh),
+            #[cfg(feature = "gpu")]
+            bvh,
+        }
     }
 
     /// Computes a cache for one mesh and its lights. It saves time if several images follow, and usually for one image

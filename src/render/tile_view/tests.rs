@@ -57,7 +57,7 @@ fn the_mean_over_a_tile_is_the_radiance_of_the_effective_brdf() {
         name: "test".into(),
         painted: scene::Painted::default(),
     };
-    let mut pipeline = Pipeline::new();
+    let pipeline = Pipeline::new();
     let brdf = pipeline.effective(&loaded).unwrap().brdf;
     let MaterialAssignment { material_of_slot, materials } = pipeline.materials(&loaded).unwrap();
     let tile = TileScene::new(Arc::new(pipeline.mesh(&loaded).unwrap()));
@@ -99,7 +99,7 @@ fn tiles_are_visible_up_close_and_the_image_keeps_its_brightness() {
     let scene = scene::parse(source).unwrap();
     let painted = scene::Painted::default();
     let loaded = scene::LoadedScene { scene, base_dir: "".into(), name: "test".into(), painted };
-    let mut pipeline = Pipeline::new();
+    let pipeline = Pipeline::new();
     let brdf = pipeline.effective(&loaded).unwrap().brdf;
     let MaterialAssignment { material_of_slot, materials } = pipeline.materials(&loaded).unwrap();
     let shaded = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };

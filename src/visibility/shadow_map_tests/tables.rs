@@ -1,15 +1,14 @@
-//! Table of errors by resolution: `BISCALE_TABLE=1 cargo test --release --lib shadow_map_tests::tables -- --ignored
-//! --nocapture`.
+//! Table of errors by resolution. The command to print it.
 
 use std::time::Instant;
 
 use super::*;
 
 #[test]
-#[ignore = "a table of error and time against resolution; run with --ignored --nocapture"]
+#[ignore = "a measurement: cargo bench --bench measure -- map-resolution"]
 fn resolution_against_error() {
     if std::env::var_os("BISCALE_TABLE").is_none() {
-        eprintln!("SKIPPED: a table of several minutes; set BISCALE_TABLE=1 to print it");
+        eprintln!("SKIPPED: several minutes without BISCALE_TABLE=1");
         return;
     }
     let directions = polar_directions(18, 24, 85.0);

@@ -1,0 +1,116 @@
+//! Measurements that `docs/measurements` holds: `cargo bench --bench measure -- NAME [ARGUMENT]` prints one and replaces the
+//! lines between `<!-- measure: NAME -->` and `<!-- end -->` of a page. Without a name, it lists the names. A page stays as it
+//! is if a measurement misses a bound.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing measurement may panic")]
+
+mod accuracy;
+#[path = "../../tests/numerics/choosing.rs"]
+mod choosing;
+mod clustered_sums;
+mod in_tests;
+mod interpolation;
+mod shading_tables;
+mod table;
+#[path = "../../tests/numerics/tiles.rs"]
+mod tiles;
+
+use std::process::ExitCode;
+
+use in_tests::InTests;
+use table::Table;
+
+const LIB: &[&str] = &["--lib"];
+
+/// Computes a measurement.
+enum Source {
+    /// Takes an argument of the command line.
+    Here(fn(Option<&str>, &mut Table) -> Result<(), String>),
+    /// An ignored test, because the measurement needs private items.
+    Test(InTests),
+}
+
+const fn in_lib(test: &'static str) -> Source {
+    Source::Test(InTests { binary: LIB, test })
+}
+
+const MEASUREMENTS: &[(&str, &str, Source)] = &[
+    ("accuracy", "errors of the presets (or of a list of presets) on four tiles: half an hour", Source::Here(accuracy)),
+    ("brdf", "nanoseconds per evaluation of each BRDF", in_lib("nanoseconds_per_evaluation")),
+    ("cache-costs", "milliseconds of the disk cache", in_lib("costs_of_caching")),
+    ("choosing", "PSNR and time that targets reach on ten scenes", Source::Here(choosing)),
+    ("few-facets", "errors of sums over 700 facets with few distinct normals", Source::Here(few_facets)),
+    ("gpu-counts", "operations of an edit on a GPU", in_lib("counts_of_an_edit")),
+    ("gpu-table", "time of a shading table on the CPU and on the GPU", in_lib("the_table_of_a_height_field_is_timed")),
+    ("half-floats", "errors of shading tables in half precision", in_lib("half_floats_would_change_a_table_by_this")),
+    (
+        "hard-cases",
+        "invariants of every hard case with every evaluator: half an hour",
+        Source::Test(InTests { binary: &["--test", "hard_cases"], test: "the_table_of_all_cases_and_evaluators" }),
+    ),
+    ("interpolation", "errors of low-rank factors by interpolation alone", Source::Here(interpolation)),
+    ("latency", "time from an edit in the editor to its images", in_lib("latency_from_a_slider")),
+    ("lobes", "nanoseconds per facet of each analytic lobe", in_lib("nanoseconds_per_facet")),
+    ("map-resolution", "error and time of shadow maps against resolution", in_lib("resolution_against_error")),
+    ("map-speed", "speed of shadow maps on the CPU and on the GPU", in_lib("speed_of_the_cpu_and_of_the_gpu")),
+    ("pictures", "times of the trial of a shading table and of the whole table", Source::Here(trials)),
+    ("slice-steps", "cells and triangles that a slice visits", in_lib("steps_of_slices")),
+    ("table-steps", "errors of shading tables against facets, azimuths and nodes", Source::Here(steps)),
+];
+
+fn accuracy(presets: Option<&str>, table: &mut Table) -> Result<(), String> {
+    accuracy::accuracy(presets, &mut |line| table.line(line))
+}
+
+/// Fails if fewer than nine of the ten scenes reach the target, or the budget.
+fn choosing(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    let (hits, misses) = choosing::choices(1, &mut |line| table.line(line))?;
+    if hits.iter().all(|&count| count >= 9) { Ok(()) } else { Err(format!("found {hits:?} of ten: {misses:?}")) }
+}
+
+fn few_facets(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    clustered_sums::few_facets(&mut |line| table.line(line))
+}
+
+fn interpolation(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    interpolation::interpolation(&mut |line| table.line(line));
+    Ok(())
+}
+
+fn trials(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    shading_tables::trials(&mut |line| table.line(line));
+    Ok(())
+}
+
+fn steps(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    shading_tables::steps(&mut |line| table.line(line));
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    // Cargo adds `--bench`.
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    let Some(name) = arguments.first() else {
+        for (name, description, _) in MEASUREMENTS {
+            println!("{name:<16} {description}");
+        }
+        return ExitCode::SUCCESS;
+    };
+    let Some((name, _, source)) = MEASUREMENTS.iter().find(|(other, ..)| other == name) else {
+        let names: Vec<&str> = MEASUREMENTS.iter().map(|(name, ..)| *name).collect();
+        eprintln!("error: found the measurement `{name}`, expected one of: {}", names.join(", "));
+        return ExitCode::from(2);
+    };
+    let argument = arguments.get(1).map(String::as_str);
+    let mut table = Table::default();
+    let measured = match source {
+        Source::Here(run) => run(argument, &mut table),
+        Source::Test(test) => test.run(&mut table),
+    };
+    match measured.and_then(|()| table.write(name)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
