@@ -1,8 +1,8 @@
-"""What the cache on disk saves and costs: seconds of a whole `biscale render` without it, with an empty one and with a full one.
+"""Savings and costs of the disk cache: seconds of a whole `biscale render` without the cache, with an empty and with a full one.
 
     python benches/cache.py [SCENE ...]
 
-Medians of three runs each, in turns. BISCALE names the program. Files that were just written are still in memory.
+The figures are medians of three runs in turns. BISCALE names the program. New files are still in memory when they are read.
 """
 
 import json
@@ -21,7 +21,7 @@ REPEAT = 3
 
 
 def run(folder, *arguments):
-    """What the program prints as JSON, and its seconds."""
+    """Returns the JSON that the program prints, and its seconds."""
     start = time.perf_counter()
     done = subprocess.run(
         [BISCALE, *arguments, "--json"],
@@ -33,12 +33,12 @@ def run(folder, *arguments):
 
 
 with tempfile.TemporaryDirectory() as work:
-    folder, picture = Path(work, "cache"), Path(work, "picture.png")
-    print(f"{'scene':22}{'without':>10}{'empty':>10}{'full':>10}   {'visibility':>20}{'picture table':>22}   kept")
+    folder, image = Path(work, "cache"), Path(work, "image.png")
+    print(f"{'scene':22}{'without':>10}{'empty':>10}{'full':>10}   {'visibility':>20}{'picture_table':>22}   cached")
     for scene in SCENES:
         seconds, stages = {}, {}
-        render = ["render", scene, "-o", str(picture), "--backend", "cpu", "--quiet"]
-        pictures = set()
+        render = ["render", scene, "-o", str(image), "--backend", "cpu", "--quiet"]
+        images = set()
         for _ in range(REPEAT):
             for name in ["without", "empty", "full"]:
                 if name == "empty":
@@ -47,14 +47,14 @@ with tempfile.TemporaryDirectory() as work:
                 seconds.setdefault(name, []).append(took)
                 for stage, ms in report["stages"].items():
                     stages.setdefault(stage, []).append(ms)
-                pictures.add(picture.read_bytes())
-        assert len(pictures) == 1, f"{scene}: the pictures differ"
-        kept, _ = run(folder, "cache")
+                images.add(image.read_bytes())
+        assert len(images) == 1, f"{scene}: the images differ"
+        usage, _ = run(folder, "cache")
         took = "".join(f"{statistics.median(seconds[name]):8.2f} s" for name in ["without", "empty", "full"])
         saved = [
             f"{statistics.median(stages[stage]):9.0f} to {statistics.median(stages['cached_' + stage]):4.0f} ms"
             if "cached_" + stage in stages
-            else f"{statistics.median(stages[stage]):9.0f} ms, not kept"
+            else f"{statistics.median(stages[stage]):9.0f} ms, not cached"
             for stage in ["visibility", "picture_table"]
         ]
-        print(f"{scene:22}{took}   {saved[0]:>20}{saved[1]:>22}   {kept['files']} files, {kept['bytes']:,} bytes")
+        print(f"{scene:22}{took}   {saved[0]:>20}{saved[1]:>22}   {usage['files']} files, {usage['bytes']:,} bytes")

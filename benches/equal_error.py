@@ -1,11 +1,10 @@
-"""Seconds for decibels: f_bar of the same pairs by `biscale eval`, by its plain reference, and by Mitsuba 3 tracing rays (LLVM,
-all cores), each against many more of Mitsuba's rays; and a Klems matrix by `biscale export` and by Radiance's rfluxmtx, which is
-what genBSDF runs.
+"""Time at equal error. f_bar of the same pairs by `biscale eval`, by its reference, and by Mitsuba 3 (LLVM, all cores), against
+many more rays of Mitsuba; and a Klems matrix by `biscale export` and by Radiance's rfluxmtx, which genBSDF runs.
 
     python benches/equal_error.py [SCENE... | klems] [--pairs 400] [--truth-rays 524288] [--no-reference]
 
-after `pip install mitsuba pyradiance numpy`. BISCALE names the program. Seconds are those of the clock, a whole process for
-biscale; Mitsuba's hold neither its import nor the loading of the tile.
+It needs `pip install mitsuba pyradiance numpy`. BISCALE names the program. Times are wall-clock seconds. Those of biscale include
+the whole process; those of Mitsuba exclude its import and the loading of the tile.
 """
 
 import argparse
@@ -26,11 +25,11 @@ except ImportError as error:
 
 mi.set_variant("llvm_ad_rgb")
 ROUGHNESS, REPEAT, GOLDEN = 0.2, 13, 0.6180339887
-# White, so that Fresnel's factor is 1 in both.
+# A white material has a Fresnel factor of 1 in both programs.
 GLOSSY = f'material=[{{ name = "default", brdf = {{ kind = "ggx", roughness = {ROUGHNESS}, f0 = 1 }} }}]'
 SCENES = ["table4_plate", "table4_skirt", "table4_pillow", "klems"]
 RAYS = [16, 64, 256, 1024, 4096, 16384]
-# Rays of one launch at most.
+# Most rays of one launch.
 LAUNCH = 1 << 23
 
 
@@ -43,7 +42,7 @@ def rel_l2(found, truth):
 
 
 def tile(scene, folder):
-    """Many periods of the tile for Mitsuba, and the height of its top."""
+    """Returns a scene of many periods of the tile, and the height of its top."""
     path = Path(folder) / f"{scene}.obj"
     biscale("tile", scene, "-o", path, "--repeat", f"{REPEAT}x{REPEAT}", "--quiet")
     heights = [float(line.split()[3]) for line in path.open() if line.startswith("v ")]
@@ -51,7 +50,7 @@ def tile(scene, folder):
 
 
 def ggx(n, i, o):
-    """f times the light's cosine: GGX with height-correlated shadowing, white."""
+    """Returns f times the cosine of the light, for white GGX with height-correlated shadowing."""
     squared = ROUGHNESS**2
     to_light, to_view = dr.dot(n, i), dr.dot(n, o)
     h = dr.normalize(i + o)
@@ -64,7 +63,7 @@ def ggx(n, i, o):
 
 
 def traced(scene, top, pairs, rays, seed):
-    """f_bar by rays from one period of the plane above the tile: the mean of what they meet."""
+    """Returns f_bar as the mean over rays from one period of a plane above the tile."""
     lights, views = direction(pairs[:, 0], pairs[:, 1]), direction(pairs[:, 2], pairs[:, 3])
     offsets = np.random.default_rng(seed).random((len(pairs), 2))
     together = max(1, LAUNCH // rays)
@@ -90,42 +89,42 @@ def traced(scene, top, pairs, rays, seed):
 
 
 def timed(work):
-    """Seconds and the result of the second run: the first compiles."""
+    """Returns the seconds and the result of the second run, because the first compiles."""
     work()
     start = time.time()
     result = work()
     return time.time() - start, result
 
 
-def compare(name, folder, asked):
+def compare(name, folder, options):
     scene, top = tile(name, folder)
-    pairs, rays = random_pairs(asked.pairs), asked.truth_rays
+    pairs, rays = random_pairs(options.pairs), options.truth_rays
     truth = traced(scene, top, pairs, rays, 1)
     again = traced(scene, top, pairs, rays // 4, 2)
-    print(f"\n{name}, GGX {ROUGHNESS}, {len(pairs)} pairs; truth: {rays} rays a pair, {psnr(again, truth):.1f} dB from a quarter as many others")
+    print(f"\n{name}, GGX {ROUGHNESS}, {len(pairs)} pairs; truth: {rays} rays per pair, {psnr(again, truth):.1f} dB from an independent quarter as many")
     table = Table("by", "setting", "seconds", "PSNR [dB]", "relative L2")
     def row(by, setting, seconds, values):
         table.row(by, setting, f"{seconds:.3f}", f"{psnr(values, truth):.1f}", f"{100 * rel_l2(values, truth):.2f} %")
         return seconds, psnr(values, truth)
-    def eval_with(*options):
-        return lambda: evaluate(name, pairs, folder, "--set", GLOSSY, "--backend", "cpu", *options)[:, 1]
+    def eval_with(*flags):
+        return lambda: evaluate(name, pairs, folder, "--set", GLOSSY, "--backend", "cpu", *flags)[:, 1]
     ours = [row("biscale", preset, *timed(eval_with("--quality", preset))) for preset in ["draft", "standard", "fine"]]
-    fewer = [rays for rays in RAYS if 4 * rays <= asked.truth_rays]
+    fewer = [rays for rays in RAYS if 4 * rays <= options.truth_rays]
     theirs = [row("Mitsuba", f"{rays} rays", *timed(lambda: traced(scene, top, pairs, rays, 3))) for rays in fewer]
-    for seconds, decibels in ours:
-        print(f"at {decibels:.1f} dB: {seconds_at(theirs, decibels) / seconds:.1f} times as fast as Mitsuba for {len(pairs)} pairs", flush=True)
-    if not asked.reference:
+    for seconds, db in ours:
+        print(f"at {db:.1f} dB: {seconds_at(theirs, db) / seconds:.1f} times as fast as Mitsuba for {len(pairs)} pairs", flush=True)
+    if not options.reference:
         return
     start = time.time()
     values = eval_with("--quality", "reference")()
-    row("plain reference", "rays, no tables", time.time() - start, values)
+    row("reference", "rays, no tables", time.time() - start, values)
 
 
-def seconds_at(points, decibels):
-    """Seconds for decibels on a line through the logarithms of the two points around; the last two beyond them."""
-    k = next((k for k in range(1, len(points)) if points[k][1] >= decibels), len(points) - 1)
+def seconds_at(points, db):
+    """Returns the seconds for a PSNR, by log-linear interpolation of the points, or by extrapolation of the last two."""
+    k = next((k for k in range(1, len(points)) if points[k][1] >= db), len(points) - 1)
     (t0, d0), (t1, d1) = points[k - 1], points[k]
-    return np.exp(np.log(t0) + (np.log(t1) - np.log(t0)) * (decibels - d0) / (d1 - d0))
+    return np.exp(np.log(t0) + (np.log(t1) - np.log(t0)) * (db - d0) / (d1 - d0))
 
 
 def compare_klems(folder):
@@ -136,7 +135,7 @@ def compare_klems(folder):
     except (ImportError, SystemExit) as error:
         print(f"SKIPPED: Radiance needs `pip install pyradiance` ({error})")
         return
-    print(f"\nKlems matrix, 145 x 145, of {SCENE[0]} in one matte material; truth: `biscale export --quality fine --seed 9`")
+    print(f"\nKlems matrix, 145 x 145, of {SCENE[0]} in one diffuse material; truth: `biscale export --quality fine --seed 9`")
     export(SCENE[0], folder / "truth.xml", *SCENE[1:], "--quality", "fine", "--seed", 9)
     truth = klems(folder / "truth.xml") * projected()[:, None]
     table = Table("by", "setting", "seconds", "PSNR [dB]", "relative L2")
@@ -155,7 +154,7 @@ def compare_klems(folder):
         options = f"-h -ab 1 -ad 32 -lw 1e-9 -c {rays} -n 2".split()
         text = radiance("rfluxmtx", *options, "sender.rad", "receiver.rad", "device.rad", cwd=folder)
         matrix = np.array(text.split(), float).reshape(145, 145, 3)[:, :, 1].T
-        row("rfluxmtx", f"{rays} rays a patch", time.time() - start, matrix)
+        row("rfluxmtx", f"{rays} rays per patch", time.time() - start, matrix)
 
 
 def main():
@@ -163,15 +162,15 @@ def main():
     parser.add_argument("scenes", nargs="*", default=SCENES)
     parser.add_argument("--pairs", type=int, default=400)
     parser.add_argument("--truth-rays", type=int, default=1 << 19)
-    parser.add_argument("--no-reference", dest="reference", action="store_false", help="leave the plain reference out, which takes minutes")
-    asked = parser.parse_args()
+    parser.add_argument("--no-reference", dest="reference", action="store_false", help="omit the reference, which takes minutes")
+    options = parser.parse_args()
     print(f"Mitsuba {mi.__version__}")
     with tempfile.TemporaryDirectory() as folder:
-        for name in asked.scenes:
+        for name in options.scenes:
             if name == "klems":
                 compare_klems(Path(folder))
             else:
-                compare(name, folder, asked)
+                compare(name, folder, options)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-//! How the time of each stage grows with its size: `cargo bench --bench scaling`. Each line doubles or quadruples one size, takes
-//! the least of a few runs, and fits an exponent; the last one tells what two threads save.
+//! Growth of the time of each stage with its size: `cargo bench --bench scaling`. Each line multiplies one size, takes
+//! the shortest of a few runs, and fits an exponent. The last lines compare one thread with two.
 
 use std::f32::consts::TAU;
 use std::hint::black_box;
@@ -21,13 +21,14 @@ use biscale::visibility::{HorizonMap, OcclusionIntervals, Visibility};
 use glam::{UVec2, Vec2, Vec3};
 
 const RUNS: usize = 3;
-const RAMP: f32 = 0.02;
+/// Width of the soft step at a horizon [rad].
+const TRANSITION_WIDTH: f32 = 0.02;
 const SHADING: &str = "fig8a_hammered";
 
 type Work = Box<dyn FnMut() + Send>;
 
 struct Bench {
-    /// `cargo test --benches` asks only whether they run.
+    /// True under `cargo test --benches`, which runs each line once.
     once: bool,
 }
 
@@ -44,7 +45,7 @@ impl Bench {
         let mut times = Vec::new();
         for &size in sizes {
             let mut run = work(size)?;
-            times.push(self.least_ms(&mut *run));
+            times.push(self.shortest_ms(&mut *run));
         }
         let exponent = slope(sizes, &times);
         let times: Vec<String> = times.iter().map(|ms| format!("{ms:.3}")).collect();
@@ -57,7 +58,7 @@ impl Bench {
         Ok(())
     }
 
-    fn least_ms(&self, run: &mut (dyn FnMut() + Send)) -> f64 {
+    fn shortest_ms(&self, run: &mut (dyn FnMut() + Send)) -> f64 {
         let once = |run: &mut (dyn FnMut() + Send)| {
             let start = Instant::now();
             run();
@@ -67,14 +68,15 @@ impl Bench {
     }
 }
 
-/// Least squares of log time over log size.
+/// Returns the slope of log time over log size, by least squares.
 fn slope(sizes: &[usize], times: &[f64]) -> f64 {
     let logs: Vec<(f64, f64)> = sizes.iter().zip(times).map(|(&n, ms)| ((n as f64).ln(), ms.ln())).collect();
     let count = logs.len() as f64;
     let (x, y) = logs.iter().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / count, y + b / count));
-    let (up, down) =
-        logs.iter().fold((0.0, 0.0), |(up, down), (a, b)| (up + (a - x) * (b - y), down + (a - x) * (a - x)));
-    up / down
+    let (covariance, variance) = logs.iter().fold((0.0, 0.0), |(covariance, variance), (a, b)| {
+        (covariance + (a - x) * (b - y), variance + (a - x) * (a - x))
+    });
+    covariance / variance
 }
 
 fn facets_of(mesh: &TileMesh, count: usize) -> Facets {
@@ -88,7 +90,7 @@ fn tile(scene: &str) -> Result<TileMesh> {
     geometry::build(&loaded.scene.tile, &loaded.base_dir)
 }
 
-/// About as many triangles as asked for over the same waves.
+/// Returns a height field of waves with about this many triangles.
 fn waves(triangles: usize) -> TileMesh {
     let side = ((triangles as f64 / 2.0).sqrt().round() as u32).max(2);
     heightfield::from_function(UVec2::splat(side), Vec2::ONE, |p| {
@@ -124,18 +126,18 @@ fn geometry_lines(
     })?;
     bench.line("facets: slices (rods)", 1.0, &counts, |n| {
         let (grid, facets) = (rod_grid.clone(), facets_of(rods, n));
-        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 16, RAMP)))))
+        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 16, TRANSITION_WIDTH)))))
     })?;
     bench.line("azimuths: slices (rods)", 1.0, &[8, 32, 128], |azimuths| {
         let (grid, facets) = (rod_grid.clone(), facets_of(rods, 1024));
-        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, azimuths, RAMP)))))
+        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, azimuths, TRANSITION_WIDTH)))))
     })?;
     if field.height_grid.is_some() {
-        bench.line("facets: horizons (height-field)", 1.0, &counts, |n| {
+        bench.line("facets: horizon maps (height field)", 1.0, &counts, |n| {
             let (field, facets) = (field.clone(), facets_of(field, n));
             Ok(Box::new(move || {
                 let heights = field.height_grid.as_ref();
-                black_box(heights.map(|heights| HorizonMap::march(heights, field.size, &facets, 64, RAMP)));
+                black_box(heights.map(|heights| HorizonMap::march(heights, field.size, &facets, 64, TRANSITION_WIDTH)));
             }))
         })?;
     }
@@ -144,28 +146,28 @@ fn geometry_lines(
         let mesh = waves(n);
         Ok(Box::new(move || drop(black_box(PeriodicGrid::for_slices(&mesh)))))
     })?;
-    // Cells have a few triangles each, and a slice walks a line of them.
+    // A slice visits a line of cells with a few triangles each.
     bench.line("triangles: slices of 2048 facets (waves)", 0.5, &triangles, |n| {
         let mesh = waves(n);
         let (grid, facets) = (PeriodicGrid::for_slices(&mesh), facets_of(&mesh, 2048));
-        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 16, RAMP)))))
+        Ok(Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 16, TRANSITION_WIDTH)))))
     })
 }
 
 fn sum_lines(bench: &Bench, field: &Arc<TileMesh>) -> Result<()> {
     let direct = |facets: usize| {
         let facets = facets_of(field, facets);
-        let horizons = HorizonMap::scan(&PeriodicGrid::for_slices(field), &facets, 32, RAMP);
+        let horizon_map = HorizonMap::scan(&PeriodicGrid::for_slices(field), &facets, 32, TRANSITION_WIDTH);
         let material = Material {
             brdf: Brdf { terms: vec![Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) }] },
             color: Vec3::ONE,
         };
         let sum = FacetSum::new(&facets, &vec![0; field.slots.len()], &[material]);
         let representation =
-            Representation::Direct(Direct::new(Arc::new(sum), Arc::new(Visibility::HorizonMap(horizons))));
+            Representation::Direct(Direct::new(Arc::new(sum), Arc::new(Visibility::HorizonMap(horizon_map))));
         EffectiveBrdf { representation, base_area: f64::from(field.base_area()) }
     };
-    bench.line("facets: 64 pairs of the sum (height-field)", 1.0, &[1024, 4096, 16_384, 65_536], |n| {
+    bench.line("facets: 64 pairs of the sum (height field)", 1.0, &[1024, 4096, 16_384, 65_536], |n| {
         let (brdf, pairs) = (direct(n), mirror_biased_pairs(64, 1));
         Ok(Box::new(move || {
             black_box(pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).sum::<Vec3>());
@@ -180,38 +182,39 @@ fn sum_lines(bench: &Bench, field: &Arc<TileMesh>) -> Result<()> {
     })
 }
 
-/// A picture of a scene whose shadows are kept, as the camera moves.
+/// Renders an image of a scene with a shadow cache, as an edit of the camera does.
 fn image(scene: &str, lights: usize, side: usize) -> Result<Work> {
     let overrides = [format!("light.count={lights}"), "quality.backend=cpu".to_owned()];
     let loaded = biscale::scene::open(scene, &overrides)?;
     let shading_brdf = Pipeline::new().effective(&loaded)?.shading_brdf(&biscale::base::Cancel::default())?;
-    let mut stage = RenderScene::new(&loaded)?;
-    stage.cache_shadows();
+    let mut render_scene = RenderScene::new(&loaded)?;
+    render_scene.cache_shadows(&Pipeline::new())?;
     Ok(Box::new(move || {
         let background = Background::default();
-        let rendered = render(&stage.input(&*shading_brdf.brdf, [side, side], 1, &background));
+        let rendered = render(&render_scene.input(&*shading_brdf.brdf, [side, side], 1, &background));
         black_box(rendered.is_ok());
     }))
 }
 
 fn image_lines(bench: &Bench) -> Result<()> {
-    bench.line("lights: a picture of 384 x 384", 1.0, &[16, 64, 256], |lights| image(SHADING, lights, 384))?;
-    bench.line("pixels: a picture with 32 lights", 1.0, &[128 * 128, 256 * 256, 512 * 512, 1024 * 1024], |pixels| {
+    bench.line("lights: an image of 384 x 384", 1.0, &[16, 64, 256], |lights| image(SHADING, lights, 384))?;
+    bench.line("pixels: an image with 32 lights", 1.0, &[128 * 128, 256 * 256, 512 * 512, 1024 * 1024], |pixels| {
         image(SHADING, 32, pixels.isqrt())
     })
 }
 
-/// The same work on one thread and on two.
+/// Times the same work on one thread and on two.
 fn thread_lines(bench: &Bench, rods: &Arc<TileMesh>, rod_grid: &Arc<PeriodicGrid>) -> Result<()> {
-    println!("\n{:<44} {:>12} {:>12} {:>8}", "threads", "one", "two", "faster");
+    println!("\n{:<44} {:>12} {:>12} {:>8}", "threads", "one", "two", "speed-up");
     let facets = facets_of(rods, 4096);
     let grid = rod_grid.clone();
-    let slices: Work = Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 32, RAMP))));
+    let intervals: Work =
+        Box::new(move || drop(black_box(OcclusionIntervals::scan(&grid, &facets, 32, TRANSITION_WIDTH))));
     let image = image(SHADING, 32, 384)?;
-    for (name, mut work) in [("slices (rods)", slices), ("a picture of 384 x 384, 32 lights", image)] {
+    for (name, mut work) in [("slices (rods)", intervals), ("an image of 384 x 384, 32 lights", image)] {
         let times = [1, 2].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.map_or(f64::NAN, |pool| pool.install(|| bench.least_ms(&mut *work)))
+            pool.map_or(f64::NAN, |pool| pool.install(|| bench.shortest_ms(&mut *work)))
         });
         println!("{name:<44} {:>9.1} ms {:>9.1} ms {:>8.2}", times[0], times[1], times[0] / times[1]);
     }

@@ -1,5 +1,6 @@
-//! Times of the stages, one at a time: `cargo bench`. Medians of seven runs after a warm-up, beside a yardstick of this
-//! machine measured in the same run; `cargo bench -- horizon` runs the lines whose name contains a word.
+//! Times of the stages, one at a time: `cargo bench --bench stages`. The times are medians of seven runs after a
+//! warm-up, beside a yardstick of the machine from the same run. `cargo bench --bench stages -- horizon` runs the lines
+//! whose name contains a word.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -24,7 +25,7 @@ const RUNS: usize = 7;
 /// Runs and prints one line at a time.
 struct Bench {
     filter: Option<String>,
-    /// `cargo test --benches` asks only whether they run.
+    /// True under `cargo test --benches`, which runs each line once.
     once: bool,
     yardstick_ms: f64,
 }
@@ -65,7 +66,7 @@ impl Bench {
         times[runs / 2]
     }
 
-    /// `count` things of the kind `each` are done in one call of `work`.
+    /// Times `work`, one call of which computes `count` items of the kind `each`.
     fn line<T>(&self, name: &str, count: usize, each: &str, work: impl FnMut() -> T) {
         if self.filter.as_ref().is_some_and(|filter| !name.contains(filter)) {
             return;
@@ -108,45 +109,49 @@ fn main() -> Result<(), biscale::base::Error> {
     let (field, rods) = (tile("fig8a_hammered")?, tile("fig6a_velvet_spread")?);
     let azimuths = settings.horizon_azimuths;
 
-    for (name, mesh) in [("height-field", &field), ("rods", &rods)] {
+    for (name, mesh) in [("height field", &field), ("rods", &rods)] {
         bench.line(&format!("facets, {name}"), count, "facet", || facets_of(mesh, count));
         bench.line(&format!("periodic grid, {name}"), mesh.triangles.len(), "triangle", || PeriodicGrid::new(mesh));
     }
     let (facets, rod_facets) = (facets_of(&field, count), facets_of(&rods, count));
     if let Some(heights) = &field.height_grid {
-        bench.line("horizons, march over the samples", count * azimuths, "azimuth", || {
+        bench.line("horizon map, march over the samples", count * azimuths, "azimuth", || {
             HorizonMap::march(heights, field.size, &facets, azimuths, settings.penumbra)
         });
     }
     let (grid, rod_grid) = (PeriodicGrid::for_slices(&field), PeriodicGrid::for_slices(&rods));
-    bench.line("horizons, scan of the triangles", count * azimuths, "azimuth", || {
+    bench.line("horizon map, scan of the triangles", count * azimuths, "azimuth", || {
         HorizonMap::scan(&grid, &facets, azimuths, settings.penumbra)
     });
-    let slices = settings.slice_azimuths;
-    bench.line("slices of the triangles (rods)", count * slices, "slice", || {
-        OcclusionIntervals::scan(&rod_grid, &rod_facets, slices, settings.penumbra)
+    let slice_azimuths = settings.slice_azimuths;
+    bench.line("slices of the triangles (rods)", count * slice_azimuths, "slice", || {
+        OcclusionIntervals::scan(&rod_grid, &rod_facets, slice_azimuths, settings.penumbra)
     });
 
     let (i, o) = (from_angles(0.5, 0.3), from_angles(0.9, 2.0));
-    let horizons = Arc::new(Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, azimuths, settings.penumbra)));
-    let sliced =
-        Visibility::OcclusionIntervals(OcclusionIntervals::scan(&rod_grid, &rod_facets, slices, settings.penumbra));
-    let mut seen = vec![0.0; count];
-    for (name, visibility) in [("horizons", horizons.as_ref()), ("slices", &sliced)] {
-        // As many as were asked for, within the rounding of strata.
-        seen.resize(visibility.facets(), 0.0);
-        bench.line(&format!("visibility of a direction, {name}"), seen.len(), "facet", || {
-            visibility.fill(black_box(i), 0..seen.len(), &mut seen);
+    let horizon_map = Arc::new(Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, azimuths, settings.penumbra)));
+    let sliced = Visibility::OcclusionIntervals(OcclusionIntervals::scan(
+        &rod_grid,
+        &rod_facets,
+        slice_azimuths,
+        settings.penumbra,
+    ));
+    let mut visible = vec![0.0; count];
+    for (name, visibility) in [("horizon map", horizon_map.as_ref()), ("occlusion intervals", &sliced)] {
+        // Stratified sampling rounds the number of facets.
+        visible.resize(visibility.facets(), 0.0);
+        bench.line(&format!("visibility of a direction, {name}"), visible.len(), "facet", || {
+            visibility.fill(black_box(i), 0..visible.len(), &mut visible);
         });
     }
 
     let pairs = mirror_biased_pairs(64, 1);
-    let all_seen = vec![1.0; facets.len()];
+    let all_visible = vec![1.0; facets.len()];
     for (name, term) in terms() {
         let (material_of_slot, materials) = materials(&term, field.slots.len());
         let sum = FacetSum::new(&facets, &material_of_slot, &materials);
         bench.line(&format!("sum of a pair, {name}"), facets.len(), "facet", || {
-            sum.sum(black_box(i), o, &all_seen, &all_seen)
+            sum.sum(black_box(i), o, &all_visible, &all_visible)
         });
         let low_rank = settings.low_rank(false);
         if let Some(lobe) = analytic_lobe(&term) {
@@ -156,10 +161,10 @@ fn main() -> Result<(), biscale::base::Error> {
                 RotatedBasis::new(lobe, low_rank.basis, low_rank.keep_m)
             });
         }
-        let build = || LowRank::build(&facets, &horizons, &material_of_slot, &materials, &low_rank);
+        let build = || LowRank::build(&facets, &horizon_map, &material_of_slot, &materials, &low_rank);
         bench.line(&format!("factors with their basis, {name}"), facets.len(), "facet", build);
         let base_area = f64::from(field.base_area());
-        let direct = Direct::new(Arc::new(sum), horizons.clone());
+        let direct = Direct::new(Arc::new(sum), horizon_map.clone());
         for (representation_name, representation) in
             [("direct", Representation::Direct(direct)), ("factors", Representation::LowRank(build()?))]
         {
@@ -172,7 +177,7 @@ fn main() -> Result<(), biscale::base::Error> {
     images(&bench, &rods, &rod_facets, sliced)
 }
 
-/// What pictures read, beside the sums it stands for.
+/// Times shading BRDFs beside the sums that they replace.
 fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -> Result<(), biscale::base::Error> {
     let ggx = Term::Ggx { roughness: 0.2, f0: Vec3::splat(0.8) };
     let direct = |mesh: &TileMesh, facets: &Facets, visibility: Visibility| {
@@ -182,11 +187,11 @@ fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -
     let rod_sum = direct(rods, facets, sliced);
     let grid = HemispherePairGrid { rings: 16, azimuths: 24, phi_d: 6, theta_d: 8 };
     let checked = image_pairs(64, 1);
-    let all = Nodes::all(grid);
+    let all_nodes = Nodes::all(grid);
     for (name, nodes) in [
-        ("all facets", all),
-        ("a fifth of the facets", Nodes { facets: Some(facets.len() / 5), ..all }),
-        ("all facets, what 64 pairs read", Nodes { read_by: Some(&checked), ..all }),
+        ("all facets", all_nodes),
+        ("a fifth of the facets", Nodes { facets: Some(facets.len() / 5), ..all_nodes }),
+        ("all facets, nodes of 64 pairs", Nodes { read_by: Some(&checked), ..all_nodes }),
     ] {
         bench.line(&format!("table (rods), {name}"), grid.nodes(), "node", || {
             ShadingTable::build(&rod_sum, nodes, &Cancel::default())
@@ -198,13 +203,13 @@ fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -
     let grooves = tile("fig4b_bicolor_cup")?;
     let groove_facets = facets_of(&grooves, Settings::of_preset(Preset::Standard).height_field_facets);
     let settings = Settings::of_preset(Preset::Standard);
-    let horizons = HorizonMap::scan(
+    let horizon_map = HorizonMap::scan(
         &PeriodicGrid::for_slices(&grooves),
         &groove_facets,
         settings.horizon_azimuths,
         settings.penumbra,
     );
-    let groove_sum = direct(&grooves, &groove_facets, Visibility::HorizonMap(horizons));
+    let groove_sum = direct(&grooves, &groove_facets, Visibility::HorizonMap(horizon_map));
     let total = |representation: &Representation, base_area: f64| {
         let (brdf, mut out) =
             (EffectiveBrdf { representation: representation.clone(), base_area }, vec![Vec3::ZERO; lights.len()]);
@@ -213,12 +218,13 @@ fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -
             out.iter().sum::<Vec3>()
         }
     };
-    let mut lines = vec![("few normals, all at once (grooves)", Representation::Direct(groove_sum.clone()), true)];
+    let mut lines =
+        vec![("few distinct normals, all at once (grooves)", Representation::Direct(groove_sum.clone()), true)];
     if let Some(strided_subset) = groove_sum.strided_subset(27) {
-        lines.push(("few normals, every 27th facet (grooves)", Representation::Direct(strided_subset), true));
+        lines.push(("few distinct normals, every 27th facet (grooves)", Representation::Direct(strided_subset), true));
     }
-    lines.push(("few normals, light by light (grooves)", Representation::Direct(groove_sum), false));
-    if let Some(table) = ShadingTable::build(&rod_sum, all, &Cancel::default())? {
+    lines.push(("few distinct normals, light by light (grooves)", Representation::Direct(groove_sum), false));
+    if let Some(table) = ShadingTable::build(&rod_sum, all_nodes, &Cancel::default())? {
         lines.push(("a table, all at once (rods)", Representation::Table(table), true));
     }
     lines.push(("the sum, light by light (rods)", Representation::Direct(rod_sum), false));

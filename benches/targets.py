@@ -1,12 +1,11 @@
-"""What an edit costs on the paper's five scenes, on the CPU: milliseconds as `biscale profile` prints them, above one
-also as multiples of a yardstick of this machine; what `biscale eval` is off with the same settings; and the most
-memory that any of it took.
+"""Costs of an edit on the paper's five scenes, on the CPU: the milliseconds that `biscale profile` prints, the error of
+`biscale eval` with the same settings, and the peak memory. Times above a millisecond are also multiples of a yardstick of
+the machine.
 
     python benches/targets.py [--no-errors]
 
-The reference that errors are told against takes minutes.
-
-MERL files of Table 3's paints are looked for in the folder that BISCALE_DATA names; without them that row says SKIPPED.
+The reference for the errors takes minutes. BISCALE_MERL names a folder with MERL files of Table 3's paints; without one, that
+row is SKIPPED.
 """
 
 import json
@@ -25,7 +24,7 @@ PAINTS = ["gold-metallic-paint", "silver-paint", "pearl-paint", "blue-metallic-p
 
 
 def yardstick_ms():
-    """A million dependent square roots in Python, the quickest of five times."""
+    """Returns the shortest of five times of a million dependent square roots in Python."""
 
     def once():
         x, start = 0.0, time.perf_counter()
@@ -42,17 +41,17 @@ def profile(scene, *options):
 
 
 def errors(table, qualities):
-    """Decibels under the peak and relative L2, of 200 pairs up to 85 degrees, half of them near the mirror direction."""
+    """Adds rows of PSNR and relative L2 for 200 pairs up to 85 degrees, half of them near the mirror direction."""
     pairs = random_pairs(200)
     with tempfile.TemporaryDirectory() as folder:
         references = [evaluate(scene, pairs, folder, "--quality", "reference") for scene in SCENES]
         for quality in qualities:
-            off = []
+            cells = []
             for scene, reference in zip(SCENES, references):
                 difference = evaluate(scene, pairs, folder, "--quality", quality, "--backend", "cpu") - reference
-                decibels = 20 * np.log10(reference.max() / np.sqrt(np.mean(difference**2)))
-                off.append(f"{decibels:.1f} dB, {100 * np.linalg.norm(difference) / np.linalg.norm(reference):.1f} %")
-            table.row(f"off, {quality}", *off)
+                psnr = 20 * np.log10(reference.max() / np.sqrt(np.mean(difference**2)))
+                cells.append(f"{psnr:.1f} dB, {100 * np.linalg.norm(difference) / np.linalg.norm(reference):.1f} %")
+            table.row(f"error, {quality}", *cells)
 
 
 def main():
@@ -62,18 +61,18 @@ def main():
     for edit, quality in EDITS:
         times = [profile(scene, "--edit", edit, "--quality", quality) for scene in SCENES]
         table.row(f"{edit}, {quality}", *(f"{ms:.1f} ms" + f", {ms / yardstick:.2f} y" * (ms > 1) for ms in times))
-    paint = next((path for name in PAINTS if (path := Path(os.environ.get("BISCALE_DATA", ".")) / f"{name}.binary").exists()), None)
+    paint = next((path for name in PAINTS if (path := Path(os.environ.get("BISCALE_MERL", ".")) / f"{name}.binary").exists()), None)
     if paint:
         swapped = [profile(scene, "--set", f'material.default.brdf={{ kind = "merl", path = "{paint}" }}') for scene in SCENES]
         plain = [profile(scene) for scene in SCENES]
-        table.row("from nothing", *(f"{ms:.1f} ms" for ms in plain))
-        table.row(f"the same, {paint.name}", *(f"{ms:.1f} ms" for ms in swapped))
+        table.row("all stages", *(f"{ms:.1f} ms" for ms in plain))
+        table.row(f"all stages, {paint.name}", *(f"{ms:.1f} ms" for ms in swapped))
     else:
-        print("SKIPPED: a MERL paint (BISCALE_DATA names no folder with one)")
+        print("SKIPPED: a MERL paint (BISCALE_MERL names no folder with one)")
     rows = json.loads(biscale("basis", "table3", "--json", "--quiet")[0])
     print(f"Table 3, {len(rows)} materials: {sum(row['seconds'] for row in rows):.2f} s")
     if resource:
-        print(f"most memory: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024:.0f} MB")
+        print(f"peak memory: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024:.0f} MB")
     print(f"yardstick {yardstick_ms():.0f} ms", flush=True)
     if "--no-errors" not in sys.argv:
         errors(table, ["standard", "draft"])

@@ -1,5 +1,5 @@
-//! biscale computes how a surface with tiny structures looks from a distance: the effective BRDF of a small tile that is
-//! repeated without end.
+//! biscale computes how a surface with tiny structures looks from a distance: the effective BRDF of a small tile that
+//! is repeated without end.
 //!
 //! ```text
 //! Scene (TOML) ─▶ Plan ─▶ TileMesh ─▶ Facets ─▶ Visibility ─┐

@@ -13,7 +13,7 @@ fn main() -> ExitCode {
     let arguments = Cli::parse();
     let result = match arguments.command {
         None => edit(arguments.scene.as_deref(), None).map_err(|error| match error.downcast_ref::<biscale::Error>() {
-            Some(_) => error.context("taken as a scene to edit, as no command was given (see --help)"),
+            Some(_) => error.context("no command was given, so the argument is opened as a scene (see --help)"),
             None => error,
         }),
         Some(Command::Edit { scene, start_times }) => edit(scene.as_deref(), start_times.then_some(started)),
@@ -22,7 +22,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // A reader that closed the pipe has all it wanted.
+            // A closed pipe is no failure, because its reader needs no further output.
             if cli::is_broken_pipe(&error) {
                 return ExitCode::SUCCESS;
             }
@@ -32,13 +32,13 @@ fn main() -> ExitCode {
     }
 }
 
-/// Opens the editor on a scene. With `since`, reports how long the first image took from that time, and quits.
+/// Opens the editor on a scene. With `since`, prints the milliseconds from that time to the first image, and quits.
 #[cfg(feature = "editor")]
 fn edit(scene: Option<&str>, since: Option<Instant>) -> anyhow::Result<()> {
     app::run(scene, app::StartTimes { since })
 }
 
-/// The program was built without the editor.
+/// Returns an error, because this build has no editor.
 #[cfg(not(feature = "editor"))]
 fn edit(_: Option<&str>, _: Option<Instant>) -> anyhow::Result<()> {
     anyhow::bail!("this program was built without the editor (feature `editor`); see `biscale --help` for its commands")

@@ -1,4 +1,5 @@
 //! A module imports only from the layers below it.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it stands")]
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -83,35 +84,31 @@ fn skip_item<'a>(lines: &mut impl Iterator<Item = &'a str>) {
 
 /// Names that follow `crate::`, also those of a group `crate::{a, b::c}`.
 fn imported(code: &str) -> BTreeSet<String> {
-    let mut found = BTreeSet::new();
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let first_name = |text: &str| text.trim_start().chars().take_while(|c| is_name(*c)).collect::<String>();
+    let mut found = BTreeSet::new();
     for (at, prefix) in code.match_indices("crate::") {
         let rest = &code[at + prefix.len()..];
-        if !code[..at].ends_with(|c: char| is_name(c) || c == '$') {
-            if let Some(group) = rest.strip_prefix('{') {
-                let mut depth = 0;
-                let mut name = String::new();
-                for c in group.chars() {
-                    match c {
-                        '{' => depth += 1,
-                        '}' if depth == 0 => break,
-                        '}' => depth -= 1,
-                        ',' if depth == 0 => name.clear(),
-                        c if depth == 0 && is_name(c) => name.push(c),
-                        ':' if depth == 0 && !name.is_empty() => {
-                            found.insert(std::mem::take(&mut name));
-                            depth += 1000;
-                        }
-                        _ => {}
-                    }
-                    if depth >= 1000 && c == ',' {
-                        depth = 0;
+        let Some(group) = rest.strip_prefix('{') else {
+            found.insert(first_name(rest));
+            continue;
+        };
+        let mut depth = 0;
+        let mut start = 0;
+        for (end, c) in group.char_indices() {
+            match c {
+                '{' => depth += 1,
+                '}' | ',' if depth == 0 => {
+                    found.insert(first_name(&group[start..]));
+                    start = end + 1;
+                    if c == '}' {
+                        break;
                     }
                 }
+                '}' => depth -= 1,
+                _ => {}
             }
         }
-        let name: String = rest.chars().take_while(|c| is_name(*c)).collect();
-        found.insert(name);
     }
     found
 }

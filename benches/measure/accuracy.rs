@@ -19,7 +19,8 @@ const BOUNDS: [(&str, f64, f64); 5] = [
     ("wu2011", 0.0, 10.0),
 ];
 
-/// Prints the errors and times of the presets in a list, or of all. `BISCALE_MERL` names a folder with `silver-paint.binary`.
+/// Prints the errors and times of the presets in a list, or of all. `BISCALE_MERL` names a folder with
+/// `silver-paint.binary`.
 ///
 /// # Errors
 /// If a preset misses its bounds.

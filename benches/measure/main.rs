@@ -1,6 +1,6 @@
-//! Measurements that `docs/measurements` holds: `cargo bench --bench measure -- NAME [ARGUMENT]` prints one and replaces the
-//! lines between `<!-- measure: NAME -->` and `<!-- end -->` of a page. Without a name, it lists the names. A page stays as it
-//! is if a measurement misses a bound.
+//! Measurements that `docs/measurements` holds: `cargo bench --bench measure -- NAME [ARGUMENT]` prints one and
+//! replaces the lines between `<!-- measure: NAME -->` and `<!-- end -->` of a page. Without a name, it lists the
+//! names. A page stays as it is if a measurement misses a bound.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing measurement may panic")]
 
 mod accuracy;
@@ -52,9 +52,9 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("lobes", "nanoseconds per facet of each analytic lobe", in_lib("nanoseconds_per_facet")),
     ("map-resolution", "error and time of shadow maps against resolution", in_lib("resolution_against_error")),
     ("map-speed", "speed of shadow maps on the CPU and on the GPU", in_lib("speed_of_the_cpu_and_of_the_gpu")),
-    ("pictures", "times of the trial of a shading table and of the whole table", Source::Here(trials)),
     ("slice-steps", "cells and triangles that a slice visits", in_lib("steps_of_slices")),
     ("table-steps", "errors of shading tables against facets, azimuths and nodes", Source::Here(steps)),
+    ("table-trials", "times of the trial of a shading table and of the whole table", Source::Here(trials)),
 ];
 
 fn accuracy(presets: Option<&str>, table: &mut Table) -> Result<(), String> {

@@ -29,7 +29,8 @@ fn tabulated(outcome: &Outcome, direct: &Direct, nodes: Nodes<'_>) -> EffectiveB
     outcome.brdf.with_direct_representation(Representation::Table(table))
 }
 
-/// Prints the times of a trial, which computes only the nodes that its check reads, and of the whole table, and their error.
+/// Prints the times of a trial, which computes only the nodes that its check reads, and of the whole table, and their
+/// error.
 pub fn trials(print: &mut dyn FnMut(String)) {
     let pairs = image_pairs(512, 12345);
     let grid = HemispherePairGrid { rings: 24, azimuths: 48, phi_d: 8, theta_d: 12 };

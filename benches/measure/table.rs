@@ -17,8 +17,8 @@ impl Table {
         self.lines.push(line);
     }
 
-    /// Returns the block that replaces the lines between the markers of a page. Markdown tables stay as they are, other lines
-    /// are fenced.
+    /// Returns the block that replaces the lines between the markers of a page. Markdown tables stay as they are, other
+    /// lines are fenced.
     fn block(&self) -> String {
         let origin = format!("commit {}, {}", commit(), machine());
         let lines = self.lines.join("\n");

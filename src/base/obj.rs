@@ -20,7 +20,9 @@ use super::{Error, InputError, Result};
 pub struct ObjFile {
     /// Vertices in the file's order, including those that no face uses.
     pub positions: Vec<Vec3>,
+    /// Texture coordinates that the corners use.
     pub texcoords: Vec<Vec2>,
+    /// Normals that the corners use.
     pub normals: Vec<Vec3>,
     /// Corners of all faces in the file's order.
     pub corners: Vec<ObjCorner>,
@@ -75,14 +77,14 @@ pub struct Rules {
 /// limit is exceeded. Returns an error without a line if the file has no faces.
 pub fn read(text: &str, rules: Rules) -> Result<ObjFile> {
     let scan = PrePass::of(text, rules)?;
-    let numbering = numbering_faces(scan.counts);
+    let numbering = numbering_faces(scan.counts[0]);
     let mut reader = numbering.as_bytes().chain(scan.statements.as_bytes());
     let options = tobj::LoadOptions::default();
     let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| Ok((Vec::new(), HashMap::new())))
         .map_err(|error| InputError::new("", error, "an OBJ file that tobj can read"))?;
     // The statements contain no group and no material, so tobj returns one model.
     let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
-    let skipped = mesh.indices.len().saturating_sub(scan.attributes.len());
+    let skipped = scan.counts[0];
     let corners = scan.attributes.iter().enumerate().map(|(k, [has_texcoord, has_normal])| ObjCorner {
         position: mesh.indices[skipped + k],
         texcoord: has_texcoord.then(|| mesh.texcoord_indices[skipped + k]),
@@ -98,14 +100,12 @@ pub fn read(text: &str, rules: Rules) -> Result<ObjFile> {
     })
 }
 
-/// Returns faces that use each vertex, texture coordinate and normal in the file's order.
-/// When they come first, the numbers that `tobj` assigns by first use are those of the file.
-fn numbering_faces(counts: [usize; 3]) -> String {
+/// Returns faces that use each vertex in the file's order. When they come first, `tobj` assigns the file's numbers.
+fn numbering_faces(count: usize) -> String {
     let mut text = String::new();
-    for k in 1..=counts.into_iter().max().unwrap_or(0) {
-        let [v, vt, vn] = counts.map(|count| if count == 0 { String::new() } else { k.min(count).to_string() });
+    for k in 1..=count {
         let start = if k % 64 == 1 { "\nf" } else { "" };
-        let _ = write!(text, "{start} {v}/{vt}/{vn}");
+        let _ = write!(text, "{start} {k}");
     }
     text.push('\n');
     text
@@ -193,6 +193,9 @@ impl PrePass {
                 self.face(words, line)?;
             }
             "l" if is_strict && words.clone().count() >= 3 => self.face(words, line)?,
+            "l" if is_strict && (words.clone().count() == 0 || !words.all(is_polyline_point)) => {
+                return Err(at(line, format!("`{}`", text.trim()), "points as v or v/vt"));
+            }
             "o" | "g" => {
                 self.check_forward_indices(false)?;
                 self.group += 1;
@@ -309,9 +312,9 @@ impl PrePass {
                 continue;
             }
             let count = self.counts[kind];
-            let index = match part.parse::<i64>() {
+            let index = match part.parse::<isize>() {
                 Ok(index) if index > 0 => usize::try_from(index).ok(),
-                Ok(index) => count.checked_add_signed(index as isize).filter(|_| index < 0).map(|index| index + 1),
+                Ok(index) => count.checked_add_signed(index).filter(|_| index < 0).map(|index| index + 1),
                 Err(_) => None,
             };
             let Some(index) = index.filter(|index| is_strict || *index <= count) else {
@@ -351,6 +354,11 @@ impl PrePass {
         }
         Ok(())
     }
+}
+
+/// Returns true for a point of a polyline that `tobj` reads. The polylines of one or two points are dropped.
+fn is_polyline_point(word: &str) -> bool {
+    word.split('/').enumerate().all(|(kind, part)| part.is_empty() || kind < 3 && part.parse::<isize>().is_ok())
 }
 
 fn at(line: usize, found: impl std::fmt::Display, expected: impl std::fmt::Display) -> Error {

@@ -32,6 +32,7 @@ fn usemtl_names_count_without_an_mtl_and_faces_before_the_first_are_default() {
 fn only_corners_with_normals_have_them() {
     let file = tolerant(&format!("{QUAD}vn 0 0 1\nf 1//1 2//1 3//1\nf 1 3 4\n")).unwrap();
     assert!(file.corners[..3].iter().all(|corner| corner.normal == Some(0)));
+    assert_eq!(file.normals, [Vec3::Z]);
     assert!(file.corners[3..].iter().all(|corner| corner.normal.is_none()));
 }
 
@@ -64,9 +65,11 @@ fn vertices_keep_the_numbers_of_the_file_also_if_no_face_uses_them() {
             file.positions.iter().map(|position| position.x as usize).collect::<Vec<_>>(),
             [0, 1, 2, 3, 4, 5, 6, 7]
         );
-        let corner = |position, texcoord, normal| ObjCorner { position, texcoord, normal };
-        assert_eq!(file.corners, [corner(7, None, Some(1)), corner(3, None, None), corner(2, Some(0), None)]);
-        assert_eq!((file.texcoords, file.normals), (vec![Vec2::Y], vec![Vec3::Z, Vec3::Y]));
+        assert_eq!(position_indices(&file), [7, 3, 2]);
+        let normals = file.corners.iter().map(|corner| corner.normal.map(|normal| file.normals[normal as usize]));
+        assert_eq!(normals.collect::<Vec<_>>(), [Some(Vec3::Y), None, None]);
+        let texcoords = file.corners.iter().map(|corner| corner.texcoord.map(|k| file.texcoords[k as usize]));
+        assert_eq!(texcoords.collect::<Vec<_>>(), [None, None, Some(Vec2::Y)]);
     }
 }
 
@@ -102,6 +105,8 @@ fn the_grammars_differ_only_as_documented() {
         ("f 1 2 3\ng a\nQUAD", false, false),
         ("QUAD l 1 2 9\nf 1 2 3", true, false),
         ("QUAD l 1 2 3", false, false),
+        ("QUAD l 1 x\nf 1 2 3", true, false),
+        ("QUAD l 1 9/\nf 1 2 3", true, true),
         ("QUAD o a\ng b\ns off\nmtllib a.mtl\np 9\nusemtl a\nf 1 2 3", true, true),
     ] {
         let text = text.replace("QUAD ", QUAD).replace("QUAD", QUAD);

@@ -1,5 +1,7 @@
 //! Hash keys of the inputs of a stage.
 
+use std::sync::LazyLock;
+
 use super::Build;
 
 /// Version of the file format and of the content of cached results.
@@ -14,15 +16,26 @@ pub struct Key(pub(super) [u8; 32]);
 pub struct KeyBuilder(blake3::Hasher);
 
 impl KeyBuilder {
+    #[cfg(test)]
     pub(super) fn new(kind: &str, build: &Build) -> Self {
-        let mut key = Self(blake3::Hasher::new());
-        key.numbers("format", &[FORMAT]).numbers("build", &build.bytes()).numbers("kind", kind.as_bytes());
+        let mut key = Self::start(build);
+        key.numbers("kind", kind.as_bytes());
         key
     }
 
     /// The start of a key of a stage: its name and this build.
     pub fn of_stage(name: &str) -> Self {
-        Self::new(name, &Build::of_this_program())
+        static START: LazyLock<blake3::Hasher> = LazyLock::new(|| KeyBuilder::start(&Build::of_this_program()).0);
+        let mut key = Self(START.clone());
+        key.numbers("kind", name.as_bytes());
+        key
+    }
+
+    /// The part of all keys: the format and the build.
+    fn start(build: &Build) -> Self {
+        let mut key = Self(blake3::Hasher::new());
+        key.numbers("format", &[FORMAT]).numbers("build", &build.bytes());
+        key
     }
 
     #[cfg(test)]

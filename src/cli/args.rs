@@ -29,13 +29,11 @@ pub enum Command {
     Render(RenderArgs),
     /// Evaluate the effective BRDF [1/sr], with the light's cosine, at the direction pairs of a CSV file.
     Eval(EvalArgs),
-    /// Write the effective BRDF as a table. The ending selects the format: .npz .csv .exr .bsdf .binary .xml .bin
-    /// .astm.
+    /// Write the effective BRDF as a table. Formats by ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
     Export(ExportArgs),
     /// Fit Lambertian + Cook-Torrance and a GGX base, print their errors, and write glTF, MaterialX or an image.
     Fit(FitArgs),
-    /// Write the tile itself: .obj, .stl (closed, in millimetres), .png (16-bit heights), .svg or .pdf (a pattern to
-    /// fold).
+    /// Write the tile itself: .obj, .stl (closed, in mm), .png (16-bit heights), .svg or .pdf (a pattern to fold).
     Tile(TileArgs),
     /// List every effect: whether it is on, why, and its cost.
     Plan(PlanArgs),
@@ -104,8 +102,7 @@ pub struct SceneArgs {
 pub struct PlanArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Also force each effect on and off, and print its milliseconds and the change of the effective BRDF and of the
-    /// image.
+    /// Also force each effect on and off, and print its time and the change of the effective BRDF and the image.
     #[arg(long)]
     pub measure: bool,
 }
@@ -233,7 +230,7 @@ pub struct ProfileArgs {
 
 #[derive(Debug, Args)]
 pub struct ReportArgs {
-    /// Scene files, or names of shipped materials.
+    /// Scene files, or names of shipped scenes.
     #[arg(required = true)]
     pub scenes: Vec<String>,
     /// Folder for report.html, report.csv and report.json. An interrupted run continues from the files in it.

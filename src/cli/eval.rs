@@ -137,19 +137,20 @@ impl Row {
 }
 
 fn read(path: &Path) -> Result<Vec<Row>, Error> {
-    let complain = |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
+    let input_error =
+        |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
     let mut text = String::new();
     let got = if path == Path::new("-") {
         std::io::stdin().lock().take(MAX_FILE).read_to_string(&mut text)
     } else {
         std::fs::File::open(path).and_then(|file| file.take(MAX_FILE).read_to_string(&mut text))
     };
-    got.map_err(|error| complain(String::new(), error.to_string(), "a CSV file that can be read"))?;
+    got.map_err(|error| input_error(String::new(), error.to_string(), "a CSV file that can be read"))?;
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let names: Vec<&str> = match lines.next() {
         Some((_, header)) => header.split(',').map(str::trim).collect(),
         None => {
-            return Err(complain("line 1".to_owned(), "an empty file".to_owned(), HEADER).into());
+            return Err(input_error("line 1".to_owned(), "an empty file".to_owned(), HEADER).into());
         }
     };
     let mut columns = [0; 4];
@@ -157,7 +158,7 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
         *column = names
             .iter()
             .position(|name| *name == wanted)
-            .ok_or_else(|| complain("line 1".to_owned(), format!("the columns {}", names.join(",")), HEADER))?;
+            .ok_or_else(|| input_error("line 1".to_owned(), format!("the columns {}", names.join(",")), HEADER))?;
     }
     lines
         .map(|(number, line)| {
@@ -166,10 +167,10 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
             let mut angles = [0.0; 4];
             for (angle, &column) in angles.iter_mut().zip(&columns) {
                 let field = fields.get(column).ok_or_else(|| {
-                    complain(place(), format!("{} values", fields.len()), &format!("{} values", names.len()))
+                    input_error(place(), format!("{} values", fields.len()), &format!("{} values", names.len()))
                 })?;
                 *angle = field.parse::<f64>().ok().filter(|angle| angle.is_finite()).ok_or_else(|| {
-                    complain(place(), format!("`{field}` for {}", names[column]), "an angle in radians")
+                    input_error(place(), format!("`{field}` for {}", names[column]), "an angle in radians")
                 })?;
             }
             Ok(Row { angles })

@@ -71,8 +71,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let reading = report.reading;
     let mut health = outcome.health().clone();
     if !(0.0..=MAX_RESAMPLING_ERROR).contains(&reading.errors.rel_l2) {
-        let warning = "the table misses most of the highlights: raise --resolution or the roughness, or choose a format that adapts to \
-                       lobes (.bsdf, --radiance tensor-tree)"
+        let warning = "the table misses most of the highlights: raise --resolution or the roughness, or choose a \
+                       format that adapts to lobes (.bsdf, --radiance tensor-tree)"
             .to_owned();
         if !args.scene.quiet {
             eprintln!("warning: {warning}");

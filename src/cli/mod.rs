@@ -123,10 +123,10 @@ impl SceneArgs {
 
 /// Parses `WIDTHxHEIGHT`.
 pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
-    let complain = || format!("found `{text}`, expected two numbers like 384x384");
-    let (a, b) = text.split_once(['x', 'X', '×']).ok_or_else(complain)?;
+    let invalid = || format!("found `{text}`, expected two numbers like 384x384");
+    let (a, b) = text.split_once(['x', 'X', '×']).ok_or_else(invalid)?;
     let number =
-        |text: &str| text.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n)).ok_or_else(complain);
+        |text: &str| text.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n)).ok_or_else(invalid);
     Ok([number(a)?, number(b)?])
 }
 
@@ -144,11 +144,11 @@ pub fn parse_minutes(text: &str) -> std::result::Result<f64, String> {
 
 /// Parses `NAME=on|off|auto` and returns it as an override. The effect `low_rank` becomes the setting `quality.method`.
 pub fn parse_effect(text: &str) -> std::result::Result<String, String> {
-    let complain = || format!("found `{text}`, expected NAME=on, NAME=off or NAME=auto");
-    let (name, value) = text.split_once('=').ok_or_else(complain)?;
+    let invalid = || format!("found `{text}`, expected NAME=on, NAME=off or NAME=auto");
+    let (name, value) = text.split_once('=').ok_or_else(invalid)?;
     let (name, value) = (name.trim(), value.trim());
     if !Switch::NAMES.contains(&value) {
-        return Err(complain());
+        return Err(invalid());
     }
     let known: Vec<&str> = Effects::fields().iter().map(|field| field.key).filter(|key| *key != "bounces").collect();
     match name {

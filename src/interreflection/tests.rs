@@ -154,7 +154,7 @@ fn interreflection_is_reciprocal_and_never_negative() {
 #[test]
 fn stages_of_interreflection_run_only_if_it_is_on_and_facets_see_each_other() {
     let runs = |geometry: &str, effects: &str| {
-        let mut pipeline = Pipeline::new();
+        let pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, WHITE, effects)).unwrap();
         let count = |wanted: &str| pipeline.runs().iter().find(|(name, _)| *name == wanted).unwrap().1;
         assert_eq!(count("transport") > 0, outcome.plan.interreflection);
@@ -168,7 +168,7 @@ fn stages_of_interreflection_run_only_if_it_is_on_and_facets_see_each_other() {
 
 #[test]
 fn a_colour_edit_does_not_cast_rays_again() {
-    let mut pipeline = Pipeline::new();
+    let pipeline = Pipeline::new();
     let mut loaded = open(DEEP, WHITE, "interreflection = \"on\"");
     pipeline.effective(&loaded).unwrap();
     loaded.scene.materials[0].color = Vec3::new(0.5, 0.25, 0.125);

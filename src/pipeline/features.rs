@@ -32,8 +32,8 @@ impl Pipeline {
         let needs_maps = !tile.flat && (!tile.height_field || settings.visibility_method != VisibilityMethod::Auto);
         let gpu_allowed = needs_maps && settings.backend != Backend::Cpu;
         let gpu = if gpu_allowed { self.env.gpu() } else { None };
-        // Software Vulkan draws shadow maps far slower than the CPU slices (the draft of the pillow: 78 s instead of 0.1 s), so
-        // that it is used only if both the GPU and maps are asked for.
+        // Software Vulkan draws shadow maps far slower than the CPU slices (the draft of the pillow: 78 s instead of
+        // 0.1 s), so that it is used only if both the GPU and maps are asked for.
         let asked = settings.backend == Backend::Gpu && settings.visibility_method == VisibilityMethod::Maps;
         let hardware_gpu = gpu.is_some_and(|gpu| asked || gpu.is_hardware());
         let scan_work = if surface.wants_scan_work && needs_maps && !hardware_gpu {

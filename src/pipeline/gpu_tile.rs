@@ -19,7 +19,8 @@ pub struct GpuTile {
     pub notes: Vec<String>,
 }
 
-/// Finding mirror planes takes some milliseconds of the CPU, which is more than half of a table of fewer nodes takes the GPU.
+/// Finding mirror planes takes some milliseconds of the CPU, which is more than half of a table of fewer nodes takes
+/// the GPU.
 const MIRRORS_FROM: usize = 60_000;
 
 /// Facets that the GPU draws for each half vector of a table.
@@ -31,8 +32,8 @@ const MAX_AZIMUTHS: [usize; 2] = [48, 96];
 /// The most rings and azimuths of half vectors of a table. The subsets of facets leave more error than larger steps.
 const MAX_HALF_VECTORS: [usize; 2] = [24, 48];
 
-/// Facets of a tile with few distinct normals, whose lobes are exact. The sequence that places facets spreads this many well
-/// over the shipped tiles; a stride through more of them would cover grooves and pyramids unevenly.
+/// Facets of a tile with few distinct normals, whose lobes are exact. The sequence that places facets spreads this many
+/// well over the shipped tiles; a stride through more of them would cover grooves and pyramids unevenly.
 const CLUSTERED_FACETS: usize = 700;
 
 /// The most distinct normals that the GPU sums as clusters. With more, too few facets are left for each.
@@ -48,8 +49,8 @@ fn has_horizon_map(algorithm: VisibilityAlgorithm) -> bool {
 }
 
 impl Pipeline {
-    /// The input of a GPU that computes visibility and product itself. `None` if only the CPU computes all that the scene calls
-    /// for: measured BRDFs summed over facets, interreflection, the paper's own tables.
+    /// The input of a GPU that computes visibility and product itself. `None` if only the CPU computes all that the
+    /// scene calls for: measured BRDFs summed over facets, interreflection, the paper's own tables.
     ///
     /// # Errors
     /// As [`Pipeline::effective`].

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::stage::Keyed;
+use super::stage::{Keyed, Stage};
 use super::stages::{Factorize, LookUpVisibility, TabulateFactors, TabulateForCheck};
 use super::{Pipeline, StageTimes};
 use crate::base::Result;
@@ -61,8 +61,15 @@ impl FactorCheck {
 }
 
 impl Pipeline {
-    /// The low-rank representation if it is close to the direct sum or asked for, else the direct sum; and the errors of the
-    /// last step of the low-rank representation that was computed.
+    /// Frees the factors and their tables.
+    pub(super) fn forget_low_rank(&self) {
+        for name in [LookUpVisibility::NAME, Factorize::NAME, TabulateForCheck::NAME, TabulateFactors::NAME] {
+            self.memo.forget(name);
+        }
+    }
+
+    /// The low-rank representation if it is close to the direct sum or asked for, else the direct sum; and the errors
+    /// of the last step of the low-rank representation that was computed.
     pub(super) fn low_rank(
         &self,
         direct: Direct,
@@ -92,7 +99,8 @@ impl Pipeline {
         let settings = &low_rank_settings;
         let factors: Keyed<Factors> =
             self.get(Factorize { facets, rows: &rows, lobes, material_of_slot, materials, settings }, times)?;
-        if !forced {
+        let known = self.memo.known(&TabulateFactors { factors: &factors });
+        if !forced && known.is_none() {
             // Skip the tables over all pairs if the tables at the pairs of the check exceed the tolerance.
             let tables = self.get(TabulateForCheck { factors: &factors, pairs: &check.pairs }, times)?;
             let errors = check.errors(&with_tables(&tables));
@@ -101,6 +109,8 @@ impl Pipeline {
             }
         }
         let tables = self.get(TabulateFactors { factors: &factors }, times)?;
+        // These tables are as large as the full ones.
+        self.memo.forget(TabulateForCheck::NAME);
         let brdf = with_tables(&tables);
         let errors = check.errors(&brdf);
         Ok((if forced || is_close(errors) { brdf } else { check.direct }, errors))

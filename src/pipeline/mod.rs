@@ -3,8 +3,9 @@
 //! ```text
 //! BuildTile ─▶ LoadMaterials ─▶ SampleFacets ─▶ Plan ─▶ ComputeVisibility ─▶ direct sum | low rank ─▶ Interreflect ─▶ Outcome
 //! ```
-//! A [`Stage`] hashes its settings and the keys of its inputs. [`Pipeline::get`] returns the last result of a stage if the key
-//! is the same, else reads it from the disk cache, else runs the stage. An edit therefore recomputes what lies downstream of it.
+//! A [`Stage`] hashes its settings and the keys of its inputs. [`Pipeline::get`] returns the last result of a stage if
+//! the key is the same, else reads it from the disk cache, else runs the stage. An edit therefore recomputes what lies
+//! downstream of it.
 
 mod env;
 mod features;
@@ -41,7 +42,7 @@ use crate::cache::{Cache, Key, KeyBuilder};
 use crate::diagnostics::{Health, HealthInputs, VisibilityInput};
 use crate::effective::{Direct, EffectiveBrdf, FacetSum, Representation, VisibleFacets, Wu2011, Wu2011Settings};
 use crate::geometry::{Facets, TileMesh};
-use crate::interreflection::InterreflectionTable;
+use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
 use crate::math::directions::ParaboloidMap;
 use crate::plan::{Costs, Plan, Preset, Settings, VisibilityAlgorithm};
 use crate::reference::Reference;
@@ -79,13 +80,24 @@ struct TileInputs {
     plan: Plan,
 }
 
+/// A tile with its visibility and its materials.
+struct VisibleSurface<'a> {
+    tile: &'a Keyed<TileShape>,
+    facets: &'a Keyed<Facets>,
+    visibility: &'a Keyed<Visibility>,
+    assignment: &'a Keyed<MaterialAssignment>,
+    material_of_slot: &'a [usize],
+}
+
 impl Pipeline {
-    /// A pipeline that runs on the CPU and stores nothing on disk. `crate::gpu::pipeline` returns one that may open a GPU.
+    /// A pipeline that runs on the CPU and stores nothing on disk. `crate::gpu::pipeline` returns one that may open a
+    /// GPU.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Later calls return [`crate::base::Error::Cancelled`] soon after `cancel` is set. Finished stages stay in the memo.
+    /// Later calls return [`crate::base::Error::Cancelled`] soon after `cancel` is set. Finished stages stay in the
+    /// memo.
     pub fn set_cancel(&mut self, cancel: Cancel) {
         self.env.cancel = cancel;
     }
@@ -119,7 +131,7 @@ impl Pipeline {
         self.memo.get_or_run(&stage, &self.env, &self.disk, times)
     }
 
-    /// How often each stage ran. A stage that the plan drops stays at 0.
+    /// The number of runs of each stage. A stage that the plan drops stays at 0.
     pub fn runs(&self) -> Vec<(&'static str, u64)> {
         let names = [
             BuildTile::NAME,
@@ -162,7 +174,8 @@ impl Pipeline {
             settings.facets = settings.facets.min(most);
         }
         let materials = self.assignment(loaded, &tile, times)?;
-        let facets = self.get(SampleFacets { tile: &tile, settings: &settings }, times)?;
+        let for_clusters = matches!(processor, Use::Gpu { max_facets: Some(_) });
+        let facets = self.get(SampleFacets { tile: &tile, settings: &settings, for_clusters }, times)?;
         let material_of_slot = grouped(&materials.material_of_slot, &facets, &settings);
         let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.materials);
         sum.force(&facets, &settings.effects);
@@ -250,13 +263,20 @@ impl Pipeline {
             let (brdf, errors) = self.low_rank(direct, &factor_inputs, &settings)?;
             (brdf, Some(errors))
         } else {
+            self.forget_low_rank();
             (EffectiveBrdf { representation: Representation::Direct(direct), base_area }, None)
         };
         times.push(("product", elapsed_ms(start)));
         let is_low_rank = matches!(brdf.representation, Representation::LowRank(_));
         if plan.interreflection {
-            let inputs = (&tile, &facets, &visibility, &materials, &material_of_slot[..]);
-            brdf = brdf.interreflecting(self.interreflection(inputs, &settings, plan.mirrors, &mut times)?);
+            let surface = VisibleSurface {
+                tile: &tile,
+                facets: &facets,
+                visibility: &visibility,
+                assignment: &materials,
+                material_of_slot: &material_of_slot,
+            };
+            brdf = brdf.interreflecting(self.interreflection(&surface, &settings, plan.mirrors, &mut times)?);
         }
         plan.note_times(&times);
         if let Some(errors) = factored {
@@ -283,28 +303,22 @@ impl Pipeline {
     /// The light that facets send to each other. Rays are cast again only for other facets.
     fn interreflection(
         &self,
-        (tile, facets, visibility, materials, material_of_slot): (
-            &Keyed<TileShape>,
-            &Keyed<Facets>,
-            &Keyed<Visibility>,
-            &Keyed<MaterialAssignment>,
-            &[usize],
-        ),
+        surface: &VisibleSurface<'_>,
         settings: &Settings,
         mirrors: [bool; 2],
         times: &mut StageTimes,
     ) -> Result<Arc<InterreflectionTable>> {
-        let mut settings = settings.interreflection();
-        settings.mirrors = mirrors;
+        let VisibleSurface { tile, facets, visibility, assignment, material_of_slot } = *surface;
+        let settings = InterreflectionSettings { mirrors, ..settings.interreflection() };
         let transport = self.get(CastTransport { tile, facets, settings: &settings }, times)?;
         let gather = Interreflect {
             tile,
             facets,
             visibility,
             transport: &transport,
-            assignment: materials.key,
+            assignment: assignment.key,
             material_of_slot,
-            materials: &materials.materials,
+            materials: &assignment.materials,
             settings: &settings,
         };
         Ok(self.get(gather, times)?.value)
@@ -420,7 +434,8 @@ fn shading_keys(inputs: &TileInputs, visibility: &Keyed<Visibility>) -> ShadingK
     surface.key("facets", &facets.key).key("visibility", &visibility.key);
     let mut lobes = KeyBuilder::of_stage("lobes");
     lobes.counts("material of slot", material_of_slot.iter().copied());
-    lobes.debug("effects", &settings.effects);
+    let effects = &settings.effects;
+    lobes.debug("effects", &[effects.exact_lobes, effects.color_weights, effects.black_materials]);
     for material in &materials.materials {
         material.hash_lobes_into(&mut lobes);
     }

@@ -36,8 +36,8 @@ impl Outcome {
         Self { times: StageTimes::new(), ..self }
     }
 
-    /// The representation that images read instead of [`Outcome::brdf`]: a table of it if that pays and is close enough. The
-    /// first call computes it.
+    /// The representation that images read instead of [`Outcome::brdf`]: a table of it if that pays and is close
+    /// enough. The first call computes it.
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].

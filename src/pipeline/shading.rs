@@ -1,5 +1,5 @@
-//! The representation that images read: a sum over a strided subset of the facets, a table, or f̄ itself. The first that is
-//! close enough is taken, when the first image asks.
+//! The representation that images read: a sum over a strided subset of the facets, a table, or f̄ itself. The first
+//! that is close enough is taken, when the first image asks.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
@@ -28,12 +28,13 @@ const STRIDES: [usize; 4] = [27, 17, 10, 3];
 /// If the error exceeds the tolerance by this factor, halving the grid step does not fix it.
 const HOPELESS: f64 = 2.5;
 
-/// A table may be computed from one facet in so many, drawn for each half vector by their lobes. Less than a fifth is tried
-/// only if at least `MANY` facets remain.
+/// A table may be computed from one facet in so many, drawn for each half vector by their lobes. Less than a fifth is
+/// tried only if at least `MANY` facets remain.
 const PARTS: [usize; 4] = [20, 10, 5, 2];
 const MANY: usize = 1600;
 
-/// The part for coarse tables of so many nodes, which are computed without a trial; from all facets if that is not close enough.
+/// The part for coarse tables of so many nodes, which are computed without a trial; from all facets if that is not
+/// close enough.
 const COARSE_PART: usize = 4;
 const COARSE: Range<usize> = 10_000..20_000;
 
@@ -210,8 +211,8 @@ impl Shading {
         self.exact.with_direct_representation(Representation::Table(table.read(self.interpolation)))
     }
 
-    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from fewer facets
-    /// if that is no worse.
+    /// A table on one grid. A large one is computed only if a trial of some of its nodes is close enough, and from
+    /// fewer facets if that is no worse.
     fn attempt(
         &self,
         grid: HemispherePairGrid,
@@ -325,6 +326,10 @@ impl Stage for Tabulate<'_> {
     fn hash_into(&self, key: &mut KeyBuilder) {
         let ShadingKeys { lobes, facets, visibility, .. } = &self.keys;
         key.key("lobes", lobes).key("facets", facets).key("visibility", visibility);
+        // Maps of different GPUs share a key but may differ in bits.
+        if let Visibility::Maps(maps) = &*self.direct.visibility {
+            key.numbers("bits", &maps.packed.words);
+        }
         self.nodes.hash_into(key);
     }
 

@@ -18,7 +18,7 @@ pub trait Stage {
     type Output: Send + Sync + 'static;
     /// The name in times and JSON.
     const NAME: &'static str;
-    /// How the output is stored on disk; `None` if it never is.
+    /// The functions that store the output on disk; `None` if it never is stored.
     const CODEC: Option<Codec<Self::Output>> = None;
 
     /// Adds the settings of this stage and the keys of its inputs. Files count by their content.
@@ -29,6 +29,14 @@ pub trait Stage {
     /// # Errors
     /// A file that cannot be used, a computation that fails, or [`crate::base::Error::Cancelled`].
     fn run(&self, env: &Env) -> Result<Self::Output>;
+
+    /// Whether `run` ignores a cancellation, so that its output is complete and is stored even then.
+    const IGNORES_CANCEL: bool = false;
+
+    /// The slot of the memo. Two slots keep two results of one stage that different callers need in turns.
+    fn slot(&self) -> &'static str {
+        Self::NAME
+    }
 
     /// Returns true if an output of this stage may be read from disk and written there.
     fn is_portable(&self) -> bool {
@@ -83,7 +91,8 @@ pub(super) struct Memo(Mutex<HashMap<&'static str, Slot>>);
 #[derive(Debug)]
 struct Slot {
     key: Key,
-    value: Arc<dyn Any + Send + Sync>,
+    /// Absent once it was freed.
+    value: Option<Arc<dyn Any + Send + Sync>>,
     runs: u64,
 }
 
@@ -91,16 +100,18 @@ impl Memo {
     fn get<T: Send + Sync + 'static>(&self, name: &'static str, key: Key) -> Option<Arc<T>> {
         let slots = lock(&self.0);
         let slot = slots.get(name).filter(|slot| slot.key == key)?;
-        slot.value.clone().downcast().ok()
+        slot.value.clone()?.downcast().ok()
     }
 
     fn put<T: Send + Sync + 'static>(&self, name: &'static str, key: Key, value: &Arc<T>) {
         let mut slots = lock(&self.0);
         let runs = slots.get(name).map_or(0, |slot| slot.runs) + 1;
-        slots.insert(name, Slot { key, value: value.clone(), runs });
+        let old = slots.insert(name, Slot { key, value: Some(value.clone()), runs });
+        drop(slots);
+        drop(old);
     }
 
-    /// How often a stage ran or was read from disk.
+    /// The number of times that a stage ran or was read from disk.
     pub(super) fn runs(&self, name: &str) -> u64 {
         lock(&self.0).get(name).map_or(0, |slot| slot.runs)
     }
@@ -116,12 +127,27 @@ impl Memo {
         let mut key = KeyBuilder::of_stage(S::NAME);
         stage.hash_into(&mut key);
         let key = key.finish();
-        if let Some(value) = self.get(S::NAME, key) {
+        if let Some(value) = self.get(stage.slot(), key) {
             return Ok(Keyed { key, value });
         }
         let value = Arc::new(compute(stage, key, env, disk, times)?);
-        self.put(S::NAME, key, &value);
+        self.put(stage.slot(), key, &value);
+        env.cancel.check()?;
         Ok(Keyed { key, value })
+    }
+
+    /// The memoized output of a stage.
+    pub(super) fn known<S: Stage>(&self, stage: &S) -> Option<Arc<S::Output>> {
+        let mut key = KeyBuilder::of_stage(S::NAME);
+        stage.hash_into(&mut key);
+        self.get(stage.slot(), key.finish())
+    }
+
+    /// Frees the memoized output of a stage.
+    pub(super) fn forget(&self, name: &str) {
+        let value = lock(&self.0).get_mut(name).and_then(|slot| slot.value.take());
+        // The value is dropped after the lock is released.
+        drop(value);
     }
 }
 
@@ -137,8 +163,10 @@ fn compute<S: Stage>(stage: &S, key: Key, env: &Env, disk: &Cache, times: &mut S
         return Ok(value);
     }
     let value = stage.run(env)?;
-    // A cancelled stage may have returned anything.
-    env.cancel.check()?;
+    if !S::IGNORES_CANCEL {
+        // A cancelled stage may have returned anything.
+        env.cancel.check()?;
+    }
     times.push((S::NAME, elapsed_ms(start)));
     if let Some((codec, entry)) = &stored {
         entry.store(start, &value, codec.write);

@@ -9,9 +9,9 @@ pub enum VisibilityAlgorithm {
     None,
     /// A walk over the samples of a height-field.
     HeightMarch,
-    /// Slices through the mesh of a surface without overhangs.
+    /// A horizon map from slices through a mesh without overhangs.
     HorizonScan,
-    /// Slices through a mesh with overhangs: horizons, and intervals above them.
+    /// A horizon map and intervals above it, from slices through a mesh with overhangs.
     OcclusionIntervals,
     /// Toroidal shadow maps on the CPU.
     CpuMaps,
@@ -42,13 +42,14 @@ impl VisibilityAlgorithm {
     }
 }
 
-/// The part of the light on a level plane that comes from lower than the steepest slope. Nothing above that is ever blocked.
+/// The part of the light on a level plane that comes from lower than the steepest slope. Nothing above that is ever
+/// blocked.
 pub(super) fn hidden_light(features: &SceneFeatures) -> f64 {
     f64::from(features.steepest).sin().powi(2)
 }
 
-/// Returns true if occlusion can be left out within a quarter of the tolerance: nothing overhangs and no slope is steep. A
-/// direction above the steepest slope sees all of a height-field.
+/// Returns true if occlusion can be left out within a quarter of the tolerance: nothing overhangs and no slope is
+/// steep. A direction above the steepest slope sees all of a height-field.
 fn is_shallow(features: &SceneFeatures, settings: &Settings) -> bool {
     features.height_field && features.closes_plane && hidden_light(features) <= 0.25 * settings.tolerance
 }

@@ -12,8 +12,8 @@ pub const IMAGE_CHECK_PAIRS: usize = 512;
 /// Milliseconds that a factorization takes, on any number of threads.
 const FACTORIZATION_MS: f64 = 800.0;
 
-/// Threads that the choice between direct sum and factors assumes, so that one scene gets one representation on every machine.
-/// The paper's machine had four cores.
+/// Threads that the choice between direct sum and factors assumes, so that one scene gets one representation on every
+/// machine. The paper's machine had four cores.
 const ASSUMED_THREADS: f64 = 4.0;
 
 /// The inputs of all rows, and what several rows need.
@@ -91,9 +91,9 @@ impl<'a> Context<'a> {
         if self.try_low_rank { FACTORIZATION_MS } else { 0.0 }
     }
 
-    /// Sums of analytic lobes are fast enough for single pairs and export, and images read a table of them, so that factors pay
-    /// only if a term is looked up. Few distinct normals have sharp edges between them, which the grid of the lobes resolves
-    /// badly.
+    /// Sums of analytic lobes are fast enough for single pairs and export, and images read a table of them, so that
+    /// factors pay only if a term is looked up. Few distinct normals have sharp edges between them, which the grid of
+    /// the lobes resolves badly.
     fn wants_low_rank(&self) -> bool {
         let features = self.features;
         match self.settings.method {
@@ -127,8 +127,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The part of all directions in which facets see each other: `1 - A/S` for a surface that closes the plane, because every
-    /// ray of uniform light ends on it once. For other surfaces it is a guess.
+    /// The part of all directions in which facets see each other: `1 - A/S` for a surface that closes the plane,
+    /// because every ray of uniform light ends on it once. For other surfaces it is a guess.
     pub fn hidden_directions(&self) -> f64 {
         if self.features.flat { 0.0 } else { (1.0 - 1.0 / self.features.area_ratio.max(1.0)).clamp(0.0, 1.0) }
     }

@@ -218,8 +218,8 @@ fn overhangs(context: &Context<'_>, _: Switch) -> Decision {
 const RAY_NS: f64 = 1500.0;
 const LOBE_NS: f64 = 60.0;
 
-/// Interreflection is on only if asked for. By default `f̄` is the paper's Eq. 7, which leaves it out and which other programs
-/// compute as well; the estimate says how much is missing.
+/// Interreflection is on only if asked for. By default `f̄` is the paper's Eq. 7, which leaves it out and which other
+/// programs compute as well; the estimate says how much is missing.
 fn interreflection(context: &Context<'_>, switch: Switch) -> Decision {
     let Context { features, settings, costs, interreflection: on, .. } = *context;
     let hidden = context.hidden_directions();

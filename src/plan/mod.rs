@@ -1,7 +1,7 @@
 //! The plan: which effects a scene calls for, why, and at what predicted cost.
 //!
-//! Every effect is one row of the table in `effects.rs`: its name, its kind, the switch that forces it, and the function that
-//! decides it. [`Plan::new`] evaluates the rows.
+//! Every effect is one row of the table in `effects.rs`: its name, its kind, the switch that forces it, and the
+//! function that decides it. [`Plan::new`] evaluates the rows.
 
 mod algorithm;
 mod context;

@@ -1,4 +1,4 @@
-//! Presets and knobs: how accurately everything is computed, as typed settings.
+//! Presets and settings: the accuracy of every computation, as typed values.
 
 use crate::effective::{BasisGrid, Interpolation, LowRankSettings};
 use crate::interreflection::InterreflectionSettings;
@@ -27,27 +27,27 @@ impl Preset {
     }
 }
 
-/// How the product is computed.
+/// The way to compute the product.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// Whatever the plan expects to be fastest within the tolerance.
+    /// The way that the plan expects to be fastest within the tolerance.
     Auto,
     Direct,
     LowRank,
 }
 
-/// How visibility is computed.
+/// The way to compute visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VisibilityMethod {
-    /// HorizonMap where nothing overhangs, else what the plan expects to be cheaper.
+    /// A horizon map if nothing overhangs, else the algorithm with the lower predicted cost.
     Auto,
-    /// Cutting the mesh along azimuths.
+    /// Occlusion intervals, from slices through the mesh along azimuths.
     OcclusionIntervals,
     /// Shadow maps along directions.
     Maps,
 }
 
-/// Where to compute.
+/// The processor to compute on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
     Auto,
@@ -55,26 +55,26 @@ pub enum Backend {
     Cpu,
 }
 
-/// Every knob, set.
+/// The values of all settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     pub preset: Preset,
-    /// Facets that stand for the surface.
+    /// Facets that sample the surface.
     pub facets: usize,
-    /// The same where nothing overhangs: no facet hides under others, and fewer are as good.
+    /// Facets of a tile without overhangs: no facet hides under others, so that fewer are as accurate.
     pub height_field_facets: usize,
     /// Azimuths of horizon maps.
     pub horizon_azimuths: usize,
-    /// Azimuths of slices under overhangs.
+    /// Azimuths of occlusion intervals.
     pub slice_azimuths: usize,
-    /// Rings and azimuths of visibility maps, for overhangs. Azimuths count more than rings.
+    /// Rings and azimuths of visibility maps, for overhangs. Azimuths change the error more than rings.
     pub map_grid: PolarGrid,
-    /// Texels a side of the shadow maps behind them.
+    /// Texels per side of the shadow maps that these maps are made from.
     pub map_resolution: u32,
     /// Width of the soft step at a horizon [rad].
     pub penumbra: f32,
     pub visibility_method: VisibilityMethod,
-    /// Bins of normals whose facets share one lobe; `None` for normals as they are.
+    /// Bins of normals whose facets share one lobe; `None` to keep each normal.
     pub normal_bins: Option<usize>,
     pub method: Method,
     pub keep_m: f64,
@@ -84,25 +84,26 @@ pub struct Settings {
     pub grid: PolarGrid,
     pub pairs: HalfDifferenceGrid,
     pub normal_rings: usize,
-    /// Between the nodes of factors and picture tables.
+    /// Interpolation between the nodes of factors and shading tables.
     pub interpolation: Interpolation,
     pub colors: Option<usize>,
     pub keep_color: f64,
-    /// Relative L2 that the factored form may differ from the direct sum by.
+    /// The largest relative L2 of the low-rank representation against the direct sum.
     pub tolerance: f64,
-    /// And the PSNR [dB] that it must reach against it: where `f̄` is broad, a small relative error is still a low PSNR.
-    /// Some 5 dB above what the preset promises: the direct sum has errors of its own.
+    /// The smallest PSNR [dB] of the low-rank representation against the direct sum: if `f̄` is broad, a small relative
+    /// error is still a low PSNR. It is some 5 dB above what the preset promises, because the direct sum has errors
+    /// too.
     pub tolerance_db: f64,
-    /// Grids of the table that pictures read, from coarse to fine; the first that is close enough is taken. None: pictures
-    /// evaluate the BRDF itself.
+    /// Grids of the table that images read, from coarse to fine. The first that is close enough is taken. Without a
+    /// grid, images evaluate the BRDF itself.
     pub image_grids: Vec<HemispherePairGrid>,
-    /// Relative L2 and PSNR [dB] that the table must keep to against the BRDF it is of.
+    /// The largest relative L2 and the smallest PSNR [dB] of the table against its BRDF.
     pub image_tolerance: (f64, f64),
     pub reference_facets: usize,
     pub reference_passes: usize,
     pub backend: Backend,
     pub seed: u64,
-    /// What a person forces on or off.
+    /// Effects that the user forces on or off.
     pub effects: Effects,
 }
 
@@ -111,12 +112,12 @@ const fn hemisphere_pair_grid(rings: usize, azimuths: usize, phi_d: usize, theta
 }
 
 impl Settings {
-    /// Everything a scene asks for.
+    /// The settings of a scene.
     pub fn of(scene: &Scene) -> Self {
         Self { effects: scene.effects.clone(), ..Self::from_quality(&scene.quality) }
     }
 
-    /// The preset's knobs, overridden by those given.
+    /// The settings of a preset, overridden by those that the scene gives.
     pub fn from_quality(quality: &Quality) -> Self {
         let preset = match quality.preset.as_str() {
             "draft" => Preset::Draft,
@@ -132,9 +133,9 @@ impl Settings {
             "cpu" => Backend::Cpu,
             _ => Backend::Auto,
         };
-        let set = |knob: &mut usize, value: Option<usize>| {
+        let set = |setting: &mut usize, value: Option<usize>| {
             if let Some(value) = value {
-                *knob = value;
+                *setting = value;
             }
         };
         set(&mut settings.facets, quality.facets);
@@ -164,11 +165,11 @@ impl Settings {
             Some("cubic") => settings.interpolation = Interpolation::Cubic,
             _ => {}
         }
-        if let Some(kept) = quality.keep_m {
-            settings.keep_m = f64::from(kept);
+        if let Some(energy) = quality.keep_m {
+            settings.keep_m = f64::from(energy);
         }
-        if let Some(kept) = quality.keep_n {
-            settings.keep_n = f64::from(kept);
+        if let Some(energy) = quality.keep_n {
+            settings.keep_n = f64::from(energy);
         }
         if let Some([rings, azimuths]) = quality.grid {
             settings.grid = PolarGrid::new(rings, azimuths);
@@ -269,7 +270,7 @@ impl Settings {
         }
     }
 
-    /// How finely facets exchange light.
+    /// The resolution of interreflection.
     pub fn interreflection(&self) -> InterreflectionSettings {
         let (elements, rays, grid) = match self.preset {
             Preset::Draft => (1024, 16, PolarGrid::new(6, 16)),
@@ -280,13 +281,13 @@ impl Settings {
         InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
     }
 
-    /// The settings for a tile without overhangs, or with.
+    /// The settings for a tile without overhangs, or with them.
     pub fn for_shape(self, height_field: bool) -> Self {
         let facets = if height_field { self.height_field_facets } else { self.facets };
         Self { facets, ..self }
     }
 
-    /// What the factored form needs to know.
+    /// The settings of the low-rank representation.
     pub fn low_rank(&self, whole_sphere: bool) -> LowRankSettings {
         LowRankSettings {
             directions: self.grid,

@@ -70,7 +70,7 @@ fn forcing_a_dropped_effect_on_changes_forty_scenes_by_less_than_the_bound() {
 #[test]
 fn a_dropped_visibility_runs_no_stage_and_takes_no_memory() {
     let visibility = |geometry: &str, effects: &str| {
-        let mut pipeline = Pipeline::new();
+        let pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, BRDFS[0], effects)).unwrap();
         let runs = pipeline.runs().iter().find(|(name, _)| *name == "visibility").unwrap().1;
         let crate::effective::Representation::Direct(direct) = &outcome.brdf.representation else {

@@ -153,8 +153,8 @@ mod tests {
                 let d = cosine_direction(normal, rng.random(), rng.random());
                 let at = |axis: Vec3| f64::from(d.dot(axis));
                 let ring = (16.0 * (at(x).powi(2) + at(y).powi(2))).clamp(0.0, 15.0) as usize;
-                let turn = (32.0 * (at(y).atan2(at(x)) / std::f64::consts::TAU + 1.0).fract()) as usize;
-                counts[32 * ring + turn.min(31)] += 1.0;
+                let azimuth = (32.0 * (at(y).atan2(at(x)) / std::f64::consts::TAU + 1.0).fract()) as usize;
+                counts[32 * ring + azimuth.min(31)] += 1.0;
             }
             let p = crate::testing::chi_square::p_value(&counts, &vec![1.0; counts.len()]);
             // Šidák: four tests at 0.01 together.

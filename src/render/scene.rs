@@ -32,8 +32,8 @@ impl RenderScene {
         Self::with(&Pipeline::new(), loaded)
     }
 
-    /// The render scene of a scene. Object, environment and lights are stages of the pipeline, so that an edit of the scene
-    /// recomputes only what it changes.
+    /// The render scene of a scene. Object, environment and lights are stages of the pipeline, so that an edit of the
+    /// scene recomputes only what it changes.
     ///
     /// # Errors
     /// An object or an environment that cannot be used.
@@ -77,6 +77,11 @@ impl RenderScene {
     /// The occluder of the object; `None` if self-shadowing is off or impossible, or if there is no light.
     pub fn occluder(&self) -> Option<&Occluder> {
         self.object.occluder.as_ref().filter(|_| !self.lights().directional.is_empty())
+    }
+
+    /// The occluder of the object in any light; `None` if self-shadowing is off or impossible.
+    pub fn object_occluder(&self) -> Option<&Occluder> {
+        self.object.occluder.as_ref()
     }
 
     pub fn lights(&self) -> &Lights {

@@ -36,6 +36,7 @@ impl<'a> BuildObject<'a> {
 impl Stage for BuildObject<'_> {
     type Output = RenderObject;
     const NAME: &'static str = "object";
+    const IGNORES_CANCEL: bool = true;
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.debug("object", &self.loaded.scene.object).debug("shadows", &self.loaded.scene.effects.self_shadow);
@@ -71,6 +72,7 @@ impl<'a> LoadEnvironment<'a> {
 impl Stage for LoadEnvironment<'_> {
     type Output = Environment;
     const NAME: &'static str = "environment";
+    const IGNORES_CANCEL: bool = true;
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.debug("name", &self.loaded.scene.light.environment).key("file", &self.file);
@@ -98,6 +100,7 @@ pub struct PlacedLights {
 impl Stage for PlaceLights<'_> {
     type Output = PlacedLights;
     const NAME: &'static str = "lights";
+    const IGNORES_CANCEL: bool = true;
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         let scene = &self.loaded.scene;
@@ -127,6 +130,7 @@ pub struct BuildShadowCache<'a> {
 impl Stage for BuildShadowCache<'_> {
     type Output = Option<ShadowCache>;
     const NAME: &'static str = "shadow_cache";
+    const IGNORES_CANCEL: bool = true;
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.key("object", &self.object.key).key("lights", &self.lights.key);

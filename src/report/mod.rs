@@ -38,7 +38,8 @@ impl Machine {
 /// Name of the processor on Linux, else its architecture.
 fn processor_name() -> String {
     let cpuinfo = if cfg!(target_os = "linux") { std::fs::read_to_string("/proc/cpuinfo").ok() } else { None };
-    cpuinfo.as_deref()
+    cpuinfo
+        .as_deref()
         .and_then(|text| text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':')))
         .map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }

@@ -160,8 +160,8 @@ pub fn measure(
     reference: &ReferenceValues,
 ) -> Result<(SweepPoint, Outcome)> {
     let scene = with_settings(loaded, candidate)?;
-    let mut moved = scene.clone();
-    let edits = moved.scene.nudge_geometry().is_some();
+    let mut edited = scene.clone();
+    let edits = edited.scene.nudge_geometry().is_some();
     let mut pipeline = crate::gpu::pipeline();
     let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
     let started = Instant::now();
@@ -174,7 +174,7 @@ pub fn measure(
     while runs.is_empty() || runs.len() < MAX_RUNS && started.elapsed().as_secs_f64() < ENOUGH_SECONDS {
         // Only the edit back to this scene is timed.
         if edits {
-            pipeline.effective(&moved)?;
+            pipeline.effective(&edited)?;
         } else {
             pipeline = crate::gpu::pipeline();
         }

@@ -1,4 +1,4 @@
-//! Horizons of a height field from its samples. The highest slope along a direction is at a crossing with a mesh edge.
+//! The horizon map of a height field from its samples. The highest slope along a direction is at a crossing with a mesh edge.
 
 use glam::{Vec2, Vec3};
 

@@ -36,7 +36,7 @@ impl HorizonMap {
     /// A horizon so high that the soft step never reaches the zenith.
     pub(super) const BLOCKED: f32 = FRAC_PI_2 + 0.02;
 
-    /// Slices the mesh along every azimuth for every facet. Elevations are exact.
+    /// Cuts the mesh along every azimuth for every facet. Elevations are exact.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         Self::fill_rows(facets.len(), azimuths, transition_width, |along, row| {

@@ -108,7 +108,7 @@ impl OcclusionIntervals {
         blocked.steps as f64 / (FACETS * AZIMUTHS) as f64
     }
 
-    /// Slices the mesh along every azimuth for every facet. Visibility has soft steps of `transition_width` radians.
+    /// Cuts the mesh along every azimuth for every facet. Visibility has soft steps of `transition_width` radians.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         // Multiples of the golden ratio fill [0, 1] evenly, also for consecutive facets.

@@ -11,7 +11,7 @@ use crate::math::simd::{F32x8Array, SimdF32x8};
 /// Number of triangles per block.
 pub(crate) const WIDTH: usize = 8;
 
-/// Eight entries of a cell, in the coordinates of the cell's tile copy. Lanes without an entry are below any height.
+/// A packet of eight entries of a cell, in the coordinates of the cell's tile copy. Lanes without an entry are below any height.
 #[derive(Debug, Clone)]
 struct Block {
     x: [F32x8Array; 3],
@@ -48,7 +48,7 @@ impl<'a> Slicer<'a> {
     }
 }
 
-/// Eight triangles of a cell, with their corners in order of distance across the slices, and the edges between these as
+/// A packet of eight triangles of a cell, with their corners in order of distance across the slices, and the edges between these as
 /// functions of that distance.
 #[derive(Debug, Clone)]
 pub(crate) struct RotatedBlock {
@@ -85,7 +85,7 @@ impl BlockBounds {
     }
 }
 
-/// Eight edges. Each begins at the corner that comes first across the slices, so neighbours compute the same edge.
+/// A packet of eight edges. Each begins at the corner that comes first across the slices, so neighbours compute the same edge.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     along: F32x8Array,

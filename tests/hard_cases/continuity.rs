@@ -20,7 +20,7 @@ fn open(text: &str) -> LoadedScene {
 }
 
 /// Returns values, and the smallest number of facets that are visible from one direction.
-fn values(pipeline: &mut Pipeline, text: &str) -> (Vec<Vec3>, usize) {
+fn values(pipeline: &Pipeline, text: &str) -> (Vec<Vec3>, usize) {
     let outcome = pipeline.effective(&open(text)).unwrap();
     let values = mirror_biased_pairs(64, 21).iter().map(|p| outcome.brdf.eval(p.i, p.o)).collect();
     (values, outcome.health().surface.fewest_visible_facets)
@@ -32,9 +32,9 @@ fn slider_values(min: f64, soft_max: f64) -> [f64; 3] {
     [low, 0.3 * soft_max + 0.7 * min.max(0.0), 0.97 * soft_max]
 }
 
-/// Returns the largest change over a thousandth of the slider, or over half a percent at its lower end. The change must stay
-/// below the tolerance of the plan, or below the noise of the visible facets if that is larger.
-fn probe(pipeline: &mut Pipeline, name: &str, min: f64, soft_max: f64, text: impl Fn(f64) -> String) -> f64 {
+/// Returns the largest change over a thousandth of the slider, or over half a percent at its lower end. The change must
+/// stay below the tolerance of the plan, or below the noise of the visible facets if that is larger.
+fn probe(pipeline: &Pipeline, name: &str, min: f64, soft_max: f64, text: impl Fn(f64) -> String) -> f64 {
     let mut worst = 0.0_f64;
     let mut values_found = Vec::new();
     for at in slider_values(min, soft_max) {
@@ -88,7 +88,7 @@ fn no_slider_of_a_geometry_jumps() {
             };
             let other_keys = other_keys(kind.kind, field.key);
             let other_keys = if field.key == "density" { ", radius = 0.05" } else { other_keys };
-            let worst = probe(&mut pipeline, &format!("{} {}", kind.kind, field.key), min, soft_max, |value| {
+            let worst = probe(&pipeline, &format!("{} {}", kind.kind, field.key), min, soft_max, |value| {
                 format!(
                     "[tile]\ngeometry = {{ kind = \"{}\"{other_keys}, {} = {value} }}\n[[material]]\nname = \"default\"\nbrdf = \
                      {BRDF}\n[[material]]\nname = \"second\"\ncolor = 0.2\n{QUALITY}",
@@ -124,7 +124,7 @@ fn no_slider_of_tile_colour_or_quality_jumps() {
     ];
     let pipeline = Pipeline::new();
     for (name, min, max, text) in sliders {
-        let worst = probe(&mut pipeline, name, min, max, text);
+        let worst = probe(&pipeline, name, min, max, text);
         eprintln!("{name:<12} {:.2} %", 100.0 * worst);
     }
 }
@@ -181,19 +181,13 @@ fn no_slider_of_a_brdf_jumps() {
     for kind in TermSpec::kinds() {
         for field in &kind.fields {
             let FieldShape::Number { min, soft_max, .. } = field.shape else { continue };
-            let worst = probe(
-                &mut pipeline,
-                &format!("{} {}", kind.kind, field.key),
-                min.max(0.1),
-                soft_max,
-                |value| {
-                    format!(
-                        "[tile]\ngeometry = {{ kind = \"pyramids\" }}\n[[material]]\nname = \"default\"\nbrdf = {{ kind = \"{}\", {} \
+            let worst = probe(&pipeline, &format!("{} {}", kind.kind, field.key), min.max(0.1), soft_max, |value| {
+                format!(
+                    "[tile]\ngeometry = {{ kind = \"pyramids\" }}\n[[material]]\nname = \"default\"\nbrdf = {{ kind = \"{}\", {} \
                      = {value} }}\n{QUALITY}",
-                        kind.kind, field.key
-                    )
-                },
-            );
+                    kind.kind, field.key
+                )
+            });
             eprintln!("{:<14} {:<10} {:.2} %", kind.kind, field.key, 100.0 * worst);
         }
     }

@@ -22,8 +22,8 @@ pub struct Evaluator {
     pub health: Health,
 }
 
-/// Returns all evaluators of a case, the direct sum first. The paper's basis has `m_directions`; with `None` it has its full
-/// number, which takes half a minute for a narrow lobe.
+/// Returns all evaluators of a case, the direct sum first. The paper's basis has `m_directions`; with `None` it has its
+/// full number, which takes half a minute for a narrow lobe.
 pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evaluator> {
     let pipeline = Pipeline::new();
     let mut evaluators = Vec::new();
@@ -61,7 +61,8 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
         closes_plane: mesh.closes_plane,
     };
     let mut health = Health::of(&brdf, &inputs, None, Limits { max_rank: 64, tolerance: 0.12 });
-    // The paper's maps have one bit per facet at 137 directions, so their projected area has a large error near the horizon.
+    // The paper's maps have one bit per facet at 137 directions, so their projected area has a large error near the
+    // horizon.
     health.result.projected_area_error = None;
     evaluators.push(Evaluator { name: "wu2011", brdf, health });
     evaluators

@@ -165,7 +165,8 @@ pub fn measured(case: &Case, evaluator: &Evaluator, pairs: &[Pair], direct: &[Ve
 /// The reference evaluates every n-th pair.
 const PAIR_STEP: usize = 12;
 
-/// Returns the row of the reference. It has values and standard errors instead of G, so deviations are in units of its error.
+/// Returns the row of the reference. It has values and standard errors instead of G, so deviations are in units of its
+/// error.
 fn reference(case: &Case, folder: &Path, pairs: &[Pair], direct: &Evaluator) -> Row {
     let facets = 128;
     let settings = ReferenceSettings { facets, max_passes: 4, target: 0.0, seed: 3 };

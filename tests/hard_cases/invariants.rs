@@ -108,6 +108,8 @@ fn a_flat_white_tile_reflects_all_light() {
     }
 }
 
+/// Prints the rows of every eighth case, or of all with `BISCALE_TABLE=1`. `BISCALE_CASES` selects the cases whose name
+/// or family contains it. With `BISCALE_WU2011_FULL=1`, the paper's basis has its full number of directions.
 #[test]
 #[ignore = "minutes: every eighth case; `cargo bench --bench measure -- hard-cases` runs all"]
 fn the_table_of_all_cases_and_evaluators() {

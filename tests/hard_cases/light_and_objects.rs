@@ -1,4 +1,4 @@
-//! Hard light and hard objects: every pixel of the picture is finite and not negative, and energy adds up.
+//! Hard lights and objects: every pixel is finite and not negative, and energy is conserved.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use biscale::scene;
 use biscale::scene::{LoadedScene, Painted};
 use glam::Vec3;
 
-/// A white matte surface that needs no small scale.
+/// A white diffuse surface.
 struct White;
 
 impl Reflectance for White {
@@ -22,15 +22,15 @@ impl Reflectance for White {
     }
 }
 
-fn stage(folder: &Path, text: &str) -> biscale::base::Result<RenderScene> {
+fn render_scene(folder: &Path, text: &str) -> biscale::base::Result<RenderScene> {
     let scene = scene::parse(&format!("[tile]\ngeometry = {{ kind = \"flat\" }}\n{text}")).unwrap();
     let base_dir: PathBuf = folder.to_owned();
     RenderScene::new(&LoadedScene { scene, base_dir, name: String::new(), painted: Painted::default() })
 }
 
-fn image(stage: &RenderScene) -> Vec<Vec3> {
+fn image(render_scene: &RenderScene) -> Vec<Vec3> {
     let background = Background::Uniform(Vec3::ZERO);
-    let rendered = render(&stage.input(&White, [48, 40], 2, &background)).unwrap();
+    let rendered = render(&render_scene.input(&White, [48, 40], 2, &background)).unwrap();
     let pixels = rendered.image.pixels;
     let bad = pixels.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);
     assert_eq!(bad, None, "{:?}", bad.map(|at| pixels[at]));
@@ -42,7 +42,7 @@ fn brightest(pixels: &[Vec3]) -> f32 {
 }
 
 #[test]
-fn lights_of_1e8_and_1e_minus_8_shine_together_and_black_ones_not_at_all() {
+fn lights_of_1e8_and_1e_minus_8_add_up_and_black_lights_add_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let lights = |bright: f64, faint: f64| {
         format!(
@@ -50,17 +50,17 @@ fn lights_of_1e8_and_1e_minus_8_shine_together_and_black_ones_not_at_all() {
              = [-1, 0.2, 0.3], irradiance = {faint} }}]\n"
         )
     };
-    // By itself the plan leaves lights out that another outshines a thousandfold.
-    let told = lights(1e8, 1e-8) + "[effects]\nfaint_lights = \"on\"\n";
-    let both = image(&stage(folder.path(), &told).unwrap());
+    // By default, the plan omits a light if another is a thousand times as bright.
+    let text = lights(1e8, 1e-8) + "[effects]\nfaint_lights = \"on\"\n";
+    let both = image(&render_scene(folder.path(), &text).unwrap());
     assert!(brightest(&both) > 1e7, "{}", brightest(&both));
-    // Where the bright one does not reach, the faint one is seen.
+    // The faint light is visible in the shadow of the bright one.
     let faint = both.iter().filter(|pixel| pixel.x > 1e-11 && pixel.x < 1e-7).count();
     assert!(faint > 10, "{faint}");
-    assert_eq!(brightest(&image(&stage(folder.path(), &lights(0.0, 0.0)).unwrap())), 0.0);
-    let none = stage(folder.path(), "[light]\nenvironment = \"none\"\n").unwrap();
+    assert_eq!(brightest(&image(&render_scene(folder.path(), &lights(0.0, 0.0)).unwrap())), 0.0);
+    let none = render_scene(folder.path(), "[light]\nenvironment = \"none\"\n").unwrap();
     assert_eq!(brightest(&image(&none)), 0.0);
-    assert!(none.lights.warnings.iter().any(|warning| warning.contains("no light")));
+    assert!(none.lights().warnings.iter().any(|warning| warning.contains("no light")));
 }
 
 fn write_sky(path: &Path, width: usize, height: usize, texel: impl Fn(usize, usize) -> f32 + Sync) {
@@ -72,27 +72,31 @@ fn write_sky(path: &Path, width: usize, height: usize, texel: impl Fn(usize, usi
 }
 
 #[test]
-fn skies_with_a_sun_of_one_pixel_or_with_texels_that_are_none_light_the_object() {
+fn skies_with_a_sun_of_one_texel_or_with_invalid_texels_light_the_object() {
     let folder = tempfile::tempdir().unwrap();
     let sky = "[light]\nenvironment = \"sky.exr\"\ncount = 16\n";
     let path = folder.path().join("sky.exr");
     write_sky(&path, 64, 32, |x, y| if (x, y) == (20, 6) { 1e6 } else { 0.0 });
-    let sun = stage(folder.path(), sky).unwrap();
-    assert_eq!(sun.lights.directional.len(), 1, "one pixel, one light");
+    let sun = render_scene(folder.path(), sky).unwrap();
+    assert_eq!(sun.lights().directional.len(), 1, "one texel becomes one light");
     assert!(brightest(&image(&sun)) > 1.0);
-    // Infinite, NaN, negative and absurd texels among even ones.
-    let hostile = [f32::INFINITY, f32::NAN, -5.0, 3e38];
-    write_sky(&path, 64, 32, |x, y| if (x + 7 * y) % 31 < 4 { hostile[(x + 7 * y) % 31] } else { 1.0 });
-    let spoilt = stage(folder.path(), sky).unwrap();
-    assert!(spoilt.lights.warnings.iter().any(|w| w.contains("count as black")), "{:?}", spoilt.lights.warnings);
-    let found = brightest(&image(&spoilt));
+    // Infinite, NaN, negative and huge texels among texels of 1.
+    let invalid = [f32::INFINITY, f32::NAN, -5.0, 3e38];
+    write_sky(&path, 64, 32, |x, y| if (x + 7 * y) % 31 < 4 { invalid[(x + 7 * y) % 31] } else { 1.0 });
+    let repaired = render_scene(folder.path(), sky).unwrap();
+    assert!(
+        repaired.lights().warnings.iter().any(|w| w.contains("count as black")),
+        "{:?}",
+        repaired.lights().warnings
+    );
+    let found = brightest(&image(&repaired));
     assert!(found > 0.3 && found < 3.0, "{found}");
     write_sky(&path, 64, 32, |_, _| 0.0);
-    assert_eq!(brightest(&image(&stage(folder.path(), sky).unwrap())), 0.0);
-    // A side that is prime: nothing divides it.
+    assert_eq!(brightest(&image(&render_scene(folder.path(), sky).unwrap())), 0.0);
+    // The width is a prime number.
     write_sky(&path, 1031, 3, |_, _| 1.0);
-    let odd = stage(folder.path(), sky).unwrap();
-    let total: f32 = odd.lights.directional.iter().map(|light| light.irradiance.x).sum();
+    let odd = render_scene(folder.path(), sky).unwrap();
+    let total: f32 = odd.lights().directional.iter().map(|light| light.irradiance.x).sum();
     assert!((total / (4.0 * std::f32::consts::PI) - 1.0).abs() < 1e-3, "{total}");
 }
 
@@ -111,14 +115,16 @@ fn objects_with_degenerate_uvs_poles_or_the_camera_inside_are_shaded() {
     ];
     for (name, text) in meshes {
         std::fs::write(folder.path().join("object.obj"), text).unwrap();
-        let stage =
-            stage(folder.path(), "[object]\nkind = \"mesh\"\npath = \"object.obj\"\n[camera]\nazimuth_deg = 0\n");
-        let stage = stage.unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert!(brightest(&image(&stage)) > 0.0, "{name}");
+        let scene = render_scene(
+            folder.path(),
+            "[object]\nkind = \"mesh\"\npath = \"object.obj\"\n[camera]\nazimuth_deg = 0\n",
+        );
+        let scene = scene.unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(brightest(&image(&scene)) > 0.0, "{name}");
         let sound = |v: &Vec3| v.is_finite() && (v.length() - 1.0).abs() < 1e-3;
-        assert!(stage.mesh().tangents.iter().chain(stage.mesh().normals).all(sound), "{name}");
+        assert!(scene.mesh().tangents.iter().chain(&scene.mesh().normals).all(sound), "{name}");
     }
-    // From straight above, where the sphere's frame has its pole, and from inside of it.
+    // From straight above, at the pole of the sphere's frame, and from inside.
     for camera in [
         "elevation_deg = 90",
         "elevation_deg = -90",
@@ -127,19 +133,19 @@ fn objects_with_degenerate_uvs_poles_or_the_camera_inside_are_shaded() {
         "fov_deg = 150\ndistance = 0.5",
     ] {
         for kind in ["sphere", "cup", "teapot"] {
-            image(&stage(folder.path(), &format!("[object]\nkind = \"{kind}\"\n[camera]\n{camera}\n")).unwrap());
+            image(&render_scene(folder.path(), &format!("[object]\nkind = \"{kind}\"\n[camera]\n{camera}\n")).unwrap());
         }
     }
 }
 
 #[test]
-fn even_light_from_everywhere_leaves_a_white_sphere_white() {
+fn uniform_light_from_all_directions_gives_a_white_sphere() {
     let folder = tempfile::tempdir().unwrap();
     write_sky(&folder.path().join("sky.exr"), 64, 32, |_, _| 1.0);
-    let stage = stage(folder.path(), "[light]\nenvironment = \"sky.exr\"\ncount = 256\n").unwrap();
-    let mut values: Vec<f32> = image(&stage).iter().map(|pixel| pixel.x).filter(|x| *x > 0.2).collect();
+    let scene = render_scene(folder.path(), "[light]\nenvironment = \"sky.exr\"\ncount = 256\n").unwrap();
+    let mut values: Vec<f32> = image(&scene).iter().map(|pixel| pixel.x).filter(|x| *x > 0.2).collect();
     values.sort_by(f32::total_cmp);
-    // A few hundred lights stand for all directions: 1 within what they leave.
+    // The 256 lights sample the sphere, so the median is 1 within their sampling error.
     let median = values[values.len() / 2];
     assert!((median - 1.0).abs() < 0.02, "{median}");
     assert!(from_angles(0.0, 0.0) == Vec3::Z);

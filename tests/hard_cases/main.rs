@@ -1,14 +1,9 @@
-//! Hard cases: directions, geometries, BRDFs, lights and objects at the limits of what a scene allows. Every evaluator must keep
-//! the invariants of an effective BRDF on each.
+//! Hard cases: directions, geometries, BRDFs, lights and objects at the limits of what a scene allows. Every evaluator
+//! must keep the invariants of an effective BRDF on each.
 //!
 //! `cargo bench --bench measure -- hard-cases` prints the worst deviation and its bound for every case and evaluator;
 //! `docs/measurements/hard_cases.md` holds the table.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::disallowed_methods,
-    reason = "a failing test may panic"
-)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::disallowed_methods, reason = "a failing test may panic")]
 
 mod cases;
 mod continuity;

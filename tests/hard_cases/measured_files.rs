@@ -1,4 +1,4 @@
-//! Measured BRDFs with samples that are none: negative, NaN, infinite, missing, all zero, fireflies.
+//! Measured BRDFs with invalid samples: negative, NaN, infinite, missing, zero, and extremely large.
 
 use std::path::Path;
 
@@ -11,8 +11,9 @@ use crate::examination::open;
 
 const BINS: [usize; 3] = [90, 90, 180];
 
-/// A MERL file of a matte paint with a broad lobe, with some of its samples replaced: `spoil(index)`.
-fn merl(path: &Path, spoil: impl Fn(usize) -> Option<f64>) {
+/// Writes a MERL file of a diffuse paint with a broad lobe. `replace(index)` returns the sample to store instead, if
+/// any.
+fn merl(path: &Path, replace: impl Fn(usize) -> Option<f64>) {
     let plane = BINS.iter().product::<usize>();
     let mut bytes: Vec<u8> = BINS.iter().flat_map(|n| (*n as i32).to_le_bytes()).collect();
     bytes.reserve(24 * plane);
@@ -20,18 +21,17 @@ fn merl(path: &Path, spoil: impl Fn(usize) -> Option<f64>) {
         for index in 0..plane {
             let h = (index / 180 / 90) as f64 / 90.0;
             let value = (0.2 + 2.0 * (-(6.0 * h * h).powi(2)).exp()) / scale;
-            bytes.extend(spoil(index).unwrap_or(value).to_le_bytes());
+            bytes.extend(replace(index).unwrap_or(value).to_le_bytes());
         }
     }
     std::fs::write(path, bytes).unwrap();
 }
 
-/// What a file says of itself, and what is wrong with values made from it.
 #[test]
-fn measured_brdfs_with_bad_samples_give_sound_values_and_say_what_was_left_out() {
+fn measured_brdfs_with_invalid_samples_give_sound_values_and_report_the_rejected_samples() {
     let every = |step: usize, value: f64| move |k: usize| k.is_multiple_of(step).then_some(value);
-    type Spoil<'a> = &'a dyn Fn(usize) -> Option<f64>;
-    let cases: [(&str, Spoil<'_>, f64, &str); 7] = [
+    type Replace<'a> = &'a dyn Fn(usize) -> Option<f64>;
+    let cases: [(&str, Replace<'_>, f64, &str); 7] = [
         ("negative", &every(3, -1.0), 0.33, "33 % of the samples"),
         ("NaN", &every(2, f64::NAN), 0.5, "50 % of the samples"),
         ("infinite", &every(50, f64::INFINITY), 0.02, ""),
@@ -41,8 +41,8 @@ fn measured_brdfs_with_bad_samples_give_sound_values_and_say_what_was_left_out()
         ("sound", &|_| None, 0.0, ""),
     ];
     let folder = tempfile::tempdir().unwrap();
-    for (name, spoil, rejected, warning) in cases {
-        merl(&folder.path().join("paint.binary"), spoil);
+    for (name, replace, rejected, warning) in cases {
+        merl(&folder.path().join("paint.binary"), replace);
         let case = Case {
             family: "measured",
             name,
@@ -61,9 +61,9 @@ fn measured_brdfs_with_bad_samples_give_sound_values_and_say_what_was_left_out()
             let [table] = &health.measured[..] else { panic!("{name}: {:?}", health.measured) };
             let part = table.rejected as f64 / table.samples as f64;
             assert!((part - rejected).abs() < 0.01, "{name}: {part} rejected");
-            let words = health.warnings.join("\n");
-            assert!(words.contains(warning), "{name}: {words}");
-            assert!(!warning.is_empty() || !words.contains("paint"), "{name}: {words}");
+            let warnings = health.warnings.join("\n");
+            assert!(warnings.contains(warning), "{name}: {warnings}");
+            assert!(!warning.is_empty() || !warnings.contains("paint"), "{name}: {warnings}");
         }
     }
 }

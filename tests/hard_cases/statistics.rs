@@ -1,4 +1,5 @@
-//! Statistics as pbrt and mitsuba hold theirs to: χ² of every sampling routine at 0.01 with Šidák's correction, energy.
+//! χ² tests of every sampling routine at the level 0.01 with Šidák's correction, and Monte Carlo tests of energy, as in
+//! pbrt and Mitsuba.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,7 +17,7 @@ mod chi_square;
 
 use chi_square::p_value;
 
-/// Šidák: `tests` tests at this level together reject a right routine once in a hundred times.
+/// Returns the level at which `tests` tests together reject a correct routine once in a hundred runs (Šidák).
 fn level(tests: usize) -> f64 {
     1.0 - (1.0 - 0.01_f64).powf(1.0 / tests as f64)
 }
@@ -26,19 +27,19 @@ fn tile(geometry: &str) -> TileMesh {
     geometry::build(&scene.tile, std::path::Path::new("")).unwrap()
 }
 
-/// Parts of the area that each triangle has.
-fn parts(mesh: &TileMesh) -> Vec<f64> {
+/// Returns the area of each triangle.
+fn areas(mesh: &TileMesh) -> Vec<f64> {
     (0..mesh.triangles.len()).map(|t| mesh.triangle_area(t)).collect()
 }
 
-/// Facets on each triangle, and in each of sixteen equal parts of whatever triangle they are on. Pooled over triangles: points
-/// that are more even than random ones hide a skew from a test of many cells.
+/// Returns the facets on each triangle, and those in each of sixteen equal parts of a triangle. The parts are pooled
+/// over the triangles: with points that are more even than random ones, a test of many cells would not detect a bias.
 fn counts(mesh: &TileMesh, facets: &Facets) -> [Vec<f64>; 2] {
     let [mut on, mut inside] = [vec![0.0; mesh.triangles.len()], vec![0.0; 64]];
     for s in 0..facets.len() {
         let triangle = facets.triangles[s] as usize;
         let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
-        // Copies over the tile's edge come back in: the nearest of them is the facet.
+        // Facets beyond the edge of the tile are wrapped. The nearest copy is the facet.
         let near = |p: glam::DVec3| {
             let size = mesh.size.as_dvec2();
             let step = ((a + b + c) / 3.0 - p).truncate() / size;
@@ -51,7 +52,7 @@ fn counts(mesh: &TileMesh, facets: &Facets) -> [Vec<f64>; 2] {
         on[triangle] += 1.0;
         inside[16 * cell[0] + 4 * cell[1] + cell[2]] += 1.0;
     }
-    // Quarters of the weights add up to three or two; the others are rounding at edges.
+    // The integer parts of the weights add up to three or two; other cells come from rounding at edges.
     let real = (0..64).filter(|k| (2..=3).contains(&(k / 16 + k / 4 % 4 + k % 4)));
     [on, real.map(|k| inside[k]).collect()]
 }
@@ -65,14 +66,14 @@ fn every_sampling_routine_passes_the_chi_squared_test() {
     ];
     for (name, geometry) in shapes {
         let mesh = tile(geometry);
-        let parts = parts(&mesh);
-        let mut judge = |what: &str, [on, inside]: [Vec<f64>; 2]| {
-            p_values.push((format!("{what} on {name}, triangles"), p_value(&on, &parts)));
-            p_values.push((format!("{what} on {name}, places in them"), p_value(&inside, &[1.0; 16])));
+        let areas = areas(&mesh);
+        let mut record = |what: &str, [on, inside]: [Vec<f64>; 2]| {
+            p_values.push((format!("{what} on {name}, triangles"), p_value(&on, &areas)));
+            p_values.push((format!("{what} on {name}, parts of them"), p_value(&inside, &[1.0; 16])));
         };
-        // The paper's random facets.
-        judge("random facets", counts(&mesh, &Facets::sample_wu2011(&mesh, 20_000, 7)));
-        // One facet a shift: over shifts a systematic facet falls anywhere with equal chance.
+        // The random facets of the paper.
+        record("random facets", counts(&mesh, &Facets::sample_wu2011(&mesh, 20_000, 7)));
+        // Over random shifts, a systematic facet is uniformly distributed.
         let sampler = FacetSampler::new(&mesh);
         let mut all = counts(&mesh, &Facets::default());
         for seed in 0..1_000 {
@@ -81,37 +82,37 @@ fn every_sampling_routine_passes_the_chi_squared_test() {
                 all.iter_mut().zip(one).for_each(|(all, one)| *all += one);
             }
         }
-        judge("997,000 systematic facets", all);
+        record("997,000 systematic facets", all);
     }
-    // Directions of test pairs: uniform in solid angle down to 85°; of every second pair the viewer too.
+    // Lights of test pairs are uniform in solid angle up to 85°, and so are the viewers of every second pair.
     let pairs = mirror_biased_pairs(1_000_000, 12);
     let lowest = 85.0_f64.to_radians().cos();
     let binned = |directions: &mut dyn Iterator<Item = Vec3>| {
         let mut counts = vec![0.0; 20 * 40];
         for d in directions {
             let ring = ((f64::from(d.z) - lowest) / (1.0 - lowest) * 20.0).clamp(0.0, 19.0) as usize;
-            let turn = (f64::from(d.y).atan2(f64::from(d.x)) / TAU + 1.0).fract() * 40.0;
-            counts[ring * 40 + (turn as usize).min(39)] += 1.0;
+            let azimuth = (f64::from(d.y).atan2(f64::from(d.x)) / TAU + 1.0).fract() * 40.0;
+            counts[ring * 40 + (azimuth as usize).min(39)] += 1.0;
         }
         counts
     };
     let even = vec![1.0 / 800.0; 800];
     p_values.push(("lights of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.i)), &even)));
     p_values.push(("viewers of pairs".to_owned(), p_value(&binned(&mut pairs.iter().step_by(2).map(|p| p.o)), &even)));
-    // Views of pictures: uniform in the square of the sine; of every second pair the light uniform in solid angle.
+    // Views of images are uniform in the square of the sine. Lights of every second pair are uniform in solid angle.
     let pairs = image_pairs(1_000_000, 13);
     let binned = |part: &dyn Fn(&Pair) -> (f64, Vec3)| {
         let mut counts = vec![0.0; 20 * 40];
         for (height, d) in pairs.iter().step_by(2).map(part) {
-            let turn = (f64::from(d.y).atan2(f64::from(d.x)) / TAU + 1.0).fract() * 40.0;
-            counts[((height * 20.0) as usize).min(19) * 40 + (turn as usize).min(39)] += 1.0;
+            let azimuth = (f64::from(d.y).atan2(f64::from(d.x)) / TAU + 1.0).fract() * 40.0;
+            counts[((height * 20.0) as usize).min(19) * 40 + (azimuth as usize).min(39)] += 1.0;
         }
         counts
     };
     let views = binned(&|p| (1.0 - f64::from(p.o.z).powi(2), p.o));
-    p_values.push(("views of pictures".to_owned(), p_value(&views, &even)));
+    p_values.push(("views of images".to_owned(), p_value(&views, &even)));
     let lights = binned(&|p| (f64::from(p.i.z), p.i));
-    p_values.push(("lights of pictures".to_owned(), p_value(&lights, &even)));
+    p_values.push(("lights of images".to_owned(), p_value(&lights, &even)));
     for (what, p) in &p_values {
         eprintln!("p = {p:.4}  {what}");
         assert!(*p > level(p_values.len()), "{what}: p = {p}, below {}", level(p_values.len()));
@@ -119,22 +120,22 @@ fn every_sampling_routine_passes_the_chi_squared_test() {
 }
 
 #[test]
-fn the_chi_squared_test_itself_rejects_a_skew_of_two_percent() {
+fn the_chi_squared_test_rejects_a_bias_of_two_percent() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut fair = vec![0.0; 64];
-    let mut skew = vec![0.0; 64];
+    let mut biased = vec![0.0; 64];
     for _ in 0..1_000_000 {
         let u: f64 = random.random();
         fair[(u * 64.0) as usize] += 1.0;
-        skew[(u.powf(1.02) * 64.0) as usize] += 1.0;
+        biased[(u.powf(1.02) * 64.0) as usize] += 1.0;
     }
     let even = vec![1.0 / 64.0; 64];
-    assert!(p_value(&fair, &even) > 0.01 && p_value(&skew, &even) < 1e-6);
+    assert!(p_value(&fair, &even) > 0.01 && p_value(&biased, &even) < 1e-6);
 }
 
-/// pbrt's test of energy, with error bars: uniform directions over the hemisphere.
+/// Integrates over uniform directions of the hemisphere, with error bars, as pbrt's test of energy does.
 #[test]
-fn conserving_brdfs_send_back_no_more_than_they_get_and_the_quadrature_agrees() {
+fn conserving_brdfs_reflect_no_more_than_they_receive_and_the_quadrature_agrees() {
     let mut random = ChaCha8Rng::seed_from_u64(77);
     for term in [
         Term::Lambertian { albedo: Vec3::ONE },

@@ -1,4 +1,4 @@
-//! A million facets: sums in f32 lanes against the same terms in f64.
+//! Sums over a million facets in SIMD lanes, against sums of the same terms in f64.
 
 use biscale::math::directions::from_angles;
 use biscale::math::simd;
@@ -16,7 +16,7 @@ fn sums_over_a_million_facets_lose_less_than_a_millionth() {
         .map(|_| from_angles(1.2 * random.random::<f32>(), std::f32::consts::TAU * random.random::<f32>()))
         .collect();
     let [x, y, z]: [Vec<f32>; 3] = std::array::from_fn(|c| normals.iter().map(|n| n[c]).collect());
-    // Areas that differ by six orders, visibilities between 0 and 1.
+    // Areas over six orders of magnitude, visibilities between 0 and 1.
     let areas: Vec<f32> = (0..COUNT).map(|_| 1e-6 * 10f32.powf(6.0 * random.random::<f32>())).collect();
     let mut soft = || -> Vec<f32> { (0..COUNT).map(|_| random.random::<f32>()).collect() };
     let (v_i, v_o) = (soft(), soft());

@@ -1,4 +1,4 @@
-//! Turning or mirroring the tile and the directions together changes nothing, and neither does the unit of length.
+//! Invariance under rotation and reflection of tile and directions, and under the unit of length.
 
 use std::sync::Arc;
 
@@ -12,19 +12,19 @@ use biscale::{geometry, scene};
 use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 
-/// A motion that maps the lattice of a tile to that of another.
-struct Motion {
+/// A map of the lattice of a tile to that of another.
+struct Isometry {
     name: &'static str,
     matrix: Mat3,
 }
 
-fn motions() -> [Motion; 4] {
+fn isometries() -> [Isometry; 4] {
     let rows = |x: Vec3, y: Vec3| Mat3::from_cols(x, y, Vec3::Z);
     [
-        Motion { name: "a quarter turn", matrix: rows(Vec3::Y, Vec3::NEG_X) },
-        Motion { name: "half a turn", matrix: rows(Vec3::NEG_X, Vec3::NEG_Y) },
-        Motion { name: "the mirror image in x", matrix: rows(Vec3::NEG_X, Vec3::Y) },
-        Motion { name: "the mirror image in the diagonal", matrix: rows(Vec3::Y, Vec3::X) },
+        Isometry { name: "a quarter turn", matrix: rows(Vec3::Y, Vec3::NEG_X) },
+        Isometry { name: "half a turn", matrix: rows(Vec3::NEG_X, Vec3::NEG_Y) },
+        Isometry { name: "the mirror image in x", matrix: rows(Vec3::NEG_X, Vec3::Y) },
+        Isometry { name: "the mirror image in the diagonal", matrix: rows(Vec3::Y, Vec3::X) },
     ]
 }
 
@@ -40,8 +40,8 @@ const TILES: [(&str, &str); 4] = [
     ("threads", r#"{ kind = "weave", warp_count = 2, weft_count = 2 }"#),
 ];
 
-/// A mesh and its facets, moved: the same facets, so that only visibility and sums can differ.
-fn moved(mesh: &TileMesh, facets: &Facets, matrix: Mat3) -> (TileMesh, Facets) {
+/// Returns the transformed mesh and facets. The facets correspond, so only visibility and sums can differ.
+fn transformed(mesh: &TileMesh, facets: &Facets, matrix: Mat3) -> (TileMesh, Facets) {
     let mut mesh = mesh.clone();
     mesh.size = (matrix * mesh.size.extend(0.0)).truncate().abs();
     mesh.positions.iter_mut().for_each(|p| *p = matrix * *p);
@@ -56,7 +56,7 @@ fn moved(mesh: &TileMesh, facets: &Facets, matrix: Mat3) -> (TileMesh, Facets) {
     (mesh, facets)
 }
 
-fn sight(mesh: &TileMesh, facets: &Facets) -> Visibility {
+fn visibility(mesh: &TileMesh, facets: &Facets) -> Visibility {
     let grid = PeriodicGrid::new(mesh);
     if mesh.is_height_field() {
         Visibility::HorizonMap(HorizonMap::scan(&grid, facets, 32, 0.02))
@@ -72,7 +72,7 @@ fn material() -> Material {
 
 fn evaluators(mesh: &TileMesh, facets: &Facets) -> [(&'static str, EffectiveBrdf); 2] {
     let (slots, materials) = (vec![0; mesh.slots.len()], [material()]);
-    let visibility = Arc::new(sight(mesh, facets));
+    let visibility = Arc::new(visibility(mesh, facets));
     let base_area = f64::from(mesh.base_area());
     let settings = Settings::of_preset(Preset::Draft).low_rank(!mesh.is_height_field());
     let factors = LowRank::build(facets, &visibility, &slots, &materials, &settings).unwrap();
@@ -84,36 +84,39 @@ fn evaluators(mesh: &TileMesh, facets: &Facets) -> [(&'static str, EffectiveBrdf
 }
 
 #[test]
-fn turning_or_mirroring_tile_and_directions_together_changes_nothing_but_rounding() {
+fn rotating_or_mirroring_tile_and_directions_changes_only_rounding() {
     let pairs = mirror_biased_pairs(120, 8);
     for (name, geometry) in TILES {
         let mesh = tile(geometry);
         let mut facets = FacetSampler::new(&mesh).sample(&mesh, 512, SampleShift::from_seed(1));
         facets.sort_for_sums();
         let here = evaluators(&mesh, &facets);
-        for motion in motions() {
-            let (mesh, facets) = moved(&mesh, &facets, motion.matrix);
+        for isometry in isometries() {
+            let (mesh, facets) = transformed(&mesh, &facets, isometry.matrix);
             let there = evaluators(&mesh, &facets);
             for ((evaluator, here), (_, there)) in here.iter().zip(&there) {
                 let largest = pairs.iter().map(|p| here.g(p.i, p.o).max_element()).fold(0.0, f32::max);
-                let mut apart: Vec<f32> = pairs
+                let mut differences: Vec<f32> = pairs
                     .par_iter()
-                    .map(|p| (here.g(p.i, p.o) - there.g(motion.matrix * p.i, motion.matrix * p.o)).abs().max_element())
+                    .map(|p| {
+                        (here.g(p.i, p.o) - there.g(isometry.matrix * p.i, isometry.matrix * p.o)).abs().max_element()
+                    })
                     .collect();
-                apart.sort_by(f32::total_cmp);
-                // Grid steps turn onto grid steps: exact but for rounding, which at a silhouette may flip a facet's view (one
-                // of 512). OcclusionIntervals under overhangs change over between azimuths facet by facet, from one side to the other:
-                // their mirror image is another interpolation. The factored form's random projection is another one, too.
-                let (typical, worst) = (apart[apart.len() / 2] / largest, apart[apart.len() - 1] / largest);
+                differences.sort_by(f32::total_cmp);
+                // Grid steps map onto grid steps, so only rounding differs, which at a silhouette may flip one of 512
+                // facets. Under overhangs, the interpolation between azimuths is not symmetric, so its mirror image
+                // differs. The random projection of low-rank factors differs, too.
+                let (typical, worst) =
+                    (differences[differences.len() / 2] / largest, differences[differences.len() - 1] / largest);
                 let overhangs = ["rods", "threads"].contains(&name);
-                let mirrored = motion.matrix.determinant() < 0.0;
+                let mirrored = isometry.matrix.determinant() < 0.0;
                 let limits = match *evaluator {
                     "direct" if mirrored && overhangs => [1e-2, 0.1],
                     "direct" => [1e-5, 2e-2],
                     _ => [1e-2, 0.1],
                 };
                 let what =
-                    format!("{name}, {evaluator}, {}: {typical:.1e} typically, {worst:.1e} at worst", motion.name);
+                    format!("{name}, {evaluator}, {}: {typical:.1e} typically, {worst:.1e} at worst", isometry.name);
                 assert!(typical < limits[0] && worst < limits[1], "{what}");
             }
         }
@@ -137,16 +140,16 @@ fn the_unit_of_length_changes_nothing() {
             let mut facets = FacetSampler::new(&mesh).sample(&mesh, 256, SampleShift::from_seed(1));
             facets.sort_for_sums();
             assert_eq!(mesh.size, Vec2::splat(unit as f32));
-            let made = evaluators(&mesh, &facets);
-            directions.iter().flat_map(|p| made.iter().map(|(_, brdf)| brdf.eval(p.i, p.o))).collect()
+            let evaluators = evaluators(&mesh, &facets);
+            directions.iter().flat_map(|p| evaluators.iter().map(|(_, brdf)| brdf.eval(p.i, p.o))).collect()
         };
-        // Powers of two: not a bit may differ, where nothing holds lengths against numbers of its own.
+        // The units are powers of two, which scale without rounding.
         let one = value(1.0);
         let scale = one.iter().map(|v| v.max_element()).fold(0.0, f32::max);
         for unit in [f64::exp2(-18.0), f64::exp2(18.0)] {
             let other = value(unit);
-            let apart = one.iter().zip(&other).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
-            assert!(apart < 1e-4 * scale, "{geometry} of {unit}: {apart} of {scale}");
+            let difference = one.iter().zip(&other).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+            assert!(difference < 1e-4 * scale, "{geometry} of {unit}: {difference} of {scale}");
         }
     }
 }

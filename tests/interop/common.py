@@ -1,4 +1,4 @@
-"""What the checks against other programs share: the command line of biscale, direction pairs, and a table of results."""
+"""Code that the checks against other programs share: the command line of biscale, direction pairs, and a table of results."""
 
 import json
 import os
@@ -23,18 +23,18 @@ BISCALE = os.environ.get("BISCALE", str(ROOT / "target/release/biscale"))
 
 
 def skip(reason):
-    """Ends a check that cannot run here: loudly, but not as a failure."""
+    """Ends a check that cannot run here. It prints SKIPPED and does not fail."""
     print(f"SKIPPED: {reason}")
     sys.exit(0)
 
 
 def children_seconds():
-    """Processor seconds of the programs that were run so far; where they are not counted, those of the clock."""
+    """Returns the CPU seconds of all child processes; wall-clock seconds if the system does not count them."""
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime if resource else time.time()
 
 
 def biscale(*arguments):
-    """Runs the program; returns what it prints and the processor seconds it took, all cores together."""
+    """Runs the program. Returns its standard output and its CPU seconds over all cores."""
     start = children_seconds()
     environment = {**os.environ, "BISCALE_CACHE": "off"}
     done = subprocess.run([BISCALE, *map(str, arguments)], check=True, capture_output=True, text=True, env=environment)
@@ -42,13 +42,13 @@ def biscale(*arguments):
 
 
 def export(scene, path, *options):
-    """Exports a table; returns the report and the seconds."""
+    """Exports a table. Returns the report and the CPU seconds."""
     out, seconds = biscale("export", scene, "-o", path, "--json", "--quiet", *options)
     return json.loads(out), seconds
 
 
 def direction(theta, phi):
-    """Unit vectors, xyz last."""
+    """Returns unit vectors. The last axis holds x, y and z."""
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
 
 
@@ -57,7 +57,8 @@ def angles(vector):
 
 
 def random_pairs(count, seed=1, lowest_deg=85):
-    """`theta_i, phi_i, theta_o, phi_o`: up to 85 degrees, uniform in solid angle, half of them near the mirror direction."""
+    """Returns rows of `theta_i, phi_i, theta_o, phi_o`, uniform in solid angle up to a bound; half of them are near the mirror
+    direction."""
     rng = np.random.default_rng(seed)
     least = np.cos(np.radians(lowest_deg))
 
@@ -75,20 +76,20 @@ def random_pairs(count, seed=1, lowest_deg=85):
 
 
 def evaluate(scene, pairs, folder, *options):
-    """f_bar of `biscale eval` at the pairs: an array of RGB."""
-    asked, told = Path(folder) / "pairs.csv", Path(folder) / "values.csv"
-    np.savetxt(asked, pairs, delimiter=",", header="theta_i,phi_i,theta_o,phi_o", comments="", fmt="%.9g")
-    biscale("eval", scene, "--pairs", asked, "-o", told, "--quiet", *options)
-    return np.loadtxt(told, delimiter=",", skiprows=1)[:, 4:7]
+    """Returns f_bar of `biscale eval` at the pairs, as an array of RGB."""
+    pairs_path, values_path = Path(folder) / "pairs.csv", Path(folder) / "values.csv"
+    np.savetxt(pairs_path, pairs, delimiter=",", header="theta_i,phi_i,theta_o,phi_o", comments="", fmt="%.9g")
+    biscale("eval", scene, "--pairs", pairs_path, "-o", values_path, "--quiet", *options)
+    return np.loadtxt(values_path, delimiter=",", skiprows=1)[:, 4:7]
 
 
 def mean_error(found, expected):
-    """Mean of the differences over the mean of what is expected."""
+    """Returns the mean difference divided by the mean expected value."""
     return np.abs(found - expected).sum() / np.abs(expected).sum()
 
 
 class Table:
-    """Rows of results that are printed as they come, and whether all of them are as they must be."""
+    """Prints rows of results at once, and records whether all checks pass."""
 
     def __init__(self, *columns):
         self.passed = True

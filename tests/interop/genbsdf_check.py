@@ -1,7 +1,7 @@
-"""Radiance's own light transport on the exported tile against our Klems matrix: what genBSDF does, with rfluxmtx and one
-bounce, which is what both compute: matte grooves. And the same grooves of Radiance's rough metal, which a MERL file gives us,
-under its own light sources by rtrace, direction by direction: what rfluxmtx scatters off a rough metal it scales to the full
-reflectance at every angle (a flat sheet of 0.75 returns 0.75 at 85 degrees, where its formula returns 0.59).
+"""Light transport of Radiance on the exported tile, against the Klems matrix of biscale. Diffuse grooves are computed as genBSDF
+does, by rfluxmtx with one bounce. Grooves of Radiance's rough metal, which biscale reads as a MERL file, are computed direction by
+direction with rtrace and a light source. rfluxmtx does not fit there, because it scales the light scattered by a rough metal to the
+full reflectance at every angle: a flat sheet of 0.75 returns 0.75 at 85 degrees, while its formula returns 0.59.
 
     python tests/interop/genbsdf_check.py
 """
@@ -23,36 +23,36 @@ except ImportError as error:
 
 PERIODS, ALBEDO, ROUGHNESS = 17, 0.75, 0.3
 SCENE = ["fig1e_lambertian", "--set", "material.sides.color=[1,1,1]"]
-# Pairs of the glossy check, rays over the period (a lattice), and the width of the source.
+# Pairs of the glossy check, rays over the period (a lattice), and the angular width of the source.
 PAIRS, RAYS, GOLDEN, SOURCE_DEG = 80, 2000, 0.618034, 0.5
 SLOTS = ["bottom", "sides"]
 RECEIVER = "#@rfluxmtx h=kf u=+Y\nvoid glow g\n0\n0\n4 1 1 1 0\n\ng source s\n0\n0\n4 0 0 1 180\n"
-# One period in the middle of the others, seen from just above.
+# One period in the middle of the others, viewed from just above.
 LOW, HIGH, TOP = PERIODS // 2, PERIODS // 2 + 1, 0.001
 SENDER = f"#@rfluxmtx h=-kf u=+Y\nvoid glow b\n0\n0\n4 0 0 0 0\n\nb polygon p\n0\n0\n12 {LOW} {LOW} {TOP} {HIGH} {LOW} {TOP} {HIGH} {HIGH} {TOP} {LOW} {HIGH} {TOP}\n"
 
 
 def projected():
-    """Projected solid angle of each patch."""
+    """Returns the projected solid angle of each patch."""
     area = [np.pi * (np.sin(np.radians(high)) ** 2 - np.sin(np.radians(low)) ** 2) / count for low, high, count in RINGS]
     return np.repeat(area, [count for _, _, count in RINGS])
 
 
 def klems(path):
-    """The luminance of the lit side, [leaving, incident]."""
+    """Returns the luminance on the lit side, indexed [leaving, incident]."""
     text = Path(path).read_text()
     block = re.search(r">Visible<.*?Reflection Back.*?<ScatteringData>(.*?)</ScatteringData>", text, re.S).group(1)
     return np.array(block.split(), float).reshape(145, 145)
 
 
 def device(folder, scene, material):
-    """The exported tile in Radiance's material."""
+    """Returns the exported tile in a material of Radiance."""
     biscale("tile", *scene, "-o", folder / "tile.obj", "--repeat", f"{PERIODS}x{PERIODS}", "--quiet")
     return "".join(f"void {material.format(slot)}" for slot in SLOTS) + radiance("obj2rad", folder / "tile.obj")
 
 
 def check_matte(folder):
-    table = Table("matte grooves", "rfluxmtx [CPU s]", "biscale [CPU s]", "mean difference", "allowed", "totals apart", "allowed")
+    table = Table("diffuse grooves", "rfluxmtx [CPU s]", "biscale [CPU s]", "mean difference", "allowed", "difference of totals", "allowed")
     _, ours = export(SCENE[0], folder / "tile.xml", *SCENE[1:])
     fluxes = klems(folder / "tile.xml") * projected()[:, None]
     start = children_seconds()
@@ -64,7 +64,7 @@ def check_matte(folder):
     text = radiance("rfluxmtx", *options, "sender.rad", "receiver.rad", "device.rad", cwd=folder)
     theirs = children_seconds() - start
     matrix = np.array(text.split(), float).reshape(145, 145, 3)[:, :, 1]
-    # Reciprocal: rays that Radiance sends out of a patch are our light that comes in through it.
+    # By reciprocity, rays that leave through a patch correspond to light that enters through it.
     difference = mean_error(matrix.T, fluxes)
     totals = np.abs(matrix.sum(1) / fluxes.sum(0) - 1).max()
     table.check(
@@ -93,7 +93,7 @@ def check_glossy(folder):
 
 
 def lit(folder, grooves, light, view):
-    """f_bar by rtrace: the mean radiance of parallel rays over one period, over the irradiance of a small source."""
+    """Returns f_bar by rtrace: the mean radiance of parallel rays over one period, divided by the irradiance of a small source."""
     source = f"void light l\n0\n0\n3 1 1 1\n\nl source s\n0\n0\n4 {light[0]} {light[1]} {light[2]} {SOURCE_DEG}\n"
     (folder / "lit.rad").write_text(grooves + "\n" + source)
     with open(folder / "lit.oct", "wb") as octree:

@@ -1,6 +1,6 @@
-"""A MERL export read back: by a small reader of its own here, written from the published layout, and by our own importer.
+"""Values of a MERL export, read by a reader written here from the published layout, and by the importer of biscale.
 
-The scene must be nearly isotropic. Each reader is held against `biscale eval` of the exported scene.
+The scene must be nearly isotropic. Both are compared with `biscale eval` of the exported scene.
 
     python tests/interop/merl_check.py [SCENE]
 """
@@ -22,7 +22,7 @@ SHAPE, SCALES = (90, 90, 180), np.array([1.0, 1.15, 1.66]) / 1500
 
 
 def read(path):
-    """The BRDF as an array [theta_h, theta_d, phi_d, rgb], in 1/sr."""
+    """Returns the BRDF [1/sr] as an array [theta_h, theta_d, phi_d, rgb]."""
     dimensions = np.fromfile(path, "<i4", 3)
     assert tuple(dimensions) == SHAPE, dimensions
     planes = np.fromfile(path, "<f8", offset=12).reshape(3, *SHAPE)
@@ -30,7 +30,7 @@ def read(path):
 
 
 def half_difference(i, o):
-    """theta_h, theta_d, phi_d of pairs, by turning the half vector onto the pole."""
+    """Returns theta_h, theta_d and phi_d of pairs, by rotating the half vector onto the pole."""
     h = (i + o) / np.linalg.norm(i + o, axis=1, keepdims=True)
     theta_h, phi_h = np.arccos(np.clip(h[:, 2], -1, 1)), np.arctan2(h[:, 1], h[:, 0])
     c, s = np.cos(-phi_h), np.sin(-phi_h)
@@ -41,7 +41,7 @@ def half_difference(i, o):
 
 
 def look_up(table, i, o):
-    """Trilinear between bin centres; cells with an invalid corner take the nearest bin."""
+    """Interpolates trilinearly between bin centres. Cells with an invalid corner use the nearest bin."""
     theta_h, theta_d, phi_d = half_difference(i, o)
     at = np.stack([90 * np.sqrt(theta_h / (np.pi / 2)), 90 * theta_d / (np.pi / 2), 180 * phi_d / np.pi], 1) - 0.5
     at[:, :2] = np.clip(at[:, :2], 0, 89)

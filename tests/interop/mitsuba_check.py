@@ -1,11 +1,11 @@
-"""Mitsuba 3 reads our RGL tables: `measured` loads them, its `eval` agrees with `biscale eval`, its `sample` and `pdf`
-pass its own chi-squared test, and a sphere that it renders looks as ours does. Also: our importer of RGL files against
+"""Mitsuba 3 on exported RGL tables: `measured` loads them, its `eval` agrees with `biscale eval`, its `sample` and `pdf` pass
+its chi-squared test, and a sphere that it renders agrees with the one of biscale. The importer of RGL files is compared with
 Mitsuba's `eval` of the same files.
 
     python tests/interop/mitsuba_check.py [--pictures SPHERES.png] [SCENE:LIMIT[:RESOLUTION:RESOLUTION_O] ...]
 
 LIMIT is the largest mean error [%]. BISCALE names the program, BISCALE_DATA a folder of measured files, DRJIT_LIBLLVM_PATH
-an LLVM library of version 15 or later where the system's is older (the chi-squared test needs one that works).
+an LLVM library of version 15 or later if that of the system is older (the chi-squared test needs it).
 """
 
 import argparse
@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from common import ROOT, Table, biscale, direction, evaluate, export, mean_error, random_pairs, skip
+from common import Table, biscale, direction, evaluate, export, mean_error, random_pairs, skip
 
 try:
     import mitsuba as mi
@@ -23,7 +23,7 @@ try:
 except ImportError as error:
     skip(f"the Mitsuba checks need `pip install mitsuba numpy` ({error})")
 
-# Smooth: below 1 %. Glossy: below 3 %.
+# The bound is 1 % for smooth and 3 % for glossy scenes.
 FLAT = Path(__file__).parent / "flat_metal.toml"
 SCENES = [f"{FLAT}:1", "fig5a_isotropic:1", "fig4b_bicolor_cup:3", "fig7a_shot_silk:3", "default:3"]
 LIGHTS = [([0.3, 0.5, 0.8], [2.0, 1.6, 1.2]), ([-0.8, 0.4, 0.4], [0.3, 0.6, 1.2]), ([0.2, -0.6, 0.7], [0.5, 0.4, 0.3])]
@@ -35,7 +35,7 @@ VIEWERS, LEVEL = [(5, 20), (35, 70), (60, 200), (75, 310)], 0.01
 
 
 def bsdf_values(path, pairs):
-    """`measured`'s eval with the viewer as its wi."""
+    """Returns the `eval` of `measured` with the viewer as its wi."""
     bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
     interaction = mi.SurfaceInteraction3f()
     out = np.empty((len(pairs), 3))
@@ -46,7 +46,7 @@ def bsdf_values(path, pairs):
 
 
 def sphere(path):
-    """The unit sphere with the pole upwards, lit and seen as the scene of `ours`."""
+    """Renders the unit sphere with the pole upwards, with the light and the camera of the scene of `ours`."""
     def lit_by(towards, irradiance):
         return mi.load_dict({
             "type": "scene",
@@ -60,7 +60,7 @@ def sphere(path):
                     "type": "hdrfilm", "width": SIZE, "height": SIZE, "rfilter": {"type": "box"}, "pixel_format": "rgb"
                 },
             },
-            # Mitsuba's pole is +z and its tangent runs eastwards, as ours does about +y.
+            # The pole of Mitsuba's sphere is +z and its tangent points east; that of biscale is +y.
             "sphere": {
                 "type": "sphere",
                 "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], -90),
@@ -73,40 +73,40 @@ def sphere(path):
             },
         })
 
-    # One light at a time: with several, Mitsuba draws one a sample, and the picture is noisy.
-    pictures = [np.array(mi.render(lit_by(*light), spp=32))[:, :, :3] for light in LIGHTS]
-    return np.sum(pictures, axis=0)
+    # One light at a time: with several, Mitsuba samples one per ray, which makes the image noisy.
+    images = [np.array(mi.render(lit_by(*light), spp=32))[:, :, :3] for light in LIGHTS]
+    return np.sum(images, axis=0)
 
 
 def ours(name, folder):
-    """The same sphere by `biscale render`."""
+    """Renders the same sphere with `biscale render`."""
     listed = ", ".join(f"{{ direction = {towards}, irradiance = {irradiance} }}" for towards, irradiance in LIGHTS)
-    picture = Path(folder) / "ours.exr"
+    image = Path(folder) / "ours.exr"
     biscale(
-        "render", name, "-o", picture, "--size", f"{SIZE}x{SIZE}", "--samples", 4, "--quiet",
+        "render", name, "-o", image, "--size", f"{SIZE}x{SIZE}", "--samples", 4, "--quiet",
         "--set", "object.kind=\"sphere\"", "--set", "light.environment=\"none\"", "--set", f"light.directional=[{listed}]",
         "--set", f"camera={{ azimuth_deg = 25, elevation_deg = 20, distance = {DISTANCE}, fov_deg = {FOV_DEG} }}",
     )
-    return np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32))
+    return np.array(mi.Bitmap(str(image)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32))
 
 
 def inside():
-    """Pixels whose ray meets the sphere well inside its outline, where no background is."""
+    """Returns the pixels well inside the outline of the sphere."""
     half = np.tan(np.radians(FOV_DEG) / 2)
     x, y = np.meshgrid(*2 * [(np.arange(SIZE) + 0.5) / SIZE * 2 * half - half])
     sine = np.hypot(x, y) / np.sqrt(1 + x * x + y * y)
     return sine < 0.99 / DISTANCE
 
 
-def side_by_side(mitsuba_sees, we_see):
-    """Mitsuba's picture, ours, and ten times their difference."""
+def side_by_side(mitsuba_image, our_image):
+    """Writes Mitsuba's image, that of biscale, and ten times their difference."""
     mask = inside()[..., None]
-    both = [mitsuba_sees * mask, we_see * mask, 10 * np.abs(mitsuba_sees - we_see) * mask]
+    both = [mitsuba_image * mask, our_image * mask, 10 * np.abs(mitsuba_image - our_image) * mask]
     return np.concatenate(both, axis=1).astype(np.float32)
 
 
 def chi_squared(path, count):
-    """The smallest p-value over the viewers, and whether all pass at the level of `count` tests."""
+    """Returns the smallest p-value over the viewers, and whether all pass at the level of `count` tests."""
     from mitsuba import chi2
 
     least = 1.0
@@ -116,11 +116,11 @@ def chi_squared(path, count):
         test = chi2.ChiSquareTest(
             domain=chi2.SphericalDomain(), sample_func=sample, pdf_func=pdf, sample_dim=3, sample_count=1_000_000, ires=32, seed=0
         )
-        # It talks, and leaves a file where it fails; the table tells what matters.
+        # The test prints details and writes a file if it fails. The table holds the result.
         with contextlib.redirect_stdout(None), tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
             test.run(LEVEL)
         least = min(least, float(np.ravel(test.p_value)[0]))
-    # Sidak: the level of each of many tests.
+    # The level of each of many tests (Sidak).
     return least, least > 1 - (1 - LEVEL) ** (1 / count)
 
 
@@ -142,11 +142,11 @@ def check_exports(arguments, folder):
         mi.load_dict({"type": "measured", "filename": str(path)})
         loaded = time.time() - start
         error = mean_error(bsdf_values(path, pairs), values)
-        mitsuba_sees, we_see = sphere(path), ours(scene, folder)
+        mitsuba_image, our_image = sphere(path), ours(scene, folder)
         mask = inside()
-        picture = mean_error(mitsuba_sees[mask], we_see[mask])
+        image_error = mean_error(mitsuba_image[mask], our_image[mask])
         if arguments.pictures:
-            rows.append(side_by_side(mitsuba_sees, we_see))
+            rows.append(side_by_side(mitsuba_image, our_image))
             arguments.pictures.parent.mkdir(parents=True, exist_ok=True)
             mi.util.write_bitmap(str(arguments.pictures), mi.Bitmap(np.concatenate(rows)))
         p, passes = (1.0, True)
@@ -155,15 +155,15 @@ def check_exports(arguments, folder):
             p, passes = chi_squared(path, len(VIEWERS) * len(arguments.scenes))
         allowed = f"{limit} %"
         table.check(
-            error < float(limit) / 100 and passes and picture < float(limit) / 100,
+            error < float(limit) / 100 and passes and image_error < float(limit) / 100,
             name, report["bytes"], f"{written:.1f}", f"{loaded:.2f}", f"{100 * error:.2f} %", allowed,
-            f"{p:.3f}" if chi_works else "skipped", f"{100 * picture:.2f} %",
+            f"{p:.3f}" if chi_works else "skipped", f"{100 * image_error:.2f} %",
         )
     return table.passed
 
 
 def check_spectral(folder):
-    """A spectral file in a spectral variant: its colour in daylight, by Mitsuba's own observer and illuminant, is ours."""
+    """Compares the colour of a spectral file in daylight with that of a spectral variant of Mitsuba."""
     scene, count = "fig5a_isotropic", 60
     path = Path(folder) / f"{scene}_spec.bsdf"
     report, written = export(scene, path)
@@ -190,7 +190,7 @@ def check_spectral(folder):
 
 
 def llvm_works():
-    """Whether the chi-squared test can run: a bad LLVM ends the process, so another one tries."""
+    """Returns whether the chi-squared test can run. It tries in another process, because a bad LLVM ends the process."""
     import subprocess
     import sys
 
@@ -199,8 +199,9 @@ def llvm_works():
 
 
 def check_import(folder):
-    """A flat tile of a measured material: Mitsuba's eval of the file against ours, which is averaged to be reciprocal."""
-    data = Path(os.environ.get("BISCALE_DATA", ROOT.parent / "shared/data"))
+    """Compares `biscale eval` of a flat tile of a measured material with Mitsuba's `eval` of the file. biscale averages both
+    directions of light, so that its values are reciprocal."""
+    data = Path(os.environ.get("BISCALE_DATA", "."))
     table = Table("measured file", "mean error", "allowed", "file itself")
     mi.set_variant("scalar_rgb")
     for name in MEASURED:
@@ -214,7 +215,7 @@ def check_import(folder):
         swapped = pairs[:, [2, 3, 0, 1]]
         there, back = bsdf_values(path, pairs), bsdf_values(path, swapped)
         cosines = np.cos(pairs[:, [0, 2]])
-        # Values hold the cosine of the light; the mean of both ways is what we keep.
+        # Values include the cosine of the light. biscale stores the mean of both directions.
         mean = 0.5 * (np.maximum(there, 0) + np.maximum(back, 0) * (cosines[:, :1] / cosines[:, 1:]))
         error = mean_error(evaluate(scene, pairs, folder), mean)
         asymmetry = mean_error(there, mean)
@@ -224,7 +225,7 @@ def check_import(folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pictures", type=Path, help="a .png for Mitsuba's spheres, ours, and ten times their differences, a row a scene")
+    parser.add_argument("--pictures", type=Path, help="a .png of the spheres by Mitsuba, by biscale, and ten times their difference; one row per scene")
     parser.add_argument("scenes", nargs="*", default=SCENES, metavar="SCENE:LIMIT")
     arguments = parser.parse_args()
     print(f"Mitsuba {mi.__version__}")

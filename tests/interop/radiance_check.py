@@ -1,4 +1,4 @@
-"""Radiance reads our XML: `checkBSDF` accepts it, and its hemispherical totals are ours.
+"""Radiance on exported XML: `checkBSDF` accepts it, and its hemispherical totals are those of biscale.
 
     python tests/interop/radiance_check.py [SCENE ...]
 """
@@ -24,7 +24,7 @@ ENVIRONMENT = {
     "PATH": f"{RADIANCE / 'bin'}{os.pathsep}{os.environ['PATH']}",
     "RAYPATH": f".{os.pathsep}/{os.pathsep}{RADIANCE / 'lib'}",
 }
-# Rings of Klems' basis (bounds in degrees, patches), and the patches whose totals are compared (ring, patch).
+# Rings of the Klems basis (bounds in degrees, patches), and the patches whose totals are compared (ring, patch).
 RINGS = [(0, 5, 1), (5, 15, 8), (15, 25, 16), (25, 35, 20), (35, 45, 24), (45, 55, 24), (55, 65, 24), (65, 75, 16), (75, 90, 12)]
 PATCHES = [(0, 0), (1, 0), (2, 5), (4, 6), (6, 12), (7, 3)]
 
@@ -34,7 +34,7 @@ def radiance(*command, **options):
 
 
 def light_over_patch(ring, patch, side=4):
-    """Source directions spread over an incident patch: those that light travelling in the patch's directions comes from."""
+    """Returns source directions spread over an incident patch: those from which light travels in directions of the patch."""
     low, high, count = RINGS[ring]
     sines = np.sin(np.radians([low, high])) ** 2
     at = (np.arange(side) + 0.5) / side
@@ -44,7 +44,7 @@ def light_over_patch(ring, patch, side=4):
 
 
 def square_to_disk(x, y):
-    """Shirley and Chiu's map, from the unit square."""
+    """Maps the unit square to the disk (Shirley and Chiu)."""
     a, b = 2 * x - 1, 2 * y - 1
     wide = np.abs(a) > np.abs(b)
     radius = np.where(wide, a, b)
@@ -54,7 +54,7 @@ def square_to_disk(x, y):
 
 
 def light_over_cells(ring, patch, side=32, parts=4):
-    """The same over the four cells of a tree about the middle of a patch: found by trying all cells."""
+    """Returns source directions over the four cells of a tree around the middle of a patch, which are found by trying all cells."""
     low, high, count = RINGS[ring]
     theta, phi = np.radians(0.5 * (low + high)), patch / count * 2 * np.pi
     at = (np.arange(side) + 0.5) / side
@@ -67,14 +67,14 @@ def light_over_cells(ring, patch, side=32, parts=4):
 
 
 def leaving(rings=24, steps=96):
-    """Directions of equal projected solid angle."""
+    """Returns directions of equal projected solid angle."""
     theta = np.arcsin(np.sqrt((np.arange(rings) + 0.5) / rings))
     phi = (np.arange(steps) + 0.5) / steps * 2 * np.pi
     return [grid.ravel() for grid in np.meshgrid(theta, phi)]
 
 
 def our_total(scene, folder, theta_i, phi_i):
-    """The luminance reflected of such light. f_bar(i, o) / cos(theta_i) is the BRDF, so its mean over leaving directions of
+    """Returns the reflected luminance of such light. f_bar(i, o) / cos(theta_i) is the BRDF, so its mean over leaving directions of
     equal projected solid angle, times pi, is the total."""
     theta_o, phi_o = leaving()
     pairs = np.array([(ti, pi, to, po) for ti, pi in zip(theta_i, phi_i) for to, po in zip(theta_o, phi_o)])
@@ -83,13 +83,13 @@ def our_total(scene, folder, theta_i, phi_i):
 
 
 def radiance_total(bsdf, theta_i, phi_i):
-    """Radiance's own hemispherical reflectance, over the same directions."""
+    """Returns the hemispherical reflectance by Radiance, over the same directions."""
     theta, phi = np.degrees(theta_i), np.degrees(phi_i)
     return float(np.mean([pyradiance.bsdf.direct_hemi(bsdf, *at, pyradiance.bsdf.SAMPLE_ALL) for at in zip(theta, phi)]))
 
 
 def values(bsdf, pairs):
-    """Radiance's own value of the luminance, times the cosine of the light."""
+    """Returns the luminance by Radiance, times the cosine of the light."""
     found = [pyradiance.bsdf.query(bsdf, *row)[1] for row in np.degrees(pairs)]
     return np.array(found) * np.cos(pairs[:, 0])
 
@@ -99,11 +99,11 @@ def main():
     parser.add_argument("scenes", nargs="*", default=["fig1e_lambertian", "fig5a_isotropic", "default"])
     table = Table("scene", "basis", "bytes", "written [CPU s]", "loaded [s]", "accepted", "worst total", "allowed", "Klems patches", "values apart")
     # pyradiance 1.3.1 frees what it loaded with the Python object, while Radiance's cache still points there: a later load
-    # then reads freed memory (valgrind shows it) and sometimes dies. So nothing loaded is let go.
+    # then reads freed memory (valgrind shows it) and sometimes crashes. The objects are therefore never freed.
     alive = []
     with tempfile.TemporaryDirectory() as folder:
         for scene in parser.parse_args().scenes:
-            # Values between patches differ by the width of the patches; that they agree at all shows which angle is which.
+            # Values differ within the width of a patch. Their agreement shows that no angles are swapped.
             pairs = random_pairs(500, lowest_deg=75)
             expected = evaluate(scene, pairs, folder) @ [0.2126, 0.7152, 0.0722]
             lights = {"klems": [light_over_patch(*patch) for patch in PATCHES], "tensor-tree": [light_over_cells(*patch) for patch in PATCHES]}
@@ -111,8 +111,8 @@ def main():
             for basis, kind in [("klems", "Klems_Full"), ("tensor-tree", "Anisotropic_Tensor_Tree")]:
                 path = Path(folder) / f"{scene}_{basis}.xml"
                 report, seconds = export(scene, path, "--radiance", basis)
-                told = radiance("checkBSDF", path)
-                accepted = f"Type: {kind}" in told and "Color: 1" in told
+                listing = radiance("checkBSDF", path)
+                accepted = f"Type: {kind}" in listing and "Color: 1" in listing
                 start = time.time()
                 bsdf = pyradiance.bsdf.load_file(str(path))
                 loaded = time.time() - start

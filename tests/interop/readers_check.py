@@ -1,11 +1,11 @@
-"""Files that other programs and packages read: tables in numpy and OpenEXR, readers of our own in Python for the layouts whose
-owners publish no package (RGL's as pbrt-v4 and brdf-loader do it, UTIA, ASTM), glTF in the Khronos validator, MaterialX in its
-own library, the tile's files in trimesh, Pillow and pypdf.
+"""Exported files in other programs and packages: tables in numpy and OpenEXR, glTF in the Khronos validator, MaterialX in its
+library, files of the tile in trimesh, Pillow and pypdf. Layouts without a published package (RGL as in pbrt-v4 and brdf-loader,
+UTIA, ASTM) are read by Python code of these checks.
 
     python tests/interop/readers_check.py [SCENE]
 
 `pip install numpy openexr materialx pygltflib trimesh scipy pypdf pillow`; `npm install gltf-validator` in a folder that
-GLTF_VALIDATOR names. What is missing is skipped, loudly.
+GLTF_VALIDATOR names. A check whose package is missing prints SKIPPED.
 """
 
 import importlib
@@ -19,7 +19,7 @@ import time
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-# First, for it skips where numpy is missing.
+# `common` is imported first because it skips the check if numpy is missing.
 from common import Table, biscale, direction, evaluate, export, mean_error, random_pairs
 
 import numpy as np
@@ -31,7 +31,7 @@ TILE, SCALE = "fig5a_isotropic", 40
 
 
 def package(name):
-    """A package, or nothing and a loud word."""
+    """Returns a package; prints SKIPPED and returns None if it is missing."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -39,7 +39,7 @@ def package(name):
 
 
 def nodes_of(angles, folder):
-    """The BRDF itself at rows of `theta_i, phi_i, theta_o, phi_o`."""
+    """Returns the BRDF at rows of `theta_i, phi_i, theta_o, phi_o`."""
     return evaluate(SCENE, angles, folder) / np.cos(angles[:, :1])
 
 
@@ -58,7 +58,7 @@ def timed(read):
 
 
 def check_tables(table, folder):
-    """Each file's own values at some of its nodes, or what its method of reading gives between them, against `eval`."""
+    """Compares the values of each file at some of its nodes, or interpolated as its format says, with `eval`."""
     def row(name, reader, report, seconds, found, expected, limit):
         error = mean_error(found, expected)
         table.check(error < limit, name, reader, seconds, f"{100 * error:.3f} %", f"{100 * limit:g} %", report["bytes"])
@@ -105,7 +105,7 @@ def check_tables(table, folder):
 
 
 def described(path):
-    """The lines of a table without those that describe it."""
+    """Returns the lines of a table without its comments."""
     return [line for line in open(path, encoding="utf-8") if not line.startswith("#")]
 
 
@@ -123,7 +123,7 @@ def read_astm(path):
 
 
 def check_fits(table, folder):
-    """Documents of fits, of a metal, a matte and a coloured scene."""
+    """Writes the fits of a metal, a diffuse and a coloured scene."""
     for scene in ["default", "fig1e_lambertian", "fig7a_shot_silk"]:
         gltf, mtlx = folder / f"{scene}.gltf", folder / f"{scene}.mtlx"
         biscale("fit", scene, "-o", gltf, "-o", mtlx, "--quality", "draft", "--quiet")
@@ -153,7 +153,7 @@ def check_gltf(table, scene, path):
 
 
 def check_materialx(table, scene, path):
-    """The document is valid against the standard libraries, and its material becomes a shader."""
+    """Checks that a document is valid against the standard libraries and that its material compiles to a shader."""
     mx = package("MaterialX")
     if not mx:
         return
@@ -180,7 +180,7 @@ def check_materialx(table, scene, path):
 
 
 def check_tile(table, folder):
-    """The solid is closed and of the right size; mesh, heights and pattern load and are of the size they say."""
+    """Checks that the solid is closed and that mesh, heights and pattern have their stated size."""
     for ending in ["obj", "stl", "png", "svg", "pdf"]:
         scale = [] if ending in ("obj", "png") else ["--scale", SCALE]
         biscale("tile", TILE, "-o", folder / f"tile.{ending}", "--samples", "128x128", "--quiet", *scale)
@@ -201,7 +201,7 @@ def check_tile(table, folder):
         extent = np.ptp(solid.bounds, axis=0)[:2]
         closed = solid.is_watertight and solid.is_winding_consistent and np.allclose(extent, SCALE, atol=1e-3)
         relief = mesh.bounds[1, 2] - mesh.bounds[0, 2]
-        # The base is a tenth of the side; on it the mean of the heights.
+        # The base is a tenth of the side. The mean height is above it.
         expected = SCALE**3 * (0.1 + (0.5 * relief if heights is None else relief * heights.mean()))
         error = abs(solid.volume / expected - 1)
         table.check(closed and error < 0.02, "tile.stl", "trimesh, watertight", seconds, f"{100 * error:.2f} % of the volume", "2 %", size["stl"])

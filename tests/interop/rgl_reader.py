@@ -1,5 +1,5 @@
-"""A reader of RGL tensor files of its own, in numpy, from the published layout (Dupuy and Jakob 2018): what pbrt-v4 and RGL's
-brdf-loader ask of a file, and what they do with it. Shared by the checks; it runs no check itself.
+"""A reader of RGL tensor files in numpy, written from the published layout (Dupuy and Jakob 2018). It requires of a file what
+pbrt-v4 and brdf-loader require, and evaluates it as they do. The checks share this module.
 """
 
 import struct
@@ -10,7 +10,7 @@ DTYPES = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8:
 
 
 def fields(path):
-    """The arrays of a file by name."""
+    """Returns the arrays of a file by name."""
     data = open(path, "rb").read()
     assert data[:12] == b"tensor_file\0" and data[12:14] == b"\1\0", data[:14]
     (count,), at, found = struct.unpack_from("<I", data, 14), 18, {}
@@ -26,7 +26,7 @@ def fields(path):
 
 
 def check_structure(found, colors="rgb"):
-    """What brdf-loader refuses a file for."""
+    """Returns the reasons for which brdf-loader refuses a file."""
     other = {"rgb": "spectra", "spectra": "rgb"}[colors]
     assert other not in found, "RGB and spectral variants refuse each other's files"
     phis, thetas = len(found["phi_i"]), len(found["theta_i"])
@@ -45,7 +45,7 @@ def check_structure(found, colors="rgb"):
 
 
 def bilinear(values, at):
-    """Of arrays [..., y, x] picked per place: values at the vertices of the unit square."""
+    """Interpolates arrays [..., y, x] at points of the unit square, whose vertices hold the values."""
     height, width = values.shape[-2:]
     x, y = np.clip(at[:, 0], 0, 1) * (width - 1), np.clip(at[:, 1], 0, 1) * (height - 1)
     left, low = np.minimum(x.astype(int), width - 2), np.minimum(y.astype(int), height - 2)
@@ -56,7 +56,7 @@ def bilinear(values, at):
 
 
 class Rgl:
-    """A table that evaluates as the owners' programs do: `f(i, o)` is the BRDF times the cosine of `o`."""
+    """A table that evaluates as pbrt-v4 and brdf-loader do: `f(i, o)` is the BRDF times the cosine of `o`."""
 
     def __init__(self, path, colors="rgb"):
         self.fields = fields(path)
@@ -71,7 +71,7 @@ class Rgl:
         self.vndf, self.along, self.over = vndf / total[..., None], along / total[..., None], over / total
 
     def slices(self, phi, theta):
-        """Four slices a direction, and their weights."""
+        """Returns four slices per direction, and their weights."""
         def between(axis, at):
             lower = np.clip(np.searchsorted(axis, at, side="right") - 1, 0, len(axis) - 2)
             return lower, np.clip((at - axis[lower]) / (axis[lower + 1] - axis[lower]), 0, 1)
@@ -81,7 +81,7 @@ class Rgl:
         return [((p + a, t + b), (u if a else 1 - u) * (v if b else 1 - v)) for a in (0, 1) for b in (0, 1)]
 
     def invert(self, slices, at):
-        """The uniform numbers that the interpolated slices' warp takes to places of the unit square."""
+        """Returns the uniform numbers that the warp of the interpolated slices maps to points of the unit square."""
         height, width = self.vndf.shape[2:]
         x, y = at[:, 0] * (width - 1), at[:, 1] * (height - 1)
         column, row = np.minimum(x.astype(int), width - 2), np.minimum(y.astype(int), height - 2)

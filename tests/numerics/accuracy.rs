@@ -1,5 +1,5 @@
-//! Errors of `draft` and `standard` on tiles to which no default is tuned. `cargo bench --bench measure -- accuracy` prints
-//! the errors of every preset.
+//! Errors of `draft` and `standard` on tiles to which no default is tuned. `cargo bench --bench measure -- accuracy`
+//! prints the errors of every preset.
 
 use biscale::metrics::{Errors, compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;

@@ -30,8 +30,8 @@ const SCENES: [&str; 10] = [
 const SET: usize = 500;
 const SETS: usize = 2;
 
-/// Prints the chosen and the measured PSNR and time of every `step`th scene, for a target of 40 dB and a budget of 150 ms.
-/// Returns how many scenes reach the target and the budget, and the misses.
+/// Prints the chosen and the measured PSNR and time of every `step`th scene, for a target of 40 dB and a budget of 150
+/// ms. Returns how many scenes reach the target and the budget, and the misses.
 ///
 /// # Errors
 /// If a scene misses the target by 6 dB.
@@ -56,7 +56,7 @@ pub fn choices(step: usize, print: &mut dyn FnMut(String)) -> Result<([usize; 2]
         };
         let power: f64 = values.chunks(SET).zip(exact.chunks(SET)).map(power_of_set).sum();
         let psnr_db = -10.0 * (power / SETS as f64).log10();
-        let is_coarsest = for_psnr.got.rung == 0.0;
+        let is_coarsest = for_psnr.reached.level == 0.0;
         let reaches_target = (psnr_db - 40.0).abs() <= 3.0 || (psnr_db > 40.0 && is_coarsest);
         hits[0] += usize::from(reaches_target);
         if !reaches_target {
@@ -80,7 +80,7 @@ pub fn choices(step: usize, print: &mut dyn FnMut(String)) -> Result<([usize; 2]
             .collect();
         times.sort_by(f64::total_cmp);
         let ms = times[2];
-        let is_finest = for_time.got.rung >= FINEST - 0.3;
+        let is_finest = for_time.reached.level >= FINEST - 0.3;
         let keeps_budget = (ms / budget_ms - 1.0).abs() <= 0.2 || (ms < budget_ms && is_finest);
         hits[1] += usize::from(keeps_budget);
         if !keeps_budget {
@@ -88,7 +88,7 @@ pub fn choices(step: usize, print: &mut dyn FnMut(String)) -> Result<([usize; 2]
         }
         print(format!(
             "| `{name}` | {:.1} dB | {psnr_db:.1} dB | {:.1} ms | {:.1} ms | {ms:.1} ms |",
-            for_psnr.got.psnr_db, for_psnr.got.ms, for_time.got.ms
+            for_psnr.reached.psnr_db, for_psnr.reached.ms, for_time.reached.ms
         ));
     }
     Ok((hits, misses))

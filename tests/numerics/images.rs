@@ -1,5 +1,5 @@
-//! The shading BRDF that images read: it is close to the effective BRDF, a colour edit keeps its table, and its values are not
-//! negative.
+//! The shading BRDF that images read: it is close to the effective BRDF, a colour edit keeps its table, and its values
+//! are not negative.
 
 use biscale::base::Cancel;
 use biscale::effective::{Direct, EffectiveBrdf, Nodes, Representation, ShadingTable};
@@ -141,7 +141,8 @@ fn a_table_of_half_a_mirrored_tile_is_symmetric_and_close_to_the_whole_table() {
         let (expected, found) = (whole.g(i, o), mirrored.g(i, o));
         error += (expected - found).length_squared();
         power += expected.length_squared();
-        // A half vector on a mirror plane is its own image: both sides of the plane are summed, each over its own facets.
+        // A half vector on a mirror plane is its own image: both sides of the plane are summed, each over its own
+        // facets.
         let h = (i + o).normalize_or_zero();
         if h.x.abs().min(h.y.abs()) < 1e-3 {
             continue;

@@ -1,5 +1,5 @@
-//! Tiles and BRDFs to which no default is tuned, with their facets and references. The tests and `benches/measure` share
-//! them.
+//! Tiles and BRDFs to which no default is tuned, with their facets and references. The tests and `benches/measure`
+//! share them.
 
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};

@@ -148,8 +148,10 @@ fn all_algorithms_agree_on_a_height_field_up_to_85_degrees() {
     let exact = ray_cast(&grid, &facets, &directions);
     let sharp = 1e-6;
     let heights = mesh.height_grid.as_ref().unwrap();
-    let march =
-        visibility_rows(&Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, AZIMUTHS, sharp)), &directions);
+    let march = visibility_rows(
+        &Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, AZIMUTHS, sharp)),
+        &directions,
+    );
     let scan = visibility_rows(&Visibility::HorizonMap(HorizonMap::scan(&grid, &facets, AZIMUTHS, sharp)), &directions);
     let maps = visibility_maps_cpu(&mesh, &facets, &directions, 512);
     let marched = disagreement(&facets, &directions, &exact, |d, s| march[d][s] > 0.5);
@@ -208,8 +210,8 @@ fn height_fields_of_few_columns_and_thousands_of_rows_have_the_horizons_of_their
     assert!(differ * 200 < march.len() * facets.len(), "{differ}");
 }
 
-/// Returns true if a ray hits a copy of the tile, up to `copies` tiles away. The intersection is that of Möller and Trumbore
-/// (1997) in f64.
+/// Returns true if a ray hits a copy of the tile, up to `copies` tiles away. The intersection is that of Möller and
+/// Trumbore (1997) in f64.
 fn is_blocked(mesh: &TileMesh, origin: Vec3, to: Vec3, own_triangle: u32, copies: i32) -> bool {
     let (p, w) = (origin.as_dvec3(), to.as_dvec3());
     (-copies..=copies).any(|y| {

@@ -1,5 +1,5 @@
-//! Faults around the program: a kill, a full disk, a read-only folder, a lost GPU. A file on disk is complete, old or new, the
-//! message names the remedy, and the work continues.
+//! Faults around the program: a kill, a full disk, a read-only folder. A file on disk is complete, old or new, and a
+//! message names the file.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -67,8 +67,8 @@ fn an_export_that_is_killed_leaves_the_old_table_or_the_complete_new_one() {
     assert_eq!(std::fs::read(&target).unwrap(), new);
 }
 
-/// Returns a [`program`] whose files have at most this many blocks of 512 bytes. At the first byte beyond, the system ends the
-/// program as a kill does if `ends` is true, and otherwise fails the write as a full disk does.
+/// Returns a [`program`] whose files have at most this many blocks of 512 bytes. At the first byte beyond, the system
+/// ends the program as a kill does if `ends` is true, and otherwise fails the write as a full disk does.
 #[cfg(target_os = "linux")]
 fn limited(folder: &Path, blocks: usize, ends: bool, arguments: &[&str]) -> Command {
     let mut command = Command::new("sh");

@@ -1,4 +1,5 @@
-//! A lost GPU of the editor's window: a new window opens and the editor continues. The test starts a display of its own.
+//! A lost GPU of the editor's window: a new window opens and the editor continues. The test starts a display of its
+//! own.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-/// Returns the error of naga for a source, if there is one. No optional capabilities are allowed, so that shaders run on every
-/// adapter.
+/// Returns the error of naga for a source, if there is one. No optional capabilities are allowed, so that shaders run
+/// on every adapter.
 fn validation_error(source: &str) -> Option<String> {
     let module = match naga::front::wgsl::parse_str(source) {
         Ok(module) => module,
@@ -137,6 +137,7 @@ fn the_table_of_shaders_lists_every_file_in_the_folders() {
     let files = entries(&folder).into_iter().flat_map(|folder| entries(&folder));
     let mut files: Vec<_> = files.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
     let mut table: Vec<_> = biscale::gpu::SHADERS.iter().map(|(name, _)| format!("{name}.wgsl")).collect();
-    (files.sort(), table.sort());
+    files.sort();
+    table.sort();
     assert_eq!(files, table);
 }

@@ -74,12 +74,17 @@ const BATCHES: [usize; 2] = [2, 24];
 const IMAGES: u64 = 24;
 
 /// The worker's state. The reference and the levels belong to a scene, independent of its settings.
-#[derive(Default)]
 pub struct AccuracyWorker {
     key: Option<Box<LoadedScene>>,
     pipeline: Pipeline,
     reference: Option<ProgressiveReference>,
     levels: Vec<(f64, AccuracyPoint)>,
+}
+
+impl Default for AccuracyWorker {
+    fn default() -> Self {
+        Self { key: None, pipeline: crate::gpu::pipeline(), reference: None, levels: Vec::new() }
+    }
 }
 
 impl AccuracyWorker {

@@ -207,7 +207,7 @@ impl OpenGpu {
         let gpu = &self.gpu;
         let mut renderer = match self.renderer.take() {
             Some((renderer, _)) => renderer,
-            None => Box::new(GpuRenderer::new(gpu, input.scene.mesh(), input.scene.occluder())?),
+            None => Box::new(GpuRenderer::new(gpu, input.scene.mesh(), input.scene.object_occluder())?),
         };
         let set = match &material {
             RendererMaterial::Brdf(brdf) => renderer.set_brdf(gpu, brdf),

@@ -63,7 +63,7 @@ impl Sizes {
     }
 
     fn theta(&self, k: usize) -> f64 {
-        // Slices are denser towards the horizon, where f̄ changes most.
+        // The slices are denser towards the horizon, where f̄ changes most.
         let t = k as f64 / (self.thetas - 1) as f64;
         t * (1.0 + 0.9 * (1.0 - t)) * FRAC_PI_2
     }

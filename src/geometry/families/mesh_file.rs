@@ -31,9 +31,9 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         let shading = |triangle: &[ObjCorner; 3]| -> [Vec3; 3] {
             let [a, b, c] = triangle.map(|corner| file.positions[corner.position as usize]);
             let flat = (b - a).as_dvec3().cross((c - a).as_dvec3()).try_normalize().unwrap_or_default().as_vec3();
-            let own =
+            let from_file =
                 triangle.map(|corner| corner.normal.and_then(|normal| file.normals[normal as usize].try_normalize()));
-            match own {
+            match from_file {
                 [Some(a), Some(b), Some(c)] => [a, b, c],
                 _ => [flat; 3],
             }
@@ -69,7 +69,8 @@ fn triangles(file: &ObjFile) -> (Vec<[ObjCorner; 3]>, Vec<u16>) {
     (triangles, slots)
 }
 
-/// Triangulates a polygon by ear clipping. Cuts off the second corner if no ear is left (folded or degenerate outlines).
+/// Triangulates a polygon by ear clipping. If no ear is left (folded or degenerate outlines), the second corner is cut
+/// off.
 fn triangulate(outline: &[Vec3]) -> Vec<[usize; 3]> {
     let count = outline.len();
     if count == 3 {

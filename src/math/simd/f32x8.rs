@@ -24,7 +24,7 @@ pub(crate) trait SimdF32x8:
     fn bits(mask: Self::Mask) -> u32;
 }
 
-/// Eight values in memory, with arithmetic that every machine supports.
+/// A group of eight values in memory, with arithmetic that every machine supports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(32))]
 pub(crate) struct F32x8Array(pub [Vec4; 2]);
@@ -140,7 +140,7 @@ mod avx {
 
     use super::{Add, Div, F32x8Array, Mul, SimdF32x8, Sub};
 
-    /// Eight values in one register. Every `unsafe` block here requires AVX: only
+    /// A group of eight values in one register. Every `unsafe` block here requires AVX: only
     /// [`with_simd_f32x8`](super::with_simd_f32x8) creates a value of this type, after it has checked for AVX.
     #[derive(Clone, Copy)]
     pub(super) struct Wide(__m256);

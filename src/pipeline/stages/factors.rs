@@ -1,5 +1,5 @@
-//! The low-rank representation: visibility on a grid, the factors, and their tables. Colours and tints are no inputs of these
-//! stages, so that an edit of a colour finds their results in the memo.
+//! The low-rank representation: visibility on a grid, the factors, and their tables. Colours and tints are no inputs of
+//! these stages, so that an edit of a colour finds their results in the memo.
 
 use crate::base::Result;
 use crate::brdf::Material;

@@ -48,7 +48,7 @@ impl Stage for CastTransport<'_> {
     }
 
     fn run(&self, env: &Env) -> Result<Transport> {
-        Transport::new(&self.tile.mesh, &self.facets, self.settings.elements, self.settings.rays, &env.cancel)
+        Transport::new(&self.tile.mesh, self.facets, self.settings.elements, self.settings.rays, &env.cancel)
     }
 }
 
@@ -78,7 +78,7 @@ impl Stage for Interreflect<'_> {
     fn run(&self, env: &Env) -> Result<InterreflectionTable> {
         gather(
             &self.tile.mesh,
-            &self.facets,
+            self.facets,
             &self.visibility.value,
             &self.transport.value,
             (self.material_of_slot, self.materials),

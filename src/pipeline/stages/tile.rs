@@ -11,12 +11,14 @@ use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage, lock};
 use crate::plan::{Preset, Settings};
-use crate::scene::{BrdfSpec, Geometry, LoadedScene, Pixels, Switch, TermSpec};
+use crate::scene::{BrdfSpec, Geometry, Heightfield, LoadedScene, Switch, TermSpec};
 
 /// The mesh of a tile, and properties of it that later stages need.
 #[derive(Debug)]
 pub struct TileShape {
     pub mesh: TileMesh,
+    /// The key of the surface and its slots: of everything but colours and the unit of length.
+    pub surface: Key,
     pub flat: bool,
     /// Nothing overhangs.
     pub height_field: bool,
@@ -27,20 +29,49 @@ pub struct TileShape {
 /// Builds the mesh of a scene's tile.
 pub struct BuildTile<'a> {
     loaded: &'a LoadedScene,
-    files: Vec<Key>,
+    /// The key of everything but colours and the unit of length.
+    surface: Key,
+    colors: [Option<Key>; 2],
 }
 
 impl<'a> BuildTile<'a> {
     pub fn new(loaded: &'a LoadedScene, env: &Env) -> Self {
-        let tile = &loaded.scene.tile;
+        let LoadedScene { scene, base_dir, painted, .. } = loaded;
+        let tile = &scene.tile;
+        let mut key = KeyBuilder::of_stage("surface");
+        key.numbers("size", &[tile.size]);
         let of_geometry = match &tile.geometry {
             Geometry::Mesh(mesh) => Some(&mesh.path),
             Geometry::Heightfield(field) => field.path.as_ref(),
             _ => None,
         };
-        let paths = [of_geometry, tile.color_path.as_ref(), tile.slot_path.as_ref()];
-        let files = paths.into_iter().flatten().map(|path| env.file_key(&loaded.base_dir, path)).collect();
-        Self { loaded, files }
+        match &tile.geometry {
+            Geometry::Heightfield(Heightfield { height_scale, path, values: Some(rows) }) => {
+                key.numbers("scale", &[*height_scale]).debug("path", path).counts("rows", [rows.len()]);
+                for row in rows {
+                    key.numbers("row", row);
+                }
+            }
+            geometry => {
+                key.debug("geometry", geometry);
+            }
+        }
+        for path in [of_geometry, tile.slot_path.as_ref()].into_iter().flatten() {
+            key.key("file", &env.file_key(base_dir, path));
+        }
+        key.debug("slot image", &tile.slot_path);
+        for image in [
+            painted.heights.as_ref().map(|image| env.image_key(image)),
+            painted.slots.as_ref().map(|image| env.image_key(image)),
+        ] {
+            key.flags("painted", [image.is_some()]);
+            if let Some(image) = image {
+                key.key("image", &image);
+            }
+        }
+        let file = tile.color_path.as_ref().map(|path| env.file_key(base_dir, path));
+        let image = painted.colors.as_ref().map(|image| env.image_key(image));
+        Self { loaded, surface: key.finish(), colors: [file, image] }
     }
 }
 
@@ -49,20 +80,14 @@ impl Stage for BuildTile<'_> {
     const NAME: &'static str = "geometry";
 
     fn hash_into(&self, key: &mut KeyBuilder) {
-        fn hash_pixels<T: bytemuck::NoUninit>(key: &mut KeyBuilder, name: &str, pixels: Option<&Pixels<T>>) {
-            key.flags("painted", [pixels.is_some()]);
-            if let Some(pixels) = pixels {
-                key.numbers("size", &[pixels.size]).numbers(name, &pixels.values);
+        let tile = &self.loaded.scene.tile;
+        key.key("surface", &self.surface).debug("unit", &tile.unit).debug("color image", &tile.color_path);
+        for image in &self.colors {
+            key.flags("colored", [image.is_some()]);
+            if let Some(image) = image {
+                key.key("image", image);
             }
         }
-        key.debug("tile", &self.loaded.scene.tile);
-        for file in &self.files {
-            key.key("file", file);
-        }
-        let painted = &self.loaded.painted;
-        hash_pixels(key, "heights", painted.heights.as_deref());
-        hash_pixels(key, "colors", painted.colors.as_deref());
-        hash_pixels(key, "slots", painted.slots.as_deref());
     }
 
     fn run(&self, _: &Env) -> Result<TileShape> {
@@ -72,7 +97,7 @@ impl Stage for BuildTile<'_> {
         let flat = high - low <= 1e-7 * mesh.size.max_element();
         let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
         let steepest = steepest(&mesh);
-        Ok(TileShape { mesh, flat, height_field, steepest })
+        Ok(TileShape { mesh, surface: self.surface, flat, height_field, steepest })
     }
 }
 
@@ -134,10 +159,19 @@ impl Stage for LoadMaterials<'_> {
     }
 }
 
+/// Adds the settings that decide where facets are and in which order.
+pub(super) fn hash_sampling_into(settings: &Settings, key: &mut KeyBuilder) {
+    let Settings { facets, normal_bins, seed, preset, .. } = settings;
+    key.counts("count", [*facets]).counts("bins", *normal_bins).numbers("seed", &[*seed]);
+    key.flags("the paper's facets", [*preset == Preset::Wu2011]);
+}
+
 /// Samples the facets of a tile, in the order that sums need.
 pub struct SampleFacets<'a> {
     pub tile: &'a Keyed<TileShape>,
     pub settings: &'a Settings,
+    /// Whether these are the few facets of a clustered sum on the GPU, which alternate with those of the CPU.
+    pub for_clusters: bool,
 }
 
 impl Stage for SampleFacets<'_> {
@@ -145,10 +179,13 @@ impl Stage for SampleFacets<'_> {
     const NAME: &'static str = "facets";
 
     fn hash_into(&self, key: &mut KeyBuilder) {
-        let Settings { facets, normal_bins, seed, preset, effects, .. } = self.settings;
-        key.key("tile", &self.tile.key).counts("count", [*facets]).counts("bins", *normal_bins);
-        key.numbers("seed", &[*seed]);
-        key.flags("ways", [*preset == Preset::Wu2011, effects.color_weights == Switch::Off]);
+        key.key("tile", &self.tile.key);
+        hash_sampling_into(self.settings, key);
+        key.flags("mean colors", [self.settings.effects.color_weights == Switch::Off]);
+    }
+
+    fn slot(&self) -> &'static str {
+        if self.for_clusters { "facets of clusters" } else { Self::NAME }
     }
 
     fn run(&self, _: &Env) -> Result<Facets> {

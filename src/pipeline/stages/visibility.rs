@@ -9,6 +9,7 @@ use crate::plan::{Settings, VisibilityAlgorithm};
 use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility, visibility_maps_cpu};
 
 use super::TileShape;
+use super::tile::hash_sampling_into;
 
 /// Computes which directions each facet sees.
 pub struct ComputeVisibility<'a> {
@@ -25,7 +26,9 @@ impl Stage for ComputeVisibility<'_> {
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         let settings = self.settings;
-        key.key("tile", &self.tile.key).key("facets", &self.facets.key);
+        // Colours of the tile and of its facets do not change visibility.
+        key.key("surface", &self.tile.surface);
+        hash_sampling_into(settings, key);
         key.counts("algorithm", [self.algorithm as usize]);
         key.counts("azimuths", [settings.horizon_azimuths, settings.slice_azimuths]);
         key.numbers("penumbra", &[settings.penumbra]);
@@ -54,7 +57,7 @@ impl Stage for ComputeVisibility<'_> {
             (VisibilityAlgorithm::GpuMaps | VisibilityAlgorithm::CpuMaps, _) => {
                 let (grid, resolution) = (settings.map_grid, settings.map_resolution);
                 let directions = grid.directions();
-                let gpu = env.gpu().filter(|_| self.algorithm == VisibilityAlgorithm::GpuMaps);
+                let gpu = if self.algorithm == VisibilityAlgorithm::GpuMaps { env.gpu() } else { None };
                 // If the GPU fails, the CPU computes the same maps.
                 let packed = gpu
                     .and_then(|gpu| gpu.visibility_maps(mesh, facets, &directions, resolution, &env.cancel).ok())
@@ -89,7 +92,7 @@ impl Stage for EstimateScanWork<'_> {
     }
 
     fn run(&self, _: &Env) -> Result<f64> {
-        Ok(OcclusionIntervals::mean_steps(&PeriodicGrid::for_slices(&self.tile.mesh), &self.facets))
+        Ok(OcclusionIntervals::mean_steps(&PeriodicGrid::for_slices(&self.tile.mesh), self.facets))
     }
 }
 

@@ -16,17 +16,17 @@ const MAX_BYTES: u64 = 1 << 30;
 /// Rules for the OBJ files of objects. Only the size of the file is bounded.
 const RULES: Rules = Rules { grammar: Grammar::Strict, max_elements: usize::MAX, max_materials: usize::MAX };
 
-/// Loads an OBJ as one mesh. Normals are the file's, else smoothed (area-weighted); tangents follow the UVs, else the
-/// horizontal, with a warning. A surface with open edges is seen from both sides.
+/// Loads an OBJ file as one mesh. Normals are the file's, or area-weighted means if the file has none. Tangents follow
+/// the UVs, or the horizontal with a warning. A surface with open edges is two-sided.
 pub(super) fn load(path: &Path) -> Result<ObjectMesh> {
     let unreadable = |what: &dyn std::fmt::Display| {
         Error::from(InputError::new("object.path", what, "a readable OBJ file").in_file(path))
     };
-    let there = std::fs::metadata(path).map_err(|error| unreadable(&error))?;
-    if !there.is_file() {
+    let metadata = std::fs::metadata(path).map_err(|error| unreadable(&error))?;
+    if !metadata.is_file() {
         return Err(unreadable(&"a folder or device"));
     }
-    let size = there.len();
+    let size = metadata.len();
     if size > MAX_BYTES {
         return Err(unreadable(&format!("{size} bytes (at most {MAX_BYTES} are read)")));
     }
@@ -44,7 +44,7 @@ fn parse(text: &str) -> Result<ObjectMesh> {
     raw.finish()
 }
 
-/// The mesh as the file gives it. `normals` and `uvs` are used only if each position has one.
+/// The mesh of the file. `normals` and `uvs` are used only if each position has one.
 #[derive(Default)]
 struct RawMesh {
     positions: Vec<Vec3>,
@@ -81,15 +81,15 @@ impl RawMesh {
         }
     }
 
-    /// Moves the mesh to the origin and scales it to radius 1: no later stage need fear tiny or huge units.
+    /// Moves the mesh to the origin and scales it to radius 1, so that the file's unit of length has no effect.
     fn normalize(&mut self) {
         let Some(first) = self.positions.first().map(|p| p.as_dvec3()) else {
             return;
         };
-        let wide = || self.positions.iter().map(|p| p.as_dvec3());
-        let (low, high) = wide().fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+        let positions = || self.positions.iter().map(|p| p.as_dvec3());
+        let (low, high) = positions().fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
         let center = 0.5 * (low + high);
-        let radius = wide().map(|p| p.distance(center)).fold(0.0, f64::max);
+        let radius = positions().map(|p| p.distance(center)).fold(0.0, f64::max);
         if radius > 0.0 {
             self.positions.iter_mut().for_each(|p| *p = ((p.as_dvec3() - center) / radius).as_vec3());
         }
@@ -110,8 +110,8 @@ impl RawMesh {
         if self.triangles.len() < all {
             warnings.push(format!("{} of {all} triangles have no area and are left out", all - self.triangles.len()));
         }
-        let places = frames::weld(&self.positions);
-        let closed = is_closed(&places, &self.triangles);
+        let welded = frames::weld(&self.positions);
+        let closed = is_closed(&welded, &self.triangles);
         let mut inside_out = false;
         if closed && signed_volume(&self.positions, &self.triangles) < 0.0 {
             inside_out = true;
@@ -168,11 +168,12 @@ impl RawMesh {
     }
 }
 
-/// Whether each edge (between places, not vertices) is shared by exactly two triangles that run along it in opposite ways.
-fn is_closed(places: &[u32], triangles: &[[u32; 3]]) -> bool {
+/// Returns true if exactly two triangles share each edge and traverse it in opposite directions. `welded` maps vertices
+/// at one position to the first of them.
+fn is_closed(welded: &[u32], triangles: &[[u32; 3]]) -> bool {
     let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(triangles.len() * 3);
     for triangle in triangles {
-        let [a, b, c] = triangle.map(|k| places[k as usize]);
+        let [a, b, c] = triangle.map(|k| welded[k as usize]);
         for (from, to) in [(a, b), (b, c), (c, a)] {
             edges.push((from.min(to), from.max(to), from < to));
         }
@@ -182,7 +183,7 @@ fn is_closed(places: &[u32], triangles: &[[u32; 3]]) -> bool {
     edges.chunk_by(same_edge).all(|uses| uses.len() == 2 && uses[0].2 != uses[1].2)
 }
 
-/// Six times the enclosed volume.
+/// Returns six times the enclosed volume.
 fn signed_volume(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     let origin = positions.first().map_or(DVec3::ZERO, |p| p.as_dvec3());
     let volume = |triangle: &[u32; 3]| {

@@ -52,8 +52,8 @@ impl CommandLine {
         serde_json::from_str(&self.text(arguments)).unwrap()
     }
 
-    /// Checks that the program fails with exit code 2, that its message contains all of `parts`, and that its standard output
-    /// is empty.
+    /// Checks that the program fails with exit code 2, that its message contains all of `parts`, and that its standard
+    /// output is empty.
     pub fn assert_refused(&self, arguments: &[&str], parts: &[&str]) {
         let output = self.run(arguments);
         let message = String::from_utf8_lossy(&output.stderr);

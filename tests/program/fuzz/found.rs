@@ -113,7 +113,7 @@ fn samples_beyond_the_range_of_f32_are_refused() {
     assert!(error.exit_code() == 2 && error.to_string().contains("number 225824"), "{error}");
 }
 
-/// On a tile of 1 by 10^6, rotated grooves at the requested density would be 350,000 grooves.
+/// Rotated grooves at the requested density would be too many on a tile of 1 by 10^6, so the tile has fewer.
 #[test]
 fn rotated_grooves_on_a_long_tile_have_fewer_than_100_000_triangles() {
     let text =

@@ -1,9 +1,10 @@
-//! Mutational fuzzing of every file reader. A seeded generator mutates valid files, byte by byte and field by field. For any
-//! input, a reader returns a valid result or an error with exit code 2, in bounded time and memory. It does not panic.
+//! Mutational fuzzing of every file reader. A seeded generator mutates valid files, byte by byte and field by field.
+//! For any input, a reader returns a valid result or an error with exit code 2, in bounded time and memory. It does not
+//! panic.
 //!
-//! The ordinary tests run each target a few hundred times. `BISCALE_FUZZ_SECONDS=300 cargo test --release --test program fuzz --
-//! --ignored --nocapture` runs each target for five minutes (30 s without the variable) and prints the executions, which
-//! `docs/measurements/hard_cases.md` quotes. Inputs that once failed are tests in `found.rs`.
+//! The ordinary tests run each target a few hundred times. `BISCALE_FUZZ_SECONDS=300 cargo test --release --test
+//! program fuzz -- --ignored --nocapture` runs each target for five minutes (30 s without the variable) and prints the
+//! executions, which `docs/measurements/hard_cases.md` quotes. Inputs that once failed are tests in `found.rs`.
 
 mod found;
 mod mutate;
