@@ -2,9 +2,9 @@
 //! is repeated without end.
 //!
 //! ```text
-//! Scene (TOML) ─▶ Plan ─▶ TileMesh ─▶ Facets ─▶ Visibility ─┐
-//!                   │                                       ├▶ EffectiveBrdf ─▶ image | table | plots
-//!                   └───────────▶ small-scale BRDFs ────────┘
+//! Scene (TOML) ─▶ TileMesh ─▶ Facets ─▶ Plan ─▶ Visibility ─┐
+//!      │                        ▲                           ├▶ EffectiveBrdf ─▶ image | table | plots
+//!      └─▶ small-scale BRDFs ───┴───────────────────────────┘
 //! ```
 //! - [`scene::open`] reads a scene, [`plan::Plan::new`] decides which effects it calls for,
 //! - [`geometry::build`] builds the tile's mesh, [`geometry::FacetSampler`] samples its facets,

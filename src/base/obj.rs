@@ -100,7 +100,8 @@ pub fn read(text: &str, rules: Rules) -> Result<ObjFile> {
     })
 }
 
-/// Returns faces that use each vertex in the file's order. When they come first, `tobj` assigns the file's numbers.
+/// Returns faces that use each vertex in the file's order. If `tobj` reads them first, it numbers the vertices as the
+/// file does.
 fn numbering_faces(count: usize) -> String {
     let mut text = String::new();
     for k in 1..=count {
@@ -117,7 +118,7 @@ const KEYWORDS: [&str; 3] = ["v", "vt", "vn"];
 /// The result of the pre-pass.
 struct PrePass {
     rules: Rules,
-    /// Numbers of vertices, texture coordinates and normals.
+    /// Counts of vertices, texture coordinates and normals.
     counts: [usize; 3],
     /// Vertices with a colour.
     colored: usize,

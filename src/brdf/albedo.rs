@@ -12,8 +12,8 @@ const LOGIT_RANGE: [f64; 2] = [-16.0, 10.0];
 
 impl Brdf {
     /// `∫ f_r(i,o) (n·o)+ dω_o` for light from `theta` [rad], by a fixed quadrature with `samples²` lookups. With 96
-    /// samples the error is 1e-3 for any roughness up to 85°. A BRDF with an albedo above 1 gains energy. The albedo is
-    /// 0 at and below the horizon.
+    /// samples the error is 1e-3 for any roughness up to 85°. A BRDF with an albedo above 1 creates energy. The albedo
+    /// is 0 at and below the horizon.
     ///
     /// The sum runs over half vectors, `dω_o = 4 (i·h) dω_h`. They are even on a scale that is logarithmic at both
     /// ends. On this scale a lobe of any width is a smooth bump, and the integrand is smooth at the horizon.

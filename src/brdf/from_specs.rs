@@ -13,7 +13,7 @@ use crate::scene::{BrdfSpec, TermSpec};
 pub const ROUGHNESS_RANGE: RangeInclusive<f32> = 1e-4..=2.0;
 /// Exponent of Blinn-Phong.
 pub const EXPONENT_RANGE: RangeInclusive<f32> = 0.0..=1e6;
-/// Albedo, specular colour and f0. A material with values above 1 gains energy, which the health reports.
+/// Albedo, specular colour and f0. A material with values above 1 may create energy, which the health reports.
 pub const COLOR_RANGE: RangeInclusive<f32> = 0.0..=1e4;
 
 impl Brdf {

@@ -42,7 +42,7 @@ pub struct MeasuredReport {
     /// Relative L2, cosine-weighted, of the table against exact evaluation of the file at random directions; 0 if the
     /// table has the file's own samples.
     pub resampling_error: f32,
-    /// Largest directional albedo of any channel up to 80°; a material with an albedo above 1 gains energy.
+    /// Largest directional albedo of any channel up to 80°; a material with an albedo above 1 creates energy.
     pub max_albedo: f32,
 }
 

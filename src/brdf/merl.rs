@@ -27,7 +27,8 @@ pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let unreadable = |error: std::io::Error| InputError::new("", error, "a MERL file that can be read").in_file(path);
     let file = File::open(path).map_err(unreadable)?;
     let len = file.metadata().map_err(unreadable)?.len();
-    // A wrong header explains more than a wrong size, so a file of the wrong size is read as well.
+    // A file of the wrong size is read as well, because an error about its header is more helpful than one about its
+    // size.
     let mut bytes = Vec::with_capacity(len.min(FILE_BYTES as u64) as usize);
     file.take(FILE_BYTES as u64).read_to_end(&mut bytes).map_err(unreadable)?;
     check_header(&bytes, len).map_err(|error| error.in_file(path))?;

@@ -81,7 +81,7 @@ fn painted_or_file<T: Clone>(
     }
 }
 
-/// Adds the slots `paint_1` and following of an image over those of the surface.
+/// Adds the slots `paint_1`, `paint_2` and so on of an image over the slots of the surface.
 fn paint_slots(mesh: &mut TileMesh, image: Pixels<u8>) {
     let first = mesh.slots.len() as u16;
     let count = image.values.iter().copied().max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Mirror planes of a tile. With one, the values of half of the directions determine those of the other half.
+//! Mirror planes of a tile. If there is one, the values at half of the directions determine those at the other half.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;

@@ -15,14 +15,14 @@ use crate::math::directions::half_vector;
 use crate::math::linalg::gemm::multiply_transposed;
 use crate::visibility::Visibility;
 
-/// Rays of one matrix product.
+/// Number of rays per matrix product.
 const BLOCK: usize = 256;
-/// Parts of the elements whose sums are added in order, so that results do not depend on the number of threads.
+/// Number of parts of the elements. Their sums are added in order, so results do not depend on the number of threads.
 const PARTS: usize = 16;
 /// Lower limit of the cosine that a lobe is divided by; it bounds the contribution of rays along their own surface.
 const MIN_COSINE: f32 = 1e-3;
 
-/// Everything that a bounce reads.
+/// Inputs of a bounce.
 struct Exchange<'a> {
     facets: &'a Facets,
     transport: &'a Transport,
@@ -45,7 +45,7 @@ struct Exchange<'a> {
 /// the rays, because the product of one estimate with itself would be biased by its variance.
 ///
 /// # Errors
-/// [`crate::base::Error::Cancelled`].
+/// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
 pub fn gather(
     mesh: &TileMesh,
     facets: &Facets,

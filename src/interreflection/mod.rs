@@ -23,14 +23,14 @@ pub use transport::Transport;
 use crate::brdf::Brdf;
 use crate::math::directions::PolarGrid;
 
-/// Resolution of the light exchange between facets.
+/// Resolution of interreflection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InterreflectionSettings {
-    /// Number of surface points that send and receive light.
+    /// Number of elements: the facets that send and receive light.
     pub elements: usize,
     /// Rays per element; even.
     pub rays: usize,
-    /// Reflections between facets that are computed; at least one.
+    /// Number of bounces; at least one.
     pub bounces: usize,
     /// Nodes of the table.
     pub grid: PolarGrid,

@@ -30,7 +30,7 @@ impl Transport {
     /// Casts `rays` rays from each of about `elements` facets.
     ///
     /// # Errors
-    /// [`crate::base::Error::Cancelled`].
+    /// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
     pub fn new(mesh: &TileMesh, facets: &Facets, elements: usize, rays: usize, cancel: &Cancel) -> Result<Self> {
         let stride = facets.len().div_ceil(elements.max(1)).max(1);
         // Facets are sorted by normal, so every n-th facet is an even sample of them.

@@ -41,10 +41,9 @@ impl Pipeline {
         } else {
             0.0
         };
-        let mut used: Vec<usize> =
-            facets.slots.iter().map(|slot| surface.material_of_slot[usize::from(*slot)]).collect();
-        used.sort_unstable();
-        used.dedup();
+        let mut is_used = vec![false; materials.len()];
+        facets.slots.iter().for_each(|slot| is_used[surface.material_of_slot[usize::from(*slot)]] = true);
+        let used: Vec<usize> = (0..materials.len()).filter(|material| is_used[*material]).collect();
         let black_materials = used.iter().filter(|index| materials[**index].is_black()).count();
         let is_lambertian =
             |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));

@@ -1,7 +1,7 @@
 //! The input of a GPU that computes visibility and product itself: the stages that come before them.
 
 use super::stages::{BuildCells, FindMirrorPlanes};
-use super::{Pipeline, StageTimes, TileInputs, Use};
+use super::{Pipeline, Processor, StageTimes, TileInputs};
 use crate::base::Result;
 use crate::effective::{FacetSum, GpuTileInput, GpuVisibilityInput, Heights, Maps, Nodes, Sliced};
 use crate::math::directions::HemispherePairGrid;
@@ -60,7 +60,7 @@ impl Pipeline {
         let is_clustered_tile = clustered.is_some();
         let inputs = match clustered {
             Some(inputs) => inputs,
-            None => self.tile_inputs(loaded, Use::Gpu { max_facets: None }, &mut times)?,
+            None => self.tile_inputs(loaded, Processor::Gpu { max_facets: None }, &mut times)?,
         };
         let TileInputs { tile, facets, sum, plan, settings, .. } = &inputs;
         if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
@@ -138,7 +138,7 @@ impl Pipeline {
             return Ok(None);
         }
         for max_facets in [1, 4, 16].map(|times| times * CLUSTERED_FACETS) {
-            let inputs = self.tile_inputs(loaded, Use::Gpu { max_facets: Some(max_facets) }, times)?;
+            let inputs = self.tile_inputs(loaded, Processor::Gpu { max_facets: Some(max_facets) }, times)?;
             let TileInputs { sum, plan, settings, .. } = &inputs;
             let is_small = sum.reflecting_normal_count().is_some_and(|normals| normals <= MAX_CLUSTERS);
             if is_clustered(sum, plan.algorithm) && is_small {

@@ -56,19 +56,21 @@ pub struct Pipeline {
     memo: Arc<Memo>,
     last_outcome: Arc<Mutex<Option<(Key, Outcome)>>>,
     last_shading: Arc<Mutex<Option<LastShading>>>,
+    /// The last settings and their key: most edits keep them.
+    last_settings: Arc<Mutex<Option<(Settings, Key)>>>,
     disk: Cache,
 }
 
 /// The processor that computes visibility and product.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Use {
+enum Processor {
     /// The plan compares the costs of the CPU's algorithms.
     Cpu,
-    /// The GPU, from at most so many facets.
+    /// The GPU. `max_facets` limits the facets of a clustered sum; `None` keeps the setting.
     Gpu { max_facets: Option<usize> },
 }
 
-/// Everything that comes before visibility.
+/// The inputs of visibility: the tile, its materials and facets, and the plan.
 struct TileInputs {
     tile: Keyed<TileShape>,
     settings: Settings,
@@ -131,7 +133,7 @@ impl Pipeline {
         self.memo.get_or_run(&stage, &self.env, &self.disk, times)
     }
 
-    /// The number of runs of each stage. A stage that the plan drops stays at 0.
+    /// The number of times that each of these stages ran or was read from disk. A stage that the plan drops stays at 0.
     pub fn runs(&self) -> Vec<(&'static str, u64)> {
         let names = [
             BuildTile::NAME,
@@ -165,16 +167,16 @@ impl Pipeline {
         self.get(LoadMaterials::new(loaded, &tile.mesh.slots, &self.env), times)
     }
 
-    /// Everything that comes before visibility.
-    fn tile_inputs(&self, loaded: &LoadedScene, processor: Use, times: &mut StageTimes) -> Result<TileInputs> {
+    /// Runs the stages before visibility.
+    fn tile_inputs(&self, loaded: &LoadedScene, processor: Processor, times: &mut StageTimes) -> Result<TileInputs> {
         let scene = &loaded.scene;
         let tile = self.tile(loaded, times)?;
         let mut settings = Settings::of(scene).for_shape(tile.height_field);
-        if let Use::Gpu { max_facets: Some(most) } = processor {
+        if let Processor::Gpu { max_facets: Some(most) } = processor {
             settings.facets = settings.facets.min(most);
         }
         let materials = self.assignment(loaded, &tile, times)?;
-        let for_clusters = matches!(processor, Use::Gpu { max_facets: Some(_) });
+        let for_clusters = matches!(processor, Processor::Gpu { max_facets: Some(_) });
         let facets = self.get(SampleFacets { tile: &tile, settings: &settings, for_clusters }, times)?;
         let material_of_slot = grouped(&materials.material_of_slot, &facets, &settings);
         let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.materials);
@@ -188,7 +190,7 @@ impl Pipeline {
             materials: &materials.materials,
             settings: &settings,
             mirrors: self.mirrors_of_interreflection(&tile, &settings, times)?,
-            wants_scan_work: processor == Use::Cpu,
+            wants_scan_work: processor == Processor::Cpu,
         };
         let plan = Plan::new(&self.features(&surface)?, &settings, &Costs::default());
         Ok(TileInputs { tile, settings, materials, facets, material_of_slot, sum, plan })
@@ -222,18 +224,46 @@ impl Pipeline {
         self.get(ComputeVisibility { tile, facets, algorithm: plan.algorithm, settings }, times)
     }
 
+    /// The key of all settings.
+    fn settings_key(&self, settings: &Settings) -> Key {
+        let mut last = lock(&self.last_settings);
+        if let Some((_, key)) = last.as_ref().filter(|(last, _)| last == settings) {
+            return *key;
+        }
+        let key = KeyBuilder::of_stage("settings").debug("settings", settings).finish();
+        *last = Some((settings.clone(), key));
+        key
+    }
+
+    /// Keys of the surface and of the lobes on it.
+    fn shading_keys(&self, inputs: &TileInputs, visibility: &Keyed<Visibility>) -> ShadingKeys {
+        let TileInputs { settings, facets, materials, material_of_slot, .. } = inputs;
+        let mut surface = KeyBuilder::of_stage("surface");
+        surface.key("settings", &self.settings_key(settings));
+        surface.key("facets", &facets.key).key("visibility", &visibility.key);
+        let mut lobes = KeyBuilder::of_stage("lobes");
+        lobes.counts("material of slot", material_of_slot.iter().copied());
+        let effects = &settings.effects;
+        lobes.debug("effects", &[effects.exact_lobes, effects.color_weights, effects.black_materials]);
+        for material in &materials.materials {
+            material.hash_lobes_into(&mut lobes);
+        }
+        let (surface, lobes) = (surface.finish(), lobes.finish());
+        ShadingKeys { surface, lobes, facets: facets.key, visibility: visibility.key }
+    }
+
     /// The effective BRDF of a scene at its own quality.
     ///
     /// # Errors
     /// A file that the scene names cannot be used, a factorization fails, or [`crate::base::Error::Cancelled`].
     pub fn effective(&self, loaded: &LoadedScene) -> Result<Outcome> {
         let mut times = StageTimes::new();
-        let inputs = self.tile_inputs(loaded, Use::Cpu, &mut times)?;
+        let inputs = self.tile_inputs(loaded, Processor::Cpu, &mut times)?;
         if inputs.settings.preset == Preset::Wu2011 {
             return self.wu2011(&loaded.scene, inputs, times);
         }
         let visibility = self.visibility(&inputs, &mut times)?;
-        let keys = shading_keys(&inputs, &visibility);
+        let keys = self.shading_keys(&inputs, &visibility);
         let key = outcome_key(&keys, &inputs.materials.key);
         if let Some((_, outcome)) = lock(&self.last_outcome).as_ref().filter(|(last, _)| *last == key) {
             return Ok(Outcome { times, ..outcome.clone() });
@@ -300,7 +330,7 @@ impl Pipeline {
         Ok(outcome)
     }
 
-    /// The light that facets send to each other. Rays are cast again only for other facets.
+    /// Interreflection. Rays are cast again only if the facets changed.
     fn interreflection(
         &self,
         surface: &VisibleSurface<'_>,
@@ -424,22 +454,6 @@ fn grouped(material_of_slot: &[usize], facets: &Facets, settings: &Settings) -> 
     }
     let largest = (0..areas.len()).max_by(|a, b| areas[*a].total_cmp(&areas[*b])).unwrap_or(0);
     material_of_slot.iter().map(|_| material_of_slot[largest]).collect()
-}
-
-/// Keys of the surface and of the lobes on it.
-fn shading_keys(inputs: &TileInputs, visibility: &Keyed<Visibility>) -> ShadingKeys {
-    let TileInputs { settings, facets, materials, material_of_slot, .. } = inputs;
-    let mut surface = KeyBuilder::of_stage("surface");
-    surface.debug("settings", settings);
-    surface.key("facets", &facets.key).key("visibility", &visibility.key);
-    let mut lobes = KeyBuilder::of_stage("lobes");
-    lobes.counts("material of slot", material_of_slot.iter().copied());
-    let effects = &settings.effects;
-    lobes.debug("effects", &[effects.exact_lobes, effects.color_weights, effects.black_materials]);
-    for material in &materials.materials {
-        material.hash_lobes_into(&mut lobes);
-    }
-    ShadingKeys { surface: surface.finish(), lobes: lobes.finish(), facets: facets.key, visibility: visibility.key }
 }
 
 fn outcome_key(keys: &ShadingKeys, materials: &Key) -> Key {

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Env;
-use super::stage::{Codec, Keyed, Stage, StageTimes, elapsed_ms, lock, run_uncounted};
+use super::stage::{Codec, Keyed, Stage, StageTimes, elapsed_ms, lock, run_without_memo};
 use super::stages::TileShape;
 use crate::base::{Cancel, Error, Result};
 use crate::cache::{Cache, Key, KeyBuilder};
@@ -28,13 +28,13 @@ const STRIDES: [usize; 4] = [27, 17, 10, 3];
 /// If the error exceeds the tolerance by this factor, halving the grid step does not fix it.
 const HOPELESS: f64 = 2.5;
 
-/// A table may be computed from one facet in so many, drawn for each half vector by their lobes. Less than a fifth is
-/// tried only if at least `MANY` facets remain.
+/// A table may be computed from 1/20, 1/10, 1/5 or 1/2 of the facets, drawn for each half vector by their lobes. 1/20 and
+/// 1/10 are tried only if at least `MIN_SAMPLED_FACETS` remain.
 const PARTS: [usize; 4] = [20, 10, 5, 2];
-const MANY: usize = 1600;
+const MIN_SAMPLED_FACETS: usize = 1600;
 
-/// The part for coarse tables of so many nodes, which are computed without a trial; from all facets if that is not
-/// close enough.
+/// Tables with a node count in `COARSE` are computed first from a quarter of the facets, without a trial. If the error is
+/// too large, they are computed again from all facets.
 const COARSE_PART: usize = 4;
 const COARSE: Range<usize> = 10_000..20_000;
 
@@ -222,7 +222,7 @@ impl Shading {
     ) -> Result<Attempt> {
         let mirrors = self.mirrored.as_ref().map_or([false; 2], |tile| mirror_planes(&tile.mesh));
         let facets = match self.exact.direct_representation() {
-            // Facets that maps see cannot be subsampled.
+            // Bit maps of visibility cannot be restricted to a subset of facets.
             Representation::Direct(direct) if !matches!(*direct.visibility, Visibility::Maps(_)) => {
                 direct.sum.facet_count()
             }
@@ -239,7 +239,9 @@ impl Shading {
             if !self.is_close(best) {
                 return Ok(Attempt::TooFar(best));
             }
-            for part in PARTS.into_iter().filter(|part| facets > 0 && (*part <= 5 || facets >= MANY * part)) {
+            for part in
+                PARTS.into_iter().filter(|part| facets > 0 && (*part <= 5 || facets >= MIN_SAMPLED_FACETS * part))
+            {
                 let sampled = trial(Some(facets / part))?;
                 let is_as_good =
                     |errors: Errors| self.is_close(errors) && errors.rel_l2 < MAX_ERROR_GROWTH * best.rel_l2;
@@ -271,7 +273,7 @@ impl Shading {
                 }
                 let stage = Tabulate { direct, nodes, keys: self.keys };
                 let env = Env::with_cancel(cancel.clone());
-                let content = run_uncounted(&stage, &env, &self.disk, times)?;
+                let content = run_without_memo(&stage, &env, &self.disk, times)?;
                 Ok(ShadingTable::from_content(direct, nodes.grid, content))
             }
             representation => {

@@ -30,16 +30,16 @@ pub trait Stage {
     /// A file that cannot be used, a computation that fails, or [`crate::base::Error::Cancelled`].
     fn run(&self, env: &Env) -> Result<Self::Output>;
 
-    /// Whether `run` ignores a cancellation, so that its output is complete and is stored even then.
+    /// True if `run` never returns early on cancellation. Its output is then stored even if the operation was cancelled.
     const IGNORES_CANCEL: bool = false;
 
-    /// The slot of the memo. Two slots keep two results of one stage that different callers need in turns.
+    /// The slot in the memo. Two slots keep two results of one stage that different callers need in turns.
     fn slot(&self) -> &'static str {
         Self::NAME
     }
 
     /// Returns true if an output of this stage may be read from disk and written there.
-    fn is_portable(&self) -> bool {
+    fn may_be_stored(&self) -> bool {
         true
     }
 
@@ -155,7 +155,7 @@ impl Memo {
 fn compute<S: Stage>(stage: &S, key: Key, env: &Env, disk: &Cache, times: &mut StageTimes) -> Result<S::Output> {
     env.cancel.check()?;
     let start = Instant::now();
-    let stored = S::CODEC.filter(|_| stage.is_portable()).map(|codec| (codec, disk.entry_of(key)));
+    let stored = S::CODEC.filter(|_| stage.may_be_stored()).map(|codec| (codec, disk.entry_of(key)));
     if let Some((codec, entry)) = &stored
         && let Some(value) = entry.read(codec.read).filter(|value| stage.accepts(value))
     {
@@ -175,7 +175,12 @@ fn compute<S: Stage>(stage: &S, key: Key, env: &Env, disk: &Cache, times: &mut S
 }
 
 /// Runs a stage whose output is not memoized, only cached on disk.
-pub(super) fn run_uncounted<S: Stage>(stage: &S, env: &Env, disk: &Cache, times: &mut StageTimes) -> Result<S::Output> {
+pub(super) fn run_without_memo<S: Stage>(
+    stage: &S,
+    env: &Env,
+    disk: &Cache,
+    times: &mut StageTimes,
+) -> Result<S::Output> {
     let mut key = KeyBuilder::of_stage(S::NAME);
     stage.hash_into(&mut key);
     compute(stage, key.finish(), env, disk, times)

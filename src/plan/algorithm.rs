@@ -48,10 +48,13 @@ pub(super) fn hidden_light(features: &SceneFeatures) -> f64 {
     f64::from(features.steepest).sin().powi(2)
 }
 
+/// The part of the tolerance that leaving out the visibility of a shallow tile may use.
+pub(super) const SHALLOW_PART: f64 = 0.25;
+
 /// Returns true if occlusion can be left out within a quarter of the tolerance: nothing overhangs and no slope is
 /// steep. A direction above the steepest slope sees all of a height-field.
 fn is_shallow(features: &SceneFeatures, settings: &Settings) -> bool {
-    features.height_field && features.closes_plane && hidden_light(features) <= 0.25 * settings.tolerance
+    features.height_field && features.closes_plane && hidden_light(features) <= SHALLOW_PART * settings.tolerance
 }
 
 /// Predicted milliseconds of slices under overhangs: cells and triangles visited per facet and azimuth.

@@ -2,7 +2,7 @@
 //!
 //! A new effect is a row here and a switch in `[effects]` (`src/scene/effects.rs`).
 
-use super::algorithm::{hidden_light, maps_ms, scan_ms};
+use super::algorithm::{SHALLOW_PART, hidden_light, maps_ms, scan_ms};
 use super::context::Context;
 use super::{
     Effect, EffectKind, FAINT_FRACTION, IMAGE_CHECK_PAIRS, Method, Preset, VisibilityAlgorithm, VisibilityMethod, is_on,
@@ -24,7 +24,7 @@ struct Decision {
     on: bool,
     reason: String,
     predicted_ms: f64,
-    /// An upper bound of the relative L2 of `f̄` that turning the effect on changes, if it is off by itself.
+    /// An upper bound of the relative L2 change of `f̄` if the effect were turned on.
     bound: Option<f64>,
 }
 
@@ -44,7 +44,7 @@ impl Decision {
 
 /// The bound of an effect that only changes the order of a sum.
 const ROUNDING: f64 = 1e-4;
-/// The bound of taking normals as one that differ by rounding.
+/// The bound of treating normals that differ only by rounding as equal.
 const SAME_NORMALS: f64 = 1e-3;
 /// The bound of an effect that does not touch f̄.
 const UNCHANGED: f64 = 0.0;
@@ -139,6 +139,9 @@ pub fn switch_mut<'a>(effects: &'a mut Effects, name: &str) -> Option<&'a mut Sw
     row.switch.map(|field| field(effects))
 }
 
+/// Milliseconds per triangle and direction of shadow maps on a GPU.
+const GPU_MAP_TRIANGLE_MS: f64 = 2e-6;
+
 fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
     let Context { features, settings, costs, algorithm, .. } = *context;
     let facets = settings.facets as f64;
@@ -182,7 +185,7 @@ fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
         ),
         VisibilityAlgorithm::GpuMaps => (
             format!("{cause}: {} toroidal shadow maps on the GPU", settings.map_grid.len()),
-            settings.map_grid.len() as f64 * features.triangles as f64 * 2e-6,
+            settings.map_grid.len() as f64 * features.triangles as f64 * GPU_MAP_TRIANGLE_MS,
         ),
     };
     let bound = if features.flat { ROUNDING } else { settings.tolerance };
@@ -198,10 +201,10 @@ fn no_visibility(context: &Context<'_>, switch: Switch) -> String {
         "the tile is flat: every facet sees every direction".to_owned()
     } else {
         format!(
-            "shallow: no slope is steeper than {:.1}°, nothing above that is hidden, and {:.2} % of the light on a plane comes from below (allowed: {:.2} %)",
+            "shallow: no slope exceeds {:.1}°, so that at most {:.2} % of uniform light is blocked (limit: {:.2} %)",
             features.steepest.to_degrees(),
             hidden_light(features) * 100.0,
-            25.0 * context.settings.tolerance
+            SHALLOW_PART * context.settings.tolerance * 100.0
         )
     }
 }
@@ -327,7 +330,10 @@ fn measured_brdf(context: &Context<'_>, _: Switch) -> Decision {
 
 fn projected_area(context: &Context<'_>, _: Switch) -> Decision {
     if context.features.closes_plane {
-        Decision::new(false, "the tile closes the plane: a_v = A cos θ, and the sum estimates it as well")
+        Decision::new(
+            false,
+            "the tile closes the plane: the projected area is A cos θ, and the sum estimates it as well",
+        )
     } else {
         Decision::new(true, "the tile leaves holes: the measured projected area normalises")
     }

@@ -30,7 +30,7 @@ pub(super) struct Paths<'a> {
     bounces: usize,
 }
 
-/// A point of a path that reflects.
+/// A vertex of a path, at which light is reflected.
 struct Vertex<'a> {
     origin: Vec3,
     geometric: Vec3,

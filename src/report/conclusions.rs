@@ -106,7 +106,7 @@ fn most_influential_setting(scene: &SceneReport) -> Option<String> {
     }
     let most = settings.into_iter().max_by(|a, b| (a.2 / a.1).total_cmp(&(b.2 / b.1)))?;
     Some(format!(
-        "The knob that matters most here is {}: over its range the error goes from {} % to {} %.",
+        "The setting that matters most here is {}: over its range the error goes from {} % to {} %.",
         most.0,
         number(most.2 * 100.0),
         number(most.1 * 100.0)

@@ -23,7 +23,7 @@ pub struct EffectCost {
     pub on_ms: f64,
     /// Time with the effect off [ms].
     pub off_ms: f64,
-    /// Time with the plan's own choice [ms]. It differs from one of the other two by noise of the clock only.
+    /// Time with the plan's own choice [ms]. It differs from one of the other two only by timing noise.
     pub auto_ms: f64,
     /// Relative L2 between `f̄` with and without the effect.
     pub rel_l2: f64,
@@ -54,7 +54,7 @@ const PAIRS: usize = 128;
 /// Measures every effect that can be forced. `progress` receives its name.
 ///
 /// # Errors
-/// As [`Pipeline::effective`], or the object or the environment cannot be used.
+/// Returns the errors of [`Pipeline::effective`], or an error if the object or the environment cannot be used.
 pub fn measure_effects(
     loaded: &LoadedScene,
     cancel: &Cancel,

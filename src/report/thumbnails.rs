@@ -26,7 +26,7 @@ pub struct ThumbnailRenderer {
 
 impl ThumbnailRenderer {
     /// # Errors
-    /// The object, the environment or the camera cannot be used.
+    /// Returns an error if the object, the environment or the camera cannot be used.
     pub fn new(loaded: &LoadedScene) -> Result<Self> {
         let mut fewer_lights = loaded.clone();
         fewer_lights.scene.light.count = fewer_lights.scene.light.count.min(LIGHTS);
@@ -36,7 +36,7 @@ impl ThumbnailRenderer {
     }
 
     /// # Errors
-    /// The camera cannot frame the object.
+    /// Returns an error if the camera cannot frame the object.
     pub fn image(&self, material: &dyn Reflectance) -> Result<Image> {
         Ok(render(&self.render_scene.input(material, [SIZE, SIZE], 1, &Background::default()))?.image)
     }
@@ -44,7 +44,7 @@ impl ThumbnailRenderer {
     /// The image as a PNG in a `data:` URL.
     ///
     /// # Errors
-    /// The image cannot be encoded.
+    /// Returns an error if the image cannot be encoded.
     pub fn png(&self, image: &Image) -> Result<String> {
         data_url(image, &self.tone_map)
     }
@@ -52,7 +52,7 @@ impl ThumbnailRenderer {
     /// A noisy image of the reference. The mean over many seeds converges to it. `None` if an image takes too long.
     ///
     /// # Errors
-    /// As [`ThumbnailRenderer::image`], and [`crate::base::Error::Cancelled`].
+    /// Returns the errors of [`ThumbnailRenderer::image`], and [`crate::base::Error::Cancelled`].
     pub fn reference_image(&self, reference: &Reference<'_>, seed: u64, cancel: &Cancel) -> Result<Option<Image>> {
         let image = reference
             .stochastic_reference(seed, cancel)
@@ -72,7 +72,7 @@ impl ThumbnailRenderer {
 /// An image of ΔE as a `data:` URL: black is 0, white is [`FULL_SCALE`] or more.
 ///
 /// # Errors
-/// The image cannot be encoded.
+/// Returns an error if the image cannot be encoded.
 pub fn difference_png(delta_e: &[f32]) -> Result<String> {
     let pixels = delta_e.iter().map(|delta| heat(*delta)).collect();
     let plain = ToneMap { curve: crate::render::image::tone_map::ToneCurve::Plain, gain: 1.0 };

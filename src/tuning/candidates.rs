@@ -108,7 +108,7 @@ fn combination(k: usize) -> Candidate {
 /// The scene with a candidate's settings, and its own seed and backend.
 ///
 /// # Errors
-/// An override is not a valid setting.
+/// Returns an error if an override is not a valid setting.
 pub fn with_settings(loaded: &LoadedScene, candidate: &Candidate) -> Result<LoadedScene> {
     let mut scene = loaded.clone();
     scene.scene.quality = Quality {

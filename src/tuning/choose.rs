@@ -31,7 +31,7 @@ pub struct Measurement {
     /// PSNR without the error of the reference [dB]. It is infinite if there is no error or none was measured.
     pub psnr_db: f64,
     pub rel_l2: f64,
-    /// Standard error of the PSNR [dB]. A few bright pairs may hold most of an error, and other pairs miss them.
+    /// Standard error of the PSNR [dB]. A few bright pairs may cause most of the error, and another set may lack them.
     pub psnr_std_error_db: f64,
 }
 
@@ -103,7 +103,7 @@ const FINE_STEPS: u32 = 16;
 /// Chooses settings for a target. `progress` receives a description of each step.
 ///
 /// # Errors
-/// As [`Pipeline::effective`].
+/// Returns the errors of [`Pipeline::effective`].
 pub fn choose(loaded: &LoadedScene, target: Target, cancel: &Cancel, mut progress: impl FnMut(&str)) -> Result<Chosen> {
     let mut search = Search::new(loaded, cancel)?;
     let reached = match target {
@@ -239,7 +239,7 @@ impl<'a> Search<'a> {
                     let margin = 0.15 * (high.level - low.level);
                     at.clamp(low.level + margin, high.level - margin)
                 }
-                // Inconsistent times: other work disturbed them. The search starts once more from the lower level.
+                // Other load on the machine made the times inconsistent. The search restarts at the lower level.
                 Some(_) if !restarted && low.ms < 0.8 * ms => {
                     (restarted, high) = (true, None);
                     (low.level + 0.3).min(quality_scale::FINEST)

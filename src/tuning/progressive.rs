@@ -47,7 +47,7 @@ impl ProgressiveReference {
     /// Adds a batch of passes.
     ///
     /// # Errors
-    /// As [`Pipeline::with_reference`].
+    /// Returns the errors of [`Pipeline::with_reference`].
     pub fn refine(&mut self, pipeline: &mut Pipeline, loaded: &LoadedScene) -> Result<()> {
         let seed = 20_110_807 + self.batches as u64;
         let settings = ReferenceSettings { facets: FACETS, max_passes: PASSES, target: 0.0, seed };

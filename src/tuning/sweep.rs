@@ -16,8 +16,8 @@ use crate::plan::Preset;
 use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
 
-/// Upper ends of the bands of angles for which errors are listed [degrees]. The larger of both angles from the normal
-/// counts.
+/// Upper ends of the bands of angles for which errors are listed [degrees]. A pair belongs to the band of the larger
+/// of its two angles from the normal.
 pub const BANDS_DEG: [f32; 4] = [30.0, 55.0, 70.0, 85.0];
 
 /// Reference values at the direction pairs of a sweep.
@@ -48,7 +48,7 @@ impl ReferenceValues {
     /// standard error)` returns whether to continue.
     ///
     /// # Errors
-    /// As [`Pipeline::effective`].
+    /// Returns the errors of [`Pipeline::effective`].
     pub fn new(
         scene: &LoadedScene,
         count: usize,
@@ -153,7 +153,7 @@ const LONG_SECONDS: f64 = 2.0;
 /// Times a geometry edit at a candidate's settings and compares the result with the reference.
 ///
 /// # Errors
-/// As [`Pipeline::effective`].
+/// Returns the errors of [`Pipeline::effective`].
 pub fn measure(
     loaded: &LoadedScene,
     candidate: &Candidate,

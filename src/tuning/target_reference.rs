@@ -35,7 +35,7 @@ impl TargetReference {
     /// mean square.
     ///
     /// # Errors
-    /// As [`Pipeline::effective`].
+    /// Returns the errors of [`Pipeline::effective`].
     pub fn new(
         pipeline: &mut Pipeline,
         loaded: &LoadedScene,

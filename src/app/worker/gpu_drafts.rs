@@ -42,7 +42,7 @@ impl GpuDrafts {
     /// CPU can compute the tile.
     ///
     /// # Errors
-    /// As [`Pipeline::unseen`].
+    /// Returns the errors of [`Pipeline::gpu_tile`].
     pub fn tile(&mut self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<GpuTile>>> {
         let key = (small_scale(loaded), self.level);
         if let Some(last) = self.last.as_ref().filter(|last| last.key == key) {

@@ -87,7 +87,7 @@ impl GpuState {
     /// Returns `None` if the CPU has to render. After a GPU failure the CPU renders all further images.
     ///
     /// # Errors
-    /// [`Error::Cancelled`].
+    /// Returns [`Error::Cancelled`] if the work was cancelled.
     pub fn run<T>(
         &mut self,
         input: PreviewInput,

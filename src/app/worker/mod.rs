@@ -45,7 +45,7 @@ pub fn spawn_tile(report: impl Fn(TileResult) + Clone + Send + Sync + 'static) -
     Worker::spawn("tile", 0, tile_image_worker::TileImageWorker::default, work, panicked).ok()
 }
 
-/// Starts the thread that plots lobes. After a fault the plot does not follow; the image's worker reports the cause.
+/// Starts the thread that plots lobes. After a panic, the plot is not updated; the image worker reports the cause.
 pub fn spawn_lobe(report: impl Fn(LobePlot) + Clone + Send + Sync + 'static) -> Option<Worker<LobeJob>> {
     let work =
         move |_: &mut (), job: LobeJob, context: &runner::JobContext<LobeJob>| lobe::work(&job, context, &report);
@@ -60,7 +60,7 @@ pub struct PreviewWorkers {
 }
 
 impl PreviewWorkers {
-    /// Starts both threads; `None` if the system provides no threads.
+    /// Starts both threads; `None` if the system cannot start them.
     pub fn spawn(cache: &Cache, report: impl Fn(ImageResult) + Clone + Send + Sync + 'static) -> Option<Self> {
         let shared = Arc::new(shared::SharedState::default());
         let workers_shared = shared.clone();

@@ -109,7 +109,7 @@ impl PreviewRenderer {
     /// Renders the prepared scene to an image on the window's GPU; `None` if that GPU cannot render it.
     ///
     /// # Errors
-    /// An invalid camera, or [`Error::Cancelled`].
+    /// Returns an error if the camera is invalid, or [`Error::Cancelled`].
     pub fn render_to_screen(
         &mut self,
         request: &RenderRequest,
@@ -137,7 +137,7 @@ impl PreviewRenderer {
     /// Renders the prepared scene; also returns the milliseconds spent on the shading table.
     ///
     /// # Errors
-    /// An invalid camera, or [`Error::Cancelled`].
+    /// Returns an error if the camera is invalid, or [`Error::Cancelled`].
     pub fn render(
         &mut self,
         pipeline: &Pipeline,

@@ -50,7 +50,7 @@ impl GpuImage {
     /// Reads the image back into CPU memory.
     ///
     /// # Errors
-    /// A GPU error.
+    /// Returns an error if the GPU fails.
     pub fn read(&self) -> Result<ColorImage, GpuError> {
         let bytes = self.screen.gpu.read_image(&self.texture)?;
         Ok(ColorImage::from_rgba_unmultiplied(self.size, &bytes))
@@ -73,7 +73,7 @@ impl ImagePool {
     /// An image of this size that is not displayed.
     ///
     /// # Errors
-    /// A GPU error.
+    /// Returns an error if the GPU fails.
     pub fn next(&mut self, screen: &Screen, size: [usize; 2]) -> Result<Arc<GpuImage>, GpuError> {
         let fits = |image: &Arc<GpuImage>| image.size == size && Arc::ptr_eq(&image.screen.gpu, &screen.gpu);
         self.0.retain(fits);

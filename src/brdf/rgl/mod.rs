@@ -55,7 +55,7 @@ impl RglTable {
     /// Checks that rotating the surface changes little. Files with one or two azimuths are isotropic by definition.
     ///
     /// # Errors
-    /// The values change by more than interpolation explains; the error states the change.
+    /// Returns an error that states the change if it is larger than interpolation explains.
     fn check_isotropic(&self) -> std::result::Result<(), InputError> {
         if self.is_isotropic() {
             return Ok(());

@@ -11,8 +11,8 @@ use crate::geometry::{HeightGrid, PeriodicGrid, TileMesh};
 const MAX_SAMPLES_PER_SIDE: u32 = 1 << 16;
 
 /// The triangles of a height field that reach into the cells of the points, in their order, and a grid of them. For
-/// vertical rays at these points, the grid gives the same hits as a grid of the whole mesh. `None` if the mesh is not
-/// that of its samples.
+/// vertical rays at these points, the grid gives the same hits as a grid of the whole mesh. `None` if the mesh was
+/// not built from its samples.
 pub(crate) fn part_below(mesh: &TileMesh, points: impl Iterator<Item = Vec2>) -> Option<(TileMesh, PeriodicGrid)> {
     let heights = mesh.height_grid.as_ref()?;
     if heights.size.max_element() > MAX_SAMPLES_PER_SIDE || !is_mesh_of(mesh, heights) {

@@ -1,4 +1,4 @@
-//! A plane grid of the periodic tile's triangles. Rays and vertical slices walk its cells.
+//! A planar grid of the periodic tile's triangles. Rays and vertical slices walk its cells.
 
 use glam::{IVec2, Vec2, Vec3};
 use rayon::prelude::*;

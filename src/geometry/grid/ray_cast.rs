@@ -43,8 +43,8 @@ impl PeriodicGrid {
     }
 }
 
-/// Minimum of the number of cells that a ray visits, besides those of sixteen tiles, before it counts as unblocked. It
-/// bounds the time of nearly horizontal rays.
+/// Number of cells, in addition to those of sixteen tiles, after which a ray counts as unblocked. The limit bounds the
+/// time of nearly horizontal rays.
 const MIN_CELLS: i32 = 16_384;
 
 impl PeriodicGrid {

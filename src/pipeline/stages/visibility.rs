@@ -68,7 +68,7 @@ impl Stage for ComputeVisibility<'_> {
     }
 
     /// Maps from a GPU belong to that GPU, and take little time.
-    fn is_portable(&self) -> bool {
+    fn may_be_stored(&self) -> bool {
         self.algorithm != VisibilityAlgorithm::GpuMaps
     }
 
