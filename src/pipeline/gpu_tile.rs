@@ -26,7 +26,7 @@ const MIRRORS_FROM: usize = 60_000;
 /// Facets that the GPU draws for each half vector of a table.
 const FACETS_PER_HALF_VECTOR: usize = 1600;
 
-/// The most azimuths of visibility from which the GPU computes a table: on height-fields, and under overhangs.
+/// The most azimuths of visibility from which the GPU computes a table: on height fields, and under overhangs.
 const MAX_AZIMUTHS: [usize; 2] = [48, 96];
 
 /// The most rings and azimuths of half vectors of a table. The subsets of facets leave more error than larger steps.

@@ -26,23 +26,23 @@ use crate::visibility::Visibility;
 const STRIDES: [usize; 4] = [27, 17, 10, 3];
 
 /// If the error exceeds the tolerance by this factor, halving the grid step does not fix it.
-const HOPELESS: f64 = 2.5;
+const MAX_ERROR_RATIO: f64 = 2.5;
 
 /// A table may be computed from 1/20, 1/10, 1/5 or 1/2 of the facets, drawn for each half vector by their lobes. 1/20 and
 /// 1/10 are tried only if at least `MIN_SAMPLED_FACETS` remain.
-const PARTS: [usize; 4] = [20, 10, 5, 2];
+const SUBSET_DIVISORS: [usize; 4] = [20, 10, 5, 2];
 const MIN_SAMPLED_FACETS: usize = 1600;
 
-/// Tables with a node count in `COARSE` are computed first from a quarter of the facets, without a trial. If the error is
+/// Tables with a node count in `COARSE_TABLE_NODES` are computed first from a quarter of the facets, without a trial. If the error is
 /// too large, they are computed again from all facets.
-const COARSE_PART: usize = 4;
-const COARSE: Range<usize> = 10_000..20_000;
+const COARSE_SUBSET_DIVISOR: usize = 4;
+const COARSE_TABLE_NODES: Range<usize> = 10_000..20_000;
 
 /// The factor by which fewer facets may raise the error of a table.
 const MAX_ERROR_GROWTH: f64 = 1.25;
 
 /// Tables of more nodes are first computed only where the pairs of the check read them, at about 10,000 nodes.
-const TRIAL_FROM: usize = 60_000;
+const MIN_TRIAL_NODES: usize = 60_000;
 
 /// The effective BRDF as images read it.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ pub struct ShadingBrdf {
     pub errors: Option<Errors>,
     /// Milliseconds that this call took.
     pub ms: f64,
-    /// Whether all tables, tried or taken, were read from the disk cache.
+    /// True if every table that this call needed was read from the disk cache.
     pub was_cached: bool,
 }
 
@@ -200,7 +200,7 @@ impl Shading {
                 Attempt::Impossible => break,
             };
             last = Some(errors);
-            if errors.rel_l2 > HOPELESS * self.tolerance.0 {
+            if errors.rel_l2 > MAX_ERROR_RATIO * self.tolerance.0 {
                 break;
             }
         }
@@ -230,7 +230,7 @@ impl Shading {
         };
         let mut nodes = Nodes { mirrors, ..Nodes::all(grid) };
         let count = grid.originals(mirrors);
-        if count > TRIAL_FROM {
+        if count > MIN_TRIAL_NODES {
             let mut trial = |facets: Option<usize>| -> Result<Option<Errors>> {
                 let trial = self.tabulate(Nodes { facets, read_by: Some(&check.pairs), ..nodes }, cancel, times)?;
                 Ok(trial.map(|trial| check.errors(&self.with_table(trial))))
@@ -239,8 +239,9 @@ impl Shading {
             if !self.is_close(best) {
                 return Ok(Attempt::TooFar(best));
             }
-            for part in
-                PARTS.into_iter().filter(|part| facets > 0 && (*part <= 5 || facets >= MIN_SAMPLED_FACETS * part))
+            for part in SUBSET_DIVISORS
+                .into_iter()
+                .filter(|part| facets > 0 && (*part <= 5 || facets >= MIN_SAMPLED_FACETS * part))
             {
                 let sampled = trial(Some(facets / part))?;
                 let is_as_good =
@@ -250,8 +251,8 @@ impl Shading {
                     break;
                 }
             }
-        } else if facets > 0 && COARSE.contains(&count) {
-            let part = Nodes { facets: Some(facets / COARSE_PART), ..nodes };
+        } else if facets > 0 && COARSE_TABLE_NODES.contains(&count) {
+            let part = Nodes { facets: Some(facets / COARSE_SUBSET_DIVISOR), ..nodes };
             let Some(table) = self.tabulate(part, cancel, times)? else { return Ok(Attempt::Impossible) };
             if self.is_close(check.errors(&self.with_table(table.clone()))) {
                 return Ok(Attempt::Table(table));

@@ -7,7 +7,7 @@ use super::{Costs, SceneFeatures, Settings, VisibilityMethod, is_on};
 pub enum VisibilityAlgorithm {
     /// Nothing is computed: a flat tile blocks nothing.
     None,
-    /// A walk over the samples of a height-field.
+    /// A walk over the samples of a height field.
     HeightMarch,
     /// A horizon map from slices through a mesh without overhangs.
     HorizonScan,
@@ -42,9 +42,8 @@ impl VisibilityAlgorithm {
     }
 }
 
-/// The part of the light on a level plane that comes from lower than the steepest slope. Nothing above that is ever
-/// blocked.
-pub(super) fn hidden_light(features: &SceneFeatures) -> f64 {
+/// An upper bound of the part of uniform irradiance that slopes can block: sin² of the steepest slope.
+pub(super) fn max_blocked_part(features: &SceneFeatures) -> f64 {
     f64::from(features.steepest).sin().powi(2)
 }
 
@@ -52,9 +51,9 @@ pub(super) fn hidden_light(features: &SceneFeatures) -> f64 {
 pub(super) const SHALLOW_PART: f64 = 0.25;
 
 /// Returns true if occlusion can be left out within a quarter of the tolerance: nothing overhangs and no slope is
-/// steep. A direction above the steepest slope sees all of a height-field.
+/// steep. A direction above the steepest slope sees all of a height field.
 fn is_shallow(features: &SceneFeatures, settings: &Settings) -> bool {
-    features.height_field && features.closes_plane && hidden_light(features) <= SHALLOW_PART * settings.tolerance
+    features.height_field && features.closes_plane && max_blocked_part(features) <= SHALLOW_PART * settings.tolerance
 }
 
 /// Predicted milliseconds of slices under overhangs: cells and triangles visited per facet and azimuth.

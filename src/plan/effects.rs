@@ -2,7 +2,7 @@
 //!
 //! A new effect is a row here and a switch in `[effects]` (`src/scene/effects.rs`).
 
-use super::algorithm::{SHALLOW_PART, hidden_light, maps_ms, scan_ms};
+use super::algorithm::{SHALLOW_PART, maps_ms, max_blocked_part, scan_ms};
 use super::context::Context;
 use super::{
     Effect, EffectKind, FAINT_FRACTION, IMAGE_CHECK_PAIRS, Method, Preset, VisibilityAlgorithm, VisibilityMethod, is_on,
@@ -154,7 +154,7 @@ fn visibility(context: &Context<'_>, switch: Switch) -> Decision {
         VisibilityAlgorithm::None => (no_visibility(context, switch), 0.0),
         VisibilityAlgorithm::HeightMarch => (
             format!(
-                "height-field: a horizon map of {} azimuths from a walk over its samples",
+                "height field: a horizon map of {} azimuths from a walk over its samples",
                 settings.horizon_azimuths
             ),
             facets * azimuths * costs.march_ns * 1e-6 / costs.threads,
@@ -203,7 +203,7 @@ fn no_visibility(context: &Context<'_>, switch: Switch) -> String {
         format!(
             "shallow: no slope exceeds {:.1}°, so that at most {:.2} % of uniform light is blocked (limit: {:.2} %)",
             features.steepest.to_degrees(),
-            hidden_light(features) * 100.0,
+            max_blocked_part(features) * 100.0,
             SHALLOW_PART * context.settings.tolerance * 100.0
         )
     }
@@ -425,14 +425,14 @@ fn exact_lobes(context: &Context<'_>, switch: Switch) -> Decision {
     Decision::new(is_on(switch, normals.is_some()), reason).changes_at_most(SAME_NORMALS)
 }
 
-/// Mirror planes are looked for when something is tabulated, so that a geometry edit does not wait for them.
+/// Mirror planes are searched for only when a table is computed, so that a geometry edit does not wait for them.
 fn mirror_symmetry(context: &Context<'_>, switch: Switch) -> Decision {
     let is_tabulated = context.interreflection || context.try_shading_table;
     let planes = context.mirrors();
     let is_known = switch == Switch::On || context.features.mirrors.is_some();
     let on = is_tabulated && switch != Switch::Off && (!is_known || planes != [false; 2]);
     let reason = match planes {
-        _ if !is_tabulated => "nothing is tabulated that it could save",
+        _ if !is_tabulated => "no table is computed",
         _ if switch == Switch::Off => "treated as having no mirror planes, as asked",
         _ if !is_known => {
             "if planes x = const or y = const mirror the tile, the shading table takes a half or a quarter of the time"

@@ -31,7 +31,7 @@ pub fn of(scene: &SceneReport) -> Vec<String> {
 }
 
 /// All points except the paper's own choices and the reference.
-fn ours(scene: &SceneReport) -> Vec<&SweepPoint> {
+fn own_points(scene: &SceneReport) -> Vec<&SweepPoint> {
     scene
         .points
         .iter()
@@ -41,8 +41,8 @@ fn ours(scene: &SceneReport) -> Vec<&SweepPoint> {
 
 /// Compares the Pareto front with the paper's own choices, at their time and at their error.
 fn against_the_paper(scene: &SceneReport, paper: &SweepPoint) -> Option<String> {
-    let ours = ours(scene);
-    let front: Vec<&SweepPoint> = pareto(&ours).into_iter().map(|k| ours[k]).collect();
+    let points = own_points(scene);
+    let front: Vec<&SweepPoint> = pareto(&points).into_iter().map(|k| points[k]).collect();
     let as_fast = front.iter().rfind(|point| point.ms <= paper.ms);
     let as_good = front.iter().find(|point| point.rel_l2 <= paper.rel_l2);
     let better = as_fast.map(|point| format!("{:.1} dB better in no more time", point.psnr_db - paper.psnr_db));
@@ -51,7 +51,7 @@ fn against_the_paper(scene: &SceneReport, paper: &SweepPoint) -> Option<String> 
     let (ms, error) = (number(paper.ms), number(paper.rel_l2 * 100.0));
     (!both.is_empty()).then(|| {
         format!(
-            "The paper's own choices (wu2011) take {ms} ms and leave {:.1} dB, {error} %: ours are {}.",
+            "The paper's own choices (wu2011) take {ms} ms and leave {:.1} dB, {error} %: the other settings are {}.",
             paper.psnr_db,
             both.join(", and ")
         )
