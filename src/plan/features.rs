@@ -1,5 +1,7 @@
 //! Properties of a scene and prices of the machine, on which the decisions rest.
 
+use std::sync::LazyLock;
+
 /// The properties of a scene on which the decisions rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneFeatures {
@@ -54,6 +56,10 @@ pub struct Costs {
     pub threads: f64,
 }
 
+/// The threads of the machine. Asking for them reads files on Linux, which takes longer than the rest of a plan.
+static THREADS: LazyLock<f64> =
+    LazyLock::new(|| std::thread::available_parallelism().map_or(1.0, |threads| threads.get() as f64));
+
 impl Default for Costs {
     fn default() -> Self {
         Self {
@@ -68,7 +74,7 @@ impl Default for Costs {
             slice_ns: 42.0,
             triangle_ns: 60.0,
             texel_ns: 10.0,
-            threads: std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64),
+            threads: *THREADS,
         }
     }
 }
