@@ -38,8 +38,11 @@ fn edit(scene: Option<&str>, since: Option<Instant>) -> anyhow::Result<()> {
     app::run(scene, app::StartTimes { since })
 }
 
-/// Returns an error, because this build has no editor.
+/// Reports that the program was built without the editor. A scene that cannot be opened is reported first, as by the editor.
 #[cfg(not(feature = "editor"))]
-fn edit(_: Option<&str>, _: Option<Instant>) -> anyhow::Result<()> {
+fn edit(scene: Option<&str>, _: Option<Instant>) -> anyhow::Result<()> {
+    if let Some(scene) = scene {
+        biscale::scene::open(scene, &[])?;
+    }
     anyhow::bail!("this program was built without the editor (feature `editor`); see `biscale --help` for its commands")
 }
