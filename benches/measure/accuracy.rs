@@ -23,7 +23,7 @@ const BOUNDS: [(&str, f64, f64); 5] = [
 /// `silver-paint.binary`.
 ///
 /// # Errors
-/// If a preset misses its bounds.
+/// The bench fails if a preset misses its bounds.
 pub fn accuracy(presets: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
     let pairs = mirror_biased_pairs(500, 77);
     let mut brdfs: Vec<(String, String)> =

@@ -17,7 +17,7 @@ impl InTests {
     /// Runs the test with all its rows and keeps the lines that it prints.
     ///
     /// # Errors
-    /// If the process does not start, fails, or runs no test.
+    /// An error is returned if the process does not start, fails, or runs no test.
     pub fn run(&self, table: &mut Table) -> Result<(), String> {
         let mut child = Command::new(env!("CARGO"))
             .args(["test", "--release"])

@@ -32,7 +32,7 @@ impl Table {
     /// Replaces the lines between `<!-- measure: NAME -->` and `<!-- end -->` in every page of `docs/measurements`.
     ///
     /// # Errors
-    /// If a page cannot be read or written, or a marker has no end.
+    /// An error is returned if a page cannot be read or written, or a marker has no end.
     pub fn write(&self, name: &str) -> Result<(), String> {
         let (start, end) = (format!("<!-- measure: {name} -->\n"), "<!-- end -->");
         for path in pages()? {

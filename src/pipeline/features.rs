@@ -22,7 +22,7 @@ pub(super) struct Surface<'a> {
     pub settings: &'a Settings,
     /// Planes x = const and y = const that mirror the tile; `None` if they were not looked for.
     pub mirrors: Option<[bool; 2]>,
-    /// Whether the cost of slicing under overhangs is wanted.
+    /// True if the plan needs the cost of slicing under overhangs.
     pub wants_scan_work: bool,
 }
 

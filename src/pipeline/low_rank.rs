@@ -26,7 +26,7 @@ pub(super) struct FactorInputs<'a> {
     pub materials: &'a [Material],
     /// The key of the lobes of all materials and of their slots.
     pub lobes: Key,
-    /// Whether normals may point anywhere, as under overhangs.
+    /// True if normals may point anywhere, as under overhangs.
     pub whole_sphere: bool,
     pub base_area: f64,
 }

@@ -25,7 +25,7 @@ use crate::visibility::Visibility;
 /// recurrence that placed the facets stays well spread.
 const STRIDES: [usize; 4] = [27, 17, 10, 3];
 
-/// If the error exceeds the tolerance by this factor, halving the grid step does not fix it.
+/// The largest ratio of error and tolerance at which halving the grid step may still help.
 const MAX_ERROR_RATIO: f64 = 2.5;
 
 /// A table may be computed from 1/20, 1/10, 1/5 or 1/2 of the facets, drawn for each half vector by their lobes. 1/20 and

@@ -10,7 +10,7 @@ pub struct SceneFeatures {
     pub steepest: f32,
     /// The largest part of uniform light that a material reflects.
     pub albedo: f64,
-    /// Whether all materials reflect all channels alike.
+    /// True if all materials reflect all channels alike.
     pub grey: bool,
     /// Planes x = const and y = const that mirror the tile; `None` if they were not looked for.
     pub mirrors: Option<[bool; 2]>,
@@ -26,7 +26,7 @@ pub struct SceneFeatures {
     /// Materials that facets carry, without black ones.
     pub materials: usize,
     pub black_materials: usize,
-    /// Whether colour weights differ within a material.
+    /// True if colour weights differ within a material.
     pub colors_vary: bool,
     /// Lobes that a direct sum adds up, and measured look-ups.
     pub lobes: usize,

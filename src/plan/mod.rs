@@ -44,9 +44,9 @@ pub struct Effect {
     pub predicted_ms: f64,
     /// Milliseconds of the stage; `None` until it has run.
     pub measured_ms: Option<f64>,
-    /// Whether the user forced the effect on or off.
+    /// True if the user forced the effect on or off.
     pub forced: bool,
-    /// If the effect is off by itself: an upper bound of the relative L2 of `f̄` that turning it on changes.
+    /// An upper bound of the relative L2 change of `f̄` if the effect, which is off by itself, were turned on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound: Option<f64>,
 }

@@ -101,7 +101,8 @@ impl Stage for BuildTile<'_> {
     }
 }
 
-/// If no surface faces down, a point that blocks a direction also blocks every lower direction: one horizon is enough.
+/// Returns true if no surface faces down. A point that blocks a direction then also blocks every lower direction, so that
+/// one horizon is enough.
 fn nothing_faces_down(mesh: &TileMesh) -> bool {
     (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
 }
@@ -170,7 +171,7 @@ pub(super) fn hash_sampling_into(settings: &Settings, key: &mut KeyBuilder) {
 pub struct SampleFacets<'a> {
     pub tile: &'a Keyed<TileShape>,
     pub settings: &'a Settings,
-    /// Whether these are the few facets of a clustered sum on the GPU, which alternate with those of the CPU.
+    /// True for the few facets of a clustered sum on the GPU, which alternate with those of the CPU.
     pub for_clusters: bool,
 }
 
