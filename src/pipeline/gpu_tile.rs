@@ -1,7 +1,8 @@
 //! The input of a GPU that computes visibility and product itself: the stages that come before them.
 
+use super::inputs::{Processor, TileInputs};
 use super::stages::{BuildCells, FindMirrorPlanes};
-use super::{Pipeline, Processor, StageTimes, TileInputs};
+use super::{Pipeline, StageTimes};
 use crate::base::Result;
 use crate::effective::{FacetSum, GpuTileInput, GpuVisibilityInput, Heights, Maps, Nodes, Sliced};
 use crate::math::directions::HemispherePairGrid;

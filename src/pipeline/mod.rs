@@ -10,6 +10,7 @@
 mod env;
 mod features;
 mod gpu_tile;
+mod inputs;
 mod low_rank;
 mod outcome;
 mod shading;
@@ -17,14 +18,15 @@ mod stage;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod wu2011;
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 pub use self::env::{Env, GpuAccess, GpuOpener};
-use self::features::Surface;
 pub use self::gpu_tile::GpuTile;
+use self::inputs::{Processor, TileInputs};
 use self::low_rank::FactorInputs;
 pub use self::outcome::Outcome;
 use self::outcome::limits;
@@ -40,14 +42,13 @@ use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
 use crate::cache::{Cache, Key, KeyBuilder};
 use crate::diagnostics::{Health, HealthInputs, VisibilityInput};
-use crate::effective::{Direct, EffectiveBrdf, FacetSum, Representation, VisibleFacets, Wu2011, Wu2011Settings};
+use crate::effective::{Direct, EffectiveBrdf, Representation};
 use crate::geometry::{Facets, TileMesh};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
-use crate::math::directions::ParaboloidMap;
-use crate::plan::{Costs, Plan, Preset, Settings, VisibilityAlgorithm};
+use crate::plan::{Preset, Settings, VisibilityAlgorithm};
 use crate::reference::Reference;
 use crate::scene::{LoadedScene, Scene, Switch};
-use crate::visibility::{Visibility, visibility_maps_cpu};
+use crate::visibility::Visibility;
 
 /// Computes effective BRDFs. Clones share the memo.
 #[derive(Debug, Clone, Default)]
@@ -59,27 +60,6 @@ pub struct Pipeline {
     /// The last settings and their key: most edits keep them.
     last_settings: Arc<Mutex<Option<(Settings, Key)>>>,
     disk: Cache,
-}
-
-/// The processor that computes visibility and product.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Processor {
-    /// The plan compares the costs of the CPU's algorithms.
-    Cpu,
-    /// The GPU. `max_facets` limits the facets of a clustered sum; `None` keeps the setting.
-    Gpu { max_facets: Option<usize> },
-}
-
-/// The inputs of visibility: the tile, its materials and facets, and the plan.
-struct TileInputs {
-    tile: Keyed<TileShape>,
-    settings: Settings,
-    materials: Keyed<MaterialAssignment>,
-    facets: Keyed<Facets>,
-    /// The material of each slot as the sum uses them.
-    material_of_slot: Vec<usize>,
-    sum: FacetSum,
-    plan: Plan,
 }
 
 /// A tile with its visibility and its materials.
@@ -165,51 +145,6 @@ impl Pipeline {
         times: &mut StageTimes,
     ) -> Result<Keyed<MaterialAssignment>> {
         self.get(LoadMaterials::new(loaded, &tile.mesh.slots, &self.env), times)
-    }
-
-    /// Runs the stages before visibility.
-    fn tile_inputs(&self, loaded: &LoadedScene, processor: Processor, times: &mut StageTimes) -> Result<TileInputs> {
-        let scene = &loaded.scene;
-        let tile = self.tile(loaded, times)?;
-        let mut settings = Settings::of(scene).for_shape(tile.height_field);
-        if let Processor::Gpu { max_facets: Some(most) } = processor {
-            settings.facets = settings.facets.min(most);
-        }
-        let materials = self.assignment(loaded, &tile, times)?;
-        let for_clusters = matches!(processor, Processor::Gpu { max_facets: Some(_) });
-        let facets = self.get(SampleFacets { tile: &tile, settings: &settings, for_clusters }, times)?;
-        let material_of_slot = grouped(&materials.material_of_slot, &facets, &settings);
-        let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.materials);
-        sum.force(&facets, &settings.effects);
-        let surface = Surface {
-            scene,
-            tile: &tile,
-            facets: &facets,
-            sum: &sum,
-            material_of_slot: &material_of_slot,
-            materials: &materials.materials,
-            settings: &settings,
-            mirrors: self.mirrors_of_interreflection(&tile, &settings, times)?,
-            wants_scan_work: processor == Processor::Cpu,
-        };
-        let plan = Plan::new(&self.features(&surface)?, &settings, &Costs::default());
-        Ok(TileInputs { tile, settings, materials, facets, material_of_slot, sum, plan })
-    }
-
-    /// The mirror planes of the tile, which are looked for only if interreflection would use them.
-    fn mirrors_of_interreflection(
-        &self,
-        tile: &Keyed<TileShape>,
-        settings: &Settings,
-        times: &mut StageTimes,
-    ) -> Result<Option<[bool; 2]>> {
-        let effects = &settings.effects;
-        match (effects.interreflection, effects.mirror_symmetry) {
-            (Switch::On, Switch::Auto) if !tile.flat => {
-                Ok(Some(*self.get(FindMirrorPlanes { tile, cells: None }, times)?))
-            }
-            _ => Ok(None),
-        }
     }
 
     /// Visibility of the facets by the plan's algorithm. Without an algorithm, no stage runs.
@@ -354,49 +289,6 @@ impl Pipeline {
         Ok(self.get(gather, times)?.value)
     }
 
-    /// The paper's own method (Wu et al. 2011, Sec. 3.2 to 3.7): its directions, its facets, its truncations.
-    fn wu2011(&self, scene: &Scene, inputs: TileInputs, mut times: StageTimes) -> Result<Outcome> {
-        let TileInputs { tile, settings, materials, facets, material_of_slot, plan, .. } = inputs;
-        let paper_settings =
-            Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
-        let start = Instant::now();
-        let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
-        let visibility = visibility_maps_cpu(&tile.mesh, &facets, directions.directions(), settings.map_resolution);
-        times.push(("visibility", elapsed_ms(start)));
-        let factors = PaperTables { materials: &materials.materials, settings: &paper_settings };
-        let factors = self.get(factors, &mut times)?;
-        let start = Instant::now();
-        let base_area = f64::from(tile.mesh.base_area());
-        let visible = VisibleFacets { facets: &facets, visibility: &visibility, directions: &directions, base_area };
-        let tables =
-            Wu2011::from_factors(&visible, &material_of_slot, &materials.materials, &factors, &paper_settings)?;
-        times.push(("product", elapsed_ms(start)));
-        let brdf = Arc::new(EffectiveBrdf { representation: Representation::Wu2011(tables), base_area });
-        let names = material_names(scene, &tile.mesh, &materials)?;
-        let keys =
-            ShadingKeys { surface: facets.key, lobes: materials.key, facets: facets.key, visibility: facets.key };
-        let last = (&self.last_shading, &self.disk);
-        let shading = Shading::new(brdf.clone(), &tile, &settings, false, keys, last);
-        let health_inputs = HealthInputs {
-            facets: facets.value.clone(),
-            visibility: VisibilityInput::Packed(Arc::new(visibility)),
-            materials: Arc::new(MaterialAssignment { material_of_slot, materials: materials.materials.clone() }),
-            names,
-            closes_plane: tile.mesh.closes_plane,
-        };
-        Ok(Outcome {
-            brdf,
-            plan,
-            settings,
-            times,
-            factored: None,
-            notes: tile.mesh.notes.clone(),
-            health_inputs,
-            examined: Arc::default(),
-            shading: Arc::new(shading),
-        })
-    }
-
     /// The tile's mesh.
     ///
     /// # Errors
@@ -441,19 +333,6 @@ impl Pipeline {
         let reference = Reference::new(&tile.mesh, &assignment.material_of_slot, &assignment.materials);
         Ok(work(&reference.with_bounces(bounces)))
     }
-}
-
-/// The material of each slot. If all materials are forced into one, it is that of the largest area.
-fn grouped(material_of_slot: &[usize], facets: &Facets, settings: &Settings) -> Vec<usize> {
-    if settings.effects.material_groups != Switch::Off {
-        return material_of_slot.to_vec();
-    }
-    let mut areas = vec![0.0_f64; material_of_slot.len()];
-    for (slot, area) in facets.slots.iter().zip(&facets.areas) {
-        areas[usize::from(*slot)] += f64::from(*area);
-    }
-    let largest = (0..areas.len()).max_by(|a, b| areas[*a].total_cmp(&areas[*b])).unwrap_or(0);
-    material_of_slot.iter().map(|_| material_of_slot[largest]).collect()
 }
 
 fn outcome_key(keys: &ShadingKeys, materials: &Key) -> Key {

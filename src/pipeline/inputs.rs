@@ -1,0 +1,97 @@
+//! The stages before visibility, and the plan.
+
+use super::features::Surface;
+use super::stages::{FindMirrorPlanes, SampleFacets, TileShape};
+use super::{Keyed, Pipeline, StageTimes};
+use crate::base::Result;
+use crate::brdf::MaterialAssignment;
+use crate::effective::FacetSum;
+use crate::geometry::Facets;
+use crate::plan::{Costs, Plan, Settings};
+use crate::scene::{LoadedScene, Switch};
+
+/// The processor that computes visibility and product.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Processor {
+    /// The plan compares the costs of the CPU's algorithms.
+    Cpu,
+    /// The GPU. `max_facets` limits the facets of a clustered sum; `None` keeps the setting.
+    Gpu { max_facets: Option<usize> },
+}
+
+/// The inputs of visibility: the tile, its materials and facets, and the plan.
+pub(super) struct TileInputs {
+    pub tile: Keyed<TileShape>,
+    pub settings: Settings,
+    pub materials: Keyed<MaterialAssignment>,
+    pub facets: Keyed<Facets>,
+    /// The material of each slot as the sum uses them.
+    pub material_of_slot: Vec<usize>,
+    pub sum: FacetSum,
+    pub plan: Plan,
+}
+
+impl Pipeline {
+    /// Runs the stages before visibility.
+    pub(super) fn tile_inputs(
+        &self,
+        loaded: &LoadedScene,
+        processor: Processor,
+        times: &mut StageTimes,
+    ) -> Result<TileInputs> {
+        let scene = &loaded.scene;
+        let tile = self.tile(loaded, times)?;
+        let mut settings = Settings::of(scene).for_shape(tile.height_field);
+        if let Processor::Gpu { max_facets: Some(most) } = processor {
+            settings.facets = settings.facets.min(most);
+        }
+        let materials = self.assignment(loaded, &tile, times)?;
+        let for_clusters = matches!(processor, Processor::Gpu { max_facets: Some(_) });
+        let facets = self.get(SampleFacets { tile: &tile, settings: &settings, for_clusters }, times)?;
+        let material_of_slot = grouped(&materials.material_of_slot, &facets, &settings);
+        let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.materials);
+        sum.force(&facets, &settings.effects);
+        let surface = Surface {
+            scene,
+            tile: &tile,
+            facets: &facets,
+            sum: &sum,
+            material_of_slot: &material_of_slot,
+            materials: &materials.materials,
+            settings: &settings,
+            mirrors: self.mirrors_of_interreflection(&tile, &settings, times)?,
+            wants_scan_work: processor == Processor::Cpu,
+        };
+        let plan = Plan::new(&self.features(&surface)?, &settings, &Costs::default());
+        Ok(TileInputs { tile, settings, materials, facets, material_of_slot, sum, plan })
+    }
+
+    /// The mirror planes of the tile, which are looked for only if interreflection would use them.
+    fn mirrors_of_interreflection(
+        &self,
+        tile: &Keyed<TileShape>,
+        settings: &Settings,
+        times: &mut StageTimes,
+    ) -> Result<Option<[bool; 2]>> {
+        let effects = &settings.effects;
+        match (effects.interreflection, effects.mirror_symmetry) {
+            (Switch::On, Switch::Auto) if !tile.flat => {
+                Ok(Some(*self.get(FindMirrorPlanes { tile, cells: None }, times)?))
+            }
+            _ => Ok(None),
+        }
+    }
+}
+
+/// The material of each slot. If all materials are forced into one, it is that of the largest area.
+fn grouped(material_of_slot: &[usize], facets: &Facets, settings: &Settings) -> Vec<usize> {
+    if settings.effects.material_groups != Switch::Off {
+        return material_of_slot.to_vec();
+    }
+    let mut areas = vec![0.0_f64; material_of_slot.len()];
+    for (slot, area) in facets.slots.iter().zip(&facets.areas) {
+        areas[usize::from(*slot)] += f64::from(*area);
+    }
+    let largest = (0..areas.len()).max_by(|a, b| areas[*a].total_cmp(&areas[*b])).unwrap_or(0);
+    material_of_slot.iter().map(|_| material_of_slot[largest]).collect()
+}
