@@ -12,7 +12,7 @@ use super::{QUICK, editor, harness, quick, settle};
 use crate::app::actions::Action;
 use crate::app::document::Document;
 use crate::app::editor::Editor;
-use crate::app::worker::{DisplayImage, GpuShare, LOSE_GPU, Screen};
+use crate::app::worker::{DisplayImage, GpuShare, Grade, LOSE_GPU, Screen};
 
 #[test]
 fn a_lost_gpu_is_reported_and_the_cpu_renders_the_next_images() {
@@ -122,18 +122,24 @@ fn with_a_gpu_the_first_image_after_an_edit_needs_no_visibility_of_the_cpu() {
     screen.is_hardware = true;
     editor(&mut harness).share_gpu(GpuShare { only_software: None, screen: Some(screen) });
     settle(&mut harness);
-    let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.nudge_geometry().unwrap();
-    editor(&mut harness).document.edit(scene);
-    let version = editor(&mut harness).document.version();
     let start = std::time::Instant::now();
+    // On a busy machine, a frame can take so long that the refined image replaces the draft before it is seen.
     let draft = loop {
-        harness.step();
-        let preview = editor(&mut harness).object.preview.clone().unwrap();
-        if preview.version == version {
+        let mut scene = (**editor(&mut harness).document.scene()).clone();
+        scene.nudge_geometry().unwrap();
+        editor(&mut harness).document.edit(scene);
+        let version = editor(&mut harness).document.version();
+        let preview = loop {
+            harness.step();
+            let preview = editor(&mut harness).object.preview.clone().unwrap();
+            assert!(start.elapsed().as_secs() < 110, "no image");
+            if preview.version == version {
+                break preview;
+            }
+        };
+        if preview.grade == Grade::Draft {
             break preview;
         }
-        assert!(start.elapsed().as_secs() < 60, "no image");
     };
     let stages: Vec<_> = draft.stages.iter().map(|(name, _)| *name).collect();
     assert!(matches!(draft.image, DisplayImage::OnGpu(_)), "{stages:?}");
