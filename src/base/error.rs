@@ -1,5 +1,6 @@
 //! Errors of the library. Every error of the user's input states its place, what was found and what was expected.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -53,6 +54,20 @@ impl InputError {
 /// Largest number of characters of the found text in a message; some decoders return very long texts.
 const MAX_FOUND_CHARS: usize = 400;
 
+/// Largest number of characters of a path or a place in a message.
+const MAX_PATH_CHARS: usize = 200;
+
+/// Leaves out the middle of a long path. Both ends stay, because the end holds the name of the file.
+fn without_middle(text: &str) -> Cow<'_, str> {
+    let count = text.chars().count();
+    if count <= MAX_PATH_CHARS {
+        return Cow::Borrowed(text);
+    }
+    let half = MAX_PATH_CHARS / 2;
+    let chars = |from: usize, count: usize| text.chars().skip(from).take(count).collect::<String>();
+    Cow::Owned(format!("{}…{}", chars(0, half), chars(count - half, half)))
+}
+
 fn brief(mut text: String) -> String {
     if let Some((end, _)) = text.char_indices().nth(MAX_FOUND_CHARS) {
         text.truncate(end);
@@ -64,10 +79,10 @@ fn brief(mut text: String) -> String {
 impl fmt::Display for InputError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(file) = &self.file {
-            write!(out, "{}: ", file.display())?;
+            write!(out, "{}: ", without_middle(&file.to_string_lossy()))?;
         }
         if !self.place.is_empty() {
-            write!(out, "{}: ", self.place)?;
+            write!(out, "{}: ", without_middle(&self.place))?;
         }
         write!(out, "found {}, expected {}", self.found, self.expected)?;
         match &self.hint {
@@ -120,5 +135,13 @@ mod tests {
         let error = InputError::new("file.tif", "1, ".repeat(100_000), "an image");
         assert!(error.to_string().chars().count() < 600);
         assert!(InputError::new("a", "short", "b").to_string().contains("short"));
+    }
+
+    #[test]
+    fn a_long_path_loses_its_middle_and_keeps_its_name() {
+        let path = format!("{}ü/name.png", "folder/".repeat(700));
+        let error = InputError::new("--set ".to_owned() + &path, "nothing", "a file").in_file(&path).to_string();
+        assert!(error.chars().count() < 500, "{error}");
+        assert!(error.starts_with("folder/") && error.contains("ü/name.png: --set folder/"), "{error}");
     }
 }

@@ -36,7 +36,12 @@ fn views() -> impl Iterator<Item = ([f32; 2], Vec3)> {
     })
 }
 
-pub fn materials(materials: &[Material], names: &[String]) -> (Vec<MeasuredHealth>, Vec<MaterialHealth>) {
+/// Measures the materials. `max_color_weight` is the largest weight of the colour image per channel.
+pub fn materials(
+    materials: &[Material],
+    names: &[String],
+    max_color_weight: Vec3,
+) -> (Vec<MeasuredHealth>, Vec<MaterialHealth>) {
     let mut measured: Vec<MeasuredHealth> = Vec::new();
     let mut all = Vec::new();
     for (k, material) in materials.iter().enumerate() {
@@ -57,7 +62,7 @@ pub fn materials(materials: &[Material], names: &[String]) -> (Vec<MeasuredHealt
         let narrowest = material.brdf.terms.iter().filter_map(half_width).reduce(f32::min);
         all.push(MaterialHealth {
             name,
-            largest_albedo: largest_albedo(&material.brdf, material.color),
+            largest_albedo: largest_albedo(&material.brdf, material.color * max_color_weight),
             narrowest_lobe_deg: narrowest.map(f32::to_degrees),
         });
     }
@@ -105,6 +110,7 @@ pub fn surface(inputs: &HealthInputs, lobe_deg: Option<f32>) -> SurfaceHealth {
     let mut health = SurfaceHealth {
         facets: facets.len(),
         triangles_left_out: facets.skipped_triangles,
+        largest_color_weight: inputs.max_color_weight.max_element(),
         has_holes: !inputs.closes_plane,
         fewest_visible_facets: facets.len(),
         facets_in_a_lobe: lobe_deg.and_then(|degrees| facets_within(&facets.normals, degrees.to_radians())),
@@ -286,7 +292,7 @@ mod tests {
                 let (scene, name) = (scene::parse(&source).unwrap(), "test".to_owned());
                 let loaded = LoadedScene { scene, base_dir: PathBuf::new(), name, painted: Painted::default() };
                 let outcome = Pipeline::new().effective(&loaded).unwrap();
-                let materials = materials(&outcome.health_inputs.materials.materials, &[]).1;
+                let materials = materials(&outcome.health_inputs.materials.materials, &[], Vec3::ONE).1;
                 let grid = grid_for(materials[0].narrowest_lobe_deg).unwrap();
                 let [albedo, exact] =
                     [grid, PolarGrid::new(96, 320)].map(|grid| largest_effective_albedo(&outcome.brdf, grid).0);

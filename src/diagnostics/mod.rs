@@ -8,6 +8,7 @@ mod warnings;
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use serde::Serialize;
 
 use crate::brdf::{Material, MaterialAssignment};
@@ -25,6 +26,8 @@ pub struct HealthInputs {
     /// Names of the materials, in their order.
     pub names: Vec<String>,
     pub closes_plane: bool,
+    /// Largest weight of the colour image per channel; 1 without an image.
+    pub max_color_weight: Vec3,
 }
 
 /// Visibility that a health is measured from.
@@ -66,7 +69,8 @@ pub struct MeasuredHealth {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct MaterialHealth {
     pub name: String,
-    /// Largest directional albedo of any channel up to 80°. The material creates energy if it exceeds 1.
+    /// Largest directional albedo of any channel up to 80°, under the brightest texel of the colour image. The material
+    /// creates energy if it exceeds 1.
     pub largest_albedo: f32,
     /// Half width of the narrowest lobe [degrees]; `None` for a diffuse material.
     pub narrowest_lobe_deg: Option<f32>,
@@ -78,6 +82,8 @@ pub struct SurfaceHealth {
     pub facets: usize,
     /// Number of triangles without area or with corners that are not finite.
     pub triangles_left_out: usize,
+    /// Largest weight of the colour image over all channels; 1 without an image.
+    pub largest_color_weight: f32,
     /// True if light can pass between triangles or around them.
     pub has_holes: bool,
     /// Part of the area that is visible from none of the examined directions.
@@ -143,7 +149,8 @@ pub struct Limits {
 impl Health {
     /// Measures the health of a result.
     pub fn of(brdf: &EffectiveBrdf, inputs: &HealthInputs, factored: Option<Errors>, limits: Limits) -> Self {
-        let (measured, materials) = measure::materials(&inputs.materials.materials, &inputs.names);
+        let (measured, materials) =
+            measure::materials(&inputs.materials.materials, &inputs.names, inputs.max_color_weight);
         let lobe = materials.iter().filter_map(|material| material.narrowest_lobe_deg).reduce(f32::min);
         let conserving = materials.iter().all(|material| material.largest_albedo <= 1.0);
         let mut health = Self {
@@ -160,10 +167,11 @@ impl Health {
 
     /// Measures the health of materials and mesh alone, because the reference has no effective BRDF to examine.
     pub fn of_input(mesh: &TileMesh, materials: &[Material], names: &[String], limits: Limits) -> Self {
-        let (measured, materials) = measure::materials(materials, names);
+        let (measured, materials) = measure::materials(materials, names, mesh.color.max());
         let left_out = (0..mesh.triangles.len()).filter(|&triangle| mesh.triangle_area(triangle) <= 0.0).count();
         let surface = SurfaceHealth {
             triangles_left_out: left_out,
+            largest_color_weight: mesh.color.max().max_element(),
             has_holes: !mesh.closes_plane,
             fewest_visible_facets: usize::MAX,
             ..SurfaceHealth::default()

@@ -44,6 +44,11 @@ fn percent(part: f64) -> String {
     if part < 0.01 { format!("{:.2} %", part * 100.0) } else { format!("{:.0} %", part * 100.0) }
 }
 
+/// A factor with three decimals, or with an exponent if they do not show it.
+fn factor(factor: f32) -> String {
+    if (0.1..1e4).contains(&factor) { format!("{factor:.3}") } else { format!("{factor:.2e}") }
+}
+
 fn inputs(health: &Health, warnings: &mut Vec<String>) {
     for table in &health.measured {
         if table.samples > 0 && table.rejected == table.samples {
@@ -66,12 +71,17 @@ fn inputs(health: &Health, warnings: &mut Vec<String>) {
         }
     }
     for material in health.materials.iter().filter(|material| material.largest_albedo > MAX_ALBEDO) {
+        let (under, or_image) = if health.surface.largest_color_weight > 1.0 {
+            (" under the brightest texel of the colour image", ", or the image,")
+        } else {
+            ("", "")
+        };
         warnings.push(format!(
-            "material `{}` reflects up to {:.3} times the light that it receives: to conserve energy, multiply its \
-             colour, specular or albedo by less than {:.3}",
+            "material `{}` reflects up to {} times the light that it receives{under}: to conserve energy, multiply its \
+             colour, specular or albedo{or_image} by less than {}",
             material.name,
-            material.largest_albedo,
-            1.0 / material.largest_albedo
+            factor(material.largest_albedo),
+            factor(1.0 / material.largest_albedo)
         ));
     }
 }
@@ -168,5 +178,17 @@ fn result(health: &Health, limits: Limits, conserving: bool, warnings: &mut Vec<
             lobe_name(health),
             percent(f64::from((step / lobe).powi(2) / 4.0).min(1.0))
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_far_from_1_keep_their_digits() {
+        for (value, text) in [(0.5468, "0.547"), (1.829, "1.829"), (5.468e-4, "5.47e-4"), (1e9, "1.00e9")] {
+            assert_eq!(factor(value), text);
+        }
     }
 }

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::sampler::{in_parallel, reading_error};
 use super::{ExportTask, Written};
+use crate::base::finite::Numbers;
 use crate::brdf::merl::{BINS_D, BINS_H, BINS_PHI, PLANE, SCALES, table_from_planes};
 use crate::brdf::{LobeAngles, Measured};
 use crate::effective::EffectiveBrdf;
@@ -28,6 +29,12 @@ const MIN_COSINE: f64 = 1e-3;
 struct Anisotropy {
     deviation: f64,
     power: f64,
+}
+
+impl Numbers for Anisotropy {
+    fn are_finite(&self) -> bool {
+        (self.deviation, self.power).are_finite()
+    }
 }
 
 /// Returns the mean BRDF over azimuths at half and difference angles; `None` if a direction is below the horizon.

@@ -156,6 +156,15 @@ pub fn check_ending(path: &Path) -> Result<()> {
     ExportFormat::of(path).map(|_| ())
 }
 
+/// Returns the files that [`write`] writes for `path`: the table, and its note if the format needs one.
+///
+/// # Errors
+/// As [`check_ending`].
+pub fn outputs(path: &Path) -> Result<Vec<PathBuf>> {
+    let note = (!ExportFormat::of(path)?.describes_itself()).then(|| note_path(path));
+    Ok(std::iter::once(path.to_owned()).chain(note).collect())
+}
+
 /// Tabulates `brdf` and writes it in the format of the extension of `path`. Formats without a description get a text
 /// note beside the file (`NAME.EXTENSION.txt`).
 ///
@@ -246,7 +255,8 @@ pub fn write_csv(
     let task = ExportTask { brdf, meta, options, progress };
     match on_grid(&task, &mut buffered, csv::write).and_then(|_| buffered.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Error::failed(format!("standard output: {error}")))
+            // An error of this crate is passed on.
+            Err(error.downcast::<Error>().unwrap_or_else(|error| Error::failed(format!("standard output: {error}"))))
         }
         _ => Ok(()),
     }

@@ -5,7 +5,8 @@ use std::io;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::base::{Progress, progress};
+use crate::base::finite::Numbers;
+use crate::base::{Progress, progress, require_finite};
 use crate::effective::EffectiveBrdf;
 use crate::metrics::{Errors, compare, mirror_biased_pairs};
 
@@ -14,16 +15,19 @@ const CHECKED_PAIRS: usize = 400;
 /// Seed of these pairs.
 const CHECKED_SEED: u64 = 2011;
 
-/// Calls [`progress::in_parallel`] and converts the error to [`io::Error`].
+/// Calls [`progress::in_parallel`], checks that the results are finite, and converts the error to [`io::Error`]. All
+/// values of all formats come from here.
 ///
 /// # Errors
-/// An error that contains [`crate::base::Error::Cancelled`] if `progress` cancels.
-pub fn in_parallel<T: Send>(
+/// An error that contains [`crate::base::Error::Cancelled`] if `progress` cancels, or the error of [`require_finite`].
+pub fn in_parallel<T: Numbers + Send>(
     count: usize,
     progress: &Progress<'_>,
     work: impl Fn(usize) -> T + Sync,
 ) -> io::Result<Vec<T>> {
-    progress::in_parallel(count, progress, work).map_err(io::Error::other)
+    let results = progress::in_parallel(count, progress, work).map_err(io::Error::other)?;
+    require_finite(&results).map_err(io::Error::other)?;
+    Ok(results)
 }
 
 /// The error of a table as a program reads it, against the effective BRDF.

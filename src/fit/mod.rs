@@ -16,7 +16,7 @@ use argmin::solver::neldermead::NelderMead;
 use glam::{DVec3, Vec3};
 
 use crate::base::progress::{in_parallel, part, report};
-use crate::base::{Error, Progress, Result};
+use crate::base::{Error, Progress, Result, require_finite};
 use crate::effective::{EffectiveBrdf, Reflectance};
 use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
 
@@ -50,12 +50,13 @@ pub struct Fit {
 /// Fits `model` to `brdf` by least squares of `f̄` over directions up to 85° from the normal.
 ///
 /// # Errors
-/// [`Error::Cancelled`] if `progress` cancels; a search that fails, which does not occur for a finite BRDF.
+/// [`Error::Cancelled`] if `progress` cancels; a value of the BRDF that is not finite; a search that fails.
 pub fn fit(brdf: &EffectiveBrdf, model: Model, progress: &Progress<'_>) -> Result<Fit> {
     let (sampling, searching, checking) =
         (part(progress, 0.0, 0.3), part(progress, 0.3, 0.9), part(progress, 0.9, 1.0));
     let pairs = mirror_biased_pairs(FITTED, SEED);
     let targets = in_parallel(pairs.len(), &sampling, |k| brdf.eval(pairs[k].i, pairs[k].o))?;
+    require_finite(&targets)?;
     let starts = model.starts();
     let problem = FitProblem { model, pairs, targets };
     let mut best: Option<(f64, Vec<f64>)> = None;

@@ -28,6 +28,12 @@ fn flat(terms: Vec<Term>) -> EffectiveBrdf {
 }
 
 #[test]
+fn a_material_that_is_not_finite_is_refused() {
+    let error = fit(&flat(vec![Term::Lambertian { albedo: Vec3::INFINITY }]), Model::Ggx, &never_cancel).unwrap_err();
+    assert!(error.exit_code() == 1 && error.to_string().contains("not finite"), "{error}");
+}
+
+#[test]
 fn a_flat_material_of_the_model_comes_back() {
     let (albedo, f0) = (Vec3::new(0.3, 0.2, 0.1), Vec3::new(0.5, 0.6, 0.2));
     let brdf = flat(vec![Term::Lambertian { albedo }, Term::CookTorrance { roughness: 0.35, f0 }]);

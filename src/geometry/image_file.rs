@@ -11,7 +11,7 @@ use image::{DynamicImage, ImageReader, Limits};
 
 use crate::base::{InputError, Result};
 pub use crate::scene::Pixels;
-use crate::scene::files;
+use crate::scene::{MAX_COLOR, files};
 
 /// Maximum size of a file, in bytes.
 const MAX_FILE: u64 = 256 << 20;
@@ -32,15 +32,18 @@ pub fn read_heights(base_dir: &Path, path: &Path) -> Result<Pixels<f32>> {
 /// Reads linear colour weights.
 ///
 /// # Errors
-/// Returns an error as [`read_heights`] does, and for negative values.
+/// Returns an error as [`read_heights`] does, and for values that the scene key `color` refuses.
 pub fn read_colors(base_dir: &Path, path: &Path) -> Result<Pixels<Vec3>> {
     let mut pixels = read(base_dir, path)?;
     if pixels.is_integer {
         pixels.values.iter_mut().for_each(|value| *value = Vec3::from_array(value.to_array().map(linear_from_srgb)));
     }
-    if let Some(at) = pixels.values.iter().position(|value| value.min_element() < 0.0) {
-        let place = pixel_name(at, pixels.size);
-        return Err(InputError::new(place, pixels.values[at], "colours that are not negative").in_file(path).into());
+    let most = MAX_COLOR as f32;
+    if let Some(at) = pixels.values.iter().position(|v| v.min_element() < 0.0 || v.max_element() > most) {
+        // This form writes large numbers with an exponent.
+        let (place, found) = (pixel_name(at, pixels.size), format!("{:?}", pixels.values[at].to_array()));
+        let error = InputError::new(place, found, format!("linear colours from 0 to {MAX_COLOR}"));
+        return Err(error.in_file(files::resolve(base_dir, path)).into());
     }
     Ok(Pixels { size: pixels.size, values: pixels.values })
 }
@@ -59,7 +62,8 @@ pub fn read_slots(base_dir: &Path, path: &Path) -> Result<Pixels<u8>> {
     if let Some(at) = pixels.values.iter().position(|value| !(0.0..=f32::from(MAX_SLOTS)).contains(&number(value))) {
         let expected = format!("the number of a slot, 0 to {MAX_SLOTS} (a grey of 8 bits)");
         let found = number(&pixels.values[at]);
-        return Err(InputError::new(pixel_name(at, pixels.size), found, expected).in_file(path).into());
+        let error = InputError::new(pixel_name(at, pixels.size), found, expected);
+        return Err(error.in_file(files::resolve(base_dir, path)).into());
     }
     Ok(Pixels { size: pixels.size, values: pixels.values.iter().map(|value| number(value) as u8).collect() })
 }
@@ -86,6 +90,7 @@ struct RawImage {
 
 fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
     let bytes = files::read(base_dir, path, MAX_FILE)?;
+    let path = &files::resolve(base_dir, path);
     let error_for = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
     let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
     let image =

@@ -26,7 +26,7 @@ pub(crate) use tile_mesh::SAME_NORMAL;
 pub use tile_mesh::{ColorField, HeightGrid, SlotField, TileMesh};
 
 use crate::base::{InputError, Result};
-use crate::scene::{Geometry, Painted, Pixels, Tile};
+use crate::scene::{self, Geometry, Painted, Pixels, Tile};
 
 /// Builds the mesh of a tile. Relative paths start in `base_dir`, the scene file's folder.
 ///
@@ -63,7 +63,7 @@ pub fn build_painted(tile: &Tile, base_dir: &Path, painted: &Painted) -> Result<
         paint_slots(&mut mesh, image);
     }
     check_extent(&mesh).map_err(|error| match &tile.geometry {
-        Geometry::Mesh(spec) => error.in_file(&spec.path),
+        Geometry::Mesh(spec) => error.in_file(scene::files::resolve(base_dir, &spec.path)),
         _ => error,
     })?;
     Ok(mesh)

@@ -151,6 +151,15 @@ impl SlotField {
 }
 
 impl ColorField {
+    /// Largest weight of each channel.
+    pub fn max(&self) -> Vec3 {
+        match self {
+            Self::Uniform => Vec3::ONE,
+            // Bilinear interpolation stays below the largest texel.
+            Self::Image { texels, .. } => texels.iter().copied().fold(Vec3::ZERO, Vec3::max),
+        }
+    }
+
     /// Colour weight at tile coordinates `xy` of a tile of size `tile_size`.
     pub fn at(&self, xy: Vec2, tile_size: Vec2) -> Vec3 {
         match self {

@@ -212,6 +212,7 @@ impl Pipeline {
             materials: materials.value.clone(),
             names: material_names(&loaded.scene, &tile.mesh, &materials)?,
             closes_plane: tile.mesh.closes_plane,
+            max_color_weight: tile.mesh.color.max(),
         };
         let direct = Direct::new(Arc::new(sum), visibility.value.clone());
         let base_area = f64::from(tile.mesh.base_area());

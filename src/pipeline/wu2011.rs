@@ -46,6 +46,7 @@ impl Pipeline {
             materials: Arc::new(MaterialAssignment { material_of_slot, materials: materials.materials.clone() }),
             names,
             closes_plane: tile.mesh.closes_plane,
+            max_color_weight: tile.mesh.color.max(),
         };
         Ok(Outcome {
             brdf,

@@ -3,8 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use super::check;
-use super::shipped;
+use super::{BrdfSpec, Geometry, LoadedScene, Scene, TermSpec, check, shipped};
 use crate::base::{InputError, Result};
 
 /// Reads a file that a scene names. The scene's folder is `base_dir`, and the file has at most `limit` bytes.
@@ -42,7 +41,33 @@ pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8
         .map_err(|error| input_error(error.to_string(), "a file that can be read").into())
 }
 
-/// Path on disk of a file that a scene names.
+/// Path on disk of a file that a scene names; the name itself if the file is embedded.
 pub fn resolve(base_dir: &Path, path: &Path) -> PathBuf {
-    base_dir.join(path)
+    if is_embedded(path) { path.to_owned() } else { base_dir.join(path) }
+}
+
+fn is_embedded(path: &Path) -> bool {
+    path.to_str().is_some_and(|path| path.starts_with("asset:"))
+}
+
+impl LoadedScene {
+    /// Paths on disk of all files that the scene names: tile, images, measured BRDFs, object and environment.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let Scene { tile, materials, object, light, .. } = &self.scene;
+        let of_geometry = match &tile.geometry {
+            Geometry::Mesh(mesh) => Some(mesh.path.as_path()),
+            Geometry::Heightfield(field) => field.path.as_deref(),
+            _ => None,
+        };
+        let terms = materials.iter().filter_map(|material| material.brdf.as_ref()).flat_map(BrdfSpec::terms);
+        // The names of built-in environments have no ending.
+        let environment = Some(Path::new(&light.environment)).filter(|path| path.extension().is_some());
+        [of_geometry, tile.color_path.as_deref(), tile.slot_path.as_deref(), object.path.as_deref(), environment]
+            .into_iter()
+            .flatten()
+            .chain(terms.filter_map(TermSpec::path))
+            .filter(|path| !is_embedded(path))
+            .map(|path| resolve(&self.base_dir, path))
+            .collect()
+    }
 }

@@ -27,9 +27,9 @@ fn white() -> Vec3 {
 }
 
 const TERM: FieldShape = FieldShape::Tagged(TermSpec::kinds);
-/// Largest colour factor. Factors above 1 may gain energy, which the health reports; a larger one is taken for a
-/// mistake.
-const GAIN_LIMIT: f64 = 1000.0;
+/// Largest colour factor, of a material and of a texel of its colour image. Factors above 1 may gain energy, which the
+/// health reports; a larger one is taken for a mistake.
+pub const MAX_COLOR: f64 = 1000.0;
 
 impl MaterialSpec {
     pub fn fields() -> Vec<Field> {
@@ -47,7 +47,7 @@ impl MaterialSpec {
                 None,
                 "One term, or a list of terms to add. Without it, the BRDF of the material `default`.",
             ),
-            Field::new("color", "", FieldShape::Color { max: GAIN_LIMIT }, None, "Factor on the BRDF."),
+            Field::new("color", "", FieldShape::Color { max: MAX_COLOR }, None, "Factor on the BRDF."),
         ]
     }
 }
@@ -152,7 +152,7 @@ impl TermSpec {
             )
         };
         let f0 = || color("f0", 1.0, "Reflectance at normal incidence (Schlick).");
-        let specular = || color("specular", GAIN_LIMIT, "Factor on the lobe.");
+        let specular = || color("specular", MAX_COLOR, "Factor on the lobe.");
         let exponent = Field::new(
             "exponent",
             "",
@@ -166,7 +166,7 @@ impl TermSpec {
             kind(
                 "lambertian",
                 "Ideally diffuse reflection.",
-                vec![color("albedo", GAIN_LIMIT, "Fraction of the light that is reflected.")],
+                vec![color("albedo", MAX_COLOR, "Fraction of the light that is reflected.")],
             ),
             kind("blinn_phong", "A power of the cosine between normal and half vector.", vec![exponent, specular()]),
             kind(

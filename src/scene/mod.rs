@@ -31,7 +31,7 @@ use serde::{Deserialize, Serialize};
 
 pub use effects::{Effects, Switch};
 pub use load::{LoadedScene, load, load_with_overrides, open, parse};
-pub use material::{BrdfSpec, MaterialSpec, TermSpec};
+pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
 pub use schema::{Field, FieldShape, Kind};

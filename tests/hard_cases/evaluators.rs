@@ -59,6 +59,7 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
         names: vec!["default".to_owned(); materials.materials.len()],
         materials: Arc::new(materials),
         closes_plane: mesh.closes_plane,
+        max_color_weight: mesh.color.max(),
     };
     let mut health = Health::of(&brdf, &inputs, None, Limits { max_rank: 64, tolerance: 0.12 });
     // The paper's maps have one bit per facet at 137 directions, so their projected area has a large error near the

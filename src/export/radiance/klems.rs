@@ -89,7 +89,7 @@ pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
     let leaving: Vec<Vec3> =
         patches.iter().flat_map(|patch| patch.directions(LEAVING)).map(|direction| direction.as_vec3()).collect();
     // By reciprocity, one call evaluates all leaving directions for one incident direction.
-    let columns: Vec<Vec<DVec3>> = in_parallel(PATCHES, task.progress, |incident| {
+    let columns: Vec<Vec<Vec3>> = in_parallel(PATCHES, task.progress, |incident| {
         let mut sums = vec![DVec3::ZERO; PATCHES];
         for direction in patches[incident].directions(INCIDENT) {
             let mut values = vec![Vec3::ZERO; leaving.len()];
@@ -100,12 +100,12 @@ pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
                 *sum += values.iter().zip(leaving).map(|(value, o)| value.as_dvec3() / f64::from(o.z)).sum::<DVec3>();
             }
         }
-        sums.into_iter().map(|sum| sum / (INCIDENT * INCIDENT * LEAVING * LEAVING) as f64).collect()
+        sums.into_iter().map(|sum| (sum / (INCIDENT * INCIDENT * LEAVING * LEAVING) as f64).as_vec3()).collect()
     })?;
     let mut channels = ["CIE-X", "Visible", "CIE-Z"].map(|name| (name, String::new()));
     for leaving in 0..PATCHES {
         for column in &columns {
-            let value = xyz(column[leaving].as_vec3());
+            let value = xyz(column[leaving]);
             for ((_, text), value) in channels.iter_mut().zip(value.to_array()) {
                 let _ = write!(text, "{:.5e}\t", value.max(0.0));
             }
@@ -114,7 +114,7 @@ pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
     }
     let read = |i: Vec3, o: Vec3| {
         let column = &columns[KlemsPatch::index_of(source_of(o.as_dvec3()))];
-        rgb(xyz(column[KlemsPatch::index_of(i.as_dvec3())].as_vec3())) * i.z
+        rgb(xyz(column[KlemsPatch::index_of(i.as_dvec3())])) * i.z
     };
     let conventions = vec![
         "Klems full basis: 145 incident (columns) by 145 leaving (rows) patches, each the mean over its patch.".to_owned(),

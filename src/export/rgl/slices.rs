@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::super::ExportResolution;
+use crate::base::finite::Numbers;
 use crate::brdf::LUMINANCE;
 use crate::brdf::rgl::table::{RglTable, direction_of_u, u_of_direction};
 use crate::brdf::rgl::warp::{Grid, Warp};
@@ -97,6 +98,12 @@ pub(super) struct Slice {
     pub(super) luminance: Vec<f32>,
     /// Planes of R, G and B.
     pub(super) rgb: Vec<f32>,
+}
+
+impl Numbers for Slice {
+    fn are_finite(&self) -> bool {
+        [&self.vndf, &self.luminance, &self.rgb].into_iter().all(Vec::are_finite)
+    }
 }
 
 /// Evaluates `f̄` at the reflections of `viewer` about half vectors. Directions below the horizon take the value at the

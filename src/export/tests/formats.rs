@@ -135,3 +135,24 @@ fn radiance_files_contain_every_value_and_balance_their_tags() {
         assert_eq!(numbers.len(), if basis == RadianceBasis::Klems { 145 * 145 } else { 1 });
     }
 }
+
+#[test]
+fn a_brdf_that_is_not_finite_is_written_in_no_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let tile = Scene::of(Geometry::Flat(Flat::default())).tile;
+    let mesh = geometry::build(&tile, Path::new("")).unwrap();
+    let brdf = brdf_of(&mesh, Term::Lambertian { albedo: Vec3::INFINITY });
+    let names = FORMATS.iter().map(|(ending, _)| format!("t.{ending}")).chain(["t_spec.bsdf".to_owned()]);
+    for name in names {
+        for radiance in [RadianceBasis::Klems, RadianceBasis::TensorTree] {
+            let sizes = ExportResolution { theta_i: 4, phi_i: 4, theta_o: 8, phi_o: 8 };
+            let options = ExportOptions { resolution: Some(sizes), radiance };
+            let error = write(&brdf, &meta(), &options, &folder.path().join(&name), &never_cancel).unwrap_err();
+            assert!(error.exit_code() == 1 && error.to_string().contains("not finite"), "{name}: {error}");
+        }
+    }
+    let mut out = Vec::new();
+    let error = write_csv(&brdf, &meta(), &small(), &mut out, &never_cancel).unwrap_err();
+    assert!(error.exit_code() == 1 && error.to_string().starts_with("the result has values"), "{error}");
+    assert!(out.is_empty() && std::fs::read_dir(folder.path()).unwrap().next().is_none());
+}

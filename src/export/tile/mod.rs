@@ -43,6 +43,11 @@ const MAX_SAMPLES: u64 = 1 << 22;
 /// Bounds the triangles of all periods together in an OBJ file: some hundred MB.
 const MAX_TRIANGLES: u64 = 1 << 24;
 
+/// Bounds the enlargement.
+const MAX_SCALE: f32 = 1e6;
+/// Bounds the thickness of a solid below its lowest point [mm].
+const MAX_BASE_MM: f32 = 1e4;
+
 impl TileOptions {
     fn check(&self) -> Result<()> {
         let input_error = |place: &str, found: String, expected: String| InputError::new(place, found, expected).into();
@@ -50,15 +55,13 @@ impl TileOptions {
         if periods == 0 || periods > u64::from(MAX_PERIODS) {
             return Err(input_error("repeat", self.repeat.to_string(), format!("1 to {MAX_PERIODS} periods")));
         }
-        if !(self.scale > 0.0 && self.scale <= 1e6) {
-            return Err(input_error("scale", self.scale.to_string(), "a positive number".to_owned()));
+        if !(self.scale > 0.0 && self.scale <= MAX_SCALE) {
+            let expected = format!("a number above 0 and at most {MAX_SCALE}");
+            return Err(input_error("scale", self.scale.to_string(), expected));
         }
-        if self.base_mm.is_some_and(|base| !(base > 0.0 && base <= 1e4)) {
-            return Err(input_error(
-                "base",
-                format!("{:?}", self.base_mm),
-                "a positive number of millimetres".to_owned(),
-            ));
+        if let Some(base) = self.base_mm.filter(|base| !(*base > 0.0 && *base <= MAX_BASE_MM)) {
+            let expected = format!("a number above 0 and at most {MAX_BASE_MM} [mm]");
+            return Err(input_error("base", base.to_string(), expected));
         }
         Ok(())
     }
@@ -84,6 +87,49 @@ fn check_triangles(mesh: &TileMesh, options: &TileOptions) -> Result<()> {
     Ok(())
 }
 
+/// File formats of a tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum TileFormat {
+    Obj,
+    Stl,
+    Png,
+    Svg,
+    Pdf,
+}
+
+impl TileFormat {
+    fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        Ok(match ending.as_str() {
+            "obj" => Self::Obj,
+            "stl" => Self::Stl,
+            "png" => Self::Png,
+            "svg" => Self::Svg,
+            "pdf" => Self::Pdf,
+            other => {
+                let found = match other {
+                    "" => "a name without an ending".to_owned(),
+                    other => format!("the ending .{other}"),
+                };
+                let expected = "a name that ends in .obj, .stl, .png, .svg or .pdf";
+                return Err(InputError::new("output", found, expected).in_file(path).into());
+            }
+        })
+    }
+}
+
+/// Checks the extension of `path` and the options. Callers check them before they build the tile.
+///
+/// # Errors
+/// An unknown extension, or an option out of range.
+pub fn check(options: &TileOptions, path: &Path) -> Result<()> {
+    options.check()?;
+    match TileFormat::of(path)? {
+        TileFormat::Stl | TileFormat::Png => check_samples(options),
+        TileFormat::Obj | TileFormat::Svg | TileFormat::Pdf => Ok(()),
+    }
+}
+
 /// Progress, 0 to 1, at which the content is complete and only has to be written.
 const CONTENT_PROGRESS: f32 = 0.7;
 
@@ -99,37 +145,28 @@ pub fn write(
     path: &Path,
     progress: &Progress<'_>,
 ) -> Result<Vec<String>> {
-    options.check()?;
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    if matches!(ending.as_str(), "stl" | "png") {
-        check_samples(options)?;
-    }
+    check(options, path)?;
+    let format = TileFormat::of(path)?;
     let (making, writing) = (part(progress, 0.0, CONTENT_PROGRESS), part(progress, CONTENT_PROGRESS, 1.0));
     let drawing = part(&making, 0.5, 1.0);
     let sheet = || pattern::sheet(scene, options, millimetres(&scene.tile.unit)?, &part(&making, 0.0, 0.5));
-    let (bytes, mut notes) = match ending.as_str() {
-        "obj" => {
+    let (bytes, mut notes) = match format {
+        TileFormat::Obj => {
             check_triangles(mesh, options)?;
             mesh::obj(mesh, options, &making)?
         }
-        "stl" => solid::stl(mesh, options, millimetres(&scene.tile.unit)?, &making)?,
-        "png" => heights::png(mesh, options, &scene.tile.unit, &making)?,
-        "svg" => {
+        TileFormat::Stl => solid::stl(mesh, options, millimetres(&scene.tile.unit)?, &making)?,
+        TileFormat::Png => heights::png(mesh, options, &scene.tile.unit, &making)?,
+        TileFormat::Svg => {
             let (page, notes) = sheet()?;
             (page.svg(&drawing)?, notes)
         }
-        "pdf" => {
+        TileFormat::Pdf => {
             let (page, notes) = sheet()?;
             (page.pdf(&drawing)?, notes)
         }
-        other => {
-            let found =
-                if other.is_empty() { "a name without an ending".to_owned() } else { format!("the ending .{other}") };
-            let expected = "a name that ends in .obj, .stl, .png, .svg or .pdf";
-            return Err(InputError::new("output", found, expected).in_file(path).into());
-        }
     };
-    if matches!(ending.as_str(), "obj" | "svg" | "pdf") {
+    if matches!(format, TileFormat::Obj | TileFormat::Svg | TileFormat::Pdf) {
         notes.extend(left_out(&scene.tile));
     }
     replace_large_file(path, &bytes, &writing)?;

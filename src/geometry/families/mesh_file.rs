@@ -17,7 +17,8 @@ const RULES: Rules = Rules { grammar: Grammar::Tolerant, max_elements: 1 << 26, 
 
 pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
     let bytes = files::read(base_dir, &spec.path, MAX_FILE)?;
-    let file = obj::read(&String::from_utf8_lossy(&bytes), RULES).map_err(|error| error.in_file(&spec.path))?;
+    let path = files::resolve(base_dir, &spec.path);
+    let file = obj::read(&String::from_utf8_lossy(&bytes), RULES).map_err(|error| error.in_file(&path))?;
     let (triangles, triangle_slot) = triangles(&file);
     let mut mesh = TileMesh {
         size,
@@ -41,7 +42,7 @@ pub fn build(spec: &MeshFile, size: Vec2, base_dir: &Path) -> Result<TileMesh> {
         mesh.corner_normals = Some(triangles.iter().map(shading).collect());
     }
     mesh.positions = file.positions;
-    crate::geometry::check_extent(&mesh).map_err(|error| error.in_file(&spec.path))?;
+    crate::geometry::check_extent(&mesh).map_err(|error| error.in_file(&path))?;
     mesh.closes_plane = closure::is_closed_sheet(&mesh);
     if !mesh.closes_plane {
         mesh.notes.push(format!(

@@ -6,7 +6,34 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::tone_map::{ToneMap, srgb_byte};
-use crate::base::{Error, InputError, Result, replace_file};
+use crate::base::{Error, InputError, Result, replace_file, require_finite};
+
+/// File formats of images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageFormat {
+    Png,
+    Exr,
+}
+
+impl ImageFormat {
+    /// Returns the format that [`Image::write`] writes at `path`. Callers check it before a long computation.
+    ///
+    /// # Errors
+    /// Another extension than `.png` and `.exr`.
+    pub fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            ending => {
+                let found = ending
+                    .map_or_else(|| "a name without an ending".to_owned(), |ending| format!("the ending .{ending}"));
+                let expected = "a name that ends in .png or .exr";
+                Err(InputError::new("output", found, expected).in_file(path).into())
+            }
+        }
+    }
+}
 
 /// Linear RGB radiance, row 0 at the top.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -24,13 +51,15 @@ impl Image {
 
     /// Writes a `.png` through the tone map or a linear `.exr`, by the path's extension. If writing fails, an existing
     /// file stays unchanged.
+    ///
+    /// # Errors
+    /// An unknown extension, a pixel that is not finite, or a path that cannot be written.
     pub fn write(&self, path: &Path, tone_map: &ToneMap) -> Result<()> {
-        let bytes = match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("png") => self.png_bytes(tone_map)?,
-            Some("exr") => self.exr_bytes()?,
-            _ => {
-                return Err(InputError::new("output", path.display(), "a name that ends in .png or .exr").into());
-            }
+        let format = ImageFormat::of(path)?;
+        require_finite(&self.pixels)?;
+        let bytes = match format {
+            ImageFormat::Png => self.png_bytes(tone_map)?,
+            ImageFormat::Exr => self.exr_bytes()?,
         };
         replace_file(path, &bytes)
     }
