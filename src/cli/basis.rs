@@ -58,7 +58,7 @@ struct Paper {
 }
 
 pub fn run(args: &SceneArgs) -> Result<()> {
-    let loaded = args.open()?;
+    let (loaded, ()) = args.open(|_| Ok(()))?;
     let settings = Settings::from_quality(&loaded.scene.quality).low_rank(false);
     let mut cache = MeasuredCache::default();
     let mut rows = Vec::new();
@@ -71,8 +71,12 @@ pub fn run(args: &SceneArgs) -> Result<()> {
         };
         loaded.scene.materials.iter().map(spec).collect::<Result<_>>()?
     };
+    // All files are read before the first factorization, which may take minutes.
+    let mut brdfs = Vec::with_capacity(specs.len());
     for (name, spec) in specs {
-        let brdf = Brdf::from_specs(&spec, &loaded.base_dir, &mut cache)?;
+        brdfs.push((name, Brdf::from_specs(&spec, &loaded.base_dir, &mut cache)?));
+    }
+    for (name, brdf) in brdfs {
         let start = Instant::now();
         let mut bases = Vec::new();
         for term in &brdf.terms {

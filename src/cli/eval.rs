@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::path::Path;
 
-use crate::base::{Error, InputError};
+use crate::base::{Error, InputError, require_finite};
 use crate::diagnostics::Health;
 use crate::effective::Reflectance;
 use crate::math::directions::from_angles;
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::EvalArgs;
-use super::{cache, print_json};
+use super::{cache, check_outputs, print_json};
 
 /// Largest size of a file of pairs [bytes]. A longer file is read up to this size.
 const MAX_FILE: u64 = 1 << 30;
@@ -30,8 +30,10 @@ struct Row {
 }
 
 pub fn run(args: &EvalArgs) -> Result<()> {
-    let loaded = args.scene.open()?;
-    let rows = read(&args.pairs)?;
+    let (loaded, rows) = args.scene.open(|loaded| {
+        check_outputs(&args.scene.scene, loaded, &[&args.pairs], [&args.output])?;
+        Ok(read(&args.pairs)?)
+    })?;
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
     let settings = Settings::from_quality(&loaded.scene.quality);
     let cache = args.caching.open();
@@ -39,7 +41,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     pipeline.set_cache(cache.clone());
     let health;
     let mut representation = "reference sum".to_owned();
-    let (values, errors) = if settings.preset == Preset::Reference {
+    let (values, errors): (Vec<Vec3>, Vec<Vec3>) = if settings.preset == Preset::Reference {
         let reference = ReferenceSettings {
             facets: settings.reference_facets,
             max_passes: settings.reference_passes,
@@ -84,6 +86,10 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         text.push('\n');
     }
     cache::finish(&cache, args.scene.quiet);
+    require_finite(&values)?;
+    if args.standard_error {
+        require_finite(&errors)?;
+    }
     if args.output == Path::new("-") {
         std::io::stdout().lock().write_all(text.as_bytes())?;
         return Ok(());
@@ -146,6 +152,8 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
         std::fs::File::open(path).and_then(|file| file.take(MAX_FILE).read_to_string(&mut text))
     };
     got.map_err(|error| input_error(String::new(), error.to_string(), "a CSV file that can be read"))?;
+    // Spreadsheets begin a file with a byte-order mark.
+    let text = text.trim_start_matches('\u{feff}');
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let names: Vec<&str> = match lines.next() {
         Some((_, header)) => header.split(',').map(str::trim).collect(),

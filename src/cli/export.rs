@@ -9,7 +9,7 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::{ExportArgs, RadianceArg};
-use super::{cache, print_json, progress_bar, progress_on};
+use super::{cache, check_outputs, print_json, progress_bar, progress_on};
 
 /// Relative L2 of a table that is read back, above which its lobes are mostly wrong.
 const MAX_RESAMPLING_ERROR: f64 = 0.5;
@@ -37,17 +37,7 @@ struct Report<'a> {
 
 pub fn run(args: &ExportArgs) -> Result<()> {
     let to_stdout = args.output == Path::new("-");
-    if !to_stdout {
-        // A wrong ending is rejected before the table is computed.
-        export::check_ending(&args.output)?;
-    }
-    let loaded = args.scene.open()?;
-    let cache = args.caching.open();
-    let mut pipeline = crate::gpu::pipeline();
-    pipeline.set_cache(cache.clone());
-    let outcome = pipeline.effective(&loaded)?;
-    args.scene.notes(&outcome);
-    let meta = ExportMeta::of(&loaded, &outcome, pipeline.mesh(&loaded)?.closes_plane);
+    let outputs = if to_stdout { Vec::new() } else { export::outputs(&args.output)? };
     let options = ExportOptions {
         resolution: resolution(args),
         radiance: match args.radiance {
@@ -55,6 +45,16 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             RadianceArg::TensorTree => RadianceBasis::TensorTree,
         },
     };
+    if let Some(resolution) = &options.resolution {
+        resolution.check()?;
+    }
+    let (loaded, ()) = args.scene.open(|loaded| check_outputs(&args.scene.scene, loaded, &[], &outputs))?;
+    let cache = args.caching.open();
+    let mut pipeline = crate::gpu::pipeline();
+    pipeline.set_cache(cache.clone());
+    let outcome = pipeline.effective(&loaded)?;
+    args.scene.notes(&outcome);
+    let meta = ExportMeta::of(&loaded, &outcome, pipeline.mesh(&loaded)?.closes_plane);
     let bar = progress_bar("tabulating", args.scene.quiet);
     let progress = progress_on(&bar);
     if to_stdout {

@@ -15,7 +15,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::FitArgs;
-use super::{print_json, progress_bar, progress_on};
+use super::{check_outputs, print_json, progress_bar, progress_on};
 
 #[derive(Serialize)]
 struct Report {
@@ -32,10 +32,11 @@ struct Report {
 }
 
 pub fn run(args: &FitArgs) -> Result<()> {
-    for path in &args.output {
-        kind(path)?;
-    }
-    let loaded = args.scene.open()?;
+    let kinds: Vec<OutputKind> = args.output.iter().map(|path| kind(path)).collect::<Result<_, _>>()?;
+    let (loaded, render_scene) = args.scene.open(|loaded| {
+        check_outputs(&args.scene.scene, loaded, &[], &args.output)?;
+        Ok(if kinds.contains(&OutputKind::Image) { Some(RenderScene::new(loaded)?) } else { None })
+    })?;
     let outcome = crate::gpu::pipeline().effective(&loaded)?;
     args.scene.notes(&outcome);
     let mut fits = Vec::new();
@@ -51,16 +52,16 @@ pub fn run(args: &FitArgs) -> Result<()> {
     }
     // The files for other programs hold the last model, the GGX base.
     let Some(base) = fits.last() else { return Ok(()) };
-    for path in &args.output {
-        match kind(path)? {
+    for (path, kind) in args.output.iter().zip(kinds) {
+        match kind {
             OutputKind::Gltf => replace_file(path, fit::gltf(base, &loaded.name).as_bytes())?,
             OutputKind::MaterialX => replace_file(path, fit::materialx(base, &loaded.name).as_bytes())?,
             OutputKind::Json => replace_file(path, format!("{:#}\n", serde_json::to_value(&reports)?).as_bytes())?,
             OutputKind::Image => {
-                let render_scene = RenderScene::new(&loaded)?;
+                let Some(render_scene) = &render_scene else { continue };
                 let materials: [&dyn Reflectance; 3] = [&*outcome.brdf, &fits[0], &fits[1]];
                 let tone_map = ToneMap::new(&render_scene.camera)?;
-                side_by_side(&render_scene, &materials, args.size)?.write(path, &tone_map)?;
+                side_by_side(render_scene, &materials, args.size)?.write(path, &tone_map)?;
             }
         }
     }
@@ -101,6 +102,7 @@ fn report(fit: &Fit, seconds: f64) -> Report {
 }
 
 /// Content of an output file.
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum OutputKind {
     Gltf,
     MaterialX,

@@ -16,8 +16,9 @@ pub mod tile;
 mod to_image;
 
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
-use crate::base::Cancel;
+use crate::base::{Cancel, check_output};
 use crate::diagnostics::Health;
 use crate::pipeline::Outcome;
 use crate::scene;
@@ -33,6 +34,8 @@ pub use self::args::*;
 /// # Errors
 /// The scene or another input cannot be used, or an output cannot be written.
 pub fn run(command: Command) -> Result<()> {
+    #[cfg(target_os = "linux")]
+    set_runtime_folder();
     match command {
         Command::Edit { .. } => anyhow::bail!("this program was built without the editor (feature `editor`)"),
         Command::Render(args) => render::run(&args),
@@ -49,9 +52,25 @@ pub fn run(command: Command) -> Result<()> {
     }
 }
 
+/// Sets `XDG_RUNTIME_DIR` to a folder without a display if it is unset or relative. Mesa's Vulkan layer searches it for
+/// a Wayland display even if no window is opened, and libwayland prints an error if the variable is invalid.
+#[cfg(target_os = "linux")]
+fn set_runtime_folder() {
+    let name = "XDG_RUNTIME_DIR";
+    if !std::env::var_os(name).is_some_and(|folder| Path::new(&folder).is_absolute()) {
+        // SAFETY: the program calls this function before it starts a thread.
+        unsafe { std::env::set_var(name, "/") };
+    }
+}
+
 impl SceneArgs {
-    /// The scene with all overrides of the command line.
-    pub fn open(&self) -> Result<LoadedScene> {
+    /// The scene with all overrides of the command line, and the result of `prepare`, which reads the other inputs of
+    /// the command and checks its outputs. `prepare` runs before settings are chosen for a target, which takes seconds
+    /// to minutes.
+    ///
+    /// # Errors
+    /// The scene cannot be used, no settings can be chosen, or the error of `prepare`.
+    pub fn open<T>(&self, prepare: impl FnOnce(&LoadedScene) -> Result<T>) -> Result<(LoadedScene, T)> {
         let mut set = self.set.clone();
         if let Some(quality) = self.quality {
             let name = match quality {
@@ -76,10 +95,12 @@ impl SceneArgs {
         }
         set.extend(self.effects.iter().cloned());
         let loaded = scene::open(&self.scene, &set)?;
-        match self.target() {
-            Some(target) => self.choose(&loaded, target),
-            None => Ok(loaded),
-        }
+        let prepared = prepare(&loaded)?;
+        let loaded = match self.target() {
+            Some(target) => self.choose(&loaded, target)?,
+            None => loaded,
+        };
+        Ok((loaded, prepared))
     }
 
     fn target(&self) -> Option<Target> {
@@ -119,6 +140,22 @@ impl SceneArgs {
             }
         }
     }
+}
+
+/// Checks that outputs can be written and that they replace no input: no scene file, no file that the scene names, and
+/// none of `more_inputs`. The name `-` stands for standard input or output.
+///
+/// # Errors
+/// As [`check_output`].
+pub fn check_outputs(
+    scene: &str,
+    loaded: &LoadedScene,
+    more_inputs: &[&Path],
+    outputs: impl IntoIterator<Item = impl AsRef<Path>>,
+) -> Result<()> {
+    let mut inputs = loaded.files();
+    inputs.extend([Path::new(scene)].iter().chain(more_inputs).map(PathBuf::from));
+    outputs.into_iter().try_for_each(|output| Ok(check_output(output.as_ref(), &inputs)?))
 }
 
 /// Parses `WIDTHxHEIGHT`.

@@ -27,10 +27,9 @@ struct Report<'a> {
 }
 
 pub fn run(args: &PlanArgs) -> Result<()> {
-    let loaded = args.scene.open()?;
+    let (loaded, dropped_lights) = args.scene.open(|loaded| Ok(RenderScene::new(loaded)?.dropped_lights()))?;
     let pipeline = crate::gpu::pipeline();
     let outcome = pipeline.effective(&loaded)?;
-    let dropped_lights = RenderScene::new(&loaded)?.dropped_lights();
     let measured = if args.measure {
         let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         let costs = measure_effects(&loaded, &Cancel::default(), |name| {

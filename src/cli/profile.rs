@@ -27,7 +27,13 @@ struct Report {
 }
 
 pub fn run(args: &ProfileArgs) -> Result<()> {
-    let loaded = args.scene.open()?;
+    let (loaded, ()) = args.scene.open(|loaded| {
+        if args.image || args.edit == Some(EditArg::Camera) {
+            // A missing object or environment is reported before the tile is computed.
+            RenderScene::new(loaded)?;
+        }
+        Ok(())
+    })?;
     let mut edited = loaded.clone();
     let parameter = match args.edit {
         Some(EditArg::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| no_parameter("tile.geometry"))?),

@@ -4,9 +4,10 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::render_path::RenderPath;
-use super::{RenderArgs, cache, print_json};
+use super::{RenderArgs, cache, check_outputs, print_json};
 use crate::diagnostics::Health;
 use crate::render::RenderScene;
+use crate::render::image::pixels::ImageFormat;
 use crate::render::image::tone_map::ToneMap;
 
 #[derive(Serialize)]
@@ -26,11 +27,14 @@ struct Report<'a> {
 }
 
 pub fn run(args: &RenderArgs) -> Result<()> {
-    let loaded = args.scene.open()?;
+    ImageFormat::of(&args.output)?;
     let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
-    let render_scene = RenderScene::with(&pipeline, &loaded)?;
+    let (loaded, render_scene) = args.scene.open(|loaded| {
+        check_outputs(&args.scene.scene, loaded, &[], [&args.output])?;
+        Ok(RenderScene::with(&pipeline, loaded)?)
+    })?;
     let tone_map = ToneMap::new(&render_scene.camera)?;
     let outcome = pipeline.effective(&loaded)?;
     if !args.scene.quiet {

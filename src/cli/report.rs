@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use crate::base::{Error, InputError, replace_file};
 use crate::effective::EffectiveBrdf;
 use crate::reference::ReferenceSettings;
+use crate::render::RenderScene;
 use crate::report::{Machine, Report, SceneReport, Thumbnail, ThumbnailRenderer, difference_png};
 use crate::scene;
 use crate::scene::LoadedScene;
@@ -17,7 +18,7 @@ use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
-use super::ReportArgs;
+use super::{ReportArgs, check_outputs};
 
 /// Results of an interrupted run, from which the next run continues.
 #[derive(Debug, Serialize, Deserialize)]
@@ -36,6 +37,8 @@ struct SavedScene {
 }
 
 const PROGRESS_FILE: &str = "progress.json";
+/// Files that the command writes.
+const FILES: [&str; 4] = ["report.html", "report.csv", "report.json", PROGRESS_FILE];
 /// Largest part of a scene's time for the reference.
 const REFERENCE_SHARE: f64 = 0.35;
 
@@ -45,6 +48,12 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     std::fs::create_dir_all(&args.output).map_err(|error| {
         Error::from(InputError::new("output", error, "a folder that can be created and written").in_file(&args.output))
     })?;
+    for (name, loaded) in args.scenes.iter().zip(&scenes) {
+        check_outputs(name, loaded, &[], FILES.map(|file| args.output.join(file)))?;
+        // All files of all scenes are read before the first scene is measured, which takes minutes.
+        crate::gpu::pipeline().materials(loaded)?;
+        RenderScene::new(loaded)?;
+    }
     let machine = Machine::here();
     let mut progress = resume(&args.output, &machine);
     let mut report = Report { machine, command: command_line(), scenes: Vec::new() };

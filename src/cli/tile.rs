@@ -6,14 +6,15 @@ use anyhow::Result;
 use glam::UVec2;
 
 use super::TileArgs;
-use super::{print_json, progress_bar, progress_on};
+use super::{check_outputs, print_json, progress_bar, progress_on};
 
 pub fn run(args: &TileArgs) -> Result<()> {
-    let loaded = args.scene.open()?;
-    let mesh = crate::gpu::pipeline().mesh(&loaded)?;
     let count = |[x, y]: [usize; 2]| UVec2::new(x as u32, y as u32);
     let options =
         TileOptions { repeat: count(args.repeat), scale: args.scale, base_mm: args.base, samples: count(args.samples) };
+    tile::check(&options, &args.output)?;
+    let (loaded, ()) = args.scene.open(|loaded| check_outputs(&args.scene.scene, loaded, &[], [&args.output]))?;
+    let mesh = crate::gpu::pipeline().mesh(&loaded)?;
     let bar = progress_bar("writing", args.scene.quiet);
     let notes = tile::write(&loaded.scene, &mesh, &options, &args.output, &progress_on(&bar));
     bar.finish_and_clear();
