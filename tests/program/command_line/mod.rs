@@ -5,4 +5,5 @@ mod cache;
 mod commands;
 mod eval;
 mod folder;
+mod inputs;
 mod refusals;
