@@ -1,14 +1,19 @@
-//! Errors, cancellation, progress, files and OBJ files: the lowest layer, which all other modules may import.
+//! Errors, cancellation, progress, lines on standard error, files and OBJ files: the lowest layer, which all other
+//! modules may import.
 
 pub mod atomic_file;
 mod cancel;
+mod console;
 mod error;
 mod gpu_error;
 pub mod obj;
 pub mod progress;
+pub mod regular_file;
+pub mod threads;
 
 pub use atomic_file::replace_file;
-pub use cancel::Cancel;
+pub use cancel::{Cancel, Running};
+pub use console::print_on_stderr;
 pub use error::{Error, InputError, Result};
 pub use gpu_error::GpuError;
 pub use progress::Progress;
