@@ -14,10 +14,11 @@ mod render_path;
 pub mod report;
 pub mod tile;
 mod to_image;
+mod watch;
 
 use std::io::Write;
 
-use crate::base::Cancel;
+use crate::base::{Cancel, print_on_stderr};
 use crate::diagnostics::Health;
 use crate::pipeline::Outcome;
 use crate::scene;
@@ -95,7 +96,7 @@ impl SceneArgs {
             bar.tick();
         })?;
         bar.finish_and_clear();
-        eprintln!("{}", chosen.summary());
+        print_on_stderr(chosen.summary());
         Ok(chosen.scene)
     }
 
@@ -106,7 +107,7 @@ impl SceneArgs {
             return;
         }
         for note in &outcome.notes {
-            eprintln!("note: {note}");
+            print_on_stderr(format_args!("note: {note}"));
         }
         self.warn(outcome.health());
     }
@@ -115,7 +116,7 @@ impl SceneArgs {
     pub fn warn(&self, health: &Health) {
         if !self.quiet {
             for warning in &health.warnings {
-                eprintln!("warning: {warning}");
+                print_on_stderr(format_args!("warning: {warning}"));
             }
         }
     }
