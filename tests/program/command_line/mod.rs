@@ -5,4 +5,9 @@ mod cache;
 mod commands;
 mod eval;
 mod folder;
+#[cfg(unix)]
+mod long_runs;
 mod refusals;
+#[cfg(unix)]
+mod special_files;
+mod standard_error;
