@@ -37,6 +37,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let render_scene = RenderScene::with(&pipeline, &loaded)?;
     let tone_map = ToneMap::new(&render_scene.camera)?;
     let outcome = pipeline.effective(&loaded)?;
+    drop(watch);
     if !args.scene.quiet {
         for warning in render_scene.warnings() {
             print_on_stderr(format_args!("note: {warning}"));
@@ -47,6 +48,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     if let (RenderPath::Cpu { refused: Some(error) }, false) = (&path, args.scene.quiet) {
         print_on_stderr(format_args!("note: shaded on the CPU: {error}"));
     }
+    let watch = Watch::new(args.scene.quiet);
     let shading_brdf = path.shading_brdf(&outcome, &watch.cancel())?;
     drop(watch);
     let rendered = path.render(&render_scene, &shading_brdf.brdf, args.size, usize::from(args.samples))?;

@@ -32,7 +32,10 @@ fn a_polygon_of_a_hundred_thousand_corners_is_read_in_seconds() {
 fn a_long_computation_tells_its_time_and_ends_at_an_interrupt() {
     let folder = CommandLine::new();
     folder.write("pairs.csv", PAIRS);
-    folder.write("rods.toml", "[tile]\ngeometry = { kind = \"rods\" }\n[[material]]\nname = \"default\"\n");
+    folder.write(
+        "rods.toml",
+        "[tile]\ngeometry = { kind = \"rods\" }\n[[material]]\nname = \"default\"\nbrdf = { kind = \"lambertian\" }\n",
+    );
     for scene in
         [&["rods.toml", "--set", "quality.facets=1000000"][..], &["fig8b_ripples", "--set", "quality.visibility=maps"]]
     {
