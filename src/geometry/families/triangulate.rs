@@ -129,12 +129,12 @@ impl CornerTree {
         let [a, b, c] = triangle;
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let edges = [(a, b - a), (b, c - b), (c, a - c)];
-        let mut stack = vec![0..self.nodes.len()];
-        while let Some(range) = stack.pop() {
-            if range.is_empty() {
+        let mut stack = vec![(0, self.nodes.len())];
+        while let Some((start, end)) = stack.pop() {
+            if start == end {
                 continue;
             }
-            let middle = range.start + range.len() / 2;
+            let middle = start + (end - start) / 2;
             let node = &self.nodes[middle];
             // The corner of the bounds that lies farthest to the left of an edge.
             let farthest =
@@ -150,8 +150,8 @@ impl CornerTree {
             if !node.is_removed && !own.contains(&self.order[middle]) && is_inside() {
                 return true;
             }
-            stack.push(range.start..middle);
-            stack.push(middle + 1..range.end);
+            stack.push((start, middle));
+            stack.push((middle + 1, end));
         }
         false
     }
