@@ -20,6 +20,7 @@
     reason = "units stand in brackets: [sr], [rad]"
 )]
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "directions in tests are known not to be zero"))]
+#![cfg_attr(not(test), warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic if a stream is closed"))]
 
 pub mod base;
 pub mod math;

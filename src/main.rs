@@ -1,16 +1,19 @@
 //! The `biscale` program: subcommands of the library, and the editor.
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic if a stream is closed")]
 
 use std::process::ExitCode;
 use std::time::Instant;
 
 #[cfg(feature = "editor")]
 use biscale::app;
+use biscale::base::{print_on_stderr, threads};
 use biscale::cli::{self, Cli, Command};
 use clap::Parser;
 
 fn main() -> ExitCode {
     let started = Instant::now();
     let arguments = Cli::parse();
+    threads::limit();
     let result = match arguments.command {
         None => edit(arguments.scene.as_deref(), None).map_err(|error| match error.downcast_ref::<biscale::Error>() {
             Some(_) => error.context("no command was given, so the argument is opened as a scene (see --help)"),
@@ -26,7 +29,7 @@ fn main() -> ExitCode {
             if cli::is_broken_pipe(&error) {
                 return ExitCode::SUCCESS;
             }
-            eprintln!("biscale: {error:#}");
+            print_on_stderr(format_args!("biscale: {error:#}"));
             ExitCode::from(error.downcast_ref::<biscale::Error>().map_or(1, biscale::Error::exit_code))
         }
     }

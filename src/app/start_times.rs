@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::worker::RenderedPreview;
+use crate::base::print_on_stderr;
 
 /// Prints the start-up times on standard error, if the option is set.
 #[derive(Debug, Clone, Copy, Default)]
@@ -15,7 +16,7 @@ impl StartTimes {
     /// Prints the time at which a step has ended.
     pub fn note(self, step: &str) {
         if let Some(since) = self.since {
-            eprintln!("{:>7.1} ms  {step}", since.elapsed().as_secs_f64() * 1e3);
+            print_on_stderr(format_args!("{:>7.1} ms  {step}", since.elapsed().as_secs_f64() * 1e3));
         }
     }
 }

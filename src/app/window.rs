@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::base::print_on_stderr;
 use crate::gpu::{Gpu, GpuError};
 use anyhow::{Result, anyhow};
 use eframe::egui::{self, Context, ViewportBuilder, ViewportCommand};
@@ -54,7 +55,7 @@ pub fn run(scene: Option<&str>, times: StartTimes) -> Result<()> {
                 return Ok(());
             }
             Ok(Ok(())) if lost.load(Ordering::Relaxed) && opened_at.elapsed() > MIN_LIFETIME => {
-                eprintln!("biscale: the window's GPU was lost; a new window is opened");
+                print_on_stderr("biscale: the window's GPU was lost; a new window is opened");
             }
             Ok(Ok(())) => return Err(give_up(&shared, "it closed by itself")),
             Ok(Err(error)) if shared.borrow().is_none() => return Err(anyhow!("{NO_WINDOW} ({error})")),
@@ -63,7 +64,7 @@ pub fn run(scene: Option<&str>, times: StartTimes) -> Result<()> {
                 let error = give_up(&shared, "a fault in the program");
                 // After a panic, the state of this process's windows is undefined, so a new process is started.
                 if opened_at.elapsed() > MIN_LIFETIME && start_again().is_ok() {
-                    eprintln!("biscale: {error}; a new editor is started");
+                    print_on_stderr(format_args!("biscale: {error}; a new editor is started"));
                     return Ok(());
                 }
                 return Err(error);
@@ -176,7 +177,8 @@ fn watch_device(creation: &eframe::CreationContext, lost: &Arc<AtomicBool>) -> O
         lost.store(true, Ordering::Relaxed);
         ctx.request_repaint();
     });
-    gpu.device.on_uncaptured_error(Arc::new(|error| eprintln!("biscale: error of the window's GPU: {error}")));
+    let report = |error: wgpu::Error| print_on_stderr(format_args!("biscale: error of the window's GPU: {error}"));
+    gpu.device.on_uncaptured_error(Arc::new(report));
     #[cfg(debug_assertions)]
     lose_for_tests(&gpu.device, &creation.egui_ctx);
     Some(Arc::new(gpu))

@@ -1,20 +1,57 @@
-//! Cancellation of long operations.
+//! Cancellation of long operations, and how much of them is done.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::{Error, Result};
 
-/// A flag that a long operation checks between its steps. Clones share the flag.
+/// A flag that a long operation checks between its steps. Clones share the flag. The operation may also count its
+/// steps, so that another thread can show what is done.
 #[derive(Debug, Clone, Default)]
 pub struct Cancel {
     flag: Arc<AtomicBool>,
+    running: Arc<Mutex<Option<Running>>>,
     /// Until this moment the flag counts as not set.
     not_before: Option<Instant>,
 }
 
+/// The operation that runs.
+#[derive(Debug, Clone, Copy)]
+pub struct Running {
+    pub name: &'static str,
+    pub since: Instant,
+    /// Number of steps that are done.
+    pub done: usize,
+    /// Number of all steps; 0 if the operation does not count them.
+    pub all: usize,
+}
+
 impl Cancel {
+    /// Notes that the operation `name` begins. [`Cancel::end`] ends it.
+    pub fn begin(&self, name: &'static str) {
+        *self.lock() = Some(Running { name, since: Instant::now(), done: 0, all: 0 });
+    }
+
+    /// Counts one of `all` equal steps of the operation.
+    pub fn step(&self, all: usize) {
+        if let Some(running) = self.lock().as_mut() {
+            (running.done, running.all) = (running.done + 1, all);
+        }
+    }
+
+    pub fn end(&self) {
+        *self.lock() = None;
+    }
+
+    pub fn running(&self) -> Option<Running> {
+        *self.lock()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<Running>> {
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Sets the flag. The caller must not use what the operation returns after this.
     pub fn set(&self) {
         self.flag.store(true, Ordering::Relaxed);
@@ -26,7 +63,7 @@ impl Cancel {
 
     /// Returns a clone for which the flag counts only after `delay` from now.
     pub fn after(&self, delay: Duration) -> Self {
-        Self { flag: self.flag.clone(), not_before: Instant::now().checked_add(delay) }
+        Self { not_before: Instant::now().checked_add(delay), ..self.clone() }
     }
 
     /// Returns an error if the flag is set.
@@ -50,5 +87,21 @@ mod tests {
         cancel.set();
         assert!(cancel.is_set() && short.is_set() && !long.is_set());
         assert!(short.check().is_err() && long.check().is_ok());
+    }
+
+    #[test]
+    fn steps_of_an_operation_are_counted_from_its_begin_to_its_end() {
+        let cancel = Cancel::default();
+        let counts = || cancel.running().map(|running| (running.name, running.done, running.all));
+        cancel.step(9);
+        assert_eq!(counts(), None, "no operation runs");
+        cancel.begin("a");
+        let clone = cancel.clone();
+        (0..3).for_each(|_| clone.step(4));
+        assert_eq!(counts(), Some(("a", 3, 4)));
+        cancel.begin("b");
+        assert_eq!(counts(), Some(("b", 0, 0)));
+        cancel.end();
+        assert_eq!(counts(), None);
     }
 }

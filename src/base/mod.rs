@@ -1,16 +1,21 @@
-//! Errors, cancellation, progress, files and OBJ files: the lowest layer, which all other modules may import.
+//! Errors, cancellation, progress, lines on standard error, files and OBJ files: the lowest layer, which all other
+//! modules may import.
 
 pub mod atomic_file;
 mod cancel;
+mod console;
 mod error;
 pub mod finite;
 mod gpu_error;
 pub mod obj;
 mod output_place;
 pub mod progress;
+pub mod regular_file;
+pub mod threads;
 
 pub use atomic_file::replace_file;
-pub use cancel::Cancel;
+pub use cancel::{Cancel, Running};
+pub use console::print_on_stderr;
 pub use error::{Error, InputError, Result};
 pub use finite::require_finite;
 pub use gpu_error::GpuError;

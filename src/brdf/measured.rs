@@ -75,9 +75,6 @@ impl MeasuredCache {
     pub fn load(&mut self, kind: MeasuredKind, path: &Path) -> Result<Arc<dyn Measured>> {
         let metadata = std::fs::metadata(path)
             .map_err(|error| InputError::new("", error, "a measured BRDF that can be read").in_file(path))?;
-        if !metadata.is_file() {
-            return Err(InputError::new("", "a folder or a device file", "a file").in_file(path).into());
-        }
         let key = FileKey { kind, path: path.to_owned(), modified: metadata.modified().ok(), len: metadata.len() };
         if let Some(table) = self.tables.get(&key) {
             return Ok(Arc::clone(table));

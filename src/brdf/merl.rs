@@ -3,7 +3,6 @@
 //! A file has three int32 (90, 90, 180), then the R, G and B planes in little-endian f64. The index in a plane is
 //! `φ_d + 180 (θ_d + 90 θ_h)`. Samples are at bin centres, `φ_d` covers [0, π), and `θ_h` has index `90 √(θ_h/90°)`.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -11,7 +10,7 @@ use glam::{Vec3, Vec4};
 
 use super::half_difference::{MERL_SHAPE, bin_angles, row_bins};
 use super::{HalfDifferenceTable, MeasuredReport};
-use crate::base::{InputError, Result};
+use crate::base::{InputError, Result, regular_file};
 
 pub(crate) const BINS_H: usize = 90;
 pub(crate) const BINS_D: usize = 90;
@@ -25,7 +24,7 @@ pub(crate) const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0]
 /// Reads a file (35 MB) and converts it to a table.
 pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let unreadable = |error: std::io::Error| InputError::new("", error, "a MERL file that can be read").in_file(path);
-    let file = File::open(path).map_err(unreadable)?;
+    let file = regular_file::open(path).map_err(unreadable)?;
     let len = file.metadata().map_err(unreadable)?.len();
     // A file of the wrong size is read as well, because an error about its header is more helpful than one about its
     // size.

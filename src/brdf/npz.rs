@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::HalfDifferenceTable;
 use super::spherical::{SphericalTable, even_turn};
-use crate::base::{InputError, Result};
+use crate::base::{InputError, Result, regular_file};
 
 /// Largest file in bytes: the largest export has 2^25 pairs of two quantities.
 const MAX_FILE: u64 = 1 << 30;
@@ -22,7 +22,7 @@ pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
         if length > MAX_FILE {
             return Err(InputError::new("file size", format!("{length} bytes"), format!("at most {MAX_FILE} bytes")));
         }
-        table(&std::fs::read(path).map_err(unreadable)?)
+        table(&regular_file::read(path).map_err(unreadable)?)
     };
     let table = read().map_err(|error| error.in_file(path))?;
     Ok(table.resample(name))

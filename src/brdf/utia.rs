@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::HalfDifferenceTable;
 use super::spherical::{MAX_F_R, SphericalTable};
-use crate::base::{InputError, Result};
+use crate::base::{InputError, Result, regular_file};
 
 const POLAR_ANGLES: usize = 6;
 const STEP_DEG: f64 = 15.0;
@@ -20,12 +20,12 @@ const FILE_BYTES: u64 = 3 * 8 * PLANE as u64;
 pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let input_error = |error: InputError| error.in_file(path);
     let unreadable = |error: std::io::Error| input_error(InputError::new("", error, "a UTIA file that can be read"));
-    let length = std::fs::metadata(path).map_err(unreadable)?.len();
+    let length = regular_file::open(path).and_then(|file| file.metadata()).map_err(unreadable)?.len();
     if length != FILE_BYTES {
         let expected = format!("{FILE_BYTES} bytes (3 x 288 x 288 f64)");
         return Err(input_error(InputError::new("file size", format!("{length} bytes"), expected)).into());
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let bytes = regular_file::read(path).map_err(unreadable)?;
     let numbers: Vec<f64> = bytes.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
     if let Some(at) = numbers.iter().position(|value| !(-MAX_F_R..=MAX_F_R).contains(value)) {
         let expected = format!("a finite number no larger than {MAX_F_R:e}");

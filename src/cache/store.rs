@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use super::Key;
+use crate::base::regular_file;
 
 const MAGIC: &[u8; 16] = b"biscale cache 1\n";
 
@@ -67,7 +68,12 @@ impl Store {
     pub(super) fn read(&self, key: &Key) -> Option<Vec<u8>> {
         let path = self.path(key);
         // The file is opened for writing so that its time can be set. Without that permission it is only read.
-        let file = OpenOptions::new().read(true).append(true).open(&path).or_else(|_| File::open(&path)).ok()?;
+        let writable = regular_file::open_with(&path, OpenOptions::new().read(true).append(true));
+        let Ok(file) = writable.or_else(|_| regular_file::open(&path)) else {
+            // Nothing else may take the place of the next result.
+            self.remove(key);
+            return None;
+        };
         let length = file.metadata().ok()?.len();
         let mut bytes = Vec::new();
         let whole = length <= self.max_bytes && (&file).take(length + 1).read_to_end(&mut bytes).is_ok();
@@ -93,7 +99,9 @@ impl Store {
         self.make_folder()?;
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let beside = self.folder.join(format!("{}-{}-{count}{UNFINISHED}", key.name(), std::process::id()));
-        let written = File::create(&beside).and_then(|mut file| {
+        // A file of an ended process with the same id may be there, or anything else that has this name.
+        let _ = fs::remove_file(&beside);
+        let written = File::create_new(&beside).and_then(|mut file| {
             file.write_all(MAGIC)?;
             file.write_all(&key.0)?;
             file.write_all(&checksum(key, payload))?;

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 
+use crate::base::print_on_stderr;
 use crate::cache::{Cache, MAX_BYTES, Usage, default_folder};
 use anyhow::Result;
 use serde::Serialize;
@@ -24,7 +25,7 @@ pub fn open() -> Cache {
 /// Waits until the cache is written, and prints a note if writing failed.
 pub fn finish(cache: &Cache, quiet: bool) {
     if let (Some(error), false) = (cache.finish(), quiet) {
-        eprintln!("note: the results could not be cached: {error}");
+        print_on_stderr(format_args!("note: the results could not be cached: {error}"));
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::path::Path;
 
-use crate::base::{Error, InputError, require_finite};
+use crate::base::{Error, InputError, regular_file, require_finite};
 use crate::diagnostics::Health;
 use crate::effective::Reflectance;
 use crate::math::directions::from_angles;
@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::EvalArgs;
+use super::watch::Watch;
 use super::{cache, check_outputs, print_json};
 
 /// Largest size of a file of pairs [bytes]. A longer file is read up to this size.
@@ -61,7 +62,10 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         args.scene.warn(&health);
         estimates.iter().map(|estimate| (estimate.f_bar, estimate.standard_error)).unzip()
     } else {
+        let watch = Watch::new(args.scene.quiet);
+        pipeline.set_cancel(watch.cancel());
         let outcome = pipeline.effective(&loaded)?;
+        drop(watch);
         args.scene.notes(&outcome);
         health = outcome.health().clone();
         representation = outcome.brdf.representation.describe();
@@ -149,7 +153,7 @@ fn read(path: &Path) -> Result<Vec<Row>, Error> {
     let got = if path == Path::new("-") {
         std::io::stdin().lock().take(MAX_FILE).read_to_string(&mut text)
     } else {
-        std::fs::File::open(path).and_then(|file| file.take(MAX_FILE).read_to_string(&mut text))
+        regular_file::open(path).and_then(|file| file.take(MAX_FILE).read_to_string(&mut text))
     };
     got.map_err(|error| input_error(String::new(), error.to_string(), "a CSV file that can be read"))?;
     // Spreadsheets begin a file with a byte-order mark.

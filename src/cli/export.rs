@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use crate::base::print_on_stderr;
 use crate::diagnostics::Health;
 use crate::export;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use anyhow::Result;
 use serde::Serialize;
 
+use super::watch::Watch;
 use super::{ExportArgs, RadianceArg};
 use super::{cache, check_outputs, print_json, progress_bar, progress_on};
 
@@ -52,7 +54,10 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
+    let watch = Watch::new(args.scene.quiet);
+    pipeline.set_cancel(watch.cancel());
     let outcome = pipeline.effective(&loaded)?;
+    drop(watch);
     args.scene.notes(&outcome);
     let meta = ExportMeta::of(&loaded, &outcome, pipeline.mesh(&loaded)?.closes_plane);
     let bar = progress_bar("tabulating", args.scene.quiet);
@@ -75,7 +80,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
                        format that adapts to lobes (.bsdf, --radiance tensor-tree)"
             .to_owned();
         if !args.scene.quiet {
-            eprintln!("warning: {warning}");
+            print_on_stderr(format_args!("warning: {warning}"));
         }
         health.warnings.push(warning);
     }
@@ -95,7 +100,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         });
     }
     if !args.scene.quiet {
-        eprintln!(
+        print_on_stderr(format_args!(
             "{} pairs, {} bytes; the table differs from eval by {:.1} % in the mean and {:.1} % ({:.1} dB) in \
              relative L2",
             report.pairs,
@@ -103,17 +108,17 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             100.0 * reading.mean,
             100.0 * reading.errors.rel_l2,
             reading.errors.psnr_db
-        );
+        ));
         if let Some(lost) = report.anisotropy_lost {
-            eprintln!(
+            print_on_stderr(format_args!(
                 "the format is isotropic: differences of {:.1} % (relative L2) between azimuths of the tile are lost",
                 100.0 * lost
-            );
+            ));
         }
-        eprintln!("directional-hemispherical reflectance (R G B):");
-        report.reflectances.lines().iter().for_each(|line| eprintln!("  {line}"));
+        print_on_stderr("directional-hemispherical reflectance (R G B):");
+        report.reflectances.lines().iter().for_each(|line| print_on_stderr(format_args!("  {line}")));
         if let Some(note) = &report.note {
-            eprintln!("{} describes the conventions and the scene", note.display());
+            print_on_stderr(format_args!("{} describes the conventions and the scene", note.display()));
         }
     }
     Ok(())

@@ -1,5 +1,6 @@
 //! `biscale fit` approximates the effective BRDF by analytic models and prints their errors.
 
+use std::io::Write;
 use std::path::Path;
 
 use crate::base::{Error, InputError, replace_file};
@@ -15,6 +16,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::FitArgs;
+use super::watch::Watch;
 use super::{check_outputs, print_json, progress_bar, progress_on};
 
 #[derive(Serialize)]
@@ -37,7 +39,11 @@ pub fn run(args: &FitArgs) -> Result<()> {
         check_outputs(&args.scene.scene, loaded, &[], &args.output)?;
         Ok(if kinds.contains(&OutputKind::Image) { Some(RenderScene::new(loaded)?) } else { None })
     })?;
-    let outcome = crate::gpu::pipeline().effective(&loaded)?;
+    let mut pipeline = crate::gpu::pipeline();
+    let watch = Watch::new(args.scene.quiet);
+    pipeline.set_cancel(watch.cancel());
+    let outcome = pipeline.effective(&loaded)?;
+    drop(watch);
     args.scene.notes(&outcome);
     let mut fits = Vec::new();
     let mut reports = Vec::new();
@@ -68,10 +74,12 @@ pub fn run(args: &FitArgs) -> Result<()> {
     if args.scene.json {
         return print_json(&reports);
     }
-    println!("{:<26} {:>12} {:>10} {:>22} {:>9}", "model", "relative L2", "PSNR", "roughness", "seconds");
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{:<26} {:>12} {:>10} {:>22} {:>9}", "model", "relative L2", "PSNR", "roughness", "seconds")?;
     for report in &reports {
         let [x, y] = report.roughness;
-        println!(
+        writeln!(
+            out,
             "{:<26} {:>10.1} % {:>7.1} dB {:>13.3} x {:.3} {:>9.2}",
             report.model,
             100.0 * report.rel_l2,
@@ -79,9 +87,9 @@ pub fn run(args: &FitArgs) -> Result<()> {
             x,
             y,
             report.seconds
-        );
+        )?;
         for (name, weight) in &report.weights {
-            println!("  {name}: {weight}");
+            writeln!(out, "  {name}: {weight}")?;
         }
     }
     Ok(())

@@ -14,11 +14,12 @@ mod render_path;
 pub mod report;
 pub mod tile;
 mod to_image;
+mod watch;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Cancel, check_output};
+use crate::base::{Cancel, check_output, print_on_stderr};
 use crate::diagnostics::Health;
 use crate::pipeline::Outcome;
 use crate::scene;
@@ -116,7 +117,7 @@ impl SceneArgs {
             bar.tick();
         })?;
         bar.finish_and_clear();
-        eprintln!("{}", chosen.summary());
+        print_on_stderr(chosen.summary());
         Ok(chosen.scene)
     }
 
@@ -127,7 +128,7 @@ impl SceneArgs {
             return;
         }
         for note in &outcome.notes {
-            eprintln!("note: {note}");
+            print_on_stderr(format_args!("note: {note}"));
         }
         self.warn(outcome.health());
     }
@@ -136,7 +137,7 @@ impl SceneArgs {
     pub fn warn(&self, health: &Health) {
         if !self.quiet {
             for warning in &health.warnings {
-                eprintln!("warning: {warning}");
+                print_on_stderr(format_args!("warning: {warning}"));
             }
         }
     }

@@ -11,6 +11,7 @@ use anyhow::Result;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
+use super::watch::Watch;
 use super::{PlanArgs, print_json};
 
 #[derive(Serialize)]
@@ -28,8 +29,11 @@ struct Report<'a> {
 
 pub fn run(args: &PlanArgs) -> Result<()> {
     let (loaded, dropped_lights) = args.scene.open(|loaded| Ok(RenderScene::new(loaded)?.dropped_lights()))?;
-    let pipeline = crate::gpu::pipeline();
+    let mut pipeline = crate::gpu::pipeline();
+    let watch = Watch::new(args.scene.quiet);
+    pipeline.set_cancel(watch.cancel());
     let outcome = pipeline.effective(&loaded)?;
+    drop(watch);
     let measured = if args.measure {
         let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         let costs = measure_effects(&loaded, &Cancel::default(), |name| {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::Instant;
 
-use crate::base::{Error, InputError};
+use crate::base::{Cancel, Error, InputError};
 use crate::render::RenderScene;
 use anyhow::Result;
 use serde::Serialize;
@@ -51,7 +51,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
         let path = RenderPath::of(&render_scene, &outcome)?;
         // A camera edit changes neither the shading BRDF nor the shadows of the object.
         render_scene.cache_shadows(&pipeline)?;
-        let shading_brdf = path.shading_brdf(&outcome)?;
+        let shading_brdf = path.shading_brdf(&outcome, &Cancel::default())?;
         representation = shading_brdf.brdf.representation.describe();
         Some((render_scene, path, shading_brdf))
     } else {

@@ -4,7 +4,9 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::render_path::RenderPath;
+use super::watch::Watch;
 use super::{RenderArgs, cache, check_outputs, print_json};
+use crate::base::print_on_stderr;
 use crate::diagnostics::Health;
 use crate::render::RenderScene;
 use crate::render::image::pixels::ImageFormat;
@@ -35,19 +37,24 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         check_outputs(&args.scene.scene, loaded, &[], [&args.output])?;
         Ok(RenderScene::with(&pipeline, loaded)?)
     })?;
+    let watch = Watch::new(args.scene.quiet);
+    pipeline.set_cancel(watch.cancel());
     let tone_map = ToneMap::new(&render_scene.camera)?;
     let outcome = pipeline.effective(&loaded)?;
+    drop(watch);
     if !args.scene.quiet {
         for warning in render_scene.warnings() {
-            eprintln!("note: {warning}");
+            print_on_stderr(format_args!("note: {warning}"));
         }
     }
     args.scene.notes(&outcome);
     let mut path = RenderPath::of(&render_scene, &outcome)?;
     if let (RenderPath::Cpu { refused: Some(error) }, false) = (&path, args.scene.quiet) {
-        eprintln!("note: shaded on the CPU: {error}");
+        print_on_stderr(format_args!("note: shaded on the CPU: {error}"));
     }
-    let shading_brdf = path.shading_brdf(&outcome)?;
+    let watch = Watch::new(args.scene.quiet);
+    let shading_brdf = path.shading_brdf(&outcome, &watch.cancel())?;
+    drop(watch);
     let rendered = path.render(&render_scene, &shading_brdf.brdf, args.size, usize::from(args.samples))?;
     rendered.image.write(&args.output, &tone_map)?;
     cache::finish(&cache, args.scene.quiet);

@@ -70,12 +70,13 @@ impl RenderPath {
     }
 
     /// The representation of a material that this processor reads: a table if it is close enough, else the sums.
+    /// `cancel` counts the steps of the table.
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
-    pub fn shading_brdf(&self, outcome: &Outcome) -> Result<ShadingBrdf> {
+    pub fn shading_brdf(&self, outcome: &Outcome, cancel: &Cancel) -> Result<ShadingBrdf> {
         match self {
-            Self::Cpu { .. } => Ok(outcome.shading_brdf(&Cancel::default())?),
+            Self::Cpu { .. } => Ok(outcome.shading_brdf(cancel)?),
             #[cfg(feature = "gpu")]
             Self::Gpu(on_gpu) => Ok(on_gpu.shading_brdf()),
         }

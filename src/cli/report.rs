@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use crate::base::{Error, InputError, replace_file};
+use crate::base::{Error, InputError, print_on_stderr, regular_file, replace_file};
 use crate::effective::EffectiveBrdf;
 use crate::reference::ReferenceSettings;
 use crate::render::RenderScene;
@@ -63,7 +63,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         write(&args.output, &report)?;
     }
     if !args.quiet {
-        eprintln!("wrote {}", args.output.join("report.html").display());
+        print_on_stderr(format_args!("wrote {}", args.output.join("report.html").display()));
     }
     Ok(())
 }
@@ -71,7 +71,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
 /// Results in the folder of an earlier run on the same machine with the same version.
 fn resume(folder: &Path, machine: &Machine) -> SavedProgress {
     let empty = SavedProgress { machine: machine.clone(), scenes: BTreeMap::new() };
-    std::fs::read(folder.join(PROGRESS_FILE))
+    regular_file::read(&folder.join(PROGRESS_FILE))
         .ok()
         .and_then(|bytes| serde_json::from_slice::<SavedProgress>(&bytes).ok())
         .filter(|found| found.machine == *machine)

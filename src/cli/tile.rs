@@ -1,5 +1,6 @@
 //! `biscale tile` writes the tile itself, to print it, to fold it, or for other programs.
 
+use crate::base::print_on_stderr;
 use crate::export::tile;
 use crate::export::tile::TileOptions;
 use anyhow::Result;
@@ -23,7 +24,7 @@ pub fn run(args: &TileArgs) -> Result<()> {
         return print_json(&serde_json::json!({ "output": args.output.display().to_string(), "notes": notes }));
     }
     if !args.scene.quiet {
-        notes.iter().chain(&mesh.notes).for_each(|note| eprintln!("note: {note}"));
+        notes.iter().chain(&mesh.notes).for_each(|note| print_on_stderr(format_args!("note: {note}")));
     }
     Ok(())
 }

@@ -183,7 +183,11 @@ pub fn write(
         resolution.check()?;
     }
     let task = ExportTask { brdf, meta, options, progress };
-    // The file is opened first, so that an unwritable path is reported before the long computation.
+    // An unwritable path is reported before the long computation.
+    atomic_file::check_place(path)?;
+    if !format.describes_itself() {
+        atomic_file::check_place(&note_path(path))?;
+    }
     let (written, bytes) = atomic_file::write_atomically(path, |out| {
         let mut counted = CountingWriter { inner: out, bytes: 0 };
         let written = match format {

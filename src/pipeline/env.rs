@@ -10,7 +10,7 @@ use std::time::{Duration, SystemTime};
 use glam::Vec3;
 
 use super::stage::lock;
-use crate::base::{Cancel, Result};
+use crate::base::{Cancel, Result, regular_file};
 use crate::brdf::MeasuredCache;
 use crate::cache::{Key, KeyBuilder};
 use crate::geometry::{Facets, TileMesh};
@@ -110,7 +110,7 @@ impl Env {
         if let Some(key) = lock(&self.files).get(&stamp) {
             return *key;
         }
-        let Ok(bytes) = std::fs::read(&stamp.0) else { return unreadable() };
+        let Ok(bytes) = regular_file::read(&stamp.0) else { return unreadable() };
         let key = Key::of_numbers(&bytes);
         if stamp.1.and_then(|modified| modified.elapsed().ok()).is_some_and(|age| age > STAMP_RESOLUTION) {
             lock(&self.files).insert(stamp, key);

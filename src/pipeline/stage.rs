@@ -162,7 +162,10 @@ fn compute<S: Stage>(stage: &S, key: Key, env: &Env, disk: &Cache, times: &mut S
         times.push((codec.cached_name, elapsed_ms(start)));
         return Ok(value);
     }
-    let value = stage.run(env)?;
+    env.cancel.begin(S::NAME);
+    let result = stage.run(env);
+    env.cancel.end();
+    let value = result?;
     if !S::IGNORES_CANCEL {
         // A cancelled stage may have returned anything.
         env.cancel.check()?;

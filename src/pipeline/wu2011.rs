@@ -14,7 +14,7 @@ use crate::diagnostics::{HealthInputs, VisibilityInput};
 use crate::effective::{EffectiveBrdf, Representation, VisibleFacets, Wu2011, Wu2011Settings};
 use crate::math::directions::ParaboloidMap;
 use crate::scene::Scene;
-use crate::visibility::visibility_maps_cpu;
+use crate::visibility::cancellable_maps_cpu;
 
 impl Pipeline {
     /// The paper's own method (Wu et al. 2011, Sec. 3.2 to 3.7): its directions, its facets, its truncations.
@@ -24,7 +24,11 @@ impl Pipeline {
             Wu2011Settings { seed: settings.seed, colors: settings.colors.unwrap_or(1), ..Wu2011Settings::default() };
         let start = Instant::now();
         let directions = ParaboloidMap::nearest_to(Wu2011Settings::VISIBILITY_DIRECTIONS);
-        let visibility = visibility_maps_cpu(&tile.mesh, &facets, directions.directions(), settings.map_resolution);
+        let (cancel, texels) = (&self.env.cancel, settings.map_resolution);
+        cancel.begin("visibility");
+        let visibility = cancellable_maps_cpu(&tile.mesh, &facets, directions.directions(), texels, cancel);
+        cancel.end();
+        cancel.check()?;
         times.push(("visibility", elapsed_ms(start)));
         let factors = PaperTables { materials: &materials.materials, settings: &paper_settings };
         let factors = self.get(factors, &mut times)?;

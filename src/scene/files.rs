@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::{BrdfSpec, Geometry, LoadedScene, Scene, TermSpec, check, shipped};
-use crate::base::{InputError, Result};
+use crate::base::{InputError, Result, regular_file};
 
 /// Reads a file that a scene names. The scene's folder is `base_dir`, and the file has at most `limit` bytes.
 ///
@@ -28,17 +28,12 @@ pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8
     }
     let full = resolve(base_dir, path);
     let input_error = |found: String, expected: &str| InputError::new("", found, expected).in_file(&full);
-    let metadata =
-        std::fs::metadata(&full).map_err(|error| input_error(error.to_string(), "a file that can be read"))?;
-    if !metadata.is_file() {
-        return Err(input_error("a folder or a device file".to_owned(), "a file").into());
+    let unreadable = |error: std::io::Error| input_error(error.to_string(), "a file that can be read");
+    let length = std::fs::metadata(&full).map_err(unreadable)?.len();
+    if length > limit {
+        return Err(input_error(format!("{length} bytes"), &format!("at most {limit} bytes")).into());
     }
-    if metadata.len() > limit {
-        return Err(input_error(format!("{} bytes", metadata.len()), &format!("at most {limit} bytes")).into());
-    }
-    std::fs::read(&full)
-        .map(Cow::Owned)
-        .map_err(|error| input_error(error.to_string(), "a file that can be read").into())
+    Ok(Cow::Owned(regular_file::read(&full).map_err(unreadable)?))
 }
 
 /// Path on disk of a file that a scene names; the name itself if the file is embedded.

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::check::{self, PathStep, Problem};
 use super::{Painted, Scene, overrides, shipped};
-use crate::base::{Error, InputError, Result};
+use crate::base::{Error, InputError, Result, regular_file};
 
 /// A scene and the folder of its relative paths.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,34 +41,34 @@ pub fn open(scene: &str, overrides: &[String]) -> Result<LoadedScene> {
             painted: Painted::default(),
         });
     }
-    let error = if path.is_dir() {
-        InputError::new("", "a folder", "a scene file").in_file(path)
-    } else {
-        let error = InputError::new(
-            "",
-            format!("no file and no shipped material `{scene}`"),
-            "a scene file or a name that `biscale materials` lists",
-        );
-        match check::nearest(scene, shipped::names()) {
-            Some(name) => error.with_hint(format!("did you mean `{name}`?")),
-            None => error,
-        }
-    };
-    Err(error.into())
+    if path.exists() {
+        // The path is no regular file, and the error says what it is.
+        return load(path, overrides);
+    }
+    let error = InputError::new(
+        "",
+        format!("no file and no shipped material `{scene}`"),
+        "a scene file or a name that `biscale materials` lists",
+    );
+    Err(match check::nearest(scene, shipped::names()) {
+        Some(name) => error.with_hint(format!("did you mean `{name}`?")),
+        None => error,
+    }
+    .into())
 }
 
 /// Loads a scene file.
 pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScene> {
     let input_error =
         |found: String| Error::from(InputError::new("", found, "a scene file (TOML, UTF-8)").in_file(path));
-    let length = std::fs::metadata(path).map_err(|error| input_error(error.to_string()))?.len();
+    let unreadable = |error: std::io::Error| input_error(error.to_string());
+    let file = regular_file::open(path).map_err(unreadable)?;
+    let length = file.metadata().map_err(unreadable)?.len();
     if length > MAX_FILE {
         return Err(input_error(format!("{length} bytes")));
     }
     let mut source = String::new();
-    // A pipe reports no length, so reading is limited as well.
-    let file = std::fs::File::open(path).map_err(|error| input_error(error.to_string()))?;
-    file.take(MAX_FILE).read_to_string(&mut source).map_err(|error| input_error(error.to_string()))?;
+    file.take(MAX_FILE).read_to_string(&mut source).map_err(unreadable)?;
     let scene = load_with_overrides(&source, overrides).map_err(|error| error.in_file(path))?;
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();

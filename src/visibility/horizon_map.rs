@@ -40,9 +40,11 @@ impl HorizonMap {
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         Self::fill_rows(facets.len(), azimuths, transition_width, |along, row| {
-            scan_all(&slicer.rotated(along.truncate()), facets, &origins, &mut |facet, blocked| {
+            let truncated = scan_all(&slicer.rotated(along.truncate()), facets, &origins, &mut |facet, blocked| {
                 row[facet as usize] = blocked.highest();
-            })
+            });
+            grid.cancel.step(azimuths);
+            truncated
         })
     }
 

@@ -25,6 +25,7 @@ pub use horizon_map::HorizonMap;
 pub use occlusion_intervals::OcclusionIntervals;
 pub use packed::PackedVisibility;
 pub use ray_cast::ray_cast;
+pub(crate) use shadow_map::cancellable_maps_cpu;
 pub use shadow_map::visibility_maps_cpu;
 pub use soft_maps::SoftMaps;
 

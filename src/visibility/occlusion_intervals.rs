@@ -126,6 +126,7 @@ impl OcclusionIntervals {
                     }));
                 });
                 above.sort_by_key(|interval| interval.0);
+                grid.cancel.step(azimuths);
                 (row, Overhangs::new(above.into_iter(), &switch), truncated)
             })
             .collect();

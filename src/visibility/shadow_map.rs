@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use super::PackedVisibility;
 use super::shadow_view::{ShadowView, affordable_resolution, max_coordinate};
+use crate::base::Cancel;
 use crate::geometry::{Facets, TileMesh};
 
 /// Computes the visibility of all facets along all directions from toroidal shadow maps; `resolution` is the number of
@@ -23,6 +24,18 @@ use crate::geometry::{Facets, TileMesh};
 /// Triangles block on both sides. No facet is visible from a direction at or below the horizon. The result does not
 /// depend on the number of threads.
 pub fn visibility_maps_cpu(mesh: &TileMesh, facets: &Facets, directions: &[Vec3], resolution: u32) -> PackedVisibility {
+    cancellable_maps_cpu(mesh, facets, directions, resolution, &Cancel::default())
+}
+
+/// Computes visibility like [`visibility_maps_cpu`], and counts the directions as steps. The result is invalid if
+/// `cancel` is set.
+pub(crate) fn cancellable_maps_cpu(
+    mesh: &TileMesh,
+    facets: &Facets,
+    directions: &[Vec3],
+    resolution: u32,
+    cancel: &Cancel,
+) -> PackedVisibility {
     let mut visibility = PackedVisibility::new(facets.len(), directions.len());
     if facets.is_empty() {
         return visibility;
@@ -34,10 +47,14 @@ pub fn visibility_maps_cpu(mesh: &TileMesh, facets: &Facets, directions: &[Vec3]
     visibility.words.par_chunks_mut(words).zip(directions).for_each_init(
         ShadowMap::default,
         |map, (row, &direction)| {
+            if cancel.is_set() {
+                return;
+            }
             if let Some(view) = ShadowView::new(mesh.size, max_coordinate, direction, resolution) {
                 map.draw(mesh, &view);
                 map.test(facets, &normals, &view, row);
             }
+            cancel.step(directions.len());
         },
     );
     visibility

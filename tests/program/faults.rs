@@ -112,7 +112,10 @@ fn a_program_that_ends_in_the_middle_of_a_write_leaves_the_old_file_complete() {
                     // The partial file stays beside the old file.
                     let [part] = &parts[..] else { panic!("{file}: {parts:?}") };
                     assert_eq!(part.metadata().unwrap().len() as usize, 512 * blocks, "{file}");
-                    std::fs::remove_file(part.path()).unwrap();
+                    // The next write to this place removes it.
+                    assert!(program(folder.path(), &arguments).status().unwrap().success());
+                    assert!(!part.path().exists());
+                    std::fs::write(&target, "the old one").unwrap();
                 } else {
                     assert!(parts.is_empty() && message.contains(file) && output.status.code() == Some(2), "{message}");
                 }
@@ -131,6 +134,31 @@ fn a_partial_file_of_an_earlier_process_with_the_same_id_does_not_stop_a_save() 
     }
     replace_file(&path, SCENE.as_bytes()).unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), SCENE);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "they are removed");
+}
+
+/// A tabulation of seconds is killed before it has anything to write.
+#[test]
+fn a_program_that_is_killed_while_it_computes_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.toml"), SCENE.replace("facets = 256", "facets = 4096")).unwrap();
+    let mut child =
+        program(folder.path(), &["export", "a.toml", "-o", "t.npz", "--resolution", "36x72"]).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    assert!(child.try_wait().unwrap().is_none(), "the export is done before it is killed");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn names_up_to_the_limit_of_the_file_system_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.toml"), SCENE).unwrap();
+    let name = "x".repeat(251) + ".png";
+    let arguments = ["render", "a.toml", "-o", &name, "--size", "8x8"];
+    assert!(program(folder.path(), &arguments).status().unwrap().success());
+    assert!(folder.path().join(&name).exists());
 }
 
 #[test]

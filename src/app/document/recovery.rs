@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Error, Result, replace_file};
+use crate::base::{Error, Result, regular_file, replace_file};
 use crate::scene;
 use crate::scene::{LoadedScene, Painted};
 use serde::{Deserialize, Serialize};
@@ -116,8 +116,8 @@ impl RecoveredDocument {
             (process != std::process::id() && !is_running_editor(process)).then(|| path.with_file_name(stem))
         });
         let open = |stem: PathBuf| {
-            let text = fs::read_to_string(with(&stem, ".toml")).ok()?;
-            let header: Header = toml::from_str(&text).ok()?;
+            let text = regular_file::read(&with(&stem, ".toml")).ok()?;
+            let header: Header = toml::from_slice(&text).ok()?;
             Some(Self { stem, name: header.name.clone(), header })
         };
         stems.filter_map(open).collect()

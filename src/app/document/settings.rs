@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::replace_file;
+use crate::base::{regular_file, replace_file};
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of recent files.
@@ -59,8 +59,8 @@ impl EditorSettings {
     }
 
     pub fn load(folder: Option<&Path>) -> Self {
-        let text = folder.and_then(|folder| std::fs::read_to_string(folder.join("editor.toml")).ok());
-        let mut settings: Self = text.and_then(|text| toml::from_str(&text).ok()).unwrap_or_default();
+        let text = folder.and_then(|folder| regular_file::read(&folder.join("editor.toml")).ok());
+        let mut settings: Self = text.and_then(|text| toml::from_slice(&text).ok()).unwrap_or_default();
         settings.zoom = if settings.zoom.is_finite() { settings.zoom.clamp(0.5, 3.0) } else { 1.0 };
         settings.window = settings.window.map(|side| if side.is_finite() { side.clamp(640.0, 8192.0) } else { 1000.0 });
         settings

@@ -7,7 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::base::Cancel;
+use crate::base::{Cancel, threads};
 
 /// Context of a job: its cancel flag and the queue that it came from.
 pub struct JobContext<'a, J> {
@@ -68,6 +68,7 @@ impl<J: Send + 'static> Worker<J> {
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
             let mut state = start();
             // A separate pool, so that other workers do not block this one.
+            let threads = if threads == 0 { threads::requested() } else { threads };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok();
             while let Some((job, cancel)) = next(&inside) {
                 let context = JobContext { cancel: &cancel, mailbox: &inside };

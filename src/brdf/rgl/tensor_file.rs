@@ -4,11 +4,10 @@
 //! u16 dimensions, u8 type, u64 offset from the start of the file, and u64 per dimension. The arrays follow, with the
 //! last dimension fastest. Numbers are little-endian.
 
-use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use crate::base::InputError;
+use crate::base::{InputError, regular_file};
 
 const MAGIC: &[u8; 12] = b"tensor_file\0";
 /// Largest file in bytes. Published isotropic RGB files have less than 1 MB.
@@ -38,7 +37,7 @@ const F64: u8 = 11;
 impl TensorFile {
     pub(crate) fn read(path: &Path) -> Result<Self, InputError> {
         let unreadable = |error: std::io::Error| InputError::new("", error, "an RGL file that can be read");
-        let file = File::open(path).map_err(unreadable)?;
+        let file = regular_file::open(path).map_err(unreadable)?;
         let len = file.metadata().map_err(unreadable)?.len();
         if len > MAX_FILE {
             let expected = format!("at most {MAX_FILE} bytes");

@@ -173,6 +173,7 @@ impl ShadingTable {
         let half_vectors = values.par_chunks_mut(half_vector_len).enumerate();
         half_vectors.try_for_each(|(half_vector, nodes)| {
             cancel.check()?;
+            cancel.step(grid.half_vectors());
             let first = half_vector * grid.phi_d * grid.theta_d;
             if images[half_vector % grid.azimuths].0 != half_vector % grid.azimuths
                 || !(first..first + grid.phi_d * grid.theta_d).any(is_read)

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
+use super::triangulate::triangulate;
 use crate::base::Result;
 use crate::base::obj::{self, Grammar, ObjCorner, ObjFile, Rules};
 use crate::geometry::{TileMesh, closure};
@@ -68,36 +69,6 @@ fn triangles(file: &ObjFile) -> (Vec<[ObjCorner; 3]>, Vec<u16>) {
         }
     }
     (triangles, slots)
-}
-
-/// Triangulates a polygon by ear clipping. If no ear is left (folded or degenerate outlines), the second corner is cut
-/// off.
-fn triangulate(outline: &[Vec3]) -> Vec<[usize; 3]> {
-    let count = outline.len();
-    if count == 3 {
-        return vec![[0, 1, 2]];
-    }
-    // Newell's normal is twice the area vector of a closed outline.
-    let normal = (0..count).map(|k| outline[k].cross(outline[(k + 1) % count])).sum::<Vec3>();
-    let orientation =
-        |a: usize, b: usize, c: usize| (outline[b] - outline[a]).cross(outline[c] - outline[a]).dot(normal);
-    let mut remaining: Vec<usize> = (0..count).collect();
-    let mut triangles = Vec::with_capacity(count - 2);
-    while remaining.len() > 3 {
-        let size = remaining.len();
-        let is_ear = |k: &usize| {
-            let [a, b, c] = [remaining[(k + size - 1) % size], remaining[*k], remaining[(k + 1) % size]];
-            let contains =
-                |p: usize| orientation(a, b, p) >= 0.0 && orientation(b, c, p) >= 0.0 && orientation(c, a, p) >= 0.0;
-            orientation(a, b, c) > 0.0 && !remaining.iter().any(|&p| p != a && p != b && p != c && contains(p))
-        };
-        // The search starts at the second corner, so that convex polygons become the fan about their first corner.
-        let ear = (1..size).chain([0]).find(is_ear).unwrap_or(1);
-        triangles.push([remaining[(ear + size - 1) % size], remaining[ear], remaining[(ear + 1) % size]]);
-        remaining.remove(ear);
-    }
-    triangles.push([remaining[0], remaining[1], remaining[2]]);
-    triangles
 }
 
 #[cfg(test)]

@@ -10,4 +10,5 @@ pub mod pyramids;
 pub(crate) mod rods;
 pub(crate) mod rounded;
 pub(crate) mod triangle_points;
+mod triangulate;
 pub(crate) mod weave;

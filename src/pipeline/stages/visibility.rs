@@ -6,7 +6,7 @@ use crate::geometry::{Facets, PeriodicGrid};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Codec, Keyed, Stage};
 use crate::plan::{Settings, VisibilityAlgorithm};
-use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility, visibility_maps_cpu};
+use crate::visibility::{HorizonMap, OcclusionIntervals, SoftMaps, Visibility, cancellable_maps_cpu};
 
 use super::TileShape;
 use super::tile::hash_sampling_into;
@@ -61,7 +61,7 @@ impl Stage for ComputeVisibility<'_> {
                 // If the GPU fails, the CPU computes the same maps.
                 let packed = gpu
                     .and_then(|gpu| gpu.visibility_maps(mesh, facets, &directions, resolution, &env.cancel).ok())
-                    .unwrap_or_else(|| visibility_maps_cpu(mesh, facets, &directions, resolution));
+                    .unwrap_or_else(|| cancellable_maps_cpu(mesh, facets, &directions, resolution, &env.cancel));
                 Visibility::Maps(SoftMaps { grid, packed })
             }
         })

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::{Bounds, frames};
 use crate::base::obj::{self, Grammar, ObjCorner, ObjFace, ObjFile, Rules};
-use crate::base::{Error, InputError, Result};
+use crate::base::{Error, InputError, Result, regular_file};
 use crate::render::ObjectMesh;
 
 /// Maximum size of a file, in bytes.
@@ -22,15 +22,11 @@ pub(super) fn load(path: &Path) -> Result<ObjectMesh> {
     let unreadable = |what: &dyn std::fmt::Display| {
         Error::from(InputError::new("object.path", what, "a readable OBJ file").in_file(path))
     };
-    let metadata = std::fs::metadata(path).map_err(|error| unreadable(&error))?;
-    if !metadata.is_file() {
-        return Err(unreadable(&"a folder or device"));
-    }
-    let size = metadata.len();
+    let size = std::fs::metadata(path).map_err(|error| unreadable(&error))?.len();
     if size > MAX_BYTES {
         return Err(unreadable(&format!("{size} bytes (at most {MAX_BYTES} are read)")));
     }
-    let bytes = std::fs::read(path).map_err(|error| unreadable(&error))?;
+    let bytes = regular_file::read(path).map_err(|error| unreadable(&error))?;
     let text = String::from_utf8(bytes).map_err(|_| unreadable(&"bytes that are not UTF-8 text"))?;
     parse(&text).map_err(|error| error.in_file(path))
 }

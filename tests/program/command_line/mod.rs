@@ -6,4 +6,9 @@ mod commands;
 mod eval;
 mod folder;
 mod inputs;
+#[cfg(unix)]
+mod long_runs;
 mod refusals;
+#[cfg(unix)]
+mod special_files;
+mod standard_error;

@@ -1,15 +1,16 @@
 //! Environments from files: Radiance `.hdr` and OpenEXR `.exr`, cleaned and reduced to the resolution that lights need.
 
 use std::fmt::Display;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+use exr::prelude as exr_file;
+use exr_file::{ReadChannels, ReadLayers};
 use glam::{DVec3, Vec3};
 use image::ImageDecoder;
 
 use super::{Environment, LatLongMap};
-use crate::base::{Error, InputError, Result};
+use crate::base::{Error, InputError, Result, regular_file};
 
 /// Bounds the texels of a file (0.8 GB); a larger file is refused before memory is allocated.
 const MAX_TEXELS: u64 = 1 << 26;
@@ -32,7 +33,7 @@ fn check_size(path: &Path, width: u64, height: u64) -> Result<()> {
 
 pub(super) fn load_hdr(path: &Path) -> Result<Environment> {
     let expected = "a complete Radiance .hdr file";
-    let file = File::open(path).map_err(|error| file_error(path, error, "a readable .hdr file"))?;
+    let file = regular_file::open(path).map_err(|error| file_error(path, error, "a readable .hdr file"))?;
     let decoder =
         image::codecs::hdr::HdrDecoder::new(BufReader::new(file)).map_err(|error| file_error(path, error, expected))?;
     let (width, height) = decoder.dimensions();
@@ -45,18 +46,25 @@ pub(super) fn load_hdr(path: &Path) -> Result<Environment> {
 
 pub(super) fn load_exr(path: &Path) -> Result<Environment> {
     let expected = "a complete OpenEXR file with R, G and B channels";
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|error| file_error(path, error, expected))?;
+    let open = || regular_file::open(path).map_err(|error| file_error(path, error, "a readable .exr file"));
+    let meta =
+        exr::meta::MetaData::read_from_unbuffered(open()?, false).map_err(|error| file_error(path, error, expected))?;
     for header in &meta.headers {
         check_size(path, header.layer_size.x() as u64, header.layer_size.y() as u64)?;
     }
-    let image = exr::prelude::read_first_rgba_layer_from_file(
-        path,
-        |size, _| LatLongMap { width: size.x(), height: size.y(), texels: vec![Vec3::ZERO; size.x() * size.y()] },
-        |map: &mut LatLongMap, at, (r, g, b, _): (f32, f32, f32, f32)| {
-            map.texels[at.y() * map.width + at.x()] = Vec3::new(r, g, b)
-        },
-    )
-    .map_err(|error| file_error(path, error, expected))?;
+    let image = exr_file::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            |size, _| LatLongMap { width: size.x(), height: size.y(), texels: vec![Vec3::ZERO; size.x() * size.y()] },
+            |map: &mut LatLongMap, at, (r, g, b, _): (f32, f32, f32, f32)| {
+                map.texels[at.y() * map.width + at.x()] = Vec3::new(r, g, b)
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_unbuffered(open()?)
+        .map_err(|error| file_error(path, error, expected))?;
     Ok(cleaned(image.layer_data.channel_data.pixels))
 }
 
