@@ -1,8 +1,6 @@
 // Computes the horizons of a height field: the twin of src/visibility/height_march.rs, which describes the algorithm.
 // One thread walks from one facet along one azimuth.
 
-//!import angles
-
 struct Params {
     // Columns and rows of the tile.
     size: vec2u,
@@ -27,13 +25,14 @@ struct Facet {
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> heights: array<f32>;
 @group(0) @binding(2) var<storage, read> facets: array<Facet>;
-// Elevations [rad]; the azimuths of a facet are adjacent.
+// Slopes; the azimuths of a facet are adjacent.
 @group(0) @binding(3) var<storage, read_write> horizons: array<f32>;
 // Unit vectors of the plane, one per azimuth.
 @group(0) @binding(4) var<storage, read> directions: array<vec2f>;
 
-// An elevation so low that the soft step ends below 0: HorizonMap::FREE.
-const FREE: f32 = -0.02;
+// HorizonMap::FREE and HorizonMap::BLOCKED.
+const FREE: f32 = -0.020002667;
+const BLOCKED: f32 = 1e9;
 // The number of edges of one family that a walk may cross, in addition to those of sixteen tiles.
 const MIN_LINES: u32 = 8192u;
 // Slopes below this are not resolved.
@@ -137,5 +136,5 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         horizons[id.x * params.azimuths + azimuth] = f32(crossings);
         return;
     }
-    horizons[id.x * params.azimuths + azimuth] = select(FREE, angle_of(slope, 1.0), slope > 0.0);
+    horizons[id.x * params.azimuths + azimuth] = select(FREE, min(slope, BLOCKED), slope > 0.0);
 }

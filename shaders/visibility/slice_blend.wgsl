@@ -3,12 +3,13 @@
 
 //!import azimuth_taps
 
-fn above(elevation: f32, edge: f32) -> f32 {
-    return clamp((elevation - edge) * sum.sharpness + 0.5, 0.0, 1.0);
+fn above(taps: VisibilityTaps, slope: f32) -> f32 {
+    return clamp(taps.base - taps.scale * slope, 0.0, 1.0);
 }
 
-// If two horizons differ by more than JUMP [rad], they belong to different surfaces. There visibility switches between
-// the azimuths over 1/SWITCH of their distance. Both constants are those of src/math/simd/visibility.rs.
+// If the tangent of the difference of two horizons exceeds JUMP, they belong to different surfaces. There visibility
+// switches between the azimuths over 1/SWITCH of their distance. Both constants are those of
+// src/math/simd/visibility.rs.
 const JUMP: f32 = 0.1;
 const SWITCH: f32 = 6.0;
 
@@ -17,9 +18,8 @@ fn between_slices(facet: u32, taps: VisibilityTaps, horizons: vec2f, hidden: vec
     // The facet switches at its own position between two azimuths: multiples of the golden ratio.
     let switch_at = f32(facet * 2654435769u) / 4294967296.0;
     let changed = clamp((taps.blend - switch_at) * SWITCH + 0.5, 0.0, 1.0);
-    let rise = horizons.y - horizons.x;
-    let between = above(taps.elevation, horizons.x + rise * taps.blend);
-    let either = mix(above(taps.elevation, horizons.x), above(taps.elevation, horizons.y), changed);
-    let open = select(between, either, abs(rise) > JUMP);
+    let either = mix(above(taps, horizons.x), above(taps, horizons.y), changed);
+    let is_jump = abs(horizons.y - horizons.x) > JUMP * (1.0 + horizons.x * horizons.y);
+    let open = select(clamp(between(taps, horizons), 0.0, 1.0), either, is_jump);
     return max(open - mix(hidden.x, hidden.y, changed), 0.0);
 }

@@ -1,7 +1,6 @@
 // Computes horizons and overhangs along vertical slices of the tiling: the twin of src/visibility/scan.rs and
 // slicer.rs, which describe the algorithm. One thread walks from one facet along one azimuth.
 
-//!import angles
 //!import slice_entry
 
 struct Params {
@@ -38,7 +37,7 @@ struct Facet {
 @group(0) @binding(3) var<storage, read> facets: array<Facet>;
 // Unit vectors of the plane, one per azimuth.
 @group(0) @binding(4) var<storage, read> directions: array<vec2f>;
-// Output: horizons [rad], or the input of visibility_packed_intervals.wgsl. The azimuths of a facet are adjacent.
+// Output: slopes of horizons, or the input of visibility_packed_intervals.wgsl. The azimuths of a facet are adjacent.
 @group(0) @binding(5) var<storage, read_write> output: array<u32>;
 
 // True if overhangs are stored apart from the horizon.
@@ -47,8 +46,8 @@ override OVERHANGS: bool = false;
 override COUNTING: bool = false;
 
 // HorizonMap::FREE and HorizonMap::BLOCKED.
-const FREE: f32 = -0.02;
-const BLOCKED: f32 = 1.59079632679490;
+const FREE: f32 = -0.020002667;
+const BLOCKED: f32 = 1e9;
 // The lowest slope that is resolved, and the highest below the vertical.
 const MIN_SLOPE: f32 = 0.005;
 const MAX_SLOPE: f32 = 1e12;
@@ -186,16 +185,13 @@ fn lies_on(origin: vec3f, entry: Entry) -> bool {
     return abs(dot(unit, origin - a)) <= length(unit) * params.near;
 }
 
-fn elevation(slope: f32) -> f32 {
-    if slope <= 0.0 {
-        return FREE;
-    }
-    return select(angle_of(slope, 1.0), BLOCKED, slope >= MAX_SLOPE);
+fn horizon(slope: f32) -> f32 {
+    return select(FREE, min(slope, BLOCKED), slope > 0.0);
 }
 
-// The elevation of a slope in 65,535ths of BLOCKED, which are 0.000024 rad apart.
+// A slope s as s/(1 + s), in 65,535ths. Neighbouring values are at most 0.000031 rad of elevation apart.
 fn quantized(slope: f32) -> u32 {
-    return u32(clamp(elevation(slope) / BLOCKED, 0.0, 1.0) * 65535.0 + 0.5);
+    return u32(65535.0 * (slope / (1.0 + slope)) + 0.5);
 }
 
 fn axis(at: f32, speed: f32, cell: f32) -> vec2f {
@@ -326,11 +322,11 @@ fn scan(@builtin(global_invocation_id) id: vec3u) {
         if count > 0u {
             highest = overhangs[count - 1u].y;
         }
-        output[slice] = bitcast<u32>(elevation(highest));
+        output[slice] = bitcast<u32>(horizon(highest));
         return;
     }
     let first = slice * (1u + STORED_OVERHANGS);
-    output[first] = bitcast<u32>(elevation(ground));
+    output[first] = bitcast<u32>(horizon(ground));
     // If there are more overhangs than are stored, the last stored one extends to the highest.
     for (var k = 0u; k < STORED_OVERHANGS; k++) {
         var packed = 0u;

@@ -2,12 +2,10 @@
 
 //!import azimuth_taps
 
-// Elevations [rad]; the azimuths of a facet are adjacent.
+// Slopes; the azimuths of a facet are adjacent.
 @group(1) @binding(2) var<storage, read> horizons: array<f32>;
 
 fn visibility(facet: u32, taps: VisibilityTaps) -> f32 {
     let row = facet * sum.azimuths;
-    let lower = horizons[row + taps.lower];
-    let horizon = lower + (horizons[row + taps.upper] - lower) * taps.blend;
-    return clamp((taps.elevation - horizon) * sum.sharpness + 0.5, 0.0, 1.0);
+    return clamp(between(taps, vec2f(horizons[row + taps.lower], horizons[row + taps.upper])), 0.0, 1.0);
 }

@@ -1,4 +1,4 @@
-//! Horizon maps: per facet and azimuth, the elevation below which all directions are blocked (Max 1988).
+//! Horizon maps: per facet and azimuth, the slope below which all directions are blocked (Max 1988).
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::ops::Range;
@@ -13,30 +13,67 @@ use crate::geometry::{Facets, HeightGrid};
 use crate::geometry::{PeriodicGrid, lifted_origins};
 use crate::math::directions::from_angles;
 use crate::math::simd;
+use crate::math::simd::HorizonTaps;
 
-/// The elevation [rad] below which all directions are blocked, for each azimuth and facet. Exact without overhangs.
+/// The slope (tangent of the elevation) below which all directions are blocked, for each azimuth and facet. Exact
+/// without overhangs.
 ///
-/// Between azimuths the elevation is interpolated, not the visibility, so few azimuths suffice.
-/// Visibility rises from 0 to 1 over `transition_width` radians, so results computed from it are continuous.
+/// Between azimuths the slope is interpolated, not the visibility, so few azimuths suffice. Above a straight wall the
+/// slope is `a cos φ + b sin φ`, and the interpolation is exact.
+/// Visibility rises from 0 to 1 over `transition_width` radians at the plane's horizon, and over `transition_width`
+/// times the cosine of a higher one, so results computed from it are continuous.
 #[derive(Debug, Clone)]
 pub struct HorizonMap {
     pub(super) azimuths: usize,
     pub(super) facets: usize,
     pub(super) transition_width: f32,
-    /// Elevations by `[azimuth][facet]`: [`HorizonMap::FREE`] if nothing blocks, [`HorizonMap::BLOCKED`] if all is
-    /// blocked.
-    pub(super) elevations: Vec<f32>,
+    /// Slopes by `[azimuth][facet]`: [`HorizonMap::FREE`] if nothing blocks, [`HorizonMap::BLOCKED`] if all is blocked.
+    pub(super) slopes: Vec<f32>,
     /// Number of truncated walks.
     pub(super) truncated: usize,
+    weights: SineWeights,
+}
+
+/// The weights `sin((1-t)Δ)/sin Δ` and `sin(tΔ)/sin Δ` of two azimuths Δ apart, at fraction t of the way. They
+/// interpolate `a cos φ + b sin φ` exactly.
+#[derive(Debug, Clone, Copy)]
+struct SineWeights {
+    /// Δ [rad].
+    step: f32,
+    per_sine: f32,
+}
+
+impl SineWeights {
+    fn new(azimuths: usize) -> Self {
+        // From half a turn on, no wave is determined. Over a small step the weights are linear.
+        let step = if azimuths < 4 { 1e-3 } else { TAU / azimuths as f32 };
+        Self { step, per_sine: 1.0 / sine(step) }
+    }
+
+    fn at(&self, blend: f32) -> [f32; 2] {
+        [1.0 - blend, blend].map(|part| sine(part * self.step) * self.per_sine)
+    }
+}
+
+/// The sine of an angle in `[0, π/2]`, within 2e-9 plus rounding (Abramowitz and Stegun, 4.3.97).
+#[inline(always)]
+fn sine(x: f32) -> f32 {
+    let s = x * x;
+    let high = s * (-0.000_198_409 + s * (0.000_002_752_6 - s * 0.000_000_023_9));
+    x * (1.0 + s * (-0.166_666_67 + s * (0.008_333_331_5 + high)))
 }
 
 impl HorizonMap {
-    /// A horizon so low that the soft step stays at or below elevation 0.
-    const FREE: f32 = -0.02;
-    /// A horizon so high that the soft step never reaches the zenith.
-    pub(super) const BLOCKED: f32 = FRAC_PI_2 + 0.02;
+    /// A slope so low that the soft step stays below elevation 0 for the widest transition, by more than rounding:
+    /// tan(-0.02).
+    const FREE: f32 = -0.020_002_667;
+    /// A slope so high that the soft step never reaches the zenith. It is finite, so that its product with 0 is 0.
+    pub(super) const BLOCKED: f32 = 1e9;
+    /// Smallest cosine of an elevation. Times [`HorizonMap::BLOCKED`] it is far above 1, so that blocked facets are
+    /// blocked at the zenith.
+    const MIN_COSINE: f32 = 1e-6;
 
-    /// Cuts the mesh along every azimuth for every facet. Elevations are exact.
+    /// Cuts the mesh along every azimuth for every facet. Slopes are exact.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         Self::fill_rows(facets.len(), azimuths, transition_width, |along, row| {
@@ -64,8 +101,8 @@ impl HorizonMap {
         })
     }
 
-    /// Computes the rows with `fill`, which writes slopes (tangents) of the horizon along a plane direction and returns
-    /// its number of truncated walks.
+    /// Computes the rows with `fill`, which writes slopes of the horizon along a plane direction and returns its number
+    /// of truncated walks.
     fn fill_rows(
         facets: usize,
         azimuths: usize,
@@ -79,24 +116,22 @@ impl HorizonMap {
         Self { truncated, ..Self::from_slopes(facets, azimuths, transition_width, slopes) }
     }
 
-    /// Converts slopes (tangents) of the horizons, by `[azimuth][facet]`, to elevations.
-    pub(super) fn from_slopes(facets: usize, azimuths: usize, transition_width: f32, slopes: Vec<f32>) -> Self {
-        let mut elevations = slopes;
-        elevations.par_iter_mut().for_each(|slope| {
-            *slope = if *slope <= 0.0 {
-                Self::FREE
-            } else if *slope == f32::INFINITY {
-                Self::BLOCKED
-            } else {
-                slope.atan()
-            };
+    /// Takes slopes of the horizons in `[0, ∞]`, by `[azimuth][facet]`.
+    pub(super) fn from_slopes(facets: usize, azimuths: usize, transition_width: f32, mut slopes: Vec<f32>) -> Self {
+        slopes.par_iter_mut().with_min_len(1 << 16).for_each(|slope| {
+            *slope = if *slope <= 0.0 { Self::FREE } else { slope.min(Self::BLOCKED) };
         });
-        Self { azimuths, facets, transition_width: Self::clamped_width(transition_width), elevations, truncated: 0 }
+        Self::stored([azimuths, facets, 0], Self::clamped_width(transition_width), slopes)
+    }
+
+    /// The map of stored slopes, from the numbers of azimuths, facets and truncated walks.
+    pub(super) fn stored([azimuths, facets, truncated]: [usize; 3], transition_width: f32, slopes: Vec<f32>) -> Self {
+        Self { azimuths, facets, transition_width, slopes, truncated, weights: SineWeights::new(azimuths) }
     }
 
     /// Clamps a width of the soft step [rad] to the range that a horizon map supports.
     pub(crate) fn clamped_width(transition_width: f32) -> f32 {
-        transition_width.clamp(1e-6, -2.0 * Self::FREE)
+        transition_width.clamp(1e-6, 0.04)
     }
 
     pub fn facets(&self) -> usize {
@@ -107,65 +142,74 @@ impl HorizonMap {
         self.azimuths
     }
 
-    /// Width of the soft step [rad].
+    /// Width of the soft step at the plane's horizon [rad].
     pub(crate) fn transition_width(&self) -> f32 {
         self.transition_width
     }
 
-    /// Elevation [rad] below which all directions along one azimuth are blocked.
-    pub(crate) fn elevation(&self, azimuth: usize, facet: usize) -> f32 {
-        self.elevations[azimuth * self.facets + facet]
+    /// Slope below which all directions along one azimuth are blocked.
+    pub(crate) fn slope(&self, azimuth: usize, facet: usize) -> f32 {
+        self.slopes[azimuth * self.facets + facet]
     }
 
     /// Fraction of the walks that were truncated. Blockers of directions near the horizon may be missing from these.
     pub fn truncated(&self) -> f64 {
-        self.truncated as f64 / self.elevations.len().max(1) as f64
+        self.truncated as f64 / self.slopes.len().max(1) as f64
     }
 
     pub fn bytes(&self) -> usize {
-        4 * self.elevations.len()
+        4 * self.slopes.len()
     }
 
-    /// Elevations [rad] of all facets along one azimuth.
+    /// Slopes of all facets along one azimuth.
     pub(super) fn row(&self, azimuth: usize) -> &[f32] {
-        &self.elevations[azimuth * self.facets..][..self.facets]
+        &self.slopes[azimuth * self.facets..][..self.facets]
     }
 
-    /// The two nodes around an azimuth [turns, at most 1], and their weights.
-    pub(crate) fn taps(&self, azimuth: f32) -> [(usize, f32); 2] {
+    /// The taps of a unit direction above the plane.
+    pub(crate) fn taps(&self, direction: Vec3) -> HorizonTaps {
+        let (azimuth, cosine) = simd::azimuth_and_cosine(direction);
+        self.taps_at(azimuth, direction.z, cosine)
+    }
+
+    /// The taps of an azimuth [turns, at most 1], and of the sine and the cosine of an elevation.
+    pub(crate) fn taps_at(&self, azimuth: f32, sine: f32, cosine: f32) -> HorizonTaps {
         let at = azimuth * self.azimuths as f32;
         let below = at as usize;
         // No division: rendering calls this function for each light of each pixel.
         let wrapped = |azimuth: usize| if azimuth >= self.azimuths { azimuth - self.azimuths } else { azimuth };
         let (from, blend) = (wrapped(below), at - below as f32);
-        [(from, 1.0 - blend), (wrapped(from + 1), blend)]
+        let sharpness = 1.0 / self.transition_width;
+        let scale = cosine.max(Self::MIN_COSINE) * sharpness;
+        HorizonTaps {
+            azimuths: [from, wrapped(from + 1)],
+            blend,
+            base: 0.5 + sine * sharpness,
+            scale,
+            scales: self.weights.at(blend).map(|weight| weight * scale),
+        }
     }
 
     /// The horizon map of some of the facets, in the given order.
     pub fn subset(&self, facets: &[usize]) -> Self {
         let rows = (0..self.azimuths).map(|azimuth| self.row(azimuth));
-        let elevations = rows.flat_map(|row| facets.iter().map(|&facet| row[facet])).collect();
-        let Self { azimuths, transition_width, truncated, .. } = *self;
-        Self { azimuths, facets: facets.len(), transition_width, elevations, truncated }
+        let slopes = rows.flat_map(|row| facets.iter().map(|&facet| row[facet])).collect();
+        Self { facets: facets.len(), slopes, ..*self }
     }
 
-    /// Computes `Σ w V(direction)` over a run of facets with weights `w`. The azimuth is in turns, the elevation in
-    /// radians.
-    pub(crate) fn visible_sum(&self, [azimuth, elevation]: [f32; 2], range: Range<usize>, weights: &[f32]) -> f64 {
-        let [(from, _), (to, blend)] = self.taps(azimuth);
-        let row = |azimuth: usize| &self.row(azimuth)[range.clone()];
-        simd::visible_sum(weights, row(from), row(to), blend, elevation, 1.0 / self.transition_width)
+    /// Computes `Σ w V(direction)` over a run of facets with weights `w`.
+    pub(crate) fn visible_sum(&self, taps: &HorizonTaps, range: Range<usize>, weights: &[f32]) -> f64 {
+        let [from, to] = taps.azimuths.map(|azimuth| &self.row(azimuth)[range.clone()]);
+        simd::visible_sum(weights, from, to, taps)
     }
 
-    /// Elevation bounds [rad] of each azimuth and run of facets. Every facet is blocked below the first bound and
-    /// visible above the second.
+    /// The lowest and the highest slope of each azimuth and run of facets. The visibility of every facet of a run lies
+    /// between those of the two bounds ([`HorizonTaps::between`]).
     pub(crate) fn horizon_bounds(&self, runs: &[Range<usize>]) -> Vec<[f32; 2]> {
-        let bounds = |horizons: &[f32]| {
-            let (low, high) = horizons.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
-                (if at < low { at } else { low }, if at > high { at } else { high })
-            });
-            // Slightly more than half the transition width, because the blend of two azimuths rounds.
-            [low - 0.51 * self.transition_width - 1e-6, high + 0.51 * self.transition_width + 1e-6]
+        let bounds = |slopes: &[f32]| {
+            slopes.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], &at| {
+                [if at < low { at } else { low }, if at > high { at } else { high }]
+            })
         };
         (0..self.azimuths)
             .flat_map(|azimuth| runs.iter().map(move |run| bounds(&self.row(azimuth)[run.clone()])))
@@ -175,9 +219,80 @@ impl HorizonMap {
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction`, which points above the horizon. Facing
     /// is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
-        let (azimuth, elevation) = simd::azimuth_and_elevation(direction);
-        let [(from, _), (to, blend)] = self.taps(azimuth);
-        let row = |azimuth: usize| &self.row(azimuth)[range.clone()];
-        simd::horizon_visibility(row(from), row(to), blend, elevation, 1.0 / self.transition_width, out);
+        let taps = self.taps(direction);
+        let [from, to] = taps.azimuths.map(|azimuth| &self.row(azimuth)[range.clone()]);
+        simd::horizon_visibility(from, to, &taps, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Directions at all azimuths, from the plane's horizon to the zenith.
+    fn directions() -> impl Iterator<Item = Vec3> {
+        (0..2000).map(|k| from_angles(FRAC_PI_2 * (k as f32 / 1999.0), TAU * (k as f32 * 0.618_034).fract()))
+    }
+
+    #[test]
+    fn the_slope_of_a_straight_wall_is_exact_between_azimuths() {
+        for azimuths in [4, 8, 16, 48] {
+            for (steepness, toward) in [(0.3, 0.1), (2.0, 1.0), (40.0, 2.5), (1000.0, 5.0)] {
+                let wall = |azimuth: f32| steepness * (azimuth - toward).cos();
+                let slopes = (0..azimuths).map(|node| wall(TAU * node as f32 / azimuths as f32)).collect();
+                let map = HorizonMap::from_slopes(1, azimuths, 0.02, slopes);
+                for direction in directions() {
+                    let taps = map.taps(direction);
+                    let [from, to] = taps.azimuths.map(|azimuth| map.slope(azimuth, 0));
+                    // Elsewhere the wall is behind the facet along one of the azimuths.
+                    if from > 0.0 && to > 0.0 {
+                        let slope = (taps.scales[0] * from + taps.scales[1] * to) / taps.scale;
+                        let azimuth = direction.y.atan2(direction.x);
+                        assert!((slope - wall(azimuth)).abs() < 4e-6 * steepness, "{azimuths} azimuths: {slope}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn free_facets_are_visible_and_blocked_facets_are_not_from_the_horizon_to_the_zenith() {
+        for azimuths in [1, 3, 4, 5, 48] {
+            for width in [0.0, 1e-4, 0.02, 1.0] {
+                let slopes = (0..azimuths).flat_map(|_| [0.0, f32::INFINITY]).collect();
+                let map = HorizonMap::from_slopes(2, azimuths, width, slopes);
+                for direction in directions() {
+                    let mut visibility = [f32::NAN; 2];
+                    map.fill(direction, 0..2, &mut visibility);
+                    assert_eq!(visibility, [1.0, 0.0], "{azimuths} azimuths, width {width}, {direction}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_visibility_of_every_facet_lies_between_those_of_the_horizon_bounds() {
+        let (azimuths, facets) = (7, 24);
+        let slope = |k: usize| match k % 5 {
+            0 => 0.0,
+            1 if k % 3 == 0 => f32::INFINITY,
+            _ => (1.5 * (k as f32 * 0.754_877_67).fract()).tan(),
+        };
+        let map = HorizonMap::from_slopes(facets, azimuths, 0.02, (0..facets * azimuths).map(slope).collect());
+        let runs = [0..1, 1..4, 4..facets];
+        let bounds = map.horizon_bounds(&runs);
+        let mut none_or_all = 0;
+        for direction in directions() {
+            let taps = map.taps(direction);
+            let mut visibility = vec![f32::NAN; facets];
+            map.fill(direction, 0..facets, &mut visibility);
+            for (k, run) in runs.iter().enumerate() {
+                let [a, b] = taps.azimuths.map(|azimuth| bounds[azimuth * runs.len() + k]);
+                let [most, least] = [0, 1].map(|end| taps.between(a[end], b[end]).clamp(0.0, 1.0));
+                none_or_all += usize::from(most == 0.0 || least == 1.0);
+                assert!(visibility[run.clone()].iter().all(|&v| least <= v && v <= most), "{direction}");
+            }
+        }
+        assert!(none_or_all > 500, "{none_or_all}");
     }
 }

@@ -15,9 +15,9 @@ use crate::math::directions::{PolarGrid, from_angles};
 use crate::math::simd;
 use crate::math::simd::F32x8Array;
 
-/// All blocked elevations of every facet along a number of azimuths, exact at these azimuths.
+/// All blocked slopes of every facet along a number of azimuths, exact at these azimuths.
 ///
-/// Between azimuths the horizon is interpolated, unless it jumps to another part of the surface. At such jumps, and for
+/// Between azimuths the slope of the horizon is interpolated, unless it jumps to another part of the surface. At such jumps, and for
 /// overhangs, each facet switches from one azimuth to the next over a soft step.
 #[derive(Debug, Clone)]
 pub struct OcclusionIntervals {
@@ -28,7 +28,7 @@ pub struct OcclusionIntervals {
     pub(crate) switch: Vec<f32>,
 }
 
-/// Overhangs along one azimuth: blocked intervals of elevation [rad] above the horizon, in the order of their facets.
+/// Overhangs along one azimuth: blocked intervals of slopes above the horizon, in the order of their facets.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Overhangs {
     pub(crate) facets: Vec<u32>,
@@ -121,9 +121,9 @@ impl OcclusionIntervals {
                 let (mut row, mut above) = (vec![0.0; facets.len()], Vec::new());
                 let truncated = scan_all(&slicer.rotated(along), facets, &origins, &mut |facet, blocked| {
                     row[facet as usize] = blocked.ground;
-                    above.extend(blocked.floating_faced().map(|(low, high)| {
-                        (facet, low.atan(), if high == f32::INFINITY { HorizonMap::BLOCKED } else { high.atan() })
-                    }));
+                    above.extend(
+                        blocked.floating_faced().map(|(low, high)| (facet, low, high.min(HorizonMap::BLOCKED))),
+                    );
                 });
                 above.sort_by_key(|interval| interval.0);
                 grid.cancel.step(azimuths);
@@ -153,23 +153,20 @@ impl OcclusionIntervals {
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction`, which points above the horizon. Facing
     /// is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
-        let (azimuth, elevation) = simd::azimuth_and_elevation(direction);
-        let [(from, _), (to, blend)] = self.horizon_map.taps(azimuth);
-        let sharpness = 1.0 / self.horizon_map.transition_width();
-        let row = |azimuth: usize| &self.horizon_map.row(azimuth)[range.clone()];
-        simd::stepped_visibility(row(from), row(to), &self.switch[range.clone()], blend, elevation, sharpness, out);
+        let taps = self.horizon_map.taps(direction);
+        let [from, to] = taps.azimuths.map(|azimuth| &self.horizon_map.row(azimuth)[range.clone()]);
+        simd::stepped_visibility(from, to, &self.switch[range.clone()], &taps, out);
         // Blocks of intervals are computed as whole vectors first, because each facet has many intervals.
         const MAX_INTERVALS: usize = 256;
         let mut covered = [0.0; MAX_INTERVALS];
-        for (azimuth, side) in [(from, 0.0), (to, 1.0)] {
+        for (azimuth, side) in taps.azimuths.into_iter().zip([0.0, 1.0]) {
             let overhangs = &self.overhangs[azimuth];
             let run = overhangs.range_of(&range);
             for first in run.clone().step_by(MAX_INTERVALS) {
                 let part = first..(first + MAX_INTERVALS).min(run.end);
                 let covered = &mut covered[..part.len()];
                 let (low, high) = (&overhangs.low[part.clone()], &overhangs.high[part.clone()]);
-                let switch = (&overhangs.switch[part.clone()], blend, side);
-                simd::interval_cover(low, high, switch, elevation, sharpness, covered);
+                simd::interval_cover(low, high, &overhangs.switch[part.clone()], side, &taps, covered);
                 for (facet, covered) in overhangs.facets[part].iter().zip(covered) {
                     let out = &mut out[*facet as usize - range.start];
                     *out = (*out - *covered).max(0.0);
@@ -192,7 +189,7 @@ impl OcclusionIntervals {
     }
 
     /// Overhangs by facet, then azimuth. The first array holds the start of each list and the end of the last one, the
-    /// second the intervals `(low, high)` [rad].
+    /// second the intervals `(low, high)` of slopes.
     #[cfg(feature = "gpu")]
     pub(crate) fn overhangs_by_facet(&self) -> (Vec<u32>, Vec<(f32, f32)>) {
         let (mut starts, mut intervals) = (vec![0], Vec::new());
@@ -213,16 +210,16 @@ impl OcclusionIntervals {
         let grid = PolarGrid::new(rings, azimuths);
         let mut packed = PackedVisibility::new(facets, grid.len());
         for ring in 0..grid.ring_count() {
-            let elevation = FRAC_PI_2 - grid.theta(ring);
+            let slope = 1.0 / grid.theta(ring).tan();
             for azimuth in 0..azimuths {
                 let node = ring * azimuths + azimuth;
                 for facet in 0..facets {
-                    if elevation > self.horizon_map.elevation(azimuth, facet) {
+                    if slope > self.horizon_map.slope(azimuth, facet) {
                         packed.set_visible(node, facet);
                     }
                 }
                 for (facet, low, high) in self.overhangs[azimuth].iter() {
-                    if low <= elevation && elevation <= high {
+                    if low <= slope && slope <= high {
                         packed.set_blocked(node, facet as usize);
                     }
                 }

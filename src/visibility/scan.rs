@@ -1,4 +1,4 @@
-//! Exact blocked elevations of one facet along one azimuth, from the slice of the tiling by a vertical half plane.
+//! Exact blocked slopes of one facet along one azimuth, from the slice of the tiling by a vertical half plane.
 
 use glam::{IVec2, Vec2, Vec3};
 

@@ -79,13 +79,13 @@ impl Stored for Visibility {
 fn write_horizon_map(horizon_map: &HorizonMap, out: &mut Writer) {
     [horizon_map.azimuths, horizon_map.facets, horizon_map.truncated].into_iter().for_each(|count| out.count(count));
     out.numbers(&[horizon_map.transition_width]);
-    out.numbers(&horizon_map.elevations);
+    out.numbers(&horizon_map.slopes);
 }
 
 fn read_horizon_map(from: &mut Reader<'_>) -> Option<HorizonMap> {
     let [azimuths, facets, truncated] = [from.count()?, from.count()?, from.count()?];
     let transition_width = from.numbers()?.first().copied()?;
-    let elevations: Vec<f32> = from.numbers()?;
-    let fits = azimuths > 0 && azimuths.checked_mul(facets)? == elevations.len();
-    fits.then_some(HorizonMap { azimuths, facets, transition_width, elevations, truncated })
+    let slopes: Vec<f32> = from.numbers()?;
+    let fits = azimuths > 0 && azimuths.checked_mul(facets)? == slopes.len();
+    fits.then(|| HorizonMap::stored([azimuths, facets, truncated], transition_width, slopes))
 }

@@ -1,10 +1,14 @@
 //! Errors of `draft` and `standard` on tiles to which no default is tuned. `cargo bench --bench measure -- accuracy`
 //! prints the errors of every preset.
 
-use biscale::metrics::{Errors, compare, mirror_biased_pairs};
+use std::f32::consts::PI;
+
+use biscale::metrics::{Errors, Pair, compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::reference::ReferenceSettings;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 use crate::tiles::{BRDFS, evaluate, merl_spec, open, reference, untuned};
 
@@ -87,6 +91,70 @@ fn a_flat_tile_has_the_small_scale_brdf_at_draft_and_standard() {
                 pairs.iter().map(|pair| material.color * material.brdf.f(Vec3::Z, pair.i, pair.o) / pair.o.z).collect();
             let errors = compare(&values, &expected);
             assert!(errors.rel_l2 < 1e-5, "{name}, {preset}: {errors:?}");
+        }
+    }
+}
+
+/// Rectangular grooves with black sides and bottoms of albedo 1. Lengths are in pitches.
+struct Grooves {
+    /// The plane direction across the grooves.
+    across: Vec2,
+    bottom: f32,
+    depth: f32,
+}
+
+impl Grooves {
+    fn reflection(&self, pair: &Pair) -> f32 {
+        // A ray from the bottom meets the plane of the tops this far away across the groove, and must miss the sides.
+        let [d_i, d_o] = [pair.i, pair.o].map(|d| self.depth * d.truncate().dot(self.across) / d.z);
+        let end = self.bottom.min(self.bottom - d_i).min(self.bottom - d_o);
+        pair.i.z / PI * (end - (-d_i).max(-d_o).max(0.0)).max(0.0)
+    }
+
+    /// Pairs of directions up to 85° that are nearly in the plane of the grooves, so that each sees a part of the
+    /// bottoms.
+    fn pairs(&self, count: usize) -> Vec<Pair> {
+        let mut rng = ChaCha8Rng::seed_from_u64(12);
+        let mut direction = || {
+            let [across, along] = [(); 2].map(|()| 2.0 * rng.random::<f32>() - 1.0);
+            let slopes = self.across * (self.bottom * across / self.depth)
+                + self.across.perp() * (85_f32.to_radians() * along).tan();
+            slopes.extend(1.0).normalize()
+        };
+        (0..count).map(|_| Pair { i: direction(), o: direction() }).collect()
+    }
+}
+
+/// The first bound is for pairs up to 85°, of which no pair reaches the bottoms at 40 pitches. The second bound is for
+/// pairs that see the bottoms.
+#[test]
+fn deep_grooves_with_bright_bottoms_have_the_reflection_of_their_closed_form() {
+    let materials = r#"{ kind = "lambertian", albedo = 0.0 }
+[[material]]
+name = "bottom"
+brdf = { kind = "lambertian", albedo = 1.0 }"#;
+    for (preset, depth, min_psnr_db) in [
+        ("standard", 0.25, [55.0, 50.0]),
+        ("standard", 1.0, [55.0, 40.0]),
+        ("standard", 2.5, [55.0, 36.0]),
+        ("standard", 10.0, [45.0, 33.0]),
+        ("fine", 10.0, [45.0, 35.0]),
+        ("fine", 40.0, [f64::NEG_INFINITY, 34.0]),
+    ] {
+        let grooves = Grooves { across: Vec2::X, bottom: 0.5, depth };
+        let geometry = format!(
+            r#"{{ kind = "grooves", profile = "rectangular", count = 4, bottom_width = 0.5, depth = {} }}"#,
+            depth / 4.0
+        );
+        let brdf = Pipeline::new().effective(&open(&geometry, materials, preset)).unwrap().brdf;
+        for (pairs, min_psnr_db) in [mirror_biased_pairs(2000, 5), grooves.pairs(2000)].into_iter().zip(min_psnr_db) {
+            let exact: Vec<Vec3> = pairs.iter().map(|pair| Vec3::splat(grooves.reflection(pair))).collect();
+            let errors = compare(&evaluate(&brdf, &pairs), &exact);
+            eprintln!("{preset}, {depth} pitches deep: {errors:?}");
+            assert!(
+                min_psnr_db.is_infinite() || errors.psnr_db >= min_psnr_db,
+                "{preset}, {depth} pitches: {errors:?}"
+            );
         }
     }
 }

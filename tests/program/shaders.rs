@@ -95,7 +95,7 @@ fn effects_that_a_scene_does_not_use_are_not_in_the_shader() {
     let horizons = [("visibility_unblocked", "visibility_horizons"), ("bounds_unblocked", "bounds_horizons")];
     let [without, with] = [&[][..], &horizons].map(|swaps| biscale::gpu::swapped_source("shade_clusters", swaps));
     let (without, with) = (without.expect("known files"), with.expect("known files"));
-    for absent in ["fn azimuth_in_turns", "horizons[", "taps.elevation"] {
+    for absent in ["fn azimuth_in_turns", "horizons[", "between(taps"] {
         assert!(!without.contains(absent) && with.contains(absent), "{absent}");
     }
     let tints = biscale::gpu::swapped_source("shade_table", &[]).expect("known files");

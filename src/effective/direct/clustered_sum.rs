@@ -10,15 +10,14 @@ use super::facet_groups::NormalCluster;
 use crate::brdf::LobeAngles;
 use crate::effective::{FacetGroup, FacetSum};
 use crate::math::simd;
-use crate::math::simd::LightPairs;
+use crate::math::simd::{HorizonTaps, LightPairs};
 use crate::visibility::{HorizonMap, Visibility};
 
 /// Horizon bounds of all normal clusters, which are computed once for all directions.
 #[derive(Debug, Clone)]
 pub(crate) struct ClusteredSum {
     clusters: usize,
-    /// `[azimuth][cluster]`: the elevations [rad] up to which a direction is visible from no facet, and from which on
-    /// it is visible from all.
+    /// `[azimuth][cluster]`: the lowest and the highest slope of a horizon.
     horizon_bounds: Vec<[f32; 2]>,
 }
 
@@ -58,10 +57,14 @@ impl ClusteredSum {
     ) {
         for (part, lights) in lights.chunks(LightPairs::MAX).enumerate() {
             pairs.set(lights, view.o);
+            let mut taps = [HorizonTaps::ABOVE_ALL; LightPairs::MAX];
+            for (k, taps) in taps.iter_mut().enumerate().take(lights.len()) {
+                *taps = view.horizon_map.taps_at(pairs.azimuths[k], pairs.i[2][k], pairs.cosines[k]);
+            }
             let mut totals = [DVec3::ZERO; LightPairs::MAX];
             for (index, (group, cluster)) in clusters(view.sum).enumerate() {
                 if cluster.normal.dot(view.o) > 0.0 {
-                    let areas = self.visible_areas(view, (index, cluster), pairs, lights.len());
+                    let areas = self.visible_areas(view, (index, cluster), pairs, &taps[..lights.len()]);
                     add(group, cluster.normal, pairs, &areas[..lights.len()], &mut totals);
                 }
             }
@@ -77,35 +80,28 @@ impl ClusteredSum {
         view: SumView,
         (index, cluster): (usize, &NormalCluster),
         pairs: &LightPairs,
-        lights: usize,
+        lights: &[HorizonTaps],
     ) -> [f64; LightPairs::MAX] {
         let areas = &view.areas[cluster.range.clone()];
-        let along = |azimuth: f32, elevation: f32| {
-            view.horizon_map.visible_sum([azimuth, elevation], cluster.range.clone(), areas)
-        };
+        let along = |taps: &HorizonTaps| view.horizon_map.visible_sum(taps, cluster.range.clone(), areas);
         let mut all = None;
         let mut visible = [0.0; LightPairs::MAX];
-        for (k, visible) in visible.iter_mut().enumerate().take(lights) {
-            let (azimuth, elevation) = (pairs.azimuths[k], pairs.elevations[k]);
+        for (k, (visible, taps)) in visible.iter_mut().zip(lights).enumerate() {
             if cluster.normal.dot(pairs.light(k)) <= 0.0 {
                 continue;
             }
-            let bounds = |(azimuth, _): (usize, f32)| self.horizon_bounds[azimuth * self.clusters + index];
-            let [a, b] = view.horizon_map.taps(azimuth).map(bounds);
-            *visible = if elevation >= a[1].max(b[1]) {
-                *all.get_or_insert_with(|| along(azimuth, ABOVE_ALL))
-            } else if elevation <= a[0].min(b[0]) {
+            let [a, b] = taps.azimuths.map(|azimuth| self.horizon_bounds[azimuth * self.clusters + index]);
+            *visible = if taps.between(a[1], b[1]) >= 1.0 {
+                *all.get_or_insert_with(|| along(&HorizonTaps::ABOVE_ALL))
+            } else if taps.between(a[0], b[0]) <= 0.0 {
                 0.0
             } else {
-                along(azimuth, elevation)
+                along(taps)
             };
         }
         visible
     }
 }
-
-/// An elevation [rad] above every horizon.
-const ABOVE_ALL: f32 = 4.0;
 
 /// Adds the reflection of one cluster, with its visible area for each light, to `totals`.
 fn add(group: &FacetGroup, normal: Vec3, pairs: &LightPairs, areas: &[f64], totals: &mut [DVec3; LightPairs::MAX]) {

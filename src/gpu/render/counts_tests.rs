@@ -11,7 +11,6 @@ use crate::gpu::shading::tests::{TestScene, open_gpu};
 use crate::gpu::visibility::{crossings, steps};
 use crate::gpu::{Gpu, GpuRenderer};
 use crate::math::directions::HemispherePairGrid;
-use crate::math::simd::azimuth_and_elevation;
 use crate::pipeline::{GpuTile, Pipeline};
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::{CameraView, GBuffer, RenderScene};
@@ -32,11 +31,11 @@ const LOBE: f64 = 29.0;
 /// Operations of a second lobe.
 const NEXT_LOBE: f64 = 10.0;
 /// Operations per facet for its visibility along two directions, with a horizon map.
-const ABOVE: f64 = 22.0;
+const ABOVE: f64 = 18.0;
 /// Operations per facet for its visibility along two directions, with occlusion intervals.
 const BETWEEN: f64 = 100.0;
-/// Operations per light for its direction, azimuth, elevation, horizon bounds and half vector.
-const DIRECTION: f64 = 85.0;
+/// Operations per light for its direction, azimuth, weights of horizons, horizon bounds and half vector.
+const DIRECTION: f64 = 103.0;
 /// Bytes from caches of the two heights of an edge.
 const EDGE_BYTES: f64 = 8.0;
 /// Bytes from caches of the entry of a cell or triangle.
@@ -154,11 +153,11 @@ fn clustered_sum_cost(loaded: &LoadedScene, tile: &GpuTile) -> [f64; 2] {
     let ranges: Vec<_> = clusters.iter().map(|(_, cluster)| cluster.range.clone()).collect();
     let bounds = horizons.horizon_bounds(&ranges);
     let visible = |d: Vec3, cluster: usize| {
-        let (azimuth, elevation) = azimuth_and_elevation(d);
-        let [a, b] = horizons.taps(azimuth).map(|(azimuth, _)| bounds[azimuth * ranges.len() + cluster]);
-        if elevation <= a[0].min(b[0]) {
+        let taps = horizons.taps(d);
+        let [a, b] = taps.azimuths.map(|azimuth| bounds[azimuth * ranges.len() + cluster]);
+        if taps.between(a[0], b[0]) <= 0.0 {
             VisiblePart::None
-        } else if elevation >= a[1].max(b[1]) {
+        } else if taps.between(a[1], b[1]) >= 1.0 {
             VisiblePart::All
         } else {
             VisiblePart::Some

@@ -65,7 +65,7 @@ impl GpuVisibility<'_> {
                 gpu.upload("horizons", &horizons_by_facet(horizons), usage)
             }
             Self::Computed(Visibility::Maps(maps)) => gpu.upload("visibility maps", &bits_by_facet(maps), usage),
-            Self::HorizonMap(computed, _) | Self::OcclusionIntervals(computed, _) => Ok(computed.elevations.clone()),
+            Self::HorizonMap(computed, _) | Self::OcclusionIntervals(computed, _) => Ok(computed.slopes.clone()),
             Self::Maps(computed, _) => Ok(computed.bits.clone()),
         }
     }
@@ -73,7 +73,7 @@ impl GpuVisibility<'_> {
 
 fn horizons_by_facet(horizons: &HorizonMap) -> Vec<f32> {
     let azimuths = horizons.azimuths();
-    (0..horizons.facets() * azimuths).map(|k| horizons.elevation(k % azimuths, k / azimuths)).collect()
+    (0..horizons.facets() * azimuths).map(|k| horizons.slope(k % azimuths, k / azimuths)).collect()
 }
 
 /// Returns horizons, starts of the overhangs and overhangs, as `visibility_intervals.wgsl` reads them.

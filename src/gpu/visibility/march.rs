@@ -32,9 +32,9 @@ pub struct GpuHorizonMap {
     pub(super) pipeline: wgpu::ComputePipeline,
     /// Bindings of each run, with its numbers of workgroups along facets and of azimuths.
     pub(super) runs: Vec<(wgpu::BindGroup, [u32; 2])>,
-    /// Elevations [rad], or the input of `visibility_packed_intervals.wgsl`; the azimuths of a facet are adjacent.
+    /// Slopes of horizons, or the input of `visibility_packed_intervals.wgsl`; the azimuths of a facet are adjacent.
     /// Zeros until they are computed.
-    pub elevations: wgpu::Buffer,
+    pub slopes: wgpu::Buffer,
     pub azimuths: usize,
 }
 
@@ -93,12 +93,11 @@ impl GpuHeightMarch {
         let facet_rows = facets.positions.iter().zip(&facets.normals);
         let facet_rows: Vec<Facet> =
             facet_rows.map(|(&position, &normal)| Facet { position, pad_p: 0, normal, pad_n: 0 }).collect();
-        let elevations =
-            gpu.buffer("horizons", (4 * facets.len() * azimuths) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
+        let slopes = gpu.buffer("horizons", (4 * facets.len() * azimuths) as u64, Usage::STORAGE | Usage::COPY_SRC)?;
         let bound = [
             &gpu.upload("heights", &heights.heights, Usage::STORAGE)?,
             &gpu.upload("facets", &facet_rows, Usage::STORAGE)?,
-            &elevations,
+            &slopes,
             &gpu.upload("azimuths", &directions(azimuths), Usage::STORAGE)?,
         ];
         let runs = runs(facets.len(), azimuths, |first_azimuth| {
@@ -106,7 +105,7 @@ impl GpuHeightMarch {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             gpu.group("height-field", &self.layout, &bound)
         })?;
-        Ok(GpuHorizonMap { preparation: None, pipeline: self.march.clone(), runs, elevations, azimuths })
+        Ok(GpuHorizonMap { preparation: None, pipeline: self.march.clone(), runs, slopes, azimuths })
     }
 }
 
@@ -180,7 +179,7 @@ pub(crate) fn crossings(
         map.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
     }
     gpu.queue.submit([encoder.finish()]);
-    let counts: Vec<f32> = gpu.read(&map.elevations).unwrap();
+    let counts: Vec<f32> = gpu.read(&map.slopes).unwrap();
     counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len() as f64
 }
 
@@ -234,18 +233,15 @@ mod tests {
                 map.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
             }
             gpu.queue.submit([encoder.finish()]);
-            let gpu_elevations: Vec<f32> = gpu.read(&map.elevations).unwrap();
+            let gpu_slopes: Vec<f32> = gpu.read(&map.slopes).unwrap();
             let mut off: Vec<f32> = (0..facets.len() * azimuths)
-                .map(|k| (gpu_elevations[k] - cpu.elevation(k % azimuths, k / azimuths)).abs())
+                .map(|k| (gpu_slopes[k].atan() - cpu.slope(k % azimuths, k / azimuths).atan()).abs())
                 .collect();
             off.sort_by(f32::total_cmp);
             let [most, worst] = [off[off.len() * 995 / 1000], off[off.len() - 1]];
-            let free = gpu_elevations.iter().filter(|&&elevation| elevation < 0.0).count();
-            eprintln!(
-                "{size}: 99.5 % within {most:.1e}, largest {worst:.1e} rad; {free} of {} free",
-                gpu_elevations.len()
-            );
-            assert!(free < gpu_elevations.len() / 2, "something blocks");
+            let free = gpu_slopes.iter().filter(|&&slope| slope < 0.0).count();
+            eprintln!("{size}: 99.5 % within {most:.1e}, largest {worst:.1e} rad; {free} of {} free", gpu_slopes.len());
+            assert!(free < gpu_slopes.len() / 2, "something blocks");
             // Slopes come from the same crossings. The slope of a crossing within rounding of the facet is a quotient
             // of two small numbers, or only one side counts it.
             assert!(most < 1e-5 && worst < 0.1, "{size}: 99.5 % within {most}, largest {worst}");

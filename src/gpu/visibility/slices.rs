@@ -157,7 +157,7 @@ impl GpuSlicer {
             let bound: Vec<_> = std::iter::once(&params).chain(bound).map(wgpu::Buffer::as_entire_binding).collect();
             gpu.group("slices", &self.layout, &bound)
         })?;
-        Ok(GpuHorizonMap { preparation: Some(preparation), pipeline, runs, elevations: slices, azimuths })
+        Ok(GpuHorizonMap { preparation: Some(preparation), pipeline, runs, slopes: slices, azimuths })
     }
 
     /// Prepares the dispatch that moves copies of triangles to the positions in their cells, which is faster than to

@@ -25,7 +25,7 @@ fn read(gpu: &Gpu, map: &GpuHorizonMap) -> Vec<u32> {
         map.dispatch(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), run);
     }
     gpu.queue.submit([encoder.finish()]);
-    gpu.read(&map.elevations).unwrap()
+    gpu.read(&map.slopes).unwrap()
 }
 
 /// Returns the distance that 99 % of the values do not exceed.
@@ -43,13 +43,12 @@ fn gpu_and_cpu_compute_the_same_horizons_of_meshes_without_overhangs() {
         let grid = PeriodicGrid::new(&mesh);
         let cpu = HorizonMap::scan(&grid, &facets, azimuths, 0.02);
         let map = slicer.prepare(&gpu, &grid, &facets, azimuths, false).unwrap();
-        let gpu_elevations: Vec<f32> = read(&gpu, &map).into_iter().map(f32::from_bits).collect();
+        let gpu_slopes: Vec<f32> = read(&gpu, &map).into_iter().map(f32::from_bits).collect();
         let off =
-            (0..gpu_elevations.len()).map(|k| (gpu_elevations[k] - cpu.elevation(k % azimuths, k / azimuths)).abs());
-        let (within, blocked) =
-            (percentile_99(off.collect()), gpu_elevations.iter().filter(|&&elevation| elevation > 0.0).count());
-        eprintln!("{name}: 99 % within {within:.1e} rad; {blocked} of {} rise", gpu_elevations.len());
-        assert!(blocked * 8 > gpu_elevations.len() && within < 1e-4, "{name}: {within}");
+            (0..gpu_slopes.len()).map(|k| (gpu_slopes[k].atan() - cpu.slope(k % azimuths, k / azimuths).atan()).abs());
+        let (within, blocked) = (percentile_99(off.collect()), gpu_slopes.iter().filter(|&&slope| slope > 0.0).count());
+        eprintln!("{name}: 99 % within {within:.1e} rad; {blocked} of {} rise", gpu_slopes.len());
+        assert!(blocked * 8 > gpu_slopes.len() && within < 1e-4, "{name}: {within}");
     }
 }
 
@@ -67,16 +66,20 @@ fn gpu_and_cpu_compute_the_same_intervals_of_meshes_with_overhangs() {
         let words = read(&gpu, &map);
         let (mut off, mut differ, mut overhang_count) = (Vec::new(), 0, 0);
         for (slice, words) in words.chunks(WORDS_PER_SLICE).enumerate() {
-            off.push((f32::from_bits(words[0]) - cpu.horizon_map.elevation(slice % azimuths, slice / azimuths)).abs());
+            let expected_slope = cpu.horizon_map.slope(slice % azimuths, slice / azimuths);
+            off.push((f32::from_bits(words[0]).atan() - expected_slope.atan()).abs());
             let expected = &intervals[starts[slice] as usize..starts[slice + 1] as usize];
             let found: Vec<(f32, f32)> = words[1..]
                 .iter()
                 .take_while(|&&word| word > 0)
-                .map(|&word| [word & 0xffff, word >> 16].map(|end| end as f32 * 1.590_796_3 / 65_535.0).into())
+                .map(|&word| [word & 0xffff, word >> 16].map(|end| (end as f32).atan2((65_535 - end) as f32)).into())
                 .collect();
             overhang_count += expected.len();
             let is_same = expected.len() == found.len()
-                && expected.iter().zip(&found).all(|(a, b)| (a.0 - b.0).abs() < 1e-3 && (a.1 - b.1).abs() < 1e-3);
+                && expected
+                    .iter()
+                    .zip(&found)
+                    .all(|(a, b)| (a.0.atan() - b.0).abs() < 1e-3 && (a.1.atan() - b.1).abs() < 1e-3);
             differ += usize::from(!is_same);
         }
         let (within, slices) = (percentile_99(off), facets.len() * azimuths);

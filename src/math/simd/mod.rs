@@ -17,11 +17,11 @@ pub(crate) use f32x8::{F32x8Array, SimdF32x8, SimdTask, with_simd_f32x8};
 pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub(crate) use math::cubic_weights;
-pub use pairs::{LightPairs, azimuth_and_elevation, pair_grid_coordinates, pair_vectors};
+pub use pairs::{LightPairs, azimuth_and_cosine, pair_grid_coordinates, pair_vectors};
 pub use rows::{RowGrid, row_sums};
 pub use visibility::{
-    SWITCH_RATE, blend_bits, horizon_visibility, interval_cover, masked_sum, projected_area, stepped_visibility,
-    visible_sum,
+    HorizonTaps, SWITCH_RATE, blend_bits, horizon_visibility, interval_cover, masked_sum, projected_area,
+    stepped_visibility, visible_sum,
 };
 
 /// Compiles a function for the baseline, AVX2 and AVX-512, and selects one of the three at run time.

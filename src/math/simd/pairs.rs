@@ -14,9 +14,9 @@ pub struct LightPairs {
     pub i: [[f32; LANES]; 3],
     pub h: [[f32; LANES]; 3],
     pub i_dot_h: [f32; LANES],
-    /// Azimuths of the lights in turns, 0 to 1, and their elevations in radians.
+    /// Azimuths of the lights in turns, 0 to 1, and the cosines of their elevations.
     pub azimuths: [f32; LANES],
-    pub elevations: [f32; LANES],
+    pub cosines: [f32; LANES],
     /// Number of lights, rounded up to whole steps of the inner loops; lights beyond the last are at +z.
     padded: usize,
 }
@@ -30,7 +30,7 @@ impl LightPairs {
     pub fn new() -> Self {
         let empty = [0.0; LANES];
         let (three, o) = ([empty; 3], Vec3::Z);
-        Self { o, i: three, h: three, i_dot_h: empty, azimuths: empty, elevations: empty, padded: 0 }
+        Self { o, i: three, h: three, i_dot_h: empty, azimuths: empty, cosines: empty, padded: 0 }
     }
 
     /// Sets up to [`LightPairs::MAX`] lights and the view, and computes half vectors and angles.
@@ -81,16 +81,16 @@ multiversion! {
             pairs.i_dot_h[k] = 0.5 * ((x * hx + y * hy + z * hz) + (o.x * hx + o.y * hy + o.z * hz));
             let half = upper_angle(y.abs(), x);
             pairs.azimuths[k] = ((if y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
-            pairs.elevations[k] = upper_angle(z.max(0.0), (x * x + y * y).sqrt());
+            pairs.cosines[k] = (x * x + y * y).sqrt();
         }
     }
 }
 
-/// Azimuth in turns and elevation [rad] of one direction above the horizon, with the same bits as in [`LightPairs`].
-pub fn azimuth_and_elevation(d: Vec3) -> (f32, f32) {
+/// Azimuth in turns and cosine of the elevation of one direction, with the same bits as in [`LightPairs`].
+pub fn azimuth_and_cosine(d: Vec3) -> (f32, f32) {
     let half = upper_angle(d.y.abs(), d.x);
     let azimuth = ((if d.y < 0.0 { TAU - half } else { half }) * (1.0 / TAU)).min(1.0);
-    (azimuth, upper_angle(d.z.max(0.0), (d.x * d.x + d.y * d.y).sqrt()))
+    (azimuth, (d.x * d.x + d.y * d.y).sqrt())
 }
 
 /// The angle of `(x, y)` in `[0, π]` for `y >= 0`, 0 at the origin. The absolute error is 1e-7 plus rounding

@@ -140,13 +140,47 @@ fn blended_bits_are_the_weighted_bits_wherever_a_run_starts() {
     }
 }
 
+/// The taps of a direction for a transition of `1/sharpness`, with linear weights of the two azimuths.
+fn taps(blend: f32, elevation: f32, sharpness: f32) -> HorizonTaps {
+    let scale = elevation.cos() * sharpness;
+    HorizonTaps {
+        azimuths: [0, 1],
+        blend,
+        base: 0.5 + elevation.sin() * sharpness,
+        scale,
+        scales: [(1.0 - blend) * scale, blend * scale],
+    }
+}
+
 #[test]
-fn horizon_visibility_is_a_linear_transition_about_the_interpolated_horizon() {
+fn horizon_visibility_is_a_linear_transition_about_the_interpolated_slope() {
     let (from, to) = ([0.2_f32; 3], [0.4_f32; 3]);
     let mut out = [f32::NAN; 3];
-    for (elevation, want) in [(0.2, 0.0), (0.25, 0.0), (0.295, 0.25), (0.3, 0.5), (0.31, 1.0), (1.0, 1.0)] {
-        horizon_visibility(&from, &to, 0.5, elevation, 50.0, &mut out);
-        assert!(out.iter().all(|v| (v - want).abs() < 1e-4), "{elevation}: {out:?}");
+    let cosine = 0.3_f32.atan().cos();
+    // A part of the transition's width, which is 0.02 cos e at the elevation e of a horizon.
+    for (part, want) in [(-5.0, 0.0), (-0.5, 0.0), (-0.25, 0.25), (0.0, 0.5), (0.4, 0.9), (0.5, 1.0), (40.0, 1.0)] {
+        horizon_visibility(&from, &to, &taps(0.5, 0.3_f32.atan() + 0.02 * part * cosine, 50.0), &mut out);
+        assert!(out.iter().all(|v| (v - want).abs() < 0.005), "{part}: {out:?}");
+    }
+}
+
+#[test]
+fn a_facet_switches_between_azimuths_if_their_horizons_differ_by_more_than_a_tenth_of_a_radian() {
+    let (blocked, free) = (1e9, -0.02);
+    for elevation in [0.05_f32, 0.8, 1.5] {
+        // 0.09 and 0.11 apart at any height, or at the ends of the range.
+        let [low, near, far] = [0.0, 0.09, 0.11].map(|more: f32| (elevation - 0.06 + more).tan());
+        let from = [low, low, blocked, free, blocked];
+        let to = [near, far, free, blocked, blocked];
+        let mut out = [f32::NAN; 5];
+        // At half the way, a facet that switches at 0.9 still has the visibility of the first azimuth.
+        let at = taps(0.5, elevation, 100.0);
+        stepped_visibility(&from, &to, &[0.9; 5], &at, &mut out);
+        let interpolated = at.between(low, near).clamp(0.0, 1.0);
+        for (got, want) in out.into_iter().zip([interpolated, 1.0, 0.0, 1.0, 0.0]) {
+            assert!((got - want).abs() < 1e-5, "{elevation}: {out:?}");
+        }
+        assert!(at.between(low, far) < 1.0, "{elevation}: interpolation would differ");
     }
 }
 
@@ -235,9 +269,9 @@ fn angles_of_lights_are_those_of_the_directions() {
     let mut pairs = LightPairs::new();
     pairs.set(&lights, Vec3::Z);
     for (k, &light) in lights.iter().enumerate() {
-        assert_eq!(azimuth_and_elevation(light), (pairs.azimuths[k], pairs.elevations[k]), "{light}");
+        assert_eq!(azimuth_and_cosine(light), (pairs.azimuths[k], pairs.cosines[k]), "{light}");
         let (theta, phi) = crate::math::directions::to_angles(light);
-        assert!((std::f32::consts::FRAC_PI_2 - theta - pairs.elevations[k]).abs() < 2e-6, "{light}");
+        assert!((theta.sin() - pairs.cosines[k]).abs() < 1e-6, "{light}");
         assert!((phi / std::f32::consts::TAU - pairs.azimuths[k]).abs() < 1e-6, "{light}");
     }
 }
@@ -297,11 +331,12 @@ fn visible_areas_are_the_plain_sums_for_runs_of_any_length() {
     for count in [1, 9, 16, 57, 64, 1024, 1031, 2047] {
         let row = |start: f64| -> Vec<f32> { (0..count).map(|k| uniform(k, start)).collect() };
         let (weights, from, to) = (row(0.1), row(0.4), row(0.7));
-        for (blend, elevation) in [(0.0, 0.3), (0.6, 0.5), (0.3, 4.0), (0.5, -1.0)] {
+        for (blend, elevation) in [(0.0, 0.3), (0.6, 0.5), (0.3, 1.5), (0.5, -1.0)] {
             let mut visibility = vec![0.0; count];
-            horizon_visibility(&from, &to, blend, elevation, 20.0, &mut visibility);
+            let taps = taps(blend, elevation, 20.0);
+            horizon_visibility(&from, &to, &taps, &mut visibility);
             let want: f64 = visibility.iter().zip(&weights).map(|(v, w)| f64::from(*v) * f64::from(*w)).sum();
-            let got = visible_sum(&weights, &from, &to, blend, elevation, 20.0);
+            let got = visible_sum(&weights, &from, &to, &taps);
             assert!((got - want).abs() < 2e-5 * want + 1e-6, "{count} facets: {got} {want}");
         }
     }

@@ -2,23 +2,58 @@
 
 use super::{BLOCK, LANES, blocks, lane, multiversion, total};
 
+/// Soft visibility along one direction as a function of slopes (tangents of the elevation) of horizons.
+///
+/// It rises from 0 to 1 about the horizon and is linear in the slope between: `½ + (sin e - s cos e)/w` for elevation
+/// `e`, slope `s` and transition width `w`.
+#[derive(Debug, Clone, Copy)]
+pub struct HorizonTaps {
+    /// The azimuths before and after the direction.
+    pub azimuths: [usize; 2],
+    /// Fraction of the way from one azimuth to the other.
+    pub blend: f32,
+    /// `½ + sin e / w`, the value for slope 0.
+    pub base: f32,
+    /// `cos e / w`, the decrease per unit of slope.
+    pub scale: f32,
+    /// `scale` times the weights of the two azimuths.
+    pub scales: [f32; 2],
+}
+
+impl HorizonTaps {
+    /// Every facet is visible.
+    pub const ABOVE_ALL: Self = Self { azimuths: [0, 0], blend: 0.0, base: 2.0, scale: 0.0, scales: [0.0; 2] };
+
+    /// Soft visibility above the horizon that is interpolated between two slopes. Values outside `[0, 1]` count as 0
+    /// and 1. It does not increase with either slope, also after rounding.
+    #[inline(always)]
+    pub fn between(&self, from: f32, to: f32) -> f32 {
+        self.base - self.scales[0] * from - self.scales[1] * to
+    }
+
+    /// Soft visibility above one slope, in `[0, 1]`.
+    #[inline(always)]
+    fn above(&self, slope: f32) -> f32 {
+        soft(self.base - self.scale * slope)
+    }
+}
+
 #[inline(always)]
-fn soft_step(x: f32) -> f32 {
-    (x + 0.5).clamp(0.0, 1.0)
+fn soft(x: f32) -> f32 {
+    x.clamp(0.0, 1.0)
 }
 
 multiversion! {
-    /// `out` is 1 above and 0 below the horizon that is interpolated between two azimuths, with a linear transition of
-    /// `1/sharpness` radians.
-    pub fn horizon_visibility(from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32, out: &mut [f32]) {
+    /// `out` is 1 above and 0 below the horizon that is interpolated between two azimuths, with a soft step between.
+    pub fn horizon_visibility(from: &[f32], to: &[f32], taps: &HorizonTaps, out: &mut [f32]) {
         for ((out, &from), &to) in out.iter_mut().zip(from).zip(to) {
-            let horizon = from + (to - from) * blend;
-            *out = soft_step((elevation - horizon) * sharpness);
+            *out = soft(taps.between(from, to));
         }
     }
 }
 
-/// Difference of two horizons [rad] above which they belong to different parts of the surface and are not interpolated.
+/// Tangent of the difference of two horizons above which they belong to different parts of the surface and are not
+/// interpolated.
 const JUMP: f32 = 0.1;
 
 /// Slope of the change from one azimuth's visibility to the next one's, per azimuth step, if their horizons differ.
@@ -32,38 +67,35 @@ multiversion! {
         from: &[f32],
         to: &[f32],
         switch: &[f32],
-        blend: f32,
-        elevation: f32,
-        sharpness: f32,
+        taps: &HorizonTaps,
         out: &mut [f32],
     ) {
         for (((out, &from), &to), &switch) in out.iter_mut().zip(from).zip(to).zip(switch) {
-            let changed = ((blend - switch) * SWITCH_RATE + 0.5).clamp(0.0, 1.0);
-            let between = soft_step((elevation - (from + (to - from) * blend)) * sharpness);
-            let (before, after) = (soft_step((elevation - from) * sharpness), soft_step((elevation - to) * sharpness));
+            let changed = ((taps.blend - switch) * SWITCH_RATE + 0.5).clamp(0.0, 1.0);
+            let (before, after) = (taps.above(from), taps.above(to));
             let either = before + (after - before) * changed;
-            *out = if (to - from).abs() > JUMP { either } else { between };
+            // The tangent of the difference of two angles is the difference of their tangents over 1 + their product.
+            let is_jump = (to - from).abs() > JUMP * (1.0 + from * to);
+            *out = if is_jump { either } else { soft(taps.between(from, to)) };
         }
     }
 }
 
 multiversion! {
-    /// The visibility, in `[0, 1]`, that each interval `(low, high)` of elevations removes from its facet at an
-    /// elevation. The interval belongs to the azimuth before (`side` 0) or after (1), and its facet changes as in
-    /// [`stepped_visibility`]. `transition` is `(switch, blend, side)`.
+    /// The visibility, in `[0, 1]`, that each interval `(low, high)` of slopes removes from its facet. The interval
+    /// belongs to the azimuth before (`side` 0) or after (1), and its facet changes at `switch` as in
+    /// [`stepped_visibility`].
     pub fn interval_cover(
         low: &[f32],
         high: &[f32],
-        transition: (&[f32], f32, f32),
-        elevation: f32,
-        sharpness: f32,
+        switch: &[f32],
+        side: f32,
+        taps: &HorizonTaps,
         out: &mut [f32],
     ) {
-        let (switch, blend, side) = transition;
         for (((out, &low), &high), &switch) in out.iter_mut().zip(low).zip(high).zip(switch) {
-            let changed = ((blend - switch) * SWITCH_RATE + 0.5).clamp(0.0, 1.0);
-            let covered = soft_step((elevation - low) * sharpness) - soft_step((elevation - high) * sharpness);
-            *out = (1.0 - (side - changed).abs()) * covered;
+            let changed = ((taps.blend - switch) * SWITCH_RATE + 0.5).clamp(0.0, 1.0);
+            *out = (1.0 - (side - changed).abs()) * (taps.above(low) - taps.above(high));
         }
     }
 }
@@ -124,7 +156,7 @@ multiversion! {
 
 multiversion! {
     /// `Σ w v` with `v` as from [`horizon_visibility`], which is not stored, and with an f64 sum over blocks.
-    pub fn visible_sum(weights: &[f32], from: &[f32], to: &[f32], blend: f32, elevation: f32, sharpness: f32) -> f64 {
+    pub fn visible_sum(weights: &[f32], from: &[f32], to: &[f32], taps: &HorizonTaps) -> f64 {
         let mut sum = 0.0;
         for start in (0..weights.len()).step_by(BLOCK) {
             let end = (start + BLOCK).min(weights.len());
@@ -135,7 +167,7 @@ multiversion! {
             let (to_head, to_tail) = to.as_chunks::<WIDTH>();
             for ((w, from), to) in w_head.iter().zip(from_head).zip(to_head) {
                 for l in 0..WIDTH {
-                    lanes[l] += w[l] * soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
+                    lanes[l] += w[l] * soft(taps.between(from[l], to[l]));
                 }
             }
             // The remainder is summed as the end of the last whole vector: runs are short, so it must be vectorised,
@@ -145,11 +177,11 @@ multiversion! {
                 let counted = WIDTH - w_tail.len();
                 for l in 0..WIDTH {
                     let w = if l < counted { 0.0 } else { w[l] };
-                    lanes[l] += w * soft_step((elevation - (from[l] + (to[l] - from[l]) * blend)) * sharpness);
+                    lanes[l] += w * soft(taps.between(from[l], to[l]));
                 }
             } else {
                 for (((lane, w), from), to) in lanes.iter_mut().zip(w_tail).zip(from_tail).zip(to_tail) {
-                    *lane += w * soft_step((elevation - (from + (to - from) * blend)) * sharpness);
+                    *lane += w * soft(taps.between(*from, *to));
                 }
             }
             sum += total(&lanes);
