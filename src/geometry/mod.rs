@@ -16,7 +16,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use facets::{FacetSampler, Facets, SampleShift};
+pub use facets::{FacetSampler, Facets, REPLICATES, SampleShift};
 pub use families::grooves::GrooveCrossSection;
 pub use families::pyramids::PyramidLayout;
 use families::{flat, grooves, heightfield, mesh_file, pyramids, rods, weave};

@@ -72,8 +72,12 @@ impl TileMesh {
 
     /// The material slot of a triangle at tile coordinates `xy`, wrapped.
     pub fn slot_at(&self, triangle: usize, xy: Vec2) -> u16 {
-        let painted = self.painted_slots.as_ref().and_then(|field| field.at(xy, self.size));
-        painted.unwrap_or(self.triangle_slot[triangle])
+        self.painted_slot(xy).unwrap_or(self.triangle_slot[triangle])
+    }
+
+    /// The slot that is painted at tile coordinates `xy`, wrapped.
+    pub(crate) fn painted_slot(&self, xy: Vec2) -> Option<u16> {
+        self.painted_slots.as_ref().and_then(|field| field.at(xy, self.size))
     }
 
     /// The slot at the centre of a triangle.
@@ -85,8 +89,7 @@ impl TileMesh {
     /// Unit geometric normal; zero for a triangle without area.
     #[inline]
     pub fn geometric_normal(&self, triangle: usize) -> Vec3 {
-        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
-        (b - a).cross(c - a).try_normalize().unwrap_or_default().as_vec3()
+        triangle_normal(self.corners(triangle))
     }
 
     /// Area of a triangle.
@@ -137,6 +140,13 @@ impl TileMesh {
     pub fn base_area(&self) -> f32 {
         self.size.x * self.size.y
     }
+}
+
+/// Unit normal of a triangle; zero for a triangle without area.
+#[inline]
+pub(crate) fn triangle_normal(corners: [Vec3; 3]) -> Vec3 {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    (b - a).cross(c - a).try_normalize().unwrap_or_default().as_vec3()
 }
 
 impl SlotField {

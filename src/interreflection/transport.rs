@@ -36,6 +36,10 @@ impl Transport {
         // Facets are sorted by normal, so every n-th facet is an even sample of them.
         let chosen: Vec<u32> = (stride / 2..facets.len()).step_by(stride).map(|s| s as u32).collect();
         let total: f64 = facets.areas.iter().map(|area| f64::from(*area)).sum();
+        // Each element represents the facets around it, whose areas are nearly equal to its own.
+        let chosen_area: f64 = chosen.iter().map(|facet| f64::from(facets.areas[*facet as usize])).sum();
+        let scale = total / chosen_area.max(f64::MIN_POSITIVE);
+        let areas = chosen.iter().map(|facet| (f64::from(facets.areas[*facet as usize]) * scale) as f32).collect();
         let area = (total / chosen.len().max(1) as f64) as f32;
         let grid = PeriodicGrid::new(mesh);
         let bottom = mesh.z_range().0;
@@ -76,7 +80,6 @@ impl Transport {
             },
         );
         cancel.check()?;
-        let areas = vec![area; chosen.len()];
         Ok(Self { facets: chosen, areas, rays, directions, hits })
     }
 

@@ -99,7 +99,8 @@ impl ImageWorker {
 
     /// Renders a draft whose visibility and facet sum the GPU computes, at the finest level that meets the time limit.
     fn render_gpu_draft(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<Option<RenderedPreview>> {
-        if !self.renderer.is_hardware() || self.renderer.is_close(&camera(&job.loaded), job.size) {
+        let on_gpu = self.backend != "cpu" && self.renderer.is_hardware();
+        if !on_gpu || self.renderer.is_close(&camera(&job.loaded), job.size) {
             return Ok(None);
         }
         let Some(tile) = self.gpu_drafts.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
@@ -307,7 +308,7 @@ impl ImageWorker {
 
     /// The largest size with the view's aspect ratio that is estimated to take at most `budget_ms`.
     fn affordable(&self, size: [usize; 2], cost_index: usize, budget_ms: f64) -> [usize; 2] {
-        let full = fitting(size, MAX_PIXELS[usize::from(self.renderer.is_hardware())]);
+        let full = fitting(size, MAX_PIXELS[usize::from(self.backend != "cpu" && self.renderer.is_hardware())]);
         let pixels = (full[0] * full[1]) as f64;
         let scale = (budget_ms / self.cost[cost_index] / pixels).sqrt();
         // Few sizes, so that the image does not change its size at every edit.

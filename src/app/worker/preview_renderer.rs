@@ -185,9 +185,11 @@ impl PreviewRenderer {
         self.scene.as_ref().is_some_and(of)
     }
 
-    /// Returns true if images are rendered on a hardware GPU.
+    /// Returns true if images are rendered on a hardware GPU: one that is open, or the window's, which the next image
+    /// opens.
     pub fn is_hardware(&self) -> bool {
-        self.gpu.is_hardware()
+        let opens_screen = matches!(self.gpu, GpuState::Unopened);
+        self.gpu.is_hardware() || opens_screen && self.screen.as_ref().is_some_and(|screen| screen.is_hardware)
     }
 
     /// Reason why the GPU failed while it was in use.

@@ -1,18 +1,24 @@
 //! Facets: planar samples of the small-scale surface (Wu et al. 2011, Sec. 3.2).
 
 pub(crate) mod kd_tree;
+mod level;
 pub(crate) mod normal_bins;
 pub(crate) mod order;
+pub(crate) mod strata;
 pub(crate) mod voronoi;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use self::strata::{Part, Strata, allocate};
 use super::TileMesh;
 use super::families::triangle_points::TrianglePoints;
 
 /// Minimum number of facets or triangles per parallel task.
 pub(crate) const MIN_ITEMS_PER_TASK: usize = 2048;
+
+/// Number of replicates in the facets. Differences between replicates show the error of the facets.
+pub const REPLICATES: usize = 8;
 
 /// Samples of the surface, with one entry per facet in each array. Areas sum to the surface area of the tile.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -31,6 +37,8 @@ pub struct Facets {
     pub colors: Vec<Vec3>,
     /// Triangle of each facet. A ray from the facet ignores it.
     pub triangles: Vec<u32>,
+    /// Replicate of each facet, below [`REPLICATES`]. The facets of one replicate are a sample of the whole surface.
+    pub replicates: Vec<u8>,
     /// Number of triangles left out because they have no area.
     pub skipped_triangles: usize,
 }
@@ -62,6 +70,7 @@ impl Facets {
             slots: entries(&self.slots, indices),
             colors: entries(&self.colors, indices),
             triangles: entries(&self.triangles, indices),
+            replicates: entries(&self.replicates, indices),
             skipped_triangles: self.skipped_triangles,
         }
     }
@@ -78,6 +87,7 @@ impl Facets {
         self.slots.push(mesh.slot_at(index, position.truncate()));
         self.colors.push(mesh.color.at(position.truncate(), mesh.size));
         self.triangles.push(triangle);
+        self.replicates.push((self.replicates.len() % REPLICATES) as u8);
     }
 }
 
@@ -129,35 +139,62 @@ impl SampleShift {
     }
 }
 
-/// The cumulative area of a mesh's triangles along a Morton curve through normals and positions, from which facets are
-/// sampled.
+/// The cumulative area of a mesh's triangles, from which facets are sampled. Triangles are sorted by stratum
+/// ([`Strata`]), and within a stratum along a Morton curve through normals and positions.
+///
+/// A piece is a triangle of the mesh, by its index, or a part of one. Parts are numbered after the triangles.
 #[derive(Debug, Clone)]
 pub struct FacetSampler {
     order: Vec<u32>,
-    /// Area of all triangles up to and including `order[k]`.
+    /// Area of all pieces up to and including `order[k]`.
     cumulative: Vec<f64>,
+    /// End of each stratum in `order`.
+    ends: Vec<usize>,
+    /// Number of triangles of the mesh.
+    triangles: usize,
+    parts: Vec<Part>,
     skipped: usize,
 }
 
 impl FacetSampler {
     pub fn new(mesh: &TileMesh) -> Self {
         let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(MIN_ITEMS_PER_TASK);
-        let strata: Vec<Option<(u32, f64)>> = triangles.map(|triangle| stratum_and_area(mesh, triangle)).collect();
-        // Equal strata are in the order of triangles, so the order is deterministic.
-        let keyed = |(triangle, stratum): (usize, &Option<(u32, f64)>)| {
-            stratum.map(|(stratum, _)| u64::from(stratum) << 32 | triangle as u64)
+        let keys: Vec<Option<(u32, f64)>> = triangles.map(|triangle| morton_and_area(mesh, triangle)).collect();
+        let Strata { of_triangle, parts: divided } = Strata::new(mesh);
+        let (parts, of_part): (Vec<Part>, Vec<u32>) = divided.into_iter().unzip();
+        let count = mesh.triangles.len();
+        let skipped = keys.iter().filter(|key| key.is_none()).count();
+        let mut area: Vec<f64> = keys.iter().map(|key| key.map_or(0.0, |(_, area)| area)).collect();
+        // Equal keys are in the order of pieces, so the order is deterministic.
+        let whole = |(piece, stratum): (usize, &Option<u32>)| match (stratum, keys[piece]) {
+            (Some(stratum), Some((morton, _))) => Some((*stratum, morton, piece as u32)),
+            _ => None,
         };
-        let mut keyed: Vec<u64> = strata.iter().enumerate().filter_map(keyed).collect();
-        let skipped = mesh.triangles.len() - keyed.len();
+        let mut keyed: Vec<(u32, u32, u32)> = of_triangle.iter().enumerate().filter_map(whole).collect();
+        for (k, (part, stratum)) in parts.iter().zip(of_part).enumerate() {
+            let corners = corners_of_part(mesh, part);
+            let [a, b, c] = corners.map(|p| p.as_dvec3());
+            area.push(0.5 * (b - a).cross(c - a).length());
+            if keys[part.triangle as usize].is_some() {
+                let normal = mesh.geometric_normal(part.triangle as usize);
+                keyed.push((stratum, morton_of(mesh, normal, corners), (count + k) as u32));
+            }
+        }
         keyed.sort_unstable();
-        let order: Vec<u32> = keyed.into_iter().map(|key| key as u32).collect();
+        let runs = keyed.chunk_by(|a, b| a.0 == b.0);
+        let ends = runs.scan(0, |end, run| {
+            *end += run.len();
+            Some(*end)
+        });
+        let ends = ends.collect();
+        let order: Vec<u32> = keyed.into_iter().map(|(_, _, piece)| piece).collect();
         let mut sum = 0.0;
-        let accumulate = |triangle: &u32| {
-            sum += strata[*triangle as usize].map_or(0.0, |(_, area)| area);
+        let accumulate = |piece: &u32| {
+            sum += area[*piece as usize];
             sum
         };
         let cumulative = order.iter().map(accumulate).collect();
-        Self { order, cumulative, skipped }
+        Self { order, cumulative, ends, triangles: count, parts, skipped }
     }
 
     /// Surface area of the tile.
@@ -165,67 +202,105 @@ impl FacetSampler {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    /// The triangle at a fraction `at` in `[0, 1)` of the cumulative area.
-    pub(crate) fn triangle_at(&self, at: f64) -> u32 {
-        let k = self.cumulative.partition_point(|sum| *sum <= at * self.area());
-        self.order[k.min(self.order.len() - 1)]
+    /// The point with barycentric coordinates `at` on the piece at a fraction `along` in `[0, 1)` of the cumulative
+    /// area: a triangle, and barycentric coordinates on it.
+    pub(crate) fn point_at(&self, along: f64, at: Vec3) -> (u32, Vec3) {
+        let k = self.cumulative.partition_point(|sum| *sum <= along * self.area());
+        self.on_triangle(self.order[k.min(self.order.len() - 1)], at)
     }
 
-    /// Takes systematic samples. Facet k lies on the triangle at `(k + shift)/count` of the cumulative area, at a point
-    /// of [`TrianglePoints`], and represents the area `area/count`. The result is empty for a mesh without area.
+    /// Takes systematic samples from each stratum. Facet k of n in a stratum lies on the piece at `(k + shift)/n` of the
+    /// stratum's cumulative area, at a point of [`TrianglePoints`], and represents `1/n` of the stratum's area. The
+    /// result is empty for a mesh without area.
     pub fn sample(&self, mesh: &TileMesh, count: usize, shift: SampleShift) -> Facets {
         let mut facets = Facets { skipped_triangles: self.skipped, ..Facets::default() };
         if self.order.is_empty() {
             return facets;
         }
-        let triangles = self.triangles_of_facets(count, shift.along);
-        let points = TrianglePoints::new(mesh, &triangles, shift.inside);
-        let each = || triangles.par_iter().with_min_len(MIN_ITEMS_PER_TASK).enumerate();
-        let at = |(s, triangle): (usize, &u32)| point_in_tile(mesh, *triangle as usize, fold(points.point(s)));
+        let pieces = self.pieces_of_facets(count, shift.along, &mut facets);
+        let points = TrianglePoints::new(mesh.size, |piece| self.corners(mesh, piece), &pieces, shift.inside);
+        facets.triangles = pieces.iter().map(|piece| self.on_triangle(*piece, Vec3::X).0).collect();
+        let each = || pieces.par_iter().with_min_len(MIN_ITEMS_PER_TASK).enumerate();
+        let point = |(s, piece): (usize, &u32)| self.on_triangle(*piece, fold(points.point(s)));
+        let at = |facet: (usize, &u32)| {
+            let (triangle, barycentric) = point(facet);
+            point_in_tile(mesh, triangle as usize, barycentric)
+        };
         facets.positions = each().map(at).collect();
         facets.geometric_normals = each().map(|(s, _)| points.geometric_normal(s)).collect();
         facets.normals = if mesh.corner_normals.is_some() {
-            let normal = |(s, triangle): (usize, &u32)| {
-                interpolated_normal(mesh, *triangle as usize, fold(points.point(s)))
-                    .unwrap_or_else(|| points.geometric_normal(s))
+            let normal = |facet: (usize, &u32)| {
+                let (triangle, barycentric) = point(facet);
+                interpolated_normal(mesh, triangle as usize, barycentric)
+                    .unwrap_or_else(|| points.geometric_normal(facet.0))
             };
             each().map(normal).collect()
         } else {
             facets.geometric_normals.clone()
         };
-        facets.areas = vec![(self.area() / count as f64) as f32; count];
         let points =
             || facets.positions.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(|position| position.truncate());
-        facets.slots = points().zip(&triangles).map(|(point, t)| mesh.slot_at(*t as usize, point)).collect();
+        facets.slots = points().zip(&facets.triangles).map(|(point, t)| mesh.slot_at(*t as usize, point)).collect();
         facets.colors = points().map(|point| mesh.color.at(point, mesh.size)).collect();
-        facets.triangles = triangles;
         facets
     }
 
-    /// The triangle of each of `count` facets.
-    fn triangles_of_facets(&self, count: usize, along: f32) -> Vec<u32> {
-        let (mut k, area) = (0, self.area());
-        let next = |facet| {
-            let target = (facet as f64 + f64::from(along)) / count as f64 * area;
-            while k + 1 < self.order.len() && self.cumulative[k] <= target {
-                k += 1;
+    /// The piece of each of `count` facets. Writes the areas and the replicates of the facets.
+    fn pieces_of_facets(&self, count: usize, along: f32, facets: &mut Facets) -> Vec<u32> {
+        // Too few facets for all strata are shared by the whole surface.
+        let whole = [self.order.len()];
+        let ends = if self.ends.len() <= count { &self.ends[..] } else { &whole };
+        let sum_before = |k: usize| if k == 0 { 0.0 } else { self.cumulative[k - 1] };
+        let starts = || std::iter::once(0).chain(ends.iter().copied());
+        let areas: Vec<f64> = starts().zip(ends).map(|(start, end)| sum_before(*end) - sum_before(start)).collect();
+        let mut pieces = Vec::with_capacity(count);
+        for (((start, end), area), count) in starts().zip(ends).zip(&areas).zip(allocate(&areas, count)) {
+            let (mut k, before) = (start, sum_before(start));
+            for facet in 0..count {
+                let target = before + (facet as f64 + f64::from(along)) / count as f64 * area;
+                while k + 1 < *end && self.cumulative[k] <= target {
+                    k += 1;
+                }
+                pieces.push(self.order[k]);
+                facets.areas.push((area / count as f64) as f32);
+                facets.replicates.push((facet % REPLICATES) as u8);
             }
-            self.order[k]
-        };
-        (0..count).map(next).collect()
+        }
+        pieces
+    }
+
+    /// The triangle of a piece, and a point of the piece in barycentric coordinates of the triangle.
+    fn on_triangle(&self, piece: u32, at: Vec3) -> (u32, Vec3) {
+        match (piece as usize).checked_sub(self.triangles).map(|part| &self.parts[part]) {
+            None => (piece, at),
+            Some(Part { triangle, corners: [a, b, c] }) => (*triangle, *a * at.x + *b * at.y + *c * at.z),
+        }
+    }
+
+    fn corners(&self, mesh: &TileMesh, piece: u32) -> [Vec3; 3] {
+        match (piece as usize).checked_sub(self.triangles) {
+            None => mesh.corners(piece as usize),
+            Some(part) => corners_of_part(mesh, &self.parts[part]),
+        }
     }
 }
 
-/// A triangle's stratum and area, or `None` if it has no area or is not finite.
-fn stratum_and_area(mesh: &TileMesh, triangle: usize) -> Option<(u32, f64)> {
+fn corners_of_part(mesh: &TileMesh, part: &Part) -> [Vec3; 3] {
+    let [a, b, c] = mesh.corners(part.triangle as usize);
+    part.corners.map(|at| a * at.x + b * at.y + c * at.z)
+}
+
+/// Key along the Morton curve and area of a triangle, or `None` if it has no area or is not finite.
+fn morton_and_area(mesh: &TileMesh, triangle: usize) -> Option<(u32, f64)> {
     let corners = mesh.corners(triangle);
     let normal = mesh.geometric_normal(triangle);
     let is_sound = corners.iter().all(|corner| corner.is_finite()) && normal != Vec3::ZERO;
-    is_sound.then(|| {
-        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let position = wrap(centre, mesh.size).truncate() / mesh.size;
-        (stratum(normal, position), mesh.triangle_area(triangle))
-    })
+    is_sound.then(|| (morton_of(mesh, normal, corners), mesh.triangle_area(triangle)))
+}
+
+fn morton_of(mesh: &TileMesh, normal: Vec3, corners: [Vec3; 3]) -> u32 {
+    let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+    morton(normal, wrap(centre, mesh.size).truncate() / mesh.size)
 }
 
 /// Folds a point of the unit square onto barycentric coordinates.
@@ -238,7 +313,7 @@ pub(crate) fn fold(point: Vec2) -> Vec3 {
 /// normals, which lobes depend on, and the positions, which shadows depend on. A curve through positions alone has a
 /// larger error on glossy surfaces. An order by the rows of a height field has a larger error if the stride of the
 /// selection divides the row.
-fn stratum(normal: Vec3, position: Vec2) -> u32 {
+fn morton(normal: Vec3, position: Vec2) -> u32 {
     let axes = [0.5 + 0.5 * normal.x, 0.5 + 0.5 * normal.y, position.x, position.y];
     axes.iter().fold(0, |key, v| key << 1 | spread(((v * 256.0) as u32).min(255)))
 }

@@ -25,6 +25,7 @@ impl Facets {
         self.slots = permuted(&self.slots, &order);
         self.colors = permuted(&self.colors, &order);
         self.triangles = permuted(&self.triangles, &order);
+        self.replicates = permuted(&self.replicates, &order);
     }
 }
 

@@ -24,8 +24,9 @@ impl Facets {
         }
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         for _ in 0..count {
-            let triangle = sampler.triangle_at(random.random());
-            facets.push(mesh, triangle, fold(Vec2::new(random.random(), random.random())), 0.0);
+            let (along, at) = (random.random(), fold(Vec2::new(random.random(), random.random())));
+            let (triangle, barycentric) = sampler.point_at(along, at);
+            facets.push(mesh, triangle, barycentric, 0.0);
         }
         let voters = sampler.sample(mesh, count * VOTES_PER_FACET, SampleShift::from_seed(seed.wrapping_add(1)));
         let tree = KdTree::new(&facets.positions, mesh.size);

@@ -4,8 +4,8 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::rounded::rounded;
-use crate::geometry::TileMesh;
 use crate::geometry::facets::MIN_ITEMS_PER_TASK;
+use crate::geometry::tile_mesh::triangle_normal;
 
 /// Points inside triangles, from one R2 sequence (Roberts 2018) per shape of triangle, which all copies of the shape
 /// share.
@@ -33,8 +33,9 @@ struct Run {
 type TriangleShape = [i32; 6];
 
 impl TrianglePoints {
-    /// Prepares the points of facets on these triangles, in this order.
-    pub fn new(mesh: &TileMesh, triangles: &[u32], shift: Vec2) -> Self {
+    /// Prepares the points of facets on these triangles, in this order. `corners` returns the corners of a triangle. The
+    /// triangles may also be parts of the triangles of a mesh.
+    pub fn new(size: Vec2, corners: impl Fn(u32) -> [Vec3; 3] + Sync, triangles: &[u32], shift: Vec2) -> Self {
         let mut firsts: Vec<u32> = Vec::new();
         let mut run_of_facet = Vec::with_capacity(triangles.len());
         for (facet, triangle) in triangles.iter().enumerate() {
@@ -44,8 +45,8 @@ impl TrianglePoints {
             run_of_facet.push(firsts.len() as u32 - 1);
         }
         let each = || firsts.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(|facet| triangles[*facet as usize]);
-        let shapes: Vec<TriangleShape> = each().map(|triangle| shape_of(mesh, triangle)).collect();
-        let normals = each().map(|triangle| mesh.geometric_normal(triangle as usize)).collect();
+        let shapes: Vec<TriangleShape> = each().map(|triangle| shape_of(size, corners(triangle))).collect();
+        let normals = each().map(|triangle| triangle_normal(corners(triangle))).collect();
         let mut table = ShapeTable::new(&shapes);
         // Number of points that each shape has used, stored at the first run of the shape.
         let mut used_points = vec![0; firsts.len()];
@@ -78,9 +79,8 @@ fn start_of(triangle: u32) -> Vec2 {
     Vec2::new(part(bits), part(bits >> 24))
 }
 
-fn shape_of(mesh: &TileMesh, triangle: u32) -> TriangleShape {
-    let [a, b, c] = mesh.corners(triangle as usize);
-    let unit = mesh.size.extend(mesh.size.max_element()) * 1e-4;
+fn shape_of(size: Vec2, [a, b, c]: [Vec3; 3]) -> TriangleShape {
+    let unit = size.extend(size.max_element()) * 1e-4;
     let [b, c] = [b - a, c - a].map(|edge| edge / unit);
     [b.x, b.y, b.z, c.x, c.y, c.z].map(rounded)
 }

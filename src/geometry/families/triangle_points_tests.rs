@@ -6,8 +6,9 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::*;
 use crate::geometry::facets::fold;
+use crate::geometry::facets::strata::allocate;
 use crate::geometry::families::heightfield;
-use crate::geometry::{ColorField, FacetSampler, Facets, SampleShift};
+use crate::geometry::{ColorField, FacetSampler, Facets, REPLICATES, SampleShift, TileMesh};
 use crate::pipeline::Pipeline;
 
 /// Computes the order and the cumulative area of the triangles.
@@ -26,7 +27,7 @@ fn order(mesh: &TileMesh) -> (Vec<u32>, Vec<f64>) {
         (0..8).rev().fold(0, |key, bit| steps.iter().fold(key, |key, step| key << 1 | (step >> bit & 1)))
     };
     let mut order: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_sound).collect();
-    order.sort_by_key(|t| (key(t), *t));
+    order.sort_by_key(|t| (mesh.triangle_slot[*t as usize], key(t), *t));
     let mut sum = 0.0;
     let cumulative = order.iter().map(|t| {
         sum += mesh.triangle_area(*t as usize);
@@ -38,12 +39,26 @@ fn order(mesh: &TileMesh) -> (Vec<u32>, Vec<f64>) {
 fn sequential(mesh: &TileMesh, count: usize, shift: SampleShift) -> Facets {
     let (order, cumulative) = order(mesh);
     let mut facets = Facets { skipped_triangles: mesh.triangles.len() - order.len(), ..Facets::default() };
-    let Some(&all) = cumulative.last() else { return facets };
+    if order.is_empty() {
+        return facets;
+    }
     let mut shapes: HashMap<[i32; 6], (Vec2, usize)> = HashMap::new();
-    let mut k = 0;
-    for facet in 0..count {
-        let target = (facet as f64 + f64::from(shift.along)) / count as f64 * all;
-        while k + 1 < order.len() && cumulative[k] <= target {
+    // Each slot has facets of its own, unless there are fewer facets than slots.
+    let slot = |k: usize| mesh.triangle_slot[order[k] as usize];
+    let mut ends: Vec<usize> = (1..order.len()).filter(|k| slot(*k) != slot(k - 1)).chain([order.len()]).collect();
+    if ends.len() > count {
+        ends = vec![order.len()];
+    }
+    let before = |k: usize| if k == 0 { 0.0 } else { cumulative[k - 1] };
+    let starts: Vec<usize> = [0].into_iter().chain(ends.iter().copied()).collect();
+    let areas: Vec<f64> = ends.iter().zip(&starts).map(|(end, start)| before(*end) - before(*start)).collect();
+    let counts = allocate(&areas, count);
+    let each = (0..ends.len()).flat_map(|stratum| (0..counts[stratum]).map(move |facet| (stratum, facet)));
+    for (stratum, facet) in each {
+        let (all, count) = (areas[stratum], counts[stratum]);
+        let target = before(starts[stratum]) + (facet as f64 + f64::from(shift.along)) / count as f64 * all;
+        let mut k = starts[stratum];
+        while k + 1 < ends[stratum] && cumulative[k] <= target {
             k += 1;
         }
         let [a, b, c] = mesh.corners(order[k] as usize);
@@ -56,6 +71,7 @@ fn sequential(mesh: &TileMesh, count: usize, shift: SampleShift) -> Facets {
         let at = |step: f64, start: f32| (f64::from(start) + *used as f64 * step).fract() as f32;
         let point = Vec2::new(at(0.754_877_666_246_692_8, start.x), at(0.569_840_290_998_053_3, start.y));
         facets.push(mesh, order[k], fold(point), (all / count as f64) as f32);
+        *facets.replicates.last_mut().unwrap() = (facet % REPLICATES) as u8;
     }
     facets
 }
@@ -78,6 +94,7 @@ fn sorted(facets: &Facets) -> Facets {
         slots: permuted(&facets.slots, &order),
         colors: permuted(&facets.colors, &order),
         triangles: permuted(&facets.triangles, &order),
+        replicates: permuted(&facets.replicates, &order),
         skipped_triangles: facets.skipped_triangles,
     }
 }

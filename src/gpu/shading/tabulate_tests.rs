@@ -31,6 +31,9 @@ const WEAVE: &str = "{ kind = \"weave\", pattern = \"plain\" }";
 /// precision and round directions to 2e-7 rad. The soft step of a facet, 1/50 rad wide, turns that into 1e-5 of its
 /// area, and a lobe of width α into 4e-7/α. The tests print the differences.
 const TABLE_TOLERANCE: f32 = 3e-5;
+/// The same for surfaces with vertical walls. Beside a wall the slope of a horizon is up to some thousand, and changes as
+/// much per radian of azimuth, so that a facet of a cluster of a hundred turns the rounding of azimuths into 1e-4.
+const WALL_TOLERANCE: f32 = 3e-4;
 
 /// Returns a material that reads a table, which the GPU computes from a direct sum.
 fn tabulated(
@@ -90,6 +93,11 @@ fn worst(cpu: &[f32], gpu_values: &[f32], width: usize) -> f32 {
 
 /// Asserts that GPU and CPU compute the same table of a sum, and returns its number of columns.
 fn assert_same_table(what: &str, gpu: &Gpu, brdf: &EffectiveBrdf, mirrors: [bool; 2]) -> usize {
+    assert_same_table_within(TABLE_TOLERANCE, what, gpu, brdf, mirrors)
+}
+
+/// As [`assert_same_table`], with a tolerance.
+fn assert_same_table_within(tolerance: f32, what: &str, gpu: &Gpu, brdf: &EffectiveBrdf, mirrors: [bool; 2]) -> usize {
     let Representation::Direct(direct) = &brdf.representation else { panic!("{what}: not direct") };
     let table =
         ShadingTable::build(direct, Nodes { mirrors, ..Nodes::all(GRID) }, &Cancel::default()).unwrap().unwrap();
@@ -101,7 +109,7 @@ fn assert_same_table(what: &str, gpu: &Gpu, brdf: &EffectiveBrdf, mirrors: [bool
         worst(table.areas().1, &areas, 1),
     ];
     eprintln!("{what}: the table within {:.1e}, areas within {:.1e}", distances[0], distances[1]);
-    assert!(distances.iter().all(|&distance| distance < TABLE_TOLERANCE), "{what}: {distances:?}");
+    assert!(distances.iter().all(|&distance| distance < tolerance), "{what}: {distances:?}");
     assert_eq!(computed(gpu, &material)[0], values, "{what}: computed twice");
     table.weights().len()
 }
@@ -190,7 +198,7 @@ fn normal_clusters_have_the_same_visible_areas_as_on_the_cpu() {
         let quality = ["quality.preset=draft", "quality.facets=600", "quality.azimuths=29"].map(str::to_owned);
         // With 29 azimuths, only the first lies along a node, where all facets of a normal may meet an edge.
         let brdf = effective(&crate::scene::open(scene, &quality).unwrap());
-        assert_eq!(assert_same_table(scene, &gpu, &brdf, [false; 2]), columns);
+        assert_eq!(assert_same_table_within(WALL_TOLERANCE, scene, &gpu, &brdf, [false; 2]), columns);
     }
 }
 

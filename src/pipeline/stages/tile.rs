@@ -191,10 +191,12 @@ impl Stage for SampleFacets<'_> {
 
     fn run(&self, _: &Env) -> Result<Facets> {
         let (mesh, settings) = (&self.tile.mesh, self.settings);
-        let mut facets = if settings.preset == Preset::Wu2011 {
-            Facets::sample_wu2011(mesh, settings.facets, settings.seed)
-        } else {
-            FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed))
+        let exact =
+            if self.tile.flat && settings.preset != Preset::Wu2011 { Facets::of_level_tile(mesh) } else { None };
+        let mut facets = match exact {
+            Some(facets) => facets,
+            None if settings.preset == Preset::Wu2011 => Facets::sample_wu2011(mesh, settings.facets, settings.seed),
+            None => FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed)),
         };
         if let Some(bins) = settings.normal_bins {
             facets.bin_normals(bins);
