@@ -60,7 +60,7 @@ impl SineWeights {
 fn sine(x: f32) -> f32 {
     let s = x * x;
     let high = s * (-0.000_198_409 + s * (0.000_002_752_6 - s * 0.000_000_023_9));
-    x * (1.0 + s * (-0.166_666_67 + s * (0.008_333_331_5 + high)))
+    x * (1.0 + s * (-0.166_666_67 + s * (0.008_333_332 + high)))
 }
 
 impl HorizonMap {
@@ -207,9 +207,11 @@ impl HorizonMap {
     /// between those of the two bounds ([`HorizonTaps::between`]).
     pub(crate) fn horizon_bounds(&self, runs: &[Range<usize>]) -> Vec<[f32; 2]> {
         let bounds = |slopes: &[f32]| {
-            slopes.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], &at| {
-                [if at < low { at } else { low }, if at > high { at } else { high }]
-            })
+            // The fold over a pair is vectorized; over an array it is not.
+            let (low, high) = slopes.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
+                (if at < low { at } else { low }, if at > high { at } else { high })
+            });
+            [low, high]
         };
         (0..self.azimuths)
             .flat_map(|azimuth| runs.iter().map(move |run| bounds(&self.row(azimuth)[run.clone()])))
@@ -275,8 +277,8 @@ mod tests {
         let (azimuths, facets) = (7, 24);
         let slope = |k: usize| match k % 5 {
             0 => 0.0,
-            1 if k % 3 == 0 => f32::INFINITY,
-            _ => (1.5 * (k as f32 * 0.754_877_67).fract()).tan(),
+            1 if k.is_multiple_of(3) => f32::INFINITY,
+            _ => (1.5 * (k as f32 * 0.754_877_7).fract()).tan(),
         };
         let map = HorizonMap::from_slopes(facets, azimuths, 0.02, (0..facets * azimuths).map(slope).collect());
         let runs = [0..1, 1..4, 4..facets];

@@ -119,7 +119,7 @@ impl Grooves {
             let [across, along] = [(); 2].map(|()| 2.0 * rng.random::<f32>() - 1.0);
             let slopes = self.across * (self.bottom * across / self.depth)
                 + self.across.perp() * (85_f32.to_radians() * along).tan();
-            slopes.extend(1.0).normalize()
+            slopes.extend(1.0).normalize_or_zero()
         };
         (0..count).map(|_| Pair { i: direction(), o: direction() }).collect()
     }

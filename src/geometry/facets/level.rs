@@ -209,7 +209,7 @@ mod tests {
     use crate::scene::{Flat, FlatPattern};
 
     fn stripes(ratio: f32) -> TileMesh {
-        flat::build(&Flat { pattern: FlatPattern::Stripes, ratio, count: 1, ..Flat::default() }, Vec2::new(2.0, 1.0))
+        flat::build(&Flat { pattern: FlatPattern::Stripes, ratio, count: 1 }, Vec2::new(2.0, 1.0))
     }
 
     fn image(size: UVec2) -> ColorField {

@@ -166,28 +166,35 @@ impl FacetSampler {
         let skipped = keys.iter().filter(|key| key.is_none()).count();
         let mut area: Vec<f64> = keys.iter().map(|key| key.map_or(0.0, |(_, area)| area)).collect();
         // Equal keys are in the order of pieces, so the order is deterministic.
-        let whole = |(piece, stratum): (usize, &Option<u32>)| match (stratum, keys[piece]) {
-            (Some(stratum), Some((morton, _))) => Some((*stratum, morton, piece as u32)),
-            _ => None,
-        };
-        let mut keyed: Vec<(u32, u32, u32)> = of_triangle.iter().enumerate().filter_map(whole).collect();
-        for (k, (part, stratum)) in parts.iter().zip(of_part).enumerate() {
+        let packed = |morton: u32, piece: usize| u64::from(morton) << 32 | piece as u64;
+        let whole =
+            |(piece, stratum): (usize, &Option<u32>)| stratum.and(keys[piece]).map(|(morton, _)| packed(morton, piece));
+        let mut keyed: Vec<u64> = of_triangle.iter().enumerate().filter_map(whole).collect();
+        for (k, part) in parts.iter().enumerate() {
             let corners = corners_of_part(mesh, part);
             let [a, b, c] = corners.map(|p| p.as_dvec3());
             area.push(0.5 * (b - a).cross(c - a).length());
             if keys[part.triangle as usize].is_some() {
                 let normal = mesh.geometric_normal(part.triangle as usize);
-                keyed.push((stratum, morton_of(mesh, normal, corners), (count + k) as u32));
+                keyed.push(packed(morton_of(mesh, normal, corners), count + k));
             }
         }
         keyed.sort_unstable();
-        let runs = keyed.chunk_by(|a, b| a.0 == b.0);
-        let ends = runs.scan(0, |end, run| {
-            *end += run.len();
-            Some(*end)
-        });
-        let ends = ends.collect();
-        let order: Vec<u32> = keyed.into_iter().map(|(_, _, piece)| piece).collect();
+        let stratum = |piece: u32| match (piece as usize).checked_sub(count) {
+            None => of_triangle[piece as usize].unwrap_or_default(),
+            Some(part) => of_part[part],
+        };
+        let mut order: Vec<u32> = keyed.into_iter().map(|key| key as u32).collect();
+        let mut ends = vec![order.len()];
+        if order.windows(2).any(|pieces| stratum(pieces[0]) != stratum(pieces[1])) {
+            order.sort_by_key(|piece| stratum(*piece));
+            ends = order.chunk_by(|a, b| stratum(*a) == stratum(*b)).map(<[u32]>::len).collect();
+            let mut end = 0;
+            ends.iter_mut().for_each(|length| {
+                end += *length;
+                *length = end;
+            });
+        }
         let mut sum = 0.0;
         let accumulate = |piece: &u32| {
             sum += area[*piece as usize];

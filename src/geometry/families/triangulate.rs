@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn folded_polygons_and_those_without_area_give_triangles_of_all_corners() {
         let bow = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [0.5, 2.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
-        for outline in [bow, [Vec3::ONE; 5], [0.0, 3.0, 1.0, 4.0, 2.0].map(|x| Vec3::splat(x))] {
+        for outline in [bow, [Vec3::ONE; 5], [0.0, 3.0, 1.0, 4.0, 2.0].map(Vec3::splat)] {
             let triangles = triangulate(&outline);
             assert_eq!(triangles.len(), 3);
             assert!((0..5).all(|corner| triangles.iter().flatten().any(|k| *k == corner)), "{triangles:?}");
