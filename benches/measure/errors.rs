@@ -12,10 +12,11 @@ use crate::hard_tiles::{BOUNDS, Measured, PAIRS_SEED, RayCast, TrueValues, all, 
 use crate::svg::{COLORS, Chart, LogAxis};
 use crate::tiles::reference;
 
+/// Number of pairs of shipped scenes.
 const PAIRS: usize = 200;
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
 /// Bounds of the standard errors of true values, well below the 4 % that `fine` promises.
-const RAYS: RayCast = RayCast { points: 2048, max_passes: 32, target: 4e-3 };
+const RAYS: RayCast = RayCast { points: 4096, max_passes: 32, target: 4e-3 };
 const REFERENCE: ReferenceSettings = ReferenceSettings { facets: 4096, max_passes: 12, target: 4e-3, seed: 99 };
 
 /// Prints the errors of all scenes, or of those whose name contains `part`, and draws them in
@@ -25,14 +26,16 @@ const REFERENCE: ReferenceSettings = ReferenceSettings { facets: 4096, max_passe
 /// The bench fails if a scene exceeds a bound without a warning, if the stated errors are not calibrated, or if the
 /// chart cannot be written.
 pub fn errors(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
-    let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
     let is_chosen = |name: &str| part.is_none_or(|part| name.contains(part));
-    print("| scene | preset | true error (seeds 1, 2, 3) | stated error | true PSNR | stated PSNR | reference |".to_owned());
+    print(
+        "| scene | preset | true error (seeds 1, 2, 3) | stated error | true PSNR | stated PSNR | reference |"
+            .to_owned(),
+    );
     print("|---|---|---|---|---|---|---|".to_owned());
     let mut found: Vec<(String, Measured)> = Vec::new();
-    let mut examine = |name: &str, loaded: &LoadedScene, truth: &TrueValues| {
+    let mut examine = |name: &str, loaded: &LoadedScene, pairs: &[Pair], truth: &TrueValues| {
         for (preset, ..) in BOUNDS {
-            let runs: Vec<Measured> = SEEDS.map(|seed| measure(loaded, preset, seed, &pairs, truth)).collect();
+            let runs: Vec<Measured> = SEEDS.map(|seed| measure(loaded, preset, seed, pairs, truth)).collect();
             print(row(name, preset, &runs, truth));
             found.extend(runs.into_iter().map(|run| (name.to_owned(), run)));
         }
@@ -40,11 +43,13 @@ pub fn errors(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), S
     for tile in all().iter().filter(|tile| is_chosen(tile.name)) {
         let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
         let loaded = tile.open(folder.path(), "standard", 1);
-        examine(tile.name, &loaded, &tile.true_values(&loaded, &pairs, &RAYS));
+        let pairs = mirror_biased_pairs(tile.pairs(), PAIRS_SEED);
+        examine(tile.name, &loaded, &pairs, &tile.true_values(&loaded, &pairs, &RAYS));
     }
+    let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
     for name in scene::shipped::names().filter(|name| is_chosen(name)) {
         let loaded = scene::open(name, &["quality.backend=cpu".to_owned()]).map_err(|error| error.to_string())?;
-        examine(&format!("`{name}`"), &loaded, &shipped_truth(&loaded, &pairs));
+        examine(&format!("`{name}`"), &loaded, &pairs, &shipped_truth(&loaded, &pairs));
     }
     draw(&found)?;
     summary(&found, print)
@@ -102,8 +107,7 @@ fn summary(found: &[(String, Measured)], print: &mut dyn FnMut(String)) -> Resul
 /// Draws stated against true errors, with lines at equal errors and at factors of 2 and 3.
 fn draw(found: &[(String, Measured)]) -> Result<(), String> {
     let range = [1e-4, 1.0];
-    let mut chart =
-        Chart::new(LogAxis::over(range), "true relative L2", LogAxis::over(range), "stated relative L2");
+    let mut chart = Chart::new(LogAxis::over(range), "true relative L2", LogAxis::over(range), "stated relative L2");
     for (factor, color, dashed) in
         [(1.0, "#333", false), (2.0, "#999", true), (0.5, "#999", true), (3.0, "#ccc", true), (1.0 / 3.0, "#ccc", true)]
     {
@@ -121,7 +125,11 @@ fn draw(found: &[(String, Measured)]) -> Result<(), String> {
     }
     let style = "<style>text { font: 12px sans-serif; fill: #333; } .grid { stroke: #eee; }</style>\
                  <rect width='100%' height='100%' fill='#fff'/>";
-    let svg = chart.finish().replacen("<svg ", "<svg xmlns='http://www.w3.org/2000/svg' ", 1).replacen('>', &format!(">{style}"), 1);
+    let svg = chart.finish().replacen("<svg ", "<svg xmlns='http://www.w3.org/2000/svg' ", 1).replacen(
+        '>',
+        &format!(">{style}"),
+        1,
+    );
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/measurements/errors.svg");
     std::fs::write(&path, svg).map_err(|error| format!("{}: {error}", path.display()))
 }

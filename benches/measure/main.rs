@@ -14,7 +14,7 @@ mod in_tests;
 mod interpolation;
 mod shading_tables;
 #[path = "../../src/report/svg.rs"]
-#[allow(dead_code, reason = "the page of `biscale report` uses all of it")]
+#[allow(dead_code, unused_imports, reason = "the page of `biscale report` uses all of it")]
 mod svg;
 mod table;
 #[path = "../../tests/numerics/tiles.rs"]

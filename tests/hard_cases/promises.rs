@@ -73,86 +73,66 @@ fn every_hard_tile_keeps_every_invariant_at_draft() {
 #[ignore = "minutes: all presets, with direct sums, tables and low-rank factors"]
 fn every_hard_tile_keeps_every_invariant_with_every_evaluator() {
     let violations = BOUNDS.iter().flat_map(|(preset, ..)| {
-        // Low-rank factors of all tiles at `fine` take an hour.
-        let evaluators: &[&str] = if *preset == "fine" { &["direct", "table"] } else { &["direct", "table", "low rank"] };
+        // Low-rank factors at `fine` are left out to save time.
+        let evaluators: &[&str] =
+            if *preset == "fine" { &["direct", "table"] } else { &["direct", "table", "low rank"] };
         all_violations(preset, evaluators)
     });
     assert_none(violations);
 }
 
-/// Fails if a closed form differs from the rays by more than four standard errors.
-fn assert_closed_form(tile: &HardTile, pairs: &[Pair], settings: &RayCast) {
+/// Fails if a closed form differs from the rays by more than four standard errors. Every second pair is near the normal,
+/// so that it sees into deep grooves.
+fn assert_closed_form(tile: &HardTile, settings: &RayCast) {
+    let mut pairs = mirror_biased_pairs(200, 3);
+    let lift = |direction: Vec3| (direction * Vec3::new(0.05, 0.05, 1.0)).normalize_or(Vec3::Z);
+    pairs.iter_mut().step_by(2).for_each(|pair| *pair = Pair { i: lift(pair.i), o: lift(pair.o) });
     let folder = tempfile::tempdir().unwrap();
     let loaded = tile.open(folder.path(), "draft", 1);
-    let exact = tile.true_values(&loaded, pairs, settings);
-    let cast = tile.ray_cast(&loaded, pairs, settings);
+    let exact = tile.true_values(&loaded, &pairs, settings);
+    let cast = tile.ray_cast(&loaded, &pairs, settings);
     let error = compare(&cast.values, &exact.values).rel_l2;
     eprintln!("{}: rays differ by {:.2} % ± {:.2} %", tile.name, 100.0 * error, 100.0 * cast.std_error);
+    assert!(exact.values.iter().any(|value| value.max_element() > 0.0), "{}: all values are 0", tile.name);
     assert!(cast.std_error < 0.05, "{}: the standard error of the rays is {}", tile.name, cast.std_error);
-    assert!(error < 4.0 * cast.std_error + 1e-5, "{}: {error}, expected {}", tile.name, cast.std_error);
+    // Corners in f32 change the width of the thinnest stripes by 0.3 %.
+    assert!(error < 4.0 * cast.std_error + 3e-3, "{}: {error}, expected {}", tile.name, cast.std_error);
 }
 
 #[test]
 fn closed_forms_of_hard_tiles_agree_with_rays() {
-    let pairs = mirror_biased_pairs(40, 3);
-    let settings = RayCast { points: 2048, max_passes: 8, target: 0.0 };
-    quick().iter().for_each(|tile| assert_closed_form(tile, &pairs, &settings));
+    let settings = RayCast { points: 1024, max_passes: 8, target: 0.0 };
+    quick().iter().for_each(|tile| assert_closed_form(tile, &settings));
 }
 
 #[test]
 #[ignore = "a minute: all closed forms"]
 fn every_closed_form_agrees_with_rays() {
-    let pairs = mirror_biased_pairs(200, 3);
-    let settings = RayCast { points: 4096, max_passes: 16, target: 0.0 };
+    let settings = RayCast { points: 2048, max_passes: 16, target: 0.0 };
     let tiles = all().into_iter().filter(|tile| !matches!(tile.truth, Truth::RayCast));
-    tiles.for_each(|tile| assert_closed_form(&tile, &pairs, &settings));
+    tiles.for_each(|tile| assert_closed_form(&tile, &settings));
 }
 
 /// Returns the broken promises of a tile at presets and at seeds 1 to 3.
-fn broken(tile: &HardTile, presets: &[&'static str], pairs: &[Pair]) -> Vec<String> {
+fn broken(tile: &HardTile, presets: &[&'static str]) -> Vec<String> {
+    let pairs = mirror_biased_pairs(tile.pairs(), PAIRS_SEED);
     let folder = tempfile::tempdir().unwrap();
     let loaded = tile.open(folder.path(), "draft", 1);
-    let truth = tile.true_values(&loaded, pairs, &RayCast { points: 2048, max_passes: 32, target: 4e-3 });
+    let truth = tile.true_values(&loaded, &pairs, &RayCast { points: 4096, max_passes: 32, target: 4e-3 });
     let runs = presets.iter().flat_map(|&preset| (1..=3).map(move |seed| (preset, seed)));
-    let broken = runs.filter_map(|(preset, seed)| measure(&loaded, preset, seed, pairs, &truth).broken_promise());
+    let broken = runs.filter_map(|(preset, seed)| measure(&loaded, preset, seed, &pairs, &truth).broken_promise());
     broken.map(|text| format!("{}: {text}", tile.name)).collect()
 }
 
 #[test]
 #[ignore = "fails: the program states no error yet"]
 fn quick_hard_tiles_are_within_their_bounds_or_say_that_they_are_not() {
-    let pairs = mirror_biased_pairs(200, PAIRS_SEED);
-    assert_none(quick().iter().flat_map(|tile| broken(tile, &["draft", "standard"], &pairs)));
+    assert_none(quick().iter().flat_map(|tile| broken(tile, &["draft", "standard"])));
 }
 
 #[test]
 #[ignore = "half an hour: all hard tiles, presets and seeds"]
 fn every_hard_tile_is_within_its_bounds_or_says_that_it_is_not() {
-    let pairs = mirror_biased_pairs(200, PAIRS_SEED);
     let presets = BOUNDS.map(|(preset, ..)| preset);
-    assert_none(all().iter().flat_map(|tile| broken(tile, &presets, &pairs)));
-}
-
-/// Prints the errors of all hard tiles at `BISCALE_PRESET` (else `standard`), seed 1.
-#[test]
-#[ignore = "minutes: all hard tiles at one preset; `cargo bench --bench measure -- errors` prints all"]
-fn errors_of_all_hard_tiles_at_one_preset() {
-    let pairs = mirror_biased_pairs(200, PAIRS_SEED);
-    for tile in all() {
-        let folder = tempfile::tempdir().unwrap();
-        let start = std::time::Instant::now();
-        let loaded = tile.open(folder.path(), "standard", 1);
-        let truth = tile.true_values(&loaded, &pairs, &RayCast { points: 2048, max_passes: 16, target: 4e-3 });
-        let seconds = start.elapsed().as_secs_f64();
-        let start = std::time::Instant::now();
-        let found = measure(&loaded, "standard", 1, &pairs, &truth);
-        println!(
-            "| {:<36} | {:7.2} % | {:6.1} dB | ± {:5.2} % | reference {seconds:5.1} s, f̄ {:5.1} s",
-            tile.name,
-            100.0 * found.errors.rel_l2,
-            found.errors.psnr_db,
-            100.0 * truth.std_error,
-            start.elapsed().as_secs_f64()
-        );
-    }
+    assert_none(all().iter().flat_map(|tile| broken(tile, &presets)));
 }

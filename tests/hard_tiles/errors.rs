@@ -34,13 +34,7 @@ pub fn stated(_: &Outcome) -> Option<(f64, f64)> {
 }
 
 /// Computes f̄ at a preset and compares it with the true values.
-pub fn measure(
-    loaded: &LoadedScene,
-    preset: &'static str,
-    seed: u64,
-    pairs: &[Pair],
-    truth: &TrueValues,
-) -> Measured {
+pub fn measure(loaded: &LoadedScene, preset: &'static str, seed: u64, pairs: &[Pair], truth: &TrueValues) -> Measured {
     let mut loaded = loaded.clone();
     loaded.scene.quality.preset = preset.to_owned();
     loaded.scene.quality.seed = seed;

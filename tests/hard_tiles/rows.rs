@@ -50,17 +50,17 @@ fn striped(name: &'static str, count: usize, share: f32, stripe: &'static str, g
     HardTile { truth, ..plain(name, &tile, &[("first", stripe), ("second", ground)]) }
 }
 
-/// Rectangular grooves with bright bottoms between black walls. `depth` is in pitches.
-fn grooves(name: &'static str, depth: f64, turned: bool, bottom: &'static str) -> HardTile {
+/// Rectangular grooves with bottoms of nine tenths of the pitch. `depth` is in pitches.
+fn grooves(name: &'static str, depth: f64, turned: bool, [bottom, sides]: [&'static str; 2]) -> HardTile {
     // Turned by 45°, four grooves across the tile become three along either side.
     let (rotation_deg, pitch) = if turned { (45.0, 1.0 / (3.0 * 2.0_f64.sqrt())) } else { (0.0, 0.25) };
-    let form = Grooves { depth: depth * pitch, pitch, width: 0.4 * pitch, azimuth_deg: rotation_deg };
+    let form = Grooves { depth: depth * pitch, pitch, width: 0.9 * pitch, azimuth_deg: rotation_deg };
     let tile = format!(
-        "geometry = {{ kind = \"grooves\", profile = \"rectangular\", count = 4, bottom_width = 0.4, depth = {}, \
+        "geometry = {{ kind = \"grooves\", profile = \"rectangular\", count = 4, bottom_width = 0.9, depth = {}, \
          rotation_deg = {rotation_deg} }}",
         form.depth
     );
-    HardTile { truth: Truth::Grooves(form), ..plain(name, &tile, &[("bottom", bottom), ("sides", BLACK)]) }
+    HardTile { truth: Truth::Grooves(form), ..plain(name, &tile, &[("bottom", bottom), ("sides", sides)]) }
 }
 
 /// A tile whose mesh is a file.
@@ -81,9 +81,6 @@ pub fn all() -> Vec<HardTile> {
     let rgb: Vec<Vec3> = (0..60).map(|k| [Vec3::X, Vec3::Y, Vec3::Z][k % 3]).collect();
     let mut stripe = vec![Vec3::ZERO; 2048];
     stripe[700] = Vec3::ONE;
-    let fins = |depth: f64| {
-        format!("geometry = {{ kind = \"grooves\", profile = \"rectangular\", bottom_width = 0.9, depth = {depth} }}")
-    };
     let rods = |parameters: &str| format!("geometry = {{ kind = \"rods\", {parameters} }}");
     vec![
         // Rare colours.
@@ -111,14 +108,14 @@ pub fn all() -> Vec<HardTile> {
         striped("mirror stripes", 3, 0.001, MIRROR, MATTE),
         striped("black stripe", 1, 0.0003, BLACK, WHITE),
         // Grooves and fins.
-        grooves("grooves of 1 pitch", 1.0, false, WHITE),
-        grooves("grooves of 4 pitches", 4.0, false, WHITE),
-        grooves("grooves of 10 pitches", 10.0, false, WHITE),
-        grooves("grooves of 40 pitches", 40.0, false, WHITE),
-        grooves("grooves of 10 pitches, turned", 10.0, true, WHITE),
-        grooves("grooves of 4 pitches, glossy", 4.0, false, GLOSSY),
-        plain("deep fins", &fins(1.0), &[("sides", WHITE), ("bottom", BLACK)]),
-        plain("deep glossy fins", &fins(2.5), &[("sides", GLOSSY), ("bottom", MATTE)]),
+        grooves("grooves of 1 pitch", 1.0, false, [WHITE, BLACK]),
+        grooves("grooves of 4 pitches", 4.0, false, [WHITE, BLACK]),
+        grooves("grooves of 10 pitches", 10.0, false, [WHITE, BLACK]),
+        grooves("grooves of 40 pitches", 40.0, false, [WHITE, BLACK]),
+        grooves("grooves of 10 pitches, turned", 10.0, true, [WHITE, BLACK]),
+        grooves("grooves of 4 pitches, glossy", 4.0, false, [GLOSSY, BLACK]),
+        grooves("deep fins", 4.0, false, [BLACK, WHITE]),
+        grooves("deep glossy fins", 10.0, true, [MATTE, GLOSSY]),
         // Holes.
         sheet("one hole of 2.25 %", Holes { height: 0.3, side: 0.15, pitch: 1.0 }, false),
         sheet("16 holes of 0.25 %", Holes { height: 0.1, side: 0.0125, pitch: 0.25 }, false),
