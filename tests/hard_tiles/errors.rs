@@ -41,7 +41,9 @@ pub fn measure(loaded: &LoadedScene, preset: &'static str, seed: u64, pairs: &[P
     let outcome = Pipeline::new().effective(&loaded).unwrap_or_else(|error| panic!("{}: {error}", loaded.name));
     let values: Vec<Vec3> = pairs.par_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect();
     let found = compare(&values, &truth.values);
-    let rel_l2 = (found.rel_l2.powi(2) - truth.std_error.powi(2)).max(0.0).sqrt();
+    // True values do not resolve errors below a third of their standard error.
+    let least = (truth.std_error / 3.0).powi(2);
+    let rel_l2 = (found.rel_l2.powi(2) - truth.std_error.powi(2)).max(least).sqrt().min(found.rel_l2);
     let psnr_db = found.psnr_db + 20.0 * (found.rel_l2.max(1e-12) / rel_l2.max(1e-12)).log10();
     Measured {
         preset,

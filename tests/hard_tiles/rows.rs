@@ -98,10 +98,10 @@ pub fn all() -> Vec<HardTile> {
         colored("white line on V-grooves", V_GROOVES, WHITE, File::Colors(2048, stripe)),
         // Rare slots.
         spotted("mirrors on rods", RODS, images::discs(256, 12, 4.0, 1)),
-        spotted("mirrors on hammered relief", HAMMERED, images::discs(256, 12, 4.0, 2)),
+        spotted("mirrors on hammered relief", HAMMERED, images::discs(256, 12, 1.5, 2)),
         spotted("mirrors, level", FLAT, images::discs(256, 12, 2.0, 3)),
         spotted("mirrors on a weave", WEAVE, images::discs(256, 12, 4.0, 4)),
-        spotted("mirrors on pyramids", PYRAMIDS, images::discs(512, 40, 3.0, 5)),
+        spotted("mirrors on pyramids", PYRAMIDS, images::discs(512, 40, 1.5, 5)),
         // Thin stripes.
         striped("white stripe", 1, 0.0003, WHITE, BLACK),
         striped("64 white stripes", 64, 0.0003, WHITE, BLACK),
@@ -128,7 +128,7 @@ pub fn all() -> Vec<HardTile> {
         ),
         plain(
             "leaning hairs",
-            &rods("count = 150, radius = 0.004, length = 0.5, lean_deg = 50"),
+            &rods("count = 60, radius = 0.006, length = 0.3, lean_deg = 40"),
             &[("rods", WHITE), ("floor", BLACK)],
         ),
         plain(
@@ -138,7 +138,7 @@ pub fn all() -> Vec<HardTile> {
         ),
         plain("pillars of two samples", &images::pillars(32, 4, 1.5, 1), &[("default", WHITE)]),
         // Flakes, two scales, black among bright, noise.
-        mesh("mirror flakes", meshes::flakes(18, 0.3, 20.0, 1), &[("floor", MATTE), ("flakes", MIRROR)]),
+        mesh("mirror flakes", meshes::flakes(18, 0.1, 20.0, 1), &[("floor", MATTE), ("flakes", MIRROR)]),
         plain("two scales of relief", &images::two_scales(64, 1), &[("default", GLOSSY)]),
         plain("black rods on white", RODS, &[("rods", BLACK), ("floor", WHITE)]),
         plain("noise of 12 x 12", &images::noise(12, 0.08, 1), &[("default", WHITE)]),
