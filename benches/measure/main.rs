@@ -75,7 +75,11 @@ fn choosing(_: Option<&str>, table: &mut Table) -> Result<(), String> {
 }
 
 fn errors(part: Option<&str>, table: &mut Table) -> Result<(), String> {
-    errors::errors(part, &mut |line| table.line(line))
+    match part {
+        // The page holds all scenes.
+        Some(_) => errors::errors(part, &mut |line| println!("{line}")),
+        None => errors::errors(None, &mut |line| table.line(line)),
+    }
 }
 
 fn few_facets(_: Option<&str>, table: &mut Table) -> Result<(), String> {
