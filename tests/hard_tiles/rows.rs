@@ -7,6 +7,7 @@ use super::{File, HardTile, Truth, images, meshes};
 
 const WHITE: &str = r#"{ kind = "lambertian", albedo = 1.0 }"#;
 const MATTE: &str = r#"{ kind = "lambertian", albedo = 0.3 }"#;
+const DARK: &str = r#"{ kind = "lambertian", albedo = 0.02 }"#;
 const BLACK: &str = r#"{ kind = "lambertian", albedo = 0 }"#;
 const GLOSSY: &str = r#"{ kind = "cook_torrance", roughness = 0.2, f0 = [0.9, 0.8, 0.6] }"#;
 const MIRROR: &str = r#"{ kind = "cook_torrance", roughness = 0.08, f0 = 0.95 }"#;
@@ -33,13 +34,13 @@ fn colored(name: &'static str, tile: &str, brdf: &'static str, image: File) -> H
     HardTile { name, tile, materials: vec![("default", brdf)], files: vec![("colors.exr", image)], truth }
 }
 
-/// A tile with mirrors painted on a matte surface.
+/// A tile with mirrors painted on a dark surface.
 fn spotted(name: &'static str, tile: &str, image: File) -> HardTile {
     let share = image.painted_share();
     let weights = vec![("default", Vec3::splat(1.0 - share)), ("paint_1", Vec3::splat(share))];
     let truth = if tile == FLAT { Truth::Level(weights) } else { Truth::RayCast };
     let tile = format!("slot_path = \"slots.png\"\n{tile}");
-    let materials = vec![("default", MATTE), ("paint_1", MIRROR)];
+    let materials = vec![("default", DARK), ("paint_1", MIRROR)];
     HardTile { name, tile, materials, files: vec![("slots.png", image)], truth }
 }
 
@@ -97,11 +98,11 @@ pub fn all() -> Vec<HardTile> {
         colored("white texels on hammered relief", HAMMERED, WHITE, white(512, 11)),
         colored("white line on V-grooves", V_GROOVES, WHITE, File::Colors(2048, stripe)),
         // Rare slots.
-        spotted("mirrors on rods", RODS, images::discs(256, 12, 4.0, 1)),
-        spotted("mirrors on hammered relief", HAMMERED, images::discs(256, 12, 1.5, 2)),
+        spotted("mirrors on rods", RODS, images::discs(256, 12, 3.0, 1)),
+        spotted("mirrors on hammered relief", HAMMERED, images::discs(256, 12, 3.0, 2)),
         spotted("mirrors, level", FLAT, images::discs(256, 12, 2.0, 3)),
-        spotted("mirrors on a weave", WEAVE, images::discs(256, 12, 4.0, 4)),
-        spotted("mirrors on pyramids", PYRAMIDS, images::discs(512, 40, 1.5, 5)),
+        spotted("mirrors on a weave", WEAVE, images::discs(256, 12, 3.0, 4)),
+        spotted("mirrors on pyramids", PYRAMIDS, images::discs(512, 40, 3.0, 5)),
         // Thin stripes.
         striped("white stripe", 1, 0.0003, WHITE, BLACK),
         striped("64 white stripes", 64, 0.0003, WHITE, BLACK),
@@ -138,7 +139,7 @@ pub fn all() -> Vec<HardTile> {
         ),
         plain("pillars of two samples", &images::pillars(32, 4, 1.5, 1), &[("default", WHITE)]),
         // Flakes, two scales, black among bright, noise.
-        mesh("mirror flakes", meshes::flakes(18, 0.1, 20.0, 1), &[("floor", MATTE), ("flakes", MIRROR)]),
+        mesh("mirror flakes", meshes::flakes(18, 0.15, 20.0, 1), &[("floor", DARK), ("flakes", MIRROR)]),
         plain("two scales of relief", &images::two_scales(64, 1), &[("default", GLOSSY)]),
         plain("black rods on white", RODS, &[("rods", BLACK), ("floor", WHITE)]),
         plain("noise of 12 x 12", &images::noise(12, 0.08, 1), &[("default", WHITE)]),
