@@ -29,11 +29,15 @@ impl Table {
         }
     }
 
-    /// Replaces the lines between `<!-- measure: NAME -->` and `<!-- end -->` in every page of `docs/measurements`.
+    /// Replaces the lines between `<!-- measure: NAME -->` and `<!-- end -->` in every page of `docs/measurements`, if
+    /// lines were kept.
     ///
     /// # Errors
     /// An error is returned if a page cannot be read or written, or a marker has no end.
     pub fn write(&self, name: &str) -> Result<(), String> {
+        if self.lines.is_empty() {
+            return Ok(());
+        }
         let (start, end) = (format!("<!-- measure: {name} -->\n"), "<!-- end -->");
         for path in pages()? {
             let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;

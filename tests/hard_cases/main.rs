@@ -10,6 +10,8 @@ mod continuity;
 mod evaluators;
 mod examination;
 mod finer_presets;
+#[path = "../hard_tiles/mod.rs"]
+mod hard_tiles;
 mod health;
 mod invariants;
 mod large_mesh;
@@ -17,6 +19,7 @@ mod light_and_objects;
 mod measured_files;
 #[cfg(feature = "gpu")]
 mod on_gpu;
+mod promises;
 mod refinement;
 mod statistics;
 mod sums;
