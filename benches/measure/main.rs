@@ -13,9 +13,6 @@ mod hard_tiles;
 mod in_tests;
 mod interpolation;
 mod shading_tables;
-#[path = "../../src/report/svg.rs"]
-#[allow(dead_code, unused_imports, reason = "the page of `biscale report` uses all of it")]
-mod svg;
 mod table;
 #[path = "../../tests/numerics/tiles.rs"]
 mod tiles;
@@ -44,7 +41,7 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("brdf", "nanoseconds per evaluation of each BRDF", in_lib("nanoseconds_per_evaluation")),
     ("cache-costs", "milliseconds of the disk cache", in_lib("costs_of_caching")),
     ("choosing", "PSNR and time that targets reach on ten scenes", Source::Here(choosing)),
-    ("errors", "true and stated errors of shipped scenes and of hard tiles: 20 minutes", Source::Here(errors)),
+    ("errors", "true errors of the presets on hard tiles: many minutes", Source::Here(errors)),
     ("few-facets", "errors of sums over 700 facets with few distinct normals", Source::Here(few_facets)),
     ("gpu-counts", "operations of an edit on a GPU", in_lib("counts_of_an_edit")),
     ("gpu-table", "time of a shading table on the CPU and on the GPU", in_lib("the_table_of_a_height_field_is_timed")),
@@ -76,7 +73,7 @@ fn choosing(_: Option<&str>, table: &mut Table) -> Result<(), String> {
 
 fn errors(part: Option<&str>, table: &mut Table) -> Result<(), String> {
     match part {
-        // The page holds all scenes.
+        // The page holds all tiles.
         Some(_) => errors::errors(part, &mut |line| println!("{line}")),
         None => errors::errors(None, &mut |line| table.line(line)),
     }

@@ -19,7 +19,7 @@ mod light_and_objects;
 mod measured_files;
 #[cfg(feature = "gpu")]
 mod on_gpu;
-mod promises;
+mod hard_tile_rows;
 mod refinement;
 mod statistics;
 mod sums;

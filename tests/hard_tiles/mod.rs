@@ -17,7 +17,7 @@ use biscale::scene;
 use biscale::scene::{LoadedScene, Painted};
 use glam::Vec3;
 
-pub use errors::{BOUNDS, Measured, PAIRS_SEED, measure};
+pub use errors::{Measured, PAIRS_SEED, measure};
 pub use ray_cast::RayCast;
 pub use rows::all;
 

@@ -1,4 +1,4 @@
-//! Hard tiles: the invariants of every case, and the bounds of the presets.
+//! Hard tiles: the invariants of every case, and known answers.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::cases::Case;
 use crate::evaluators::Evaluator;
 use crate::examination::{Row, measured, pairs};
-use crate::hard_tiles::{BOUNDS, HardTile, PAIRS_SEED, RayCast, Truth, all, measure};
+use crate::hard_tiles::{HardTile, PAIRS_SEED, RayCast, Truth, all, measure};
 use crate::invariants::{assert_none, violations};
 
 /// Tiles of the ordinary tests. Each has a closed form and takes less than a second.
@@ -72,10 +72,10 @@ fn every_hard_tile_keeps_every_invariant_at_draft() {
 #[test]
 #[ignore = "minutes: all presets, with direct sums, tables and low-rank factors"]
 fn every_hard_tile_keeps_every_invariant_with_every_evaluator() {
-    let violations = BOUNDS.iter().flat_map(|(preset, ..)| {
+    let violations = ["draft", "standard", "fine"].into_iter().flat_map(|preset| {
         // Low-rank factors at `fine` are left out to save time.
         let evaluators: &[&str] =
-            if *preset == "fine" { &["direct", "table"] } else { &["direct", "table", "low rank"] };
+            if preset == "fine" { &["direct", "table"] } else { &["direct", "table", "low rank"] };
         all_violations(preset, evaluators)
     });
     assert_none(violations);
@@ -114,26 +114,39 @@ fn every_closed_form_agrees_with_rays() {
     tiles.for_each(|tile| assert_closed_form(&tile, &settings));
 }
 
-/// Returns the broken promises of a tile at presets and at seeds 1 to 3.
-fn broken(tile: &HardTile, presets: &[&'static str]) -> Vec<String> {
-    let pairs = mirror_biased_pairs(tile.pairs(), PAIRS_SEED);
-    let folder = tempfile::tempdir().unwrap();
-    let loaded = tile.open(folder.path(), "draft", 1);
-    let truth = tile.true_values(&loaded, &pairs, &RayCast { points: 4096, max_passes: 32, target: 4e-3 });
-    let runs = presets.iter().flat_map(|&preset| (1..=3).map(move |seed| (preset, seed)));
-    let broken = runs.filter_map(|(preset, seed)| measure(&loaded, preset, seed, &pairs, &truth).broken_promise());
-    broken.map(|text| format!("{}: {text}", tile.name)).collect()
+#[test]
+fn level_tiles_are_exact_at_every_preset_and_seed() {
+    let tiles = all().into_iter().filter(|tile| matches!(tile.truth, Truth::Level(_)));
+    let mut count = 0;
+    for tile in tiles {
+        let pairs = mirror_biased_pairs(50, PAIRS_SEED);
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = tile.open(folder.path(), "draft", 1);
+        let truth = tile.true_values(&loaded, &pairs, &RayCast { points: 1, max_passes: 1, target: 0.0 });
+        for (preset, seed) in [("draft", 1), ("standard", 2), ("fine", 3)] {
+            let error = measure(&loaded, preset, seed, &pairs, &truth).errors.rel_l2;
+            // Corners in f32 change the width of the thinnest stripes by 0.3 %.
+            assert!(error < 4e-3, "{}, {preset}: {error}", tile.name);
+        }
+        count += 1;
+    }
+    assert!(count > 8, "{count}");
 }
 
 #[test]
-#[ignore = "fails: the program states no error yet"]
-fn quick_hard_tiles_are_within_their_bounds_or_say_that_they_are_not() {
-    assert_none(quick().iter().flat_map(|tile| broken(tile, &["draft", "standard"])));
-}
-
-#[test]
-#[ignore = "half an hour: all hard tiles, presets and seeds"]
-fn every_hard_tile_is_within_its_bounds_or_says_that_it_is_not() {
-    let presets = BOUNDS.map(|(preset, ..)| preset);
-    assert_none(all().iter().flat_map(|tile| broken(tile, &presets)));
+fn rare_texels_and_slots_on_relief_are_not_missed() {
+    for (name, bound) in
+        [("white texels on V-grooves", 0.5), ("white texels on hammered relief", 0.5), ("mirrors on rods", 0.5)]
+    {
+        let tile = all().into_iter().find(|tile| tile.name == name).unwrap();
+        let pairs = mirror_biased_pairs(60, PAIRS_SEED);
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = tile.open(folder.path(), "standard", 1);
+        let truth = tile.true_values(&loaded, &pairs, &RayCast { points: 2048, max_passes: 8, target: 0.0 });
+        for seed in 1..=3 {
+            let error = measure(&loaded, "standard", seed, &pairs, &truth).errors.rel_l2;
+            eprintln!("{name}, seed {seed}: {:.1} % ± {:.1} %", 100.0 * error, 100.0 * truth.std_error);
+            assert!(error < bound, "{name}, seed {seed}: {error}");
+        }
+    }
 }
