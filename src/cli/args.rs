@@ -136,8 +136,9 @@ pub struct EvalArgs {
     /// CSV file to write; `-` is standard output.
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Also write the columns se_r,se_g,se_b: the standard error, which is zero unless the quality is `reference`.
-    #[arg(long)]
+    /// Also write the columns se_r,se_g,se_b: the standard error of a reference, or the estimated error of other
+    /// qualities. It is empty with the method of the paper.
+    #[arg(long, alias = "errors")]
     pub standard_error: bool,
 }
 

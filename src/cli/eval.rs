@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::base::{Error, InputError, regular_file, require_finite};
 use crate::diagnostics::Health;
-use crate::effective::Reflectance;
+use crate::effective::{ErrorEstimate, Reflectance};
 use crate::math::directions::from_angles;
 use crate::metrics::Pair;
 use crate::plan::{Preset, Settings};
@@ -42,6 +42,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     pipeline.set_cache(cache.clone());
     let health;
     let mut representation = "reference sum".to_owned();
+    let mut error = None;
     let (values, errors): (Vec<Vec3>, Vec<Vec3>) = if settings.preset == Preset::Reference {
         let reference = ReferenceSettings {
             facets: settings.reference_facets,
@@ -77,15 +78,23 @@ pub fn run(args: &EvalArgs) -> Result<()> {
                 out[0]
             })
             .collect();
-        let zeros = vec![Vec3::ZERO; values.len()];
-        (values, zeros)
+        let errors = match outcome.errors() {
+            Some(estimator) => {
+                error = Some(estimator.estimate());
+                if args.standard_error { estimator.standard_errors(&pairs) } else { Vec::new() }
+            }
+            None => Vec::new(),
+        };
+        (values, errors)
     };
     let mut text = format!("{HEADER},r,g,b{}\n", if args.standard_error { ",se_r,se_g,se_b" } else { "" });
-    for ((row, value), error) in rows.iter().zip(&values).zip(&errors) {
+    let of_pair = errors.iter().copied().chain(std::iter::repeat(Vec3::NAN));
+    for ((row, value), error) in rows.iter().zip(&values).zip(of_pair) {
         let [a, b, c, d] = row.angles;
         let _ = write!(text, "{a},{b},{c},{d},{},{},{}", value.x, value.y, value.z);
         if args.standard_error {
-            let _ = write!(text, ",{},{},{}", error.x, error.y, error.z);
+            let cell = |error: f32| if error.is_nan() { String::new() } else { error.to_string() };
+            let _ = write!(text, ",{},{},{}", cell(error.x), cell(error.y), cell(error.z));
         }
         text.push('\n');
     }
@@ -101,7 +110,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     crate::base::replace_file(&args.output, text.as_bytes())?;
     if args.scene.json {
         let output = args.output.display().to_string();
-        return print_json(&Report { output, pairs: values.len(), representation, health });
+        return print_json(&Report { output, pairs: values.len(), representation, error, health });
     }
     Ok(())
 }
@@ -113,6 +122,8 @@ struct Report {
     pairs: usize,
     #[serde(rename = "form")]
     representation: String,
+    /// Estimated error; absent for a reference, and for the paper's method.
+    error: Option<ErrorEstimate>,
     health: Health,
 }
 

@@ -109,6 +109,7 @@ pub fn surface(inputs: &HealthInputs, lobe_deg: Option<f32>) -> SurfaceHealth {
     let facets = &inputs.facets;
     let mut health = SurfaceHealth {
         facets: facets.len(),
+        is_exact: facets.replicates.is_empty(),
         triangles_left_out: facets.skipped_triangles,
         largest_color_weight: inputs.max_color_weight.max_element(),
         has_holes: !inputs.closes_plane,

@@ -80,6 +80,9 @@ pub struct MaterialHealth {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SurfaceHealth {
     pub facets: usize,
+    /// True if the facets represent the surface exactly, so that few of them suffice.
+    #[serde(rename = "exact")]
+    pub is_exact: bool,
     /// Number of triangles without area or with corners that are not finite.
     pub triangles_left_out: usize,
     /// Largest weight of the colour image over all channels; 1 without an image.

@@ -92,7 +92,7 @@ fn surface(health: &Health, warnings: &mut Vec<String>) {
         warnings.push("the tile has no area and reflects nothing: check the mesh".to_owned());
         return;
     }
-    if surface.fewest_visible_facets < MIN_VISIBLE {
+    if surface.fewest_visible_facets < MIN_VISIBLE && !surface.is_exact {
         let [theta, phi] = surface.fewest_visible_at_deg;
         warnings.push(format!(
             "only {} of {} facets are visible from theta {theta:.0}°, phi {phi:.0}°, so values there are noisy: raise \
@@ -113,7 +113,7 @@ fn surface(health: &Health, warnings: &mut Vec<String>) {
             percent(surface.truncated_searches)
         ));
     }
-    if surface.facets_in_a_lobe.is_some_and(|count| count < MIN_IN_A_LOBE) {
+    if surface.facets_in_a_lobe.is_some_and(|count| count < MIN_IN_A_LOBE) && !surface.is_exact {
         warnings.push(format!(
             "the narrowest lobe ({}) contains only {} of {} facets at a time, so highlights sparkle: raise \
              quality.facets or the roughness",

@@ -2,6 +2,7 @@
 
 pub mod direct;
 mod effective_brdf;
+mod error_estimate;
 mod gpu_tile;
 pub mod low_rank;
 pub mod shading_table;
@@ -17,6 +18,7 @@ pub(crate) use direct::facet_groups::FacetGroup;
 pub use direct::facet_sum::FacetSum;
 pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
+pub use error_estimate::{ErrorEstimate, ErrorEstimator};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, Heights, Maps, Sliced};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};

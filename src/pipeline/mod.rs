@@ -215,6 +215,7 @@ impl Pipeline {
             max_color_weight: tile.mesh.color.max(),
         };
         let direct = Direct::new(Arc::new(sum), visibility.value.clone());
+        let examined_sum = Some((direct.clone(), material_of_slot.clone()));
         let base_area = f64::from(tile.mesh.base_area());
         let (mut brdf, factored) = if plan.try_low_rank {
             let factor_inputs = FactorInputs {
@@ -261,6 +262,8 @@ impl Pipeline {
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),
+            direct: examined_sum,
+            estimator: Arc::default(),
         };
         *lock(&self.last_outcome) = Some((key, outcome.clone()));
         Ok(outcome)

@@ -8,7 +8,7 @@ use super::shading::{Shading, ShadingBrdf};
 use super::stage::StageTimes;
 use crate::base::{Cancel, Result};
 use crate::diagnostics::{Health, HealthInputs, Limits};
-use crate::effective::{EffectiveBrdf, Reflectance};
+use crate::effective::{Direct, EffectiveBrdf, ErrorEstimator, Reflectance, Representation};
 use crate::metrics::Errors;
 use crate::plan::{Plan, Settings};
 
@@ -28,6 +28,9 @@ pub struct Outcome {
     /// The health report, once [`Outcome::health`] computed it.
     pub examined: Arc<OnceLock<Health>>,
     pub(super) shading: Arc<Shading>,
+    /// The direct sum and the materials of its slots, from which errors are estimated; absent with the paper's method.
+    pub(super) direct: Option<(Direct, Vec<usize>)>,
+    pub(super) estimator: Arc<OnceLock<ErrorEstimator>>,
 }
 
 impl Outcome {
@@ -48,6 +51,18 @@ impl Outcome {
     /// The result of [`Outcome::shading_brdf`], if it was computed.
     pub fn known_shading_brdf(&self) -> Option<Arc<EffectiveBrdf>> {
         self.shading.known()
+    }
+
+    /// Estimates the errors of the result. The first call examines some dozens of direction pairs. `None` with the paper's
+    /// method. Interreflection and the sampling of its rays are not examined.
+    pub fn errors(&self) -> Option<&ErrorEstimator> {
+        let (direct, material_of_slot) = self.direct.as_ref()?;
+        Some(self.estimator.get_or_init(|| {
+            let HealthInputs { facets, materials, .. } = &self.health_inputs;
+            let is_low_rank = matches!(self.brdf.direct_representation(), Representation::LowRank(_));
+            let table = self.factored.filter(|_| is_low_rank).map_or(0.0, |errors| errors.rel_l2);
+            ErrorEstimator::new(direct, facets, material_of_slot, &materials.materials, table)
+        }))
     }
 
     /// The health of the result. The first call measures it: some hundredths of a second at draft.

@@ -62,6 +62,8 @@ impl Pipeline {
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),
+            direct: None,
+            estimator: Arc::default(),
         })
     }
 }

@@ -197,6 +197,18 @@ impl HorizonMap {
         Self { facets: facets.len(), slopes, ..*self }
     }
 
+    /// The horizon map of every second azimuth; `None` if their number is odd.
+    pub(crate) fn every_second_azimuth(&self) -> Option<Self> {
+        let azimuths = self.azimuths.is_multiple_of(2).then_some(self.azimuths / 2)?;
+        let slopes = (0..azimuths).flat_map(|azimuth| self.row(2 * azimuth)).copied().collect();
+        Some(Self::stored([azimuths, self.facets, self.truncated], self.transition_width, slopes))
+    }
+
+    /// The same horizons with a soft step of another width [rad].
+    pub(crate) fn with_transition_width(&self, width: f32) -> Self {
+        Self { transition_width: Self::clamped_width(width), ..self.clone() }
+    }
+
     /// Computes `Σ w V(direction)` over a run of facets with weights `w`.
     pub(crate) fn visible_sum(&self, taps: &HorizonTaps, range: Range<usize>, weights: &[f32]) -> f64 {
         let [from, to] = taps.azimuths.map(|azimuth| &self.row(azimuth)[range.clone()]);

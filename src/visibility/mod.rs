@@ -80,6 +80,28 @@ impl Visibility {
         }
     }
 
+    /// The visibility with a soft step of twice the width; `None` for bit maps, and if nothing blocks.
+    pub(crate) fn twice_as_soft(&self) -> Option<Self> {
+        match self {
+            Self::Unblocked { .. } | Self::Maps(_) => None,
+            Self::HorizonMap(map) => Some(Self::HorizonMap(map.with_transition_width(2.0 * map.transition_width()))),
+            Self::OcclusionIntervals(intervals) => {
+                let map = &intervals.horizon_map;
+                let horizon_map = map.with_transition_width(2.0 * map.transition_width());
+                Some(Self::OcclusionIntervals(OcclusionIntervals { horizon_map, ..intervals.clone() }))
+            }
+        }
+    }
+
+    /// The visibility from every second azimuth; `None` for bit maps, for an odd number of azimuths, and if nothing blocks.
+    pub(crate) fn every_second_azimuth(&self) -> Option<Self> {
+        match self {
+            Self::Unblocked { .. } | Self::Maps(_) => None,
+            Self::HorizonMap(horizon_map) => horizon_map.every_second_azimuth().map(Self::HorizonMap),
+            Self::OcclusionIntervals(intervals) => intervals.every_second_azimuth().map(Self::OcclusionIntervals),
+        }
+    }
+
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction`, 0 at and below the horizon.
     ///
     /// For a direction that a facet does not face, the value depends on the algorithm. The caller must exclude it.

@@ -175,6 +175,13 @@ impl OcclusionIntervals {
         }
     }
 
+    /// The occlusion intervals of every second azimuth; `None` if their number is odd.
+    pub(crate) fn every_second_azimuth(&self) -> Option<Self> {
+        let horizon_map = self.horizon_map.every_second_azimuth()?;
+        let overhangs = self.overhangs.iter().step_by(2).cloned().collect();
+        Some(Self { horizon_map, overhangs, switch: self.switch.clone() })
+    }
+
     /// The occlusion intervals of some of the facets, in ascending order.
     pub(crate) fn subset(&self, facets: &[usize]) -> Self {
         let mut new_indices = vec![NOT_IN_SUBSET; self.facets()];

@@ -1,4 +1,4 @@
-//! True errors of f̄.
+//! True errors of f̄ beside the errors that the program states.
 
 use biscale::metrics::{Errors, Pair, compare};
 use biscale::pipeline::Pipeline;
@@ -16,6 +16,8 @@ pub const PAIRS_SEED: u64 = 20_110_801;
 pub struct Measured {
     /// Without the standard error of the true values, which is subtracted in squares.
     pub errors: Errors,
+    /// Relative L2 that the program states.
+    pub stated: f64,
     /// True if the true values resolve the error: it exceeds twice their standard error.
     pub is_resolved: bool,
 }
@@ -32,5 +34,6 @@ pub fn measure(loaded: &LoadedScene, preset: &str, seed: u64, pairs: &[Pair], tr
     let least = (truth.std_error / 3.0).powi(2);
     let rel_l2 = (found.rel_l2.powi(2) - truth.std_error.powi(2)).max(least).sqrt().min(found.rel_l2);
     let psnr_db = found.psnr_db + 20.0 * (found.rel_l2.max(1e-12) / rel_l2.max(1e-12)).log10();
-    Measured { errors: Errors { rel_l2, psnr_db }, is_resolved: found.rel_l2 > 2.0 * truth.std_error }
+    let stated = outcome.errors().unwrap().estimate().rel_l2;
+    Measured { errors: Errors { rel_l2, psnr_db }, stated, is_resolved: found.rel_l2 > 2.0 * truth.std_error }
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{Facets, REPLICATES, wrap};
+use super::{Facets, wrap};
 use crate::geometry::{ColorField, TileMesh};
 
 /// Area and integral of the colour over the part of the tile with one slot and one side.
@@ -43,7 +43,6 @@ impl Facets {
             facets.slots.push(slot);
             facets.colors.push((color / area).as_vec3());
             facets.triangles.push(triangle);
-            facets.replicates.push((facets.replicates.len() % REPLICATES) as u8);
         }
         Some(facets)
     }

@@ -17,8 +17,9 @@ use super::families::triangle_points::TrianglePoints;
 /// Minimum number of facets or triangles per parallel task.
 pub(crate) const MIN_ITEMS_PER_TASK: usize = 2048;
 
-/// Number of replicates in the facets. Differences between replicates show the error of the facets.
-pub const REPLICATES: usize = 8;
+/// Number of replicates in the facets. Differences between replicates show the error of the facets. Six, three and two
+/// steps of the R2 sequence of points lie far apart, so that each replicate, and each sum of replicates, is spread well.
+pub const REPLICATES: usize = 6;
 
 /// Samples of the surface, with one entry per facet in each array. Areas sum to the surface area of the tile.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,7 +38,8 @@ pub struct Facets {
     pub colors: Vec<Vec3>,
     /// Triangle of each facet. A ray from the facet ignores it.
     pub triangles: Vec<u32>,
-    /// Replicate of each facet, below [`REPLICATES`]. The facets of one replicate are a sample of the whole surface.
+    /// Replicate of each facet, below [`REPLICATES`]. The facets of one replicate are a sample of the whole surface. Empty
+    /// if the facets are not samples, but represent the surface exactly.
     pub replicates: Vec<u8>,
     /// Number of triangles left out because they have no area.
     pub skipped_triangles: usize,
@@ -60,7 +62,7 @@ impl Facets {
     /// The facets with the given indices, in this order.
     pub fn subset(&self, indices: &[usize]) -> Self {
         fn entries<T: Copy>(column: &[T], indices: &[usize]) -> Vec<T> {
-            indices.iter().map(|&index| column[index]).collect()
+            if column.is_empty() { Vec::new() } else { indices.iter().map(|&index| column[index]).collect() }
         }
         Self {
             positions: entries(&self.positions, indices),

@@ -16,6 +16,9 @@ impl Facets {
         // The facet's index breaks ties, which gives the order of a stable sort in less time.
         order.sort_unstable();
         fn permuted<T: Copy + Send + Sync>(values: &[T], order: &[(u64, u32)]) -> Vec<T> {
+            if values.is_empty() {
+                return Vec::new();
+            }
             order.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(|&(_, s)| values[s as usize]).collect()
         }
         self.positions = permuted(&self.positions, &order);

@@ -5,6 +5,24 @@ use std::f64::consts::PI;
 use super::folder::{CommandLine, FLAT, GROOVES, PAIRS, rows};
 
 #[test]
+fn presets_state_an_error_of_each_pair_and_of_the_whole() {
+    let folder = CommandLine::new();
+    folder.write("pairs.csv", PAIRS);
+    folder.write("scene.toml", GROOVES);
+    let arguments =
+        ["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "values.csv", "--quality", "draft", "--errors"];
+    let report = folder.json(&[&arguments[..], &["--json"]].concat());
+    let error = &report["error"];
+    let rel_l2 = error["rel_l2"].as_f64().unwrap();
+    assert!(rel_l2 > 0.0 && rel_l2 < 0.3, "{error}");
+    let [facets, visibility, table] = ["facets", "visibility", "table"].map(|part| error[part].as_f64().unwrap());
+    assert!((facets.hypot(visibility).hypot(table) / rel_l2 - 1.0).abs() < 1e-6, "{error}");
+    let text = std::fs::read_to_string(folder.path("values.csv")).unwrap();
+    let stated = |line: &str| line.split(',').skip(7).map(|cell| cell.parse::<f64>().unwrap()).sum::<f64>();
+    assert!(text.lines().skip(1).any(|line| stated(line) > 0.0), "{text}");
+}
+
+#[test]
 fn a_flat_lambertian_tile_is_albedo_over_pi_times_the_cosine() {
     let folder = CommandLine::new();
     folder.write("flat.toml", FLAT);
