@@ -144,7 +144,7 @@ fn a_program_that_is_killed_while_it_computes_leaves_nothing() {
     std::fs::write(folder.path().join("a.toml"), SCENE.replace("facets = 256", "facets = 4096")).unwrap();
     let mut child =
         program(folder.path(), &["export", "a.toml", "-o", "t.npz", "--resolution", "36x72"]).spawn().unwrap();
-    std::thread::sleep(std::time::Duration::from_secs(2));
+    std::thread::sleep(std::time::Duration::from_millis(500));
     assert!(child.try_wait().unwrap().is_none(), "the export is done before it is killed");
     child.kill().unwrap();
     child.wait().unwrap();
