@@ -138,7 +138,7 @@ pub struct EvalArgs {
     pub output: PathBuf,
     /// Also write the columns se_r,se_g,se_b: the standard error of a reference, or the estimated error of other
     /// qualities. It is empty with the method of the paper.
-    #[arg(long, alias = "errors")]
+    #[arg(long, visible_alias = "errors")]
     pub standard_error: bool,
 }
 

@@ -78,7 +78,8 @@ pub fn run(args: &EvalArgs) -> Result<()> {
                 out[0]
             })
             .collect();
-        let errors = match outcome.errors() {
+        let stated = if args.standard_error || args.scene.json { outcome.errors() } else { None };
+        let errors = match stated {
             Some(estimator) => {
                 error = Some(estimator.estimate());
                 if args.standard_error { estimator.standard_errors(&pairs) } else { Vec::new() }

@@ -60,7 +60,7 @@ impl Drop for Watch {
     }
 }
 
-/// What is shown of the operation that runs.
+/// The progress bar and the notes of the operation that runs.
 #[derive(Default)]
 struct Shown {
     bar: Option<(Running, ProgressBar)>,

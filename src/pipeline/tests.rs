@@ -73,6 +73,25 @@ fn what_was_cached_is_the_same_bits_as_what_is_made() {
     }
 }
 
+/// Rare bright texels decide where facets are, so visibility must not outlive an edit of such an image.
+#[test]
+fn an_edit_of_rare_bright_texels_gives_the_result_of_a_fresh_pipeline() {
+    let painted = |white: usize| {
+        let mut loaded = scene::open("fig5d_pentagonal", &["quality.preset=draft".to_owned()]).unwrap();
+        let mut values = vec![Vec3::splat(0.01); 64 * 64];
+        values[white] = Vec3::ONE;
+        loaded.painted.colors = Some(Arc::new(scene::Pixels { size: glam::UVec2::splat(64), values }));
+        loaded
+    };
+    let pipeline = Pipeline::new();
+    let values = |pipeline: &Pipeline, white: usize| {
+        let outcome = pipeline.effective(&painted(white)).unwrap();
+        image_pairs(60, 3).into_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect::<Vec<_>>()
+    };
+    values(&pipeline, 500);
+    assert_eq!(values(&pipeline, 2900), values(&Pipeline::new(), 2900));
+}
+
 #[test]
 fn a_table_that_was_cached_serves_other_colours_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
@@ -149,7 +168,8 @@ fn keyed<T>(number: u32, value: T) -> Keyed<T> {
 
 fn shape(scene: &str, number: u32) -> TileShape {
     let mesh = Pipeline::new().mesh(&scene::open(scene, &[]).unwrap()).unwrap();
-    TileShape { mesh, surface: Key::of_numbers(&[number]), flat: false, height_field: true, steepest: 1.0 }
+    let surface = Key::of_numbers(&[number]);
+    TileShape { mesh, surface, flat: false, height_field: true, steepest: 1.0, colors_place_facets: false }
 }
 
 #[test]

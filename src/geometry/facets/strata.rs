@@ -50,6 +50,11 @@ impl Strata {
     }
 }
 
+/// Returns true if the colour field of a mesh decides where facets are.
+pub(crate) fn colors_place_facets(mesh: &TileMesh) -> bool {
+    matches!(&mesh.color, ColorField::Image { size, texels } if luminance_classes(*size, texels).is_some())
+}
+
 /// Classes of luminance relative to the image's mean; `None` if all texels are in one class.
 fn luminance_classes(size: UVec2, texels: &[Vec3]) -> Option<ClassImage> {
     let luminance = |texel: &Vec3| texel.dot(LUMINANCE);

@@ -7,6 +7,7 @@ use crate::base::Result;
 use crate::brdf::{Brdf, Material, MaterialAssignment};
 use crate::cache::{Key, KeyBuilder};
 use crate::effective::mean_colors;
+use crate::geometry::facets::strata::colors_place_facets;
 use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage, lock};
@@ -24,6 +25,8 @@ pub struct TileShape {
     pub height_field: bool,
     /// The largest angle between a surface normal and z [rad].
     pub steepest: f32,
+    /// The colours decide where facets are, because the image has rare bright texels.
+    pub colors_place_facets: bool,
 }
 
 /// Builds the mesh of a scene's tile.
@@ -97,7 +100,8 @@ impl Stage for BuildTile<'_> {
         let flat = high - low <= 1e-7 * mesh.size.max_element();
         let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
         let steepest = steepest(&mesh);
-        Ok(TileShape { mesh, surface: self.surface, flat, height_field, steepest })
+        let colors_place_facets = colors_place_facets(&mesh);
+        Ok(TileShape { mesh, surface: self.surface, flat, height_field, steepest, colors_place_facets })
     }
 }
 

@@ -26,8 +26,9 @@ impl Stage for ComputeVisibility<'_> {
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         let settings = self.settings;
-        // Colours of the tile and of its facets do not change visibility.
-        key.key("surface", &self.tile.surface);
+        // Colours do not change visibility, unless they decide where facets are.
+        let colored = self.tile.colors_place_facets;
+        key.key("surface", if colored { &self.tile.key } else { &self.tile.surface });
         hash_sampling_into(settings, key);
         key.counts("algorithm", [self.algorithm as usize]);
         key.counts("azimuths", [settings.horizon_azimuths, settings.slice_azimuths]);
