@@ -43,7 +43,6 @@ override COUNTING: bool = false;
 
 const COLUMNS: u32 = 0u;
 const ROWS: u32 = 1u;
-const DIAGONALS: u32 = 2u;
 
 fn wrapped(k: f32, n: u32) -> u32 {
     let rest = k - f32(n) * floor((k + 0.5) / f32(n));
@@ -84,10 +83,6 @@ fn highest_slope(edges: u32, across: vec2f, along: vec2f, max_crossings: u32, z:
             column = low;
             row = line;
             next = vec2f(1.0, 0.0);
-        } else if edges == DIAGONALS {
-            column = low;
-            row = low - line;
-            next = vec2f(1.0, 1.0);
         }
         let below = height_at(column, row);
         let above = height_at(column + next.x, row + next.y);
@@ -126,10 +121,6 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         }
         if !along_x {
             slope = highest_slope(ROWS, y, x, max_crossings, start.z, slope);
-        }
-        let diagonal_speed = speed.x - speed.y;
-        if abs(diagonal_speed) >= 1e-6 * max(params.samples_from_tile.x, params.samples_from_tile.y) {
-            slope = highest_slope(DIAGONALS, vec2f(at.x - at.y, diagonal_speed), x, max_crossings, start.z, slope);
         }
     }
     if COUNTING {

@@ -6,7 +6,8 @@ use super::scan::FACING_MARGIN;
 use crate::geometry::{Facets, HeightGrid};
 use crate::math::simd::multiversion;
 
-/// Computes the horizons of a height field. Its cells are split along the diagonal from (i, j) to (i+1, j+1).
+/// Computes the horizons of a height field. Its cells are split along their lower diagonals. These are valleys, so that no
+/// horizon lies on them.
 #[derive(Debug)]
 pub(crate) struct HeightMarch {
     /// Heights row by row. The first column and the first row are repeated at the end.
@@ -40,8 +41,6 @@ enum Edges {
     Columns,
     /// Edges on y = k, between columns.
     Rows,
-    /// Edges on x - y = k.
-    Diagonals,
 }
 
 /// A walk over one family of edges. Coordinates are in samples.
@@ -98,15 +97,6 @@ impl HeightMarch {
         if !is_along_x {
             slope = self.cross(Edges::Rows, Walk { across: y, along: x, max_edges }, from.z, slope);
         }
-        let diagonal_speed = speed.x - speed.y;
-        if diagonal_speed.abs() >= 1e-6 * self.samples_from_tile.max_element() {
-            slope = self.cross(
-                Edges::Diagonals,
-                Walk { across: [at.x - at.y, diagonal_speed], along: x, max_edges },
-                from.z,
-                slope,
-            );
-        }
         slope
     }
 
@@ -129,7 +119,6 @@ impl HeightMarch {
         let next = match edges {
             Edges::Columns => stride,
             Edges::Rows => 1,
-            Edges::Diagonals => stride + 1,
         };
         for k in (0..walk.max_edges).step_by(WIDTH) {
             let near = start + step * k as f32;
@@ -146,7 +135,6 @@ impl HeightMarch {
                 let (column, row) = match edges {
                     Edges::Columns => (line, low),
                     Edges::Rows => (low, line),
-                    Edges::Diagonals => (low, low - line),
                 };
                 indices[l] = wrapped(row, rows) * stride as u32 + wrapped(column, columns);
                 fractions[l] = coordinate - low;

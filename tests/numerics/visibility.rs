@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 
 use biscale::brdf::{Brdf, Material, Term};
 use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Representation};
+use biscale::geometry::families::heightfield;
 use biscale::geometry::{
     FacetSampler, Facets, HeightGrid, PeriodicGrid, SampleShift, TileMesh, is_facet_visible, lifted_origins,
 };
@@ -28,16 +29,19 @@ fn mesh(size: Vec2, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> TileMesh 
     }
 }
 
-/// Returns a height field with its samples, whose cells are split along the diagonal from (i, j) to (i+1, j+1).
+/// Returns a height field with its samples, whose cells are split along their lower diagonals.
 fn height_field([w, h]: [u32; 2], height: impl Fn(f32, f32) -> f32) -> TileMesh {
     let at = |i: u32, j: u32| Vec2::new((i as f32 + 0.5) / w as f32, (j as f32 + 0.5) / h as f32);
     let heights: Vec<f32> = (0..w * h).map(|k| at(k % w, k / w)).map(|point| height(point.x, point.y)).collect();
-    let positions = (0..=h)
-        .flat_map(|j| (0..=w).map(move |i| (i, j)))
-        .map(|(i, j)| at(i, j).extend(heights[(j % h * w + i % w) as usize]))
-        .collect();
-    let cells = (0..h).flat_map(|j| (0..w).map(move |i| j * (w + 1) + i));
-    let triangles = cells.flat_map(|k| [[k, k + 1, k + w + 2], [k, k + w + 2, k + w + 1]]).collect();
+    let sample = |i: u32, j: u32| at(i, j).extend(heights[(j % h * w + i % w) as usize]);
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for (i, j) in (0..h).flat_map(|j| (0..w).map(move |i| (i, j))) {
+        let corners = [sample(i, j), sample(i + 1, j), sample(i + 1, j + 1), sample(i, j + 1)];
+        let turn = u32::from(corners[0].z + corners[2].z > corners[1].z + corners[3].z);
+        let corner = |k: u32| positions.len() as u32 + (k + turn) % 4;
+        triangles.extend([[corner(0), corner(1), corner(2)], [corner(0), corner(2), corner(3)]]);
+        positions.extend(corners);
+    }
     TileMesh {
         height_grid: Some(HeightGrid { size: UVec2::new(w, h), heights }),
         ..mesh(Vec2::ONE, positions, triangles)
@@ -50,6 +54,17 @@ fn dunes(n: u32) -> TileMesh {
             + 0.06 * (TAU * (3.0 * x - y) + 1.0).sin()
             + 0.02 * (TAU * (5.0 * y + 4.0 * x)).cos()
     })
+}
+
+/// Returns a height field of independent random heights. On 12 x 12 samples, the root mean square of the slopes between
+/// neighbours is 0.4.
+fn noise(samples: [u32; 2]) -> TileMesh {
+    let random = |x: f32, y: f32| {
+        let seed = ((x * 4096.0) as u32) << 16 | (y * 4096.0) as u32;
+        let bits = (seed ^ seed >> 15).wrapping_mul(0x2c1b_3c6d);
+        ((bits ^ bits >> 12).wrapping_mul(0x297a_2d39) >> 8) as f32 / (1 << 24) as f32
+    };
+    height_field(samples, |x, y| 0.0816 * random(x, y))
 }
 
 /// Returns a slab on a leg over a floor. The slab overhangs the floor and crosses the edge of the tile.
@@ -179,13 +194,18 @@ fn all_algorithms_agree_under_overhangs_up_to_85_degrees() {
 
 #[test]
 fn marching_over_the_samples_finds_the_horizons_of_the_sliced_mesh() {
-    let mesh = dunes(24);
-    let facets = sample(&mesh, 800);
+    for mesh in [dunes(24), noise([12, 12]), noise([9, 16])] {
+        check_march(&mesh);
+    }
+}
+
+fn check_march(mesh: &TileMesh) {
+    let facets = sample(mesh, 800);
     let heights = mesh.height_grid.as_ref().unwrap();
     // A wide transition turns differences of the horizon into differences of visibility.
     let transition_width = 0.04;
     let march = Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, AZIMUTHS, transition_width));
-    let scan = Visibility::HorizonMap(HorizonMap::scan(&PeriodicGrid::new(&mesh), &facets, AZIMUTHS, transition_width));
+    let scan = Visibility::HorizonMap(HorizonMap::scan(&PeriodicGrid::new(mesh), &facets, AZIMUTHS, transition_width));
     let directions = on_azimuths();
     let (march, scan) = (visibility_rows(&march, &directions), visibility_rows(&scan, &directions));
     let mut differ = 0;
@@ -336,6 +356,64 @@ fn the_direct_sum_is_reciprocal_to_the_last_bit() {
             for pair in mirror_biased_pairs(80, 11) {
                 assert_eq!(brdf.g(pair.i, pair.o), brdf.g(pair.o, pair.i), "{pair:?}");
             }
+        }
+    }
+}
+
+/// Returns the effective BRDF of a height field from one facet per triangle, so that facets do not depend on the
+/// orientation.
+fn effective_of_all_triangles(heights: &HeightGrid) -> EffectiveBrdf {
+    let mesh = heightfield::from_grid(heights.clone(), Vec2::ONE);
+    let mut facets = Facets::default();
+    for triangle in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(triangle);
+        let centre = (a + b + c) / 3.0;
+        facets.positions.push(Vec3::new(centre.x.rem_euclid(1.0), centre.y.rem_euclid(1.0), centre.z));
+        facets.normals.push(mesh.geometric_normal(triangle));
+        facets.geometric_normals.push(mesh.geometric_normal(triangle));
+        facets.areas.push(mesh.triangle_area(triangle) as f32);
+        facets.slots.push(0);
+        facets.colors.push(Vec3::ONE);
+        facets.triangles.push(triangle as u32);
+    }
+    facets.sort_for_sums();
+    let visibility = Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, AZIMUTHS, 0.02));
+    let brdf = Brdf { terms: vec![Term::CookTorrance { roughness: 0.3, f0: Vec3::ONE }] };
+    let sum = FacetSum::new(&facets, &[0], &[Material { brdf, color: Vec3::ONE }]);
+    let representation = Representation::Direct(Direct::new(Arc::new(sum), Arc::new(visibility)));
+    EffectiveBrdf { representation, base_area: f64::from(mesh.base_area()) }
+}
+
+#[test]
+fn turning_or_mirroring_a_height_image_turns_or_mirrors_the_result() {
+    for mesh in [noise([12, 12]), dunes(64)] {
+        let heights = mesh.height_grid.unwrap();
+        let side = heights.size.x;
+        // Returns the image whose sample (i, j) is the sample `from(i, j)` of the original.
+        let image = |from: &dyn Fn(u32, u32) -> [u32; 2]| {
+            let at = |k: u32| from(k % side, k / side);
+            let values = (0..side * side).map(at).map(|[i, j]| heights.heights[(j * side + i) as usize]).collect();
+            HeightGrid { size: heights.size, heights: values }
+        };
+        let original = effective_of_all_triangles(&heights);
+        let last = side - 1;
+        type Motion = (&'static str, fn(Vec3) -> Vec3);
+        let moved: [(Motion, HeightGrid); 3] = [
+            (("a quarter turn", |d| Vec3::new(-d.y, d.x, d.z)), image(&|i, j| [j, last - i])),
+            (("a mirror image", |d| Vec3::new(-d.x, d.y, d.z)), image(&|i, j| [last - i, j])),
+            (("the mirror image in the diagonal", |d| Vec3::new(d.y, d.x, d.z)), image(&|i, j| [j, i])),
+        ];
+        for ((name, motion), image) in moved {
+            let moved = effective_of_all_triangles(&image);
+            let (mut difference, mut norm) = (0.0, 0.0);
+            for pair in mirror_biased_pairs(200, 5) {
+                let (a, b) = (original.eval(pair.i, pair.o), moved.eval(motion(pair.i), motion(pair.o)));
+                difference += (a - b).length_squared();
+                norm += a.length_squared();
+            }
+            let relative = (difference / norm).sqrt();
+            eprintln!("{side} x {side} samples, {name}: {relative:.1e}");
+            assert!(relative < 1e-3, "{side} x {side} samples, {name}: {relative}");
         }
     }
 }
