@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::base::print_on_stderr;
 use crate::diagnostics::Health;
+use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::export;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use anyhow::Result;
@@ -34,6 +35,8 @@ struct Report<'a> {
     representation: String,
     /// Directional-hemispherical reflectances: theta and phi in degrees, then R, G, B.
     reflectance: Vec<[f32; 5]>,
+    /// Estimated error of the effective BRDF.
+    error: Option<ErrorEstimate>,
     health: &'a Health,
 }
 
@@ -95,6 +98,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             resampling_psnr_db: reading.errors.psnr_db,
             anisotropy_lost: report.anisotropy_lost,
             representation: outcome.brdf.representation.describe(),
+            error: outcome.errors().map(ErrorEstimator::estimate),
             health: &health,
             reflectance: report.reflectances.rows(),
         });

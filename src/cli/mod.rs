@@ -19,7 +19,7 @@ mod watch;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Cancel, check_output, print_on_stderr};
+use crate::base::{Cancel, Error, check_output, print_on_stderr};
 use crate::diagnostics::Health;
 use crate::pipeline::Outcome;
 use crate::scene;
@@ -109,7 +109,7 @@ impl SceneArgs {
     }
 
     /// The scene with settings that reach a target. The summary is printed even with `--quiet`, because it holds the
-    /// options that repeat the choice.
+    /// options that repeat the choice. If no settings reach the target, the error names the closest.
     fn choose(&self, loaded: &LoadedScene, target: Target) -> Result<LoadedScene> {
         let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         let chosen = choose(loaded, target, &Cancel::default(), |step| {
@@ -117,6 +117,9 @@ impl SceneArgs {
             bar.tick();
         })?;
         bar.finish_and_clear();
+        if !chosen.reaches_target {
+            return Err(Error::Failed(chosen.summary()).into());
+        }
         print_on_stderr(chosen.summary());
         Ok(chosen.scene)
     }

@@ -8,6 +8,7 @@ use super::watch::Watch;
 use super::{RenderArgs, cache, check_outputs, print_json};
 use crate::base::print_on_stderr;
 use crate::diagnostics::Health;
+use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::render::RenderScene;
 use crate::render::image::pixels::ImageFormat;
 use crate::render::image::tone_map::ToneMap;
@@ -25,6 +26,8 @@ struct Report<'a> {
     /// Representation of the effective BRDF that was read.
     reads: String,
     stages: serde_json::Map<String, serde_json::Value>,
+    /// Estimated error of the effective BRDF, without that of the representation that was read.
+    error: Option<ErrorEstimate>,
     health: &'a Health,
 }
 
@@ -77,6 +80,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             device: path.describe(),
             reads: shading_brdf.brdf.representation.describe(),
             stages,
+            error: outcome.errors().map(ErrorEstimator::estimate),
             health: outcome.health(),
         });
     }

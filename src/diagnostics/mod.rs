@@ -12,7 +12,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use crate::brdf::{Material, MaterialAssignment};
-use crate::effective::EffectiveBrdf;
+use crate::effective::{EffectiveBrdf, ErrorBound, ErrorEstimate};
 use crate::geometry::{Facets, TileMesh};
 use crate::metrics::Errors;
 use crate::visibility::{PackedVisibility, Visibility};
@@ -147,11 +147,23 @@ pub struct Limits {
     pub max_rank: usize,
     /// Largest relative L2 between factors and the direct sum.
     pub tolerance: f64,
+    /// Name of the preset.
+    pub preset: &'static str,
+    /// The error that the preset allows.
+    pub error: Option<ErrorBound>,
 }
 
 impl Health {
     /// Measures the health of a result.
-    pub fn of(brdf: &EffectiveBrdf, inputs: &HealthInputs, factored: Option<Errors>, limits: Limits) -> Self {
+    ///
+    /// `estimate` is the estimated error of the result, if it is close to what the preset allows.
+    pub fn of(
+        brdf: &EffectiveBrdf,
+        inputs: &HealthInputs,
+        factored: Option<Errors>,
+        estimate: Option<ErrorEstimate>,
+        limits: Limits,
+    ) -> Self {
         let (measured, materials) =
             measure::materials(&inputs.materials.materials, &inputs.names, inputs.max_color_weight);
         let lobe = materials.iter().filter_map(|material| material.narrowest_lobe_deg).reduce(f32::min);
@@ -165,6 +177,7 @@ impl Health {
             materials,
         };
         health.warnings = warnings::of(&health, limits, conserving);
+        health.warnings.extend(estimate.and_then(|estimate| warnings::of_error(&estimate, limits)));
         health
     }
 

@@ -1,6 +1,7 @@
 //! Warnings about a result, each with a remedy, and their thresholds with the reasons.
 
 use super::{Health, Limits};
+use crate::effective::ErrorEstimate;
 
 /// Largest part of invalid samples of a measured file. Below it, only single bins are interpolated. The files of the
 /// MERL database mark no samples as missing; other programs mark the bins below the horizon, which are 20 %.
@@ -38,6 +39,28 @@ pub fn of(health: &Health, limits: Limits, conserving: bool) -> Vec<String> {
     surface(health, &mut warnings);
     result(health, limits, conserving, &mut warnings);
     warnings
+}
+
+/// A warning if the estimated error exceeds what the preset allows.
+pub fn of_error(estimate: &ErrorEstimate, limits: Limits) -> Option<String> {
+    let bound = limits.error.filter(|bound| estimate.exceeds(*bound))?;
+    let decibels = |psnr: Option<f64>| psnr.map_or_else(String::new, |psnr| format!(", {psnr:.1} dB"));
+    let ErrorEstimate { facets, visibility, table, .. } = *estimate;
+    let remedy = if table > facets.max(visibility) {
+        "set quality.method to auto or direct"
+    } else if facets > visibility {
+        "raise quality.max_facets, use a finer preset, or raise roughness"
+    } else {
+        "use a finer preset, or make the tile shallower"
+    };
+    Some(format!(
+        "the error is estimated at {}{}, and `{}` allows {}{}: {remedy}",
+        percent(estimate.rel_l2),
+        decibels(estimate.psnr_db),
+        limits.preset,
+        percent(bound.rel_l2),
+        decibels(bound.psnr_db)
+    ))
 }
 
 fn percent(part: f64) -> String {

@@ -12,14 +12,36 @@ use super::{Direct, FacetSum};
 use crate::brdf::Material;
 use crate::geometry::{Facets, REPLICATES};
 use crate::metrics::{Pair, mirror_biased_pairs};
-use crate::visibility::Visibility;
+use crate::visibility::Resolution;
 
 /// Number of direction pairs that an estimate for a whole BRDF examines.
-const PAIRS: usize = 96;
+const PAIRS: usize = 200;
+/// Number of direction pairs of a quick estimate.
+const QUICK_PAIRS: usize = 16;
 /// Seed of these pairs.
 const PAIRS_SEED: u64 = 20_261_123;
+/// Factor within which an estimate is taken to be right. Estimates from six replicates and 200 pairs of tiles whose error
+/// is near a bound are within it in two of three cases (`cargo bench --bench measure -- errors`).
+const UNCERTAINTY: f64 = 1.25;
+/// Resolutions that show the error of visibility: a half and a quarter of the azimuths, and a soft step of twice the
+/// width.
+const HALF: Resolution = Resolution { azimuth_step: 2, softness: 1.0 };
+const QUARTER: Resolution = Resolution { azimuth_step: 4, softness: 1.0 };
+const SOFTER: Resolution = Resolution { azimuth_step: 1, softness: 2.0 };
+/// Both at once, for a quick estimate.
+const COARSE: Resolution = Resolution { azimuth_step: 2, softness: 2.0 };
+
+/// The error that a preset allows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorBound {
+    /// Largest relative L2.
+    pub rel_l2: f64,
+    /// Smallest PSNR [dB].
+    pub psnr_db: Option<f64>,
+}
+
 /// Estimated error of an effective BRDF over the pairs that `biscale report` draws from.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ErrorEstimate {
     /// Relative L2 of all errors.
     pub rel_l2: f64,
@@ -31,6 +53,42 @@ pub struct ErrorEstimate {
     pub visibility: f64,
     /// Relative L2 of the low-rank factors against the direct sum.
     pub table: f64,
+    /// The part of `visibility` that is due to the number of azimuths.
+    #[serde(skip)]
+    pub azimuths: f64,
+    /// The part of `visibility` that is due to the width of the soft step.
+    #[serde(skip)]
+    pub soft_step: f64,
+    /// The variance of the facets falls with their number to this power.
+    #[serde(skip)]
+    pub facets_power: f64,
+}
+
+impl ErrorEstimate {
+    /// The estimate in words, such as `0.8 %, 54.1 dB`.
+    pub fn describe(&self) -> String {
+        let psnr = self.psnr_db.map_or_else(String::new, |psnr| format!(", {psnr:.1} dB"));
+        let percent = 100.0 * self.rel_l2;
+        if percent < 0.1 { format!("{percent:.3} %{psnr}") } else { format!("{percent:.1} %{psnr}") }
+    }
+
+    fn of_table(table: f64) -> Self {
+        Self { rel_l2: table, table, facets_power: 1.0, ..Self::default() }
+    }
+
+    /// Returns true if the error exceeds a bound by more than the uncertainty of the estimate.
+    pub fn exceeds(&self, bound: ErrorBound) -> bool {
+        self.excess(bound) > UNCERTAINTY
+    }
+
+    /// The error as a multiple of a bound.
+    pub fn excess(&self, bound: ErrorBound) -> f64 {
+        let psnr = match (self.psnr_db, bound.psnr_db) {
+            (Some(psnr), Some(bound)) => 10.0_f64.powf((bound - psnr) / 20.0),
+            _ => 0.0,
+        };
+        psnr.max(self.rel_l2 / bound.rel_l2)
+    }
 }
 
 /// Estimates errors of one direct sum.
@@ -39,10 +97,6 @@ pub struct ErrorEstimator {
     direct: Direct,
     /// Facets and sum of each replicate. Empty if the facets represent the surface exactly.
     replicates: Vec<(Vec<usize>, FacetSum)>,
-    /// Visibility from a half and from a quarter of the azimuths.
-    coarse: [Option<Visibility>; 2],
-    /// Visibility with a soft step of twice the width.
-    softer: Option<Visibility>,
     /// Ratio of the error of interpolation between azimuths to its difference from that of half of the azimuths.
     azimuth_ratio: f64,
     /// Variance of `f̄` relative to that of the spread of the replicates. Systematic samples converge faster than
@@ -78,6 +132,83 @@ impl Deviations {
     }
 }
 
+/// `f̄` of `direct` with visibility of a lower resolution, for directions above the horizon.
+fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: Pair) -> DVec3 {
+    let count = direct.sum.facet_count();
+    let (mut v_i, mut v_o) = (vec![0.0; count], vec![0.0; count]);
+    direct.visibility.fill_at(resolution, i, &mut v_i);
+    direct.visibility.fill_at(resolution, o, &mut v_o);
+    let area = direct.sum.projected_area(&v_o, o);
+    if area > 0.0 { direct.sum.sum(i, o, &v_i, &v_o) / area } else { DVec3::ZERO }
+}
+
+/// Sums of squares over the pairs of an estimate, and the largest value.
+struct Totals {
+    /// Sum of `|f̄|²`.
+    norm: f64,
+    /// Largest value of `f̄`.
+    peak: f64,
+    /// Number of values: three per pair.
+    values: usize,
+}
+
+impl Totals {
+    fn of(f_bars: impl Iterator<Item = DVec3>) -> Self {
+        let mut totals = Self { norm: 0.0, peak: 0.0, values: 0 };
+        for f_bar in f_bars {
+            totals.norm += f_bar.length_squared();
+            totals.peak = totals.peak.max(f_bar.max_element());
+            totals.values += 3;
+        }
+        totals
+    }
+
+    /// The PSNR of a relative L2 [dB].
+    fn psnr_db(&self, rel_l2: f64) -> Option<f64> {
+        let rms = rel_l2 * (self.norm / self.values as f64).sqrt();
+        (rms > 0.0).then(|| 20.0 * (self.peak / rms).log10())
+    }
+}
+
+/// Estimates `rel_l2` and `psnr_db` of a direct sum from few pairs, in a small part of the time of an edit. The parts are
+/// left out, and the estimate tends to be too large: facets count as random samples, and convergence as of first order.
+pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate {
+    let exact_facets = facets.replicates.is_empty();
+    let has_coarse = direct.visibility.has_azimuth_step(COARSE.azimuth_step);
+    let mut estimate = ErrorEstimate::of_table(0.0);
+    if exact_facets && !has_coarse {
+        return estimate;
+    }
+    let sum = &direct.sum;
+    let deviations = |pair: &Pair| {
+        let Pair { i, o } = *pair;
+        let (area, reflected, difference) = direct.with_visibility(i, o, |v_i, v_o| {
+            let (area, reflected) = (sum.projected_area(v_o, o), sum.sum(i, o, v_i, v_o));
+            if exact_facets || area <= 0.0 {
+                return (area, reflected, DVec3::ZERO);
+            }
+            // Of two halves of the sample, the squared difference has the expectation of the variance of their sum.
+            let half: Vec<f32> =
+                v_o.iter().zip(&facets.replicates).map(|(v, replicate)| v * f32::from(replicate % 2)).collect();
+            let (half_area, half) = (sum.projected_area(&half, o), sum.sum(i, o, v_i, &half));
+            (area, reflected, 2.0 * half - reflected - reflected / area * (2.0 * half_area - area))
+        });
+        if area <= 0.0 {
+            return (DVec3::ZERO, 0.0);
+        }
+        let f_bar = reflected / area;
+        let coarse = if has_coarse { f_bar_at(direct, COARSE, *pair) - f_bar } else { DVec3::ZERO };
+        (f_bar, (difference / area).length_squared() + coarse.length_squared())
+    };
+    let all: Vec<(DVec3, f64)> = mirror_biased_pairs(QUICK_PAIRS, PAIRS_SEED).par_iter().map(deviations).collect();
+    let totals = Totals::of(all.iter().map(|at| at.0));
+    if totals.norm > 0.0 {
+        estimate.rel_l2 = (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
+        estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
+    }
+    estimate
+}
+
 impl ErrorEstimator {
     /// Examines a direct sum over `facets`. `table` is the relative L2 of factors that stand for the sum, or 0.
     pub fn new(
@@ -94,18 +225,9 @@ impl ErrorEstimator {
             (indices, sum)
         };
         let replicates = if facets.replicates.is_empty() { Vec::new() } else { (0..REPLICATES).map(sum_of).collect() };
-        let estimate = ErrorEstimate { rel_l2: table, psnr_db: None, facets: 0.0, visibility: 0.0, table };
-        let half = direct.visibility.every_second_azimuth();
-        let quarter = half.as_ref().and_then(Visibility::every_second_azimuth);
-        let mut estimator = Self {
-            direct: direct.clone(),
-            replicates,
-            coarse: [half, quarter],
-            softer: direct.visibility.twice_as_soft(),
-            azimuth_ratio: 1.0,
-            variance_ratio: 1.0,
-            estimate,
-        };
+        let estimate = ErrorEstimate::of_table(table);
+        let mut estimator =
+            Self { direct: direct.clone(), replicates, azimuth_ratio: 1.0, variance_ratio: 1.0, estimate };
         estimator.examine(table);
         estimator
     }
@@ -119,51 +241,43 @@ impl ErrorEstimator {
     pub fn standard_errors(&self, pairs: &[Pair]) -> Vec<Vec3> {
         let of = |deviations: Deviations| {
             let facets = deviations.random_variance() * self.variance_ratio;
-            let visibility = self.visibility_error(&deviations);
+            let azimuths = deviations.coarse[0] * self.azimuth_ratio;
+            let visibility = azimuths * azimuths + deviations.softer * deviations.softer;
             let table = deviations.f_bar * self.estimate.table;
             (facets + visibility + table * table).map(f64::sqrt).as_vec3()
         };
         pairs.par_iter().map(|pair| of(self.deviations(*pair))).collect()
     }
 
-    /// Squared error of visibility.
-    fn visibility_error(&self, deviations: &Deviations) -> DVec3 {
-        let azimuths = deviations.coarse[0] * self.azimuth_ratio;
-        azimuths * azimuths + deviations.softer * deviations.softer
-    }
-
     fn examine(&mut self, table: f64) {
         let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
         let all: Vec<Deviations> = pairs.par_iter().map(|pair| self.deviations(*pair)).collect();
-        let norm: f64 = all.iter().map(|at| at.f_bar.length_squared()).sum();
-        let peak = all.iter().map(|at| at.f_bar.max_element()).fold(0.0, f64::max);
-        if norm <= 0.0 {
+        let totals = Totals::of(all.iter().map(|at| at.f_bar));
+        if totals.norm <= 0.0 {
             return;
         }
         let total = |of: &dyn Fn(&Deviations) -> f64| all.iter().map(of).sum::<f64>();
         let [six, three, two] = [6, 3, 2].map(|count| total(&|at| at.variance_of(count)));
         // Variance falls with the number of facets to this power: 1 for random samples, up to 3 for smooth integrands.
-        let power = if two > 0.0 { ((six / two).ln() / 3.0_f64.ln()).clamp(1.0, 3.0) } else { 1.0 };
-        let variance = (three * 3.0_f64.powf(-power) * two * 2.0_f64.powf(-power)).sqrt();
+        let facets_power = if two > 0.0 { ((six / two).ln() / 3.0_f64.ln()).clamp(1.0, 3.0) } else { 1.0 };
+        let variance = (three * 3.0_f64.powf(-facets_power) * two * 2.0_f64.powf(-facets_power)).sqrt();
         let random = total(&|at| at.random_variance().element_sum());
         self.variance_ratio = if random > 0.0 { variance / random } else { 0.0 };
         let [half, quarter] = [0, 1].map(|k| total(&|at| at.coarse[k].length_squared()).sqrt());
         // Second order for smooth horizons, and first order where horizons jump.
         let order = if half > 0.0 && quarter > 0.0 { (quarter / half).log2().clamp(1.0, 2.0) } else { 1.0 };
         self.azimuth_ratio = 1.0 / (2.0_f64.powf(order) - 1.0);
-        let visibility = total(&|at| self.visibility_error(at).element_sum());
-        let rel_l2 = ((variance + visibility) / norm + table * table).sqrt();
-        let rms = rel_l2 * (norm / (3 * PAIRS) as f64).sqrt();
-        self.estimate = ErrorEstimate {
-            rel_l2,
-            psnr_db: (rms > 0.0).then(|| 20.0 * (peak / rms).log10()),
-            facets: (variance / norm).sqrt(),
-            visibility: (visibility / norm).sqrt(),
-            table,
-        };
+        let relative = |squares: f64| (squares / totals.norm).sqrt();
+        let azimuths = self.azimuth_ratio * relative(half * half);
+        let soft_step = relative(total(&|at| at.softer.length_squared()));
+        let (facets, visibility) = (relative(variance), azimuths.hypot(soft_step));
+        let rel_l2 = facets.hypot(visibility).hypot(table);
+        let psnr_db = totals.psnr_db(rel_l2);
+        self.estimate = ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, azimuths, soft_step, facets_power };
     }
 
-    fn deviations(&self, Pair { i, o }: Pair) -> Deviations {
+    fn deviations(&self, pair: Pair) -> Deviations {
+        let Pair { i, o } = pair;
         let mut deviations = Deviations::default();
         if i.z <= 0.0 || o.z <= 0.0 {
             return deviations;
@@ -186,24 +300,16 @@ impl ErrorEstimator {
             return deviations;
         }
         deviations.f_bar = reflected / area;
-        let with = |visibility: &Visibility| {
-            let count = sum.facet_count();
-            let (mut v_i, mut v_o) = (vec![0.0; count], vec![0.0; count]);
-            visibility.fill(i, 0..count, &mut v_i);
-            visibility.fill(o, 0..count, &mut v_o);
-            let area = sum.projected_area(&v_o, o);
-            if area > 0.0 { sum.sum(i, o, &v_i, &v_o) / area } else { DVec3::ZERO }
-        };
         let mut finer = deviations.f_bar;
-        for (visibility, deviation) in self.coarse.iter().zip(&mut deviations.coarse) {
-            if let Some(visibility) = visibility {
-                let f_bar = with(visibility);
+        for (resolution, deviation) in [HALF, QUARTER].into_iter().zip(&mut deviations.coarse) {
+            if self.direct.visibility.has_azimuth_step(resolution.azimuth_step) {
+                let f_bar = f_bar_at(&self.direct, resolution, pair);
                 *deviation = f_bar - finer;
                 finer = f_bar;
             }
         }
-        if let Some(visibility) = &self.softer {
-            deviations.softer = with(visibility) - deviations.f_bar;
+        if self.direct.visibility.has_azimuth_step(SOFTER.azimuth_step) {
+            deviations.softer = f_bar_at(&self.direct, SOFTER, pair) - deviations.f_bar;
         }
         deviations
     }

@@ -12,7 +12,7 @@ use crate::visibility::Visibility;
 /// Facets, their lobes, and the input of their visibility.
 #[derive(Debug)]
 pub struct GpuTileInput {
-    pub sum: FacetSum,
+    pub sum: Arc<FacetSum>,
     pub visibility_input: GpuVisibilityInput,
     /// Base area `A` of the tile.
     pub base_area: f64,

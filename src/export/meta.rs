@@ -36,6 +36,12 @@ impl ExportMeta {
     /// Describes the outcome of a scene. `closes_plane` is true if its tile has no holes.
     pub fn of(loaded: &LoadedScene, outcome: &Outcome, closes_plane: bool) -> Self {
         let tile = &loaded.scene.tile;
+        let stated = outcome.errors().map(|errors| {
+            format!(
+                "estimated error of f (relative L2, PSNR), without that of the table: {}",
+                errors.estimate().describe()
+            )
+        });
         Self {
             scene: loaded.name.clone(),
             quality: format!("{}; {}", outcome.settings.preset.name(), outcome.brdf.representation.describe()),
@@ -44,7 +50,7 @@ impl ExportMeta {
             tile_unit: tile.unit.clone(),
             closes_plane,
             isotropic: !outcome.plan.is_on("anisotropy"),
-            notes: outcome.notes.clone(),
+            notes: outcome.notes.iter().cloned().chain(stated).collect(),
         }
     }
 

@@ -1,20 +1,22 @@
 //! The stages before visibility, and the plan.
 
+use std::sync::Arc;
+
 use super::features::Surface;
-use super::stages::{FindMirrorPlanes, SampleFacets, TileShape};
+use super::stages::{FacetsRole, FindMirrorPlanes, SampleFacets, TileShape};
 use super::{Keyed, Pipeline, StageTimes};
 use crate::base::Result;
 use crate::brdf::MaterialAssignment;
 use crate::effective::FacetSum;
 use crate::geometry::Facets;
-use crate::plan::{Costs, Plan, Settings};
+use crate::plan::{Costs, Plan, Refinement, Settings};
 use crate::scene::{LoadedScene, Switch};
 
 /// The processor that computes visibility and product.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Processor {
     /// The plan compares the costs of the CPU's algorithms.
-    Cpu,
+    Cpu(Refinement),
     /// The GPU. `max_facets` limits the facets of a clustered sum; `None` keeps the setting.
     Gpu { max_facets: Option<usize> },
 }
@@ -27,8 +29,10 @@ pub(super) struct TileInputs {
     pub facets: Keyed<Facets>,
     /// The material of each slot as the sum uses them.
     pub material_of_slot: Vec<usize>,
-    pub sum: FacetSum,
+    pub sum: Arc<FacetSum>,
     pub plan: Plan,
+    /// True if `settings` are finer than those of the scene.
+    pub refined: bool,
 }
 
 impl Pipeline {
@@ -42,12 +46,19 @@ impl Pipeline {
         let scene = &loaded.scene;
         let tile = self.tile(loaded, times)?;
         let mut settings = Settings::of(scene).for_shape(tile.height_field);
-        if let Processor::Gpu { max_facets: Some(most) } = processor {
-            settings.facets = settings.facets.min(most);
-        }
+        let role = match processor {
+            Processor::Cpu(Refinement::NONE) | Processor::Gpu { max_facets: None } => FacetsRole::Main,
+            Processor::Cpu(refinement) => {
+                settings = refinement.apply(&settings);
+                FacetsRole::Refined
+            }
+            Processor::Gpu { max_facets: Some(most) } => {
+                settings.facets = settings.facets.min(most);
+                FacetsRole::Clusters
+            }
+        };
         let materials = self.assignment(loaded, &tile, times)?;
-        let for_clusters = matches!(processor, Processor::Gpu { max_facets: Some(_) });
-        let facets = self.get(SampleFacets { tile: &tile, settings: &settings, for_clusters }, times)?;
+        let facets = self.get(SampleFacets { tile: &tile, settings: &settings, role }, times)?;
         let material_of_slot = grouped(&materials.material_of_slot, &facets, &settings);
         let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.materials);
         sum.force(&facets, &settings.effects);
@@ -60,10 +71,12 @@ impl Pipeline {
             materials: &materials.materials,
             settings: &settings,
             mirrors: self.mirrors_of_interreflection(&tile, &settings, times)?,
-            wants_scan_work: processor == Processor::Cpu,
+            wants_scan_work: matches!(processor, Processor::Cpu(_)),
         };
         let plan = Plan::new(&self.features(&surface)?, &settings, &Costs::default());
-        Ok(TileInputs { tile, settings, materials, facets, material_of_slot, sum, plan })
+        let sum = Arc::new(sum);
+        let refined = role == FacetsRole::Refined;
+        Ok(TileInputs { tile, settings, materials, facets, material_of_slot, sum, plan, refined })
     }
 
     /// The mirror planes of the tile, which are looked for only if interreflection would use them.

@@ -13,6 +13,7 @@ mod gpu_tile;
 mod inputs;
 mod low_rank;
 mod outcome;
+mod refine;
 mod shading;
 mod stage;
 mod stages;
@@ -30,6 +31,7 @@ use self::inputs::{Processor, TileInputs};
 use self::low_rank::FactorInputs;
 pub use self::outcome::Outcome;
 use self::outcome::limits;
+use self::refine::RefinedSum;
 pub use self::shading::ShadingBrdf;
 use self::shading::{LastShading, Shading, ShadingKeys};
 pub use self::stage::{Codec, Keyed, Stage, StageTimes};
@@ -42,10 +44,10 @@ use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
 use crate::cache::{Cache, Key, KeyBuilder};
 use crate::diagnostics::{Health, HealthInputs, VisibilityInput};
-use crate::effective::{Direct, EffectiveBrdf, Representation};
+use crate::effective::{EffectiveBrdf, Representation};
 use crate::geometry::{Facets, TileMesh};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
-use crate::plan::{Preset, Settings, VisibilityAlgorithm};
+use crate::plan::{Preset, Refinement, Settings, VisibilityAlgorithm};
 use crate::reference::Reference;
 use crate::scene::{LoadedScene, Scene, Switch};
 use crate::visibility::Visibility;
@@ -149,14 +151,14 @@ impl Pipeline {
 
     /// Visibility of the facets by the plan's algorithm. Without an algorithm, no stage runs.
     fn visibility(&self, inputs: &TileInputs, times: &mut StageTimes) -> Result<Keyed<Visibility>> {
-        let TileInputs { tile, facets, settings, plan, .. } = inputs;
+        let TileInputs { tile, facets, settings, plan, refined, .. } = inputs;
         if plan.algorithm == VisibilityAlgorithm::None {
             let mut key = KeyBuilder::of_stage("unblocked");
             key.key("facets", &facets.key);
             let value = Arc::new(Visibility::Unblocked { facets: facets.len() });
             return Ok(Keyed { key: key.finish(), value });
         }
-        self.get(ComputeVisibility { tile, facets, algorithm: plan.algorithm, settings }, times)
+        self.get(ComputeVisibility { tile, facets, algorithm: plan.algorithm, settings, refined: *refined }, times)
     }
 
     /// The key of all settings.
@@ -193,19 +195,22 @@ impl Pipeline {
     /// A file that the scene names cannot be used, a factorization fails, or [`crate::base::Error::Cancelled`].
     pub fn effective(&self, loaded: &LoadedScene) -> Result<Outcome> {
         let mut times = StageTimes::new();
-        let inputs = self.tile_inputs(loaded, Processor::Cpu, &mut times)?;
+        let inputs = self.tile_inputs(loaded, Processor::Cpu(Refinement::NONE), &mut times)?;
         if inputs.settings.preset == Preset::Wu2011 {
             return self.wu2011(&loaded.scene, inputs, times);
         }
         let visibility = self.visibility(&inputs, &mut times)?;
-        let keys = self.shading_keys(&inputs, &visibility);
-        let key = outcome_key(&keys, &inputs.materials.key);
+        let key = outcome_key(&self.shading_keys(&inputs, &visibility), &inputs.materials.key);
         if let Some((_, outcome)) = lock(&self.last_outcome).as_ref().filter(|(last, _)| *last == key) {
             return Ok(Outcome { times, ..outcome.clone() });
         }
         self.env.cancel.check()?;
+        let refined = self.refined_sum(loaded, inputs, visibility, &mut times)?;
+        let refinement_note = refined.note();
+        let RefinedSum { inputs, visibility, direct, estimator, .. } = refined;
+        let keys = self.shading_keys(&inputs, &visibility);
         let start = Instant::now();
-        let TileInputs { tile, settings, materials, facets, material_of_slot, sum, mut plan } = inputs;
+        let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
         let health_inputs = HealthInputs {
             facets: facets.value.clone(),
             visibility: VisibilityInput::Soft(visibility.value.clone()),
@@ -214,7 +219,6 @@ impl Pipeline {
             closes_plane: tile.mesh.closes_plane,
             max_color_weight: tile.mesh.color.max(),
         };
-        let direct = Direct::new(Arc::new(sum), visibility.value.clone());
         let examined_sum = Some((direct.clone(), material_of_slot.clone()));
         let base_area = f64::from(tile.mesh.base_area());
         let (mut brdf, factored) = if plan.try_low_rank {
@@ -258,12 +262,14 @@ impl Pipeline {
             settings,
             times,
             factored,
-            notes: notes(&tile.mesh, &facets),
+            notes: notes(&tile.mesh, &facets).into_iter().chain(refinement_note).collect(),
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),
             direct: examined_sum,
-            estimator: Arc::default(),
+            close_to_bound: estimator.is_some(),
+            // The error of the factors is not in this estimator.
+            estimator: Arc::new(estimator.filter(|_| !is_low_rank).map_or_else(OnceLock::new, OnceLock::from)),
         };
         *lock(&self.last_outcome) = Some((key, outcome.clone()));
         Ok(outcome)

@@ -31,6 +31,8 @@ pub struct Outcome {
     /// The direct sum and the materials of its slots, from which errors are estimated; absent with the paper's method.
     pub(super) direct: Option<(Direct, Vec<usize>)>,
     pub(super) estimator: Arc<OnceLock<ErrorEstimator>>,
+    /// The estimated error decided whether the result was refined.
+    pub(super) close_to_bound: bool,
 }
 
 impl Outcome {
@@ -68,13 +70,15 @@ impl Outcome {
     /// The health of the result. The first call measures it: some hundredths of a second at draft.
     pub fn health(&self) -> &Health {
         let limits = limits(&self.settings);
-        self.examined.get_or_init(|| Health::of(&self.brdf, &self.health_inputs, self.factored, limits))
+        let estimate = self.close_to_bound.then(|| self.errors()).flatten().map(ErrorEstimator::estimate);
+        self.examined.get_or_init(|| Health::of(&self.brdf, &self.health_inputs, self.factored, estimate, limits))
     }
 }
 
 /// The settings that the health report needs.
 pub(super) fn limits(settings: &Settings) -> Limits {
-    Limits { max_rank: settings.max_rank, tolerance: settings.tolerance }
+    let Settings { max_rank, tolerance, .. } = *settings;
+    Limits { max_rank, tolerance, preset: settings.preset.name(), error: settings.error_bound() }
 }
 
 impl Reflectance for Outcome {

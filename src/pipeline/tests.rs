@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::low_rank::FactorInputs;
-use super::stages::{BuildTile, ComputeVisibility, LoadMaterials, SampleFacets, TileShape};
+use super::stages::{BuildTile, ComputeVisibility, FacetsRole, LoadMaterials, SampleFacets, TileShape};
 use super::{Env, Keyed, Outcome, Pipeline, Stage};
 use crate::base::Cancel;
 use crate::brdf::{Brdf, Material, Measured, MeasuredReport, Term};
@@ -229,7 +229,7 @@ fn each_input_of_the_facets_changes_their_key() {
     let with = |tile: usize, change: &dyn Fn(&mut Settings)| {
         let mut changed = settings.clone();
         change(&mut changed);
-        key_of(&SampleFacets { tile: &tiles[tile], settings: &changed, for_clusters: false })
+        key_of(&SampleFacets { tile: &tiles[tile], settings: &changed, role: FacetsRole::Main })
     };
     let same = with(0, &|_| {});
     assert_eq!(same, with(0, &|settings| settings.penumbra = 0.5));
@@ -252,7 +252,13 @@ fn each_input_of_visibility_changes_its_key() {
     let with = |tile: usize, algorithm, change: &dyn Fn(&mut Settings)| {
         let mut changed = settings.clone();
         change(&mut changed);
-        key_of(&ComputeVisibility { tile: &tiles[tile], facets: &facets, algorithm, settings: &changed })
+        key_of(&ComputeVisibility {
+            tile: &tiles[tile],
+            facets: &facets,
+            algorithm,
+            settings: &changed,
+            refined: false,
+        })
     };
     let march = VisibilityAlgorithm::HeightMarch;
     let setting = |change: &dyn Fn(&mut Settings)| with(0, march, change);

@@ -64,6 +64,7 @@ impl Pipeline {
             shading: Arc::new(shading),
             direct: None,
             estimator: Arc::default(),
+            close_to_bound: false,
         })
     }
 }

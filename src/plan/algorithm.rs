@@ -20,8 +20,9 @@ pub enum VisibilityAlgorithm {
 }
 
 impl VisibilityAlgorithm {
-    /// The algorithm for a scene. Under overhangs it is the one with the lower predicted cost.
-    pub(super) fn choose(features: &SceneFeatures, settings: &Settings, costs: &Costs) -> Self {
+    /// The algorithm for a scene. Shadow maps on the CPU must be asked for: between their directions the error is large
+    /// where light passes small holes, and no estimate shows it.
+    pub(super) fn choose(features: &SceneFeatures, settings: &Settings) -> Self {
         if !is_on(settings.effects.visibility, !features.flat && !is_shallow(features, settings)) {
             return Self::None;
         }
@@ -31,13 +32,8 @@ impl VisibilityAlgorithm {
             VisibilityMethod::Maps => maps,
             VisibilityMethod::Auto if features.height_samples => Self::HeightMarch,
             VisibilityMethod::Auto if features.height_field => Self::HorizonScan,
-            VisibilityMethod::Auto
-                if scan_ms(features, settings, costs) <= maps_ms(features, settings, costs)
-                    && !features.hardware_gpu =>
-            {
-                Self::OcclusionIntervals
-            }
-            VisibilityMethod::Auto => maps,
+            VisibilityMethod::Auto if features.hardware_gpu => Self::GpuMaps,
+            VisibilityMethod::Auto => Self::OcclusionIntervals,
         }
     }
 }

@@ -39,7 +39,7 @@ impl<'a> Context<'a> {
             features,
             settings,
             costs,
-            algorithm: VisibilityAlgorithm::choose(features, settings, costs),
+            algorithm: VisibilityAlgorithm::choose(features, settings),
             try_low_rank: false,
             try_shading_table: false,
             interreflection: false,

@@ -7,6 +7,7 @@ mod algorithm;
 mod context;
 mod effects;
 mod features;
+mod refinement;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ use context::Context;
 pub use context::IMAGE_CHECK_PAIRS;
 pub use effects::{effect_names, switch_mut};
 pub use features::{Costs, SceneFeatures};
+pub use refinement::Refinement;
 pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};
 
 use crate::scene::Switch;

@@ -1,6 +1,6 @@
 //! Presets and settings: the accuracy of every computation, as typed values.
 
-use crate::effective::{BasisGrid, Interpolation, LowRankSettings};
+use crate::effective::{BasisGrid, ErrorBound, Interpolation, LowRankSettings};
 use crate::interreflection::InterreflectionSettings;
 use crate::math::directions::{HalfDifferenceGrid, HemispherePairGrid, PolarGrid};
 use crate::scene::{Effects, Quality, Scene};
@@ -39,7 +39,7 @@ pub enum Method {
 /// The way to compute visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VisibilityMethod {
-    /// A horizon map if nothing overhangs, else the algorithm with the lower predicted cost.
+    /// A horizon map if nothing overhangs, else occlusion intervals, or shadow maps on a hardware GPU.
     Auto,
     /// Occlusion intervals, from slices through the mesh along azimuths.
     OcclusionIntervals,
@@ -103,6 +103,9 @@ pub struct Settings {
     pub reference_passes: usize,
     pub backend: Backend,
     pub seed: u64,
+    /// The most facets to which a result may be refined, to keep its error within [`Settings::error_bound`]. `None` if
+    /// the scene sets the resolution itself or forbids refinement.
+    pub max_refined_facets: Option<usize>,
     /// Effects that the user forces on or off.
     pub effects: Effects,
 }
@@ -174,6 +177,8 @@ impl Settings {
         if let Some([rings, azimuths]) = quality.grid {
             settings.grid = PolarGrid::new(rings, azimuths);
         }
+        let sets_resolution = quality.facets.is_some() || quality.azimuths.is_some() || quality.penumbra_deg.is_some();
+        settings.max_refined_facets = (quality.adaptive && !sets_resolution).then_some(quality.max_facets);
         if let Some(degrees) = quality.penumbra_deg {
             settings.penumbra = degrees.to_radians();
         }
@@ -219,6 +224,7 @@ impl Settings {
             reference_passes: 32,
             backend: Backend::Auto,
             seed: 1,
+            max_refined_facets: Some(131_072),
             effects: Effects::default(),
         };
         match preset {
@@ -268,6 +274,17 @@ impl Settings {
                 ..standard
             },
         }
+    }
+
+    /// The error that the preset allows; `None` for the reference and the paper's method.
+    pub fn error_bound(&self) -> Option<ErrorBound> {
+        let (rel_l2, psnr_db) = match self.preset {
+            Preset::Draft => (0.35, None),
+            Preset::Standard => (0.1, Some(35.0)),
+            Preset::Fine => (0.04, Some(43.0)),
+            Preset::Reference | Preset::Wu2011 => return None,
+        };
+        Some(ErrorBound { rel_l2, psnr_db })
     }
 
     /// The resolution of interreflection.

@@ -118,6 +118,7 @@ fn kind_and_range(shape: FieldShape, unit: &str) -> (String, String) {
         FieldShape::Integer { min, max } => ("integer", format!("{min} to {max} {unit}").trim_end().to_owned()),
         FieldShape::Color { max } => ("colour", range(0.0, max)),
         FieldShape::Vector { length, min, max } => return (format!("{length} numbers"), range(min, max)),
+        FieldShape::Bool => ("true or false", String::new()),
         FieldShape::Text => ("text", String::new()),
         FieldShape::Path => ("file", String::new()),
         FieldShape::Choice(names) => {

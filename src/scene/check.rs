@@ -147,6 +147,8 @@ fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<PathStep>) -> R
             }
             other => Err(Problem::new(path, show(other), format!("a list of {length} numbers"))),
         },
+        FieldShape::Bool if value.is_bool() => Ok(()),
+        FieldShape::Bool => Err(Problem::new(path, show(value), "true or false")),
         FieldShape::Text => check_text(value, "a text", path).map(drop),
         FieldShape::Path => match check_text(value, "a file name", path)? {
             "" => Err(Problem::new(path, "an empty text", "a file name")),
@@ -235,6 +237,7 @@ fn takes_type(shape: &FieldShape, value: &Value) -> bool {
         FieldShape::Number { .. } | FieldShape::Integer { .. } => {
             matches!(value, Value::Integer(_) | Value::Float(_))
         }
+        FieldShape::Bool => value.is_bool(),
         FieldShape::Text | FieldShape::Path | FieldShape::Choice(_) => value.is_str(),
         FieldShape::Table(_) | FieldShape::Tagged(_) => value.is_table(),
         FieldShape::List { .. } | FieldShape::Vector { .. } | FieldShape::Color { .. } => value.is_array(),

@@ -28,6 +28,10 @@ scene_table! {
         /// Number of facets that sample the surface.
         #[serde(skip_serializing_if = "Option::is_none")]
         facets: Option<usize> = None, FieldShape::Integer { min: 16, max: 4_000_000 }, "";
+        /// Refine until the estimated error is within the preset's bound, unless facets, azimuths or penumbra_deg are set.
+        adaptive: bool = true, FieldShape::Bool, "";
+        /// Largest number of facets to which a result is refined.
+        max_facets: usize = 131_072, FieldShape::Integer { min: 16, max: 4_000_000 }, "";
         /// Number of azimuths at which visibility is computed.
         #[serde(skip_serializing_if = "Option::is_none")]
         azimuths: Option<usize> = None, FieldShape::Integer { min: 4, max: 1024 }, "";

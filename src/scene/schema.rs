@@ -60,6 +60,7 @@ pub enum FieldShape {
         min: f64,
         max: f64,
     },
+    Bool,
     Text,
     /// A file, relative to the scene file, or `asset:name` for one that ships in the binary.
     Path,
@@ -111,6 +112,7 @@ macro_rules! numeric_defaults {
 numeric_defaults!(f32, u32, u64, usize);
 
 impl<T> DefaultNumber for Option<T> {}
+impl DefaultNumber for bool {}
 impl DefaultNumber for String {}
 impl DefaultNumber for glam::Vec2 {}
 impl DefaultNumber for glam::Vec3 {}

@@ -398,6 +398,7 @@ pub(crate) fn value_of(shape: FieldShape) -> BoxedStrategy<Value> {
         FieldShape::Choice(names) => {
             proptest::sample::select(names).prop_map(|name| Value::String(name.to_owned())).boxed()
         }
+        FieldShape::Bool => any::<bool>().prop_map(Value::Boolean).boxed(),
         FieldShape::Text | FieldShape::Path => "[a-z ./\\\\\"é]{1,9}".prop_map(Value::String).boxed(),
         FieldShape::AnyOf(shapes) => value_of(shapes[0]),
         FieldShape::Table(fields) => table_of(fields()).prop_map(Value::Table).boxed(),

@@ -1,14 +1,14 @@
 //! Settings that reach a target in dB or milliseconds.
 //!
-//! Errors of different tiles with the same settings differ by 20 dB, so the scene is measured. Its quality levels are
-//! compared with a small reference, which takes seconds. No measurement is stored between runs. The choice for a PSNR
-//! uses no clock and is the same on every machine.
+//! Errors of different tiles with the same settings differ by 20 dB, so each result states its own error
+//! ([`crate::effective::ErrorEstimator`]). The stated errors lead to a quality level, and a small reference corrects it.
+//! Nothing is stored between runs. The choice for a PSNR uses no clock and is the same on every machine.
 
 use std::time::Instant;
 
 use super::candidates::{Candidate, with_settings};
-use super::quality_scale;
-use super::target_reference::{PAIRS_SEED, TargetReference};
+use super::quality_scale::{self, FINEST};
+use super::target_reference::TargetReference;
 use crate::base::{Cancel, Result};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::scene::LoadedScene;
@@ -36,17 +36,6 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Averages the errors with those on as many other pairs.
-    fn averaged_with(self, (psnr_db, psnr_std_error_db, rel_l2): (f64, f64, f64)) -> Self {
-        let power = |db: f64| 10_f64.powf(-0.1 * db);
-        Self {
-            psnr_db: -10.0 * (0.5 * (power(self.psnr_db) + power(psnr_db))).log10(),
-            psnr_std_error_db: 0.5 * self.psnr_std_error_db.hypot(psnr_std_error_db),
-            rel_l2: (0.5 * (self.rel_l2 * self.rel_l2 + rel_l2 * rel_l2)).sqrt(),
-            ..self
-        }
-    }
-
     /// PSNR that other pairs reach in two of three cases [dB].
     fn safe_db(&self) -> f64 {
         self.psnr_db - 0.5 * self.psnr_std_error_db
@@ -62,6 +51,8 @@ pub struct Chosen {
     pub candidate: Candidate,
     /// Measurement of the chosen settings.
     pub reached: Measurement,
+    /// False if no settings reach the target; these are then the closest.
+    pub reaches_target: bool,
     /// All measurements, in order.
     pub measurements: Vec<Measurement>,
 }
@@ -74,8 +65,7 @@ impl Chosen {
         let Measurement { ms, psnr_db, rel_l2, psnr_std_error_db, .. } = self.reached;
         match self.target {
             Target::Psnr(asked) => {
-                let missed =
-                    if psnr_db < asked { "; no finer quality level exists, see --quality reference" } else { "" };
+                let missed = if self.reaches_target { "" } else { "; no finer quality level exists" };
                 let reached = if psnr_db.is_finite() { format!("{psnr_db:.1} dB") } else { "no difference".to_owned() };
                 format!(
                     "asked {asked:.1} dB, got {reached} (± {psnr_std_error_db:.1} dB, {:.2} % relative L2) in {ms:.1} \
@@ -84,21 +74,24 @@ impl Chosen {
                 )
             }
             Target::Milliseconds(asked) => {
-                let missed = if ms > asked { "; no coarser quality level exists" } else { "" };
+                let missed = if self.reaches_target { "" } else { "; no coarser quality level exists" };
                 format!("asked {asked:.1} ms, got {ms:.1} ms{missed}: {options}")
             }
         }
     }
 }
 
-/// Quality level that estimates peak and mean square of a scene.
-const TYPICAL_LEVEL: f64 = 6.0;
-/// Smallest step between quality levels above [`UNEVEN_BELOW`], where errors fall evenly.
-const STEP: f64 = 0.125;
-/// Quality level up to which errors fall unevenly, so that all fine steps are scanned.
-const UNEVEN_BELOW: f64 = 7.0;
-/// Fine steps per quality level up to [`UNEVEN_BELOW`].
-const FINE_STEPS: u32 = 16;
+/// Quality level at which a search for a PSNR begins.
+const FIRST_LEVEL: f64 = 4.0;
+/// PSNR that a quality level more usually gains [dB]: the error falls with about the 0.75th power of the number of facets.
+const DB_PER_LEVEL: f64 = 4.5;
+/// Largest step between quality levels whose stated errors are compared. Larger steps would overshoot: on smooth tiles
+/// errors fall faster.
+const MAX_STEP: f64 = 3.0;
+/// Smallest step between quality levels.
+const STEP: f64 = 0.25;
+/// Largest number of quality levels that are compared with a reference.
+const MAX_CHECKS: usize = 6;
 
 /// Chooses settings for a target. `progress` receives a description of each step.
 ///
@@ -112,7 +105,11 @@ pub fn choose(loaded: &LoadedScene, target: Target, cancel: &Cancel, mut progres
     };
     let candidate = quality_scale::candidate_at(reached.level, search.overhangs);
     let scene = with_settings(loaded, &candidate)?;
-    Ok(Chosen { target, scene, candidate, reached, measurements: search.measurements })
+    let reaches_target = match target {
+        Target::Psnr(asked) => reached.psnr_db >= asked,
+        Target::Milliseconds(asked) => reached.ms <= asked,
+    };
+    Ok(Chosen { target, scene, candidate, reached, reaches_target, measurements: search.measurements })
 }
 
 struct Search<'a> {
@@ -154,53 +151,54 @@ impl<'a> Search<'a> {
         Ok((outcome, self.geometry_ms + times[times.len() / 2]))
     }
 
-    /// The coarsest quality level that reaches `db`, or the best one.
+    /// A quality level whose stated PSNR is about `db`, or the finest one, and the result there.
+    fn level_by_stated_error(&mut self, db: f64, progress: &mut impl FnMut(&str)) -> Result<(f64, Outcome)> {
+        let (mut level, mut low) = (FIRST_LEVEL, -MAX_STEP);
+        loop {
+            let outcome = self.build(level, 1)?.0;
+            let stated = outcome.errors().and_then(|errors| errors.estimate().psnr_db).unwrap_or(f64::INFINITY);
+            progress(&format!("{} facets: {stated:.1} dB stated", outcome.settings.facets));
+            let step = ((db - stated) / DB_PER_LEVEL).clamp(-MAX_STEP, FINEST);
+            // What no level is expected to reach is tried at the finest one at once.
+            let step = if level + step >= FINEST { FINEST - level } else { step.min(MAX_STEP) };
+            if step.abs() <= 2.0 * STEP || level + step <= low {
+                return Ok((level, outcome));
+            }
+            if step > 0.0 {
+                low = level;
+            }
+            level = (level + step).clamp(0.0, FINEST);
+        }
+    }
+
+    /// The coarsest quality level that was found to reach `db`, or the best one.
     fn cheapest_with_psnr(&mut self, db: f64, progress: &mut impl FnMut(&str)) -> Result<Measurement> {
-        let coarse = self.build(TYPICAL_LEVEL, 1)?.0;
-        let reference = TargetReference::new(&mut self.pipeline, self.loaded, &coarse, db, PAIRS_SEED, progress)?;
-        let measure = |search: &mut Self, level: f64, progress: &mut dyn FnMut(&str)| -> Result<Measurement> {
-            let (outcome, ms) = search.build(level, 1)?;
+        let (mut level, outcome) = self.level_by_stated_error(db, progress)?;
+        let stated = outcome.errors().and_then(|errors| errors.estimate().psnr_db).unwrap_or(db);
+        let reference = TargetReference::new(&self.pipeline, self.loaded, &outcome, db.min(stated), progress)?;
+        // Levels that are known to miss and to reach the target, and the best of those that miss.
+        let (mut misses, mut reaches, mut best) = (-STEP, None::<Measurement>, None::<Measurement>);
+        loop {
+            let (outcome, ms) = self.build(level, 1)?;
             let (psnr_db, psnr_std_error_db, rel_l2) = reference.errors(&outcome);
             let measured = Measurement { level, ms, psnr_db, rel_l2, psnr_std_error_db };
             progress(&format!("{} facets: {psnr_db:.1} dB", outcome.settings.facets));
-            search.measurements.push(measured);
-            Ok(measured)
-        };
-        let (mut level, mut best) = (0.0, measure(self, 0.0, progress)?);
-        while best.safe_db() < db && level < quality_scale::FINEST {
-            level = (level + 1.0).min(quality_scale::FINEST);
-            best = measure(self, level, progress)?;
-        }
-        if best.safe_db() < db {
-            // Errors need not fall with every level, so the best measurement is returned.
-            let better = self.measurements.iter().copied().max_by(|a, b| a.safe_db().total_cmp(&b.safe_db()));
-            return Ok(better.unwrap_or(best));
-        }
-        if best.level <= UNEVEN_BELOW && best.level > 0.0 {
-            // With few facets, errors vary from one number of facets to the next. All fine steps are scanned, coarse
-            // ones first. The first of many steps may pass by chance, so it must also pass on other pairs.
-            let other = TargetReference::new(&mut self.pipeline, self.loaded, &coarse, db, PAIRS_SEED + 1, progress)?;
-            let first = (best.level - 2.0).max(0.0);
-            for k in 1..=3 * FINE_STEPS {
-                let measured = measure(self, first + f64::from(k) / f64::from(FINE_STEPS), progress)?;
-                if measured.safe_db() < db {
-                    continue;
-                }
-                let both = measured.averaged_with(other.errors(&self.build(measured.level, 1)?.0));
-                if both.safe_db() >= db || k == 3 * FINE_STEPS {
-                    return Ok(both);
-                }
-            }
-        }
-        let mut step = 0.5;
-        while step >= STEP && best.level > 0.0 {
-            let measured = measure(self, best.level - step, progress)?;
+            self.measurements.push(measured);
+            // Levels are multiples of the smallest step, so that nearly equal ones are not tried.
+            let steps = ((db - measured.safe_db()) / (DB_PER_LEVEL * STEP)).clamp(-MAX_STEP / STEP, MAX_STEP / STEP);
+            let next = level + STEP * steps.ceil();
             if measured.safe_db() >= db {
-                best = measured;
+                reaches = Some(measured);
+            } else {
+                misses = f64::max(misses, level);
+                best = best.filter(|best| best.safe_db() > measured.safe_db()).or(Some(measured));
             }
-            step *= 0.5;
+            let (least, most) = (misses + STEP, reaches.map_or(FINEST, |measured| measured.level - STEP));
+            if least > most || next == level || self.measurements.len() >= MAX_CHECKS {
+                return Ok(reaches.or(best).unwrap_or(measured));
+            }
+            level = next.clamp(least, most);
         }
-        Ok(best)
     }
 
     /// The finest quality level that takes at most `ms`, or the coarsest one.
@@ -219,7 +217,7 @@ impl<'a> Search<'a> {
         let (mut low, mut high) = (measure(self, 0.0, progress)?, None::<Measurement>);
         let (mut level, mut restarted) = (5.0_f64, false);
         for _ in 0..MAX_TRIES {
-            if low.ms > ms || quality_scale::FINEST - low.level < STEP {
+            if low.ms > ms || FINEST - low.level < 0.5 * STEP {
                 break;
             }
             let measured = measure(self, level, progress)?;
@@ -242,11 +240,11 @@ impl<'a> Search<'a> {
                 // Other load on the machine made the times inconsistent. The search restarts at the lower level.
                 Some(_) if !restarted && low.ms < 0.8 * ms => {
                     (restarted, high) = (true, None);
-                    (low.level + 0.3).min(quality_scale::FINEST)
+                    (low.level + 0.3).min(FINEST)
                 }
                 Some(_) => break,
                 // A step takes at least a quarter more work and at most eight times as much.
-                None => (low.level + (aim / low.ms).log2().clamp(0.3, 3.0)).min(quality_scale::FINEST),
+                None => (low.level + (aim / low.ms).log2().clamp(0.3, 3.0)).min(FINEST),
             };
         }
         Ok(low)
@@ -270,8 +268,9 @@ mod tests {
         let first = chosen(Target::Psnr(38.0));
         let again = chosen(Target::Psnr(38.0));
         assert_eq!(first.candidate, again.candidate);
-        assert!(first.reached.psnr_db >= 38.0 && first.reached.psnr_db < 45.0, "{:?}", first.reached);
+        assert!(first.reaches_target && first.reached.psnr_db < 45.0, "{:?}", first.reached);
         assert!(first.summary().contains("asked 38.0 dB, got ") && first.summary().contains("--set quality.facets="));
+        assert!(first.measurements.len() <= MAX_CHECKS);
         let higher = chosen(Target::Psnr(50.0));
         assert!(higher.reached.level > first.reached.level);
     }
@@ -280,7 +279,16 @@ mod tests {
     fn a_budget_that_no_level_meets_takes_the_coarsest_level_and_the_summary_says_so() {
         let coarsest = chosen(Target::Milliseconds(1e-6));
         assert_eq!(coarsest.reached.level, 0.0);
+        assert!(!coarsest.reaches_target);
         assert!(coarsest.summary().contains("no coarser quality level"), "{}", coarsest.summary());
+    }
+
+    #[test]
+    fn a_psnr_that_nothing_reaches_is_tried_at_few_levels_and_the_best_is_named() {
+        let best = chosen(Target::Psnr(900.0));
+        assert!(!best.reaches_target && best.reached.level == FINEST, "{:?}", best.measurements);
+        assert_eq!(best.measurements.len(), 1);
+        assert!(best.summary().contains("; no finer quality level exists: --quality fine"), "{}", best.summary());
     }
 
     #[test]

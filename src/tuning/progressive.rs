@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::base::Result;
-use crate::effective::EffectiveBrdf;
+use crate::effective::{EffectiveBrdf, ErrorEstimate};
 use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::pipeline::Pipeline;
 use crate::reference::ReferenceSettings;
@@ -30,6 +30,26 @@ pub struct ReferenceErrors {
     /// Relative L2 of the standard errors of the reference.
     pub std_error: f64,
     pub batches: usize,
+}
+
+impl ReferenceErrors {
+    /// Errors that a result states without a reference. Their error bars are those of an estimate that is off by a factor of
+    /// up to two.
+    pub fn stated(estimate: &ErrorEstimate) -> Self {
+        Self {
+            rel_l2: estimate.rel_l2,
+            rel_l2_std_error: 0.5 * estimate.rel_l2,
+            psnr_db: estimate.psnr_db.unwrap_or(f64::INFINITY),
+            psnr_std_error_db: 3.0,
+            std_error: 0.0,
+            batches: 0,
+        }
+    }
+
+    /// Returns true if no reference was used.
+    pub fn is_stated(&self) -> bool {
+        self.batches == 0
+    }
 }
 
 /// Facets per pass.

@@ -1,4 +1,4 @@
-//! A small reference, which measures within seconds whether settings reach a target.
+//! A small reference, which measures within a second whether settings reach a target.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -10,14 +10,18 @@ use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
 
 /// Number of direction pairs.
-const PAIRS: usize = 512;
+const PAIRS: usize = 64;
 /// Seed of the pairs, which `biscale report` uses as well.
-pub const PAIRS_SEED: u64 = 20_110_801;
-const REFERENCE_FACETS: usize = 2048;
+const PAIRS_SEED: u64 = 20_110_801;
+const REFERENCE_FACETS: usize = 1024;
+/// Enough passes for a standard error of some 60 dB on ordinary tiles.
 const MAX_PASSES: usize = 128;
 const MIN_PASSES: usize = 4;
-/// Margin by which the PSNR of the reference exceeds the target [dB].
-const REFERENCE_LEAD_DB: f64 = 8.0;
+/// Margin by which the PSNR of the reference exceeds the target [dB]. The error of the reference is subtracted in squares.
+const REFERENCE_LEAD_DB: f64 = 5.0;
+/// Largest factor between the stated errors of all pairs and of the pairs of the reference that is applied to a measured
+/// error.
+const MAX_CORRECTION: f64 = 2.0;
 
 /// Reference values of a scene at a few hundred pairs, with their standard error.
 #[derive(Debug, Clone)]
@@ -37,14 +41,13 @@ impl TargetReference {
     /// # Errors
     /// Returns the errors of [`Pipeline::effective`].
     pub fn new(
-        pipeline: &mut Pipeline,
+        pipeline: &Pipeline,
         loaded: &LoadedScene,
         outcome: &Outcome,
         db: f64,
-        pairs_seed: u64,
         progress: &mut impl FnMut(&str),
     ) -> Result<Self> {
-        let pairs = mirror_biased_pairs(PAIRS, pairs_seed);
+        let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
         let settings =
             ReferenceSettings { facets: REFERENCE_FACETS, max_passes: MAX_PASSES, target: 1e-5, seed: 20_110_807 };
         let mut std_error = 0.0;
@@ -61,7 +64,8 @@ impl TargetReference {
         Ok(Self { pairs, f_bar: estimates.iter().map(|estimate| estimate.f_bar).collect(), std_error, peak_db })
     }
 
-    /// Errors of an outcome without the error of the reference: PSNR [dB], its standard error [dB], relative L2.
+    /// Errors of an outcome without the error of the reference: PSNR [dB], its standard error [dB], relative L2. Stated errors
+    /// correct for the choice of the pairs, because few of them may lack those with the largest errors.
     pub fn errors(&self, outcome: &Outcome) -> (f64, f64, f64) {
         let values: Vec<Vec3> = self.pairs.par_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect();
         let errors = compare(&values, &self.f_bar);
@@ -71,10 +75,20 @@ impl TargetReference {
         // The reference does not resolve errors below a third of its standard error.
         let smallest = (self.std_error / 3.0).powi(2);
         let rel_l2 = (errors.rel_l2.powi(2) - self.std_error.powi(2)).max(smallest).sqrt().min(errors.rel_l2);
+        let rel_l2 = rel_l2 * self.correction(outcome);
         // Upper errors lie two standard errors of the mean square above the errors.
         let upper = upper_errors(&values, &self.f_bar).rel_l2 / errors.rel_l2;
         let psnr_std_error_db = 10.0 * (0.5 * (1.0 + upper * upper)).log10();
         (self.peak_db - 20.0 * rel_l2.max(1e-12).log10(), psnr_std_error_db, rel_l2)
+    }
+
+    /// The stated error of all pairs relative to that of the pairs of the reference.
+    fn correction(&self, outcome: &Outcome) -> f64 {
+        let Some(estimator) = outcome.errors() else { return 1.0 };
+        let squares = |values: &[Vec3]| values.iter().map(|value| value.as_dvec3().length_squared()).sum::<f64>();
+        let here = (squares(&estimator.standard_errors(&self.pairs)) / squares(&self.f_bar)).sqrt();
+        let ratio = estimator.estimate().rel_l2 / here;
+        if ratio.is_finite() { ratio.clamp(1.0 / MAX_CORRECTION, MAX_CORRECTION) } else { 1.0 }
     }
 }
 

@@ -6,9 +6,11 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::Resolution;
 use super::height_march::{HeightMarch, march_all};
 use super::scan::scan_all;
 use super::slicer::Slicer;
+use crate::base::Cancel;
 use crate::geometry::{Facets, HeightGrid};
 use crate::geometry::{PeriodicGrid, lifted_origins};
 use crate::math::directions::from_angles;
@@ -26,7 +28,7 @@ use crate::math::simd::HorizonTaps;
 pub struct HorizonMap {
     pub(super) azimuths: usize,
     pub(super) facets: usize,
-    pub(super) transition_width: f32,
+    pub(crate) transition_width: f32,
     /// Slopes by `[azimuth][facet]`: [`HorizonMap::FREE`] if nothing blocks, [`HorizonMap::BLOCKED`] if all is blocked.
     pub(super) slopes: Vec<f32>,
     /// Number of truncated walks.
@@ -94,9 +96,24 @@ impl HorizonMap {
         azimuths: usize,
         transition_width: f32,
     ) -> Self {
+        Self::cancellable_march(heights, tile_size, facets, azimuths, transition_width, &Cancel::default())
+    }
+
+    /// As [`HorizonMap::march`], with a count of the azimuths that are done.
+    pub(crate) fn cancellable_march(
+        heights: &HeightGrid,
+        tile_size: glam::Vec2,
+        facets: &Facets,
+        azimuths: usize,
+        transition_width: f32,
+        cancel: &Cancel,
+    ) -> Self {
         let march = HeightMarch::new(heights, tile_size);
         Self::fill_rows(facets.len(), azimuths, transition_width, |along, row| {
-            march_all(&march, facets, along.truncate(), row);
+            if !cancel.is_set() {
+                march_all(&march, facets, along.truncate(), row);
+            }
+            cancel.step(azimuths);
             0
         })
     }
@@ -142,11 +159,6 @@ impl HorizonMap {
         self.azimuths
     }
 
-    /// Width of the soft step at the plane's horizon [rad].
-    pub(crate) fn transition_width(&self) -> f32 {
-        self.transition_width
-    }
-
     /// Slope below which all directions along one azimuth are blocked.
     pub(crate) fn slope(&self, azimuth: usize, facet: usize) -> f32 {
         self.slopes[azimuth * self.facets + facet]
@@ -190,23 +202,26 @@ impl HorizonMap {
         }
     }
 
+    /// The taps of a unit direction above the plane at a lower resolution.
+    pub(super) fn coarse_taps(&self, direction: Vec3, resolution: Resolution) -> HorizonTaps {
+        let Resolution { azimuth_step, softness } = resolution;
+        let azimuths = self.azimuths / azimuth_step;
+        let coarse = Self {
+            azimuths,
+            transition_width: Self::clamped_width(softness * self.transition_width),
+            slopes: Vec::new(),
+            weights: SineWeights::new(azimuths),
+            ..*self
+        };
+        let taps = coarse.taps(direction);
+        HorizonTaps { azimuths: taps.azimuths.map(|azimuth| azimuth * azimuth_step), ..taps }
+    }
+
     /// The horizon map of some of the facets, in the given order.
     pub fn subset(&self, facets: &[usize]) -> Self {
         let rows = (0..self.azimuths).map(|azimuth| self.row(azimuth));
         let slopes = rows.flat_map(|row| facets.iter().map(|&facet| row[facet])).collect();
         Self { facets: facets.len(), slopes, ..*self }
-    }
-
-    /// The horizon map of every second azimuth; `None` if their number is odd.
-    pub(crate) fn every_second_azimuth(&self) -> Option<Self> {
-        let azimuths = self.azimuths.is_multiple_of(2).then_some(self.azimuths / 2)?;
-        let slopes = (0..azimuths).flat_map(|azimuth| self.row(2 * azimuth)).copied().collect();
-        Some(Self::stored([azimuths, self.facets, self.truncated], self.transition_width, slopes))
-    }
-
-    /// The same horizons with a soft step of another width [rad].
-    pub(crate) fn with_transition_width(&self, width: f32) -> Self {
-        Self { transition_width: Self::clamped_width(width), ..self.clone() }
     }
 
     /// Computes `Σ w V(direction)` over a run of facets with weights `w`.
@@ -233,9 +248,13 @@ impl HorizonMap {
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction`, which points above the horizon. Facing
     /// is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
-        let taps = self.taps(direction);
+        self.fill_taps(&self.taps(direction), range, out);
+    }
+
+    /// As [`HorizonMap::fill`], from the taps of the direction.
+    pub(super) fn fill_taps(&self, taps: &HorizonTaps, range: Range<usize>, out: &mut [f32]) {
         let [from, to] = taps.azimuths.map(|azimuth| &self.row(azimuth)[range.clone()]);
-        simd::horizon_visibility(from, to, &taps, out);
+        simd::horizon_visibility(from, to, taps, out);
     }
 }
 

@@ -41,6 +41,15 @@ pub enum Visibility {
     Maps(SoftMaps),
 }
 
+/// A resolution at which visibility is read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Resolution {
+    /// Every `azimuth_step`-th azimuth is read. It divides their number.
+    pub azimuth_step: usize,
+    /// Factor of the width of the soft step.
+    pub softness: f32,
+}
+
 impl Visibility {
     pub fn facets(&self) -> usize {
         match self {
@@ -80,25 +89,27 @@ impl Visibility {
         }
     }
 
-    /// The visibility with a soft step of twice the width; `None` for bit maps, and if nothing blocks.
-    pub(crate) fn twice_as_soft(&self) -> Option<Self> {
+    /// Returns true if visibility can be read from every `step`-th azimuth; false for bit maps, and if nothing blocks.
+    pub(crate) fn has_azimuth_step(&self, step: usize) -> bool {
         match self {
-            Self::Unblocked { .. } | Self::Maps(_) => None,
-            Self::HorizonMap(map) => Some(Self::HorizonMap(map.with_transition_width(2.0 * map.transition_width()))),
-            Self::OcclusionIntervals(intervals) => {
-                let map = &intervals.horizon_map;
-                let horizon_map = map.with_transition_width(2.0 * map.transition_width());
-                Some(Self::OcclusionIntervals(OcclusionIntervals { horizon_map, ..intervals.clone() }))
+            Self::Unblocked { .. } | Self::Maps(_) => false,
+            Self::HorizonMap(map) | Self::OcclusionIntervals(OcclusionIntervals { horizon_map: map, .. }) => {
+                map.azimuths().is_multiple_of(step)
             }
         }
     }
 
-    /// The visibility from every second azimuth; `None` for bit maps, for an odd number of azimuths, and if nothing blocks.
-    pub(crate) fn every_second_azimuth(&self) -> Option<Self> {
+    /// As [`Visibility::fill`] at a lower resolution, for estimates of errors. Bit maps have one resolution.
+    pub(crate) fn fill_at(&self, resolution: Resolution, direction: Vec3, out: &mut [f32]) {
+        let range = 0..self.facets();
         match self {
-            Self::Unblocked { .. } | Self::Maps(_) => None,
-            Self::HorizonMap(horizon_map) => horizon_map.every_second_azimuth().map(Self::HorizonMap),
-            Self::OcclusionIntervals(intervals) => intervals.every_second_azimuth().map(Self::OcclusionIntervals),
+            Self::HorizonMap(map) if direction.z > 0.0 => {
+                map.fill_taps(&map.coarse_taps(direction, resolution), range, out);
+            }
+            Self::OcclusionIntervals(intervals) if direction.z > 0.0 => {
+                intervals.fill_taps(&intervals.horizon_map.coarse_taps(direction, resolution), range, out);
+            }
+            _ => self.fill(direction, range, out),
         }
     }
 

@@ -13,7 +13,7 @@ use crate::geometry::Facets;
 use crate::geometry::{PeriodicGrid, lifted_origins};
 use crate::math::directions::{PolarGrid, from_angles};
 use crate::math::simd;
-use crate::math::simd::F32x8Array;
+use crate::math::simd::{F32x8Array, HorizonTaps};
 
 /// All blocked slopes of every facet along a number of azimuths, exact at these azimuths.
 ///
@@ -153,9 +153,13 @@ impl OcclusionIntervals {
     /// Writes the visibility in `[0, 1]` of a run of facets along `direction`, which points above the horizon. Facing
     /// is not included.
     pub fn fill(&self, direction: Vec3, range: Range<usize>, out: &mut [f32]) {
-        let taps = self.horizon_map.taps(direction);
+        self.fill_taps(&self.horizon_map.taps(direction), range, out);
+    }
+
+    /// As [`OcclusionIntervals::fill`], from the taps of the direction.
+    pub(super) fn fill_taps(&self, taps: &HorizonTaps, range: Range<usize>, out: &mut [f32]) {
         let [from, to] = taps.azimuths.map(|azimuth| &self.horizon_map.row(azimuth)[range.clone()]);
-        simd::stepped_visibility(from, to, &self.switch[range.clone()], &taps, out);
+        simd::stepped_visibility(from, to, &self.switch[range.clone()], taps, out);
         // Blocks of intervals are computed as whole vectors first, because each facet has many intervals.
         const MAX_INTERVALS: usize = 256;
         let mut covered = [0.0; MAX_INTERVALS];
@@ -166,20 +170,13 @@ impl OcclusionIntervals {
                 let part = first..(first + MAX_INTERVALS).min(run.end);
                 let covered = &mut covered[..part.len()];
                 let (low, high) = (&overhangs.low[part.clone()], &overhangs.high[part.clone()]);
-                simd::interval_cover(low, high, &overhangs.switch[part.clone()], side, &taps, covered);
+                simd::interval_cover(low, high, &overhangs.switch[part.clone()], side, taps, covered);
                 for (facet, covered) in overhangs.facets[part].iter().zip(covered) {
                     let out = &mut out[*facet as usize - range.start];
                     *out = (*out - *covered).max(0.0);
                 }
             }
         }
-    }
-
-    /// The occlusion intervals of every second azimuth; `None` if their number is odd.
-    pub(crate) fn every_second_azimuth(&self) -> Option<Self> {
-        let horizon_map = self.horizon_map.every_second_azimuth()?;
-        let overhangs = self.overhangs.iter().step_by(2).cloned().collect();
-        Some(Self { horizon_map, overhangs, switch: self.switch.clone() })
     }
 
     /// The occlusion intervals of some of the facets, in ascending order.

@@ -61,7 +61,8 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
         closes_plane: mesh.closes_plane,
         max_color_weight: mesh.color.max(),
     };
-    let mut health = Health::of(&brdf, &inputs, None, Limits { max_rank: 64, tolerance: 0.12 });
+    let limits = Limits { max_rank: 64, tolerance: 0.12, preset: "wu2011", error: None };
+    let mut health = Health::of(&brdf, &inputs, None, None, limits);
     // The paper's maps have one bit per facet at 137 directions, so their projected area has a large error near the
     // horizon.
     health.result.projected_area_error = None;

@@ -88,7 +88,7 @@ impl AccuracyState {
     #[cfg(test)]
     pub fn is_measured(&self, version: u64) -> bool {
         self.activity.is_none()
-            && self.levels.len() >= 5
+            && self.levels.iter().filter(|point| !point.compared.is_stated()).count() >= 5
             && self.current.is_some_and(|(measured, _)| measured == version)
     }
 }
@@ -119,6 +119,13 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
     }
     let current = state.current.filter(|(measured, _)| *measured == version).map(|(_, point)| point);
     let text = match current {
+        Some(point) if point.compared.is_stated() => format!(
+            "{} facets: PSNR about {:.0} dB, relative L2 about {:.1} % (estimated), {}",
+            point.facets,
+            point.compared.psnr_db,
+            point.compared.rel_l2 * 100.0,
+            milliseconds(point.ms)
+        ),
         Some(point) => format!(
             "{} facets: PSNR {:.1} ± {:.1} dB, relative L2 {:.2} ± {:.2} %, {}",
             point.facets,
@@ -232,7 +239,8 @@ fn chart(ui: &mut Ui, levels: &[AccuracyPoint], current: Option<&AccuracyPoint>)
         painter.circle_filled(at(point), 5.0, orange);
     }
     response.on_hover_text(
-        "PSNR against the time from a geometry edit to the effective BRDF. Blue: quality levels. Orange: this scene.",
+        "PSNR against the time from a geometry edit to the effective BRDF. Blue: quality levels. Orange: this scene. The errors \
+         are estimated until the reference is ready.",
     );
 }
 

@@ -32,6 +32,12 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field
         FieldShape::Integer { min, max } => integer_ui(ui, value, (min, max), &wrong),
         FieldShape::Color { max } => color_ui(ui, value, max, &wrong),
         FieldShape::Vector { min, max, .. } => vector_ui(ui, value, (min, max), &wrong),
+        FieldShape::Bool => {
+            let mut on = value.as_bool().unwrap_or_default();
+            if ui.checkbox(&mut on, "").changed() {
+                *value = Value::Boolean(on);
+            }
+        }
         FieldShape::Text => text_ui(ui, value, 40.0, str::to_owned),
         FieldShape::Path => {
             text_ui(ui, value, 66.0, file_name);

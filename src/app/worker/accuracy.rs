@@ -1,10 +1,11 @@
-//! Accuracy against time of the open scene. Quality levels and the scene's own settings are compared with a reference
-//! that is refined in the background.
+//! Accuracy against time of the open scene. Quality levels and the scene's own settings first state their errors. Then they
+//! are compared with a reference that is refined in the background.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use crate::base::{Error, Result};
+use crate::effective::{EffectiveBrdf, ErrorEstimator};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::render::Image;
 use crate::report::{EffectCost, ThumbnailRenderer, heat, measure_effects};
@@ -78,7 +79,15 @@ pub struct AccuracyWorker {
     key: Option<Box<LoadedScene>>,
     pipeline: Pipeline,
     reference: Option<ProgressiveReference>,
-    levels: Vec<(f64, AccuracyPoint)>,
+    levels: Vec<MeasuredLevel>,
+}
+
+/// A measured quality level.
+struct MeasuredLevel {
+    level: f64,
+    point: AccuracyPoint,
+    /// The result, until it is compared with the reference.
+    brdf: Option<Arc<EffectiveBrdf>>,
 }
 
 impl Default for AccuracyWorker {
@@ -115,6 +124,11 @@ impl AccuracyWorker {
         if !job.chart {
             return Ok(());
         }
+        let outcome = self.pipeline.effective(&job.loaded)?;
+        let ms = self.edit_ms(&job.loaded)?;
+        let mut current = stated_point(&outcome, ms);
+        report(AccuracyResult::Current(job.version, current));
+        self.measure_levels(job, &outcome, context, report)?;
         report(AccuracyResult::Doing("Reference"));
         let mut reference = self.reference.take().unwrap_or_else(|| ProgressiveReference::new(PAIRS));
         while reference.batches < BATCHES[0] {
@@ -122,23 +136,45 @@ impl AccuracyWorker {
             context.cancel.check()?;
         }
         self.reference = Some(reference.clone());
-        let outcome = self.pipeline.effective(&job.loaded)?;
-        let current = self.point(&job.loaded, &reference)?;
+        current.compared = reference.compare(&outcome.brdf);
         report(AccuracyResult::Current(job.version, current));
-        let overhangs = has_overhangs(&outcome);
+        for measured in self.levels.iter_mut().filter(|measured| measured.point.compared.is_stated()) {
+            if let Some(brdf) = measured.brdf.take() {
+                measured.point.compared = reference.compare(&brdf);
+            }
+        }
+        report(AccuracyResult::Levels(self.points()));
+        if job.compare { self.compare(job, context, report, reference, &outcome, current) } else { Ok(()) }
+    }
+
+    fn points(&self) -> Vec<AccuracyPoint> {
+        self.levels.iter().map(|measured| measured.point).collect()
+    }
+
+    /// Measures the time and the stated error of the quality levels that are not known yet, the fastest first.
+    fn measure_levels(
+        &mut self,
+        job: &AccuracyJob,
+        current: &Outcome,
+        context: &JobContext<AccuracyJob>,
+        report: &dyn Fn(AccuracyResult),
+    ) -> Result<()> {
+        let overhangs = current.plan.overhangs();
         for level in LEVELS {
-            if self.levels.iter().any(|(known, _)| *known == level) {
+            if self.levels.iter().any(|measured| measured.level == level) {
                 continue;
             }
             context.cancel.check()?;
             report(AccuracyResult::Doing("Faster and finer settings"));
             let scene = with_settings(&job.loaded, &quality_scale::candidate_at(level, overhangs))?;
-            let point = self.point(&scene, &reference)?;
-            self.levels.push((level, point));
-            report(AccuracyResult::Levels(self.levels.iter().map(|(_, point)| *point).collect()));
+            let ms = self.edit_ms(&scene)?;
+            let outcome = self.pipeline.effective(&scene)?;
+            let point = stated_point(&outcome, ms);
+            self.levels.push(MeasuredLevel { level, point, brdf: Some(outcome.brdf) });
+            report(AccuracyResult::Levels(self.points()));
         }
-        report(AccuracyResult::Levels(self.levels.iter().map(|(_, point)| *point).collect()));
-        if job.compare { self.compare(job, context, report, reference, &outcome, current) } else { Ok(()) }
+        report(AccuracyResult::Levels(self.points()));
+        Ok(())
     }
 
     /// Renders the difference from the mean of noisy reference images, and refines the reference between them.
@@ -164,7 +200,7 @@ impl AccuracyWorker {
                 Some(sample) => mean.add(sample),
                 // With interreflection, the finest level replaces the reference.
                 None if seed == 0 => {
-                    let settings = quality_scale::candidate_at(FINEST, has_overhangs(outcome));
+                    let settings = quality_scale::candidate_at(FINEST, outcome.plan.overhangs());
                     let fine = with_settings(&job.loaded, &settings)?;
                     let finest = thumbnails.image(&*self.pipeline.effective(&fine)?.brdf)?;
                     report(AccuracyResult::Difference(
@@ -188,21 +224,21 @@ impl AccuracyWorker {
         Ok(())
     }
 
-    /// Errors of a scene at its settings, and the time of an edit that requires new facets.
-    fn point(&mut self, scene: &LoadedScene, reference: &ProgressiveReference) -> Result<AccuracyPoint> {
+    /// The time of an edit that requires new facets [ms].
+    fn edit_ms(&mut self, scene: &LoadedScene) -> Result<f64> {
         let mut moved = scene.clone();
         moved.scene.quality.seed ^= 1;
         self.pipeline.effective(&moved)?;
         let start = Instant::now();
-        let outcome = self.pipeline.effective(scene)?;
-        let ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(AccuracyPoint { facets: outcome.settings.facets, ms, compared: reference.compare(&outcome.brdf) })
+        self.pipeline.effective(scene)?;
+        Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 }
 
-/// Returns true if the plan computes visibility with overhangs.
-fn has_overhangs(outcome: &Outcome) -> bool {
-    outcome.plan.effects.iter().any(|effect| effect.name == "overhangs" && effect.on)
+/// The point of a result by its stated error.
+fn stated_point(outcome: &Outcome, ms: f64) -> AccuracyPoint {
+    let estimate = outcome.errors().map(ErrorEstimator::estimate).unwrap_or_default();
+    AccuracyPoint { facets: outcome.settings.facets, ms, compared: ReferenceErrors::stated(&estimate) }
 }
 
 /// The inputs of the reference and of the levels: the scene without settings, object, light and camera.

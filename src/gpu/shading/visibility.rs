@@ -39,9 +39,9 @@ impl GpuVisibility<'_> {
         };
         match self {
             Self::Computed(Visibility::Unblocked { .. }) => sum,
-            Self::Computed(Visibility::HorizonMap(map)) => horizons(map.azimuths(), map.transition_width()),
+            Self::Computed(Visibility::HorizonMap(map)) => horizons(map.azimuths(), map.transition_width),
             Self::Computed(Visibility::OcclusionIntervals(intervals)) => {
-                horizons(intervals.horizon_map.azimuths(), intervals.horizon_map.transition_width())
+                horizons(intervals.horizon_map.azimuths(), intervals.horizon_map.transition_width)
             }
             Self::Computed(Visibility::Maps(SoftMaps { grid, .. })) | Self::Maps(_, grid) => {
                 Sum { azimuths: grid.azimuths as u32, rings: grid.rings as u32, nodes: grid.len() as u32, ..sum }

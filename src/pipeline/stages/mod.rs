@@ -9,5 +9,5 @@ mod visibility;
 pub(super) use factors::{Factorize, LookUpVisibility, TabulateFactors, TabulateForCheck};
 pub(super) use interreflection::{CastTransport, FindMirrorPlanes, Interreflect};
 pub(super) use paper::PaperTables;
-pub(super) use tile::{BuildTile, LoadMaterials, SampleFacets, TileShape};
+pub(super) use tile::{BuildTile, FacetsRole, LoadMaterials, SampleFacets, TileShape};
 pub(super) use visibility::{BuildCells, ComputeVisibility, EstimateScanWork};

@@ -98,15 +98,17 @@ impl Stage for BuildTile<'_> {
         let mesh = geometry::build_painted(&scene.tile, base_dir, painted)?;
         let (low, high) = mesh.z_range();
         let flat = high - low <= 1e-7 * mesh.size.max_element();
-        let height_field = mesh.is_height_field() || mesh.closes_plane && nothing_faces_down(&mesh);
+        let is_of_file = matches!(scene.tile.geometry, Geometry::Mesh(_));
+        let height_field = mesh.is_height_field() || !is_of_file && mesh.closes_plane && nothing_faces_down(&mesh);
         let steepest = steepest(&mesh);
         let colors_place_facets = colors_place_facets(&mesh);
         Ok(TileShape { mesh, surface: self.surface, flat, height_field, steepest, colors_place_facets })
     }
 }
 
-/// Returns true if no surface faces down. A point that blocks a direction then also blocks every lower direction, so that
-/// one horizon is enough.
+/// Returns true if no surface faces down. In the families, whose parts stand on the floor, a point that blocks a direction
+/// then also blocks every lower direction, so that one horizon is enough. In a file, a sheet without an underside may
+/// hang above others, and light passes below it.
 fn nothing_faces_down(mesh: &TileMesh) -> bool {
     (0..mesh.triangles.len()).all(|triangle| mesh.geometric_normal(triangle).z > -1e-6)
 }
@@ -175,8 +177,18 @@ pub(super) fn hash_sampling_into(settings: &Settings, key: &mut KeyBuilder) {
 pub struct SampleFacets<'a> {
     pub tile: &'a Keyed<TileShape>,
     pub settings: &'a Settings,
-    /// True for the few facets of a clustered sum on the GPU, which alternate with those of the CPU.
-    pub for_clusters: bool,
+    pub role: FacetsRole,
+}
+
+/// Facets that are needed in turns, so that each role has its own slot in the memo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FacetsRole {
+    /// As many facets as the settings say.
+    Main,
+    /// The few facets of a clustered sum on the GPU.
+    Clusters,
+    /// More facets than the settings say, because the estimated error with the main ones is too large.
+    Refined,
 }
 
 impl Stage for SampleFacets<'_> {
@@ -190,7 +202,11 @@ impl Stage for SampleFacets<'_> {
     }
 
     fn slot(&self) -> &'static str {
-        if self.for_clusters { "facets of clusters" } else { Self::NAME }
+        match self.role {
+            FacetsRole::Main => Self::NAME,
+            FacetsRole::Clusters => "facets of clusters",
+            FacetsRole::Refined => "refined facets",
+        }
     }
 
     fn run(&self, _: &Env) -> Result<Facets> {

@@ -17,6 +17,8 @@ pub struct ComputeVisibility<'a> {
     pub facets: &'a Keyed<Facets>,
     pub algorithm: VisibilityAlgorithm,
     pub settings: &'a Settings,
+    /// True if the settings are refined: visibility of the main settings stays in the memo.
+    pub refined: bool,
 }
 
 impl Stage for ComputeVisibility<'_> {
@@ -37,6 +39,10 @@ impl Stage for ComputeVisibility<'_> {
         key.numbers("texels", &[settings.map_resolution]);
     }
 
+    fn slot(&self) -> &'static str {
+        if self.refined { "refined visibility" } else { Self::NAME }
+    }
+
     fn run(&self, env: &Env) -> Result<Visibility> {
         let (mesh, facets, settings) = (&self.tile.mesh, &**self.facets, self.settings);
         let grid = || PeriodicGrid::for_slices(mesh).cancelled_by(&env.cancel);
@@ -44,7 +50,8 @@ impl Stage for ComputeVisibility<'_> {
         Ok(match (self.algorithm, &mesh.height_grid) {
             (VisibilityAlgorithm::None, _) => Visibility::Unblocked { facets: facets.len() },
             (VisibilityAlgorithm::HeightMarch, Some(heights)) => {
-                Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, facets, azimuths, width))
+                let map = HorizonMap::cancellable_march(heights, mesh.size, facets, azimuths, width, &env.cancel);
+                Visibility::HorizonMap(map)
             }
             (VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan, _) => {
                 Visibility::HorizonMap(HorizonMap::scan(&grid(), facets, azimuths, width))
