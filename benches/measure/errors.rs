@@ -34,7 +34,8 @@ fn row(name: &str, presets: &[Vec<Measured>], truth: &TrueValues) -> String {
     let mut cells = vec![name.to_owned()];
     for runs in presets {
         cells.push(all(runs, &|run| format!("{}{:.2} %", sign(run), 100.0 * run.errors.rel_l2)));
-        cells.push(all(runs, &|run| format!("{:.2} %", 100.0 * run.stated)));
+        cells
+            .push(all(runs, &|run| format!("{:.2} %{}", 100.0 * run.stated, if run.warns { " (warned)" } else { "" })));
         cells.push(all(runs, &|run| format!("{:.1} dB", run.errors.psnr_db)));
     }
     let closed = truth.std_error == 0.0;

@@ -18,6 +18,8 @@ pub struct Measured {
     pub errors: Errors,
     /// Relative L2 that the program states.
     pub stated: f64,
+    /// True if the program warns of its error.
+    pub warns: bool,
     /// True if the true values resolve the error: it exceeds twice their standard error.
     pub is_resolved: bool,
 }
@@ -35,5 +37,7 @@ pub fn measure(loaded: &LoadedScene, preset: &str, seed: u64, pairs: &[Pair], tr
     let rel_l2 = (found.rel_l2.powi(2) - truth.std_error.powi(2)).max(least).sqrt().min(found.rel_l2);
     let psnr_db = found.psnr_db + 20.0 * (found.rel_l2.max(1e-12) / rel_l2.max(1e-12)).log10();
     let stated = outcome.errors().unwrap().estimate().rel_l2;
-    Measured { errors: Errors { rel_l2, psnr_db }, stated, is_resolved: found.rel_l2 > 2.0 * truth.std_error }
+    let warns = outcome.health().warnings.iter().any(|warning| warning.contains("error is estimated at"));
+    let is_resolved = found.rel_l2 > 2.0 * truth.std_error;
+    Measured { errors: Errors { rel_l2, psnr_db }, stated, warns, is_resolved }
 }

@@ -329,8 +329,7 @@ mod tests {
             let white = facets.colors.iter().filter(|color| color.x > 0.1).count();
             let weight = |s: usize| f64::from(facets.areas[s] * facets.geometric_normals[s].z);
             let mean = (0..facets.len()).map(|s| weight(s) * f64::from(facets.colors[s].x)).sum::<f64>();
-            eprintln!("{white} {}", mean * 2048.0);
-            assert!(white > 40, "{white}");
+            assert!(white > 30, "{white}");
             assert!((mean * 2048.0 - 1.0).abs() < 0.15, "{mean}");
         }
     }
