@@ -50,7 +50,10 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     if let Some(resolution) = &options.resolution {
         resolution.check()?;
     }
-    let (loaded, ()) = args.scene.open(|loaded| check_outputs(&args.scene.scene, loaded, &[], &outputs))?;
+    let (loaded, ()) = args.scene.open(|loaded| {
+        super::slab::refuse(loaded, "export")?;
+        check_outputs(&args.scene.scene, loaded, &[], &outputs)
+    })?;
     let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());

@@ -8,6 +8,7 @@ mod context;
 mod effects;
 mod features;
 mod settings;
+mod slab;
 #[cfg(test)]
 mod tests;
 
@@ -19,6 +20,7 @@ pub use context::IMAGE_CHECK_PAIRS;
 pub use effects::{effect_names, switch_mut};
 pub use features::{Costs, SceneFeatures};
 pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};
+pub use slab::{SlabDecision, SlabFeatures, SlabSettings};
 
 use crate::scene::Switch;
 

@@ -103,6 +103,8 @@ pub struct Settings {
     pub reference_passes: usize,
     pub backend: Backend,
     pub seed: u64,
+    /// Facets that the method `faces` of a slab sums; `None` for those of the preset.
+    pub slab_facets: Option<usize>,
     /// Effects that the user forces on or off.
     pub effects: Effects,
 }
@@ -180,6 +182,7 @@ impl Settings {
         if let Some(samples) = quality.reference_samples {
             settings.reference_passes = samples.div_ceil(settings.reference_facets).max(2);
         }
+        settings.slab_facets = quality.slab_facets;
         settings.colors = quality.colors.or(settings.colors);
         settings.normal_bins = quality.normal_bins.or(settings.normal_bins);
         settings
@@ -219,6 +222,7 @@ impl Settings {
             reference_passes: 32,
             backend: Backend::Auto,
             seed: 1,
+            slab_facets: None,
             effects: Effects::default(),
         };
         match preset {

@@ -68,6 +68,20 @@ pub fn masking(top: &Ndf, bottom: &Ndf, i: DVec3, inner: DVec3, o: DVec3) -> f64
     top.seen(i) * top.seen(inner) * bottom.seen(inner) * bottom.seen(o)
 }
 
+/// One rough face and one refraction (Walter et al. 2007, Eq. 21), with `o` as the direction inside: what Fig. 5 of Dai et
+/// al. compares with. `face` is the density of the slopes, mass 1.
+pub fn walter(face: &Ndf, i: DVec3, o: DVec3, eta: f64) -> f64 {
+    let Some(h) = (-(i + eta * o)).try_normalize().filter(|h| h.z > 0.0) else { return 0.0 };
+    let (outer, inner) = (i.dot(h), -o.dot(h));
+    if outer <= 0.0 || inner <= 0.0 || i.z <= 0.0 || o.z >= 0.0 {
+        return 0.0;
+    }
+    let slope = h.truncate() / h.z;
+    let jacobian = eta * eta * inner / (i + eta * o).length_squared();
+    let density = face.density(slope) / h.z.powi(4) * face.seen(i) * face.seen(o);
+    (1.0 - reflectance(outer, eta)) * jacobian * outer * density / (i.z * o.z.abs())
+}
+
 /// Eq. 11: the two BTDFs blended in the logarithm. At the ends of `alpha` one of them stands alone, so that `0⁰` does not
 /// arise.
 pub fn blend(top: f64, bottom: f64, alpha: f64) -> f64 {

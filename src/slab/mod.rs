@@ -4,25 +4,32 @@
 //! `m = h.xy / h.z` of its normal `h`, which points up on both faces. `eta` is the index of the slab over that of its
 //! surroundings. `ρ(i, o)` is the BTDF [1/sr], and `f̄ = ρ |cos θ_i|`.
 
+mod choose;
 mod dual;
 mod ellipse;
 mod faces;
+mod from_geometry;
 pub mod fresnel;
 pub mod half_vectors;
 mod inner;
+mod lobe;
 mod model;
 mod ndf;
 mod optics;
 mod slope_table;
 mod smith;
 mod straight;
+pub mod table_file;
 mod virtual_face;
 pub(crate) mod walk;
 
-pub use dual::{Configuration, DualFaces, blend, leaving_bottom, masking, rough_bottom, rough_top};
+pub use choose::dual_error;
+pub use dual::{Configuration, DualFaces, blend, leaving_bottom, masking, rough_bottom, rough_top, walter};
 pub use ellipse::{Ellipse, Profile};
 pub use faces::{FaceSum, Order};
+pub use from_geometry::of_mesh;
 pub use inner::{Inner, Parts};
+pub use lobe::DiscLobe;
 pub use model::{Method, Slab, alpha_of};
 pub use ndf::{Ndf, Spread, normal};
 pub use optics::{Channel, Optics};

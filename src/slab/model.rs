@@ -177,6 +177,11 @@ impl Slab {
         [left * transmitted, left * reflected]
     }
 
+    /// Root mean square difference of the slopes of both faces.
+    pub fn deviation(&self) -> f64 {
+        self.top.deviation().hypot(self.bottom.deviation())
+    }
+
     /// The slab turned over: `eval(i, o)` of it is that of this slab with all z reversed. Inner reflections are left out.
     pub fn turned(&self) -> Self {
         let (top, bottom) = (Arc::new(self.bottom.mirrored()), Arc::new(self.top.mirrored()));

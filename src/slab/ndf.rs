@@ -172,6 +172,12 @@ impl Ndf {
         (mean, (of_points + self.spread_mass * (variance + (center - mean).length_squared())) / rough)
     }
 
+    /// Root mean square slope of the whole face, about slope 0.
+    pub fn deviation(&self) -> f64 {
+        let (mean, variance) = self.rough_moments();
+        (self.rough() * (variance + mean.length_squared())).sqrt()
+    }
+
     /// The face seen from its other side: all slopes turned by 180°.
     pub fn mirrored(&self) -> Self {
         let points = self.points.iter().map(|(slope, mass)| (-*slope, *mass)).collect();
@@ -198,6 +204,14 @@ impl Ndf {
             _ => f64::MAX,
         };
         points.min(spread)
+    }
+
+    /// Part of the face whose slopes lie in the outermost cells of a table.
+    pub fn at_edge(&self) -> f64 {
+        match &self.spread {
+            Spread::Table(table) => self.spread_mass * table.at_edge(),
+            _ => 0.0,
+        }
     }
 
     /// Adds the rough part, scaled to mass 1, to a grid; `sign` is -1 for slopes turned by 180°.

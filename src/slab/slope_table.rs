@@ -118,6 +118,13 @@ impl SlopeTable {
         self.origin.abs().max(far.abs()).max_element() + self.cell
     }
 
+    /// Part of the slopes in the outermost cells.
+    pub fn at_edge(&self) -> f64 {
+        let last = self.side - 1;
+        let is_outer = |k: usize| [k % self.side, k / self.side].iter().any(|at| *at == 0 || *at == last);
+        self.masses.iter().enumerate().filter(|(k, _)| is_outer(*k)).map(|(_, mass)| mass).sum()
+    }
+
     /// The table of all slopes turned by 180°.
     pub fn mirrored(&self) -> Option<Self> {
         let far = self.origin + self.cell * (self.side - 1) as f64;

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::base::{Cancel, Result};
 use crate::slab::fresnel::{inside, reflectance};
 use crate::slab::walk::scatter;
-use crate::slab::{Channel, Ndf, Optics, half_vectors, leaving_bottom};
+use crate::slab::{Channel, Ndf, Optics, leaving_bottom};
 
 /// Work and accuracy of the truth of pairs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -252,6 +252,5 @@ mod tests {
         let closed =
             at.factor * top.density(at.slope) * top.seen(i) * top.seen(at.inner) * channel.transmission(at.inner);
         assert!((walk.walk(&mut rng) / closed - 1.0).abs() < 1e-12);
-        assert!(half_vectors::of_top(i, o, 1.5).is_some());
     }
 }
