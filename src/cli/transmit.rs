@@ -11,7 +11,7 @@ use super::watch::Watch;
 use super::{TransmitArgs, TransmitMethod, check_outputs, print_json};
 use crate::base::{Cancel, Error, InputError, replace_file};
 use crate::pipeline::SlabOutcome;
-use crate::reference::photons::{LobeSettings, TrueLobe};
+use crate::reference::photons::{LobeSettings, Totals, TrueLobe};
 use crate::scene::{LoadedScene, Switch};
 use crate::slab::{DiscLobe, Method, Slab, Walk, walter};
 
@@ -34,7 +34,7 @@ pub fn parse_phi(text: &str) -> std::result::Result<f64, String> {
 
 /// Parts of the incident flux; `None` for parts that the method does not know.
 #[derive(Debug, Clone, Copy, Default)]
-struct Totals {
+struct Parts {
     transmitted: DVec3,
     reflected: Option<DVec3>,
     absorbed: Option<DVec3>,
@@ -43,7 +43,7 @@ struct Totals {
     after_bounces: Option<DVec3>,
 }
 
-impl Totals {
+impl Parts {
     fn named(&self) -> [(&'static str, Option<DVec3>); 6] {
         [
             ("transmitted", Some(self.transmitted)),
@@ -61,7 +61,7 @@ struct Transmitted {
     lobe: DiscLobe,
     /// BTDF in the plane of incidence, from the horizon on the side of the light to the other.
     plane: Vec<(DVec3, DVec3)>,
-    totals: Totals,
+    totals: Parts,
     /// Standard error of the transmitted part, and of each cell.
     standard_error: Option<f64>,
     cell_errors: Option<Vec<DVec3>>,
@@ -177,7 +177,7 @@ fn model(slab: &Slab, i: DVec3) -> Transmitted {
         Some(left * DVec3::select(slab.optics.eta.cmpne(DVec3::ONE), parts, DVec3::ZERO))
     };
     let clear = DVec3::select(slab.optics.eta.cmpeq(DVec3::ONE), left - straight, DVec3::ZERO);
-    let totals = Totals {
+    let totals = Parts {
         transmitted: lobe.total() + straight,
         reflected: Some(DiscLobe::reflected(slab, i, SIDE).total() + mirrored),
         absorbed: part(&|parts| parts.absorbed).map(|absorbed| absorbed + clear),
@@ -195,7 +195,7 @@ fn of_walter(slab: &Slab, i: DVec3) -> Transmitted {
     let value = |o: DVec3| slab.optics.per_channel(|channel| walter(face, i, o, channel.eta));
     let eta = slab.optics.eta.max_element();
     let lobe = DiscLobe::new(SIDE, -i.truncate() / eta, (eta - 1.0) / eta * face.deviation(), true, value);
-    let totals = Totals { transmitted: lobe.total(), ..Totals::default() };
+    let totals = Parts { transmitted: lobe.total(), ..Parts::default() };
     let plane = plane_directions(i).map(|o| (o, value(o))).collect();
     Transmitted { lobe, plane, totals, standard_error: None, cell_errors: None, rel_l2: None }
 }
@@ -237,9 +237,12 @@ fn truth(loaded: &LoadedScene, outcome: &SlabOutcome, i: DVec3, cancel: &Cancel)
     let of_flux = |value: &dyn Fn(&TrueLobe) -> f64| left * rgb(value);
     let single = of_flux(&|lobe| lobe.totals.single_pass.value);
     let all = of_flux(&|lobe| lobe.totals.transmitted.value);
-    let totals = Totals {
+    let totals = Parts {
         transmitted: diffuse + if bounces { all } else { single },
-        reflected: Some(of_flux(&|lobe| lobe.totals.reflected.value)),
+        reflected: Some(of_flux(&|lobe| {
+            let Totals { reflected, first_reflected, .. } = lobe.totals;
+            if bounces { reflected.value } else { first_reflected.value }
+        })),
         absorbed: Some(of_flux(&|lobe| lobe.totals.absorbed.value)),
         straight: of_flux(&|lobe| lobe.totals.straight.value),
         first_arrival_tir: Some(of_flux(&|lobe| lobe.totals.first_total_reflection.value)),
@@ -338,7 +341,7 @@ fn png(result: &Transmitted) -> Result<Vec<u8>> {
 
 /// Draws the curve and the face above it. The light arrives from the upper left.
 fn draw_plane(image: &mut image::RgbImage, result: &Transmitted, peak: f64) {
-    let (center, radius) = (DVec2::new(1.5 * PIXELS as f64, 0.08 * PIXELS as f64), 0.88 * PIXELS as f64);
+    let (center, radius) = (DVec2::new(1.5 * PIXELS as f64, 0.3 * PIXELS as f64), 0.48 * PIXELS as f64);
     let mut line = |from: DVec2, to: DVec2, color: [u8; 3]| {
         let steps = (to - from).abs().max_element().ceil().max(1.0) as usize;
         for k in 0..=steps {
@@ -351,9 +354,10 @@ fn draw_plane(image: &mut image::RgbImage, result: &Transmitted, peak: f64) {
     };
     let half = DVec2::new(0.48 * PIXELS as f64, 0.0);
     line(center - half, center + half, [120; 3]);
+    let is_grey = result.plane.iter().all(|(_, value)| value.x == value.y && value.y == value.z);
     for channel in 0..3 {
         let mut color = [0; 3];
-        color[channel] = 200;
+        color[channel] = if is_grey { 0 } else { 200 };
         let point = |k: usize| {
             let theta = (k as f64 / STEPS as f64 - 0.5) * std::f64::consts::PI;
             let part = if peak > 0.0 { result.plane[k].1[channel] / peak } else { 0.0 };

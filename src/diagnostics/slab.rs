@@ -45,8 +45,9 @@ impl Health {
             ));
         }
         for (side, face) in [("top", &slab.top), ("bottom", &slab.bottom)] {
-            let cells = face.deviation() / face.resolution();
-            if cells < LEAST_CELLS && !face.is_smooth() {
+            let (deviation, cell) = (face.deviation(), face.resolution());
+            let cells = deviation / cell;
+            if !face.is_smooth() && cells < LEAST_CELLS {
                 warnings.push(format!(
                     "the slopes of slab.{side} spread over {cells:.1} cells of their table: the lobe is wider than it should \
                      be; use a finer table or `--quality fine`"

@@ -19,6 +19,8 @@ mod slab;
 mod stage;
 mod stages;
 #[cfg(test)]
+mod slab_tests;
+#[cfg(test)]
 mod tests;
 mod wu2011;
 

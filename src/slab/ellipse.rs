@@ -101,8 +101,8 @@ impl Ellipse {
         match self.profile {
             // Beyond 3.2 roughnesses lie 4e-5 of the slopes.
             Profile::Beckmann => 3.2 * widest,
-            // Beyond 7 roughnesses lie 2 % of the slopes.
-            Profile::Ggx => 7.0 * widest,
+            // Beyond 14 roughnesses lie 0.5 % of the slopes.
+            Profile::Ggx => 14.0 * widest,
         }
     }
 

@@ -14,6 +14,8 @@ use crate::base::{Cancel, Result};
 
 /// Rings of the polar angle, for the light and for the viewer.
 const RINGS: usize = 24;
+/// Photons per ring between smooth faces; they spread over the angles of the ring.
+const SMOOTH_PHOTONS: usize = 512;
 /// Steps of the azimuth between light and viewer, 0 to 180°.
 const TURNS: usize = 12;
 
@@ -53,6 +55,8 @@ impl Inner {
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
     pub fn new(top: &Ndf, bottom: &Ndf, optics: &Optics, photons: usize, seed: u64, cancel: &Cancel) -> Result<Self> {
+        // All photons of a direction are alike without rough facets.
+        let photons = if top.is_smooth() && bottom.is_smooth() { photons.min(SMOOTH_PHOTONS) } else { photons };
         let mut channels: Vec<Channel> = Vec::new();
         let of_channel = [0, 1, 2].map(|k| {
             let channel = optics.channel(k);

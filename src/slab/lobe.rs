@@ -25,8 +25,16 @@ impl DiscLobe {
     /// `width`. `down` is true for directions below.
     pub fn new(side: usize, center: DVec2, width: f64, down: bool, value: impl Fn(DVec3) -> DVec3 + Sync) -> Self {
         let half = REACH * width.clamp(1e-9, 1.0);
-        let (low, high) = ((center - half).max(DVec2::NEG_ONE), (center + half).min(DVec2::ONE));
         let cell = 2.0 / side as f64;
+        let (mut low, mut high) = ((center - half).max(DVec2::NEG_ONE), (center + half).min(DVec2::ONE));
+        let mut fine = DVec2::splat(FINE as f64);
+        if half > cell {
+            // A square of whole cells, so that all cells have equally many points.
+            low = ((low + 1.0) / cell).floor() * cell - 1.0;
+            high = ((high + 1.0) / cell).ceil() * cell - 1.0;
+            let cells = ((high - low) / cell).round().max(DVec2::ONE);
+            fine = (fine / cells).ceil().max(DVec2::splat(COARSE as f64)) * cells;
+        }
         let at = |p: DVec2| {
             let square = p.length_squared();
             if square >= 1.0 - 1e-12 {
@@ -44,14 +52,15 @@ impl DiscLobe {
             (0..COARSE * COARSE).map(point).filter(|p| !is_inside(*p)).map(at).sum::<DVec3>() / (COARSE * COARSE) as f64
         };
         let mut values: Vec<DVec3> = (0..side * side).into_par_iter().map(coarse).collect();
-        let step = (high - low) / FINE as f64;
+        let step = (high - low) / fine;
         if step.min_element() > 0.0 {
-            let fine = |k: usize| {
-                let p = low + step * (DVec2::new((k % FINE) as f64, (k / FINE) as f64) + 0.5);
+            let (columns, rows) = (fine.x as usize, fine.y as usize);
+            let point = |k: usize| {
+                let p = low + step * (DVec2::new((k % columns) as f64, (k / columns) as f64) + 0.5);
                 let index = ((p + 1.0) / cell).floor().clamp(DVec2::ZERO, DVec2::splat((side - 1) as f64));
                 (index.y as usize * side + index.x as usize, at(p))
             };
-            let points: Vec<(usize, DVec3)> = (0..FINE * FINE).into_par_iter().map(fine).collect();
+            let points: Vec<(usize, DVec3)> = (0..columns * rows).into_par_iter().map(point).collect();
             let share = step.x * step.y / (cell * cell);
             points.into_iter().for_each(|(index, value)| values[index] += share * value);
         }

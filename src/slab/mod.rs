@@ -11,6 +11,8 @@ mod faces;
 mod from_geometry;
 pub mod fresnel;
 pub mod half_vectors;
+#[cfg(test)]
+mod hard_cases_tests;
 mod inner;
 mod lobe;
 mod model;

@@ -195,7 +195,8 @@ impl Ndf {
         points.max(if self.spread_mass > 0.0 { self.spread.span() } else { 0.0 })
     }
 
-    /// Width of the finest detail that the density resolves: a cell of a table or a line, or the width of a point.
+    /// Width of the finest detail that the density resolves: a cell of a table or a line, or the width of a point. 0 for
+    /// analytic slopes.
     pub fn resolution(&self) -> f64 {
         let points = if self.points.is_empty() { f64::MAX } else { self.point_width };
         let spread = match &self.spread {
@@ -203,7 +204,8 @@ impl Ndf {
             Spread::Line(line) => line.cell(),
             _ => f64::MAX,
         };
-        points.min(spread)
+        let finest = points.min(spread);
+        if finest == f64::MAX { 0.0 } else { finest }
     }
 
     /// Part of the face whose slopes lie in the outermost cells of a table.

@@ -60,6 +60,8 @@ pub struct Totals {
     /// Transmitted by level facets alone; a part of `transmitted`.
     pub straight: Estimated,
     pub reflected: Estimated,
+    /// Reflected by the top face; a part of `reflected`.
+    pub first_reflected: Estimated,
     pub absorbed: Estimated,
     /// Light that masking removes; 0 for explicit tiles.
     pub masked: Estimated,
@@ -89,7 +91,7 @@ pub struct TrueLobe {
 }
 
 /// Number of fields of [`Totals`].
-const PARTS: usize = 8;
+const PARTS: usize = 9;
 
 /// Sums over photons.
 struct Sums {
@@ -162,6 +164,7 @@ impl TrueLobe {
             masked: part(5),
             first_total_reflection: part(6),
             sum: part(7),
+            first_reflected: part(8),
         };
         Self { side, photons, single: bins(&sums.single), all: bins(&sums.all), totals }
     }
@@ -228,6 +231,9 @@ fn trace_chunk(source: &impl PhotonSource, i: DVec3, settings: &LobeSettings, st
             let Exit { direction, weight, bounces, is_straight } = exit;
             if direction.z >= 0.0 {
                 parts[3] += weight;
+                if bounces == 0 {
+                    parts[8] += weight;
+                }
                 return;
             }
             parts[0] += weight;

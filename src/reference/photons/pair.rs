@@ -61,13 +61,14 @@ impl PairTruth {
             if i_up.z <= 0.0 || other.z == 0.0 {
                 return Ok(Self::default());
             }
-            let mut error = DVec3::ZERO;
+            let mut errors = [0.0; 3];
             let value = optics.per_channel_indexed(|k, channel| {
                 let walks = PairWalk::new(faces, channel, i_up, other, settings.bounces);
                 let (value, standard_error) = walks.estimate(settings, (at * 3 + k) as u64);
-                error[k] = standard_error;
+                errors[k] = standard_error;
                 value
             });
+            let error = optics.per_channel_indexed(|k, _| errors[k]);
             let diffuse = optics.diffuse;
             let scattered = if other.z < 0.0 { diffuse / std::f64::consts::PI } else { DVec3::ZERO };
             let cosine = i.z.abs();

@@ -216,3 +216,68 @@ fn photons_are_the_same_for_any_number_of_threads() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| truth(&slab, 40.0, 200_000));
     assert_eq!(one, truth(&slab, 40.0, 200_000));
 }
+
+/// A tile of smooth random waves with this deviation of slopes along each axis.
+fn waves(deviation: f64, seed: u64) -> crate::geometry::TileMesh {
+    use rand::{RngExt, SeedableRng};
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let side = 96;
+    let mut waves = Vec::new();
+    for x in -5_i32..=5 {
+        for y in -5_i32..=5 {
+            let square = x * x + y * y;
+            if square > 0 && square <= 25 {
+                waves.push((f64::from(x), f64::from(y), std::f64::consts::TAU * rng.random::<f64>()));
+            }
+        }
+    }
+    let height = |px: f64, py: f64| {
+        waves.iter().map(|(x, y, phase)| (std::f64::consts::TAU * (x * px + y * py) + phase).cos()).sum::<f64>()
+    };
+    let squares: f64 = waves.iter().map(|(x, y, _)| 0.25 * std::f64::consts::TAU.powi(2) * (x * x + y * y)).sum();
+    let scale = deviation / squares.sqrt();
+    let at = |k: usize| (k as f64 + 0.5) / side as f64;
+    let rows: Vec<Vec<f64>> = (0..side).map(|y| (0..side).map(|x| scale * height(at(x), at(y))).collect()).collect();
+    let lowest = rows.iter().flatten().copied().fold(f64::MAX, f64::min);
+    let values: Vec<Vec<f64>> = rows.iter().map(|row| row.iter().map(|height| height - lowest).collect()).collect();
+    let geometry = toml::from_str(&format!("kind = \"heightfield\"\nheight_scale = 1.0\nvalues = {values:?}")).unwrap();
+    crate::geometry::build(&crate::scene::Tile::of(geometry), std::path::Path::new("")).unwrap()
+}
+
+#[test]
+fn the_normals_of_explicit_tiles_give_their_single_passes_and_half_of_masked_light_goes_through() {
+    for (deviation, bound) in [(0.1, 0.05), (0.2, 0.05)] {
+        let meshes = [1, 2].map(|seed| Arc::new(waves(deviation, seed)));
+        let [top, bottom] = [0, 1].map(|k| Arc::new(crate::slab::of_mesh(&meshes[k], 0.0, 256).unwrap()));
+        let [above, below] = meshes.map(|mesh| super::TileFace::new(mesh).unwrap());
+        let channel = Channel { eta: 1.5, depth: 0.0 };
+        let tiles =
+            super::TileSlab { top: Some(above), bottom: Some(below), channel, positions: super::Positions::Random };
+        let slab = Slab::new(top.clone(), bottom.clone(), Optics::default(), 256).by_faces(256);
+        let inner = Inner::new(&top, &bottom, &slab.optics, 16_384, 1, &Cancel::default()).unwrap();
+        for degrees in [45.0, 75.0_f64] {
+            let i = DVec3::new(degrees.to_radians().sin() * 0.94, degrees.to_radians().sin() * 0.34, 0.0);
+            let i = i.with_z((1.0 - i.length_squared()).sqrt());
+            let settings = LobeSettings { side: 48, photons: 260_000, target: 0.01, seed: 1 };
+            let lobe = TrueLobe::trace(&tiles, i, &settings, &Cancel::default()).unwrap();
+            let single = cell_means(48, 4, |o| slab.single_pass(i, o).x);
+            let error = lobe.relative_l2(&lobe.single, &single);
+            let all = single.iter().sum::<f64>() * (2.0 / 48.0_f64).powi(2);
+            let bounced = cell_means(48, 2, |o| inner.btdf(i, o).x).iter().sum::<f64>() * (2.0 / 48.0_f64).powi(2);
+            let (masked, traced) = (inner.parts(i, 0).masked, lobe.totals.transmitted.value);
+            let part = (traced - (all + bounced - 0.5 * masked)) / masked;
+            println!(
+                "explicit tiles {deviation} at {degrees}: single passes {:.1} %, T {traced:.4} for {:.4}, of {masked:.3} masked {:.0} % go through, sum {:.5}",
+                100.0 * error,
+                all + bounced,
+                100.0 * part,
+                lobe.totals.sum.value
+            );
+            assert!((lobe.totals.sum.value - 1.0).abs() < 1e-9);
+            if degrees == 45.0 {
+                assert!(error < bound, "{deviation}: {error}");
+            }
+            assert!((traced - all - bounced).abs() < 0.03, "{traced} {all} {bounced}");
+        }
+    }
+}
