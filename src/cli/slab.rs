@@ -85,7 +85,8 @@ pub fn refuse(loaded: &LoadedScene, command: &str) -> Result<()> {
     if loaded.scene.slab.is_none() {
         return Ok(());
     }
-    let expected =
-        format!("a scene without it: `biscale {command}` knows no slabs, only `eval`, `transmit` and `plan` do");
+    let expected = format!(
+        "a scene without it: `biscale {command}` knows no slabs, only `eval`, `transmit`, `export` and `plan` do"
+    );
     Err(crate::Error::from(InputError::new("slab", "a scene with a slab", expected)).into())
 }

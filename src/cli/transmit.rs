@@ -194,7 +194,7 @@ fn of_walter(slab: &Slab, i: DVec3) -> Transmitted {
     let face = if slab.top.deviation() >= slab.bottom.deviation() { &slab.top } else { &slab.bottom };
     let value = |o: DVec3| slab.optics.per_channel(|channel| walter(face, i, o, channel.eta));
     let eta = slab.optics.eta.max_element();
-    let lobe = DiscLobe::new(SIDE, -i.truncate() / eta, (eta - 1.0) / eta * face.deviation(), true, value);
+    let lobe = DiscLobe::new(SIDE, -i.truncate() / eta, ((eta - 1.0) / eta * face.deviation(), 0.0), true, value);
     let totals = Parts { transmitted: lobe.total(), ..Parts::default() };
     let plane = plane_directions(i).map(|o| (o, value(o))).collect();
     Transmitted { lobe, plane, totals, standard_error: None, cell_errors: None, rel_l2: None }

@@ -1,5 +1,7 @@
 //! Eq. 1 of Dai et al. 2009 as a sum: facets of one face, each followed by the exact lobe of the other.
 
+use std::cmp::Ordering;
+
 use glam::{DVec2, DVec3};
 
 use super::dual::leaving_bottom;
@@ -20,8 +22,17 @@ pub enum Order {
 const SAME_VARIANCE: f64 = 1e-9;
 
 impl Order {
-    /// Sums the facets of the smoother face: fewer of them are needed. The choice is the same for the slab turned over.
-    pub fn of_variances(top: f64, bottom: f64) -> Self {
+    /// Sums the facets of the face with fewer slopes: single ones, or those on a line. Of alike faces it sums those of the
+    /// smoother one, because fewer of them are needed. The choice is the same for the slab turned over.
+    pub fn of_faces(top: &Ndf, bottom: &Ndf) -> Self {
+        match top.dimension().cmp(&bottom.dimension()) {
+            Ordering::Less => Self::Top,
+            Ordering::Greater => Self::Bottom,
+            Ordering::Equal => Self::of_variances(top.rough_moments().1, bottom.rough_moments().1),
+        }
+    }
+
+    fn of_variances(top: f64, bottom: f64) -> Self {
         if (top - bottom).abs() <= SAME_VARIANCE * (top + bottom) {
             return Self::Both;
         }
@@ -42,7 +53,7 @@ impl FaceSum {
         if top.is_smooth() || bottom.is_smooth() {
             return Self { top: Vec::new(), bottom: Vec::new() };
         }
-        let order = Order::of_variances(top.rough_moments().1, bottom.rough_moments().1);
+        let order = Order::of_faces(top, bottom);
         let of = |face: &Ndf, other: Order| if order == other { Vec::new() } else { face.facets(count) };
         Self { top: of(top, Order::Bottom), bottom: of(bottom, Order::Top) }
     }

@@ -13,21 +13,34 @@ pub struct DiscLobe {
     pub values: Vec<DVec3>,
 }
 
-/// Points per side of the square in which most of a lobe lies.
+/// Points per side of the square in which most of a lobe lies: at least, and at most where slopes are single.
 const FINE: usize = 192;
+const FINEST: usize = 768;
 /// Half width of that square, in deviations of the lobe.
 const REACH: f64 = 6.0;
 /// Points per side of the other cells.
 const COARSE: usize = 3;
 
-impl DiscLobe {
-    /// Integrates a function of the direction over cells. Most of its light lies around `center`, with the deviation
-    /// `width`. `down` is true for directions below.
-    pub fn new(side: usize, center: DVec2, width: f64, down: bool, value: impl Fn(DVec3) -> DVec3 + Sync) -> Self {
+/// Resolution of points over the disc.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiscGrid {
+    /// Cells per side of the square around the disc; each has nine points.
+    pub side: usize,
+    /// Points per side of the square in which most of a lobe lies: at least, and at most where slopes are single.
+    pub fine: usize,
+    pub finest: usize,
+}
+
+impl DiscGrid {
+    /// Points of the disc with their areas. They are denser around `center`, where a lobe of the deviation `width` lies.
+    /// `detail` is the size of details in it, or 0 without any.
+    pub fn points(&self, center: DVec2, (width, detail): (f64, f64)) -> Vec<(DVec2, f64)> {
         let half = REACH * width.clamp(1e-9, 1.0);
-        let cell = 2.0 / side as f64;
+        let cell = 2.0 / self.side as f64;
         let (mut low, mut high) = ((center - half).max(DVec2::NEG_ONE), (center + half).min(DVec2::ONE));
-        let mut fine = DVec2::splat(FINE as f64);
+        let (least, most) = (self.fine as f64, self.finest as f64);
+        let wanted = if detail > 0.0 { (8.0 * half.min(1.0) / detail).clamp(least, most).ceil() } else { least };
+        let mut fine = DVec2::splat(wanted);
         if half > cell {
             // A square of whole cells, so that all cells have equally many points.
             low = ((low + 1.0) / cell).floor() * cell - 1.0;
@@ -35,47 +48,58 @@ impl DiscLobe {
             let cells = ((high - low) / cell).round().max(DVec2::ONE);
             fine = (fine / cells).ceil().max(DVec2::splat(COARSE as f64)) * cells;
         }
-        let at = |p: DVec2| {
-            let square = p.length_squared();
-            if square >= 1.0 - 1e-12 {
-                return DVec3::ZERO;
-            }
-            value(p.extend((1.0 - square).sqrt() * if down { -1.0 } else { 1.0 }))
-        };
         let is_inside = |p: DVec2| p.cmpge(low).all() && p.cmplt(high).all();
-        let coarse = |k: usize| {
-            let corner = DVec2::new((k % side) as f64, (k / side) as f64);
-            let point = |j: usize| {
-                let inside = (DVec2::new((j % COARSE) as f64, (j / COARSE) as f64) + 0.5) / COARSE as f64;
-                (corner + inside) * cell - 1.0
-            };
-            (0..COARSE * COARSE).map(point).filter(|p| !is_inside(*p)).map(at).sum::<DVec3>() / (COARSE * COARSE) as f64
-        };
-        let mut values: Vec<DVec3> = (0..side * side).into_par_iter().map(coarse).collect();
+        let is_on_disc = |p: &DVec2| p.length_squared() < 1.0 - 1e-12;
+        let side = self.side * COARSE;
+        let at = |k: usize| (DVec2::new((k % side) as f64, (k / side) as f64) + 0.5) * (2.0 / side as f64) - 1.0;
+        let coarse = (0..side * side).map(at).filter(|p| is_on_disc(p) && !is_inside(*p));
+        let area = (2.0 / side as f64).powi(2);
+        let mut points: Vec<(DVec2, f64)> = coarse.map(|p| (p, area)).collect();
         let step = (high - low) / fine;
         if step.min_element() > 0.0 {
             let (columns, rows) = (fine.x as usize, fine.y as usize);
-            let point = |k: usize| {
-                let p = low + step * (DVec2::new((k % columns) as f64, (k / columns) as f64) + 0.5);
-                let index = ((p + 1.0) / cell).floor().clamp(DVec2::ZERO, DVec2::splat((side - 1) as f64));
-                (index.y as usize * side + index.x as usize, at(p))
-            };
-            let points: Vec<(usize, DVec3)> = (0..columns * rows).into_par_iter().map(point).collect();
-            let share = step.x * step.y / (cell * cell);
-            points.into_iter().for_each(|(index, value)| values[index] += share * value);
+            let at = |k: usize| low + step * (DVec2::new((k % columns) as f64, (k / columns) as f64) + 0.5);
+            points.extend((0..columns * rows).map(at).filter(is_on_disc).map(|p| (p, step.x * step.y)));
         }
+        points
+    }
+}
+
+impl DiscLobe {
+    /// Integrates a function of the direction over cells. Most of its light lies around `center`, with the deviation
+    /// `width`, in details of the size `detail`, or 0 without any. `down` is true for directions below.
+    pub fn new(
+        side: usize,
+        center: DVec2,
+        shape: (f64, f64),
+        down: bool,
+        value: impl Fn(DVec3) -> DVec3 + Sync,
+    ) -> Self {
+        let cell = 2.0 / side as f64;
+        let points = DiscGrid { side, fine: FINE, finest: FINEST }.points(center, shape);
+        let at = |(p, area): &(DVec2, f64)| {
+            let z = (1.0 - p.length_squared()).max(0.0).sqrt();
+            let index = ((*p + 1.0) / cell).floor().clamp(DVec2::ZERO, DVec2::splat((side - 1) as f64));
+            let share = area / (cell * cell);
+            (index.y as usize * side + index.x as usize, share * value(p.extend(if down { -z } else { z })))
+        };
+        let found: Vec<(usize, DVec3)> = points.par_iter().map(at).collect();
+        let mut values = vec![DVec3::ZERO; side * side];
+        found.into_iter().for_each(|(index, value)| values[index] += value);
         Self { side, values }
     }
 
     /// The transmitted lobe of light from `i`, which points up.
     pub fn transmitted(slab: &Slab, i: DVec3, side: usize) -> Self {
         let width = (slab.optics.eta.max_element() - 1.0) * slab.deviation();
-        Self::new(side, -i.truncate(), width, true, |o| slab.btdf(i, o))
+        Self::new(side, -i.truncate(), (width, 0.0), true, |o| slab.btdf(i, o))
     }
 
     /// The reflected lobe of light from `i`, which points up.
     pub fn reflected(slab: &Slab, i: DVec3, side: usize) -> Self {
-        Self::new(side, -i.truncate(), 2.0 * slab.top.deviation(), false, |o| slab.brdf(i, o))
+        // Near the horizon details shrink on the disc.
+        let detail = slab.top.resolution() * i.z.max(0.1);
+        Self::new(side, -i.truncate(), (2.0 * slab.top.deviation(), detail), false, |o| slab.brdf(i, o))
     }
 
     /// Flux of the whole lobe, as a part of the incident flux.

@@ -31,7 +31,7 @@ pub use ellipse::{Ellipse, Profile};
 pub use faces::{FaceSum, Order};
 pub use from_geometry::of_mesh;
 pub use inner::{Inner, Parts};
-pub use lobe::DiscLobe;
+pub use lobe::{DiscGrid, DiscLobe};
 pub use model::{Method, Slab, alpha_of};
 pub use ndf::{Ndf, Spread, normal};
 pub use optics::{Channel, Optics};

@@ -158,6 +158,15 @@ impl Ndf {
         spread.into_iter().map(|slope| (slope, part)).chain(self.points.iter().copied()).collect()
     }
 
+    /// Dimension of the rough slopes: 0 for single slopes, 1 for a line, 2 for others.
+    pub fn dimension(&self) -> usize {
+        match &self.spread {
+            Spread::Empty => 0,
+            Spread::Line(_) => 1,
+            _ => 2,
+        }
+    }
+
     /// Mean slope of the rough part and mean squared distance from it; zero without a rough part. GGX counts as Beckmann
     /// of the same roughness.
     pub fn rough_moments(&self) -> (DVec2, f64) {

@@ -154,18 +154,36 @@ fn bad_slabs_are_refused_with_key_found_and_expected() {
     eval("circle.toml", &[], &["slab.top.scene", "circle"]);
     for arguments in [
         &["render", "slab.toml", "-o", "out.png"][..],
-        &["export", "slab.toml", "-o", "out.npz"],
         &["fit", "slab.toml", "-o", "out.gltf"],
         &["profile", "slab.toml"],
     ] {
         folder.assert_refused(arguments, &["slab", arguments[0]]);
     }
+    folder.assert_refused(&["export", "slab.toml", "-o", "out.npz"], &["out.npz", ".xml"]);
+    folder.assert_refused(
+        &["export", "slab.toml", "-o", "out.xml", "--radiance", "tensor-tree"],
+        &["--radiance", "klems"],
+    );
     folder.assert_refused(&["transmit", "default", "--json"], &["default", "slab", "nothing"]);
     folder.assert_refused(&["transmit", "slab.toml"], &["--output"]);
     folder.assert_refused(&["transmit", "slab.toml", "-o", "out.gif"], &["out.gif", ".csv or .png"]);
     folder.assert_refused(&["transmit", "slab.toml", "--json", "--theta-i", "91"], &["91", "from 0 to 90"]);
     folder.assert_refused(&["transmit", "slab.toml", "-o", "slab.toml"], &["slab.toml"]);
     assert_eq!(folder.files(), before);
+}
+
+#[test]
+fn export_writes_four_matrices_for_radiance() {
+    let folder = CommandLine::new();
+    let report = folder.json(&["export", "slab_fig3_top", "-o", "slab.xml", "--json", "--quiet"]);
+    let text = std::fs::read_to_string(folder.path("slab.xml")).unwrap();
+    for direction in ["Transmission Front", "Transmission Back", "Reflection Front", "Reflection Back"] {
+        let count = text.matches(&format!("<WavelengthDataDirection>{direction}<")).count();
+        assert_eq!(count, 3, "{direction}");
+    }
+    let transmitted = report["transmitted"][1].as_f64().unwrap();
+    assert!((transmitted - 0.921).abs() < 0.005, "{report}");
+    assert!(std::fs::read_to_string(folder.path("slab.xml.txt")).unwrap().contains("top face"));
 }
 
 #[test]
