@@ -80,6 +80,20 @@ mod tests {
     }
 
     #[test]
+    fn tiles_of_a_millionth_and_of_a_million_units_have_the_same_slopes() {
+        let slopes = |size: f32| {
+            let geometry = format!("kind = \"pyramids\"\nheight = {}\nspacing = {}", 0.1 * size, 0.25 * size);
+            let tile = Tile { size: glam::Vec2::splat(size), ..Tile::of(toml::from_str(&geometry).unwrap()) };
+            of_mesh(&crate::geometry::build(&tile, std::path::Path::new("")).unwrap(), 0.0, 64).unwrap().facets(1)
+        };
+        for size in [1e-6, 1e6] {
+            for ((a, p), (b, q)) in slopes(size).iter().zip(slopes(1.0)) {
+                assert!((*a - b).length() < 1e-4 && (p - q).abs() < 1e-4, "{size}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
     fn overhangs_are_refused_with_the_reason() {
         for geometry in ["kind = \"rods\"", "kind = \"weave\""] {
             let error = of_mesh(&mesh(geometry), 0.0, 64).unwrap_err();

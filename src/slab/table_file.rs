@@ -99,6 +99,28 @@ mod tests {
     }
 
     #[test]
+    fn damaged_tables_are_read_or_refused_but_never_unsound() {
+        use rand::{RngExt, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let sound = example(Profile::Ggx, 0.3, 6, 1.0).into_bytes();
+        let pieces: [&[u8]; 8] = [b",", b"\n", b"-", b"1e308", b"nan", b"inf", b"1e-320", b"\xff"];
+        for _ in 0..400 {
+            let mut bytes = sound.clone();
+            for _ in 0..rng.random_range(1..4) {
+                let at = rng.random_range(0..bytes.len());
+                let end = (at + rng.random_range(0..9)).min(bytes.len());
+                bytes.splice(at..end, pieces[rng.random_range(0..pieces.len())].iter().copied());
+            }
+            let Ok(text) = std::str::from_utf8(&bytes) else { continue };
+            if let Ok(ndf) = read(text, 1.0, 0.0) {
+                let density = ndf.density(DVec2::new(rng.random(), rng.random()));
+                assert!(density.is_finite() && density >= 0.0, "{text}");
+                assert!(ndf.signed_lambda(glam::DVec3::new(0.9, 0.1, 0.1)).is_finite(), "{text}");
+            }
+        }
+    }
+
+    #[test]
     fn bad_tables_are_refused_with_their_place() {
         for (text, expected) in [
             ("", "0 rows"),

@@ -211,6 +211,34 @@ fn a_flat_slab_of_photons_has_the_closed_transmittance() {
 }
 
 #[test]
+fn photons_agree_with_two_rough_dielectrics_of_mitsuba() {
+    // Mitsuba 3.9.1: two `roughdielectric` samples in a row, 20,000 paths, η = 1.5: T with its standard error, mean and
+    // deviation of o.x.
+    let cases = [
+        (beckmann(0.2), beckmann(0.2), 45.0, [0.8150, 0.0027, -0.6958, 0.1055]),
+        (ggx(0.3), ggx(0.1), 30.0, [0.8498, 0.0025, -0.5092, 0.1670]),
+        (beckmann(0.3), beckmann(0.3), 75.0, [0.2502, 0.0030, -0.8773, 0.0799]),
+        (ggx(0.2), ggx(0.2), 60.0, [0.4698, 0.0034, -0.7846, 0.1295]),
+    ];
+    for (top, bottom, degrees, [total, error, mean, deviation]) in cases {
+        let lobe = truth(&slab(&top, &bottom), degrees, 400_000);
+        let found = lobe.totals.single_pass;
+        let moments = crate::slab::DiscLobe {
+            side: lobe.side,
+            values: lobe.single.values.iter().map(|value| DVec3::splat(*value)).collect(),
+        };
+        let (found_mean, found_deviation) = moments.moments();
+        println!(
+            "{degrees}: T {:.4} for {total}, mean {:.4} for {mean}, width {:.4} for {deviation}",
+            found.value, found_mean.x, found_deviation.x
+        );
+        assert!((found.value - total).abs() < 3.0 * error.hypot(found.standard_error), "{degrees}: {found:?} {total}");
+        // The means of Mitsuba's 20,000 paths have a standard error of some 0.001.
+        assert!((found_mean.x - mean).abs() < 0.005 && (found_deviation.x - deviation).abs() < 0.005, "{degrees}");
+    }
+}
+
+#[test]
 fn photons_are_the_same_for_any_number_of_threads() {
     let slab = slab(&beckmann(0.2), &ggx(0.1));
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| truth(&slab, 40.0, 200_000));
