@@ -112,40 +112,65 @@ impl<P: Fn(DVec2) -> f64> DualFaces<'_, P> {
     /// BTDF [1/sr] of the pair, single pass, without what only level facets transmit. Light that meets a level facet on
     /// one face sees the other face alone, for which Eq. 6 or 10 is exact; the rest is Eq. 11.
     pub fn btdf(&self, i: DVec3, o: DVec3, channel: Channel) -> f64 {
-        self.one_rough(i, o, channel) + self.both_rough(i, o, channel)
+        let pair = Pair::new(i, o, channel);
+        self.one_rough_at(&pair) + self.both_rough(&pair)
     }
 
     /// The light that meets a level facet on exactly one face.
     pub fn one_rough(&self, i: DVec3, o: DVec3, channel: Channel) -> f64 {
+        let has_level = self.top.level() + self.bottom.level() > 0.0;
+        if has_level { self.one_rough_at(&Pair::new(i, o, channel)) } else { 0.0 }
+    }
+
+    fn one_rough_at(&self, pair: &Pair) -> f64 {
         let Self { top, bottom, .. } = *self;
-        let weight =
-            |at: &Configuration| masking(top, bottom, i, at.inner, o) * channel.transmission(at.inner) * at.factor;
         let mut sum = 0.0;
-        if !top.is_smooth() && bottom.level() > 0.0 {
-            sum += rough_top(i, o, channel.eta).map_or(0.0, |at| bottom.level() * top.density(at.slope) * weight(&at));
+        if let Some(at) = pair.top.as_ref().filter(|_| !top.is_smooth() && bottom.level() > 0.0) {
+            sum += self.weight(pair, at, bottom.level() * top.density(at.slope));
         }
-        if !bottom.is_smooth() && top.level() > 0.0 {
-            sum +=
-                rough_bottom(i, o, channel.eta).map_or(0.0, |at| top.level() * bottom.density(at.slope) * weight(&at));
+        if let Some(at) = pair.bottom.as_ref().filter(|_| !bottom.is_smooth() && top.level() > 0.0) {
+            sum += self.weight(pair, at, top.level() * bottom.density(at.slope));
         }
         sum
     }
 
     /// Eq. 11 for the light that meets rough facets on both faces.
-    fn both_rough(&self, i: DVec3, o: DVec3, channel: Channel) -> f64 {
-        let Self { top, bottom, alpha, .. } = *self;
-        let mass = top.rough() * bottom.rough();
+    fn both_rough(&self, pair: &Pair) -> f64 {
+        let mass = self.top.rough() * self.bottom.rough();
         if mass <= 0.0 {
             return 0.0;
         }
-        let value = |at: Option<Configuration>, sign: f64| {
-            at.map_or(0.0, |at| {
-                let density = (self.virtual_density)(sign * at.slope);
-                density * masking(top, bottom, i, at.inner, o) * channel.transmission(at.inner) * at.factor
-            })
+        let value = |at: Option<&Configuration>, sign: f64| {
+            at.map_or(0.0, |at| self.weight(pair, at, (self.virtual_density)(sign * at.slope)))
         };
-        let of_top = if alpha > 0.0 { value(rough_top(i, o, channel.eta), 1.0) } else { 0.0 };
-        let of_bottom = if alpha < 1.0 { value(rough_bottom(i, o, channel.eta), -1.0) } else { 0.0 };
-        mass * blend(of_top, of_bottom, alpha)
+        let top = if self.alpha > 0.0 { value(pair.top.as_ref(), 1.0) } else { 0.0 };
+        // Eq. 11 is 0 where one of its factors is.
+        let needs_bottom = self.alpha < 1.0 && (self.alpha <= 0.0 || top > 0.0);
+        let bottom = if needs_bottom { value(pair.bottom.as_ref(), -1.0) } else { 0.0 };
+        mass * blend(top, bottom, self.alpha)
+    }
+
+    /// The BTDF of a configuration whose rough facets have this density.
+    fn weight(&self, pair: &Pair, at: &Configuration, density: f64) -> f64 {
+        if density <= 0.0 {
+            return 0.0;
+        }
+        let masking = masking(self.top, self.bottom, pair.i, at.inner, pair.o);
+        density * masking * pair.channel.transmission(at.inner) * at.factor
+    }
+}
+
+/// A pair of directions in both virtual slabs; `None` where no facet refracts `i` to `o`.
+struct Pair {
+    i: DVec3,
+    o: DVec3,
+    channel: Channel,
+    top: Option<Configuration>,
+    bottom: Option<Configuration>,
+}
+
+impl Pair {
+    fn new(i: DVec3, o: DVec3, channel: Channel) -> Self {
+        Self { i, o, channel, top: rough_top(i, o, channel.eta), bottom: rough_bottom(i, o, channel.eta) }
     }
 }

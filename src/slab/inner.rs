@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -25,8 +25,8 @@ struct ChannelTable {
     /// BTDF and BRDF [1/sr] by ring of the light, ring of the viewer and azimuth.
     transmitted: Vec<f32>,
     reflected: Vec<f32>,
-    /// Parts of the light of each ring.
-    parts: Vec<Parts>,
+    /// Parts of the light of each ring, over the azimuth of the light.
+    parts: Vec<RingParts>,
     /// Mean of the masked part over all directions of the light, by projected solid angle.
     mean_masked: f64,
 }
@@ -40,6 +40,72 @@ pub struct Parts {
     pub first_total_reflection: f64,
     /// Light that leaves below after reflections inside.
     pub after_bounces: f64,
+}
+
+/// Parts of the light of a ring as functions of its azimuth.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct RingParts {
+    absorbed: Harmonics,
+    masked: Harmonics,
+    first_total_reflection: Harmonics,
+    after_bounces: Harmonics,
+    /// Light in the tables.
+    transmitted: Harmonics,
+    reflected: Harmonics,
+}
+
+impl RingParts {
+    fn all_mut(&mut self) -> [&mut Harmonics; 6] {
+        let Self { absorbed, masked, first_total_reflection, after_bounces, transmitted, reflected } = self;
+        [absorbed, masked, first_total_reflection, after_bounces, transmitted, reflected]
+    }
+}
+
+/// A function of the azimuth: its mean, and its products with the cosine and the sine of once, twice and four times the
+/// azimuth. These hold tilted faces, grooves and square patterns.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Harmonics {
+    products: [f64; 7],
+    /// Mean of the squares.
+    square: f64,
+}
+
+/// Standard errors that a product must exceed to be kept: isotropic faces have none.
+const SIGNIFICANT: f64 = 4.0;
+
+impl Harmonics {
+    /// The functions at the azimuth of a direction.
+    fn basis(i: DVec3) -> [f64; 7] {
+        let Some(DVec2 { x, y }) = i.truncate().try_normalize() else { return [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
+        let (x2, y2) = (x * x - y * y, 2.0 * x * y);
+        [1.0, x, y, x2, y2, x2 * x2 - y2 * y2, 2.0 * x2 * y2]
+    }
+
+    fn add(&mut self, basis: &[f64; 7], value: f64) {
+        self.products.iter_mut().zip(basis).for_each(|(sum, base)| *sum += base * value);
+        self.square += value * value;
+    }
+
+    /// Turns sums over `count` photons into means, and drops products that may be noise.
+    fn finish(&mut self, count: usize) {
+        let scale = 1.0 / count.max(1) as f64;
+        self.products.iter_mut().for_each(|product| *product *= scale);
+        self.square *= scale;
+        let error = (0.5 * self.square * scale).sqrt();
+        self.products[1..]
+            .iter_mut()
+            .filter(|product| product.abs() < SIGNIFICANT * error)
+            .for_each(|product| *product = 0.0);
+    }
+
+    fn at(&self, basis: &[f64; 7]) -> f64 {
+        let rest: f64 = self.products[1..].iter().zip(&basis[1..]).map(|(a, b)| a * b).sum();
+        (self.products[0] + 2.0 * rest).max(0.0)
+    }
+
+    fn mean(&self) -> f64 {
+        self.products[0]
+    }
 }
 
 /// The tables of all channels. Channels that are alike share one.
@@ -82,16 +148,20 @@ impl Inner {
 
     /// BTDF [1/sr] of the light that bounced inside, and of half of the masked light, for light from above.
     pub fn btdf(&self, i: DVec3, o: DVec3) -> DVec3 {
-        self.per_channel(|table| table.read(&table.transmitted, i, o) + 0.5 * table.part(i, |parts| parts.masked) / PI)
+        self.per_channel(|table| {
+            let scale = table.relative(i, |parts| &parts.transmitted);
+            scale * table.read(&table.transmitted, i, o) + 0.5 * table.part(i, |parts| &parts.masked) / PI
+        })
     }
 
     /// BRDF [1/sr] of the light that returns from inside, and of half of the masked light, for light from above.
     pub fn brdf(&self, i: DVec3, o: DVec3) -> DVec3 {
         self.per_channel(|table| {
-            let masked = |w: DVec3| table.part(w, |parts| parts.masked);
+            let masked = |w: DVec3| table.part(w, |parts| &parts.masked);
             // The product is reciprocal, and its integral over the viewers is half of the masked part.
             let part = if table.mean_masked > 0.0 { masked(i) * masked(o) / table.mean_masked } else { 0.0 };
-            table.read(&table.reflected, i, o) + 0.5 * part / PI
+            let scale = |w: DVec3| table.relative(w, |parts| &parts.reflected);
+            scale(i) * scale(o) * table.read(&table.reflected, i, o) + 0.5 * part / PI
         })
     }
 
@@ -99,17 +169,17 @@ impl Inner {
     pub fn parts(&self, i: DVec3, channel: usize) -> Parts {
         let table = &self.tables[self.of_channel[channel]];
         Parts {
-            absorbed: table.part(i, |parts| parts.absorbed),
-            masked: table.part(i, |parts| parts.masked),
-            first_total_reflection: table.part(i, |parts| parts.first_total_reflection),
-            after_bounces: table.part(i, |parts| parts.after_bounces),
+            absorbed: table.part(i, |parts| &parts.absorbed),
+            masked: table.part(i, |parts| &parts.masked),
+            first_total_reflection: table.part(i, |parts| &parts.first_total_reflection),
+            after_bounces: table.part(i, |parts| &parts.after_bounces),
         }
     }
 
     /// Largest masked part of light up to 75° from the normal.
     pub fn largest_masked(&self) -> f64 {
         let rings = RINGS * 75 / 90;
-        self.tables.iter().flat_map(|table| &table.parts[..rings]).map(|parts| parts.masked).fold(0.0, f64::max)
+        self.tables.iter().flat_map(|table| &table.parts[..rings]).map(|parts| parts.masked.mean()).fold(0.0, f64::max)
     }
 
     /// Size in memory [bytes].
@@ -122,7 +192,7 @@ impl Inner {
 struct RingSums {
     transmitted: Vec<f64>,
     reflected: Vec<f64>,
-    parts: Parts,
+    parts: RingParts,
 }
 
 impl ChannelTable {
@@ -141,8 +211,8 @@ impl ChannelTable {
         // Reflection is reciprocal: both ways estimate one value.
         let other = |k: usize| (k / TURNS % RINGS * RINGS + k / TURNS / RINGS) * TURNS + k % TURNS;
         let reflected = (0..one_way.len()).map(|k| (0.5 * (one_way[k] + one_way[other(k)])) as f32).collect();
-        let parts: Vec<Parts> = rings.iter().map(|ring| ring.parts).collect();
-        let mean_masked = (0..RINGS).map(|ring| projected_solid_angle(ring) / PI * parts[ring].masked).sum();
+        let parts: Vec<RingParts> = rings.iter().map(|ring| ring.parts).collect();
+        let mean_masked = (0..RINGS).map(|ring| projected_solid_angle(ring) / PI * parts[ring].masked.mean()).sum();
         Self { transmitted: transmitted.iter().map(|value| *value as f32).collect(), reflected, parts, mean_masked }
     }
 
@@ -162,8 +232,16 @@ impl ChannelTable {
         sum
     }
 
-    fn part(&self, i: DVec3, of: impl Fn(&Parts) -> f64) -> f64 {
-        ring_taps(i).iter().map(|(ring, weight)| weight * of(&self.parts[*ring])).sum()
+    /// A part of light from `i`, interpolated between the rings.
+    fn part(&self, i: DVec3, of: impl Fn(&RingParts) -> &Harmonics) -> f64 {
+        let basis = Harmonics::basis(i);
+        ring_taps(i).iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).at(&basis)).sum()
+    }
+
+    /// A part of light from `i` over its mean of all azimuths.
+    fn relative(&self, i: DVec3, of: impl Fn(&RingParts) -> &Harmonics) -> f64 {
+        let mean: f64 = ring_taps(i).iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).mean()).sum();
+        if mean > 0.0 { self.part(i, of) / mean } else { 1.0 }
     }
 }
 
@@ -196,7 +274,7 @@ fn trace_ring(walk: &Walk<'_>, ring: usize, photons: usize, seed: u64, cancel: &
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(ring as u64);
     let bins = RINGS * TURNS;
-    let mut sums = RingSums { transmitted: vec![0.0; bins], reflected: vec![0.0; bins], parts: Parts::default() };
+    let mut sums = RingSums { transmitted: vec![0.0; bins], reflected: vec![0.0; bins], parts: RingParts::default() };
     let (low, high) = (edge(ring), edge(ring + 1));
     for photon in 0..photons {
         if photon % 4096 == 0 && cancel.is_set() {
@@ -205,7 +283,7 @@ fn trace_ring(walk: &Walk<'_>, ring: usize, photons: usize, seed: u64, cancel: &
         let square: f64 = low + (high - low) * rng.random::<f64>();
         let (y, x) = (TAU * rng.random::<f64>()).sin_cos();
         let i = DVec3::new(square.sqrt() * x, square.sqrt() * y, (1.0 - square).max(0.0).sqrt());
-        let mut after_bounces = 0.0;
+        let (mut after_bounces, mut through, mut back) = (0.0, 0.0, 0.0);
         let losses = walk.run(i, &mut rng, |exit| {
             let Exit { direction, weight, bounces, is_straight } = exit;
             let is_below = direction.z < 0.0;
@@ -219,17 +297,13 @@ fn trace_ring(walk: &Walk<'_>, ring: usize, photons: usize, seed: u64, cancel: &
             let ring = ((direction.z.abs().min(1.0).acos() / FRAC_PI_2 * RINGS as f64) as usize).min(RINGS - 1);
             let step = ((turn(i, direction) / PI * TURNS as f64) as usize).min(TURNS - 1);
             let side = if is_below { &mut sums.transmitted } else { &mut sums.reflected };
+            *(if is_below { &mut through } else { &mut back }) += weight;
             side[ring * TURNS + step] += weight;
         });
-        sums.parts.absorbed += losses.absorbed;
-        sums.parts.masked += losses.masked;
-        sums.parts.first_total_reflection += losses.first_total_reflection;
-        sums.parts.after_bounces += after_bounces;
+        let values = [losses.absorbed, losses.masked, losses.first_total_reflection, after_bounces, through, back];
+        let basis = Harmonics::basis(i);
+        sums.parts.all_mut().into_iter().zip(values).for_each(|(part, value)| part.add(&basis, value));
     }
-    let scale = 1.0 / photons.max(1) as f64;
-    let Parts { absorbed, masked, first_total_reflection, after_bounces } = &mut sums.parts;
-    for part in [absorbed, masked, first_total_reflection, after_bounces] {
-        *part *= scale;
-    }
+    sums.parts.all_mut().into_iter().for_each(|part| part.finish(photons));
     sums
 }

@@ -18,12 +18,27 @@ pub struct SlopeTable {
     /// Cumulative mass of the rows, and within each row.
     rows: Vec<f64>,
     columns: Vec<f64>,
-    smith: SmithTable,
+    /// Absent for a table that is only read as a density.
+    smith: Option<SmithTable>,
 }
 
 impl SlopeTable {
     /// A table of masses, which are scaled to the sum 1. `None` if a mass is negative or not finite, or if all are 0.
-    pub fn new(side: usize, origin: DVec2, cell: f64, mut masses: Vec<f64>) -> Option<Self> {
+    pub fn new(side: usize, origin: DVec2, cell: f64, masses: Vec<f64>) -> Option<Self> {
+        let table = Self::only_density(side, origin, cell, masses)?;
+        let node = |k: usize| origin + cell * DVec2::new((k % side) as f64, (k / side) as f64);
+        let slopes: Vec<(DVec2, f64)> = table
+            .masses
+            .iter()
+            .enumerate()
+            .filter(|(_, mass)| **mass > 0.0)
+            .map(|(k, mass)| (node(k), *mass))
+            .collect();
+        Some(Self { smith: Some(SmithTable::new(&slopes)), ..table })
+    }
+
+    /// As [`Self::new`], but without masking: [`Self::lambda`] is 0.
+    pub fn only_density(side: usize, origin: DVec2, cell: f64, mut masses: Vec<f64>) -> Option<Self> {
         let sum: f64 = masses.iter().sum();
         let is_sound = masses.len() == side * side && masses.iter().all(|mass| *mass >= 0.0);
         if !is_sound || !(sum > 0.0 && sum.is_finite()) || side < 2 {
@@ -43,11 +58,7 @@ impl SlopeTable {
         let columns: Vec<f64> = masses.chunks_exact(side).flat_map(cumulative).collect();
         let totals: Vec<f64> = columns.chunks_exact(side).map(|row| row[side - 1]).collect();
         let rows = cumulative(&totals);
-        let node = |k: usize| origin + cell * DVec2::new((k % side) as f64, (k / side) as f64);
-        let slopes: Vec<(DVec2, f64)> =
-            masses.iter().enumerate().filter(|(_, mass)| **mass > 0.0).map(|(k, mass)| (node(k), *mass)).collect();
-        let smith = SmithTable::new(&slopes);
-        Some(Self { side, origin, cell, masses, rows, columns, smith })
+        Some(Self { side, origin, cell, masses, rows, columns, smith: None })
     }
 
     /// A table of slopes with masses. Slopes beyond `span` of `center` along an axis count at its edge.
@@ -84,7 +95,7 @@ impl SlopeTable {
 
     /// Smith's Λ of a direction `w` with `k = w.xy / w.z`.
     pub fn lambda(&self, k: DVec2) -> f64 {
-        self.smith.lambda(k)
+        self.smith.as_ref().map_or(0.0, |smith| smith.lambda(k))
     }
 
     /// Mean slope and mean squared distance from it.

@@ -37,7 +37,8 @@ pub fn virtual_face(top: &Ndf, bottom: &Ndf, side: usize) -> Spread {
         if sums[row * side + column] > 1e-14 { sums[row * side + column] } else { 0.0 }
     };
     let masses = (0..side * side).map(shifted).collect();
-    SlopeTable::new(side, a.origin, a.cell, masses).map_or(Spread::Empty, |table| Spread::Table(Arc::new(table)))
+    SlopeTable::only_density(side, a.origin, a.cell, masses)
+        .map_or(Spread::Empty, |table| Spread::Table(Arc::new(table)))
 }
 
 #[cfg(test)]

@@ -40,9 +40,9 @@ fn single(slab: &Slab, degrees: f64, sub: usize) -> Vec<f64> {
 #[test]
 fn one_rough_face_is_exact_within_two_per_cent_at_0_to_75_degrees() {
     let flat = Arc::new(Ndf::smooth());
-    for (top, bottom) in [(beckmann(0.2), flat.clone()), (flat.clone(), beckmann(0.2)), (ggx(0.2), flat.clone())] {
+    for (top, bottom) in [(beckmann(0.2), flat.clone()), (flat.clone(), ggx(0.2))] {
         let slab = slab(&top, &bottom);
-        for degrees in [0.0, 30.0, 45.0, 60.0, 75.0] {
+        for degrees in [0.0, 45.0, 75.0] {
             let lobe = truth(&slab, degrees, 1_000_000);
             let error = lobe.relative_l2(&lobe.single, &single(&slab, degrees, 5));
             println!("one rough face, {}/{} at {degrees}: {:.1} %", top.describe(), bottom.describe(), 100.0 * error);
@@ -65,14 +65,9 @@ fn eq_11_of_two_equal_faces_is_within_its_bound_at_0_to_60_degrees() {
 
 #[test]
 fn sums_over_64_and_256_facets_are_eq_1_within_their_bounds_to_75_degrees() {
-    for (top, bottom) in [
-        (beckmann(0.2), beckmann(0.2)),
-        (beckmann(0.4), beckmann(0.4)),
-        (beckmann(0.1), beckmann(0.3)),
-        (ggx(0.2), ggx(0.2)),
-    ] {
+    for (top, bottom) in [(beckmann(0.4), beckmann(0.4)), (beckmann(0.1), beckmann(0.3)), (ggx(0.2), ggx(0.2))] {
         let slab = slab(&top, &bottom);
-        for degrees in [30.0, 60.0, 75.0] {
+        for degrees in [30.0, 75.0] {
             let lobe = truth(&slab, degrees, 500_000);
             for (count, bound) in [(64, 0.06), (256, 0.04)] {
                 let faces = slab.clone().by_faces(count);
@@ -169,12 +164,10 @@ fn pairs_by_walks_agree_with_counted_photons_and_with_the_sum_of_facets() {
 
 #[test]
 fn all_light_with_bounces_is_within_eight_per_cent_and_its_total_within_two_to_75_degrees() {
-    for (top, bottom) in
-        [(beckmann(0.2), beckmann(0.2)), (beckmann(0.3), Arc::new(Ndf::smooth())), (ggx(0.3), ggx(0.3))]
-    {
+    for (top, bottom) in [(beckmann(0.3), Arc::new(Ndf::smooth())), (ggx(0.3), ggx(0.3))] {
         let slab = slab(&top, &bottom).by_faces(64);
         let inner = Inner::new(&top, &bottom, &slab.optics, 16_384, 1, &Cancel::default()).unwrap();
-        for degrees in [0.0, 45.0, 60.0, 75.0] {
+        for degrees in [0.0, 60.0, 75.0] {
             let lobe = truth(&slab, degrees, 400_000);
             let (i, inner) = (polar(degrees), &inner);
             // The truth of normals has no place for masked light: compare without it.
