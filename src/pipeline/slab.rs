@@ -3,8 +3,6 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{DVec3, Vec3};
-
 use super::Pipeline;
 use super::stage::{Keyed, StageTimes, elapsed_ms};
 use super::stages::{BuildFace, CorrelateFaces, FaceNormals, TraceInner};
@@ -114,19 +112,18 @@ impl Pipeline {
         let health = Health::of_slab(&slab, &inputs);
         let mut effects = decision.effects;
         for effect in &mut effects {
-            let of_stage = |name: &str| times.iter().find(|(stage, _)| *stage == name).map(|(_, ms)| *ms);
-            effect.measured_ms = of_stage(if effect.name == "slab" { "slab" } else { "slab_inner" });
+            let name = if effect.name == "slab" { "slab" } else { "slab_inner" };
+            effect.measured_ms = times.iter().find(|(stage, _)| *stage == name).map(|(_, ms)| *ms);
         }
         Ok(SlabOutcome { slab: Arc::new(slab), effects, settings, times, dual_error, health })
     }
 }
 
 fn optics(spec: &SlabSpec) -> Optics {
-    let wide = |value: Vec3| -> DVec3 { value.as_dvec3() };
     Optics {
-        eta: wide(spec.eta),
+        eta: spec.eta.as_dvec3(),
         thickness: f64::from(spec.thickness),
-        absorption: wide(spec.absorption),
-        diffuse: wide(spec.diffuse),
+        absorption: spec.absorption.as_dvec3(),
+        diffuse: spec.diffuse.as_dvec3(),
     }
 }

@@ -5,7 +5,8 @@ use glam::{DVec2, DVec3};
 use super::faces::FaceSum;
 use super::fresnel::refract;
 use super::model::{Method, Slab};
-use super::ndf::{normal, r2};
+use super::ndf::normal;
+use super::spread::r2;
 
 /// Polar angles of the light [degrees], and pairs of each.
 const ANGLES_DEG: [f64; 4] = [15.0, 40.0, 60.0, 72.0];

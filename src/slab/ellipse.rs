@@ -34,7 +34,7 @@ impl Ellipse {
     /// roughnesses are 0: then all facets are level.
     pub fn new(profile: Profile, roughness: DVec2, rotation: f64) -> Option<Self> {
         let roughness = roughness.abs();
-        if !(roughness.max_element() > 0.0) {
+        if roughness.max_element().is_nan() || roughness.max_element() <= 0.0 {
             return None;
         }
         let roughness = roughness.max(DVec2::splat(MIN_ROUGHNESS));

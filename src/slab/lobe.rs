@@ -114,7 +114,7 @@ impl DiscLobe {
         };
         let weight = |value: &DVec3| value.element_sum();
         let total: f64 = self.values.iter().map(weight).sum();
-        if !(total > 0.0) {
+        if total.is_nan() || total <= 0.0 {
             return (DVec2::ZERO, DVec2::ZERO);
         }
         let mean = self.values.iter().enumerate().map(|(k, value)| weight(value) * center(k)).sum::<DVec2>() / total;

@@ -41,7 +41,8 @@ impl SlopeTable {
     pub fn only_density(side: usize, origin: DVec2, cell: f64, mut masses: Vec<f64>) -> Option<Self> {
         let sum: f64 = masses.iter().sum();
         let is_sound = masses.len() == side * side && masses.iter().all(|mass| *mass >= 0.0);
-        if !is_sound || !(sum > 0.0 && sum.is_finite()) || side < 2 {
+        let is_distribution = is_sound && sum > 0.0 && sum.is_finite() && side >= 2;
+        if !is_distribution {
             return None;
         }
         masses.iter_mut().for_each(|mass| *mass /= sum);

@@ -31,7 +31,7 @@ impl SmithTable {
     /// Λ of a direction `w` with `k = w.xy / w.z`. It is negative if the mean slope tilts away from the direction.
     pub fn lambda(&self, k: DVec2) -> f64 {
         let tangent = k.length();
-        if !(tangent > 0.0) {
+        if tangent.is_nan() || tangent <= 0.0 {
             return 0.0;
         }
         let turn = (k.y.atan2(k.x) / TAU).rem_euclid(1.0) * AZIMUTHS as f64;

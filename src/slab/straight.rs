@@ -19,7 +19,7 @@ pub struct Straight {
 /// level facets is summed as a geometric series; for a flat slab without absorption they are `(1-R)/(1+R)` and
 /// `2R/(1+R)`. A slab of index 1 transmits everything that it does not absorb.
 pub fn straight(top: &Ndf, bottom: &Ndf, i: DVec3, channel: Channel, bounces: bool) -> Straight {
-    if !(i.z > 0.0) {
+    if i.z.is_nan() || i.z <= 0.0 {
         // At grazing incidence a face reflects all light, but for a slab that has no faces.
         let is_clear = channel.is_clear() && channel.depth <= 0.0;
         return Straight {

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::ndf::{Ndf, Spread};
+use super::ndf::Ndf;
 use super::slope_table::{Deposit, SlopeTable};
+use super::spread::Spread;
 use crate::math::fft;
 
 /// The distribution of `m_top - m_bottom` for independent rough facets of both faces. It is closed for Beckmann slopes, and
@@ -44,7 +45,7 @@ pub fn virtual_face(top: &Ndf, bottom: &Ndf, side: usize) -> Spread {
 #[cfg(test)]
 mod tests {
     use super::super::ellipse::Profile;
-    use super::super::ndf::r2;
+    use super::super::spread::r2;
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;

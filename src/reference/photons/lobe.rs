@@ -188,11 +188,11 @@ impl TrueLobe {
     /// Relative L2 over solid angle of a model's cells against these, with the noise of the truth taken out.
     pub fn relative_l2(&self, truth: &Bins, model: &[f64]) -> f64 {
         let (mut difference, mut norm) = (0.0, 0.0);
-        for cell in 0..truth.values.len() {
+        let cells = truth.values.iter().zip(&truth.variances).zip(model).enumerate();
+        for (cell, ((value, variance), model)) in cells {
             let weight = self.weight(cell);
-            let variance = truth.variances[cell];
-            difference += weight * ((model[cell] - truth.values[cell]).powi(2) - variance);
-            norm += weight * (truth.values[cell].powi(2) - variance);
+            difference += weight * ((model - value).powi(2) - variance);
+            norm += weight * (value.powi(2) - variance);
         }
         if norm > 0.0 { (difference.max(0.0) / norm).sqrt() } else { 0.0 }
     }
