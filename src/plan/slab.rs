@@ -74,7 +74,7 @@ pub struct SlabDecision {
 }
 
 /// Nanoseconds of Eq. 11 per pair, and of each facet of the sum (`cargo bench --bench measure -- slabs`).
-const DUAL_NS: f64 = 250.0;
+const DUAL_NS: f64 = 160.0;
 const FACET_NS: f64 = 100.0;
 /// Nanoseconds per photon of the table of inner reflections, and its rings.
 const PHOTON_NS: f64 = 1000.0;
