@@ -235,6 +235,10 @@ printed 2 table4_cup eval-keys json_keys \
 printed 2 table4_cup export-keys json_keys \
     export table4_cup -o keys.csv --resolution 8x12 --quality draft --json --quiet --backend cpu
 printed 2 - materials-keys json_keys materials --json
+for method in dual faces truth; do
+    written 2 slab_fig3_both transmit-$method csv transmit slab_fig3_both --method $method --quiet
+done
+written 2 slab_two_tiles slab xml export slab_two_tiles --quality draft --quiet
 
 # Exit codes of wrong usage and of bad input.
 values 2 no_such_scene unknown-scene

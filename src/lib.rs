@@ -33,6 +33,7 @@ pub mod geometry;
 pub mod visibility;
 pub mod interreflection;
 pub mod effective;
+pub mod slab;
 
 pub mod reference;
 pub mod diagnostics;

@@ -17,6 +17,7 @@ const LAYERS: &[&str] = &[
     "visibility",
     "interreflection",
     "effective",
+    "slab",
     "reference",
     "diagnostics",
     "plan",

@@ -13,6 +13,7 @@ mod hard_tiles;
 mod in_tests;
 mod interpolation;
 mod shading_tables;
+mod slabs;
 mod table;
 #[path = "../../tests/numerics/tiles.rs"]
 mod tiles;
@@ -56,6 +57,7 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("lobes", "nanoseconds per facet of each analytic lobe", in_lib("nanoseconds_per_facet")),
     ("map-resolution", "error and time of shadow maps against resolution", in_lib("resolution_against_error")),
     ("map-speed", "speed of shadow maps on the CPU and on the GPU", in_lib("speed_of_the_cpu_and_of_the_gpu")),
+    ("slabs", "errors of the models of slabs against photons, and their times: minutes", Source::Here(slabs)),
     ("slice-steps", "cells and triangles that a slice visits", in_lib("steps_of_slices")),
     ("table-steps", "errors of shading tables against facets, azimuths and nodes", Source::Here(steps)),
     ("table-trials", "times of the trial of a shading table and of the whole table", Source::Here(trials)),
@@ -85,6 +87,11 @@ fn few_facets(_: Option<&str>, table: &mut Table) -> Result<(), String> {
 
 fn interpolation(_: Option<&str>, table: &mut Table) -> Result<(), String> {
     interpolation::interpolation(&mut |line| table.line(line));
+    Ok(())
+}
+
+fn slabs(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    slabs::slabs(&mut |line| table.line(line));
     Ok(())
 }
 

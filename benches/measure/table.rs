@@ -29,8 +29,8 @@ impl Table {
         }
     }
 
-    /// Replaces the lines between `<!-- measure: NAME -->` and `<!-- end -->` in every page of `docs/measurements`, if
-    /// lines were kept.
+    /// Replaces the lines between `<!-- measure: NAME -->` and `<!-- end -->` in every page of `docs` and of
+    /// `docs/measurements`, if lines were kept.
     ///
     /// # Errors
     /// An error is returned if a page cannot be read or written, or a marker has no end.
@@ -54,9 +54,12 @@ impl Table {
 }
 
 fn pages() -> Result<Vec<PathBuf>, String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/measurements");
-    let entries = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let mut pages: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    let mut pages = Vec::new();
+    for folder in ["docs", "docs/measurements"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        let entries = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        pages.extend(entries.flatten().map(|entry| entry.path()));
+    }
     pages.retain(|path| path.extension().is_some_and(|ending| ending == "md"));
     pages.sort();
     Ok(pages)

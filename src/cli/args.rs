@@ -35,6 +35,8 @@ pub enum Command {
     Fit(FitArgs),
     /// Write the tile itself: .obj, .stl (closed, in mm), .png (16-bit heights), .svg or .pdf (a pattern to fold).
     Tile(TileArgs),
+    /// Write the lobe that a slab makes of light from one direction, and where the light goes. A scene needs `[slab]`.
+    Transmit(TransmitArgs),
     /// List every effect: whether it is on, why, and its cost.
     Plan(PlanArgs),
     /// Factor the rotated BRDF of every material and list its size and rank (Table 3 of Wu et al. 2011).
@@ -195,6 +197,36 @@ pub struct TileArgs {
     /// Height samples per period in x and y (.stl, .png).
     #[arg(long, default_value = "256x256", value_parser = super::parse_size)]
     pub samples: [usize; 2],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TransmitMethod {
+    /// The dual-microfacet model (Dai et al. 2009, Eq. 11).
+    Dual,
+    /// A sum over facets of the smoother face (Eq. 1).
+    Faces,
+    /// Photons through random facets of both faces.
+    Truth,
+    /// One rough face and one refraction (Walter et al. 2007), for comparison.
+    Walter,
+}
+
+#[derive(Debug, Args)]
+pub struct TransmitArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Lobe over the disc (o.x, o.y) and in the plane of incidence: .csv or .png. Needed unless `--json` is given.
+    #[arg(short, long, required_unless_present = "json")]
+    pub output: Option<PathBuf>,
+    /// Polar angle of the light above the top face [degrees].
+    #[arg(long, default_value_t = 30.0, value_parser = super::transmit::parse_theta)]
+    pub theta_i: f64,
+    /// Azimuth of the light [degrees].
+    #[arg(long, default_value_t = 0.0, value_parser = super::transmit::parse_phi, allow_negative_numbers = true)]
+    pub phi_i: f64,
+    /// How the lobe is computed; without it, as the plan decides.
+    #[arg(long, value_enum)]
+    pub method: Option<TransmitMethod>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

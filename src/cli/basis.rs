@@ -58,7 +58,7 @@ struct Paper {
 }
 
 pub fn run(args: &SceneArgs) -> Result<()> {
-    let (loaded, ()) = args.open(|_| Ok(()))?;
+    let (loaded, ()) = args.open(|loaded| super::slab::refuse(loaded, "basis"))?;
     let settings = Settings::from_quality(&loaded.scene.quality).low_rank(false);
     let mut cache = MeasuredCache::default();
     let mut rows = Vec::new();

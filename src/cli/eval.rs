@@ -12,13 +12,13 @@ use crate::metrics::Pair;
 use crate::plan::{Preset, Settings};
 use crate::reference::ReferenceSettings;
 use anyhow::Result;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::EvalArgs;
 use super::watch::Watch;
-use super::{cache, check_outputs, print_json};
+use super::{cache, check_outputs, print_json, slab};
 
 /// Largest size of a file of pairs [bytes]. A longer file is read up to this size.
 const MAX_FILE: u64 = 1 << 30;
@@ -43,7 +43,14 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let health;
     let mut representation = "reference sum".to_owned();
     let mut error = None;
-    let (values, errors): (Vec<Vec3>, Vec<Vec3>) = if settings.preset == Preset::Reference {
+    let (values, errors): (Vec<Vec3>, Vec<Vec3>) = if loaded.scene.slab.is_some() {
+        let directions: Vec<(DVec3, DVec3)> = rows.iter().map(Row::any_side).collect();
+        let slab = slab::eval(&mut pipeline, &loaded, &directions, args.scene.quiet)?;
+        args.scene.warn(&slab.health);
+        health = slab.health;
+        representation = slab.representation;
+        (slab.values, slab.errors)
+    } else if settings.preset == Preset::Reference {
         let reference = ReferenceSettings {
             facets: settings.reference_facets,
             max_passes: settings.reference_passes,
@@ -143,6 +150,19 @@ fn progress(passes: usize, quiet: bool) -> indicatif::ProgressBar {
 }
 
 impl Row {
+    /// Directions on any side, with polar angles up to π.
+    fn any_side(&self) -> (DVec3, DVec3) {
+        let [theta_i, phi_i, theta_o, phi_o] = self.angles;
+        let direction = |theta: f64, phi: f64| {
+            let (sin_theta, cos_theta) = theta.sin_cos();
+            let (sin_phi, cos_phi) = phi.sin_cos();
+            // The cosine of the nearest number to π/2 is not 0.
+            let z = if cos_theta.abs() < 1e-15 { 0.0 } else { cos_theta };
+            DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, z)
+        };
+        (direction(theta_i, phi_i), direction(theta_o, phi_o))
+    }
+
     fn pair(&self) -> Pair {
         let [theta_i, phi_i, theta_o, phi_o] = self.angles;
         let direction = |theta: f64, phi: f64| -> Vec3 {

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
-use crate::base::print_on_stderr;
+use crate::base::{InputError, print_on_stderr};
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::export;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
+use crate::pipeline::SlabOutcome;
+use crate::scene::LoadedScene;
 use anyhow::Result;
 use serde::Serialize;
 
@@ -53,12 +55,26 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     if let Some(resolution) = &options.resolution {
         resolution.check()?;
     }
-    let (loaded, ()) = args.scene.open(|loaded| check_outputs(&args.scene.scene, loaded, &[], &outputs))?;
+    let (loaded, ()) = args.scene.open(|loaded| {
+        if loaded.scene.slab.is_some() {
+            export::radiance_slab::check_ending(&args.output)?;
+            if options.radiance != RadianceBasis::Klems {
+                let expected = "klems, the basis of slabs";
+                return Err(crate::Error::from(InputError::new("--radiance", "tensor-tree", expected)).into());
+            }
+        }
+        check_outputs(&args.scene.scene, loaded, &[], &outputs)
+    })?;
     let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
     let watch = Watch::new(args.scene.quiet);
     pipeline.set_cancel(watch.cancel());
+    if loaded.scene.slab.is_some() {
+        let outcome = pipeline.slab(&loaded)?;
+        drop(watch);
+        return of_slab(args, &loaded, &outcome);
+    }
     let outcome = pipeline.effective(&loaded)?;
     drop(watch);
     args.scene.notes(&outcome);
@@ -124,6 +140,37 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         if let Some(note) = &report.note {
             print_on_stderr(format_args!("{} describes the conventions and the scene", note.display()));
         }
+    }
+    Ok(())
+}
+
+/// Writes a slab.
+fn of_slab(args: &ExportArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Result<()> {
+    args.scene.warn(&outcome.health);
+    let bar = progress_bar("tabulating", args.scene.quiet);
+    let written = export::radiance_slab::write(&outcome.slab, loaded, &args.output, &progress_on(&bar));
+    bar.finish_and_clear();
+    let written = written?;
+    let [transmitted, reflected] = written.normal_incidence;
+    if args.scene.json {
+        return print_json(&serde_json::json!({
+            "output": args.output.display().to_string(),
+            "note": written.note.display().to_string(),
+            "pairs": written.pairs,
+            "transmitted": transmitted.to_array(),
+            "reflected": reflected.to_array(),
+            "form": super::slab::describe(outcome),
+            "health": outcome.health,
+        }));
+    }
+    if !args.scene.quiet {
+        print_on_stderr(format_args!(
+            "{} pairs; light along the normal: {:.4} transmitted, {:.4} reflected (means of the channels)",
+            written.pairs,
+            transmitted.element_sum() / 3.0,
+            reflected.element_sum() / 3.0
+        ));
+        print_on_stderr(format_args!("{} describes the conventions and the scene", written.note.display()));
     }
     Ok(())
 }

@@ -36,6 +36,7 @@ struct Report {
 pub fn run(args: &FitArgs) -> Result<()> {
     let kinds: Vec<OutputKind> = args.output.iter().map(|path| kind(path)).collect::<Result<_, _>>()?;
     let (loaded, render_scene) = args.scene.open(|loaded| {
+        super::slab::refuse(loaded, "fit")?;
         check_outputs(&args.scene.scene, loaded, &[], &args.output)?;
         Ok(if kinds.contains(&OutputKind::Image) { Some(RenderScene::new(loaded)?) } else { None })
     })?;

@@ -12,8 +12,10 @@ pub mod profile;
 pub mod render;
 mod render_path;
 pub mod report;
+mod slab;
 pub mod tile;
 mod to_image;
+pub mod transmit;
 mod watch;
 
 use std::io::Write;
@@ -44,6 +46,7 @@ pub fn run(command: Command) -> Result<()> {
         Command::Export(args) => export::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Tile(args) => tile::run(&args),
+        Command::Transmit(args) => transmit::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Basis(args) => basis::run(&args),
         Command::Profile(args) => profile::run(&args),

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use crate::base::Cancel;
 use crate::diagnostics::Health;
+use crate::pipeline::{Pipeline, SlabOutcome};
 use crate::plan::EffectKind;
 use crate::render::RenderScene;
 use crate::report::{EffectCost, measure_effects};
@@ -32,6 +33,11 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     let mut pipeline = crate::gpu::pipeline();
     let watch = Watch::new(args.scene.quiet);
     pipeline.set_cancel(watch.cancel());
+    if loaded.scene.slab.is_some() {
+        let outcome = pipeline.slab(&loaded)?;
+        drop(watch);
+        return of_slab(args, &pipeline, &outcome, dropped_lights);
+    }
     let outcome = pipeline.effective(&loaded)?;
     drop(watch);
     let measured = if args.measure {
@@ -57,31 +63,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
         });
     }
     let mut out = std::io::stdout().lock();
-    writeln!(out, "{:<20} {:<7} {:>12} {:>12}  reason", "effect", "", "predicted", "measured")?;
-    let mut kind = None;
-    for effect in &outcome.plan.effects {
-        if kind != Some(effect.kind) {
-            kind = Some(effect.kind);
-            writeln!(out, "{}", heading(effect.kind))?;
-        }
-        let measured = effect.measured_ms.map_or("-".to_owned(), |ms| format!("{ms:.1} ms"));
-        let predicted =
-            if effect.predicted_ms > 0.0 { format!("{:.1} ms", effect.predicted_ms) } else { "-".to_owned() };
-        let on = if effect.on { "on" } else { "off" };
-        let forced = if effect.forced { "!" } else { "" };
-        let bound = match effect.bound {
-            Some(bound) if bound >= 5e-4 => format!(" (turning it on changes at most {:.1} %)", bound * 100.0),
-            Some(_) => " (turning it on changes nothing)".to_owned(),
-            None => String::new(),
-        };
-        writeln!(
-            out,
-            "{:<20} {:<7} {predicted:>12} {measured:>12}  {}{bound}",
-            effect.name,
-            format!("{on}{forced}"),
-            effect.reason
-        )?;
-    }
+    print_effects(&mut out, &outcome.plan.effects)?;
     if dropped_lights > 0 {
         writeln!(out, "{dropped_lights} lights left out")?;
     }
@@ -106,6 +88,52 @@ pub fn run(args: &PlanArgs) -> Result<()> {
         }
     }
     args.scene.notes(&outcome);
+    Ok(())
+}
+
+/// Prints the plan of a slab. Its effects are not forced, so that `--measure` has nothing to measure.
+fn of_slab(args: &PlanArgs, pipeline: &Pipeline, outcome: &SlabOutcome, dropped_lights: usize) -> Result<()> {
+    args.scene.warn(&outcome.health);
+    if args.scene.json {
+        return print_json(&Report {
+            effects: &outcome.effects,
+            measured: None,
+            runs: pipeline.runs().into_iter().collect(),
+            dropped_lights,
+            notes: &[],
+            health: &outcome.health,
+        });
+    }
+    print_effects(&mut std::io::stdout().lock(), &outcome.effects)
+}
+
+/// Prints one line per effect, and a heading before each kind.
+fn print_effects(out: &mut impl Write, effects: &[crate::plan::Effect]) -> Result<()> {
+    writeln!(out, "{:<20} {:<7} {:>12} {:>12}  reason", "effect", "", "predicted", "measured")?;
+    let mut kind = None;
+    for effect in effects {
+        if kind != Some(effect.kind) {
+            kind = Some(effect.kind);
+            writeln!(out, "{}", heading(effect.kind))?;
+        }
+        let measured = effect.measured_ms.map_or("-".to_owned(), |ms| format!("{ms:.1} ms"));
+        let predicted =
+            if effect.predicted_ms > 0.0 { format!("{:.1} ms", effect.predicted_ms) } else { "-".to_owned() };
+        let on = if effect.on { "on" } else { "off" };
+        let forced = if effect.forced { "!" } else { "" };
+        let bound = match effect.bound {
+            Some(bound) if bound >= 5e-4 => format!(" (turning it on changes at most {:.1} %)", bound * 100.0),
+            Some(_) => " (turning it on changes nothing)".to_owned(),
+            None => String::new(),
+        };
+        writeln!(
+            out,
+            "{:<20} {:<7} {predicted:>12} {measured:>12}  {}{bound}",
+            effect.name,
+            format!("{on}{forced}"),
+            effect.reason
+        )?;
+    }
     Ok(())
 }
 

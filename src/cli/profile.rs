@@ -28,6 +28,7 @@ struct Report {
 
 pub fn run(args: &ProfileArgs) -> Result<()> {
     let (loaded, ()) = args.scene.open(|loaded| {
+        super::slab::refuse(loaded, "profile")?;
         if args.image || args.edit == Some(EditArg::Camera) {
             // A missing object or environment is reported before the tile is computed.
             RenderScene::new(loaded)?;

@@ -37,6 +37,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
     let (loaded, render_scene) = args.scene.open(|loaded| {
+        super::slab::refuse(loaded, "render")?;
         check_outputs(&args.scene.scene, loaded, &[], [&args.output])?;
         Ok(RenderScene::with(&pipeline, loaded)?)
     })?;

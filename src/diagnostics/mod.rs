@@ -4,7 +4,10 @@
 //! that drafts of the editor do not wait for it.
 
 mod measure;
+mod slab;
 mod warnings;
+
+pub use slab::SlabHealthInputs;
 
 use std::sync::Arc;
 

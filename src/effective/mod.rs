@@ -39,6 +39,16 @@ pub trait Reflectance: Sync {
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
 }
 
+/// Light that passes through a surface to its other side. Rendering knows nothing else of a slab.
+pub trait Transmittance: Sync {
+    /// Writes `out[k] = f̄(lights[k], o)` [1/sr], the light's cosine included; 0 unless light and viewer are on opposite
+    /// sides. Light that keeps its direction is left out. Directions are unit vectors in the tangent frame.
+    fn eval_transmitted(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
+
+    /// The part of the light that arrives from behind along `-o` and keeps its direction.
+    fn straight(&self, o: Vec3) -> Vec3;
+}
+
 /// A reflectance of zero, for renderings that a GPU shades with a material of its own.
 #[derive(Debug, Clone, Copy)]
 pub struct Black;

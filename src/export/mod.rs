@@ -32,6 +32,7 @@ pub use grid::ExportResolution;
 pub use meta::ExportMeta;
 pub use note::Reflectances;
 pub use radiance::RadianceBasis;
+pub use radiance::slab as radiance_slab;
 pub use sampler::ReadingError;
 
 use meta::Description;

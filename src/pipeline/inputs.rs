@@ -43,6 +43,7 @@ impl Pipeline {
         processor: Processor,
         times: &mut StageTimes,
     ) -> Result<TileInputs> {
+        super::slab::refuse_slab(loaded)?;
         let scene = &loaded.scene;
         let tile = self.tile(loaded, times)?;
         let mut settings = Settings::of(scene).for_shape(tile.height_field);

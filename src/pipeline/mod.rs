@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! BuildTile ─▶ LoadMaterials ─▶ SampleFacets ─▶ Plan ─▶ ComputeVisibility ─▶ direct sum | low rank ─▶ Interreflect ─▶ Outcome
+//! BuildFace (top, bottom) ─▶ CorrelateFaces ─▶ TraceInner ─▶ SlabOutcome
 //! ```
 //! A [`Stage`] hashes its settings and the keys of its inputs. [`Pipeline::get`] returns the last result of a stage if
 //! the key is the same, else reads it from the disk cache, else runs the stage. An edit therefore recomputes what lies
@@ -15,8 +16,11 @@ mod low_rank;
 mod outcome;
 mod refine;
 mod shading;
+mod slab;
 mod stage;
 mod stages;
+#[cfg(test)]
+mod slab_tests;
 #[cfg(test)]
 mod tests;
 mod wu2011;
@@ -34,6 +38,8 @@ use self::outcome::limits;
 use self::refine::RefinedSum;
 pub use self::shading::ShadingBrdf;
 use self::shading::{LastShading, Shading, ShadingKeys};
+pub use self::slab::SlabOutcome;
+use self::slab::refuse_slab;
 pub use self::stage::{Codec, Keyed, Stage, StageTimes};
 use self::stage::{Memo, elapsed_ms, lock};
 use self::stages::{
@@ -127,6 +133,10 @@ impl Pipeline {
             CastTransport::NAME,
             Interreflect::NAME,
             PaperTables::NAME,
+            "slab_top",
+            "slab_bottom",
+            stages::CorrelateFaces::NAME,
+            stages::TraceInner::NAME,
         ];
         names.into_iter().map(|name| (name, self.memo.runs(name))).collect()
     }
@@ -335,6 +345,7 @@ impl Pipeline {
     /// # Errors
     /// As [`Pipeline::effective`].
     pub fn with_reference<T>(&self, loaded: &LoadedScene, work: impl FnOnce(&Reference<'_>) -> T) -> Result<T> {
+        refuse_slab(loaded)?;
         let mut times = StageTimes::new();
         let tile = self.tile(loaded, &mut times)?;
         let assignment = self.assignment(loaded, &tile, &mut times)?;

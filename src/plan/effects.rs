@@ -62,7 +62,7 @@ static ROWS: &[Row] = &[
     },
     Row { name: "self_shadow", kind: Physics, switch: Some(|effects| &mut effects.self_shadow), decide: self_shadow },
     Row { name: "anisotropy", kind: Physics, switch: Some(|effects| &mut effects.anisotropy), decide: anisotropy },
-    Row { name: "transmission", kind: Physics, switch: None, decide: transmission },
+    Row { name: "slab", kind: Physics, switch: None, decide: slab },
     Row { name: "color_map_filtering", kind: Physics, switch: None, decide: color_map_filtering },
     Row {
         name: "material_groups",
@@ -276,8 +276,8 @@ fn anisotropy(context: &Context<'_>, switch: Switch) -> Decision {
     Decision::new(on, reason).changes_at_most(ROUNDING)
 }
 
-fn transmission(_: &Context<'_>, _: Switch) -> Decision {
-    Decision::new(false, "light through thin slabs (Dai et al. 2009): not asked for")
+fn slab(_: &Context<'_>, _: Switch) -> Decision {
+    Decision::new(false, "the scene has no slab (Dai et al. 2009): light is reflected only")
 }
 
 fn color_map_filtering(_: &Context<'_>, _: Switch) -> Decision {

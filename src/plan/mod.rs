@@ -9,6 +9,7 @@ mod effects;
 mod features;
 mod refinement;
 mod settings;
+mod slab;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +22,7 @@ pub use effects::{effect_names, switch_mut};
 pub use features::{Costs, SceneFeatures};
 pub use refinement::Refinement;
 pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};
+pub use slab::{SlabDecision, SlabFeatures, SlabSettings};
 
 use crate::scene::Switch;
 

@@ -106,6 +106,8 @@ pub struct Settings {
     /// The most facets to which a result may be refined, to keep its error within [`Settings::error_bound`]. `None` if
     /// the scene sets the resolution itself or forbids refinement.
     pub max_refined_facets: Option<usize>,
+    /// Facets that the method `faces` of a slab sums; `None` for those of the preset.
+    pub slab_facets: Option<usize>,
     /// Effects that the user forces on or off.
     pub effects: Effects,
 }
@@ -185,6 +187,7 @@ impl Settings {
         if let Some(samples) = quality.reference_samples {
             settings.reference_passes = samples.div_ceil(settings.reference_facets).max(2);
         }
+        settings.slab_facets = quality.slab_facets;
         settings.colors = quality.colors.or(settings.colors);
         settings.normal_bins = quality.normal_bins.or(settings.normal_bins);
         settings
@@ -225,6 +228,7 @@ impl Settings {
             backend: Backend::Auto,
             seed: 1,
             max_refined_facets: Some(131_072),
+            slab_facets: None,
             effects: Effects::default(),
         };
         match preset {

@@ -90,6 +90,8 @@ fn defaults(path: &str, kind: Option<&str>) -> Table {
         ("camera", _) => of(Table::try_from(Camera::default())),
         ("quality", _) => of(Table::try_from(Quality::default())),
         ("effects", _) => of(Table::try_from(Effects::default())),
+        ("slab", _) => of(Table::try_from(Slab::default())),
+        ("slab.top" | "slab.bottom", Some(kind)) => of(Table::try_from(SlabFace::with_defaults(kind).unwrap())),
         _ => panic!("no defaults for [{path}]"),
     }
 }

@@ -48,7 +48,7 @@ fn is_embedded(path: &Path) -> bool {
 impl LoadedScene {
     /// Paths on disk of all files that the scene names: tile, images, measured BRDFs, object and environment.
     pub fn files(&self) -> Vec<PathBuf> {
-        let Scene { tile, materials, object, light, .. } = &self.scene;
+        let Scene { tile, materials, object, light, slab, .. } = &self.scene;
         let of_geometry = match &tile.geometry {
             Geometry::Mesh(mesh) => Some(mesh.path.as_path()),
             Geometry::Heightfield(field) => field.path.as_deref(),
@@ -61,6 +61,7 @@ impl LoadedScene {
             .into_iter()
             .flatten()
             .chain(terms.filter_map(TermSpec::path))
+            .chain(slab.iter().flat_map(|slab| slab.faces().map(|(_, face)| face.path())).flatten())
             .filter(|path| !is_embedded(path))
             .map(|path| resolve(&self.base_dir, path))
             .collect()

@@ -15,6 +15,7 @@ mod painted;
 mod quality;
 mod schema;
 pub mod shipped;
+pub mod slab;
 mod tile;
 mod view;
 
@@ -35,6 +36,7 @@ pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
 pub use schema::{Field, FieldShape, Kind};
+pub use slab::{Alpha, RoughFace, Slab, SlabFace, SlabMethod, TableFace, TileFace};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
     MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
@@ -64,6 +66,9 @@ pub struct Scene {
     pub quality: Quality,
     #[serde(default, skip_serializing_if = "Effects::is_default")]
     pub effects: Effects,
+    /// A thin transparent slab; without it, the scene reflects only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slab: Option<Slab>,
 }
 
 fn one() -> u32 {
@@ -99,6 +104,7 @@ impl Scene {
             camera: None,
             quality: Quality::default(),
             effects: Effects::default(),
+            slab: None,
         }
     }
 
@@ -126,6 +132,7 @@ impl Scene {
             ),
             optional("quality", FieldShape::Table(Quality::fields), "Accuracy and backend."),
             optional("effects", FieldShape::Table(Effects::fields), "Effects that are forced on or off."),
+            optional("slab", FieldShape::Table(Slab::fields), "A thin transparent slab with two faces."),
         ]
     }
 
@@ -189,6 +196,12 @@ impl Scene {
                 return problem(geometry("pattern"), "rows of different lengths", "rows of one length");
             }
             _ => {}
+        }
+        for (side, face) in self.slab.iter().flat_map(Slab::faces) {
+            if face.path().is_some_and(|path| path.as_os_str().is_empty()) {
+                let key_of_path = if matches!(face, SlabFace::Table(_)) { "path" } else { "scene" };
+                return problem(vec![key("slab"), key(side), key(key_of_path)], "nothing", "a file");
+            }
         }
         let mut names = HashSet::new();
         for (index, material) in self.materials.iter().enumerate() {

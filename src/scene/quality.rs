@@ -65,6 +65,9 @@ scene_table! {
         /// Number of rays or samples per direction pair of the reference.
         #[serde(skip_serializing_if = "Option::is_none")]
         reference_samples: Option<usize> = None, FieldShape::Integer { min: 16, max: 1_000_000_000 }, "";
+        /// Number of facets that the method `faces` of a slab sums; 0: the method `auto` never sums.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        slab_facets: Option<usize> = None, FieldShape::Integer { min: 0, max: 65_536 }, "";
         /// Width of the soft transition of visibility at a horizon.
         #[serde(skip_serializing_if = "Option::is_none")]
         penumbra_deg: Option<f32> = None, number(0.0, 45.0), "degrees";

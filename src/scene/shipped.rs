@@ -38,6 +38,14 @@ pub const MATERIALS: &[(&str, &str)] = materials![
     "fig8d_leather",
     "fig9a_cylinder_grooves",
     "fig9b_cylinder_stripes",
+    "slab_fig3_both",
+    "slab_fig3_bottom",
+    "slab_fig3_top",
+    "slab_fig5_30",
+    "slab_fig5_45",
+    "slab_fig5_60",
+    "slab_two_tiles",
+    "slab_window",
     "table3",
     "table4_cup",
     "table4_pillow",
@@ -52,6 +60,11 @@ pub const ASSETS: &[(&str, &[u8])] = assets!["brushed.png", "hammered.png", "lea
 /// Names of the shipped scenes.
 pub fn names() -> impl Iterator<Item = &'static str> {
     MATERIALS.iter().map(|(name, _)| *name)
+}
+
+/// Names of the shipped scenes that an object can be rendered in: those without a slab.
+pub fn rendered_names() -> impl Iterator<Item = &'static str> {
+    MATERIALS.iter().filter(|(_, source)| !source.contains("[slab]")).map(|(name, _)| *name)
 }
 
 /// Text of a shipped scene.

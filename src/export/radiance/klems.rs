@@ -23,7 +23,7 @@ const RINGS: [(u32, u32, usize); 9] = [
     (70, 75, 16),
     (80, 90, 12),
 ];
-const PATCHES: usize = 145;
+pub(super) const PATCHES: usize = 145;
 /// Directions along each side of a patch of incident light.
 const INCIDENT: usize = 3;
 /// Directions along each side of a patch of leaving light.
@@ -31,14 +31,14 @@ const LEAVING: usize = 5;
 
 /// Bounds of a patch in radians.
 #[derive(Debug, Clone, Copy)]
-struct KlemsPatch {
+pub(super) struct KlemsPatch {
     theta: [f64; 2],
     phi: [f64; 2],
 }
 
 impl KlemsPatch {
     /// Returns all patches in the order of the format.
-    fn all() -> Vec<Self> {
+    pub(super) fn all() -> Vec<Self> {
         let mut lower = 0;
         let mut patches = Vec::with_capacity(PATCHES);
         for (_, upper, count) in RINGS {
@@ -51,7 +51,7 @@ impl KlemsPatch {
     }
 
     /// Returns `side²` directions that represent equal projected solid angles.
-    fn directions(&self, side: usize) -> Vec<DVec3> {
+    pub(super) fn directions(&self, side: usize) -> Vec<DVec3> {
         let [low, high] = self.theta.map(|theta| theta.sin().powi(2));
         let along = |range: [f64; 2], k: usize| range[0] + (range[1] - range[0]) * (k as f64 + 0.5) / side as f64;
         let cells = (0..side * side).map(|k| (k / side, k % side));
@@ -63,8 +63,14 @@ impl KlemsPatch {
             .collect()
     }
 
+    /// Projected solid angle [sr].
+    pub(super) fn projected_solid_angle(&self) -> f64 {
+        let [low, high] = self.theta.map(|theta| theta.sin().powi(2));
+        0.5 * (high - low) * (self.phi[1] - self.phi[0])
+    }
+
     /// Returns the index of the patch that contains a direction.
-    fn index_of(direction: DVec3) -> usize {
+    pub(super) fn index_of(direction: DVec3) -> usize {
         let theta = direction.x.hypot(direction.y).atan2(direction.z).to_degrees();
         let mut first = 0;
         for (_, upper, count) in RINGS {
@@ -80,7 +86,7 @@ impl KlemsPatch {
 
 /// Returns the direction towards the light for an incident direction of the format. Radiance numbers incident patches
 /// by the direction that the light travels in.
-fn source_of(direction: DVec3) -> DVec3 {
+pub(super) fn source_of(direction: DVec3) -> DVec3 {
     DVec3::new(-direction.x, -direction.y, direction.z)
 }
 
@@ -127,10 +133,10 @@ pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
     Ok((Content { definition: definition(), basis: BASIS, channels, black: zeros }, written))
 }
 
-const BASIS: &str =
+pub(super) const BASIS: &str =
     "<ColumnAngleBasis>LBNL/Klems Full</ColumnAngleBasis>\n<RowAngleBasis>LBNL/Klems Full</RowAngleBasis>";
 
-fn definition() -> String {
+pub(super) fn definition() -> String {
     let mut text = "<IncidentDataStructure>Columns</IncidentDataStructure>\n<AngleBasis>\n<AngleBasisName>LBNL/Klems Full</AngleBasisName>\n".to_owned();
     let mut lower = 0;
     for (middle, upper, count) in RINGS {
@@ -156,8 +162,7 @@ mod tests {
         let mut total = 0.0;
         for (k, patch) in patches.iter().enumerate() {
             assert!(patch.directions(4).into_iter().all(|direction| KlemsPatch::index_of(direction) == k), "{k}");
-            let [low, high] = patch.theta.map(|theta| theta.sin().powi(2));
-            total += 0.5 * (high - low) * (patch.phi[1] - patch.phi[0]);
+            total += patch.projected_solid_angle();
         }
         assert!((total - 0.5 * TAU).abs() < 1e-9);
     }

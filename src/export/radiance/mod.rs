@@ -4,6 +4,7 @@
 //! therefore "Reflection Back".
 
 mod klems;
+pub mod slab;
 mod tensor_tree;
 
 use std::io::{self, Write};
@@ -56,18 +57,7 @@ pub fn write(task: &ExportTask<'_>, out: &mut dyn Write) -> io::Result<Written> 
         RadianceBasis::Klems => klems::tabulate(task)?,
         RadianceBasis::TensorTree => tensor_tree::tabulate(task)?,
     };
-    let [x, y] = task.meta.tile_size;
-    writeln!(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>")?;
-    writeln!(out, "<WindowElement xmlns=\"http://windows.lbl.gov\">")?;
-    writeln!(out, "<WindowElementType>System</WindowElementType>\n<Optical>\n<Layer>")?;
-    writeln!(out, "<Material>\n<Name>{}</Name>", escaped(&task.meta.scene))?;
-    writeln!(out, "<Manufacturer>{}</Manufacturer>", super::meta::PROGRAM)?;
-    writeln!(
-        out,
-        "<Thickness unit=\"meter\">0</Thickness>\n<Width unit=\"meter\">{x}</Width>\n<Height unit=\"meter\">{y}</Height>"
-    )?;
-    writeln!(out, "<DeviceType>Other</DeviceType>\n</Material>")?;
-    writeln!(out, "<DataDefinition>\n{}</DataDefinition>", content.definition)?;
+    header(out, &task.meta.scene, task.meta.tile_size, 0.0, &content.definition)?;
     for (name, values) in &content.channels {
         block(out, name, "Reflection Back", content.basis, values)?;
     }
@@ -84,6 +74,21 @@ pub fn write(task: &ExportTask<'_>, out: &mut dyn Write) -> io::Result<Written> 
     Ok(written)
 }
 
+/// Everything before the blocks of data; `thickness` is in the unit of the tile.
+fn header(out: &mut dyn Write, scene: &str, [x, y]: [f32; 2], thickness: f32, definition: &str) -> io::Result<()> {
+    writeln!(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>")?;
+    writeln!(out, "<WindowElement xmlns=\"http://windows.lbl.gov\">")?;
+    writeln!(out, "<WindowElementType>System</WindowElementType>\n<Optical>\n<Layer>")?;
+    writeln!(out, "<Material>\n<Name>{}</Name>", escaped(scene))?;
+    writeln!(out, "<Manufacturer>{}</Manufacturer>", super::meta::PROGRAM)?;
+    writeln!(
+        out,
+        "<Thickness unit=\"meter\">{thickness}</Thickness>\n<Width unit=\"meter\">{x}</Width>\n<Height unit=\"meter\">{y}</Height>"
+    )?;
+    writeln!(out, "<DeviceType>Other</DeviceType>\n</Material>")?;
+    writeln!(out, "<DataDefinition>\n{definition}</DataDefinition>")
+}
+
 fn block(out: &mut dyn Write, channel: &str, direction: &str, basis: &str, values: &str) -> io::Result<()> {
     let detector = if channel == "Visible" { "ASTM E308 1931 Y.dsp" } else { "None" };
     writeln!(
@@ -93,7 +98,11 @@ fn block(out: &mut dyn Write, channel: &str, direction: &str, basis: &str, value
     writeln!(out, "<SourceSpectrum>CIE Illuminant D65 1nm.ssp</SourceSpectrum>")?;
     writeln!(out, "<DetectorSpectrum>{detector}</DetectorSpectrum>\n<WavelengthDataBlock>")?;
     writeln!(out, "<WavelengthDataDirection>{direction}</WavelengthDataDirection>\n{basis}")?;
-    writeln!(out, "<ScatteringDataType>BRDF</ScatteringDataType>\n<ScatteringData>\n{values}</ScatteringData>")?;
+    writeln!(
+        out,
+        "<ScatteringDataType>{}</ScatteringDataType>\n<ScatteringData>\n{values}</ScatteringData>",
+        if direction.starts_with("Transmission") { "BTDF" } else { "BRDF" }
+    )?;
     writeln!(out, "</WavelengthDataBlock>\n</WavelengthData>")
 }
 

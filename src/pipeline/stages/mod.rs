@@ -3,11 +3,13 @@
 mod factors;
 mod interreflection;
 mod paper;
+mod slab;
 mod tile;
 mod visibility;
 
 pub(super) use factors::{Factorize, LookUpVisibility, TabulateFactors, TabulateForCheck};
 pub(super) use interreflection::{CastTransport, FindMirrorPlanes, Interreflect};
 pub(super) use paper::PaperTables;
+pub(super) use slab::{BuildFace, CorrelateFaces, FaceNormals, TraceInner};
 pub(super) use tile::{BuildTile, FacetsRole, LoadMaterials, SampleFacets, TileShape};
 pub(super) use visibility::{BuildCells, ComputeVisibility, EstimateScanWork};

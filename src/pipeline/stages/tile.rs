@@ -76,6 +76,11 @@ impl<'a> BuildTile<'a> {
         let image = painted.colors.as_ref().map(|image| env.image_key(image));
         Self { loaded, surface: key.finish(), colors: [file, image] }
     }
+
+    /// The key of everything but colours and the unit of length.
+    pub fn surface(&self) -> Key {
+        self.surface
+    }
 }
 
 impl Stage for BuildTile<'_> {

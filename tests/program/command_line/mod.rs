@@ -9,6 +9,7 @@ mod inputs;
 #[cfg(unix)]
 mod long_runs;
 mod refusals;
+mod slabs;
 #[cfg(unix)]
 mod special_files;
 mod standard_error;

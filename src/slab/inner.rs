@@ -1,0 +1,309 @@
+//! Light that is reflected inside the slab before it leaves, and the light that masking removes, as tables.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{DVec2, DVec3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::ndf::Ndf;
+use super::optics::{Channel, Optics};
+use super::walk::{Exit, Walk};
+use crate::base::{Cancel, Result};
+
+/// Rings of the polar angle, for the light and for the viewer.
+const RINGS: usize = 24;
+/// Photons per ring between smooth faces; they spread over the angles of the ring.
+const SMOOTH_PHOTONS: usize = 512;
+/// Steps of the azimuth between light and viewer, 0 to 180°.
+const TURNS: usize = 12;
+
+/// Light of one channel that was reflected inside, from above, averaged over the azimuth of the light.
+#[derive(Debug, Clone, PartialEq)]
+struct ChannelTable {
+    /// BTDF and BRDF [1/sr] by ring of the light, ring of the viewer and azimuth.
+    transmitted: Vec<f32>,
+    reflected: Vec<f32>,
+    /// Parts of the light of each ring, over the azimuth of the light.
+    parts: Vec<RingParts>,
+    /// Mean of the masked part over all directions of the light, by projected solid angle.
+    mean_masked: f64,
+}
+
+/// Parts of the incident light that do not pass at once.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Parts {
+    pub absorbed: f64,
+    /// Light that masking removes; half of it joins each side.
+    pub masked: f64,
+    pub first_total_reflection: f64,
+    /// Light that leaves below after reflections inside.
+    pub after_bounces: f64,
+}
+
+/// Parts of the light of a ring as functions of its azimuth.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct RingParts {
+    absorbed: Harmonics,
+    masked: Harmonics,
+    first_total_reflection: Harmonics,
+    after_bounces: Harmonics,
+    /// Light in the tables.
+    transmitted: Harmonics,
+    reflected: Harmonics,
+}
+
+impl RingParts {
+    fn all_mut(&mut self) -> [&mut Harmonics; 6] {
+        let Self { absorbed, masked, first_total_reflection, after_bounces, transmitted, reflected } = self;
+        [absorbed, masked, first_total_reflection, after_bounces, transmitted, reflected]
+    }
+}
+
+/// A function of the azimuth: its mean, and its products with the cosine and the sine of once, twice and four times the
+/// azimuth. These hold tilted faces, grooves and square patterns.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Harmonics {
+    products: [f64; 7],
+    /// Mean of the squares.
+    square: f64,
+}
+
+/// Standard errors that a product must exceed to be kept: isotropic faces have none.
+const SIGNIFICANT: f64 = 4.0;
+
+impl Harmonics {
+    /// The functions at the azimuth of a direction.
+    fn basis(i: DVec3) -> [f64; 7] {
+        let Some(DVec2 { x, y }) = i.truncate().try_normalize() else { return [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
+        let (x2, y2) = (x * x - y * y, 2.0 * x * y);
+        [1.0, x, y, x2, y2, x2 * x2 - y2 * y2, 2.0 * x2 * y2]
+    }
+
+    fn add(&mut self, basis: &[f64; 7], value: f64) {
+        self.products.iter_mut().zip(basis).for_each(|(sum, base)| *sum += base * value);
+        self.square += value * value;
+    }
+
+    /// Turns sums over `count` photons into means, and drops products that may be noise.
+    fn finish(&mut self, count: usize) {
+        let scale = 1.0 / count.max(1) as f64;
+        self.products.iter_mut().for_each(|product| *product *= scale);
+        self.square *= scale;
+        let error = (0.5 * self.square * scale).sqrt();
+        self.products[1..]
+            .iter_mut()
+            .filter(|product| product.abs() < SIGNIFICANT * error)
+            .for_each(|product| *product = 0.0);
+    }
+
+    fn at(&self, basis: &[f64; 7]) -> f64 {
+        let rest: f64 = self.products[1..].iter().zip(&basis[1..]).map(|(a, b)| a * b).sum();
+        (self.products[0] + 2.0 * rest).max(0.0)
+    }
+
+    fn mean(&self) -> f64 {
+        self.products[0]
+    }
+}
+
+/// The tables of all channels. Channels that are alike share one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inner {
+    tables: Vec<ChannelTable>,
+    of_channel: [usize; 3],
+}
+
+impl Inner {
+    /// Traces `photons` photons per ring and channel, with a fixed seed.
+    ///
+    /// # Errors
+    /// [`crate::base::Error::Cancelled`].
+    pub fn new(top: &Ndf, bottom: &Ndf, optics: &Optics, photons: usize, seed: u64, cancel: &Cancel) -> Result<Self> {
+        // All photons of a direction are alike without rough facets.
+        let photons = if top.is_smooth() && bottom.is_smooth() { photons.min(SMOOTH_PHOTONS) } else { photons };
+        let mut channels: Vec<Channel> = Vec::new();
+        let of_channel = [0, 1, 2].map(|k| {
+            let channel = optics.channel(k);
+            channels.iter().position(|other| *other == channel).unwrap_or_else(|| {
+                channels.push(channel);
+                channels.len() - 1
+            })
+        });
+        let table = |channel: &Channel| {
+            cancel.check()?;
+            Ok(ChannelTable::new(&Walk { top, bottom, channel: *channel }, photons, seed, cancel))
+        };
+        let tables = channels.iter().map(table).collect::<Result<Vec<_>>>()?;
+        cancel.check()?;
+        Ok(Self { tables, of_channel })
+    }
+
+    fn per_channel(&self, value: impl Fn(&ChannelTable) -> f64) -> DVec3 {
+        let values: Vec<f64> = self.tables.iter().map(value).collect();
+        let [r, g, b] = self.of_channel.map(|k| values[k]);
+        DVec3::new(r, g, b)
+    }
+
+    /// BTDF [1/sr] of the light that bounced inside, and of half of the masked light, for light from above.
+    pub fn btdf(&self, i: DVec3, o: DVec3) -> DVec3 {
+        self.per_channel(|table| {
+            let scale = table.relative(i, |parts| &parts.transmitted);
+            scale * table.read(&table.transmitted, i, o) + 0.5 * table.part(i, |parts| &parts.masked) / PI
+        })
+    }
+
+    /// BRDF [1/sr] of the light that returns from inside, and of half of the masked light, for light from above.
+    pub fn brdf(&self, i: DVec3, o: DVec3) -> DVec3 {
+        self.per_channel(|table| {
+            let masked = |w: DVec3| table.part(w, |parts| &parts.masked);
+            // The product is reciprocal, and its integral over the viewers is half of the masked part.
+            let part = if table.mean_masked > 0.0 { masked(i) * masked(o) / table.mean_masked } else { 0.0 };
+            let scale = |w: DVec3| table.relative(w, |parts| &parts.reflected);
+            scale(i) * scale(o) * table.read(&table.reflected, i, o) + 0.5 * part / PI
+        })
+    }
+
+    /// Parts of light from `i` of a channel, interpolated.
+    pub fn parts(&self, i: DVec3, channel: usize) -> Parts {
+        let table = &self.tables[self.of_channel[channel]];
+        Parts {
+            absorbed: table.part(i, |parts| &parts.absorbed),
+            masked: table.part(i, |parts| &parts.masked),
+            first_total_reflection: table.part(i, |parts| &parts.first_total_reflection),
+            after_bounces: table.part(i, |parts| &parts.after_bounces),
+        }
+    }
+
+    /// Largest masked part of light up to 75° from the normal.
+    pub fn largest_masked(&self) -> f64 {
+        let rings = RINGS * 75 / 90;
+        self.tables.iter().flat_map(|table| &table.parts[..rings]).map(|parts| parts.masked.mean()).fold(0.0, f64::max)
+    }
+
+    /// Size in memory [bytes].
+    pub fn bytes(&self) -> usize {
+        self.tables.iter().map(|table| 4 * (table.transmitted.len() + table.reflected.len())).sum()
+    }
+}
+
+/// Sums of one ring of the light.
+struct RingSums {
+    transmitted: Vec<f64>,
+    reflected: Vec<f64>,
+    parts: RingParts,
+}
+
+impl ChannelTable {
+    fn new(walk: &Walk<'_>, photons: usize, seed: u64, cancel: &Cancel) -> Self {
+        let rings: Vec<RingSums> =
+            (0..RINGS).into_par_iter().map(|ring| trace_ring(walk, ring, photons, seed, cancel)).collect();
+        let per_bin = |ring: usize| projected_solid_angle(ring) / TURNS as f64 * photons as f64;
+        let values = |sums: &dyn Fn(&RingSums) -> &[f64]| -> Vec<f64> {
+            rings
+                .iter()
+                .flat_map(|ring| sums(ring).iter().enumerate().map(|(k, sum)| sum / per_bin(k / TURNS)))
+                .collect()
+        };
+        let transmitted = values(&|ring| &ring.transmitted);
+        let one_way = values(&|ring| &ring.reflected);
+        // Reflection is reciprocal: both ways estimate one value.
+        let other = |k: usize| (k / TURNS % RINGS * RINGS + k / TURNS / RINGS) * TURNS + k % TURNS;
+        let reflected = (0..one_way.len()).map(|k| (0.5 * (one_way[k] + one_way[other(k)])) as f32).collect();
+        let parts: Vec<RingParts> = rings.iter().map(|ring| ring.parts).collect();
+        let mean_masked = (0..RINGS).map(|ring| projected_solid_angle(ring) / PI * parts[ring].masked.mean()).sum();
+        Self { transmitted: transmitted.iter().map(|value| *value as f32).collect(), reflected, parts, mean_masked }
+    }
+
+    /// Reads a table at polar angles and the azimuth between the directions of travel of straight light, linearly.
+    fn read(&self, values: &[f32], i: DVec3, o: DVec3) -> f64 {
+        let (a, b) = (ring_taps(i), ring_taps(o));
+        let turn = turn(i, o) / PI * TURNS as f64 - 0.5;
+        let (low, t) = (turn.floor(), turn - turn.floor());
+        let turns = [low.max(0.0) as usize, (low + 1.0).min((TURNS - 1) as f64) as usize];
+        let mut sum = 0.0;
+        for (ring_i, u) in a {
+            for (ring_o, v) in b {
+                let at = (ring_i * RINGS + ring_o) * TURNS;
+                sum += u * v * ((1.0 - t) * f64::from(values[at + turns[0]]) + t * f64::from(values[at + turns[1]]));
+            }
+        }
+        sum
+    }
+
+    /// A part of light from `i`, interpolated between the rings.
+    fn part(&self, i: DVec3, of: impl Fn(&RingParts) -> &Harmonics) -> f64 {
+        let basis = Harmonics::basis(i);
+        ring_taps(i).iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).at(&basis)).sum()
+    }
+
+    /// A part of light from `i` over its mean of all azimuths.
+    fn relative(&self, i: DVec3, of: impl Fn(&RingParts) -> &Harmonics) -> f64 {
+        let mean: f64 = ring_taps(i).iter().map(|(ring, weight)| weight * of(&self.parts[*ring]).mean()).sum();
+        if mean > 0.0 { self.part(i, of) / mean } else { 1.0 }
+    }
+}
+
+/// Angle between the azimuths of `-i` and `o`, 0 to π.
+fn turn(i: DVec3, o: DVec3) -> f64 {
+    let (a, b) = (-i.truncate(), o.truncate());
+    if a.length_squared() * b.length_squared() <= 1e-24 { FRAC_PI_2 } else { a.perp_dot(b).atan2(a.dot(b)).abs() }
+}
+
+/// The two rings around a direction, with weights.
+fn ring_taps(w: DVec3) -> [(usize, f64); 2] {
+    let theta = w.z.abs().min(1.0).acos();
+    let at = (theta / FRAC_PI_2 * RINGS as f64 - 0.5).clamp(0.0, (RINGS - 1) as f64);
+    let low = (at as usize).min(RINGS - 2);
+    [(low, 1.0 - (at - low as f64)), (low + 1, at - low as f64)]
+}
+
+/// Squared sine of the lower edge of a ring.
+fn edge(ring: usize) -> f64 {
+    (ring as f64 / RINGS as f64 * FRAC_PI_2).sin().powi(2)
+}
+
+/// Projected solid angle of a ring [sr].
+fn projected_solid_angle(ring: usize) -> f64 {
+    PI * (edge(ring + 1) - edge(ring))
+}
+
+/// Traces photons from one ring, spread evenly over its projected solid angle.
+fn trace_ring(walk: &Walk<'_>, ring: usize, photons: usize, seed: u64, cancel: &Cancel) -> RingSums {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(ring as u64);
+    let bins = RINGS * TURNS;
+    let mut sums = RingSums { transmitted: vec![0.0; bins], reflected: vec![0.0; bins], parts: RingParts::default() };
+    let (low, high) = (edge(ring), edge(ring + 1));
+    for photon in 0..photons {
+        if photon % 4096 == 0 && cancel.is_set() {
+            break;
+        }
+        let square: f64 = low + (high - low) * rng.random::<f64>();
+        let (y, x) = (TAU * rng.random::<f64>()).sin_cos();
+        let i = DVec3::new(square.sqrt() * x, square.sqrt() * y, (1.0 - square).max(0.0).sqrt());
+        let (mut after_bounces, mut through, mut back) = (0.0, 0.0, 0.0);
+        let losses = walk.run(i, &mut rng, |exit| {
+            let Exit { direction, weight, bounces, is_straight } = exit;
+            let is_below = direction.z < 0.0;
+            if is_below && bounces > 0 {
+                after_bounces += weight;
+            }
+            // Straight light has a closed form, as has light that reflects off the top or passes at once.
+            if is_straight || bounces == 0 {
+                return;
+            }
+            let ring = ((direction.z.abs().min(1.0).acos() / FRAC_PI_2 * RINGS as f64) as usize).min(RINGS - 1);
+            let step = ((turn(i, direction) / PI * TURNS as f64) as usize).min(TURNS - 1);
+            let side = if is_below { &mut sums.transmitted } else { &mut sums.reflected };
+            *(if is_below { &mut through } else { &mut back }) += weight;
+            side[ring * TURNS + step] += weight;
+        });
+        let values = [losses.absorbed, losses.masked, losses.first_total_reflection, after_bounces, through, back];
+        let basis = Harmonics::basis(i);
+        sums.parts.all_mut().into_iter().zip(values).for_each(|(part, value)| part.add(&basis, value));
+    }
+    sums.parts.all_mut().into_iter().for_each(|part| part.finish(photons));
+    sums
+}
