@@ -7,6 +7,9 @@
 //! the key is the same, else reads it from the disk cache, else runs the stage. An edit therefore recomputes what lies
 //! downstream of it.
 
+pub mod color_filter;
+#[cfg(test)]
+mod color_filter_tests;
 mod env;
 mod features;
 mod gpu_tile;
@@ -36,7 +39,7 @@ pub use self::stage::{Codec, Keyed, Stage, StageTimes};
 use self::stage::{Memo, elapsed_ms, lock};
 use self::stages::{
     BuildTile, CastTransport, ComputeVisibility, FindMirrorPlanes, Interreflect, LoadMaterials, PaperTables,
-    SampleFacets, TileShape,
+    SampleDrivers, SampleFacets, TileShape,
 };
 use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
@@ -125,6 +128,8 @@ impl Pipeline {
             CastTransport::NAME,
             Interreflect::NAME,
             PaperTables::NAME,
+            SampleDrivers::NAME,
+            stages::MeasureHeights::NAME,
         ];
         names.into_iter().map(|name| (name, self.memo.runs(name))).collect()
     }
@@ -135,7 +140,11 @@ impl Pipeline {
     }
 
     fn tile(&self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Keyed<TileShape>> {
-        self.get(BuildTile::new(loaded, &self.env), times)
+        let drivers = match &loaded.scene.color_map {
+            Some(map) => Some(self.get(SampleDrivers::new(loaded, map, &self.env), times)?),
+            None => None,
+        };
+        self.get(BuildTile::new(loaded, drivers.as_ref(), &self.env), times)
     }
 
     fn assignment(

@@ -17,7 +17,7 @@ pub use algorithm::VisibilityAlgorithm;
 use context::Context;
 pub use context::IMAGE_CHECK_PAIRS;
 pub use effects::{effect_names, switch_mut};
-pub use features::{Costs, SceneFeatures};
+pub use features::{ColorMapFeatures, Costs, SceneFeatures};
 pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};
 
 use crate::scene::Switch;

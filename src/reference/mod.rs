@@ -1,5 +1,6 @@
 //! The ray-cast reference with its standard error: the sum over facets, and paths between facets.
 
+pub mod color_map;
 mod paths;
 mod ray_cast;
 mod stochastic_reference;
