@@ -28,6 +28,7 @@ pub mod metrics;
 pub mod cache;
 
 pub mod scene;
+pub mod color_map;
 pub mod brdf;
 pub mod geometry;
 pub mod visibility;

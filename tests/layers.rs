@@ -12,6 +12,7 @@ const LAYERS: &[&str] = &[
     "metrics",
     "cache",
     "scene",
+    "color_map",
     "brdf",
     "geometry",
     "visibility",

@@ -31,6 +31,8 @@ pub enum Command {
     Eval(EvalArgs),
     /// Write the effective BRDF as a table. Formats by ending: .npz .csv .exr .bsdf .binary .xml .bin .astm.
     Export(ExportArgs),
+    /// Filter the scene's colour map: at the queries of a CSV file, as a table, or as an image beside naive and truth.
+    Filter(FilterArgs),
     /// Fit Lambertian + Cook-Torrance and a GGX base, print their errors, and write glTF, MaterialX or an image.
     Fit(FitArgs),
     /// Write the tile itself: .obj, .stl (closed, in mm), .png (16-bit heights), .svg or .pdf (a pattern to fold).
@@ -142,6 +144,45 @@ pub struct EvalArgs {
     /// qualities. It is empty with the method of the paper.
     #[arg(long, visible_alias = "errors")]
     pub standard_error: bool,
+}
+
+/// How `filter` evaluates queries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FilterMethod {
+    /// The means of the maps.
+    Filtered,
+    /// The colour of the drivers' means.
+    Naive,
+    /// Quadrature, supersampling and ray casting.
+    Truth,
+}
+
+#[derive(Debug, Args)]
+pub struct FilterArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    #[command(flatten)]
+    pub caching: CachingArgs,
+    /// CSV file of queries. Its header decides what is evaluated: `mean,deviation`, `a`, `theta_o,phi_o`,
+    /// `theta_i,phi_i,theta_o,phi_o` or `u,v,width_u,width_v,angle`; `-` is standard input.
+    #[arg(long, requires = "output", required_unless_present_any = ["table", "side_by_side"])]
+    pub queries: Option<PathBuf>,
+    /// CSV file to write: the queries and their results; `-` is standard output.
+    #[arg(short, long, requires = "queries")]
+    pub output: Option<PathBuf>,
+    /// Layer to evaluate, by its name. Pairs of directions evaluate all layers together.
+    #[arg(long, value_name = "NAME")]
+    pub layer: Option<String>,
+    /// Evaluation of the queries.
+    #[arg(long, value_enum, default_value_t = FilterMethod::Filtered)]
+    pub method: FilterMethod,
+    /// Write the prefiltered table of a layer: .exr or .npz.
+    #[arg(long, value_name = "FILE")]
+    pub table: Option<PathBuf>,
+    /// Write an image (.png): naive, supersampled truth and filtered from left to right, and below them ten times the
+    /// differences from the truth.
+    #[arg(long, value_name = "FILE")]
+    pub side_by_side: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,9 @@ pub mod basis;
 pub mod cache;
 pub mod eval;
 pub mod export;
+pub mod filter;
+mod filter_image;
+mod filter_queries;
 pub mod fit;
 pub mod materials;
 pub mod plan;
@@ -44,6 +47,7 @@ pub fn run(command: Command) -> Result<()> {
         Command::Render(args) => render::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Filter(args) => filter::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Tile(args) => tile::run(&args),
         Command::Transmit(args) => transmit::run(&args),

@@ -52,6 +52,23 @@ pub fn write(table: &ExportTable, description: &Description<'_>, out: &mut dyn W
     out.write_all(bytes.get_ref())
 }
 
+/// Writes one part of f32 channels R, G and B, row by row, with `comments` (JSON) as attribute.
+pub(super) fn rgb(size: [usize; 2], comments: &str, values: &[Vec3], out: &mut dyn Write) -> io::Result<()> {
+    let size = Vec2(size[0], size[1]);
+    let channels =
+        SpecificChannels::rgb(|at: Vec2<usize>| -> (f32, f32, f32) { values[at.y() * size.x() + at.x()].into() });
+    let attributes = LayerAttributes { comments: Text::new_or_none(ascii(comments)), ..LayerAttributes::default() };
+    let image = Image::empty(ImageAttributes::new(IntegerBounds::from_dimensions(size))).with_layer(Layer::new(
+        size,
+        attributes,
+        Encoding::SMALL_LOSSLESS,
+        channels,
+    ));
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;
+    out.write_all(bytes.get_ref())
+}
+
 /// Returns R, G, B of `values` in the layout of the atlas.
 fn channels<'a>(
     table: &'a ExportTable,

@@ -6,6 +6,7 @@
 //! is written beside each of those files.
 
 mod astm;
+pub mod color_table;
 mod csv;
 mod exr_atlas;
 mod grid;

@@ -37,7 +37,7 @@ pub fn write(table: &ExportTable, description: &Description<'_>, out: &mut dyn W
 }
 
 /// Adds `name.npy` in C order; `kind` is the NumPy type without its byte order.
-fn array(zip: &mut ZipWriter<'_>, name: &str, kind: &str, shape: &[usize], data: &[u8]) -> io::Result<()> {
+pub(super) fn array(zip: &mut ZipWriter<'_>, name: &str, kind: &str, shape: &[usize], data: &[u8]) -> io::Result<()> {
     // A Python tuple of one element needs a trailing comma; longer tuples allow one.
     let shape: String = shape.iter().map(|length| format!("{length},")).collect();
     let mut header = format!("{{'descr': '{ORDER}{kind}', 'fortran_order': False, 'shape': ({shape}), }}");

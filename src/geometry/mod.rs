@@ -5,6 +5,7 @@ pub mod facets;
 pub mod families;
 pub mod grid;
 pub mod image_file;
+pub mod relief;
 mod symmetry;
 mod tile_mesh;
 

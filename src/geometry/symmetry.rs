@@ -124,7 +124,7 @@ impl ColumnSampler<'_> {
                 height: hit.position.z,
                 normal: self.mesh.geometric_normal(triangle),
                 slot: self.mesh.slot_at(triangle, point),
-                color: self.mesh.color.at(point, self.mesh.size),
+                color: self.mesh.color.at(hit.position, self.mesh.geometric_normal(triangle), self.mesh.size),
             });
             start = hit.position.z - step;
             if layers.len() == MAX_LAYERS {

@@ -4,6 +4,9 @@ use std::sync::Arc;
 
 use glam::{UVec2, Vec2, Vec3};
 
+use super::relief::surface_point;
+use crate::color_map::layers::LayeredMap;
+
 /// Difference per component up to which normals count as equal. It covers the rounding of coordinates.
 pub(crate) const SAME_NORMAL: f32 = 2e-5;
 
@@ -53,6 +56,8 @@ pub enum ColorField {
     Uniform,
     /// Linear RGB texels, row 0 at y = 0, sampled bilinearly and wrapped; texel centres at `((i+½)/w, (j+½)/h)`.
     Image { size: UVec2, texels: Arc<Vec<Vec3>> },
+    /// A colour map of the surface's place, height and slope, times the field below it.
+    Mapped { map: Arc<LayeredMap>, below: Box<ColorField> },
 }
 
 /// Samples of a height field. Sample (i, j) lies at `((i+½)/w, (j+½)/h)` of the tile, row 0 at y = 0, wrapped.
@@ -161,18 +166,32 @@ impl SlotField {
 }
 
 impl ColorField {
+    /// The image under a colour map, or the field itself.
+    pub fn image(&self) -> &Self {
+        match self {
+            Self::Mapped { below, .. } => below.image(),
+            field => field,
+        }
+    }
+
     /// Largest weight of each channel.
     pub fn max(&self) -> Vec3 {
         match self {
             Self::Uniform => Vec3::ONE,
             // Bilinear interpolation stays below the largest texel.
             Self::Image { texels, .. } => texels.iter().copied().fold(Vec3::ZERO, Vec3::max),
+            Self::Mapped { map, below } => map.max() * below.max(),
         }
     }
 
-    /// Colour weight at tile coordinates `xy` of a tile of size `tile_size`.
-    pub fn at(&self, xy: Vec2, tile_size: Vec2) -> Vec3 {
+    /// Colour weight of a point with this position and normal, on a tile of size `tile_size`. Only colour maps depend on
+    /// the height and the normal.
+    pub fn at(&self, position: Vec3, normal: Vec3, tile_size: Vec2) -> Vec3 {
+        let xy = position.truncate();
         match self {
+            Self::Mapped { map, below } => {
+                map.color(&surface_point(tile_size, position, normal)) * below.at(position, normal, tile_size)
+            }
             Self::Uniform => Vec3::ONE,
             Self::Image { size, texels } => {
                 let at = xy / tile_size * size.as_vec2() - 0.5;

@@ -5,10 +5,11 @@ use super::stages::{EstimateScanWork, TileShape};
 use super::{Pipeline, StageTimes};
 use crate::base::Result;
 use crate::brdf::{Material, Term};
+use crate::color_map::filter::is_naive_enough;
 use crate::effective::FacetSum;
-use crate::geometry::Facets;
+use crate::geometry::{ColorField, Facets};
 use crate::interreflection::mean_albedo;
-use crate::plan::{Backend, SceneFeatures, Settings, VisibilityMethod};
+use crate::plan::{Backend, ColorMapFeatures, SceneFeatures, Settings, VisibilityMethod};
 use crate::scene::Scene;
 
 /// Everything that comes before the plan.
@@ -70,9 +71,21 @@ impl Pipeline {
             distinct_normals: sum.normal_count(),
             object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
             lights: scene.light.count + scene.light.directional.len(),
+            color_map: color_map_features(&tile.mesh.color),
             lights_below: scene.light.directional.iter().filter(|light| light.direction.y < 0.0).count(),
         })
     }
+}
+
+/// Properties of the colour map on a tile.
+fn color_map_features(color: &ColorField) -> Option<ColorMapFeatures> {
+    let ColorField::Mapped { map, .. } = color else { return None };
+    let places = map.places();
+    Some(ColorMapFeatures {
+        layers: map.layers.len(),
+        samples: places.iter().map(|place| place.grid.values.len()).sum(),
+        naive_is_enough: is_naive_enough(map),
+    })
 }
 
 /// The largest part of uniform light that a material reflects in any channel.

@@ -8,6 +8,9 @@
 //! the key is the same, else reads it from the disk cache, else runs the stage. An edit therefore recomputes what lies
 //! downstream of it.
 
+pub mod color_filter;
+#[cfg(test)]
+mod color_filter_tests;
 mod env;
 mod features;
 mod gpu_tile;
@@ -44,7 +47,7 @@ pub use self::stage::{Codec, Keyed, Stage, StageTimes};
 use self::stage::{Memo, elapsed_ms, lock};
 use self::stages::{
     BuildTile, CastTransport, ComputeVisibility, FindMirrorPlanes, Interreflect, LoadMaterials, PaperTables,
-    SampleFacets, TileShape,
+    SampleDrivers, SampleFacets, TileShape,
 };
 use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
@@ -137,6 +140,8 @@ impl Pipeline {
             "slab_bottom",
             stages::CorrelateFaces::NAME,
             stages::TraceInner::NAME,
+            SampleDrivers::NAME,
+            stages::MeasureHeights::NAME,
         ];
         names.into_iter().map(|name| (name, self.memo.runs(name))).collect()
     }
@@ -147,7 +152,11 @@ impl Pipeline {
     }
 
     fn tile(&self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Keyed<TileShape>> {
-        self.get(BuildTile::new(loaded, &self.env), times)
+        let drivers = match &loaded.scene.color_map {
+            Some(map) => Some(self.get(SampleDrivers::new(loaded, map, &self.env), times)?),
+            None => None,
+        };
+        self.get(BuildTile::new(loaded, drivers.as_ref(), &self.env), times)
     }
 
     fn assignment(

@@ -180,7 +180,7 @@ fn each_input_of_the_tile_changes_its_key() {
     std::fs::write(&path, "one").unwrap();
     let mut loaded = scene::open("table4_plate", &[]).unwrap();
     loaded.scene.tile.color_path = Some(path.clone());
-    let key = |loaded: &LoadedScene| key_of(&BuildTile::new(loaded, &env));
+    let key = |loaded: &LoadedScene| key_of(&BuildTile::new(loaded, None, &env));
     let same = key(&loaded);
     assert_eq!(same, key(&loaded));
     let with = |change: &dyn Fn(&mut LoadedScene)| {

@@ -36,6 +36,18 @@ pub struct SceneFeatures {
     pub object_self_shadows: bool,
     pub lights: usize,
     pub lights_below: usize,
+    /// Colour maps; `None` for a scene without.
+    pub color_map: Option<ColorMapFeatures>,
+}
+
+/// Properties of a scene's colour maps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColorMapFeatures {
+    pub layers: usize,
+    /// Samples of all textures and noises, whose moments are computed.
+    pub samples: usize,
+    /// Every driver varies by less than a step of the prefiltered table.
+    pub naive_is_enough: bool,
 }
 
 /// Prices on the machine [ns].

@@ -19,7 +19,7 @@ pub use algorithm::VisibilityAlgorithm;
 use context::Context;
 pub use context::IMAGE_CHECK_PAIRS;
 pub use effects::{effect_names, switch_mut};
-pub use features::{Costs, SceneFeatures};
+pub use features::{ColorMapFeatures, Costs, SceneFeatures};
 pub use refinement::Refinement;
 pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};
 pub use slab::{SlabDecision, SlabFeatures, SlabSettings};

@@ -136,6 +136,7 @@ fn features() -> SceneFeatures {
         object_self_shadows: true,
         lights: 4,
         lights_below: 0,
+        color_map: None,
     }
 }
 

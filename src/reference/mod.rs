@@ -1,5 +1,6 @@
 //! The ray-cast reference with its standard error: the sum over facets, and paths between facets.
 
+pub mod color_map;
 mod paths;
 pub mod photons;
 mod ray_cast;

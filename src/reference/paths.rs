@@ -126,7 +126,7 @@ impl<'a> Paths<'a> {
         let flat = hit.position.truncate();
         let position = (flat - size * (flat / size).floor()).clamp(Vec2::ZERO, size).extend(hit.position.z);
         let material = &self.materials[self.material_of_slot[usize::from(self.mesh.slot_at(triangle, flat))]];
-        let color = material.color * self.mesh.color.at(position.truncate(), size);
+        let color = material.color * self.mesh.color.at(position, normal, size);
         let origin = position + geometric * (LIFT * size.length());
         Vertex { origin, geometric, normal, triangle: hit.triangle, material, color }
     }

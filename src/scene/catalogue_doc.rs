@@ -88,6 +88,19 @@ fn defaults(path: &str, kind: Option<&str>) -> Table {
         ("light", _) => of(Table::try_from(Light::default())),
         ("light.directional", _) => Table::new(),
         ("camera", _) => of(Table::try_from(Camera::default())),
+        ("color_map", _) => of(Table::try_from(ColorMap::default())),
+        ("color_map.surface", _) => of(Table::try_from(GaussianSurface::default())),
+        ("color_map.layer", _) => Table::from_iter([
+            ("unit".to_owned(), Value::String("deviation".to_owned())),
+            ("weight".to_owned(), Value::Float(1.0)),
+        ]),
+        ("color_map.layer.driver", Some(kind)) | ("color_map.layer.driver.terms.driver", Some(kind)) => match kind {
+            "texture" => of(Table::try_from(TextureDriver::default())),
+            "noise" => of(Table::try_from(NoiseDriver::default())),
+            "height" => of(Table::try_from(HeightDriver::default())),
+            "slope" => of(Table::try_from(SlopeAlong::default())),
+            _ => Table::new(),
+        },
         ("quality", _) => of(Table::try_from(Quality::default())),
         ("effects", _) => of(Table::try_from(Effects::default())),
         ("slab", _) => of(Table::try_from(Slab::default())),
@@ -126,6 +139,7 @@ fn kind_and_range(shape: FieldShape, unit: &str) -> (String, String) {
         FieldShape::Choice(names) => {
             ("choice", names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", "))
         }
+        FieldShape::Stops { max_color } => ("stops", format!("colours from 0 to {max_color}")),
         FieldShape::Table(_) => ("table", String::new()),
         FieldShape::Tagged(_) => ("table", "the kinds below".to_owned()),
         FieldShape::List { of, min, max } => {

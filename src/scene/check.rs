@@ -164,6 +164,7 @@ fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<PathStep>) -> R
             problem.hint = did_you_mean(found, names.iter().copied());
             Err(problem)
         }
+        FieldShape::Stops { max_color } => check_stops(value, max_color, path),
         FieldShape::Table(fields) => match value {
             Value::Table(table) => check_keys(table, &fields(), None, path),
             other => Err(Problem::new(path, show(other), "a table")),
@@ -205,6 +206,35 @@ fn check_value(value: &Value, shape: &FieldShape, path: &mut Vec<PathStep>) -> R
     }
 }
 
+/// Maximum number of stops of a colour map, and the largest value of a stop.
+const MAX_STOPS: usize = 256;
+const MAX_STOP: f64 = 1e9;
+
+fn check_stops(value: &Value, max_color: f64, path: &mut Vec<PathStep>) -> Result<(), Problem> {
+    let expected = format!("1 to {MAX_STOPS} stops [value, [r, g, b]] of ascending values");
+    let stops = match value {
+        Value::Array(stops) if (1..=MAX_STOPS).contains(&stops.len()) => stops,
+        Value::Array(stops) => return Err(Problem::new(path, format!("{} stops", stops.len()), expected)),
+        other => return Err(Problem::new(path, show(other), expected)),
+    };
+    let mut last = f64::NEG_INFINITY;
+    for (index, stop) in stops.iter().enumerate() {
+        path.push(PathStep::Entry(index, None));
+        let Some([at, color]) = stop.as_array().map(Vec::as_slice) else {
+            return Err(Problem::new(path, show(stop), "a stop [value, [r, g, b]]"));
+        };
+        check_number(at, -MAX_STOP, MAX_STOP, path)?;
+        check_value(color, &FieldShape::Color { max: max_color }, path)?;
+        let at = at.as_float().or(at.as_integer().map(|at| at as f64)).unwrap_or(f64::NAN);
+        if at < last {
+            return Err(Problem::new(path, format!("the value {at} after {last}"), "ascending values"));
+        }
+        last = at;
+        path.pop();
+    }
+    Ok(())
+}
+
 fn check_entries(values: &[Value], of: &FieldShape, path: &mut Vec<PathStep>) -> Result<(), Problem> {
     for (index, value) in values.iter().enumerate() {
         let name = value.get("name").and_then(Value::as_str).filter(|name| !name.is_empty());
@@ -240,7 +270,9 @@ fn takes_type(shape: &FieldShape, value: &Value) -> bool {
         FieldShape::Bool => value.is_bool(),
         FieldShape::Text | FieldShape::Path | FieldShape::Choice(_) => value.is_str(),
         FieldShape::Table(_) | FieldShape::Tagged(_) => value.is_table(),
-        FieldShape::List { .. } | FieldShape::Vector { .. } | FieldShape::Color { .. } => value.is_array(),
+        FieldShape::List { .. } | FieldShape::Vector { .. } | FieldShape::Color { .. } | FieldShape::Stops { .. } => {
+            value.is_array()
+        }
         FieldShape::AnyOf(shapes) => shapes.iter().any(|shape| takes_type(shape, value)),
     }
 }

@@ -5,6 +5,7 @@
 
 mod check;
 mod color;
+mod color_map;
 mod edits;
 mod effects;
 pub mod files;
@@ -30,6 +31,11 @@ use std::sync::LazyLock;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+pub use color_map::{
+    Blend, ColorLayer, ColorMap, Combine, Driver, DriverSum, GaussianSurface, Gaussianize, GradientStop,
+    HeightDistribution, HeightDriver, LayerWeight, NoiseBasis, NoiseDriver, SlopeAlong, Steepness, StopEvaluation,
+    StopUnit, TextureDriver, WeightedDriver,
+};
 pub use effects::{Effects, Switch};
 pub use load::{LoadedScene, load, load_with_overrides, open, parse};
 pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
@@ -62,6 +68,9 @@ pub struct Scene {
     pub light: Light,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
+    /// Colours that the surface's place, heights and slopes drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color_map: Option<ColorMap>,
     #[serde(default)]
     pub quality: Quality,
     #[serde(default, skip_serializing_if = "Effects::is_default")]
@@ -102,6 +111,7 @@ impl Scene {
             object: Object::default(),
             light: Light::default(),
             camera: None,
+            color_map: None,
             quality: Quality::default(),
             effects: Effects::default(),
             slab: None,
@@ -129,6 +139,11 @@ impl Scene {
                 "camera",
                 FieldShape::Table(Camera::fields),
                 "The camera; without it, the object is framed automatically.",
+            ),
+            optional(
+                "color_map",
+                FieldShape::Table(ColorMap::fields),
+                "Colour maps of textures, noise, heights and slopes; they multiply the materials.",
             ),
             optional("quality", FieldShape::Table(Quality::fields), "Accuracy and backend."),
             optional("effects", FieldShape::Table(Effects::fields), "Effects that are forced on or off."),
@@ -202,6 +217,9 @@ impl Scene {
                 let key_of_path = if matches!(face, SlabFace::Table(_)) { "path" } else { "scene" };
                 return problem(vec![key("slab"), key(side), key(key_of_path)], "nothing", "a file");
             }
+        }
+        if let Some(map) = &self.color_map {
+            map.check(self)?;
         }
         let mut names = HashSet::new();
         for (index, material) in self.materials.iter().enumerate() {

@@ -5,7 +5,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::check::PathStep;
-use super::{Geometry, Kind, SlabFace, TermSpec};
+use super::{Driver, Geometry, Kind, SlabFace, TermSpec};
 use crate::base::{Error, InputError, Result};
 
 /// Applies one override. Lists are indexed by number, by `name`, or by `*` for every entry; missing tables are created.
@@ -149,7 +149,7 @@ fn set_in_list(entries: &mut Vec<Value>, keys: &[&str], value: &Value) -> std::r
 /// Removes the keys that only the table's old kind has, because they would be unknown keys of the new kind.
 fn drop_keys_of_other_kinds(table: &mut Table, kind: &Value) {
     let find = |kinds: Vec<Kind>, name: &str| kinds.into_iter().find(|kind| kind.kind == name);
-    for kinds in [Geometry::kinds, TermSpec::kinds, SlabFace::kinds] {
+    for kinds in [Geometry::kinds, TermSpec::kinds, SlabFace::kinds, Driver::kinds] {
         let old = table.get("kind").and_then(Value::as_str).and_then(|name| find(kinds(), name));
         let new = kind.as_str().and_then(|name| find(kinds(), name));
         if let (Some(old), Some(new)) = (old, new) {

@@ -65,6 +65,10 @@ pub enum FieldShape {
     /// A file, relative to the scene file, or `asset:name` for one that ships in the binary.
     Path,
     Choice(&'static [&'static str]),
+    /// Gradient stops `[value, [r, g, b]]` of ascending values; colours reach up to `max_color`.
+    Stops {
+        max_color: f64,
+    },
     Table(fn() -> Vec<Field>),
     /// A table whose `kind` selects its keys.
     Tagged(fn() -> Vec<Kind>),

@@ -399,6 +399,15 @@ pub(crate) fn value_of(shape: FieldShape) -> BoxedStrategy<Value> {
             proptest::sample::select(names).prop_map(|name| Value::String(name.to_owned())).boxed()
         }
         FieldShape::Bool => any::<bool>().prop_map(Value::Boolean).boxed(),
+        FieldShape::Stops { .. } => {
+            let stop = (number(-3.0, 3.0), number(0.0, 1.0)).prop_map(|(value, grey)| (value, grey));
+            let sorted = |mut stops: Vec<(f64, f64)>| {
+                stops.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let entry = |(value, grey)| Value::Array(vec![Value::Float(value), Value::Float(grey)]);
+                Value::Array(stops.into_iter().map(entry).collect())
+            };
+            proptest::collection::vec(stop, 1..5).prop_map(sorted).boxed()
+        }
         FieldShape::Text | FieldShape::Path => "[a-z ./\\\\\"é]{1,9}".prop_map(Value::String).boxed(),
         FieldShape::AnyOf(shapes) => value_of(shapes[0]),
         FieldShape::Table(fields) => table_of(fields()).prop_map(Value::Table).boxed(),
@@ -449,4 +458,64 @@ proptest! {
         let _ = load_with_overrides(TWO_COLOURS, &[format!("{key}={value}")]);
         let _ = load_with_overrides(TWO_COLOURS, &[text]);
     }
+}
+
+/// A scene with one colour map layer of these keys.
+fn color_map_scene(geometry: &str, map: &str, layer: &str) -> String {
+    format!("[tile]\ngeometry = {{ kind = \"{geometry}\" }}\n[color_map]\n{map}\n[[color_map.layer]]\n{layer}\n")
+}
+
+#[test]
+fn errors_of_colour_maps_name_the_key_what_was_found_and_what_was_expected() {
+    let stops = "stops = [[0, 0], [1, [1, 1, 1]]]";
+    let height = format!("driver = {{ kind = \"height\" }}\n{stops}");
+    let noise = |keys: &str| format!("driver = {{ kind = \"noise\", {keys} }}\n{stops}");
+    let sum = |terms: &str| format!("driver = {{ kind = \"sum\", terms = [{terms}] }}\n{stops}");
+    let of_stops = |stops: &str| format!("driver = {{ kind = \"height\" }}\nstops = {stops}");
+    let surface = |covariance: &str| format!("surface = {{ slope_covariance = {covariance} }}");
+    let cases = [
+        ("pyramids", "", of_stops("[[1, 0], [0, 1]]"), "layer.0.stops.1: found the value 0 after 1"),
+        ("pyramids", "", of_stops("[[nan, 0]]"), "stops.0: found nan"),
+        ("pyramids", "", of_stops("[[0, [1, -1, 0]]]"), "stops.0.1: found -1"),
+        ("pyramids", "", of_stops("[[0, [1, 1]]]"), "expected a number or a triple"),
+        ("pyramids", "", of_stops("[]"), "found 0 stops"),
+        ("pyramids", "", of_stops("[[0]]"), "expected a stop [value, [r, g, b]]"),
+        ("pyramids", "", format!("driver = {{ kind = \"heigth\" }}\n{stops}"), "did you mean `height`?"),
+        ("pyramids", "", format!("driver = {{ kind = \"height\", nois = 1 }}\n{stops}"), "did you mean `noise`?"),
+        ("pyramids", "", format!("{height}\ncolour = 1"), "unknown key `colour`"),
+        ("pyramids", "combin = \"sum\"", height.clone(), "did you mean `combine`?"),
+        ("pyramids", "taps = 5", height.clone(), "taps: found 5, expected 1, 4 or 16"),
+        ("flat", "", height.clone(), "found `height` on a flat tile, expected a tile with relief"),
+        ("pyramids", &surface("[0.1, 0.2, 0.1]"), height.clone(), "positive semi-definite"),
+        ("pyramids", &surface("[-0.1, 0, 0.1]"), height.clone(), "positive semi-definite"),
+        ("pyramids", "", noise("cells = 100, octaves = 3"), "at most 128 cells in the finest octave"),
+        ("pyramids", "", format!("driver = {{ kind = \"texture\" }}\n{stops}"), "driver.path: found nothing"),
+        ("pyramids", "", sum(""), "found 0 entries"),
+        ("pyramids", "", sum("{ driver = { kind = \"steepness\" }, weight = 1 }"), "unknown kind \"steepness\""),
+        (
+            "pyramids",
+            "combine = \"product\"",
+            format!("{height}\n[[color_map.layer]]\n{}", sum("{ driver = { kind = \"height\" }, weight = 1 }")),
+            "which depend on each other",
+        ),
+    ];
+    for (geometry, map, layer, part) in cases {
+        let error = parse(&color_map_scene(geometry, map, &layer)).unwrap_err();
+        assert!(error.to_string().contains(part), "{layer}\n{map}\n{error}, not {part}");
+        assert_eq!(error.exit_code(), 2);
+    }
+    let none = parse("[tile]\ngeometry = { kind = \"flat\" }\n[color_map]\ntaps = 4\n").unwrap_err();
+    assert!(none.to_string().contains("no layers"), "{none}");
+}
+
+#[test]
+fn a_colour_map_with_every_key_is_read_and_written_back_and_an_analytic_surface_needs_no_relief() {
+    let layer = "name = \"snow\"\ndriver = { kind = \"height\", noise = 0.1 }\nunit = \"value\"\nstops = [[-1.2, 0.5], [-1.2, [0, 1, 0]]]\n\
+        weight = { driver = { kind = \"slope\", azimuth_deg = 30 }, stops = [[0, 0], [1, 1]] }";
+    let map = "combine = \"sum\"\ndistribution = \"smith\"\ngaussianize = \"on\"\ntaps = 16\ntable = \"table\"\n\
+        surface = { height = 0.2, slope_mean = [0.1, 0], slope_covariance = [0.1, 0.02, 0.2] }";
+    let scene = parse(&color_map_scene("flat", map, layer)).unwrap();
+    assert_eq!(parse(&scene.to_toml().unwrap()).unwrap(), scene);
+    let map = scene.color_map.unwrap();
+    assert_eq!((map.layer[0].stops.len(), map.taps, map.layer[0].factor()), (2, 16, 1.0));
 }

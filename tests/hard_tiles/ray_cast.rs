@@ -213,7 +213,7 @@ impl<'a> Pieces<'a> {
         points.geometric_normals.push(normal);
         points.areas.push(area as f32);
         points.slots.push(piece.slot);
-        points.colors.push(self.mesh.color.at(wrapped, size));
+        points.colors.push(self.mesh.color.at(wrapped.extend(at.z), normal, size));
         points.triangles.push(piece.triangle);
     }
 

@@ -52,7 +52,7 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field
             let entries = value.as_array().map_or(0, Vec::len);
             ui.weak(format!("{entries} values in the file"));
         }
-        FieldShape::Table(_) | FieldShape::Tagged(_) => {}
+        FieldShape::Stops { .. } | FieldShape::Table(_) | FieldShape::Tagged(_) => {}
     }
     if wrong.get() {
         let name = caption(field);

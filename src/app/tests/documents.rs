@@ -107,7 +107,10 @@ fn a_saved_and_reopened_document_is_equal_with_its_painted_images() {
     };
     let (ours, theirs) = (mesh(&document), mesh(&opened));
     assert_eq!(ours.positions, theirs.positions);
-    assert_eq!(ours.color.at(Vec2::splat(0.5), ours.size), theirs.color.at(Vec2::splat(0.5), theirs.size));
+    assert_eq!(
+        ours.color.at(Vec3::splat(0.5), Vec3::Z, ours.size),
+        theirs.color.at(Vec3::splat(0.5), Vec3::Z, theirs.size)
+    );
     std::fs::write(&path, "# someone else\n").unwrap();
     assert!(document.changed_on_disk());
 }

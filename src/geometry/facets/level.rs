@@ -48,6 +48,9 @@ impl Facets {
     }
 }
 
+/// Largest number of cells along an axis into which a colour map divides a level tile.
+const MAX_CELLS: u32 = 2048;
+
 /// The slot of all triangles if they face up and cover the tile once.
 fn covering_slot(mesh: &TileMesh, triangles: &[u32]) -> Option<u16> {
     let slot = mesh.triangle_slot[*triangles.first()? as usize];
@@ -60,9 +63,16 @@ fn covering_slot(mesh: &TileMesh, triangles: &[u32]) -> Option<u16> {
 /// Coordinates in `[0, 1]` between which an axis of both images has one slot and a linear colour.
 fn breaks(mesh: &TileMesh, axis: usize) -> Vec<f64> {
     let mut breaks = vec![0.0, 1.0];
-    if let ColorField::Image { size, .. } = &mesh.color {
+    if let ColorField::Image { size, .. } = mesh.color.image() {
         let count = size[axis];
         breaks.extend((0..count).map(|k| (f64::from(k) + 0.5) / f64::from(count)));
+    }
+    if let ColorField::Mapped { map, .. } = &mesh.color {
+        // The map is not linear between texels: cells of half a texel bound the error.
+        for place in map.places() {
+            let count = (2 * place.grid.size[axis] * place.grid.repeat).min(MAX_CELLS);
+            breaks.extend((1..count).map(|k| f64::from(k) / f64::from(count)));
+        }
     }
     if let Some(field) = &mesh.painted_slots {
         let count = field.size[axis];
@@ -74,7 +84,9 @@ fn breaks(mesh: &TileMesh, axis: usize) -> Vec<f64> {
 }
 
 fn color_at(mesh: &TileMesh, at: DVec2) -> DVec3 {
-    mesh.color.at(at.as_vec2() * mesh.size, mesh.size).as_dvec3()
+    // A level tile has one height, and colour maps of it see that of its first vertex.
+    let height = mesh.positions.first().map_or(0.0, |position| position.z);
+    mesh.color.at((at.as_vec2() * mesh.size).extend(height), Vec3::Z, mesh.size).as_dvec3()
 }
 
 /// Adds the sums of rows in their order, so that the result does not depend on the number of threads.

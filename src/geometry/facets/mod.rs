@@ -87,7 +87,7 @@ impl Facets {
         self.geometric_normals.push(geometric);
         self.areas.push(area);
         self.slots.push(mesh.slot_at(index, position.truncate()));
-        self.colors.push(mesh.color.at(position.truncate(), mesh.size));
+        self.colors.push(mesh.color.at(position, self.normals[self.normals.len() - 1], mesh.size));
         self.triangles.push(triangle);
         self.replicates.push((self.replicates.len() % REPLICATES) as u8);
     }
@@ -250,7 +250,8 @@ impl FacetSampler {
         let points =
             || facets.positions.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(|position| position.truncate());
         facets.slots = points().zip(&facets.triangles).map(|(point, t)| mesh.slot_at(*t as usize, point)).collect();
-        facets.colors = points().map(|point| mesh.color.at(point, mesh.size)).collect();
+        let oriented = facets.positions.par_iter().with_min_len(MIN_ITEMS_PER_TASK).zip(&facets.normals);
+        facets.colors = oriented.map(|(position, normal)| mesh.color.at(*position, *normal, mesh.size)).collect();
         facets
     }
 

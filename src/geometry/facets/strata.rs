@@ -36,9 +36,11 @@ impl Strata {
     /// Divides a mesh into strata.
     pub fn new(mesh: &TileMesh) -> Self {
         let slots = mesh.painted_slots.as_ref().map(|field| ClassImage::new(field.size, field.texels.to_vec(), 0.0));
-        let colors = match &mesh.color {
-            ColorField::Uniform => None,
+        // A colour map places no facets, because an edit of a stop would then recompute visibility. The order of facets
+        // through normals and positions samples heights and slopes evenly.
+        let colors = match mesh.color.image() {
             ColorField::Image { size, texels } => luminance_classes(*size, texels),
+            ColorField::Uniform | ColorField::Mapped { .. } => None,
         };
         let divider = Divider { mesh, slots: slots.filter(|image| image.rarest() > 0.0), colors };
         if divider.slots.is_none() && divider.colors.is_none() {
@@ -52,7 +54,7 @@ impl Strata {
 
 /// Returns true if the colour field of a mesh decides where facets are.
 pub(crate) fn colors_place_facets(mesh: &TileMesh) -> bool {
-    matches!(&mesh.color, ColorField::Image { size, texels } if luminance_classes(*size, texels).is_some())
+    matches!(mesh.color.image(), ColorField::Image { size, texels } if luminance_classes(*size, texels).is_some())
 }
 
 /// Classes of luminance relative to the image's mean; `None` if all texels are in one class.
@@ -312,7 +314,7 @@ mod tests {
         // Samples by area alone miss nearly all of it.
         mesh.color = ColorField::Uniform;
         let by_area = Facets::sample(&mesh, 6144, 1);
-        let hit = by_area.positions.iter().filter(|p| white_texels(10).at(p.truncate(), mesh.size).x > 0.1).count();
+        let hit = by_area.positions.iter().filter(|p| white_texels(10).at(**p, Vec3::Z, mesh.size).x > 0.1).count();
         assert!(hit < 10, "{hit}");
     }
 

@@ -1,5 +1,6 @@
 //! The stages from scene to effective BRDF, one file per step.
 
+mod color_map;
 mod factors;
 mod interreflection;
 mod paper;
@@ -7,6 +8,7 @@ mod slab;
 mod tile;
 mod visibility;
 
+pub(super) use color_map::{MeasureHeights, PlaceDrivers, SampleDrivers};
 pub(super) use factors::{Factorize, LookUpVisibility, TabulateFactors, TabulateForCheck};
 pub(super) use interreflection::{CastTransport, FindMirrorPlanes, Interreflect};
 pub(super) use paper::PaperTables;

@@ -1,5 +1,7 @@
 //! The first stages: the tile's mesh, the materials of its slots, and its facets.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -8,11 +10,12 @@ use crate::brdf::{Brdf, Material, MaterialAssignment};
 use crate::cache::{Key, KeyBuilder};
 use crate::effective::mean_colors;
 use crate::geometry::facets::strata::colors_place_facets;
-use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
+use crate::geometry::{self, ColorField, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage, lock};
+use crate::pipeline::stages::PlaceDrivers;
 use crate::plan::{Preset, Settings};
-use crate::scene::{BrdfSpec, Geometry, Heightfield, LoadedScene, Switch, TermSpec};
+use crate::scene::{BrdfSpec, ColorMap, Geometry, Heightfield, LoadedScene, Switch, TermSpec};
 
 /// The mesh of a tile, and properties of it that later stages need.
 #[derive(Debug)]
@@ -35,11 +38,14 @@ pub struct BuildTile<'a> {
     /// The key of everything but colours and the unit of length.
     surface: Key,
     colors: [Option<Key>; 2],
+    /// The scene's colour map and the samples of its drivers.
+    color_map: Option<(&'a ColorMap, &'a Keyed<PlaceDrivers>)>,
 }
 
 impl<'a> BuildTile<'a> {
-    pub fn new(loaded: &'a LoadedScene, env: &Env) -> Self {
+    pub fn new(loaded: &'a LoadedScene, drivers: Option<&'a Keyed<PlaceDrivers>>, env: &Env) -> Self {
         let LoadedScene { scene, base_dir, painted, .. } = loaded;
+        let color_map = scene.color_map.as_ref().zip(drivers);
         let tile = &scene.tile;
         let mut key = KeyBuilder::of_stage("surface");
         key.numbers("size", &[tile.size]);
@@ -74,7 +80,7 @@ impl<'a> BuildTile<'a> {
         }
         let file = tile.color_path.as_ref().map(|path| env.file_key(base_dir, path));
         let image = painted.colors.as_ref().map(|image| env.image_key(image));
-        Self { loaded, surface: key.finish(), colors: [file, image] }
+        Self { loaded, surface: key.finish(), colors: [file, image], color_map }
     }
 
     /// The key of everything but colours and the unit of length.
@@ -96,11 +102,18 @@ impl Stage for BuildTile<'_> {
                 key.key("image", image);
             }
         }
+        if let Some((map, drivers)) = self.color_map {
+            key.debug("layers", &(&map.combine, &map.layer, &map.surface)).key("drivers", &drivers.key);
+        }
     }
 
     fn run(&self, _: &Env) -> Result<TileShape> {
         let LoadedScene { scene, base_dir, painted, .. } = self.loaded;
-        let mesh = geometry::build_painted(&scene.tile, base_dir, painted)?;
+        let mut mesh = geometry::build_painted(&scene.tile, base_dir, painted)?;
+        if let Some((map, drivers)) = self.color_map {
+            let map = Arc::new(drivers.resolve(map, &mesh));
+            mesh.color = ColorField::Mapped { map, below: Box::new(std::mem::take(&mut mesh.color)) };
+        }
         let (low, high) = mesh.z_range();
         let flat = high - low <= 1e-7 * mesh.size.max_element();
         let is_of_file = matches!(scene.tile.geometry, Geometry::Mesh(_));

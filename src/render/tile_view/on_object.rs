@@ -108,7 +108,7 @@ impl TileScene {
             return Vec3::ZERO;
         }
         let angles = crate::brdf::LobeAngles::new(normal, i, o, half_vector(i, o));
-        let weight = self.mesh.color.at(hit.position.truncate(), self.mesh.size) * material.color;
+        let weight = self.mesh.color.at(hit.position, normal, self.mesh.size) * material.color;
         material.brdf.f_cos(&angles) / normal.dot(o).max(1e-3) * weight
     }
 }

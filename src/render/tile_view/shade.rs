@@ -61,7 +61,7 @@ impl TileScene {
 
     pub(super) fn shade(&self, hit: &Hit, to_viewer: Vec3, shading: &TileShading, palette: &Palette) -> Vec3 {
         let (normal, geometric) = self.normals(hit, to_viewer);
-        let weight = self.mesh.color.at(hit.position.truncate(), self.mesh.size);
+        let weight = self.mesh.color.at(hit.position, normal, self.mesh.size);
         let slot = self.mesh.slot_at(hit.triangle as usize, hit.position.truncate());
         let clay = palette.material(slot).map_or(Vec3::splat(0.5), |(index, _)| palette.clay[index]) * weight;
         match shading {

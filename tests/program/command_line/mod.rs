@@ -4,6 +4,7 @@ mod accuracy;
 mod cache;
 mod commands;
 mod eval;
+mod filter;
 mod folder;
 mod inputs;
 #[cfg(unix)]

@@ -1,0 +1,13 @@
+//! Statistics of drivers: noise, moments over footprints, and moments of what is seen and lit.
+
+mod grid;
+mod measured;
+mod mips;
+mod noise;
+pub mod place;
+
+pub use grid::DriverGrid;
+pub use measured::RankedHeights;
+pub use mips::{MomentMips, principal};
+pub use noise::residual_variance;
+pub use place::{Footprint, PlaceDriver, PlaceMap};

@@ -1,0 +1,230 @@
+//! All statistics of a driver that depends on the place: moments of its values, and of its ranks.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::{DriverGrid, MomentMips};
+use crate::color_map::{Normal, Quantiles, StopMap, gaussianize};
+use crate::scene::Gaussianize;
+
+/// Mean colour far away that may be wrong before `gaussianize = "auto"` uses ranks.
+const FAR_ERROR: f64 = 0.005;
+/// Largest number of points from which quantiles are taken.
+const MAX_POINTS: u32 = 1 << 20;
+
+/// A driver on the tile. Moments are computed when they are first read, so that colouring facets needs none.
+#[derive(Debug)]
+pub struct PlaceDriver {
+    pub grid: DriverGrid,
+    mips: OnceLock<MomentMips>,
+    ranked: OnceLock<Ranked>,
+}
+
+/// The ranks of a driver.
+#[derive(Debug)]
+struct Ranked {
+    grid: DriverGrid,
+    mips: MomentMips,
+    /// Values of the surface by their quantile.
+    quantiles: Quantiles,
+}
+
+/// A footprint: its centre in parts of the tile's size, and its covariance in the same unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Footprint {
+    pub centre: DVec2,
+    pub covariance: DMat2,
+}
+
+/// A map of a driver, ready to be filtered: the stops in the unit of the moments, and the choice between values and
+/// ranks.
+#[derive(Debug, Clone)]
+pub struct PlaceMap {
+    driver: Arc<PlaceDriver>,
+    map: StopMap,
+    ranked: bool,
+}
+
+impl PlaceDriver {
+    pub fn new(grid: DriverGrid) -> Self {
+        Self { grid, mips: OnceLock::new(), ranked: OnceLock::new() }
+    }
+
+    /// Moments of the values.
+    pub fn mips(&self) -> &MomentMips {
+        self.mips.get_or_init(|| MomentMips::new(&self.grid))
+    }
+
+    fn ranked(&self) -> &Ranked {
+        self.ranked.get_or_init(|| {
+            let grid = DriverGrid::new(self.grid.size, &gaussianize(&self.grid.values), self.grid.repeat);
+            let mips = MomentMips::new(&grid);
+            Ranked { grid, mips, quantiles: Quantiles::new(self.surface_values()) }
+        })
+    }
+
+    /// Values between texels as well, because footprints see the interpolated surface.
+    fn surface_values(&self) -> Vec<(f32, f32)> {
+        let size = self.grid.size;
+        let count = size.x * size.y;
+        let parts = if 4 * count <= MAX_POINTS { 2 } else { 1 };
+        let texel = |k: u32| DVec2::new(f64::from(k % (size.x * parts)), f64::from(k / (size.x * parts)));
+        let scale = DVec2::splat(f64::from(self.grid.repeat)) * (size * parts).as_dvec2();
+        let at = |k: u32| (self.grid.at((texel(k) + 0.5) / scale) as f32, 1.0);
+        (0..count * parts * parts).map(at).collect()
+    }
+
+    /// The plain mean of a map's colours over the tile.
+    pub fn plain_mean(&self, map: &StopMap) -> DVec3 {
+        let values = self.surface_values();
+        values.iter().map(|(value, _)| map.color(f64::from(*value))).sum::<DVec3>() / values.len().max(1) as f64
+    }
+}
+
+impl PlaceMap {
+    /// A map over deviations of a driver.
+    pub fn new(driver: Arc<PlaceDriver>, map: &StopMap, gaussianize: Gaussianize) -> Self {
+        let by_values = || map.mean(&driver.mips().whole());
+        let ranked = match gaussianize {
+            _ if driver.grid.deviation == 0.0 => false,
+            Gaussianize::On => true,
+            Gaussianize::Off => false,
+            Gaussianize::Auto => (by_values() - driver.plain_mean(map)).abs().max_element() > FAR_ERROR,
+        };
+        let map = if ranked { driver.ranked().quantiles.compose(map) } else { map.clone() };
+        Self { driver, map, ranked }
+    }
+
+    /// The map over the values that [`PlaceMap::reads`] returns.
+    pub fn map(&self) -> &StopMap {
+        &self.map
+    }
+
+    pub fn is_ranked(&self) -> bool {
+        self.ranked
+    }
+
+    /// Moments over the whole tile, in the unit of [`PlaceMap::map`].
+    pub fn whole(&self) -> Normal {
+        if self.ranked { Normal { mean: 0.0, deviation: 1.0 } } else { self.driver.mips().whole() }
+    }
+
+    /// The reads of a footprint: weights and moments in the unit of [`PlaceMap::map`].
+    pub fn reads(&self, footprint: &Footprint, taps: u32) -> Vec<(f64, Normal)> {
+        let grid = &self.driver.grid;
+        let scale = grid.size.as_dvec2() * f64::from(grid.repeat);
+        let scaling = DMat2::from_diagonal(scale);
+        let covariance = scaling * footprint.covariance * scaling;
+        let centre = grid.texels(footprint.centre);
+        if !self.ranked {
+            return self.driver.mips().reads(grid, centre, covariance, taps);
+        }
+        let ranked = self.driver.ranked();
+        let whole = ranked.mips.whole();
+        let standard = |at: Normal| Normal {
+            mean: (at.mean - whole.mean) / whole.deviation,
+            deviation: at.deviation / whole.deviation,
+        };
+        let reads = ranked.mips.reads(&ranked.grid, centre, covariance, taps);
+        reads.into_iter().map(|(weight, at)| (weight, standard(at))).collect()
+    }
+
+    /// Mean and deviation of the driver over a footprint, in deviations of the driver.
+    pub fn moments(&self, footprint: &Footprint, taps: u32) -> Normal {
+        let plain = Self { ranked: false, ..self.clone() };
+        let (mut first, mut second) = (0.0, 0.0);
+        for (weight, at) in plain.reads(footprint, taps) {
+            first += weight * at.mean;
+            second += weight * (at.mean * at.mean + at.deviation * at.deviation);
+        }
+        Normal { mean: first, deviation: (second - first * first).max(0.0).sqrt() }
+    }
+
+    /// The mean colour of a footprint.
+    pub fn mean(&self, footprint: &Footprint, taps: u32) -> DVec3 {
+        self.reads(footprint, taps).iter().map(|(weight, at)| self.map.mean(at) * *weight).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::UVec2;
+
+    use super::*;
+    use crate::color_map::stops::tests::{MAPS, map};
+    use crate::scene::{NoiseBasis, NoiseDriver};
+
+    /// Textures of 256² from normal noise: the data of the accuracy table.
+    fn data() -> Vec<(&'static str, DriverGrid)> {
+        let noise = |basis| DriverGrid::of_noise(&NoiseDriver { basis, cells: 32, octaves: 1, seed: 2 });
+        let g = noise(NoiseBasis::Gaussian);
+        let of = |f: &dyn Fn(f64) -> f64| {
+            let values: Vec<f32> = g.values.iter().map(|value| f(f64::from(*value)) as f32).collect();
+            DriverGrid::new(g.size, &values, 1)
+        };
+        vec![
+            ("gaussian", of(&|z| z)),
+            ("perlin", noise(NoiseBasis::Perlin)),
+            ("absolute", of(&f64::abs)),
+            ("bimodal", of(&|z| (3.0 * z).tanh())),
+            ("lognormal", of(&|z| (0.8 * z).exp())),
+        ]
+    }
+
+    #[test]
+    fn far_means_of_textures_of_any_distribution_are_within_0_005_of_the_plain_means() {
+        let mut worst_without = 0.0_f64;
+        for (name, grid) in data() {
+            let driver = Arc::new(PlaceDriver::new(grid));
+            let mut square = 0.0;
+            for kind in MAPS {
+                let far = Footprint { centre: DVec2::splat(0.3), covariance: DMat2::from_diagonal(DVec2::splat(1e6)) };
+                let plain = driver.plain_mean(&map(kind));
+                let ours = PlaceMap::new(driver.clone(), &map(kind), Gaussianize::Auto).mean(&far, 4);
+                let without = PlaceMap::new(driver.clone(), &map(kind), Gaussianize::Off).mean(&far, 4);
+                square += (ours - plain).length_squared() / 9.0;
+                worst_without = worst_without.max(((without - plain).length_squared() / 3.0).sqrt());
+            }
+            println!("far mean of {name}: rms {:.4}", square.sqrt());
+            assert!(square.sqrt() < 0.005, "{name}: {}", square.sqrt());
+        }
+        println!("without ranks: worst {worst_without:.4}");
+        assert!(worst_without > 0.03);
+    }
+
+    #[test]
+    fn constant_two_valued_and_nearly_constant_textures_have_their_mean_colour_far_away_and_no_nan_near() {
+        let nearly: Vec<f32> = (0..64).map(|k| if k == 13 { 5.0 } else { 1.0 }).collect();
+        let two: Vec<f32> = (0..64).map(|k| f32::from(u8::from(k % 8 < 3))).collect();
+        for values in [vec![2.0; 64], nearly, two] {
+            let driver = Arc::new(PlaceDriver::new(DriverGrid::new(UVec2::splat(8), &values, 1)));
+            for gaussianize in [Gaussianize::Auto, Gaussianize::On] {
+                let place = PlaceMap::new(driver.clone(), &map("bands"), gaussianize);
+                let plain = driver.plain_mean(&map("bands"));
+                let far = place.map().mean(&place.whole());
+                assert!((far - plain).abs().max_element() < 0.02, "{gaussianize:?}: {far} {plain}");
+                for width in [0.0, 1e-6, 0.1, 3.0] {
+                    let covariance = DMat2::from_diagonal(DVec2::new(width, width / 64.0));
+                    let color = place.mean(&Footprint { centre: DVec2::new(0.9, -3.3), covariance }, 16);
+                    assert!(color.is_finite() && color.min_element() >= 0.0 && color.max_element() <= 1.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn on_a_linear_map_the_naive_value_is_the_filtered_one() {
+        let (_, grid) = data().swap_remove(0);
+        let stops = [(-40.0, 0.0), (0.0, 0.5), (40.0, 1.0)];
+        let stops = stops.map(|(value, grey)| crate::color_map::Stop { value, color: DVec3::splat(grey) });
+        let linear = StopMap::new(stops.to_vec());
+        let place = PlaceMap::new(Arc::new(PlaceDriver::new(grid)), &linear, Gaussianize::Off);
+        for width in [1e-4, 0.02, 0.5] {
+            let covariance = DMat2::from_diagonal(DVec2::splat(width * width));
+            let at = Footprint { centre: DVec2::new(0.2, 0.7), covariance };
+            let naive = linear.color(place.moments(&at, 4).mean);
+            assert!((place.mean(&at, 4) - naive).abs().max_element() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,338 @@
+//! The filtered colour map of a scene: the mean colours of what pixels see, beside `f̄` from the core.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::inputs::Processor;
+use super::stages::MeasureHeights;
+use super::{Keyed, Outcome, Pipeline, StageTimes};
+use crate::base::{InputError, Result};
+use crate::brdf::{LUMINANCE, Material, Term};
+use crate::color_map::filter::{HeightsSeen, Seen, SlopesSeen, naive_color};
+use crate::color_map::heights::{Largest, lit_part, pair_exponent, paper_moments};
+use crate::color_map::layers::{LayeredMap, Source};
+use crate::color_map::slopes::{Focus, SlopeDriver, Slopes};
+use crate::color_map::statistics::{Footprint, PlaceMap, RankedHeights};
+use crate::color_map::{Normal, PrefilteredTable};
+use crate::geometry::relief::slope_of;
+use crate::geometry::{ColorField, Facets};
+use crate::math::directions::half_vector;
+use crate::plan::Refinement;
+use crate::scene::{ColorMap, HeightDistribution, LoadedScene, StopEvaluation};
+use crate::visibility::Visibility;
+
+/// The colour map of a scene with everything that its means depend on.
+#[derive(Debug)]
+pub struct ColorFilter {
+    /// `f̄` with the colours of the map on the facets.
+    pub outcome: Outcome,
+    pub map: Arc<LayeredMap>,
+    spec: ColorMap,
+    facets: Arc<Facets>,
+    visibility: Arc<Visibility>,
+    heights: Arc<RankedHeights>,
+    materials: Vec<Material>,
+    material_of_slot: Vec<usize>,
+    /// Part of the surface with each material.
+    shares: Vec<f64>,
+    overhangs: bool,
+    tables: Vec<OnceLock<PrefilteredTable>>,
+    places: Vec<OnceLock<Option<PlaceMap>>>,
+}
+
+/// What is seen and lit at one pair of directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairColor {
+    pub lambda_i: f64,
+    pub lambda_o: f64,
+    /// Lit part of what is seen, of facets that face the light.
+    pub lit: f64,
+    /// Mean colour of what is seen and lit, weighted with the BRDF.
+    pub color: DVec3,
+}
+
+impl Pipeline {
+    /// The filtered colour map of a scene and its effective BRDF.
+    ///
+    /// # Errors
+    /// The errors of [`Pipeline::effective`]; the scene has no colour map; or it asks for Smith's distribution of a tile
+    /// that overhangs.
+    pub fn color_filter(&self, loaded: &LoadedScene) -> Result<ColorFilter> {
+        let Some(spec) = &loaded.scene.color_map else {
+            return Err(InputError::new("color_map", "nothing", "a table `[color_map]` with layers").into());
+        };
+        let outcome = self.effective(loaded)?;
+        let mut times = StageTimes::new();
+        let inputs = self.tile_inputs(loaded, Processor::Cpu(Refinement::NONE), &mut times)?;
+        let visibility = self.visibility(&inputs, &mut times)?;
+        let tile = &inputs.tile;
+        let ColorField::Mapped { map, .. } = &tile.mesh.color else {
+            return Err(InputError::new("color_map", "nothing", "a table `[color_map]` with layers").into());
+        };
+        let overhangs = !tile.height_field && spec.surface.is_none();
+        if overhangs && map.is_of_surface() && spec.distribution != HeightDistribution::Measured {
+            let found = format!("`{}` on a tile with overhangs", spec.distribution.name());
+            let expected = "`measured`, or an analytic surface in `[color_map.surface]`";
+            return Err(InputError::new("color_map.distribution", found, expected).into());
+        }
+        let heights: Keyed<RankedHeights> =
+            self.get(MeasureHeights { tile, facets: &inputs.facets, settings: &inputs.settings }, &mut times)?;
+        let materials = inputs.materials.materials.clone();
+        let mut shares = vec![0.0; materials.len()];
+        for (slot, area) in inputs.facets.slots.iter().zip(&inputs.facets.areas) {
+            shares[inputs.material_of_slot[usize::from(*slot)]] += f64::from(*area);
+        }
+        Ok(ColorFilter {
+            outcome,
+            map: map.clone(),
+            spec: spec.clone(),
+            facets: inputs.facets.value.clone(),
+            visibility: visibility.value.clone(),
+            heights: heights.value,
+            materials,
+            material_of_slot: inputs.material_of_slot,
+            shares,
+            overhangs,
+            tables: map.layers.iter().map(|_| OnceLock::new()).collect(),
+            places: map.layers.iter().map(|_| OnceLock::new()).collect(),
+        })
+    }
+}
+
+impl ColorFilter {
+    /// The prefiltered table of a layer, over its stops' unit.
+    pub fn table(&self, layer: usize) -> &PrefilteredTable {
+        self.tables[layer].get_or_init(|| PrefilteredTable::new(&self.map.layers[layer].mapped.stops))
+    }
+
+    /// The mean of a layer under a normal distribution in the unit of its stops.
+    pub fn normal(&self, layer: usize, at: &Normal) -> DVec3 {
+        match self.spec.table {
+            StopEvaluation::Closed => self.map.layers[layer].mapped.stops.mean(at),
+            StopEvaluation::Table => self.table(layer).mean(at),
+        }
+    }
+
+    /// Moments of D_h at an exponent [height deviations], and the mean of a layer under it.
+    pub fn heights(&self, layer: usize, exponent: f64) -> (Normal, DVec3) {
+        let mapped = &self.map.layers[layer].mapped;
+        let noise = match mapped.driver.source {
+            Source::Height { noise } => noise,
+            _ => 0.0,
+        };
+        if self.spec.distribution == HeightDistribution::Paper {
+            let at = paper_moments(exponent);
+            let noisy = Normal { deviation: at.deviation.hypot(noise), ..at };
+            return (at, mapped.map.mean(&noisy));
+        }
+        let largest = Largest { exponent };
+        let map = if noise > 0.0 { mapped.map.blurred(noise) } else { mapped.map.clone() };
+        (largest.moments(), map.mean(&largest))
+    }
+
+    /// Slopes that a viewer sees, and the mean of a layer of slopes by what is seen.
+    pub fn slopes(&self, layer: usize, o: DVec3) -> (Slopes, DVec3) {
+        let relief = &self.map.relief;
+        let mapped = &self.map.layers[layer].mapped;
+        let weight = |s: DVec2| DVec3::splat((o.z - s.dot(o.truncate())).max(0.0));
+        let facets = if self.is_by_facets() { self.seen_facets(o) } else { Vec::new() };
+        let slopes = if self.is_by_facets() {
+            SlopesSeen::Facets(&facets)
+        } else if self.spec.distribution == HeightDistribution::Paper {
+            SlopesSeen::Apart(o)
+        } else {
+            SlopesSeen::Joint { weight: &weight, focus: None }
+        };
+        let seen = Seen { heights: HeightsSeen::Normal(STANDARD), slopes, gaussianize: self.spec.gaussianize };
+        let color = match &mapped.driver.source {
+            Source::Slope(driver) => seen.slope_color(&[(*driver, mapped.map.clone())], relief),
+            _ => mapped.map.color(0.0),
+        };
+        (relief.slopes.visible(o), color)
+    }
+
+    /// What is seen and lit at a pair of directions.
+    pub fn pair(&self, i: DVec3, o: DVec3) -> PairColor {
+        let slopes = &self.map.relief.slopes;
+        let (lambda_i, lambda_o) = (slopes.lambda(i), slopes.lambda(o));
+        let exponent = match self.spec.distribution {
+            HeightDistribution::Paper => lambda_i + lambda_o,
+            _ => pair_exponent(lambda_o, lambda_i, i.y.atan2(i.x) - o.y.atan2(o.x)),
+        };
+        let weights = if self.is_measured() { Some(self.weights(i.as_vec3(), o.as_vec3())) } else { None };
+        let heights = match (&weights, self.spec.distribution) {
+            (Some(weights), _) => HeightsSeen::Ranked(
+                self.heights.moments(weights.reflected.iter().copied()).unwrap_or(STANDARD),
+                self.heights.quantiles.clone(),
+            ),
+            (None, HeightDistribution::Paper) => HeightsSeen::Normal(paper_moments(exponent)),
+            (None, _) => HeightsSeen::Smith(Largest { exponent }),
+        };
+        let facets: Vec<(DVec2, f64)> = match &weights {
+            Some(weights) if self.overhangs => {
+                self.facets.normals.iter().map(|n| slope_of(*n)).zip(weights.reflected.iter().copied()).collect()
+            }
+            _ => Vec::new(),
+        };
+        let weight = |s: DVec2| self.reflected(s, i, o);
+        let slopes = if self.is_by_facets() {
+            SlopesSeen::Facets(&facets)
+        } else if self.spec.distribution == HeightDistribution::Paper {
+            SlopesSeen::Apart(o)
+        } else {
+            SlopesSeen::Joint { weight: &weight, focus: self.focus(i, o) }
+        };
+        let seen = Seen { heights, slopes, gaussianize: self.spec.gaussianize };
+        let lit = weights.map_or_else(|| lit_part(lambda_o, exponent), |weights| weights.lit);
+        PairColor { lambda_i, lambda_o, lit, color: seen.color(&self.map) }
+    }
+
+    /// The colour of the mean of every driver.
+    pub fn naive(&self) -> DVec3 {
+        naive_color(&self.map)
+    }
+
+    /// The map of a layer of textures or noise, ready to be filtered; `None` for other drivers.
+    pub fn place_map(&self, layer: usize) -> Option<&PlaceMap> {
+        let mapped = &self.map.layers[layer].mapped;
+        let place_map = || match &mapped.driver.source {
+            Source::Place(place) => Some(PlaceMap::new(place.clone(), &mapped.map, self.spec.gaussianize)),
+            _ => None,
+        };
+        self.places[layer].get_or_init(place_map).as_ref()
+    }
+
+    /// Number of reads of a footprint.
+    pub fn taps(&self) -> u32 {
+        self.spec.taps
+    }
+
+    /// Moments of a layer of textures or noise over a footprint in the unit of its stops, and its mean colour.
+    pub fn footprint(&self, layer: usize, footprint: &Footprint) -> Option<(Normal, DVec3)> {
+        let mapped = &self.map.layers[layer].mapped;
+        let map = self.place_map(layer)?;
+        let moments = mapped.in_stop_unit(map.moments(footprint, self.spec.taps));
+        Some((moments, map.mean(footprint, self.spec.taps)))
+    }
+
+    /// Heights come from the facets. An analytic surface has none, so that Smith's distribution takes their place.
+    fn is_measured(&self) -> bool {
+        self.spec.distribution == HeightDistribution::Measured && self.spec.surface.is_none()
+    }
+
+    /// Slopes come from the facets as well, because they are no function of normal heights.
+    fn is_by_facets(&self) -> bool {
+        self.is_measured() && self.overhangs
+    }
+
+    /// Facets' slopes with the projected areas that a viewer sees.
+    fn seen_facets(&self, o: DVec3) -> Vec<(DVec2, f64)> {
+        let o = o.as_vec3();
+        let mut visible = vec![0.0; self.facets.len()];
+        self.visibility.fill(o, 0..self.facets.len(), &mut visible);
+        let facet = |s: usize| {
+            let n = self.facets.normals[s];
+            (slope_of(n), f64::from(visible[s] * n.dot(o).max(0.0) * self.facets.areas[s]))
+        };
+        (0..self.facets.len()).map(facet).collect()
+    }
+
+    fn weights(&self, i: Vec3, o: Vec3) -> FacetWeights {
+        let facets = &self.facets;
+        let (mut v_i, mut v_o) = (vec![0.0; facets.len()], vec![0.0; facets.len()]);
+        self.visibility.fill(i, 0..facets.len(), &mut v_i);
+        self.visibility.fill(o, 0..facets.len(), &mut v_o);
+        let (mut seen, mut lit) = (0.0, 0.0);
+        let mut reflected = Vec::with_capacity(facets.len());
+        for s in 0..facets.len() {
+            let (n, area) = (facets.normals[s], facets.areas[s]);
+            let material = &self.materials[self.material_of_slot[usize::from(facets.slots[s])]];
+            if n.dot(i) > 0.0 {
+                let projected = f64::from(area * n.dot(o).max(0.0) * v_o[s]);
+                seen += projected;
+                lit += projected * f64::from(v_i[s]);
+            }
+            let f = (material.brdf.f(n, i, o) * material.color).dot(LUMINANCE);
+            reflected.push(f64::from(area * v_i[s] * v_o[s] * f));
+        }
+        FacetWeights { reflected, lit: if seen > 0.0 { lit / seen } else { 0.0 } }
+    }
+
+    /// What a facet of this slope reflects, per base area: `√(1+s²) f(n, i, o)`, the mean over all materials.
+    fn reflected(&self, s: DVec2, i: DVec3, o: DVec3) -> DVec3 {
+        let length = (1.0 + s.length_squared()).sqrt();
+        let n = (DVec3::new(-s.x, -s.y, 1.0) / length).as_vec3();
+        let (i, o) = (i.as_vec3(), o.as_vec3());
+        let of = |(material, share): (&Material, &f64)| (material.brdf.f(n, i, o) * material.color).as_dvec3() * *share;
+        self.materials.iter().zip(&self.shares).map(of).sum::<DVec3>() * length
+    }
+
+    /// Where the narrowest lobe makes the density of slopes narrow.
+    fn focus(&self, i: DVec3, o: DVec3) -> Option<Focus> {
+        let terms = self.materials.iter().flat_map(|material| &material.brdf.terms);
+        let width = terms.filter_map(|term| match term {
+            Term::Lambertian { .. } | Term::Measured(_) => None,
+            Term::BlinnPhong { exponent, .. } => Some(1.0 / f64::from(exponent.max(1.0)).sqrt()),
+            Term::CookTorrance { roughness, .. } | Term::Ward { roughness, .. } | Term::Ggx { roughness, .. } => {
+                Some(f64::from(*roughness))
+            }
+        });
+        let width = width.reduce(f64::min)?;
+        let h = half_vector(i.as_vec3(), o.as_vec3()).as_dvec3();
+        if h.z <= 1e-3 {
+            return None;
+        }
+        let slope = -h.truncate() / h.z;
+        Some(Focus { slope, width: width * (1.0 + slope.length_squared()).sqrt() })
+    }
+
+    /// The first layer whose driver fits, or the named one.
+    ///
+    /// # Errors
+    /// No layer has this name, none fits, or several do and none is named.
+    pub fn layer(&self, name: Option<&str>, wanted: &str, fits: impl Fn(&Source) -> bool) -> Result<usize> {
+        let layers = &self.map.layers;
+        let names = || layers.iter().map(|layer| layer.name.as_str()).collect::<Vec<_>>().join(", ");
+        if let Some(name) = name {
+            let found = layers.iter().position(|layer| layer.name == name);
+            let index = found.ok_or_else(|| {
+                InputError::new("--layer", format!("`{name}`"), format!("the name of a layer: {}", names()))
+            })?;
+            if !fits(&layers[index].mapped.driver.source) {
+                let found = format!("`{name}`, a layer of `{}`", layers[index].mapped.driver.spec.kind());
+                return Err(InputError::new("--layer", found, format!("a layer of {wanted}")).into());
+            }
+            return Ok(index);
+        }
+        let fitting: Vec<usize> = (0..layers.len()).filter(|k| fits(&layers[*k].mapped.driver.source)).collect();
+        match fitting[..] {
+            [only] => Ok(only),
+            [] => Err(InputError::new("color_map.layer", "none", format!("a layer of {wanted}")).into()),
+            _ => {
+                let found = format!("{} layers of {wanted}", fitting.len());
+                Err(InputError::new("--layer", found, format!("the name of one of them: {}", names())).into())
+            }
+        }
+    }
+}
+
+/// Weights of facets at a pair of directions.
+struct FacetWeights {
+    /// What each facet reflects from the light to the viewer.
+    reflected: Vec<f64>,
+    /// Lit part of what is seen.
+    lit: f64,
+}
+
+const STANDARD: Normal = Normal { mean: 0.0, deviation: 1.0 };
+
+/// Returns true for drivers that footprints filter.
+pub fn is_place(source: &Source) -> bool {
+    matches!(source, Source::Place(_))
+}
+
+/// Returns true for drivers of slopes.
+pub fn is_slope(source: &Source) -> bool {
+    matches!(source, Source::Slope(SlopeDriver::Along { .. } | SlopeDriver::Steepness))
+}

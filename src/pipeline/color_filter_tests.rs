@@ -1,0 +1,242 @@
+//! Colour maps on tiles: the core against the filter, and which stages run.
+
+use std::sync::Arc;
+
+use glam::{DVec3, UVec2, Vec3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::color_filter::ColorFilter;
+use super::*;
+use crate::color_map::slopes::direction;
+use crate::color_map::statistics::DriverGrid;
+use crate::scene::{NoiseBasis, NoiseDriver, Pixels};
+
+const BANDS: &str = "stops = [[-1.2, [0.6, 0.3, 0.1]], [-1.2, 0.05], [-0.4, 0.05], [-0.4, [0.9, 0.8, 0.2]], \
+    [0.3, [0.9, 0.8, 0.2]], [0.3, [0.1, 0.4, 0.7]], [1.0, [0.1, 0.4, 0.7]], [1.0, 0.95]]";
+const RAMP: &str = "stops = [[-2, [0.05, 0.05, 0.2]], [0, [0.1, 0.5, 0.1]], [2, [1, 0.95, 0.8]]]";
+
+fn loaded(text: &str) -> LoadedScene {
+    LoadedScene {
+        scene: crate::scene::parse(text).unwrap(),
+        base_dir: std::path::PathBuf::new(),
+        name: "test".to_owned(),
+        painted: crate::scene::Painted::default(),
+    }
+}
+
+/// A tile of Gaussian heights with slopes of deviation 0.35, under a map.
+fn hills(side: u32, cells: u32, preset: &str, map: &str) -> LoadedScene {
+    let text = format!(
+        "[tile]\ngeometry = {{ kind = \"heightfield\", path = \"painted.png\" }}\n[quality]\npreset = \"{preset}\"\n{map}"
+    );
+    let mut loaded = loaded(&text);
+    let grid = DriverGrid::of_noise(&NoiseDriver { basis: NoiseBasis::Gaussian, cells, octaves: 1, seed: 7 });
+    let deviation = 0.35 / f64::from(cells) / 2.0_f64.sqrt();
+    let at = |k: u32| {
+        let place = (glam::DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+        (grid.at(place) * deviation) as f32
+    };
+    let heights = Pixels { size: UVec2::splat(side), values: (0..side * side).map(at).collect() };
+    loaded.painted.heights = Some(Arc::new(heights));
+    loaded
+}
+
+fn layer(driver: &str, stops: &str) -> String {
+    format!("[color_map]\n[[color_map.layer]]\ndriver = {driver}\n{stops}\n")
+}
+
+fn white(loaded: &LoadedScene) -> LoadedScene {
+    let mut white = loaded.clone();
+    white.scene.color_map = None;
+    white
+}
+
+/// Errors of a filter against the core: colours (median, worst), and relative RMS and worst of the whole value.
+fn against_core(loaded: &LoadedScene, count: usize) -> [f64; 4] {
+    let pipeline = Pipeline::new();
+    let filter = pipeline.color_filter(loaded).unwrap();
+    let plain = pipeline.effective(&white(loaded)).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+    let (mut colors, mut wholes, mut square, mut norm) = (Vec::new(), Vec::new(), 0.0, 0.0);
+    for _ in 0..count {
+        let mut at = || direction(draw(85_f64.to_radians().cos(), 20_f64.to_radians().cos()).acos(), draw(0.0, 6.283));
+        let (i, o) = (at(), at());
+        let colored = filter.outcome.brdf.eval(i.as_vec3(), o.as_vec3()).as_dvec3();
+        let base = plain.brdf.eval(i.as_vec3(), o.as_vec3()).as_dvec3();
+        let ours = filter.pair(i, o).color;
+        let error = ours - colored / base;
+        colors.push((error.length_squared() / 3.0).sqrt());
+        let whole = ours * base - colored;
+        wholes.push(whole.length() / colored.length());
+        square += whole.length_squared();
+        norm += colored.length_squared();
+    }
+    colors.sort_by(f64::total_cmp);
+    wholes.sort_by(f64::total_cmp);
+    [colors[count / 2], colors[count - 1], (square / norm).sqrt(), wholes[count - 1]]
+}
+
+#[test]
+fn the_filter_of_heights_agrees_with_the_core_on_a_gaussian_tile() {
+    for (stops, name) in [(BANDS, "bands"), (RAMP, "ramp")] {
+        let loaded = hills(192, 16, "standard", &layer("{ kind = \"height\" }", stops));
+        let [median, worst, rms, whole] = against_core(&loaded, 80);
+        println!("heights, {name}: colour {median:.4} / {worst:.4}; whole {rms:.4} / {whole:.4}");
+        assert!(median < 0.008 && worst < 0.03 && rms < 0.02 && whole < 0.06, "{median} {worst} {rms} {whole}");
+    }
+}
+
+#[test]
+fn the_filter_of_slopes_agrees_with_the_core_matte_and_glossy() {
+    let glossy = "[[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.3, f0 = 0.5 }\n";
+    for (materials, most) in [("", 0.03), (glossy, 0.08)] {
+        let map = format!("{materials}{}", layer("{ kind = \"slope\", azimuth_deg = 30 }", BANDS));
+        let [median, worst, rms, whole] = against_core(&hills(192, 16, "standard", &map), 60);
+        println!("slopes: colour {median:.4} / {worst:.4}; whole {rms:.4} / {whole:.4}");
+        assert!(rms < most, "{median} {worst} {rms} {whole}");
+    }
+}
+
+#[test]
+fn a_sum_and_a_product_of_layers_agree_with_the_core() {
+    let noise = "{ kind = \"noise\", basis = \"gaussian\", cells = 24 }";
+    let layers = format!(
+        "[[color_map.layer]]\ndriver = {noise}\n{RAMP}\n[[color_map.layer]]\ndriver = {{ kind = \"height\" }}\n{RAMP}\n\
+         [[color_map.layer]]\ndriver = {{ kind = \"slope\" }}\n{RAMP}\n"
+    );
+    for (combine, most) in [("sum", 0.02), ("product", 0.05)] {
+        let map = format!("[color_map]\ncombine = \"{combine}\"\n{layers}");
+        let [median, worst, rms, whole] = against_core(&hills(192, 16, "standard", &map), 40);
+        println!("{combine} of three: colour {median:.4} / {worst:.4}; whole {rms:.4} / {whole:.4}");
+        assert!(rms < most, "{combine}: {median} {worst} {rms} {whole}");
+    }
+}
+
+#[test]
+fn seen_along_the_light_nothing_is_in_shadow() {
+    for distribution in ["measured", "smith"] {
+        let map = layer("{ kind = \"height\" }", BANDS)
+            .replace("[color_map]", &format!("[color_map]\ndistribution = \"{distribution}\""));
+        let filter = Pipeline::new().color_filter(&hills(128, 12, "standard", &map)).unwrap();
+        for theta in [20.0_f64, 60.0, 75.0, 85.0] {
+            let at = direction(theta.to_radians(), 0.7);
+            let lit = filter.pair(at, at).lit;
+            assert!((0.97..=1.03).contains(&lit), "{distribution} {theta}: {lit}");
+        }
+    }
+}
+
+#[test]
+fn an_edit_of_a_stop_recomputes_neither_drivers_nor_ranks_nor_visibility() {
+    let noise = "{ kind = \"noise\", cells = 4 }";
+    let map = |value: f64| {
+        format!(
+            "{}[[color_map.layer]]\ndriver = {{ kind = \"height\" }}\nstops = [[{value}, 0], [{value}, 1]]\n",
+            layer(noise, RAMP)
+        )
+    };
+    let pipeline = Pipeline::new();
+    let runs = |value: f64| {
+        pipeline.color_filter(&hills(64, 6, "draft", &map(value))).unwrap();
+        pipeline
+            .runs()
+            .into_iter()
+            .filter(|(name, _)| matches!(*name, "visibility" | "color_drivers" | "color_heights"))
+            .collect::<Vec<_>>()
+    };
+    let first = runs(0.1);
+    assert!(first.iter().all(|(_, count)| *count == 1), "{first:?}");
+    assert_eq!(runs(0.4), first);
+}
+
+#[test]
+fn a_scene_without_a_colour_map_runs_none_of_its_stages_and_its_effect_is_off() {
+    let pipeline = Pipeline::new();
+    let plain = white(&hills(64, 6, "draft", ""));
+    let outcome = pipeline.effective(&plain).unwrap();
+    assert!(!outcome.plan.is_on("color_map_filtering"));
+    assert!(pipeline.runs().iter().all(|(name, count)| !name.starts_with("color_") || *count == 0));
+    assert!(pipeline.color_filter(&plain).unwrap_err().to_string().contains("color_map"));
+    let mapped = Pipeline::new().effective(&hills(64, 6, "draft", &layer("{ kind = \"height\" }", RAMP))).unwrap();
+    assert!(mapped.plan.is_on("color_map_filtering"));
+}
+
+#[test]
+fn a_flat_tile_of_noise_has_the_plain_mean_of_its_colours_in_the_core_and_in_the_filter() {
+    let text = format!(
+        "[tile]\ngeometry = {{ kind = \"flat\" }}\n{}",
+        layer("{ kind = \"noise\", basis = \"perlin\", cells = 8, octaves = 3 }", BANDS)
+    );
+    let loaded = loaded(&text);
+    let filter = Pipeline::new().color_filter(&loaded).unwrap();
+    let plain = Pipeline::new().effective(&white(&loaded)).unwrap();
+    let (i, o) = (direction(0.4, 1.0), direction(0.7, 2.0));
+    let of = |brdf: &EffectiveBrdf| brdf.eval(i.as_vec3(), o.as_vec3()).as_dvec3();
+    let core: DVec3 = of(&filter.outcome.brdf) / of(&plain.brdf);
+    let ours = filter.pair(i, o).color;
+    assert!((core - ours).abs().max_element() < 0.005, "{core} {ours}");
+}
+
+#[test]
+fn tiles_of_any_size_have_the_same_colours() {
+    let color = |size: f32| -> Vec<DVec3> {
+        let mut loaded = hills(64, 6, "draft", &layer("{ kind = \"height\" }", RAMP));
+        loaded.scene.tile.size = glam::Vec2::splat(size);
+        let heights = loaded.painted.heights.as_ref().unwrap();
+        let values = heights.values.iter().map(|height| height * size).collect();
+        loaded.painted.heights = Some(Arc::new(Pixels { size: heights.size, values }));
+        let filter: ColorFilter = Pipeline::new().color_filter(&loaded).unwrap();
+        (0..6).map(|k| filter.pair(direction(0.25 * f64::from(k), 0.3), direction(1.2, 2.0)).color).collect()
+    };
+    let one = color(1.0);
+    for size in [1e-6, 1e6] {
+        for (a, b) in color(size).iter().zip(&one) {
+            assert!((*a - *b).abs().max_element() < 2e-3, "{size}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn overhangs_use_the_facets_themselves_and_refuse_smith() {
+    let scene = |distribution: &str| {
+        loaded(&format!(
+            "[tile]\ngeometry = {{ kind = \"weave\" }}\n[quality]\npreset = \"draft\"\n[color_map]\ndistribution = \"{distribution}\"\n\
+             [[color_map.layer]]\ndriver = {{ kind = \"slope\" }}\n{BANDS}\n"
+        ))
+    };
+    let filter = Pipeline::new().color_filter(&scene("measured")).unwrap();
+    let color = filter.pair(direction(0.5, 0.0), direction(1.0, 2.0)).color;
+    let core = filter.outcome.brdf.eval(direction(0.5, 0.0).as_vec3(), direction(1.0, 2.0).as_vec3());
+    assert!(color.is_finite() && core.cmpgt(Vec3::ZERO).all());
+    for distribution in ["smith", "paper"] {
+        let error = Pipeline::new().color_filter(&scene(distribution)).unwrap_err();
+        assert!(error.to_string().contains("overhangs") && error.exit_code() == 2, "{error}");
+    }
+}
+
+#[test]
+fn colours_are_finite_and_between_those_of_the_stops_at_every_angle_and_on_flat_steep_and_singular_surfaces() {
+    for covariance in ["[0, 0, 0]", "[0.1, 0, 0]", "[100, 0, 100]", "[0.12, 0.12, 0.12]"] {
+        for (driver, distribution) in
+            [("height", "smith"), ("slope", "smith"), ("steepness", "smith"), ("height", "paper"), ("slope", "paper")]
+        {
+            let text = format!(
+                "[tile]\ngeometry = {{ kind = \"flat\" }}\n[color_map]\ndistribution = \"{distribution}\"\n\
+                 surface = {{ height = 0, slope_mean = [9, 0], slope_covariance = {covariance} }}\n\
+                 [[color_map.layer]]\ndriver = {{ kind = \"{driver}\" }}\n{BANDS}\n"
+            );
+            let filter = Pipeline::new().color_filter(&loaded(&text)).unwrap();
+            for theta in [0.0, 0.8, 89.99_f64.to_radians(), std::f64::consts::FRAC_PI_2, 2.0] {
+                for phi in [0.0, 3.0] {
+                    let at = filter.pair(direction(theta, phi), direction(theta, 1.0));
+                    let sound =
+                        at.color.is_finite() && at.color.min_element() >= 0.0 && at.color.max_element() <= 0.951;
+                    let finite = at.lambda_i.is_finite() && at.lambda_o.is_finite() && (0.0..=1.0).contains(&at.lit);
+                    assert!(sound && finite, "{covariance} {driver} {distribution} {theta}: {at:?}");
+                }
+            }
+        }
+    }
+}
