@@ -135,9 +135,9 @@ impl Reference<'_> {
         for pass in 0..PASSES {
             let facets = sampler.sample(self.mesh, FACETS, SampleShift::from_seed(pass));
             let origins = lifted_origins(&facets, self.mesh.size);
-            for s in 0..facets.len() {
+            for (s, &origin) in origins.iter().enumerate() {
                 let (n, triangle) = (facets.normals[s], facets.triangles[s]);
-                let sees = |to: Vec3| to.z > 0.0 && n.dot(to) > 0.0 && !self.grid.is_blocked(origins[s], to, triangle);
+                let sees = |to: Vec3| to.z > 0.0 && n.dot(to) > 0.0 && !self.grid.is_blocked(origin, to, triangle);
                 if !sees(o) {
                     continue;
                 }
