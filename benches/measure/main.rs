@@ -42,6 +42,11 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("brdf", "nanoseconds per evaluation of each BRDF", in_lib("nanoseconds_per_evaluation")),
     ("cache-costs", "milliseconds of the disk cache", in_lib("costs_of_caching")),
     ("choosing", "PSNR and time that targets reach on ten scenes", Source::Here(choosing)),
+    (
+        "color-maps",
+        "errors of filtered colour maps against the core on a Gaussian tile",
+        in_lib("the_table_of_color_maps_against_the_core"),
+    ),
     ("errors", "true and stated errors of the presets on hard tiles: many minutes", Source::Here(errors)),
     ("few-facets", "errors of sums over 700 facets with few distinct normals", Source::Here(few_facets)),
     ("gpu-counts", "operations of an edit on a GPU", in_lib("counts_of_an_edit")),

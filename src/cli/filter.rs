@@ -49,6 +49,9 @@ pub fn run(args: &FilterArgs) -> Result<()> {
     let filter = pipeline.color_filter(&loaded)?;
     drop(watch);
     args.scene.notes(&filter.outcome);
+    if !args.scene.quiet {
+        filter.warnings().iter().for_each(|warning| print_on_stderr(format_args!("warning: {warning}")));
+    }
     let layer = args.layer.as_deref();
     let mut report = Report { output: None, queries: None, method: name(args.method), table: None, side_by_side: None };
     if let (Some(queries), Some(output)) = (&queries, &args.output) {

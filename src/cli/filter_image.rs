@@ -99,8 +99,12 @@ fn plane(filter: &ColorFilter, layer: usize) -> Panels {
     // The first read computes the moments, which are not part of an image's time.
     let places = filter.place_map(layer);
     let naive = image(&|at| places.as_ref().map_or(DVec3::ZERO, |map| mapped.map.color(map.moments(at, 1).mean)));
+    let histograms = std::sync::OnceLock::new();
     let exact = image(&|at| match &mapped.driver.source {
-        Source::Place(place) => truth::footprint(&place.grid, &mapped.map, at, at.centre.x.to_bits()).color,
+        Source::Place(place) => {
+            truth::footprint(&place.grid, &histograms, &mapped.map, at, truth::IMAGE_STRATA, at.centre.x.to_bits())
+                .color
+        }
         _ => DVec3::ZERO,
     });
     let taps = filter.taps();

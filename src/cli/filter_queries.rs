@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::io::Read;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use super::FilterMethod;
 use crate::base::{Error, InputError, Result, regular_file};
 use crate::color_map::layers::Source;
 use crate::color_map::slopes::direction;
-use crate::color_map::statistics::Footprint;
+use crate::color_map::statistics::{Footprint, HistogramMips};
 use crate::color_map::{Normal, StopMap};
 use crate::metrics::Pair;
 use crate::pipeline::Pipeline;
@@ -194,7 +195,8 @@ pub fn evaluate(
             let index = layer_of("texture or noise", &is_place)?;
             with_error = method == FilterMethod::Truth;
             let size = loaded.scene.tile.size;
-            let of = |query: &Vec<f64>| footprint(filter, index, method, &footprint_of(query, size));
+            let histograms = OnceLock::new();
+            let of = |query: &Vec<f64>| footprint(filter, index, method, &histograms, &footprint_of(query, size));
             queries.rows.par_iter().map(of).collect()
         }
     };
@@ -210,7 +212,13 @@ fn noisy(filter: &ColorFilter, layer: usize) -> StopMap {
     }
 }
 
-fn footprint(filter: &ColorFilter, layer: usize, method: FilterMethod, at: &Footprint) -> Vec<f64> {
+fn footprint(
+    filter: &ColorFilter,
+    layer: usize,
+    method: FilterMethod,
+    histograms: &OnceLock<HistogramMips>,
+    at: &Footprint,
+) -> Vec<f64> {
     let mapped = &filter.map.layers[layer].mapped;
     let (Some((moments, color)), Source::Place(place)) = (filter.footprint(layer, at), &mapped.driver.source) else {
         return vec![0.0; 5];
@@ -220,7 +228,7 @@ fn footprint(filter: &ColorFilter, layer: usize, method: FilterMethod, at: &Foot
         FilterMethod::Naive => row(&[moments.mean, moments.deviation], mapped.stops.color(moments.mean)),
         FilterMethod::Truth => {
             let seed = at.centre.x.to_bits() ^ at.centre.y.to_bits().rotate_left(17);
-            let exact = truth::footprint(&place.grid, &mapped.map, at, seed);
+            let exact = truth::footprint(&place.grid, histograms, &mapped.map, at, truth::QUERY_STRATA, seed);
             let moments = mapped.in_stop_unit(exact.moments);
             let mut cells = row(&[moments.mean, moments.deviation], exact.color);
             cells.extend(exact.standard_error.to_array());

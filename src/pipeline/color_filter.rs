@@ -12,14 +12,14 @@ use crate::brdf::{LUMINANCE, Material, Term};
 use crate::color_map::filter::{HeightsSeen, Seen, SlopesSeen, naive_color};
 use crate::color_map::heights::{Largest, lit_part, pair_exponent, paper_moments};
 use crate::color_map::layers::{LayeredMap, Source};
-use crate::color_map::slopes::{Focus, SlopeDriver, Slopes};
+use crate::color_map::slopes::{Focus, SlopeDriver, Slopes, direction};
 use crate::color_map::statistics::{Footprint, PlaceMap, RankedHeights};
 use crate::color_map::{Normal, PrefilteredTable};
 use crate::geometry::relief::slope_of;
 use crate::geometry::{ColorField, Facets};
 use crate::math::directions::half_vector;
 use crate::plan::Refinement;
-use crate::scene::{ColorMap, HeightDistribution, LoadedScene, StopEvaluation};
+use crate::scene::{ColorMap, Gaussianize, HeightDistribution, LoadedScene, StopEvaluation};
 use crate::visibility::Visibility;
 
 /// The colour map of a scene with everything that its means depend on.
@@ -216,6 +216,43 @@ impl ColorFilter {
         Some((moments, map.mean(footprint, self.spec.taps)))
     }
 
+    /// What the user should know about the filter, each with a remedy.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for (index, layer) in self.map.layers.iter().enumerate() {
+            let (Some(map), Source::Place(place)) = (self.place_map(index), &layer.mapped.driver.source) else {
+                continue;
+            };
+            let error = (map.map().mean(&map.whole()) - place.plain_mean(&layer.mapped.map)).abs().max_element();
+            if self.spec.gaussianize == Gaussianize::Off && error > MAX_FAR_ERROR {
+                warnings.push(format!(
+                    "the driver of layer `{}` is far from normal: its mean colour is wrong by {error:.3}; set gaussianize = \"auto\"",
+                    layer.name
+                ));
+            }
+        }
+        if self.spec.distribution == HeightDistribution::Smith
+            && self.spec.surface.is_none()
+            && self.map.is_of_surface()
+        {
+            let [i, o] = SMITH_CHECK.map(|[theta, phi]| direction(theta, phi));
+            let mut measured = HeightsSeen::Normal(STANDARD);
+            if let Some(at) = self.heights.moments(self.weights(i.as_vec3(), o.as_vec3()).reflected.into_iter()) {
+                measured = HeightsSeen::Ranked(at, self.heights.quantiles.clone());
+            }
+            let slopes = &self.map.relief.slopes;
+            let apart = SMITH_CHECK[0][1] - SMITH_CHECK[1][1];
+            let exponent = pair_exponent(slopes.lambda(o), slopes.lambda(i), apart);
+            let difference = (measured.moments().mean - Largest { exponent }.moments().mean).abs();
+            if difference > MAX_SMITH_ERROR {
+                warnings.push(format!(
+                    "smith is far from this tile: visible heights differ by {difference:.2} deviations; set distribution = \"measured\""
+                ));
+            }
+        }
+        warnings
+    }
+
     /// Heights come from the facets. An analytic surface has none, so that Smith's distribution takes their place.
     fn is_measured(&self) -> bool {
         self.spec.distribution == HeightDistribution::Measured && self.spec.surface.is_none()
@@ -251,7 +288,8 @@ impl ColorFilter {
             if n.dot(i) > 0.0 {
                 let projected = f64::from(area * n.dot(o).max(0.0) * v_o[s]);
                 seen += projected;
-                lit += projected * f64::from(v_i[s]);
+                // Of two soft steps, the lower hides what the higher hides: along the light nothing that is seen is dark.
+                lit += f64::from(area * n.dot(o).max(0.0) * v_o[s].min(v_i[s]));
             }
             let f = (material.brdf.f(n, i, o) * material.color).dot(LUMINANCE);
             reflected.push(f64::from(area * v_i[s] * v_o[s] * f));
@@ -316,6 +354,13 @@ impl ColorFilter {
         }
     }
 }
+
+/// Largest error of the mean colour of a driver whose values are not ranked.
+const MAX_FAR_ERROR: f64 = 0.01;
+/// Largest difference of the mean visible height from that of Smith's surface [deviations]: about 0.02 in colour.
+const MAX_SMITH_ERROR: f64 = 0.15;
+/// Polar angle and azimuth of light and view at which Smith's heights are compared [rad].
+const SMITH_CHECK: [[f64; 2]; 2] = [[0.9, 1.6], [1.3, 0.0]];
 
 /// Weights of facets at a pair of directions.
 struct FacetWeights {

@@ -240,3 +240,50 @@ fn colours_are_finite_and_between_those_of_the_stops_at_every_angle_and_on_flat_
         }
     }
 }
+
+#[test]
+fn warnings_name_drivers_that_are_not_normal_and_tiles_far_from_smith() {
+    let map = |off: &str| {
+        format!(
+            "[tile]\ngeometry = {{ kind = \"flat\" }}\n[color_map]\ngaussianize = \"{off}\"\n[[color_map.layer]]\nname = \"waves\"\n\
+             driver = {{ kind = \"texture\", path = \"asset:leather.png\" }}\n{BANDS}\n"
+        )
+    };
+    let warnings = |text: &str| Pipeline::new().color_filter(&loaded(text)).unwrap().warnings();
+    assert!(warnings(&map("auto")).is_empty());
+    let off = warnings(&map("off"));
+    assert!(off.len() == 1 && off[0].contains("`waves` is far from normal"), "{off:?}");
+    let grooves = "[tile]\ngeometry = { kind = \"grooves\", depth = 0.4 }\n[quality]\npreset = \"draft\"\n[color_map]\n\
+        distribution = \"smith\"\n[[color_map.layer]]\ndriver = { kind = \"height\" }\nstops = [[0, 0], [0, 1]]\n";
+    let smith = warnings(grooves);
+    assert!(smith.len() == 1 && smith[0].contains("distribution"), "{smith:?}");
+}
+
+#[test]
+#[ignore = "a measurement: cargo bench --bench measure -- color-maps"]
+fn the_table_of_color_maps_against_the_core() {
+    let glossy = "[[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.15, f0 = 0.5 }\n";
+    let of = |distribution: &str, driver: &str, stops: &str| {
+        layer(driver, stops).replace("[color_map]", &format!("[color_map]\ndistribution = \"{distribution}\""))
+    };
+    let (height, slope) = ("{ kind = \"height\" }", "{ kind = \"slope\", azimuth_deg = 30 }");
+    let rows = [
+        ("heights, bands, measured", "standard", of("measured", height, BANDS)),
+        ("heights, bands, measured", "fine", of("measured", height, BANDS)),
+        ("heights, ramp, measured", "standard", of("measured", height, RAMP)),
+        ("heights, bands, smith", "standard", of("smith", height, BANDS)),
+        ("heights, bands, paper", "standard", of("paper", height, BANDS)),
+        ("slopes, bands, diffuse", "standard", of("measured", slope, BANDS)),
+        ("slopes, bands, diffuse, paper", "standard", of("paper", slope, BANDS)),
+        ("slopes, bands, Cook-Torrance 0.15", "standard", format!("{glossy}{}", of("measured", slope, BANDS))),
+        ("slopes, bands, Cook-Torrance 0.15, paper", "standard", format!("{glossy}{}", of("paper", slope, BANDS))),
+        ("steepness, ramp, diffuse", "standard", of("measured", "{ kind = \"steepness\" }", RAMP)),
+    ];
+    println!("| map | preset | colour, median | colour, worst | whole value, relative RMS | whole value, worst |");
+    println!("|---|---|---|---|---|---|");
+    for (name, preset, map) in rows {
+        let [median, worst, rms, whole] = against_core(&hills(384, 32, preset, &map), 80);
+        let [rms, whole] = [rms, whole].map(|error| 100.0 * error);
+        println!("| {name} | `{preset}` | {median:.4} | {worst:.4} | {rms:.1} % | {whole:.1} % |");
+    }
+}

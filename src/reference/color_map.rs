@@ -1,19 +1,24 @@
 //! Truth of filtered colour maps: quadrature, supersampling and ray casting.
 
-use glam::{DVec2, DVec3, Vec3};
+use std::sync::{LazyLock, OnceLock};
+
+use glam::{DMat2, DVec2, DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::Reference;
-use crate::color_map::statistics::{DriverGrid, Footprint};
+use crate::color_map::statistics::{DriverGrid, Footprint, HistogramMips, MIN_DEVIATION};
 use crate::color_map::{Normal, StopMap, normal};
 use crate::geometry::relief::slope_of;
 use crate::geometry::{FacetSampler, SampleShift, lifted_origins};
 
 /// Nodes of a quadrature over a distribution.
 const NODES: usize = 100_000;
-/// Samples of a footprint: strata along each axis, and samples whose spread gives the standard error.
-const STRATA: usize = 64;
+/// Strata of a footprint along each axis: of queries, and of the pixels of an image.
+pub const QUERY_STRATA: usize = 64;
+pub const IMAGE_STRATA: usize = 16;
+/// Entries of the table of normal quantiles, from which samples are drawn.
+const QUANTILES: usize = 1 << 14;
 /// Facets and passes from which visible slopes and lit parts are estimated.
 const FACETS: usize = 6144;
 const PASSES: u64 = 8;
@@ -48,18 +53,20 @@ pub struct FootprintTruth {
 }
 
 /// Supersamples a footprint at stratified points. `map` is over deviations.
-pub fn footprint(grid: &DriverGrid, map: &StopMap, at: &Footprint, seed: u64) -> FootprintTruth {
+pub fn supersampled(grid: &DriverGrid, map: &StopMap, at: &Footprint, strata: usize, seed: u64) -> FootprintTruth {
+    static TABLE: LazyLock<Vec<f64>> =
+        LazyLock::new(|| (0..QUANTILES).map(|k| normal::quantile((k as f64 + 0.5) / QUANTILES as f64)).collect());
     let (axes, deviations) = crate::color_map::statistics::principal(at.covariance);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let (mut first, mut second) = (0.0, 0.0);
     let (mut color, mut square) = (DVec3::ZERO, DVec3::ZERO);
-    let count = (STRATA * STRATA) as f64;
-    for k in 0..STRATA * STRATA {
+    let count = (strata * strata) as f64;
+    for k in 0..strata * strata {
         let mut draw = |cell: usize| {
             let u: f64 = random.random();
-            normal::quantile(((cell as f64 + u) / STRATA as f64).clamp(1e-12, 1.0 - 1e-12))
+            TABLE[(((cell as f64 + u) / strata as f64 * QUANTILES as f64) as usize).min(QUANTILES - 1)]
         };
-        let (x, y) = (deviations[0] * draw(k % STRATA), deviations[1] * draw(k / STRATA));
+        let (x, y) = (deviations[0] * draw(k % strata), deviations[1] * draw(k / strata));
         let value = grid.at(at.centre + axes[0] * x + axes[1] * y);
         first += value / count;
         second += value * value / count;
@@ -74,6 +81,40 @@ pub fn footprint(grid: &DriverGrid, map: &StopMap, at: &Footprint, seed: u64) ->
     FootprintTruth { moments, color, standard_error }
 }
 
+/// The truth of a footprint: from histograms where it is large enough for them, else supersampled. The error of
+/// histograms is below 0.01 and counts as no standard error.
+pub fn footprint(
+    grid: &DriverGrid,
+    histograms: &OnceLock<HistogramMips>,
+    map: &StopMap,
+    at: &Footprint,
+    strata: usize,
+    seed: u64,
+) -> FootprintTruth {
+    let scale = grid.size.as_dvec2() * f64::from(grid.repeat);
+    let scale = DMat2::from_diagonal(scale);
+    let covariance = scale * at.covariance * scale;
+    let (_, deviations) = crate::color_map::statistics::principal(covariance);
+    // Up to a few correlation lengths the supersamples are exact enough, and histograms blur at their bins.
+    if deviations[1] < LARGE * MIN_DEVIATION {
+        return supersampled(grid, map, at, strata, seed);
+    }
+    let mips = histograms.get_or_init(|| HistogramMips::new(grid));
+    let parts = mips.read(grid.texels(at.centre), covariance);
+    FootprintTruth { moments: mips.moments(&parts), color: mips.mean(map, &parts), standard_error: DVec3::ZERO }
+}
+
+/// Footprints whose shorter deviation is this many times the smallest one of histograms take their truth from them.
+const LARGE: f64 = 4.0;
+
+/// The sine of the lowest elevation of rays.
+const LOWEST: f32 = 2e-3;
+
+/// A direction at least [`LOWEST`] above the horizon.
+fn lifted(direction: Vec3) -> Vec3 {
+    direction.with_z(direction.z.max(LOWEST))
+}
+
 /// Facets that rays find visible.
 #[derive(Debug, Clone, Default)]
 pub struct SeenFacets {
@@ -84,17 +125,19 @@ pub struct SeenFacets {
 }
 
 impl Reference<'_> {
-    /// What a viewer sees of the tile, by rays, and which part of it a light reaches.
+    /// What a viewer sees of the tile, by rays, and which part of it a light reaches. A direction that is closer to the
+    /// horizon than [`LOWEST`] is lifted there, because its rays would cross thousands of tiles.
     pub fn seen(&self, light: Option<Vec3>, o: Vec3) -> SeenFacets {
+        let (light, o) = (light.map(lifted), lifted(o));
         let sampler = FacetSampler::new(self.mesh);
         let mut result = SeenFacets::default();
         let (mut facing, mut lit) = (0.0, 0.0);
         for pass in 0..PASSES {
             let facets = sampler.sample(self.mesh, FACETS, SampleShift::from_seed(pass));
             let origins = lifted_origins(&facets, self.mesh.size);
-            for s in 0..facets.len() {
+            for (s, &origin) in origins.iter().enumerate() {
                 let (n, triangle) = (facets.normals[s], facets.triangles[s]);
-                let sees = |to: Vec3| to.z > 0.0 && n.dot(to) > 0.0 && !self.grid.is_blocked(origins[s], to, triangle);
+                let sees = |to: Vec3| to.z > 0.0 && n.dot(to) > 0.0 && !self.grid.is_blocked(origin, to, triangle);
                 if !sees(o) {
                     continue;
                 }

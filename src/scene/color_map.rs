@@ -369,6 +369,9 @@ impl ColorLayer {
     }
 }
 
+/// Makes the error of a key: path, found, expected.
+type MakeProblem<'a> = dyn Fn(&[PathStep], &str, &str) -> Result<(), Problem> + 'a;
+
 impl ColorMap {
     /// Image files of all drivers.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
@@ -436,10 +439,7 @@ impl ColorMap {
     }
 
     /// Refuses products of layers whose drivers depend on each other and that cannot be merged.
-    fn check_dependence(
-        &self,
-        problem: &dyn Fn(&[PathStep], &str, &str) -> Result<(), Problem>,
-    ) -> Result<(), Problem> {
+    fn check_dependence(&self, problem: &MakeProblem<'_>) -> Result<(), Problem> {
         let key = |name: &str| PathStep::Key(name.to_owned());
         for (index, layer) in self.layer.iter().enumerate() {
             let with_blend: Vec<&Driver> = layer.drivers().collect();

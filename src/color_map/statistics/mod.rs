@@ -1,12 +1,14 @@
 //! Statistics of drivers: noise, moments over footprints, and moments of what is seen and lit.
 
 mod grid;
+mod histogram;
 mod measured;
 mod mips;
 mod noise;
 pub mod place;
 
 pub use grid::DriverGrid;
+pub use histogram::{HistogramMips, MIN_DEVIATION};
 pub use measured::RankedHeights;
 pub use mips::{MomentMips, principal};
 pub use noise::residual_variance;
