@@ -223,7 +223,7 @@ mod tests {
             let (seen, swapped) = (lit_part(l, a) / (1.0 + l), lit_part(other, b) / (1.0 + other));
             assert!((seen - swapped).abs() < 1e-12);
         }
-        assert_eq!(pair_exponent(1.0, 2.0, 6.283_185_307_179_586), 2.0);
+        assert_eq!(pair_exponent(1.0, 2.0, std::f64::consts::TAU), 2.0);
     }
 
     #[test]

@@ -433,7 +433,7 @@ mod tests {
         let (mean, variance) = visible_moments(0.0);
         assert!((mean - 1.2533).abs() < 1e-4 && (variance - 0.4292).abs() < 1e-4);
         let singular = Slopes { mean: DVec2::ZERO, covariance: [0.1, 0.0, 0.0] };
-        for theta in [0.0, 0.7, 1.5707, FRAC_PI_2] {
+        for theta in [0.0, 0.7, 1.57, FRAC_PI_2] {
             for phi in [0.0, FRAC_PI_2] {
                 let seen = singular.visible(direction(theta, phi));
                 assert!(seen.mean.is_finite() && seen.covariance.iter().all(|c| c.is_finite()));

@@ -61,7 +61,12 @@ fn against_core(loaded: &LoadedScene, count: usize) -> [f64; 4] {
     let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
     let (mut colors, mut wholes, mut square, mut norm) = (Vec::new(), Vec::new(), 0.0, 0.0);
     for _ in 0..count {
-        let mut at = || direction(draw(85_f64.to_radians().cos(), 20_f64.to_radians().cos()).acos(), draw(0.0, 6.283));
+        let mut at = || {
+            direction(
+                draw(85_f64.to_radians().cos(), 20_f64.to_radians().cos()).acos(),
+                draw(0.0, std::f64::consts::TAU),
+            )
+        };
         let (i, o) = (at(), at());
         let colored = filter.outcome.brdf.eval(i.as_vec3(), o.as_vec3()).as_dvec3();
         let base = plain.brdf.eval(i.as_vec3(), o.as_vec3()).as_dvec3();
