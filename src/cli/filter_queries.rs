@@ -288,8 +288,13 @@ fn no_truth() -> Error {
 
 /// The reference's colour of what is seen and lit, and `f̄`, at pairs of directions: the ratio of the reference with and
 /// without colours.
-pub fn true_colors(pipeline: &Pipeline, loaded: &LoadedScene, pairs: &[Pair]) -> Result<Vec<(DVec3, Vec3)>> {
-    let settings = ReferenceSettings { facets: 24_576, max_passes: 4, target: 0.0, seed: loaded.scene.quality.seed };
+pub fn true_colors(
+    pipeline: &Pipeline,
+    loaded: &LoadedScene,
+    pairs: &[Pair],
+    facets: usize,
+) -> Result<Vec<(DVec3, Vec3)>> {
+    let settings = ReferenceSettings { facets, max_passes: 4, target: 0.0, seed: loaded.scene.quality.seed };
     let estimate = |reference: &Reference<'_>| reference.estimate(pairs, &settings, |_, _| true);
     let colored = pipeline.with_reference(loaded, estimate)?;
     let mut white = loaded.clone();
@@ -318,7 +323,7 @@ fn pairs(
         if loaded.scene.color_map.as_ref().is_some_and(|map| map.surface.is_some()) {
             return Err(no_truth());
         }
-        let colors = true_colors(pipeline, loaded, &pairs)?;
+        let colors = true_colors(pipeline, loaded, &pairs, 24_576)?;
         return pipeline.with_reference(loaded, |reference| {
             let of = |(pair, (color, f)): (&Pair, &(DVec3, Vec3))| {
                 let slopes = &filter.map.relief.slopes;
