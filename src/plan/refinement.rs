@@ -9,6 +9,8 @@ const AIM: f64 = 0.85;
 const MAX_STEP: usize = 8;
 /// Largest number of azimuths that refinement asks for. Visibility takes time in proportion.
 const MAX_AZIMUTHS: usize = 384;
+/// Largest factor by which refinement raises the product of facets and azimuths, and so the time of visibility.
+const MAX_WORK: usize = 32;
 /// Largest factor by which refinement narrows the soft step. `standard` then has a tenth of a degree.
 const MAX_SHARPNESS: usize = 8;
 
@@ -66,6 +68,8 @@ impl Refinement {
         }
         let azimuths = settings.horizon_azimuths.max(settings.slice_azimuths);
         next.azimuths = next.azimuths.min((MAX_AZIMUTHS / azimuths.max(1)).max(1));
+        next.facets = next.facets.min((MAX_WORK / next.azimuths).max(self.facets));
+        next.azimuths = next.azimuths.min((MAX_WORK / next.facets).max(self.azimuths));
         let (before, after) = (self.apply(settings), next.apply(settings));
         let same_width = before.penumbra.to_bits() == after.penumbra.to_bits();
         let same_azimuths = before.horizon_azimuths == after.horizon_azimuths;
@@ -116,7 +120,7 @@ mod tests {
             steps += 1;
         }
         let most = refinement.apply(&settings());
-        assert_eq!((most.facets, most.horizon_azimuths, most.penumbra), (131_072, 384, 0.0025));
+        assert_eq!((most.facets, most.horizon_azimuths, most.penumbra), (49_152, 192, 0.0025));
         assert!(steps < 6, "{steps}");
     }
 }
