@@ -1,7 +1,5 @@
 //! Errors of sums over few facets, on tiles with few distinct normals. A test includes this file.
 
-use std::path::Path;
-
 use biscale::effective::EffectiveBrdf;
 use biscale::metrics::{image_pairs, upper_errors};
 use biscale::pipeline::Pipeline;
@@ -17,10 +15,7 @@ pub fn few_facets(print: &mut dyn FnMut(String)) -> Result<(), String> {
     let values = |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
     print("scene                  preset    facets        rel. L2   PSNR".to_owned());
     let (mut rows, mut worst) = (0, 0.0_f64);
-    let materials = Path::new(env!("CARGO_MANIFEST_DIR")).join("materials");
-    let mut paths: Vec<_> = std::fs::read_dir(materials).unwrap().map(|entry| entry.unwrap().path()).collect();
-    paths.sort();
-    for scene in paths.iter().filter_map(|path| path.file_stem()?.to_str()) {
+    for scene in scene::shipped::rendered_names() {
         for preset in ["draft", "standard", "fine"] {
             let overrides = ["quality.backend=cpu".to_owned(), format!("quality.preset={preset}")];
             let open = |facets: Option<usize>| {
