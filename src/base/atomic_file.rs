@@ -33,18 +33,6 @@ pub(crate) fn replace_large_file(path: &Path, bytes: &[u8], progress: &Progress<
     })
 }
 
-/// Checks that [`write_atomically`] can open a file beside `path`. Callers check it before a long computation.
-///
-/// # Errors
-/// As [`replace_file`].
-pub(crate) fn check_place(path: &Path) -> Result<()> {
-    let place = Place::of(path)?;
-    if !place.is_device {
-        Temporary::beside(&place.target).map_err(|error| unwritable(error, path))?;
-    }
-    Ok(())
-}
-
 /// Calls `content` to fill a file beside `path`, and renames that file to `path`. The file is opened when the first
 /// bytes are written to it. Devices and pipes are written directly.
 ///
@@ -234,7 +222,7 @@ mod tests {
     fn the_temporary_file_is_opened_by_the_first_bytes_and_never_after_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npz");
-        check_place(&path).unwrap();
+        crate::base::check_output(&path, &[]).unwrap();
         let bytes = vec![7; 2 * BYTES_PER_STEP];
         write_atomically(&path, |out| {
             assert!(names(folder.path()).is_empty(), "nothing is written yet");

@@ -4,6 +4,7 @@
 pub mod atomic_file;
 mod cancel;
 mod console;
+pub mod csv;
 mod error;
 pub mod finite;
 mod gpu_error;

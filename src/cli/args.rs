@@ -146,7 +146,7 @@ pub struct EvalArgs {
     pub standard_error: bool,
 }
 
-/// How `filter` evaluates queries.
+/// Method by which `filter` evaluates queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FilterMethod {
     /// The means of the maps.
@@ -265,7 +265,7 @@ pub struct TransmitArgs {
     /// Azimuth of the light [degrees].
     #[arg(long, default_value_t = 0.0, value_parser = super::transmit::parse_phi, allow_negative_numbers = true)]
     pub phi_i: f64,
-    /// How the lobe is computed; without it, as the plan decides.
+    /// Method for the lobe; without it, the plan decides.
     #[arg(long, value_enum)]
     pub method: Option<TransmitMethod>,
 }

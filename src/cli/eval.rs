@@ -1,10 +1,11 @@
 //! `biscale eval` evaluates f̄ at the direction pairs of a file.
 
 use std::fmt::Write as _;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
 
-use crate::base::{Error, InputError, regular_file, require_finite};
+use crate::base::csv::CsvFile;
+use crate::base::{Error, require_finite};
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, Reflectance};
 use crate::math::directions::from_angles;
@@ -19,9 +20,6 @@ use serde::Serialize;
 use super::EvalArgs;
 use super::watch::Watch;
 use super::{cache, check_outputs, print_json, slab};
-
-/// Largest size of a file of pairs [bytes]. A longer file is read up to this size.
-const MAX_FILE: u64 = 1 << 30;
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
 
@@ -179,43 +177,17 @@ impl Row {
 }
 
 fn read(path: &Path) -> Result<Vec<Row>, Error> {
-    let input_error =
-        |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
-    let mut text = String::new();
-    let got = if path == Path::new("-") {
-        std::io::stdin().lock().take(MAX_FILE).read_to_string(&mut text)
-    } else {
-        regular_file::open(path).and_then(|file| file.take(MAX_FILE).read_to_string(&mut text))
-    };
-    got.map_err(|error| input_error(String::new(), error.to_string(), "a CSV file that can be read"))?;
-    // Spreadsheets begin a file with a byte-order mark.
-    let text = text.trim_start_matches('\u{feff}');
-    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-    let names: Vec<&str> = match lines.next() {
-        Some((_, header)) => header.split(',').map(str::trim).collect(),
-        None => {
-            return Err(input_error("line 1".to_owned(), "an empty file".to_owned(), HEADER).into());
-        }
-    };
+    let file = CsvFile::read(path, HEADER)?;
     let mut columns = [0; 4];
     for (column, wanted) in columns.iter_mut().zip(HEADER.split(',')) {
-        *column = names
-            .iter()
-            .position(|name| *name == wanted)
-            .ok_or_else(|| input_error("line 1".to_owned(), format!("the columns {}", names.join(",")), HEADER))?;
+        let place = file.names().iter().position(|name| name == wanted);
+        *column = place.ok_or_else(|| file.header_error(HEADER))?;
     }
-    lines
-        .map(|(number, line)| {
-            let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-            let place = || format!("line {}", number + 1);
+    file.rows()
+        .map(|row| {
             let mut angles = [0.0; 4];
             for (angle, &column) in angles.iter_mut().zip(&columns) {
-                let field = fields.get(column).ok_or_else(|| {
-                    input_error(place(), format!("{} values", fields.len()), &format!("{} values", names.len()))
-                })?;
-                *angle = field.parse::<f64>().ok().filter(|angle| angle.is_finite()).ok_or_else(|| {
-                    input_error(place(), format!("`{field}` for {}", names[column]), "an angle in radians")
-                })?;
+                *angle = row.number(column, "an angle in radians", |_| true)?;
             }
             Ok(Row { angles })
         })

@@ -1,7 +1,6 @@
 //! Queries of `biscale filter`: the five headers, and their evaluation by each method.
 
 use std::fmt::Write as _;
-use std::io::Read;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -9,7 +8,8 @@ use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::FilterMethod;
-use crate::base::{Error, InputError, Result, regular_file};
+use crate::base::csv::{CsvFile, CsvRow};
+use crate::base::{Error, InputError, Result};
 use crate::color_map::layers::Source;
 use crate::color_map::slopes::direction;
 use crate::color_map::statistics::{Footprint, HistogramMips};
@@ -20,10 +20,7 @@ use crate::pipeline::color_filter::{ColorFilter, is_place, is_slope};
 use crate::reference::{Reference, ReferenceSettings, color_map as truth};
 use crate::scene::LoadedScene;
 
-/// Largest size of a file of queries [bytes].
-const MAX_FILE: u64 = 1 << 30;
-
-/// What a file of queries asks for.
+/// Kind of the queries in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Normal,
@@ -63,43 +60,26 @@ impl Queries {
     /// # Errors
     /// The file cannot be read, its header is none of the five, or a number is out of its range.
     pub fn read(path: &Path) -> Result<Self> {
-        let error =
-            |place: String, found: String, expected: &str| InputError::new(place, found, expected).in_file(path);
-        let mut text = String::new();
-        let got = if path == Path::new("-") {
-            std::io::stdin().lock().take(MAX_FILE).read_to_string(&mut text)
-        } else {
-            regular_file::open(path).and_then(|file| file.take(MAX_FILE).read_to_string(&mut text))
-        };
-        got.map_err(|problem| error(String::new(), problem.to_string(), "a CSV file that can be read"))?;
-        let text = text.trim_start_matches('\u{feff}');
-        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-        let found: String = lines
-            .next()
-            .map_or(String::new(), |(_, line)| line.split(',').map(str::trim).collect::<Vec<_>>().join(","));
         let headers = KINDS.map(|(_, header, _)| header).join("; ");
-        let &(kind, header, results) = KINDS.iter().find(|(_, header, _)| *header == found).ok_or_else(|| {
-            let found = if found.is_empty() { "an empty file".to_owned() } else { format!("the columns {found}") };
-            error("line 1".to_owned(), found, &format!("one of the headers {headers}"))
-        })?;
-        let names: Vec<&str> = header.split(',').collect();
-        let row = |(number, line): (usize, &str)| -> Result<Vec<f64>> {
-            let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-            let place = format!("line {}", number + 1);
-            if fields.len() != names.len() {
-                let expected = format!("{} values", names.len());
-                return Err(error(place, format!("{} values", fields.len()), &expected).into());
+        let expected = format!("one of the headers {headers}");
+        let file = CsvFile::read(path, &expected)?;
+        let found = file.names().join(",");
+        let &(kind, header, results) =
+            KINDS.iter().find(|(_, header, _)| *header == found).ok_or_else(|| file.header_error(&expected))?;
+        let row = |row: CsvRow<'_>| -> Result<Vec<f64>> {
+            if row.len() != file.names().len() {
+                return Err(row.length_error().into());
             }
-            let number = |(field, name): (&&str, &&str)| {
-                let not_negative = matches!(*name, "deviation" | "a" | "width_u" | "width_v");
-                let value =
-                    field.parse::<f64>().ok().filter(|value| value.is_finite() && (!not_negative || *value >= 0.0));
-                let expected = if not_negative { "a number that is not negative" } else { "a number" };
-                value.ok_or_else(|| Error::from(error(place.clone(), format!("`{field}` for {name}"), expected)))
+            let number = |(column, name): (usize, &String)| {
+                if matches!(name.as_str(), "deviation" | "a" | "width_u" | "width_v") {
+                    row.number(column, "a number that is not negative", |value| value >= 0.0)
+                } else {
+                    row.number(column, "a number", |_| true)
+                }
             };
-            fields.iter().zip(&names).map(number).collect()
+            file.names().iter().enumerate().map(number).collect()
         };
-        let rows = lines.map(row).collect::<Result<_>>()?;
+        let rows = file.rows().map(row).collect::<Result<_>>()?;
         Ok(Self { kind, header, results, rows })
     }
 

@@ -52,7 +52,7 @@ impl HeightsSeen {
     }
 }
 
-/// How slopes are weighted.
+/// Weights of slopes.
 pub enum SlopesSeen<'a> {
     /// By what is seen, lit and reflected: the density is `p(s) weight(s)`.
     Joint { weight: &'a dyn Fn(DVec2) -> DVec3, focus: Option<Focus> },

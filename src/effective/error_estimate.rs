@@ -187,7 +187,7 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
             if exact_facets || area <= 0.0 {
                 return (area, reflected, DVec3::ZERO);
             }
-            // Of two halves of the sample, the squared difference has the expectation of the variance of their sum.
+            // The squared difference of two halves of the sample has the variance of their sum as its expectation.
             let half: Vec<f32> =
                 v_o.iter().zip(&facets.replicates).map(|(v, replicate)| v * f32::from(replicate % 2)).collect();
             let (half_area, half) = (sum.projected_area(&half, o), sum.sum(i, o, v_i, &half));
@@ -282,24 +282,25 @@ impl ErrorEstimator {
         if i.z <= 0.0 || o.z <= 0.0 {
             return deviations;
         }
-        let sum = &self.direct.sum;
-        let (area, reflected) = self.direct.with_visibility(i, o, |v_i, v_o| {
-            let (area, reflected) = (sum.projected_area(v_o, o), sum.sum(i, o, v_i, v_o));
-            if area > 0.0 {
-                let f_bar = reflected / area;
-                for ((facets, sum), deviation) in self.replicates.iter().zip(&mut deviations.replicates) {
-                    let visible = |v: &[f32]| -> Vec<f32> { facets.iter().map(|&s| v[s]).collect() };
-                    let (v_i, v_o) = (visible(v_i), visible(v_o));
-                    let part = sum.sum(i, o, &v_i, &v_o) - f_bar * sum.projected_area(&v_o, o);
-                    *deviation = part * (REPLICATES as f64 / area);
-                }
+        // Projected area and reflection of each replicate, or of all facets.
+        let parts: Vec<(f64, DVec3)> = self.direct.with_visibility(i, o, |v_i, v_o| {
+            let of = |sum: &FacetSum, v_i: &[f32], v_o: &[f32]| (sum.projected_area(v_o, o), sum.sum(i, o, v_i, v_o));
+            if self.replicates.is_empty() {
+                return vec![of(&self.direct.sum, v_i, v_o)];
             }
-            (area, reflected)
+            let visible = |facets: &[usize], v: &[f32]| -> Vec<f32> { facets.iter().map(|&s| v[s]).collect() };
+            self.replicates.iter().map(|(facets, sum)| of(sum, &visible(facets, v_i), &visible(facets, v_o))).collect()
         });
+        let area: f64 = parts.iter().map(|part| part.0).sum();
         if area <= 0.0 {
             return deviations;
         }
-        deviations.f_bar = reflected / area;
+        deviations.f_bar = parts.iter().map(|part| part.1).sum::<DVec3>() / area;
+        if !self.replicates.is_empty() {
+            for (deviation, (part_area, reflected)) in deviations.replicates.iter_mut().zip(&parts) {
+                *deviation = (reflected - deviations.f_bar * part_area) * (REPLICATES as f64 / area);
+            }
+        }
         let mut finer = deviations.f_bar;
         for (resolution, deviation) in [HALF, QUARTER].into_iter().zip(&mut deviations.coarse) {
             if self.direct.visibility.has_azimuth_step(resolution.azimuth_step) {

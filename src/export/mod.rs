@@ -26,7 +26,7 @@ use std::ffi::OsString;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use crate::base::{Error, InputError, Progress, Result, atomic_file, replace_file};
+use crate::base::{Error, InputError, Progress, Result, atomic_file, check_output, replace_file};
 use crate::effective::EffectiveBrdf;
 
 pub use grid::ExportResolution;
@@ -186,9 +186,9 @@ pub fn write(
     }
     let task = ExportTask { brdf, meta, options, progress };
     // An unwritable path is reported before the long computation.
-    atomic_file::check_place(path)?;
+    check_output(path, &[])?;
     if !format.describes_itself() {
-        atomic_file::check_place(&note_path(path))?;
+        check_output(&note_path(path), &[])?;
     }
     let (written, bytes) = atomic_file::write_atomically(path, |out| {
         let mut counted = CountingWriter { inner: out, bytes: 0 };

@@ -41,7 +41,7 @@ pub struct ColorFilter {
     places: Vec<OnceLock<Option<PlaceMap>>>,
 }
 
-/// What is seen and lit at one pair of directions.
+/// Statistics of the surface that is visible and lit at one pair of directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairColor {
     pub lambda_i: f64,
@@ -152,7 +152,7 @@ impl ColorFilter {
         (relief.slopes.visible(o), color)
     }
 
-    /// What is seen and lit at a pair of directions.
+    /// Statistics of the surface that is visible and lit at a pair of directions.
     pub fn pair(&self, i: DVec3, o: DVec3) -> PairColor {
         let slopes = &self.map.relief.slopes;
         let (lambda_i, lambda_o) = (slopes.lambda(i), slopes.lambda(o));
@@ -216,7 +216,7 @@ impl ColorFilter {
         Some((moments, map.mean(footprint, self.spec.taps)))
     }
 
-    /// What the user should know about the filter, each with a remedy.
+    /// Warnings about the filter, each with a remedy.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         for (index, layer) in self.map.layers.iter().enumerate() {
@@ -288,7 +288,8 @@ impl ColorFilter {
             if n.dot(i) > 0.0 {
                 let projected = f64::from(area * n.dot(o).max(0.0) * v_o[s]);
                 seen += projected;
-                // Of two soft steps, the lower hides what the higher hides: along the light nothing that is seen is dark.
+                // The lower of two soft steps hides all that the higher one hides, so that along the light no visible
+                // point is dark.
                 lit += f64::from(area * n.dot(o).max(0.0) * v_o[s].min(v_i[s]));
             }
             let f = (material.brdf.f(n, i, o) * material.color).dot(LUMINANCE);
@@ -297,7 +298,7 @@ impl ColorFilter {
         FacetWeights { reflected, lit: if seen > 0.0 { lit / seen } else { 0.0 } }
     }
 
-    /// What a facet of this slope reflects, per base area: `√(1+s²) f(n, i, o)`, the mean over all materials.
+    /// Reflection of a facet of this slope per base area: `√(1+s²) f(n, i, o)`, the mean over all materials.
     fn reflected(&self, s: DVec2, i: DVec3, o: DVec3) -> DVec3 {
         let length = (1.0 + s.length_squared()).sqrt();
         let n = (DVec3::new(-s.x, -s.y, 1.0) / length).as_vec3();
@@ -306,7 +307,7 @@ impl ColorFilter {
         self.materials.iter().zip(&self.shares).map(of).sum::<DVec3>() * length
     }
 
-    /// Where the narrowest lobe makes the density of slopes narrow.
+    /// Slopes around which the narrowest lobe makes the density of slopes narrow.
     fn focus(&self, i: DVec3, o: DVec3) -> Option<Focus> {
         let terms = self.materials.iter().flat_map(|material| &material.brdf.terms);
         let width = terms.filter_map(|term| match term {
@@ -364,7 +365,7 @@ const SMITH_CHECK: [[f64; 2]; 2] = [[0.9, 1.6], [1.3, 0.0]];
 
 /// Weights of facets at a pair of directions.
 struct FacetWeights {
-    /// What each facet reflects from the light to the viewer.
+    /// Reflection of each facet from the light to the viewer.
     reflected: Vec<f64>,
     /// Lit part of what is seen.
     lit: f64,

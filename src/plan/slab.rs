@@ -66,7 +66,7 @@ impl SlabFeatures {
     }
 }
 
-/// How a slab is computed, with the rows of the plan that say why.
+/// The method chosen for a slab, with the rows of the plan that give the reasons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlabDecision {
     pub method: Method,

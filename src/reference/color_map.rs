@@ -44,7 +44,7 @@ pub fn heights_mean(map: &StopMap, exponent: f64) -> (Normal, DVec3) {
     (Normal { mean: first, deviation: (second - first * first).max(0.0).sqrt() }, color)
 }
 
-/// What a Gaussian footprint of a driver has: moments of the driver, mean colour, and the colour's standard error.
+/// Statistics of a Gaussian footprint: moments of the driver, mean colour, and the colour's standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FootprintTruth {
     pub moments: Normal,
@@ -125,8 +125,8 @@ pub struct SeenFacets {
 }
 
 impl Reference<'_> {
-    /// What a viewer sees of the tile, by rays, and which part of it a light reaches. A direction that is closer to the
-    /// horizon than [`LOWEST`] is lifted there, because its rays would cross thousands of tiles.
+    /// Casts rays to find the part of the tile that a viewer sees and the part of it that a light reaches. A direction
+    /// that is closer to the horizon than [`LOWEST`] is lifted there, because its rays would cross thousands of tiles.
     pub fn seen(&self, light: Option<Vec3>, o: Vec3) -> SeenFacets {
         let (light, o) = (light.map(lifted), lifted(o));
         let sampler = FacetSampler::new(self.mesh);

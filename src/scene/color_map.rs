@@ -10,7 +10,7 @@ use super::schema::{number, scene_choice, scene_table};
 use super::{Field, FieldShape, Geometry, Kind, Scene};
 
 scene_choice! {
-    /// How layers are combined.
+    /// Combination of the layers.
     Combine {
         /// The sum of weight times colour.
         Sum = "sum",
@@ -44,7 +44,7 @@ scene_choice! {
 }
 
 scene_choice! {
-    /// How the mean of a map under a normal distribution is computed.
+    /// Method for the mean of a map under a normal distribution.
     StopEvaluation {
         /// In closed form from the stops.
         Closed = "closed",

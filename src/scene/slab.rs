@@ -11,7 +11,7 @@ use super::schema::{DefaultNumber, length, number, scene_choice, scene_table};
 use super::{FieldShape, Kind};
 
 scene_choice! {
-    /// How light that meets rough facets on both faces is computed.
+    /// Method for light that meets rough facets on both faces.
     SlabMethod {
         /// The dual-microfacet model where it is close enough, otherwise the sum over facets.
         Auto = "auto",
@@ -39,7 +39,7 @@ scene_table! {
         #[serde(with = "color")] absorption: Vec3 = Vec3::ZERO, FieldShape::Color { max: 1e6 }, "1 / tile unit";
         /// Part of the light that leaves the other side evenly.
         #[serde(with = "color")] diffuse: Vec3 = Vec3::ZERO, FieldShape::Color { max: 1.0 }, "";
-        /// How light that meets rough facets on both faces is computed: auto, dual (one formula) or faces (a sum).
+        /// Method for light that meets rough facets on both faces: auto, dual (one formula) or faces (a sum).
         method: SlabMethod = SlabMethod::Auto, FieldShape::Choice(SlabMethod::NAMES), "";
         /// Part of the roughness on top, 0 (all below) to 1 (all on top); auto: by the variances of the slopes.
         alpha: Alpha = Alpha::Auto, ALPHA, "";

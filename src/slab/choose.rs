@@ -1,4 +1,4 @@
-//! How far Eq. 11 is from Eq. 1 on fixed pairs of directions.
+//! Difference of Eq. 11 from Eq. 1 on fixed pairs of directions.
 
 use glam::{DVec2, DVec3};
 

@@ -16,7 +16,7 @@ use super::straight::{Straight, straight};
 use super::virtual_face::virtual_face;
 use crate::effective::{Reflectance, Transmittance};
 
-/// How the light that meets rough facets on both faces is computed.
+/// Method for light that meets rough facets on both faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Dai et al. 2009, Eq. 11.

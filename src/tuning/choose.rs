@@ -159,7 +159,7 @@ impl<'a> Search<'a> {
             let stated = outcome.errors().and_then(|errors| errors.estimate().psnr_db).unwrap_or(f64::INFINITY);
             progress(&format!("{} facets: {stated:.1} dB stated", outcome.settings.facets));
             let step = ((db - stated) / DB_PER_LEVEL).clamp(-MAX_STEP, FINEST);
-            // What no level is expected to reach is tried at the finest one at once.
+            // If no level is expected to reach the target, only the finest one is tried.
             let step = if level + step >= FINEST { FINEST - level } else { step.min(MAX_STEP) };
             if step.abs() <= 2.0 * STEP || level + step <= low {
                 return Ok((level, outcome));

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::klems::{BASIS, KlemsPatch, PATCHES, definition, source_of};
 use super::{block, header, xyz};
-use crate::base::{InputError, Progress, Result, atomic_file, progress, replace_file, require_finite};
+use crate::base::{InputError, Progress, Result, atomic_file, check_output, progress, replace_file, require_finite};
 use crate::export::{meta, note_path};
 use crate::scene::LoadedScene;
 use crate::slab::{DiscGrid, Slab};
@@ -68,8 +68,8 @@ pub fn check_ending(path: &Path) -> Result<()> {
 pub fn write(slab: &Slab, loaded: &LoadedScene, path: &Path, progress: &Progress<'_>) -> Result<SlabExport> {
     check_ending(path)?;
     let note = note_path(path);
-    atomic_file::check_place(path)?;
-    atomic_file::check_place(&note)?;
+    check_output(path, &[])?;
+    check_output(&note, &[])?;
     let mut matrices = Vec::new();
     for (k, kind) in KINDS.iter().enumerate() {
         let part = progress::part(progress, 0.25 * k as f32, 0.25 * (k + 1) as f32);

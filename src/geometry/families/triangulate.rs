@@ -26,7 +26,7 @@ pub(super) fn triangulate(outline: &[Vec3]) -> Vec<[usize; 3]> {
         if ear == first {
             first = after;
         }
-        // Whether another corner of a simple polygon is an ear does not depend on the clipped one.
+        // Clipping a corner of a simple polygon does not change which of the other corners are ears.
         for corner in [before, after] {
             if polygon.is_ear(corner) {
                 ears.insert(corner);

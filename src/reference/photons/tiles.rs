@@ -20,12 +20,12 @@ pub struct TileFace {
     bottom: f32,
 }
 
-/// Where light arrives at the other face.
+/// Place at which light arrives at the other face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Positions {
     /// Anywhere, as if the faces were far apart.
     Random,
-    /// Where its ray leads, with this distance between the mean levels [tile units].
+    /// Place that its ray reaches, with this distance between the mean levels [tile units].
     Kept(f32),
 }
 
@@ -44,7 +44,7 @@ const LIFT: f32 = 2e-6;
 const MAX_HITS: usize = 64;
 const MAX_FACES: usize = 64;
 
-/// What a face makes of a photon.
+/// Outcome of a photon's encounter with a face.
 struct Passage {
     direction: DVec3,
     position: Vec2,
