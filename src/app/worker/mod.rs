@@ -12,6 +12,7 @@ mod rendered_preview;
 mod runner;
 mod screen;
 mod shared;
+mod slab_image;
 mod thumbnail;
 mod tile_image_worker;
 mod tone;
