@@ -103,8 +103,9 @@ fn of_slab(args: &RenderArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, ren
     let tone_map = ToneMap::new(&render_scene.camera)?;
     let watch = Watch::new(args.scene.quiet);
     pipeline.set_cancel(watch.cancel());
-    let outcome = pipeline.slab(loaded)?;
+    let mut outcome = pipeline.slab(loaded)?;
     let scene = SlabScene::with(pipeline, loaded, &outcome, render_scene)?;
+    outcome.health.warnings.extend(scene.warnings(render_scene)?);
     let rendered = scene.render(render_scene, args.size, usize::from(args.samples), &watch.cancel())?;
     drop(watch);
     args.scene.warn(&outcome.health);

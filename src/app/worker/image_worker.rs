@@ -292,6 +292,7 @@ impl ImageWorker {
             radiance,
             image,
             brdf,
+            slab: None,
             stages,
             latency_ms: ms(job.submitted),
             rendered_on: self.renderer.rendered_on(),

@@ -8,7 +8,7 @@ use crate::pipeline::{Pipeline, SlabOutcome, StageTimes};
 use crate::render::lighting::environment::Environment;
 use crate::render::lighting::lights;
 use crate::render::stages::LoadEnvironment;
-use crate::render::{DirectionalLight, RenderScene, Rendered};
+use crate::render::{CameraView, DirectionalLight, RenderScene, Rendered};
 use crate::scene::LoadedScene;
 use crate::slab::{Slab, SlabView};
 
@@ -84,6 +84,28 @@ impl SlabScene {
             seed: self.seed,
             cancel: cancel.clone(),
         })
+    }
+
+    /// The slab as a viewer sees it.
+    pub fn view(&self) -> &SlabView {
+        &self.view
+    }
+
+    /// Warnings about what lies behind the object.
+    ///
+    /// # Errors
+    /// A camera that cannot frame the object.
+    pub fn warnings(&self, render_scene: &RenderScene) -> Result<Vec<String>> {
+        let Some(plane) = &self.backdrop.plane else { return Ok(Vec::new()) };
+        let view = CameraView::new(&render_scene.camera, render_scene.mesh(), [1, 1])?;
+        if view.eye.z > plane.z {
+            return Ok(Vec::new());
+        }
+        let azimuth = render_scene.camera.azimuth_deg;
+        Ok(vec![format!(
+            "the camera at azimuth {azimuth}° is behind the plane of [background], which is seen from its +z side: choose an azimuth \
+             from -90 to 90°"
+        )])
     }
 
     /// How the image is computed, in words.

@@ -14,7 +14,7 @@ const REFLECTED_EVERY: usize = 2;
 const GRAZING: f32 = 0.6;
 /// Facets of which light inside meets one, chosen by their areas as the light sees them. The variance of the area of a
 /// single facet of GGX is infinite.
-const CANDIDATES: usize = 4;
+const CANDIDATES: usize = 16;
 /// Largest number of reflections inside, and weight below which a path ends.
 const MAX_BOUNCES: usize = 64;
 const LEAST_WEIGHT: f32 = 1e-3;
