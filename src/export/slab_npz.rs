@@ -5,9 +5,9 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
-use super::grid::{Axes, ExportResolution};
+use super::grid::{ExportGrid, ExportResolution};
 use super::meta::{FRAME, PROGRAM};
-use super::npz::array;
+use super::npz::{array, axes, text};
 use super::zip::ZipWriter;
 use crate::base::progress::in_parallel;
 use crate::base::{Progress, Result, atomic_file, require_finite};
@@ -16,8 +16,7 @@ use crate::slab::Slab;
 
 /// Tables of a slab over a grid of directions.
 struct SlabTables {
-    light: Axes,
-    view: Axes,
+    grid: ExportGrid,
     /// BTDF [1/sr] by light above and viewer below.
     btdf: Vec<Vec3>,
     /// BRDF [1/sr] of the top face, then of the bottom face, each by light and viewer on its side.
@@ -43,7 +42,7 @@ pub fn write(
     atomic_file::check_place(path)?;
     let tables = SlabTables::new(slab, resolution, progress)?;
     atomic_file::write_atomically(path, |out| tables.write(&meta(slab, loaded), out))?;
-    Ok(3 * tables.light.len() * tables.view.len())
+    Ok(3 * tables.grid.pairs())
 }
 
 fn meta(slab: &Slab, loaded: &LoadedScene) -> String {
@@ -86,8 +85,7 @@ impl SlabTables {
             brdf: table(1).chain(table(2)).collect(),
             straight: part(0),
             mirrored: part(1),
-            light: grid.light,
-            view: grid.view,
+            grid,
         };
         require_finite(&tables.btdf)?;
         require_finite(&tables.brdf)?;
@@ -96,23 +94,13 @@ impl SlabTables {
 
     fn write(&self, meta: &str, out: &mut dyn Write) -> io::Result<()> {
         let mut zip = ZipWriter::new(out);
-        let [ti, pi, to, po] =
-            [self.light.theta.len(), self.light.phi.len(), self.view.theta.len(), self.view.phi.len()];
-        let axes = [
-            ("theta_i", &self.light.theta),
-            ("phi_i", &self.light.phi),
-            ("theta_o", &self.view.theta),
-            ("phi_o", &self.view.phi),
-        ];
-        for (name, axis) in axes {
-            array(&mut zip, name, "f4", &[axis.len()], bytemuck::cast_slice(axis))?;
-        }
+        let [ti, pi, to, po] = self.grid.shape();
+        axes(&mut zip, &self.grid)?;
         array(&mut zip, "btdf", "f4", &[ti, pi, to, po, 3], bytemuck::cast_slice(&self.btdf))?;
         array(&mut zip, "brdf", "f4", &[2, ti, pi, to, po, 3], bytemuck::cast_slice(&self.brdf))?;
         array(&mut zip, "straight", "f4", &[2, ti, pi, 3], bytemuck::cast_slice(&self.straight))?;
         array(&mut zip, "mirrored", "f4", &[2, ti, pi, 3], bytemuck::cast_slice(&self.mirrored))?;
-        let meta: Vec<u32> = meta.chars().map(u32::from).collect();
-        array(&mut zip, "meta", &format!("U{}", meta.len()), &[], bytemuck::cast_slice(&meta))?;
+        text(&mut zip, meta)?;
         zip.finish()
     }
 }
@@ -129,7 +117,7 @@ mod tests {
         let slab = Pipeline::new().slab(&loaded).unwrap().slab;
         let resolution = ExportResolution { theta_i: 3, phi_i: 2, theta_o: 32, phi_o: 64 };
         let tables = SlabTables::new(&slab, resolution, &|_| true).unwrap();
-        let (lights, viewers) = (tables.light.directions(), tables.view.directions());
+        let (lights, viewers) = (tables.grid.light.directions(), tables.grid.view.directions());
         let (i, o) = (lights[1].as_dvec3(), viewers[70].as_dvec3());
         let over = DVec3::new(1.0, 1.0, -1.0);
         assert_eq!(tables.btdf[viewers.len() + 70], slab.btdf(i, o * over).as_vec3());

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use super::{Backdrop, BackdropKernel, Footprint};
 use crate::base::{Cancel, Result};
 use crate::effective::{Lobe, PathKind, Reflectance, Transmittance, ViewPaths, Viewer};
-use crate::render::image::render::{RenderTimes, check_size};
+use crate::render::image::render::{RenderTimes, check_size, visible_points};
 use crate::render::image::shading::gather_over;
 use crate::render::image::shading_points::ShadingPoints;
-use crate::render::{CameraView, DirectionalLight, GBuffer, ObjectMesh, Rendered};
+use crate::render::{CameraView, DirectionalLight, ObjectMesh, Rendered};
 use crate::scene;
 
 /// Everything that an image depends on.
@@ -49,9 +49,7 @@ pub fn render<S: ViewPaths>(input: &SeenThrough<'_, S>) -> Result<Rendered> {
     check_size(input.size, input.samples_per_side)?;
     let view = CameraView::new(input.camera, input.mesh, input.size)?;
     let start = Instant::now();
-    let buffer = GBuffer::new(input.mesh, &view, input.samples_per_side);
-    let points = ShadingPoints::new(&buffer, &view, input.samples_per_side);
-    drop(buffer);
+    let points = visible_points(input.mesh, &view, input.samples_per_side);
     let after_gbuffer = Instant::now();
     let mut radiance = vec![Vec3::ZERO; points.len()];
     radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {

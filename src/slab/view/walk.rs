@@ -15,6 +15,8 @@ const GRAZING: f32 = 0.6;
 /// Facets of which light inside meets one, chosen by their areas as the light sees them. The variance of the area of a
 /// single facet of GGX is infinite.
 const CANDIDATES: usize = 16;
+/// Cosine below which light inside is so steep that it meets one of several candidates also at its first arrival.
+const STEEP: f32 = 0.7;
 /// Largest number of reflections inside, and weight below which a path ends.
 const MAX_BOUNCES: usize = 64;
 const LEAST_WEIGHT: f32 = 1e-3;
@@ -137,8 +139,14 @@ impl Faces {
         }
         let Some(inner) = leave(&self.top, met.refracted(start.ray.d), true, &mut masked) else { return masked };
         let part = group.mask * self.transmission(inner.d);
-        let facing = self.bottom.facing(inner.d);
-        let Some(below) = Met::new(inner, self.bottom.slope(second), facing, 1.0 / group.eta) else { return masked };
+        let chosen = if inner.d.z > -STEEP {
+            candidate(&self.bottom, inner.d, mixed(start.seed, !(path as u64)))
+        } else {
+            Some((self.bottom.slope(second), 1.0))
+        };
+        let Some((slope, area)) = chosen else { return masked };
+        let facing = self.bottom.facing(inner.d) * area;
+        let Some(below) = Met::new(inner, slope, facing, 1.0 / group.eta) else { return masked };
         let mut lost = 0.0;
         let is_straight = met.is_level && below.is_level;
         if below.reflectance < 1.0
