@@ -65,11 +65,16 @@ fn text(loaded: &LoadedScene) -> Result<String> {
     let _ = writeln!(out, "  <integrator type=\"{kind}\"><integer name=\"max_depth\" value=\"32\"/></integrator>");
     out.push_str(&sensor(loaded)?);
     let medium = if absorbs {
-        let sigma = depth.as_dvec3() / GAP;
+        // Mitsuba takes colours up to 1, and a factor.
+        let scale = f64::from(depth.max_element());
+        let sigma = depth.as_dvec3() / scale;
         format!(
             "    <medium name=\"interior\" type=\"homogeneous\">\n      <rgb name=\"sigma_t\" value=\"{}, {}, {}\"/>\n      \
-             <rgb name=\"albedo\" value=\"0, 0, 0\"/>\n    </medium>\n",
-            sigma.x, sigma.y, sigma.z
+             <rgb name=\"albedo\" value=\"0, 0, 0\"/>\n      <float name=\"scale\" value=\"{}\"/>\n    </medium>\n",
+            sigma.x,
+            sigma.y,
+            sigma.z,
+            scale / GAP
         )
     } else {
         String::new()
@@ -163,7 +168,7 @@ mod tests {
         .unwrap();
         let text = text(&loaded).unwrap();
         assert_eq!(text.matches("roughdielectric").count(), 2);
-        assert!(text.contains("sigma_t\" value=\"500, 500, 500\"") && text.contains("volpath"), "{text}");
+        assert!(text.contains("sigma_t\" value=\"1, 1, 1\"") && text.contains("volpath"), "{text}");
         assert!(text.contains("type=\"checkerboard\"") && text.contains("angle=\"30\""));
     }
 

@@ -178,7 +178,7 @@ impl Backdrop {
 
     /// The mean radiance of the hemisphere around `axis`, weighted by the cosine.
     pub fn even(&self, axis: Vec3) -> Vec3 {
-        self.even.pyramid.read(self.even.texel_at(axis), &self.even.pyramid.kernel([0.0; 3]))
+        self.even.pyramid.bilinear(0, self.even.texel_at(axis))
     }
 
     /// The footprint of rays from about `position` along about `d`.

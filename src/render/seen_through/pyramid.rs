@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Largest number of reads along the longer axis of a footprint.
-const MAX_PROBES: usize = 15;
+const MAX_PROBES: usize = 9;
 /// Variance of a bilinear read of level k in squared texels of level 0: `A 4^k - B`. Each level is reduced by weights of
 /// variance 11/4, and the linear interpolation adds 1/6.
 const A: f32 = 13.0 / 12.0;
@@ -70,12 +70,14 @@ impl Pyramid {
         let (major, minor) = (middle + radius, (middle - radius).max(0.0));
         let major = if major.is_finite() { major } else { bound };
         // As many probes as are allowed must cover the longer axis.
-        let minor = if minor.is_finite() { minor } else { bound }.max(major / 20.0).max(A - B);
+        let minor = if minor.is_finite() { minor } else { bound }.max(major / 14.0).max(A - B);
         // A nearly round footprint is read as a round one of the same mean variance.
         let rest = major - minor;
         let minor = if rest > ROUND * minor { minor } else { minor + 0.5 * rest };
-        let level = (0.5 * ((minor + B) / A).log2()).clamp(0.0, (self.levels.len() - 1) as f32);
-        let (low, variance) = (level as usize, |level: usize| A * (1u64 << (2 * level)) as f32 - B);
+        // The exponent of a number is the integer part of its logarithm.
+        let exponent = (((minor + B) / A).to_bits() >> 23) as i32 - 127;
+        let low = (exponent.max(0) as usize / 2).min(self.levels.len() - 1);
+        let variance = |level: usize| A * (1u64 << (2 * level)) as f32 - B;
         let coarser = if low + 1 < self.levels.len() {
             ((minor - variance(low)) / (variance(low + 1) - variance(low))).clamp(0.0, 1.0)
         } else {
@@ -111,7 +113,8 @@ impl Pyramid {
         sum
     }
 
-    fn bilinear(&self, level: usize, at: Vec2) -> Vec3 {
+    /// Reads one level at `at` [texels of level 0].
+    pub fn bilinear(&self, level: usize, at: Vec2) -> Vec3 {
         let Level { size: [width, height], texels } = &self.levels[level];
         let [full_width, full_height] = self.size();
         let x = at.x * (*width as f32 / full_width as f32) - 0.5;
@@ -146,7 +149,7 @@ fn wrapped(k: i32, n: usize) -> usize {
 impl Kernel {
     /// Spreads reads along `deviation`, which is `ratio` times the footprint of one read.
     fn spread(&mut self, deviation: Vec2, ratio: f32) {
-        let count = (((3.2 * ratio).ceil() as usize) | 1).clamp(3, MAX_PROBES);
+        let count = (((2.4 * ratio).ceil() as usize) | 1).clamp(3, MAX_PROBES);
         // The reads reach over 2.2 deviations to either side.
         let step = 4.4 / (count - 1) as f32;
         let at = |k: usize| (k as f32 - 0.5 * (count - 1) as f32) * step;
