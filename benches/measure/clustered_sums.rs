@@ -15,7 +15,7 @@ pub fn few_facets(print: &mut dyn FnMut(String)) -> Result<(), String> {
     let values = |brdf: &EffectiveBrdf| -> Vec<Vec3> { pairs.iter().map(|pair| brdf.eval(pair.i, pair.o)).collect() };
     print("scene                  preset    facets        rel. L2   PSNR".to_owned());
     let (mut rows, mut worst) = (0, 0.0_f64);
-    for scene in scene::shipped::rendered_names() {
+    for scene in scene::shipped::opaque_names() {
         for preset in ["draft", "standard", "fine"] {
             let overrides = ["quality.backend=cpu".to_owned(), format!("quality.preset={preset}")];
             let open = |facets: Option<usize>| {

@@ -192,8 +192,9 @@ impl Editor {
                 let painted = self.document.painted().clone();
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     let effects = self.object.preview.as_ref().map_or(&[][..], |preview| &preview.effects);
+                    let slab = self.object.preview.as_ref().and_then(|preview| preview.slab.as_deref());
                     let version = self.document.version();
-                    let shown = panels::PanelInputs { accuracy: &mut self.accuracy, effects, version };
+                    let shown = panels::PanelInputs { accuracy: &mut self.accuracy, effects, slab, version };
                     panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots, shown)
                 })
             });

@@ -51,7 +51,7 @@ impl Editor {
         });
         ui.menu_button("Open a shipped scene", |ui| {
             egui::ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
-                for name in shipped::rendered_names() {
+                for name in shipped::names() {
                     let tip = shipped::description(name).unwrap_or_default();
                     if ui.button(name).on_hover_text(tip).clicked() {
                         *chosen = Some(Action::OpenShipped(name.to_owned()));

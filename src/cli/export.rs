@@ -6,9 +6,11 @@ use crate::base::{InputError, print_on_stderr};
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::export;
+use crate::export::slab::SlabFormat;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
 use crate::pipeline::SlabOutcome;
 use crate::scene::LoadedScene;
+use crate::slab::DiscLobe;
 use anyhow::Result;
 use serde::Serialize;
 
@@ -57,7 +59,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     }
     let (loaded, ()) = args.scene.open(|loaded| {
         if loaded.scene.slab.is_some() {
-            export::radiance_slab::check_ending(&args.output)?;
+            if SlabFormat::of(&args.output)? == SlabFormat::Mitsuba {
+                export::mitsuba::check(loaded)?;
+            }
             if options.radiance != RadianceBasis::Klems {
                 let expected = "klems, the basis of slabs";
                 return Err(crate::Error::from(InputError::new("--radiance", "tensor-tree", expected)).into());
@@ -148,14 +152,20 @@ pub fn run(args: &ExportArgs) -> Result<()> {
 fn of_slab(args: &ExportArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Result<()> {
     args.scene.warn(&outcome.health);
     let bar = progress_bar("tabulating", args.scene.quiet);
-    let written = export::radiance_slab::write(&outcome.slab, loaded, &args.output, &progress_on(&bar));
+    let resolution = resolution(args).unwrap_or_default();
+    let format = SlabFormat::of(&args.output)?;
+    let written = format.write(&outcome.slab, loaded, resolution, &args.output, &progress_on(&bar));
     bar.finish_and_clear();
     let written = written?;
-    let [transmitted, reflected] = written.normal_incidence;
+    let normal = glam::DVec3::Z;
+    let [straight, mirrored] = outcome.slab.straight(normal);
+    let transmitted = DiscLobe::transmitted(&outcome.slab, normal, SIDE).total() + straight;
+    let reflected = DiscLobe::reflected(&outcome.slab, normal, SIDE).total() + mirrored;
+    let note = written.note.as_ref().map(|note| note.display().to_string());
     if args.scene.json {
         return print_json(&serde_json::json!({
             "output": args.output.display().to_string(),
-            "note": written.note.display().to_string(),
+            "note": note,
             "pairs": written.pairs,
             "transmitted": transmitted.to_array(),
             "reflected": reflected.to_array(),
@@ -170,10 +180,15 @@ fn of_slab(args: &ExportArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Re
             transmitted.element_sum() / 3.0,
             reflected.element_sum() / 3.0
         ));
-        print_on_stderr(format_args!("{} describes the conventions and the scene", written.note.display()));
+        if let Some(note) = note {
+            print_on_stderr(format_args!("{note} describes the conventions and the scene"));
+        }
     }
     Ok(())
 }
+
+/// Cells per side of the disc over which the light along the normal is summed.
+const SIDE: usize = 96;
 
 /// The requested resolution: `--resolution` for both directions, `--resolution-o` for the second one alone.
 fn resolution(args: &ExportArgs) -> Option<ExportResolution> {

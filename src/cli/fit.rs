@@ -7,10 +7,12 @@ use crate::base::{Error, InputError, replace_file};
 use crate::effective::Reflectance;
 use crate::fit;
 use crate::fit::{Fit, Model};
+use crate::pipeline::SlabOutcome;
 use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
 use crate::render::{Image, RenderScene};
+use crate::scene::LoadedScene;
 use anyhow::Result;
 use glam::Vec3;
 use serde::Serialize;
@@ -36,13 +38,21 @@ struct Report {
 pub fn run(args: &FitArgs) -> Result<()> {
     let kinds: Vec<OutputKind> = args.output.iter().map(|path| kind(path)).collect::<Result<_, _>>()?;
     let (loaded, render_scene) = args.scene.open(|loaded| {
-        super::slab::refuse(loaded, "fit")?;
+        if loaded.scene.slab.is_some() && kinds.contains(&OutputKind::Image) {
+            let expected = ".gltf, .mtlx or .json; `biscale render` shows a slab";
+            return Err(Error::from(InputError::new("output", "an image of the fit of a slab", expected)).into());
+        }
         check_outputs(&args.scene.scene, loaded, &[], &args.output)?;
         Ok(if kinds.contains(&OutputKind::Image) { Some(RenderScene::new(loaded)?) } else { None })
     })?;
     let mut pipeline = crate::gpu::pipeline();
     let watch = Watch::new(args.scene.quiet);
     pipeline.set_cancel(watch.cancel());
+    if loaded.scene.slab.is_some() {
+        let outcome = pipeline.slab(&loaded)?;
+        drop(watch);
+        return of_slab(args, &loaded, &outcome);
+    }
     let outcome = pipeline.effective(&loaded)?;
     drop(watch);
     args.scene.notes(&outcome);
@@ -154,4 +164,45 @@ fn side_by_side(render_scene: &RenderScene, materials: &[&dyn Reflectance], size
         }
     }
     Ok(sheet)
+}
+
+/// Fits a thin surface to a slab.
+fn of_slab(args: &FitArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Result<()> {
+    args.scene.warn(&outcome.health);
+    let slab = &outcome.slab;
+    let bar = progress_bar("fitting", args.scene.quiet);
+    let straight = slab.straight(glam::DVec3::Z)[0].as_vec3();
+    let eta = (slab.optics.eta.element_sum() / 3.0) as f32;
+    let fitted = fit::fit_thin(&**slab, eta, straight, &progress_on(&bar));
+    bar.finish_and_clear();
+    let fitted = fitted?;
+    let report = serde_json::json!({
+        "model": "thin GGX transmission",
+        "rel_l2": fitted.errors.rel_l2,
+        "psnr_db": fitted.errors.psnr_db,
+        "roughness": fitted.alpha,
+        "eta": fitted.eta,
+        "color": fitted.color.to_array(),
+        "straight": fitted.straight.to_array(),
+    });
+    for path in &args.output {
+        let text = match kind(path)? {
+            OutputKind::Gltf => fit::thin_gltf(&fitted, &loaded.name),
+            OutputKind::MaterialX => fit::thin_materialx(&fitted, &loaded.name),
+            OutputKind::Json | OutputKind::Image => format!("{report:#}\n"),
+        };
+        replace_file(path, text.as_bytes())?;
+    }
+    if args.scene.json {
+        return print_json(&report);
+    }
+    let mut out = std::io::stdout().lock();
+    writeln!(
+        out,
+        "thin GGX transmission: roughness {:.4}, relative L2 {:.1} %, {:.1} dB",
+        fitted.alpha,
+        100.0 * fitted.errors.rel_l2,
+        fitted.errors.psnr_db
+    )?;
+    Ok(())
 }

@@ -9,9 +9,12 @@ use super::{RenderArgs, cache, check_outputs, print_json};
 use crate::base::print_on_stderr;
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
+use crate::pipeline::Pipeline;
 use crate::render::RenderScene;
 use crate::render::image::pixels::ImageFormat;
 use crate::render::image::tone_map::ToneMap;
+use crate::render::seen_through::SlabScene;
+use crate::scene::LoadedScene;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -37,10 +40,17 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
     let (loaded, render_scene) = args.scene.open(|loaded| {
-        super::slab::refuse(loaded, "render")?;
         check_outputs(&args.scene.scene, loaded, &[], [&args.output])?;
-        Ok(RenderScene::with(&pipeline, loaded)?)
+        let render_scene = RenderScene::with(&pipeline, loaded)?;
+        if loaded.scene.slab.is_some() {
+            // A background that cannot be used is reported before the slab is computed.
+            SlabScene::backdrop(&pipeline, loaded, &render_scene)?;
+        }
+        Ok(render_scene)
     })?;
+    if loaded.scene.slab.is_some() {
+        return of_slab(args, &mut pipeline, &loaded, &render_scene);
+    }
     let watch = Watch::new(args.scene.quiet);
     pipeline.set_cancel(watch.cancel());
     let tone_map = ToneMap::new(&render_scene.camera)?;
@@ -83,6 +93,38 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             stages,
             error: outcome.errors().map(ErrorEstimator::estimate),
             health: outcome.health(),
+        });
+    }
+    Ok(())
+}
+
+/// Renders the object of a scene with a slab.
+fn of_slab(args: &RenderArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, render_scene: &RenderScene) -> Result<()> {
+    let tone_map = ToneMap::new(&render_scene.camera)?;
+    let watch = Watch::new(args.scene.quiet);
+    pipeline.set_cancel(watch.cancel());
+    let mut outcome = pipeline.slab(loaded)?;
+    let scene = SlabScene::with(pipeline, loaded, &outcome, render_scene)?;
+    outcome.health.warnings.extend(scene.warnings(render_scene)?);
+    let rendered = scene.render(render_scene, args.size, usize::from(args.samples), &watch.cancel())?;
+    drop(watch);
+    args.scene.warn(&outcome.health);
+    rendered.image.write(&args.output, &tone_map)?;
+    if args.scene.json {
+        let times = rendered.times;
+        let large = [("g_buffer", times.gbuffer_ms), ("shading", times.shading_ms)];
+        let stages = outcome.times.iter().copied().chain(large).map(|(name, ms)| (name.to_owned(), ms.into()));
+        return print_json(&Report {
+            image: args.output.display().to_string(),
+            width: args.size[0],
+            height: args.size[1],
+            lights: render_scene.lights().directional.len(),
+            points: rendered.points,
+            device: "cpu".to_owned(),
+            reads: scene.describe(),
+            stages: stages.collect(),
+            error: None,
+            health: &outcome.health,
         });
     }
     Ok(())

@@ -7,6 +7,7 @@ mod gpu_tile;
 pub mod low_rank;
 pub mod shading_table;
 mod tint;
+mod view_paths;
 pub mod wu2011;
 
 use glam::Vec3;
@@ -30,6 +31,7 @@ pub use shading_table::content::TableContent;
 pub(crate) use shading_table::sampled_facets::subset_size;
 pub use shading_table::{Nodes, ShadingTable};
 pub use tint::Tint;
+pub use view_paths::{Lobe, PathEnd, PathKind, ViewLobes, ViewPaths, Viewer};
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 
 /// A reflectance that rendering can evaluate. Rendering knows nothing else of the small scale.
@@ -44,9 +46,6 @@ pub trait Transmittance: Sync {
     /// Writes `out[k] = f̄(lights[k], o)` [1/sr], the light's cosine included; 0 unless light and viewer are on opposite
     /// sides. Light that keeps its direction is left out. Directions are unit vectors in the tangent frame.
     fn eval_transmitted(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
-
-    /// The part of the light that arrives from behind along `-o` and keeps its direction.
-    fn straight(&self, o: Vec3) -> Vec3;
 }
 
 /// A reflectance of zero, for renderings that a GPU shades with a material of its own.

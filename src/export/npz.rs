@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::grid::ExportGrid;
 use super::meta::Description;
 use super::table::ExportTable;
 use super::zip::ZipWriter;
@@ -16,24 +17,32 @@ pub fn write(table: &ExportTable, description: &Description<'_>, out: &mut dyn W
     let mut zip = ZipWriter::new(out);
     let grid = &table.grid;
     let [ti, pi, to, po] = grid.shape();
-    let axes = [
-        ("theta_i", &grid.light.theta),
-        ("phi_i", &grid.light.phi),
-        ("theta_o", &grid.view.theta),
-        ("phi_o", &grid.view.phi),
-    ];
-    for (name, axis) in axes {
-        array(&mut zip, name, "f4", &[axis.len()], bytemuck::cast_slice(axis))?;
-    }
+    axes(&mut zip, grid)?;
     array(&mut zip, "brdf", "f4", &[ti, pi, to, po, 3], bytemuck::cast_slice(&table.brdf))?;
     array(&mut zip, "g", "f4", &[ti, pi, to, po, 3], bytemuck::cast_slice(&table.g))?;
     array(&mut zip, "projected_area", "f4", &[to, po], bytemuck::cast_slice(&table.projected_area))?;
     array(&mut zip, "base_area", "f8", &[], bytemuck::bytes_of(&description.base_area))?;
     array(&mut zip, "resampling_rel_l2", "f8", &[], bytemuck::bytes_of(&description.resampling_rel_l2))?;
     array(&mut zip, "seed", "u8", &[], bytemuck::bytes_of(&description.meta.seed))?;
-    let meta: Vec<u32> = description.json()?.chars().map(u32::from).collect();
-    array(&mut zip, "meta", &format!("U{}", meta.len()), &[], bytemuck::cast_slice(&meta))?;
+    text(&mut zip, &description.json()?)?;
     zip.finish()
+}
+
+/// Adds the arrays `theta_i`, `phi_i`, `theta_o` and `phi_o`.
+pub(super) fn axes(zip: &mut ZipWriter<'_>, grid: &ExportGrid) -> io::Result<()> {
+    let axes = [
+        ("theta_i", &grid.light.theta),
+        ("phi_i", &grid.light.phi),
+        ("theta_o", &grid.view.theta),
+        ("phi_o", &grid.view.phi),
+    ];
+    axes.into_iter().try_for_each(|(name, axis)| array(zip, name, "f4", &[axis.len()], bytemuck::cast_slice(axis)))
+}
+
+/// Adds the array `meta`, a text in unicode.
+pub(super) fn text(zip: &mut ZipWriter<'_>, text: &str) -> io::Result<()> {
+    let letters: Vec<u32> = text.chars().map(u32::from).collect();
+    array(zip, "meta", &format!("U{}", letters.len()), &[], bytemuck::cast_slice(&letters))
 }
 
 /// Adds `name.npy` in C order; `kind` is the NumPy type without its byte order.

@@ -46,13 +46,17 @@ pub fn materialx(fit: &Fit, name: &str) -> String {
             color(if fuzz.max_element() > 0.0 { fuzz / fuzz.max_element() } else { Vec3::ONE }),
         ),
     ];
-    let identifier: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     let nodes = if anisotropy > 0.0 { tangent_nodes(fit.shape.wide_azimuth().to_degrees()) } else { String::new() };
+    document(&nodes, &inputs.concat(), name)
+}
+
+/// A document with one OpenPBR surface: `nodes` before it, and its inputs.
+pub(super) fn document(nodes: &str, inputs: &str, name: &str) -> String {
+    let identifier: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     format!(
         "<?xml version=\"1.0\"?>\n<materialx version=\"1.39\" colorspace=\"lin_rec709\">\n{nodes}  <open_pbr_surface name=\"{identifier}_surface\" \
-         type=\"surfaceshader\">\n{}  </open_pbr_surface>\n  <surfacematerial name=\"{identifier}\" type=\"material\">\n    <input \
-         name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"{identifier}_surface\" />\n  </surfacematerial>\n</materialx>\n",
-        inputs.concat()
+         type=\"surfaceshader\">\n{inputs}  </open_pbr_surface>\n  <surfacematerial name=\"{identifier}\" type=\"material\">\n    <input \
+         name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"{identifier}_surface\" />\n  </surfacematerial>\n</materialx>\n"
     )
 }
 

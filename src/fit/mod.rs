@@ -8,6 +8,7 @@ mod gltf;
 mod least_squares;
 mod materialx;
 mod models;
+mod transmission;
 
 use std::cell::Cell;
 
@@ -23,6 +24,7 @@ use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
 pub use gltf::gltf;
 pub use materialx::materialx;
 pub use models::{LobeShape, Model};
+pub use transmission::{ThinFit, fit_thin, thin_gltf, thin_materialx};
 
 use least_squares::NormalEquations;
 

@@ -32,7 +32,7 @@ pub(super) fn refuse_slab(loaded: &LoadedScene) -> Result<()> {
     if loaded.scene.slab.is_none() {
         return Ok(());
     }
-    let expected = "a scene without it; `biscale eval`, `transmit`, `export` and `plan` know slabs";
+    let expected = "a scene without it; `biscale eval`, `transmit`, `render`, `export`, `fit` and `plan` know slabs";
     Err(InputError::new("slab", "a scene with a slab", expected).into())
 }
 

@@ -74,7 +74,7 @@ fn shipped_slabs_are_computed_and_keep_all_light() {
         }
         count += 1;
     }
-    assert_eq!(count, 8);
+    assert_eq!(count, 9);
 }
 
 #[test]

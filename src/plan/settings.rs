@@ -108,6 +108,8 @@ pub struct Settings {
     pub max_refined_facets: Option<usize>,
     /// Facets that the method `faces` of a slab sums; `None` for those of the preset.
     pub slab_facets: Option<usize>,
+    /// Paths per pixel through a slab; `None` for those of the preset.
+    pub paths: Option<usize>,
     /// Effects that the user forces on or off.
     pub effects: Effects,
 }
@@ -188,6 +190,7 @@ impl Settings {
             settings.reference_passes = samples.div_ceil(settings.reference_facets).max(2);
         }
         settings.slab_facets = quality.slab_facets;
+        settings.paths = quality.paths;
         settings.colors = quality.colors.or(settings.colors);
         settings.normal_bins = quality.normal_bins.or(settings.normal_bins);
         settings
@@ -229,6 +232,7 @@ impl Settings {
             seed: 1,
             max_refined_facets: Some(131_072),
             slab_facets: None,
+            paths: None,
             effects: Effects::default(),
         };
         match preset {

@@ -16,6 +16,8 @@ pub struct SlabSettings {
     pub virtual_table: usize,
     /// Photons per ring of the table of inner reflections.
     pub photons: usize,
+    /// Paths per pixel of an image; 0 for one filtered lookup.
+    pub paths: usize,
     pub seed: u64,
     /// Largest number of walks per pair of a reference.
     pub reference_walks: usize,
@@ -24,10 +26,11 @@ pub struct SlabSettings {
 impl Settings {
     /// The accuracy of a slab.
     pub fn slab(&self) -> SlabSettings {
-        let (facets, bound, face_table, virtual_table, photons) = match self.preset {
-            Preset::Draft => (16, 0.2, 128, 256, 2048),
-            Preset::Standard | Preset::Wu2011 => (64, 0.05, 256, 256, 16_384),
-            Preset::Fine | Preset::Reference => (256, 0.02, 256, 512, 65_536),
+        let (facets, bound, face_table, virtual_table, photons, paths) = match self.preset {
+            Preset::Draft => (16, 0.2, 128, 256, 2048, 0),
+            Preset::Standard | Preset::Wu2011 => (64, 0.05, 256, 256, 16_384, 64),
+            Preset::Fine => (256, 0.02, 256, 512, 65_536, 1024),
+            Preset::Reference => (256, 0.02, 256, 512, 65_536, 16_384),
         };
         SlabSettings {
             facets: self.slab_facets.unwrap_or(facets),
@@ -35,6 +38,7 @@ impl Settings {
             face_table,
             virtual_table,
             photons,
+            paths: self.paths.unwrap_or(paths),
             seed: self.seed,
             reference_walks: self.reference_passes * self.reference_facets,
         }

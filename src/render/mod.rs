@@ -4,6 +4,7 @@ pub mod image;
 pub mod lighting;
 pub mod object;
 mod scene;
+pub mod seen_through;
 pub mod shadow;
 pub mod stages;
 pub mod tile_view;

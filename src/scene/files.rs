@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use super::{BrdfSpec, ColorMap, Geometry, LoadedScene, Scene, TermSpec, check, shipped};
+use super::{Background, BrdfSpec, ColorMap, Geometry, LoadedScene, Scene, TermSpec, check, shipped};
 use crate::base::{InputError, Result, regular_file};
 
 /// Reads a file that a scene names. The scene's folder is `base_dir`, and the file has at most `limit` bytes.
@@ -48,7 +48,7 @@ fn is_embedded(path: &Path) -> bool {
 impl LoadedScene {
     /// Paths on disk of all files that the scene names: tile, images, measured BRDFs, object and environment.
     pub fn files(&self) -> Vec<PathBuf> {
-        let Scene { tile, materials, object, light, color_map, slab, .. } = &self.scene;
+        let Scene { tile, materials, object, light, color_map, slab, background, .. } = &self.scene;
         let of_geometry = match &tile.geometry {
             Geometry::Mesh(mesh) => Some(mesh.path.as_path()),
             Geometry::Heightfield(field) => field.path.as_deref(),
@@ -62,6 +62,7 @@ impl LoadedScene {
             .flatten()
             .chain(terms.filter_map(TermSpec::path))
             .chain(slab.iter().flat_map(|slab| slab.faces().map(|(_, face)| face.path())).flatten())
+            .chain(background.iter().filter_map(Background::path))
             .chain(color_map.iter().flat_map(ColorMap::files).map(PathBuf::as_path))
             .filter(|path| !is_embedded(path))
             .map(|path| resolve(&self.base_dir, path))

@@ -3,6 +3,7 @@
 //!
 //! [`open`] reads a file or a shipped name; the catalogue ([`Field`]) lists every key with its range and meaning.
 
+mod background;
 mod check;
 mod color;
 mod color_map;
@@ -31,6 +32,7 @@ use std::sync::LazyLock;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+pub use background::{Background, Checkerboard, ImagePlane};
 pub use color_map::{
     Blend, ColorLayer, ColorMap, Combine, Driver, DriverSum, GaussianSurface, Gaussianize, GradientStop,
     HeightDistribution, HeightDriver, LayerWeight, NoiseBasis, NoiseDriver, SlopeAlong, Steepness, StopEvaluation,
@@ -78,6 +80,9 @@ pub struct Scene {
     /// A thin transparent slab; without it, the scene reflects only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slab: Option<Slab>,
+    /// What is seen through the slab; without it, the environment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub background: Option<Background>,
 }
 
 fn one() -> u32 {
@@ -115,6 +120,7 @@ impl Scene {
             quality: Quality::default(),
             effects: Effects::default(),
             slab: None,
+            background: None,
         }
     }
 
@@ -148,6 +154,11 @@ impl Scene {
             optional("quality", FieldShape::Table(Quality::fields), "Accuracy and backend."),
             optional("effects", FieldShape::Table(Effects::fields), "Effects that are forced on or off."),
             optional("slab", FieldShape::Table(Slab::fields), "A thin transparent slab with two faces."),
+            optional(
+                "background",
+                FieldShape::Tagged(Background::kinds),
+                "What is seen through the slab; without it, the environment.",
+            ),
         ]
     }
 
@@ -216,6 +227,14 @@ impl Scene {
             if face.path().is_some_and(|path| path.as_os_str().is_empty()) {
                 let key_of_path = if matches!(face, SlabFace::Table(_)) { "path" } else { "scene" };
                 return problem(vec![key("slab"), key(side), key(key_of_path)], "nothing", "a file");
+            }
+        }
+        if let Some(background) = &self.background {
+            if self.slab.is_none() {
+                return problem(vec![key("background")], "a background without a slab", "a table [slab] beside it");
+            }
+            if background.path().is_some_and(|path| path.as_os_str().is_empty()) {
+                return problem(vec![key("background"), key("path")], "nothing", "an image file");
             }
         }
         if let Some(map) = &self.color_map {

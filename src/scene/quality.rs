@@ -68,6 +68,9 @@ scene_table! {
         /// Number of facets that the method `faces` of a slab sums; 0: the method `auto` never sums.
         #[serde(skip_serializing_if = "Option::is_none")]
         slab_facets: Option<usize> = None, FieldShape::Integer { min: 0, max: 65_536 }, "";
+        /// Number of paths per pixel for what is seen through a slab; 0: one filtered lookup per pixel.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        paths: Option<usize> = None, FieldShape::Integer { min: 0, max: 1_000_000 }, "";
         /// Width of the soft transition of visibility at a horizon.
         #[serde(skip_serializing_if = "Option::is_none")]
         penumbra_deg: Option<f32> = None, number(0.0, 45.0), "degrees";

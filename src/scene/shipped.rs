@@ -50,6 +50,7 @@ pub const MATERIALS: &[(&str, &str)] = materials![
     "slab_fig5_30",
     "slab_fig5_45",
     "slab_fig5_60",
+    "slab_fig7_leaf_glass",
     "slab_two_tiles",
     "slab_window",
     "table3",
@@ -68,8 +69,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     MATERIALS.iter().map(|(name, _)| *name)
 }
 
-/// Names of the shipped scenes that an object can be rendered in: those without a slab.
-pub fn rendered_names() -> impl Iterator<Item = &'static str> {
+/// Names of the shipped scenes without a slab.
+pub fn opaque_names() -> impl Iterator<Item = &'static str> {
     MATERIALS.iter().filter(|(_, source)| !source.contains("[slab]")).map(|(name, _)| *name)
 }
 

@@ -23,6 +23,7 @@ mod smith;
 mod spread;
 mod straight;
 pub mod table_file;
+mod view;
 mod virtual_face;
 pub(crate) mod walk;
 
@@ -39,5 +40,6 @@ pub use optics::{Channel, Optics};
 pub use slope_table::SlopeTable;
 pub use spread::Spread;
 pub use straight::{Straight, straight};
+pub use view::SlabView;
 pub use virtual_face::virtual_face;
 pub use walk::{Exit, Losses, Walk};

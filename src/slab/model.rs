@@ -220,8 +220,4 @@ impl Transmittance for Slab {
             *value = if is_transmitted { self.eval(light.as_dvec3(), o.as_dvec3()).as_vec3() } else { Vec3::ZERO };
         }
     }
-
-    fn straight(&self, o: Vec3) -> Vec3 {
-        Slab::straight(self, o.as_dvec3())[0].as_vec3()
-    }
 }

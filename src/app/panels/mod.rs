@@ -8,8 +8,10 @@ pub mod large_scale;
 pub mod materials;
 mod matrix;
 pub mod paints;
+mod slab;
 pub mod surface;
 
+use crate::app::worker::SlabPlot;
 use crate::plan::Effect;
 use crate::scene::{Painted, Scene};
 use eframe::egui::{self, RichText, Ui};
@@ -32,6 +34,8 @@ pub struct PanelInputs<'a> {
     pub accuracy: &'a mut AccuracyState,
     /// The plan of the displayed image.
     pub effects: &'a [Effect],
+    /// Lobe and energy of the displayed slab.
+    pub slab: Option<&'a SlabPlot>,
     /// Version of the document.
     pub version: u64,
 }
@@ -51,6 +55,7 @@ pub fn ui(
     ui.set_max_width(ui.available_width());
     section(ui, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut context));
     section(ui, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut context));
+    section(ui, "Slab", scene.slab.is_some(), |ui| slab::ui(ui, scene, inputs.slab, &mut context));
     section(ui, "Object", true, |ui| large_scale::object_ui(ui, scene, &mut context));
     section(ui, "Light", true, |ui| large_scale::light_ui(ui, &mut scene.light, &mut context));
     section(ui, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));

@@ -29,7 +29,7 @@ impl Gallery {
         if self.requested.is_some() {
             return None;
         }
-        let name = shipped::rendered_names().find(|name| !self.images.contains_key(name))?;
+        let name = shipped::names().find(|name| !self.images.contains_key(name))?;
         self.requested = Some(name);
         Some(ThumbnailJob { name })
     }
@@ -52,7 +52,7 @@ impl Gallery {
         let field = ui.add(hint).on_hover_text("Words in a name or a description: velvet, groove, silver, Fig. 8");
         field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Search the gallery"));
         ui.add_space(2.0);
-        let found: Vec<_> = shipped::rendered_names().filter(|name| matches_search(name, &self.search)).collect();
+        let found: Vec<_> = shipped::names().filter(|name| matches_search(name, &self.search)).collect();
         if found.is_empty() {
             ui.weak(format!("No scene matches \"{}\".", self.search.trim()));
             if ui.button("Show all").clicked() {

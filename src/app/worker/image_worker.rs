@@ -42,8 +42,8 @@ const MAX_SIDE: f64 = 4096.0;
 /// The state of a worker that renders the object. One worker drafts, another one refines.
 pub struct ImageWorker {
     shared: Arc<SharedState>,
-    pipeline: Pipeline,
-    renderer: PreviewRenderer,
+    pub(super) pipeline: Pipeline,
+    pub(super) renderer: PreviewRenderer,
     /// The tile, while the camera is so close that the tile itself is visible.
     close: Option<(SmallScale, CloseUpTile)>,
     /// Milliseconds per pixel with the draft's BRDF and with the refined BRDF.
@@ -86,6 +86,9 @@ impl ImageWorker {
         self.pipeline.set_cancel(cancel.clone());
         self.choose_backend(job, false);
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
+        if job.loaded.scene.slab.is_some() {
+            return self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel);
+        }
         let (outcome, cost_index) = match self.shared.known(&job.loaded) {
             Some(outcome) => (outcome.without_times(), 1),
             None => match self.render_gpu_draft(job, cancel)? {
@@ -163,6 +166,13 @@ impl ImageWorker {
         }
         self.pipeline.set_cancel(context.cancel.clone());
         self.choose_backend(job, true);
+        if job.loaded.scene.slab.is_some() {
+            report(ImageResult::Doing(job.version, "Refining the image"));
+            let preview = self.render_slab(job, Grade::Final, fitting(job.size, MAX_PIXELS[0]), context.cancel)?;
+            *lock(&self.shared.last) = Some((Box::new((*job.loaded).clone()), job.size, preview.clone()));
+            report(ImageResult::Rendered(Box::new(preview)));
+            return Ok(());
+        }
         let mut outcome = match self.shared.known(&job.loaded) {
             Some(outcome) => outcome.without_times(),
             None => {
@@ -282,6 +292,7 @@ impl ImageWorker {
             radiance,
             image,
             brdf,
+            slab: None,
             stages,
             latency_ms: ms(job.submitted),
             rendered_on: self.renderer.rendered_on(),
@@ -334,10 +345,10 @@ fn report_error(job: &ImageJob, done: Result<()>, report: &dyn Fn(ImageResult)) 
     }
 }
 
-fn camera(loaded: &LoadedScene) -> Camera {
+pub(super) fn camera(loaded: &LoadedScene) -> Camera {
     loaded.scene.camera.clone().unwrap_or_default()
 }
 
-fn ms(since: Instant) -> f64 {
+pub(super) fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }

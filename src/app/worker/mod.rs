@@ -12,6 +12,7 @@ mod rendered_preview;
 mod runner;
 mod screen;
 mod shared;
+mod slab_image;
 mod thumbnail;
 mod tile_image_worker;
 mod tone;
@@ -32,6 +33,7 @@ pub use rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedP
 pub use runner::Worker;
 pub use screen::{GpuImage, Screen};
 pub use shared::GpuShare;
+pub use slab_image::SlabPlot;
 pub use thumbnail::{SceneThumbnail, ThumbnailJob};
 pub use tile_image_worker::{RenderedTile, TileDisplay, TileJob, TileResult};
 

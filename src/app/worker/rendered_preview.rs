@@ -10,6 +10,7 @@ use crate::scene::{Camera, LoadedScene};
 use eframe::egui::ColorImage;
 
 use super::screen::GpuImage;
+use super::slab_image::SlabPlot;
 
 /// An image to render.
 #[derive(Debug, Clone)]
@@ -67,6 +68,8 @@ pub struct RenderedPreview {
     pub image: DisplayImage,
     /// Absent if the GPU rendered the image from the tile itself.
     pub brdf: Option<Arc<EffectiveBrdf>>,
+    /// Lobe and energy of a scene with a slab.
+    pub slab: Option<Arc<SlabPlot>>,
     /// Milliseconds per stage that ran for this image.
     pub stages: Vec<(&'static str, f64)>,
     /// Time from the edit to the finished image.

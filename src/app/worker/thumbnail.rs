@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::base::Result;
 use crate::pipeline::Pipeline;
+use crate::render::RenderScene;
 use crate::render::image::tone_map::ToneMap;
+use crate::render::seen_through::SlabScene;
 use crate::scene;
 use crate::scene::Quality;
 use eframe::egui::ColorImage;
@@ -62,6 +64,13 @@ fn render(worker: &mut ThumbnailWorker, name: &str, context: &JobContext<Thumbna
     loaded.scene.light.count = loaded.scene.light.count.min(LIGHTS);
     let ThumbnailWorker { pipeline, renderer } = worker;
     pipeline.set_cancel(context.cancel.clone());
+    if loaded.scene.slab.is_some() {
+        let outcome = pipeline.slab(&loaded)?;
+        let render_scene = RenderScene::with(pipeline, &loaded)?;
+        let scene = SlabScene::with(pipeline, &loaded, &outcome, &render_scene)?;
+        let rendered = scene.render(&render_scene, [SIDE, SIDE], 2, context.cancel)?;
+        return Ok(color_image(&rendered.image, &ToneMap::new(&render_scene.camera)?));
+    }
     let outcome = pipeline.effective(&loaded)?;
     renderer.prepare(pipeline, &loaded)?;
     let camera = loaded.scene.camera.clone().unwrap_or_default();

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::klems::{BASIS, KlemsPatch, PATCHES, definition, source_of};
 use super::{block, header, xyz};
-use crate::base::{InputError, Progress, Result, atomic_file, check_output, progress, replace_file, require_finite};
+use crate::base::{Progress, Result, atomic_file, check_output, progress, replace_file, require_finite};
 use crate::export::{meta, note_path};
 use crate::scene::LoadedScene;
 use crate::slab::{DiscGrid, Slab};
@@ -18,15 +18,6 @@ use crate::slab::{DiscGrid, Slab};
 const INCIDENT: usize = 2;
 /// Points of the disc of leaving light, for each incident direction.
 const GRID: DiscGrid = DiscGrid { side: 18, fine: 36, finest: 160 };
-
-/// Size of a written file, and the parts of light that it holds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SlabExport {
-    pub note: PathBuf,
-    pub pairs: usize,
-    /// Transmitted and reflected part of light from above along the normal, linear RGB.
-    pub normal_incidence: [Vec3; 2],
-}
 
 /// Means of the BSDF over pairs of patches by incident, then by leaving patch, and the side that the light comes from.
 struct Matrix {
@@ -48,25 +39,11 @@ const KINDS: [Kind; 4] = [
     Kind { name: "Reflection Front", from_above: false, to_above: false },
 ];
 
-/// Checks that a slab can be written to `path`.
+/// Writes the matrices, and a note beside them. Returns the note and the number of pairs.
 ///
 /// # Errors
-/// The name does not end in `.xml`.
-pub fn check_ending(path: &Path) -> Result<()> {
-    let is_xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
-    if is_xml {
-        return Ok(());
-    }
-    let found = format!("`{}` for a scene with a slab", path.display());
-    Err(InputError::new("output", found, "a name that ends in .xml (Radiance)").into())
-}
-
-/// Writes the matrices, and a note beside them.
-///
-/// # Errors
-/// As [`check_ending`], a path that cannot be written, or [`crate::Error::Cancelled`].
-pub fn write(slab: &Slab, loaded: &LoadedScene, path: &Path, progress: &Progress<'_>) -> Result<SlabExport> {
-    check_ending(path)?;
+/// A path that cannot be written, or [`crate::Error::Cancelled`].
+pub fn write(slab: &Slab, loaded: &LoadedScene, path: &Path, progress: &Progress<'_>) -> Result<(PathBuf, usize)> {
     let note = note_path(path);
     check_output(path, &[])?;
     check_output(&note, &[])?;
@@ -93,7 +70,7 @@ pub fn write(slab: &Slab, loaded: &LoadedScene, path: &Path, progress: &Progress
     };
     let normal_incidence = [flux(&matrices[0]), flux(&matrices[1])];
     replace_file(&note, text(loaded, normal_incidence).as_bytes())?;
-    Ok(SlabExport { note, pairs: 4 * PATCHES * PATCHES, normal_incidence })
+    Ok((note, 4 * PATCHES * PATCHES))
 }
 
 /// Columns of one kind of scattering. Straight and mirrored light falls into the patch of its direction.

@@ -56,9 +56,7 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
     check_size(input.size, input.samples_per_side)?;
     let view = CameraView::new(input.camera, input.mesh, input.size)?;
     let start = Instant::now();
-    let buffer = GBuffer::new(input.mesh, &view, input.samples_per_side);
-    let points = ShadingPoints::new(&buffer, &view, input.samples_per_side);
-    drop(buffer);
+    let points = visible_points(input.mesh, &view, input.samples_per_side);
     let after_gbuffer = Instant::now();
     let visibility = input
         .occluder
@@ -74,6 +72,12 @@ pub fn render(input: &RenderInput) -> Result<Rendered> {
         shading_ms: ms(after_shadows, Instant::now()),
     };
     Ok(Rendered { image, times, points: points.len() })
+}
+
+/// The points of an object that the camera sees.
+pub(crate) fn visible_points(mesh: &ObjectMesh, view: &CameraView, samples_per_side: usize) -> ShadingPoints {
+    let buffer = GBuffer::new(mesh, view, samples_per_side);
+    ShadingPoints::new(&buffer, view, samples_per_side)
 }
 
 pub(crate) fn check_size([width, height]: [usize; 2], samples_per_side: usize) -> Result<()> {

@@ -76,17 +76,26 @@ impl Background {
 
 /// Averages the points of each pixel over the background, in linear radiance.
 pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &Background) -> Image {
-    let [width, height] = view.size;
+    gather_over(points, radiance, view.size, |pixel| background.at(pixel, view.size))
+}
+
+/// As [`gather`]; `background` is the radiance behind a pixel.
+pub fn gather_over(
+    points: &ShadingPoints,
+    radiance: &[Vec3],
+    [width, height]: [usize; 2],
+    background: impl Fn(usize) -> Vec3 + Sync,
+) -> Image {
     let mut coverage = vec![0f32; width * height];
     let mut pixels = vec![Vec3::ZERO; width * height];
     for ((&pixel, &weight), radiance) in points.pixels.iter().zip(&points.weights).zip(radiance) {
         coverage[pixel as usize] += weight;
         pixels[pixel as usize] += *radiance * weight;
     }
-    for (k, (pixel, covered)) in pixels.iter_mut().zip(coverage).enumerate() {
+    pixels.par_iter_mut().zip(coverage).enumerate().with_min_len(CHUNK).for_each(|(k, (pixel, covered))| {
         if covered < 1.0 {
-            *pixel += background.at(k, view.size) * (1.0 - covered);
+            *pixel += background(k) * (1.0 - covered);
         }
-    }
+    });
     Image { width, height, pixels }
 }

@@ -16,7 +16,7 @@ use crate::base::{InputError, Result};
 use crate::scene;
 
 /// Names that `object.kind` accepts.
-pub const KINDS: [&str; 8] = ["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "mesh"];
+pub const KINDS: [&str; 9] = ["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "sheet", "mesh"];
 
 /// An object in the world frame: y up, about two units in size. OBJ files are centred and scaled to radius 1.
 ///
@@ -88,6 +88,7 @@ pub fn build(object: &scene::Object, base_dir: &Path) -> Result<ObjectMesh> {
         "pillow" => Ok(cloth::pillow()),
         "skirt" => Ok(cloth::skirt()),
         "teapot" => Ok(teapot::teapot()),
+        "sheet" => Ok(parametric::sheet()),
         "mesh" => match &object.path {
             Some(path) => obj::load(&base_dir.join(path)),
             None => {

@@ -96,6 +96,13 @@ impl ObjectBuilder {
     }
 }
 
+/// Builds an upright flat square of side 2 in the plane z = 0. Tile x runs to the right, and the front faces +z.
+pub(super) fn sheet() -> ObjectMesh {
+    let mut builder = ObjectBuilder::default();
+    builder.add_patch(&evenly(16), &evenly(16), |u, v| DVec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, 0.0));
+    builder.finish(true)
+}
+
 /// Returns `count + 1` parameters evenly spaced from 0 to 1.
 pub(super) fn evenly(count: usize) -> Vec<f64> {
     (0..=count).map(|k| k as f64 / count as f64).collect()

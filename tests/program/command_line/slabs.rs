@@ -152,14 +152,12 @@ fn bad_slabs_are_refused_with_key_found_and_expected() {
         eval("slab.toml", &[set], parts);
     }
     eval("circle.toml", &[], &["slab.top.scene", "circle"]);
-    for arguments in [
-        &["render", "slab.toml", "-o", "out.png"][..],
-        &["fit", "slab.toml", "-o", "out.gltf"],
-        &["profile", "slab.toml"],
-    ] {
+    for arguments in [&["basis", "slab.toml"][..], &["profile", "slab.toml"]] {
         folder.assert_refused(arguments, &["slab", arguments[0]]);
     }
-    folder.assert_refused(&["export", "slab.toml", "-o", "out.npz"], &["out.npz", ".xml"]);
+    folder.assert_refused(&["fit", "slab.toml", "-o", "out.png"], &["output", "render"]);
+    folder.assert_refused(&["export", "slab.toml", "-o", "out.csv"], &["out.csv", ".npz"]);
+    folder.assert_refused(&["export", "slab.toml", "-o", "out_mitsuba.xml"], &["slab.top.kind", "tile", "ggx"]);
     folder.assert_refused(
         &["export", "slab.toml", "-o", "out.xml", "--radiance", "tensor-tree"],
         &["--radiance", "klems"],
@@ -170,6 +168,78 @@ fn bad_slabs_are_refused_with_key_found_and_expected() {
     folder.assert_refused(&["transmit", "slab.toml", "--json", "--theta-i", "91"], &["91", "from 0 to 90"]);
     folder.assert_refused(&["transmit", "slab.toml", "-o", "slab.toml"], &["slab.toml"]);
     assert_eq!(folder.files(), before);
+}
+
+#[test]
+fn bad_backgrounds_are_refused_before_anything_is_computed() {
+    let folder = CommandLine::new();
+    folder.write("slab.toml", SLAB);
+    folder.write("text.png", "no image");
+    folder.write("opaque.toml", "background = { kind = \"environment\" }\n[tile]\ngeometry = { kind = \"flat\" }\n");
+    let before = folder.files();
+    for (set, parts) in [
+        (
+            "background={ kind = \"checkerbord\" }",
+            &["background.kind", "checkerbord", "did you mean `checkerboard`"][..],
+        ),
+        ("background={ kind = \"checkerboard\", size = 0 }", &["background.size", "0"]),
+        ("background={ kind = \"checkerboard\", distance = -1 }", &["background.distance", "-1"]),
+        ("background={ kind = \"checkerboard\", distance = nan }", &["background.distance", "nan"]),
+        ("background={ kind = \"checkerboard\", colors = [1.0] }", &["background.colors", "2 to 2"]),
+        ("background={ kind = \"checkerboard\", colors = [1.0, -1.0] }", &["background.colors", "-1"]),
+        ("background={ kind = \"environment\", size = 1 }", &["background", "size"]),
+        ("background={ kind = \"image\" }", &["background.path", "nothing", "image file"]),
+        ("background={ kind = \"image\", path = \"missing.png\" }", &["missing.png"]),
+        ("background={ kind = \"image\", path = \"text.png\" }", &["text.png", "an image"]),
+        ("quality.paths=-1", &["quality.paths", "-1"]),
+    ] {
+        folder.assert_refused(&["render", "slab.toml", "-o", "out.png", "--set", set], parts);
+    }
+    folder.assert_refused(&["render", "opaque.toml", "-o", "out.png"], &["background", "[slab]"]);
+    assert_eq!(folder.files(), before);
+}
+
+#[test]
+fn render_shows_what_lies_behind_a_slab_and_its_far_parameters_do_no_harm() {
+    let folder = CommandLine::new();
+    let render = |set: &[&str]| {
+        let mut arguments = vec!["render", "slab_window", "-o", "out.exr", "--size", "24x24", "--json", "--quiet"];
+        set.iter().for_each(|set| arguments.extend(["--set", *set]));
+        folder.json(&arguments)
+    };
+    let report = render(&[]);
+    assert!(report["points"].as_u64().unwrap() > 50, "{report}");
+    assert!(report["reads"].as_str().unwrap().starts_with("64 paths"), "{report}");
+    for set in [
+        "background.distance=0",
+        "background.distance=1e6",
+        "background.size=1e-3",
+        "background.size=1e6",
+        "slab.bottom={ kind = \"ggx\", roughness = 1 }",
+        "slab.bottom={ kind = \"beckmann\", roughness = [1e-3, 1] }",
+        "slab.eta=1.000001",
+        "slab.eta=[1, 1.5, 4]",
+        "slab.absorption=1e6",
+        "camera={ azimuth_deg = 180 }",
+    ] {
+        for paths in ["quality.paths=0", "quality.paths=2"] {
+            render(&[set, paths]);
+        }
+    }
+}
+
+#[test]
+fn a_slab_is_exported_to_numpy_and_mitsuba_and_fitted_for_gltf_and_materialx() {
+    let folder = CommandLine::new();
+    let set = ["--quality", "draft", "--json", "--quiet"];
+    let run = |arguments: &[&str]| folder.json(&[arguments, &set].concat());
+    let report = run(&["export", "slab_fig3_both", "-o", "slab.npz", "--resolution", "4x8"]);
+    assert_eq!(report["pairs"], 3 * 32 * 32);
+    run(&["export", "slab_fig3_both", "-o", "slab_mitsuba.xml"]);
+    assert!(std::fs::read_to_string(folder.path("slab_mitsuba.xml")).unwrap().contains("roughdielectric"));
+    let report = run(&["fit", "slab_fig3_both", "-o", "slab.gltf", "-o", "slab.mtlx"]);
+    assert!((0.0..0.8).contains(&report["rel_l2"].as_f64().unwrap()), "{report}");
+    assert!(std::fs::read_to_string(folder.path("slab.gltf")).unwrap().contains("KHR_materials_transmission"));
 }
 
 #[test]

@@ -1,0 +1,149 @@
+//! Mean and covariance of what a viewer receives, as a table over the direction of the viewer.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::Faces;
+use crate::effective::{Lobe, PathKind, ViewLobes, Viewer};
+use crate::slab::Slab;
+
+/// Nodes per side of the square around the disc of stereographic coordinates.
+const SIDE: usize = 33;
+/// Paths per node.
+const PATHS: usize = 256;
+/// Largest distance of a node from the centre of the disc: 89°.
+const RIM: f32 = 0.982_7;
+
+/// Lobes by the direction of the viewer. The means are stored relative to the straight direction.
+#[derive(Debug, Clone)]
+pub(super) struct LobeTable {
+    nodes: Vec<ViewLobes>,
+}
+
+/// Steps of the fit of a core and a tail.
+const FIT_STEPS: usize = 6;
+
+/// Directions of a bundle with their weights.
+#[derive(Default)]
+struct Bundle {
+    part: Vec3,
+    /// Tangential components relative to the straight direction, and weights.
+    directions: Vec<(Vec2, f32)>,
+}
+
+impl Bundle {
+    fn add(&mut self, direction: Vec3, from: Vec2, weight: Vec3) {
+        self.part += weight;
+        self.directions.push((direction.truncate() - from, weight.element_sum()));
+    }
+
+    /// Mean and covariance of the directions, each counted with a factor.
+    fn moments(&self, factor: impl Fn(usize) -> f32) -> (Vec2, [f32; 3]) {
+        let (mut weights, mut first) = (0.0, Vec2::ZERO);
+        for (k, (at, weight)) in self.directions.iter().enumerate() {
+            let weight = weight * factor(k);
+            weights += weight;
+            first += weight * *at;
+        }
+        let mean = if weights > 0.0 { first / weights } else { Vec2::ZERO };
+        let mut second = [0.0; 3];
+        for (k, (at, weight)) in self.directions.iter().enumerate() {
+            let (d, weight) = (*at - mean, weight * factor(k));
+            second.iter_mut().zip([d.x * d.x, d.x * d.y, d.y * d.y]).for_each(|(sum, value)| *sum += weight * value);
+        }
+        (mean, second)
+    }
+
+    /// Fits two Gaussians of one mean and one shape by expectation and maximisation. Tails would widen a single one.
+    fn lobe(&self) -> Lobe {
+        let total: f32 = self.directions.iter().map(|(_, weight)| weight).sum();
+        if total <= 0.0 {
+            return Lobe::default();
+        }
+        let (mut mean, second) = self.moments(|_| 1.0);
+        let mut covariance = second.map(|sum| sum / total);
+        let mut tail = 0.3;
+        let mut in_tail = vec![0.0; self.directions.len()];
+        for _ in 0..FIT_STEPS {
+            let [xx, xy, yy] = covariance;
+            let determinant = xx * yy - xy * xy;
+            if determinant.is_nan() || determinant <= 1e-16 {
+                break;
+            }
+            let mut weight_of_tail = 0.0;
+            for (part, (at, weight)) in in_tail.iter_mut().zip(&self.directions) {
+                let d = *at - mean;
+                let square = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
+                let core = (1.0 - tail) * (-0.5 * square).exp();
+                let far = tail / Lobe::TAIL * (-0.5 * square / Lobe::TAIL).exp();
+                *part = if core + far > 0.0 { far / (core + far) } else { 1.0 };
+                weight_of_tail += weight * *part;
+            }
+            tail = (weight_of_tail / total).clamp(1e-3, 0.9);
+            // A direction of the tail says as much of the shape as one of the core at a smaller distance.
+            let (center, second) = self.moments(|k| 1.0 - in_tail[k] * (1.0 - 1.0 / Lobe::TAIL));
+            mean = center;
+            covariance = second.map(|sum| sum / total);
+        }
+        Lobe { part: self.part, mean, covariance, tail }
+    }
+}
+
+impl LobeTable {
+    pub fn new(faces: &Faces, slab: &Slab) -> Self {
+        let node = |k: usize| {
+            let at = Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) * (2.0 / (SIDE - 1) as f32) - 1.0;
+            let at = at.clamp_length_max(RIM);
+            let square = at.length_squared();
+            let o = (2.0 * at / (1.0 + square)).extend((1.0 - square) / (1.0 + square));
+            let straight = slab.straight(o.as_dvec3()).map(|part| part.as_vec3());
+            lobes(faces, o, straight)
+        };
+        Self { nodes: (0..SIDE * SIDE).into_par_iter().map(node).collect() }
+    }
+
+    /// The lobes of a viewer, interpolated.
+    pub fn at(&self, o: Vec3) -> ViewLobes {
+        let at = 0.5 * (o.truncate() / (1.0 + o.z.max(0.0)) + 1.0) * (SIDE - 1) as f32;
+        let at = at.clamp(Vec2::ZERO, Vec2::splat((SIDE - 1) as f32 - 1e-3));
+        let (x, y) = (at.x as usize, at.y as usize);
+        let (s, t) = (at.x - x as f32, at.y - y as f32);
+        let k = y * SIDE + x;
+        let taps =
+            [(k, (1.0 - s) * (1.0 - t)), (k + 1, s * (1.0 - t)), (k + SIDE, (1.0 - s) * t), (k + SIDE + 1, s * t)];
+        let mut sum = ViewLobes::default();
+        for (k, weight) in taps {
+            let node = &self.nodes[k];
+            add(&mut sum.transmitted, &node.transmitted, weight);
+            add(&mut sum.reflected, &node.reflected, weight);
+            for side in 0..2 {
+                sum.even[side] += weight * node.even[side];
+                sum.straight[side] += weight * node.straight[side];
+            }
+        }
+        sum.transmitted.mean -= o.truncate();
+        sum.reflected.mean -= o.truncate();
+        sum
+    }
+}
+
+fn add(sum: &mut Lobe, lobe: &Lobe, weight: f32) {
+    sum.part += weight * lobe.part;
+    sum.mean += weight * lobe.mean;
+    sum.tail += weight * lobe.tail;
+    sum.covariance.iter_mut().zip(lobe.covariance).for_each(|(sum, value)| *sum += weight * value);
+}
+
+/// The lobes of one viewer, from paths. Light from behind that was reflected inside counts as even.
+fn lobes(faces: &Faces, o: Vec3, straight: [Vec3; 2]) -> ViewLobes {
+    let (mut transmitted, mut reflected, mut bounced) = (Bundle::default(), Bundle::default(), Vec3::ZERO);
+    let viewer = Viewer { o, paths: PATHS, seed: 0 };
+    let from = -o.truncate();
+    let mut even = faces.follow(&viewer, |end| match end.kind {
+        PathKind::Transmitted => transmitted.add(end.direction, from, end.weight),
+        PathKind::Bounced if end.direction.z < 0.0 => bounced += end.weight,
+        _ => reflected.add(end.direction, from, end.weight),
+    });
+    even[0] += bounced;
+    ViewLobes { transmitted: transmitted.lobe(), reflected: reflected.lobe(), even, straight }
+}
