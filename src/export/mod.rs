@@ -20,7 +20,6 @@ mod sampler;
 mod table;
 pub mod tile;
 mod utia;
-mod zip;
 
 use std::ffi::OsString;
 use std::io::{self, BufWriter, Write};

@@ -37,11 +37,11 @@ pub use color_map::{
     StopUnit, TextureDriver, WeightedDriver,
 };
 pub use effects::{Effects, Switch};
-pub use load::{LoadedScene, load, load_with_overrides, open, parse};
+pub use load::{LoadedScene, load, load_with_overrides, open, parse, parse_table};
 pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
-pub use schema::{Field, FieldShape, Kind};
+pub use schema::{Field, FieldShape, Kind, number};
 pub use slab::{Alpha, RoughFace, Slab, SlabFace, SlabMethod, TableFace, TileFace};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
@@ -217,6 +217,14 @@ impl Scene {
                 let key_of_path = if matches!(face, SlabFace::Table(_)) { "path" } else { "scene" };
                 return problem(vec![key("slab"), key(side), key(key_of_path)], "nothing", "a file");
             }
+        }
+        if let Some(side) = self.slab.as_ref().and_then(Slab::face_beside_svbtdf) {
+            let found = format!("`svbtdf` and `{side}`");
+            return problem(
+                vec![key("slab"), key("svbtdf")],
+                &found,
+                "a captured sheet, or the faces `top` and `bottom`",
+            );
         }
         if let Some(map) = &self.color_map {
             map.check(self)?;
