@@ -1,18 +1,28 @@
 //! Errors and times of the capture of simulated points and sheets.
 
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::time::Instant;
 
 use biscale::Cancel;
-use biscale::slab::Profile;
-use biscale::slab::capture::alpha::{FitSettings, fit_point};
+use biscale::reference::photons::lobe::cell_means;
+use biscale::reference::photons::{Bins, LobeSettings, TrueLobe};
+use biscale::slab::capture::alpha::{FitSettings, Fitted, choose_smoothness, fit_point};
 use biscale::slab::capture::clusters::{Slices, nearest, representatives};
+use biscale::slab::capture::fit::{Sample, View};
 use biscale::slab::capture::lobe::{Optics, SlopeGrid};
+use biscale::slab::capture::radiance::{Light, diffuse_part};
 use biscale::slab::capture::simulated::{KnownPoint, Recovered};
-use glam::DVec2;
+use biscale::slab::{Channel, Ndf, Profile, Walk};
+use glam::{DVec2, DVec3};
+
+/// Cells per side of lobes by photons.
+const SIDE: usize = 96;
 
 /// Prints the tables.
 pub fn capture(print: &mut dyn FnMut(String)) {
     points(print);
+    print(String::new());
+    faces(print);
     print(String::new());
     times(print);
 }
@@ -43,6 +53,80 @@ fn points(print: &mut dyn FnMut(String)) {
             ));
         }
     }
+}
+
+/// Slabs of two Beckmann faces by photons, without and with inner reflections.
+fn faces(print: &mut dyn FnMut(String)) {
+    print("| roughness of the faces | light | α by variances, found | error of lobes at 0, 30, 60°; all |".to_owned());
+    print("|---|---|---|---|".to_owned());
+    for (top, bottom) in [(0.2, 0.02), (0.02, 0.2), (0.15, 0.15), (0.3, 0.1)] {
+        let face = |roughness: f64| Ndf::analytic(Profile::Beckmann, DVec2::splat(roughness), 0.0);
+        // From the camera, light passes the bottom first.
+        let walk_faces = (face(bottom).mirrored(), face(top).mirrored());
+        let walk = Walk { top: &walk_faces.0, bottom: &walk_faces.1, channel: Channel { eta: 1.5, depth: 0.0 } };
+        let lobe = |degrees: f64, photons: usize| {
+            let (sin, cos) = f64::to_radians(degrees).sin_cos();
+            let settings = LobeSettings { side: SIDE, photons, target: 5e-3, seed: 1 };
+            TrueLobe::trace(&walk, DVec3::new(sin, 0.0, cos), &settings, &Cancel::default()).ok()
+        };
+        let (Some(seen), new) = (lobe(45.0, 4_000_000), [0.0, 30.0, 60.0].map(|degrees| lobe(degrees, 1_000_000)))
+        else {
+            return;
+        };
+        type Part = fn(&TrueLobe) -> &Bins;
+        let parts: [(&str, Part); 2] = [("single pass", |lobe| &lobe.single), ("all", |lobe| &lobe.all)];
+        for (name, part) in parts {
+            let Some((fitted, diffuse)) = of_photons(&part(&seen).values) else { continue };
+            let optics = Optics::new(1.5, 0.2);
+            let (mut squares, mut listed) = (0.0, Vec::new());
+            for (degrees, truth) in [0.0, 30.0, 60.0_f64].into_iter().zip(&new) {
+                let Some(truth) = truth else { return };
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                let o = DVec3::new(sin, 0.0, -cos);
+                let found = cell_means(SIDE, 2, |to| {
+                    let terms = optics.terms(to * DVec3::new(1.0, 1.0, -1.0), o);
+                    diffuse + terms.map_or(0.0, |terms| fitted.scale * fitted.model.btdf(&terms))
+                });
+                let error = truth.relative_l2(part(truth), &found);
+                squares += error * error / 3.0;
+                listed.push(format!("{:.1}", 100.0 * error));
+            }
+            let by_variances = top * top / (top * top + bottom * bottom);
+            print(format!(
+                "| {top}, {bottom} | {name} | {by_variances:.2}, {:.2} | {}; {:.1} % |",
+                fitted.model.alpha,
+                listed.join(", "),
+                100.0 * squares.sqrt()
+            ));
+        }
+    }
+}
+
+/// The fit of a lobe over cells of (i.x, i.y) that a camera at 45° sees under 40 x 40 dots, and its diffuse part.
+fn of_photons(cells: &[f64]) -> Option<(Fitted, f64)> {
+    let read = |i: DVec3| {
+        let last = (SIDE - 1) as f64;
+        let at = ((i.truncate() + 1.0) * (0.5 * SIDE as f64) - 0.5).clamp(DVec2::ZERO, DVec2::splat(last - 1e-9));
+        let (base, t) = (at.floor(), at - at.floor());
+        let first = base.y as usize * SIDE + base.x as usize;
+        let row = |k: usize| (1.0 - t.x) * cells[k] + t.x * cells[k + 1];
+        (1.0 - t.y) * row(first) + t.y * row(first + SIDE)
+    };
+    let dot = |k: u32| DVec2::new(f64::from(k % 40) - 19.5, f64::from(k / 40) - 19.5) * 0.0024 - DVec2::new(0.04, 0.0);
+    let lights: Vec<Light> = (0..1600).map(|k| Light::new(dot(k), 0.04, DVec2::ZERO)).collect();
+    let values: Vec<(f64, f64)> = lights.iter().map(|light| (light.irradiance, read(light.i))).collect();
+    let diffuse = diffuse_part(&values);
+    let sample = |(light, (irradiance, btdf)): (&Light, &(f64, f64))| Sample {
+        i: light.i,
+        irradiance: *irradiance,
+        btdf: (btdf - diffuse).max(0.0),
+    };
+    let o = DVec3::new(FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2);
+    let view = View { o, samples: lights.iter().zip(&values).map(sample).collect() };
+    let grid = SlopeGrid { side: 32, span: 0.8 };
+    let settings = FitSettings { optics: Optics::new(1.5, 0.2), grid, smooth: 1.0, alpha: None };
+    let smooth = choose_smoothness(&[vec![view.clone()]], &settings);
+    Some((fit_point(&[view], &FitSettings { smooth, ..settings })?, diffuse))
 }
 
 fn times(print: &mut dyn FnMut(String)) {

@@ -34,6 +34,9 @@ const ALPHA_TOLERANCE: f64 = 0.01;
 const SHIFT: f64 = 0.005;
 /// Error at held-out samples of the free distribution over that of the symmetric one below which it is taken.
 const FREE_IS_BETTER: f64 = 0.9;
+/// Part of the span outside which a distribution must not grow, and the largest growth of its mass there.
+const OUTER: f64 = 0.8;
+const MAX_GROWTH: f64 = 0.01;
 
 /// Fits the model of one point. For each α, the distribution is solved anew. One camera takes the α that makes the product
 /// of Eqs. 15 and 18 least while the distribution is point symmetric, and then frees the distribution if that predicts
@@ -49,18 +52,27 @@ pub fn fit_point(views: &[View], settings: &FitSettings) -> Option<Fitted> {
         None if views.len() > 1 => least(|alpha| misfit(&fit, alpha, settings.smooth)),
         None => symmetric_alpha(&fit, settings.smooth)?,
     };
-    let symmetry = if views.len() > 1 { Symmetry::WhereUnseen } else { second_pass(&fit, alpha, settings.smooth) };
-    let x = fit.solve(alpha, settings.smooth, symmetry, |_| true)?;
+    let x = if views.len() > 1 {
+        fit.solve(alpha, settings.smooth, Symmetry::WhereUnseen, |_| true)?
+    } else {
+        second_pass(&fit, alpha, settings.smooth)?
+    };
     let residual = fit.residual(alpha, &x);
     let (model, scale) = fit.model(alpha, x);
     (scale > 0.0 && residual.is_finite()).then_some(Fitted { model, scale, residual })
 }
 
-/// The symmetry of the second pass of one camera.
-fn second_pass(fit: &PointFit, alpha: f64, smooth: f64) -> Symmetry {
+/// The second pass of one camera: the free distribution if it predicts held-out samples better than the symmetric one, and
+/// if it does not grow at the rim, where few dots hold it.
+fn second_pass(fit: &PointFit, alpha: f64, smooth: f64) -> Option<Vec<f64>> {
+    let symmetric = fit.solve(alpha, smooth, Symmetry::Exact, |_| true)?;
     let error = |symmetry| held_out_error(fit, alpha, smooth, symmetry).map_or(f64::MAX, |(misfit, _)| misfit);
-    let is_better = error(Symmetry::WhereUnseen) < FREE_IS_BETTER * error(Symmetry::Exact);
-    if is_better { Symmetry::WhereUnseen } else { Symmetry::Exact }
+    if error(Symmetry::WhereUnseen) >= FREE_IS_BETTER * error(Symmetry::Exact) {
+        return Some(symmetric);
+    }
+    let free = fit.solve(alpha, smooth, Symmetry::WhereUnseen, |_| true);
+    let outside = |x: &[f64]| fit.model(alpha, x.to_vec()).0.outside(OUTER);
+    Some(free.filter(|free| outside(free) < outside(&symmetric) + MAX_GROWTH).unwrap_or(symmetric))
 }
 
 /// Eq. 15 of the free distribution.

@@ -16,7 +16,7 @@ pub struct Slices {
 
 impl Slices {
     pub fn count(&self) -> usize {
-        if self.cells == 0 { 0 } else { self.values.len() / self.cells }
+        self.values.len().checked_div(self.cells).unwrap_or(0)
     }
 
     pub fn slice(&self, point: usize) -> &[f32] {

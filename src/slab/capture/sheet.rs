@@ -85,8 +85,8 @@ const SLICE_SIDE: usize = 16;
 const PROBES: usize = 64;
 const SMOOTHED_PROBES: usize = 8;
 /// Part of the energy that the span of slopes, and the slices, hold; and the factors on their widths.
-const SPAN_ENERGY: f64 = 0.998;
-const SPAN_MARGIN: f64 = 1.3;
+const SPAN_ENERGY: f64 = 0.98;
+const SPAN_MARGIN: f64 = 1.6;
 const SLICE_ENERGY: f64 = 0.98;
 const SLICE_MARGIN: f64 = 1.2;
 /// Representatives that a pixel is interpolated between.
