@@ -11,7 +11,7 @@ use biscale::slab::capture::clusters::{Slices, nearest, representatives};
 use biscale::slab::capture::fit::{Sample, View};
 use biscale::slab::capture::lobe::{Optics, SlopeGrid};
 use biscale::slab::capture::radiance::{Light, diffuse_part};
-use biscale::slab::capture::simulated::{KnownPoint, Recovered};
+use biscale::slab::capture::simulated::{KnownPoint, Recovered, varying_sheet};
 use biscale::slab::{Channel, Ndf, Profile, Walk};
 use glam::{DVec2, DVec3};
 
@@ -144,6 +144,18 @@ fn times(print: &mut dyn FnMut(String)) {
         (0..count).for_each(|_| drop(std::hint::black_box(fit_point(&views, &settings))));
         row(&format!("fit of a point, 1600 dots, {} camera(s), one core", cameras.len()), start, count);
     }
+    let mean = varying_sheet([32, 32]).mean();
+    let start = Instant::now();
+    let pairs = 1000;
+    (0..pairs).for_each(|k| {
+        let i = DVec3::new(1e-4 * f64::from(k), 0.0, 1.0).normalize_or(DVec3::Z);
+        std::hint::black_box(mean.btdf(i, DVec3::NEG_Z));
+    });
+    let ns = start.elapsed().as_secs_f64() * 1e9 / (f64::from(pairs) * mean.len() as f64);
+    print(format!("| mean of a sheet, per pair and representative, one core | {ns:.0} ns |"));
+    let mut row = |what: &str, start: Instant, count: usize| {
+        print(format!("| {what} | {:.1} ms |", start.elapsed().as_secs_f64() * 1e3 / count as f64));
+    };
     let cells = 256;
     let value = |k: usize| ((k % cells) as f32 * (1.0 + (k / cells) as f32 * 1e-4)).sin();
     let slices = Slices { cells, values: (0..36_000 * cells).map(value).collect() };

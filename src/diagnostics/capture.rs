@@ -45,8 +45,7 @@ impl Health {
         }
         if !figures.shadowing_is_determined && figures.representatives > 0 {
             warnings.push(format!(
-                "the photographs do not determine the roughness of masking (alpha_b): {} is kept; it changes a lobe by 2 % at \
-                 most",
+                "the photographs do not determine the roughness of masking (alpha_b): {} is kept",
                 figures.shadowing
             ));
         }

@@ -13,7 +13,7 @@ use crate::geometry::image_file;
 /// Largest value of an integer image that is not saturated.
 const INTEGER_SATURATION: f64 = 0.999;
 
-/// Largest number of pixels. A slice and what belongs to it take some 1.5 KB per pixel and camera.
+/// Largest number of pixels. Their slices take 1 GiB per camera.
 const MAX_PIXELS: u64 = 1 << 20;
 
 /// The photographs of a folder.
