@@ -80,7 +80,7 @@ const FACET_NS: f64 = 100.0;
 const PHOTON_NS: f64 = 1000.0;
 const RINGS: f64 = 24.0;
 /// Nanoseconds of each representative of a captured sheet per pair (`cargo bench --bench measure -- capture`, per core).
-const REPRESENTATIVE_NS: f64 = 60.0;
+const REPRESENTATIVE_NS: f64 = 95.0;
 /// Pairs of which the predicted time is stated: a Klems matrix.
 const PAIRS: f64 = 145.0 * 145.0;
 
