@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing measurement may panic")]
 
 mod accuracy;
+mod capture;
+mod capture_sheet;
 #[path = "../../tests/numerics/choosing.rs"]
 mod choosing;
 mod clustered_sums;
@@ -41,6 +43,12 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("accuracy", "errors of the presets (or of a list of presets) on four tiles: half an hour", Source::Here(accuracy)),
     ("brdf", "nanoseconds per evaluation of each BRDF", in_lib("nanoseconds_per_evaluation")),
     ("cache-costs", "milliseconds of the disk cache", in_lib("costs_of_caching")),
+    ("capture", "errors and times of captured points: half a minute", Source::Here(capture)),
+    (
+        "capture-sheet",
+        "errors, time and memory of captured sheets (or of one, PIXELSxDOTS): minutes",
+        Source::Here(capture_sheet),
+    ),
     ("choosing", "PSNR and time that targets reach on ten scenes", Source::Here(choosing)),
     (
         "color-maps",
@@ -93,6 +101,15 @@ fn few_facets(_: Option<&str>, table: &mut Table) -> Result<(), String> {
 fn interpolation(_: Option<&str>, table: &mut Table) -> Result<(), String> {
     interpolation::interpolation(&mut |line| table.line(line));
     Ok(())
+}
+
+fn capture(_: Option<&str>, table: &mut Table) -> Result<(), String> {
+    capture::capture(&mut |line| table.line(line));
+    Ok(())
+}
+
+fn capture_sheet(sheet: Option<&str>, table: &mut Table) -> Result<(), String> {
+    capture_sheet::capture_sheet(sheet, &mut |line| table.line(line))
 }
 
 fn slabs(_: Option<&str>, table: &mut Table) -> Result<(), String> {

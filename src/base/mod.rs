@@ -1,4 +1,4 @@
-//! Errors, cancellation, progress, lines on standard error, files and OBJ files: the lowest layer, which all other
+//! Errors, cancellation, progress, lines on standard error, files, `.npz` archives and OBJ files: the lowest layer, which all other
 //! modules may import.
 
 pub mod atomic_file;
@@ -8,11 +8,13 @@ pub mod csv;
 mod error;
 pub mod finite;
 mod gpu_error;
+pub mod npz;
 pub mod obj;
 mod output_place;
 pub mod progress;
 pub mod regular_file;
 pub mod threads;
+pub mod zip;
 
 pub use atomic_file::replace_file;
 pub use cancel::{Cancel, Running};

@@ -1,12 +1,12 @@
 //! Reader of isotropic `.npz` exports of this program: arrays of f32 stored in a ZIP archive.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::HalfDifferenceTable;
 use super::spherical::{SphericalTable, even_turn};
+use crate::base::npz::arrays;
 use crate::base::{InputError, Result, regular_file};
 
 /// Largest file in bytes: the largest export has 2^25 pairs of two quantities.
@@ -27,8 +27,6 @@ pub(crate) fn load(path: &Path) -> Result<HalfDifferenceTable> {
     let table = read().map_err(|error| error.in_file(path))?;
     Ok(table.resample(name))
 }
-
-type Arrays = HashMap<String, (Vec<usize>, Vec<f32>)>;
 
 fn table(bytes: &[u8]) -> std::result::Result<SphericalTable, InputError> {
     let arrays = arrays(bytes)?;
@@ -72,56 +70,6 @@ fn table(bytes: &[u8]) -> std::result::Result<SphericalTable, InputError> {
 
 fn missing(name: &str) -> InputError {
     InputError::new("archive", format!("no array \"{name}\""), "an .npz that `biscale export` wrote")
-}
-
-/// The little-endian f32 arrays of an archive of stored members. Members of other types are skipped.
-fn arrays(bytes: &[u8]) -> std::result::Result<Arrays, InputError> {
-    let broken =
-        |at: usize| InputError::new(format!("byte {at}"), "something else", "a ZIP member without compression");
-    let half = |at: usize| bytes.get(at..at + 2).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]])));
-    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
-    let mut arrays = Arrays::new();
-    let mut at = 0;
-    if !bytes.starts_with(b"PK\x03\x04") {
-        return Err(InputError::new("header", "other bytes", "a ZIP archive").with_hint("is this an .npz file?"));
-    }
-    while bytes.get(at..at + 4) == Some(b"PK\x03\x04") {
-        let whole = || Some((half(at + 8)?, word(at + 18)?, half(at + 26)?, half(at + 28)?));
-        let (method, size, name_length, extra) = whole().ok_or_else(|| broken(at))?;
-        let first = at + 30 + name_length + extra;
-        let (Some(name), Some(data)) =
-            (bytes.get(at + 30..at + 30 + name_length), bytes.get(first..first.saturating_add(size)))
-        else {
-            return Err(broken(at));
-        };
-        if method != 0 {
-            return Err(broken(at).with_hint("archives of numpy.savez_compressed are not supported"));
-        }
-        let name = String::from_utf8_lossy(name).trim_end_matches(".npy").to_owned();
-        if let Some(array) = npy(data) {
-            arrays.insert(name, array);
-        }
-        at = first + size;
-    }
-    Ok(arrays)
-}
-
-/// Shape and values of a C-ordered array of little-endian f32.
-fn npy(data: &[u8]) -> Option<(Vec<usize>, Vec<f32>)> {
-    if !data.starts_with(b"\x93NUMPY\x01") {
-        return None;
-    }
-    let length = usize::from(u16::from_le_bytes([*data.get(8)?, *data.get(9)?]));
-    let header = std::str::from_utf8(data.get(10..10 + length)?).ok()?;
-    if !header.contains("'<f4'") || header.contains("'fortran_order': True") {
-        return None;
-    }
-    let shape = header.split("'shape': (").nth(1)?.split(')').next()?;
-    let shape: Vec<usize> =
-        shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect::<Option<_>>()?;
-    let count = shape.iter().try_fold(1_usize, |product, &n| product.checked_mul(n))?;
-    let numbers = data.get(10 + length..)?.as_chunks().0;
-    (numbers.len() == count).then(|| (shape, numbers.iter().map(|&b| f32::from_le_bytes(b)).collect()))
 }
 
 #[cfg(test)]

@@ -39,6 +39,10 @@ pub enum Command {
     Tile(TileArgs),
     /// Write the lobe that a slab makes of light from one direction, and where the light goes. A scene needs `[slab]`.
     Transmit(TransmitArgs),
+    /// Make the photographs that a monitor and a camera would take of a slab, for `capture`.
+    Rig(RigArgs),
+    /// Capture a sheet from photographs of it before a monitor: an SVBTDF (.npz) and a scene that shows it (.toml).
+    Capture(CaptureArgs),
     /// List every effect: whether it is on, why, and its cost.
     Plan(PlanArgs),
     /// Factor the rotated BRDF of every material and list its size and rank (Table 3 of Wu et al. 2011).
@@ -268,6 +272,63 @@ pub struct TransmitArgs {
     /// Method for the lobe; without it, the plan decides.
     #[arg(long, value_enum)]
     pub method: Option<TransmitMethod>,
+}
+
+/// What simulated photographs show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RigSource {
+    /// The slab as `eval` computes it.
+    Model,
+    /// Photons through random facets of both faces.
+    Truth,
+}
+
+#[derive(Debug, Args)]
+pub struct RigArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Folder for rig.toml and the images.
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// Dots of the monitor along x and y.
+    #[arg(long, default_value = "40x40", value_parser = super::parse_size)]
+    pub dots: [usize; 2],
+    /// Columns and rows of the images.
+    #[arg(long, default_value = "64x64", value_parser = super::parse_size)]
+    pub pixels: [usize; 2],
+    /// Number of cameras: one at 45°, and one that looks straight.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub cameras: u8,
+    /// Relative noise of the pixels; a hundredth of it is added in the dark, relative to the brightest pixel.
+    #[arg(long, default_value_t = 0.01, value_parser = super::parse_part)]
+    pub noise: f64,
+    /// What the photographs show.
+    #[arg(long, value_enum, default_value_t = RigSource::Model)]
+    pub source: RigSource,
+}
+
+#[derive(Debug, Args)]
+pub struct CaptureArgs {
+    /// Folder with rig.toml and the images.
+    pub folder: PathBuf,
+    /// File to write (repeatable): .npz (the SVBTDF, needed), .toml (a scene that shows it), .png or .exr (residuals).
+    #[arg(short, long, required = true)]
+    pub output: Vec<PathBuf>,
+    /// A known part of the roughness on the side of the monitor, 0 to 1.
+    #[arg(long, value_parser = super::parse_part)]
+    pub alpha: Option<f64>,
+    /// Fit every pixel for itself in place of 1 % of representatives.
+    #[arg(long)]
+    pub every_pixel: bool,
+    /// Seed of the choice of representatives.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Print a machine-readable report on standard output.
+    #[arg(long)]
+    pub json: bool,
+    /// Print no notes and no progress on standard error.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -3,6 +3,7 @@
 mod args;
 pub mod basis;
 pub mod cache;
+pub mod capture;
 pub mod eval;
 pub mod export;
 pub mod filter;
@@ -15,6 +16,7 @@ pub mod profile;
 pub mod render;
 mod render_path;
 pub mod report;
+pub mod rig;
 mod slab;
 pub mod tile;
 mod to_image;
@@ -51,6 +53,8 @@ pub fn run(command: Command) -> Result<()> {
         Command::Fit(args) => fit::run(&args),
         Command::Tile(args) => tile::run(&args),
         Command::Transmit(args) => transmit::run(&args),
+        Command::Rig(args) => rig::run(&args),
+        Command::Capture(args) => capture::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Basis(args) => basis::run(&args),
         Command::Profile(args) => profile::run(&args),
@@ -182,6 +186,12 @@ pub fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
 pub fn parse_count(text: &str) -> std::result::Result<usize, String> {
     let count = text.parse::<usize>().ok().filter(|count| (16..=100_000).contains(count));
     count.ok_or_else(|| format!("found `{text}`, expected a number from 16 to 100000"))
+}
+
+/// Parses a part from 0 to 1.
+pub fn parse_part(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| (0.0..=1.0).contains(number));
+    number.ok_or_else(|| format!("found `{text}`, expected a number from 0 to 1"))
 }
 
 /// Parses minutes, which may be a fraction.

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::watch::Watch;
-use crate::base::{Cancel, InputError};
+use crate::base::{Cancel, Error, InputError};
 use crate::diagnostics::Health;
 use crate::pipeline::{Pipeline, SlabOutcome};
 use crate::plan::{Preset, Settings};
@@ -38,6 +38,9 @@ pub fn eval(
     pipeline.set_cancel(cancel.clone());
     let settings = Settings::of(&loaded.scene);
     let is_reference = settings.preset == Preset::Reference;
+    if is_reference {
+        require_faces(loaded, "the quality `reference`")?;
+    }
     let outcome = if is_reference { pipeline.slab_of_faces(loaded)? } else { pipeline.slab(loaded)? };
     if is_reference {
         return reference(loaded, &outcome, pairs, &cancel);
@@ -70,11 +73,26 @@ fn reference(
 /// The slab in words.
 pub fn describe(outcome: &SlabOutcome) -> String {
     let slab = &outcome.slab;
+    if let Some(captured) = &slab.captured {
+        return format!("captured sheet: mean over its pixels, {} representatives", captured.len());
+    }
     let method = match slab.method {
         crate::slab::Method::Dual => "dual-microfacet model".to_owned(),
         crate::slab::Method::Faces => format!("sum over {} facets", outcome.settings.facets.max(1)),
     };
     format!("{method}; top: {}; bottom: {}; alpha {:.2}", slab.top.describe(), slab.bottom.describe(), slab.alpha)
+}
+
+/// Checks that photons and facets are asked for only if the slab has faces.
+///
+/// # Errors
+/// The scene shows a captured sheet.
+pub fn require_faces(loaded: &LoadedScene, asked: &str) -> Result<(), Error> {
+    if loaded.scene.slab.as_ref().is_some_and(|slab| slab.svbtdf.is_some()) {
+        let expected = "the mean of its pixels: a captured sheet has no faces";
+        return Err(InputError::new("slab.svbtdf", format!("a captured sheet and {asked}"), expected).into());
+    }
+    Ok(())
 }
 
 /// Checks that a scene has no slab, before a command that knows none reads or writes anything.

@@ -102,6 +102,9 @@ pub fn run(args: &TransmitArgs) -> Result<()> {
             let error = InputError::new("slab", "nothing", "a table [slab]: without it a scene transmits no light");
             return Err(Error::from(error.in_file(&args.scene.scene)).into());
         }
+        if args.method.is_some_and(|method| method != TransmitMethod::Dual) {
+            super::slab::require_faces(loaded, "a method other than `dual`")?;
+        }
         if args.output.as_deref() == Some(Path::new("-")) {
             return Err(Error::from(InputError::new("output", "`-`", "a file that ends in .csv or .png")).into());
         }

@@ -4,6 +4,7 @@
 //! that drafts of the editor do not wait for it.
 
 mod measure;
+mod capture;
 mod slab;
 mod warnings;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::zip::ZipWriter;
+use crate::base::zip::ZipWriter;
 use crate::base::{Error, InputError, Result, replace_file};
 use crate::color_map::{DEVIATIONS, MEANS, Normal, PrefilteredTable, StopMap};
 

@@ -23,7 +23,6 @@ pub mod slab;
 mod slab_npz;
 pub mod tile;
 mod utia;
-mod zip;
 
 use std::ffi::OsString;
 use std::io::{self, BufWriter, Write};

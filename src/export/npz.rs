@@ -5,10 +5,8 @@ use std::io::{self, Write};
 use super::grid::ExportGrid;
 use super::meta::Description;
 use super::table::ExportTable;
-use super::zip::ZipWriter;
-
-/// The machine's byte order, in which numbers are written, as a NumPy type prefix.
-const ORDER: char = if cfg!(target_endian = "big") { '>' } else { '<' };
+pub(super) use crate::base::npz::array;
+use crate::base::zip::ZipWriter;
 
 /// Writes the f32 arrays `theta_i`, `phi_i`, `theta_o`, `phi_o`, `brdf[ti,pi,to,po,3]`, `g[ti,pi,to,po,3]` and
 /// `projected_area[to,po]`, and the scalars `base_area`, `resampling_rel_l2` (f64), `seed` (u64) and `meta` (JSON in
@@ -43,18 +41,4 @@ pub(super) fn axes(zip: &mut ZipWriter<'_>, grid: &ExportGrid) -> io::Result<()>
 pub(super) fn text(zip: &mut ZipWriter<'_>, text: &str) -> io::Result<()> {
     let letters: Vec<u32> = text.chars().map(u32::from).collect();
     array(zip, "meta", &format!("U{}", letters.len()), &[], bytemuck::cast_slice(&letters))
-}
-
-/// Adds `name.npy` in C order; `kind` is the NumPy type without its byte order.
-pub(super) fn array(zip: &mut ZipWriter<'_>, name: &str, kind: &str, shape: &[usize], data: &[u8]) -> io::Result<()> {
-    // A Python tuple of one element needs a trailing comma; longer tuples allow one.
-    let shape: String = shape.iter().map(|length| format!("{length},")).collect();
-    let mut header = format!("{{'descr': '{ORDER}{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
-    // Magic number, version and length take 10 bytes; the data must start at a multiple of 64, after a line break.
-    while (10 + header.len() + 1) % 64 != 0 {
-        header.push(' ');
-    }
-    header.push('\n');
-    let length = u16::try_from(header.len()).map_err(io::Error::other)?.to_le_bytes();
-    zip.member(&format!("{name}.npy"), &[b"\x93NUMPY\x01\x00", &length, header.as_bytes(), data])
 }

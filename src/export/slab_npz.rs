@@ -8,9 +8,9 @@ use glam::{DVec3, Vec3};
 use super::grid::{ExportGrid, ExportResolution};
 use super::meta::{FRAME, PROGRAM};
 use super::npz::{array, axes, text};
-use super::zip::ZipWriter;
 use crate::base::progress::in_parallel;
-use crate::base::{Progress, Result, atomic_file, require_finite};
+use crate::base::zip::ZipWriter;
+use crate::base::{Progress, Result, atomic_file, check_output, require_finite};
 use crate::scene::LoadedScene;
 use crate::slab::Slab;
 
@@ -39,7 +39,7 @@ pub fn write(
     progress: &Progress<'_>,
 ) -> Result<usize> {
     resolution.check()?;
-    atomic_file::check_place(path)?;
+    check_output(path, &[])?;
     let tables = SlabTables::new(slab, resolution, progress)?;
     atomic_file::write_atomically(path, |out| tables.write(&meta(slab, loaded), out))?;
     Ok(3 * tables.grid.pairs())

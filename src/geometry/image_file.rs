@@ -48,6 +48,22 @@ pub fn read_colors(base_dir: &Path, path: &Path) -> Result<Pixels<Vec3>> {
     Ok(Pixels { size: pixels.size, values: pixels.values })
 }
 
+/// Reads linear values of an EXR, HDR or 16-bit PNG file; 65535 is 1. Values may be NaN, infinite or negative, as
+/// photographs have them. The second value is true for integers.
+///
+/// # Errors
+/// Returns an error if the file is missing, is not such an image, or is too large.
+pub fn read_linear(base_dir: &Path, path: &Path) -> Result<(Pixels<Vec3>, bool)> {
+    let RawImage { size, values, is_integer, bits } = read_any(base_dir, path)?;
+    if bits < 16 {
+        let expected = "linear values: an .exr, an .hdr or a .png of 16 bits";
+        return Err(InputError::new("", format!("an image of {bits} bits"), expected)
+            .in_file(files::resolve(base_dir, path))
+            .into());
+    }
+    Ok((Pixels { size, values }, is_integer))
+}
+
 /// Maximum number of slots that an image may paint.
 pub const MAX_SLOTS: u8 = 16;
 
@@ -86,9 +102,22 @@ struct RawImage {
     size: UVec2,
     values: Vec<Vec3>,
     is_integer: bool,
+    /// Bits per channel.
+    bits: u8,
 }
 
+/// Reads an image of finite values.
 fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
+    let image = read_any(base_dir, path)?;
+    if let Some(at) = image.values.iter().position(|value| !value.is_finite()) {
+        return Err(InputError::new(pixel_name(at, image.size), image.values[at], "finite values")
+            .in_file(files::resolve(base_dir, path))
+            .into());
+    }
+    Ok(image)
+}
+
+fn read_any(base_dir: &Path, path: &Path) -> Result<RawImage> {
     let bytes = files::read(base_dir, path, MAX_FILE)?;
     let path = &files::resolve(base_dir, path);
     let error_for = |found: String| InputError::new("", found, "an image: PNG, JPEG, TIFF, HDR or EXR").in_file(path);
@@ -96,11 +125,6 @@ fn read(base_dir: &Path, path: &Path) -> Result<RawImage> {
     let image =
         if is_exr { read_exr(&bytes, path)? } else { decode(&bytes).map_err(|error| error_for(error.to_string()))? };
     check_size(image.size, path)?;
-    if let Some(at) = image.values.iter().position(|value| !value.is_finite()) {
-        return Err(InputError::new(pixel_name(at, image.size), image.values[at], "finite values")
-            .in_file(path)
-            .into());
-    }
     Ok(image)
 }
 
@@ -123,8 +147,9 @@ fn decode(bytes: &[u8]) -> image::ImageResult<RawImage> {
     let image = reader.decode()?;
     let is_integer = !matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
     let size = UVec2::new(image.width(), image.height());
+    let bits = (image.color().bits_per_pixel() / u16::from(image.color().channel_count())) as u8;
     let values = image.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
-    Ok(RawImage { size, values, is_integer })
+    Ok(RawImage { size, values, is_integer, bits })
 }
 
 /// Reads R, G and B of an EXR file, or its Y channel, or its only channel.
@@ -162,7 +187,7 @@ fn read_exr(bytes: &[u8], path: &Path) -> Result<RawImage> {
     }
     let value =
         |index: usize| Vec3::from_array(chosen.map(|channel| channel.sample_data.value_by_flat_index(index).to_f32()));
-    Ok(RawImage { size, values: (0..count).map(value).collect(), is_integer: false })
+    Ok(RawImage { size, values: (0..count).map(value).collect(), is_integer: false, bits: 32 })
 }
 
 #[cfg(test)]

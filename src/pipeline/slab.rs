@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use super::Pipeline;
 use super::stage::{Keyed, StageTimes, elapsed_ms};
-use super::stages::{BuildFace, CorrelateFaces, FaceNormals, TraceInner};
+use super::stages::{BuildFace, CorrelateFaces, FaceNormals, ReadSvbtdf, TraceInner};
 use crate::base::{InputError, Result};
 use crate::diagnostics::{Health, SlabHealthInputs};
 use crate::plan::{Effect, Settings, SlabDecision, SlabFeatures, SlabSettings};
 use crate::scene::{Alpha, LoadedScene, Slab as SlabSpec, Switch};
+use crate::slab::capture::svbtdf::Svbtdf;
 use crate::slab::{Method, Optics, Slab, alpha_of, dual_error};
 
 /// A slab, and how it was computed.
@@ -24,6 +25,8 @@ pub struct SlabOutcome {
     /// Relative L2 of Eq. 11 against Eq. 1 on 32 pairs.
     pub dual_error: f64,
     pub health: Health,
+    /// The captured sheet of a scene with one: its pixels have lobes of their own.
+    pub svbtdf: Option<Arc<Svbtdf>>,
 }
 
 /// # Errors
@@ -76,7 +79,11 @@ impl Pipeline {
         let correlation = CorrelateFaces { top: &top, bottom: &bottom, table_side: settings.virtual_table };
         let virtual_face = self.get(correlation, &mut times)?;
         let optics = optics(spec);
-        let inner = if bounces {
+        let captured = match &spec.svbtdf {
+            Some(path) => Some(self.get(ReadSvbtdf::new(loaded, path, &self.env), &mut times)?.value),
+            None => None,
+        };
+        let inner = if bounces && captured.is_none() {
             let (photons, seed) = (settings.photons, settings.seed);
             let trace = TraceInner { top: &top, bottom: &bottom, optics, photons, seed };
             Some(self.get(trace, &mut times)?.value)
@@ -100,9 +107,16 @@ impl Pipeline {
             below: Arc::default(),
             photons: settings.photons,
             seed: settings.seed,
+            captured: captured.as_ref().map(|captured| captured.mean.clone()),
         };
+        if let Some(captured) = &captured {
+            slab.optics.eta = glam::DVec3::splat(captured.svbtdf.optics.eta);
+        }
         let dual_error = dual_error(&slab);
-        let decision = SlabDecision::new(&SlabFeatures::of(&slab, spec.method, dual_error), &settings);
+        let decision = match &slab.captured {
+            Some(captured) => SlabDecision::of_capture(captured.len()),
+            None => SlabDecision::new(&SlabFeatures::of(&slab, spec.method, dual_error), &settings),
+        };
         if decision.method == Method::Faces {
             slab = slab.by_faces(settings.facets.max(1));
         }
@@ -115,7 +129,8 @@ impl Pipeline {
             let name = if effect.name == "slab" { "slab" } else { "slab_inner" };
             effect.measured_ms = times.iter().find(|(stage, _)| *stage == name).map(|(_, ms)| *ms);
         }
-        Ok(SlabOutcome { slab: Arc::new(slab), effects, settings, times, dual_error, health })
+        let svbtdf = captured.map(|captured| captured.svbtdf.clone());
+        Ok(SlabOutcome { slab: Arc::new(slab), effects, settings, times, dual_error, health, svbtdf })
     }
 }
 

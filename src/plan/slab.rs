@@ -83,6 +83,8 @@ const FACET_NS: f64 = 100.0;
 /// Nanoseconds per photon of the table of inner reflections, and its rings.
 const PHOTON_NS: f64 = 1000.0;
 const RINGS: f64 = 24.0;
+/// Nanoseconds of each representative of a captured sheet per pair (`cargo bench --bench measure -- capture`, per core).
+const REPRESENTATIVE_NS: f64 = 95.0;
 /// Pairs of which the predicted time is stated: a Klems matrix.
 const PAIRS: f64 = 145.0 * 145.0;
 
@@ -115,16 +117,6 @@ impl SlabDecision {
                 Method::Dual => DUAL_NS,
                 Method::Faces => DUAL_NS + FACET_NS * settings.facets as f64,
             };
-        let row = |name, on, reason, predicted_ms| Effect {
-            name,
-            kind: EffectKind::Physics,
-            on,
-            reason,
-            predicted_ms,
-            measured_ms: None,
-            forced: false,
-            bound: None,
-        };
         let inner_ms = channels as f64 * RINGS * settings.photons as f64 * PHOTON_NS * 1e-6;
         let inner_reason = if bounces {
             format!("light between the faces: a table from {} photons at each of 24 angles", settings.photons)
@@ -142,6 +134,21 @@ impl SlabDecision {
         ];
         Self { method, effects }
     }
+
+    /// A captured sheet of so many representatives: the mean over its pixels, without inner reflections.
+    pub fn of_capture(representatives: usize) -> Self {
+        let reason =
+            format!("a captured sheet: the mean over its pixels is a sum over {representatives} representatives");
+        let pair_ns = DUAL_NS + REPRESENTATIVE_NS * representatives as f64;
+        let bounces = "photographs hold the light that is reflected inside".to_owned();
+        let effects = vec![row("slab", true, reason, PAIRS * pair_ns * 1e-6), row("slab_bounces", false, bounces, 0.0)];
+        Self { method: Method::Dual, effects }
+    }
+}
+
+fn row(name: &'static str, on: bool, reason: String, predicted_ms: f64) -> Effect {
+    let kind = EffectKind::Physics;
+    Effect { name, kind, on, reason, predicted_ms, measured_ms: None, forced: false, bound: None }
 }
 
 #[cfg(test)]

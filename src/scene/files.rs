@@ -63,6 +63,7 @@ impl LoadedScene {
             .chain(terms.filter_map(TermSpec::path))
             .chain(slab.iter().flat_map(|slab| slab.faces().map(|(_, face)| face.path())).flatten())
             .chain(background.iter().filter_map(Background::path))
+            .chain(slab.iter().filter_map(|slab| slab.svbtdf.as_deref()))
             .chain(color_map.iter().flat_map(ColorMap::files).map(PathBuf::as_path))
             .filter(|path| !is_embedded(path))
             .map(|path| resolve(&self.base_dir, path))

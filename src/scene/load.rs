@@ -100,6 +100,21 @@ impl Scene {
     }
 }
 
+/// Parses another file of TOML against a catalogue of its keys.
+///
+/// # Errors
+/// The text is no TOML, or a key is unknown, missing or has a wrong value. The error names the line and the key.
+pub fn parse_table<T: serde::de::DeserializeOwned>(source: &str, fields: &[super::Field]) -> Result<T> {
+    let table: Table = toml::from_str(source).map_err(|error| syntax_error(source, &error))?;
+    check::check_table(&table, fields, &mut Vec::new()).map_err(|problem| {
+        let line = line_of(source, &problem.path);
+        Error::from(problem.into_error(line))
+    })?;
+    table
+        .try_into()
+        .map_err(|error: toml::de::Error| InputError::new("", error.message(), "values of the listed keys").into())
+}
+
 /// Parses a scene from its text. Overrides are applied to the text's table, which is then checked.
 pub fn load_with_overrides(source: &str, overrides: &[String]) -> Result<Scene> {
     let mut table: Table = toml::from_str(source).map_err(|error| syntax_error(source, &error))?;

@@ -39,11 +39,11 @@ pub use color_map::{
     StopUnit, TextureDriver, WeightedDriver,
 };
 pub use effects::{Effects, Switch};
-pub use load::{LoadedScene, load, load_with_overrides, open, parse};
+pub use load::{LoadedScene, load, load_with_overrides, open, parse, parse_table};
 pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
-pub use schema::{Field, FieldShape, Kind};
+pub use schema::{Field, FieldShape, Kind, number};
 pub use slab::{Alpha, RoughFace, Slab, SlabFace, SlabMethod, TableFace, TileFace};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
@@ -236,6 +236,14 @@ impl Scene {
             if background.path().is_some_and(|path| path.as_os_str().is_empty()) {
                 return problem(vec![key("background"), key("path")], "nothing", "an image file");
             }
+        }
+        if let Some(side) = self.slab.as_ref().and_then(Slab::face_beside_svbtdf) {
+            let found = format!("`svbtdf` and `{side}`");
+            return problem(
+                vec![key("slab"), key("svbtdf")],
+                &found,
+                "a captured sheet, or the faces `top` and `bottom`",
+            );
         }
         if let Some(map) = &self.color_map {
             map.check(self)?;

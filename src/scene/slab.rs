@@ -49,7 +49,19 @@ scene_table! {
         top: SlabFace = SlabFace::Smooth {}, FieldShape::Tagged(SlabFace::kinds), "";
         /// The face towards -z, in the coordinates of the top: its normals also point to +z.
         bottom: SlabFace = SlabFace::Smooth {}, FieldShape::Tagged(SlabFace::kinds), "";
+        /// A captured sheet in place of both faces: an .npz file of `biscale capture`, which also holds the index and alpha.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        svbtdf: Option<PathBuf> = None, FieldShape::Path, "";
+        /// How often a captured sheet repeats over the object, along u and along v.
+        #[serde(skip_serializing_if = "is_once")]
+        repeat: [u32; 2] = [1, 1], FieldShape::List { of: &FieldShape::Integer { min: 1, max: 10_000 }, min: 2, max: 2 }, "";
     }
+}
+
+impl DefaultNumber for [u32; 2] {}
+
+fn is_once(repeat: &[u32; 2]) -> bool {
+    *repeat == [1, 1]
 }
 
 /// Part of the virtual roughness that lies on top.
@@ -188,6 +200,12 @@ impl Slab {
     /// Both faces with their keys.
     pub fn faces(&self) -> [(&'static str, &SlabFace); 2] {
         [("top", &self.top), ("bottom", &self.bottom)]
+    }
+
+    /// The face that stands beside a captured sheet, which takes the place of both.
+    pub(super) fn face_beside_svbtdf(&self) -> Option<&'static str> {
+        self.svbtdf.as_ref()?;
+        self.faces().into_iter().find(|(_, face)| **face != SlabFace::Smooth {}).map(|(side, _)| side)
     }
 }
 

@@ -4,6 +4,7 @@
 //! `m = h.xy / h.z` of its normal `h`, which points up on both faces. `eta` is the index of the slab over that of its
 //! surroundings. `ρ(i, o)` is the BTDF [1/sr], and `f̄ = ρ |cos θ_i|`.
 
+pub mod capture;
 mod choose;
 mod dual;
 mod ellipse;

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec3};
 
+use super::capture::svbtdf::MeanBtdf;
 use super::dual::DualFaces;
 use super::faces::FaceSum;
 use super::fresnel::reflectance;
@@ -45,6 +46,8 @@ pub struct Slab {
     /// Photons per ring of the table from below, and their seed.
     pub photons: usize,
     pub seed: u64,
+    /// The far appearance of a captured sheet, which takes the place of both faces. It has no reflection.
+    pub captured: Option<Arc<MeanBtdf>>,
 }
 
 /// Part of the virtual roughness that lies on top, by the variances of the rough parts; 1/2 without any.
@@ -70,6 +73,7 @@ impl Slab {
             below: Arc::default(),
             photons: 4096,
             seed: 1,
+            captured: None,
         }
     }
 
@@ -108,6 +112,9 @@ impl Slab {
         let (i, o) = if i.z > 0.0 { (i, o) } else { (o, i) };
         if !(i.z > 0.0 && o.z < 0.0) {
             return DVec3::ZERO;
+        }
+        if let Some(captured) = &self.captured {
+            return captured.btdf(i, o);
         }
         let mut sum = self.single_pass(i, o);
         if let Some(inner) = &self.inner {
@@ -165,6 +172,9 @@ impl Slab {
 
     /// Parts of light from `i` that pass straight through, and that level facets mirror, per channel.
     pub fn straight(&self, i: DVec3) -> [DVec3; 2] {
+        if self.captured.is_some() {
+            return [DVec3::ZERO; 2];
+        }
         let over = DVec3::new(1.0, 1.0, i.z.signum());
         let parts = |channel: Channel| -> Straight {
             if i.z >= 0.0 {
@@ -180,6 +190,9 @@ impl Slab {
 
     /// Root mean square difference of the slopes of both faces.
     pub fn deviation(&self) -> f64 {
+        if let Some(captured) = &self.captured {
+            return captured.deviation();
+        }
         self.top.deviation().hypot(self.bottom.deviation())
     }
 
@@ -190,7 +203,8 @@ impl Slab {
             Spread::Table(table) => table.side,
             _ => 256,
         };
-        let turned = Self { alpha: 1.0 - self.alpha, ..Self::new(top, bottom, self.optics, side) };
+        let captured = self.captured.as_ref().map(|captured| Arc::new(captured.turned()));
+        let turned = Self { alpha: 1.0 - self.alpha, captured, ..Self::new(top, bottom, self.optics, side) };
         let facets = self.facets.as_ref().map(|facets| Arc::new(facets.turned()));
         Self { facets, method: self.method, photons: self.photons, seed: self.seed, ..turned }
     }

@@ -1,3 +1,4 @@
-//! Dense linear algebra.
+//! Linear algebra.
 
 pub(crate) mod gemm;
+pub(crate) mod skyline;

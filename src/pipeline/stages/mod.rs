@@ -12,6 +12,6 @@ pub(super) use color_map::{MeasureHeights, PlaceDrivers, SampleDrivers};
 pub(super) use factors::{Factorize, LookUpVisibility, TabulateFactors, TabulateForCheck};
 pub(super) use interreflection::{CastTransport, FindMirrorPlanes, Interreflect};
 pub(super) use paper::PaperTables;
-pub(super) use slab::{BuildFace, CorrelateFaces, FaceNormals, TraceInner};
+pub(super) use slab::{BuildFace, CorrelateFaces, FaceNormals, ReadSvbtdf, TraceInner};
 pub(super) use tile::{BuildTile, FacetsRole, LoadMaterials, SampleFacets, TileShape};
 pub(super) use visibility::{BuildCells, ComputeVisibility, EstimateScanWork};

@@ -1,6 +1,6 @@
 //! Slabs: the normals of each face, their correlation, and the light of inner reflections.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec2;
@@ -13,6 +13,7 @@ use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage};
 use crate::plan::SlabSettings;
 use crate::scene::{self, LoadedScene, SlabFace};
+use crate::slab::capture::svbtdf::{MeanBtdf, Svbtdf};
 use crate::slab::{self, Inner, Ndf, Optics, Profile, Spread, table_file, virtual_face};
 
 /// The normals of a face.
@@ -160,6 +161,40 @@ impl BuildFace<'_> {
             }
             other => other,
         }
+    }
+}
+
+/// A captured sheet.
+#[derive(Debug)]
+pub struct CapturedSheet {
+    pub svbtdf: Arc<Svbtdf>,
+    pub mean: Arc<MeanBtdf>,
+}
+
+/// Reads a captured sheet.
+pub struct ReadSvbtdf {
+    path: PathBuf,
+    file: Key,
+}
+
+impl ReadSvbtdf {
+    pub fn new(loaded: &LoadedScene, path: &Path, env: &Env) -> Self {
+        Self { path: scene::files::resolve(&loaded.base_dir, path), file: env.file_key(&loaded.base_dir, path) }
+    }
+}
+
+impl Stage for ReadSvbtdf {
+    type Output = CapturedSheet;
+    const NAME: &'static str = "slab_svbtdf";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("file", &self.file);
+    }
+
+    fn run(&self, _: &Env) -> Result<CapturedSheet> {
+        let svbtdf = Svbtdf::read(&self.path)?;
+        let mean = Arc::new(svbtdf.mean());
+        Ok(CapturedSheet { svbtdf: Arc::new(svbtdf), mean })
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod cache;
+mod capture;
 mod commands;
 mod eval;
 mod filter;

@@ -98,4 +98,4 @@ macro_rules! targets {
     )* };
 }
 
-targets! { scene merl rgl utia npz obj_tile obj_object heights environment pipeline }
+targets! { scene merl rgl utia npz obj_tile obj_object heights environment rig photographs svbtdf pipeline }

@@ -133,6 +133,42 @@ pub fn npz() -> Vec<Vec<u8>> {
     vec![std::fs::read(path).unwrap()]
 }
 
+pub fn rigs() -> Vec<Vec<u8>> {
+    let rig = "eta = 1.5\nsample_size = [0.08, 0.06]\ndistance = 0.04\nmonitor = [1, 0.9, 0.8]\nsaturation = 0.99\n\
+               dots = { count = [4, 3], from = [-0.09, -0.05], to = [0.01, 0.05] }\n[[camera]]\ndirection = [1, 0, -1]\n\
+               images = \"a/dot_%04d_%d.exr\"\nexposures = [0.1, 1]\ndark = \"dark.exr\"\n";
+    let second = "eta = 1.4\nsample_size = [1, 1]\ndistance = 2\npixels = [8, 8]\n[dots]\npositions = [[0, 0], [1, 0]]\n\
+                  [[camera]]\ndirection = [0, 0, -1]\nimages = \"%d.png\"\ncorners = [[0, 0], [9, 0], [9, 9], [0, 9]]\n\
+                  [[camera]]\ndirection = [0, 0.5, -1]\nimages = \"b%d.hdr\"\n";
+    vec![rig.as_bytes().to_vec(), second.as_bytes().to_vec()]
+}
+
+/// Returns a sheet of 2 x 2 pixels between two models.
+pub fn svbtdfs() -> Vec<Vec<u8>> {
+    use biscale::slab::capture::lobe::{Optics, PointModel, SlopeGrid};
+    use biscale::slab::capture::svbtdf::Svbtdf;
+    let grid = SlopeGrid { side: 8, span: 0.5 };
+    let model = |alpha: f64| {
+        let ln_density = (0..64).map(|k| -20.0 * grid.node(k).length_squared()).collect();
+        PointModel { grid, alpha, ln_density }
+    };
+    let sheet = Svbtdf {
+        size: [2, 2],
+        optics: Optics::new(1.5, 0.2),
+        grid,
+        models: vec![model(0.2), model(0.8)],
+        neighbours: 2,
+        index: [0, 1].repeat(4),
+        weight: [0.25, 0.75].repeat(4),
+        scale: vec![glam::Vec3::ONE; 4],
+        diffuse: vec![glam::Vec3::splat(0.1); 4],
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    sheet.write(&path).unwrap();
+    vec![std::fs::read(path).unwrap()]
+}
+
 pub fn objs() -> Vec<Vec<u8>> {
     [
         "# a plane\nmtllib x.mtl\no plane\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nusemtl a b\ns 1\nf 1/1/1 2/2/1 3/1/1 4/2/1\nusemtl c\nf -4 -3 -1\n",

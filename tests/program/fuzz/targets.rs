@@ -2,13 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use biscale::base::{Error, Result};
+use biscale::base::{Cancel, Error, Result};
 use biscale::brdf::{Brdf, MeasuredCache};
 use biscale::math::directions::from_angles;
 use biscale::pipeline::Pipeline;
 use biscale::render::lighting::lights;
 use biscale::render::object;
 use biscale::scene::{BrdfSpec, Geometry, Heightfield, LoadedScene, MeshFile, Painted, TermSpec};
+use biscale::slab::capture::photographs::Photographs;
+use biscale::slab::capture::rig::Rig;
+use biscale::slab::capture::sheet::{CaptureSettings, capture};
+use biscale::slab::capture::svbtdf::Svbtdf;
 use biscale::{geometry, scene};
 use glam::Vec3;
 
@@ -26,7 +30,7 @@ pub struct Target {
     pub brief: usize,
 }
 
-pub const TARGETS: [Target; 10] = [
+pub const TARGETS: [Target; 13] = [
     Target { name: "scene", is_text: true, seeds: seeds::scenes, run: scene, brief: 400 },
     Target { name: "merl", is_text: false, seeds: seeds::merl, run: |f, b| measured(f, b, "a.binary"), brief: 30 },
     Target { name: "rgl", is_text: false, seeds: seeds::rgl, run: |f, b| measured(f, b, "a.bsdf"), brief: 60 },
@@ -36,6 +40,9 @@ pub const TARGETS: [Target; 10] = [
     Target { name: "obj_object", is_text: true, seeds: seeds::objs, run: obj_object, brief: 300 },
     Target { name: "heights", is_text: false, seeds: seeds::heights, run: heights, brief: 300 },
     Target { name: "environment", is_text: false, seeds: seeds::environments, run: environment, brief: 150 },
+    Target { name: "rig", is_text: true, seeds: seeds::rigs, run: rig, brief: 300 },
+    Target { name: "photographs", is_text: false, seeds: seeds::heights, run: photographs, brief: 100 },
+    Target { name: "svbtdf", is_text: false, seeds: seeds::svbtdfs, run: svbtdf, brief: 200 },
     Target { name: "pipeline", is_text: true, seeds: seeds::quick_scenes, run: pipeline, brief: 40 },
 ];
 
@@ -129,6 +136,55 @@ fn environment(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String>
     std::fs::write(folder.join(name), bytes).map_err(|error| error.to_string())?;
     let light = scene::Light { environment: name.to_owned(), count: 16, ..scene::Light::default() };
     check(lights::build(&light, folder), |lights| lights.directional.iter().all(|light| is_sound(light.irradiance)))
+}
+
+fn rig(_: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
+    let Ok(text) = std::str::from_utf8(bytes) else { return Ok(false) };
+    check(Rig::parse(text), |rig| {
+        // An accepted rig survives a round trip through TOML.
+        let is_finite = rig.dots().iter().all(|dot| dot.is_finite());
+        is_finite && rig.to_toml().is_ok_and(|text| Rig::parse(&text).is_ok_and(|again| again == rig))
+    })
+}
+
+/// Captures a sheet from one photograph under two dots.
+fn photographs(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
+    let name = match bytes {
+        [b'#', b'?', ..] => "a.hdr",
+        [b'v', b'/', ..] => "a.exr",
+        _ => "a.png",
+    };
+    std::fs::write(folder.join(name), bytes).map_err(|error| error.to_string())?;
+    let text = format!(
+        "eta = 1.5\nsample_size = [0.01, 0.01]\ndistance = 0.04\ndots = {{ positions = [[-0.04, 0]] }}\n[[camera]]\ndirection = \
+         [1, 0, -1]\nimages = \"{name}%d\"\n"
+    );
+    std::fs::rename(folder.join(name), folder.join(format!("{name}0"))).map_err(|error| error.to_string())?;
+    let rig = Rig::parse(&text).map_err(|error| error.to_string())?;
+    match Photographs::open(&rig, folder) {
+        // Large photographs are valid, but they would only cost time.
+        Ok(opened) if opened.size.element_product() > 4096 => return Ok(true),
+        Ok(_) => {}
+        Err(error) => return refused(&error),
+    }
+    let settings = CaptureSettings::default();
+    check(capture(&rig, folder, &settings, &Cancel::default(), &|_| true), |captured| is_sound_sheet(&captured.svbtdf))
+}
+
+fn svbtdf(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
+    let path = folder.join("a.npz");
+    std::fs::write(&path, bytes).map_err(|error| error.to_string())?;
+    check(Svbtdf::read(&path), |sheet| is_sound_sheet(&sheet))
+}
+
+fn is_sound_sheet(sheet: &Svbtdf) -> bool {
+    let mean = sheet.mean();
+    (0..100).all(|k| {
+        let direction = |a: usize, b: usize| from_angles((k * a % 90) as f32 * 0.0175, (k * b % 360) as f32 * 0.0175);
+        let (i, o) = (direction(7, 13).as_dvec3(), -direction(11, 29).as_dvec3());
+        let values = [sheet.btdf(k % sheet.scale.len(), i, o), mean.btdf(i, o)];
+        values.iter().all(|value| value.is_finite() && value.min_element() >= 0.0)
+    })
 }
 
 /// Runs all stages of a scene.
