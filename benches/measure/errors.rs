@@ -1,8 +1,6 @@
 //! True and stated errors of hard tiles.
 
-use biscale::metrics::mirror_biased_pairs;
-
-use crate::hard_tiles::{Measured, PAIRS_SEED, RayCast, TrueValues, all, measure};
+use crate::hard_tiles::{Measured, RayCast, TrueValues, all, measure};
 
 const PRESETS: [&str; 2] = ["draft", "standard"];
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
@@ -19,8 +17,7 @@ pub fn errors(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), S
     for tile in all().iter().filter(|tile| part.is_none_or(|part| tile.name.contains(part))) {
         let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
         let loaded = tile.open(folder.path(), "standard", 1);
-        let pairs = mirror_biased_pairs(tile.pairs(), PAIRS_SEED);
-        let truth = tile.true_values(&loaded, &pairs, &RAYS);
+        let (pairs, truth) = tile.pairs_and_values(&loaded, &RAYS);
         let of = |preset| SEEDS.map(|seed| measure(&loaded, preset, seed, &pairs, &truth)).collect::<Vec<_>>();
         print(row(tile.name, &PRESETS.map(of), &truth));
     }

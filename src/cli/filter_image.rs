@@ -22,7 +22,7 @@ use crate::scene::LoadedScene;
 /// Side of a panel [pixels], and of the disc of view directions, whose pixels are rays of the reference.
 const SIDE: usize = 256;
 const DISC: usize = 32;
-/// Facets per pass of the disc's truth: some ten seconds.
+/// Facets per pass of the disc's truth. They bound its time.
 const DISC_FACETS: usize = 2048;
 /// Width of the plane at its near edge, in tiles, and the ratio of the distances of its far and near edge.
 const NEAR: f64 = 0.25;

@@ -2,7 +2,7 @@
 //!
 //! Facets are divided into replicates, each of which is a systematic sample of the whole surface. Their spread shows the
 //! error of the facets. Visibility from a half and from a quarter of the azimuths shows the order and the error of
-//! interpolation between azimuths (Richardson 1911), and a soft step of twice the width that of the soft step.
+//! interpolation between azimuths (Richardson 1911), and a soft step of half the width that of the soft step.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,21 +14,23 @@ use crate::geometry::{Facets, REPLICATES};
 use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
-/// Number of direction pairs that an estimate for a whole BRDF examines.
-const PAIRS: usize = 200;
-/// Number of direction pairs of a quick estimate.
-const QUICK_PAIRS: usize = 16;
+/// Numbers of direction pairs that an estimate for a whole BRDF examines.
+const PAIRS: PairCount = PairCount { min: 200, min_effective: 16.0 };
+/// Numbers of direction pairs of a quick estimate.
+const QUICK_PAIRS: PairCount = PairCount { min: 16, min_effective: 1.5 };
+/// Most pairs of an estimate.
+const MAX_PAIRS: usize = 6400;
 /// Seed of these pairs.
 const PAIRS_SEED: u64 = 20_261_123;
 /// Factor within which an estimate is taken to be right. Estimates from six replicates and 200 pairs of tiles whose error
 /// is near a bound are within it in two of three cases (`cargo bench --bench measure -- errors`).
 const UNCERTAINTY: f64 = 1.25;
-/// Resolutions that show the error of visibility: a half and a quarter of the azimuths, and a soft step of twice the
+/// Resolutions that show the error of visibility: a half and a quarter of the azimuths, and a soft step of half the
 /// width.
 const HALF: Resolution = Resolution { azimuth_step: 2, softness: 1.0 };
 const QUARTER: Resolution = Resolution { azimuth_step: 4, softness: 1.0 };
-const SOFTER: Resolution = Resolution { azimuth_step: 1, softness: 2.0 };
-/// Both at once, for a quick estimate.
+const SHARPER: Resolution = Resolution { azimuth_step: 1, softness: 0.5 };
+/// Fewer azimuths and a wider soft step at once, for a quick estimate.
 const COARSE: Resolution = Resolution { azimuth_step: 2, softness: 2.0 };
 
 /// The error that a preset allows.
@@ -113,8 +115,8 @@ struct Deviations {
     replicates: [DVec3; REPLICATES],
     /// `f̄` with half of the azimuths less `f̄`, and with a quarter less `f̄` with half.
     coarse: [DVec3; 2],
-    /// `f̄` with a soft step of twice the width less `f̄`: the error of the soft step is of first order.
-    softer: DVec3,
+    /// Twice `f̄` with a soft step of half the width less `f̄`: the error of the soft step is of first order.
+    soft_step: DVec3,
 }
 
 impl Deviations {
@@ -140,6 +142,35 @@ fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: Pair) -> DVe
     direct.visibility.fill_at(resolution, o, &mut v_o);
     let area = direct.sum.projected_area(&v_o, o);
     if area > 0.0 { direct.sum.sum(i, o, &v_i, &v_o) / area } else { DVec3::ZERO }
+}
+
+/// Number of direction pairs of an estimate. It is doubled while few pairs hold most of the sum of squares, such as those
+/// that see the bottom of deep grooves.
+struct PairCount {
+    min: usize,
+    /// Smallest effective number of pairs, `(Σ|f̄|²)² / Σ|f̄|⁴`.
+    min_effective: f64,
+}
+
+impl PairCount {
+    /// Evaluates `of` at enough pairs. `f_bar` returns `f̄` of an evaluation.
+    fn evaluate<T: Send>(&self, of: impl Fn(Pair) -> T + Sync, f_bar: impl Fn(&T) -> DVec3) -> Vec<T> {
+        let mut all: Vec<T> = Vec::new();
+        let mut count = self.min;
+        loop {
+            let pairs = mirror_biased_pairs(count, PAIRS_SEED);
+            all.par_extend(pairs[all.len()..].par_iter().map(|&pair| of(pair)));
+            let (mut norm, mut squares) = (0.0, 0.0);
+            for value in all.iter().map(|at| f_bar(at).length_squared()) {
+                norm += value;
+                squares += value * value;
+            }
+            if norm * norm >= self.min_effective * squares && norm > 0.0 || count >= MAX_PAIRS {
+                return all;
+            }
+            count *= 2;
+        }
+    }
 }
 
 /// Sums of squares over the pairs of an estimate, and the largest value.
@@ -180,8 +211,8 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
         return estimate;
     }
     let sum = &direct.sum;
-    let deviations = |pair: &Pair| {
-        let Pair { i, o } = *pair;
+    let deviations = |pair: Pair| {
+        let Pair { i, o } = pair;
         let (area, reflected, difference) = direct.with_visibility(i, o, |v_i, v_o| {
             let (area, reflected) = (sum.projected_area(v_o, o), sum.sum(i, o, v_i, v_o));
             if exact_facets || area <= 0.0 {
@@ -197,10 +228,10 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
             return (DVec3::ZERO, 0.0);
         }
         let f_bar = reflected / area;
-        let coarse = if has_coarse { f_bar_at(direct, COARSE, *pair) - f_bar } else { DVec3::ZERO };
+        let coarse = if has_coarse { f_bar_at(direct, COARSE, pair) - f_bar } else { DVec3::ZERO };
         (f_bar, (difference / area).length_squared() + coarse.length_squared())
     };
-    let all: Vec<(DVec3, f64)> = mirror_biased_pairs(QUICK_PAIRS, PAIRS_SEED).par_iter().map(deviations).collect();
+    let all = QUICK_PAIRS.evaluate(deviations, |at| at.0);
     let totals = Totals::of(all.iter().map(|at| at.0));
     if totals.norm > 0.0 {
         estimate.rel_l2 = (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
@@ -242,7 +273,7 @@ impl ErrorEstimator {
         let of = |deviations: Deviations| {
             let facets = deviations.random_variance() * self.variance_ratio;
             let azimuths = deviations.coarse[0] * self.azimuth_ratio;
-            let visibility = azimuths * azimuths + deviations.softer * deviations.softer;
+            let visibility = azimuths * azimuths + deviations.soft_step * deviations.soft_step;
             let table = deviations.f_bar * self.estimate.table;
             (facets + visibility + table * table).map(f64::sqrt).as_vec3()
         };
@@ -250,16 +281,15 @@ impl ErrorEstimator {
     }
 
     fn examine(&mut self, table: f64) {
-        let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
-        let all: Vec<Deviations> = pairs.par_iter().map(|pair| self.deviations(*pair)).collect();
+        let all = PAIRS.evaluate(|pair| self.deviations(pair), |at| at.f_bar);
         let totals = Totals::of(all.iter().map(|at| at.f_bar));
         if totals.norm <= 0.0 {
             return;
         }
         let total = |of: &dyn Fn(&Deviations) -> f64| all.iter().map(of).sum::<f64>();
         let [six, three, two] = [6, 3, 2].map(|count| total(&|at| at.variance_of(count)));
-        // Variance falls with the number of facets to this power: 1 for random samples, up to 3 for smooth integrands.
-        let facets_power = if two > 0.0 { ((six / two).ln() / 3.0_f64.ln()).clamp(1.0, 3.0) } else { 1.0 };
+        // Variance falls with the number of facets to this power: 1 for random samples, 2 for smooth integrands over a surface.
+        let facets_power = if two > 0.0 { ((six / two).ln() / 3.0_f64.ln()).clamp(1.0, 2.0) } else { 1.0 };
         let variance = (three * 3.0_f64.powf(-facets_power) * two * 2.0_f64.powf(-facets_power)).sqrt();
         let random = total(&|at| at.random_variance().element_sum());
         self.variance_ratio = if random > 0.0 { variance / random } else { 0.0 };
@@ -269,7 +299,7 @@ impl ErrorEstimator {
         self.azimuth_ratio = 1.0 / (2.0_f64.powf(order) - 1.0);
         let relative = |squares: f64| (squares / totals.norm).sqrt();
         let azimuths = self.azimuth_ratio * relative(half * half);
-        let soft_step = relative(total(&|at| at.softer.length_squared()));
+        let soft_step = relative(total(&|at| at.soft_step.length_squared()));
         let (facets, visibility) = (relative(variance), azimuths.hypot(soft_step));
         let rel_l2 = facets.hypot(visibility).hypot(table);
         let psnr_db = totals.psnr_db(rel_l2);
@@ -309,8 +339,8 @@ impl ErrorEstimator {
                 finer = f_bar;
             }
         }
-        if self.direct.visibility.has_azimuth_step(SOFTER.azimuth_step) {
-            deviations.softer = f_bar_at(&self.direct, SOFTER, pair) - deviations.f_bar;
+        if self.direct.visibility.has_azimuth_step(SHARPER.azimuth_step) {
+            deviations.soft_step = 2.0 * (f_bar_at(&self.direct, SHARPER, pair) - deviations.f_bar);
         }
         deviations
     }
@@ -319,8 +349,6 @@ impl ErrorEstimator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::compare;
-    use crate::pipeline::{Outcome, Pipeline};
 
     fn outcome(scene: &str, settings: &[&str]) -> Outcome {
         let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();

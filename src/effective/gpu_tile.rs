@@ -27,16 +27,16 @@ pub enum GpuVisibilityInput {
     /// The CPU computed the visibility.
     Computed(Arc<Visibility>),
     /// The GPU marches over the samples of a height field.
-    Heights(Heights),
+    Heights(HeightMarchInput),
     /// The GPU slices the tile along azimuths.
-    OcclusionIntervals(Box<Sliced>),
+    OcclusionIntervals(Box<SliceInput>),
     /// The GPU renders shadow maps of the tile from many directions.
-    Maps(Box<Maps>),
+    Maps(Box<ShadowMapInput>),
 }
 
 /// A tile that is intersected with vertical slices.
 #[derive(Debug)]
-pub struct Sliced {
+pub struct SliceInput {
     pub grid: Arc<PeriodicGrid>,
     pub facets: Arc<Facets>,
     pub azimuths: usize,
@@ -48,7 +48,7 @@ pub struct Sliced {
 
 /// A height field, its tile and its facets.
 #[derive(Debug)]
-pub struct Heights {
+pub struct HeightMarchInput {
     pub samples: HeightGrid,
     pub tile_size: Vec2,
     pub facets: Arc<Facets>,
@@ -59,7 +59,7 @@ pub struct Heights {
 
 /// A tile whose shadow maps are rendered from the nodes of a grid.
 #[derive(Debug)]
-pub struct Maps {
+pub struct ShadowMapInput {
     pub mesh: TileMesh,
     pub facets: Arc<Facets>,
     pub grid: PolarGrid,

@@ -21,7 +21,7 @@ pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
 pub(crate) use error_estimate::quick_estimate;
 pub use error_estimate::{ErrorBound, ErrorEstimate, ErrorEstimator};
-pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, Heights, Maps, Sliced};
+pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};

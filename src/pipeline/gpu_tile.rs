@@ -4,7 +4,9 @@ use super::inputs::{Processor, TileInputs};
 use super::stages::{BuildCells, FindMirrorPlanes};
 use super::{Pipeline, StageTimes};
 use crate::base::Result;
-use crate::effective::{FacetSum, GpuTileInput, GpuVisibilityInput, Heights, Maps, Nodes, Sliced};
+use crate::effective::{
+    FacetSum, GpuTileInput, GpuVisibilityInput, HeightMarchInput, Nodes, ShadowMapInput, SliceInput,
+};
 use crate::math::directions::HemispherePairGrid;
 use crate::plan::{Plan, Preset, Settings, VisibilityAlgorithm, VisibilityMethod};
 use crate::scene::{LoadedScene, Switch};
@@ -82,7 +84,7 @@ impl Pipeline {
         let of_intervals = settings.slice_azimuths.min(of_intervals);
         let (mesh, facets) = (&tile.mesh, facets.value.clone());
         let visibility_input = match (plan.algorithm, &mesh.height_grid) {
-            (VisibilityAlgorithm::HeightMarch, Some(samples)) => GpuVisibilityInput::Heights(Heights {
+            (VisibilityAlgorithm::HeightMarch, Some(samples)) => GpuVisibilityInput::Heights(HeightMarchInput {
                 samples: samples.clone(),
                 tile_size: mesh.size,
                 facets,
@@ -92,7 +94,7 @@ impl Pipeline {
             (VisibilityAlgorithm::GpuMaps | VisibilityAlgorithm::CpuMaps, _)
                 if settings.visibility_method == VisibilityMethod::Maps =>
             {
-                GpuVisibilityInput::Maps(Box::new(Maps {
+                GpuVisibilityInput::Maps(Box::new(ShadowMapInput {
                     mesh: mesh.clone(),
                     facets,
                     grid: settings.map_grid,
@@ -104,7 +106,7 @@ impl Pipeline {
             }
             (algorithm, _) => {
                 let overhangs = algorithm != VisibilityAlgorithm::HorizonScan;
-                GpuVisibilityInput::OcclusionIntervals(Box::new(Sliced {
+                GpuVisibilityInput::OcclusionIntervals(Box::new(SliceInput {
                     grid: self.get(BuildCells { tile }, &mut times)?.value,
                     facets,
                     azimuths: if overhangs { of_intervals } else { of_horizons },

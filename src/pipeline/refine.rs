@@ -13,7 +13,7 @@ use crate::scene::LoadedScene;
 use crate::visibility::Visibility;
 
 /// A quick estimate below this part of the bound ends the search. It examines few pairs, so that the highest of them
-/// may be missing.
+/// may be missing. Light from a rare part of the surface reaches few pairs, so that no quick estimate is made.
 const QUICK_PART: f64 = 0.5;
 
 /// A direct sum with the results that it was computed from.
@@ -36,7 +36,8 @@ impl RefinedSum {
     fn examine(&mut self, bound: ErrorBound) {
         let TileInputs { facets, material_of_slot, materials, .. } = &self.inputs;
         let is_first = self.refinement == Refinement::NONE;
-        if is_first && quick_estimate(&self.direct, facets).excess(bound) <= QUICK_PART {
+        let is_quick = is_first && !facets.has_rare_part();
+        if is_quick && quick_estimate(&self.direct, facets).excess(bound) <= QUICK_PART {
             return;
         }
         self.estimator = Some(ErrorEstimator::new(&self.direct, facets, material_of_slot, &materials.materials, 0.0));

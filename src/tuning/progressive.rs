@@ -33,8 +33,8 @@ pub struct ReferenceErrors {
 }
 
 impl ReferenceErrors {
-    /// Errors that a result states without a reference. Their error bars are those of an estimate that is off by a factor of
-    /// up to two.
+    /// Errors that a result states without a reference. The error bars span half and
+    /// one and a half times the estimate.
     pub fn stated(estimate: &ErrorEstimate) -> Self {
         Self {
             rel_l2: estimate.rel_l2,

@@ -1,4 +1,4 @@
-//! A small reference, which measures within a second whether settings reach a target.
+//! A small ray-cast reference that checks whether settings reach a target.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -14,8 +14,8 @@ const PAIRS: usize = 64;
 /// Seed of the pairs, which `biscale report` uses as well.
 const PAIRS_SEED: u64 = 20_110_801;
 const REFERENCE_FACETS: usize = 1024;
-/// Enough passes for a standard error of some 60 dB on ordinary tiles.
-const MAX_PASSES: usize = 128;
+/// Bounds the time of the reference. Its standard error is subtracted in squares from what is measured.
+const MAX_PASSES: usize = 32;
 const MIN_PASSES: usize = 4;
 /// Margin by which the PSNR of the reference exceeds the target [dB]. The error of the reference is subtracted in squares.
 const REFERENCE_LEAD_DB: f64 = 5.0;

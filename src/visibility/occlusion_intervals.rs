@@ -105,7 +105,7 @@ impl OcclusionIntervals {
                 slicer.scan::<F32x8Array>(origins[facet], facets.normals[facet], facets.triangles[facet], &mut blocked);
             }
         }
-        blocked.steps as f64 / (FACETS * AZIMUTHS) as f64
+        blocked.steps as f64 / (sampled.max(1) * AZIMUTHS) as f64
     }
 
     /// Cuts the mesh along every azimuth for every facet. Visibility has soft steps of `transition_width` radians.

@@ -11,7 +11,7 @@ mod rows;
 
 use std::path::Path;
 
-use biscale::metrics::Pair;
+use biscale::metrics::{Pair, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::scene;
 use biscale::scene::{LoadedScene, Painted};
@@ -20,6 +20,10 @@ use glam::Vec3;
 pub use errors::{Measured, PAIRS_SEED, measure};
 pub use ray_cast::RayCast;
 pub use rows::all;
+
+/// Smallest effective number of pairs, `(Σ|f̄|²)² / Σ|f̄|⁴`, at which a closed form is compared.
+const MIN_EFFECTIVE_PAIRS: f64 = 16.0;
+const MAX_PAIRS: usize = 25_600;
 
 /// A tile and its materials, as the text of a scene, with the files that it names.
 #[derive(Debug, Clone)]
@@ -112,13 +116,19 @@ impl HardTile {
         }
     }
 
-    /// Number of pairs that resolves the error. Few pairs see through a deep or small opening, and closed forms cost
-    /// nothing.
-    pub fn pairs(&self) -> usize {
-        match self.truth {
-            Truth::Grooves(_) => 4000,
-            Truth::Holes(_) => 1000,
-            _ => 200,
+    /// Direction pairs that resolve the error, and the true values at them. Closed forms cost nothing, so that there are enough
+    /// pairs that see through a deep or small opening.
+    pub fn pairs_and_values(&self, loaded: &LoadedScene, settings: &RayCast) -> (Vec<Pair>, TrueValues) {
+        let mut count = 200;
+        loop {
+            let pairs = mirror_biased_pairs(count, PAIRS_SEED);
+            let truth = self.true_values(loaded, &pairs, settings);
+            let squares = || truth.values.iter().map(|value| f64::from(value.length_squared()));
+            let effective = squares().sum::<f64>().powi(2) / squares().map(|square| square * square).sum::<f64>();
+            if truth.std_error > 0.0 || effective >= MIN_EFFECTIVE_PAIRS || count >= MAX_PAIRS {
+                return (pairs, truth);
+            }
+            count *= 2;
         }
     }
 

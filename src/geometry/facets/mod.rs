@@ -54,6 +54,15 @@ impl Facets {
         self.positions.is_empty()
     }
 
+    /// Returns true if a part of the surface has many more facets than its area asks for, because it is small, but may reflect
+    /// much.
+    pub fn has_rare_part(&self) -> bool {
+        /// Smallest ratio of the area of a facet to the mean of all on a surface without rare parts.
+        const MIN_RATIO: f32 = 0.25;
+        let mean = self.areas.iter().sum::<f32>() / self.len() as f32;
+        self.areas.iter().any(|&area| area < MIN_RATIO * mean)
+    }
+
     /// Takes `count` systematic samples; `seed` shifts them.
     pub fn sample(mesh: &TileMesh, count: usize, seed: u64) -> Self {
         FacetSampler::new(mesh).sample(mesh, count, SampleShift::from_seed(seed))

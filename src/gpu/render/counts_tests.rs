@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::{Mat3, Vec3};
 
 use super::gbuffer::Point;
-use crate::effective::{GpuVisibilityInput, Heights, Nodes, Sliced};
+use crate::effective::{GpuVisibilityInput, HeightMarchInput, Nodes, SliceInput};
 use crate::geometry::Facets;
 use crate::gpu::shading::tests::{TestScene, open_gpu};
 use crate::gpu::visibility::{crossings, steps};
@@ -81,12 +81,12 @@ fn sampled(facets: &Facets) -> Facets {
 /// Returns the operations and bytes of visibility.
 fn visibility_cost(gpu: &Gpu, tile: &GpuTile) -> [f64; 2] {
     match &tile.input.visibility_input {
-        GpuVisibilityInput::Heights(Heights { samples, tile_size, facets, azimuths, .. }) => {
+        GpuVisibilityInput::Heights(HeightMarchInput { samples, tile_size, facets, azimuths, .. }) => {
             let crossings_per_walk = crossings(gpu, (samples, *tile_size, &sampled(facets)), *azimuths);
             [CROSSING, EDGE_BYTES].map(|each| (facets.len() * azimuths) as f64 * crossings_per_walk * each)
         }
         GpuVisibilityInput::OcclusionIntervals(of) => {
-            let Sliced { grid, facets, azimuths, overhangs, .. } = &**of;
+            let SliceInput { grid, facets, azimuths, overhangs, .. } = &**of;
             let [steps, cuts] = steps(gpu, grid, &sampled(facets), *azimuths, *overhangs);
             [STEP * steps + CUT * cuts, STEP_BYTES * steps].map(|each| (facets.len() * azimuths) as f64 * each)
         }
@@ -133,7 +133,7 @@ const WARP: usize = 32;
 /// Computes the horizon map of a tile on the CPU.
 fn horizon_map(tile: &GpuTile) -> HorizonMap {
     match &tile.input.visibility_input {
-        GpuVisibilityInput::Heights(Heights { samples, tile_size, facets, azimuths, transition_width }) => {
+        GpuVisibilityInput::Heights(HeightMarchInput { samples, tile_size, facets, azimuths, transition_width }) => {
             HorizonMap::march(samples, *tile_size, facets, *azimuths, *transition_width)
         }
         GpuVisibilityInput::OcclusionIntervals(of) => {

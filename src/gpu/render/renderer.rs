@@ -10,7 +10,7 @@ use super::image::{GpuImages, Output};
 use super::light_rays::{GpuLightRays, GpuOccluder};
 use super::stages::{Clock, GpuPassKind, Recorder};
 use crate::base::{Cancel, Result};
-use crate::effective::{EffectiveBrdf, GpuTileInput, GpuVisibilityInput, Heights, Maps, Sliced};
+use crate::effective::{EffectiveBrdf, GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 use crate::gpu::shading::visibility::GpuVisibility;
 use crate::gpu::shading::{GpuMaterial, GpuShading, Light};
 use crate::gpu::{Gpu, GpuError, GpuHeightMarch, GpuShadowMaps, GpuSlicer, Tier, shading};
@@ -116,7 +116,7 @@ impl GpuRenderer {
                     Some(march) => march,
                     none => none.insert(GpuHeightMarch::new(gpu)?),
                 };
-                let Heights { samples, tile_size, facets, azimuths, transition_width } = heights;
+                let HeightMarchInput { samples, tile_size, facets, azimuths, transition_width } = heights;
                 GpuVisibility::HorizonMap(
                     march.horizon_map(gpu, samples, *tile_size, facets, *azimuths)?,
                     *transition_width,
@@ -127,7 +127,7 @@ impl GpuRenderer {
                     Some(slicer) => slicer,
                     none => none.insert(GpuSlicer::new(gpu)?),
                 };
-                let Sliced { grid, facets, azimuths, transition_width, overhangs } = &**of;
+                let SliceInput { grid, facets, azimuths, transition_width, overhangs } = &**of;
                 let computed = slicer.prepare(gpu, grid, facets, *azimuths, *overhangs)?;
                 if *overhangs {
                     GpuVisibility::OcclusionIntervals(computed, *transition_width)
@@ -140,7 +140,7 @@ impl GpuRenderer {
                     Some(maps) => maps,
                     none => none.insert(GpuShadowMaps::new(gpu)?),
                 };
-                let Maps { mesh, facets, grid, resolution } = &**of;
+                let ShadowMapInput { mesh, facets, grid, resolution } = &**of;
                 GpuVisibility::Maps(maps.maps(gpu, mesh, facets, &grid.directions(), *resolution)?, *grid)
             }
         };
