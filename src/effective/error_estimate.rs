@@ -349,6 +349,8 @@ impl ErrorEstimator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::compare;
+    use crate::pipeline::{Outcome, Pipeline};
 
     fn outcome(scene: &str, settings: &[&str]) -> Outcome {
         let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::cases::Case;
 use crate::evaluators::Evaluator;
 use crate::examination::{measured, pairs};
-use crate::hard_tiles::{HardTile, PAIRS_SEED, RayCast, Truth, all, measure};
+use crate::hard_tiles::{HardTile, Measured, PAIRS_SEED, RayCast, Truth, all, measure};
 use crate::invariants::{assert_none, violations};
 
 /// Tiles of the ordinary tests. Each has a closed form and takes less than a second.
@@ -114,5 +114,18 @@ fn rare_texels_and_slots_on_relief_are_not_missed() {
             eprintln!("{name}, seed {seed}: {:.1} % ± {:.1} %", 100.0 * error, 100.0 * truth.std_error);
             assert!(error < bound, "{name}, seed {seed}: {error}");
         }
+    }
+}
+
+#[test]
+fn grooves_whose_bottom_few_pairs_see_state_their_error() {
+    for name in ["grooves of 10 pitches", "grooves of 40 pitches"] {
+        let tile = all().into_iter().find(|tile| tile.name == name).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = tile.open(folder.path(), "draft", 1);
+        let (pairs, truth) = tile.pairs_and_values(&loaded, &RayCast { points: 1, max_passes: 1, target: 0.0 });
+        let Measured { errors, stated, .. } = measure(&loaded, "draft", 1, &pairs, &truth);
+        eprintln!("{name}: {:.1} %, stated {:.1} %", 100.0 * errors.rel_l2, 100.0 * stated);
+        assert!((errors.rel_l2 / 3.0..errors.rel_l2 * 3.0).contains(&stated), "{name}: {} {stated}", errors.rel_l2);
     }
 }
