@@ -215,7 +215,7 @@ mod tests {
             let texels = (0..side * side).map(|n| Vec3::splat(wave(n % side, n / side))).collect();
             let pyramid = Pyramid::new([side; 2], texels, true);
             for (major, minor, turn) in
-                [(2.0, 2.0, 0.0), (6.0, 6.0, 0.0), (8.0, 3.0, 0.0), (12.0, 4.0, 0.7), (9.0, 2.5, 1.5708)]
+                [(2.0, 2.0, 0.0), (6.0, 6.0, 0.0), (8.0, 3.0, 0.0), (12.0, 4.0, 0.7), (9.0, 2.5, 1.57)]
             {
                 let (u, v) = (major * Vec2::from_angle(turn), minor * Vec2::from_angle(turn).perp());
                 let covariance = [u.x * u.x + v.x * v.x, u.x * u.y + v.x * v.y, u.y * u.y + v.y * v.y];
