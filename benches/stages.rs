@@ -201,7 +201,7 @@ fn images(bench: &Bench, rods: &TileMesh, facets: &Facets, sliced: Visibility) -
     let lights: Vec<Vec3> = (0..32_u8).map(|k| from_angles(0.2 + 0.03 * f32::from(k), 2.4 * f32::from(k))).collect();
     let o = from_angles(0.6, 1.0);
     let grooves = tile("fig4b_bicolor_cup")?;
-    let groove_facets = facets_of(&grooves, Settings::of_preset(Preset::Standard).height_field_facets);
+    let groove_facets = facets_of(&grooves, Settings::of_preset(Preset::Standard).facets);
     let settings = Settings::of_preset(Preset::Standard);
     let horizon_map = HorizonMap::scan(
         &PeriodicGrid::for_slices(&grooves),

@@ -46,7 +46,7 @@ impl Pipeline {
         super::slab::refuse_slab(loaded)?;
         let scene = &loaded.scene;
         let tile = self.tile(loaded, times)?;
-        let mut settings = Settings::of(scene).for_shape(tile.height_field);
+        let mut settings = Settings::of(scene);
         let role = match processor {
             Processor::Cpu(Refinement::NONE) | Processor::Gpu { max_facets: None } => FacetsRole::Main,
             Processor::Cpu(refinement) => {

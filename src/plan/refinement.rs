@@ -85,7 +85,7 @@ mod tests {
     const BOUND: ErrorBound = ErrorBound { rel_l2: 0.1, psnr_db: Some(35.0) };
 
     fn settings() -> Settings {
-        Settings::of_preset(Preset::Standard).for_shape(true)
+        Settings::of_preset(Preset::Standard)
     }
 
     fn estimate(facets: f64, azimuths: f64, soft_step: f64) -> ErrorEstimate {

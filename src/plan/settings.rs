@@ -61,8 +61,6 @@ pub struct Settings {
     pub preset: Preset,
     /// Facets that sample the surface.
     pub facets: usize,
-    /// Facets of a tile without overhangs: no facet hides under others, so that fewer are as accurate.
-    pub height_field_facets: usize,
     /// Azimuths of horizon maps.
     pub horizon_azimuths: usize,
     /// Azimuths of occlusion intervals.
@@ -146,7 +144,6 @@ impl Settings {
             }
         };
         set(&mut settings.facets, quality.facets);
-        set(&mut settings.height_field_facets, quality.facets);
         if let Some(azimuths) = quality.azimuths {
             settings.horizon_azimuths = azimuths;
             settings.slice_azimuths = azimuths;
@@ -199,10 +196,9 @@ impl Settings {
     pub fn of_preset(preset: Preset) -> Self {
         let standard = Self {
             preset,
-            facets: 8192,
-            height_field_facets: 6144,
+            facets: 6144,
             horizon_azimuths: 48,
-            slice_azimuths: 48,
+            slice_azimuths: 40,
             map_grid: PolarGrid::new(32, 192),
             map_resolution: 256,
             penumbra: 0.02,
@@ -237,12 +233,11 @@ impl Settings {
         };
         match preset {
             Preset::Standard => standard,
-            Preset::Wu2011 => Self { facets: 12_000, height_field_facets: 12_000, map_resolution: 512, ..standard },
+            Preset::Wu2011 => Self { facets: 12_000, map_resolution: 512, ..standard },
             Preset::Draft => Self {
                 facets: 2048,
-                height_field_facets: 2048,
                 horizon_azimuths: 24,
-                slice_azimuths: 24,
+                slice_azimuths: 20,
                 map_grid: PolarGrid::new(20, 40),
                 map_resolution: 160,
                 keep_m: 0.999,
@@ -259,9 +254,8 @@ impl Settings {
             },
             Preset::Fine | Preset::Reference => Self {
                 facets: 32_768,
-                height_field_facets: 32_768,
                 horizon_azimuths: 96,
-                slice_azimuths: 192,
+                slice_azimuths: 128,
                 map_grid: PolarGrid::new(48, 192),
                 map_resolution: 384,
                 penumbra: 0.01,
@@ -304,12 +298,6 @@ impl Settings {
         };
         let elements = elements.min(self.facets);
         InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
-    }
-
-    /// The settings for a tile without overhangs, or with them.
-    pub fn for_shape(self, height_field: bool) -> Self {
-        let facets = if height_field { self.height_field_facets } else { self.facets };
-        Self { facets, ..self }
     }
 
     /// The settings of the low-rank representation.

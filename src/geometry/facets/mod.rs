@@ -3,6 +3,7 @@
 pub(crate) mod kd_tree;
 mod level;
 pub(crate) mod normal_bins;
+pub(crate) mod openness;
 pub(crate) mod order;
 pub(crate) mod strata;
 pub(crate) mod voronoi;

@@ -9,6 +9,7 @@ use crate::base::Result;
 use crate::brdf::{Brdf, Material, MaterialAssignment};
 use crate::cache::{Key, KeyBuilder};
 use crate::effective::mean_colors;
+use crate::geometry::facets::openness::Openness;
 use crate::geometry::facets::strata::colors_place_facets;
 use crate::geometry::{self, ColorField, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::pipeline::Env;
@@ -234,7 +235,16 @@ impl Stage for SampleFacets<'_> {
         let mut facets = match exact {
             Some(facets) => facets,
             None if settings.preset == Preset::Wu2011 => Facets::sample_wu2011(mesh, settings.facets, settings.seed),
-            None => FacetSampler::new(mesh).sample(mesh, settings.facets, SampleShift::from_seed(settings.seed)),
+            None => {
+                let (sampler, shift) = (FacetSampler::new(mesh), SampleShift::from_seed(settings.seed));
+                if self.tile.height_field {
+                    sampler.sample(mesh, settings.facets, shift)
+                } else {
+                    // Much of a surface that overhangs is hidden.
+                    let openness = Openness::measure(&sampler, mesh);
+                    sampler.sample_by_openness(mesh, settings.facets, shift, &openness)
+                }
+            }
         };
         if let Some(bins) = settings.normal_bins {
             facets.bin_normals(bins);
