@@ -187,7 +187,6 @@ impl TermSpec {
         ]
     }
 
-    /// The name in the scene file.
     /// The file of a measured BRDF; `None` for an analytic term.
     pub fn path(&self) -> Option<&Path> {
         match self {
@@ -196,6 +195,7 @@ impl TermSpec {
         }
     }
 
+    /// The name in the scene file.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Lambertian { .. } => "lambertian",
