@@ -195,6 +195,14 @@ impl TermSpec {
         }
     }
 
+    /// As [`TermSpec::path`].
+    pub fn path_mut(&mut self) -> Option<&mut PathBuf> {
+        match self {
+            Self::Merl { path } | Self::Rgl { path } | Self::Utia { path } | Self::Npz { path } => Some(path),
+            _ => None,
+        }
+    }
+
     /// The name in the scene file.
     pub fn kind(&self) -> &'static str {
         match self {
