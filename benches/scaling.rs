@@ -15,7 +15,7 @@ use biscale::geometry::{Facets, PeriodicGrid, TileMesh};
 use biscale::metrics::mirror_biased_pairs;
 use biscale::pipeline::Pipeline;
 use biscale::render::RenderScene;
-use biscale::render::image::shading::Background;
+use biscale::render::image::shading::ImageBackground;
 use biscale::render::render;
 use biscale::visibility::{HorizonMap, OcclusionIntervals, Visibility};
 use glam::{UVec2, Vec2, Vec3};
@@ -190,7 +190,7 @@ fn image(scene: &str, lights: usize, side: usize) -> Result<Work> {
     let mut render_scene = RenderScene::new(&loaded)?;
     render_scene.cache_shadows(&Pipeline::new())?;
     Ok(Box::new(move || {
-        let background = Background::default();
+        let background = ImageBackground::default();
         let rendered = render(&render_scene.input(&*shading_brdf.brdf, [side, side], 1, &background));
         black_box(rendered.is_ok());
     }))

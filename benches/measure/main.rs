@@ -70,6 +70,11 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("lobes", "nanoseconds per facet of each analytic lobe", in_lib("nanoseconds_per_facet")),
     ("map-resolution", "error and time of shadow maps against resolution", in_lib("resolution_against_error")),
     ("map-speed", "speed of shadow maps on the CPU and on the GPU", in_lib("speed_of_the_cpu_and_of_the_gpu")),
+    (
+        "seen-through",
+        "errors of images seen through slabs against 4096 paths: a minute",
+        in_lib("checkerboards_by_distance_and_times"),
+    ),
     ("slabs", "errors of the models of slabs against photons, and their times: minutes", Source::Here(slabs)),
     ("slice-steps", "cells and triangles that a slice visits", in_lib("steps_of_slices")),
     ("table-steps", "errors of shading tables against facets, azimuths and nodes", Source::Here(steps)),

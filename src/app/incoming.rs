@@ -13,7 +13,7 @@ use super::dialogs::{Dialog, Purpose};
 use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
-use super::views::brushes::Layer;
+use super::views::brushes::PaintLayer;
 use super::worker::{ExportJob, ExportKind, ExportResult, TableChoice};
 
 impl Editor {
@@ -24,10 +24,10 @@ impl Editor {
                 "mesh" => Purpose::TileMesh,
                 "object" => Purpose::ObjectMesh,
                 "environment" => Purpose::Environment,
-                "color_path" => Purpose::Paint(Layer::Colors),
-                "slot_path" => Purpose::Paint(Layer::Slots),
+                "color_path" => Purpose::Paint(PaintLayer::Colors),
+                "slot_path" => Purpose::Paint(PaintLayer::Slots),
                 _ if matches!(self.document.scene().tile.geometry, Geometry::Mesh(_)) => Purpose::TileMesh,
-                _ => Purpose::Paint(Layer::Heights),
+                _ => Purpose::Paint(PaintLayer::Heights),
             };
             self.browse(purpose, "");
         }
@@ -60,7 +60,7 @@ impl Editor {
                 }
                 None => return self.unknown_file(&path),
             },
-            Purpose::Paint(Layer::Heights) => match surface::of_file(&relative, &scene) {
+            Purpose::Paint(PaintLayer::Heights) => match surface::of_file(&relative, &scene) {
                 Some(geometry) => scene.tile.geometry = geometry,
                 None => return self.unknown_file(&path),
             },
@@ -68,8 +68,8 @@ impl Editor {
                 Some(geometry) => scene.tile.geometry = geometry,
                 None => return self.unknown_file(&path),
             },
-            Purpose::Paint(Layer::Colors) => scene.tile.color_path = Some(relative),
-            Purpose::Paint(Layer::Slots) => scene.tile.slot_path = Some(relative),
+            Purpose::Paint(PaintLayer::Colors) => scene.tile.color_path = Some(relative),
+            Purpose::Paint(PaintLayer::Slots) => scene.tile.slot_path = Some(relative),
             Purpose::ObjectMesh => {
                 "mesh".clone_into(&mut scene.object.kind);
                 scene.object.path = Some(relative);
@@ -164,7 +164,7 @@ impl Editor {
             }
             "obj" => self.use_file(ctx, Purpose::TileMesh, path),
             "hdr" | "exr" => self.use_file(ctx, Purpose::Environment, path),
-            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.use_file(ctx, Purpose::Paint(Layer::Heights), path),
+            "png" | "jpg" | "jpeg" | "tif" | "tiff" => self.use_file(ctx, Purpose::Paint(PaintLayer::Heights), path),
             _ => self.unknown_file(&path),
         }
     }
@@ -173,7 +173,8 @@ impl Editor {
         if let Some(worker) = &self.background.exports {
             self.messages.clear("export");
             self.exporting = Some((0.0, "Starting"));
-            worker.submit(ExportJob { loaded: Arc::new(self.document.loaded()), path, kind });
+            let (loaded, scene_file) = (Arc::new(self.document.loaded()), self.document.path.clone());
+            worker.submit(ExportJob { loaded, scene_file, path, kind });
         }
     }
 

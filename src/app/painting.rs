@@ -12,7 +12,7 @@ use super::editor::Editor;
 use super::messages::Level;
 use super::paint::{self, Stroke, Tool};
 use super::panels::paints;
-use super::views::brushes::{BrushRequest, Layer};
+use super::views::brushes::{BrushRequest, PaintLayer};
 use super::views::pointer::Pointer;
 
 impl Editor {
@@ -140,13 +140,13 @@ impl Editor {
         match request {
             BrushRequest::Open(layer) => self.browse(Purpose::Paint(layer), ""),
             BrushRequest::Save(layer) => self.browse(Purpose::SavePaint(layer), layer.file()),
-            BrushRequest::Clear(Layer::Heights) => {
+            BrushRequest::Clear(PaintLayer::Heights) => {
                 let size = self.document.painted().heights.as_ref().map_or(UVec2::splat(128), |image| image.size);
                 let plane = Pixels { size, values: vec![0.5; (size.x * size.y) as usize] };
                 self.document.paint_heights("Flatten all", plane, None);
             }
-            BrushRequest::Clear(Layer::Colors) => self.document.paint_colors("No colours", None),
-            BrushRequest::Clear(Layer::Slots) => {
+            BrushRequest::Clear(PaintLayer::Colors) => self.document.paint_colors("No colours", None),
+            BrushRequest::Clear(PaintLayer::Slots) => {
                 let scene = (**self.document.scene()).clone();
                 self.document.paint_slots("No painted materials", scene, None);
             }
@@ -155,12 +155,12 @@ impl Editor {
     }
 
     /// Writes one painted image to a file.
-    pub(super) fn save_image(&mut self, path: &Path, layer: Layer) {
+    pub(super) fn save_image(&mut self, path: &Path, layer: PaintLayer) {
         let loaded = self.document.loaded();
         let written = match layer {
-            Layer::Heights => paint::heights_of(&loaded).and_then(|image| write_heights(&image, path)),
-            Layer::Colors => paint::colors_of(&loaded).and_then(|image| write_colors(&image, path)),
-            Layer::Slots => paint::slots_of(&loaded).and_then(|image| write_slots(&image, path)),
+            PaintLayer::Heights => paint::heights_of(&loaded).and_then(|image| write_heights(&image, path)),
+            PaintLayer::Colors => paint::colors_of(&loaded).and_then(|image| write_colors(&image, path)),
+            PaintLayer::Slots => paint::slots_of(&loaded).and_then(|image| write_slots(&image, path)),
         };
         match written {
             Ok(()) => self.messages.put(Level::Note, "save", format!("Saved {}.", path.display())),

@@ -27,7 +27,7 @@ pub fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<()> {
         }
         Ok(there) => {
             if let Some(input) = inputs.iter().find(|input| is_same_file(input, path, &there)) {
-                let found = format!("an input of this command (`{}`)", input.display());
+                let found = format!("an input (`{}`)", input.display());
                 return Err(refused(found, "another place, so that the input stays"));
             }
         }

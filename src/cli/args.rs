@@ -274,7 +274,7 @@ pub struct TransmitArgs {
     pub method: Option<TransmitMethod>,
 }
 
-/// What simulated photographs show.
+/// The light that simulated photographs show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RigSource {
     /// The slab as `eval` computes it.
@@ -302,7 +302,7 @@ pub struct RigArgs {
     /// Relative noise of the pixels; a hundredth of it is added in the dark, relative to the brightest pixel.
     #[arg(long, default_value_t = 0.01, value_parser = super::parse_part)]
     pub noise: f64,
-    /// What the photographs show.
+    /// The light that the photographs show.
     #[arg(long, value_enum, default_value_t = RigSource::Model)]
     pub source: RigSource,
 }

@@ -4,8 +4,9 @@ use std::io::Write;
 use std::time::Instant;
 
 use crate::brdf::{Brdf, ColorBasis, MeasuredCache, Term, analytic_lobe};
-use crate::effective::{RotatedBasis, RotatedLobe};
+use crate::effective::{LowRankSettings, RotatedBasis, RotatedLobe};
 use crate::plan::Settings;
+use crate::scene::LoadedScene;
 use anyhow::Result;
 use serde::Serialize;
 
@@ -60,62 +61,67 @@ struct Paper {
 pub fn run(args: &SceneArgs) -> Result<()> {
     let (loaded, ()) = args.open(|loaded| super::slab::refuse(loaded, "basis"))?;
     let settings = Settings::from_quality(&loaded.scene.quality).low_rank(false);
-    let mut cache = MeasuredCache::default();
-    let mut rows = Vec::new();
-    let specs: Vec<(String, crate::scene::BrdfSpec)> = if loaded.scene.materials.is_empty() {
-        let default = loaded.scene.material_for_slot("default")?;
-        vec![(default.name.to_owned(), default.brdf.clone())]
-    } else {
-        let spec = |material: &crate::scene::MaterialSpec| -> Result<_> {
-            Ok((material.name.clone(), loaded.scene.material_for_slot(&material.name)?.brdf.clone()))
-        };
-        loaded.scene.materials.iter().map(spec).collect::<Result<_>>()?
-    };
     // All files are read before the first factorization, which may take minutes.
-    let mut brdfs = Vec::with_capacity(specs.len());
-    for (name, spec) in specs {
-        brdfs.push((name, Brdf::from_specs(&spec, &loaded.base_dir, &mut cache)?));
+    let brdfs = brdfs(&loaded)?;
+    let rows = brdfs.into_iter().map(|(name, brdf)| row(name, &brdf, &settings)).collect::<Result<Vec<Row>>>()?;
+    if args.json { print_json(&rows) } else { print(&rows) }
+}
+
+/// Name and BRDF of each material, or of the default material if the scene lists none.
+fn brdfs(loaded: &LoadedScene) -> Result<Vec<(String, Brdf)>> {
+    let scene = &loaded.scene;
+    let names: Vec<&str> = match scene.materials.as_slice() {
+        [] => vec![scene.material_for_slot("default")?.name],
+        materials => materials.iter().map(|material| material.name.as_str()).collect(),
+    };
+    let mut cache = MeasuredCache::default();
+    let brdf = |name: &str| -> Result<_> {
+        let material = scene.material_for_slot(name)?;
+        Ok((name.to_owned(), Brdf::from_specs(material.brdf, &loaded.base_dir, &mut cache)?))
+    };
+    names.into_iter().map(brdf).collect()
+}
+
+/// Factors the rotated basis of each term of a BRDF.
+fn row(name: String, brdf: &Brdf, settings: &LowRankSettings) -> Result<Row> {
+    const MIB: f64 = 1_048_576.0;
+    let start = Instant::now();
+    let mut bases = Vec::new();
+    for term in &brdf.terms {
+        let lobe = match (term, analytic_lobe(term)) {
+            (_, Some(lobe)) => RotatedLobe::Analytic(lobe),
+            (Term::Measured(table), None) => {
+                let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
+                RotatedLobe::Measured { table: table.as_ref(), along: colors.directions[0] }
+            }
+            _ => continue,
+        };
+        bases.push(RotatedBasis::new(lobe, settings.basis, settings.keep_m)?);
     }
-    for (name, brdf) in brdfs {
-        let start = Instant::now();
-        let mut bases = Vec::new();
-        for term in &brdf.terms {
-            let lobe = match (term, analytic_lobe(term)) {
-                (_, Some(lobe)) => RotatedLobe::Analytic(lobe),
-                (Term::Measured(table), None) => {
-                    let colors = ColorBasis::of(&Brdf { terms: vec![term.clone()] });
-                    RotatedLobe::Measured { table: table.as_ref(), along: colors.directions[0] }
-                }
-                _ => continue,
-            };
-            bases.push(RotatedBasis::new(lobe, settings.basis, settings.keep_m)?);
-        }
-        let seconds = start.elapsed().as_secs_f64();
-        let (pairs, columns) = (settings.basis.pairs.nodes(), settings.basis.columns());
-        const MIB: f64 = 1_048_576.0;
-        rows.push(Row {
-            paper: PAPER.iter().find(|row| row.0 == name).map(|row| Paper {
-                rows: row.1,
-                columns: row.2,
-                full_mb: row.3,
-                final_mb: row.4,
-                rank: row.5,
-                seconds: row.6,
-            }),
-            material: name,
-            rows: pairs,
-            columns,
-            full_mb: (pairs * columns * 8) as f64 / MIB,
-            final_mb: bases.iter().map(RotatedBasis::bytes).sum::<usize>() as f64 / MIB,
-            rank: bases.iter().map(|basis| basis.rank).sum(),
-            seconds,
-            kept_energy: bases.iter().map(|basis| basis.kept_energy).fold(1.0, f64::min),
-            rank_at_98_percent_norm: bases.iter().map(|basis| basis.rank_at(0.98 * 0.98)).sum(),
-        });
+    let (rows, columns) = (settings.basis.pairs.nodes(), settings.basis.columns());
+    Ok(Row {
+        paper: Paper::row(&name),
+        material: name,
+        rows,
+        columns,
+        full_mb: (rows * columns * 8) as f64 / MIB,
+        final_mb: bases.iter().map(RotatedBasis::bytes).sum::<usize>() as f64 / MIB,
+        rank: bases.iter().map(|basis| basis.rank).sum(),
+        seconds: start.elapsed().as_secs_f64(),
+        kept_energy: bases.iter().map(|basis| basis.kept_energy).fold(1.0, f64::min),
+        rank_at_98_percent_norm: bases.iter().map(|basis| basis.rank_at(0.98 * 0.98)).sum(),
+    })
+}
+
+impl Paper {
+    /// The row of a material in the paper's table.
+    fn row(material: &str) -> Option<Self> {
+        let &(_, rows, columns, full_mb, final_mb, rank, seconds) = PAPER.iter().find(|row| row.0 == material)?;
+        Some(Self { rows, columns, full_mb, final_mb, rank, seconds })
     }
-    if args.json {
-        return print_json(&rows);
-    }
+}
+
+fn print(rows: &[Row]) -> Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(
         out,
@@ -135,7 +141,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
             row.rank_at_98_percent_norm,
             row.seconds
         )?;
-        match row.paper {
+        match &row.paper {
             Some(p) => {
                 writeln!(out, "   ({} {} {} {} {} {})", p.rows, p.columns, p.full_mb, p.final_mb, p.rank, p.seconds)?
             }

@@ -11,7 +11,7 @@ use crate::base::{Error, InputError, check_output, print_on_stderr, replace_file
 use crate::diagnostics::Health;
 use crate::render::image::pixels::Image;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
-use crate::slab::capture::rig::{FILE, Rig};
+use crate::slab::capture::rig::{Camera, FILE, Rig};
 use crate::slab::capture::sheet::{CaptureSettings, Captured, capture};
 
 /// Files that the command writes, by their endings.
@@ -51,8 +51,8 @@ impl<'a> Outputs<'a> {
 pub fn run(args: &CaptureArgs) -> Result<()> {
     let outputs = Outputs::new(&args.output)?;
     let rig = Rig::read(&args.folder)?;
-    let input = args.folder.join(FILE);
-    args.output.iter().try_for_each(|output| check_output(output, std::slice::from_ref(&input)))?;
+    let inputs = inputs(&args.folder, &rig);
+    args.output.iter().try_for_each(|output| check_output(output, &inputs))?;
     let settings = CaptureSettings {
         alpha: args.alpha,
         every_pixel: args.every_pixel,
@@ -75,6 +75,17 @@ pub fn run(args: &CaptureArgs) -> Result<()> {
         map(&captured).write(path, &ToneMap { curve: ToneCurve::Plain, gain: 1.0 })?;
     }
     report(args, &captured)
+}
+
+/// The files that the command reads: the rig, and every image that it names.
+fn inputs(folder: &Path, rig: &Rig) -> Vec<PathBuf> {
+    let dots = rig.dots().len();
+    let of_camera = |camera: &Camera| -> Vec<PathBuf> {
+        let images = (0..dots * camera.times().len()).map(|k| camera.image(k % dots, k / dots));
+        images.chain(camera.dark.clone()).collect()
+    };
+    let names = rig.cameras.iter().flat_map(of_camera).chain([PathBuf::from(FILE)]);
+    names.map(|name| folder.join(name)).collect()
 }
 
 /// A scene with the captured sheet.

@@ -7,11 +7,13 @@ use std::path::Path;
 use crate::base::csv::CsvFile;
 use crate::base::{Error, require_finite};
 use crate::diagnostics::Health;
-use crate::effective::{ErrorEstimate, Reflectance};
+use crate::effective::{ErrorEstimate, ErrorEstimator, Reflectance};
 use crate::math::directions::from_angles;
 use crate::metrics::Pair;
+use crate::pipeline::Pipeline;
 use crate::plan::{Preset, Settings};
 use crate::reference::ReferenceSettings;
+use crate::scene::LoadedScene;
 use anyhow::Result;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -33,82 +35,24 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         check_outputs(&args.scene.scene, loaded, &[&args.pairs], [&args.output])?;
         Ok(read(&args.pairs)?)
     })?;
-    let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
     let settings = Settings::from_quality(&loaded.scene.quality);
     let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cache(cache.clone());
-    let health;
-    let mut representation = "reference sum".to_owned();
-    let mut error = None;
-    let (values, errors): (Vec<Vec3>, Vec<Vec3>) = if loaded.scene.slab.is_some() {
-        let directions: Vec<(DVec3, DVec3)> = rows.iter().map(Row::any_side).collect();
-        let slab = slab::eval(&mut pipeline, &loaded, &directions, args.scene.quiet)?;
-        args.scene.warn(&slab.health);
-        health = slab.health;
-        representation = slab.representation;
-        (slab.values, slab.errors)
+    let evaluation = if loaded.scene.slab.is_some() {
+        of_slab(args, &mut pipeline, &loaded, &rows)?
     } else if settings.preset == Preset::Reference {
-        let reference = ReferenceSettings {
-            facets: settings.reference_facets,
-            max_passes: settings.reference_passes,
-            target: 2e-3,
-            seed: settings.seed,
-        };
-        let bar = progress(settings.reference_passes, args.scene.quiet);
-        let estimates = pipeline.with_reference(&loaded, |evaluator| {
-            evaluator.estimate(&pairs, &reference, |passes, error| {
-                bar.set_position(passes as u64);
-                bar.set_message(format!("standard error {:.2} %", error * 100.0));
-                true
-            })
-        })?;
-        bar.finish_and_clear();
-        health = pipeline.input_health(&loaded)?;
-        args.scene.warn(&health);
-        estimates.iter().map(|estimate| (estimate.f_bar, estimate.standard_error)).unzip()
+        of_reference(args, &pipeline, &loaded, &settings, &rows)?
     } else {
-        let watch = Watch::new(args.scene.quiet);
-        pipeline.set_cancel(watch.cancel());
-        let outcome = pipeline.effective(&loaded)?;
-        drop(watch);
-        args.scene.notes(&outcome);
-        health = outcome.health().clone();
-        representation = outcome.brdf.representation.describe();
-        let values: Vec<Vec3> = pairs
-            .par_iter()
-            .map(|pair| {
-                let mut out = [Vec3::ZERO];
-                outcome.brdf.eval_lights(&[pair.i], pair.o, &mut out);
-                out[0]
-            })
-            .collect();
-        let stated = if args.standard_error || args.scene.json { outcome.errors() } else { None };
-        let errors = match stated {
-            Some(estimator) => {
-                error = Some(estimator.estimate());
-                if args.standard_error { estimator.standard_errors(&pairs) } else { Vec::new() }
-            }
-            None => Vec::new(),
-        };
-        (values, errors)
+        of_outcome(args, &mut pipeline, &loaded, &rows)?
     };
-    let mut text = format!("{HEADER},r,g,b{}\n", if args.standard_error { ",se_r,se_g,se_b" } else { "" });
-    let of_pair = errors.iter().copied().chain(std::iter::repeat(Vec3::NAN));
-    for ((row, value), error) in rows.iter().zip(&values).zip(of_pair) {
-        let [a, b, c, d] = row.angles;
-        let _ = write!(text, "{a},{b},{c},{d},{},{},{}", value.x, value.y, value.z);
-        if args.standard_error {
-            let cell = |error: f32| if error.is_nan() { String::new() } else { error.to_string() };
-            let _ = write!(text, ",{},{},{}", cell(error.x), cell(error.y), cell(error.z));
-        }
-        text.push('\n');
-    }
     cache::finish(&cache, args.scene.quiet);
+    let Evaluation { values, errors, representation, error, health } = evaluation;
     require_finite(&values)?;
     if args.standard_error {
         require_finite(&errors)?;
     }
+    let text = table(&rows, &values, args.standard_error.then_some(&errors));
     if args.output == Path::new("-") {
         std::io::stdout().lock().write_all(text.as_bytes())?;
         return Ok(());
@@ -119,6 +63,93 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         return print_json(&Report { output, pairs: values.len(), representation, error, health });
     }
     Ok(())
+}
+
+/// Values of f̄ at the pairs, and a description of the result that they come from.
+struct Evaluation {
+    values: Vec<Vec3>,
+    /// Standard errors; empty if they were not computed.
+    errors: Vec<Vec3>,
+    representation: String,
+    error: Option<ErrorEstimate>,
+    health: Health,
+}
+
+fn of_slab(args: &EvalArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, rows: &[Row]) -> Result<Evaluation> {
+    let directions: Vec<(DVec3, DVec3)> = rows.iter().map(Row::any_side).collect();
+    let slab = slab::eval(pipeline, loaded, &directions, args.scene.quiet)?;
+    args.scene.warn(&slab.health);
+    let (values, errors, representation, health) = (slab.values, slab.errors, slab.representation, slab.health);
+    Ok(Evaluation { values, errors, representation, error: None, health })
+}
+
+fn of_reference(
+    args: &EvalArgs,
+    pipeline: &Pipeline,
+    loaded: &LoadedScene,
+    settings: &Settings,
+    rows: &[Row],
+) -> Result<Evaluation> {
+    let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
+    let reference = ReferenceSettings {
+        facets: settings.reference_facets,
+        max_passes: settings.reference_passes,
+        target: 2e-3,
+        seed: settings.seed,
+    };
+    let bar = progress(settings.reference_passes, args.scene.quiet);
+    let estimates = pipeline.with_reference(loaded, |evaluator| {
+        evaluator.estimate(&pairs, &reference, |passes, error| {
+            bar.set_position(passes as u64);
+            bar.set_message(format!("standard error {:.2} %", error * 100.0));
+            true
+        })
+    })?;
+    bar.finish_and_clear();
+    let health = pipeline.input_health(loaded)?;
+    args.scene.warn(&health);
+    let (values, errors) = estimates.iter().map(|estimate| (estimate.f_bar, estimate.standard_error)).unzip();
+    Ok(Evaluation { values, errors, representation: "reference sum".to_owned(), error: None, health })
+}
+
+fn of_outcome(args: &EvalArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, rows: &[Row]) -> Result<Evaluation> {
+    let watch = Watch::new(args.scene.quiet);
+    pipeline.set_cancel(watch.cancel());
+    let outcome = pipeline.effective(loaded)?;
+    drop(watch);
+    args.scene.notes(&outcome);
+    let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
+    let value = |pair: &Pair| {
+        let mut out = [Vec3::ZERO];
+        outcome.brdf.eval_lights(&[pair.i], pair.o, &mut out);
+        out[0]
+    };
+    let values = pairs.par_iter().map(value).collect();
+    let estimator = if args.standard_error || args.scene.json { outcome.errors() } else { None };
+    let errors = estimator.filter(|_| args.standard_error).map(|estimator| estimator.standard_errors(&pairs));
+    Ok(Evaluation {
+        values,
+        errors: errors.unwrap_or_default(),
+        representation: outcome.brdf.representation.describe(),
+        error: estimator.map(ErrorEstimator::estimate),
+        health: outcome.health().clone(),
+    })
+}
+
+/// The values as CSV, with standard errors if they are wanted; unknown ones are empty cells.
+fn table(rows: &[Row], values: &[Vec3], errors: Option<&Vec<Vec3>>) -> String {
+    let mut text = format!("{HEADER},r,g,b{}\n", if errors.is_some() { ",se_r,se_g,se_b" } else { "" });
+    for (k, (row, value)) in rows.iter().zip(values).enumerate() {
+        let [a, b, c, d] = row.angles;
+        let _ = write!(text, "{a},{b},{c},{d},{},{},{}", value.x, value.y, value.z);
+        if let Some(errors) = errors {
+            let error = errors.get(k).copied().unwrap_or(Vec3::NAN);
+            let cell = |error: f32| if error.is_nan() { String::new() } else { error.to_string() };
+            let _ = write!(text, ",{},{},{}", cell(error.x), cell(error.y), cell(error.z));
+        }
+        text.push('\n');
+    }
+    text
 }
 
 /// JSON that `--json` prints if the values go to a file.

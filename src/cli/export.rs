@@ -7,8 +7,8 @@ use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::export;
 use crate::export::slab::SlabFormat;
-use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
-use crate::pipeline::SlabOutcome;
+use crate::export::{ExportMeta, ExportOptions, ExportReport, ExportResolution, RadianceBasis};
+use crate::pipeline::{Outcome, SlabOutcome};
 use crate::scene::LoadedScene;
 use crate::slab::DiscLobe;
 use anyhow::Result;
@@ -47,25 +47,10 @@ struct Report<'a> {
 pub fn run(args: &ExportArgs) -> Result<()> {
     let to_stdout = args.output == Path::new("-");
     let outputs = if to_stdout { Vec::new() } else { export::outputs(&args.output)? };
-    let options = ExportOptions {
-        resolution: resolution(args),
-        radiance: match args.radiance {
-            RadianceArg::Klems => RadianceBasis::Klems,
-            RadianceArg::TensorTree => RadianceBasis::TensorTree,
-        },
-    };
-    if let Some(resolution) = &options.resolution {
-        resolution.check()?;
-    }
+    let options = options(args)?;
     let (loaded, ()) = args.scene.open(|loaded| {
         if loaded.scene.slab.is_some() {
-            if SlabFormat::of(&args.output)? == SlabFormat::Mitsuba {
-                export::mitsuba::check(loaded)?;
-            }
-            if options.radiance != RadianceBasis::Klems {
-                let expected = "klems, the basis of slabs";
-                return Err(crate::Error::from(InputError::new("--radiance", "tensor-tree", expected)).into());
-            }
+            check_slab(args, loaded, &options)?;
         }
         check_outputs(&args.scene.scene, loaded, &[], &outputs)
     })?;
@@ -96,7 +81,38 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     bar.finish_and_clear();
     let report = report?;
     cache::finish(&cache, args.scene.quiet);
-    let reading = report.reading;
+    print_report(args, &outcome, &report)
+}
+
+/// The options of the table, checked.
+fn options(args: &ExportArgs) -> Result<ExportOptions> {
+    let options = ExportOptions {
+        resolution: resolution(args),
+        radiance: match args.radiance {
+            RadianceArg::Klems => RadianceBasis::Klems,
+            RadianceArg::TensorTree => RadianceBasis::TensorTree,
+        },
+    };
+    if let Some(resolution) = &options.resolution {
+        resolution.check()?;
+    }
+    Ok(options)
+}
+
+/// Checks that the format and the options suit a slab.
+fn check_slab(args: &ExportArgs, loaded: &LoadedScene, options: &ExportOptions) -> Result<(), crate::Error> {
+    if SlabFormat::of(&args.output)? == SlabFormat::Mitsuba {
+        export::mitsuba::check(loaded)?;
+    }
+    if options.radiance != RadianceBasis::Klems {
+        return Err(InputError::new("--radiance", "tensor-tree", "klems, the basis of slabs").into());
+    }
+    Ok(())
+}
+
+/// Prints size, errors and reflectances of a table, as JSON or in words on standard error.
+fn print_report(args: &ExportArgs, outcome: &Outcome, report: &ExportReport) -> Result<()> {
+    let reading = &report.reading;
     let mut health = outcome.health().clone();
     if !(0.0..=MAX_RESAMPLING_ERROR).contains(&reading.errors.rel_l2) {
         let warning = "the table misses most of the highlights: raise --resolution or the roughness, or choose a \
@@ -124,28 +140,32 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         });
     }
     if !args.scene.quiet {
-        print_on_stderr(format_args!(
-            "{} pairs, {} bytes; the table differs from eval by {:.1} % in the mean and {:.1} % ({:.1} dB) in \
-             relative L2",
-            report.pairs,
-            report.bytes,
-            100.0 * reading.mean,
-            100.0 * reading.errors.rel_l2,
-            reading.errors.psnr_db
-        ));
-        if let Some(lost) = report.anisotropy_lost {
-            print_on_stderr(format_args!(
-                "the format is isotropic: differences of {:.1} % (relative L2) between azimuths of the tile are lost",
-                100.0 * lost
-            ));
-        }
-        print_on_stderr("directional-hemispherical reflectance (R G B):");
-        report.reflectances.lines().iter().for_each(|line| print_on_stderr(format_args!("  {line}")));
-        if let Some(note) = &report.note {
-            print_on_stderr(format_args!("{} describes the conventions and the scene", note.display()));
-        }
+        describe(report);
     }
     Ok(())
+}
+
+/// Describes a table on standard error.
+fn describe(report: &ExportReport) {
+    print_on_stderr(format_args!(
+        "{} pairs, {} bytes; the table differs from eval by {:.1} % in the mean and {:.1} % ({:.1} dB) in relative L2",
+        report.pairs,
+        report.bytes,
+        100.0 * report.reading.mean,
+        100.0 * report.reading.errors.rel_l2,
+        report.reading.errors.psnr_db
+    ));
+    if let Some(lost) = report.anisotropy_lost {
+        print_on_stderr(format_args!(
+            "the format is isotropic: differences of {:.1} % (relative L2) between azimuths of the tile are lost",
+            100.0 * lost
+        ));
+    }
+    print_on_stderr("directional-hemispherical reflectance (R G B):");
+    report.reflectances.lines().iter().for_each(|line| print_on_stderr(format_args!("  {line}")));
+    if let Some(note) = &report.note {
+        print_on_stderr(format_args!("{} describes the conventions and the scene", note.display()));
+    }
 }
 
 /// Writes a slab.

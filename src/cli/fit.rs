@@ -8,7 +8,7 @@ use crate::effective::Reflectance;
 use crate::fit;
 use crate::fit::{Fit, Model};
 use crate::pipeline::SlabOutcome;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
 use crate::render::{Image, RenderScene};
@@ -145,7 +145,7 @@ fn kind(path: &Path) -> Result<OutputKind, Error> {
 
 /// Renders the object in each material, from left to right. The differences from the first image are below them.
 fn side_by_side(render_scene: &RenderScene, materials: &[&dyn Reflectance], size: [usize; 2]) -> Result<Image> {
-    let background = Background::Uniform(Vec3::ZERO);
+    let background = ImageBackground::Uniform(Vec3::ZERO);
     let mut images = Vec::new();
     for &reflectance in materials {
         images.push(render(&render_scene.input(reflectance, size, 2, &background))?.image);

@@ -5,7 +5,9 @@ use std::io::Write;
 use std::time::Instant;
 
 use crate::base::{Cancel, Error, InputError};
+use crate::pipeline::{Outcome, Pipeline, ShadingBrdf, StageTimes};
 use crate::render::RenderScene;
+use crate::scene::LoadedScene;
 use anyhow::Result;
 use serde::Serialize;
 
@@ -47,18 +49,14 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     args.scene.notes(&outcome);
     let mut to_image = if args.image { Some(ToImage::new(&loaded, &outcome, args.size)?) } else { None };
     let mut representation = outcome.brdf.representation.describe();
-    let mut camera = if args.edit == Some(EditArg::Camera) {
-        let mut render_scene = RenderScene::with(&pipeline, &loaded)?;
-        let path = RenderPath::of(&render_scene, &outcome)?;
-        // A camera edit changes neither the shading BRDF nor the shadows of the object.
-        render_scene.cache_shadows(&pipeline)?;
-        let shading_brdf = path.shading_brdf(&outcome, &Cancel::default())?;
-        representation = shading_brdf.brdf.representation.describe();
-        Some((render_scene, path, shading_brdf))
-    } else {
-        None
+    let mut camera = match args.edit {
+        Some(EditArg::Camera) => Some(CameraEdit::new(&pipeline, &loaded, &outcome)?),
+        _ => None,
     };
-    let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
+    if let Some(camera) = &camera {
+        representation = camera.shading_brdf.brdf.representation.describe();
+    }
+    let mut runs: Vec<(f64, StageTimes)> = Vec::new();
     for run in 0..=args.repeat {
         let start = Instant::now();
         let times = match (&mut camera, args.edit) {
@@ -68,10 +66,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
                 representation.clone_from(&to_image.representation);
                 times
             }
-            (Some((render_scene, path, shading_brdf)), _) => {
-                let times = path.show(render_scene, &shading_brdf.brdf, args.size)?;
-                vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)]
-            }
+            (Some(camera), _) => camera.run(args.size)?,
             (None, Some(_)) => {
                 // Runs alternate between the two scenes, so that each run is an edit.
                 outcome = pipeline.effective(if run % 2 == 0 { &edited } else { &loaded })?;
@@ -88,22 +83,40 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
             runs.push((total, times));
         }
     }
-    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
-    for (_, times) in &runs {
-        for (name, ms) in times {
-            stages.entry(name).or_default().push(*ms);
-        }
-    }
     let report = Report {
-        stages: stages.into_iter().map(|(name, ms)| (name, median(ms))).collect(),
+        stages: medians(&runs),
         total_ms: median(runs.iter().map(|run| run.0).collect()),
         edited: parameter,
         runs: args.repeat,
         representation,
     };
-    if args.scene.json {
-        return print_json(&report);
+    if args.scene.json { print_json(&report) } else { print(&report) }
+}
+
+/// A move of the camera, which changes neither the shading BRDF nor the shadows of the object.
+struct CameraEdit {
+    render_scene: RenderScene,
+    path: RenderPath,
+    shading_brdf: ShadingBrdf,
+}
+
+impl CameraEdit {
+    fn new(pipeline: &Pipeline, loaded: &LoadedScene, outcome: &Outcome) -> Result<Self> {
+        let mut render_scene = RenderScene::with(pipeline, loaded)?;
+        let path = RenderPath::of(&render_scene, outcome)?;
+        render_scene.cache_shadows(pipeline)?;
+        let shading_brdf = path.shading_brdf(outcome, &Cancel::default())?;
+        Ok(Self { render_scene, path, shading_brdf })
     }
+
+    /// Renders the image and returns the milliseconds of its stages.
+    fn run(&mut self, size: [usize; 2]) -> Result<StageTimes> {
+        let times = self.path.show(&self.render_scene, &self.shading_brdf.brdf, size)?;
+        Ok(vec![("g_buffer", times.gbuffer_ms), ("shadows", times.shadows_ms), ("shading", times.shading_ms)])
+    }
+}
+
+fn print(report: &Report) -> Result<()> {
     let mut out = std::io::stdout().lock();
     if let Some(edited) = &report.edited {
         writeln!(out, "edited {edited}")?;
@@ -117,6 +130,15 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
         "total", report.total_ms, report.runs, report.representation
     )?;
     Ok(())
+}
+
+/// The median milliseconds of each stage over the runs in which it ran.
+fn medians(runs: &[(f64, StageTimes)]) -> BTreeMap<&'static str, f64> {
+    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
+    for (name, ms) in runs.iter().flat_map(|(_, times)| times) {
+        stages.entry(name).or_default().push(*ms);
+    }
+    stages.into_iter().map(|(name, ms)| (name, median(ms))).collect()
 }
 
 fn no_parameter(place: &str) -> Error {

@@ -6,7 +6,7 @@ use crate::base::{Cancel, GpuError};
 use crate::effective::EffectiveBrdf;
 use crate::pipeline::{Outcome, ShadingBrdf};
 use crate::render::image::render::RenderTimes;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::{RenderScene, Rendered, render};
 
 #[cfg(feature = "gpu")]
@@ -48,7 +48,7 @@ impl RenderPath {
         size: [usize; 2],
         samples_per_side: usize,
     ) -> Result<Rendered> {
-        let background = Background::default();
+        let background = ImageBackground::default();
         let input = scene.input(brdf, size, samples_per_side, &background);
         match self {
             Self::Cpu { .. } => Ok(render(&input)?),
@@ -118,7 +118,7 @@ pub mod on_gpu {
     use crate::pipeline::{Outcome, ShadingBrdf};
     use crate::plan::Backend;
     use crate::render::image::render::RenderTimes;
-    use crate::render::image::shading::Background;
+    use crate::render::image::shading::ImageBackground;
     use crate::render::image::tone_map::ToneMap;
     use crate::render::{RenderInput, RenderScene, Rendered, render};
 
@@ -173,7 +173,7 @@ pub mod on_gpu {
                     &none.insert((size, texture.create_view(&Default::default()))).1
                 }
             };
-            let background = Background::default();
+            let background = ImageBackground::default();
             let input = scene.input(brdf, size, 1, &background);
             Ok(renderer.show(gpu, &input, &ToneMap::new(&scene.camera)?, image, &Cancel::default())?)
         }

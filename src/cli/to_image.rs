@@ -8,7 +8,7 @@ use crate::base::Cancel;
 use crate::base::Error;
 use crate::pipeline::{Outcome, Pipeline, StageTimes};
 use crate::render::image::render::RenderTimes;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::{RenderScene, render};
 use crate::scene::LoadedScene;
 
@@ -63,7 +63,7 @@ impl ToImage {
         let outcome = pipeline.effective(loaded)?;
         let shading = outcome.shading_brdf(&Cancel::default())?;
         self.representation = shading.brdf.representation.describe();
-        let background = Background::default();
+        let background = ImageBackground::default();
         let input = self.scene.input(&*shading.brdf, self.size, 1, &background);
         let mut times = outcome.times;
         times.push(("picture_table", shading.ms));
@@ -91,7 +91,7 @@ mod on_gpu {
     use crate::effective::Black;
     use crate::gpu::{Gpu, GpuRenderer, Tier};
     use crate::pipeline::{Outcome, Pipeline, StageTimes};
-    use crate::render::image::shading::Background;
+    use crate::render::image::shading::ImageBackground;
     use crate::render::image::tone_map::ToneMap;
     use crate::render::{RenderScene, render};
     use crate::scene::LoadedScene;
@@ -121,7 +121,7 @@ mod on_gpu {
             scene: &RenderScene,
             size: [usize; 2],
         ) -> Result<(StageTimes, String)> {
-            let (cancel, background) = (Cancel::default(), Background::default());
+            let (cancel, background) = (Cancel::default(), ImageBackground::default());
             let tone_map = ToneMap::new(&scene.camera)?;
             let Self { gpu, renderer, view } = self;
             let computes_tile = gpu.tier == Tier::Hardware || loaded.scene.quality.backend == "gpu";

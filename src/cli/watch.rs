@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 
 use super::progress_bar;
 
-/// Time between two looks at the computation.
+/// Interval between two checks of the computation.
 const INTERVAL: Duration = Duration::from_millis(100);
 /// A computation that takes longer is noted, with an estimate of its time.
 const UNNOTED: Duration = Duration::from_secs(2);

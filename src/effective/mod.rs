@@ -24,7 +24,7 @@ pub use error_estimate::{ErrorBound, ErrorEstimate, ErrorEstimator};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
-pub use low_rank::{Channel, Factors, LowRank, LowRankSettings};
+pub use low_rank::{ChannelTables, Factors, LowRank, LowRankSettings};
 
 pub use shading_table::content::TableContent;
 #[cfg(feature = "gpu")]

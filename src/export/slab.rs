@@ -17,7 +17,7 @@ pub enum SlabFormat {
     Mitsuba,
 }
 
-/// What was written.
+/// A report on the files that were written.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SlabWritten {
     /// A file beside it that describes the conventions.

@@ -56,7 +56,7 @@ pub struct Env {
     images: Arc<Mutex<Vec<(AnyImage, Key)>>>,
 }
 
-/// Files of more bytes are told apart by length and time of modification alone.
+/// Files of more bytes are distinguished by length and time of modification alone.
 const MAX_HASHED_FILE: u64 = 1 << 30;
 
 /// A file that was modified less than this before it was read may change again within the resolution of its time stamp.

@@ -65,7 +65,7 @@ impl Pipeline {
             Some(inputs) => inputs,
             None => self.tile_inputs(loaded, Processor::Gpu { max_facets: None }, &mut times)?,
         };
-        let TileInputs { tile, facets, sum, plan, settings, .. } = &inputs;
+        let TileInputs { tile, sum, plan, settings, .. } = &inputs;
         if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
             return Ok(None);
         }
@@ -79,11 +79,40 @@ impl Pipeline {
             azimuths: grid.azimuths.min(MAX_HALF_VECTORS[1]),
             ..*grid
         });
-        let [of_horizons, of_intervals] = MAX_AZIMUTHS.map(|most| if grid.is_some() { most } else { usize::MAX });
+        let visibility_input = self.gpu_visibility(&inputs, grid.is_some(), &mut times)?;
+        let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORS_FROM);
+        let mirrors = if is_large && settings.effects.mirror_symmetry != Switch::Off {
+            let cells = match &visibility_input {
+                GpuVisibilityInput::OcclusionIntervals(sliced) => Some(&*sliced.grid),
+                _ => None,
+            };
+            *self.get(FindMirrorPlanes { tile, cells }, &mut times)?
+        } else {
+            [false; 2]
+        };
+        let base_area = f64::from(tile.mesh.base_area());
+        let nodes = grid.map(|grid| Nodes { mirrors, facets: Some(FACETS_PER_HALF_VECTOR), ..Nodes::all(grid) });
+        let notes = tile.mesh.notes.clone();
+        let TileInputs { sum, plan, settings, .. } = inputs;
+        let interpolation = settings.interpolation;
+        let input = GpuTileInput { sum, visibility_input, base_area, nodes, interpolation };
+        Ok(Some(GpuTile { input, plan, settings, times, notes }))
+    }
+
+    /// The input from which the GPU computes visibility by the plan's algorithm, or visibility by the CPU. A table
+    /// needs fewer azimuths.
+    fn gpu_visibility(
+        &self,
+        inputs: &TileInputs,
+        for_table: bool,
+        times: &mut StageTimes,
+    ) -> Result<GpuVisibilityInput> {
+        let TileInputs { tile, facets, plan, settings, .. } = inputs;
+        let [of_horizons, of_intervals] = MAX_AZIMUTHS.map(|most| if for_table { most } else { usize::MAX });
         let of_horizons = settings.horizon_azimuths.min(of_horizons);
         let of_intervals = settings.slice_azimuths.min(of_intervals);
         let (mesh, facets) = (&tile.mesh, facets.value.clone());
-        let visibility_input = match (plan.algorithm, &mesh.height_grid) {
+        Ok(match (plan.algorithm, &mesh.height_grid) {
             (VisibilityAlgorithm::HeightMarch, Some(samples)) => GpuVisibilityInput::Heights(HeightMarchInput {
                 samples: samples.clone(),
                 tile_size: mesh.size,
@@ -102,36 +131,19 @@ impl Pipeline {
                 }))
             }
             (VisibilityAlgorithm::None | VisibilityAlgorithm::HeightMarch, _) => {
-                GpuVisibilityInput::Computed(self.visibility(&inputs, &mut times)?.value)
+                GpuVisibilityInput::Computed(self.visibility(inputs, times)?.value)
             }
             (algorithm, _) => {
                 let overhangs = algorithm != VisibilityAlgorithm::HorizonScan;
                 GpuVisibilityInput::OcclusionIntervals(Box::new(SliceInput {
-                    grid: self.get(BuildCells { tile }, &mut times)?.value,
+                    grid: self.get(BuildCells { tile }, times)?.value,
                     facets,
                     azimuths: if overhangs { of_intervals } else { of_horizons },
                     transition_width: settings.penumbra,
                     overhangs,
                 }))
             }
-        };
-        let is_large = grid.is_some_and(|grid| grid.nodes() > MIRRORS_FROM);
-        let mirrors = if is_large && settings.effects.mirror_symmetry != Switch::Off {
-            let cells = match &visibility_input {
-                GpuVisibilityInput::OcclusionIntervals(sliced) => Some(&*sliced.grid),
-                _ => None,
-            };
-            *self.get(FindMirrorPlanes { tile, cells }, &mut times)?
-        } else {
-            [false; 2]
-        };
-        let base_area = f64::from(mesh.base_area());
-        let nodes = grid.map(|grid| Nodes { mirrors, facets: Some(FACETS_PER_HALF_VECTOR), ..Nodes::all(grid) });
-        let notes = mesh.notes.clone();
-        let TileInputs { sum, plan, settings, .. } = inputs;
-        let interpolation = settings.interpolation;
-        let input = GpuTileInput { sum, visibility_input, base_area, nodes, interpolation };
-        Ok(Some(GpuTile { input, plan, settings, times, notes }))
+        })
     }
 
     /// The inputs with few facets, if the tile has few distinct normals and a horizon map. More facets are taken if one

@@ -12,7 +12,7 @@ use crate::cache::Key;
 use crate::effective::{Direct, EffectiveBrdf, Factors, LowRank, Representation, VisibilityRows};
 use crate::geometry::Facets;
 use crate::metrics::{Errors, Pair, mirror_biased_pairs, upper_errors};
-use crate::plan::{Method, Settings};
+use crate::plan::{ProductMethod, Settings};
 use crate::visibility::Visibility;
 
 /// Pairs on which the low-rank representation is compared with the direct sum.
@@ -78,7 +78,7 @@ impl Pipeline {
     ) -> Result<(EffectiveBrdf, Errors)> {
         let low_rank_settings = settings.low_rank(inputs.whole_sphere);
         let check = FactorCheck::new(direct, inputs.base_area, settings.seed);
-        let forced = settings.method == Method::LowRank;
+        let forced = settings.method == ProductMethod::LowRank;
         let is_close = |errors: Errors| errors.rel_l2 <= settings.tolerance && errors.psnr_db >= settings.tolerance_db;
         let with_tables = |tables: &LowRank| EffectiveBrdf {
             representation: Representation::LowRank(tables.recolored(inputs.materials)),

@@ -53,9 +53,10 @@ use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
 use crate::cache::{Cache, Key, KeyBuilder};
 use crate::diagnostics::{Health, HealthInputs, VisibilityInput};
-use crate::effective::{EffectiveBrdf, Representation};
+use crate::effective::{Direct, EffectiveBrdf, Representation};
 use crate::geometry::{Facets, TileMesh};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
+use crate::metrics::Errors;
 use crate::plan::{Preset, Refinement, Settings, VisibilityAlgorithm};
 use crate::reference::Reference;
 use crate::scene::{LoadedScene, Scene, Switch};
@@ -225,38 +226,21 @@ impl Pipeline {
         }
         self.env.cancel.check()?;
         let refined = self.refined_sum(loaded, inputs, visibility, &mut times)?;
+        let outcome = self.outcome_of(&loaded.scene, refined, times)?;
+        *lock(&self.last_outcome) = Some((key, outcome.clone()));
+        Ok(outcome)
+    }
+
+    /// The outcome of a direct sum: its factors if the plan tries them and they pass their check, interreflection, and
+    /// the representation that images read.
+    fn outcome_of(&self, scene: &Scene, refined: RefinedSum, mut times: StageTimes) -> Result<Outcome> {
         let refinement_note = refined.note();
         let RefinedSum { inputs, visibility, direct, estimator, .. } = refined;
         let keys = self.shading_keys(&inputs, &visibility);
         let start = Instant::now();
-        let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
-        let health_inputs = HealthInputs {
-            facets: facets.value.clone(),
-            visibility: VisibilityInput::Soft(visibility.value.clone()),
-            materials: materials.value.clone(),
-            names: material_names(&loaded.scene, &tile.mesh, &materials)?,
-            closes_plane: tile.mesh.closes_plane,
-            max_color_weight: tile.mesh.color.max(),
-        };
-        let examined_sum = Some((direct.clone(), material_of_slot.clone()));
-        let base_area = f64::from(tile.mesh.base_area());
-        let (mut brdf, factored) = if plan.try_low_rank {
-            let factor_inputs = FactorInputs {
-                facets: &facets,
-                visibility: &visibility,
-                material_of_slot: &material_of_slot,
-                materials: &materials.materials,
-                lobes: keys.lobes,
-                whole_sphere: !tile.height_field,
-                base_area,
-            };
-            let (brdf, errors) = self.low_rank(direct, &factor_inputs, &settings)?;
-            (brdf, Some(errors))
-        } else {
-            self.forget_low_rank();
-            (EffectiveBrdf { representation: Representation::Direct(direct), base_area }, None)
-        };
+        let (mut brdf, factored) = self.product(direct.clone(), &inputs, &visibility, keys.lobes)?;
         times.push(("product", elapsed_ms(start)));
+        let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
         let is_low_rank = matches!(brdf.representation, Representation::LowRank(_));
         if plan.interreflection {
             let surface = VisibleSurface {
@@ -275,7 +259,15 @@ impl Pipeline {
         let brdf = Arc::new(brdf);
         let last = (&self.last_shading, &self.disk);
         let shading = Shading::new(brdf.clone(), &tile, &settings, plan.try_shading_table, keys, last);
-        let outcome = Outcome {
+        let health_inputs = HealthInputs {
+            facets: facets.value.clone(),
+            visibility: VisibilityInput::Soft(visibility.value),
+            names: material_names(scene, &tile.mesh, &materials)?,
+            materials: materials.value,
+            closes_plane: tile.mesh.closes_plane,
+            max_color_weight: tile.mesh.color.max(),
+        };
+        Ok(Outcome {
             brdf,
             plan,
             settings,
@@ -285,13 +277,38 @@ impl Pipeline {
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),
-            direct: examined_sum,
+            direct: Some((direct, material_of_slot)),
             close_to_bound: estimator.is_some(),
             // The error of the factors is not in this estimator.
             estimator: Arc::new(estimator.filter(|_| !is_low_rank).map_or_else(OnceLock::new, OnceLock::from)),
+        })
+    }
+
+    /// The direct sum, or factors if the plan tries them and they are close to it; and their errors if they were tried.
+    fn product(
+        &self,
+        direct: Direct,
+        inputs: &TileInputs,
+        visibility: &Keyed<Visibility>,
+        lobes: Key,
+    ) -> Result<(EffectiveBrdf, Option<Errors>)> {
+        let TileInputs { tile, settings, materials, facets, material_of_slot, plan, .. } = inputs;
+        let base_area = f64::from(tile.mesh.base_area());
+        if !plan.try_low_rank {
+            self.forget_low_rank();
+            return Ok((EffectiveBrdf { representation: Representation::Direct(direct), base_area }, None));
+        }
+        let factor_inputs = FactorInputs {
+            facets,
+            visibility,
+            material_of_slot,
+            materials: &materials.materials,
+            lobes,
+            whole_sphere: !tile.height_field,
+            base_area,
         };
-        *lock(&self.last_outcome) = Some((key, outcome.clone()));
-        Ok(outcome)
+        let (brdf, errors) = self.low_rank(direct, &factor_inputs, settings)?;
+        Ok((brdf, Some(errors)))
     }
 
     /// Interreflection. Rays are cast again only if the facets changed.

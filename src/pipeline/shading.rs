@@ -346,7 +346,7 @@ impl Stage for Tabulate<'_> {
     }
 }
 
-/// Pairs of directions as images ask for them, and the BRDF there.
+/// Pairs of directions distributed as in images, and the BRDF there.
 struct Check {
     pairs: Vec<Pair>,
     exact: Vec<Vec3>,

@@ -60,7 +60,18 @@ pub(super) fn scan_ms(features: &SceneFeatures, settings: &Settings, costs: &Cos
 
 /// Predicted milliseconds of shadow maps: triangles set up and texels covered per direction.
 pub(super) fn maps_ms(features: &SceneFeatures, settings: &Settings, costs: &Costs) -> f64 {
-    let texels = f64::from(settings.map_resolution).powi(2) * features.area_ratio;
-    let direction = features.triangles as f64 * costs.triangle_ns + texels * costs.texel_ns;
-    settings.map_grid.len() as f64 * direction * 1e-6 / costs.threads
+    let grid = settings.map_grid;
+    let texels = f64::from(settings.map_resolution).powi(2);
+    let ring_ns = |ring: usize| {
+        let covered = texels * covered_areas(features.area_ratio, f64::from(grid.theta(ring)));
+        features.triangles as f64 * costs.triangle_ns + covered * costs.texel_ns
+    };
+    (0..grid.ring_count()).map(ring_ns).sum::<f64>() * grid.azimuths as f64 * 1e-6 / costs.threads
+}
+
+/// The projections of all parts of a surface along a direction at the polar angle `theta`, over the base area. The
+/// estimate is exact for a surface of one slope `s` along all azimuths: the mean of `|1 - s tan θ cos φ|`.
+fn covered_areas(area_ratio: f64, theta: f64) -> f64 {
+    let rise = (area_ratio.powi(2) - 1.0).max(0.0).sqrt() * theta.tan();
+    if rise <= 1.0 { 1.0 } else { ((rise.powi(2) - 1.0).sqrt() + (1.0 / rise).asin()) * std::f64::consts::FRAC_2_PI }
 }

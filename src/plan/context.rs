@@ -1,6 +1,6 @@
 //! Quantities on which several effects rest, computed once per plan.
 
-use super::{Costs, Method, Preset, SceneFeatures, Settings, VisibilityAlgorithm, is_on};
+use super::{Costs, Preset, ProductMethod, SceneFeatures, Settings, VisibilityAlgorithm, is_on};
 use crate::scene::Switch;
 
 /// Queries of the image that the cost model assumes: 384x384 pixels, 32 lights, a third of them lit and covered.
@@ -97,9 +97,9 @@ impl<'a> Context<'a> {
     fn wants_low_rank(&self) -> bool {
         let features = self.features;
         match self.settings.method {
-            Method::Direct => false,
-            Method::LowRank => true,
-            Method::Auto => {
+            ProductMethod::Direct => false,
+            ProductMethod::LowRank => true,
+            ProductMethod::Auto => {
                 !matches!(self.settings.preset, Preset::Reference | Preset::Wu2011)
                     && features.lookups > 0
                     && features.distinct_normals.is_none()

@@ -1,12 +1,10 @@
-//! The table of effects: one row per effect, physics first.
+//! The table of effects: one row per effect, physics first. Decisions on methods are in `methods.rs`.
 //!
 //! A new effect is a row here and a switch in `[effects]` (`src/scene/effects.rs`).
 
 use super::algorithm::{SHALLOW_PART, maps_ms, max_blocked_part, scan_ms};
 use super::context::Context;
-use super::{
-    Effect, EffectKind, FAINT_FRACTION, IMAGE_CHECK_PAIRS, Method, Preset, VisibilityAlgorithm, VisibilityMethod, is_on,
-};
+use super::{Effect, EffectKind, FAINT_FRACTION, Preset, VisibilityAlgorithm, VisibilityMethod, is_on, methods};
 use crate::interreflection::predicted_share;
 use crate::scene::{Effects, Switch};
 
@@ -20,7 +18,7 @@ struct Row {
 }
 
 /// The decision on one effect.
-struct Decision {
+pub(super) struct Decision {
     on: bool,
     reason: String,
     predicted_ms: f64,
@@ -29,23 +27,23 @@ struct Decision {
 }
 
 impl Decision {
-    fn new(on: bool, reason: impl Into<String>) -> Self {
+    pub fn new(on: bool, reason: impl Into<String>) -> Self {
         Self { on, reason: reason.into(), predicted_ms: 0.0, bound: None }
     }
 
-    fn costs(self, predicted_ms: f64) -> Self {
+    pub fn costs(self, predicted_ms: f64) -> Self {
         Self { predicted_ms, ..self }
     }
 
-    fn changes_at_most(self, bound: f64) -> Self {
+    pub fn changes_at_most(self, bound: f64) -> Self {
         Self { bound: Some(bound), ..self }
     }
 }
 
 /// The bound of an effect that only changes the order of a sum.
-const ROUNDING: f64 = 1e-4;
+pub(super) const ROUNDING: f64 = 1e-4;
 /// The bound of treating normals that differ only by rounding as equal.
-const SAME_NORMALS: f64 = 1e-3;
+pub(super) const SAME_NORMALS: f64 = 1e-3;
 /// The bound of an effect that does not touch f̄.
 const UNCHANGED: f64 = 0.0;
 
@@ -92,19 +90,24 @@ static ROWS: &[Row] = &[
         switch: Some(|effects| &mut effects.faint_lights),
         decide: faint_lights,
     },
-    Row { name: "low_rank", kind: ByMethod, switch: None, decide: low_rank },
+    Row { name: "low_rank", kind: ByMethod, switch: None, decide: methods::low_rank },
     Row {
         name: "picture_table",
         kind: ByMethod,
         switch: Some(|effects| &mut effects.picture_table),
-        decide: shading_table,
+        decide: methods::shading_table,
     },
-    Row { name: "exact_lobes", kind: ByMethod, switch: Some(|effects| &mut effects.exact_lobes), decide: exact_lobes },
+    Row {
+        name: "exact_lobes",
+        kind: ByMethod,
+        switch: Some(|effects| &mut effects.exact_lobes),
+        decide: methods::exact_lobes,
+    },
     Row {
         name: "mirror_symmetry",
         kind: ByMethod,
         switch: Some(|effects| &mut effects.mirror_symmetry),
-        decide: mirror_symmetry,
+        decide: methods::mirror_symmetry,
     },
 ];
 
@@ -283,7 +286,7 @@ fn slab(_: &Context<'_>, _: Switch) -> Decision {
 /// Moments of one sample of a driver on all levels, and its rank [ns].
 const SAMPLE_NS: f64 = 300.0;
 
-/// The naive map of the drivers' means is kept where it is as good.
+/// The colour of the drivers' means stands in for the filter if it is as good.
 fn color_map_filtering(context: &Context<'_>, _: Switch) -> Decision {
     let Some(map) = context.features.color_map else {
         return Decision::new(false, "filtered colour maps (Heitz et al. 2013): not asked for");
@@ -377,85 +380,4 @@ fn faint_lights(_: &Context<'_>, switch: Switch) -> Decision {
         )
     };
     Decision::new(on, reason).changes_at_most(UNCHANGED)
-}
-
-fn low_rank(context: &Context<'_>, _: Switch) -> Decision {
-    let Context { settings, costs, try_low_rank: on, .. } = *context;
-    let comparison = format!(
-        "a 384x384 image with 32 lights is predicted at {:.0} ms summed directly, {:.0} ms factored",
-        context.direct_image_ms(costs.threads),
-        context.low_rank_image_ms(costs.threads)
-    );
-    let reason = match settings.method {
-        Method::Auto if on => format!(
-            "{comparison}; used if within {:.1} % and {:.0} dB of the direct sum",
-            settings.tolerance * 100.0,
-            settings.tolerance_db
-        ),
-        Method::Auto => comparison,
-        _ => "asked for by quality.method".to_owned(),
-    };
-    Decision::new(on, reason).costs(context.factorization_ms())
-}
-
-fn shading_table(context: &Context<'_>, _: Switch) -> Decision {
-    let Context { features, settings, costs, try_shading_table: on, .. } = *context;
-    let strided_subset = context.has_horizon_map() && features.distinct_normals.is_some();
-    let cost = context.table_cost();
-    // A strided subset of the facets takes no more time than its check.
-    let predicted_ms = if strided_subset {
-        IMAGE_CHECK_PAIRS as f64 * context.direct_query_ms()
-    } else {
-        cost.as_ref().map_or(0.0, |cost| cost.compute_ms)
-    };
-    let reason = match cost {
-        _ if features.flat => "a flat tile is its own BRDF".to_owned(),
-        None => "images evaluate the BRDF itself at this quality".to_owned(),
-        Some(cost) => {
-            let (percent, db) = (settings.image_tolerance.0 * 100.0, settings.image_tolerance.1);
-            let condition = format!("if within {percent:.0} % and {db:.0} dB of the sum");
-            let direct = format!(
-                "a 384x384 image with 32 lights is predicted at {:.0} ms summed directly",
-                context.direct_image_ms(costs.threads)
-            );
-            if strided_subset {
-                format!("{direct}; few distinct normals: a strided subset of the facets is summed {condition}")
-            } else {
-                format!(
-                    "{direct}, {:.0} ms from a table that takes {:.0} ms, once; used {condition}",
-                    cost.image_ms, cost.compute_ms
-                )
-            }
-        }
-    };
-    Decision::new(on, reason).costs(if on { predicted_ms } else { 0.0 })
-}
-
-fn exact_lobes(context: &Context<'_>, switch: Switch) -> Decision {
-    let normals = context.features.distinct_normals;
-    let reason = match normals {
-        Some(count) => format!("{count} distinct normals: one exact lobe each, for any number of facets"),
-        None => "normals differ from facet to facet".to_owned(),
-    };
-    Decision::new(is_on(switch, normals.is_some()), reason).changes_at_most(SAME_NORMALS)
-}
-
-/// Mirror planes are searched for only when a table is computed, so that a geometry edit does not wait for them.
-fn mirror_symmetry(context: &Context<'_>, switch: Switch) -> Decision {
-    let is_tabulated = context.interreflection || context.try_shading_table;
-    let planes = context.mirrors();
-    let is_known = switch == Switch::On || context.features.mirrors.is_some();
-    let on = is_tabulated && switch != Switch::Off && (!is_known || planes != [false; 2]);
-    let reason = match planes {
-        _ if !is_tabulated => "no table is computed",
-        _ if switch == Switch::Off => "treated as having no mirror planes, as asked",
-        _ if !is_known => {
-            "if planes x = const or y = const mirror the tile, the shading table takes a half or a quarter of the time"
-        }
-        [true, true] => "mirrored in planes x = const and y = const: a quarter of the viewers is enough",
-        [false, false] => "no plane x = const or y = const mirrors the tile",
-        _ => "mirrored in one plane: half of the viewers is enough",
-    };
-    let decision = Decision::new(on, reason);
-    if context.interreflection { decision } else { decision.changes_at_most(ROUNDING) }
 }

@@ -7,6 +7,7 @@ mod algorithm;
 mod context;
 mod effects;
 mod features;
+mod methods;
 mod refinement;
 mod settings;
 mod slab;
@@ -21,7 +22,7 @@ pub use context::IMAGE_CHECK_PAIRS;
 pub use effects::{effect_names, switch_mut};
 pub use features::{ColorMapFeatures, Costs, SceneFeatures};
 pub use refinement::Refinement;
-pub use settings::{Backend, Method, Preset, Settings, VisibilityMethod};
+pub use settings::{Backend, Preset, ProductMethod, Settings, VisibilityMethod};
 pub use slab::{SlabDecision, SlabFeatures, SlabSettings};
 
 use crate::scene::Switch;

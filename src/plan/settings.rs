@@ -29,7 +29,7 @@ impl Preset {
 
 /// The way to compute the product.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
+pub enum ProductMethod {
     /// The way that the plan expects to be fastest within the tolerance.
     Auto,
     Direct,
@@ -74,7 +74,7 @@ pub struct Settings {
     pub visibility_method: VisibilityMethod,
     /// Bins of normals whose facets share one lobe; `None` to keep each normal.
     pub normal_bins: Option<usize>,
-    pub method: Method,
+    pub method: ProductMethod,
     pub keep_m: f64,
     pub keep_n: f64,
     pub max_rank: usize,
@@ -153,9 +153,9 @@ impl Settings {
             settings.map_grid = PolarGrid::new(rings, settings.map_grid.azimuths);
         }
         match quality.method.as_deref() {
-            Some("direct") => settings.method = Method::Direct,
-            Some("low_rank") => settings.method = Method::LowRank,
-            Some("auto") => settings.method = Method::Auto,
+            Some("direct") => settings.method = ProductMethod::Direct,
+            Some("low_rank") => settings.method = ProductMethod::LowRank,
+            Some("auto") => settings.method = ProductMethod::Auto,
             _ => {}
         }
         match quality.visibility.as_deref() {
@@ -204,7 +204,7 @@ impl Settings {
             penumbra: 0.02,
             visibility_method: VisibilityMethod::Auto,
             normal_bins: None,
-            method: Method::Auto,
+            method: ProductMethod::Auto,
             keep_m: 0.9995,
             keep_n: 0.9995,
             max_rank: 40,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::image::shading::Background;
+use super::image::shading::ImageBackground;
 use super::lighting::lights::Lights;
 use super::shadow::Occluder;
 use super::shadow::shadow_cache::ShadowCache;
@@ -108,7 +108,7 @@ impl RenderScene {
         reflectance: &'a dyn Reflectance,
         size: [usize; 2],
         samples_per_side: usize,
-        background: &'a Background,
+        background: &'a ImageBackground,
     ) -> RenderInput<'a> {
         RenderInput {
             mesh: self.mesh(),

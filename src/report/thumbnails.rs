@@ -7,7 +7,7 @@ use glam::Vec3;
 use crate::base::{Cancel, Result};
 use crate::effective::Reflectance;
 use crate::reference::Reference;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::{ToneMap, srgb_byte};
 use crate::render::render;
 use crate::render::{Image, RenderScene};
@@ -38,7 +38,7 @@ impl ThumbnailRenderer {
     /// # Errors
     /// Returns an error if the camera cannot frame the object.
     pub fn image(&self, material: &dyn Reflectance) -> Result<Image> {
-        Ok(render(&self.render_scene.input(material, [SIZE, SIZE], 1, &Background::default()))?.image)
+        Ok(render(&self.render_scene.input(material, [SIZE, SIZE], 1, &ImageBackground::default()))?.image)
     }
 
     /// The image as a PNG in a `data:` URL.

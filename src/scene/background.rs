@@ -13,7 +13,7 @@ const COLORS: FieldShape = FieldShape::List { of: &COLOR, min: 2, max: 2 };
 const DISTANCE: FieldShape = FieldShape::Number { min: 0.0, max: 1e6, soft_max: 2.0 };
 const SIZE: FieldShape = number(1e-3, 1e6);
 
-/// What lies behind a slab as a scene file writes it.
+/// A background behind a slab, as a scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Background {

@@ -3,7 +3,10 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use super::{Background, BrdfSpec, ColorMap, Geometry, LoadedScene, Scene, TermSpec, check, shipped};
+use super::{
+    Background, BrdfSpec, ColorMap, Driver, Geometry, LayerWeight, LoadedScene, Scene, SlabFace, TermSpec, check,
+    shipped,
+};
 use crate::base::{InputError, Result, regular_file};
 
 /// Reads a file that a scene names. The scene's folder is `base_dir`, and the file has at most `limit` bytes.
@@ -68,5 +71,103 @@ impl LoadedScene {
             .filter(|path| !is_embedded(path))
             .map(|path| resolve(&self.base_dir, path))
             .collect()
+    }
+}
+
+impl Scene {
+    /// The paths of all files that the scene names, but for the environment, whose name is text.
+    pub fn paths_mut(&mut self) -> Vec<&mut PathBuf> {
+        let Self { tile, materials, object, color_map, slab, background, .. } = self;
+        let mut paths: Vec<&mut PathBuf> = Vec::new();
+        match &mut tile.geometry {
+            Geometry::Mesh(mesh) => paths.push(&mut mesh.path),
+            Geometry::Heightfield(field) => paths.extend(&mut field.path),
+            _ => {}
+        }
+        paths.extend(&mut tile.color_path);
+        paths.extend(&mut tile.slot_path);
+        paths.extend(&mut object.path);
+        let brdfs = materials.iter_mut().filter_map(|material| material.brdf.as_mut());
+        paths.extend(brdfs.flat_map(BrdfSpec::terms_mut).filter_map(TermSpec::path_mut));
+        if let Some(slab) = slab {
+            for face in [&mut slab.top, &mut slab.bottom] {
+                match face {
+                    SlabFace::Table(table) => paths.push(&mut table.path),
+                    SlabFace::Tile(tile) => paths.extend(&mut tile.scene),
+                    _ => {}
+                }
+            }
+            paths.extend(&mut slab.svbtdf);
+        }
+        if let Some(Background::Image(image)) = background {
+            paths.push(&mut image.path);
+        }
+        for layer in color_map.iter_mut().flat_map(|map| &mut map.layer) {
+            paths.extend(texture_paths(&mut layer.driver));
+            if let LayerWeight::Blend(blend) = &mut layer.weight {
+                paths.extend(texture_paths(&mut blend.driver));
+            }
+        }
+        paths
+    }
+}
+
+/// The paths of the textures of a driver.
+fn texture_paths(driver: &mut Driver) -> Vec<&mut PathBuf> {
+    match driver {
+        Driver::Texture(texture) => vec![&mut texture.path],
+        Driver::Sum(sum) => sum.terms.iter_mut().flat_map(|term| texture_paths(&mut term.driver)).collect(),
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paths_to_change_are_those_of_all_files() {
+        let stops = "stops = [[0.0, 0.0], [1.0, 1.0]]";
+        let texture = |name: &str| format!("{{ kind = \"texture\", path = \"{name}\" }}");
+        let text = format!(
+            r#"
+            [tile]
+            geometry = {{ kind = "mesh", path = "a.obj" }}
+            color_path = "b.png"
+            slot_path = "c.png"
+            [[material]]
+            name = "default"
+            brdf = [{{ kind = "merl", path = "d.binary" }}, {{ kind = "npz", path = "e.npz" }}]
+            [object]
+            kind = "obj"
+            path = "f.obj"
+            [slab]
+            top = {{ kind = "table", path = "g.npz" }}
+            bottom = {{ kind = "tile", scene = "h.toml" }}
+            [background]
+            kind = "image"
+            path = "i.png"
+            [[color_map.layer]]
+            driver = {}
+            {stops}
+            weight = {{ driver = {{ kind = "sum", terms = [{{ driver = {}, weight = 1.0 }}] }}, {stops} }}
+            "#,
+            texture("j.png"),
+            texture("k.png"),
+        );
+        let table: toml::Table = toml::from_str(&text).unwrap();
+        let mut scene: Scene = table.try_into().unwrap();
+        let loaded = LoadedScene {
+            scene: scene.clone(),
+            base_dir: PathBuf::new(),
+            name: String::new(),
+            painted: super::super::Painted::default(),
+        };
+        let mut files = loaded.files();
+        let mut paths: Vec<PathBuf> = scene.paths_mut().into_iter().map(|path| path.clone()).collect();
+        files.sort();
+        paths.sort();
+        assert_eq!(files.len(), 11);
+        assert_eq!(paths, files);
     }
 }

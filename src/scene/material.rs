@@ -187,7 +187,6 @@ impl TermSpec {
         ]
     }
 
-    /// The name in the scene file.
     /// The file of a measured BRDF; `None` for an analytic term.
     pub fn path(&self) -> Option<&Path> {
         match self {
@@ -196,6 +195,15 @@ impl TermSpec {
         }
     }
 
+    /// As [`TermSpec::path`].
+    pub fn path_mut(&mut self) -> Option<&mut PathBuf> {
+        match self {
+            Self::Merl { path } | Self::Rgl { path } | Self::Utia { path } | Self::Npz { path } => Some(path),
+            _ => None,
+        }
+    }
+
+    /// The name in the scene file.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Lambertian { .. } => "lambertian",

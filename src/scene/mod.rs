@@ -80,7 +80,7 @@ pub struct Scene {
     /// A thin transparent slab; without it, the scene reflects only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slab: Option<Slab>,
-    /// What is seen through the slab; without it, the environment.
+    /// The background seen through the slab; without it, the environment.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<Background>,
 }

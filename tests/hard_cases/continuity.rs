@@ -5,7 +5,7 @@ use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::plan::{Preset, Settings};
 use biscale::render::RenderScene;
-use biscale::render::image::shading::Background;
+use biscale::render::image::shading::ImageBackground;
 use biscale::render::render;
 use biscale::scene;
 use biscale::scene::{Camera, FieldShape, Geometry, Light, LoadedScene, Painted, TermSpec};
@@ -144,7 +144,7 @@ impl Reflectance for White {
 fn no_slider_of_light_or_camera_jumps() {
     let image = |text: &str| -> Vec<Vec3> {
         let render_scene = RenderScene::new(&open(text)).unwrap();
-        let background = Background::Uniform(Vec3::ZERO);
+        let background = ImageBackground::Uniform(Vec3::ZERO);
         render(&render_scene.input(&White, [64, 64], 4, &background)).unwrap().image.pixels
     };
     for (table, fields) in [("light", Light::fields()), ("camera", Camera::fields())] {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use biscale::effective::Reflectance;
 use biscale::math::directions::from_angles;
 use biscale::render::RenderScene;
-use biscale::render::image::shading::Background;
+use biscale::render::image::shading::ImageBackground;
 use biscale::render::render;
 use biscale::scene;
 use biscale::scene::{LoadedScene, Painted};
@@ -29,7 +29,7 @@ fn render_scene(folder: &Path, text: &str) -> biscale::base::Result<RenderScene>
 }
 
 fn image(render_scene: &RenderScene) -> Vec<Vec3> {
-    let background = Background::Uniform(Vec3::ZERO);
+    let background = ImageBackground::Uniform(Vec3::ZERO);
     let rendered = render(&render_scene.input(&White, [48, 40], 2, &background)).unwrap();
     let pixels = rendered.image.pixels;
     let bad = pixels.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0);

@@ -5,7 +5,7 @@ use biscale::gpu::{Gpu, GpuRenderer};
 use biscale::metrics::{compare, mirror_biased_pairs};
 use biscale::pipeline::Pipeline;
 use biscale::render::RenderScene;
-use biscale::render::image::shading::Background;
+use biscale::render::image::shading::ImageBackground;
 use biscale::render::render;
 use biscale::scene::LoadedScene;
 use glam::Vec3;
@@ -92,7 +92,7 @@ fn one_case_of_each_family_agrees_on_cpu_and_gpu_at_finer_presets() {
 fn check_image(gpu: &Gpu, loaded: &LoadedScene, side: usize, name: &str) {
     let outcome = Pipeline::new().effective(loaded).unwrap();
     let render_scene = RenderScene::new(loaded).unwrap();
-    let background = Background::default();
+    let background = ImageBackground::default();
     let input = render_scene.input(&*outcome.brdf, [side; 2], 1, &background);
     let cpu_pixels = render(&input).unwrap().image.pixels;
     let mut renderer =

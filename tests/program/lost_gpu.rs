@@ -6,7 +6,7 @@ use biscale::base::Cancel;
 use biscale::gpu::{Gpu, GpuRenderer};
 use biscale::pipeline::Pipeline;
 use biscale::render::RenderScene;
-use biscale::render::image::shading::Background;
+use biscale::render::image::shading::ImageBackground;
 use biscale::render::render;
 use biscale::scene;
 use biscale::scene::{LoadedScene, Painted};
@@ -40,7 +40,7 @@ fn a_gpu_lost_in_the_middle_of_a_frame_is_an_error_and_the_cpu_still_renders() {
     let loaded = loaded();
     let outcome = Pipeline::new().effective(&loaded).unwrap();
     let render_scene = RenderScene::new(&loaded).unwrap();
-    let background = Background::default();
+    let background = ImageBackground::default();
     let input = render_scene.input(&*outcome.brdf, [96, 96], 2, &background);
     let mut renderer =
         GpuRenderer::with_material(&gpu, render_scene.mesh(), render_scene.occluder(), &outcome.brdf).unwrap();

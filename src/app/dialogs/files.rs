@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui::{self, Key, RichText, ScrollArea, Ui};
 
-use crate::app::views::brushes::Layer;
+use crate::app::views::brushes::PaintLayer;
 
 /// Purpose for which the user chooses a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,11 +17,11 @@ pub enum Purpose {
         term: usize,
     },
     /// An image to paint on.
-    Paint(Layer),
+    Paint(PaintLayer),
     TileMesh,
     ObjectMesh,
     Environment,
-    SavePaint(Layer),
+    SavePaint(PaintLayer),
     ExportTable,
     ExportTile,
     ExportImage,
@@ -33,15 +33,15 @@ impl Purpose {
             Self::OpenScene => "Open a scene",
             Self::SaveScene => "Save the scene",
             Self::Measured { .. } => "Open a measured BRDF",
-            Self::Paint(Layer::Heights) => "Open an image of heights",
-            Self::Paint(Layer::Colors) => "Open an image of colours",
-            Self::Paint(Layer::Slots) => "Open an image of materials",
+            Self::Paint(PaintLayer::Heights) => "Open an image of heights",
+            Self::Paint(PaintLayer::Colors) => "Open an image of colours",
+            Self::Paint(PaintLayer::Slots) => "Open an image of materials",
             Self::TileMesh => "Open a mesh for the tile",
             Self::ObjectMesh => "Open an object",
             Self::Environment => "Open an environment",
-            Self::SavePaint(Layer::Heights) => "Save the heights",
-            Self::SavePaint(Layer::Colors) => "Save the colours",
-            Self::SavePaint(Layer::Slots) => "Save the painted materials",
+            Self::SavePaint(PaintLayer::Heights) => "Save the heights",
+            Self::SavePaint(PaintLayer::Colors) => "Save the colours",
+            Self::SavePaint(PaintLayer::Slots) => "Save the painted materials",
             Self::ExportTable => "Export the material",
             Self::ExportTile => "Export the tile",
             Self::ExportImage => "Export the image",
@@ -55,7 +55,7 @@ impl Purpose {
             Self::Paint(_) => &["png", "jpg", "jpeg", "tif", "tiff", "hdr", "exr"],
             Self::TileMesh | Self::ObjectMesh => &["obj"],
             Self::Environment => &["hdr", "exr"],
-            Self::SavePaint(Layer::Slots) => &["png"],
+            Self::SavePaint(PaintLayer::Slots) => &["png"],
             Self::SavePaint(_) | Self::ExportImage => &["png", "exr"],
             Self::ExportTable => &["npz", "csv", "exr", "bsdf", "binary", "xml", "bin", "astm", "gltf", "mtlx"],
             Self::ExportTile => &["obj", "stl", "png", "svg", "pdf"],

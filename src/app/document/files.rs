@@ -173,40 +173,9 @@ fn exr(values: &[Vec3], size: glam::UVec2, path: &Path) -> Result<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// Returns mutable references to all file paths of a scene.
-pub fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
-    let mut found: Vec<&mut PathBuf> = Vec::new();
-    match &mut scene.tile.geometry {
-        Geometry::Heightfield(field) => found.extend(&mut field.path),
-        Geometry::Mesh(mesh) => found.push(&mut mesh.path),
-        _ => {}
-    }
-    found.extend(&mut scene.tile.color_path);
-    found.extend(&mut scene.tile.slot_path);
-    for term in scene.materials.iter_mut().filter_map(|m| m.brdf.as_mut()).flat_map(BrdfSpec::terms_mut) {
-        if let TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } =
-            term
-        {
-            found.push(path);
-        }
-    }
-    found.extend(&mut scene.object.path);
-    found
-}
-
-/// Returns mutable references to the measured files of a material.
-fn measured_paths(material: &mut MaterialSpec) -> impl Iterator<Item = &mut PathBuf> {
-    material.brdf.iter_mut().flat_map(BrdfSpec::terms_mut).filter_map(|term| match term {
-        TermSpec::Merl { path } | TermSpec::Rgl { path } | TermSpec::Utia { path } | TermSpec::Npz { path } => {
-            Some(path)
-        }
-        _ => None,
-    })
-}
-
 /// Makes the file paths of a material absolute, so that scenes in other folders find them.
 pub fn make_absolute(material: &mut MaterialSpec, base_dir: &Path) {
-    for path in measured_paths(material) {
+    for path in material.brdf.iter_mut().flat_map(BrdfSpec::terms_mut).filter_map(TermSpec::path_mut) {
         let file = base_dir.join(&*path);
         if file.is_file() {
             *path = std::path::absolute(&file).unwrap_or(file);
@@ -225,7 +194,7 @@ fn rebase(scene: &mut Scene, old: &Path, new: &Path) {
         let file = std::path::absolute(&file).unwrap_or(file);
         Some(file.strip_prefix(new).map(Path::to_owned).unwrap_or(file))
     };
-    for path in paths(scene) {
+    for path in scene.paths_mut() {
         if let Some(to) = moved_path(path) {
             *path = to;
         }

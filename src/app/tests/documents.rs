@@ -125,6 +125,17 @@ fn files_of_a_scene_are_found_after_it_is_saved_in_another_folder() {
     let opened = Document::open(new.path().join("b.toml").to_str().unwrap()).unwrap();
     let loaded = opened.loaded();
     crate::geometry::build(&loaded.scene.tile, &loaded.base_dir).unwrap();
+    for name in ["behind.png", "values.png"] {
+        image::GrayImage::new(2, 2).save(old.path().join(name)).unwrap();
+    }
+    let text = "[tile]\ngeometry = { kind = \"flat\" }\n[slab]\nbottom = { kind = \"tile\", scene = \"a.toml\" }\n\
+                [background]\nkind = \"image\"\npath = \"behind.png\"\n[[color_map.layer]]\n\
+                driver = { kind = \"texture\", path = \"values.png\" }\nstops = [[0.0, 0.0], [1.0, 1.0]]\n";
+    std::fs::write(old.path().join("slab.toml"), text).unwrap();
+    let mut document = Document::open(old.path().join("slab.toml").to_str().unwrap()).unwrap();
+    document.save_as(&new.path().join("slab.toml")).unwrap();
+    let files = Document::open(new.path().join("slab.toml").to_str().unwrap()).unwrap().loaded().files();
+    assert!(files.len() == 3 && files.iter().all(|file| file.exists()), "{files:?}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ use egui_kittest::kittest::Queryable;
 
 use super::{editor, harness, quick, settle};
 use crate::app::dialogs::{Dialog, Purpose};
+use crate::app::document::Document;
 use crate::app::worker::{ExportKind, TableChoice};
 
 #[test]
@@ -115,4 +116,26 @@ fn a_table_that_is_too_large_is_refused_before_any_work() {
     harness.key_press(Key::Enter);
     harness.run_steps(2);
     assert!(editor(&mut harness).dialog.is_some() && editor(&mut harness).exporting.is_none());
+}
+
+#[test]
+fn an_export_does_not_replace_the_scene_or_a_file_that_it_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, heights] = ["scene.toml", "heights.png"].map(|name| folder.path().join(name));
+    let text = "[tile]\ngeometry = { kind = \"heightfield\", path = \"heights.png\" }\n[quality]\npreset = \"draft\"\n";
+    std::fs::write(&scene, text).unwrap();
+    image::GrayImage::from_fn(4, 4, |x, _| image::Luma([x as u8 * 60])).save(&heights).unwrap();
+    let before = std::fs::read(&heights).unwrap();
+    let mut harness = harness(Document::new(crate::scene::open(&scene.to_string_lossy(), &[]).unwrap(), Some(scene)));
+    settle(&mut harness);
+    editor(&mut harness).export(heights.clone(), ExportKind::Image { size: [16, 16] });
+    let start = std::time::Instant::now();
+    while editor(&mut harness).exporting.is_some() {
+        harness.step();
+        assert!(start.elapsed().as_secs() < 60, "not ended");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let texts = editor(&mut harness).messages.texts().join("; ");
+    assert!(texts.contains("Not exported") && texts.contains("heights.png"), "{texts}");
+    assert_eq!(std::fs::read(&heights).unwrap(), before);
 }

@@ -8,7 +8,7 @@ use glam::{UVec2, Vec2, Vec3};
 use super::{editor, harness, quick, settle};
 use crate::app::document::Document;
 use crate::app::paint::Tool;
-use crate::app::views::brushes::{BrushRequest, Layer};
+use crate::app::views::brushes::{BrushRequest, PaintLayer};
 
 fn document(text: &str) -> Document {
     let scene = scene::parse(text).unwrap();
@@ -65,7 +65,7 @@ fn a_material_is_painted_on_any_surface_undone_to_the_start_and_redone_to_the_en
         editor.document.redo().unwrap();
     }
     assert_eq!((editor.document.scene(), editor.document.painted()), (&end.0, &end.1));
-    editor.apply_brush_request(BrushRequest::Clear(Layer::Slots));
+    editor.apply_brush_request(BrushRequest::Clear(PaintLayer::Slots));
     assert!(editor.document.painted().slots.is_none() && editor.document.scene().tile.slot_path.is_none());
     editor.document.undo();
     assert_eq!((editor.document.scene(), editor.document.painted()), (&end.0, &end.1));

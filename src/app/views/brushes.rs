@@ -11,13 +11,13 @@ use crate::app::panels::paints;
 
 /// An image over the tile that the user paints on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Layer {
+pub enum PaintLayer {
     Heights,
     Colors,
     Slots,
 }
 
-impl Layer {
+impl PaintLayer {
     /// Default name of the image's file.
     pub fn file(self) -> &'static str {
         match self {
@@ -31,9 +31,9 @@ impl Layer {
 /// A request of the brush panel to the editor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BrushRequest {
-    Open(Layer),
-    Save(Layer),
-    Clear(Layer),
+    Open(PaintLayer),
+    Save(PaintLayer),
+    Clear(PaintLayer),
 }
 
 /// Draws the brush panel. `scene` lists the materials that the brush can paint.
@@ -136,9 +136,9 @@ fn stem(file: &str) -> String {
 /// Draws the buttons that open, save and clear the layer that the brush paints on.
 fn files_ui(ui: &mut Ui, tool: Tool) -> Option<BrushRequest> {
     let (layer, names, clear) = match tool {
-        Tool::Color => (Layer::Colors, "colours", ("Clear colours", "Remove the painted colours")),
-        Tool::Material => (Layer::Slots, "materials", ("Clear materials", "Remove the painted materials")),
-        _ => (Layer::Heights, "heights", ("Flatten all", "Set all heights to a plane")),
+        Tool::Color => (PaintLayer::Colors, "colours", ("Clear colours", "Remove the painted colours")),
+        Tool::Material => (PaintLayer::Slots, "materials", ("Clear materials", "Remove the painted materials")),
+        _ => (PaintLayer::Heights, "heights", ("Flatten all", "Set all heights to a plane")),
     };
     let mut request = None;
     ui.horizontal_wrapped(|ui| {

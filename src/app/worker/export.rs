@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::base::{Cancel, Error, Progress, Result};
+use crate::base::{Cancel, Error, Progress, Result, check_output};
 use crate::cache::Cache;
 use crate::export::tile::TileOptions;
 use crate::export::{ExportMeta, ExportOptions, ExportResolution, RadianceBasis};
@@ -22,6 +22,8 @@ use super::runner::JobContext;
 #[derive(Debug, Clone)]
 pub struct ExportJob {
     pub loaded: Arc<LoadedScene>,
+    /// The file of the scene, if it has one.
+    pub scene_file: Option<PathBuf>,
     pub path: PathBuf,
     pub kind: ExportKind,
 }
@@ -91,6 +93,7 @@ pub fn work(job: &ExportJob, cache: &Cache, context: &JobContext<ExportJob>, rep
 }
 
 fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, report: &(dyn Fn(ExportResult) + Sync)) -> Result<String> {
+    check_places(job)?;
     report(ExportResult::Progress(0.0, "Computing the material"));
     let mut pipeline = crate::gpu::pipeline();
     pipeline.set_cancel(cancel.clone());
@@ -126,6 +129,16 @@ fn export(job: &ExportJob, cache: &Cache, cancel: &Cancel, report: &(dyn Fn(Expo
             Ok(format!("Wrote {}.", job.path.display()))
         }
     }
+}
+
+/// Checks that the files of an export can be written and that they replace neither the scene nor a file that it names.
+fn check_places(job: &ExportJob) -> Result<()> {
+    let outputs = match job.kind {
+        ExportKind::Table(_) => export::outputs(&job.path)?,
+        _ => vec![job.path.clone()],
+    };
+    let inputs: Vec<PathBuf> = job.loaded.files().into_iter().chain(job.scene_file.clone()).collect();
+    outputs.iter().try_for_each(|output| check_output(output, &inputs))
 }
 
 /// Fits the GGX base with a diffuse part, which both formats support.

@@ -9,7 +9,7 @@ use crate::brdf::MaterialAssignment;
 use crate::effective::{Black, EffectiveBrdf, Reflectance};
 use crate::pipeline::{GpuTile, Outcome, Pipeline};
 use crate::render::image::render::RenderTimes;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
 use crate::render::tile_view::{ShadedMaterials, TileScene, on_object};
@@ -118,7 +118,7 @@ impl PreviewRenderer {
     ) -> Result<Option<GpuPreview>> {
         let (Some(scene), Some(screen)) = (&self.scene, &self.screen) else { return Ok(None) };
         let preview_input = PreviewInput { scene, request, screen: Some(screen) };
-        let background = Background::default();
+        let background = ImageBackground::default();
         let input = render_input(scene, request, &Black, &background);
         let images = &mut self.images;
         let shown = self.gpu.run(preview_input, cancel, |renderer, gpu| {
@@ -148,7 +148,7 @@ impl PreviewRenderer {
         let (Some(scene), ShadedMaterial::Outcome(outcome)) = (&mut self.scene, request.material) else {
             return Err(Error::failed("nothing was prepared"));
         };
-        let background = Background::default();
+        let background = ImageBackground::default();
         let preview_input = PreviewInput { scene, request, screen: self.screen.as_ref() };
         let exact = Cancellable { brdf: &outcome.brdf, cancel };
         let input = RenderInput { shadow_cache: None, ..render_input(scene, request, &exact, &background) };
@@ -213,7 +213,7 @@ fn render_input<'a>(
     scene: &'a RenderScene,
     request: &'a RenderRequest,
     reflectance: &'a dyn Reflectance,
-    background: &'a Background,
+    background: &'a ImageBackground,
 ) -> RenderInput<'a> {
     let input = scene.input(reflectance, request.size, request.samples_per_side, background);
     RenderInput { camera: request.camera, ..input }

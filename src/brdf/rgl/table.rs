@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::DVec3;
 
 use super::tensor_file::TensorFile;
-use super::warp::{Between, Blend, Grid, Warp};
+use super::warp::{Between, Grid, SliceBlend, Warp};
 use crate::base::InputError;
 use crate::brdf::spectrum::rgb_weights;
 
@@ -137,7 +137,7 @@ impl RglTable {
         let u_h = [u_of_theta(elevation(h)), u_of_phi(h.y.atan2(h.x) - rotation)];
         let phi =
             if self.is_isotropic() { Between { lower: 0, weight: 0.0 } } else { Between::find(&self.phi_i, phi_i) };
-        let slice = Blend::new(phi, Between::find(&self.theta_i, theta_i), self.theta_i.len());
+        let slice = SliceBlend::new(phi, Between::find(&self.theta_i, theta_i), self.theta_i.len());
         let s = self.vndf.invert(slice, u_h);
         let (grid, rgb) = &self.rgb;
         let channel = |c: usize| {

@@ -60,7 +60,7 @@ impl TintSource {
 
 /// One scalar BRDF over one group of facets with one set of weights.
 #[derive(Debug, Clone)]
-pub struct Channel {
+pub struct ChannelTables {
     /// Visibility factors, `[o][i][column]`.
     pub(crate) u: Arc<Vec<f32>>,
     /// Lobe factors, `[node of (h, d)][column]`; `None` for a Lambertian lobe, whose cosines are in `u`.
@@ -77,12 +77,12 @@ pub struct Channel {
 pub struct LowRank {
     pub directions: PolarGrid,
     pub pairs: HalfDifferenceGrid,
-    pub channels: Vec<Channel>,
+    pub channels: Vec<ChannelTables>,
     /// `a_v(o) / cos θ_o` on the nodes of `directions`.
     pub projected_area: Arc<Vec<f32>>,
 }
 
-impl Channel {
+impl ChannelTables {
     /// Size of the factors in bytes.
     pub fn bytes(&self) -> usize {
         4 * (self.u.len() + self.p.as_ref().map_or(0, |p| p.len()))
@@ -169,7 +169,7 @@ impl FactoredChannel {
     }
 
     /// Tabulates the visibility factors at all pairs of nodes, or at the pairs in `read`.
-    fn tabulated(&self, rows: &VisibilityRows, normals: &[Vec3], read: Option<&[(usize, usize)]>) -> Channel {
+    fn tabulated(&self, rows: &VisibilityRows, normals: &[Vec3], read: Option<&[(usize, usize)]>) -> ChannelTables {
         let table = |rows: &VisibilityRows, y: &[f32]| match read {
             None => visibility_table(rows, &self.weights, y, self.columns),
             Some(nodes) => visibility_at(rows, &self.weights, y, self.columns, nodes),
@@ -180,7 +180,7 @@ impl FactoredChannel {
             None => table(&rows.with_cosines(normals), &vec![std::f32::consts::FRAC_1_PI; self.weights.len()]),
         };
         let (p, columns, ranks) = (self.p.clone(), self.columns, self.ranks);
-        Channel { u: Arc::new(u), p, columns, tint: self.tint.clone(), source: self.source, ranks }
+        ChannelTables { u: Arc::new(u), p, columns, tint: self.tint.clone(), source: self.source, ranks }
     }
 }
 
@@ -372,6 +372,6 @@ impl LowRank {
 
     /// Size of all factors in bytes.
     pub fn bytes(&self) -> usize {
-        self.channels.iter().map(Channel::bytes).sum()
+        self.channels.iter().map(ChannelTables::bytes).sum()
     }
 }

@@ -18,7 +18,7 @@ use crate::brdf::rgl::table::RglTable;
 use crate::brdf::rgl::tensor_file::TensorWriter;
 use crate::brdf::rgl::warp::Warp;
 use crate::brdf::spectrum::{WRITTEN_NM, spectra_of_primaries};
-use slices::{Sizes, Slice, one_slice, planes};
+use slices::{Sizes, ViewSlice, one_slice, planes};
 
 /// Polar angles and azimuths of the viewer, then samples along both axes of a warp: files of 3, 20 and 105 MB.
 const RESOLUTIONS: [[usize; 4]; 3] = [[9, 24, 24, 24], [13, 48, 36, 36], [19, 72, 56, 56]];
@@ -29,7 +29,7 @@ const MAX_MEAN_ERROR: f64 = 0.008;
 struct Tabulated {
     sizes: Sizes,
     table: RglTable,
-    slices: Vec<Slice>,
+    slices: Vec<ViewSlice>,
     reading: ReadingError,
 }
 
@@ -40,7 +40,7 @@ impl Tabulated {
         let planes = planes(brdf, &sizes);
         let count = sizes.phis * sizes.thetas;
         let slices = in_parallel(count, progress, |slice| one_slice(brdf, &planes, &sizes, slice))?;
-        let slices: Vec<Slice> = slices.into_iter().collect::<io::Result<_>>()?;
+        let slices: Vec<ViewSlice> = slices.into_iter().collect::<io::Result<_>>()?;
         let vndf = Warp::new(sizes.vndf, widened(&slices, |slice| &slice.vndf)).map_err(io::Error::other)?;
         let table = RglTable { vndf, rgb: (sizes.samples, widened(&slices, |slice| &slice.rgb)), ..planes };
         let read = |i: Vec3, o: Vec3| table.eval(o.as_dvec3(), i.as_dvec3()).as_vec3();
@@ -71,7 +71,7 @@ impl Tabulated {
     }
 }
 
-fn widened(slices: &[Slice], of: impl Fn(&Slice) -> &Vec<f32>) -> Vec<f64> {
+fn widened(slices: &[ViewSlice], of: impl Fn(&ViewSlice) -> &Vec<f32>) -> Vec<f64> {
     slices.iter().flat_map(|slice| of(slice).iter().map(|&value| f64::from(value))).collect()
 }
 
@@ -90,7 +90,7 @@ pub fn write(task: &ExportTask<'_>, out: &mut dyn Write, colors: Colors) -> io::
     let Tabulated { sizes, table, slices, reading } = Tabulated::with_resolution(task, sizes)?;
     let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<f32>>();
     let Sizes { thetas, phis, samples, vndf, ndf } = sizes;
-    let joined = |of: fn(&Slice) -> &Vec<f32>| slices.iter().flat_map(of).copied().collect::<Vec<f32>>();
+    let joined = |of: fn(&ViewSlice) -> &Vec<f32>| slices.iter().flat_map(of).copied().collect::<Vec<f32>>();
     let per_slice = [phis, thetas, samples.height, samples.width];
     let mut file = TensorWriter::default();
     file.bytes("description", task.summary().as_bytes());
@@ -121,7 +121,7 @@ pub fn write(task: &ExportTask<'_>, out: &mut dyn Write, colors: Colors) -> io::
 }
 
 /// Converts the RGB planes of slices to `[slice][wavelength][sample]`.
-fn spectra(slices: &[Slice], plane: usize) -> Vec<f32> {
+fn spectra(slices: &[ViewSlice], plane: usize) -> Vec<f32> {
     let primaries = spectra_of_primaries();
     let mut values = Vec::with_capacity(slices.len() * primaries.len() * plane);
     for slice in slices {

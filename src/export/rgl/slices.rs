@@ -93,14 +93,14 @@ fn solid_angle([x, _]: [f64; 2]) -> f64 {
 }
 
 /// The data of one view direction.
-pub(super) struct Slice {
+pub(super) struct ViewSlice {
     pub(super) vndf: Vec<f32>,
     pub(super) luminance: Vec<f32>,
     /// Planes of R, G and B.
     pub(super) rgb: Vec<f32>,
 }
 
-impl Numbers for Slice {
+impl Numbers for ViewSlice {
     fn are_finite(&self) -> bool {
         [&self.vndf, &self.luminance, &self.rgb].into_iter().all(Vec::are_finite)
     }
@@ -177,7 +177,7 @@ fn as_stored(values: Vec<f64>) -> Vec<f64> {
     values.into_iter().map(|value| f64::from(value as f32)).collect()
 }
 
-pub(super) fn one_slice(brdf: &EffectiveBrdf, planes: &RglTable, sizes: &Sizes, slice: usize) -> io::Result<Slice> {
+pub(super) fn one_slice(brdf: &EffectiveBrdf, planes: &RglTable, sizes: &Sizes, slice: usize) -> io::Result<ViewSlice> {
     let viewer = sizes.viewer(slice);
     // The warp must use the rounded numbers that the file stores.
     let vndf = scaled(warp_density(viewer, sizes.vndf, &planes.ndf));
@@ -207,7 +207,7 @@ pub(super) fn one_slice(brdf: &EffectiveBrdf, planes: &RglTable, sizes: &Sizes, 
             0.0
         });
     }
-    Ok(Slice { vndf, luminance: scaled(with_minimum(weights)), rgb })
+    Ok(ViewSlice { vndf, luminance: scaled(with_minimum(weights)), rgb })
 }
 
 /// Raises values to at least a thousandth of the mean, so that every reflecting direction can be sampled.

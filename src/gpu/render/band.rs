@@ -5,11 +5,11 @@
 
 use std::ops::Range;
 
-use super::gbuffer::{Camera, GpuGBuffer, GpuObject, GpuSamples, Point};
+use super::gbuffer::{GpuCamera, GpuGBuffer, GpuObject, GpuPoint, GpuSamples};
 use super::image;
 use super::image::GpuImages;
 use super::light_rays::{GpuLightRays, GpuOccluder};
-use crate::gpu::shading::{GpuShading, Light, MAX_POINTS};
+use crate::gpu::shading::{GpuLight, GpuShading, MAX_POINTS};
 use crate::gpu::{Gpu, GpuError, Tier, shading};
 use crate::render::shadow::LightVisibility;
 
@@ -88,7 +88,7 @@ impl RenderBuffers {
         };
         let slice = sizes.lights.div_ceil(slices).max(1);
         let slices = sizes.lights.div_ceil(slice).max(1);
-        let bytes = size_of::<Point>() + 16 + 16 * slices + 4 * words + 4;
+        let bytes = size_of::<GpuPoint>() + 16 + 16 * slices + 4 * words + 4;
         let points_per_row = width * slots;
         if points_per_row > MAX_POINTS || slices > 65_535 {
             let what = format!("{} lights on {width} pixels per row", sizes.lights);
@@ -100,8 +100,8 @@ impl RenderBuffers {
 
         let samples = GpuSamples::new(gpu, sizes.size.map(|side| side * sizes.samples_per_side))?;
         let buffer = |label, bytes| gpu.buffer(label, bytes, Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
-        let lights = buffer("lights", (size_of::<Light>() * sizes.lights) as u64)?;
-        let points = buffer("shading points", size_of::<Point>() as u64 * max_points)?;
+        let lights = buffer("lights", (size_of::<GpuLight>() * sizes.lights) as u64)?;
+        let points = buffer("shading points", size_of::<GpuPoint>() as u64 * max_points)?;
         let origins = buffer("origins of rays", if shadowed { 16 * max_points } else { 0 })?;
         let bits = buffer("light visibility", 4 * words as u64 * max_points)?;
         let radiance = buffer("radiance", 16 * slices as u64 * max_points)?;
@@ -109,9 +109,9 @@ impl RenderBuffers {
         let to_bits = parts.rays.map(|(rays, occluder)| rays.rays(gpu, occluder, &origins, &bits)).transpose()?;
         let bands = (0..height).step_by(rows).map(|first| {
             let uniform = |label, bytes: usize| gpu.buffer(label, bytes as u64, Usage::UNIFORM | Usage::COPY_DST);
-            let camera = uniform("camera", size_of::<Camera>())?;
-            let params = uniform("parameters", size_of::<shading::Params>())?;
-            let image = uniform("image", size_of::<image::Params>())?;
+            let camera = uniform("camera", size_of::<GpuCamera>())?;
+            let params = uniform("parameters", size_of::<shading::ShadingParams>())?;
+            let image = uniform("image", size_of::<image::ImageParams>())?;
             let rays = parts.rays.map(|(rays, _)| rays.points(gpu, [&params, &points, &lights]));
             let shading = [&params, &points, &lights, &bits, &radiance, &scales];
             Ok(Band {
@@ -159,9 +159,9 @@ impl Band {
     pub fn write(
         &self,
         gpu: &Gpu,
-        camera: Camera,
-        params: shading::Params,
-        image: image::Params,
+        camera: GpuCamera,
+        params: shading::ShadingParams,
+        image: image::ImageParams,
     ) -> Result<(), GpuError> {
         gpu.write(&self.camera, &[camera])?;
         gpu.write(&self.params, &[params])?;

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::{Mat3, Vec3};
 
-use super::gbuffer::Point;
+use super::gbuffer::GpuPoint;
 use crate::effective::{GpuVisibilityInput, HeightMarchInput, Nodes, SliceInput};
 use crate::geometry::Facets;
 use crate::gpu::shading::tests::{TestScene, open_gpu};
@@ -243,7 +243,7 @@ fn counts_of_an_edit() {
     let Some(gpu) = open_gpu() else { return };
     let TestScene { mesh, occluder, .. } = TestScene::of("cup");
     // Bytes that are written and read: samples, points, origins, bits and radiance; then the image.
-    let traffic = POINTS * (2.0 * (4.0 + 4.0 + size_of::<Point>() as f64 + 16.0 + 4.0 + 16.0) + 4.0);
+    let traffic = POINTS * (2.0 * (4.0 + 4.0 + size_of::<GpuPoint>() as f64 + 16.0 + 4.0 + 16.0) + 4.0);
     println!(
         "1920 x 1080, 32 lights; CPU and upload in ms on this machine; 10⁹ operations and, from caches, 10⁹ bytes;"
     );

@@ -53,7 +53,7 @@ pub(crate) struct GpuSamples {
 /// `Point` in `point.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
-pub(crate) struct Point {
+pub(crate) struct GpuPoint {
     pub position: Vec3,
     /// Share of its pixel; 0 if the slot is empty.
     pub weight: f32,
@@ -66,7 +66,7 @@ pub(crate) struct Point {
 /// `Camera` in `gbuffer.wgsl`, for one band of rows.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct Camera {
+pub(crate) struct GpuCamera {
     eye: Vec3,
     near: f32,
     right: Vec3,
@@ -256,7 +256,7 @@ fn draw_pipeline(
     gpu.checked("building the G-buffer pipeline", || Ok(gpu.device.create_render_pipeline(&description)))
 }
 
-impl Camera {
+impl GpuCamera {
     /// `rows`: rows of pixels of the band.
     pub fn new(view: &CameraView, object: &GpuObject, samples_per_side: usize, rows: Range<usize>) -> Self {
         Self {

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use crate::gpu::device::pipelines::{READ, UNIFORM, WRITE};
 use crate::gpu::{Gpu, GpuError};
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 
 /// Format of an image for a screen: sRGB bytes, written by a shader.
@@ -54,7 +54,7 @@ pub(super) enum Output<'a> {
 /// Parameters of one band of rows.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct Params {
+pub(super) struct ImageParams {
     background: Vec3,
     is_wall: u32,
     size: [u32; 2],
@@ -66,18 +66,18 @@ pub(super) struct Params {
     is_filmic: u32,
 }
 
-impl Params {
+impl ImageParams {
     /// `slots`: point slots per pixel; `slices`: rows of radiance.
     pub fn new(
         size: [usize; 2],
         rows: Range<usize>,
         [slots, slices]: [u32; 2],
-        background: &Background,
+        background: &ImageBackground,
         tone_map: &ToneMap,
     ) -> Self {
         let (background, is_wall) = match background {
-            Background::Wall => (Vec3::ZERO, 1),
-            Background::Uniform(radiance) => (*radiance, 0),
+            ImageBackground::Wall => (Vec3::ZERO, 1),
+            ImageBackground::Uniform(radiance) => (*radiance, 0),
         };
         Self {
             background,
@@ -110,7 +110,7 @@ impl GpuImages {
         Ok(Self { points, outputs, write })
     }
 
-    /// Binds [`Params`], points and their radiance.
+    /// Binds [`ImageParams`], points and their radiance.
     pub fn points(&self, gpu: &Gpu, bound: [&wgpu::Buffer; 3]) -> Result<wgpu::BindGroup, GpuError> {
         gpu.group("points of pixels", &self.points, &bound.map(wgpu::Buffer::as_entire_binding))
     }

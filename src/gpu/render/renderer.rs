@@ -4,7 +4,7 @@
 //! Large work is split into several submissions, so that it stays below the timeout of drivers and can be cancelled.
 
 use super::band::{Band, BufferSizes, RenderBuffers, RendererParts};
-use super::gbuffer::{Camera, GpuGBuffer, GpuObject};
+use super::gbuffer::{GpuCamera, GpuGBuffer, GpuObject};
 use super::image;
 use super::image::{GpuImages, Output};
 use super::light_rays::{GpuLightRays, GpuOccluder};
@@ -12,7 +12,7 @@ use super::stages::{Clock, GpuPassKind, Recorder};
 use crate::base::{Cancel, Result};
 use crate::effective::{EffectiveBrdf, GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 use crate::gpu::shading::visibility::GpuVisibility;
-use crate::gpu::shading::{GpuMaterial, GpuShading, Light};
+use crate::gpu::shading::{GpuLight, GpuMaterial, GpuShading};
 use crate::gpu::{Gpu, GpuError, GpuHeightMarch, GpuShadowMaps, GpuSlicer, Tier, shading};
 use crate::render::image::render::{RenderTimes, check_size};
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
@@ -203,11 +203,11 @@ impl GpuRenderer {
             points,
         };
         let buffers = self.buffers(gpu, sizes)?;
-        let lights: Vec<Light> = input.lights.iter().map(Light::from).collect();
+        let lights: Vec<GpuLight> = input.lights.iter().map(GpuLight::from).collect();
         gpu.write(&buffers.lights, &lights)?;
         for band in &buffers.bands {
-            let camera = Camera::new(&view, &self.object, sizes.samples_per_side, band.rows.clone());
-            let params = shading::Params {
+            let camera = GpuCamera::new(&view, &self.object, sizes.samples_per_side, band.rows.clone());
+            let params = shading::ShadingParams {
                 eye: view.eye,
                 point_count: buffers.point_slots(band),
                 light_count: sizes.lights as u32,
@@ -216,7 +216,7 @@ impl GpuRenderer {
                 min_area: self.material.as_ref().map_or(0.0, GpuMaterial::min_area),
             };
             let counts = [buffers.slots(), buffers.slices];
-            let image = image::Params::new(sizes.size, band.rows.clone(), counts, input.background, tone_map);
+            let image = image::ImageParams::new(sizes.size, band.rows.clone(), counts, input.background, tone_map);
             band.write(gpu, camera, params, image)?;
         }
         let group = self.images.output(gpu, output)?;

@@ -9,7 +9,7 @@ use crate::gpu::shading::tests::{
     FLAT, LOBES, PYRAMIDS, RODS, TestScene, assert_same_image, effective, open, open_gpu,
 };
 use crate::pipeline::Pipeline;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
 use crate::render::{Image, RenderInput, RenderScene};
@@ -56,7 +56,7 @@ fn a_tile_that_the_gpu_computes_from_its_facets_has_the_same_image_as_on_the_cpu
             GpuVisibilityInput::Maps(_) => "maps",
         };
         assert_eq!(found, expected, "{geometry}");
-        let (test_scene, background) = (TestScene::of(kind), Background::Uniform(Vec3::ZERO));
+        let (test_scene, background) = (TestScene::of(kind), ImageBackground::Uniform(Vec3::ZERO));
         let shading_brdf = match tabulated {
             true => {
                 let Representation::Direct(direct) = &outcome.brdf.representation else {
@@ -103,7 +103,7 @@ fn an_image_in_many_bands_and_submissions_has_the_same_bits() {
     let Some(gpu) = open_gpu() else { return };
     let brdf = effective(&open(PYRAMIDS, LOBES[4], "direct"));
     let test_scene = TestScene::of("cup");
-    let input = RenderInput { samples_per_side: 2, ..test_scene.input(&brdf, 50, &Background::Wall) };
+    let input = RenderInput { samples_per_side: 2, ..test_scene.input(&brdf, 50, &ImageBackground::Wall) };
     let mut renderer = GpuRenderer::with_material(&gpu, input.mesh, input.occluder, &brdf).unwrap();
     let bands = |renderer: &GpuRenderer| renderer.buffers.as_ref().unwrap().bands.len();
     let whole = renderer.render(&gpu, &input, &Cancel::default()).unwrap();
@@ -127,7 +127,7 @@ fn a_cancelled_image_is_an_error_and_the_next_image_is_complete() {
     let Some(gpu) = open_gpu() else { return };
     let brdf = effective(&open(RODS, LOBES[4], "direct"));
     let test_scene = TestScene::of("cup");
-    let input = test_scene.input(&brdf, 96, &Background::Wall);
+    let input = test_scene.input(&brdf, 96, &ImageBackground::Wall);
     let mut renderer = GpuRenderer::with_material(&gpu, input.mesh, input.occluder, &brdf).unwrap();
     let before = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
     let cancel = Cancel::default();
@@ -151,7 +151,7 @@ fn a_cancelled_image_is_an_error_and_the_next_image_is_complete() {
 #[ignore = "takes a minute on software Vulkan"]
 fn images_of_the_papers_five_scenes_that_the_gpu_computes_from_the_tile_match_the_cpu() {
     let Some(gpu) = open_gpu() else { return };
-    let background = Background::Uniform(Vec3::ZERO);
+    let background = ImageBackground::Uniform(Vec3::ZERO);
     for name in ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"] {
         let loaded = scene::open(name, &[]).unwrap();
         let outcome = Pipeline::new().effective(&loaded).unwrap();

@@ -4,16 +4,16 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::gbuffer::Point;
+use super::gbuffer::GpuPoint;
 use super::image;
 use super::light_rays::{GpuLightRays, GpuOccluder};
 use crate::base::Cancel;
 use crate::effective::EffectiveBrdf;
-use crate::gpu::shading::{Light, Params};
+use crate::gpu::shading::{GpuLight, ShadingParams};
 use crate::gpu::{Gpu, GpuRenderer};
 use crate::pipeline::Pipeline;
 use crate::render::image::raster::NO_TRIANGLE;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::image::tone_map::{ToneCurve, ToneMap, srgb_byte};
 use crate::render::shadow::{LightVisibility, Occluder, ray_origin};
@@ -58,7 +58,7 @@ fn points_and_lifted(
     camera: &scene::Camera,
     size: [usize; 2],
     samples: usize,
-) -> [Vec<Point>; 2] {
+) -> [Vec<GpuPoint>; 2] {
     let (occluder, brdf) = (Occluder::new(mesh), brdf());
     let mut renderer = GpuRenderer::with_material(gpu, mesh, Some(&occluder), &brdf).unwrap();
     let input = RenderInput {
@@ -70,16 +70,16 @@ fn points_and_lifted(
         reflectance: &brdf,
         size,
         samples_per_side: samples,
-        background: &Background::Wall,
+        background: &ImageBackground::Wall,
     };
     renderer.render(gpu, &input, &Cancel::default()).unwrap();
     let [points, origins] = &renderer.buffers.as_ref().unwrap().points_and_origins;
     let count = size[0] * size[1] * samples * samples;
-    let mut points: Vec<Point> = gpu.read(points).unwrap();
+    let mut points: Vec<GpuPoint> = gpu.read(points).unwrap();
     let origins: Vec<[f32; 4]> = gpu.read(origins).unwrap();
     points.truncate(count);
     let lifted =
-        points.iter().zip(&origins).map(|(point, origin)| Point { position: Vec3::from_slice(origin), ..*point });
+        points.iter().zip(&origins).map(|(point, origin)| GpuPoint { position: Vec3::from_slice(origin), ..*point });
     [points.clone(), lifted.collect()]
 }
 
@@ -160,7 +160,7 @@ fn on_gpu_and_cpu_the_same_samples_share_a_point() {
         }
         let (mut shared, mut separate, mut differ) = (0, 0, 0);
         for pixel in 0..pixels {
-            let slots: Vec<&Point> = (0..samples * samples).map(|k| &gpu_points[k * pixels + pixel]).collect();
+            let slots: Vec<&GpuPoint> = (0..samples * samples).map(|k| &gpu_points[k * pixels + pixel]).collect();
             let mut gpu_weights: Vec<f32> = slots.iter().map(|point| point.weight).filter(|&w| w > 0.0).collect();
             gpu_weights.reverse();
             if gpu_weights != weights[pixel] {
@@ -191,9 +191,9 @@ fn an_image_for_a_screen_is_the_tone_mapped_image_that_is_read_back() {
     let texture = image::image(&gpu, size).unwrap();
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     for (curve, gain, background) in [
-        (ToneCurve::Filmic, 1.0, Background::Wall),
-        (ToneCurve::Plain, 0.7, Background::Uniform(Vec3::new(0.001, 0.3, 2.0))),
-        (ToneCurve::Filmic, 9.0, Background::Wall),
+        (ToneCurve::Filmic, 1.0, ImageBackground::Wall),
+        (ToneCurve::Plain, 0.7, ImageBackground::Uniform(Vec3::new(0.001, 0.3, 2.0))),
+        (ToneCurve::Filmic, 9.0, ImageBackground::Wall),
     ] {
         let input = RenderInput {
             mesh: &mesh,
@@ -234,7 +234,7 @@ fn traced(
     use wgpu::BufferUsages as Usage;
     let (rays, gpu_occluder) = (GpuLightRays::new(gpu).unwrap(), GpuOccluder::new(gpu, occluder).unwrap());
     let words = LightVisibility::words_of(lights.len()) as u32;
-    let params = Params {
+    let params = ShadingParams {
         eye,
         point_count: points.len() as u32,
         light_count: lights.len() as u32,
@@ -245,10 +245,10 @@ fn traced(
     let (mut slots, mut origins) = (Vec::new(), Vec::new());
     for k in 0..points.len() {
         let (position, normal) = (points.positions[k], points.normals[k]);
-        slots.push(Point { position, normal, weight: 1.0, ..Point::default() });
+        slots.push(GpuPoint { position, normal, weight: 1.0, ..GpuPoint::default() });
         origins.push(ray_origin(mesh, points.triangles[k] as usize, position, eye).0.extend(0.0));
     }
-    let gpu_lights: Vec<Light> = lights.iter().map(Light::from).collect();
+    let gpu_lights: Vec<GpuLight> = lights.iter().map(GpuLight::from).collect();
     let bits =
         gpu.buffer("bits", 4 * u64::from(words) * points.len() as u64, Usage::STORAGE | Usage::COPY_SRC).unwrap();
     let group = rays

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::direct::{FacetBuffers, Sum, pieces};
-use super::tabulate::{Nodes, Preparation, Step, workgroups};
+use super::tabulate::{GpuNodes, Preparation, Step, workgroups};
 use super::visibility::GpuVisibility;
 use super::{GpuShading, PaddedVec3, TintRow, padded, tint_shader};
 use crate::effective::{FacetSum, Tint};
@@ -156,7 +156,7 @@ impl GpuShading {
         let step = Step {
             pipeline: self.pipeline_over(gpu, variant, &layouts.each_ref())?,
             groups: vec![
-                self.nodes_group(gpu, Nodes::zeroed(), &directions, &buffer)?,
+                self.nodes_group(gpu, GpuNodes::zeroed(), &directions, &buffer)?,
                 self.sum_group(gpu, &without_clusters, empty.over(&(0..clusters.pieces.len())))?,
             ],
             workgroups: workgroups(threads)?,

@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{GpuShading, Pass, SecondGroup, TintRow, Variant, shadow_swap, tint_shader};
-use crate::effective::{Channel, LowRank};
+use crate::effective::{ChannelTables, LowRank};
 use crate::gpu::{Gpu, GpuError};
 
 /// `Grids` in `shade_low_rank.wgsl`.
@@ -74,7 +74,7 @@ impl GpuShading {
 }
 
 /// Appends the tables of a channel, with rows padded to multiples of four columns, and returns their offsets.
-fn add_channel(channel: &Channel, u: &mut Vec<f32>, p: &mut Vec<f32>) -> Row {
+fn add_channel(channel: &ChannelTables, u: &mut Vec<f32>, p: &mut Vec<f32>) -> Row {
     let [first_u, first_p] = [u.len(), p.len()].map(|at| (at / 4) as u32);
     let columns = channel.columns.div_ceil(4);
     match &channel.p {

@@ -78,7 +78,7 @@ struct Pass {
 /// Parameters of all passes over the points of one band.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct Params {
+pub(crate) struct ShadingParams {
     pub eye: Vec3,
     pub point_count: u32,
     pub light_count: u32,
@@ -91,9 +91,9 @@ pub(crate) struct Params {
 /// `Light` in `shading_points.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct Light([PaddedVec3; 2]);
+pub(crate) struct GpuLight([PaddedVec3; 2]);
 
-impl From<&DirectionalLight> for Light {
+impl From<&DirectionalLight> for GpuLight {
     fn from(light: &DirectionalLight) -> Self {
         Self([light.direction, light.irradiance].map(padded))
     }
@@ -181,7 +181,7 @@ impl GpuShading {
         Ok(GpuMaterial { horizons, maps, preparation, ..GpuMaterial::of(passes, tile.base_area) })
     }
 
-    /// Binds [`Params`], points, lights, bits of visible lights, radiance and scales.
+    /// Binds [`ShadingParams`], points, lights, bits of visible lights, radiance and scales.
     pub(crate) fn points(
         &self,
         gpu: &Gpu,

@@ -29,7 +29,7 @@ const MAX_SAMPLED_FROM: usize = 1 << 19;
 /// `Nodes` in `table_nodes.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct Nodes {
+pub(crate) struct GpuNodes {
     pairs: [u32; 4],
     columns: [u32; 3],
     column_count: u32,
@@ -43,7 +43,7 @@ pub(crate) struct Nodes {
     lowest: f32,
 }
 
-impl Nodes {
+impl GpuNodes {
     /// Returns the nodes with the parameters of sampling. `lobes` holds number, shape and scale of one lobe or two.
     pub(crate) fn with_lobes(
         self,
@@ -146,17 +146,17 @@ impl TableShape {
         4 * self.vec4s * self.rows() * (self.grid.theta_d + 2)
     }
 
-    pub(crate) fn nodes(self, columns: &[u32]) -> Nodes {
+    pub(crate) fn nodes(self, columns: &[u32]) -> GpuNodes {
         let HemispherePairGrid { rings, azimuths, phi_d, theta_d } = self.grid;
         let column = |k: usize| columns.get(k).copied().unwrap_or_default();
-        Nodes {
+        GpuNodes {
             pairs: [rings, azimuths, phi_d, theta_d].map(|n| n as u32),
             columns: [column(0), column(1), column(2)],
             column_count: columns.len() as u32,
             width: 4 * self.vec4s as u32,
             crowding: HemispherePairGrid::CROWDING,
             lowest: HemispherePairGrid::MIN_SINE,
-            ..Nodes::zeroed()
+            ..GpuNodes::zeroed()
         }
     }
 
@@ -246,7 +246,7 @@ impl GpuShading {
         let max_facets = if gpu.tier == Tier::Software { SOFTWARE_FACETS } else { facets.max(1) };
         let directions_buffer: Vec<PaddedVec3> = directions.directions().into_iter().map(padded).collect();
         let directions_buffer = gpu.upload("directions", &directions_buffer, wgpu::BufferUsages::STORAGE)?;
-        let nodes = self.nodes_group(gpu, Nodes::zeroed(), &directions_buffer, areas)?;
+        let nodes = self.nodes_group(gpu, GpuNodes::zeroed(), &directions_buffer, areas)?;
         let visibility_swap = ("visibility_unblocked", visibility.shader_name());
         let variant =
             Variant { shader: "table_areas", entry_point: "add", swaps: vec![visibility_swap], constants: Vec::new() };
@@ -323,7 +323,7 @@ impl GpuShading {
     pub(crate) fn nodes_group(
         &self,
         gpu: &Gpu,
-        nodes: Nodes,
+        nodes: GpuNodes,
         angles: &wgpu::Buffer,
         sums: &wgpu::Buffer,
     ) -> Result<wgpu::BindGroup, GpuError> {

@@ -5,17 +5,17 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{GpuMaterial, GpuShading, Light, Params};
+use super::{GpuLight, GpuMaterial, GpuShading, ShadingParams};
 use crate::base::Cancel;
 use crate::brdf::{Brdf, LobeAngles, Material, Measured, MeasuredReport, Term};
 use crate::effective::shading_table::columns::Weight;
 use crate::effective::{Direct, EffectiveBrdf, FacetSum, Interpolation, Nodes, Representation, ShadingTable};
-use crate::gpu::render::gbuffer::Point;
+use crate::gpu::render::gbuffer::GpuPoint;
 use crate::gpu::{Gpu, GpuError, GpuRenderer, render_gpu};
 use crate::math::directions::HemispherePairGrid;
 use crate::pipeline::Pipeline;
 use crate::render::image::shading;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::shading_points::ShadingPoints;
 use crate::render::lighting::lights;
 use crate::render::render;
@@ -82,7 +82,7 @@ impl TestScene {
         &'a self,
         brdf: &'a EffectiveBrdf,
         side: usize,
-        background: &'a Background,
+        background: &'a ImageBackground,
     ) -> RenderInput<'a> {
         RenderInput {
             mesh: &self.mesh,
@@ -102,7 +102,7 @@ impl TestScene {
 /// pixels.
 fn assert_same(what: &str, gpu: &Gpu, kind: &str, brdf: &EffectiveBrdf) {
     assert_same_shading(what, gpu, kind, brdf);
-    let (test_scene, background) = (TestScene::of(kind), Background::Uniform(Vec3::ZERO));
+    let (test_scene, background) = (TestScene::of(kind), ImageBackground::Uniform(Vec3::ZERO));
     let input = test_scene.input(brdf, 64, &background);
     let images = [render(&input).unwrap().image, render_gpu(gpu, &input, brdf).unwrap().image];
     assert_same_image(what, &images);
@@ -134,7 +134,7 @@ pub(crate) fn radiance(
 ) -> Vec<Vec3> {
     use wgpu::BufferUsages as Usage;
     let slices = lights.len().div_ceil(8);
-    let params = Params {
+    let params = ShadingParams {
         eye,
         point_count: points.len() as u32,
         light_count: lights.len() as u32,
@@ -142,15 +142,15 @@ pub(crate) fn radiance(
         slice: 8,
         min_area: material.min_area(),
     };
-    let point = |k: usize| Point {
+    let point = |k: usize| GpuPoint {
         position: points.positions[k],
         normal: points.normals[k],
         tangent: points.tangents[k],
         weight: 1.0,
-        ..Point::default()
+        ..GpuPoint::default()
     };
-    let point_rows: Vec<Point> = (0..points.len()).map(point).collect();
-    let lights: Vec<Light> = lights.iter().map(Light::from).collect();
+    let point_rows: Vec<GpuPoint> = (0..points.len()).map(point).collect();
+    let lights: Vec<GpuLight> = lights.iter().map(GpuLight::from).collect();
     let words = visible.map_or(Vec::new(), |visible| visible.words.clone());
     let rows = gpu.buffer("radiance", (16 * points.len() * slices) as u64, Usage::STORAGE | Usage::COPY_SRC).unwrap();
     let bound = [
@@ -293,7 +293,7 @@ fn facets_of_different_colours_and_an_exchanged_brdf_give_the_same_image() {
         reflectance: &second,
         size: [64, 64],
         samples_per_side: 2,
-        background: &Background::Wall,
+        background: &ImageBackground::Wall,
     };
     let gpu_radiance = renderer.render(&gpu, &input, &Cancel::default()).unwrap().image;
     let images = [render(&input).unwrap().image, gpu_radiance];

@@ -38,7 +38,7 @@ impl Default for LobeSettings {
     }
 }
 
-/// Photons of one stream of random numbers, and streams between two looks at the error.
+/// Photons of one stream of random numbers, and streams between two checks of the error.
 const CHUNK: usize = 8192;
 const CHUNKS_PER_BATCH: usize = 16;
 /// Polar angle [degrees] up to which errors are taken.

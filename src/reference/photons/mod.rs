@@ -9,4 +9,4 @@ mod tiles;
 
 pub use lobe::{Bins, Estimated, LobeSettings, PhotonSource, Totals, TrueLobe};
 pub use pair::{PairSettings, PairTruth};
-pub use tiles::{Positions, TileFace, TileSlab};
+pub use tiles::{Positions, TileSlab, TracedTile};

@@ -30,7 +30,7 @@ pub struct PairTruth {
     pub standard_error: DVec3,
 }
 
-/// Walks between two looks at the error.
+/// Walks between two checks of the error.
 const WALKS_PER_PASS: usize = 2048;
 /// Weight below which a walk ends.
 const LEAST_WEIGHT: f64 = 1e-6;

@@ -270,7 +270,7 @@ fn the_normals_of_explicit_tiles_give_their_single_passes_and_half_of_masked_lig
     for (deviation, bound) in [(0.1, 0.05), (0.2, 0.05)] {
         let meshes = [1, 2].map(|seed| Arc::new(waves(deviation, seed)));
         let [top, bottom] = [0, 1].map(|k| Arc::new(crate::slab::of_mesh(&meshes[k], 0.0, 256).unwrap()));
-        let [above, below] = meshes.map(|mesh| super::TileFace::new(mesh).unwrap());
+        let [above, below] = meshes.map(|mesh| super::TracedTile::new(mesh).unwrap());
         let channel = Channel { eta: 1.5, depth: 0.0 };
         let tiles =
             super::TileSlab { top: Some(above), bottom: Some(below), channel, positions: super::Positions::Random };

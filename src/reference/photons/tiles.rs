@@ -14,7 +14,7 @@ use crate::slab::{Channel, Exit, Losses};
 
 /// A tile as a face of a slab, with its rays.
 #[derive(Debug, Clone)]
-pub struct TileFace {
+pub struct TracedTile {
     mesh: Arc<TileMesh>,
     grid: Arc<PeriodicGrid>,
     bottom: f32,
@@ -32,8 +32,8 @@ pub enum Positions {
 /// Two faces, `None` for a level one, and one colour channel of the material between them.
 #[derive(Debug, Clone)]
 pub struct TileSlab {
-    pub top: Option<TileFace>,
-    pub bottom: Option<TileFace>,
+    pub top: Option<TracedTile>,
+    pub bottom: Option<TracedTile>,
     pub channel: Channel,
     pub positions: Positions,
 }
@@ -53,7 +53,7 @@ struct Passage {
     is_alive: bool,
 }
 
-impl TileFace {
+impl TracedTile {
     /// # Errors
     /// The mesh leaves holes, so that rays pass it without a hit.
     pub fn new(mesh: Arc<TileMesh>) -> Result<Self> {

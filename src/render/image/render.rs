@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::shading;
-use super::shading::Background;
+use super::shading::ImageBackground;
 use super::shading_points::ShadingPoints;
 use crate::base::{InputError, Result};
 use crate::effective::Reflectance;
@@ -29,7 +29,7 @@ pub struct RenderInput<'a> {
     pub size: [usize; 2],
     /// Samples per pixel side; 1 leaves edges aliased.
     pub samples_per_side: usize,
-    pub background: &'a Background,
+    pub background: &'a ImageBackground,
 }
 
 /// Time of each stage in milliseconds.

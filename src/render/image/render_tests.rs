@@ -64,7 +64,7 @@ fn image(
         reflectance,
         size: [128, 128],
         samples_per_side: 2,
-        background: &Background::Uniform(Vec3::ZERO),
+        background: &ImageBackground::Uniform(Vec3::ZERO),
     })
     .unwrap()
 }
@@ -175,7 +175,7 @@ fn sizes_that_make_no_image_are_errors() {
             reflectance: &Lambertian,
             size,
             samples_per_side,
-            background: &Background::Wall,
+            background: &ImageBackground::Wall,
         };
         assert_eq!(render(&input).unwrap_err().exit_code(), 2);
     }

@@ -50,7 +50,7 @@ pub fn radiance(
 
 /// The background of an image.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub enum Background {
+pub enum ImageBackground {
     /// A grey studio wall, lighter behind the object.
     #[default]
     Wall,
@@ -58,7 +58,7 @@ pub enum Background {
     Uniform(Vec3),
 }
 
-impl Background {
+impl ImageBackground {
     /// Returns the radiance at the centre of a pixel.
     fn at(&self, pixel: usize, [width, height]: [usize; 2]) -> Vec3 {
         match self {
@@ -75,7 +75,7 @@ impl Background {
 }
 
 /// Averages the points of each pixel over the background, in linear radiance.
-pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &Background) -> Image {
+pub fn gather(points: &ShadingPoints, radiance: &[Vec3], view: &CameraView, background: &ImageBackground) -> Image {
     gather_over(points, radiance, view.size, |pixel| background.at(pixel, view.size))
 }
 

@@ -1,4 +1,4 @@
-//! What lies behind an object: an endless plane with an image, and the environment.
+//! The backdrop of an object: an endless plane with an image, and the environment.
 
 use std::f32::consts::{PI, TAU};
 

@@ -20,7 +20,7 @@ pub struct SeenThrough<'a, S: ViewPaths> {
     pub camera: &'a scene::Camera,
     pub backdrop: &'a Backdrop,
     pub surface: &'a S,
-    /// What the surface makes of directional lights.
+    /// The BRDF by which the surface reflects directional lights.
     pub reflectance: &'a dyn Reflectance,
     pub transmittance: &'a dyn Transmittance,
     /// Lights that are not part of the backdrop.

@@ -27,7 +27,7 @@ pub struct Pyramid {
     wraps_y: bool,
 }
 
-/// Where and how a footprint is read.
+/// The reads that average a footprint.
 #[derive(Debug, Clone, Copy)]
 pub struct Kernel {
     /// Reads around the centre: offsets in texels of level 0, with weights.
@@ -85,7 +85,7 @@ impl Pyramid {
         };
         let mut kernel = Kernel { probes: [(Vec2::ZERO, 1.0); MAX_PROBES], count: 1, level: low, coarser };
         if rest > ROUND * minor && low + 1 < self.levels.len() {
-            // Of the two forms of the longer axis, the one without cancellation.
+            // The axis has two forms; this one is free of cancellation.
             let axis = if half > 0.0 { Vec2::new(half + radius, xy) } else { Vec2::new(xy, radius - half) };
             let along = axis.try_normalize().unwrap_or(Vec2::X);
             kernel.spread(along * rest.sqrt(), (rest / minor).sqrt());

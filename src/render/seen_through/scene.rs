@@ -48,7 +48,7 @@ impl SlabScene {
         })
     }
 
-    /// What lies behind the object of a scene.
+    /// The backdrop behind the object of a scene.
     ///
     /// # Errors
     /// An environment or a background that cannot be used.
@@ -108,7 +108,7 @@ impl SlabScene {
         )])
     }
 
-    /// How the image is computed, in words.
+    /// Describes the computation of the image in words.
     pub fn describe(&self) -> String {
         match self.paths {
             0 => "one filtered lookup per lobe".to_owned(),

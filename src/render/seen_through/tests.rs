@@ -137,22 +137,17 @@ fn a_lamp_behind_is_seen_and_one_in_front_is_reflected() {
     assert!(behind > 20.0 * before && before > 0.1, "{behind} {before}");
 }
 
-/// `cargo test --release --lib checkerboards_by_distance -- --ignored --nocapture` prints the errors and times.
+/// Prints the errors as rows of a table, and times on standard error.
 #[test]
-#[ignore = "a measurement of a minute"]
+#[ignore = "a measurement: cargo bench --bench measure -- seen-through"]
 fn checkerboards_by_distance_and_times() {
+    println!("| faces | distance | draft | 16 paths | 64 paths | 1024 paths |\n|---|---|---|---|---|---|");
     for (name, faces) in FACES {
         for distance in [0.05, 0.3, 1.0] {
             let loaded = sheet(&format!("[slab]\n{faces}"), distance);
             let truth = rendered(&loaded, 4096, [96, 64]);
             let of = |paths: usize| rms(&rendered(&loaded, paths, [96, 64]), &truth);
-            println!(
-                "{name}, {distance}: draft {:.4}, 16 {:.4}, 64 {:.4}, 1024 {:.4}",
-                of(0),
-                of(16),
-                of(64),
-                of(1024)
-            );
+            println!("| {name} | {distance} | {:.3} | {:.3} | {:.3} | {:.3} |", of(0), of(16), of(64), of(1024));
         }
         let mut loaded = sheet(&format!("[slab]\n{faces}"), 0.2);
         if let Some(camera) = &mut loaded.scene.camera {
@@ -170,13 +165,13 @@ fn checkerboards_by_distance_and_times() {
                 (start.elapsed().as_secs_f64() * 1e3, rendered.points, rendered.times.gbuffer_ms)
             };
             let best = (0..5).map(time).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
-            println!(
+            eprintln!(
                 "{name}, {paths} paths, 640 x 360: {:.1} ms, of it {:.1} ms before shading, {} points",
                 best.0, best.2, best.1
             );
         }
         let start = Instant::now();
         let _ = crate::slab::SlabView::new(outcome.slab);
-        println!("{name}: table of lobes {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+        eprintln!("{name}: table of lobes {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
     }
 }

@@ -90,7 +90,7 @@ fn a_cancelled_image_is_an_error_and_clay_has_the_materials_hue() {
 
 #[test]
 fn tiles_are_visible_up_close_and_the_image_keeps_its_brightness() {
-    use crate::render::image::shading::Background;
+    use crate::render::image::shading::ImageBackground;
     use crate::render::render;
     use crate::render::{RenderInput, object};
     let source = "[tile]\ngeometry = { kind = \"pyramids\", height = 0.2, spacing = 0.5 }\n\
@@ -119,7 +119,7 @@ fn tiles_are_visible_up_close_and_the_image_keeps_its_brightness() {
             reflectance: &*brdf,
             size: [240, 240],
             samples_per_side: 1,
-            background: &Background::default(),
+            background: &ImageBackground::default(),
         };
         let far = render(&input).unwrap().image;
         let mut near = far.clone();

@@ -25,7 +25,7 @@ pub struct Photographs<'a> {
     cameras: Vec<Prepared>,
 }
 
-/// What all images of a camera share.
+/// Data that all images of a camera share.
 struct Prepared {
     /// Size of the files.
     size: UVec2,

@@ -121,7 +121,7 @@ struct Sheet<'a> {
     cancel: &'a Cancel,
 }
 
-/// What is measured at each pixel beside its lobe.
+/// Colours that are measured at each pixel beside its lobe.
 #[derive(Default)]
 struct Measured {
     tint: Vec<DVec3>,

@@ -232,7 +232,7 @@ struct Bounced {
     seed: u64,
 }
 
-/// Where the paths of a viewer begin.
+/// The start of the paths of a viewer.
 struct Start {
     ray: Ray,
     /// Mean over the paths of the first facets' areas, projected towards the viewer. Weights over this mean add up to 1

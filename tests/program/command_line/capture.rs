@@ -76,6 +76,7 @@ fn bad_folders_outputs_and_sheets_are_refused_and_nothing_is_written() {
     folder.assert_refused(&["capture", "rig", "-o", "a.toml"], &["no .npz"]);
     folder.assert_refused(&["capture", "rig", "-o", "a.npz", "-o", "a.obj"], &["ending .obj"]);
     folder.assert_refused(&["capture", "rig", "-o", "a.npz", "--alpha", "1.5"], &["1.5"]);
+    folder.assert_refused(&["capture", "rig", "-o", "a.npz", "-o", "rig/camera_0/dot_0003.exr"], &["an input ("]);
     folder.assert_refused(&["rig", "default", "-o", "other"], &["slab"]);
     let image = folder.path("rig/camera_0/dot_0003.exr");
     let bytes = std::fs::read(&image).unwrap();

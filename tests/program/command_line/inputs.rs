@@ -197,7 +197,7 @@ fn an_output_that_is_an_input_is_refused_and_the_input_stays() {
     };
     let before = contents();
     let refused = |arguments: &[&str], input: &str| {
-        folder.assert_refused(arguments, &["an input of this command", input]);
+        folder.assert_refused(arguments, &["an input (", input]);
         assert!(contents() == before, "{arguments:?} changed a file");
     };
     let eval = |scene: &str, output: &str, input: &str| {
@@ -227,7 +227,7 @@ fn an_output_that_is_an_input_is_refused_and_the_input_stays() {
     refused(&["tile", "default", "--set", "tile.color_path=color.png", "-o", "color.png"], "color.png");
     std::fs::create_dir(folder.path("report")).unwrap();
     folder.write("report/report.csv", scene.replace(" \"tile.obj", " \"../tile.obj"));
-    folder.assert_refused(&["report", "report/report.csv", "-o", "report"], &["an input of this command"]);
+    folder.assert_refused(&["report", "report/report.csv", "-o", "report"], &["an input ("]);
     assert!(std::fs::read_to_string(folder.path("report/report.csv")).unwrap().contains("[tile]"));
 }
 
