@@ -78,9 +78,9 @@ impl ErrorEstimate {
         Self { rel_l2: table, table, facets_power: 1.0, ..Self::default() }
     }
 
-    /// Returns true if the error exceeds a bound by more than the uncertainty of the estimate.
-    pub fn exceeds(&self, bound: ErrorBound) -> bool {
-        self.excess(bound) > UNCERTAINTY
+    /// Returns true if the error may exceed a bound, within the uncertainty of the estimate.
+    pub fn may_exceed(&self, bound: ErrorBound) -> bool {
+        self.excess(bound) * UNCERTAINTY > 1.0
     }
 
     /// The error as a multiple of a bound.

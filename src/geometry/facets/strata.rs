@@ -230,7 +230,7 @@ fn quarters(part: &Part) -> [Part; 4] {
 }
 
 /// Smallest part of the facets that a stratum gets, if there are few strata.
-const MIN_SHARE: f64 = 1.0 / 32.0;
+const MIN_SHARE: f64 = 1.0 / 8.0;
 
 /// Divides `count` facets among strata of these areas: in proportion to area, but no stratum gets less than
 /// [`MIN_SHARE`], or half of an equal share. Every stratum gets a facet. The counts sum to `count`, which must not be
@@ -289,7 +289,7 @@ mod tests {
             assert!(counts.iter().all(|count| *count >= 1), "{counts:?}");
         }
         assert_eq!(allocate(&[0.5, 0.5], 100), [50, 50]);
-        assert_eq!(allocate(&[1e-6, 1.0], 6400)[0], 200);
+        assert_eq!(allocate(&[1e-6, 1.0], 6400)[0], 800);
         assert_eq!(allocate(&[2.0], 0), [0]);
     }
 
