@@ -11,6 +11,8 @@
 //! - [`visibility::HorizonMap`] and [`visibility::OcclusionIntervals`] compute what each facet sees,
 //! - [`effective::Direct`], [`effective::LowRank`] and [`effective::Wu2011`] represent the effective BRDF,
 //! - [`pipeline::Pipeline::effective`] runs all of these and recomputes only what an edit changed,
+//! - [`pipeline::Pipeline::slab`] computes a thin transparent slab in place of a tile ([`slab`]),
+//! - [`pipeline::Pipeline::color_filter`] filters the colour map of a tile ([`color_map`]),
 //! - [`render::render`] renders an object, [`export`] writes tables, [`reference`] checks them by ray casting.
 //!
 //! Modules are declared from the lowest layer to the highest; a module imports only from the layers above its line.

@@ -75,3 +75,23 @@ fn covered_areas(area_ratio: f64, theta: f64) -> f64 {
     let rise = (area_ratio.powi(2) - 1.0).max(0.0).sqrt() * theta.tan();
     if rise <= 1.0 { 1.0 } else { ((rise.powi(2) - 1.0).sqrt() + (1.0 / rise).asin()) * std::f64::consts::FRAC_2_PI }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steep_views_cover_a_rough_surface_many_times_and_a_level_one_once() {
+        for theta in [0.0, 0.7, 1.569] {
+            assert!((covered_areas(1.0, theta) - 1.0).abs() < 1e-12);
+        }
+        // The slope along the azimuth of the view: the mean of |1 - s tan θ cos φ| over azimuths.
+        let (area_ratio, theta) = (1.2_f64, 1.4_f64);
+        let rise = (area_ratio.powi(2) - 1.0).sqrt() * theta.tan();
+        let mean =
+            (0..1000).map(|k| (1.0 - rise * (std::f64::consts::TAU * f64::from(k) / 1000.0).cos()).abs()).sum::<f64>()
+                / 1000.0;
+        assert!((covered_areas(area_ratio, theta) / mean - 1.0).abs() < 1e-4, "{mean}");
+        assert!(covered_areas(area_ratio, 1.569) > 100.0);
+    }
+}

@@ -85,7 +85,7 @@ impl Default for Costs {
             table_query_ns: 100.0,
             slice_ns: 42.0,
             triangle_ns: 60.0,
-            texel_ns: 10.0,
+            texel_ns: 1.2,
             threads: *THREADS,
         }
     }

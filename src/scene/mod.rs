@@ -24,6 +24,8 @@ mod view;
 #[cfg(test)]
 mod catalogue_doc;
 #[cfg(test)]
+mod overrides_tests;
+#[cfg(test)]
 pub(crate) mod tests;
 
 use std::collections::HashSet;
