@@ -5,14 +5,16 @@ use std::io::Write;
 use std::time::Instant;
 
 use crate::base::{Cancel, Error, InputError};
+use crate::pipeline::StageTimes;
 use crate::render::RenderScene;
+use crate::scene::LoadedScene;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::print_json;
 use super::render_path::RenderPath;
 use super::to_image::ToImage;
 use super::{EditArg, ProfileArgs};
+use super::{print_json, profile_slab};
 
 #[derive(Serialize)]
 struct Report {
@@ -28,27 +30,42 @@ struct Report {
 
 pub fn run(args: &ProfileArgs) -> Result<()> {
     let (loaded, ()) = args.scene.open(|loaded| {
-        super::slab::refuse(loaded, "profile")?;
         if args.image || args.edit == Some(EditArg::Camera) {
             // A missing object or environment is reported before the tile is computed.
             RenderScene::new(loaded)?;
         }
         Ok(())
     })?;
+    let measured =
+        if loaded.scene.slab.is_some() { profile_slab::measure(args, &loaded)? } else { measure(args, &loaded)? };
+    print(args, measured)
+}
+
+/// Timed runs.
+pub(super) struct Measured {
+    /// Milliseconds of each run, and of the stages that ran in it.
+    pub runs: Vec<(f64, StageTimes)>,
+    /// Path of the edited parameter.
+    pub parameter: Option<String>,
+    pub representation: String,
+}
+
+fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<Measured> {
     let mut edited = loaded.clone();
     let parameter = match args.edit {
         Some(EditArg::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| no_parameter("tile.geometry"))?),
         Some(EditArg::Brdf) => Some(edited.scene.nudge_brdf().ok_or_else(|| no_parameter("material"))?),
         Some(EditArg::Color) => Some(edited.scene.nudge_color().ok_or_else(|| no_parameter("material"))?),
+        Some(EditArg::Face | EditArg::Eta | EditArg::Thickness) => return Err(no_parameter("slab").into()),
         Some(EditArg::Camera) | None => None,
     };
     let mut pipeline = crate::gpu::pipeline();
-    let mut outcome = pipeline.effective(&loaded)?;
+    let mut outcome = pipeline.effective(loaded)?;
     args.scene.notes(&outcome);
-    let mut to_image = if args.image { Some(ToImage::new(&loaded, &outcome, args.size)?) } else { None };
+    let mut to_image = if args.image { Some(ToImage::new(loaded, &outcome, args.size)?) } else { None };
     let mut representation = outcome.brdf.representation.describe();
     let mut camera = if args.edit == Some(EditArg::Camera) {
-        let mut render_scene = RenderScene::with(&pipeline, &loaded)?;
+        let mut render_scene = RenderScene::with(&pipeline, loaded)?;
         let path = RenderPath::of(&render_scene, &outcome)?;
         // A camera edit changes neither the shading BRDF nor the shadows of the object.
         render_scene.cache_shadows(&pipeline)?;
@@ -58,13 +75,13 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     } else {
         None
     };
-    let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
+    let mut runs: Vec<(f64, StageTimes)> = Vec::new();
     for run in 0..=args.repeat {
         let start = Instant::now();
         let times = match (&mut camera, args.edit) {
             (None, Some(_)) if to_image.is_some() => {
                 let Some(to_image) = &mut to_image else { continue };
-                let times = to_image.run(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
+                let times = to_image.run(&mut pipeline, if run % 2 == 0 { &edited } else { loaded })?;
                 representation.clone_from(&to_image.representation);
                 times
             }
@@ -74,11 +91,11 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
             }
             (None, Some(_)) => {
                 // Runs alternate between the two scenes, so that each run is an edit.
-                outcome = pipeline.effective(if run % 2 == 0 { &edited } else { &loaded })?;
+                outcome = pipeline.effective(if run % 2 == 0 { &edited } else { loaded })?;
                 outcome.times.clone()
             }
             (None, None) => {
-                outcome = crate::gpu::pipeline().effective(&loaded)?;
+                outcome = crate::gpu::pipeline().effective(loaded)?;
                 outcome.times.clone()
             }
         };
@@ -88,6 +105,12 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
             runs.push((total, times));
         }
     }
+    Ok(Measured { runs, parameter, representation })
+}
+
+/// Prints the medians.
+fn print(args: &ProfileArgs, measured: Measured) -> Result<()> {
+    let Measured { runs, parameter, representation } = measured;
     let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     for (_, times) in &runs {
         for (name, ms) in times {
@@ -119,7 +142,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
     Ok(())
 }
 
-fn no_parameter(place: &str) -> Error {
+pub(super) fn no_parameter(place: &str) -> Error {
     InputError::new(place, "no numeric parameter", "a parameter that can be changed by 5 %").into()
 }
 

@@ -52,7 +52,7 @@ scene_table! {
         /// A captured sheet in place of both faces: an .npz file of `biscale capture`, which also holds the index and alpha.
         #[serde(skip_serializing_if = "Option::is_none")]
         svbtdf: Option<PathBuf> = None, FieldShape::Path, "";
-        /// How often a captured sheet repeats over the object, along u and along v.
+        /// How often a captured sheet repeats over the object, along x and along y.
         #[serde(skip_serializing_if = "is_once")]
         repeat: [u32; 2] = [1, 1], FieldShape::List { of: &FieldShape::Integer { min: 1, max: 10_000 }, min: 2, max: 2 }, "";
     }
