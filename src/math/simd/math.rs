@@ -26,15 +26,7 @@ pub(crate) fn ln_one_minus(s: f32) -> f32 {
     let y = (1.0 - s).max(1e-30);
     // Rounding error of the subtraction.
     let lost = ((1.0 - y) - s) / y;
-    // y = m 2^k with m in [2/3, 4/3).
-    const TWO_THIRDS_BITS: i32 = 0x3f2a_aaab;
-    let k = (y.to_bits() as i32).wrapping_sub(TWO_THIRDS_BITS) >> 23;
-    let m = f32::from_bits((y.to_bits() as i32).wrapping_sub(k << 23) as u32);
-    let r = (m - 1.0) / (m + 1.0);
-    let r2 = r * r;
-    let series =
-        2.0 * r * (1.0 + r2 * (1.0 / 3.0 + r2 * (1.0 / 5.0 + r2 * (1.0 / 7.0 + r2 * (1.0 / 9.0 + r2 * (1.0 / 11.0))))));
-    series + k as f32 * std::f32::consts::LN_2 + lost
+    ln_positive(y) + lost
 }
 
 /// `ln y` for normal `y > 0`, to 2e-7 absolute beside the logarithm's own rounding.

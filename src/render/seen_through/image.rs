@@ -47,9 +47,8 @@ pub struct Places {
 
 /// Points per task.
 const CHUNK: usize = 256;
-/// Part of the light below which a tail is not read, and below which a lobe is read as a round one, once.
-const LEAST_TAIL: f32 = 0.03;
-const WEAK: f32 = 0.15;
+/// Part of a lobe below which its tail is not read.
+const LEAST_TAIL: f32 = 0.02;
 /// Deviation of an even distribution over an interval of width 1.
 const BOX: f32 = 0.288_675_13;
 
@@ -149,14 +148,9 @@ impl<'a, S: VaryingSurface> Point<'a, S> {
                 if lobe.part == Vec3::ZERO {
                     continue;
                 }
-                let (mean, part) = (direction(lobe, side), lobe.part.max_element());
-                if part < WEAK {
-                    let whole = lobe.covariance.map(|value| value * (1.0 + lobe.tail * (Lobe::TAIL - 1.0)));
-                    sum += lobe.part * self.read(mean, &self.narrow_kernel(mean, whole));
-                    continue;
-                }
+                let mean = direction(lobe, side);
                 let mut value = self.read(mean, &self.kernel(mean, lobe.covariance));
-                if lobe.tail * part > LEAST_TAIL {
+                if lobe.tail > LEAST_TAIL {
                     let wide = lobe.covariance.map(|value| value * Lobe::TAIL);
                     value += lobe.tail * (self.read(mean, &self.kernel(mean, wide)) - value);
                 }
