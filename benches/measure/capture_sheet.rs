@@ -4,34 +4,47 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use biscale::slab::capture::patterns::Pattern;
 use biscale::slab::capture::simulated::varying_sheet;
 use biscale::slab::capture::svbtdf::Svbtdf;
 use glam::{DVec2, DVec3};
 
 /// Sheets by the pixels of a side, and dots of a side.
 const SHEETS: [(usize, usize); 3] = [(48, 40), (96, 40), (192, 40)];
+/// The sheets of Table 1 of Dai et al. 2009, made by formulas: pixels and dots of a side. The paper's have 600 x 600, 400 x 420
+/// and 600 x 600 pixels.
+const PATTERNS: [(Pattern, &str, usize, usize); 3] = [
+    (Pattern::GridSheet, "grid sheet", 64, 40),
+    (Pattern::LeafGlass, "leaf glass", 64, 40),
+    (Pattern::RicePaper, "rice paper", 64, 20),
+];
 /// Pixels whose lobes are compared.
 const COMPARED: usize = 60;
 
 /// Prints a row per sheet, or the row of a sheet of `PIXELSxDOTS`.
 pub fn capture_sheet(argument: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
-    print("| pixels | dots | noise | representatives | error of lobes at 0, 30 and 60°: median, worst of 60 pixels | mean error of alpha | capture | memory |".to_owned());
-    print("|---|---|---|---|---|---|---|---|".to_owned());
+    print("| sheet | pixels | dots | noise | representatives | error of lobes at 0, 30 and 60°: median, worst of 60 pixels | mean error of alpha | capture | memory |".to_owned());
+    print("|---|---|---|---|---|---|---|---|---|".to_owned());
     let one = argument.and_then(|text| {
         let (pixels, dots) = text.split_once('x')?;
         Some((pixels.parse().ok()?, dots.parse().ok()?))
     });
     let sheets = one.map_or(SHEETS.to_vec(), |one| vec![one]);
     for (side, dots) in sheets {
-        print(row(side, dots, 0.01)?);
+        print(row("varying", &varying_sheet([side, side]), dots, 0.01)?);
+    }
+    if argument.is_none() {
+        for (pattern, name, side, dots) in PATTERNS {
+            print(row(name, &pattern.sheet([side, side]), dots, 0.01)?);
+        }
     }
     Ok(())
 }
 
-fn row(side: usize, dots: usize, noise: f64) -> Result<String, String> {
+fn row(name: &str, sheet: &Svbtdf, dots: usize, noise: f64) -> Result<String, String> {
+    let side = sheet.size[0];
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let path = |name: &str| folder.path().join(name);
-    let sheet = varying_sheet([side, side]);
     sheet.write(&path("known.npz")).map_err(|error| error.to_string())?;
     let scene = "[tile]\ngeometry = { kind = \"flat\" }\n[slab]\nsvbtdf = \"known.npz\"\n";
     std::fs::write(path("known.toml"), scene).map_err(|error| error.to_string())?;
@@ -45,13 +58,13 @@ fn row(side: usize, dots: usize, noise: f64) -> Result<String, String> {
     let found = Svbtdf::read(&path("found.npz")).map_err(|error| error.to_string())?;
     let step = side * side / COMPARED;
     let compared: Vec<usize> = (0..COMPARED).map(|k| k * step + (k * 7919) % step.max(1)).collect();
-    let mut errors: Vec<f64> = compared.iter().map(|pixel| error(&sheet, &found, *pixel)).collect();
+    let mut errors: Vec<f64> = compared.iter().map(|pixel| error(sheet, &found, *pixel)).collect();
     errors.sort_by(f64::total_cmp);
     let alpha: f64 =
         compared.iter().map(|pixel| (sheet.model(*pixel).alpha - found.model(*pixel).alpha).abs()).sum::<f64>()
             / COMPARED as f64;
     Ok(format!(
-        "| {side} x {side} | {dots} x {dots} | {:.0} % | {} | {:.1} %, {:.1} % | {alpha:.2} | {seconds:.1} s | {} MB |",
+        "| {name} | {side} x {side} | {dots} x {dots} | {:.0} % | {} | {:.1} %, {:.1} % | {alpha:.2} | {seconds:.1} s | {} MB |",
         100.0 * noise,
         found.models.len(),
         100.0 * errors[COMPARED / 2],

@@ -343,6 +343,12 @@ pub enum EditArg {
     Brdf,
     Color,
     Camera,
+    /// A face of a slab.
+    Face,
+    /// The index of a slab.
+    Eta,
+    /// The thickness of a slab.
+    Thickness,
 }
 
 #[derive(Debug, Args)]

@@ -13,6 +13,7 @@ pub mod fit;
 pub mod materials;
 pub mod plan;
 pub mod profile;
+mod profile_slab;
 pub mod render;
 mod render_path;
 pub mod report;

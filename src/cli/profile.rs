@@ -11,10 +11,10 @@ use crate::scene::LoadedScene;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::print_json;
 use super::render_path::RenderPath;
 use super::to_image::ToImage;
 use super::{EditArg, ProfileArgs};
+use super::{print_json, profile_slab};
 
 #[derive(Serialize)]
 struct Report {
@@ -30,27 +30,43 @@ struct Report {
 
 pub fn run(args: &ProfileArgs) -> Result<()> {
     let (loaded, ()) = args.scene.open(|loaded| {
-        super::slab::refuse(loaded, "profile")?;
         if args.image || args.edit == Some(EditArg::Camera) {
             // A missing object or environment is reported before the tile is computed.
             RenderScene::new(loaded)?;
         }
         Ok(())
     })?;
+    let measured =
+        if loaded.scene.slab.is_some() { profile_slab::measure(args, &loaded)? } else { measure(args, &loaded)? };
+    let report = report_of(args, measured);
+    if args.scene.json { print_json(&report) } else { print(&report) }
+}
+
+/// Timed runs.
+pub(super) struct Measured {
+    /// Milliseconds of each run, and of the stages that ran in it.
+    pub runs: Vec<(f64, StageTimes)>,
+    /// Path of the edited parameter.
+    pub parameter: Option<String>,
+    pub representation: String,
+}
+
+fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<Measured> {
     let mut edited = loaded.clone();
     let parameter = match args.edit {
         Some(EditArg::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| no_parameter("tile.geometry"))?),
         Some(EditArg::Brdf) => Some(edited.scene.nudge_brdf().ok_or_else(|| no_parameter("material"))?),
         Some(EditArg::Color) => Some(edited.scene.nudge_color().ok_or_else(|| no_parameter("material"))?),
+        Some(EditArg::Face | EditArg::Eta | EditArg::Thickness) => return Err(no_parameter("slab").into()),
         Some(EditArg::Camera) | None => None,
     };
     let mut pipeline = crate::gpu::pipeline();
-    let mut outcome = pipeline.effective(&loaded)?;
+    let mut outcome = pipeline.effective(loaded)?;
     args.scene.notes(&outcome);
-    let mut to_image = if args.image { Some(ToImage::new(&loaded, &outcome, args.size)?) } else { None };
+    let mut to_image = if args.image { Some(ToImage::new(loaded, &outcome, args.size)?) } else { None };
     let mut representation = outcome.brdf.representation.describe();
     let mut camera = match args.edit {
-        Some(EditArg::Camera) => Some(CameraEdit::new(&pipeline, &loaded, &outcome)?),
+        Some(EditArg::Camera) => Some(CameraEdit::new(&pipeline, loaded, &outcome)?),
         _ => None,
     };
     if let Some(camera) = &camera {
@@ -62,18 +78,18 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
         let times = match (&mut camera, args.edit) {
             (None, Some(_)) if to_image.is_some() => {
                 let Some(to_image) = &mut to_image else { continue };
-                let times = to_image.run(&mut pipeline, if run % 2 == 0 { &edited } else { &loaded })?;
+                let times = to_image.run(&mut pipeline, if run % 2 == 0 { &edited } else { loaded })?;
                 representation.clone_from(&to_image.representation);
                 times
             }
             (Some(camera), _) => camera.run(args.size)?,
             (None, Some(_)) => {
                 // Runs alternate between the two scenes, so that each run is an edit.
-                outcome = pipeline.effective(if run % 2 == 0 { &edited } else { &loaded })?;
+                outcome = pipeline.effective(if run % 2 == 0 { &edited } else { loaded })?;
                 outcome.times.clone()
             }
             (None, None) => {
-                outcome = crate::gpu::pipeline().effective(&loaded)?;
+                outcome = crate::gpu::pipeline().effective(loaded)?;
                 outcome.times.clone()
             }
         };
@@ -83,14 +99,19 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
             runs.push((total, times));
         }
     }
-    let report = Report {
+    Ok(Measured { runs, parameter, representation })
+}
+
+/// The medians of timed runs.
+fn report_of(args: &ProfileArgs, measured: Measured) -> Report {
+    let Measured { runs, parameter, representation } = measured;
+    Report {
         stages: medians(&runs),
         total_ms: median(runs.iter().map(|run| run.0).collect()),
         edited: parameter,
         runs: args.repeat,
         representation,
-    };
-    if args.scene.json { print_json(&report) } else { print(&report) }
+    }
 }
 
 /// A move of the camera, which changes neither the shading BRDF nor the shadows of the object.
@@ -141,7 +162,7 @@ fn medians(runs: &[(f64, StageTimes)]) -> BTreeMap<&'static str, f64> {
     stages.into_iter().map(|(name, ms)| (name, median(ms))).collect()
 }
 
-fn no_parameter(place: &str) -> Error {
+pub(super) fn no_parameter(place: &str) -> Error {
     InputError::new(place, "no numeric parameter", "a parameter that can be changed by 5 %").into()
 }
 

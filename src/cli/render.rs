@@ -113,7 +113,13 @@ fn of_slab(args: &RenderArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, ren
     if args.scene.json {
         let times = rendered.times;
         let large = [("g_buffer", times.gbuffer_ms), ("shading", times.shading_ms)];
-        let stages = outcome.times.iter().copied().chain(large).map(|(name, ms)| (name.to_owned(), ms.into()));
+        let stages = outcome
+            .times
+            .iter()
+            .chain(&scene.times)
+            .copied()
+            .chain(large)
+            .map(|(name, ms)| (name.to_owned(), ms.into()));
         return print_json(&Report {
             image: args.output.display().to_string(),
             width: args.size[0],

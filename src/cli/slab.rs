@@ -104,7 +104,7 @@ pub fn refuse(loaded: &LoadedScene, command: &str) -> Result<()> {
         return Ok(());
     }
     let expected = format!(
-        "a scene without it: `biscale {command}` knows no slabs; `eval`, `transmit`, `render`, `export`, `fit` and `plan` do"
+        "a scene without it: `biscale {command}` knows no slabs; `eval`, `transmit`, `render`, `export`, `fit`, `plan` and `profile` do"
     );
     Err(crate::Error::from(InputError::new("slab", "a scene with a slab", expected)).into())
 }

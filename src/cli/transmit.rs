@@ -188,7 +188,8 @@ fn model(slab: &Slab, i: DVec3) -> Transmitted {
         first_arrival_tir: part(&|parts| parts.first_total_reflection),
         after_bounces: part(&|parts| parts.after_bounces),
     };
-    let plane = plane_directions(i).map(|o| (o, slab.btdf(i, o))).collect();
+    let row = slab.row(i);
+    let plane = plane_directions(i).map(|o| (o, row.btdf(o))).collect();
     Transmitted { lobe, plane, totals, standard_error: None, cell_errors: None, rel_l2: None }
 }
 

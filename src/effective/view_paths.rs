@@ -76,3 +76,13 @@ pub trait ViewPaths: Sync {
     /// The parts of [`ViewLobes::straight`], exactly.
     fn straight(&self, o: Vec3) -> [Vec3; 2];
 }
+
+/// A surface through which a viewer sees, and which may differ from place to place.
+pub trait VaryingSurface: Sync {
+    type Point<'a>: ViewPaths
+    where
+        Self: 'a;
+
+    /// The surface at a place, 0 to 1 along x and y. It repeats outside.
+    fn at(&self, place: Vec2) -> Self::Point<'_>;
+}

@@ -71,10 +71,14 @@ impl SlabTables {
         let over = DVec3::new(1.0, 1.0, -1.0);
         let rows = in_parallel(lights.len(), progress, |k| {
             let i = lights[k];
+            let from_above = slab.row(i);
             let row =
                 |value: &dyn Fn(DVec3) -> DVec3| viewers.iter().map(|o| value(*o).as_vec3()).collect::<Vec<Vec3>>();
-            let values =
-                [row(&|o| slab.btdf(i, o * over)), row(&|o| slab.brdf(i, o)), row(&|o| slab.brdf(i * over, o * over))];
+            let values = [
+                row(&|o| from_above.btdf(o * over)),
+                row(&|o| slab.brdf(i, o)),
+                row(&|o| slab.brdf(i * over, o * over)),
+            ];
             (values, [slab.straight(i), slab.straight(i * over)].map(|side| side.map(|part| part.as_vec3())))
         })?;
         let rows = &rows;

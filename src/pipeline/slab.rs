@@ -7,6 +7,7 @@ use super::Pipeline;
 use super::stage::{Keyed, StageTimes, elapsed_ms};
 use super::stages::{BuildFace, CorrelateFaces, FaceNormals, ReadSvbtdf, TraceInner};
 use crate::base::{InputError, Result};
+use crate::cache::{Key, KeyBuilder};
 use crate::diagnostics::{Health, SlabHealthInputs};
 use crate::plan::{Effect, Settings, SlabDecision, SlabFeatures, SlabSettings};
 use crate::scene::{Alpha, LoadedScene, Slab as SlabSpec, Switch};
@@ -17,6 +18,8 @@ use crate::slab::{Method, Optics, Slab, alpha_of, dual_error};
 #[derive(Debug, Clone)]
 pub struct SlabOutcome {
     pub slab: Arc<Slab>,
+    /// Key of all that paths through the slab depend on: both faces and the material between them.
+    pub paths_key: Key,
     /// The plan's rows: the slab and its inner reflections.
     pub effects: Vec<Effect>,
     pub settings: SlabSettings,
@@ -35,7 +38,8 @@ pub(super) fn refuse_slab(loaded: &LoadedScene) -> Result<()> {
     if loaded.scene.slab.is_none() {
         return Ok(());
     }
-    let expected = "a scene without it; `biscale eval`, `transmit`, `render`, `export`, `fit` and `plan` know slabs";
+    let expected =
+        "a scene without it; `biscale eval`, `transmit`, `render`, `export`, `fit`, `plan` and `profile` know slabs";
     Err(InputError::new("slab", "a scene with a slab", expected).into())
 }
 
@@ -80,9 +84,11 @@ impl Pipeline {
         let virtual_face = self.get(correlation, &mut times)?;
         let optics = optics(spec);
         let captured = match &spec.svbtdf {
-            Some(path) => Some(self.get(ReadSvbtdf::new(loaded, path, &self.env), &mut times)?.value),
+            Some(path) => Some(self.get(ReadSvbtdf::new(loaded, path, &self.env), &mut times)?),
             None => None,
         };
+        let captured_key = captured.as_ref().map(|captured| captured.key);
+        let captured = captured.map(|captured| captured.value);
         let inner = if bounces && captured.is_none() {
             let (photons, seed) = (settings.photons, settings.seed);
             let trace = TraceInner { top: &top, bottom: &bottom, optics, photons, seed };
@@ -90,6 +96,13 @@ impl Pipeline {
         } else {
             None
         };
+        let mut paths_key = KeyBuilder::of_stage("slab_paths");
+        paths_key.key("top", &top.key).key("bottom", &bottom.key).flags("bounces", [bounces]);
+        let Optics { eta, thickness, absorption, diffuse } = optics;
+        paths_key.numbers("optics", &[eta, absorption, diffuse]).numbers("thickness", &[thickness]);
+        if let Some(captured) = &captured_key {
+            paths_key.key("svbtdf", captured);
+        }
         let start = Instant::now();
         let alpha = match spec.alpha {
             Alpha::Auto => alpha_of(&top.ndf, &bottom.ndf),
@@ -130,7 +143,8 @@ impl Pipeline {
             effect.measured_ms = times.iter().find(|(stage, _)| *stage == name).map(|(_, ms)| *ms);
         }
         let svbtdf = captured.map(|captured| captured.svbtdf.clone());
-        Ok(SlabOutcome { slab: Arc::new(slab), effects, settings, times, dual_error, health, svbtdf })
+        let paths_key = paths_key.finish();
+        Ok(SlabOutcome { slab: Arc::new(slab), paths_key, effects, settings, times, dual_error, health, svbtdf })
     }
 }
 

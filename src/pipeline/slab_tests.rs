@@ -65,16 +65,18 @@ fn shipped_slabs_are_computed_and_keep_all_light() {
         let transmitted = DiscLobe::transmitted(slab, i, 96).total() + straight;
         let all = transmitted + DiscLobe::reflected(slab, i, 96).total() + mirrored;
         println!("{name}: T {:.3}, all {:.3}", transmitted.x, all.x);
-        assert!(transmitted.min_element() > 0.5 && all.max_element() < 1.05, "{name}: {transmitted} {all}");
+        // Paper absorbs.
+        let least = if slab.captured.is_some() { 0.3 } else { 0.5 };
+        assert!(transmitted.min_element() > least && all.max_element() < 1.03, "{name}: {transmitted} {all}");
         if slab.inner.is_some() {
             let absorbed = DVec3::from_array([0, 1, 2].map(|k| slab.inner.as_ref().unwrap().parts(i, k).absorbed));
-            // Eq. 11 loses light. The few photons of a draft do not resolve how inner reflections depend on the azimuth.
-            let bound = if slab.method == Method::Faces || slab.top.is_smooth() { 0.05 } else { 0.1 };
+            // Eq. 11 loses light.
+            let bound = if slab.method == Method::Faces || slab.top.is_smooth() { 0.03 } else { 0.1 };
             assert!((all + absorbed - 1.0).abs().max_element() < bound, "{name}: {all} + {absorbed}");
         }
         count += 1;
     }
-    assert_eq!(count, 9);
+    assert_eq!(count, 13);
 }
 
 #[test]

@@ -79,7 +79,7 @@ pub struct SlabDecision {
 
 /// Nanoseconds of Eq. 11 per pair, and of each facet of the sum (`cargo bench --bench measure -- slabs`).
 const DUAL_NS: f64 = 160.0;
-const FACET_NS: f64 = 100.0;
+const FACET_NS: f64 = 30.0;
 /// Nanoseconds per photon of the table of inner reflections, and its rings.
 const PHOTON_NS: f64 = 1000.0;
 const RINGS: f64 = 24.0;

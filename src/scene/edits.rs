@@ -2,8 +2,7 @@
 
 use toml::{Table, Value};
 
-use super::Scene;
-use super::{FieldShape, Geometry, Kind, TermSpec};
+use super::{FieldShape, Geometry, Kind, Scene, SlabFace, TableFace, TermSpec, TileFace};
 
 impl Scene {
     /// Changes the first numeric parameter of the geometry by 5 % and returns its path (`tile.geometry.depth`). Returns
@@ -25,6 +24,41 @@ impl Scene {
             }
         }
         None
+    }
+
+    /// Changes the first face of the slab that is not smooth, and returns the path of what changed: roughnesses by 5 %, other
+    /// faces by a turn of 5°.
+    pub fn nudge_face(&mut self) -> Option<String> {
+        let slab = self.slab.as_mut()?;
+        for (side, face) in [("top", &mut slab.top), ("bottom", &mut slab.bottom)] {
+            let key = match face {
+                SlabFace::Smooth {} => continue,
+                SlabFace::Beckmann(rough) | SlabFace::Ggx(rough) => {
+                    rough.roughness *= if rough.roughness.max_element() > 1.9 { 0.95 } else { 1.05 };
+                    "roughness"
+                }
+                SlabFace::Table(TableFace { rotation_deg, .. }) | SlabFace::Tile(TileFace { rotation_deg, .. }) => {
+                    *rotation_deg += if *rotation_deg > 350.0 { -5.0 } else { 5.0 };
+                    "rotation_deg"
+                }
+            };
+            return Some(format!("slab.{side}.{key}"));
+        }
+        None
+    }
+
+    /// Changes the index of the slab by 0.05 and returns its path. A captured sheet has an index of its own.
+    pub fn nudge_eta(&mut self) -> Option<String> {
+        let slab = self.slab.as_mut().filter(|slab| slab.svbtdf.is_none())?;
+        slab.eta += if slab.eta.max_element() > 3.9 { -0.05 } else { 0.05 };
+        Some("slab.eta".to_owned())
+    }
+
+    /// Makes the slab thicker, by 5 % or from nothing to 0.05 tile units, and returns the path of its thickness.
+    pub fn nudge_thickness(&mut self) -> Option<String> {
+        let slab = self.slab.as_mut().filter(|slab| slab.svbtdf.is_none())?;
+        slab.thickness = if slab.thickness > 0.0 { slab.thickness * 1.05 } else { 0.05 };
+        Some("slab.thickness".to_owned())
     }
 
     /// Makes the first material's colour 5 % darker and returns its path.

@@ -18,7 +18,7 @@ pub fn read(base_dir: &Path, path: &Path, limit: u64) -> Result<Cow<'static, [u8
         return match shipped::asset(name) {
             Some(bytes) => Ok(Cow::Borrowed(bytes)),
             None => {
-                let names = shipped::ASSETS.iter().map(|(name, _)| *name);
+                let names = shipped::ASSETS.iter().chain(shipped::SHEETS).map(|(name, _)| *name);
                 let expected = format!("one of {}", names.clone().collect::<Vec<_>>().join(", "));
                 let error = InputError::new("", format!("no asset `{name}`"), expected).in_file(path);
                 Err(match check::nearest(name, names) {

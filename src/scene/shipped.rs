@@ -6,9 +6,9 @@ macro_rules! materials {
     };
 }
 
-macro_rules! assets {
-    ($($name:literal),* $(,)?) => {
-        &[$(($name, include_bytes!(concat!("../../assets/", $name)).as_slice())),*]
+macro_rules! embedded {
+    ($folder:literal, $($name:literal),* $(,)?) => {
+        &[$(($name, include_bytes!(concat!($folder, $name)).as_slice())),*]
     };
 }
 
@@ -44,12 +44,16 @@ pub const MATERIALS: &[(&str, &str)] = materials![
     "fig9_slopes_color_map",
     "fig9a_cylinder_grooves",
     "fig9b_cylinder_stripes",
+    "slab_fig1_grid_sheet",
+    "slab_fig1_leaf_glass",
+    "slab_fig1_rice_paper",
     "slab_fig3_both",
     "slab_fig3_bottom",
     "slab_fig3_top",
     "slab_fig5_30",
     "slab_fig5_45",
     "slab_fig5_60",
+    "slab_fig6_grid_sheet",
     "slab_fig7_leaf_glass",
     "slab_two_tiles",
     "slab_window",
@@ -62,7 +66,11 @@ pub const MATERIALS: &[(&str, &str)] = materials![
 ];
 
 /// Name and content of every file in `assets/`, sorted.
-pub const ASSETS: &[(&str, &[u8])] = assets!["brushed.png", "hammered.png", "leather.png", "ripples.png"];
+pub const ASSETS: &[(&str, &[u8])] =
+    embedded!["../../assets/", "brushed.png", "hammered.png", "leather.png", "ripples.png"];
+
+/// Name and content of every sheet in `sheets/`, sorted: SVBTDFs made by formulas.
+pub const SHEETS: &[(&str, &[u8])] = embedded!["../../sheets/", "grid_sheet.npz", "leaf_glass.npz", "rice_paper.npz"];
 
 /// Names of the shipped scenes.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -87,7 +95,7 @@ pub fn description(name: &str) -> Option<String> {
 
 /// Content of a shipped file.
 pub fn asset(name: &str) -> Option<&'static [u8]> {
-    ASSETS.iter().find(|(candidate, _)| *candidate == name).map(|(_, bytes)| *bytes)
+    ASSETS.iter().chain(SHEETS).find(|(candidate, _)| *candidate == name).map(|(_, bytes)| *bytes)
 }
 
 #[cfg(test)]
@@ -110,7 +118,9 @@ mod tests {
     #[test]
     fn everything_in_materials_and_assets_is_embedded_in_order() {
         assert_eq!(files("materials", Some(".toml")), names().collect::<Vec<_>>());
-        assert_eq!(files("assets", None), ASSETS.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+        let names = |files: &[(&'static str, &[u8])]| files.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+        assert_eq!(files("assets", None), names(ASSETS));
+        assert_eq!(files("sheets", None), names(SHEETS));
     }
 
     #[test]

@@ -28,9 +28,10 @@ pub fn dual_error(slab: &Slab) -> f64 {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let azimuth = DVec2::from_angle(0.4 + 1.7 * turn as f64);
         let i = (sin * azimuth).extend(cos);
+        let (dual, faces) = (dual.row(i), faces.row(i));
         let (mut difference, mut norm) = (0.0, 0.0);
         for o in directions(slab, i) {
-            let (a, b) = (dual.single_pass(i, o), faces.single_pass(i, o));
+            let (a, b) = (dual.single_pass(o), faces.single_pass(o));
             difference += (a - b).length_squared();
             norm += b.length_squared();
         }

@@ -19,7 +19,7 @@ pub struct Ellipse {
     pub profile: Profile,
     /// Squared roughnesses `S`.
     pub squares: DMat2,
-    inverse: DMat2,
+    pub(super) inverse: DMat2,
     /// `S = L Lᵀ`, lower triangular.
     root: DMat2,
     /// `1 / (π √|S|)`.

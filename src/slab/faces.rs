@@ -8,6 +8,7 @@ use super::dual::leaving_bottom;
 use super::fresnel::{reflectance, refract};
 use super::ndf::{Ndf, normal};
 use super::optics::Channel;
+use crate::math::simd::{FacetColumns, Interior, RayColumns, enter};
 
 /// The order of a sum: which face's facets are summed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,67 +41,161 @@ impl Order {
     }
 }
 
+/// Facets of one face that are summed.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Facets {
+    /// Slopes with their masses.
+    list: Vec<(DVec2, f64)>,
+    /// The same in single precision, as the side that light enters sees them.
+    columns: FacetColumns,
+}
+
+impl Facets {
+    /// `sign` is 1 for facets of the top, and -1 for those of the bottom, which light from below enters.
+    fn new(list: Vec<(DVec2, f64)>, sign: f64) -> Self {
+        let columns =
+            FacetColumns::new(list.iter().map(|(slope, mass)| ((sign * *slope).as_vec2().to_array(), *mass as f32)));
+        Self { list, columns }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+}
+
 /// The summed facets of a slab's rough parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaceSum {
-    top: Vec<(DVec2, f64)>,
-    bottom: Vec<(DVec2, f64)>,
+    top: Facets,
+    bottom: Facets,
 }
 
 impl FaceSum {
     /// `count` facets of the smoother face, or of each.
     pub fn new(top: &Ndf, bottom: &Ndf, count: usize) -> Self {
         if top.is_smooth() || bottom.is_smooth() {
-            return Self { top: Vec::new(), bottom: Vec::new() };
+            return Self { top: Facets::default(), bottom: Facets::default() };
         }
         let order = Order::of_faces(top, bottom);
         let of = |face: &Ndf, other: Order| if order == other { Vec::new() } else { face.facets(count) };
-        Self { top: of(top, Order::Bottom), bottom: of(bottom, Order::Top) }
+        Self { top: Facets::new(of(top, Order::Bottom), 1.0), bottom: Facets::new(of(bottom, Order::Top), -1.0) }
     }
 
     /// The same facets on the slab turned over.
     pub fn turned(&self) -> Self {
-        let turned = |facets: &[(DVec2, f64)]| facets.iter().map(|(slope, mass)| (-*slope, *mass)).collect();
-        Self { top: turned(&self.bottom), bottom: turned(&self.top) }
+        let turned = |facets: &Facets, sign: f64| {
+            Facets::new(facets.list.iter().map(|(slope, mass)| (-*slope, *mass)).collect(), sign)
+        };
+        Self { top: turned(&self.bottom, 1.0), bottom: turned(&self.top, -1.0) }
     }
 
-    /// BTDF [1/sr] of the light that meets rough facets on both faces, single pass.
-    pub fn btdf(&self, top: &Ndf, bottom: &Ndf, i: DVec3, o: DVec3, channel: Channel) -> f64 {
-        let over = DVec3::new(1.0, 1.0, -1.0);
-        let mut orders = 0.0;
+    /// The sum for one direction `w`, above or below, and many on the other side.
+    pub fn row<'a>(&'a self, top: &'a Ndf, bottom: &'a Ndf, w: DVec3, channel: Channel) -> SumRow<'a> {
+        let passes = [
+            Pass { first: top, second: bottom, facets: &self.top, sign: 1.0, channel },
+            Pass { first: bottom, second: top, facets: &self.bottom, sign: -1.0, channel },
+        ];
+        let own = &passes[usize::from(w.z < 0.0)];
+        let rays = own.is_single_precision().then(|| own.rays(from_above(w)));
+        SumRow { passes, w, rays }
+    }
+}
+
+/// The direction mirrored to the upper side: that of the slab turned over.
+fn from_above(w: DVec3) -> DVec3 {
+    w.with_z(w.z.abs())
+}
+
+/// The sum over facets for one direction and many others, for light that meets rough facets on both faces.
+#[derive(Debug, Clone)]
+pub struct SumRow<'a> {
+    /// Light that enters at the top, and the slab turned over with light from the viewer.
+    passes: [Pass<'a>; 2],
+    w: DVec3,
+    /// Rays from `w` inside; absent if single precision is too coarse.
+    rays: Option<RayColumns>,
+}
+
+impl SumRow<'_> {
+    /// BTDF [1/sr] for `w` and a direction on its other side, single pass. It is reciprocal.
+    pub fn btdf(&self, other: DVec3) -> f64 {
+        let is_pair = self.w.z * other.z < 0.0;
+        let used = self.passes.iter().filter(|pass| !pass.facets.is_empty()).count();
+        if !is_pair || used == 0 {
+            return 0.0;
+        }
+        let (i, o) = if self.w.z > 0.0 { (self.w, other) } else { (other, self.w) };
+        let down = |w: DVec3| w.with_z(-w.z.abs());
         let mut sum = 0.0;
-        if !self.top.is_empty() {
-            sum += Pass { first: top, second: bottom, facets: &self.top, sign: 1.0 }.btdf(i, o, channel);
-            orders += 1.0;
+        for (k, pass) in self.passes.iter().enumerate().filter(|(_, pass)| !pass.facets.is_empty()) {
+            let (i, o) = if k == 0 { (i, o) } else { (from_above(o), down(i)) };
+            let is_own = k == usize::from(self.w.z < 0.0);
+            sum += match &self.rays {
+                Some(rays) if is_own => pass.leaving(rays, i, o),
+                _ => pass.btdf(i, o),
+            };
         }
-        if !self.bottom.is_empty() {
-            // The slab turned over: its light comes from the viewer, and all slopes change sign.
-            sum +=
-                Pass { first: bottom, second: top, facets: &self.bottom, sign: -1.0 }.btdf(o * over, i * over, channel);
-            orders += 1.0;
-        }
-        if orders > 0.0 { sum / orders } else { 0.0 }
+        sum / used as f64
     }
 }
 
 /// One order of the sum. Slopes of both faces are multiplied by `sign`.
-struct Pass<'a> {
+#[derive(Debug, Clone)]
+pub(super) struct Pass<'a> {
     first: &'a Ndf,
     second: &'a Ndf,
-    facets: &'a [(DVec2, f64)],
+    facets: &'a Facets,
     sign: f64,
+    channel: Channel,
 }
 
+/// Width of the narrowest lobe of a facet, `(η - 1)` times a deviation of slopes, down to which single precision resolves
+/// it: it is wrong by some 1e-4 of this width.
+const NARROWEST: f64 = 1e-3;
+
 impl Pass<'_> {
-    fn btdf(&self, i: DVec3, o: DVec3, channel: Channel) -> f64 {
+    fn seen(&self, face: &Ndf, w: DVec3) -> f64 {
+        face.seen(w * DVec3::new(self.sign, self.sign, 1.0))
+    }
+
+    fn is_single_precision(&self) -> bool {
+        (self.channel.eta - 1.0) * self.second.narrowest() > NARROWEST
+    }
+
+    fn btdf(&self, i: DVec3, o: DVec3) -> f64 {
+        if self.is_single_precision() { self.leaving(&self.rays(i), i, o) } else { self.in_double_precision(i, o) }
+    }
+
+    /// The rays of light from `i`, which points up, after each facet.
+    fn rays(&self, i: DVec3) -> RayColumns {
+        let mut rays = RayColumns::default();
+        let Channel { eta, depth } = self.channel;
+        let interior = Interior { eta: eta as f32, depth: depth as f32 };
+        enter(&self.facets.columns, i.as_vec3().to_array(), interior, &mut rays);
+        self.first.mask(self.sign, &mut rays);
+        self.second.mask(self.sign, &mut rays);
+        rays
+    }
+
+    /// BTDF [1/sr] of the rays of light from `i` towards `o`.
+    fn leaving(&self, rays: &RayColumns, i: DVec3, o: DVec3) -> f64 {
         if !(i.z > 0.0 && o.z < 0.0) {
             return 0.0;
         }
-        let turned = DVec3::new(self.sign, self.sign, 1.0);
-        let seen = |face: &Ndf, w: DVec3| face.seen(w * turned);
-        let outer = seen(self.first, i) * seen(self.second, o) / i.z;
+        let square = (self.channel.eta * self.channel.eta) as f32;
+        let sum = self.second.sum_leaving(self.sign, rays, o.as_vec3().to_array(), square);
+        sum * self.seen(self.first, i) * self.seen(self.second, o) / (i.z * o.z.abs())
+    }
+
+    /// As [`Self::btdf`], for any width; the simple version.
+    pub(super) fn in_double_precision(&self, i: DVec3, o: DVec3) -> f64 {
+        if !(i.z > 0.0 && o.z < 0.0) {
+            return 0.0;
+        }
+        let channel = self.channel;
+        let outer = self.seen(self.first, i) * self.seen(self.second, o) / i.z;
         let mut sum = 0.0;
-        for (slope, mass) in self.facets {
+        for (slope, mass) in &self.facets.list {
             let h = normal(self.sign * *slope);
             let c = i.dot(h);
             let Some(d) = refract(-i, h, channel.eta).filter(|d| d.z < 0.0) else { continue };
@@ -112,12 +207,75 @@ impl Pass<'_> {
             let fresnel = 1.0 - reflectance(c, channel.eta);
             sum += mass * c / h.z
                 * fresnel
-                * seen(self.first, d)
-                * seen(self.second, d)
+                * self.seen(self.first, d)
+                * self.seen(self.second, d)
                 * channel.transmission(d)
                 * lobe.factor
                 * density;
         }
         sum * outer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ellipse::Profile;
+    use super::*;
+
+    #[test]
+    fn sums_in_single_precision_are_those_in_double_precision() {
+        let analytic = |profile, x, y| Ndf::analytic(profile, DVec2::new(x, y), 0.3);
+        let slopes: Vec<_> = (0..900)
+            .map(|k| (DVec2::new(0.3 * (f64::from(k) * 0.37).sin().powi(2), 0.2 * (f64::from(k) * 0.71).cos()), 1.0))
+            .collect();
+        let mixed: Vec<_> =
+            slopes.iter().copied().chain([(DVec2::new(0.2, -0.1), 90.0), (DVec2::ZERO, 90.0)]).collect();
+        let line: Vec<_> = (0..200).map(|k| (DVec2::new(f64::from(k) * 0.003 - 0.2, 0.0), 1.0)).collect();
+        let of = |facets: &[(DVec2, f64)]| Ndf::of_facets(facets, 64).unwrap();
+        let faces = [
+            analytic(Profile::Beckmann, 0.2, 0.3),
+            analytic(Profile::Ggx, 0.1, 0.2),
+            analytic(Profile::Beckmann, 0.005, 0.4),
+            of(&slopes),
+            of(&mixed),
+            of(&line),
+        ];
+        for (top, bottom) in faces.iter().flat_map(|top| faces.iter().map(move |bottom| (top, bottom))) {
+            let sum = FaceSum::new(top, bottom, 24);
+            for (eta, depth) in [(1.5, 0.0), (1.1, 0.3)] {
+                for degrees in [0.0, 50.0, 80.0, 89.0_f64] {
+                    let (sin, cos) = degrees.to_radians().sin_cos();
+                    let i = (sin * DVec2::from_angle(1.0)).extend(cos);
+                    let rows = [i, i.with_z(-i.z)].map(|w| sum.row(top, bottom, w, Channel { eta, depth }));
+                    let (mut worst, mut peak) = (0.0_f64, 0.0_f64);
+                    for k in 0..60 {
+                        let at = 0.98 * f64::from(k).sqrt() / 60f64.sqrt() * DVec2::from_angle(2.4 * f64::from(k));
+                        let z = (1.0 - at.length_squared()).sqrt();
+                        for (row, sign) in rows.iter().zip([1.0, -1.0]) {
+                            let found = row.btdf(at.extend(-sign * z));
+                            let pair = |k: usize| {
+                                let (up, down) = (i, at.extend(-z));
+                                if (k == 0) == (sign > 0.0) { (up, down) } else { (from_above(down), up.with_z(-up.z)) }
+                            };
+                            let used: Vec<f64> = row
+                                .passes
+                                .iter()
+                                .enumerate()
+                                .filter(|(_, pass)| !pass.facets.is_empty())
+                                .map(|(k, pass)| {
+                                    let (i, o) = pair(k);
+                                    pass.in_double_precision(i, o)
+                                })
+                                .collect();
+                            let expected = used.iter().sum::<f64>() / used.len() as f64;
+                            worst = worst.max((found - expected).abs());
+                            peak = peak.max(expected);
+                        }
+                    }
+                    let names = format!("{}/{}", top.describe(), bottom.describe());
+                    assert!(worst <= 2e-3 * peak + 1e-12, "{names}, {eta} at {degrees}: {worst} of {peak}");
+                }
+            }
+        }
     }
 }

@@ -66,11 +66,11 @@ impl RingParts {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Harmonics {
     products: [f64; 7],
-    /// Mean of the squares.
-    square: f64,
+    /// Variance of each product; the sum of squares until [`Self::finish`].
+    variance: f64,
 }
 
-/// Standard errors that a product must exceed to be kept: isotropic faces have none.
+/// Standard deviations of chance that the products of all rings must exceed together to be kept: isotropic faces have none.
 const SIGNIFICANT: f64 = 4.0;
 
 impl Harmonics {
@@ -83,19 +83,14 @@ impl Harmonics {
 
     fn add(&mut self, basis: &[f64; 7], value: f64) {
         self.products.iter_mut().zip(basis).for_each(|(sum, base)| *sum += base * value);
-        self.square += value * value;
+        self.variance += value * value;
     }
 
-    /// Turns sums over `count` photons into means, and drops products that may be noise.
+    /// Turns sums over `count` photons into means.
     fn finish(&mut self, count: usize) {
         let scale = 1.0 / count.max(1) as f64;
         self.products.iter_mut().for_each(|product| *product *= scale);
-        self.square *= scale;
-        let error = (0.5 * self.square * scale).sqrt();
-        self.products[1..]
-            .iter_mut()
-            .filter(|product| product.abs() < SIGNIFICANT * error)
-            .for_each(|product| *product = 0.0);
+        self.variance *= 0.5 * scale * scale;
     }
 
     fn at(&self, basis: &[f64; 7]) -> f64 {
@@ -105,6 +100,22 @@ impl Harmonics {
 
     fn mean(&self) -> f64 {
         self.products[0]
+    }
+}
+
+/// Drops products that may be noise. A dependence on the azimuth shows in all rings, so that few photons are enough to see it.
+fn drop_noise(rings: &mut [RingParts]) {
+    let count = rings.len() as f64;
+    for part in 0..rings[0].all_mut().len() {
+        for k in 1..7 {
+            let square = |ring: &mut RingParts| {
+                let Harmonics { products, variance } = &*ring.all_mut()[part];
+                if *variance > 0.0 { products[k] * products[k] / variance } else { 0.0 }
+            };
+            if rings.iter_mut().map(square).sum::<f64>() < count + SIGNIFICANT * (2.0 * count).sqrt() {
+                rings.iter_mut().for_each(|ring| ring.all_mut()[part].products[k] = 0.0);
+            }
+        }
     }
 }
 
@@ -211,7 +222,8 @@ impl ChannelTable {
         // Reflection is reciprocal: both ways estimate one value.
         let other = |k: usize| (k / TURNS % RINGS * RINGS + k / TURNS / RINGS) * TURNS + k % TURNS;
         let reflected = (0..one_way.len()).map(|k| (0.5 * (one_way[k] + one_way[other(k)])) as f32).collect();
-        let parts: Vec<RingParts> = rings.iter().map(|ring| ring.parts).collect();
+        let mut parts: Vec<RingParts> = rings.iter().map(|ring| ring.parts).collect();
+        drop_noise(&mut parts);
         let mean_masked = (0..RINGS).map(|ring| projected_solid_angle(ring) / PI * parts[ring].masked.mean()).sum();
         Self { transmitted: transmitted.iter().map(|value| *value as f32).collect(), reflected, parts, mean_masked }
     }

@@ -91,8 +91,8 @@ impl DiscLobe {
 
     /// The transmitted lobe of light from `i`, which points up.
     pub fn transmitted(slab: &Slab, i: DVec3, side: usize) -> Self {
-        let width = (slab.optics.eta.max_element() - 1.0) * slab.deviation();
-        Self::new(side, -i.truncate(), (width, 0.0), true, |o| slab.btdf(i, o))
+        let row = slab.row(i);
+        Self::new(side, -i.truncate(), slab.transmitted_shape(), true, |o| row.btdf(o))
     }
 
     /// The reflected lobe of light from `i`, which points up.

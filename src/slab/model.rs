@@ -1,17 +1,16 @@
 //! A slab: what it transmits and reflects for a pair of directions.
 
-use std::f64::consts::PI;
 use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec3};
 
 use super::capture::svbtdf::MeanBtdf;
-use super::dual::DualFaces;
 use super::faces::FaceSum;
 use super::fresnel::reflectance;
 use super::inner::Inner;
 use super::ndf::Ndf;
 use super::optics::{Channel, Optics};
+use super::rows::SlabRow;
 use super::spread::Spread;
 use super::straight::{Straight, straight};
 use super::virtual_face::virtual_face;
@@ -88,40 +87,19 @@ impl Slab {
         Self { inner: Some(inner), below: Arc::default(), ..self }
     }
 
-    /// BTDF [1/sr] of light that is refracted once at each face, and not straight, for `i` above and `o` below.
-    pub fn single_pass(&self, i: DVec3, o: DVec3) -> DVec3 {
-        self.optics.per_channel(|channel| self.single_pass_in(i, o, channel))
+    /// What the slab transmits for one direction, above or below, and many others.
+    pub fn row(&self, w: DVec3) -> SlabRow<'_> {
+        SlabRow::new(self, w)
     }
 
-    fn single_pass_in(&self, i: DVec3, o: DVec3, channel: Channel) -> f64 {
-        if channel.is_clear() {
-            return 0.0;
-        }
-        let density = |m| self.virtual_face.density(m);
-        let faces = DualFaces { top: &self.top, bottom: &self.bottom, virtual_density: density, alpha: self.alpha };
-        match (&self.facets, self.method) {
-            (Some(facets), Method::Faces) => {
-                faces.one_rough(i, o, channel) + facets.btdf(&self.top, &self.bottom, i, o, channel)
-            }
-            _ => faces.btdf(i, o, channel),
-        }
+    /// BTDF [1/sr] of light that is refracted once at each face, and not straight, for directions on opposite sides.
+    pub fn single_pass(&self, i: DVec3, o: DVec3) -> DVec3 {
+        self.row(i).single_pass(o)
     }
 
     /// BTDF [1/sr] without the straight light, for directions on opposite sides. It is reciprocal.
     pub fn btdf(&self, i: DVec3, o: DVec3) -> DVec3 {
-        let (i, o) = if i.z > 0.0 { (i, o) } else { (o, i) };
-        if !(i.z > 0.0 && o.z < 0.0) {
-            return DVec3::ZERO;
-        }
-        if let Some(captured) = &self.captured {
-            return captured.btdf(i, o);
-        }
-        let mut sum = self.single_pass(i, o);
-        if let Some(inner) = &self.inner {
-            sum += self.where_not_clear(inner.btdf(i, o));
-        }
-        let diffuse = self.optics.diffuse;
-        (DVec3::ONE - diffuse) * sum + diffuse / PI
+        self.row(i).btdf(o)
     }
 
     /// BRDF [1/sr] of the face on the side of both directions, with the light that returns from inside, but without the
@@ -143,7 +121,7 @@ impl Slab {
     }
 
     /// Keeps the channels in which the slab has faces.
-    fn where_not_clear(&self, value: DVec3) -> DVec3 {
+    pub(super) fn where_not_clear(&self, value: DVec3) -> DVec3 {
         DVec3::select(self.optics.eta.cmpne(DVec3::ONE), value, DVec3::ZERO)
     }
 
@@ -196,6 +174,12 @@ impl Slab {
         self.top.deviation().hypot(self.bottom.deviation())
     }
 
+    /// Deviation of transmitted directions, and the size of the details in a lobe, or 0 if it is smooth.
+    pub fn transmitted_shape(&self) -> (f64, f64) {
+        let turn = self.optics.eta.max_element() - 1.0;
+        (turn * self.deviation(), turn * Ndf::finest_of(&self.top, &self.bottom))
+    }
+
     /// The slab turned over: `eval(i, o)` of it is that of this slab with all z reversed. Inner reflections are left out.
     pub fn turned(&self) -> Self {
         let (top, bottom) = (Arc::new(self.bottom.mirrored()), Arc::new(self.top.mirrored()));
@@ -229,9 +213,10 @@ impl Reflectance for Slab {
 
 impl Transmittance for Slab {
     fn eval_transmitted(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        let row = self.row(o.as_dvec3());
         for (light, value) in lights.iter().zip(out) {
-            let is_transmitted = light.z * o.z < 0.0;
-            *value = if is_transmitted { self.eval(light.as_dvec3(), o.as_dvec3()).as_vec3() } else { Vec3::ZERO };
+            let i = light.as_dvec3();
+            *value = (row.btdf(i) * i.z.abs()).as_vec3();
         }
     }
 }

@@ -205,6 +205,31 @@ impl Ndf {
         if finest == f64::MAX { 0.0 } else { finest }
     }
 
+    /// Width of single slopes and lines of slopes in the density; 0 without any.
+    fn width_of_lines(&self) -> f64 {
+        match &self.spread {
+            _ if self.is_smooth() => 0.0,
+            Spread::Line(_) => self.resolution(),
+            _ if !self.points.is_empty() => self.point_width,
+            _ => 0.0,
+        }
+    }
+
+    /// Width of the finest detail of light through two faces, per refraction; 0 for smooth lobes.
+    pub(super) fn finest_of(top: &Self, bottom: &Self) -> f64 {
+        let widths = [top, bottom].map(Self::width_of_lines);
+        widths.into_iter().filter(|width| *width > 0.0).reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// Smallest width of the slopes with a density: a roughness, or the finest detail that is resolved.
+    pub(super) fn narrowest(&self) -> f64 {
+        match &self.spread {
+            Spread::Analytic(ellipse) if self.points.is_empty() => ellipse.narrowest(),
+            Spread::Analytic(ellipse) => ellipse.narrowest().min(self.point_width),
+            _ => self.resolution(),
+        }
+    }
+
     /// Part of the face whose slopes lie in the outermost cells of a table.
     pub fn at_edge(&self) -> f64 {
         match &self.spread {

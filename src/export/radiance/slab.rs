@@ -79,21 +79,18 @@ fn matrix(slab: &Slab, kind: &Kind, progress: &Progress<'_>) -> Result<Vec<Vec<V
     let side = |is_above: bool| DVec3::new(1.0, 1.0, if is_above { 1.0 } else { -1.0 });
     let is_transmitted = kind.from_above != kind.to_above;
     let face = if kind.from_above { &slab.top } else { &slab.bottom };
-    let shape = if is_transmitted {
-        ((slab.optics.eta.max_element() - 1.0) * slab.deviation(), 0.0)
-    } else {
-        (2.0 * face.deviation(), face.resolution())
-    };
+    let shape = if is_transmitted { slab.transmitted_shape() } else { (2.0 * face.deviation(), face.resolution()) };
     let columns = progress::in_parallel(PATCHES, progress, |incident| {
         let mut sums = vec![DVec3::ZERO; PATCHES];
         let directions = patches[incident].directions(INCIDENT);
         for direction in &directions {
             // The direction that straight and mirrored light leaves in is that of its patch, on the side of the viewer.
             let i = source_of(*direction) * side(kind.from_above);
+            let row = slab.row(i);
             for (p, area) in GRID.points(direction.truncate(), shape) {
                 let o = p.extend((1.0 - p.length_squared()).max(0.0).sqrt());
                 let value = if is_transmitted {
-                    slab.btdf(i, o * side(kind.to_above))
+                    row.btdf(o * side(kind.to_above))
                 } else {
                     slab.brdf(i, o * side(kind.to_above))
                 };

@@ -8,6 +8,8 @@ mod gather;
 mod lobes;
 mod math;
 mod pairs;
+mod paths;
+mod refraction;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -18,6 +20,11 @@ pub use gather::gathered_dot;
 pub use lobes::{Lobe, PairVectors, light_lobes, lobe_sums, lobe_values};
 pub(crate) use math::cubic_weights;
 pub use pairs::{LightPairs, azimuth_and_cosine, pair_grid_coordinates, pair_vectors};
+pub use paths::{RayLane, enter_lane, facing_lane, facing_sum, leave_lane, ln_of_sum, mask_lane};
+pub(crate) use refraction::smith_lambda;
+pub use refraction::{
+    BECKMANN, FacetColumns, GGX, Interior, LeavingColumns, Quadratic, RayColumns, enter, leave, leaving_facets, mask,
+};
 pub use rows::{RowGrid, row_sums};
 pub use visibility::{
     HorizonTaps, SWITCH_RATE, blend_bits, horizon_visibility, interval_cover, masked_sum, projected_area,
@@ -38,23 +45,23 @@ macro_rules! multiversion {
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2,fma")]
-                fn avx2 $(<const $n: usize>)? ($($arg: $ty),*) $(-> $ret)? { generic($($arg),*) }
+                fn avx2 $(<const $n: usize>)? ($($arg: $ty),*) $(-> $ret)? { generic $(::<$n>)? ($($arg),*) }
 
                 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
-                fn avx512 $(<const $n: usize>)? ($($arg: $ty),*) $(-> $ret)? { generic($($arg),*) }
+                fn avx512 $(<const $n: usize>)? ($($arg: $ty),*) $(-> $ret)? { generic $(::<$n>)? ($($arg),*) }
 
                 if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw")
                     && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl")
                 {
                     // SAFETY: the condition checks all features that the function is compiled for.
-                    return unsafe { avx512($($arg),*) };
+                    return unsafe { avx512 $(::<$n>)? ($($arg),*) };
                 }
                 if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                     // SAFETY: as above.
-                    return unsafe { avx2($($arg),*) };
+                    return unsafe { avx2 $(::<$n>)? ($($arg),*) };
                 }
             }
-            generic($($arg),*)
+            generic $(::<$n>)? ($($arg),*)
         }
     };
 }

@@ -1,6 +1,6 @@
 //! Slabs: the normals of each face, their correlation, and the light of inner reflections.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec2;
@@ -172,18 +172,19 @@ pub struct CapturedSheet {
 }
 
 /// Reads a captured sheet.
-pub struct ReadSvbtdf {
-    path: PathBuf,
+pub struct ReadSvbtdf<'a> {
+    loaded: &'a LoadedScene,
+    path: &'a Path,
     file: Key,
 }
 
-impl ReadSvbtdf {
-    pub fn new(loaded: &LoadedScene, path: &Path, env: &Env) -> Self {
-        Self { path: scene::files::resolve(&loaded.base_dir, path), file: env.file_key(&loaded.base_dir, path) }
+impl<'a> ReadSvbtdf<'a> {
+    pub fn new(loaded: &'a LoadedScene, path: &'a Path, env: &Env) -> Self {
+        Self { loaded, path, file: env.file_key(&loaded.base_dir, path) }
     }
 }
 
-impl Stage for ReadSvbtdf {
+impl Stage for ReadSvbtdf<'_> {
     type Output = CapturedSheet;
     const NAME: &'static str = "slab_svbtdf";
 
@@ -192,7 +193,7 @@ impl Stage for ReadSvbtdf {
     }
 
     fn run(&self, _: &Env) -> Result<CapturedSheet> {
-        let svbtdf = Svbtdf::read(&self.path)?;
+        let svbtdf = Svbtdf::of_scene(&self.loaded.base_dir, self.path)?;
         let mean = Arc::new(svbtdf.mean());
         Ok(CapturedSheet { svbtdf: Arc::new(svbtdf), mean })
     }

@@ -56,6 +56,14 @@ const EVEN_SIZE: [usize; 2] = [32, 16];
 /// Cosines below which directions count as parallel to the plane, for the size of footprints.
 const LEAST_COSINE: f32 = 0.02;
 
+impl BackdropKernel {
+    /// Variance that is read over that which was asked for, on the plane if it is `below`.
+    pub fn share(&self, below: bool) -> f32 {
+        let plane = self.plane.as_ref().filter(|_| below);
+        plane.or(self.environment.as_ref()).map_or(1.0, |kernel| kernel.share)
+    }
+}
+
 impl Footprint {
     /// Deviation of the z of the direction.
     fn tilt(&self) -> f32 {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{Backdrop, BackdropKernel, Footprint};
 use crate::base::{Cancel, Result};
-use crate::effective::{Lobe, PathKind, Reflectance, Transmittance, ViewPaths, Viewer};
+use crate::effective::{Lobe, PathKind, Reflectance, Transmittance, VaryingSurface, ViewPaths, Viewer};
 use crate::render::image::render::{RenderTimes, check_size, visible_points};
 use crate::render::image::shading::gather_over;
 use crate::render::image::shading_points::ShadingPoints;
@@ -15,11 +15,13 @@ use crate::render::{CameraView, DirectionalLight, ObjectMesh, Rendered};
 use crate::scene;
 
 /// Everything that an image depends on.
-pub struct SeenThrough<'a, S: ViewPaths> {
+pub struct SeenThrough<'a, S: VaryingSurface> {
     pub mesh: &'a ObjectMesh,
     pub camera: &'a scene::Camera,
     pub backdrop: &'a Backdrop,
     pub surface: &'a S,
+    /// Where positions lie on the surface.
+    pub places: Places,
     /// The BRDF by which the surface reflects directional lights.
     pub reflectance: &'a dyn Reflectance,
     pub transmittance: &'a dyn Transmittance,
@@ -34,6 +36,15 @@ pub struct SeenThrough<'a, S: ViewPaths> {
     pub cancel: Cancel,
 }
 
+/// Places on a surface, by the x and y of positions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Places {
+    /// Position of the place (0, 0).
+    pub origin: Vec2,
+    /// Places per world unit.
+    pub scale: Vec2,
+}
+
 /// Points per task.
 const CHUNK: usize = 256;
 /// Part of a lobe below which its tail is not read.
@@ -45,7 +56,7 @@ const BOX: f32 = 0.288_675_13;
 ///
 /// # Errors
 /// The camera cannot frame the object, the size is out of range, or [`crate::base::Error::Cancelled`].
-pub fn render<S: ViewPaths>(input: &SeenThrough<'_, S>) -> Result<Rendered> {
+pub fn render<S: VaryingSurface>(input: &SeenThrough<'_, S>) -> Result<Rendered> {
     check_size(input.size, input.samples_per_side)?;
     let view = CameraView::new(input.camera, input.mesh, input.size)?;
     let start = Instant::now();
@@ -84,8 +95,9 @@ pub(super) fn behind_pixel(backdrop: &Backdrop, view: &CameraView, pixel: usize)
 }
 
 /// A point of the surface with its viewer.
-struct Point<'a, S: ViewPaths> {
+struct Point<'a, S: VaryingSurface> {
     input: &'a SeenThrough<'a, S>,
+    surface: S::Point<'a>,
     view: &'a CameraView,
     number: usize,
     pixel: usize,
@@ -98,7 +110,7 @@ struct Point<'a, S: ViewPaths> {
     spread: [Vec3; 2],
 }
 
-impl<'a, S: ViewPaths> Point<'a, S> {
+impl<'a, S: VaryingSurface> Point<'a, S> {
     fn new(input: &'a SeenThrough<'a, S>, view: &'a CameraView, points: &ShadingPoints, number: usize) -> Self {
         let (z, x) = (points.normals[number], points.tangents[number]);
         let position = points.positions[number];
@@ -107,7 +119,9 @@ impl<'a, S: ViewPaths> Point<'a, S> {
         let axes = [x, z.cross(x), z];
         let o = Vec3::from_array(axes.map(|axis| axis.dot(to_eye))).try_normalize().unwrap_or(Vec3::Z);
         let pixel = points.pixels[number] as usize;
-        Self { input, view, number, pixel, position, axes, o, spread: [extent * view.right, extent * view.up] }
+        let surface = input.surface.at((position.truncate() - input.places.origin) * input.places.scale);
+        let spread = [extent * view.right, extent * view.up];
+        Self { input, surface, view, number, pixel, position, axes, o, spread }
     }
 
     fn in_world(&self, d: Vec3) -> Vec3 {
@@ -118,9 +132,9 @@ impl<'a, S: ViewPaths> Point<'a, S> {
     fn radiance(&self) -> Vec3 {
         let Self { input, o, .. } = self;
         let backdrop = input.backdrop;
-        let lobes = input.surface.lobes(*o);
+        let lobes = self.surface.lobes(*o);
         let is_draft = input.paths == 0;
-        let straight = if is_draft { lobes.straight } else { input.surface.straight(*o) };
+        let straight = if is_draft { lobes.straight } else { self.surface.straight(*o) };
         let mut sum = Vec3::ZERO;
         if straight[0] != Vec3::ZERO {
             sum += straight[0] * behind_pixel(backdrop, self.view, self.pixel);
@@ -164,21 +178,19 @@ impl<'a, S: ViewPaths> Point<'a, S> {
         let (below, above) = (direction(transmitted, -1.0), direction(reflected, 1.0));
         let wide = WIDE * WIDE * part_of(bounce_paths);
         let wide = [wide, 0.0, wide];
-        let kernel = |d: Vec3, covariance: [f32; 3]| {
-            self.input.backdrop.narrow_kernel(self.position, self.in_world(d), &self.footprint(d, covariance))
-        };
-        let through = PathKernels::new(transmitted, paths, |covariance| kernel(below, covariance));
-        let back = PathKernels::new(reflected, bounce_paths, |covariance| kernel(above, covariance));
+        let kernel = |d: Vec3, covariance: [f32; 3]| self.narrow_kernel(d, covariance);
+        let through = PathKernels::new(transmitted, paths, true, |covariance| kernel(below, covariance));
+        let back = PathKernels::new(reflected, bounce_paths, false, |covariance| kernel(above, covariance));
         let bounced = [kernel(below, wide), kernel(above, wide)];
         let seed = self.input.seed.wrapping_mul(1 << 32).wrapping_add(self.number as u64);
         let mut sum = Vec3::ZERO;
-        let even = self.input.surface.follow(&Viewer { o: self.o, paths, seed }, |end| {
-            let kernel = match end.kind {
+        let even = self.surface.follow(&Viewer { o: self.o, paths, seed }, |end| {
+            let (direction, kernel) = match end.kind {
                 PathKind::Transmitted => through.at(end.direction),
                 PathKind::Reflected => back.at(end.direction),
-                PathKind::Bounced => &bounced[usize::from(end.direction.z > 0.0)],
+                PathKind::Bounced => (end.direction, &bounced[usize::from(end.direction.z > 0.0)]),
             };
-            sum += end.weight * self.read(end.direction, kernel);
+            sum += end.weight * self.read(direction, kernel);
         });
         (sum, even)
     }
@@ -189,6 +201,10 @@ impl<'a, S: ViewPaths> Point<'a, S> {
 
     fn kernel(&self, d: Vec3, covariance: [f32; 3]) -> BackdropKernel {
         self.input.backdrop.kernel(self.position, self.in_world(d), &self.footprint(d, covariance))
+    }
+
+    fn narrow_kernel(&self, d: Vec3, covariance: [f32; 3]) -> BackdropKernel {
+        self.input.backdrop.narrow_kernel(self.position, self.in_world(d), &self.footprint(d, covariance))
     }
 
     /// The footprint of a lobe around `d` with this covariance of tangential components.
@@ -219,9 +235,12 @@ impl<'a, S: ViewPaths> Point<'a, S> {
     }
 }
 
+/// Number of paths whose footprints together are as wide as the lobe.
+const COVER: f32 = 8.0;
+
 /// The part of a lobe's covariance that one of many paths stands for. It vanishes as paths are added.
 fn part_of(paths: usize) -> f32 {
-    (2.0 / paths as f32).min(1.0)
+    (COVER / paths as f32).min(1.0)
 }
 
 /// Deviation of the directions of light that is reflected inside, for the footprint of its paths.
@@ -229,16 +248,19 @@ const WIDE: f32 = 0.5;
 /// Squared distances from the mean of a lobe, in deviations, from which paths are sparser and their footprints wider.
 const SPARSE: [f32; 3] = [2.0, 8.0, 32.0];
 
-/// Footprints of the paths of a lobe, by the distance from its mean.
+/// Footprints of the paths of a lobe, by the distance from its mean. Paths are drawn towards the mean, so that paths and
+/// footprints together have the covariance of the lobe.
 struct PathKernels {
     mean: Vec2,
     /// Inverse of the covariance: xx, xy and yy.
     inverse: [f32; 3],
+    /// The symmetric matrix that draws paths towards the mean: xx, xy and yy.
+    drawn: [f32; 3],
     kernels: [BackdropKernel; SPARSE.len() + 1],
 }
 
 impl PathKernels {
-    fn new(lobe: &Lobe, paths: usize, kernel: impl Fn([f32; 3]) -> BackdropKernel) -> Self {
+    fn new(lobe: &Lobe, paths: usize, below: bool, kernel: impl Fn([f32; 3]) -> BackdropKernel) -> Self {
         let [xx, xy, yy] = lobe.covariance;
         let determinant = xx * yy - xy * xy;
         let inverse = if determinant > 0.0 { [yy, -xy, xx].map(|value| value / determinant) } else { [0.0; 3] };
@@ -247,15 +269,35 @@ impl PathKernels {
             let scale = part_of(paths) * (1 << (2 * step)) as f32;
             kernel(lobe.covariance.map(|value| value * scale.min(Lobe::TAIL)))
         };
-        Self { mean: lobe.mean, inverse, kernels: std::array::from_fn(of_step) }
+        let kernels: [BackdropKernel; SPARSE.len() + 1] = std::array::from_fn(of_step);
+        let drawn = drawn(lobe.covariance, part_of(paths) * kernels[0].share(below));
+        Self { mean: lobe.mean, inverse, drawn, kernels }
     }
 
-    fn at(&self, direction: Vec3) -> &BackdropKernel {
+    fn at(&self, direction: Vec3) -> (Vec3, &BackdropKernel) {
         let d = direction.truncate() - self.mean;
         let [xx, xy, yy] = self.inverse;
         let square = xx * d.x * d.x + 2.0 * xy * d.x * d.y + yy * d.y * d.y;
-        &self.kernels[SPARSE.iter().filter(|bound| square > **bound).count()]
+        let kernel = &self.kernels[SPARSE.iter().filter(|bound| square > **bound).count()];
+        let [xx, xy, yy] = self.drawn;
+        let at = self.mean + Vec2::new(xx * d.x + xy * d.y, xy * d.x + yy * d.y);
+        (at.extend((1.0 - at.length_squared()).max(1e-6).sqrt().copysign(direction.z)), kernel)
     }
+}
+
+/// The matrix M with `M C Mᵀ = C - part λ I`, for the covariance C and its smaller variance λ: the variance that round
+/// footprints of this size add.
+fn drawn([xx, xy, yy]: [f32; 3], part: f32) -> [f32; 3] {
+    let (middle, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let radius = (half * half + xy * xy).sqrt();
+    let (major, minor) = (middle + radius, (middle - radius).max(0.0));
+    if major.is_nan() || major <= 0.0 {
+        return [1.0, 0.0, 1.0];
+    }
+    let (along, across) = ((1.0 - part * minor / major).max(0.0).sqrt(), (1.0 - part).max(0.0).sqrt());
+    let (cosine, sine) = if radius > 0.0 { (half / radius, xy / radius) } else { (1.0, 0.0) };
+    let (mean, difference) = (0.5 * (along + across), 0.5 * (along - across));
+    [mean + difference * cosine, difference * sine, mean - difference * cosine]
 }
 
 /// The mean direction of a lobe below (-1) or above (1) the surface.

@@ -12,7 +12,7 @@ mod stage;
 mod tests;
 
 pub use backdrop::{Backdrop, BackdropKernel, Footprint, Plane};
-pub use image::{SeenThrough, render};
+pub use image::{Places, SeenThrough, render};
 pub use pyramid::{Kernel, Pyramid};
 pub use scene::SlabScene;
-pub use stage::BuildBackdrop;
+pub use stage::{BuildBackdrop, BuildView};

@@ -36,6 +36,8 @@ pub struct Kernel {
     level: usize,
     /// Weight of the next coarser level.
     coarser: f32,
+    /// Variance that is read over that which was asked for, at most 1.
+    pub share: f32,
 }
 
 impl Pyramid {
@@ -83,7 +85,7 @@ impl Pyramid {
         } else {
             0.0
         };
-        let mut kernel = Kernel { probes: [(Vec2::ZERO, 1.0); MAX_PROBES], count: 1, level: low, coarser };
+        let mut kernel = Kernel { probes: [(Vec2::ZERO, 1.0); MAX_PROBES], count: 1, level: low, coarser, share: 1.0 };
         if rest > ROUND * minor && low + 1 < self.levels.len() {
             // The axis has two forms; this one is free of cancellation.
             let axis = if half > 0.0 { Vec2::new(half + radius, xy) } else { Vec2::new(xy, radius - half) };
@@ -97,7 +99,9 @@ impl Pyramid {
     pub fn narrow_kernel(&self, [xx, xy, yy]: [f32; 3]) -> Kernel {
         let (middle, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
         let minor = (middle - (half * half + xy * xy).sqrt()).max(0.0);
-        Kernel { coarser: 0.0, ..self.kernel([minor, 0.0, minor]) }
+        let kernel = self.kernel([minor, 0.0, minor]);
+        let read = A * (1u64 << (2 * kernel.level)) as f32 - B;
+        Kernel { coarser: 0.0, share: (read / minor.max(1e-12)).min(1.0), ..kernel }
     }
 
     /// The mean of the image under a footprint around `at` [texels of level 0].
@@ -214,9 +218,13 @@ mod tests {
             let wave = |x: usize, y: usize| (k.dot(Vec2::new(x as f32 + 0.5, y as f32 + 0.5))).cos();
             let texels = (0..side * side).map(|n| Vec3::splat(wave(n % side, n / side))).collect();
             let pyramid = Pyramid::new([side; 2], texels, true);
-            for (major, minor, turn) in
-                [(2.0, 2.0, 0.0), (6.0, 6.0, 0.0), (8.0, 3.0, 0.0), (12.0, 4.0, 0.7), (9.0, 2.5, 1.57)]
-            {
+            for (major, minor, turn) in [
+                (2.0, 2.0, 0.0),
+                (6.0, 6.0, 0.0),
+                (8.0, 3.0, 0.0),
+                (12.0, 4.0, 0.7),
+                (9.0, 2.5, std::f32::consts::FRAC_PI_2),
+            ] {
                 let (u, v) = (major * Vec2::from_angle(turn), minor * Vec2::from_angle(turn).perp());
                 let covariance = [u.x * u.x + v.x * v.x, u.x * u.y + v.x * v.y, u.y * u.y + v.y * v.y];
                 let expected = (-0.5 * (k.dot(u).powi(2) + k.dot(v).powi(2))).exp();

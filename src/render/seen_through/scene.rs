@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Backdrop, BuildBackdrop, SeenThrough, render};
+use glam::Vec2;
+
+use super::{Backdrop, BuildBackdrop, BuildView, Places, SeenThrough, render};
 use crate::base::{Cancel, Result};
 use crate::pipeline::{Pipeline, SlabOutcome, StageTimes};
 use crate::render::lighting::environment::Environment;
@@ -20,9 +22,13 @@ pub struct SlabScene {
     backdrop: Arc<Backdrop>,
     /// The directional lights of the scene; the environment is part of the backdrop.
     lights: Vec<DirectionalLight>,
+    /// How often a captured sheet repeats along x and y.
+    repeat: Vec2,
     /// Paths per point; 0 for drafts.
     pub paths: usize,
     seed: u64,
+    /// The stages that ran to prepare the view and what lies behind.
+    pub times: StageTimes,
 }
 
 impl SlabScene {
@@ -38,11 +44,14 @@ impl SlabScene {
     ) -> Result<Self> {
         let light = &loaded.scene.light;
         let lights = lights::from_environment(light, Environment::default()).directional;
+        let mut times = StageTimes::new();
         Ok(Self {
             slab: outcome.slab.clone(),
-            view: Arc::new(SlabView::new(outcome.slab.clone())),
-            backdrop: Self::backdrop(pipeline, loaded, render_scene)?,
+            view: pipeline.get(BuildView { outcome }, &mut times)?.value,
+            backdrop: Self::backdrop_with(pipeline, loaded, render_scene, &mut times)?,
+            times,
             lights,
+            repeat: Vec2::from_array(loaded.scene.slab.as_ref().map_or([1, 1], |slab| slab.repeat).map(|n| n as f32)),
             paths: outcome.settings.paths,
             seed: outcome.settings.seed,
         })
@@ -53,7 +62,15 @@ impl SlabScene {
     /// # Errors
     /// An environment or a background that cannot be used.
     pub fn backdrop(pipeline: &Pipeline, loaded: &LoadedScene, render_scene: &RenderScene) -> Result<Arc<Backdrop>> {
-        let times = &mut StageTimes::new();
+        Self::backdrop_with(pipeline, loaded, render_scene, &mut StageTimes::new())
+    }
+
+    fn backdrop_with(
+        pipeline: &Pipeline,
+        loaded: &LoadedScene,
+        render_scene: &RenderScene,
+        times: &mut StageTimes,
+    ) -> Result<Arc<Backdrop>> {
         let environment = pipeline.get(LoadEnvironment::new(loaded, pipeline), times)?;
         let rear = render_scene.mesh().positions.iter().map(|position| position.z).fold(f32::MAX, f32::min);
         Ok(pipeline.get(BuildBackdrop::new(loaded, pipeline, &environment, rear), times)?.value)
@@ -75,6 +92,7 @@ impl SlabScene {
             camera: &render_scene.camera,
             backdrop: &self.backdrop,
             surface: &*self.view,
+            places: self.places(render_scene),
             reflectance: &*self.slab,
             transmittance: &*self.slab,
             lights: &self.lights,
@@ -84,6 +102,14 @@ impl SlabScene {
             seed: self.seed,
             cancel: cancel.clone(),
         })
+    }
+
+    /// A captured sheet lies over the x and y of the object.
+    fn places(&self, render_scene: &RenderScene) -> Places {
+        let positions = || render_scene.mesh().positions.iter().map(|position| position.truncate());
+        let origin = positions().reduce(Vec2::min).unwrap_or(Vec2::ZERO);
+        let extent = positions().reduce(Vec2::max).unwrap_or(Vec2::ONE) - origin;
+        Places { origin, scale: self.repeat / extent.max(Vec2::splat(f32::MIN_POSITIVE)) }
     }
 
     /// The slab as a viewer sees it.

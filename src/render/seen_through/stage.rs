@@ -1,4 +1,4 @@
-//! The stage that builds what lies behind the object of a scene.
+//! The stages of an image of a slab: what lies behind the object, and the slab as a viewer sees it.
 
 use glam::Vec3;
 
@@ -6,9 +6,10 @@ use super::{Backdrop, Plane, Pyramid};
 use crate::base::Result;
 use crate::cache::{Key, KeyBuilder};
 use crate::geometry::image_file;
-use crate::pipeline::{Env, Keyed, Pipeline, Stage};
+use crate::pipeline::{Env, Keyed, Pipeline, SlabOutcome, Stage};
 use crate::render::lighting::environment::Environment;
 use crate::scene::{Background, Checkerboard, LoadedScene};
+use crate::slab::SlabView;
 
 /// Texels along the side of a square of a checkerboard.
 const SQUARE: usize = 128;
@@ -55,6 +56,29 @@ fn squares(board: &Checkerboard) -> Pyramid {
     let side = 2 * SQUARE;
     let texel = |k: usize| board.colors[(k % side / SQUARE + k / side / SQUARE) % 2];
     Pyramid::new([side; 2], (0..side * side).map(texel).collect::<Vec<Vec3>>(), true)
+}
+
+/// Draws the slopes of both faces that paths meet, and tabulates the lobes of drafts.
+pub struct BuildView<'a> {
+    pub outcome: &'a SlabOutcome,
+}
+
+impl Stage for BuildView<'_> {
+    type Output = SlabView;
+    const NAME: &'static str = "slab_view";
+    const IGNORES_CANCEL: bool = true;
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("slab", &self.outcome.paths_key);
+    }
+
+    fn run(&self, _: &Env) -> Result<SlabView> {
+        let slab = self.outcome.slab.clone();
+        Ok(match &self.outcome.svbtdf {
+            Some(sheet) => SlabView::of_sheet(slab, sheet.clone()),
+            None => SlabView::new(slab),
+        })
+    }
 }
 
 impl Stage for BuildBackdrop<'_> {

@@ -78,6 +78,26 @@ fn a_slab_of_index_1_shows_the_background_exactly() {
 }
 
 #[test]
+fn an_edit_of_the_background_makes_only_what_lies_behind_again_and_one_of_the_camera_nothing() {
+    let pipeline = Pipeline::new();
+    let stages = |loaded: &LoadedScene| -> Vec<&'static str> {
+        let outcome = pipeline.slab(loaded).unwrap();
+        let render_scene = RenderScene::with(&pipeline, loaded).unwrap();
+        let scene = SlabScene::with(&pipeline, loaded, &outcome, &render_scene).unwrap();
+        let names = outcome.times.iter().chain(&scene.times).map(|(name, _)| *name);
+        names.filter(|name| *name != "slab").collect()
+    };
+    let mut loaded = sheet(&format!("[slab]\n{}", FACES[1].1), 0.2);
+    assert!(stages(&loaded).contains(&"slab_view"));
+    loaded.scene.camera.as_mut().unwrap().azimuth_deg = 5.0;
+    assert_eq!(stages(&loaded), [""; 0]);
+    loaded.scene.background = sheet("[slab]", 0.3).scene.background;
+    assert_eq!(stages(&loaded), ["backdrop"]);
+    loaded.scene.slab.as_mut().unwrap().eta = Vec3::splat(1.4);
+    assert_eq!(stages(&loaded), ["slab_inner", "slab_view"]);
+}
+
+#[test]
 fn white_surroundings_without_absorption_are_white_through_a_slab_within_2_per_cent() {
     let folder = tempfile::tempdir().unwrap();
     exr::prelude::write_rgb_file(folder.path().join("white.exr"), 32, 16, |_, _| (1f32, 1f32, 1f32)).unwrap();
@@ -121,6 +141,24 @@ fn a_checkerboard_seen_through_is_near_that_of_very_many_paths() {
         println!("{name}: draft {draft:.4}, 64 paths {refined:.4}");
         assert!(draft < 0.05 && refined < 0.03, "{name}: draft {draft}, 64 paths {refined}");
     }
+}
+
+#[test]
+fn a_captured_sheet_is_seen_through_and_its_pixels_differ() {
+    let open = |set: &[&str]| {
+        let set: Vec<String> = set.iter().map(|set| (*set).to_owned()).collect();
+        crate::scene::open("slab_fig1_grid_sheet", &set).unwrap()
+    };
+    let loaded = open(&["slab.repeat=[3, 3]"]);
+    let (draft, few, many) =
+        (rendered(&loaded, 0, [48, 36]), rendered(&loaded, 64, [48, 36]), rendered(&loaded, 1024, [48, 36]));
+    let errors = [rms(&draft, &many), rms(&few, &many)];
+    println!("captured sheet: draft {:.4}, 64 paths {:.4}", errors[0], errors[1]);
+    assert!(errors[0] < 0.05 && errors[1] < 0.03, "{errors:?}");
+    let brightest = many.pixels.iter().map(|pixel| pixel.x).fold(0.0, f32::max);
+    assert!((0.5..1.0).contains(&brightest), "{brightest}");
+    let once = rendered(&open(&["slab.repeat=[1, 1]"]), 1024, [48, 36]);
+    assert!(rms(&once, &many) > 0.004, "{}", rms(&once, &many));
 }
 
 #[test]

@@ -86,11 +86,16 @@ impl Optics {
         Self { eta, shadowing, face: Ndf::analytic(Profile::Ggx, DVec2::splat(shadowing), 0.0) }
     }
 
+    /// Masking of one rough face along two directions.
+    pub fn masking(&self, a: DVec3, b: DVec3) -> f64 {
+        self.face.seen(a) * self.face.seen(b)
+    }
+
     /// The terms of a pair; `None` where one of the two configurations transmits nothing. The rough face masks the two
     /// directions that it sees: light and inside if it is the top, inside and viewer if it is the bottom.
     pub fn terms(&self, i: DVec3, o: DVec3) -> Option<PairTerms> {
         let (top, bottom) = (rough_top(i, o, self.eta)?, rough_bottom(i, o, self.eta)?);
-        let value = |at: &Configuration, outside: DVec3| at.factor * self.face.seen(at.inner) * self.face.seen(outside);
+        let value = |at: &Configuration, outside: DVec3| at.factor * self.masking(at.inner, outside);
         let (a_top, a_bottom) = (value(&top, i), value(&bottom, o));
         let is_sound = a_top > 0.0 && a_bottom > 0.0;
         is_sound.then(|| PairTerms {

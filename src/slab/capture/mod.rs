@@ -9,6 +9,7 @@ pub mod fit;
 #[cfg(test)]
 mod hard_cases_tests;
 pub mod lobe;
+pub mod patterns;
 pub mod photographs;
 pub mod points;
 pub mod push_pull;

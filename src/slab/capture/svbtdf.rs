@@ -9,7 +9,8 @@ use super::super::dual::blend;
 use super::lobe::{Optics, PointModel, SlopeGrid};
 use crate::base::npz::{Arrays, array, arrays};
 use crate::base::zip::ZipWriter;
-use crate::base::{Error, InputError, Result, atomic_file, regular_file};
+use crate::base::{Error, InputError, Result, atomic_file};
+use crate::scene::files;
 
 /// Least logarithm of a density, below which f32 has no numbers.
 const LEAST_LN: f64 = -80.0;
@@ -150,16 +151,17 @@ impl Svbtdf {
     /// # Errors
     /// The file is missing or too large, or is no SVBTDF.
     pub fn read(path: &Path) -> Result<Self> {
-        let unreadable = |error: io::Error| InputError::new("", error, "an .npz that `biscale capture` wrote");
-        let read = || -> std::result::Result<Self, InputError> {
-            let length = std::fs::metadata(path).map_err(unreadable)?.len();
-            if length > MAX_FILE {
-                let expected = format!("at most {MAX_FILE} bytes");
-                return Err(InputError::new("file size", format!("{length} bytes"), expected));
-            }
-            Self::of_arrays(&mut arrays(&regular_file::read(path).map_err(unreadable)?)?)
-        };
-        read().map_err(|error| Error::from(error.in_file(path)))
+        Self::of_scene(Path::new(""), path)
+    }
+
+    /// As [`Self::read`], for a file that a scene in the folder `base_dir` names.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn of_scene(base_dir: &Path, path: &Path) -> Result<Self> {
+        let bytes = files::read(base_dir, path, MAX_FILE)?;
+        let sheet = arrays(&bytes).and_then(|mut arrays| Self::of_arrays(&mut arrays));
+        sheet.map_err(|error| Error::from(error.in_file(files::resolve(base_dir, path))))
     }
 
     fn of_arrays(arrays: &mut Arrays) -> std::result::Result<Self, InputError> {

@@ -2,16 +2,19 @@
 
 mod face_samples;
 mod lobe_table;
+mod sheet;
 mod walk;
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use self::face_samples::FaceSamples;
 use self::lobe_table::LobeTable;
+use self::sheet::{SheetPoint, SheetView};
+use super::capture::svbtdf::Svbtdf;
 use super::model::Slab;
-use crate::effective::{PathEnd, ViewLobes, ViewPaths, Viewer};
+use crate::effective::{PathEnd, VaryingSurface, ViewLobes, ViewPaths, Viewer};
 
 /// Colour channels that refract alike.
 #[derive(Debug, Clone, Copy)]
@@ -35,12 +38,30 @@ struct Faces {
 }
 
 /// A slab prepared for images: light from behind and from the viewer's side, exact for Eq. 1 of Dai et al. 2009 and with
-/// all reflections inside.
+/// all reflections inside, or a captured sheet by Eq. 11.
 #[derive(Debug, Clone)]
 pub struct SlabView {
     slab: Arc<Slab>,
-    faces: Faces,
-    lobes: LobeTable,
+    source: Source,
+}
+
+#[derive(Debug, Clone)]
+enum Source {
+    Faces { faces: Faces, lobes: LobeTable },
+    Sheet(SheetView),
+}
+
+/// A slab at one place.
+#[derive(Debug, Clone)]
+pub struct SlabPoint<'a> {
+    slab: &'a Slab,
+    source: PointSource<'a>,
+}
+
+#[derive(Debug, Clone)]
+enum PointSource<'a> {
+    Faces { faces: &'a Faces, lobes: &'a LobeTable },
+    Sheet(SheetPoint<'a>),
 }
 
 impl SlabView {
@@ -65,21 +86,59 @@ impl SlabView {
             diffuse: slab.optics.diffuse.as_vec3(),
         };
         let lobes = LobeTable::new(&faces, &slab);
-        Self { slab, faces, lobes }
+        Self { slab, source: Source::Faces { faces, lobes } }
+    }
+
+    /// Prepares a captured sheet whose top faces the viewer; `slab` is its mean.
+    pub fn of_sheet(slab: Arc<Slab>, sheet: Arc<Svbtdf>) -> Self {
+        Self { slab, source: Source::Sheet(SheetView::new(sheet)) }
     }
 }
 
-impl ViewPaths for SlabView {
+impl VaryingSurface for SlabView {
+    type Point<'a> = SlabPoint<'a>;
+
+    fn at(&self, place: Vec2) -> SlabPoint<'_> {
+        let source = match &self.source {
+            Source::Faces { faces, lobes } => PointSource::Faces { faces, lobes },
+            Source::Sheet(sheet) => PointSource::Sheet(sheet.at(place)),
+        };
+        SlabPoint { slab: &self.slab, source }
+    }
+}
+
+impl ViewPaths for SlabPoint<'_> {
     fn follow(&self, viewer: &Viewer, end: impl FnMut(PathEnd)) -> [Vec3; 2] {
-        self.faces.follow(viewer, end)
+        match &self.source {
+            PointSource::Faces { faces, .. } => faces.follow(viewer, end),
+            PointSource::Sheet(sheet) => sheet.follow(viewer, end),
+        }
     }
 
     fn lobes(&self, o: Vec3) -> ViewLobes {
-        self.lobes.at(o)
+        match &self.source {
+            PointSource::Faces { lobes, .. } => lobes.at(o),
+            PointSource::Sheet(sheet) => sheet.lobes(o),
+        }
     }
 
     fn straight(&self, o: Vec3) -> [Vec3; 2] {
         self.slab.straight(o.as_dvec3()).map(|part| part.as_vec3())
+    }
+}
+
+/// The middle of a captured sheet; a slab of two faces is the same everywhere.
+impl ViewPaths for SlabView {
+    fn follow(&self, viewer: &Viewer, end: impl FnMut(PathEnd)) -> [Vec3; 2] {
+        self.at(Vec2::splat(0.5)).follow(viewer, end)
+    }
+
+    fn lobes(&self, o: Vec3) -> ViewLobes {
+        self.at(Vec2::splat(0.5)).lobes(o)
+    }
+
+    fn straight(&self, o: Vec3) -> [Vec3; 2] {
+        self.at(Vec2::splat(0.5)).straight(o)
     }
 }
 

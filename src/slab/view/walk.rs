@@ -6,20 +6,23 @@ use glam::{Vec2, Vec3};
 use super::face_samples::{FaceSamples, SLOPES};
 use super::{ChannelGroup, Faces};
 use crate::effective::{PathEnd, PathKind, Viewer};
+use crate::math::simd::{LANES, RayLane, enter_lane, facing_sum, leave_lane, mask_lane};
 
-/// Every so many paths, one also follows the reflected light. At grazing views each path does, because the reflected part
-/// then differs from facet to facet.
+/// Every so many paths, one also follows the light that the top reflects. At grazing views each path does, because the
+/// reflected part then differs from facet to facet.
 const REFLECTED_EVERY: usize = 2;
+/// Light that the bottom reflects in steps of this weight is followed: facets that reflect little stand for others.
+const BOUNCED_STEP: f32 = 0.25;
 /// Cosine of the viewer below which a view is grazing.
 const GRAZING: f32 = 0.6;
 /// Facets of which light inside meets one, chosen by their areas as the light sees them. The variance of the area of a
 /// single facet of GGX is infinite.
 const CANDIDATES: usize = 16;
-/// Cosine below which light inside is so steep that it meets one of several candidates also at its first arrival.
+/// Cosine below which light inside is so steep that it meets one of several candidates.
 const STEEP: f32 = 0.7;
 /// Largest number of reflections inside, and weight below which a path ends.
 const MAX_BOUNCES: usize = 64;
-const LEAST_WEIGHT: f32 = 1e-3;
+const LEAST_WEIGHT: f32 = 5e-3;
 
 /// Fresnel reflectance and the cosine behind the facet, for the cosine `c` before it; `eta` is the index behind over that
 /// before. The cosine is 0 if all light is reflected.
@@ -92,7 +95,7 @@ fn leave(face: &FaceSamples, ray: Ray, is_down: bool, masked: &mut f32) -> Optio
 }
 
 /// A well mixed number of a path and a step.
-fn mixed(seed: u64, step: u64) -> u64 {
+pub(super) fn mixed(seed: u64, step: u64) -> u64 {
     let mut x = seed ^ step.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -107,82 +110,148 @@ impl Faces {
         if let Some(start) = Some(viewer).filter(|viewer| viewer.o.z > 0.0).and_then(|viewer| Start::new(viewer, self))
         {
             for group in &self.groups {
-                for path in 0..viewer.paths {
-                    let lost = self.path(group, &start, path, &mut |mut found: PathEnd| {
-                        found.weight *= scale;
-                        end(found);
-                    });
-                    masked += group.mask * lost;
+                let mut scaled = |mut found: PathEnd| {
+                    found.weight *= scale;
+                    end(found);
+                };
+                let mut lost = 0.0;
+                // The sum of all weights decides, so that their total is kept but for one step.
+                let mut bounced = (start.seed >> 40) as f32 / (1 << 24) as f32 * BOUNCED_STEP;
+                for first in (0..viewer.paths).step_by(LANES) {
+                    let (masked, crossing) = self.through_both(group, &start, first, &mut scaled);
+                    lost += masked;
+                    if self.bounces {
+                        lost += self.bounced(group, &start, &crossing, &mut bounced, &mut scaled);
+                    }
                 }
+                for path in (0..viewer.paths).step_by(start.every) {
+                    lost += self.reflected(group, &start, path, &mut scaled);
+                }
+                masked += group.mask * lost;
             }
         }
         let half = if self.bounces { 0.5 * masked * scale } else { Vec3::ZERO };
         [half + self.diffuse, half]
     }
 
-    /// Follows one path; returns the masked part.
-    fn path(&self, group: &ChannelGroup, start: &Start, path: usize, end: &mut impl FnMut(PathEnd)) -> f32 {
+    /// Follows the light of a lane of paths that is refracted at both faces; returns the masked part.
+    fn through_both(
+        &self,
+        group: &ChannelGroup,
+        start: &Start,
+        first: usize,
+        end: &mut impl FnMut(PathEnd),
+    ) -> (f32, Crossing) {
+        let count = (start.paths - first).min(LANES);
+        let (mut inner, mut out, mut areas) = (RayLane::EMPTY, RayLane::EMPTY, [1.0; LANES]);
+        let [top_x, top_y] = self.top.lane(start.top + first);
+        enter_lane(top_x, top_y, start.ray.d.to_array(), 1.0 / start.facing, group.eta, &mut inner);
+        inner.weight[count..].fill(0.0);
+        inner.lost[count..].fill(0.0);
+        self.top.facing_of(&inner, &mut areas);
+        mask_lane(&areas, &mut inner);
+        let mut masked: f32 = inner.lost.iter().sum();
+        let [mut slope_x, mut slope_y] = self.bottom.lane(start.below(first)).map(|column| *column);
+        self.bottom.facing_of(&inner, &mut areas);
+        for l in (0..count).filter(|l| inner.z[*l] > -STEEP) {
+            let d = Vec3::new(inner.x[l], inner.y[l], inner.z[l]);
+            match candidate(&self.bottom, d, start.numbers_below(first + l)) {
+                Some((slope, area)) => {
+                    (slope_x[l], slope_y[l]) = (slope.x, slope.y);
+                    areas[l] *= area;
+                }
+                None => inner.weight[l] = 0.0,
+            }
+        }
+        let mut reflected = [0.0; LANES];
+        leave_lane([&slope_x, &slope_y], &areas, group.eta, &inner, &mut out, &mut reflected);
+        self.bottom.facing_of(&out, &mut areas);
+        mask_lane(&areas, &mut out);
+        for l in 0..count {
+            let part = self.arriving(group, inner.z[l]);
+            masked += out.lost[l] * grey(group, part);
+            let is_straight = [top_x[l], top_y[l], slope_x[l], slope_y[l]] == [0.0; 4];
+            if out.weight[l] > 0.0 && !is_straight {
+                let direction = Vec3::new(out.x[l], out.y[l], out.z[l]);
+                end(PathEnd { kind: PathKind::Transmitted, direction, weight: part * out.weight[l] });
+            }
+        }
+        (masked, Crossing { first, count, inner, slopes: [slope_x, slope_y], reflected })
+    }
+
+    /// Follows some of the light that the bottom reflects when it first arrives, in steps of one weight; `sum` is the light
+    /// since the last step. Returns the masked part.
+    fn bounced(
+        &self,
+        group: &ChannelGroup,
+        start: &Start,
+        crossing: &Crossing,
+        sum: &mut f32,
+        end: &mut impl FnMut(PathEnd),
+    ) -> f32 {
+        let Crossing { first, count, inner, slopes: [slope_x, slope_y], reflected } = crossing;
         let mut masked = 0.0;
-        // Paths beyond the number of slopes pair them anew.
-        let (first, second) = (start.top + path, start.bottom + path + path / SLOPES * 7919);
-        let Some(met) = Met::new(start.ray, self.top.slope(first), start.facing, group.eta) else { return 0.0 };
-        let follows_reflection = path.is_multiple_of(start.every);
-        if follows_reflection {
-            let mut lost = 0.0;
-            if let Some(out) = leave(&self.top, met.reflected(start.ray.d), false, &mut lost)
-                && !met.is_level
-            {
-                let weight = group.mask * (out.weight * start.share);
-                end(PathEnd { kind: PathKind::Reflected, direction: out.d, weight });
+        for l in 0..*count {
+            *sum += reflected[l];
+            if *sum < BOUNCED_STEP {
+                continue;
             }
-            masked += lost * start.share;
-        }
-        let Some(inner) = leave(&self.top, met.refracted(start.ray.d), true, &mut masked) else { return masked };
-        let part = group.mask * self.transmission(inner.d);
-        let chosen = if inner.d.z > -STEEP {
-            candidate(&self.bottom, inner.d, mixed(start.seed, !(path as u64)))
-        } else {
-            Some((self.bottom.slope(second), 1.0))
-        };
-        let Some((slope, area)) = chosen else { return masked };
-        let facing = self.bottom.facing(inner.d) * area;
-        let Some(below) = Met::new(inner, slope, facing, 1.0 / group.eta) else { return masked };
-        let mut lost = 0.0;
-        let is_straight = met.is_level && below.is_level;
-        if below.reflectance < 1.0
-            && let Some(out) = leave(&self.bottom, below.refracted(inner.d), true, &mut lost)
-            && !is_straight
-        {
-            end(PathEnd { kind: PathKind::Transmitted, direction: out.d, weight: part * out.weight });
-        }
-        let grey = |part: Vec3| part.dot(group.mask) / group.mask.dot(group.mask);
-        masked += lost * grey(part);
-        if self.bounces && follows_reflection && below.reflectance > 0.0 {
-            let share = start.share;
+            let weight = (*sum / BOUNCED_STEP).floor() * BOUNCED_STEP;
+            *sum -= weight;
+            let path = first + l;
+            let d = Vec3::new(inner.x[l], inner.y[l], inner.z[l]);
+            let slope = Vec2::new(slope_x[l], slope_y[l]);
+            let h = slope.extend(1.0) / (1.0 + slope.length_squared()).sqrt();
+            let ray = Ray { d: d - 2.0 * d.dot(h) * h, weight };
+            let part = self.arriving(group, d.z);
             let mut lost = 0.0;
-            if let Some(ray) = leave(&self.bottom, below.reflected(inner.d), false, &mut lost) {
-                let seed = mixed(start.seed, path as u64 + 1);
-                let bounced = Bounced { ray, part: part * share, is_straight, seed };
-                masked += self.bounce(group, bounced, end);
+            if let Some(ray) = leave(&self.bottom, ray, false, &mut lost) {
+                let is_straight = self.top.slope(start.top + path) == Vec2::ZERO && slope == Vec2::ZERO;
+                masked += self.follow_up(group, Bounced { ray, part, is_straight, seed: start.numbers(path) }, end);
             }
-            masked += lost * grey(part) * share;
+            masked += lost * grey(group, part);
         }
         masked
     }
 
+    /// Follows the light of a path that the top reflects; returns the masked part.
+    fn reflected(&self, group: &ChannelGroup, start: &Start, path: usize, end: &mut impl FnMut(PathEnd)) -> f32 {
+        let slope = self.top.slope(start.top + path);
+        let Some(met) = Met::new(start.ray, slope, start.facing, group.eta) else { return 0.0 };
+        let mut lost = 0.0;
+        if let Some(out) = leave(&self.top, met.reflected(start.ray.d), false, &mut lost)
+            && !met.is_level
+        {
+            let weight = group.mask * (out.weight * start.share);
+            end(PathEnd { kind: PathKind::Reflected, direction: out.d, weight });
+        }
+        lost * start.share
+    }
+
+    /// The channels of a group, with the part of light along a direction of vertical component `z` that arrives at the other
+    /// face.
+    fn arriving(&self, group: &ChannelGroup, z: f32) -> Vec3 {
+        if self.depth == Vec3::ZERO { group.mask } else { group.mask * (-self.depth / z.abs().max(1e-6)).exp() }
+    }
+
     /// Follows light that the bottom reflected; returns the masked part.
-    fn bounce(&self, group: &ChannelGroup, bounced: Bounced, end: &mut impl FnMut(PathEnd)) -> f32 {
+    fn follow_up(&self, group: &ChannelGroup, bounced: Bounced, end: &mut impl FnMut(PathEnd)) -> f32 {
         let Bounced { mut ray, mut part, mut is_straight, seed } = bounced;
-        let grey = |part: Vec3| part.dot(group.mask) / group.mask.dot(group.mask);
         let mut masked = 0.0;
         for step in 0..MAX_BOUNCES {
-            part *= self.transmission(ray.d);
-            if ray.weight * grey(part) < LEAST_WEIGHT {
+            part *= self.arriving(group, ray.d.z);
+            if ray.weight * grey(group, part) < LEAST_WEIGHT {
                 break;
             }
             let is_down = ray.d.z < 0.0;
             let face = if is_down { &self.bottom } else { &self.top };
-            let Some((slope, area)) = candidate(face, ray.d, mixed(seed, step as u64)) else { return masked };
+            let numbers = mixed(seed, step as u64);
+            let chosen = if ray.d.z.abs() < STEEP {
+                candidate(face, ray.d, numbers)
+            } else {
+                Some((face.slope(numbers as usize), 1.0))
+            };
+            let Some((slope, area)) = chosen else { return masked };
             let Some(met) = Met::new(ray, slope, face.facing(ray.d) * area, 1.0 / group.eta) else { return masked };
             is_straight &= met.is_level;
             let mut lost = 0.0;
@@ -193,20 +262,20 @@ impl Faces {
                 end(PathEnd { kind: PathKind::Bounced, direction: out.d, weight: part * out.weight });
             }
             let next = leave(face, met.reflected(ray.d), !is_down, &mut lost);
-            masked += lost * grey(part);
+            masked += lost * grey(group, part);
             match next {
                 Some(next) => ray = next,
                 None => return masked,
             }
         }
         // Light between level facets has a closed form, which leaves nothing.
-        if is_straight { masked } else { masked + ray.weight * grey(part) }
+        if is_straight { masked } else { masked + ray.weight * grey(group, part) }
     }
+}
 
-    /// The part of the light along a direction inside that arrives at the other face.
-    fn transmission(&self, d: Vec3) -> Vec3 {
-        if self.depth == Vec3::ZERO { Vec3::ONE } else { (-self.depth / d.z.abs().max(1e-6)).exp() }
-    }
+/// Mean of a group's channels.
+fn grey(group: &ChannelGroup, part: Vec3) -> f32 {
+    part.dot(group.mask) / group.mask.dot(group.mask)
 }
 
 /// One of several facets, chosen by its area as light along `d` sees it, and this area over the mean of all candidates.
@@ -224,6 +293,15 @@ fn candidate(face: &FaceSamples, d: Vec3, numbers: u64) -> Option<(Vec2, f32)> {
     Some((slopes[chosen], areas[chosen] * CANDIDATES as f32 / sum))
 }
 
+/// A lane of paths at the bottom: the rays inside, the slopes that they meet, and the light that these reflect.
+struct Crossing {
+    first: usize,
+    count: usize,
+    inner: RayLane,
+    slopes: [[f32; LANES]; 2],
+    reflected: [f32; LANES],
+}
+
 /// Light on its way up inside.
 struct Bounced {
     ray: Ray,
@@ -235,13 +313,13 @@ struct Bounced {
 /// The start of the paths of a viewer.
 struct Start {
     ray: Ray,
+    paths: usize,
     /// Mean over the paths of the first facets' areas, projected towards the viewer. Weights over this mean add up to 1
     /// exactly, whatever the number of paths.
     facing: f32,
-    /// Factor on the light of a path that stands for those after it, which do not follow reflections.
-    share: f32,
-    /// Every so many paths, one follows reflected light.
+    /// Every so many paths, one follows the light that the top reflects, and stands for the others by this factor.
     every: usize,
+    share: f32,
     /// Numbers of the first slopes.
     top: usize,
     bottom: usize,
@@ -253,16 +331,45 @@ impl Start {
     fn new(viewer: &Viewer, faces: &Faces) -> Option<Self> {
         let numbers = mixed(viewer.seed, 0);
         let (top, bottom) = (numbers as usize % SLOPES, (numbers >> 32) as usize % SLOPES);
+        let all: f32 = (0..viewer.paths)
+            .step_by(LANES)
+            .map(|first| {
+                let [x, y] = faces.top.slopes(top + first, (viewer.paths - first).min(LANES));
+                facing_sum(x, y, viewer.o.to_array())
+            })
+            .sum();
         let every = if viewer.o.z < GRAZING { 1 } else { REFLECTED_EVERY };
-        let (mut all, mut followed) = (0.0, 0.0);
-        for path in 0..viewer.paths {
-            let facing = viewer.o.dot(faces.top.slope(top + path).extend(1.0)).max(0.0);
-            all += facing;
-            followed += if path.is_multiple_of(every) { facing } else { 0.0 };
-        }
-        let share = if followed > 0.0 { all / followed } else { 0.0 };
+        let facing = |path: usize| viewer.o.dot(faces.top.slope(top + path).extend(1.0)).max(0.0);
+        let followed: f32 = (0..viewer.paths).step_by(every).map(facing).sum();
         let facing = all / viewer.paths as f32;
-        let ray = Ray { d: -viewer.o, weight: 1.0 };
-        (facing > 0.0).then_some(Self { ray, facing, share, every, top, bottom, seed: viewer.seed })
+        (facing > 0.0).then(|| Self {
+            ray: Ray { d: -viewer.o, weight: 1.0 },
+            paths: viewer.paths,
+            facing,
+            every,
+            share: if followed > 0.0 { all / followed } else { 0.0 },
+            top,
+            bottom,
+            seed: viewer.seed,
+        })
+    }
+
+    /// Number of the slope of the bottom that a path meets. Paths beyond the number of slopes pair them anew.
+    fn below(&self, path: usize) -> usize {
+        self.bottom + path + path / SLOPES * 7919
+    }
+
+    /// Random numbers for the facet of the bottom that a path meets first.
+    fn numbers_below(&self, path: usize) -> u64 {
+        mixed(self.seed, !(path as u64))
+    }
+
+    /// Random numbers for the further facets of a path.
+    fn numbers(&self, path: usize) -> u64 {
+        mixed(self.seed, path as u64 + 1)
     }
 }
+
+#[cfg(test)]
+#[path = "walk_tests.rs"]
+mod tests;

@@ -102,6 +102,25 @@ fn a_slab_of_index_1_passes_all_light() {
 }
 
 #[test]
+fn profile_times_only_the_stages_that_an_edit_of_a_slab_makes_again() {
+    let folder = CommandLine::new();
+    folder.write("slab.toml", SLAB);
+    let stages = |more: &[&str]| -> Vec<String> {
+        let arguments = ["profile", "slab.toml", "--repeat", "1", "--size", "32x32", "--json", "--quiet"];
+        let report = folder.json(&[&arguments[..], more].concat());
+        report["stages"].as_object().unwrap().keys().cloned().collect()
+    };
+    assert_eq!(stages(&["--edit", "eta"]), ["slab", "slab_inner"]);
+    assert_eq!(stages(&["--edit", "face"]), ["slab", "slab_correlation", "slab_face", "slab_inner"]);
+    assert_eq!(stages(&["--edit", "geometry"]), ["slab", "slab_correlation", "slab_face", "slab_inner"]);
+    assert_eq!(stages(&["--edit", "camera"]), ["g_buffer", "shading"]);
+    // Thickness alone absorbs nothing.
+    assert_eq!(stages(&["--edit", "thickness"]), ["slab"]);
+    let shown = ["--edit", "thickness", "--picture", "--set", "slab.absorption=0.1"];
+    assert_eq!(stages(&shown), ["g_buffer", "shading", "slab", "slab_inner", "slab_view"]);
+}
+
+#[test]
 fn plan_says_how_a_slab_is_computed_and_why() {
     let folder = CommandLine::new();
     folder.write("slab.toml", SLAB);
@@ -152,9 +171,10 @@ fn bad_slabs_are_refused_with_key_found_and_expected() {
         eval("slab.toml", &[set], parts);
     }
     eval("circle.toml", &[], &["slab.top.scene", "circle"]);
-    for arguments in [&["basis", "slab.toml"][..], &["profile", "slab.toml"]] {
-        folder.assert_refused(arguments, &["slab", arguments[0]]);
-    }
+    folder.assert_refused(&["basis", "slab.toml"], &["slab", "basis"]);
+    folder.assert_refused(&["profile", "slab.toml", "--edit", "brdf"], &["--edit", "face, eta, thickness or camera"]);
+    folder.assert_refused(&["profile", "slab_window", "--edit", "face"], &["slab.top", "no numeric parameter"]);
+    folder.assert_refused(&["profile", "default", "--edit", "eta"], &["slab", "no numeric parameter"]);
     folder.assert_refused(&["fit", "slab.toml", "-o", "out.png"], &["output", "render"]);
     folder.assert_refused(&["export", "slab.toml", "-o", "out.csv"], &["out.csv", ".npz"]);
     folder.assert_refused(&["export", "slab.toml", "-o", "out_mitsuba.xml"], &["slab.top.kind", "tile", "ggx"]);
@@ -220,6 +240,9 @@ fn render_shows_what_lies_behind_a_slab_and_its_far_parameters_do_no_harm() {
         "slab.eta=1.000001",
         "slab.eta=[1, 1.5, 4]",
         "slab.absorption=1e6",
+        "slab.thickness=1e6",
+        "tile.size=[1e-6, 1e-6]",
+        "tile.size=[1e6, 1e6]",
         "camera={ azimuth_deg = 180 }",
     ] {
         for paths in ["quality.paths=0", "quality.paths=2"] {
