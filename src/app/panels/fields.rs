@@ -77,6 +77,8 @@ pub(super) fn caption(field: &Field) -> String {
         "slot_path" => "Material image".to_owned(),
         "color" => "Colour".to_owned(),
         "f0" => "Reflectance".to_owned(),
+        "eta" => "Index".to_owned(),
+        "svbtdf" => "Captured sheet".to_owned(),
         "fov_deg" => "Field of view".to_owned(),
         "exposure_ev" => "Exposure".to_owned(),
         "count" if field.doc.contains("lights") => "Lights".to_owned(),
