@@ -76,6 +76,7 @@ pub(super) fn caption(field: &Field) -> String {
         "color_path" => "Colour image".to_owned(),
         "slot_path" => "Material image".to_owned(),
         "color" => "Colour".to_owned(),
+        "colors" => "Colours".to_owned(),
         "f0" => "Reflectance".to_owned(),
         "eta" => "Index".to_owned(),
         "svbtdf" => "Captured sheet".to_owned(),

@@ -349,5 +349,6 @@ fn the_chart_draws_its_first_points_from_stated_errors_before_the_reference() {
         assert!(start.elapsed().as_secs() < 100, "not measured");
         std::thread::sleep(std::time::Duration::from_millis(2));
     };
+    println!("first points {:.2} s after unfolding the panel", start.elapsed().as_secs_f64());
     assert!(counts[0] > 0 && counts[1] == 0, "{counts:?}");
 }
