@@ -12,9 +12,10 @@ use super::document::Snapshot;
 use super::editor::Editor;
 use super::messages::Level;
 use super::worker::{
-    AccuracyJob, AccuracyResult, ExportJob, ExportResult, GpuShare, Grade, ImageJob, ImageResult, LobeJob, LobePlot,
-    PreviewWorkers, RenderedPreview, SceneThumbnail, ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy,
-    spawn_autosave, spawn_export, spawn_lobe, spawn_thumbnail, spawn_tile,
+    AccuracyJob, AccuracyResult, ColorMapJob, ColorMapResult, ExportJob, ExportResult, GpuShare, Grade, ImageJob,
+    ImageResult, LobeJob, LobePlot, PreviewWorkers, RenderedPreview, SceneThumbnail, SlabLobeJob, SlabLobeResult,
+    ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy, spawn_autosave, spawn_color_map, spawn_export,
+    spawn_lobe, spawn_slab_lobe, spawn_thumbnail, spawn_tile,
 };
 
 /// Height of menu, toolbar and status line [points].
@@ -30,6 +31,8 @@ enum JobResult {
     Thumbnail(SceneThumbnail),
     Export(ExportResult),
     Accuracy(AccuracyResult),
+    ColorMap(ColorMapResult),
+    SlabLobe(SlabLobeResult),
     Autosaved(Result<(), String>),
 }
 
@@ -41,6 +44,8 @@ pub struct BackgroundJobs {
     thumbnails: Option<Worker<ThumbnailJob>>,
     pub exports: Option<Worker<ExportJob>>,
     accuracy: Option<Worker<AccuracyJob>>,
+    color_map: Option<Worker<ColorMapJob>>,
+    slab_lobes: Option<Worker<SlabLobeJob>>,
     autosaver: Option<Worker<Snapshot>>,
     /// The last version in the recovery file, and the earliest time of the next one.
     autosaved: (u64, f64),
@@ -62,9 +67,12 @@ impl BackgroundJobs {
             let _ = sender.send(result);
             wake.request_repaint();
         };
-        let (to_tile, to_lobe, to_gallery, to_export, to_save, to_chart) =
-            (send.clone(), send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
+        let (to_tile, to_lobe, to_gallery, to_export, to_save) =
+            (send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
+        let (to_chart, to_map, to_slab) = (send.clone(), send.clone(), send.clone());
         let accuracy = spawn_accuracy(move |result| to_chart(JobResult::Accuracy(result)));
+        let color_map = spawn_color_map(move |result| to_map(JobResult::ColorMap(result)));
+        let slab_lobes = spawn_slab_lobe(move |result| to_slab(JobResult::SlabLobe(result)));
         let images = PreviewWorkers::spawn(cache, move |result| send(JobResult::Image(result)));
         let tiles = spawn_tile(move |result| to_tile(JobResult::Tile(result)));
         let thumbnails = spawn_thumbnail(move |thumbnail| to_gallery(JobResult::Thumbnail(thumbnail)));
@@ -78,6 +86,8 @@ impl BackgroundJobs {
             thumbnails,
             exports,
             accuracy,
+            color_map,
+            slab_lobes,
             autosaver,
             autosaved: (1, 0.0),
             results,
@@ -96,6 +106,8 @@ impl BackgroundJobs {
         self.thumbnails.into_iter().for_each(|worker| worker.finish(longest));
         self.exports.into_iter().for_each(|worker| worker.finish(longest));
         self.accuracy.into_iter().for_each(|worker| worker.finish(longest));
+        self.color_map.into_iter().for_each(|worker| worker.finish(longest));
+        self.slab_lobes.into_iter().for_each(|worker| worker.finish(longest));
     }
 }
 
@@ -116,7 +128,7 @@ impl Editor {
         }
     }
 
-    /// Submits a measurement of accuracy when the image is final and the panel is open.
+    /// Submits a measurement of accuracy if the panel is open: of the first points at once, of all when the image is final.
     pub(super) fn measure_accuracy(&mut self) {
         let version = self.document.version();
         let Some(worker) = &self.background.accuracy else { return };
@@ -124,9 +136,10 @@ impl Editor {
             worker.cancel();
         }
         let is_final = |preview: &RenderedPreview| preview.grade == Grade::Final && preview.version == version;
-        let idle = self.object.preview.as_deref().is_some_and(is_final) && self.exporting.is_none();
-        if let (true, Some((_, loaded))) = (idle, &self.background.loaded)
-            && let Some(job) = self.accuracy.job(version, loaded)
+        let is_shown = self.object.preview.is_some() && self.exporting.is_none();
+        let is_final = self.object.preview.as_deref().is_some_and(is_final);
+        if let (true, Some((_, loaded))) = (is_shown, &self.background.loaded)
+            && let Some(job) = self.accuracy.job(version, loaded, is_final)
         {
             worker.submit(job);
         }
@@ -205,6 +218,18 @@ impl Editor {
         if let (Some(worker), Some(job)) = (&self.background.tiles, self.tile.job(&loaded, self.lobe.light)) {
             worker.submit(job);
         }
+        if let Some(worker) = &self.background.color_map {
+            let picked = self.lobe.viewer.map(|viewer| (self.lobe.light, viewer));
+            if let Some(job) = self.color_map.job(self.document.version(), &loaded, picked) {
+                worker.submit(job);
+            }
+        }
+        if !self.tile.painting
+            && let Some(worker) = &self.background.slab_lobes
+            && let Some(job) = self.slab_lobe.job(self.document.version(), &loaded, self.lobe.light, self.lobe.log)
+        {
+            worker.submit(job);
+        }
         if !self.tile.painting
             && let (Some(worker), Some(preview)) = (&self.background.lobes, &self.object.preview)
             && let Some(job) = preview.brdf.as_ref().and_then(|brdf| self.lobe.job(brdf))
@@ -255,6 +280,8 @@ impl Editor {
                 JobResult::Lobe(plot) => self.lobe.receive(ctx, plot),
                 JobResult::Thumbnail(thumbnail) => self.gallery.receive(ctx, thumbnail),
                 JobResult::Accuracy(result) => self.accuracy.receive(ctx, result),
+                JobResult::ColorMap(result) => self.color_map.receive(result),
+                JobResult::SlabLobe(result) => self.slab_lobe.receive(ctx, result),
                 JobResult::Export(result) => self.receive_export(result),
                 JobResult::Autosaved(Ok(())) => self.messages.clear("autosave"),
                 JobResult::Autosaved(Err(text)) => {
@@ -280,6 +307,7 @@ impl Editor {
                 self.object.activity = Some(what);
             }
             ImageResult::Doing(..) => {}
+            ImageResult::Stated(brdf, error) => self.object.stated = Some((brdf, error)),
             ImageResult::Failed(version, _) if version < self.document.version() => {}
             ImageResult::Failed(version, text) => {
                 self.object.fail(version);

@@ -18,6 +18,7 @@ use super::views::gallery::Gallery;
 use super::views::lobe::LobeState;
 use super::views::object::ObjectView;
 use super::views::pointer::Pointer;
+use super::views::slab_lobe::SlabLobeState;
 use super::views::tile::TileState;
 
 /// Message of the first start, shown until the user closes it.
@@ -44,7 +45,11 @@ pub struct Editor {
     pub object: ObjectView,
     pub tile: TileState,
     pub lobe: LobeState,
+    pub slab_lobe: SlabLobeState,
     pub accuracy: panels::AccuracyState,
+    pub color_map: panels::ColorMapState,
+    /// The document was opened in this frame.
+    pub(super) is_new: bool,
     /// The tile is in the large view.
     pub exchanged: bool,
     /// The stroke that the user is drawing.
@@ -99,7 +104,10 @@ impl Editor {
             object: ObjectView::default(),
             tile: TileState::default(),
             lobe: LobeState::default(),
+            slab_lobe: SlabLobeState::default(),
             accuracy: panels::AccuracyState::default(),
+            color_map: panels::ColorMapState::default(),
+            is_new: false,
             exchanged: false,
             stroke: None,
             title: String::new(),
@@ -125,8 +133,10 @@ impl Editor {
         self.object.move_to(ctx);
         self.tile.move_to();
         self.lobe.move_to();
+        self.slab_lobe.move_to();
         self.gallery = Gallery::default();
         self.accuracy = panels::AccuracyState::default();
+        self.color_map = panels::ColorMapState::default();
         self.exporting = None;
         self.title.clear();
         let text = "The window's GPU was lost, so a new window was opened. Your document is unchanged. If this happens \
@@ -192,9 +202,10 @@ impl Editor {
                 let painted = self.document.painted().clone();
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     let effects = self.object.preview.as_ref().map_or(&[][..], |preview| &preview.effects);
-                    let slab = self.object.preview.as_ref().and_then(|preview| preview.slab.as_deref());
                     let version = self.document.version();
-                    let shown = panels::PanelInputs { accuracy: &mut self.accuracy, effects, slab, version };
+                    let (accuracy, color_map) = (&mut self.accuracy, &mut self.color_map);
+                    let is_new = std::mem::take(&mut self.is_new);
+                    let shown = panels::PanelInputs { accuracy, color_map, effects, version, is_new };
                     panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots, shown)
                 })
             });

@@ -151,6 +151,8 @@ impl Editor {
         self.document = document;
         // Version numbers continue, so that an image of the old document never matches the new one.
         self.document.start_at(version);
+        self.accuracy.forget();
+        self.is_new = true;
         self.scene_changed();
     }
 

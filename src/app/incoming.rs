@@ -39,6 +39,12 @@ impl Editor {
             Some(materials::MaterialRequest::Paste { slot }) => self.paste_material(&slot),
             None => {}
         }
+        if let Some(file) = requests.slab_file {
+            self.browse(Purpose::Slab(file), "");
+        }
+        if let Some(place) = requests.driver_image {
+            self.browse(Purpose::DriverImage(place), "");
+        }
         if let Some(text) = requests.error {
             self.messages.put(Level::Error, "edit", text);
         }
@@ -60,6 +66,8 @@ impl Editor {
                 }
                 None => return self.unknown_file(&path),
             },
+            Purpose::Slab(file) => panels::slab::set_file(&mut scene, file, relative),
+            Purpose::DriverImage(place) => panels::color_map::set_image(&mut scene, place, relative),
             Purpose::Paint(PaintLayer::Heights) => match surface::of_file(&relative, &scene) {
                 Some(geometry) => scene.tile.geometry = geometry,
                 None => return self.unknown_file(&path),

@@ -9,6 +9,7 @@ use super::actions::Action;
 use super::editor::Editor;
 use super::pick;
 use super::views::brushes;
+use super::views::slab_lobe;
 use super::views::tile::{self, TileMode};
 
 impl Editor {
@@ -63,10 +64,11 @@ impl Editor {
     /// Shows the smaller view, and under it the brush or the lobe plot.
     pub(super) fn side_ui(&mut self, ui: &mut Ui, scene: &mut Scene) {
         if self.exchanged {
-            let size = tile::size_above(ui, 300.0);
+            let size = tile::size_above(ui, 330.0);
             ui.allocate_ui(size, |ui| self.object_ui(ui, scene));
         } else {
-            let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + 90.0 };
+            let around = if scene.slab.is_some() { slab_lobe::AROUND } else { 90.0 };
+            let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + around };
             self.tile_ui(ui, scene, below);
         }
         ui.add_space(6.0);
@@ -76,6 +78,8 @@ impl Editor {
                     self.apply_brush_request(request);
                 }
             });
+        } else if scene.slab.is_some() {
+            self.slab_lobe.ui(ui, &mut self.lobe.light, &mut self.lobe.log);
         } else {
             self.lobe.ui(ui);
         }

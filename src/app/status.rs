@@ -6,6 +6,7 @@ use super::editor::Editor;
 use super::theme;
 use super::views::spinner::spinner;
 use super::worker::Grade;
+use crate::effective::ErrorEstimate;
 
 impl Editor {
     fn stop_refining(&mut self) {
@@ -63,6 +64,10 @@ impl Editor {
                     self.exporting = None;
                 }
             }
+            if let Some(error) = self.object.stated_error() {
+                ui.separator();
+                ui.label(format!("Error about {}", error.describe())).on_hover_text(error_parts(&error));
+            }
             ui.separator();
             let stages: Vec<String> = preview.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect();
             let tip = format!("{}\n\n{}", stages.join("\n"), effects(&preview));
@@ -87,6 +92,18 @@ impl Editor {
 
 fn count(number: usize, what: &str) -> String {
     if number == 1 { format!("1 {what}") } else { format!("{number} {what}s") }
+}
+
+/// Explains a stated error.
+fn error_parts(error: &ErrorEstimate) -> String {
+    format!(
+        "Stated error of the effective BRDF: relative L2, and PSNR over pairs of a light and a viewer.\n\
+         Facets {:.2} %, visibility {:.2} %, low-rank factors {:.2} %. Interreflection is not examined.\n\
+         The panel Accuracy compares it with a reference.",
+        100.0 * error.facets,
+        100.0 * error.visibility,
+        100.0 * error.table
+    )
 }
 
 fn time(ms: f64) -> String {

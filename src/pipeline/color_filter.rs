@@ -7,19 +7,19 @@ use glam::{DVec2, DVec3, Vec3};
 use super::inputs::Processor;
 use super::stages::MeasureHeights;
 use super::{Keyed, Outcome, Pipeline, StageTimes};
-use crate::base::{InputError, Result};
+use crate::base::{Cancel, InputError, Result};
 use crate::brdf::{LUMINANCE, Material, Term};
 use crate::color_map::filter::{HeightsSeen, Seen, SlopesSeen, naive_color};
 use crate::color_map::heights::{Largest, lit_part, pair_exponent, paper_moments};
-use crate::color_map::layers::{LayeredMap, Source};
+use crate::color_map::layers::{DrivenMap, Layer, LayeredMap, ResolvedDriver, Source};
 use crate::color_map::slopes::{Focus, SlopeDriver, Slopes, direction};
 use crate::color_map::statistics::{Footprint, PlaceMap, RankedHeights};
-use crate::color_map::{Normal, PrefilteredTable};
+use crate::color_map::{Normal, PrefilteredTable, Stop, StopMap};
 use crate::geometry::relief::slope_of;
 use crate::geometry::{ColorField, Facets};
 use crate::math::directions::half_vector;
 use crate::plan::Refinement;
-use crate::scene::{ColorMap, Gaussianize, HeightDistribution, LoadedScene, StopEvaluation};
+use crate::scene::{ColorMap, Combine, Gaussianize, HeightDistribution, LoadedScene, StopEvaluation, StopUnit};
 use crate::visibility::Visibility;
 
 /// The colour map of a scene with everything that its means depend on.
@@ -156,6 +156,32 @@ impl ColorFilter {
     pub fn pair(&self, i: DVec3, o: DVec3) -> PairColor {
         let slopes = &self.map.relief.slopes;
         let (lambda_i, lambda_o) = (slopes.lambda(i), slopes.lambda(o));
+        let (lit, color) = self.with_seen(i, o, |seen, lit| (lit, seen.color(&self.map)));
+        PairColor { lambda_i, lambda_o, lit, color }
+    }
+
+    /// The part of a driver's values that is at least each of `values` [deviations], by what is visible, lit and reflected
+    /// at a pair of directions. Stops early with fewer parts if `cancel` is set.
+    pub fn tails(&self, driver: &ResolvedDriver, i: DVec3, o: DVec3, values: &[f64], cancel: &Cancel) -> Vec<f64> {
+        self.with_seen(i, o, |seen, _| {
+            let tail = |value: &f64| {
+                // The mean of a jump from 0 to 1.
+                let stop = |color| Stop { value: *value, color };
+                let jump = StopMap::new(vec![stop(DVec3::ZERO), stop(DVec3::ONE)]);
+                let (map, stops) = (jump.clone(), jump);
+                let mapped = DrivenMap { driver: driver.clone(), map, stops, stop_unit: StopUnit::Deviation };
+                let layer = Layer { name: String::new(), mapped, factor: 1.0, blend: None };
+                let map = LayeredMap { combine: Combine::Sum, layers: vec![layer], relief: self.map.relief };
+                seen.color(&map).dot(LUMINANCE.as_dvec3())
+            };
+            values.iter().take_while(|_| !cancel.is_set()).map(tail).collect()
+        })
+    }
+
+    /// Reads what is visible, lit and reflected at a pair of directions, and the lit part of what is visible.
+    fn with_seen<R>(&self, i: DVec3, o: DVec3, read: impl FnOnce(&Seen<'_>, f64) -> R) -> R {
+        let slopes = &self.map.relief.slopes;
+        let (lambda_i, lambda_o) = (slopes.lambda(i), slopes.lambda(o));
         let exponent = match self.spec.distribution {
             HeightDistribution::Paper => lambda_i + lambda_o,
             _ => pair_exponent(lambda_o, lambda_i, i.y.atan2(i.x) - o.y.atan2(o.x)),
@@ -184,8 +210,7 @@ impl ColorFilter {
             SlopesSeen::Joint { weight: &weight, focus: self.focus(i, o) }
         };
         let seen = Seen { heights, slopes, gaussianize: self.spec.gaussianize };
-        let lit = weights.map_or_else(|| lit_part(lambda_o, exponent), |weights| weights.lit);
-        PairColor { lambda_i, lambda_o, lit, color: seen.color(&self.map) }
+        read(&seen, weights.map_or_else(|| lit_part(lambda_o, exponent), |weights| weights.lit))
     }
 
     /// The colour of the mean of every driver.

@@ -37,8 +37,8 @@ use serde::{Deserialize, Serialize};
 pub use background::{Background, Checkerboard, ImagePlane};
 pub use color_map::{
     Blend, ColorLayer, ColorMap, Combine, Driver, DriverSum, GaussianSurface, Gaussianize, GradientStop,
-    HeightDistribution, HeightDriver, LayerWeight, NoiseBasis, NoiseDriver, SlopeAlong, Steepness, StopEvaluation,
-    StopUnit, TextureDriver, WeightedDriver,
+    HeightDistribution, HeightDriver, LayerWeight, MAX_CELLS, NoiseBasis, NoiseDriver, SlopeAlong, Steepness,
+    StopEvaluation, StopUnit, TextureDriver, WeightedDriver,
 };
 pub use effects::{Effects, Switch};
 pub use load::{LoadedScene, load, load_with_overrides, open, parse, parse_table};

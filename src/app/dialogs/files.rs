@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui::{self, Key, RichText, ScrollArea, Ui};
 
+use crate::app::panels::{DriverPlace, SlabFile};
 use crate::app::views::brushes::PaintLayer;
 
 /// Purpose for which the user chooses a file.
@@ -16,6 +17,10 @@ pub enum Purpose {
         material: usize,
         term: usize,
     },
+    /// An image that drives a layer of the colour map.
+    DriverImage(DriverPlace),
+    /// A file of the slab.
+    Slab(SlabFile),
     /// An image to paint on.
     Paint(PaintLayer),
     TileMesh,
@@ -33,6 +38,11 @@ impl Purpose {
             Self::OpenScene => "Open a scene",
             Self::SaveScene => "Save the scene",
             Self::Measured { .. } => "Open a measured BRDF",
+            Self::DriverImage(_) => "Open an image for the colour map",
+            Self::Slab(SlabFile::Table { .. }) => "Open a table of slopes",
+            Self::Slab(SlabFile::Tile { .. }) => "Open a scene whose tile is the face",
+            Self::Slab(SlabFile::Svbtdf) => "Open a captured sheet",
+            Self::Slab(SlabFile::Background) => "Open an image for the background",
             Self::Paint(PaintLayer::Heights) => "Open an image of heights",
             Self::Paint(PaintLayer::Colors) => "Open an image of colours",
             Self::Paint(PaintLayer::Slots) => "Open an image of materials",
@@ -50,9 +60,12 @@ impl Purpose {
 
     pub fn endings(&self) -> &'static [&'static str] {
         match self {
-            Self::OpenScene | Self::SaveScene => &["toml"],
+            Self::OpenScene | Self::SaveScene | Self::Slab(SlabFile::Tile { .. }) => &["toml"],
+            Self::Slab(SlabFile::Table { .. }) => &["csv"],
+            Self::Slab(SlabFile::Svbtdf) => &["npz"],
+            Self::Slab(SlabFile::Background) => &["png", "jpg", "jpeg", "hdr", "exr"],
             Self::Measured { .. } => &["binary", "bsdf", "bin", "npz"],
-            Self::Paint(_) => &["png", "jpg", "jpeg", "tif", "tiff", "hdr", "exr"],
+            Self::DriverImage(_) | Self::Paint(_) => &["png", "jpg", "jpeg", "tif", "tiff", "hdr", "exr"],
             Self::TileMesh | Self::ObjectMesh => &["obj"],
             Self::Environment => &["hdr", "exr"],
             Self::SavePaint(PaintLayer::Slots) => &["png"],

@@ -4,7 +4,7 @@ use eframe::egui::{self, Context, Grid, RichText, ScrollArea};
 
 use crate::app::actions;
 
-const TASKS: [(&str, &str); 7] = [
+const TASKS: [(&str, &str); 10] = [
     (
         "Make a blue velvet",
         "Search the gallery for \"velvet\" and click a scene. Under Materials, set the colour of \"Default\" to \
@@ -21,6 +21,24 @@ const TASKS: [(&str, &str); 7] = [
         "Paint materials and colours",
         "Press P and choose Material. The first stroke creates the material \"Paint 1\", which appears under \
          Materials. Colour multiplies the material below it. Both work on any surface and are saved beside the scene.",
+    ),
+    (
+        "Colour by height, slope or noise",
+        "Unfold Colour map and tick its box. Choose a preset map, or edit the stops on the bar: drag them, double-click \
+         to add one, press Delete to remove the selected one. Driver is the value that decides the colour. The grey \
+         histogram shows how often each value occurs. Press I and point at the object: the orange line shows the values \
+         that are visible and lit there.",
+    ),
+    (
+        "See through frosted glass",
+        "Search the gallery for \"slab\" and click a scene, or unfold Slab and tick its box. Top and Bottom are the two \
+         faces: smooth, rough, or a tile. Drag Distance to move the background away, which blurs it. Below the tile, drag \
+         the light on the disc: the curves show the transmitted light by each method, and photons as the truth.",
+    ),
+    (
+        "See how far off the result is",
+        "The status line states the error once the image rests. Unfold Accuracy to see PSNR against time for faster and \
+         finer settings, and to compare with a reference.",
     ),
     (
         "Use a measured BRDF",

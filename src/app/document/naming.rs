@@ -26,6 +26,10 @@ pub fn name_of_edit(old: &Scene, new: &Scene) -> String {
 fn first_difference(old: &Value, new: &Value, path: &mut Vec<String>) {
     match (old, new) {
         (Value::Table(old), Value::Table(new)) => {
+            // Another kind has other keys.
+            if old.get("kind").zip(new.get("kind")).is_some_and(|(old, new)| old != new) {
+                return path.push("kind".to_owned());
+            }
             let keys = old.keys().chain(new.keys().filter(|key| !old.contains_key(*key)));
             for key in keys {
                 match (old.get(key), new.get(key)) {
@@ -60,7 +64,8 @@ fn caption_of(path: &[String]) -> String {
     let mut caption = last.trim_end_matches("_deg").replace('_', " ");
     if caption == "kind" {
         caption = match path.iter().rev().nth(1).map(String::as_str) {
-            Some("object") => "object".to_owned(),
+            Some(part @ ("object" | "driver" | "background")) => part.to_owned(),
+            Some(side @ ("top" | "bottom")) => format!("{side} face"),
             _ => "BRDF model".to_owned(),
         };
     }

@@ -7,7 +7,7 @@ use eframe::egui::{self, DragValue, Slider, SliderClamping, Ui};
 use toml::Value;
 
 use super::fields::{PanelContext, caption, display_name, suffix};
-use super::matrix;
+use super::{alternatives, matrix};
 
 /// Makes a drag value reject text that is not a finite number, and set `wrong` if the user types such text.
 fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
@@ -46,7 +46,8 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field
             }
         }
         FieldShape::Choice(names) => choice_ui(ui, value, names, field.key),
-        FieldShape::AnyOf(shapes) => any_of_ui(ui, value, shapes, field, context),
+        FieldShape::AnyOf(shapes) => any_of_ui(ui, value, shapes, field, context, &wrong),
+        FieldShape::List { of, min, max } if min == max => alternatives::list_ui(ui, value, of, &wrong),
         FieldShape::List { .. } if matrix::is_matrix(value) => matrix::ui(ui, value),
         FieldShape::List { .. } => {
             let entries = value.as_array().map_or(0, Vec::len);
@@ -66,7 +67,13 @@ fn is_logarithmic(min: f64, soft_max: f64) -> bool {
     min >= 0.0 && soft_max / min.max(1e-4) > 500.0
 }
 
-fn number_ui(ui: &mut Ui, value: &mut Value, (min, max, soft_max): (f64, f64, f64), suffix: &str, wrong: &Cell<bool>) {
+pub(super) fn number_ui(
+    ui: &mut Ui,
+    value: &mut Value,
+    (min, max, soft_max): (f64, f64, f64),
+    suffix: &str,
+    wrong: &Cell<bool>,
+) {
     let Some(before) = number(value) else { return };
     // Displays 0.1 that was stored as f32 as 0.1, not as 0.10000000149.
     let mut now = tidy(before);
@@ -110,30 +117,43 @@ fn integer_ui(ui: &mut Ui, value: &mut Value, (min, max): (i64, i64), wrong: &Ce
     }
 }
 
-fn color_ui(ui: &mut Ui, value: &mut Value, max: f64, wrong: &Cell<bool>) {
-    let Some(list) = value.as_array() else { return };
-    let mut rgb = [0.0f32; 3];
-    for (channel, value) in rgb.iter_mut().zip(list) {
-        *channel = number(value).unwrap_or(0.0) as f32;
-    }
-    let before = rgb;
-    // The colour picker covers 0 to 1. A brighter colour keeps its brightness as a factor.
+/// Draws a button that opens the colour picker. The picker covers 0 to 1; a brighter colour keeps its brightness as a factor.
+pub(super) fn color_button(ui: &mut Ui, value: &mut Value) {
+    let Some(rgb) = rgb_of(value) else { return };
     let gain = rgb.iter().copied().fold(1.0, f32::max);
     let mut shown = rgb.map(|channel| channel / gain);
     if ui.color_edit_button_rgb(&mut shown).on_hover_text("Linear RGB").changed() {
-        rgb = shown.map(|channel| channel * gain);
+        *value = color_value(shown.map(|channel| channel * gain));
     }
+}
+
+fn rgb_of(value: &Value) -> Option<[f32; 3]> {
+    let mut rgb = [0.0f32; 3];
+    for (channel, value) in rgb.iter_mut().zip(value.as_array()?) {
+        *channel = number(value).unwrap_or(0.0) as f32;
+    }
+    Some(rgb)
+}
+
+fn color_value(rgb: [f32; 3]) -> Value {
+    Value::Array(rgb.map(|channel| Value::Float(f64::from(channel))).to_vec())
+}
+
+fn color_ui(ui: &mut Ui, value: &mut Value, max: f64, wrong: &Cell<bool>) {
+    color_button(ui, value);
+    let Some(mut rgb) = rgb_of(value) else { return };
+    let before = rgb;
     let width = ((ui.available_width() - 14.0) / 3.0).clamp(30.0, 48.0);
     for channel in &mut rgb {
         let drag = DragValue::new(channel).range(0.0..=max as f32).speed(0.005).max_decimals(3);
         ui.add_sized([width, ui.spacing().interact_size.y], finite(drag, wrong));
     }
     if rgb != before && rgb.iter().all(|channel| channel.is_finite()) {
-        *value = Value::Array(rgb.map(|channel| Value::Float(f64::from(channel))).to_vec());
+        *value = color_value(rgb);
     }
 }
 
-fn vector_ui(ui: &mut Ui, value: &mut Value, (min, max): (f64, f64), wrong: &Cell<bool>) {
+pub(super) fn vector_ui(ui: &mut Ui, value: &mut Value, (min, max): (f64, f64), wrong: &Cell<bool>) {
     let Value::Array(list) = value else { return };
     for entry in list {
         let Some(before) = number(entry) else { continue };
@@ -185,15 +205,26 @@ fn choice_ui(ui: &mut Ui, value: &mut Value, names: &[&str], key: &str) {
     });
 }
 
-/// Draws the named choice or matrix of a weave pattern, and the first shape of any other field.
-fn any_of_ui(ui: &mut Ui, value: &mut Value, shapes: &[FieldShape], field: &Field, context: &mut PanelContext) {
-    let names = shapes.iter().find_map(|shape| match shape {
-        FieldShape::Choice(names) => Some(*names),
-        _ => None,
-    });
-    match names {
-        Some(names) => matrix::pattern_ui(ui, value, names, field.key),
-        None => {
+/// Draws the named choice or matrix of a weave pattern, the forms of a number, and the first shape of any other field.
+fn any_of_ui(
+    ui: &mut Ui,
+    value: &mut Value,
+    shapes: &[FieldShape],
+    field: &Field,
+    context: &mut PanelContext,
+    wrong: &Cell<bool>,
+) {
+    match *shapes {
+        [FieldShape::Number { min, max, soft_max }, FieldShape::Vector { length, .. }] => {
+            alternatives::number_or_vector_ui(ui, value, (min, max, soft_max), length, field, context, wrong);
+        }
+        [ref number @ FieldShape::Number { .. }, FieldShape::Choice([automatic])] => {
+            alternatives::number_or_auto_ui(ui, value, number, automatic, field, context, wrong);
+        }
+        [FieldShape::Choice(names), ..] => {
+            matrix::pattern_ui(ui, value, names, field.key);
+        }
+        _ => {
             if let Some(first) = shapes.first() {
                 value_ui(ui, value, first, field, context);
             }

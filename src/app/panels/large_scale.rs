@@ -109,7 +109,7 @@ pub fn quality_ui(ui: &mut Ui, quality: &mut Quality, context: &mut PanelContext
 }
 
 /// Draws a table of the scene from its catalogue fields, and applies the edits.
-fn edit<T: Serialize + DeserializeOwned>(
+pub(super) fn edit<T: Serialize + DeserializeOwned>(
     ui: &mut Ui,
     target: &mut T,
     fields: &[crate::scene::Field],

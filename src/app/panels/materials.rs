@@ -32,7 +32,9 @@ pub enum MaterialRequest {
 /// Draws the controls of every slot of the surface, the default first.
 pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], context: &mut PanelContext) -> Option<MaterialRequest> {
     let mut request = None;
-    if scene.materials.is_empty() {
+    // A scene without materials has this one, and stays as it is until the user edits it.
+    let is_implied = scene.materials.is_empty();
+    if is_implied {
         scene.materials.push(grey());
     }
     let mut names: Vec<String> = vec![DEFAULT.to_owned()];
@@ -52,6 +54,9 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], context: &mut PanelC
             .inner;
         request = request.or(from_slot);
         ui.add_space(2.0);
+    }
+    if is_implied && scene.materials == [grey()] {
+        scene.materials.clear();
     }
     request
 }

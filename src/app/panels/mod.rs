@@ -1,6 +1,9 @@
 //! The parameter panel: sections for one scene, generated from the catalogue.
 
 pub mod accuracy;
+mod accuracy_chart;
+mod alternatives;
+pub mod color_map;
 mod controls;
 mod effects;
 pub mod fields;
@@ -8,16 +11,17 @@ pub mod large_scale;
 pub mod materials;
 mod matrix;
 pub mod paints;
-mod slab;
+pub mod slab;
 pub mod surface;
 
-use crate::app::worker::SlabPlot;
 use crate::plan::Effect;
 use crate::scene::{Painted, Scene};
 use eframe::egui::{self, RichText, Ui};
 
 pub use accuracy::AccuracyState;
+pub use color_map::{ColorMapState, DriverPlace};
 pub use fields::PanelContext;
+pub use slab::SlabFile;
 
 /// Requests of the panel to the editor.
 #[derive(Debug, Default)]
@@ -25,6 +29,10 @@ pub struct PanelRequests {
     /// Key of the field for which the user requests a file.
     pub browse: Option<&'static str>,
     pub material: Option<materials::MaterialRequest>,
+    /// Driver of the colour map for which the user requests an image.
+    pub driver_image: Option<DriverPlace>,
+    /// File of the slab that the user requests.
+    pub slab_file: Option<SlabFile>,
     /// Message about an invalid value.
     pub error: Option<String>,
 }
@@ -32,12 +40,13 @@ pub struct PanelRequests {
 /// State of the displayed image, for the sections that measure it.
 pub struct PanelInputs<'a> {
     pub accuracy: &'a mut AccuracyState,
+    pub color_map: &'a mut ColorMapState,
     /// The plan of the displayed image.
     pub effects: &'a [Effect],
-    /// Lobe and energy of the displayed slab.
-    pub slab: Option<&'a SlabPlot>,
     /// Version of the document.
     pub version: u64,
+    /// True in the first frame of a document: sections that its scene uses unfold.
+    pub is_new: bool,
 }
 
 /// Draws all sections and writes the edits into `scene`.
@@ -50,12 +59,19 @@ pub fn ui(
     inputs: PanelInputs<'_>,
 ) -> PanelRequests {
     let mut context = PanelContext { unit: scene.tile.unit.clone(), ..PanelContext::default() };
-    let mut material = None;
+    let (mut material, mut driver_image, mut slab_file) = (None, None, None);
     // A wide row must not widen the panel.
     ui.set_max_width(ui.available_width());
+    // A scene of the gallery unfolds what it shows.
+    let unfolds = |used: bool| inputs.is_new.then_some(used);
+    let (shows_map, shows_slab) = (scene.color_map.is_some(), scene.slab.is_some());
     section(ui, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut context));
     section(ui, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut context));
-    section(ui, "Slab", scene.slab.is_some(), |ui| slab::ui(ui, scene, inputs.slab, &mut context));
+    inputs.color_map.open = false;
+    foldable(ui, "Colour map", shows_map, unfolds(shows_map), |ui| {
+        driver_image = color_map::ui(ui, scene, inputs.color_map, &mut context);
+    });
+    foldable(ui, "Slab", shows_slab, unfolds(shows_slab), |ui| slab_file = slab::ui(ui, scene, &mut context));
     section(ui, "Object", true, |ui| large_scale::object_ui(ui, scene, &mut context));
     section(ui, "Light", true, |ui| large_scale::light_ui(ui, &mut scene.light, &mut context));
     section(ui, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));
@@ -63,17 +79,20 @@ pub fn ui(
     inputs.accuracy.open = false;
     section(ui, "Accuracy", false, |ui| accuracy::ui(ui, scene, inputs.accuracy, inputs.effects, inputs.version));
     section(ui, "Effects", false, |ui| effects::ui(ui, scene, inputs.effects, inputs.accuracy, inputs.version));
-    PanelRequests { browse: context.browse, material, error: context.error }
+    PanelRequests { browse: context.browse, material, driver_image, slab_file, error: context.error }
 }
 
 fn section(ui: &mut Ui, title: &str, open: bool, body: impl FnOnce(&mut Ui)) {
-    egui::CollapsingHeader::new(RichText::new(title).heading()).id_salt(title).default_open(open).show_unindented(
-        ui,
-        |ui| {
-            ui.add_space(2.0);
-            body(ui);
-            ui.add_space(6.0);
-        },
-    );
+    foldable(ui, title, open, None, body);
+}
+
+/// Draws a section. `unfold` folds or unfolds it in this frame.
+fn foldable(ui: &mut Ui, title: &str, open: bool, unfold: Option<bool>, body: impl FnOnce(&mut Ui)) {
+    let header = egui::CollapsingHeader::new(RichText::new(title).heading()).id_salt(title);
+    header.default_open(open).open(unfold).show_unindented(ui, |ui| {
+        ui.add_space(2.0);
+        body(ui);
+        ui.add_space(6.0);
+    });
     ui.separator();
 }

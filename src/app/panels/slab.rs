@@ -1,30 +1,35 @@
-//! The panel of a thin transparent slab: its faces, its material, its background, its lobe and where the light goes.
+//! The panel of a thin transparent slab: its faces, its material and its background. The lobe view shows its light.
+
+use std::path::PathBuf;
 
 use crate::scene::{Background, Kind, Scene, Slab, SlabFace};
-use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
+use eframe::egui::Ui;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::Table;
 
 use super::controls;
 use super::fields::{self, PanelContext};
-use crate::app::worker::SlabPlot;
+use super::large_scale::edit;
 
-/// Height of the polar plot and of the bar [points].
-const PLOT: f32 = 150.0;
-const BAR: f32 = 18.0;
-/// Colours of the curves and of the parts of the light.
-const CURVES: [Color32; 3] =
-    [Color32::from_rgb(255, 170, 60), Color32::from_rgb(90, 180, 255), Color32::from_rgb(160, 160, 160)];
-const PARTS: [Color32; 4] = [
-    Color32::from_rgb(120, 200, 120),
-    Color32::from_rgb(230, 220, 120),
-    Color32::from_rgb(110, 150, 230),
-    Color32::from_rgb(90, 90, 90),
-];
+/// A file that a slab reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SlabFile {
+    /// Slopes of the top or the bottom face.
+    Table {
+        is_top: bool,
+    },
+    /// Scene whose tile is the top or the bottom face.
+    Tile {
+        is_top: bool,
+    },
+    /// A captured sheet in place of both faces.
+    Svbtdf,
+    Background,
+}
 
-/// Draws the controls of the slab, which a scene may have or not.
-pub fn ui(ui: &mut Ui, scene: &mut Scene, plot: Option<&SlabPlot>, context: &mut PanelContext) {
+/// Draws the controls of the slab, which a scene may have or not. Returns a request for a file.
+pub fn ui(ui: &mut Ui, scene: &mut Scene, context: &mut PanelContext) -> Option<SlabFile> {
     let mut has_slab = scene.slab.is_some();
     let tip = "The surface is a sheet of glass or plastic between two rough faces.";
     if ui.checkbox(&mut has_slab, "Thin transparent slab").on_hover_text(tip).changed() {
@@ -36,45 +41,71 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, plot: Option<&SlabPlot>, context: &mut
             (scene.slab, scene.background) = (None, None);
         }
     }
-    let Some(slab) = &mut scene.slab else { return };
-    for (caption, side) in [("Top", 0), ("Bottom", 1)] {
-        let face = if side == 0 { &mut slab.top } else { &mut slab.bottom };
-        let now = face.kind();
-        let with_defaults =
-            |kind: &str| SlabFace::with_defaults(kind).filter(|face| face.path().is_none() || kind == "tile");
-        ui.push_id(caption, |ui| tagged_ui(ui, caption, face, now, &SlabFace::kinds(), with_defaults, context));
-    }
-    edit(ui, slab, &["top", "bottom"], context);
+    let slab = scene.slab.as_mut()?;
+    let mut request = if slab.svbtdf.is_some() {
+        captured_ui(ui, slab, context)
+    } else {
+        let top = face_ui(ui, "Top", &mut slab.top, true, context);
+        let bottom = face_ui(ui, "Bottom", &mut slab.bottom, false, context);
+        edit(ui, slab, &Slab::fields(), &["top", "bottom", "svbtdf", "repeat"], context);
+        let tip = "A sheet that `biscale capture` made of photographs, in place of both faces (.npz)";
+        let captured = ui.button("Use a captured sheet…").on_hover_text(tip).clicked().then_some(SlabFile::Svbtdf);
+        top.or(bottom).or(captured)
+    };
     if let Some(background) = &mut scene.background {
-        let now = background.kind();
-        let with_defaults =
-            |kind: &str| Background::with_defaults(kind).filter(|background| background.path().is_none());
+        let mut removed = false;
         ui.push_id("background", |ui| {
-            tagged_ui(ui, "Background", background, now, &Background::kinds(), with_defaults, context);
+            let now = background.kind();
+            let kinds = Background::kinds();
+            let of_file =
+                tagged_ui(ui, "Background", background, now, &kinds, Background::with_defaults, "image", context);
+            request = request.or(of_file.then_some(SlabFile::Background));
+            let tip = "Behind the slab lies only the environment";
+            removed = ui.button("Remove the background").on_hover_text(tip).clicked();
         });
-    } else if ui.button("Add a background").clicked() {
+        if removed {
+            scene.background = None;
+        }
+    } else if ui.button("Add a background").on_hover_text("A plane behind the slab").clicked() {
         scene.background = Background::with_defaults("checkerboard");
     }
-    if let Some(plot) = plot {
-        ui.add_space(4.0);
-        polar_ui(ui, plot);
-        bar_ui(ui, plot);
-    }
+    request
 }
 
-/// Draws the fields of the slab itself.
-fn edit(ui: &mut Ui, slab: &mut Slab, skip: &[&str], context: &mut PanelContext) {
-    let Ok(mut table) = Table::try_from(&*slab) else { return };
-    let before = table.clone();
-    fields::table_ui(ui, &mut table, &Slab::fields(), skip, context);
-    if table != before
-        && let Ok(changed) = table.try_into()
-    {
-        *slab = changed;
+/// Draws the controls of a captured sheet.
+fn captured_ui(ui: &mut Ui, slab: &mut Slab, context: &mut PanelContext) -> Option<SlabFile> {
+    let fields: Vec<_> =
+        Slab::fields().into_iter().filter(|field| matches!(field.key, "svbtdf" | "repeat" | "thickness")).collect();
+    let mut inside = PanelContext { unit: context.unit.clone(), ..PanelContext::default() };
+    edit(ui, slab, &fields, &[], &mut inside);
+    context.error = context.error.take().or(inside.error);
+    if ui.button("Use two faces").on_hover_text("Faces with slopes in place of the captured sheet").clicked() {
+        (slab.svbtdf, slab.repeat) = (None, [1, 1]);
     }
+    inside.browse.map(|_| SlabFile::Svbtdf)
 }
 
-/// Draws the choice of a kind and its fields. `with_defaults` returns `None` for kinds that need a file first.
+/// Draws the controls of a face. Returns a request for its file.
+fn face_ui(
+    ui: &mut Ui,
+    caption: &str,
+    face: &mut SlabFace,
+    is_top: bool,
+    context: &mut PanelContext,
+) -> Option<SlabFile> {
+    ui.push_id(caption, |ui| {
+        let now = face.kind();
+        let of_file = tagged_ui(ui, caption, face, now, &SlabFace::kinds(), SlabFace::with_defaults, "table", context);
+        of_file.then_some(match face {
+            SlabFace::Tile(_) => SlabFile::Tile { is_top },
+            _ => SlabFile::Table { is_top },
+        })
+    })
+    .inner
+}
+
+/// Draws the choice of a kind and its fields. The kind `of_file` needs a file first. Returns true if the user requests one.
+#[expect(clippy::too_many_arguments, reason = "one call for faces and one for backgrounds, which share no type")]
 fn tagged_ui<T: Serialize + DeserializeOwned>(
     ui: &mut Ui,
     caption: &str,
@@ -82,70 +113,62 @@ fn tagged_ui<T: Serialize + DeserializeOwned>(
     now: &str,
     kinds: &[Kind],
     with_defaults: impl Fn(&str) -> Option<T>,
+    of_file: &str,
     context: &mut PanelContext,
-) {
-    let Some(kind) = kinds.iter().find(|kind| kind.kind == now) else { return };
-    let offered: Vec<Kind> =
-        kinds.iter().filter(|kind| kind.kind == now || with_defaults(kind.kind).is_some()).cloned().collect();
-    let chosen = fields::row(ui, caption, kind.doc, |ui| controls::kind_ui(ui, caption, now, &offered));
+) -> bool {
+    let Some(kind) = kinds.iter().find(|kind| kind.kind == now) else { return false };
+    let chosen = fields::row(ui, caption, kind.doc, |ui| controls::kind_ui(ui, caption, now, kinds));
+    if chosen == Some(of_file) {
+        return true;
+    }
     if let Some(chosen) = chosen.and_then(with_defaults) {
         *value = chosen;
-        return;
+        return false;
     }
+    let mut inside = PanelContext { unit: context.unit.clone(), ..PanelContext::default() };
+    edit_kind(ui, value, kind, &mut inside);
+    context.error = context.error.take().or(inside.error);
+    inside.browse.is_some()
+}
+
+/// Draws the fields of a kind.
+fn edit_kind<T: Serialize + DeserializeOwned>(ui: &mut Ui, value: &mut T, kind: &Kind, context: &mut PanelContext) {
     let Ok(mut table) = Table::try_from(&*value) else { return };
     let before = table.clone();
-    fields::table_ui(ui, &mut table, &kind.fields, &["path", "scene"], context);
-    if table != before
-        && let Ok(changed) = table.try_into()
-    {
-        *value = changed;
+    fields::table_ui(ui, &mut table, &kind.fields, &[], context);
+    if table != before {
+        match table.try_into() {
+            Ok(changed) => *value = changed,
+            Err(error) => context.error = Some(error.message().to_owned()),
+        }
     }
 }
 
-/// Draws the lobe in the plane of incidence: the light arrives from the upper left, and the slab is the line on top.
-fn polar_ui(ui: &mut Ui, plot: &SlabPlot) {
-    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), PLOT), Sense::hover());
-    response.on_hover_text(format!(
-        "What the slab transmits of light at {:.0}°, in the plane of incidence, each curve on the scale of the largest. Straight light is left out.",
-        plot.theta_deg
-    ));
-    let painter = ui.painter_at(area);
-    painter.rect_filled(area, 2.0, Color32::from_gray(12));
-    let center = pos2(area.center().x, area.top() + 34.0);
-    let radius = (0.5 * area.width() - 8.0).min(area.bottom() - center.y - 6.0);
-    let line = Stroke::new(1.0, Color32::from_gray(110));
-    painter.line_segment([center - vec2(radius, 0.0), center + vec2(radius, 0.0)], line);
-    let (sin, cos) = plot.theta_deg.to_radians().sin_cos();
-    painter.arrow(center - 30.0 * vec2(sin, cos), 26.0 * vec2(sin, cos), Stroke::new(1.5, Color32::YELLOW));
-    let peak =
-        plot.curves.iter().flat_map(|(_, values)| values).fold(f32::MIN_POSITIVE, |peak, value| peak.max(*value));
-    for ((name, values), (k, color)) in plot.curves.iter().zip(CURVES.iter().enumerate()) {
-        let steps = (values.len().max(2) - 1) as f32;
-        let point = |(at, value): (usize, &f32)| -> Pos2 {
-            let angle = (at as f32 / steps - 0.5) * std::f32::consts::PI;
-            center + radius * value / peak * vec2(angle.sin(), angle.cos())
+/// Sets a file that the user chose.
+pub fn set_file(scene: &mut Scene, file: SlabFile, path: PathBuf) {
+    if file == SlabFile::Background {
+        let mut image = match scene.background.take() {
+            Some(Background::Image(image)) => image,
+            _ => crate::scene::ImagePlane::default(),
         };
-        let points: Vec<Pos2> = values.iter().enumerate().map(point).collect();
-        painter.add(eframe::egui::Shape::line(points, Stroke::new(1.5, *color)));
-        let at = area.left_bottom() + vec2(6.0, -6.0 - 13.0 * k as f32);
-        painter.text(at, Align2::LEFT_BOTTOM, *name, FontId::proportional(11.0), *color);
+        image.path = path;
+        scene.background = Some(Background::Image(image));
+        return;
     }
-}
-
-/// Draws the parts of the light as a bar.
-fn bar_ui(ui: &mut Ui, plot: &SlabPlot) {
-    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR), Sense::hover());
-    let painter = ui.painter_at(area);
-    let mut left = area.left();
-    let mut text = Vec::new();
-    for ((name, part), color) in plot.parts.iter().zip(PARTS) {
-        let width = area.width() * part.clamp(0.0, 1.0);
-        let part_area = Rect::from_min_size(pos2(left, area.top()), vec2(width, BAR));
-        painter.rect_filled(part_area, 0.0, color);
-        left += width;
-        text.push(format!("{name} {:.1} %", 100.0 * part));
+    let Some(slab) = &mut scene.slab else { return };
+    let (SlabFile::Table { is_top } | SlabFile::Tile { is_top }) = file else {
+        // A captured sheet has no faces.
+        (slab.top, slab.bottom) = (SlabFace::Smooth {}, SlabFace::Smooth {});
+        slab.svbtdf = Some(path);
+        return;
+    };
+    let face = if is_top { &mut slab.top } else { &mut slab.bottom };
+    match (face, file) {
+        (SlabFace::Table(table), SlabFile::Table { .. }) => table.path = path,
+        (SlabFace::Tile(tile), SlabFile::Tile { .. }) => tile.scene = Some(path),
+        (face, SlabFile::Tile { .. }) => {
+            *face = SlabFace::Tile(crate::scene::TileFace { scene: Some(path), ..Default::default() });
+        }
+        (face, _) => *face = SlabFace::Table(crate::scene::TableFace { path, ..Default::default() }),
     }
-    let text = text.join(", ");
-    response.on_hover_text(format!("Light at {:.0}°: {text}", plot.theta_deg));
-    ui.small(text);
 }

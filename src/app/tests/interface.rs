@@ -219,6 +219,8 @@ fn no_two_actions_share_a_shortcut() {
 #[test]
 fn the_accuracy_panel_measures_the_scene_and_its_slider_sets_the_quality_level() {
     let mut harness = harness(quick());
+    harness.set_size(eframe::egui::vec2(1400.0, 1500.0));
+    harness.run_steps(2);
     settle(&mut harness);
     assert!(harness.query_by_label("Accuracy chart").is_none(), "the folded panel measures nothing");
     harness.get_by_label("Accuracy").click();
@@ -236,6 +238,7 @@ fn the_accuracy_panel_measures_the_scene_and_its_slider_sets_the_quality_level()
         }
     };
     wait(&mut harness);
+    assert_eq!(editor(&mut harness).accuracy.point_counts(), [0, 5], "all points are compared with the reference");
     assert!(harness.query_by_label("Accuracy chart").is_some());
     let slider = harness.get_all_by_role(eframe::egui::Role::Slider).last().unwrap();
     slider.set_value_accesskit(5.0);
@@ -294,4 +297,58 @@ fn an_image_that_is_requested_before_the_window_opens_has_the_size_of_its_view()
     let (editor, early) = harness.state().as_ref().unwrap();
     assert!(early.is_some());
     assert_eq!(editor.object.requested, *early);
+}
+
+#[test]
+fn the_status_line_states_the_error_of_a_resting_image_and_a_moved_camera_keeps_it() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let wait = |harness: &mut Harness<'static, Option<Editor>>| {
+        let start = std::time::Instant::now();
+        while editor(harness).object.stated_error().is_none() {
+            harness.step();
+            assert!(start.elapsed().as_secs() < 60, "no stated error");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        harness.step();
+    };
+    wait(&mut harness);
+    let error = editor(&mut harness).object.stated_error().unwrap();
+    assert!(error.rel_l2 > 0.0 && error.psnr_db.is_some(), "{error:?}");
+    assert!(harness.query_by_label(&format!("Error about {}", error.describe())).is_some());
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.camera.get_or_insert_default().azimuth_deg = 33.0;
+    editor(&mut harness).document.edit(scene.clone());
+    harness.step();
+    settle(&mut harness);
+    assert_eq!(editor(&mut harness).object.stated_error(), Some(error), "the BRDF is the same");
+    let Geometry::Grooves(grooves) = &mut scene.tile.geometry else { panic!() };
+    grooves.depth *= 1.5;
+    editor(&mut harness).document.edit(scene);
+    harness.step();
+    settle(&mut harness);
+    assert_eq!(editor(&mut harness).object.stated_error(), None, "the error of the old BRDF is no longer shown");
+    wait(&mut harness);
+    assert_ne!(editor(&mut harness).object.stated_error(), Some(error));
+}
+
+#[test]
+fn the_chart_draws_its_first_points_from_stated_errors_before_the_reference() {
+    let mut harness = harness(quick());
+    harness.set_size(eframe::egui::vec2(1400.0, 1500.0));
+    harness.run_steps(2);
+    settle(&mut harness);
+    harness.get_by_label("Accuracy").click();
+    let start = std::time::Instant::now();
+    let counts = loop {
+        harness.step();
+        let counts = editor(&mut harness).accuracy.point_counts();
+        if counts != [0, 0] {
+            break counts;
+        }
+        assert!(start.elapsed().as_secs() < 100, "not measured");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    };
+    println!("first points {:.2} s after unfolding the panel", start.elapsed().as_secs_f64());
+    assert!(counts[0] > 0 && counts[1] == 0, "{counts:?}");
 }

@@ -1,5 +1,6 @@
 //! The editor without a window: frames run as in a window, with the same workers.
 
+mod color_map;
 mod disk;
 mod documents;
 mod errors;
@@ -8,6 +9,7 @@ mod interface;
 mod latency;
 mod newcomer;
 mod painting;
+mod slab;
 mod soak;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -46,9 +48,22 @@ method = "direct"
 "#;
 
 fn quick() -> Document {
-    let scene = scene::parse(QUICK).unwrap();
+    quick_with("")
+}
+
+/// The quick scene with more tables.
+fn quick_with(tables: &str) -> Document {
+    let scene = scene::parse(&format!("{QUICK}{tables}")).unwrap();
     let painted = Painted::default();
     Document::new(scene::LoadedScene { scene, base_dir: "".into(), name: "quick".into(), painted }, None)
+}
+
+/// Opens an editor that is so high that all unfolded sections are visible.
+fn tall(document: Document) -> Harness<'static, Option<Editor>> {
+    let mut harness = harness(document);
+    harness.set_size(egui::vec2(1300.0, 2000.0));
+    harness.run_steps(3);
+    harness
 }
 
 /// Opens an editor on a document in a harness.

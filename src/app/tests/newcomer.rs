@@ -158,6 +158,16 @@ fn turning_a_shipped_scene_asks_for_no_save() {
 }
 
 #[test]
+fn opening_a_scene_without_materials_changes_nothing() {
+    let mut harness = harness(quick());
+    let ctx = harness.ctx.clone();
+    editor(&mut harness).action(&ctx, Action::OpenShipped("slab_window".to_owned()));
+    harness.run_steps(4);
+    let editor = editor(&mut harness);
+    assert!(editor.document.scene().materials.is_empty() && !editor.document.is_dirty());
+}
+
+#[test]
 fn the_ending_of_a_typed_measured_file_selects_its_kind() {
     let mut document = quick();
     let mut scene = (**document.scene()).clone();

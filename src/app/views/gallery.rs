@@ -108,12 +108,53 @@ fn matches_search(name: &str, search: &str) -> bool {
     search.to_lowercase().split_whitespace().all(|word| text.contains(word))
 }
 
-/// Returns the caption of a scene: `Velvet spread` for `fig6a_velvet_spread`.
+/// Returns the caption of a scene: `Velvet spread` for `fig6a_velvet_spread`, `Slab: window` for `slab_window`.
 pub fn title(name: &str) -> String {
+    if let Some(rest) = name.strip_prefix("slab_") {
+        return slab_title(rest);
+    }
+    if let Some(rest) = name.strip_suffix("_color_map") {
+        let rest = rest.split_once('_').map_or(rest, |(_, rest)| rest);
+        return format!("Colours: {}", rest.replace('_', " "));
+    }
     let rest = match name.split_once('_') {
         Some((first, rest)) if first.starts_with("fig") => rest.to_owned(),
         Some((first, rest)) if first.starts_with("table") => format!("{rest} ({first})"),
         _ => name.to_owned(),
     };
     crate::app::panels::fields::display_name(&rest)
+}
+
+/// Returns the caption of a scene with a slab from its name without `slab_`.
+fn slab_title(name: &str) -> String {
+    let rest = match name.split_once('_') {
+        Some((figure, rest)) if figure.starts_with("fig") => rest,
+        _ => name,
+    };
+    match rest {
+        "top" | "bottom" | "both" => format!("Slab: {rest} rough"),
+        angle if angle.bytes().all(|byte| byte.is_ascii_digit()) => format!("Slab: light at {angle}°"),
+        rest => format!("Slab: {}", rest.replace('_', " ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn captions_of_shipped_scenes_are_words_that_differ() {
+        assert_eq!(title("fig6a_velvet_spread"), "Velvet spread");
+        assert_eq!(title("slab_fig3_top"), "Slab: top rough");
+        assert_eq!(title("slab_fig5_30"), "Slab: light at 30°");
+        assert_eq!(title("slab_fig7_leaf_glass"), "Slab: leaf glass");
+        assert_eq!(title("fig1a_noise_color_map"), "Colours: noise");
+        let mut titles: Vec<String> = shipped::names().map(title).collect();
+        assert!(titles.iter().all(|title| !title.contains('_')), "{titles:?}");
+        titles.sort();
+        let count = titles.len();
+        titles.dedup();
+        // Figures 1 and 9 of Heitz et al. both show slopes.
+        assert!(titles.len() + 1 >= count, "{titles:?}");
+    }
 }

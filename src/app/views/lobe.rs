@@ -72,7 +72,9 @@ impl LobeState {
         let width = ui.available_width();
         let side = (0.5 * (width - 8.0)).min(ui.available_height() - 24.0).max(60.0);
         ui.horizontal(|ui| {
-            self.disc_ui(ui, side);
+            let tip = "All view directions above the surface, projected onto the disc. Drag the light.";
+            let named = ("Lobe view", tip);
+            disc_ui(ui, side, self.texture.as_ref(), &mut self.light, self.viewer, named);
             self.polar_ui(ui, vec2(width - side - 8.0, side));
         });
         if let Some(plot) = &self.plot {
@@ -92,35 +94,6 @@ impl LobeState {
             };
             ui.small(caption);
         }
-    }
-
-    /// Draws the hemisphere of viewers, on which the user drags the light.
-    fn disc_ui(&mut self, ui: &mut Ui, side: f32) {
-        let (area, response) = ui.allocate_exact_size(vec2(side, side), Sense::click_and_drag());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Lobe view"));
-        let (center, radius) = (area.center(), 0.5 * side - 1.0);
-        ui.painter().circle_filled(center, radius, Color32::from_gray(12));
-        if let Some(texture) = &self.texture {
-            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            ui.painter().image(
-                texture.id(),
-                Rect::from_center_size(center, vec2(2.0, 2.0) * radius),
-                uv,
-                Color32::WHITE,
-            );
-        }
-        ui.painter().circle_stroke(center, radius, Stroke::new(1.0, Color32::from_gray(110)));
-        let on_disc = |direction: Vec3| center + vec2(direction.x, -direction.y) * radius;
-        if let Some(viewer) = self.viewer {
-            ui.painter().circle_stroke(on_disc(viewer), 5.0, Stroke::new(1.5, Color32::from_rgb(110, 190, 255)));
-        }
-        sun(ui, on_disc(self.light));
-        if let Some(at) = response.interact_pointer_pos() {
-            let offset = glam::Vec2::new(at.x - center.x, center.y - at.y) / radius;
-            let inside = offset.clamp_length_max(0.995);
-            self.light = inside.extend((1.0 - inside.length_squared()).max(0.0).sqrt());
-        }
-        response.on_hover_text("All view directions above the surface, projected onto the disc. Drag the light.");
     }
 
     fn polar_ui(&self, ui: &mut Ui, size: egui::Vec2) {
@@ -166,13 +139,45 @@ impl LobeState {
     }
 }
 
+/// Draws a plot over the directions of a hemisphere, on which the user drags the light. `named` is its name and tooltip.
+pub(super) fn disc_ui(
+    ui: &mut Ui,
+    side: f32,
+    texture: Option<&TextureHandle>,
+    light: &mut Vec3,
+    viewer: Option<Vec3>,
+    named: (&str, &str),
+) {
+    let (area, response) = ui.allocate_exact_size(vec2(side, side), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, named.0));
+    let (center, radius) = (area.center(), 0.5 * side - 1.0);
+    ui.painter().circle_filled(center, radius, Color32::from_gray(12));
+    if let Some(texture) = texture {
+        let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        ui.painter().image(texture.id(), Rect::from_center_size(center, vec2(2.0, 2.0) * radius), uv, Color32::WHITE);
+    }
+    ui.painter().circle_stroke(center, radius, Stroke::new(1.0, Color32::from_gray(110)));
+    let on_disc = |direction: Vec3| center + vec2(direction.x, -direction.y) * radius;
+    if let Some(viewer) = viewer {
+        ui.painter().circle_stroke(on_disc(viewer), 5.0, Stroke::new(1.5, Color32::from_rgb(110, 190, 255)));
+    }
+    sun(ui, on_disc(*light));
+    if let Some(at) = response.interact_pointer_pos() {
+        let offset = glam::Vec2::new(at.x - center.x, center.y - at.y) / radius;
+        let inside = offset.clamp_length_max(0.995);
+        *light = inside.extend((1.0 - inside.length_squared()).max(0.0).sqrt());
+    }
+    response.on_hover_text(named.1);
+}
+
 /// Returns a point on an arc about `origin`. 0° is up, and positive angles are to the right.
-fn on_arc(origin: Pos2, radius: f32, degrees: f32) -> Pos2 {
+pub(super) fn on_arc(origin: Pos2, radius: f32, degrees: f32) -> Pos2 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     origin + vec2(sin, -cos) * radius
 }
 
-fn sun(ui: &Ui, at: Pos2) {
+/// Draws the mark of the light.
+pub(super) fn sun(ui: &Ui, at: Pos2) {
     ui.painter().circle_filled(at, 4.5, Color32::from_rgb(255, 205, 90));
     ui.painter().circle_stroke(at, 4.5, Stroke::new(1.0, Color32::from_black_alpha(160)));
 }

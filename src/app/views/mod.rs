@@ -5,6 +5,7 @@ pub mod gallery;
 pub mod lobe;
 pub mod object;
 pub mod pointer;
+pub mod slab_lobe;
 pub mod spinner;
 pub mod tile;
 pub mod wipe;

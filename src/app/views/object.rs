@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::effective::{EffectiveBrdf, ErrorEstimate};
 use crate::scene::{Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureId, TextureOptions, Ui,
@@ -57,6 +58,8 @@ pub struct ObjectView {
     pub activity: Option<&'static str>,
     /// The version whose refinement was cancelled.
     pub stopped: Option<u64>,
+    /// The error that a BRDF states.
+    pub stated: Option<(Arc<EffectiveBrdf>, ErrorEstimate)>,
     /// The version that could not be rendered.
     pub failed: Option<u64>,
     /// Image A, which the view compares with the current one.
@@ -102,6 +105,13 @@ impl ObjectView {
         // Plots show the last known BRDF until the next one arrives.
         preview.brdf = preview.brdf.or_else(|| self.preview.as_ref().and_then(|last| last.brdf.clone()));
         self.preview = Some(preview);
+    }
+
+    /// The stated error of the displayed BRDF, once it is known.
+    pub fn stated_error(&self) -> Option<ErrorEstimate> {
+        let (brdf, error) = self.stated.as_ref()?;
+        let shown = self.preview.as_ref()?.brdf.as_ref()?;
+        Arc::ptr_eq(brdf, shown).then_some(*error)
     }
 
     /// Notes that a version cannot be rendered.

@@ -22,12 +22,21 @@ use super::runner::JobContext;
 pub struct AccuracyJob {
     pub version: u64,
     pub loaded: Arc<LoadedScene>,
-    /// Measure the scene's settings and the quality levels.
-    pub chart: bool,
+    pub chart: Chart,
     /// Continue to refine the reference and render the difference image.
     pub compare: bool,
     /// Measure each effect forced on and off.
     pub effects: bool,
+}
+
+/// Points of the chart to measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chart {
+    None,
+    /// The fastest quality levels, by their stated errors.
+    First,
+    /// The scene's settings and all quality levels, also against the reference.
+    Whole,
 }
 
 /// Time and error of one quality level on this machine.
@@ -65,6 +74,8 @@ pub struct Difference {
 
 /// Quality levels of the chart.
 const LEVELS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
+/// Number of levels that are measured before the image is final.
+const FIRST_LEVELS: usize = 2;
 /// Quality level that replaces the reference in difference images, if the reference is too slow for images.
 const FINEST: f64 = 12.0;
 /// Direction pairs of the reference.
@@ -121,14 +132,20 @@ impl AccuracyWorker {
             let costs = measure_effects(&job.loaded, context.cancel, |_| {})?;
             report(AccuracyResult::Effects(job.version, costs));
         }
-        if !job.chart {
-            return Ok(());
+        match job.chart {
+            Chart::None => return Ok(()),
+            Chart::First => {
+                let coarsest = with_settings(&job.loaded, &quality_scale::candidate_at(LEVELS[0], false))?;
+                let overhangs = self.pipeline.effective(&coarsest)?.plan.overhangs();
+                return self.measure_levels(job, &LEVELS[..FIRST_LEVELS], overhangs, context, report);
+            }
+            Chart::Whole => {}
         }
         let outcome = self.pipeline.effective(&job.loaded)?;
         let ms = self.edit_ms(&job.loaded)?;
         let mut current = stated_point(&outcome, ms);
         report(AccuracyResult::Current(job.version, current));
-        self.measure_levels(job, &outcome, context, report)?;
+        self.measure_levels(job, &LEVELS, outcome.plan.overhangs(), context, report)?;
         report(AccuracyResult::Doing("Reference"));
         let mut reference = self.reference.take().unwrap_or_else(|| ProgressiveReference::new(PAIRS));
         while reference.batches < BATCHES[0] {
@@ -155,12 +172,12 @@ impl AccuracyWorker {
     fn measure_levels(
         &mut self,
         job: &AccuracyJob,
-        current: &Outcome,
+        levels: &[f64],
+        overhangs: bool,
         context: &JobContext<AccuracyJob>,
         report: &dyn Fn(AccuracyResult),
     ) -> Result<()> {
-        let overhangs = current.plan.overhangs();
-        for level in LEVELS {
+        for &level in levels {
             if self.levels.iter().any(|measured| measured.level == level) {
                 continue;
             }

@@ -33,6 +33,9 @@ const POLL: Duration = Duration::from_millis(5);
 /// Time without a new edit after which refinement begins.
 const PAUSE: Duration = Duration::from_millis(120);
 
+/// Time without a new edit after the final image, after which its error is estimated.
+const STATED_PAUSE: Duration = Duration::from_millis(400);
+
 /// Stage that computes visibility and facet sum on the GPU.
 const SUM_STAGE: &str = "visibility and product";
 
@@ -205,6 +208,12 @@ impl ImageWorker {
         let last = preview.radiance.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, preview.clone()));
         *lock(&self.shared.last) = last;
         report(ImageResult::Rendered(Box::new(preview)));
+        // The estimate takes some tenths of a second on all cores. It never runs while the user edits.
+        if context.is_newest_after(STATED_PAUSE)
+            && let Some(errors) = outcome.errors()
+        {
+            report(ImageResult::Stated(outcome.brdf.clone(), errors.estimate()));
+        }
         Ok(())
     }
 
@@ -292,7 +301,6 @@ impl ImageWorker {
             radiance,
             image,
             brdf,
-            slab: None,
             stages,
             latency_ms: ms(job.submitted),
             rendered_on: self.renderer.rendered_on(),

@@ -1,7 +1,8 @@
 //! Background work of the editor, with one thread per task: draft, refined image, tile, lobe plot, thumbnails,
-//! accuracy, export, recovery file.
+//! accuracy, values of colour maps, lobe of a slab, export, recovery file.
 
 mod accuracy;
+mod color_map;
 mod export;
 mod gpu_drafts;
 mod gpu_state;
@@ -13,6 +14,8 @@ mod runner;
 mod screen;
 mod shared;
 mod slab_image;
+mod slab_lobe;
+mod slab_truth;
 mod thumbnail;
 mod tile_image_worker;
 mod tone;
@@ -21,10 +24,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::cache::Cache;
+use crate::pipeline::Pipeline;
 
 use super::document::Snapshot;
 
-pub use accuracy::{AccuracyJob, AccuracyPoint, AccuracyResult};
+pub use accuracy::{AccuracyJob, AccuracyPoint, AccuracyResult, Chart};
+pub use color_map::{ColorMapJob, ColorMapResult, DriverValues, REACH as HISTOGRAM_REACH};
 pub use export::{ExportJob, ExportKind, ExportResult, TableChoice};
 #[cfg(test)]
 pub use gpu_state::LOSE_GPU;
@@ -33,7 +38,7 @@ pub use rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedP
 pub use runner::Worker;
 pub use screen::{GpuImage, Screen};
 pub use shared::GpuShare;
-pub use slab_image::SlabPlot;
+pub use slab_lobe::{LobeCurve, SlabLobe, SlabLobeJob, SlabLobeResult};
 pub use thumbnail::{SceneThumbnail, ThumbnailJob};
 pub use tile_image_worker::{RenderedTile, TileDisplay, TileJob, TileResult};
 
@@ -136,6 +141,27 @@ pub fn spawn_accuracy(report: impl Fn(AccuracyResult) + Clone + Send + Sync + 's
         };
     let panicked = move |text: String| report_fault(AccuracyResult::Failed(format!("a fault in the program ({text})")));
     Worker::spawn("accuracy", 0, accuracy::AccuracyWorker::default, work, panicked).ok()
+}
+
+/// Starts the thread that measures the drivers of colour maps.
+pub fn spawn_color_map(report: impl Fn(ColorMapResult) + Clone + Send + Sync + 'static) -> Option<Worker<ColorMapJob>> {
+    let report_fault = report.clone();
+    let work = move |state: &mut Pipeline, job: ColorMapJob, context: &runner::JobContext<ColorMapJob>| {
+        color_map::work(state, &job, context, &report);
+    };
+    let panicked = move |text: String| report_fault(ColorMapResult::Failed(format!("a fault in the program ({text})")));
+    Worker::spawn("color map", 1, Pipeline::new, work, panicked).ok()
+}
+
+/// Starts the thread that plots the light through slabs.
+pub fn spawn_slab_lobe(report: impl Fn(SlabLobeResult) + Clone + Send + Sync + 'static) -> Option<Worker<SlabLobeJob>> {
+    let report_fault = report.clone();
+    let work = move |state: &mut Pipeline, job: SlabLobeJob, context: &runner::JobContext<SlabLobeJob>| {
+        slab_lobe::work(state, &job, context, &report);
+    };
+    let panicked = move |text: String| report_fault(SlabLobeResult::Failed(format!("a fault in the program ({text})")));
+    // One thread, because the image of the slab takes the others.
+    Worker::spawn("slab lobe", 1, Pipeline::new, work, panicked).ok()
 }
 
 /// Starts the thread that writes exports.

@@ -3,14 +3,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::effective::EffectiveBrdf;
+use crate::effective::{EffectiveBrdf, ErrorEstimate};
 use crate::plan::Effect;
 use crate::render::{Image, RenderScene};
 use crate::scene::{Camera, LoadedScene};
 use eframe::egui::ColorImage;
 
 use super::screen::GpuImage;
-use super::slab_image::SlabPlot;
 
 /// An image to render.
 #[derive(Debug, Clone)]
@@ -68,8 +67,6 @@ pub struct RenderedPreview {
     pub image: DisplayImage,
     /// Absent if the GPU rendered the image from the tile itself.
     pub brdf: Option<Arc<EffectiveBrdf>>,
-    /// Lobe and energy of a scene with a slab.
-    pub slab: Option<Arc<SlabPlot>>,
     /// Milliseconds per stage that ran for this image.
     pub stages: Vec<(&'static str, f64)>,
     /// Time from the edit to the finished image.
@@ -97,6 +94,8 @@ pub enum ImageResult {
     Rendered(Box<RenderedPreview>),
     /// The current work, for the status line.
     Doing(u64, &'static str),
+    /// The error that a BRDF states, after its image came to rest.
+    Stated(Arc<EffectiveBrdf>, ErrorEstimate),
     Failed(u64, String),
     /// A panic in the worker, which continues with a fresh state.
     Fault(String),

@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::pipeline::Outcome;
-use crate::scene::{Effects, LoadedScene, MaterialSpec, Painted, Quality, Tile};
+use crate::scene::{ColorMap, Effects, LoadedScene, MaterialSpec, Painted, Quality, Tile};
 
 use super::rendered_preview::RenderedPreview;
 use super::screen::Screen;
 
 /// Inputs of an effective BRDF.
-pub type SmallScale = (Tile, Vec<MaterialSpec>, Quality, Effects, PathBuf, Painted);
+pub type SmallScale = (Tile, Option<ColorMap>, Vec<MaterialSpec>, Quality, Effects, PathBuf, Painted);
 
 /// A final image with its scene and size.
 pub type FinishedPreview = (Box<LoadedScene>, [usize; 2], RenderedPreview);
@@ -68,6 +68,7 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 pub fn small_scale(loaded: &LoadedScene) -> SmallScale {
     let scene = &loaded.scene;
-    let parts = (scene.tile.clone(), scene.materials.clone(), scene.quality.clone(), scene.effects.clone());
-    (parts.0, parts.1, parts.2, parts.3, loaded.base_dir.clone(), loaded.painted.clone())
+    let (tile, map, materials) = (scene.tile.clone(), scene.color_map.clone(), scene.materials.clone());
+    let (quality, effects) = (scene.quality.clone(), scene.effects.clone());
+    (tile, map, materials, quality, effects, loaded.base_dir.clone(), loaded.painted.clone())
 }

@@ -11,7 +11,7 @@ use crate::render::DirectionalLight;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 use crate::render::lighting::lights;
 use crate::render::tile_view::{ShadedMaterials, TileScene, TileShading, TileView};
-use crate::scene::{Light, LoadedScene, Painted, Tile};
+use crate::scene::{ColorMap, Light, LoadedScene, Painted, Tile};
 use eframe::egui::ColorImage;
 use glam::Vec3;
 
@@ -59,7 +59,13 @@ pub enum TileResult {
     Failed(String),
 }
 
-type Key = (Tile, std::path::PathBuf, Painted);
+type Key = (Tile, Option<ColorMap>, std::path::PathBuf, Painted);
+
+/// The inputs of the tile and of its colours.
+fn key(loaded: &LoadedScene) -> Key {
+    let scene = &loaded.scene;
+    (scene.tile.clone(), scene.color_map.clone(), loaded.base_dir.clone(), loaded.painted.clone())
+}
 
 /// The worker's state, which caches the inputs of the next image.
 #[derive(Default)]
@@ -106,7 +112,7 @@ impl TileImageWorker {
     }
 
     fn tile(&mut self, loaded: &LoadedScene) -> Result<Arc<TileScene>> {
-        let key = (loaded.scene.tile.clone(), loaded.base_dir.clone(), loaded.painted.clone());
+        let key = key(loaded);
         if let Some((last, tile)) = &self.tile
             && *last == key
         {
@@ -118,7 +124,7 @@ impl TileImageWorker {
     }
 
     fn facets(&mut self, job: &TileJob, tile: &TileScene) -> Arc<Facets> {
-        let key = (job.loaded.scene.tile.clone(), job.loaded.base_dir.clone(), job.loaded.painted.clone());
+        let key = key(&job.loaded);
         if let Some((last, facets)) = &self.facets
             && *last == key
         {
