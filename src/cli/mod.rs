@@ -15,6 +15,7 @@ pub mod plan;
 pub mod profile;
 pub mod render;
 mod render_path;
+mod render_zoom;
 pub mod report;
 pub mod rig;
 mod slab;
