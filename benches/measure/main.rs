@@ -55,6 +55,8 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
         "errors of filtered colour maps against the core on a Gaussian tile",
         in_lib("the_table_of_color_maps_against_the_core"),
     ),
+    ("color-map-speed", "milliseconds of the colours of an image of 1920 x 1080 pixels", in_lib("the_table_of_speeds")),
+    ("color-zoom", "errors of images under colour maps at every distance: minutes", in_lib("the_table_of_zooms")),
     ("errors", "true and stated errors of the presets on hard tiles: many minutes", Source::Here(errors)),
     ("few-facets", "errors of sums over 700 facets with few distinct normals", Source::Here(few_facets)),
     ("gpu-counts", "operations of an edit on a GPU", in_lib("counts_of_an_edit")),

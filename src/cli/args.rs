@@ -121,7 +121,7 @@ pub struct RenderArgs {
     pub scene: SceneArgs,
     #[command(flatten)]
     pub caching: CachingArgs,
-    /// Image to write: .png (tone-mapped) or .exr (linear).
+    /// Image to write: .png (tone-mapped) or .exr (linear). With --zoom, a folder.
     #[arg(short, long)]
     pub output: PathBuf,
     /// Width and height in pixels.
@@ -130,6 +130,10 @@ pub struct RenderArgs {
     /// Samples per pixel side at edges.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=8))]
     pub samples: u8,
+    /// Zoom towards the middle of the image, from FROM to TO pixels per tile: frames 0000.png ... and zoom.csv, the mean
+    /// radiance of the tile in each frame. The scene needs a colour map.
+    #[arg(long, value_name = "FROM:TO:FRAMES", value_parser = super::render_zoom::parse)]
+    pub zoom: Option<super::render_zoom::Zoom>,
 }
 
 #[derive(Debug, Args)]

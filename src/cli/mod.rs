@@ -16,6 +16,7 @@ pub mod profile;
 mod profile_slab;
 pub mod render;
 mod render_path;
+mod render_zoom;
 pub mod report;
 pub mod rig;
 mod slab;

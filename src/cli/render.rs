@@ -4,16 +4,19 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::render_path::RenderPath;
+use super::render_zoom::MappedTile;
 use super::watch::Watch;
-use super::{RenderArgs, cache, check_outputs, print_json};
+use super::{RenderArgs, cache, check_outputs, print_json, render_zoom};
 use crate::base::print_on_stderr;
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::pipeline::Pipeline;
 use crate::render::RenderScene;
 use crate::render::image::pixels::ImageFormat;
+use crate::render::image::shading::Background;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::seen_through::SlabScene;
+use crate::render::tile_view::filtered::Calibration;
 use crate::scene::LoadedScene;
 
 #[derive(Serialize)]
@@ -35,6 +38,9 @@ struct Report<'a> {
 }
 
 pub fn run(args: &RenderArgs) -> Result<()> {
+    if let Some(zoom) = &args.zoom {
+        return render_zoom::run(args, zoom);
+    }
     ImageFormat::of(&args.output)?;
     let cache = args.caching.open();
     let mut pipeline = crate::gpu::pipeline();
@@ -69,7 +75,15 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let watch = Watch::new(args.scene.quiet);
     let shading_brdf = path.shading_brdf(&outcome, &watch.cancel())?;
     drop(watch);
-    let rendered = path.render(&render_scene, &shading_brdf.brdf, args.size, usize::from(args.samples))?;
+    let mut rendered = path.render(&render_scene, &shading_brdf.brdf, args.size, usize::from(args.samples))?;
+    if let Some(tile) = MappedTile::of(&pipeline, &loaded)? {
+        let start = std::time::Instant::now();
+        let watch = Watch::new(args.scene.quiet);
+        let background = Background::default();
+        let input = render_scene.input(&*shading_brdf.brdf, args.size, usize::from(args.samples), &background);
+        tile.shade_into(&mut rendered.image, &input, &mut Calibration::none(), &watch.cancel())?;
+        rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
+    }
     rendered.image.write(&args.output, &tone_map)?;
     cache::finish(&cache, args.scene.quiet);
     if args.scene.json {

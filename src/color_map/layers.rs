@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Vec3};
 use super::slopes::{SlopeDriver, Slopes};
 use super::statistics::PlaceDriver;
 use super::{Normal, Stop, StopMap};
-use crate::scene::{ColorLayer, ColorMap, Combine, Driver, GradientStop, LayerWeight, StopUnit};
+use crate::scene::{ColorLayer, ColorMap, Combine, Driver, Gaussianize, GradientStop, LayerWeight, StopUnit};
 
 /// Statistics of the surface, from which drivers are standardized.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +76,11 @@ pub struct LayeredMap {
     pub combine: Combine,
     pub layers: Vec<Layer>,
     pub relief: Relief,
+    /// Number of reads of a footprint.
+    pub taps: u32,
+    pub gaussianize: Gaussianize,
+    /// True if the relief is that of an analytic surface and not of the tile.
+    pub is_analytic: bool,
 }
 
 /// A product of maps of independent drivers, times a number. Maps of one driver are merged.
@@ -111,7 +116,14 @@ impl LayeredMap {
                 }
             },
         };
-        Self { combine: spec.combine, layers: spec.layer.iter().map(layer).collect(), relief }
+        Self {
+            combine: spec.combine,
+            layers: spec.layer.iter().map(layer).collect(),
+            relief,
+            taps: spec.taps,
+            gaussianize: spec.gaussianize,
+            is_analytic: spec.surface.is_some(),
+        }
     }
 
     /// The colour of a point: what a facet there has.

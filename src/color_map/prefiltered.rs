@@ -9,7 +9,7 @@ use super::{Normal, StopMap, normal};
 pub const MEANS: usize = 1024;
 pub const DEVIATIONS: usize = 64;
 /// Largest deviation of the table. A driver in deviations never has more, apart from noise added to heights.
-const MAX_DEVIATION: f64 = 1.5;
+pub(super) const MAX_DEVIATION: f64 = 1.5;
 /// The table covers at least these means [deviations].
 const MEAN_RANGE: f64 = 3.0;
 /// Below this many steps of the mean, the closed form is read: the table would blur a jump.
@@ -89,6 +89,11 @@ impl PrefilteredTable {
         let step = (self.high - self.low) / (MEANS - 1) as f64;
         let means = (0..MEANS).map(|k| self.low + step * k as f64).collect();
         (means, (0..DEVIATIONS).map(|k| deviation_of(k as f64)).collect())
+    }
+
+    /// The mean of the first entry, and entries per mean.
+    pub fn mean_axis(&self) -> (f32, f32) {
+        (self.low as f32, (1.0 / self.step()) as f32)
     }
 
     /// Linear colours, one row per deviation.

@@ -96,6 +96,22 @@ impl Slopes {
         }
     }
 
+    /// The product of this density with a normal one of a variance about a slope: its mass, and the normalized product.
+    pub fn times_normal(&self, centre: DVec2, variance: f64) -> (f64, Self) {
+        let [xx, xy, yy] = self.covariance;
+        // Σ (Σ + v)⁻¹ maps the distance of the centres and the variance alike.
+        let (a, d) = (xx + variance, yy + variance);
+        let determinant = (a * d - xy * xy).max(f64::MIN_POSITIVE);
+        let inverse = [d / determinant, -xy / determinant, a / determinant];
+        let solve = |t: DVec2| DVec2::new(inverse[0] * t.x + inverse[1] * t.y, inverse[1] * t.x + inverse[2] * t.y);
+        let away = centre - self.mean;
+        let mass = (-0.5 * away.dot(solve(away))).exp() / (std::f64::consts::TAU * determinant.sqrt());
+        let (x, y) = (solve(DVec2::X), solve(DVec2::Y));
+        let narrowed = [variance * self.times(x).x, variance * self.times(x).y, variance * self.times(y).y];
+        let covariance = [narrowed[0].max(0.0), narrowed[1], narrowed[2].max(0.0)];
+        (mass, Self { mean: self.mean + self.times(solve(away)), covariance })
+    }
+
     /// The driver of a slope layer, the slope `-∂h/∂a` along an azimuth [rad].
     pub fn driver(&self, azimuth: f64) -> Normal {
         let e = DVec2::from_angle(azimuth);

@@ -3,6 +3,8 @@
 #[cfg(feature = "gpu")]
 mod access;
 #[cfg(feature = "gpu")]
+pub mod color_map;
+#[cfg(feature = "gpu")]
 pub mod device;
 #[cfg(feature = "gpu")]
 pub mod render;

@@ -255,6 +255,12 @@ impl ColorFilter {
                     layer.name
                 ));
             }
+            if self.spec.taps == 1 {
+                warnings.push(format!(
+                    "one read of layer `{}` is wrong by up to 0.06 where a pixel is as wide as its structure; set taps = 4 or 16",
+                    layer.name
+                ));
+            }
         }
         if self.spec.distribution == HeightDistribution::Smith
             && self.spec.surface.is_none()

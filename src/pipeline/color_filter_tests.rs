@@ -2,49 +2,15 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, UVec2, Vec3};
+use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::color_filter::ColorFilter;
 use super::*;
 use crate::color_map::slopes::direction;
-use crate::color_map::statistics::DriverGrid;
-use crate::scene::{NoiseBasis, NoiseDriver, Pixels};
-
-const BANDS: &str = "stops = [[-1.2, [0.6, 0.3, 0.1]], [-1.2, 0.05], [-0.4, 0.05], [-0.4, [0.9, 0.8, 0.2]], \
-    [0.3, [0.9, 0.8, 0.2]], [0.3, [0.1, 0.4, 0.7]], [1.0, [0.1, 0.4, 0.7]], [1.0, 0.95]]";
-const RAMP: &str = "stops = [[-2, [0.05, 0.05, 0.2]], [0, [0.1, 0.5, 0.1]], [2, [1, 0.95, 0.8]]]";
-
-fn loaded(text: &str) -> LoadedScene {
-    LoadedScene {
-        scene: crate::scene::parse(text).unwrap(),
-        base_dir: std::path::PathBuf::new(),
-        name: "test".to_owned(),
-        painted: crate::scene::Painted::default(),
-    }
-}
-
-/// A tile of Gaussian heights with slopes of deviation 0.35, under a map.
-fn hills(side: u32, cells: u32, preset: &str, map: &str) -> LoadedScene {
-    let text = format!(
-        "[tile]\ngeometry = {{ kind = \"heightfield\", path = \"painted.png\" }}\n[quality]\npreset = \"{preset}\"\n{map}"
-    );
-    let mut loaded = loaded(&text);
-    let grid = DriverGrid::of_noise(&NoiseDriver { basis: NoiseBasis::Gaussian, cells, octaves: 1, seed: 7 });
-    let deviation = 0.35 / f64::from(cells) / 2.0_f64.sqrt();
-    let at = |k: u32| {
-        let place = (glam::DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-        (grid.at(place) * deviation) as f32
-    };
-    let heights = Pixels { size: UVec2::splat(side), values: (0..side * side).map(at).collect() };
-    loaded.painted.heights = Some(Arc::new(heights));
-    loaded
-}
-
-fn layer(driver: &str, stops: &str) -> String {
-    format!("[color_map]\n[[color_map.layer]]\ndriver = {driver}\n{stops}\n")
-}
+use crate::scene::Pixels;
+use crate::testing::gaussian_tile::{BANDS, RAMP, hills_under_ripples, layer, loaded, smooth};
 
 fn white(loaded: &LoadedScene) -> LoadedScene {
     let mut white = loaded.clone();
@@ -86,7 +52,7 @@ fn against_core(loaded: &LoadedScene, count: usize) -> [f64; 4] {
 #[test]
 fn the_filter_of_heights_agrees_with_the_core_on_a_gaussian_tile() {
     for (stops, name) in [(BANDS, "bands"), (RAMP, "ramp")] {
-        let loaded = hills(192, 16, "standard", &layer("{ kind = \"height\" }", stops));
+        let loaded = smooth(192, 16, "standard", &layer("{ kind = \"height\" }", stops));
         let [median, worst, rms, whole] = against_core(&loaded, 80);
         println!("heights, {name}: colour {median:.4} / {worst:.4}; whole {rms:.4} / {whole:.4}");
         assert!(median < 0.008 && worst < 0.03 && rms < 0.02 && whole < 0.06, "{median} {worst} {rms} {whole}");
@@ -98,22 +64,24 @@ fn the_filter_of_slopes_agrees_with_the_core_matte_and_glossy() {
     let glossy = "[[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.3, f0 = 0.5 }\n";
     for (materials, most) in [("", 0.03), (glossy, 0.08)] {
         let map = format!("{materials}{}", layer("{ kind = \"slope\", azimuth_deg = 30 }", BANDS));
-        let [median, worst, rms, whole] = against_core(&hills(192, 16, "standard", &map), 60);
+        let [median, worst, rms, whole] = against_core(&smooth(192, 16, "standard", &map), 60);
         println!("slopes: colour {median:.4} / {worst:.4}; whole {rms:.4} / {whole:.4}");
         assert!(rms < most, "{median} {worst} {rms} {whole}");
     }
 }
 
+/// Layers of noise, heights and slopes.
+fn three_layers(combine: &str) -> String {
+    let drivers =
+        ["{ kind = \"noise\", basis = \"gaussian\", cells = 24 }", "{ kind = \"height\" }", "{ kind = \"slope\" }"];
+    let layers: String = drivers.map(|driver| format!("[[color_map.layer]]\ndriver = {driver}\n{RAMP}\n")).concat();
+    format!("[color_map]\ncombine = \"{combine}\"\n{layers}")
+}
+
 #[test]
 fn a_sum_and_a_product_of_layers_agree_with_the_core() {
-    let noise = "{ kind = \"noise\", basis = \"gaussian\", cells = 24 }";
-    let layers = format!(
-        "[[color_map.layer]]\ndriver = {noise}\n{RAMP}\n[[color_map.layer]]\ndriver = {{ kind = \"height\" }}\n{RAMP}\n\
-         [[color_map.layer]]\ndriver = {{ kind = \"slope\" }}\n{RAMP}\n"
-    );
     for (combine, most) in [("sum", 0.02), ("product", 0.05)] {
-        let map = format!("[color_map]\ncombine = \"{combine}\"\n{layers}");
-        let [median, worst, rms, whole] = against_core(&hills(192, 16, "standard", &map), 40);
+        let [median, worst, rms, whole] = against_core(&smooth(192, 16, "standard", &three_layers(combine)), 40);
         println!("{combine} of three: colour {median:.4} / {worst:.4}; whole {rms:.4} / {whole:.4}");
         assert!(rms < most, "{combine}: {median} {worst} {rms} {whole}");
     }
@@ -142,7 +110,7 @@ fn seen_along_the_light_nothing_is_in_shadow() {
     for distribution in ["measured", "smith"] {
         let map = layer("{ kind = \"height\" }", BANDS)
             .replace("[color_map]", &format!("[color_map]\ndistribution = \"{distribution}\""));
-        let filter = Pipeline::new().color_filter(&hills(128, 12, "standard", &map)).unwrap();
+        let filter = Pipeline::new().color_filter(&smooth(128, 12, "standard", &map)).unwrap();
         for theta in [20.0_f64, 60.0, 75.0, 85.0] {
             let at = direction(theta.to_radians(), 0.7);
             let lit = filter.pair(at, at).lit;
@@ -162,7 +130,7 @@ fn an_edit_of_a_stop_recomputes_neither_drivers_nor_ranks_nor_visibility() {
     };
     let pipeline = Pipeline::new();
     let runs = |value: f64| {
-        pipeline.color_filter(&hills(64, 6, "draft", &map(value))).unwrap();
+        pipeline.color_filter(&smooth(64, 6, "draft", &map(value))).unwrap();
         pipeline
             .runs()
             .into_iter()
@@ -177,12 +145,12 @@ fn an_edit_of_a_stop_recomputes_neither_drivers_nor_ranks_nor_visibility() {
 #[test]
 fn a_scene_without_a_colour_map_runs_none_of_its_stages_and_its_effect_is_off() {
     let pipeline = Pipeline::new();
-    let plain = white(&hills(64, 6, "draft", ""));
+    let plain = white(&smooth(64, 6, "draft", ""));
     let outcome = pipeline.effective(&plain).unwrap();
     assert!(!outcome.plan.is_on("color_map_filtering"));
     assert!(pipeline.runs().iter().all(|(name, count)| !name.starts_with("color_") || *count == 0));
     assert!(pipeline.color_filter(&plain).unwrap_err().to_string().contains("color_map"));
-    let mapped = Pipeline::new().effective(&hills(64, 6, "draft", &layer("{ kind = \"height\" }", RAMP))).unwrap();
+    let mapped = Pipeline::new().effective(&smooth(64, 6, "draft", &layer("{ kind = \"height\" }", RAMP))).unwrap();
     assert!(mapped.plan.is_on("color_map_filtering"));
 }
 
@@ -205,7 +173,7 @@ fn a_flat_tile_of_noise_has_the_plain_mean_of_its_colours_in_the_core_and_in_the
 #[test]
 fn tiles_of_any_size_have_the_same_colours() {
     let color = |size: f32| -> Vec<DVec3> {
-        let mut loaded = hills(64, 6, "draft", &layer("{ kind = \"height\" }", RAMP));
+        let mut loaded = smooth(64, 6, "draft", &layer("{ kind = \"height\" }", RAMP));
         loaded.scene.tile.size = glam::Vec2::splat(size);
         let heights = loaded.painted.heights.as_ref().unwrap();
         let values = heights.values.iter().map(|height| height * size).collect();
@@ -276,6 +244,8 @@ fn warnings_name_drivers_that_are_not_normal_and_tiles_far_from_smith() {
     assert!(warnings(&map("auto")).is_empty());
     let off = warnings(&map("off"));
     assert!(off.len() == 1 && off[0].contains("`waves` is far from normal"), "{off:?}");
+    let one = warnings(&map("auto").replace("[[color", "taps = 1\n[[color"));
+    assert!(one.len() == 1 && one[0].contains("taps = 4"), "{one:?}");
     let grooves = "[tile]\ngeometry = { kind = \"grooves\", depth = 0.4 }\n[quality]\npreset = \"draft\"\n[color_map]\n\
         distribution = \"smith\"\n[[color_map.layer]]\ndriver = { kind = \"height\" }\nstops = [[0, 0], [0, 1]]\n";
     let smith = warnings(grooves);
@@ -290,22 +260,36 @@ fn the_table_of_color_maps_against_the_core() {
         layer(driver, stops).replace("[color_map]", &format!("[color_map]\ndistribution = \"{distribution}\""))
     };
     let (height, slope) = ("{ kind = \"height\" }", "{ kind = \"slope\", azimuth_deg = 30 }");
+    let of_tile = |name: &'static str, preset: &'static str, map: String| (name, preset, smooth(384, 32, preset, &map));
+    let of_hills =
+        |name: &'static str, preset: &'static str, map: String| (name, preset, hills_under_ripples(384, preset, &map));
     let rows = [
-        ("heights, bands, measured", "standard", of("measured", height, BANDS)),
-        ("heights, bands, measured", "fine", of("measured", height, BANDS)),
-        ("heights, ramp, measured", "standard", of("measured", height, RAMP)),
-        ("heights, bands, smith", "standard", of("smith", height, BANDS)),
-        ("heights, bands, paper", "standard", of("paper", height, BANDS)),
-        ("slopes, bands, diffuse", "standard", of("measured", slope, BANDS)),
-        ("slopes, bands, diffuse, paper", "standard", of("paper", slope, BANDS)),
-        ("slopes, bands, Cook-Torrance 0.15", "standard", format!("{glossy}{}", of("measured", slope, BANDS))),
-        ("slopes, bands, Cook-Torrance 0.15, paper", "standard", format!("{glossy}{}", of("paper", slope, BANDS))),
-        ("steepness, ramp, diffuse", "standard", of("measured", "{ kind = \"steepness\" }", RAMP)),
+        of_tile("heights, bands, measured", "standard", of("measured", height, BANDS)),
+        of_tile("heights, bands, measured", "fine", of("measured", height, BANDS)),
+        of_tile("heights, ramp, measured", "standard", of("measured", height, RAMP)),
+        of_tile("heights, bands, smith", "standard", of("smith", height, BANDS)),
+        of_tile("heights, bands, paper", "standard", of("paper", height, BANDS)),
+        of_hills("hills under ripples, heights, bands, measured", "standard", of("measured", height, BANDS)),
+        of_hills("hills under ripples, heights, bands, measured", "fine", of("measured", height, BANDS)),
+        of_hills("hills under ripples, heights, bands, smith", "standard", of("smith", height, BANDS)),
+        of_hills("hills under ripples, heights, bands, smith", "fine", of("smith", height, BANDS)),
+        of_tile("slopes, bands, diffuse", "standard", of("measured", slope, BANDS)),
+        of_tile("slopes, bands, diffuse, paper", "standard", of("paper", slope, BANDS)),
+        of_tile("slopes, bands, Cook-Torrance 0.15", "standard", format!("{glossy}{}", of("measured", slope, BANDS))),
+        of_tile("slopes, bands, Cook-Torrance 0.15", "fine", format!("{glossy}{}", of("measured", slope, BANDS))),
+        of_tile(
+            "slopes, bands, Cook-Torrance 0.15, paper",
+            "standard",
+            format!("{glossy}{}", of("paper", slope, BANDS)),
+        ),
+        of_tile("steepness, ramp, diffuse", "standard", of("measured", "{ kind = \"steepness\" }", RAMP)),
+        of_tile("sum of noise, heights and slopes, ramp", "standard", three_layers("sum")),
+        of_tile("product of noise, heights and slopes, ramp", "standard", three_layers("product")),
     ];
     println!("| map | preset | colour, median | colour, worst | whole value, relative RMS | whole value, worst |");
     println!("|---|---|---|---|---|---|");
-    for (name, preset, map) in rows {
-        let [median, worst, rms, whole] = against_core(&hills(384, 32, preset, &map), 80);
+    for (name, preset, loaded) in rows {
+        let [median, worst, rms, whole] = against_core(&loaded, 80);
         let [rms, whole] = [rms, whole].map(|error| 100.0 * error);
         println!("| {name} | `{preset}` | {median:.4} | {worst:.4} | {rms:.1} % | {whole:.1} % |");
     }

@@ -15,6 +15,8 @@ macro_rules! embedded {
 /// Name and text of every file in `materials/`, sorted.
 pub const MATERIALS: &[(&str, &str)] = materials![
     "default",
+    "fig10_snake_color_map",
+    "fig11_scales_color_map",
     "fig1a_noise_color_map",
     "fig1b_heights_color_map",
     "fig1b_silver_shallow",
@@ -37,7 +39,9 @@ pub const MATERIALS: &[(&str, &str)] = materials![
     "fig6d_velvet_left",
     "fig7a_shot_silk",
     "fig7b_shot_silk_wide_weft",
+    "fig8a_bear_heights_color_map",
     "fig8a_hammered",
+    "fig8b_bear_slopes_color_map",
     "fig8b_ripples",
     "fig8c_brushed",
     "fig8d_leather",

@@ -10,7 +10,8 @@ use super::schema::{number, scene_table};
 use super::{Field, FieldShape};
 
 /// Values of `object.kind`; `mesh` reads the file `object.path`.
-pub const OBJECT_KINDS: &[&str] = &["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "sheet", "mesh"];
+pub const OBJECT_KINDS: &[&str] =
+    &["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "bear", "snake", "sheet", "mesh"];
 
 /// Values of `camera.tone_map`.
 pub const TONE_MAPS: &[&str] = &["filmic", "plain"];
@@ -18,7 +19,7 @@ pub const TONE_MAPS: &[&str] = &["filmic", "plain"];
 scene_table! {
     /// The large-scale object that the tile covers.
     Object {
-        /// Shape: sphere, plate, cup, cylinder, pillow, skirt, teapot, sheet or mesh.
+        /// Shape: sphere, plate, cup, cylinder, pillow, skirt, teapot, bear, snake, sheet or mesh.
         kind: String = "sphere".to_owned(), FieldShape::Choice(OBJECT_KINDS), "";
         /// OBJ file; required if the kind is `mesh`.
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -2,6 +2,7 @@
 
 mod grid;
 mod histogram;
+mod levels;
 mod measured;
 mod mips;
 mod noise;
@@ -9,6 +10,7 @@ pub mod place;
 
 pub use grid::DriverGrid;
 pub use histogram::{HistogramMips, MIN_DEVIATION};
+pub use levels::{LOW_PASS, LevelAt, Levels};
 pub use measured::RankedHeights;
 pub use mips::{MomentMips, principal};
 pub use noise::residual_variance;

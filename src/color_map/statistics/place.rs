@@ -64,6 +64,18 @@ impl PlaceDriver {
         })
     }
 
+    /// Centre and covariance of a footprint in texels.
+    fn in_texels(&self, footprint: &Footprint) -> (DVec2, DMat2) {
+        let scale = DMat2::from_diagonal(self.grid.size.as_dvec2() * f64::from(self.grid.repeat));
+        (self.grid.texels(footprint.centre), scale * footprint.covariance * scale)
+    }
+
+    /// The reads of a footprint: weights and moments of the values.
+    fn reads(&self, footprint: &Footprint, taps: u32) -> Vec<(f64, Normal)> {
+        let (centre, covariance) = self.in_texels(footprint);
+        self.mips().reads(&self.grid, centre, covariance, taps)
+    }
+
     /// Values between texels as well, because footprints see the interpolated surface.
     fn surface_values(&self) -> Vec<(f32, f32)> {
         let size = self.grid.size;
@@ -110,16 +122,17 @@ impl PlaceMap {
         if self.ranked { Normal { mean: 0.0, deviation: 1.0 } } else { self.driver.mips().whole() }
     }
 
+    /// Moments of the driver over the whole tile, in its deviations.
+    pub fn moments_of_whole(&self) -> Normal {
+        self.driver.mips().whole()
+    }
+
     /// The reads of a footprint: weights and moments in the unit of [`PlaceMap::map`].
     pub fn reads(&self, footprint: &Footprint, taps: u32) -> Vec<(f64, Normal)> {
-        let grid = &self.driver.grid;
-        let scale = grid.size.as_dvec2() * f64::from(grid.repeat);
-        let scaling = DMat2::from_diagonal(scale);
-        let covariance = scaling * footprint.covariance * scaling;
-        let centre = grid.texels(footprint.centre);
         if !self.ranked {
-            return self.driver.mips().reads(grid, centre, covariance, taps);
+            return self.driver.reads(footprint, taps);
         }
+        let (centre, covariance) = self.driver.in_texels(footprint);
         let ranked = self.driver.ranked();
         let whole = ranked.mips.whole();
         let standard = |at: Normal| Normal {
@@ -132,9 +145,8 @@ impl PlaceMap {
 
     /// Mean and deviation of the driver over a footprint, in deviations of the driver.
     pub fn moments(&self, footprint: &Footprint, taps: u32) -> Normal {
-        let plain = Self { ranked: false, ..self.clone() };
         let (mut first, mut second) = (0.0, 0.0);
-        for (weight, at) in plain.reads(footprint, taps) {
+        for (weight, at) in self.driver.reads(footprint, taps) {
             first += weight * at.mean;
             second += weight * (at.mean * at.mean + at.deviation * at.deviation);
         }

@@ -31,6 +31,7 @@ pub const SHADERS: &[(&str, &str)] = shaders! {
         "weights_rgb";
     "tabulate": "facet_subsets", "sample_facets", "table_areas", "table_borders", "table_nodes",
         "table_of_subsets", "table_of_sum", "table_pairs", "table_values", "two_lobes";
+    "color_map": "color_pixels", "color_reads";
     "render": "gbuffer", "image", "light_rays";
 };
 

@@ -2,6 +2,7 @@
 
 mod cloth;
 mod curves;
+mod figures;
 mod frames;
 mod lathed;
 mod obj;
@@ -16,7 +17,8 @@ use crate::base::{InputError, Result};
 use crate::scene;
 
 /// Names that `object.kind` accepts.
-pub const KINDS: [&str; 9] = ["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "sheet", "mesh"];
+pub const KINDS: [&str; 11] =
+    ["sphere", "plate", "cup", "cylinder", "pillow", "skirt", "teapot", "bear", "snake", "sheet", "mesh"];
 
 /// An object in the world frame: y up, about two units in size. OBJ files are centred and scaled to radius 1.
 ///
@@ -88,6 +90,8 @@ pub fn build(object: &scene::Object, base_dir: &Path) -> Result<ObjectMesh> {
         "pillow" => Ok(cloth::pillow()),
         "skirt" => Ok(cloth::skirt()),
         "teapot" => Ok(teapot::teapot()),
+        "bear" => Ok(figures::bear()),
+        "snake" => Ok(figures::snake()),
         "sheet" => Ok(parametric::sheet()),
         "mesh" => match &object.path {
             Some(path) => obj::load(&base_dir.join(path)),

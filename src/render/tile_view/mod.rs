@@ -4,12 +4,13 @@
 //! the facets with their projected areas. The average is therefore `Σ_k E_k f̄(i_k, o)`, the radiance of the effective
 //! BRDF (Wu et al. 2011, Eq. 4 and 5).
 
+pub mod filtered;
 pub mod on_object;
 mod shade;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -21,6 +22,7 @@ use crate::geometry::{PeriodicGrid, TileMesh};
 use crate::math::directions::from_angles;
 
 pub use crate::geometry::Hit;
+use filtered::FilteredTile;
 
 /// A tile mesh with its ray-casting grid, ready to be rendered.
 #[derive(Debug)]
@@ -28,6 +30,8 @@ pub struct TileScene {
     pub mesh: Arc<TileMesh>,
     grid: PeriodicGrid,
     bottom: f32,
+    /// The tile at every distance, computed when it is first needed; `None` without a colour map.
+    filtered: OnceLock<Option<FilteredTile>>,
 }
 
 /// An orthographic view of the tile from above.
@@ -103,7 +107,12 @@ impl TileScene {
         let grid = PeriodicGrid::new(&mesh);
         let (low, high) = mesh.z_range();
         let bottom = low - 1e-3 * (high - low).max(mesh.size.max_element());
-        Self { mesh, grid, bottom }
+        Self { mesh, grid, bottom, filtered: OnceLock::new() }
+    }
+
+    /// The tile under its colour map at every distance; `None` without a map, or if the tile overhangs.
+    pub fn filtered(&self) -> Option<&FilteredTile> {
+        self.filtered.get_or_init(|| FilteredTile::new(self)).as_ref()
     }
 
     /// Returns the surface point that is visible at pixel coordinates of a view.

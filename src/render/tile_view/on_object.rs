@@ -32,7 +32,8 @@ pub fn tiles_are_visible(view: &CameraView, mesh: &ObjectMesh) -> bool {
 
 impl TileScene {
     /// Blends the tile's own geometry into an image rendered from `input`. It returns at once if no tile is large
-    /// enough to be visible.
+    /// enough to be visible. Under a colour map, every pixel shows the low-passed tile instead
+    /// ([`FilteredTile::shade_into`](super::filtered::FilteredTile::shade_into)).
     ///
     /// # Errors
     /// An invalid camera, or [`crate::base::Error::Cancelled`].
@@ -43,6 +44,9 @@ impl TileScene {
         materials: ShadedMaterials<'_>,
         cancel: &Cancel,
     ) -> Result<()> {
+        if let Some(filtered) = self.filtered() {
+            return filtered.shade_into(image, input, materials, None, cancel);
+        }
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
         if !tiles_are_visible(&view, input.mesh) {
             return Ok(());
@@ -90,7 +94,7 @@ impl TileScene {
     }
 
     /// Returns the surface point that is visible from `o` through a point of the plane z = 0.
-    fn visible_through(&self, point: Vec2, o: Vec3) -> Option<Hit> {
+    pub(super) fn visible_through(&self, point: Vec2, o: Vec3) -> Option<Hit> {
         let o = Vec3::new(o.x, o.y, o.z.max(0.02)).try_normalize()?;
         // Small coordinates keep rays accurate.
         let inside = point - (point / self.mesh.size).floor() * self.mesh.size;
@@ -99,7 +103,7 @@ impl TileScene {
     }
 
     /// Returns `f_r (n·i)+ V(i)` of a point [1/sr].
-    fn reflected(&self, hit: &Hit, i: Vec3, o: Vec3, materials: ShadedMaterials<'_>) -> Vec3 {
+    pub(super) fn reflected(&self, hit: &Hit, i: Vec3, o: Vec3, materials: ShadedMaterials<'_>) -> Vec3 {
         let (normal, geometric) = self.normals(hit, o);
         let slot = usize::from(self.mesh.slot_at(hit.triangle as usize, hit.position.truncate()));
         let material = materials.material_of_slot.get(slot).and_then(|index| materials.materials.get(*index));
@@ -114,7 +118,7 @@ impl TileScene {
 }
 
 /// The vertex nearest to the middle of the image; tiles are laid out on its tangent plane.
-struct Anchor {
+pub(super) struct Anchor {
     origin: Vec3,
     x: Vec3,
     y: Vec3,
@@ -125,9 +129,14 @@ impl Anchor {
         let offset = position - self.origin;
         Vec2::new(offset.dot(self.x), offset.dot(self.y))
     }
+
+    /// As [`Anchor::tile_coordinates`], as long as the distance of the point: it stretches a curved surface less.
+    pub(super) fn along_surface(&self, position: Vec3) -> Vec2 {
+        self.tile_coordinates(position).normalize_or_zero() * position.distance(self.origin)
+    }
 }
 
-fn anchor(input: &RenderInput, view: &CameraView, points: &ShadingPoints) -> Option<Anchor> {
+pub(super) fn anchor(input: &RenderInput, view: &CameraView, points: &ShadingPoints) -> Option<Anchor> {
     let [width, height] = view.size.map(|side| side as f32);
     let from_middle = |point: &usize| {
         let pixel = points.pixels[*point] as usize;

@@ -86,6 +86,24 @@ fn bad_queries_and_outputs_exit_with_2_name_what_was_expected_and_write_nothing(
 }
 
 #[test]
+fn textures_that_are_missing_or_unreadable_are_named_and_nothing_is_written() {
+    let folder = CommandLine::new();
+    folder.write("broken.png", b"not an image");
+    folder.write("q.csv", "mean,deviation\n0,1\n");
+    for (path, part) in [("missing.png", "missing.png"), ("broken.png", "broken.png")] {
+        folder.write(
+            "scene.toml",
+            format!(
+                "[tile]\ngeometry = {{ kind = \"flat\" }}\n[color_map]\n[[color_map.layer]]\n\
+                 driver = {{ kind = \"texture\", path = \"{path}\" }}\nstops = [[0, 0], [1, 1]]\n"
+            ),
+        );
+        folder.assert_refused(&["filter", "scene.toml", "--queries", "q.csv", "-o", "out.csv"], &[part]);
+    }
+    assert_eq!(folder.files(), ["broken.png", "q.csv", "scene.toml"]);
+}
+
+#[test]
 fn tables_and_comparisons_are_written_and_state_their_errors() {
     let folder = CommandLine::new();
     folder.write("scene.toml", MAPPED);

@@ -15,3 +15,4 @@ mod slabs;
 #[cfg(unix)]
 mod special_files;
 mod standard_error;
+mod zoom;

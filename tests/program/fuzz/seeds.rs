@@ -38,6 +38,22 @@ pub fn quick_scenes() -> Vec<Vec<u8>> {
         );
         all.push(text.into_bytes());
     }
+    let layers = [
+        "driver = { kind = \"height\", noise = 0.3 }\nunit = \"value\"\nstops = [[0, 0], [0.1, [1, 0.5, 0]], [0.1, 0.2]]",
+        "driver = { kind = \"slope\", azimuth_deg = 40 }\nstops = [[-1, [0.1, 0.2, 0.3]], [0.5, 1]]\nweight = { driver = { kind = \
+         \"steepness\" }, stops = [[0, 0], [1, 1]] }",
+        "driver = { kind = \"noise\", basis = \"gabor\", cells = 3, octaves = 2 }\nstops = [[-1, 0], [1, 1]]\nweight = 0.5",
+        "driver = { kind = \"sum\", terms = [{ driver = { kind = \"height\" }, weight = 1 }, { driver = { kind = \"slope\" }, \
+         weight = -2 }] }\nstops = [[0, 0], [0, 1]]",
+    ];
+    for (k, layer) in layers.iter().enumerate() {
+        let keys = ["combine = \"product\"", "gaussianize = \"on\"", "taps = 16", "distribution = \"smith\""][k];
+        let text = format!(
+            "[tile]\ngeometry = {{ {} }}\n[color_map]\n{keys}\n[[color_map.layer]]\n{layer}\n{quality}",
+            geometries[6]
+        );
+        all.push(text.into_bytes());
+    }
     all
 }
 

@@ -206,6 +206,17 @@ fn pipeline(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String> {
         (rods.count, rods.density) = (rods.count.min(30), None);
     }
     let loaded = LoadedScene { scene, base_dir: folder.to_owned(), name: String::new(), painted: Painted::default() };
+    if loaded.scene.color_map.is_some() {
+        let is_mapped = check(Pipeline::new().color_filter(&loaded), |filter| {
+            biscale::metrics::mirror_biased_pairs(6, 2).iter().all(|pair| {
+                let color = filter.pair(pair.i.as_dvec3(), pair.o.as_dvec3()).color;
+                color.is_finite() && color.min_element() >= 0.0
+            })
+        })?;
+        if !is_mapped {
+            return Ok(false);
+        }
+    }
     check(Pipeline::new().effective(&loaded), |outcome| {
         let pairs = biscale::metrics::mirror_biased_pairs(24, 1);
         pairs.iter().all(|p| is_sound(outcome.brdf.eval(p.i, p.o))) && outcome.health().result.unsound_values == 0

@@ -1,0 +1,174 @@
+//! A filtered tile on an object: every pixel shows what is left of the relief at its distance.
+
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::calibration::Calibration;
+use super::radiance::{PixelMaterials, PixelReflectance};
+use super::surface::FilteredTile;
+use crate::base::{Cancel, Result};
+use crate::render::image::render::visible_points;
+use crate::render::image::shading_points::ShadingPoints;
+use crate::render::tile_view::ShadedMaterials;
+use crate::render::tile_view::on_object::{TILE_RADII, anchor};
+use crate::render::{CameraView, Image, RenderInput};
+
+/// Lowest elevation of a viewer above the plane of the tile, as a sine.
+const LOWEST: f64 = 0.02;
+/// Largest number of parts along the line of sight into which a pixel is split, so that each is as long as wide.
+const MAX_PARTS: f64 = 4.0;
+/// Bound of the factor by which the model of the relief is brought to `f̄`.
+const MOST_CORRECTION: f64 = 16.0;
+
+/// A pixel's part of the plane of the tile.
+#[derive(Debug, Clone, Copy)]
+pub struct PixelOnTile {
+    /// Its centre [tile units].
+    pub centre: DVec2,
+    /// Its extent across the line of sight [tile units].
+    pub width: f64,
+}
+
+/// The number of parts into which a pixel of this width is split, and the width of a part.
+fn parts(width: f64, cosine: f64) -> (f64, f64) {
+    let stretch = 1.0 / cosine.max(LOWEST);
+    let parts = stretch.ceil().clamp(1.0, MAX_PARTS);
+    (parts, width * (stretch / parts).max(1.0))
+}
+
+impl FilteredTile {
+    /// Replaces `f̄` of lights by the reflectance of a pixel [1/sr], the lights' cosines included. `far` holds `f̄` and
+    /// is not changed if the tile is far away. Directions are unit vectors in the tile frame, above the horizon.
+    pub fn eval_lights(
+        &self,
+        pixel: &PixelOnTile,
+        lights: &[Vec3],
+        o: Vec3,
+        materials: &PixelMaterials<'_>,
+        calibration: &Calibration,
+        far: &mut [Vec3],
+    ) {
+        let o = o.as_dvec3();
+        let o = DVec3::new(o.x, o.y, o.z.max(LOWEST)).normalize_or(DVec3::Z);
+        let (parts, width) = parts(pixel.width, o.z);
+        let length = pixel.width / o.z;
+        if width >= self.far() || !width.is_finite() {
+            return;
+        }
+        let (axes, terms) = (self.map().slope_axes(), self.map().count());
+        let along = o.truncate().normalize_or(DVec2::X);
+        let mut values = vec![DVec3::ZERO; lights.len()];
+        for part in 0..parts as usize {
+            let offset = (part as f64 - 0.5 * (parts - 1.0)) * length / parts;
+            let at = self.seen_through(pixel.centre + along * offset, o, width);
+            let content = self.content(at, width);
+            let reflectance = PixelReflectance::new(&content, materials, axes, terms, o);
+            for (value, light) in values.iter_mut().zip(lights) {
+                let i = light.as_dvec3();
+                let lit = self.lit(at, i, width);
+                if lit > 0.0 {
+                    *value += reflectance.towards(i) * (lit / parts);
+                }
+            }
+        }
+        // Where all slopes are filtered away, the model must agree with `f̄`, of which it is an approximation.
+        let (whole, left) = (self.whole(), self.left(width));
+        let model = PixelReflectance::new(&whole, materials, axes, terms, o);
+        for ((far, value), light) in far.iter_mut().zip(&values).zip(lights) {
+            let (exact, model) = (far.as_dvec3(), model.towards(light.as_dvec3()));
+            let least = DVec3::splat(1e-9 + 1e-4 * exact.max_element());
+            let ratio = ((exact + least) / (model + least))
+                .clamp(DVec3::splat(1.0 / MOST_CORRECTION), DVec3::splat(MOST_CORRECTION));
+            let correction = calibration.at(self, width, light.as_dvec3(), o);
+            *far = (*value * ratio.powf(left)).as_vec3() * correction;
+        }
+    }
+
+    /// Replaces `f̄` by what each pixel of an image holds. Edges keep the samples of the image. A `calibration` is extended
+    /// by the widths of the image; without one, only distant pixels agree with `f̄` on average.
+    ///
+    /// # Errors
+    /// An invalid camera, or [`crate::base::Error::Cancelled`].
+    pub fn shade_into(
+        &self,
+        image: &mut Image,
+        input: &RenderInput,
+        materials: ShadedMaterials<'_>,
+        calibration: Option<&mut Calibration>,
+        cancel: &Cancel,
+    ) -> Result<()> {
+        let view = CameraView::new(input.camera, input.mesh, input.size)?;
+        let radius = input.mesh.bounds.radius;
+        let scale = self.size().min_element() / f64::from(TILE_RADII * radius);
+        let width_at = |depth: f32| scale * f64::from(view.pixel_extent() * depth);
+        let nearest = ((view.eye - input.mesh.bounds.center).length() - radius).max(view.near);
+        if width_at(nearest) >= self.far() {
+            return Ok(());
+        }
+        let points = visible_points(input.mesh, &view, input.samples_per_side);
+        let Some(anchor) = anchor(input, &view, &points) else { return Ok(()) };
+        let visibility = input
+            .occluder
+            .map(|occluder| occluder.visible_lights(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
+        let materials = PixelMaterials::new(materials);
+        let none = Calibration::none();
+        let calibration = match calibration {
+            Some(calibration) => {
+                if let Some(widths) = widths(&points, view.eye, &width_at) {
+                    calibration.measure(self, &materials, input.reflectance, widths);
+                }
+                &*calibration
+            }
+            None => &none,
+        };
+        let changes: Vec<Vec3> = (0..points.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|point| {
+                let (position, z, x) = (points.positions[point], points.normals[point], points.tangents[point]);
+                let depth = (view.eye - position).length();
+                let width = width_at(depth);
+                if width >= self.far() || cancel.is_set() {
+                    return Vec3::ZERO;
+                }
+                let y = z.cross(x);
+                let local = |d: Vec3| Vec3::new(d.dot(x), d.dot(y), d.dot(z));
+                let lights = input.lights.iter().enumerate().filter(|(k, light)| {
+                    light.direction.dot(z) > 0.0
+                        && visibility.as_ref().is_none_or(|visibility| visibility.is_lit(point, *k))
+                });
+                let (directions, irradiances): (Vec<Vec3>, Vec<Vec3>) =
+                    lights.map(|(_, light)| (local(light.direction), light.irradiance)).unzip();
+                if directions.is_empty() {
+                    return Vec3::ZERO;
+                }
+                let o = local((view.eye - position) / depth);
+                let mut far = vec![Vec3::ZERO; directions.len()];
+                input.reflectance.eval_lights(&directions, o, &mut far);
+                let mut near = far.clone();
+                let centre = anchor.along_surface(position).as_dvec2() * scale;
+                self.eval_lights(&PixelOnTile { centre, width }, &directions, o, &materials, calibration, &mut near);
+                near.iter().zip(&far).zip(&irradiances).map(|((near, far), e)| (*near - *far) * *e).sum()
+            })
+            .collect();
+        cancel.check()?;
+        for ((&pixel, &weight), change) in points.pixels.iter().zip(&points.weights).zip(changes) {
+            let pixel = &mut image.pixels[pixel as usize];
+            *pixel = (*pixel + change * weight).max(Vec3::ZERO);
+        }
+        Ok(())
+    }
+}
+
+/// Smallest and largest width of a part of the pixels [tile units]; `None` without pixels.
+fn widths(points: &ShadingPoints, eye: Vec3, width_at: &dyn Fn(f32) -> f64) -> Option<(f64, f64)> {
+    let of = |k: usize| {
+        let away = eye - points.positions[k];
+        let cosine = points.normals[k].dot(away.normalize_or(points.normals[k]));
+        parts(width_at(away.length()), f64::from(cosine)).1
+    };
+    (0..points.len()).map(of).fold(None, |range, width| {
+        let (low, high) = range.unwrap_or((width, width));
+        Some((width.min(low), width.max(high)))
+    })
+}
