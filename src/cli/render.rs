@@ -13,7 +13,7 @@ use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::pipeline::Pipeline;
 use crate::render::RenderScene;
 use crate::render::image::pixels::ImageFormat;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::seen_through::SlabScene;
 use crate::render::tile_view::filtered::Calibration;
@@ -79,7 +79,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     if let Some(tile) = MappedTile::of(&pipeline, &loaded)? {
         let start = std::time::Instant::now();
         let watch = Watch::new(args.scene.quiet);
-        let background = Background::default();
+        let background = ImageBackground::default();
         let input = render_scene.input(&*shading_brdf.brdf, args.size, usize::from(args.samples), &background);
         tile.shade_into(&mut rendered.image, &input, &mut Calibration::none(), &watch.cancel())?;
         rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;

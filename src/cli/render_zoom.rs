@@ -12,7 +12,7 @@ use super::{RenderArgs, cache, check_outputs};
 use crate::base::{Cancel, Error, InputError, print_on_stderr, replace_file};
 use crate::brdf::MaterialAssignment;
 use crate::pipeline::Pipeline;
-use crate::render::image::shading::Background;
+use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::tile_view::filtered::{Calibration, FilteredTile, ZoomTarget};
 use crate::render::tile_view::{ShadedMaterials, TileScene};
@@ -142,7 +142,7 @@ pub fn run(args: &RenderArgs, zoom: &Zoom) -> Result<()> {
         let pixels_per_tile = zoom.pixels_per_tile(frame);
         scene.camera = target.camera(pixels_per_tile)?;
         let mut image = path.render(&scene, &brdf, args.size, usize::from(args.samples))?.image;
-        let background = Background::default();
+        let background = ImageBackground::default();
         let input = scene.input(&*brdf, args.size, usize::from(args.samples), &background);
         mapped.shade_into(&mut image, &input, &mut calibration, &watch.cancel())?;
         image.write(&folder.join(format!("{frame:04}.png")), &tone_map)?;

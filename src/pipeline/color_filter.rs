@@ -171,7 +171,9 @@ impl ColorFilter {
                 let (map, stops) = (jump.clone(), jump);
                 let mapped = DrivenMap { driver: driver.clone(), map, stops, stop_unit: StopUnit::Deviation };
                 let layer = Layer { name: String::new(), mapped, factor: 1.0, blend: None };
-                let map = LayeredMap { combine: Combine::Sum, layers: vec![layer], relief: self.map.relief };
+                let LayeredMap { relief, taps, gaussianize, is_analytic, .. } = *self.map;
+                let (combine, layers) = (Combine::Sum, vec![layer]);
+                let map = LayeredMap { combine, layers, relief, taps, gaussianize, is_analytic };
                 seen.color(&map).dot(LUMINANCE.as_dvec3())
             };
             values.iter().take_while(|_| !cancel.is_set()).map(tail).collect()

@@ -92,7 +92,7 @@ fn the_mean_colour_of_jumps_follows_from_the_tails_of_the_values_that_are_seen()
     let stops = "stops = [[-0.5, 0.1], [-0.5, 0.4], [0.7, 0.4], [0.7, 0.9]]";
     let [i, o] = [direction(0.6, 1.0), direction(1.1, -0.4)];
     for driver in ["{ kind = \"height\" }", "{ kind = \"slope\", azimuth_deg = 20 }", "{ kind = \"steepness\" }"] {
-        let filter = Pipeline::new().color_filter(&hills(96, 8, "draft", &layer(driver, stops))).unwrap();
+        let filter = Pipeline::new().color_filter(&smooth(96, 8, "draft", &layer(driver, stops))).unwrap();
         let resolved = &filter.map.layers[0].mapped.driver;
         let tails = filter.tails(resolved, i, o, &[-9.0, -0.5, 0.7, 9.0], &Cancel::default());
         assert!(tails[0] > 0.999 && tails[3] < 0.001 && tails[1] > tails[2], "{driver}: {tails:?}");
