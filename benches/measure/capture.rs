@@ -7,10 +7,10 @@ use biscale::Cancel;
 use biscale::reference::photons::lobe::cell_means;
 use biscale::reference::photons::{Bins, LobeSettings, TrueLobe};
 use biscale::slab::capture::alpha::{FitSettings, Fitted, choose_smoothness, fit_point};
-use biscale::slab::capture::clusters::{Slices, nearest, representatives};
+use biscale::slab::capture::clusters::{LobeSlices, nearest, representatives};
 use biscale::slab::capture::fit::{Sample, View};
-use biscale::slab::capture::lobe::{Optics, SlopeGrid};
-use biscale::slab::capture::radiance::{Light, diffuse_part};
+use biscale::slab::capture::lobe::{LobeOptics, SlopeGrid};
+use biscale::slab::capture::radiance::{DotLight, diffuse_part};
 use biscale::slab::capture::simulated::{KnownPoint, Recovered, varying_sheet};
 use biscale::slab::{Channel, Ndf, Profile, Walk};
 use glam::{DVec2, DVec3};
@@ -77,7 +77,7 @@ fn faces(print: &mut dyn FnMut(String)) {
         let parts: [(&str, Part); 2] = [("single pass", |lobe| &lobe.single), ("all", |lobe| &lobe.all)];
         for (name, part) in parts {
             let Some((fitted, diffuse)) = of_photons(&part(&seen).values) else { continue };
-            let optics = Optics::new(1.5, 0.2);
+            let optics = LobeOptics::new(1.5, 0.2);
             let (mut squares, mut listed) = (0.0, Vec::new());
             for (degrees, truth) in [0.0, 30.0, 60.0_f64].into_iter().zip(&new) {
                 let Some(truth) = truth else { return };
@@ -113,10 +113,10 @@ fn of_photons(cells: &[f64]) -> Option<(Fitted, f64)> {
         (1.0 - t.y) * row(first) + t.y * row(first + SIDE)
     };
     let dot = |k: u32| DVec2::new(f64::from(k % 40) - 19.5, f64::from(k / 40) - 19.5) * 0.0024 - DVec2::new(0.04, 0.0);
-    let lights: Vec<Light> = (0..1600).map(|k| Light::new(dot(k), 0.04, DVec2::ZERO)).collect();
+    let lights: Vec<DotLight> = (0..1600).map(|k| DotLight::new(dot(k), 0.04, DVec2::ZERO)).collect();
     let values: Vec<(f64, f64)> = lights.iter().map(|light| (light.irradiance, read(light.i))).collect();
     let diffuse = diffuse_part(&values);
-    let sample = |(light, (irradiance, btdf)): (&Light, &(f64, f64))| Sample {
+    let sample = |(light, (irradiance, btdf)): (&DotLight, &(f64, f64))| Sample {
         i: light.i,
         irradiance: *irradiance,
         btdf: (btdf - diffuse).max(0.0),
@@ -124,7 +124,7 @@ fn of_photons(cells: &[f64]) -> Option<(Fitted, f64)> {
     let o = DVec3::new(FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2);
     let view = View { o, samples: lights.iter().zip(&values).map(sample).collect() };
     let grid = SlopeGrid { side: 32, span: 0.8 };
-    let settings = FitSettings { optics: Optics::new(1.5, 0.2), grid, smooth: 1.0, alpha: None };
+    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 1.0, alpha: None };
     let smooth = choose_smoothness(&[vec![view.clone()]], &settings);
     Some((fit_point(&[view], &FitSettings { smooth, ..settings })?, diffuse))
 }
@@ -136,7 +136,7 @@ fn times(print: &mut dyn FnMut(String)) {
         print(format!("| {what} | {:.1} ms |", start.elapsed().as_secs_f64() * 1e3 / count as f64));
     };
     let grid = SlopeGrid { side: 32, span: 0.7 };
-    let settings = FitSettings { optics: Optics::new(1.5, 0.2), grid, smooth: 0.1, alpha: None };
+    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 0.1, alpha: None };
     let Some(known) = KnownPoint::analytic(Profile::Beckmann, DVec2::splat(0.2), 0.5) else { return };
     for (cameras, count) in [(&[45.0][..], 20), (&[45.0, 0.0], 5)] {
         let views: Vec<_> = cameras.iter().map(|theta| known.photographed(*theta, 0.01)).collect();
@@ -158,12 +158,12 @@ fn times(print: &mut dyn FnMut(String)) {
     };
     let cells = 256;
     let value = |k: usize| ((k % cells) as f32 * (1.0 + (k / cells) as f32 * 1e-4)).sin();
-    let slices = Slices { cells, values: (0..36_000 * cells).map(value).collect() };
+    let slices = LobeSlices { cells, values: (0..36_000 * cells).map(value).collect() };
     let all: Vec<usize> = (0..slices.count()).collect();
     let start = Instant::now();
     let chosen = representatives(&slices, &all, 360, 1, &Cancel::default()).unwrap_or_default();
     row("360 representatives of 36,000 slices", start, 1);
-    let others = Slices { cells, values: chosen.iter().flat_map(|k| slices.slice(*k)).copied().collect() };
+    let others = LobeSlices { cells, values: chosen.iter().flat_map(|k| slices.slice(*k)).copied().collect() };
     let start = Instant::now();
     std::hint::black_box(nearest(&slices, &others, 6));
     row("six nearest of 360 for 36,000 slices", start, 1);

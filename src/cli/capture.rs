@@ -11,7 +11,7 @@ use crate::base::{Error, InputError, check_output, print_on_stderr, replace_file
 use crate::diagnostics::Health;
 use crate::render::image::pixels::Image;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
-use crate::slab::capture::rig::{Camera, FILE, Rig};
+use crate::slab::capture::rig::{FILE, Rig, RigCamera};
 use crate::slab::capture::sheet::{CaptureSettings, Captured, capture};
 
 /// Files that the command writes, by their endings.
@@ -80,7 +80,7 @@ pub fn run(args: &CaptureArgs) -> Result<()> {
 /// The files that the command reads: the rig, and every image that it names.
 fn inputs(folder: &Path, rig: &Rig) -> Vec<PathBuf> {
     let dots = rig.dots().len();
-    let of_camera = |camera: &Camera| -> Vec<PathBuf> {
+    let of_camera = |camera: &RigCamera| -> Vec<PathBuf> {
         let images = (0..dots * camera.times().len()).map(|k| camera.image(k % dots, k / dots));
         images.chain(camera.dark.clone()).collect()
     };

@@ -43,7 +43,7 @@ pub fn run(args: &ProfileArgs) -> Result<()> {
 }
 
 /// Timed runs.
-pub(super) struct Measured {
+pub(super) struct TimedRuns {
     /// Milliseconds of each run, and of the stages that ran in it.
     pub runs: Vec<(f64, StageTimes)>,
     /// Path of the edited parameter.
@@ -51,7 +51,7 @@ pub(super) struct Measured {
     pub representation: String,
 }
 
-fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<Measured> {
+fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<TimedRuns> {
     let mut edited = loaded.clone();
     let parameter = match args.edit {
         Some(EditArg::Geometry) => Some(edited.scene.nudge_geometry().ok_or_else(|| no_parameter("tile.geometry"))?),
@@ -99,12 +99,12 @@ fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<Measured> {
             runs.push((total, times));
         }
     }
-    Ok(Measured { runs, parameter, representation })
+    Ok(TimedRuns { runs, parameter, representation })
 }
 
 /// The medians of timed runs.
-fn report_of(args: &ProfileArgs, measured: Measured) -> Report {
-    let Measured { runs, parameter, representation } = measured;
+fn report_of(args: &ProfileArgs, measured: TimedRuns) -> Report {
+    let TimedRuns { runs, parameter, representation } = measured;
     Report {
         stages: medians(&runs),
         total_ms: median(runs.iter().map(|run| run.0).collect()),

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 
-use super::profile::{Measured, no_parameter};
+use super::profile::{TimedRuns, no_parameter};
 use super::slab::describe;
 use super::{EditArg, ProfileArgs};
 use crate::base::{Cancel, Error, InputError};
@@ -17,7 +17,7 @@ use crate::scene::{LoadedScene, SlabFace};
 ///
 /// # Errors
 /// The scene has no such parameter, or as [`Pipeline::slab`] and [`SlabScene::with`].
-pub(super) fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<Measured> {
+pub(super) fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<TimedRuns> {
     let mut edited = loaded.clone();
     let parameter = edit(args.edit, &mut edited)?;
     let mut pipeline = Pipeline::new();
@@ -59,7 +59,7 @@ pub(super) fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<Measur
             runs.push((total, times));
         }
     }
-    Ok(Measured { runs, parameter, representation })
+    Ok(TimedRuns { runs, parameter, representation })
 }
 
 /// Edits a scene; returns the path of the parameter.

@@ -17,8 +17,8 @@ use crate::render::image::pixels::Image;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 use crate::scene::{LoadedScene, Switch};
 use crate::slab::Walk;
-use crate::slab::capture::radiance::Light;
-use crate::slab::capture::rig::{self, Camera, Dots, Rig};
+use crate::slab::capture::radiance::DotLight;
+use crate::slab::capture::rig::{self, Dots, Rig, RigCamera};
 use crate::slab::capture::simulated::add_noise;
 
 /// The paper's rig (Sec. 4.1): sides of the sample, the distance to the monitor, both in metres, and how much farther the
@@ -89,7 +89,7 @@ fn rig_of(args: &RigArgs) -> Rig {
     };
     let camera = |k: usize| {
         let (sin, cos) = CAMERAS_DEG[k].to_radians().sin_cos();
-        Camera {
+        RigCamera {
             direction: [sin, 0.0, -cos],
             images: format!("camera_{k}/dot_%04d.exr"),
             exposures: Vec::new(),
@@ -125,7 +125,7 @@ impl<'a> Source<'a> {
         let settings =
             LobeSettings { side: TRUTH_SIDE, photons: TRUTH_PHOTONS, target: 5e-3, seed: outcome.settings.seed };
         let slab = outcome.slab.turned();
-        let lobe = |camera: &Camera| -> Result<[Vec<f64>; 3]> {
+        let lobe = |camera: &RigCamera| -> Result<[Vec<f64>; 3]> {
             // Light that takes the opposite way: from the camera, through the slab turned over.
             let from = camera.unit_direction() * DVec3::new(1.0, 1.0, -1.0);
             let mut channels: [Vec<f64>; 3] = Default::default();
@@ -201,7 +201,7 @@ fn image(
     let o = rig.cameras[camera].unit_direction();
     let value = |pixel: usize| {
         let place = rig.place(pixel, size);
-        let light = Light::new(dot, rig.distance, place);
+        let light = DotLight::new(dot, rig.distance, place);
         let on_sheet = place / DVec2::from_array(rig.sample_size) + 0.5;
         DVec3::from_array(rig.monitor) * light.irradiance * source.btdf(camera, (pixel, on_sheet), light.i, o)
     };

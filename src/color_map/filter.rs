@@ -63,13 +63,13 @@ pub enum SlopesSeen<'a> {
 }
 
 /// Everything that the colour of what is seen and lit depends on.
-pub struct Seen<'a> {
+pub struct VisibleValues<'a> {
     pub heights: HeightsSeen,
     pub slopes: SlopesSeen<'a>,
     pub gaussianize: Gaussianize,
 }
 
-impl Seen<'_> {
+impl VisibleValues<'_> {
     /// The mean colour of the map.
     pub fn color(&self, map: &LayeredMap) -> DVec3 {
         map.terms().iter().map(|term| self.term(term, &map.relief)).sum()
@@ -242,8 +242,8 @@ mod tests {
         resolved(&format!("[color_map]\n{text}"))
     }
 
-    fn seen(slopes: SlopesSeen<'_>) -> Seen<'_> {
-        Seen {
+    fn seen(slopes: SlopesSeen<'_>) -> VisibleValues<'_> {
+        VisibleValues {
             heights: HeightsSeen::Normal(Normal { mean: 0.4, deviation: 0.8 }),
             slopes,
             gaussianize: Gaussianize::Auto,

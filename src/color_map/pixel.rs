@@ -256,7 +256,7 @@ impl PixelColors<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::filter::{HeightsSeen, Seen, SlopesSeen};
+    use super::super::filter::{HeightsSeen, SlopesSeen, VisibleValues};
     use super::super::layers::tests::{RELIEF, resolved};
     use super::super::slopes::direction;
     use super::*;
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn a_pixel_that_sees_the_whole_surface_from_above_has_the_filters_colour() {
         let map = resolved(LAYERS);
-        let seen = Seen {
+        let seen = VisibleValues {
             heights: HeightsSeen::Normal(Normal { mean: 0.0, deviation: 1.0 }),
             slopes: SlopesSeen::Apart(direction(0.0, 0.0)),
             gaussianize: crate::scene::Gaussianize::Auto,

@@ -31,7 +31,7 @@ pub use shading_table::content::TableContent;
 pub(crate) use shading_table::sampled_facets::subset_size;
 pub use shading_table::{Nodes, ShadingTable};
 pub use tint::Tint;
-pub use view_paths::{Lobe, PathEnd, PathKind, VaryingSurface, ViewLobes, ViewPaths, Viewer};
+pub use view_paths::{PathEnd, PathKind, VaryingSurface, ViewLobe, ViewLobes, ViewPaths, Viewer};
 pub use wu2011::{MaterialFactors, MaterialReport, VisibleFacets, Wu2011, Wu2011Report, Wu2011Settings};
 
 /// A reflectance that rendering can evaluate. Rendering knows nothing else of the small scale.

@@ -4,18 +4,18 @@ use glam::{Vec2, Vec3};
 
 /// A bundle of directions away from the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Lobe {
+pub struct ViewLobe {
     /// Part of the light of this bundle that reaches the viewer.
     pub part: Vec3,
     /// Mean of the tangential components of the directions.
     pub mean: Vec2,
     /// Covariance of their core: xx, xy and yy.
     pub covariance: [f32; 3],
-    /// Part of the bundle that forms its tail, whose covariance is [`Lobe::TAIL`] times that of the core.
+    /// Part of the bundle that forms its tail, whose covariance is [`ViewLobe::TAIL`] times that of the core.
     pub tail: f32,
 }
 
-impl Lobe {
+impl ViewLobe {
     /// Covariance of the tail over that of the core.
     pub const TAIL: f32 = 8.0;
 }
@@ -24,9 +24,9 @@ impl Lobe {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ViewLobes {
     /// Light from behind that is refracted once at each face.
-    pub transmitted: Lobe,
+    pub transmitted: ViewLobe,
     /// Light from the viewer's side.
-    pub reflected: Lobe,
+    pub reflected: ViewLobe,
     /// Parts of the mean radiance behind, and on the viewer's side, that arrive spread over all directions.
     pub even: [Vec3; 2],
     /// Parts that arrive straight from behind, and mirrored by level facets.

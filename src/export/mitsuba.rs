@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use crate::base::{InputError, Result, replace_file};
 use crate::render::{CameraView, RenderScene};
-use crate::scene::{Background, LoadedScene, RoughFace, Slab, SlabFace};
+use crate::scene::{Background, LoadedScene, RoughFace, SlabFace, SlabSpec};
 
 /// Ending of the file name that selects this format.
 pub const ENDING: &str = "_mitsuba.xml";
@@ -33,7 +33,7 @@ pub fn write(loaded: &LoadedScene, path: &Path) -> Result<()> {
 ///
 /// # Errors
 /// The kind of a face, an index per channel, or a diffuse part that Mitsuba's materials cannot hold.
-pub fn check(loaded: &LoadedScene) -> Result<&Slab> {
+pub fn check(loaded: &LoadedScene) -> Result<&SlabSpec> {
     let refuse = |place: &str, found: String, expected: &str| Err(InputError::new(place, found, expected).into());
     let Some(slab) = &loaded.scene.slab else {
         return refuse("slab", "nothing".to_owned(), "a slab, which a scene of Mitsuba shows");

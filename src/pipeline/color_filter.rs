@@ -9,7 +9,7 @@ use super::stages::MeasureHeights;
 use super::{Keyed, Outcome, Pipeline, StageTimes};
 use crate::base::{Cancel, InputError, Result};
 use crate::brdf::{LUMINANCE, Material, Term};
-use crate::color_map::filter::{HeightsSeen, Seen, SlopesSeen, naive_color};
+use crate::color_map::filter::{HeightsSeen, SlopesSeen, VisibleValues, naive_color};
 use crate::color_map::heights::{Largest, lit_part, pair_exponent, paper_moments};
 use crate::color_map::layers::{DrivenMap, Layer, LayeredMap, ResolvedDriver, Source};
 use crate::color_map::slopes::{Focus, SlopeDriver, Slopes, direction};
@@ -144,7 +144,7 @@ impl ColorFilter {
         } else {
             SlopesSeen::Joint { weight: &weight, focus: None }
         };
-        let seen = Seen { heights: HeightsSeen::Normal(STANDARD), slopes, gaussianize: self.spec.gaussianize };
+        let seen = VisibleValues { heights: HeightsSeen::Normal(STANDARD), slopes, gaussianize: self.spec.gaussianize };
         let color = match &mapped.driver.source {
             Source::Slope(driver) => seen.slope_color(&[(*driver, mapped.map.clone())], relief),
             _ => mapped.map.color(0.0),
@@ -181,7 +181,7 @@ impl ColorFilter {
     }
 
     /// Reads what is visible, lit and reflected at a pair of directions, and the lit part of what is visible.
-    fn with_seen<R>(&self, i: DVec3, o: DVec3, read: impl FnOnce(&Seen<'_>, f64) -> R) -> R {
+    fn with_seen<R>(&self, i: DVec3, o: DVec3, read: impl FnOnce(&VisibleValues<'_>, f64) -> R) -> R {
         let slopes = &self.map.relief.slopes;
         let (lambda_i, lambda_o) = (slopes.lambda(i), slopes.lambda(o));
         let exponent = match self.spec.distribution {
@@ -211,7 +211,7 @@ impl ColorFilter {
         } else {
             SlopesSeen::Joint { weight: &weight, focus: self.focus(i, o) }
         };
-        let seen = Seen { heights, slopes, gaussianize: self.spec.gaussianize };
+        let seen = VisibleValues { heights, slopes, gaussianize: self.spec.gaussianize };
         read(&seen, weights.map_or_else(|| lit_part(lambda_o, exponent), |weights| weights.lit))
     }
 

@@ -10,7 +10,7 @@ use crate::base::{InputError, Result};
 use crate::cache::{Key, KeyBuilder};
 use crate::diagnostics::{Health, SlabHealthInputs};
 use crate::plan::{Effect, Settings, SlabDecision, SlabFeatures, SlabSettings};
-use crate::scene::{Alpha, LoadedScene, Slab as SlabSpec, Switch};
+use crate::scene::{Alpha, LoadedScene, SlabSpec, Switch};
 use crate::slab::capture::svbtdf::Svbtdf;
 use crate::slab::{Method, Optics, Slab, alpha_of, dual_error};
 

@@ -103,7 +103,7 @@ fn defaults(path: &str, kind: Option<&str>) -> Table {
         },
         ("quality", _) => of(Table::try_from(Quality::default())),
         ("effects", _) => of(Table::try_from(Effects::default())),
-        ("slab", _) => of(Table::try_from(Slab::default())),
+        ("slab", _) => of(Table::try_from(SlabSpec::default())),
         ("slab.top" | "slab.bottom", Some(kind)) => of(Table::try_from(SlabFace::with_defaults(kind).unwrap())),
         ("background", Some(kind)) => of(Table::try_from(Background::with_defaults(kind).unwrap())),
         _ => panic!("no defaults for [{path}]"),

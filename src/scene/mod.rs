@@ -46,7 +46,7 @@ pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};
 pub use schema::{Field, FieldShape, Kind, number};
-pub use slab::{Alpha, RoughFace, Slab, SlabFace, SlabMethod, TableFace, TileFace};
+pub use slab::{Alpha, RoughFace, SlabFace, SlabMethod, SlabSpec, TableFace, TileFace};
 pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
     MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
@@ -81,7 +81,7 @@ pub struct Scene {
     pub effects: Effects,
     /// A thin transparent slab; without it, the scene reflects only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub slab: Option<Slab>,
+    pub slab: Option<SlabSpec>,
     /// The background seen through the slab; without it, the environment.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<Background>,
@@ -155,7 +155,7 @@ impl Scene {
             ),
             optional("quality", FieldShape::Table(Quality::fields), "Accuracy and backend."),
             optional("effects", FieldShape::Table(Effects::fields), "Effects that are forced on or off."),
-            optional("slab", FieldShape::Table(Slab::fields), "A thin transparent slab with two faces."),
+            optional("slab", FieldShape::Table(SlabSpec::fields), "A thin transparent slab with two faces."),
             optional(
                 "background",
                 FieldShape::Tagged(Background::kinds),
@@ -225,7 +225,7 @@ impl Scene {
             }
             _ => {}
         }
-        for (side, face) in self.slab.iter().flat_map(Slab::faces) {
+        for (side, face) in self.slab.iter().flat_map(SlabSpec::faces) {
             if face.path().is_some_and(|path| path.as_os_str().is_empty()) {
                 let key_of_path = if matches!(face, SlabFace::Table(_)) { "path" } else { "scene" };
                 return problem(vec![key("slab"), key(side), key(key_of_path)], "nothing", "a file");
@@ -239,7 +239,7 @@ impl Scene {
                 return problem(vec![key("background"), key("path")], "nothing", "an image file");
             }
         }
-        if let Some(side) = self.slab.as_ref().and_then(Slab::face_beside_svbtdf) {
+        if let Some(side) = self.slab.as_ref().and_then(SlabSpec::face_beside_svbtdf) {
             let found = format!("`svbtdf` and `{side}`");
             return problem(
                 vec![key("slab"), key("svbtdf")],

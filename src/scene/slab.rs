@@ -30,7 +30,7 @@ const BOUNCES: FieldShape = FieldShape::Choice(&["on", "off"]);
 
 scene_table! {
     /// A thin transparent slab. With this table, the scene's effective BRDF is that of the slab.
-    Slab {
+    SlabSpec {
         /// Index of refraction over that of the surroundings.
         #[serde(with = "color")] eta: Vec3 = Vec3::splat(1.5), ETA, "";
         /// Distance of the faces.
@@ -196,7 +196,7 @@ impl SlabFace {
     }
 }
 
-impl Slab {
+impl SlabSpec {
     /// Both faces with their keys.
     pub fn faces(&self) -> [(&'static str, &SlabFace); 2] {
         [("top", &self.top), ("bottom", &self.bottom)]

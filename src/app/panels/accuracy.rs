@@ -9,7 +9,7 @@ use crate::tuning::quality_scale;
 use eframe::egui::{self, Context, Slider, TextureHandle, TextureOptions, Ui, vec2};
 
 use super::{accuracy_chart, fields};
-use crate::app::worker::{AccuracyJob, AccuracyPoint, AccuracyResult, Chart};
+use crate::app::worker::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult};
 
 /// State of the panel between frames.
 #[derive(Default)]
@@ -44,9 +44,9 @@ impl AccuracyState {
         self.requested = Some(wanted);
         self.error = None;
         let chart = match (self.open, is_final) {
-            (false, _) => Chart::None,
-            (true, false) => Chart::First,
-            (true, true) => Chart::Whole,
+            (false, _) => AccuracyChart::None,
+            (true, false) => AccuracyChart::First,
+            (true, true) => AccuracyChart::Whole,
         };
         let (compare, effects) = (self.comparing, self.measuring && is_final);
         Some(AccuracyJob { version, loaded: loaded.clone(), chart, compare, effects })

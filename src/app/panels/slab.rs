@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::scene::{Background, Kind, Scene, Slab, SlabFace};
+use crate::scene::{Background, Kind, Scene, SlabFace, SlabSpec};
 use eframe::egui::Ui;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -35,7 +35,7 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, context: &mut PanelContext) -> Option<
     if ui.checkbox(&mut has_slab, "Thin transparent slab").on_hover_text(tip).changed() {
         if has_slab {
             let bottom = SlabFace::with_defaults("ggx").unwrap_or(SlabFace::Smooth {});
-            scene.slab = Some(Slab { bottom, ..Slab::default() });
+            scene.slab = Some(SlabSpec { bottom, ..SlabSpec::default() });
             scene.background = Background::with_defaults("checkerboard");
         } else {
             (scene.slab, scene.background) = (None, None);
@@ -47,7 +47,7 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, context: &mut PanelContext) -> Option<
     } else {
         let top = face_ui(ui, "Top", &mut slab.top, true, context);
         let bottom = face_ui(ui, "Bottom", &mut slab.bottom, false, context);
-        edit(ui, slab, &Slab::fields(), &["top", "bottom", "svbtdf", "repeat"], context);
+        edit(ui, slab, &SlabSpec::fields(), &["top", "bottom", "svbtdf", "repeat"], context);
         let tip = "A sheet that `biscale capture` made of photographs, in place of both faces (.npz)";
         let captured = ui.button("Use a captured sheet…").on_hover_text(tip).clicked().then_some(SlabFile::Svbtdf);
         top.or(bottom).or(captured)
@@ -73,9 +73,9 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, context: &mut PanelContext) -> Option<
 }
 
 /// Draws the controls of a captured sheet.
-fn captured_ui(ui: &mut Ui, slab: &mut Slab, context: &mut PanelContext) -> Option<SlabFile> {
+fn captured_ui(ui: &mut Ui, slab: &mut SlabSpec, context: &mut PanelContext) -> Option<SlabFile> {
     let fields: Vec<_> =
-        Slab::fields().into_iter().filter(|field| matches!(field.key, "svbtdf" | "repeat" | "thickness")).collect();
+        SlabSpec::fields().into_iter().filter(|field| matches!(field.key, "svbtdf" | "repeat" | "thickness")).collect();
     let mut inside = PanelContext { unit: context.unit.clone(), ..PanelContext::default() };
     edit(ui, slab, &fields, &[], &mut inside);
     context.error = context.error.take().or(inside.error);

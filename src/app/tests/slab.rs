@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::scene::{Alpha, Background, Slab, SlabFace};
+use crate::scene::{Alpha, Background, SlabFace, SlabSpec};
 use eframe::egui::{Role, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -22,7 +22,7 @@ fn sheet() -> Document {
     quick_with(SLAB)
 }
 
-fn spec(harness: &mut Harness<'static, Option<Editor>>) -> Slab {
+fn spec(harness: &mut Harness<'static, Option<Editor>>) -> SlabSpec {
     editor(harness).document.scene().slab.clone().unwrap()
 }
 

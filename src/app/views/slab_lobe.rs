@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::math::directions::to_angles;
-use crate::scene::{LoadedScene, Painted, Quality, Slab, Tile};
+use crate::scene::{LoadedScene, Painted, Quality, SlabSpec, Tile};
 use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, TextureHandle, Ui, Vec2, pos2, vec2};
 use glam::Vec3;
 
@@ -27,7 +27,7 @@ const PARTS: [Color32; 5] = [
 ];
 
 /// What the plots depend on besides the light.
-type Key = (Slab, Tile, Quality, PathBuf, Painted);
+type Key = (SlabSpec, Tile, Quality, PathBuf, Painted);
 
 /// State of the plots between frames.
 #[derive(Default)]

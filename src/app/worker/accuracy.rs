@@ -22,7 +22,7 @@ use super::runner::JobContext;
 pub struct AccuracyJob {
     pub version: u64,
     pub loaded: Arc<LoadedScene>,
-    pub chart: Chart,
+    pub chart: AccuracyChart,
     /// Continue to refine the reference and render the difference image.
     pub compare: bool,
     /// Measure each effect forced on and off.
@@ -31,7 +31,7 @@ pub struct AccuracyJob {
 
 /// Points of the chart to measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Chart {
+pub enum AccuracyChart {
     None,
     /// The fastest quality levels, by their stated errors.
     First,
@@ -133,13 +133,13 @@ impl AccuracyWorker {
             report(AccuracyResult::Effects(job.version, costs));
         }
         match job.chart {
-            Chart::None => return Ok(()),
-            Chart::First => {
+            AccuracyChart::None => return Ok(()),
+            AccuracyChart::First => {
                 let coarsest = with_settings(&job.loaded, &quality_scale::candidate_at(LEVELS[0], false))?;
                 let overhangs = self.pipeline.effective(&coarsest)?.plan.overhangs();
                 return self.measure_levels(job, &LEVELS[..FIRST_LEVELS], overhangs, context, report);
             }
-            Chart::Whole => {}
+            AccuracyChart::Whole => {}
         }
         let outcome = self.pipeline.effective(&job.loaded)?;
         let ms = self.edit_ms(&job.loaded)?;

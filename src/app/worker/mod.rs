@@ -28,7 +28,7 @@ use crate::pipeline::Pipeline;
 
 use super::document::Snapshot;
 
-pub use accuracy::{AccuracyJob, AccuracyPoint, AccuracyResult, Chart};
+pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult};
 pub use color_map::{ColorMapJob, ColorMapResult, DriverValues, REACH as HISTOGRAM_REACH};
 pub use export::{ExportJob, ExportKind, ExportResult, TableChoice};
 #[cfg(test)]

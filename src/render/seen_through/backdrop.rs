@@ -37,7 +37,7 @@ struct SurroundingMap {
 
 /// Deviations of the position and the direction of a bundle of rays: two vectors each.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Footprint {
+pub struct BackdropFootprint {
     pub position: [Vec3; 2],
     pub direction: [Vec3; 2],
 }
@@ -64,7 +64,7 @@ impl BackdropKernel {
     }
 }
 
-impl Footprint {
+impl BackdropFootprint {
     /// Deviation of the z of the direction.
     fn tilt(&self) -> f32 {
         let [u, v] = self.direction;
@@ -118,7 +118,7 @@ impl Plane {
         Vec2::new(hit.x, -hit.y) * self.scale + self.origin
     }
 
-    fn covariance(&self, position: Vec3, d: Vec3, footprint: &Footprint) -> [f32; 3] {
+    fn covariance(&self, position: Vec3, d: Vec3, footprint: &BackdropFootprint) -> [f32; 3] {
         let d = d.with_z(d.z.min(-LEAST_COSINE));
         let distance = ((self.z - position.z) / d.z).max(0.0);
         let on_plane = |shift: Vec3| {
@@ -190,7 +190,7 @@ impl Backdrop {
     }
 
     /// The footprint of rays from about `position` along about `d`.
-    pub fn kernel(&self, position: Vec3, d: Vec3, footprint: &Footprint) -> BackdropKernel {
+    pub fn kernel(&self, position: Vec3, d: Vec3, footprint: &BackdropFootprint) -> BackdropKernel {
         let tilt = footprint.tilt();
         let below = if self.plane.is_some() { part_below(d.z, tilt) } else { 0.0 };
         let on_plane = |plane: &Plane| plane.pyramid.kernel(plane.covariance(position, d, footprint));
@@ -203,7 +203,7 @@ impl Backdrop {
     }
 
     /// The footprint of each of many rays along about `d`: one read per ray, at one resolution.
-    pub fn narrow_kernel(&self, position: Vec3, d: Vec3, footprint: &Footprint) -> BackdropKernel {
+    pub fn narrow_kernel(&self, position: Vec3, d: Vec3, footprint: &BackdropFootprint) -> BackdropKernel {
         let on_plane = |plane: &Plane| plane.pyramid.narrow_kernel(plane.covariance(position, d, footprint));
         let map = &self.environment;
         BackdropKernel {
@@ -251,7 +251,8 @@ mod tests {
     fn rays_end_on_the_plane_below_the_horizon_and_on_the_environment_above() {
         let map = LatLongMap::from_fn(64, 32, |d| DVec3::new(0.0, 1.0 + d.y, 0.0));
         let backdrop = Backdrop::new(&map, 0.0, 2.0, Some(white_below(-1.0)));
-        let read = |d: Vec3| backdrop.read(Vec3::ZERO, d, &backdrop.kernel(Vec3::ZERO, d, &Footprint::default()));
+        let read =
+            |d: Vec3| backdrop.read(Vec3::ZERO, d, &backdrop.kernel(Vec3::ZERO, d, &BackdropFootprint::default()));
         assert_eq!(read(Vec3::NEG_Z), Vec3::X);
         assert!((read(Vec3::Y) - Vec3::new(0.0, 4.0, 0.0)).length() < 0.02);
         let d = Vec3::new(0.6, 0.3, 0.5).normalize();
@@ -267,7 +268,8 @@ mod tests {
         let rotation = 70f32.to_radians();
         let backdrop = Backdrop::new(&map, rotation, 1.0, None);
         let turned = glam::Quat::from_rotation_y(rotation) * Vec3::Z;
-        let value = backdrop.read(Vec3::ZERO, turned, &backdrop.kernel(Vec3::ZERO, turned, &Footprint::default()));
+        let value =
+            backdrop.read(Vec3::ZERO, turned, &backdrop.kernel(Vec3::ZERO, turned, &BackdropFootprint::default()));
         assert!((value.x - 1.0).abs() < 0.01, "{value}");
     }
 

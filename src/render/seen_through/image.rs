@@ -5,9 +5,9 @@ use std::time::Instant;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{Backdrop, BackdropKernel, Footprint};
+use super::{Backdrop, BackdropFootprint, BackdropKernel};
 use crate::base::{Cancel, Result};
-use crate::effective::{Lobe, PathKind, Reflectance, Transmittance, VaryingSurface, ViewPaths, Viewer};
+use crate::effective::{PathKind, Reflectance, Transmittance, VaryingSurface, ViewLobe, ViewPaths, Viewer};
 use crate::render::image::render::{RenderTimes, check_size, visible_points};
 use crate::render::image::shading::gather_over;
 use crate::render::image::shading_points::ShadingPoints;
@@ -89,7 +89,8 @@ pub(super) fn behind_pixel(backdrop: &Backdrop, view: &CameraView, pixel: usize)
     let ndc = (2.0 * at / Vec2::new(width as f32, height as f32) - 1.0) * view.tan_half_fov;
     let d = view.right * ndc.x - view.up * ndc.y - view.back;
     let scale = BOX * view.pixel_extent() / d.length();
-    let footprint = Footprint { direction: [scale * view.right, scale * view.up], ..Footprint::default() };
+    let footprint =
+        BackdropFootprint { direction: [scale * view.right, scale * view.up], ..BackdropFootprint::default() };
     let d = d.normalize_or(-view.back);
     backdrop.read(view.eye, d, &backdrop.kernel(view.eye, d, &footprint))
 }
@@ -151,7 +152,7 @@ impl<'a, S: VaryingSurface> Point<'a, S> {
                 let mean = direction(lobe, side);
                 let mut value = self.read(mean, &self.kernel(mean, lobe.covariance));
                 if lobe.tail > LEAST_TAIL {
-                    let wide = lobe.covariance.map(|value| value * Lobe::TAIL);
+                    let wide = lobe.covariance.map(|value| value * ViewLobe::TAIL);
                     value += lobe.tail * (self.read(mean, &self.kernel(mean, wide)) - value);
                 }
                 sum += lobe.part * value;
@@ -171,7 +172,7 @@ impl<'a, S: VaryingSurface> Point<'a, S> {
     }
 
     /// The mean over the paths, and the parts of even light.
-    fn by_paths(&self, transmitted: &Lobe, reflected: &Lobe) -> (Vec3, [Vec3; 2]) {
+    fn by_paths(&self, transmitted: &ViewLobe, reflected: &ViewLobe) -> (Vec3, [Vec3; 2]) {
         let paths = self.input.paths;
         // At most every second path follows reflected light.
         let bounce_paths = paths.div_ceil(2);
@@ -208,14 +209,14 @@ impl<'a, S: VaryingSurface> Point<'a, S> {
     }
 
     /// The footprint of a lobe around `d` with this covariance of tangential components.
-    fn footprint(&self, d: Vec3, [xx, xy, yy]: [f32; 3]) -> Footprint {
+    fn footprint(&self, d: Vec3, [xx, xy, yy]: [f32; 3]) -> BackdropFootprint {
         let first = xx.max(0.0).sqrt();
         let across = if first > 0.0 { xy / first } else { 0.0 };
         let deviations = [Vec2::new(first, across), Vec2::new(0.0, (yy - across * across).max(0.0).sqrt())];
         // The vertical component keeps the length at 1.
         let z = d.z.abs().max(0.1).copysign(d.z);
         let turn = |at: Vec2| self.in_world(at.extend(-(d.x * at.x + d.y * at.y) / z));
-        Footprint { position: self.spread, direction: deviations.map(turn) }
+        BackdropFootprint { position: self.spread, direction: deviations.map(turn) }
     }
 
     /// The light of directional lights on both sides.
@@ -260,14 +261,14 @@ struct PathKernels {
 }
 
 impl PathKernels {
-    fn new(lobe: &Lobe, paths: usize, below: bool, kernel: impl Fn([f32; 3]) -> BackdropKernel) -> Self {
+    fn new(lobe: &ViewLobe, paths: usize, below: bool, kernel: impl Fn([f32; 3]) -> BackdropKernel) -> Self {
         let [xx, xy, yy] = lobe.covariance;
         let determinant = xx * yy - xy * xy;
         let inverse = if determinant > 0.0 { [yy, -xy, xx].map(|value| value / determinant) } else { [0.0; 3] };
         let of_step = |step: usize| {
             // The density of GGX falls with the fourth power of the distance, so that spacings grow with its square.
             let scale = part_of(paths) * (1 << (2 * step)) as f32;
-            kernel(lobe.covariance.map(|value| value * scale.min(Lobe::TAIL)))
+            kernel(lobe.covariance.map(|value| value * scale.min(ViewLobe::TAIL)))
         };
         let kernels: [BackdropKernel; SPARSE.len() + 1] = std::array::from_fn(of_step);
         let drawn = drawn(lobe.covariance, part_of(paths) * kernels[0].share(below));
@@ -301,7 +302,7 @@ fn drawn([xx, xy, yy]: [f32; 3], part: f32) -> [f32; 3] {
 }
 
 /// The mean direction of a lobe below (-1) or above (1) the surface.
-fn direction(lobe: &Lobe, side: f32) -> Vec3 {
+fn direction(lobe: &ViewLobe, side: f32) -> Vec3 {
     let at = lobe.mean.clamp_length_max(0.999);
     at.extend(side * (1.0 - at.length_squared()).sqrt())
 }

@@ -11,7 +11,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub use backdrop::{Backdrop, BackdropKernel, Footprint, Plane};
+pub use backdrop::{Backdrop, BackdropFootprint, BackdropKernel, Plane};
 pub use image::{Places, SeenThrough, render};
 pub use pyramid::{Kernel, Pyramid};
 pub use scene::SlabScene;

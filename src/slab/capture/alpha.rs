@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::fit::{Equation, PointFit, Symmetry, View};
-use super::lobe::{Optics, PointModel, SlopeGrid};
+use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 
 /// A fitted point.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Fitted {
 /// Settings of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitSettings {
-    pub optics: Optics,
+    pub optics: LobeOptics,
     pub grid: SlopeGrid,
     /// Weight of Eq. 17.
     pub smooth: f64,
@@ -192,7 +192,7 @@ const SAME_MISFIT: f64 = 1.1;
 /// whether the samples determine it: the distribution is solved again for a small and a large roughness.
 pub fn shadowing(views: &[View], settings: &FitSettings, fitted: &Fitted) -> Shadowing {
     let alpha = fitted.model.alpha;
-    let optics = |roughness: f64| Optics::new(settings.optics.eta, roughness);
+    let optics = |roughness: f64| LobeOptics::new(settings.optics.eta, roughness);
     let x: Vec<f64> = fitted.model.ln_density.iter().map(|value| value + fitted.scale.ln()).collect();
     let residuals = |roughness: f64| -> Vec<f64> {
         let fit = PointFit::new(views, &optics(roughness), settings.grid);

@@ -9,12 +9,12 @@ use crate::math::linalg::gemm;
 
 /// Slices of points: `cells` values each.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Slices {
+pub struct LobeSlices {
     pub cells: usize,
     pub values: Vec<f32>,
 }
 
-impl Slices {
+impl LobeSlices {
     pub fn count(&self) -> usize {
         self.values.len().checked_div(self.cells).unwrap_or(0)
     }
@@ -41,7 +41,7 @@ const CHUNK: usize = 256;
 /// # Errors
 /// [`crate::base::Error::Cancelled`].
 pub fn representatives(
-    slices: &Slices,
+    slices: &LobeSlices,
     points: &[usize],
     count: usize,
     seed: u64,
@@ -86,9 +86,9 @@ pub fn representatives(
 }
 
 /// Slices that start the clusters: each is the farthest of a few random ones from those before it (Mitchell 1991).
-fn first_means(slices: &Slices, count: usize, rng: &mut ChaCha8Rng) -> Slices {
+fn first_means(slices: &LobeSlices, count: usize, rng: &mut ChaCha8Rng) -> LobeSlices {
     const CANDIDATES: usize = 4;
-    let mut means = Slices { cells: slices.cells, values: Vec::new() };
+    let mut means = LobeSlices { cells: slices.cells, values: Vec::new() };
     for _ in 0..count {
         let candidates: Vec<usize> = (0..CANDIDATES).map(|_| rng.random_range(0..slices.count())).collect();
         let to_nearest = |point: &usize| {
@@ -103,7 +103,7 @@ fn first_means(slices: &Slices, count: usize, rng: &mut ChaCha8Rng) -> Slices {
 }
 
 /// The `count` nearest of `others` for every slice of `points`, nearest first.
-pub fn nearest(points: &Slices, others: &Slices, count: usize) -> Vec<u32> {
+pub fn nearest(points: &LobeSlices, others: &LobeSlices, count: usize) -> Vec<u32> {
     let (cells, candidates) = (points.cells, others.count());
     let square = |slice: &[f32]| slice.iter().map(|value| value * value).sum::<f32>();
     let squares: Vec<f32> = others.values.chunks_exact(cells).map(square).collect();
@@ -156,13 +156,13 @@ mod tests {
     use super::*;
 
     /// Points in three groups around corners of a triangle.
-    fn groups() -> Slices {
+    fn groups() -> LobeSlices {
         let corner = [[0.0, 0.0], [5.0, 0.0], [0.0, 5.0]];
         let value = |k: usize| {
             let (x, y) = ((k as f32 * 1.7).sin() * 0.3, (k as f32 * 2.9).cos() * 0.3);
             [corner[k % 3][0] + x, corner[k % 3][1] + y]
         };
-        Slices { cells: 2, values: (0..300).flat_map(value).collect() }
+        LobeSlices { cells: 2, values: (0..300).flat_map(value).collect() }
     }
 
     #[test]

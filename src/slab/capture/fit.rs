@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::lobe::{Optics, PointModel, SlopeGrid, Stencil};
+use super::lobe::{LobeOptics, PointModel, SlopeGrid, Stencil};
 use crate::math::linalg::skyline::Skyline;
 
 /// One direction of the light with the BTDF of the point there, without its diffuse part.
@@ -82,7 +82,7 @@ pub struct PointFit {
 
 impl PointFit {
     /// The equations of the samples of all cameras. `None` if no sample above 0 lies in the grid of slopes.
-    pub fn new(views: &[View], optics: &Optics, grid: SlopeGrid) -> Option<Self> {
+    pub fn new(views: &[View], optics: &LobeOptics, grid: SlopeGrid) -> Option<Self> {
         let mut equations = Vec::new();
         let mut peak_density = f64::MIN;
         for View { o, samples } in views {

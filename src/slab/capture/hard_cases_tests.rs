@@ -4,8 +4,8 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
-use super::lobe::Optics;
-use super::radiance::Light;
+use super::lobe::LobeOptics;
+use super::radiance::DotLight;
 use super::rig::Rig;
 use super::sheet::{CaptureSettings, Captured, capture};
 use super::svbtdf::Svbtdf;
@@ -29,12 +29,12 @@ fn photographed(folder: &Path, case: &Case<'_>) -> Rig {
     );
     let rig = Rig::parse(&text).unwrap();
     let o = rig.cameras[0].unit_direction();
-    let optics = Optics::new(1.5, 0.2);
+    let optics = LobeOptics::new(1.5, 0.2);
     let size = glam::UVec2::new(case.pixels[0] as u32, case.pixels[1] as u32);
     for (number, dot) in rig.dots().into_iter().enumerate() {
         let value = |x: usize, y: usize| {
             let pixel = y * case.pixels[0] + x;
-            let light = Light::new(dot, 0.04, rig.place(pixel, size));
+            let light = DotLight::new(dot, 0.04, rig.place(pixel, size));
             let lobe = optics
                 .terms(light.i, o)
                 .map_or(0.0, |terms| terms.ln_top.exp() * (-terms.slope_top.length_squared() / 0.04).exp() * 8.0);
@@ -91,7 +91,8 @@ fn black_photographs_and_a_sheet_that_only_scatters_have_no_lobe() {
         let at = DVec2::new((pixel % 3) as f64, (pixel / 3) as f64) + 0.5;
         (at / size.as_dvec2() - 0.5) * 0.02
     };
-    let even = |dot: usize, pixel: usize, _: f64| (0.1 * Light::new(dots[dot], 0.04, place(pixel)).irradiance) as f32;
+    let even =
+        |dot: usize, pixel: usize, _: f64| (0.1 * DotLight::new(dots[dot], 0.04, place(pixel)).irradiance) as f32;
     let diffuse = captured(&Case { dots: GRID, pixels: [3, 2], radiance: &even }, &CaptureSettings::default());
     assert!(lobes(&diffuse) < 1e-3, "{}", lobes(&diffuse));
     assert!(diffuse.svbtdf.diffuse.iter().all(|value| (value.x - 0.1).abs() < 1e-3), "{:?}", diffuse.svbtdf.diffuse);

@@ -74,14 +74,14 @@ pub struct PairTerms {
 
 /// Index of a captured slab and its masking: Smith's G of one GGX face (`α_b` of Sec. 4.2).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Optics {
+pub struct LobeOptics {
     pub eta: f64,
     /// Roughness of the masking.
     pub shadowing: f64,
     face: Ndf,
 }
 
-impl Optics {
+impl LobeOptics {
     pub fn new(eta: f64, shadowing: f64) -> Self {
         Self { eta, shadowing, face: Ndf::analytic(Profile::Ggx, DVec2::splat(shadowing), 0.0) }
     }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, Vec3};
 
 use super::super::ellipse::{Ellipse, Profile};
-use super::lobe::{Optics, PointModel, SlopeGrid};
+use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 use super::svbtdf::Svbtdf;
 
 /// A sheet of a figure of Dai et al. 2009, made by formulas.
@@ -61,7 +61,7 @@ impl Pattern {
             diffuse.push(place.diffuse);
         }
         let models = self.materials().iter().map(|material| model(grid, material)).collect();
-        let optics = Optics::new(self.eta(), 0.2);
+        let optics = LobeOptics::new(self.eta(), 0.2);
         Svbtdf { size, optics, grid, models, neighbours: MIXED, index, weight, scale, diffuse }
     }
 

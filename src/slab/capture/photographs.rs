@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3, UVec2, Vec3};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-use super::rig::{Camera, Rig};
+use super::rig::{Rig, RigCamera};
 use crate::base::{Cancel, InputError, Result};
 use crate::geometry::image_file;
 
@@ -214,8 +214,8 @@ fn rectification(corners: &[[f64; 2]; 4], camera: usize) -> Result<DMat3> {
 }
 
 /// The camera of an image pattern, for a rig that is to be written.
-pub fn camera(direction: DVec3, images: String) -> Camera {
-    Camera { direction: direction.to_array(), images, exposures: Vec::new(), dark: None, corners: None }
+pub fn camera(direction: DVec3, images: String) -> RigCamera {
+    RigCamera { direction: direction.to_array(), images, exposures: Vec::new(), dark: None, corners: None }
 }
 
 #[cfg(test)]
@@ -274,7 +274,7 @@ mod tests {
             assert!((found[2 * pixel] - (x + 100.0 * y)).abs() < 1e-3, "{pixel}");
         }
         let outside = Rig {
-            cameras: vec![Camera {
+            cameras: vec![RigCamera {
                 corners: Some([[0.0, 0.0], [90.0, 0.0], [90.0, 9.0], [0.0, 9.0]]),
                 ..rig.cameras[0].clone()
             }],

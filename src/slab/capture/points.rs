@@ -4,9 +4,9 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::clusters::non_negative;
 use super::fit::{Sample, View};
-use super::lobe::{Optics, PointModel};
+use super::lobe::{LobeOptics, PointModel};
 use super::push_pull::DirectionGrid;
-use super::radiance::{Light, diffuse_part};
+use super::radiance::{DotLight, diffuse_part};
 use super::rig::Rig;
 
 /// Part of the diffuse BTDF below which the rest is no lobe.
@@ -29,9 +29,9 @@ impl Point {
     /// The point at `place`, from the radiances of each dot for each camera. Negative values count as 0.
     pub fn new(rig: &Rig, dots: &[DVec2], place: DVec2, radiances: &[&[Vec3]]) -> Self {
         let monitor = DVec3::from_array(rig.monitor);
-        let lights: Vec<Light> = dots.iter().map(|dot| Light::new(*dot, rig.distance, place)).collect();
+        let lights: Vec<DotLight> = dots.iter().map(|dot| DotLight::new(*dot, rig.distance, place)).collect();
         let clean = |value: &Vec3| if value.is_finite() { value.max(Vec3::ZERO) } else { Vec3::NAN };
-        let btdf = |(light, radiance): (&Light, &Vec3)| {
+        let btdf = |(light, radiance): (&DotLight, &Vec3)| {
             let radiance = clean(radiance).as_dvec3();
             DVec3::from_array([0, 1, 2].map(|k| light.btdf(radiance[k], monitor[k])))
         };
@@ -45,7 +45,7 @@ impl Point {
         let mut color = DVec3::ZERO;
         let mut broken = 0;
         let mut view = |o: DVec3, values: &[DVec3]| {
-            let sample = |(light, value): (&Light, &DVec3)| {
+            let sample = |(light, value): (&DotLight, &DVec3)| {
                 let lobe = *value - diffuse;
                 let lobe = DVec3::select(lobe.cmpgt(LEAST_LOBE * diffuse), lobe, DVec3::ZERO);
                 let btdf = if value.is_finite() { lobe.element_sum() / 3.0 } else { f64::NAN };
@@ -78,7 +78,7 @@ impl Point {
     }
 
     /// Directions of the first camera's samples and slopes of their facets with the transmitted energy.
-    fn energies(&self, camera: usize, optics: &Optics) -> Vec<(DVec2, DVec2, f64)> {
+    fn energies(&self, camera: usize, optics: &LobeOptics) -> Vec<(DVec2, DVec2, f64)> {
         let View { o, samples } = &self.views[camera];
         let energy = |sample: &Sample| {
             let terms = optics.terms(sample.i, *o)?;
@@ -90,7 +90,7 @@ impl Point {
     }
 
     /// Half width of the square of slopes that holds the part `part` of the energy of all cameras; `None` without a lobe.
-    pub fn slope_reach(&self, optics: &Optics, part: f64) -> Option<f64> {
+    pub fn slope_reach(&self, optics: &LobeOptics, part: f64) -> Option<f64> {
         let reach = |camera| {
             reach(self.energies(camera, optics).into_iter().map(|(_, slope, energy)| (slope, energy)).collect(), part)
         };
@@ -98,7 +98,7 @@ impl Point {
     }
 
     /// The same of the directions (i.x, i.y) of one camera about the straight one.
-    pub fn direction_reach(&self, camera: usize, optics: &Optics, part: f64) -> Option<f64> {
+    pub fn direction_reach(&self, camera: usize, optics: &LobeOptics, part: f64) -> Option<f64> {
         reach(self.energies(camera, optics).into_iter().map(|(at, _, energy)| (at, energy)).collect(), part)
     }
 
@@ -109,7 +109,7 @@ impl Point {
 
     /// The combination of models that is nearest to the samples inside the squares of directions (Eq. 21), without negative
     /// weights.
-    pub fn mixed(&self, optics: &Optics, directions: &[DirectionGrid], models: &[&PointModel]) -> Mixture {
+    pub fn mixed(&self, optics: &LobeOptics, directions: &[DirectionGrid], models: &[&PointModel]) -> Mixture {
         let count = models.len();
         let (mut gram, mut right, mut power) = (vec![0.0; count * count], vec![0.0; count], 0.0);
         for (View { o, samples }, grid) in self.views.iter().zip(directions) {

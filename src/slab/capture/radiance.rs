@@ -4,14 +4,14 @@ use glam::{DVec2, DVec3};
 
 /// Light of one dot of the monitor at a point of the sheet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Light {
+pub struct DotLight {
     /// Unit direction to the dot.
     pub i: DVec3,
     /// Irradiance of a dot of intensity 1: `cos θ / r²` [1/m²].
     pub irradiance: f64,
 }
 
-impl Light {
+impl DotLight {
     /// The light of the dot at `dot` at the point `x` of the sheet; the monitor is `distance` above the sheet.
     pub fn new(dot: DVec2, distance: f64, x: DVec2) -> Self {
         let to = (dot - x).extend(distance);
@@ -56,7 +56,7 @@ mod tests {
     fn a_lambertian_sheet_has_the_same_btdf_under_every_dot_because_r_squared_stands_above_the_line() {
         for dot in [DVec2::ZERO, DVec2::new(0.05, 0.02), DVec2::new(-0.2, 0.1)] {
             let (x, distance) = (DVec2::new(0.01, -0.02), 0.04);
-            let light = Light::new(dot, distance, x);
+            let light = DotLight::new(dot, distance, x);
             let to = (dot - x).extend(distance);
             // A point source of intensity 3 gives E = 3 cos θ / r², and a diffuse BTDF of 0.25 sends 0.25 E.
             let radiance = 0.25 * 3.0 * (distance / to.length()) / to.length_squared();

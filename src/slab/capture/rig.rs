@@ -36,7 +36,7 @@ pub struct Rig {
     pub pixels: Option<[usize; 2]>,
     pub dots: Dots,
     #[serde(rename = "camera")]
-    pub cameras: Vec<Camera>,
+    pub cameras: Vec<RigCamera>,
 }
 
 fn ones() -> [f64; 3] {
@@ -60,7 +60,7 @@ pub struct Dots {
 /// A camera and its images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Camera {
+pub struct RigCamera {
     /// From the sheet to the camera; z is negative.
     pub direction: [f64; 3],
     /// Names of the images. `%04d` stands for the number of the dot, from 0, and a second one for the exposure.
@@ -216,7 +216,7 @@ impl Rig {
     }
 }
 
-impl Camera {
+impl RigCamera {
     /// The unit direction from the sheet to the camera.
     pub fn unit_direction(&self) -> DVec3 {
         DVec3::from_array(self.direction).try_normalize().unwrap_or(DVec3::NEG_Z)

@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::alpha::{FitSettings, Fitted, Shadowing, choose_smoothness, fit_point, shadowing};
-use super::clusters::{Slices, nearest, representatives};
-use super::lobe::{Optics, PointModel, SlopeGrid};
+use super::clusters::{LobeSlices, nearest, representatives};
+use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 use super::photographs::Photographs;
 use super::points::{Mixture, Point};
 use super::push_pull::DirectionGrid;
@@ -151,7 +151,7 @@ impl<'a> Sheet<'a> {
         let rig = photographs.rig;
         let dots = rig.dots();
         let count = photographs.size.element_product() as usize;
-        let optics = Optics::new(rig.eta, SHADOWING);
+        let optics = LobeOptics::new(rig.eta, SHADOWING);
         let grid = SlopeGrid { side: SIDE, span: 1.0 };
         let fit = FitSettings { optics, grid, smooth: 1.0, alpha: settings.alpha };
         let figures = Figures {
@@ -247,9 +247,9 @@ impl<'a> Sheet<'a> {
     }
 
     /// The slices of all pixels, scaled to the mean 1, and the pixels that have one.
-    fn slices(&self, progress: &Progress<'_>) -> Result<(Slices, Vec<usize>)> {
+    fn slices(&self, progress: &Progress<'_>) -> Result<(LobeSlices, Vec<usize>)> {
         let cells = self.directions.iter().map(|grid| grid.side * grid.side).sum();
-        let mut slices = Slices { cells, values: Vec::new() };
+        let mut slices = LobeSlices { cells, values: Vec::new() };
         let mut lit = Vec::new();
         self.for_all(progress, |pixels, points| {
             let found: Vec<Option<Vec<f32>>> = points.par_iter().map(|point| slice(point, &self.directions)).collect();
@@ -328,7 +328,7 @@ impl<'a> Sheet<'a> {
     /// the weights from the samples of the pixel itself, because slices are resampled.
     fn interpolated(
         self,
-        slices: &Slices,
+        slices: &LobeSlices,
         fitted: Vec<(usize, PointModel)>,
         progress: &Progress<'_>,
     ) -> Result<Captured> {
@@ -369,7 +369,7 @@ impl<'a> Sheet<'a> {
         let lobes = scale.iter().map(|value| f64::from(value.element_sum())).sum::<f64>();
         let even = std::f64::consts::PI * diffuse.iter().map(|value| f64::from(value.element_sum())).sum::<f64>();
         self.figures.diffuse = if even > 0.0 { even / (even + lobes) } else { 0.0 };
-        let optics = Optics::new(self.photographs.rig.eta, self.fit.optics.shadowing);
+        let optics = LobeOptics::new(self.photographs.rig.eta, self.fit.optics.shadowing);
         let Interpolation { neighbours, index, weight, residual, .. } = parts;
         let (size, grid) = (self.figures.pixels, self.fit.grid);
         let svbtdf = Svbtdf { size, optics, grid, models, neighbours, index, weight, scale, diffuse };

@@ -11,8 +11,8 @@ use super::super::dual::blend;
 use super::super::ellipse::{Ellipse, Profile};
 use super::alpha::{FitSettings, Fitted, choose_smoothness, fit_point};
 use super::fit::{Sample, View};
-use super::lobe::{Optics, PairTerms, PointModel, SlopeGrid};
-use super::radiance::{Light, diffuse_part};
+use super::lobe::{LobeOptics, PairTerms, PointModel, SlopeGrid};
+use super::radiance::{DotLight, diffuse_part};
 use super::svbtdf::Svbtdf;
 
 /// Noise of the dark, in parts of the relative noise, of the brightest value.
@@ -33,7 +33,7 @@ pub fn add_noise(values: &mut [f64], noise: f64, rng: &mut impl Rng) {
 pub struct KnownPoint {
     density: Box<dyn Fn(DVec2) -> f64 + Sync>,
     pub alpha: f64,
-    pub optics: Optics,
+    pub optics: LobeOptics,
 }
 
 /// A captured [`KnownPoint`].
@@ -62,7 +62,7 @@ impl KnownPoint {
     /// Beckmann or GGX slopes with a roughness along x, the plane of the cameras, and one along y. `None` if both are 0.
     pub fn analytic(profile: Profile, roughness: DVec2, alpha: f64) -> Option<Self> {
         let ellipse = Ellipse::new(profile, roughness, 0.0)?;
-        Some(Self { density: Box::new(move |m| ellipse.density(m)), alpha, optics: Optics::new(1.5, 0.2) })
+        Some(Self { density: Box::new(move |m| ellipse.density(m)), alpha, optics: LobeOptics::new(1.5, 0.2) })
     }
 
     /// Gentle and steep flanks of a sawtooth, blurred; the mean slope is 0.
@@ -70,7 +70,7 @@ impl KnownPoint {
         let blur = Ellipse::new(Profile::Beckmann, DVec2::splat(0.113), 0.0)?;
         let flanks = [(0.7, DVec2::new(-0.09, 0.0)), (0.3, DVec2::new(0.21, 0.0))];
         let density = move |m: DVec2| flanks.iter().map(|(mass, at)| mass * blur.density(m - *at)).sum();
-        Some(Self { density: Box::new(density), alpha, optics: Optics::new(1.5, 0.2) })
+        Some(Self { density: Box::new(density), alpha, optics: LobeOptics::new(1.5, 0.2) })
     }
 
     /// The BTDF [1/sr] at a pair.
@@ -86,17 +86,17 @@ impl KnownPoint {
         let shift = 0.04 * theta_deg.to_radians().tan();
         let at = |k: u32| (f64::from(k) + 0.5) / 40.0 * 0.096 - 0.048;
         let dot = |k: u32| DVec2::new(at(k % 40) - shift, at(k / 40));
-        let lights: Vec<Light> = (0..1600).map(|k| Light::new(dot(k), 0.04, DVec2::ZERO)).collect();
-        let radiance = |light: &Light| {
+        let lights: Vec<DotLight> = (0..1600).map(|k| DotLight::new(dot(k), 0.04, DVec2::ZERO)).collect();
+        let radiance = |light: &DotLight| {
             let lobe = self.optics.terms(light.i, o).map_or(0.0, |terms| self.btdf(&terms));
             (lobe + DIFFUSE) * light.irradiance
         };
         let mut radiances: Vec<f64> = lights.iter().map(radiance).collect();
         add_noise(&mut radiances, noise, &mut ChaCha8Rng::seed_from_u64(5));
-        let btdf = |(light, radiance): (&Light, &f64)| (light.irradiance, light.btdf(radiance.max(0.0), 1.0));
+        let btdf = |(light, radiance): (&DotLight, &f64)| (light.irradiance, light.btdf(radiance.max(0.0), 1.0));
         let values: Vec<(f64, f64)> = lights.iter().zip(&radiances).map(btdf).collect();
         let diffuse = diffuse_part(&values);
-        let sample = |(light, (irradiance, btdf)): (&Light, &(f64, f64))| Sample {
+        let sample = |(light, (irradiance, btdf)): (&DotLight, &(f64, f64))| Sample {
             i: light.i,
             irradiance: *irradiance,
             btdf: (btdf - diffuse).max(0.0),
@@ -181,7 +181,7 @@ pub fn varying_sheet(size: [usize; 2]) -> Svbtdf {
     let pixels = size[0] * size[1];
     Svbtdf {
         size,
-        optics: Optics::new(1.5, 0.2),
+        optics: LobeOptics::new(1.5, 0.2),
         grid,
         models: (0..columns * rows * layers).map(model).collect(),
         neighbours: 8,

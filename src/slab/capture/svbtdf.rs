@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3, Vec3};
 
 use super::super::dual::blend;
-use super::lobe::{Optics, PointModel, SlopeGrid};
+use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 use crate::base::npz::{Arrays, array, arrays};
 use crate::base::zip::ZipWriter;
 use crate::base::{Error, InputError, Result, atomic_file};
@@ -26,7 +26,7 @@ const MAX_MODELS: usize = 1 << 24;
 pub struct Svbtdf {
     /// Columns and rows.
     pub size: [usize; 2],
-    pub optics: Optics,
+    pub optics: LobeOptics,
     pub grid: SlopeGrid,
     /// Models of mass 1.
     pub models: Vec<PointModel>,
@@ -43,7 +43,7 @@ pub struct Svbtdf {
 /// The far appearance of an SVBTDF: the mean over its pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeanBtdf {
-    optics: Optics,
+    optics: LobeOptics,
     /// Representatives with their part of the mean lobe.
     models: Vec<(PointModel, DVec3)>,
     diffuse: DVec3,
@@ -193,7 +193,7 @@ impl Svbtdf {
         let models = ndf.chunks_exact(side * side).zip(&alpha).map(model).collect();
         Ok(Self {
             size: [width, height],
-            optics: Optics::new(eta, shadowing),
+            optics: LobeOptics::new(eta, shadowing),
             grid,
             models,
             neighbours,

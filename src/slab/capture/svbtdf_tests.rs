@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::lobe::{Optics, PointModel, SlopeGrid};
+use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 use super::svbtdf::Svbtdf;
 
 /// A sheet of 3 x 2 pixels between two models.
@@ -17,7 +17,7 @@ fn sheet() -> Svbtdf {
     };
     Svbtdf {
         size: [3, 2],
-        optics: Optics::new(1.5, 0.25),
+        optics: LobeOptics::new(1.5, 0.25),
         grid,
         models: vec![model(0.2, 0.25), model(0.3, 0.75)],
         neighbours: 2,
@@ -100,7 +100,7 @@ fn a_file_that_is_no_svbtdf_is_refused_with_the_array() {
         (Svbtdf { index: vec![9; 12], ..good.clone() }, "index"),
         (Svbtdf { weight: vec![f32::NAN; 12], ..good.clone() }, "weight"),
         (Svbtdf { scale: vec![Vec3::splat(-1.0); 6], ..good.clone() }, "scale"),
-        (Svbtdf { optics: Optics::new(0.5, 0.2), ..good.clone() }, "eta"),
+        (Svbtdf { optics: LobeOptics::new(0.5, 0.2), ..good.clone() }, "eta"),
         (Svbtdf { grid: SlopeGrid { side: 16, span: 0.0 }, ..good.clone() }, "span"),
     ];
     for (sheet, part) in cases {

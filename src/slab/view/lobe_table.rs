@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::Faces;
-use crate::effective::{Lobe, PathKind, ViewLobes, Viewer};
+use crate::effective::{PathKind, ViewLobe, ViewLobes, Viewer};
 use crate::slab::Slab;
 
 /// Nodes per side of the square around the disc of stereographic coordinates.
@@ -55,10 +55,10 @@ impl Bundle {
     }
 
     /// Fits two Gaussians of one mean and one shape by expectation and maximisation. Tails would widen a single one.
-    fn lobe(&self) -> Lobe {
+    fn lobe(&self) -> ViewLobe {
         let total: f32 = self.directions.iter().map(|(_, weight)| weight).sum();
         if total <= 0.0 {
-            return Lobe::default();
+            return ViewLobe::default();
         }
         let (mut mean, second) = self.moments(|_| 1.0);
         let mut covariance = second.map(|sum| sum / total);
@@ -75,17 +75,17 @@ impl Bundle {
                 let d = *at - mean;
                 let square = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
                 let core = (1.0 - tail) * (-0.5 * square).exp();
-                let far = tail / Lobe::TAIL * (-0.5 * square / Lobe::TAIL).exp();
+                let far = tail / ViewLobe::TAIL * (-0.5 * square / ViewLobe::TAIL).exp();
                 *part = if core + far > 0.0 { far / (core + far) } else { 1.0 };
                 weight_of_tail += weight * *part;
             }
             tail = (weight_of_tail / total).clamp(1e-3, 0.9);
             // A direction of the tail says as much of the shape as one of the core at a smaller distance.
-            let (center, second) = self.moments(|k| 1.0 - in_tail[k] * (1.0 - 1.0 / Lobe::TAIL));
+            let (center, second) = self.moments(|k| 1.0 - in_tail[k] * (1.0 - 1.0 / ViewLobe::TAIL));
             mean = center;
             covariance = second.map(|sum| sum / total);
         }
-        Lobe { part: self.part, mean, covariance, tail }
+        ViewLobe { part: self.part, mean, covariance, tail }
     }
 }
 
@@ -127,7 +127,7 @@ impl LobeTable {
     }
 }
 
-fn add(sum: &mut Lobe, lobe: &Lobe, weight: f32) {
+fn add(sum: &mut ViewLobe, lobe: &ViewLobe, weight: f32) {
     sum.part += weight * lobe.part;
     sum.mean += weight * lobe.mean;
     sum.tail += weight * lobe.tail;

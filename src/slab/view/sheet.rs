@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::walk::mixed;
-use crate::effective::{Lobe, PathEnd, PathKind, ViewLobes, Viewer};
+use crate::effective::{PathEnd, PathKind, ViewLobe, ViewLobes, Viewer};
 use crate::math::simd::ln_of_sum;
 use crate::slab::capture::lobe::SlopeGrid;
 use crate::slab::capture::svbtdf::Svbtdf;
@@ -162,7 +162,7 @@ impl SheetPoint<'_> {
         let t = (step - low as f32).min(1.0);
         let kept = |kept: &[f32; ANGLES]| (1.0 - t) * kept[low] + t * kept[low + 1];
         let kept: f32 = self.parts.iter().map(|(model, weight)| weight * kept(&self.view.kept[*model])).sum();
-        let transmitted = Lobe {
+        let transmitted = ViewLobe {
             part: self.scale * (self.view.level(o) * kept),
             mean: -o.truncate() - turn * Vec2::new(x, y),
             covariance: [wide * (xx - x * x).max(0.0), wide * (xy - x * y), wide * (yy - y * y).max(0.0)],
@@ -338,7 +338,7 @@ mod tests {
             });
             assert!((sum / expected - 1.0).abs() < 0.01, "{pixel}: {sum} {expected}");
             assert!((even[0].x - PI * sheet.diffuse[pixel].x).abs() < 1e-6 && even[1] == Vec3::ZERO);
-            let Lobe { part, mean, covariance, .. } = point.lobes(viewer.o).transmitted;
+            let ViewLobe { part, mean, covariance, .. } = point.lobes(viewer.o).transmitted;
             let draft = f64::from(part.x * (1.0 + mean.x + mean.y.powi(2) + covariance[2]));
             assert!((draft / expected - 1.0).abs() < 0.1, "{pixel}: draft {draft}, {expected}");
         }

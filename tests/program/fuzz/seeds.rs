@@ -161,7 +161,7 @@ pub fn rigs() -> Vec<Vec<u8>> {
 
 /// Returns a sheet of 2 x 2 pixels between two models.
 pub fn svbtdfs() -> Vec<Vec<u8>> {
-    use biscale::slab::capture::lobe::{Optics, PointModel, SlopeGrid};
+    use biscale::slab::capture::lobe::{LobeOptics, PointModel, SlopeGrid};
     use biscale::slab::capture::svbtdf::Svbtdf;
     let grid = SlopeGrid { side: 8, span: 0.5 };
     let model = |alpha: f64| {
@@ -170,7 +170,7 @@ pub fn svbtdfs() -> Vec<Vec<u8>> {
     };
     let sheet = Svbtdf {
         size: [2, 2],
-        optics: Optics::new(1.5, 0.2),
+        optics: LobeOptics::new(1.5, 0.2),
         grid,
         models: vec![model(0.2), model(0.8)],
         neighbours: 2,
