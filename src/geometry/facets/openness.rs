@@ -164,7 +164,7 @@ mod tests {
 
     /// Leaning rods, much of which is hidden.
     fn velvet() -> TileMesh {
-        let loaded = crate::scene::open("fig6a_velvet_spread", &["tile.geometry.count=40".to_owned()]).unwrap();
+        let loaded = crate::scene::open("fig6a_velvet_spread", &[]).unwrap();
         geometry::build(&loaded.scene.tile, &loaded.base_dir).unwrap()
     }
 
@@ -203,7 +203,7 @@ mod tests {
         let mesh = velvet();
         let grid = PeriodicGrid::new(&mesh);
         let variance = |by_openness: bool| -> f64 {
-            let samples: Vec<Facets> = samples(&mesh, 800, by_openness).collect();
+            let samples: Vec<Facets> = samples(&mesh, 2048, by_openness).collect();
             let at = |k: usize| {
                 let [i, o] = [1.7, 4.1].map(|step| from_angles(0.2 + 0.1 * k as f32, step * k as f32));
                 let reflected = |facets: &Facets| -> f64 {
