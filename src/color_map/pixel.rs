@@ -125,7 +125,7 @@ impl PixelMap {
         axes
     }
 
-    /// How far the places of the map vary between footprints of this covariance, in deviations.
+    /// Variation of the places of the map between footprints of this covariance, in deviations.
     pub fn place_variation(&self, covariance: glam::DMat2) -> f64 {
         const SAMPLES: u32 = 16;
         let of = |place: &PlaceMap| {

@@ -87,7 +87,7 @@ impl Slab {
         Self { inner: Some(inner), below: Arc::default(), ..self }
     }
 
-    /// What the slab transmits for one direction, above or below, and many others.
+    /// Transmission of the slab for one direction, above or below, and many others.
     pub fn row(&self, w: DVec3) -> SlabRow<'_> {
         SlabRow::new(self, w)
     }

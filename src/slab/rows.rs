@@ -1,4 +1,4 @@
-//! What a slab transmits for one direction and many others. What depends on the one alone is computed once.
+//! Transmission of a slab for one direction and many others. Terms of the one direction are computed once.
 
 use std::f64::consts::PI;
 

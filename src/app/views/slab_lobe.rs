@@ -26,7 +26,7 @@ const PARTS: [Color32; 5] = [
     Color32::from_rgb(110, 110, 110),
 ];
 
-/// What the plots depend on besides the light.
+/// Inputs of the plots besides the light.
 type Key = (SlabSpec, Tile, Quality, PathBuf, Painted);
 
 /// State of the plots between frames.

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use super::{FacetSampler, Facets, REPLICATES, SampleShift};
 use crate::geometry::{PeriodicGrid, TileMesh, is_facet_visible};
 
-/// Facets and directions whose visibility is tested. Twice as many of either change the errors of Table 4 by less than
-/// their noise.
+/// Facets and directions whose visibility is tested. They bound the time of the measurement, which is part of the stage
+/// `facets` of `biscale profile --edit geometry`.
 const TESTED_FACETS: usize = 256;
 const TESTED_DIRECTIONS: usize = 12;
 /// Intervals of height, and classes of normals: up, sideways and down.

@@ -31,7 +31,7 @@ struct Material {
     alpha: f64,
 }
 
-/// What a place of a sheet is made of: parts of its materials, `k_s`, and the diffuse part.
+/// Composition of a place of a sheet: parts of its materials, `k_s`, and the diffuse part.
 struct Place {
     parts: Vec<(usize, f64)>,
     scale: Vec3,

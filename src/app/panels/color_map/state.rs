@@ -7,7 +7,7 @@ use crate::app::worker::{ColorMapJob, ColorMapResult, DriverValues};
 use crate::scene::{ColorLayer, Driver, GaussianSurface, HeightDistribution, LoadedScene, MaterialSpec, Painted, Tile};
 use glam::Vec3;
 
-/// What the values depend on. Stops are no part of it, so that dragging one measures nothing.
+/// Inputs of the values. Stops are no part of them, so that dragging one measures nothing.
 type Key = (Tile, Vec<Driver>, Option<GaussianSurface>, HeightDistribution, Vec<MaterialSpec>, PathBuf, Painted);
 
 /// Directions to the light and to the viewer of the picked point, in the tile frame.

@@ -30,7 +30,7 @@ const SHOWN: f64 = 2.5;
 /// Colour of what is visible and lit at the picked point.
 pub const SEEN: Color32 = Color32::from_rgb(230, 140, 30);
 
-/// What the bar shows besides the stops.
+/// Content of the bar besides the stops.
 pub struct BarInputs<'a> {
     pub unit: StopUnit,
     pub values: Option<&'a DriverValues>,

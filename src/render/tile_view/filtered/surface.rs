@@ -163,7 +163,7 @@ impl FilteredTile {
         DMat2::from_diagonal(side * side / 12.0)
     }
 
-    /// What a pixel of this width at a place of the tile [tile units] holds.
+    /// The content of a pixel of this width at a place of the tile [tile units].
     pub(super) fn content(&self, at: DVec2, width: f64) -> PixelContent<'_> {
         let (place, level) = (at / self.size, self.relief.of_width(width));
         let tint = |(slot, tint): &(u16, Levels<3>)| (*slot, Vec3::from(tint.at(place, tint.of_width(width))));
@@ -175,7 +175,7 @@ impl FilteredTile {
         }
     }
 
-    /// What a pixel far away holds.
+    /// The content of a pixel far away.
     pub(super) fn whole(&self) -> PixelContent<'_> {
         let last = |tint: &Levels<3>| Vec3::from(tint.values(tint.count() - 1).1[0]);
         PixelContent {
