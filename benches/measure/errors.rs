@@ -1,41 +1,139 @@
-//! True and stated errors of hard tiles.
+//! True and stated errors of hard tiles and of shipped scenes.
 
-use crate::hard_tiles::{Measured, RayCast, TrueValues, all, measure};
+use std::path::Path;
+
+use biscale::metrics::mirror_biased_pairs;
+use biscale::pipeline::Pipeline;
+use biscale::reference::ReferenceSettings;
+use biscale::report::svg::{Chart, LogAxis};
+use biscale::scene;
+
+use crate::hard_tiles::{Measured, PAIRS_SEED, RayCast, TrueValues, all, measure};
+use crate::tiles::reference;
 
 const PRESETS: [&str; 2] = ["draft", "standard"];
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
-/// Bounds of the standard errors of true values.
+/// Bounds of the standard errors of true values of hard tiles.
 const RAYS: RayCast = RayCast { points: 4096, max_passes: 16, target: 4e-3 };
+/// The same for shipped scenes.
+const REFERENCE: ReferenceSettings = ReferenceSettings { facets: 16_384, max_passes: 8, target: 1e-3, seed: 99 };
+/// Errors below this are rounding.
+const MIN_ERROR: f64 = 1e-5;
+/// The plot of stated against true errors.
+const PLOT: &str = "docs/measurements/errors.svg";
 
-/// Prints the errors of all hard tiles, or of those whose name contains `part`.
+/// The errors of one tile: three seeds at each preset.
+struct Row {
+    name: String,
+    presets: [Vec<Measured>; 2],
+    std_error: f64,
+}
+
+/// Prints the errors of all hard tiles and shipped scenes, or of those whose name contains `part`.
 ///
 /// # Errors
-/// A temporary folder cannot be created.
+/// A temporary folder cannot be created, a scene cannot be opened, or the plot cannot be written.
 pub fn errors(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
-    print("| tile | `draft`: true | stated | PSNR | `standard`: true | stated | PSNR | true values |".to_owned());
-    print("|---|---|---|---|---|---|---|---|".to_owned());
-    for tile in all().iter().filter(|tile| part.is_none_or(|part| tile.name.contains(part))) {
+    let is_wanted = |name: &str| part.is_none_or(|part| name.contains(part));
+    let mut rows = Vec::new();
+    let header = |what: &str| {
+        format!(
+            "| {what} | `draft`: true | stated | PSNR | `standard`: true | stated | PSNR | true values |\n|---|---|---|---|---|---|---|---|"
+        )
+    };
+    print(header("tile"));
+    for tile in all().iter().filter(|tile| is_wanted(tile.name)) {
         let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
         let loaded = tile.open(folder.path(), "standard", 1);
         let (pairs, truth) = tile.pairs_and_values(&loaded, &RAYS);
         let of = |preset| SEEDS.map(|seed| measure(&loaded, preset, seed, &pairs, &truth)).collect::<Vec<_>>();
-        print(row(tile.name, &PRESETS.map(of), &truth));
+        rows.push(Row { name: tile.name.to_owned(), presets: PRESETS.map(of), std_error: truth.std_error });
+        print(rows[rows.len() - 1].text());
+    }
+    print(format!("\n{}", header("shipped scene")));
+    for name in shipped().into_iter().filter(|name| is_wanted(name)) {
+        let loaded = scene::open(name, &["quality.backend=cpu".to_owned()]).map_err(|error| error.to_string())?;
+        let pairs = mirror_biased_pairs(200, PAIRS_SEED);
+        let (values, std_error) = reference(&Pipeline::new(), &loaded, &pairs, &REFERENCE);
+        let truth = TrueValues { values, std_error };
+        let of = |preset| SEEDS.map(|seed| measure(&loaded, preset, seed, &pairs, &truth)).collect::<Vec<_>>();
+        rows.push(Row { name: name.to_owned(), presets: PRESETS.map(of), std_error });
+        print(rows[rows.len() - 1].text());
+    }
+    print(format!("\n{}", calibration(&rows)));
+    if part.is_none() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(PLOT);
+        std::fs::write(&path, plot(&rows)).map_err(|error| format!("{}: {error}", path.display()))?;
     }
     Ok(())
 }
 
-fn row(name: &str, presets: &[Vec<Measured>], truth: &TrueValues) -> String {
-    let all =
-        |runs: &[Measured], value: &dyn Fn(&Measured) -> String| runs.iter().map(value).collect::<Vec<_>>().join(", ");
-    let sign = |run: &Measured| if run.is_resolved { "" } else { "≈ " };
-    let mut cells = vec![name.to_owned()];
-    for runs in presets {
-        cells.push(all(runs, &|run| format!("{}{:.2} %", sign(run), 100.0 * run.errors.rel_l2)));
-        cells
-            .push(all(runs, &|run| format!("{:.2} %{}", 100.0 * run.stated, if run.warns { " (warned)" } else { "" })));
-        cells.push(all(runs, &|run| format!("{:.1} dB", run.errors.psnr_db)));
+/// The shipped scenes that only reflect. Two scenes of Table 4 and `table3` share tile and materials with others.
+fn shipped() -> Vec<&'static str> {
+    let others = ["table3", "table4_cup", "fig9b_cylinder_stripes"];
+    let all = scene::shipped::names();
+    all.filter(|name| !name.starts_with("slab") && !name.ends_with("color_map") && !others.contains(name)).collect()
+}
+
+/// The runs whose true error is resolved, with the preset.
+fn resolved<'a>(rows: &'a [Row]) -> impl Iterator<Item = (&'a Row, usize, &'a Measured)> {
+    let runs = |row: &'a Row| {
+        let of = move |k: usize| row.presets[k].iter().map(move |run| (row, k, run));
+        (0..PRESETS.len()).flat_map(of)
+    };
+    rows.iter().flat_map(runs).filter(|(.., run)| run.is_resolved && run.errors.rel_l2 > MIN_ERROR)
+}
+
+/// A sentence on the ratio of stated and true errors.
+fn calibration(rows: &[Row]) -> String {
+    let ratios: Vec<f64> = resolved(rows).map(|(.., run)| run.stated / run.errors.rel_l2).collect();
+    let share = |is_counted: &dyn Fn(f64) -> bool| {
+        100.0 * ratios.iter().filter(|ratio| is_counted(**ratio)).count() as f64 / ratios.len().max(1) as f64
+    };
+    format!(
+        "Stated over true error of {} resolved runs: {:.0} % between 0.5 and 2, {:.0} % below 0.5, {:.0} % above 2; smallest {:.2}, largest {:.1}.",
+        ratios.len(),
+        share(&|ratio| (0.5..=2.0).contains(&ratio)),
+        share(&|ratio| ratio < 0.5),
+        share(&|ratio| ratio > 2.0),
+        ratios.iter().copied().fold(f64::INFINITY, f64::min),
+        ratios.iter().copied().fold(0.0, f64::max),
+    )
+}
+
+/// Stated against true errors, with lines at a half of, equal to, and twice the true error.
+fn plot(rows: &[Row]) -> String {
+    let percent = |run: &Measured| (100.0 * run.errors.rel_l2, 100.0 * run.stated.max(MIN_ERROR));
+    let values = || resolved(rows).flat_map(|(.., run)| <[f64; 2]>::from(percent(run)));
+    let axis = LogAxis::over(values());
+    let mut chart = Chart::new(axis, "true relative L2 [%]", axis, "stated relative L2 [%]");
+    let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max));
+    for (factor, dashed) in [(0.5_f64, true), (1.0, false), (2.0, true)] {
+        chart.line(&[(low / factor.max(1.0), low * factor.min(1.0)), (high, high * factor)], "#8a8a8a", dashed);
     }
-    let closed = truth.std_error == 0.0;
-    cells.push(if closed { "closed form".to_owned() } else { format!("± {:.2} %", 100.0 * truth.std_error) });
-    format!("| {} |", cells.join(" | "))
+    for (row, preset, run) in resolved(rows) {
+        let (x, y) = percent(run);
+        chart.dot(x, y, 3.0, ["#d97706", "#2563eb"][preset], &format!("{}, {}", row.name, PRESETS[preset]));
+    }
+    chart.file()
+}
+
+impl Row {
+    fn text(&self) -> String {
+        let all = |runs: &[Measured], value: &dyn Fn(&Measured) -> String| {
+            runs.iter().map(value).collect::<Vec<_>>().join(", ")
+        };
+        let sign = |run: &Measured| if run.is_resolved { "" } else { "≈ " };
+        let mut cells = vec![self.name.clone()];
+        for runs in &self.presets {
+            cells.push(all(runs, &|run| format!("{}{:.2} %", sign(run), 100.0 * run.errors.rel_l2)));
+            cells.push(all(runs, &|run| {
+                format!("{:.2} %{}", 100.0 * run.stated, if run.warns { " (warned)" } else { "" })
+            }));
+            cells.push(all(runs, &|run| format!("{:.1} dB", run.errors.psnr_db)));
+        }
+        let closed = self.std_error == 0.0;
+        cells.push(if closed { "closed form".to_owned() } else { format!("± {:.2} %", 100.0 * self.std_error) });
+        format!("| {} |", cells.join(" | "))
+    }
 }

@@ -1,8 +1,10 @@
 //! Error of a direct sum, estimated from the sum itself.
 //!
-//! Facets are divided into replicates, each of which is a systematic sample of the whole surface. Their spread shows the
-//! error of the facets. Visibility from a half and from a quarter of the azimuths shows the order and the error of
-//! interpolation between azimuths (Richardson 1911), and a soft step of half the width that of the soft step.
+//! Facets are divided into replicates, each of which is a systematic sample of the whole surface. Their spread shows how
+//! the error of the facets is distributed over direction pairs. Its size follows from the difference from a second sample
+//! of fewer facets, because replicates are less even than the whole sample. Visibility from a half and from a quarter of
+//! the azimuths shows the order and the error of interpolation between azimuths (Richardson 1911), and a soft step of half
+//! the width that of the soft step.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -25,6 +27,12 @@ const PAIRS_SEED: u64 = 20_261_123;
 /// Factor within which an estimate is taken to be right. Estimates from six replicates and 200 pairs of tiles whose error
 /// is near a bound are within it in two of three cases (`cargo bench --bench measure -- errors`).
 const UNCERTAINTY: f64 = 1.25;
+/// The variance of a sum over systematic samples falls with the number of facets to this power: 1 for random samples, 2
+/// for smooth integrands.
+pub(crate) const FACETS_POWER: f64 = 1.5;
+/// The second sample has fewer facets by this factor. With a factor of 2 the stated error depends little on
+/// [`FACETS_POWER`]: by 14 % if the true power is 1 or 2.
+pub(crate) const SECOND_SAMPLE_DIVISOR: usize = 2;
 /// Resolutions that show the error of visibility: a half and a quarter of the azimuths, and a soft step of half the
 /// width.
 const HALF: Resolution = Resolution { azimuth_step: 2, softness: 1.0 };
@@ -61,9 +69,6 @@ pub struct ErrorEstimate {
     /// The part of `visibility` that is due to the width of the soft step.
     #[serde(skip)]
     pub soft_step: f64,
-    /// The variance of the facets falls with their number to this power.
-    #[serde(skip)]
-    pub facets_power: f64,
 }
 
 impl ErrorEstimate {
@@ -75,7 +80,7 @@ impl ErrorEstimate {
     }
 
     fn of_table(table: f64) -> Self {
-        Self { rel_l2: table, table, facets_power: 1.0, ..Self::default() }
+        Self { rel_l2: table, table, ..Self::default() }
     }
 
     /// Returns true if the error may exceed a bound, within the uncertainty of the estimate.
@@ -101,8 +106,7 @@ pub struct ErrorEstimator {
     replicates: Vec<(Vec<usize>, FacetSum)>,
     /// Ratio of the error of interpolation between azimuths to its difference from that of half of the azimuths.
     azimuth_ratio: f64,
-    /// Variance of `f̄` relative to that of the spread of the replicates. Systematic samples converge faster than
-    /// random ones, for which it is 1.
+    /// Variance of `f̄` relative to what the spread of the replicates would show if they were random samples.
     variance_ratio: f64,
     estimate: ErrorEstimate,
 }
@@ -117,6 +121,8 @@ struct Deviations {
     coarse: [DVec3; 2],
     /// Twice `f̄` with a soft step of half the width less `f̄`: the error of the soft step is of first order.
     soft_step: DVec3,
+    /// `f̄` of the second sample less `f̄`.
+    second: DVec3,
 }
 
 impl Deviations {
@@ -124,13 +130,6 @@ impl Deviations {
     fn random_variance(&self) -> DVec3 {
         let squares: DVec3 = self.replicates.iter().map(|x| x * x).sum();
         squares / (REPLICATES * (REPLICATES - 1)) as f64
-    }
-
-    /// Variance among means of replicates whose numbers are equal modulo `count`.
-    fn variance_of(&self, count: usize) -> f64 {
-        let part = REPLICATES / count;
-        let mean = |k: usize| (0..part).map(|m| self.replicates[k + m * count]).sum::<DVec3>() / part as f64;
-        (0..count).map(|k| mean(k).length_squared()).sum::<f64>() / (count - 1) as f64
     }
 }
 
@@ -241,12 +240,15 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
 }
 
 impl ErrorEstimator {
-    /// Examines a direct sum over `facets`. `table` is the relative L2 of factors that stand for the sum, or 0.
+    /// Examines a direct sum over `facets`. `second` is the sum over a second sample of the surface, with
+    /// [`SECOND_SAMPLE_DIVISOR`] times fewer facets. Without it the replicates alone show the error of the facets: it then is
+    /// too large, by up to a factor of 6, on surfaces of few large triangles. `table` is the relative L2 of factors that stand
+    /// for the sum, or 0.
     pub fn new(
         direct: &Direct,
         facets: &Facets,
-        material_of_slot: &[usize],
-        materials: &[Material],
+        (material_of_slot, materials): (&[usize], &[Material]),
+        second: Option<&Direct>,
         table: f64,
     ) -> Self {
         let sum_of = |replicate: usize| {
@@ -257,9 +259,9 @@ impl ErrorEstimator {
         };
         let replicates = if facets.replicates.is_empty() { Vec::new() } else { (0..REPLICATES).map(sum_of).collect() };
         let estimate = ErrorEstimate::of_table(table);
-        let mut estimator =
-            Self { direct: direct.clone(), replicates, azimuth_ratio: 1.0, variance_ratio: 1.0, estimate };
-        estimator.examine(table);
+        let variance_ratio = (REPLICATES as f64).powf(1.0 - FACETS_POWER);
+        let mut estimator = Self { direct: direct.clone(), replicates, azimuth_ratio: 1.0, variance_ratio, estimate };
+        estimator.examine(second, table);
         estimator
     }
 
@@ -277,22 +279,23 @@ impl ErrorEstimator {
             let table = deviations.f_bar * self.estimate.table;
             (facets + visibility + table * table).map(f64::sqrt).as_vec3()
         };
-        pairs.par_iter().map(|pair| of(self.deviations(*pair))).collect()
+        pairs.par_iter().map(|pair| of(self.deviations(None, *pair))).collect()
     }
 
-    fn examine(&mut self, table: f64) {
-        let all = PAIRS.evaluate(|pair| self.deviations(pair), |at| at.f_bar);
+    fn examine(&mut self, second: Option<&Direct>, table: f64) {
+        let all = PAIRS.evaluate(|pair| self.deviations(second, pair), |at| at.f_bar);
         let totals = Totals::of(all.iter().map(|at| at.f_bar));
         if totals.norm <= 0.0 {
             return;
         }
         let total = |of: &dyn Fn(&Deviations) -> f64| all.iter().map(of).sum::<f64>();
-        let [six, three, two] = [6, 3, 2].map(|count| total(&|at| at.variance_of(count)));
-        // Variance falls with the number of facets to this power: 1 for random samples, 2 for smooth integrands over a surface.
-        let facets_power = if two > 0.0 { ((six / two).ln() / 3.0_f64.ln()).clamp(1.0, 2.0) } else { 1.0 };
-        let variance = (three * 3.0_f64.powf(-facets_power) * two * 2.0_f64.powf(-facets_power)).sqrt();
         let random = total(&|at| at.random_variance().element_sum());
-        self.variance_ratio = if random > 0.0 { variance / random } else { 0.0 };
+        if second.is_some() && random > 0.0 {
+            // The squared difference of two samples has the sum of their variances as its expectation.
+            let variances = 1.0 + (SECOND_SAMPLE_DIVISOR as f64).powf(FACETS_POWER);
+            self.variance_ratio = total(&|at| at.second.length_squared()) / variances / random;
+        }
+        let variance = random * self.variance_ratio;
         let [half, quarter] = [0, 1].map(|k| total(&|at| at.coarse[k].length_squared()).sqrt());
         // Second order for smooth horizons, and first order where horizons jump.
         let order = if half > 0.0 && quarter > 0.0 { (quarter / half).log2().clamp(1.0, 2.0) } else { 1.0 };
@@ -303,10 +306,10 @@ impl ErrorEstimator {
         let (facets, visibility) = (relative(variance), azimuths.hypot(soft_step));
         let rel_l2 = facets.hypot(visibility).hypot(table);
         let psnr_db = totals.psnr_db(rel_l2);
-        self.estimate = ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, azimuths, soft_step, facets_power };
+        self.estimate = ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, azimuths, soft_step };
     }
 
-    fn deviations(&self, pair: Pair) -> Deviations {
+    fn deviations(&self, second: Option<&Direct>, pair: Pair) -> Deviations {
         let Pair { i, o } = pair;
         let mut deviations = Deviations::default();
         if i.z <= 0.0 || o.z <= 0.0 {
@@ -330,6 +333,11 @@ impl ErrorEstimator {
             for (deviation, (part_area, reflected)) in deviations.replicates.iter_mut().zip(&parts) {
                 *deviation = (reflected - deviations.f_bar * part_area) * (REPLICATES as f64 / area);
             }
+        }
+        if let Some(second) = second {
+            let mut reflected = DVec3::ZERO;
+            let area = second.sums(&[i], o, |_, sum| reflected = sum);
+            deviations.second = if area > 0.0 { reflected / area } else { DVec3::ZERO } - deviations.f_bar;
         }
         let mut finer = deviations.f_bar;
         for (resolution, deviation) in [HALF, QUARTER].into_iter().zip(&mut deviations.coarse) {

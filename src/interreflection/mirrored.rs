@@ -32,7 +32,7 @@ impl MirroredNodes {
             if lowest == node {
                 computed.push(node);
             }
-            // The images of a node have higher indices, so `computed` already contains `lowest`.
+            // `lowest` is at most `node`, so it was visited and `computed` contains it.
             let at = computed.binary_search(&lowest).unwrap_or(0);
             originals.push((at, reflection));
         }

@@ -37,7 +37,7 @@ pub use self::gpu_tile::GpuTile;
 use self::inputs::{Processor, TileInputs};
 use self::low_rank::FactorInputs;
 pub use self::outcome::Outcome;
-use self::outcome::limits;
+use self::outcome::{ExaminedSum, limits};
 use self::refine::RefinedSum;
 pub use self::shading::ShadingBrdf;
 use self::shading::{LastShading, Shading, ShadingKeys};
@@ -235,7 +235,8 @@ impl Pipeline {
     /// the representation that images read.
     fn outcome_of(&self, scene: &Scene, refined: RefinedSum, mut times: StageTimes) -> Result<Outcome> {
         let refinement_note = refined.note();
-        let RefinedSum { inputs, visibility, direct, estimator, .. } = refined;
+        let RefinedSum { inputs, visibility, direct, estimate, .. } = refined;
+        let (close_to_bound, algorithm) = (estimate.is_some(), inputs.plan.algorithm);
         let keys = self.shading_keys(&inputs, &visibility);
         let start = Instant::now();
         let (mut brdf, factored) = self.product(direct.clone(), &inputs, &visibility, keys.lobes)?;
@@ -277,10 +278,9 @@ impl Pipeline {
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),
-            direct: Some((direct, material_of_slot)),
-            close_to_bound: estimator.is_some(),
-            // The error of the factors is not in this estimator.
-            estimator: Arc::new(estimator.filter(|_| !is_low_rank).map_or_else(OnceLock::new, OnceLock::from)),
+            close_to_bound,
+            direct: Some(ExaminedSum { direct, tile, material_of_slot, algorithm, env: self.env.clone() }),
+            estimator: Arc::default(),
         })
     }
 

@@ -4,13 +4,19 @@ use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
+use super::Env;
 use super::shading::{Shading, ShadingBrdf};
-use super::stage::StageTimes;
+use super::stage::{Keyed, StageTimes, run_without_memo};
+use super::stages::{ComputeVisibility, FacetsRole, SampleFacets, TileShape};
 use crate::base::{Cancel, Result};
+use crate::brdf::Material;
+use crate::cache::{Cache, Key};
 use crate::diagnostics::{Health, HealthInputs, Limits};
-use crate::effective::{Direct, EffectiveBrdf, ErrorEstimator, Reflectance, Representation};
+use crate::effective::{
+    Direct, EffectiveBrdf, ErrorEstimator, FacetSum, Reflectance, Representation, SECOND_SAMPLE_DIVISOR,
+};
 use crate::metrics::Errors;
-use crate::plan::{Plan, Settings};
+use crate::plan::{Plan, Settings, VisibilityAlgorithm};
 
 /// The effective BRDF of a scene, and how it was computed.
 #[derive(Debug, Clone)]
@@ -28,11 +34,48 @@ pub struct Outcome {
     /// The health report, once [`Outcome::health`] computed it.
     pub examined: Arc<OnceLock<Health>>,
     pub(super) shading: Arc<Shading>,
-    /// The direct sum and the materials of its slots, from which errors are estimated; absent with the paper's method.
-    pub(super) direct: Option<(Direct, Vec<usize>)>,
+    /// The direct sum whose error is estimated; absent with the paper's method.
+    pub(super) direct: Option<ExaminedSum>,
     pub(super) estimator: Arc<OnceLock<ErrorEstimator>>,
-    /// The estimated error decided whether the result was refined.
+    /// True if the quick estimate was too close to the bound to rule refinement out.
     pub(super) close_to_bound: bool,
+}
+
+/// A direct sum, and what a second sample of its surface needs.
+#[derive(Debug, Clone)]
+pub(super) struct ExaminedSum {
+    pub direct: Direct,
+    pub tile: Keyed<TileShape>,
+    pub material_of_slot: Vec<usize>,
+    pub algorithm: VisibilityAlgorithm,
+    pub env: Env,
+}
+
+impl ExaminedSum {
+    /// The sum over other facets of the same surface, fewer by [`SECOND_SAMPLE_DIVISOR`]. The memo keeps the facets of the
+    /// result itself.
+    fn second_sample(&self, settings: &Settings, materials: &[Material], cancel: &Cancel) -> Result<Direct> {
+        /// Added to the seed, so that no scene is likely to ask for the facets of the second sample.
+        const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+        let Self { tile, material_of_slot, algorithm, .. } = self;
+        let settings = Settings {
+            facets: settings.facets.div_ceil(SECOND_SAMPLE_DIVISOR),
+            seed: settings.seed.wrapping_add(SEED_STEP),
+            ..settings.clone()
+        };
+        let mut env = self.env.clone();
+        env.cancel = cancel.clone();
+        let (disk, mut times) = (Cache::default(), StageTimes::new());
+        let sample = SampleFacets { tile, settings: &settings, role: FacetsRole::Main };
+        let facets = Arc::new(run_without_memo(&sample, &env, &disk, &mut times)?);
+        let facets = Keyed { key: Key::of_numbers(b"second sample"), value: facets };
+        let (algorithm, settings) = (*algorithm, &settings);
+        let visible = ComputeVisibility { tile, facets: &facets, algorithm, settings, refined: false };
+        let visibility = run_without_memo(&visible, &env, &disk, &mut times)?;
+        let mut sum = FacetSum::new(&facets, material_of_slot, materials);
+        sum.force(&facets, &settings.effects);
+        Ok(Direct::new(Arc::new(sum), Arc::new(visibility)))
+    }
 }
 
 impl Outcome {
@@ -55,16 +98,34 @@ impl Outcome {
         self.shading.known()
     }
 
-    /// Estimates the errors of the result. The first call examines some dozens of direction pairs. `None` with the paper's
-    /// method. Interreflection and the sampling of its rays are not examined.
+    /// Estimates the errors of the result, as [`Outcome::errors_unless`].
     pub fn errors(&self) -> Option<&ErrorEstimator> {
-        let (direct, material_of_slot) = self.direct.as_ref()?;
-        Some(self.estimator.get_or_init(|| {
-            let HealthInputs { facets, materials, .. } = &self.health_inputs;
-            let is_low_rank = matches!(self.brdf.direct_representation(), Representation::LowRank(_));
-            let table = self.factored.filter(|_| is_low_rank).map_or(0.0, |errors| errors.rel_l2);
-            ErrorEstimator::new(direct, facets, material_of_slot, &materials.materials, table)
-        }))
+        self.errors_unless(&Cancel::default()).ok().flatten()
+    }
+
+    /// Estimates the errors of the result. The first call computes a second sample of the facets with their visibility, in
+    /// about half of the time of the result, and examines some hundreds of direction pairs. `None` with the paper's method.
+    /// Interreflection and the sampling of its rays are not examined.
+    ///
+    /// # Errors
+    /// [`crate::base::Error::Cancelled`].
+    pub fn errors_unless(&self, cancel: &Cancel) -> Result<Option<&ErrorEstimator>> {
+        let Some(examined) = &self.direct else { return Ok(None) };
+        if let Some(estimator) = self.estimator.get() {
+            return Ok(Some(estimator));
+        }
+        let HealthInputs { facets, materials, .. } = &self.health_inputs;
+        let is_low_rank = matches!(self.brdf.direct_representation(), Representation::LowRank(_));
+        let table = self.factored.filter(|_| is_low_rank).map_or(0.0, |errors| errors.rel_l2);
+        let slots = (&examined.material_of_slot[..], &materials.materials[..]);
+        // Without replicates the facets are exact.
+        let second = if facets.replicates.is_empty() {
+            None
+        } else {
+            Some(examined.second_sample(&self.settings, &materials.materials, cancel)?)
+        };
+        let new = || ErrorEstimator::new(&examined.direct, facets, slots, second.as_ref(), table);
+        Ok(Some(self.estimator.get_or_init(new)))
     }
 
     /// The health of the result. The first call measures it: some hundredths of a second at draft.

@@ -33,7 +33,7 @@ pub trait Stage {
     /// True if `run` never returns early on cancellation. Its output is then stored even if the operation was cancelled.
     const IGNORES_CANCEL: bool = false;
 
-    /// The slot in the memo. Two slots keep two results of one stage that different callers need in turns.
+    /// The entry in the memo. Two entries keep two results of one stage that different callers need in turns.
     fn slot(&self) -> &'static str {
         Self::NAME
     }

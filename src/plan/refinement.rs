@@ -1,7 +1,7 @@
 //! Settings that are raised until the estimated error of a result is within the bound of its preset.
 
 use super::Settings;
-use crate::effective::{ErrorBound, ErrorEstimate};
+use crate::effective::{ErrorBound, ErrorEstimate, FACETS_POWER};
 
 /// Part of the bound that a refined result should have, so that one refinement usually suffices.
 const AIM: f64 = 0.7;
@@ -55,8 +55,7 @@ impl Refinement {
         let mut next = self;
         let of_facets = facets / allowed(facets, [azimuths, soft_step]);
         if of_facets > 1.0 {
-            // The squared error falls with the number of facets to `facets_power`.
-            let wanted = of_facets.powf(2.0 / estimate.facets_power);
+            let wanted = of_facets.powf(2.0 / FACETS_POWER);
             next.facets *= (wanted.min(MAX_STEP as f64).ceil() as usize).next_power_of_two();
         }
         let of_azimuths = azimuths / allowed(azimuths, [facets, soft_step]);
@@ -92,15 +91,15 @@ mod tests {
         let visibility = azimuths.hypot(soft_step);
         let rel_l2 = facets.hypot(visibility);
         let psnr_db = Some(40.0);
-        ErrorEstimate { rel_l2, psnr_db, facets, visibility, table: 0.0, azimuths, soft_step, facets_power: 1.0 }
+        ErrorEstimate { rel_l2, psnr_db, facets, visibility, table: 0.0, azimuths, soft_step }
     }
 
     #[test]
     fn only_the_setting_that_causes_the_error_is_raised() {
         let next = |estimate: ErrorEstimate| Refinement::NONE.next(&estimate, BOUND, &settings());
         assert_eq!(next(estimate(0.06, 0.04, 0.03)), None);
-        // 0.15 is to become 0.069: a factor of 4.8 in facets, which is rounded up.
-        assert_eq!(next(estimate(0.15, 0.01, 0.01)), Some(Refinement { facets: 8, azimuths: 1, sharpness: 1 }));
+        // 0.15 is to become 0.069: a factor of 2.8 in facets, which is rounded up.
+        assert_eq!(next(estimate(0.15, 0.01, 0.01)), Some(Refinement { facets: 4, azimuths: 1, sharpness: 1 }));
         assert_eq!(next(estimate(0.01, 0.3, 0.01)), Some(Refinement { facets: 1, azimuths: 4, sharpness: 1 }));
         assert_eq!(next(estimate(0.01, 0.01, 0.2)), Some(Refinement { facets: 1, azimuths: 1, sharpness: 2 }));
     }

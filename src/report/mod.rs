@@ -3,7 +3,7 @@
 mod conclusions;
 mod effects;
 mod html;
-mod svg;
+pub mod svg;
 mod thumbnails;
 
 use std::fmt::Write as _;

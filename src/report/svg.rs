@@ -142,7 +142,17 @@ impl Chart {
         );
     }
 
-    /// Returns the SVG element.
+    /// Returns the text of an SVG file.
+    pub fn file(self) -> String {
+        format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {WIDTH} {HEIGHT}' width='{WIDTH}' height='{HEIGHT}' font-family='sans-serif'>\
+             <style>.grid {{ stroke: #d4d4d4 }} .tick {{ font-size: 12px; fill: #555 }} .label {{ font-size: 13px }}</style>\
+             <rect width='{WIDTH}' height='{HEIGHT}' fill='white'/>{}</svg>\n",
+            self.body
+        )
+    }
+
+    /// Returns the SVG element for an HTML page.
     pub fn finish(self) -> String {
         format!("<svg viewBox='0 0 {WIDTH} {HEIGHT}' role='img'>{}</svg>", self.body)
     }

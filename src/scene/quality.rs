@@ -38,7 +38,7 @@ scene_table! {
         /// Number of elevation rings at which visibility is computed.
         #[serde(skip_serializing_if = "Option::is_none")]
         rings: Option<usize> = None, FieldShape::Integer { min: 2, max: 512 }, "";
-        /// Visibility method: auto (slices, or maps on a hardware GPU), slices or maps (shadow maps).
+        /// Visibility method: auto (a horizon map if nothing overhangs; else shadow maps on a hardware GPU, else slices), slices or maps.
         #[serde(skip_serializing_if = "Option::is_none")]
         visibility: Option<String> = None, FieldShape::Choice(VISIBILITIES), "";
         /// Number of bins over the sphere of normals; facets of one bin share one lobe. Empty: no bins.
@@ -68,7 +68,7 @@ scene_table! {
         /// Number of facets that the method `faces` of a slab sums; 0: the method `auto` never sums.
         #[serde(skip_serializing_if = "Option::is_none")]
         slab_facets: Option<usize> = None, FieldShape::Integer { min: 0, max: 65_536 }, "";
-        /// Number of paths per pixel for what is seen through a slab; 0: one filtered lookup per pixel.
+        /// Number of paths per shading point for what is seen through a slab; 0: one filtered lookup per point.
         #[serde(skip_serializing_if = "Option::is_none")]
         paths: Option<usize> = None, FieldShape::Integer { min: 0, max: 1_000_000 }, "";
         /// Width of the soft transition of visibility at a horizon.

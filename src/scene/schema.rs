@@ -81,7 +81,7 @@ pub enum FieldShape {
     AnyOf(&'static [FieldShape]),
 }
 
-/// One alternative of a tagged table: a geometry family or a BRDF model.
+/// One alternative of a table with `kind`, such as a geometry family, a BRDF model or a face of a slab.
 #[derive(Debug, Clone)]
 pub struct Kind {
     pub kind: &'static str,

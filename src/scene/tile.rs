@@ -15,7 +15,7 @@ pub struct Tile {
     /// Extent of the period in x and y, tile units.
     #[serde(default = "unit_square")]
     pub size: Vec2,
-    /// Name of the tile unit; it is displayed and changes no result.
+    /// Name of the tile unit; only exports of true size (.stl, .svg, .pdf) depend on it.
     #[serde(default = "millimetre")]
     pub unit: String,
     /// Image of linear colour weights over the tile, projected along z; they multiply the materials.

@@ -17,8 +17,8 @@ const FINE_FACETS: usize = 24_000;
 /// Settings at the quality level `level` in `0..=FINEST`: a direct sum over `16 · 2^level` facets. The number of
 /// azimuths makes the error of visibility as large as that of the sum; overhangs take 1.5 times as many.
 ///
-/// Facets and azimuths are balanced as in `draft`, `standard` and `fine`. The error of the sum falls with about the
-/// 0.75th power of the number of facets, the error of horizons with the square of the number of azimuths.
+/// The error of the sum falls with about the 0.75th power of the number of facets, the error of horizons with the square
+/// of the number of azimuths.
 pub fn candidate_at(level: f64, overhangs: bool) -> Candidate {
     let level = if level.is_finite() { level.clamp(0.0, FINEST) } else { 0.0 };
     let facets = (COARSEST_FACETS * level.exp2()).round();

@@ -23,7 +23,7 @@ const REFERENCE_LEAD_DB: f64 = 5.0;
 /// error.
 const MAX_CORRECTION: f64 = 2.0;
 
-/// Reference values of a scene at a few hundred pairs, with their standard error.
+/// Reference values of a scene at 64 direction pairs, with their standard error.
 #[derive(Debug, Clone)]
 pub struct TargetReference {
     pairs: Vec<Pair>,

@@ -210,7 +210,7 @@ impl ImageWorker {
         report(ImageResult::Rendered(Box::new(preview)));
         // The estimate takes some tenths of a second on all cores. It never runs while the user edits.
         if context.is_newest_after(STATED_PAUSE)
-            && let Some(errors) = outcome.errors()
+            && let Some(errors) = outcome.errors_unless(context.cancel)?
         {
             report(ImageResult::Stated(outcome.brdf.clone(), errors.estimate()));
         }

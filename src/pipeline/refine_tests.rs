@@ -1,0 +1,81 @@
+use glam::Vec3;
+
+use super::*;
+use crate::metrics::mirror_biased_pairs;
+use crate::pipeline::Outcome;
+
+/// Grooves whose horizons jump between azimuths.
+const DEEP_GROOVES: [&str; 3] =
+    ["tile.geometry.depth=2.5", "tile.geometry.side_angle_deg=89", "tile.geometry.rotation_deg=32"];
+
+fn open(scene: &str, preset: &str, settings: &[&str]) -> LoadedScene {
+    let mut all = vec![format!("quality.preset={preset}"), "quality.backend=cpu".to_owned()];
+    all.extend(settings.iter().map(|&setting| setting.to_owned()));
+    crate::scene::open(scene, &all).unwrap()
+}
+
+fn effective(loaded: &LoadedScene) -> Outcome {
+    Pipeline::new().effective(loaded).unwrap()
+}
+
+fn values(outcome: &Outcome) -> Vec<Vec3> {
+    mirror_biased_pairs(20, 3).iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect()
+}
+
+fn refines(outcome: &Outcome) -> bool {
+    outcome.notes.iter().any(|note| note.starts_with("refined to "))
+}
+
+#[test]
+fn a_result_within_its_bound_has_the_same_bits_without_refinement() {
+    for scene in ["table4_plate", "fig4b_bicolor_cup", "fig6d_velvet_left", "fig9b_cylinder_stripes"] {
+        let (with, without) =
+            (effective(&open(scene, "draft", &[])), effective(&open(scene, "draft", &["quality.adaptive=false"])));
+        assert_eq!(values(&with), values(&without), "{scene}");
+        assert!(!refines(&with) && with.times.iter().any(|(name, _)| *name == "error_estimate"), "{scene}");
+        assert!(without.times.iter().all(|(name, _)| *name != "error_estimate"), "{scene}");
+    }
+}
+
+#[test]
+fn a_difficult_tile_is_refined_until_it_states_an_error_within_the_bound() {
+    let plain = effective(&open("fig1d_yellow_sides", "fine", &["quality.adaptive=false"]));
+    let bound = plain.settings.error_bound().unwrap();
+    let loaded = open("fig1d_yellow_sides", "fine", &DEEP_GROOVES);
+    let outcome = effective(&loaded);
+    assert!(refines(&outcome), "{:?}", outcome.errors().unwrap().estimate());
+    assert!(outcome.settings.facets > plain.settings.facets || outcome.settings.horizon_azimuths > 96);
+    let estimate = outcome.errors().unwrap().estimate();
+    let warns = outcome.health().warnings.iter().any(|warning| warning.contains("error is estimated at"));
+    assert_eq!(warns, estimate.may_exceed(bound), "{estimate:?}");
+}
+
+#[test]
+fn limits_end_refinement_and_a_warning_states_the_error() {
+    let mirror = "material.default.brdf={kind=\"cook_torrance\",roughness=0.02,f0=[1,1,1]}";
+    let loaded = open("fig8d_leather", "standard", &["quality.max_facets=16", mirror]);
+    let outcome = effective(&loaded);
+    let estimate = outcome.errors().unwrap().estimate();
+    assert!(estimate.may_exceed(outcome.settings.error_bound().unwrap()), "{estimate:?}");
+    let warning = outcome.health().warnings.iter().find(|warning| warning.contains("error is estimated at")).unwrap();
+    assert!(warning.contains("`standard` allows 10 %"), "{warning}");
+}
+
+#[test]
+fn a_refined_result_does_not_depend_on_earlier_edits() {
+    let pipeline = Pipeline::new();
+    let refined = open("fig1d_yellow_sides", "fine", &DEEP_GROOVES);
+    let plain = open("fig1d_yellow_sides", "fine", &["tile.geometry.depth=0.02"]);
+    let first = values(&pipeline.effective(&refined).unwrap());
+    assert!(!refines(&pipeline.effective(&plain).unwrap()));
+    assert_eq!(values(&pipeline.effective(&refined).unwrap()), first);
+    assert_eq!(values(&effective(&refined)), first);
+}
+
+#[test]
+fn a_scene_that_sets_the_resolution_is_not_refined() {
+    for setting in ["quality.facets=64", "quality.azimuths=4", "quality.penumbra_deg=2.0"] {
+        let outcome = effective(&open("fig1d_yellow_sides", "draft", &[setting, DEEP_GROOVES[0]]));
+        assert!(!refines(&outcome) && outcome.times.iter().all(|(name, _)| *name != "error_estimate"), "{setting}");
+    }
+}
