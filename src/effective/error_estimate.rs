@@ -241,9 +241,9 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
 
 impl ErrorEstimator {
     /// Examines a direct sum over `facets`. `second` is the sum over a second sample of the surface, with
-    /// [`SECOND_SAMPLE_DIVISOR`] times fewer facets. Without it the replicates alone show the error of the facets: it then is
-    /// too large, by up to a factor of 6, on surfaces of few large triangles. `table` is the relative L2 of factors that stand
-    /// for the sum, or 0.
+    /// [`SECOND_SAMPLE_DIVISOR`] times fewer facets. Without it, facets count as random samples: their error then is too large,
+    /// by up to a factor of 6, on surfaces of few large triangles. `table` is the relative L2 of factors that stand for the
+    /// sum, or 0.
     pub fn new(
         direct: &Direct,
         facets: &Facets,
@@ -259,8 +259,8 @@ impl ErrorEstimator {
         };
         let replicates = if facets.replicates.is_empty() { Vec::new() } else { (0..REPLICATES).map(sum_of).collect() };
         let estimate = ErrorEstimate::of_table(table);
-        let variance_ratio = (REPLICATES as f64).powf(1.0 - FACETS_POWER);
-        let mut estimator = Self { direct: direct.clone(), replicates, azimuth_ratio: 1.0, variance_ratio, estimate };
+        let mut estimator =
+            Self { direct: direct.clone(), replicates, azimuth_ratio: 1.0, variance_ratio: 1.0, estimate };
         estimator.examine(second, table);
         estimator
     }
