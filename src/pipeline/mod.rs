@@ -57,7 +57,7 @@ use crate::effective::{Direct, EffectiveBrdf, Representation};
 use crate::geometry::{Facets, TileMesh};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
 use crate::metrics::Errors;
-use crate::plan::{Preset, Refinement, Settings, VisibilityAlgorithm};
+use crate::plan::{Preset, ProductMethod, Refinement, Settings, VisibilityAlgorithm};
 use crate::reference::Reference;
 use crate::scene::{LoadedScene, Scene, Switch};
 use crate::visibility::Visibility;
@@ -267,6 +267,8 @@ impl Pipeline {
             closes_plane: tile.mesh.closes_plane,
             max_color_weight: tile.mesh.color.max(),
         };
+        // Factors that are asked for are used whatever their error is.
+        let asks_for_factors = is_low_rank && settings.method == ProductMethod::LowRank;
         Ok(Outcome {
             brdf,
             plan,
@@ -278,7 +280,7 @@ impl Pipeline {
             examined: Arc::default(),
             shading: Arc::new(shading),
             direct: Some((direct, material_of_slot)),
-            close_to_bound: estimator.is_some(),
+            close_to_bound: estimator.is_some() || asks_for_factors,
             // The error of the factors is not in this estimator.
             estimator: Arc::new(estimator.filter(|_| !is_low_rank).map_or_else(OnceLock::new, OnceLock::from)),
         })

@@ -31,7 +31,8 @@ pub struct Outcome {
     /// The direct sum and the materials of its slots, from which errors are estimated; absent with the paper's method.
     pub(super) direct: Option<(Direct, Vec<usize>)>,
     pub(super) estimator: Arc<OnceLock<ErrorEstimator>>,
-    /// The estimated error decided whether the result was refined.
+    /// The error may exceed what the preset allows: its estimate decided whether the result was refined, or factors were asked
+    /// for.
     pub(super) close_to_bound: bool,
 }
 
