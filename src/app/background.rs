@@ -141,14 +141,19 @@ impl Editor {
         if self.accuracy.is_late(version) {
             worker.cancel();
         }
-        let is_final = |preview: &RenderedPreview| preview.grade == Grade::Final && preview.version == version;
         let is_shown = self.object.preview.is_some() && self.exporting.is_none();
-        let is_final = self.object.preview.as_deref().is_some_and(is_final);
+        let is_final = self.shows_final_image();
         if let (true, Some((_, loaded))) = (is_shown, &self.background.loaded)
             && let Some(job) = self.accuracy.job(version, loaded, is_final)
         {
             worker.submit(job);
         }
+    }
+
+    fn shows_final_image(&self) -> bool {
+        let version = self.document.version();
+        let preview = self.object.preview.as_deref();
+        preview.is_some_and(|preview| preview.grade == Grade::Final && preview.version == version)
     }
 
     /// Submits the images of the scene's methods once its own image is final, and cancels those that are late.
@@ -158,8 +163,7 @@ impl Editor {
         if self.methods.is_late(version) {
             worker.cancel();
         }
-        let is_final = |preview: &RenderedPreview| preview.grade == Grade::Final && preview.version == version;
-        let is_final = self.object.preview.as_deref().is_some_and(is_final) && self.exporting.is_none();
+        let is_final = self.shows_final_image() && self.exporting.is_none();
         if let Some((_, loaded)) = &self.background.loaded
             && let Some(job) = self.methods.job(version, loaded, self.size, is_final)
         {

@@ -103,6 +103,9 @@ fn faster_and_finer_settings_are_taken_by_a_click_and_undone_in_one_step() {
     assert_eq!(editor(&mut harness).document.scene().quality.facets, Some(1024));
     editor(&mut harness).document.undo();
     assert_eq!(editor(&mut harness).document.scene().quality, before);
+    // The strip must not move between the press and the release of the button.
+    harness.step();
+    settle(&mut harness);
     let version = editor(&mut harness).document.version();
     editor(&mut harness).accuracy.record(version, vec![point(4096, 1300.0, 61.0)], point(128, 410.0, 52.0));
     harness.run_steps(2);
