@@ -73,6 +73,11 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ),
     ("interpolation", "errors of low-rank factors by interpolation alone", Source::Here(interpolation)),
     ("latency", "time from an edit in the editor to its images", in_lib("latency_from_a_slider")),
+    (
+        "latency-stops",
+        "time from a dragged stop of a colour map to its images in the editor",
+        in_lib("latency_from_a_dragged_stop"),
+    ),
     ("lobes", "nanoseconds per facet of each analytic lobe", in_lib("nanoseconds_per_facet")),
     ("map-resolution", "error and time of shadow maps against resolution", in_lib("resolution_against_error")),
     ("map-speed", "speed of shadow maps on the CPU and on the GPU", in_lib("speed_of_the_cpu_and_of_the_gpu")),

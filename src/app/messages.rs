@@ -2,7 +2,7 @@
 //!
 //! Notes disappear by themselves. Errors stay until the user closes them or their cause is gone.
 
-use eframe::egui::{self, Align2, Area, Color32, Context, Frame, Order, Rect, Response, Ui};
+use eframe::egui::{self, Align2, Area, Color32, Context, Frame, Order, Rect, Response, ScrollArea, Ui};
 
 use super::theme;
 
@@ -86,25 +86,34 @@ impl Messages {
                     self.unfolded = !self.unfolded;
                 }
             }
-            for at in visible {
-                let message = &mut self.list[at];
-                let (shown, close) = line(ui, message);
-                if close {
-                    closed = Some(at);
-                }
-                if message.level == Level::Note {
-                    let full = now + message.seconds();
-                    let until = message.until.get_or_insert(full);
-                    if shown.contains_pointer() {
-                        *until = until.max(now + AFTER_HOVER);
-                    }
-                    ctx.request_repaint_after_secs((*until - now) as f32 + 0.05);
-                }
-            }
+            // Long messages must not cover what lies below the view.
+            let height = (over.height() - 2.0 * MARGIN - 30.0).max(30.0);
+            ScrollArea::vertical().max_height(height).show(ui, |ui| closed = self.lines_ui(ui, visible, now));
         });
         let closed = closed.map(|at| self.list.remove(at))?;
         self.list.retain(|message| message.text != closed.text);
         Some(closed.source)
+    }
+
+    /// Draws the lines of messages. Returns the index of the one that the user closed.
+    fn lines_ui(&mut self, ui: &mut Ui, visible: Vec<usize>, now: f64) -> Option<usize> {
+        let mut closed = None;
+        for at in visible {
+            let message = &mut self.list[at];
+            let (shown, close) = line(ui, message);
+            if close {
+                closed = Some(at);
+            }
+            if message.level == Level::Note {
+                let full = now + message.seconds();
+                let until = message.until.get_or_insert(full);
+                if shown.contains_pointer() {
+                    *until = until.max(now + AFTER_HOVER);
+                }
+                ui.ctx().request_repaint_after_secs((*until - now) as f32 + 0.05);
+            }
+        }
+        closed
     }
 
     /// Indices of the visible messages, in the order of arrival, and the number of hidden ones. Errors and the newest
@@ -128,7 +137,7 @@ impl Messages {
 fn line(ui: &mut Ui, message: &Message) -> (Response, bool) {
     let color = match message.level {
         Level::Note | Level::Guide => theme::ACCENT,
-        Level::Error => theme::WARNING,
+        Level::Error => theme::warning(ui.visuals()),
     };
     let frame = Frame::new()
         .fill(ui.visuals().panel_fill.lerp_to_gamma(color, 0.22))

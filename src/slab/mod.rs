@@ -44,6 +44,6 @@ pub use rows::SlabRow;
 pub use slope_table::SlopeTable;
 pub use spread::Spread;
 pub use straight::{Straight, straight};
-pub use view::SlabView;
+pub use view::{BtdfView, SlabView};
 pub use virtual_face::virtual_face;
 pub use walk::{Exit, Losses, Walk};

@@ -258,7 +258,7 @@ fn stated_point(outcome: &Outcome, ms: f64) -> AccuracyPoint {
 }
 
 /// The inputs of the reference and of the levels: the scene without settings, object, light and camera.
-fn without_settings(loaded: &LoadedScene) -> LoadedScene {
+pub fn without_settings(loaded: &LoadedScene) -> LoadedScene {
     let mut key = loaded.clone();
     key.scene.quality = Quality { seed: key.scene.quality.seed, ..Quality::default() };
     key.scene.camera = None;

@@ -338,7 +338,7 @@ impl ImageWorker {
 }
 
 /// The view's size, reduced to the largest size that is rendered.
-fn fitting(size: [usize; 2], max_pixels: f64) -> [usize; 2] {
+pub(super) fn fitting(size: [usize; 2], max_pixels: f64) -> [usize; 2] {
     let size = size.map(|side| side.clamp(24, 8192));
     let longest = size[0].max(size[1]) as f64;
     let scale = (max_pixels / (size[0] * size[1]) as f64).sqrt().min(MAX_SIDE / longest).min(1.0);

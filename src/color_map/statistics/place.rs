@@ -76,6 +76,11 @@ impl PlaceDriver {
         self.mips().reads(&self.grid, centre, covariance, taps)
     }
 
+    /// The mean over a footprint [deviations], by one read as of a mip-mapped texture.
+    pub fn mean(&self, footprint: &Footprint) -> f64 {
+        self.reads(footprint, 1).iter().map(|(weight, at)| weight * at.mean).sum()
+    }
+
     /// Values between texels as well, because footprints see the interpolated surface.
     fn surface_values(&self) -> Vec<(f32, f32)> {
         let size = self.grid.size;

@@ -2,6 +2,7 @@
 //! geometry, and the rest is filtered in the plane of its slope. Far away nothing but `f̄` is left, without a transition.
 
 mod calibration;
+mod methods;
 mod object;
 mod radiance;
 mod surface;

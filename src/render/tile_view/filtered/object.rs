@@ -98,18 +98,13 @@ impl FilteredTile {
         cancel: &Cancel,
     ) -> Result<()> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
-        let radius = input.mesh.bounds.radius;
-        let scale = self.size().min_element() / f64::from(TILE_RADII * radius);
+        let scale = scale_of(self.size(), input);
+        let nearest = ((view.eye - input.mesh.bounds.center).length() - input.mesh.bounds.radius).max(view.near);
         let width_at = |depth: f32| scale * f64::from(view.pixel_extent() * depth);
-        let nearest = ((view.eye - input.mesh.bounds.center).length() - radius).max(view.near);
         if width_at(nearest) >= self.far() {
             return Ok(());
         }
         let points = visible_points(input.mesh, &view, input.samples_per_side);
-        let Some(anchor) = anchor(input, &view, &points) else { return Ok(()) };
-        let visibility = input
-            .occluder
-            .map(|occluder| occluder.visible_lights(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
         let materials = PixelMaterials::new(materials);
         let none = Calibration::none();
         let calibration = match calibration {
@@ -121,14 +116,51 @@ impl FilteredTile {
             }
             None => &none,
         };
+        let tile_pixels = TilePixels { view, points, scale, far: self.far() };
+        tile_pixels.replace(image, input, cancel, |_, pixel, lights, o, values| {
+            self.eval_lights(pixel, lights, o, &materials, calibration, values);
+        })
+    }
+}
+
+/// Tile units per world unit on the object.
+pub(super) fn scale_of(tile_size: DVec2, input: &RenderInput) -> f64 {
+    tile_size.min_element() / f64::from(TILE_RADII * input.mesh.bounds.radius)
+}
+
+/// The points of an object in an image, and the pixels that they are on its tiles.
+pub(super) struct TilePixels {
+    pub view: CameraView,
+    pub points: ShadingPoints,
+    /// Tile units per world unit.
+    pub scale: f64,
+    /// Width of a pixel [tile units] from which it keeps `f̄`.
+    pub far: f64,
+}
+
+impl TilePixels {
+    /// Replaces `f̄` in an image. `shade` receives the number of a point, its pixel, the directions to the lights that it
+    /// sees and to the viewer, and their `f̄`, which it replaces.
+    pub fn replace(
+        &self,
+        image: &mut Image,
+        input: &RenderInput,
+        cancel: &Cancel,
+        shade: impl Fn(usize, &PixelOnTile, &[Vec3], Vec3, &mut [Vec3]) + Sync,
+    ) -> Result<()> {
+        let Self { view, points, scale, far } = self;
+        let Some(anchor) = anchor(input, view, points) else { return Ok(()) };
+        let visibility = input
+            .occluder
+            .map(|occluder| occluder.visible_lights(input.mesh, points, input.lights, view.eye, input.shadow_cache));
         let changes: Vec<Vec3> = (0..points.len())
             .into_par_iter()
             .with_min_len(64)
             .map(|point| {
                 let (position, z, x) = (points.positions[point], points.normals[point], points.tangents[point]);
                 let depth = (view.eye - position).length();
-                let width = width_at(depth);
-                if width >= self.far() || cancel.is_set() {
+                let width = scale * f64::from(view.pixel_extent() * depth);
+                if width >= *far || cancel.is_set() {
                     return Vec3::ZERO;
                 }
                 let y = z.cross(x);
@@ -146,8 +178,8 @@ impl FilteredTile {
                 let mut far = vec![Vec3::ZERO; directions.len()];
                 input.reflectance.eval_lights(&directions, o, &mut far);
                 let mut near = far.clone();
-                let centre = anchor.along_surface(position).as_dvec2() * scale;
-                self.eval_lights(&PixelOnTile { centre, width }, &directions, o, &materials, calibration, &mut near);
+                let centre = anchor.along_surface(position).as_dvec2() * *scale;
+                shade(point, &PixelOnTile { centre, width }, &directions, o, &mut near);
                 near.iter().zip(&far).zip(&irradiances).map(|((near, far), e)| (*near - *far) * *e).sum()
             })
             .collect();

@@ -165,14 +165,23 @@ impl FilteredTile {
 
     /// The content of a pixel of this width at a place of the tile [tile units].
     pub(super) fn content(&self, at: DVec2, width: f64) -> PixelContent<'_> {
-        let (place, level) = (at / self.size, self.relief.of_width(width));
+        let place = at / self.size;
         let tint = |(slot, tint): &(u16, Levels<3>)| (*slot, Vec3::from(tint.at(place, tint.of_width(width))));
-        let footprint = Footprint { centre: place, covariance: self.covariance(width) };
         PixelContent {
-            relief: ReliefLeft::of(self.relief.at(place, level), self.base),
+            relief: self.relief_left(at, width),
             tints: self.tints.iter().map(tint).filter(|(_, tint)| *tint != Vec3::ZERO).collect(),
-            colors: self.map.at(Some(&footprint)),
+            colors: self.map.at(Some(&self.footprint(at, width))),
         }
+    }
+
+    /// Heights and slopes within a pixel of this width at a place [tile units].
+    pub(super) fn relief_left(&self, at: DVec2, width: f64) -> ReliefLeft {
+        ReliefLeft::of(self.relief.at(at / self.size, self.relief.of_width(width)), self.base)
+    }
+
+    /// The footprint of a pixel of this width at a place [tile units].
+    pub(super) fn footprint(&self, at: DVec2, width: f64) -> Footprint {
+        Footprint { centre: at / self.size, covariance: self.covariance(width) }
     }
 
     /// The content of a pixel far away.
