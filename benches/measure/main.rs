@@ -86,6 +86,11 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
         "errors of images seen through slabs against 4096 paths: a minute",
         in_lib("checkerboards_by_distance_and_times"),
     ),
+    (
+        "slab-figure-7",
+        "a checkerboard behind patterned glass by several models, as images",
+        in_lib("figure_7_by_the_slab_by_one_refraction"),
+    ),
     ("slabs", "errors of the models of slabs against photons, and their times: minutes", Source::Here(slabs)),
     ("slice-steps", "cells and triangles that a slice visits", in_lib("steps_of_slices")),
     ("table-steps", "errors of shading tables against facets, azimuths and nodes", Source::Here(steps)),

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DMat2, DVec2};
+use glam::{DMat2, DVec2, DVec3};
 
 /// A family of distributions of slopes. `q = mᵀ S⁻¹ m` with the matrix of squared roughnesses `S`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,6 +73,23 @@ impl Ellipse {
         self.root * (radius * DVec2::new(cos, sin))
     }
 
+    /// The slope of a facet that the direction `w` above sees, at a point of the unit square: random points give facets by their
+    /// areas as seen along `w` (Heitz 2018). `None` for Beckmann.
+    pub fn visible_slope(&self, w: DVec3, u: f64, v: f64) -> Option<DVec2> {
+        if self.profile != Profile::Ggx {
+            return None;
+        }
+        let stretched = (self.root.transpose() * w.truncate()).extend(w.z).try_normalize()?;
+        let across = DVec2::new(-stretched.y, stretched.x).try_normalize().unwrap_or(DVec2::X).extend(0.0);
+        let along = stretched.cross(across);
+        let (sin, cos) = (TAU * v).sin_cos();
+        let (s, t) = (u.sqrt() * cos, u.sqrt() * sin);
+        let half = 0.5 * (1.0 + stretched.z);
+        let t = (1.0 - half) * (1.0 - s * s).max(0.0).sqrt() + half * t;
+        let normal = s * across + t * along + (1.0 - s * s - t * t).max(0.0).sqrt() * stretched;
+        (normal.z > 1e-9).then(|| self.root * (normal.truncate() / normal.z))
+    }
+
     /// Smith's Λ of a direction `w` with `k = w.xy / w.z` (Walter et al. 2007, Eqs. 34 and 25 for Beckmann and GGX).
     pub fn lambda(&self, k: DVec2) -> f64 {
         let square = k.dot(self.squares * k).max(0.0);
@@ -80,8 +97,8 @@ impl Ellipse {
             Profile::Ggx => 0.5 * ((1.0 + square).sqrt() - 1.0),
             Profile::Beckmann => {
                 let v = 1.0 / square.sqrt();
-                // Λ(6) is below 1e-17.
-                if v > 6.0 {
+                // Λ(4.5) is below 3e-12.
+                if v > 4.5 {
                     return 0.0;
                 }
                 (0.5 * ((-v * v).exp() / (v * PI.sqrt()) - libm::erfc(v))).max(0.0)
@@ -104,6 +121,12 @@ impl Ellipse {
             // Beyond 14 roughnesses lie 0.5 % of the slopes.
             Profile::Ggx => 14.0 * widest,
         }
+    }
+
+    /// Returns true if both roughnesses are the same.
+    pub fn is_round(&self) -> bool {
+        let (x, y) = (self.squares.x_axis.x, self.squares.y_axis.y);
+        (x - y).abs() <= 1e-9 * (x + y) && self.squares.x_axis.y.abs() <= 1e-9 * (x + y)
     }
 
     /// Smallest roughness of any axis.
@@ -150,6 +173,39 @@ mod tests {
                 let bound = if ellipse.profile == Profile::Ggx { 1.2e-2 } else { 3e-4 };
                 assert!((closed / sum - 1.0).abs() < bound, "{ellipse:?} {k}: {closed} {sum}");
             }
+        }
+    }
+
+    #[test]
+    fn visible_slopes_of_ggx_are_the_slopes_by_the_area_that_a_direction_sees() {
+        let ellipse = Ellipse::new(Profile::Ggx, DVec2::new(0.15, 0.4), 0.6).unwrap();
+        for w in [DVec3::new(0.7, 0.3, 0.65), DVec3::new(-0.2, 0.95, 0.15)] {
+            let (w, side, cells, span) = (w.normalize(), 400, 12, 1.2);
+            let bin = |m: DVec2| {
+                let at = (m + span) / (2.0 * span) * cells as f64;
+                let inside = at.min_element() >= 0.0 && at.max_element() < cells as f64;
+                inside.then(|| at.y as usize * cells + at.x as usize)
+            };
+            let mut found = vec![0.0; cells * cells];
+            for j in 0..side * side {
+                let [u, v] = [j / side, j % side].map(|k| (k as f64 + 0.5) / side as f64);
+                let m = ellipse.visible_slope(w, u, v).unwrap();
+                // Every slope drawn is turned towards the direction.
+                assert!(w.dot(m.extend(1.0)) > -1e-9);
+                if let Some(bin) = bin(m) {
+                    found[bin] += 1.0 / (side * side) as f64;
+                }
+            }
+            let (k, fine) = (w.truncate() / w.z, 50 * cells);
+            let cell = 2.0 * span / fine as f64;
+            let mut expected = vec![0.0; cells * cells];
+            for j in 0..fine * fine {
+                let m = (DVec2::new((j % fine) as f64, (j / fine) as f64) + 0.5) * cell - span;
+                let seen = (1.0 + k.dot(m)).max(0.0) / (1.0 + ellipse.lambda(k));
+                expected[bin(m).unwrap()] += ellipse.density(m) * seen * cell * cell;
+            }
+            let worst = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-3, "{w}: {worst}");
         }
     }
 

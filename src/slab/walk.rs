@@ -6,6 +6,7 @@ use rand::{Rng, RngExt};
 use super::fresnel::{reflectance, refract};
 use super::ndf::{Ndf, normal};
 use super::optics::Channel;
+use super::spread::r2;
 
 /// Two faces and one colour channel of the material between them.
 #[derive(Debug, Clone, Copy)]
@@ -49,19 +50,49 @@ pub(crate) struct Scattering {
     pub is_total: bool,
 }
 
-/// Weight below which a photon ends; what is left counts as masked.
+/// Weight below which a photon between level facets ends.
 const LEAST_WEIGHT: f64 = 1e-5;
+/// Weight below which one of several photons goes on with this weight and stands for the others.
+const ROULETTE: f64 = 0.02;
+/// Vertical component below which light is steep, and the facets of which steep light meets one.
+const STEEP: f64 = 0.7;
+const CANDIDATES: usize = 8;
 /// Largest number of reflections inside.
 const MAX_BOUNCES: usize = 256;
 
 /// Scatters light of weight `weight` that travels along `d` at a random facet. `eta` is the index behind over that before.
 ///
-/// Facets are drawn by base area and weighted by `(w·h)+ / (h.z w.z (1 + Λ(w)))`, whose mean is 1.
+/// Facets of GGX are drawn by the area that the light sees. Others are drawn by base area and weighted by the area that the
+/// light sees over its mean, `(w·h)+ / (h.z w.z (1 + Λ(w)))`. Light that is steep meets one of several such facets, chosen by
+/// their areas, because the area of a single one then varies much.
 pub(crate) fn scatter(face: &Ndf, d: DVec3, weight: f64, eta: f64, rng: &mut impl Rng) -> Scattering {
-    let (slope, is_level) = face.facet(rng.random(), rng.random());
-    scatter_at(face, (slope, is_level), d, weight, eta)
+    let (u, v) = (rng.random(), rng.random());
+    if let Some(slope) = face.visible_slope(-d, u, v) {
+        return scatter_at(face, (slope, false), d, weight, eta);
+    }
+    let k = d.truncate() / d.z.abs().max(1e-12).copysign(d.z);
+    let seen = |slope: DVec2| (1.0 + k.dot(slope)).max(0.0);
+    let mean = (1.0 + face.signed_lambda(-d)).max(1e-9);
+    if d.z.abs() >= STEEP || face.is_smooth() {
+        let facet = face.facet(u, v);
+        return scatter_at(face, facet, d, weight * seen(facet.0) / mean, eta);
+    }
+    let candidates: [(DVec2, bool); CANDIDATES] = std::array::from_fn(|j| {
+        let [x, y] = r2(j);
+        face.facet((u + x).fract(), (v + y).fract())
+    });
+    let areas = candidates.map(|(slope, _)| seen(slope));
+    let sum: f64 = areas.iter().sum();
+    let mut left = sum * rng.random::<f64>();
+    let chosen = areas.iter().position(|area| {
+        left -= area;
+        left < 0.0
+    });
+    let facet = candidates[chosen.unwrap_or(0)];
+    scatter_at(face, facet, d, weight * sum / (CANDIDATES as f64 * mean), eta)
 }
 
+/// Scatters light at a facet. `weight` is that of the light on the facet.
 fn scatter_at(face: &Ndf, (slope, is_level): (DVec2, bool), d: DVec3, weight: f64, eta: f64) -> Scattering {
     let up = normal(slope);
     let h = if d.z < 0.0 { up } else { -up };
@@ -70,8 +101,6 @@ fn scatter_at(face: &Ndf, (slope, is_level): (DVec2, bool), d: DVec3, weight: f6
     if c <= 0.0 {
         return result;
     }
-    let area = (1.0 + face.signed_lambda(-d)).max(1e-9);
-    let weight = weight * c / (up.z * d.z.abs().max(1e-12) * area);
     let r = reflectance(c, eta);
     result.is_total = r >= 1.0;
     let mut leave = |direction: Option<DVec3>, part: f64, is_down: bool| {
@@ -113,11 +142,19 @@ impl Walk<'_> {
             let part = self.channel.transmission(d);
             losses.absorbed += weight * (1.0 - part);
             let weight = weight * part;
-            if weight < LEAST_WEIGHT {
+            let weight = if weight >= ROULETTE {
+                weight
+            } else if is_straight {
                 // Light between level facets has a closed form, which leaves nothing.
-                losses.masked += if is_straight { 0.0 } else { weight };
+                if weight < LEAST_WEIGHT {
+                    return losses;
+                }
+                weight
+            } else if ROULETTE * rng.random::<f64>() < weight {
+                ROULETTE
+            } else {
                 return losses;
-            }
+            };
             let face = if d.z < 0.0 { self.bottom } else { self.top };
             let met = scatter(face, d, weight, 1.0 / eta, rng);
             is_straight &= met.is_level;

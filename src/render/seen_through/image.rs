@@ -47,7 +47,7 @@ pub struct Places {
 
 /// Points per task.
 const CHUNK: usize = 256;
-/// Part of a lobe below which its tail is not read.
+/// Part of the light below which the tail of a lobe is not read.
 const LEAST_TAIL: f32 = 0.02;
 /// Deviation of an even distribution over an interval of width 1.
 const BOX: f32 = 0.288_675_13;
@@ -151,7 +151,7 @@ impl<'a, S: VaryingSurface> Point<'a, S> {
                 }
                 let mean = direction(lobe, side);
                 let mut value = self.read(mean, &self.kernel(mean, lobe.covariance));
-                if lobe.tail > LEAST_TAIL {
+                if lobe.tail * lobe.part.max_element() > LEAST_TAIL {
                     let wide = lobe.covariance.map(|value| value * ViewLobe::TAIL);
                     value += lobe.tail * (self.read(mean, &self.kernel(mean, wide)) - value);
                 }

@@ -21,7 +21,7 @@ const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549
 /// Density of slopes below which a node counts as empty.
 const LEAST: f32 = 1e-30;
 
-/// A sheet prepared for images. It has no reflection, and light that is reflected inside is part of its lobes.
+/// A sheet prepared for images. It has no reflection. Light that is reflected inside counts as even.
 #[derive(Debug, Clone)]
 pub(super) struct SheetView {
     sheet: Arc<Svbtdf>,
@@ -140,20 +140,33 @@ impl SheetPoint<'_> {
         self.diffuse += share * sheet.diffuse[pixel];
     }
 
-    /// The parts of even light: the diffuse part, from behind.
-    fn even(&self) -> [Vec3; 2] {
-        [PI * self.diffuse, Vec3::ZERO]
+    /// Roughness of the virtual face along both axes together, from moments of its slopes.
+    fn roughness([x, y, xx, _, yy]: [f32; 5]) -> f64 {
+        f64::from(xx + yy - x * x - y * y).max(0.0).sqrt()
+    }
+
+    /// The parts of even light towards a viewer: the diffuse part and the light that is reflected inside, from behind.
+    fn even(&self, o: Vec3) -> [Vec3; 2] {
+        let bounced = self.view.sheet.bounced.as_ref().map_or(0.0, |bounced| {
+            bounced.light.total(Self::roughness(self.moments()), self.alpha.into(), o.as_dvec3()) as f32
+        });
+        [PI * self.diffuse + self.scale * bounced, Vec3::ZERO]
+    }
+
+    /// Mean and raw second moments of the slopes.
+    fn moments(&self) -> [f32; 5] {
+        let mut sums = [0.0; 5];
+        for (model, weight) in &self.parts {
+            sums.iter_mut().zip(self.view.moments[*model]).for_each(|(sum, value)| *sum += weight * value);
+        }
+        sums
     }
 
     /// The lobe to first order in the slopes: a facet of slope `m` deflects the tangential direction by
     /// `(√(η² - sin²θ) - cos θ) m`.
     pub fn lobes(&self, o: Vec3) -> ViewLobes {
         let optics = &self.view.sheet.optics;
-        let mut sums = [0.0; 5];
-        for (model, weight) in &self.parts {
-            sums.iter_mut().zip(self.view.moments[*model]).for_each(|(sum, value)| *sum += weight * value);
-        }
-        let [x, y, xx, xy, yy] = sums;
+        let [x, y, xx, xy, yy] = self.moments();
         let eta = optics.eta as f32;
         let turn = (eta * eta - 1.0 + o.z * o.z).max(0.0).sqrt() - o.z;
         let wide = turn * turn;
@@ -168,7 +181,7 @@ impl SheetPoint<'_> {
             covariance: [wide * (xx - x * x).max(0.0), wide * (xy - x * y), wide * (yy - y * y).max(0.0)],
             tail: 0.0,
         };
-        ViewLobes { transmitted, even: self.even(), ..ViewLobes::default() }
+        ViewLobes { transmitted, even: self.even(o), ..ViewLobes::default() }
     }
 
     /// Reports the ends of the paths of a viewer above. Slopes are drawn from the interpolated density, and refracted at the
@@ -191,7 +204,7 @@ impl SheetPoint<'_> {
                 end(PathEnd { kind: PathKind::Transmitted, direction: direction.as_vec3(), weight });
             }
         }
-        self.even()
+        self.even(viewer.o)
     }
 
     /// The direction of light from the viewer that meets a facet of the virtual slope at the top, or at the bottom.
@@ -306,7 +319,9 @@ fn pick(cumulative: &[f32], u: f32) -> (usize, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::slab::capture::bounced::{ALPHAS, Bounced, ROUGHNESSES, SheetBounces};
     use crate::slab::capture::simulated::varying_sheet;
+    use crate::slab::ring_table::RingTable;
 
     /// The light that arrives from directions below, by the BTDF at pixel centres: radiance `1 + d.x + d.y²`.
     fn integrated(sheet: &Svbtdf, pixel: usize, o: DVec3) -> f64 {
@@ -341,6 +356,20 @@ mod tests {
             let ViewLobe { part, mean, covariance, .. } = point.lobes(viewer.o).transmitted;
             let draft = f64::from(part.x * (1.0 + mean.x + mean.y.powi(2) + covariance[2]));
             assert!((draft / expected - 1.0).abs() < 0.1, "{pixel}: draft {draft}, {expected}");
+        }
+    }
+
+    #[test]
+    fn light_reflected_inside_a_captured_sheet_is_even() {
+        let plain = varying_sheet([6, 4]);
+        let tables = vec![RingTable::new(vec![0.05; RingTable::LEN]); ROUGHNESSES * ALPHAS];
+        let bounced = Some(SheetBounces::new(Arc::new(Bounced::of_tables(tables)), &plain.models));
+        let view = SheetView::new(Arc::new(Svbtdf { bounced, ..plain }));
+        let point = view.at(Vec2::splat(0.3));
+        let viewer = Viewer { o: Vec3::new(0.6, 0.0, 0.8), paths: 16, seed: 1 };
+        let expected = PI * (point.diffuse + 0.05 * point.scale);
+        for even in [point.follow(&viewer, |_| {}), point.lobes(viewer.o).even] {
+            assert!((even[0] - expected).length() < 1e-3 && even[1] == Vec3::ZERO, "{even:?} {expected}");
         }
     }
 
