@@ -265,7 +265,7 @@ impl Pipeline {
             names: material_names(scene, &tile.mesh, &materials)?,
             materials: materials.value,
             closes_plane: tile.mesh.closes_plane,
-            max_color_weight: tile.mesh.color.max(),
+            color: tile.mesh.color.clone(),
         };
         Ok(Outcome {
             brdf,
