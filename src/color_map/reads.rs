@@ -12,8 +12,8 @@ use super::{DEVIATIONS, MEANS, PrefilteredTable};
 
 /// Entries of each table over a number.
 pub const ENTRIES: usize = 512;
-/// log(1 + a) of the last entry of [`heights`].
-const LAST_EXPONENT: f32 = 17.0;
+/// Octaves of `1 + a` that [`heights`] covers: exponents to 2e7.
+const OCTAVES: f32 = 24.5;
 /// Bound of Λ: `1/(1+Λ)` below it is 0 in single precision.
 const LEAST: f32 = 1e-7;
 
@@ -37,18 +37,28 @@ pub fn directions() -> &'static Entries {
     &TABLE
 }
 
-/// Mean and deviation of D_h (Eq. 16) over `log(1 + a) / 17`.
+/// Mean and deviation of D_h (Eq. 16) over [`octave`] of `1 + a`, divided by 24.5.
 pub fn heights() -> &'static Entries {
     static TABLE: LazyLock<Entries> = LazyLock::new(|| {
         std::array::from_fn(|k| {
-            let log = f64::from(LAST_EXPONENT) * k as f64 / (ENTRIES - 1) as f64;
-            let at = Largest { exponent: log.exp_m1() }.exact_moments();
+            let octave = f64::from(OCTAVES) * k as f64 / (ENTRIES - 1) as f64;
+            let exponent = octave.floor().exp2() * (1.0 + octave.fract()) - 1.0;
+            let at = Largest { exponent }.exact_moments();
             [at.mean as f32, at.deviation as f32, 0.0, 0.0]
         })
     });
     &TABLE
 }
 
+/// The logarithm to base 2 at powers of 2, and linear between them: it is read from the bits of the number.
+#[inline]
+fn octave(x: f32) -> f32 {
+    const ONE: u32 = 0x3f80_0000;
+    const PER_BIT: f32 = 1.0 / 8_388_608.0;
+    x.to_bits().saturating_sub(ONE) as f32 * PER_BIT
+}
+
+#[inline]
 fn entry(table: &Entries, t: f32) -> [f32; 3] {
     let x = t.clamp(0.0, 1.0) * (ENTRIES - 1) as f32;
     let k = (x as usize).min(ENTRIES - 2);
@@ -106,7 +116,7 @@ impl<'a> ColorReads<'a> {
         let (o, i) = (lambda(nu.x), lambda(nu.y));
         let independence = 4.41 * apart / (4.41 * apart + 1.0);
         let exponent = o.max(i) + independence * o.min(i);
-        let [mean, deviation, _] = entry(self.heights, exponent.ln_1p() / LAST_EXPONENT);
+        let [mean, deviation, _] = entry(self.heights, octave(1.0 + exponent) * (1.0 / OCTAVES));
         self.texture(Within { mean: at.mean + at.deviation * mean, deviation: at.deviation * deviation })
     }
 

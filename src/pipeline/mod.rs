@@ -266,7 +266,7 @@ impl Pipeline {
             names: material_names(scene, &tile.mesh, &materials)?,
             materials: materials.value,
             closes_plane: tile.mesh.closes_plane,
-            max_color_weight: tile.mesh.color.max(),
+            color: tile.mesh.color.clone(),
         };
         // Factors that are asked for are used whatever their error is.
         let asks_for_factors = is_low_rank && settings.method == ProductMethod::LowRank;

@@ -10,7 +10,7 @@ mod surface;
 mod tests;
 mod zoom;
 
-pub use calibration::Calibration;
+pub use calibration::{Calibration, Corrections};
 pub use object::PixelOnTile;
 pub use radiance::PixelMaterials;
 pub use surface::FilteredTile;
