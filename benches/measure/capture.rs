@@ -14,7 +14,7 @@ use biscale::slab::capture::fit::{Sample, View};
 use biscale::slab::capture::lobe::{LobeOptics, SlopeGrid};
 use biscale::slab::capture::radiance::{DotLight, diffuse_part};
 use biscale::slab::capture::simulated::{KnownPoint, Recovered, varying_sheet};
-use biscale::slab::{Channel, Ndf, Profile, Walk};
+use biscale::slab::{Channel, ChannelSlab, Ndf, Profile};
 use glam::{DVec2, DVec3};
 
 /// Cells per side of lobes by photons.
@@ -66,7 +66,7 @@ fn faces(print: &mut dyn FnMut(String)) {
         let face = |roughness: f64| Ndf::analytic(Profile::Beckmann, DVec2::splat(roughness), 0.0);
         // From the camera, light passes the bottom first.
         let walk_faces = (face(bottom).mirrored(), face(top).mirrored());
-        let walk = Walk { top: &walk_faces.0, bottom: &walk_faces.1, channel: Channel { eta: 1.5, depth: 0.0 } };
+        let walk = ChannelSlab { top: &walk_faces.0, bottom: &walk_faces.1, channel: Channel { eta: 1.5, depth: 0.0 } };
         let lobe = |degrees: f64, photons: usize| {
             let (sin, cos) = f64::to_radians(degrees).sin_cos();
             let settings = LobeSettings { side: SIDE, photons, target: 5e-3, seed: 1 };

@@ -7,7 +7,7 @@ use std::time::Instant;
 use biscale::Cancel;
 use biscale::reference::photons::lobe::cell_means;
 use biscale::reference::photons::{LobeSettings, TrueLobe};
-use biscale::slab::{Inner, Ndf, Optics, Profile, Slab, Walk, virtual_face, walter};
+use biscale::slab::{ChannelSlab, Inner, Ndf, Optics, Profile, Slab, virtual_face, walter};
 use glam::{DVec2, DVec3};
 
 const ANGLES: [f64; 5] = [0.0, 30.0, 45.0, 60.0, 75.0];
@@ -52,7 +52,7 @@ fn errors(print: &mut dyn FnMut(String)) {
         let mut columns: [Vec<String>; 6] = Default::default();
         for degrees in ANGLES {
             let i = polar(degrees);
-            let walk = Walk { top: &t, bottom: &b, channel: dual.optics.channel(0) };
+            let walk = ChannelSlab { top: &t, bottom: &b, channel: dual.optics.channel(0) };
             let settings = LobeSettings { side: SIDE, photons: 1_000_000, target: 0.01, seed: 1 };
             let Ok(truth) = TrueLobe::trace(&walk, i, &settings, &Cancel::default()) else { return };
             let rough = if t.is_smooth() { &b } else { &t };

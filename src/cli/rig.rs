@@ -16,7 +16,7 @@ use crate::reference::photons::{LobeSettings, TrueLobe};
 use crate::render::image::pixels::Image;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
 use crate::scene::Switch;
-use crate::slab::Walk;
+use crate::slab::ChannelSlab;
 use crate::slab::capture::radiance::DotLight;
 use crate::slab::capture::rig::{self, Dots, Rig, RigCamera};
 use crate::slab::capture::simulated::add_noise;
@@ -140,7 +140,7 @@ impl<'a> Source<'a> {
                     channels[k] = channels[known].clone();
                     continue;
                 }
-                let walk = Walk { top: &slab.top, bottom: &slab.bottom, channel };
+                let walk = ChannelSlab { top: &slab.top, bottom: &slab.bottom, channel };
                 let traced = TrueLobe::trace(&walk, from, &settings, cancel)?;
                 channels[k] = if rig.bounces { traced.all.values } else { traced.single.values };
             }

@@ -1,5 +1,5 @@
-//! Colours of pixels by a few reads of tables in single precision: the prefiltered table, and two tables over a number
-//! that know no colour map. `shaders/color_map/` holds the twins.
+//! Colours of pixels by a few reads of tables in single precision: the prefiltered table, and two one-dimensional tables
+//! that do not depend on the colour map. `shaders/color_map/` holds the twins.
 
 use std::sync::LazyLock;
 
@@ -10,11 +10,11 @@ use super::prefiltered::MAX_DEVIATION;
 use super::slopes::visible_moments;
 use super::{DEVIATIONS, MEANS, PrefilteredTable};
 
-/// Entries of each table over a number.
+/// Entries of each one-dimensional table.
 pub const ENTRIES: usize = 512;
 /// Octaves of `1 + a` that [`heights`] covers: exponents to 2e7.
 const OCTAVES: f32 = 24.5;
-/// Bound of Λ: `1/(1+Λ)` below it is 0 in single precision.
+/// Smallest `1/(1+Λ)`. It bounds Λ by 1e7.
 const LEAST: f32 = 1e-7;
 
 /// Bound of ν, which is infinite from above.

@@ -13,7 +13,7 @@ use super::optics::{Channel, Optics};
 use super::ring_table::{
     RINGS, RingTable, TURNS, edge, projected_solid_angle, ring_of, ring_taps, transposed, turn_of,
 };
-use super::walk::{Exit, Walk};
+use super::walk::{ChannelSlab, Exit};
 use crate::base::{Cancel, Result};
 
 /// Photons per ring between smooth faces; they spread over the angles of the ring.
@@ -145,7 +145,7 @@ impl Inner {
         });
         let table = |channel: &Channel| {
             cancel.check()?;
-            Ok(ChannelTable::new(&Walk { top, bottom, channel: *channel }, photons, seed, cancel))
+            Ok(ChannelTable::new(&ChannelSlab { top, bottom, channel: *channel }, photons, seed, cancel))
         };
         let tables = channels.iter().map(table).collect::<Result<Vec<_>>>()?;
         cancel.check()?;
@@ -214,7 +214,7 @@ struct RingSums {
 }
 
 impl ChannelTable {
-    fn new(walk: &Walk<'_>, photons: usize, seed: u64, cancel: &Cancel) -> Self {
+    fn new(walk: &ChannelSlab<'_>, photons: usize, seed: u64, cancel: &Cancel) -> Self {
         let rings: Vec<RingSums> =
             (0..RINGS).into_par_iter().map(|ring| trace_ring(walk, ring, photons, seed, cancel)).collect();
         let per_bin = |ring: usize| projected_solid_angle(ring) / TURNS as f64;
@@ -253,7 +253,7 @@ impl ChannelTable {
 const LEAST_SHARE: f64 = 0.25;
 
 /// Traces photons from one ring, spread evenly over its projected solid angle.
-fn trace_ring(walk: &Walk<'_>, ring: usize, photons: usize, seed: u64, cancel: &Cancel) -> RingSums {
+fn trace_ring(walk: &ChannelSlab<'_>, ring: usize, photons: usize, seed: u64, cancel: &Cancel) -> RingSums {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(ring as u64);
     let share = LEAST_SHARE + (1.0 - LEAST_SHARE) * (ring + 1) as f64 / RINGS as f64;

@@ -48,4 +48,4 @@ pub use spread::Spread;
 pub use straight::{Straight, straight};
 pub use view::{BtdfView, SlabView};
 pub use virtual_face::virtual_face;
-pub use walk::{Exit, Losses, Walk};
+pub use walk::{ChannelSlab, Exit, Tally};

@@ -8,9 +8,9 @@ use super::ndf::{Ndf, normal};
 use super::optics::Channel;
 use super::spread::r2;
 
-/// Two faces and one colour channel of the material between them.
+/// A slab in one colour channel, through which photons walk: two faces and the material between them.
 #[derive(Debug, Clone, Copy)]
-pub struct Walk<'a> {
+pub struct ChannelSlab<'a> {
     pub top: &'a Ndf,
     pub bottom: &'a Ndf,
     pub channel: Channel,
@@ -29,9 +29,9 @@ pub struct Exit {
     pub is_straight: bool,
 }
 
-/// Parts of a photon that do not leave.
+/// Parts of a photon by what became of them. Light of `first_total_reflection` may leave later.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Losses {
+pub struct Tally {
     pub absorbed: f64,
     /// Light that Smith's masking blocks after a facet, or that a facet sends into the face.
     pub masked: f64,
@@ -119,16 +119,16 @@ fn scatter_at(face: &Ndf, (slope, is_level): (DVec2, bool), d: DVec3, weight: f6
     result
 }
 
-impl Walk<'_> {
+impl ChannelSlab<'_> {
     /// Follows a photon of weight 1 from the direction `i` above. At each facet it splits into the light that leaves, which
     /// is reported to `exit`, and the light that stays inside.
-    pub fn run(&self, i: DVec3, rng: &mut impl Rng, mut exit: impl FnMut(Exit)) -> Losses {
-        let mut losses = Losses::default();
+    pub fn run(&self, i: DVec3, rng: &mut impl Rng, mut exit: impl FnMut(Exit)) -> Tally {
+        let mut losses = Tally::default();
         let eta = self.channel.eta;
         if self.channel.is_clear() {
             let part = self.channel.transmission(-i);
             exit(Exit { direction: -i, weight: part, bounces: 0, is_straight: true });
-            return Losses { absorbed: 1.0 - part, ..losses };
+            return Tally { absorbed: 1.0 - part, ..losses };
         }
         let entered = scatter(self.top, -i, 1.0, eta, rng);
         let mut is_straight = entered.is_level;
@@ -189,7 +189,7 @@ mod tests {
         for (top, bottom) in [(&ggx, &uneven), (&points, &ggx), (&uneven, &points)] {
             for degrees in [0.0, 45.0, 75.0, 85.0_f64] {
                 let (sin, cos) = degrees.to_radians().sin_cos();
-                let walk = Walk { top, bottom, channel: Channel { eta: 1.5, depth: 0.2 } };
+                let walk = ChannelSlab { top, bottom, channel: Channel { eta: 1.5, depth: 0.2 } };
                 let mut rng = ChaCha8Rng::seed_from_u64(5);
                 let count = 20_000;
                 let (mut sum, mut square) = (0.0, 0.0);
