@@ -1,18 +1,20 @@
 //! Errors and times of the capture of simulated points and sheets.
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::sync::Arc;
 use std::time::Instant;
 
 use biscale::Cancel;
 use biscale::reference::photons::lobe::cell_means;
 use biscale::reference::photons::{Bins, LobeSettings, TrueLobe};
 use biscale::slab::capture::alpha::{FitSettings, Fitted, choose_smoothness, fit_point};
+use biscale::slab::capture::bounced::Bounced;
 use biscale::slab::capture::clusters::{LobeSlices, nearest, representatives};
 use biscale::slab::capture::fit::{Sample, View};
 use biscale::slab::capture::lobe::{LobeOptics, SlopeGrid};
 use biscale::slab::capture::radiance::{DotLight, diffuse_part};
 use biscale::slab::capture::simulated::{KnownPoint, Recovered, varying_sheet};
-use biscale::slab::{Channel, Ndf, Profile, Walk};
+use biscale::slab::{Channel, ChannelSlab, Ndf, Profile};
 use glam::{DVec2, DVec3};
 
 /// Cells per side of lobes by photons.
@@ -59,11 +61,12 @@ fn points(print: &mut dyn FnMut(String)) {
 fn faces(print: &mut dyn FnMut(String)) {
     print("| roughness of the faces | light | α by variances, found | error of lobes at 0, 30, 60°; all |".to_owned());
     print("|---|---|---|---|".to_owned());
+    let Ok(bounced) = Bounced::new(1.5, &Cancel::default()).map(Arc::new) else { return };
     for (top, bottom) in [(0.2, 0.02), (0.02, 0.2), (0.15, 0.15), (0.3, 0.1)] {
         let face = |roughness: f64| Ndf::analytic(Profile::Beckmann, DVec2::splat(roughness), 0.0);
         // From the camera, light passes the bottom first.
         let walk_faces = (face(bottom).mirrored(), face(top).mirrored());
-        let walk = Walk { top: &walk_faces.0, bottom: &walk_faces.1, channel: Channel { eta: 1.5, depth: 0.0 } };
+        let walk = ChannelSlab { top: &walk_faces.0, bottom: &walk_faces.1, channel: Channel { eta: 1.5, depth: 0.0 } };
         let lobe = |degrees: f64, photons: usize| {
             let (sin, cos) = f64::to_radians(degrees).sin_cos();
             let settings = LobeSettings { side: SIDE, photons, target: 5e-3, seed: 1 };
@@ -76,7 +79,10 @@ fn faces(print: &mut dyn FnMut(String)) {
         type Part = fn(&TrueLobe) -> &Bins;
         let parts: [(&str, Part); 2] = [("single pass", |lobe| &lobe.single), ("all", |lobe| &lobe.all)];
         for (name, part) in parts {
-            let Some((fitted, diffuse)) = of_photons(&part(&seen).values) else { continue };
+            let bounced = if name == "all" { Some(bounced.clone()) } else { None };
+            let Some((fitted, diffuse)) = of_photons(&part(&seen).values, bounced.clone()) else { continue };
+            let table = bounced.map(|bounced| bounced.of_model(&fitted.model));
+            let diffuse = (diffuse - fitted.scale * fitted.floor).max(0.0);
             let optics = LobeOptics::new(1.5, 0.2);
             let (mut squares, mut listed) = (0.0, Vec::new());
             for (degrees, truth) in [0.0, 30.0, 60.0_f64].into_iter().zip(&new) {
@@ -84,8 +90,10 @@ fn faces(print: &mut dyn FnMut(String)) {
                 let (sin, cos) = degrees.to_radians().sin_cos();
                 let o = DVec3::new(sin, 0.0, -cos);
                 let found = cell_means(SIDE, 2, |to| {
-                    let terms = optics.terms(to * DVec3::new(1.0, 1.0, -1.0), o);
-                    diffuse + terms.map_or(0.0, |terms| fitted.scale * fitted.model.btdf(&terms))
+                    let i = to * DVec3::new(1.0, 1.0, -1.0);
+                    let inside = table.as_ref().map_or(0.0, |table| table.read(i, o));
+                    let lobe = optics.terms(i, o).map_or(0.0, |terms| fitted.model.btdf(&terms));
+                    diffuse + fitted.scale * (lobe + inside)
                 });
                 let error = truth.relative_l2(part(truth), &found);
                 squares += error * error / 3.0;
@@ -103,7 +111,7 @@ fn faces(print: &mut dyn FnMut(String)) {
 }
 
 /// The fit of a lobe over cells of (i.x, i.y) that a camera at 45° sees under 40 x 40 dots, and its diffuse part.
-fn of_photons(cells: &[f64]) -> Option<(Fitted, f64)> {
+fn of_photons(cells: &[f64], bounced: Option<Arc<Bounced>>) -> Option<(Fitted, f64)> {
     let read = |i: DVec3| {
         let last = (SIDE - 1) as f64;
         let at = ((i.truncate() + 1.0) * (0.5 * SIDE as f64) - 0.5).clamp(DVec2::ZERO, DVec2::splat(last - 1e-9));
@@ -124,7 +132,7 @@ fn of_photons(cells: &[f64]) -> Option<(Fitted, f64)> {
     let o = DVec3::new(FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2);
     let view = View { o, samples: lights.iter().zip(&values).map(sample).collect() };
     let grid = SlopeGrid { side: 32, span: 0.8 };
-    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 1.0, alpha: None };
+    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 1.0, alpha: None, bounced };
     let smooth = choose_smoothness(&[vec![view.clone()]], &settings);
     Some((fit_point(&[view], &FitSettings { smooth, ..settings })?, diffuse))
 }
@@ -136,7 +144,7 @@ fn times(print: &mut dyn FnMut(String)) {
         print(format!("| {what} | {:.1} ms |", start.elapsed().as_secs_f64() * 1e3 / count as f64));
     };
     let grid = SlopeGrid { side: 32, span: 0.7 };
-    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 0.1, alpha: None };
+    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 0.1, alpha: None, bounced: None };
     let Some(known) = KnownPoint::analytic(Profile::Beckmann, DVec2::splat(0.2), 0.5) else { return };
     for (cameras, count) in [(&[45.0][..], 20), (&[45.0, 0.0], 5)] {
         let views: Vec<_> = cameras.iter().map(|theta| known.photographed(*theta, 0.01)).collect();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use biscale::slab::capture::patterns::Pattern;
 use biscale::slab::capture::simulated::varying_sheet;
@@ -23,7 +23,7 @@ const COMPARED: usize = 60;
 
 /// Prints a row per sheet, or the row of a sheet of `PIXELSxDOTS`.
 pub fn capture_sheet(argument: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
-    print("| sheet | pixels | dots | noise | representatives | error of lobes at 0, 30 and 60°: median, worst of 60 pixels | mean error of alpha | capture | memory |".to_owned());
+    print("| sheet | pixels | dots | noise | representatives | error of lobes at 0, 30 and 60°: median, worst of 60 pixels | mean error of alpha | capture, processor time | memory |".to_owned());
     print("|---|---|---|---|---|---|---|---|---|".to_owned());
     let one = argument.and_then(|text| {
         let (pixels, dots) = text.split_once('x')?;
@@ -52,9 +52,7 @@ fn row(name: &str, sheet: &Svbtdf, dots: usize, noise: f64) -> Result<String, St
     let rig =
         ["rig", "known.toml", "-o", "rig", "--pixels", &pixels, "--dots", &counts, "--noise", &noise_text, "--quiet"];
     run(folder.path(), &rig)?;
-    let start = Instant::now();
-    let memory = run(folder.path(), &["capture", "rig", "-o", "found.npz", "--quiet"])?;
-    let seconds = start.elapsed().as_secs_f64();
+    let Used { memory, seconds } = run(folder.path(), &["capture", "rig", "-o", "found.npz", "--quiet"])?;
     let found = Svbtdf::read(&path("found.npz")).map_err(|error| error.to_string())?;
     let step = side * side / COMPARED;
     let compared: Vec<usize> = (0..COMPARED).map(|k| k * step + (k * 7919) % step.max(1)).collect();
@@ -94,24 +92,43 @@ fn error(known: &Svbtdf, found: &Svbtdf, pixel: usize) -> f64 {
     (difference / norm).sqrt()
 }
 
-/// Runs the program and returns its peak resident memory [bytes].
-fn run(folder: &Path, arguments: &[&str]) -> Result<u64, String> {
+/// What a run of the program used.
+struct Used {
+    /// Peak resident memory [bytes].
+    memory: u64,
+    /// Time of all processors.
+    seconds: f64,
+}
+
+/// Clock ticks per second in `/proc`.
+const TICKS: f64 = 100.0;
+
+/// Processor time from the text of `/proc/PID/stat`; its name in brackets may hold spaces.
+fn processor_seconds(stat: &str) -> Option<f64> {
+    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks = |field: usize| fields.get(field)?.parse::<f64>().ok();
+    Some((ticks(11)? + ticks(12)?) / TICKS)
+}
+
+/// Runs the program.
+fn run(folder: &Path, arguments: &[&str]) -> Result<Used, String> {
     let mut child = Command::new(env!("CARGO_BIN_EXE_biscale"))
         .args(arguments)
         .current_dir(folder)
         .stdout(Stdio::null())
         .spawn()
         .map_err(|error| error.to_string())?;
-    let status = format!("/proc/{}/status", child.id());
-    let mut peak = 0;
+    let [status, stat] = ["status", "stat"].map(|file| format!("/proc/{}/{file}", child.id()));
+    let mut used = Used { memory: 0, seconds: 0.0 };
     loop {
         let text = std::fs::read_to_string(&status).unwrap_or_default();
         let found = text.lines().find(|line| line.starts_with("VmHWM")).and_then(|line| line.split_whitespace().nth(1));
-        peak = found
-            .and_then(|kilobytes| kilobytes.parse::<u64>().ok())
-            .map_or(peak, |kilobytes| peak.max(kilobytes << 10));
+        let peak = found.and_then(|kilobytes| kilobytes.parse::<u64>().ok());
+        used.memory = used.memory.max(peak.unwrap_or(0) << 10);
+        let text = std::fs::read_to_string(&stat).unwrap_or_default();
+        used.seconds = processor_seconds(&text).unwrap_or(0.0).max(used.seconds);
         if let Some(ended) = child.try_wait().map_err(|error| error.to_string())? {
-            return if ended.success() { Ok(peak) } else { Err(format!("{arguments:?} failed")) };
+            return if ended.success() { Ok(used) } else { Err(format!("{arguments:?} failed")) };
         }
         std::thread::sleep(Duration::from_millis(20));
     }

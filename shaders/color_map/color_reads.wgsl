@@ -5,11 +5,11 @@
 @group(0) @binding(0) var color_table: texture_2d<f32>;
 // 1/(1+Λ), mean and variance of visible slopes over ν/(1+ν).
 @group(0) @binding(1) var<storage, read> directions: array<vec4f>;
-// Mean and deviation of visible heights over log(1+a) / 17.
+// Mean and deviation of visible heights over the octave of 1+a, divided by 24.5.
 @group(0) @binding(2) var<storage, read> heights: array<vec4f>;
 
 const MAX_DEVIATION: f32 = 1.5;
-const LAST_EXPONENT: f32 = 17.0;
+const OCTAVES: f32 = 24.5;
 const LEAST: f32 = 1e-7;
 
 struct ColorAxis {
@@ -41,7 +41,9 @@ fn direction_entry(nu: f32) -> vec4f {
 
 fn height_entry(exponent: f32) -> vec4f {
     let last = arrayLength(&heights) - 1u;
-    let x = clamp(log(1.0 + exponent) / LAST_EXPONENT, 0.0, 1.0) * f32(last);
+    // The logarithm to base 2 at powers of 2, and linear between them.
+    let octave = f32(bitcast<u32>(1.0 + exponent) - 0x3f800000u) / 8388608.0;
+    let x = clamp(octave / OCTAVES, 0.0, 1.0) * f32(last);
     let k = min(u32(x), last - 1u);
     return mix(heights[k], heights[k + 1u], x - f32(k));
 }

@@ -10,12 +10,13 @@ use eframe::egui::Context;
 
 use super::document::Snapshot;
 use super::editor::Editor;
+use super::layout::{OBJECT_PART, is_narrow};
 use super::messages::Level;
 use super::worker::{
     AccuracyJob, AccuracyResult, ColorMapJob, ColorMapResult, ExportJob, ExportResult, GpuShare, Grade, ImageJob,
-    ImageResult, LobeJob, LobePlot, PreviewWorkers, RenderedPreview, SceneThumbnail, SlabLobeJob, SlabLobeResult,
-    ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy, spawn_autosave, spawn_color_map, spawn_export,
-    spawn_lobe, spawn_slab_lobe, spawn_thumbnail, spawn_tile,
+    ImageResult, LobeJob, LobePlot, MethodsJob, MethodsResult, PreviewWorkers, RenderedPreview, SceneThumbnail,
+    SlabLobeJob, SlabLobeResult, ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy, spawn_autosave,
+    spawn_color_map, spawn_export, spawn_lobe, spawn_methods, spawn_slab_lobe, spawn_thumbnail, spawn_tile,
 };
 
 /// Height of menu, toolbar and status line [points].
@@ -33,6 +34,7 @@ enum JobResult {
     Accuracy(AccuracyResult),
     ColorMap(ColorMapResult),
     SlabLobe(SlabLobeResult),
+    Methods(MethodsResult),
     Autosaved(Result<(), String>),
 }
 
@@ -46,6 +48,7 @@ pub struct BackgroundJobs {
     accuracy: Option<Worker<AccuracyJob>>,
     color_map: Option<Worker<ColorMapJob>>,
     slab_lobes: Option<Worker<SlabLobeJob>>,
+    methods: Option<Worker<MethodsJob>>,
     autosaver: Option<Worker<Snapshot>>,
     /// The last version in the recovery file, and the earliest time of the next one.
     autosaved: (u64, f64),
@@ -69,10 +72,11 @@ impl BackgroundJobs {
         };
         let (to_tile, to_lobe, to_gallery, to_export, to_save) =
             (send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
-        let (to_chart, to_map, to_slab) = (send.clone(), send.clone(), send.clone());
+        let (to_chart, to_map, to_slab, to_methods) = (send.clone(), send.clone(), send.clone(), send.clone());
         let accuracy = spawn_accuracy(move |result| to_chart(JobResult::Accuracy(result)));
         let color_map = spawn_color_map(move |result| to_map(JobResult::ColorMap(result)));
         let slab_lobes = spawn_slab_lobe(move |result| to_slab(JobResult::SlabLobe(result)));
+        let methods = spawn_methods(move |result| to_methods(JobResult::Methods(result)));
         let images = PreviewWorkers::spawn(cache, move |result| send(JobResult::Image(result)));
         let tiles = spawn_tile(move |result| to_tile(JobResult::Tile(result)));
         let thumbnails = spawn_thumbnail(move |thumbnail| to_gallery(JobResult::Thumbnail(thumbnail)));
@@ -88,6 +92,7 @@ impl BackgroundJobs {
             accuracy,
             color_map,
             slab_lobes,
+            methods,
             autosaver,
             autosaved: (1, 0.0),
             results,
@@ -108,6 +113,7 @@ impl BackgroundJobs {
         self.accuracy.into_iter().for_each(|worker| worker.finish(longest));
         self.color_map.into_iter().for_each(|worker| worker.finish(longest));
         self.slab_lobes.into_iter().for_each(|worker| worker.finish(longest));
+        self.methods.into_iter().for_each(|worker| worker.finish(longest));
     }
 }
 
@@ -135,11 +141,31 @@ impl Editor {
         if self.accuracy.is_late(version) {
             worker.cancel();
         }
-        let is_final = |preview: &RenderedPreview| preview.grade == Grade::Final && preview.version == version;
         let is_shown = self.object.preview.is_some() && self.exporting.is_none();
-        let is_final = self.object.preview.as_deref().is_some_and(is_final);
+        let is_final = self.shows_final_image();
         if let (true, Some((_, loaded))) = (is_shown, &self.background.loaded)
             && let Some(job) = self.accuracy.job(version, loaded, is_final)
+        {
+            worker.submit(job);
+        }
+    }
+
+    fn shows_final_image(&self) -> bool {
+        let version = self.document.version();
+        let preview = self.object.preview.as_deref();
+        preview.is_some_and(|preview| preview.grade == Grade::Final && preview.version == version)
+    }
+
+    /// Submits the images of the scene's methods once its own image is final, and cancels those that are late.
+    pub(super) fn compare_methods(&mut self) {
+        let version = self.document.version();
+        let Some(worker) = &self.background.methods else { return };
+        if self.methods.is_late(version) {
+            worker.cancel();
+        }
+        let is_final = self.shows_final_image() && self.exporting.is_none();
+        if let Some((_, loaded)) = &self.background.loaded
+            && let Some(job) = self.methods.job(version, loaded, self.size, is_final)
         {
             worker.submit(job);
         }
@@ -198,9 +224,13 @@ impl Editor {
     pub fn request_first_image(&mut self) {
         let settings = &self.settings;
         let gallery = if settings.gallery { settings.gallery_width } else { 0.0 };
-        let panels = [gallery + settings.parameters_width + settings.side_width, BARS];
-        self.size =
-            [0, 1].map(|axis| ((settings.window[axis] - panels[axis]) * settings.zoom).round().max(64.0) as usize);
+        let [width, height] = settings.window;
+        let view = if is_narrow(width) {
+            [width - settings.parameters_width, (height - BARS) * OBJECT_PART]
+        } else {
+            [width - gallery - settings.parameters_width - settings.side_width, height - BARS]
+        };
+        self.size = view.map(|side| (side * settings.zoom).round().max(64.0) as usize);
         self.request_image();
     }
 
@@ -282,6 +312,7 @@ impl Editor {
                 JobResult::Accuracy(result) => self.accuracy.receive(ctx, result),
                 JobResult::ColorMap(result) => self.color_map.receive(result),
                 JobResult::SlabLobe(result) => self.slab_lobe.receive(ctx, result),
+                JobResult::Methods(result) => self.methods.receive(ctx, result),
                 JobResult::Export(result) => self.receive_export(result),
                 JobResult::Autosaved(Ok(())) => self.messages.clear("autosave"),
                 JobResult::Autosaved(Err(text)) => {

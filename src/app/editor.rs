@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::cache::Cache;
 use crate::scene::{MaterialSpec, Scene};
-use eframe::egui::{self, CentralPanel, Context, Panel, ScrollArea, Ui, ViewportCommand};
+use eframe::egui::{self, Context, Panel, Ui, ViewportCommand};
 
 use super::actions::{self, Action};
 use super::background::BackgroundJobs;
@@ -16,20 +16,17 @@ use super::panels::{self, materials};
 use super::theme;
 use super::views::gallery::Gallery;
 use super::views::lobe::LobeState;
+use super::views::methods::MethodsState;
 use super::views::object::ObjectView;
 use super::views::pointer::Pointer;
 use super::views::slab_lobe::SlabLobeState;
 use super::views::tile::TileState;
+use super::views::zoom::TileScale;
 
 /// Message of the first start, shown until the user closes it.
 const WELCOME: &str = "welcome";
 const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (left) and change its surface and materials \
                             (right). F1 explains common tasks and lists all shortcuts.";
-
-/// Minimum and maximum width of the smaller view [points].
-const SIDE: [f32; 2] = [240.0, 900.0];
-/// Minimum width of the large view [points].
-const MIN_VIEW: f32 = 260.0;
 
 /// The state of the editor, independent of its window.
 pub struct Editor {
@@ -46,7 +43,10 @@ pub struct Editor {
     pub tile: TileState,
     pub lobe: LobeState,
     pub slab_lobe: SlabLobeState,
+    pub methods: MethodsState,
     pub accuracy: panels::AccuracyState,
+    /// The sections that the parameters show.
+    pub tab: panels::Tab,
     pub color_map: panels::ColorMapState,
     /// The document was opened in this frame.
     pub(super) is_new: bool,
@@ -71,6 +71,10 @@ pub struct Editor {
     /// The action that the object view's toolbar started in this frame.
     pub(super) from_view: Option<Action>,
     pub(super) copied: Option<MaterialSpec>,
+    /// Width of the window in the last frame [points].
+    pub(super) window_width: f32,
+    /// The gallery lies over the object in a narrow window.
+    pub(super) drawer: bool,
     /// The GPU failure that was reported last.
     pub(super) gpu_error: Option<String>,
 }
@@ -105,7 +109,9 @@ impl Editor {
             tile: TileState::default(),
             lobe: LobeState::default(),
             slab_lobe: SlabLobeState::default(),
+            methods: MethodsState::default(),
             accuracy: panels::AccuracyState::default(),
+            tab: panels::Tab::default(),
             color_map: panels::ColorMapState::default(),
             is_new: false,
             exchanged: false,
@@ -117,6 +123,8 @@ impl Editor {
             exporting: None,
             gallery: Gallery::default(),
             copied: None,
+            window_width: 0.0,
+            drawer: false,
             gpu_error: None,
             size: [64, 64],
             pointer: Vec::new(),
@@ -134,6 +142,7 @@ impl Editor {
         self.tile.move_to();
         self.lobe.move_to();
         self.slab_lobe.move_to();
+        self.methods.move_to();
         self.gallery = Gallery::default();
         self.accuracy = panels::AccuracyState::default();
         self.color_map = panels::ColorMapState::default();
@@ -189,41 +198,18 @@ impl Editor {
     pub fn frame(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         self.receive_results(&ctx);
-        let action = actions::pressed(&ctx);
+        let action = if self.dialog.as_ref().is_some_and(Dialog::is_modal) { None } else { actions::pressed(&ctx) };
         let from_menu = Panel::top("menu").show(ui, |ui| self.menu_ui(ui)).inner;
         Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
-        let from_gallery = self.gallery_ui(ui);
+        let window = self.measure_window(ui);
+        let from_gallery = self.gallery_ui(ui, window);
         let mut scene = (**self.document.scene()).clone();
-        let widest = (ui.available_width() - SIDE[0] - MIN_VIEW).clamp(260.0, 620.0);
-        let parameters = Panel::right("parameters")
-            .default_size(self.settings.parameters_width)
-            .size_range(260.0..=widest)
-            .show(ui, |ui| {
-                let painted = self.document.painted().clone();
-                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                    let effects = self.object.preview.as_ref().map_or(&[][..], |preview| &preview.effects);
-                    let version = self.document.version();
-                    let (accuracy, color_map) = (&mut self.accuracy, &mut self.color_map);
-                    let is_new = std::mem::take(&mut self.is_new);
-                    let shown = panels::PanelInputs { accuracy, color_map, effects, version, is_new };
-                    panels::ui(ui, &mut scene, &painted, &self.document.name, &self.slots, shown)
-                })
-            });
-        self.settings.parameters_width = parameters.response.rect.width();
-        let requests = parameters.inner.inner;
-        let widest = (ui.available_width() - MIN_VIEW).clamp(SIDE[0], SIDE[1]);
-        let side = Panel::right("side").default_size(self.settings.side_width).size_range(SIDE[0]..=widest);
-        let side = side.show(ui, |ui| self.side_ui(ui, &mut scene)).response.rect.width();
-        self.settings.side_width = side;
-        let large = CentralPanel::no_frame().show(ui, |ui| {
-            ui.spacing_mut().item_spacing.y = 0.0;
-            if self.exchanged {
-                self.tile_ui(ui, &scene, 0.0);
-            } else {
-                self.object_ui(ui, &mut scene);
-            }
-        });
-        if self.messages.ui(&ctx, large.response.rect) == Some(WELCOME) {
+        let height = self.size[1] as f32;
+        self.color_map.scale =
+            self.object.preview.as_ref().map(|preview| TileScale { framing: preview.distance, height });
+        let requests = self.parameters_ui(ui, &mut scene, window);
+        let large = self.views_ui(ui, &mut scene, window);
+        if self.messages.ui(&ctx, large) == Some(WELCOME) {
             self.settings.welcomed = true;
             self.settings.save(self.folder.as_deref());
         }
@@ -246,6 +232,7 @@ impl Editor {
         self.update_recovery(&ctx);
         self.fill_gallery();
         self.measure_accuracy();
+        self.compare_methods();
     }
 
     /// Applies strokes after the panels, so that they edit the scene of this frame.
@@ -266,6 +253,8 @@ impl Editor {
         match scene.validate() {
             Ok(()) => {
                 self.messages.clear("edit");
+                // After an edit, a file that could not be opened is no longer of interest.
+                self.messages.clear("open");
                 self.slots = materials::slots_of(&scene);
                 self.document.edit(scene);
             }

@@ -9,8 +9,9 @@ use super::actions::Action;
 use super::dialogs::{Dialog, FileDialog, Purpose};
 use super::document::Document;
 use super::editor::Editor;
+use super::layout::is_narrow;
 use super::messages::Level;
-use super::panels::materials;
+use super::panels::{Tab, materials};
 use super::views::object;
 use super::views::tile::TileMode;
 
@@ -87,6 +88,9 @@ impl Editor {
                     }
                 }
             }
+            Action::SceneTab => self.tab = Tab::Scene,
+            Action::CostTab => self.tab = Tab::Cost,
+            Action::Methods => self.methods.on = !self.methods.on,
             Action::BackToA => {
                 if let Some(comparison) = &self.object.comparison {
                     let scene = (*comparison.scene).clone();
@@ -104,6 +108,7 @@ impl Editor {
             Action::ZoomReset => self.zoom(ctx, 0.0),
             Action::Help => self.dialog = Some(Dialog::Help),
             Action::About => self.dialog = Some(Dialog::About),
+            Action::Gallery if is_narrow(self.window_width) => self.drawer = !self.drawer,
             Action::Gallery => self.settings.gallery = !self.settings.gallery,
             Action::Pick => {
                 self.object.picking = !self.object.picking;
@@ -152,6 +157,7 @@ impl Editor {
         // Version numbers continue, so that an image of the old document never matches the new one.
         self.document.start_at(version);
         self.accuracy.forget();
+        self.object.refined_effects = None;
         self.is_new = true;
         self.scene_changed();
     }

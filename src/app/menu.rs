@@ -23,7 +23,9 @@ impl Editor {
             ui.menu_button("View", |ui| {
                 items(ui, &[Action::Frame, Action::Exchange, Action::Paint, Action::Gallery], &mut chosen);
                 ui.separator();
-                items(ui, &[Action::Snapshot, Action::Pick], &mut chosen);
+                items(ui, &[Action::SceneTab, Action::CostTab], &mut chosen);
+                ui.separator();
+                items(ui, &[Action::Snapshot, Action::Methods, Action::Pick], &mut chosen);
                 ui.separator();
                 items(ui, &[Action::Theme, Action::ZoomIn, Action::ZoomOut, Action::ZoomReset], &mut chosen);
             });

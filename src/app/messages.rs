@@ -2,7 +2,7 @@
 //!
 //! Notes disappear by themselves. Errors stay until the user closes them or their cause is gone.
 
-use eframe::egui::{self, Align2, Area, Color32, Context, Frame, Order, Rect, Response, Ui};
+use eframe::egui::{self, Align2, Area, Color32, Context, Frame, Order, Rect, Response, ScrollArea, Ui};
 
 use super::theme;
 
@@ -86,25 +86,34 @@ impl Messages {
                     self.unfolded = !self.unfolded;
                 }
             }
-            for at in visible {
-                let message = &mut self.list[at];
-                let (shown, close) = line(ui, message);
-                if close {
-                    closed = Some(at);
-                }
-                if message.level == Level::Note {
-                    let full = now + message.seconds();
-                    let until = message.until.get_or_insert(full);
-                    if shown.contains_pointer() {
-                        *until = until.max(now + AFTER_HOVER);
-                    }
-                    ctx.request_repaint_after_secs((*until - now) as f32 + 0.05);
-                }
-            }
+            // Long messages must not cover what lies below the view.
+            let height = (over.height() - 2.0 * MARGIN - 30.0).max(30.0);
+            ScrollArea::vertical().max_height(height).show(ui, |ui| closed = self.lines_ui(ui, visible, now));
         });
         let closed = closed.map(|at| self.list.remove(at))?;
         self.list.retain(|message| message.text != closed.text);
         Some(closed.source)
+    }
+
+    /// Draws the lines of messages. Returns the index of the one that the user closed.
+    fn lines_ui(&mut self, ui: &mut Ui, visible: Vec<usize>, now: f64) -> Option<usize> {
+        let mut closed = None;
+        for at in visible {
+            let message = &mut self.list[at];
+            let (shown, close) = line(ui, message);
+            if close {
+                closed = Some(at);
+            }
+            if message.level == Level::Note {
+                let full = now + message.seconds();
+                let until = message.until.get_or_insert(full);
+                if shown.contains_pointer() {
+                    *until = until.max(now + AFTER_HOVER);
+                }
+                ui.ctx().request_repaint_after_secs((*until - now) as f32 + 0.05);
+            }
+        }
+        closed
     }
 
     /// Indices of the visible messages, in the order of arrival, and the number of hidden ones. Errors and the newest
@@ -128,7 +137,7 @@ impl Messages {
 fn line(ui: &mut Ui, message: &Message) -> (Response, bool) {
     let color = match message.level {
         Level::Note | Level::Guide => theme::ACCENT,
-        Level::Error => theme::WARNING,
+        Level::Error => theme::warning(ui.visuals()),
     };
     let frame = Frame::new()
         .fill(ui.visuals().panel_fill.lerp_to_gamma(color, 0.22))
@@ -154,71 +163,5 @@ fn line(ui: &mut Ui, message: &Message) -> (Response, bool) {
 }
 
 #[cfg(test)]
-mod tests {
-    use eframe::egui::ViewportId;
-    use egui_kittest::Harness;
-    use egui_kittest::kittest::Queryable;
-
-    use super::*;
-
-    fn harness() -> Harness<'static, Messages> {
-        Harness::builder().with_size([600.0, 400.0]).build_ui_state(
-            |ui, messages: &mut Messages| {
-                let over = ui.max_rect();
-                messages.ui(ui.ctx(), over);
-            },
-            Messages::default(),
-        )
-    }
-
-    #[test]
-    fn notes_disappear_after_their_reading_time_and_errors_and_first_steps_stay() {
-        let mut harness = harness();
-        harness.state_mut().put(Level::Note, "a", "Wrote a file.");
-        harness.state_mut().put(Level::Error, "b", "Not saved.");
-        harness.state_mut().put(Level::Guide, "c", "First steps.");
-        harness.run_steps(4);
-        assert_eq!(harness.state().texts().len(), 3);
-        // No frame is painted until the note disappears.
-        let delay = harness.output().viewport_output[&ViewportId::ROOT].repaint_delay.as_secs_f64();
-        assert!((1.0..10.0).contains(&delay), "{delay}");
-        // Each step takes a quarter of a second.
-        harness.run_steps(40);
-        assert_eq!(harness.state().texts(), ["Not saved.", "First steps."]);
-        let delay = harness.output().viewport_output[&ViewportId::ROOT].repaint_delay.as_secs_f64();
-        assert!(delay > 1e6, "without changes no frame is painted: {delay}");
-    }
-
-    #[test]
-    fn a_note_under_the_pointer_stays() {
-        let mut harness = harness();
-        harness.state_mut().put(Level::Note, "a", "Wrote a file.");
-        harness.run_steps(3);
-        harness.get_by_label("Wrote a file.").hover();
-        harness.run_steps(60);
-        assert_eq!(harness.state().texts(), ["Wrote a file."]);
-        harness.event(egui::Event::PointerGone);
-        harness.run_steps(20);
-        assert!(harness.state().texts().is_empty());
-    }
-
-    #[test]
-    fn many_messages_are_few_lines_with_the_errors_first_and_the_rest_behind_a_button() {
-        let mut harness = harness();
-        for (source, text) in [("a", "one"), ("b", "two"), ("c", "three"), ("d", "four"), ("e", "one")] {
-            let level = if source == "a" { Level::Error } else { Level::Note };
-            harness.state_mut().put(level, source, text);
-        }
-        harness.run_steps(3);
-        let visible = |harness: &Harness<'_, Messages>| {
-            ["one", "two", "three", "four"].map(|text| harness.query_all_by_label(text).count())
-        };
-        assert_eq!(visible(&harness), [1, 0, 1, 1]);
-        harness.get_by_label("1 more").click();
-        harness.run_steps(3);
-        assert_eq!(visible(&harness), [1, 1, 1, 1]);
-        harness.get_by_label("Show fewer messages").click();
-        harness.run_steps(3);
-        assert_eq!(visible(&harness), [1, 0, 1, 1]);
-    }
-}
+#[path = "messages_tests.rs"]
+mod tests;

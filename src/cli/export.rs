@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::base::{InputError, print_on_stderr};
+use crate::base::print_on_stderr;
 use crate::diagnostics::Health;
 use crate::effective::{ErrorEstimate, ErrorEstimator};
 use crate::export;
@@ -50,7 +50,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let options = options(args)?;
     let (loaded, ()) = args.scene.open(|loaded| {
         if loaded.scene.slab.is_some() {
-            check_slab(args, loaded, &options)?;
+            check_slab(args, loaded)?;
         }
         check_outputs(&args.scene.scene, loaded, &[], &outputs)
     })?;
@@ -62,7 +62,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     if loaded.scene.slab.is_some() {
         let outcome = pipeline.slab(&loaded)?;
         drop(watch);
-        return of_slab(args, &loaded, &outcome);
+        return of_slab(args, &loaded, &outcome, &options);
     }
     let outcome = pipeline.effective(&loaded)?;
     drop(watch);
@@ -99,13 +99,10 @@ fn options(args: &ExportArgs) -> Result<ExportOptions> {
     Ok(options)
 }
 
-/// Checks that the format and the options suit a slab.
-fn check_slab(args: &ExportArgs, loaded: &LoadedScene, options: &ExportOptions) -> Result<(), crate::Error> {
+/// Checks that the format suits a slab.
+fn check_slab(args: &ExportArgs, loaded: &LoadedScene) -> Result<(), crate::Error> {
     if SlabFormat::of(&args.output)? == SlabFormat::Mitsuba {
         export::mitsuba::check(loaded)?;
-    }
-    if options.radiance != RadianceBasis::Klems {
-        return Err(InputError::new("--radiance", "tensor-tree", "klems, the basis of slabs").into());
     }
     Ok(())
 }
@@ -169,12 +166,11 @@ fn describe(report: &ExportReport) {
 }
 
 /// Writes a slab.
-fn of_slab(args: &ExportArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Result<()> {
+fn of_slab(args: &ExportArgs, loaded: &LoadedScene, outcome: &SlabOutcome, options: &ExportOptions) -> Result<()> {
     args.scene.warn(&outcome.health);
     let bar = progress_bar("tabulating", args.scene.quiet);
-    let resolution = resolution(args).unwrap_or_default();
     let format = SlabFormat::of(&args.output)?;
-    let written = format.write(&outcome.slab, loaded, resolution, &args.output, &progress_on(&bar));
+    let written = format.write(&outcome.slab, loaded, options, &args.output, &progress_on(&bar));
     bar.finish_and_clear();
     let written = written?;
     let normal = glam::DVec3::Z;

@@ -325,3 +325,7 @@ fn pairs(
     };
     Ok(queries.rows.par_iter().zip(&pairs).map(of).collect())
 }
+
+#[cfg(test)]
+#[path = "filter_queries_tests.rs"]
+mod tests;

@@ -126,9 +126,13 @@ fn print_effects(out: &mut impl Write, effects: &[crate::plan::Effect]) -> Resul
             Some(_) => " (turning it on changes nothing)".to_owned(),
             None => String::new(),
         };
+        let remedy = match effect.left_out.filter(|_| !effect.forced) {
+            Some(left_out) => format!(": ask with --effect {}=on ({:.0} ms)", effect.name, left_out.predicted_ms),
+            None => String::new(),
+        };
         writeln!(
             out,
-            "{:<20} {:<7} {predicted:>12} {measured:>12}  {}{bound}",
+            "{:<20} {:<7} {predicted:>12} {measured:>12}  {}{remedy}{bound}",
             effect.name,
             format!("{on}{forced}"),
             effect.reason

@@ -16,7 +16,6 @@ use crate::render::image::pixels::ImageFormat;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::seen_through::SlabScene;
-use crate::render::tile_view::filtered::Calibration;
 use crate::scene::LoadedScene;
 
 #[derive(Serialize)]
@@ -81,7 +80,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         let watch = Watch::new(args.scene.quiet);
         let background = ImageBackground::default();
         let input = render_scene.input(&*shading_brdf.brdf, args.size, usize::from(args.samples), &background);
-        tile.shade_into(&mut rendered.image, &input, &mut Calibration::none(), &watch.cancel())?;
+        tile.shade_into(&mut rendered.image, &input, &watch.cancel())?;
         rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
     }
     rendered.image.write(&args.output, &tone_map)?;

@@ -14,7 +14,7 @@ use crate::brdf::MaterialAssignment;
 use crate::pipeline::Pipeline;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
-use crate::render::tile_view::filtered::{Calibration, FilteredTile, ZoomTarget};
+use crate::render::tile_view::filtered::{Corrections, FilteredTile, ZoomTarget};
 use crate::render::tile_view::{ShadedMaterials, TileScene};
 use crate::render::{Image, RenderInput, RenderScene};
 use crate::scene::LoadedScene;
@@ -80,15 +80,9 @@ impl MappedTile {
     ///
     /// # Errors
     /// [`Error::Cancelled`].
-    pub fn shade_into(
-        &self,
-        image: &mut Image,
-        input: &RenderInput<'_>,
-        calibration: &mut Calibration,
-        cancel: &Cancel,
-    ) -> Result<()> {
+    pub fn shade_into(&self, image: &mut Image, input: &RenderInput<'_>, cancel: &Cancel) -> Result<()> {
         if let Some(filtered) = self.filtered() {
-            filtered.shade_into(image, input, self.materials(), Some(calibration), cancel)?;
+            filtered.shade_into(image, input, self.materials(), Corrections::Measured, cancel)?;
         }
         Ok(())
     }
@@ -137,16 +131,15 @@ pub fn run(args: &RenderArgs, zoom: &Zoom) -> Result<()> {
     })?;
     let mut table = "pixels_per_tile,r,g,b,change\n".to_owned();
     let mut before: Option<DVec3> = None;
-    let mut calibration = Calibration::none();
     for frame in 0..zoom.frames {
         let pixels_per_tile = zoom.pixels_per_tile(frame);
         scene.camera = target.camera(pixels_per_tile)?;
         let mut image = path.render(&scene, &brdf, args.size, usize::from(args.samples))?.image;
         let background = ImageBackground::default();
         let input = scene.input(&*brdf, args.size, usize::from(args.samples), &background);
-        mapped.shade_into(&mut image, &input, &mut calibration, &watch.cancel())?;
+        mapped.shade_into(&mut image, &input, &watch.cancel())?;
         image.write(&folder.join(format!("{frame:04}.png")), &tone_map)?;
-        let mean = target.mean(tile, mapped.materials(), &*brdf, &calibration, pixels_per_tile, &watch.cancel())?;
+        let mean = target.mean(tile, mapped.materials(), &*brdf, pixels_per_tile, &watch.cancel())?;
         let change = before
             .map_or(0.0, |before| (mean - before).abs().max_element() / before.max_element().max(f64::MIN_POSITIVE));
         before = Some(mean);

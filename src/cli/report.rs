@@ -13,7 +13,8 @@ use crate::scene;
 use crate::scene::LoadedScene;
 use crate::tuning::candidates::{Candidate, Family, candidates, with_settings};
 use crate::tuning::quality_scale;
-use crate::tuning::sweep::{ReferenceValues, SweepPoint, measure, reference_point};
+use crate::tuning::sweep::{ReferenceValues, SweepPoint, reference_point};
+use crate::tuning::timed_result::{TimedResult, time};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
@@ -58,7 +59,9 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     let mut progress = resume(&args.output, &machine);
     let mut report = Report { machine, command: command_line(), scenes: Vec::new() };
     for loaded in &scenes {
-        report.scenes.push(one_scene(args, loaded, &mut progress)?);
+        let known = known_results(&mut progress, loaded, args.pairs)?;
+        let first = if known.is_none() { first_points(args, loaded, &mut report)? } else { Vec::new() };
+        report.scenes.push(one_scene(args, loaded, (known, first), &mut progress)?);
         // The page is written after each scene, so that an interrupted run leaves a page.
         write(&args.output, &report)?;
     }
@@ -100,15 +103,53 @@ fn key(loaded: &LoadedScene, pairs: usize) -> Result<String> {
     Ok(format!("{pairs} {}", serde_json::to_string(&scene)?))
 }
 
-fn one_scene(args: &ReportArgs, loaded: &LoadedScene, progress: &mut SavedProgress) -> Result<SceneReport> {
+/// Writes and prints the quality levels by their stated errors, each as soon as it is known. Returns them, so that the
+/// reference of the scene can measure them later.
+fn first_points(args: &ReportArgs, loaded: &LoadedScene, report: &mut Report) -> Result<Vec<TimedResult>> {
+    let mut results = Vec::new();
+    report.scenes.push(SceneReport::without_reference(&loaded.name, args.pairs));
+    let all = candidates(false, overhangs(loaded), 0);
+    for candidate in all.iter().filter(|candidate| candidate.family == Family::QualityScale) {
+        let result = time(loaded, candidate)?;
+        if let (Some(point), Some(scene)) = (result.stated_point(), report.scenes.last_mut()) {
+            if !args.quiet {
+                let SweepPoint { scene, ms, psnr_db, rel_l2, settings, .. } = &point;
+                let percent = 100.0 * rel_l2;
+                print_on_stderr(format_args!(
+                    "{scene}: {ms:.1} ms, {psnr_db:.1} dB, {percent:.2} % stated: {settings}"
+                ));
+            }
+            scene.points.push(point);
+            write(&args.output, report)?;
+        }
+        results.push(result);
+    }
+    report.scenes.pop();
+    Ok(results)
+}
+
+/// The results of an earlier run for a scene with the same inputs.
+fn known_results(progress: &mut SavedProgress, loaded: &LoadedScene, pairs: usize) -> Result<Option<SavedScene>> {
+    let key = key(loaded, pairs)?;
+    Ok(progress.scenes.remove(&loaded.name).filter(|known| known.key == key))
+}
+
+fn one_scene(
+    args: &ReportArgs,
+    loaded: &LoadedScene,
+    (known, first): (Option<SavedScene>, Vec<TimedResult>),
+    progress: &mut SavedProgress,
+) -> Result<SceneReport> {
     let bar = bar(args.quiet, &loaded.name);
     let started = Instant::now();
     let budget = Duration::from_secs_f64(args.minutes * 60.0);
-    let key = key(loaded, args.pairs)?;
-    let known = progress.scenes.remove(&loaded.name).filter(|known| known.key == key);
     let mut state = match known {
         Some(known) => known,
-        None => SavedScene { key, reference: reference(args, loaded, budget, &bar)?, points: Vec::new() },
+        None => {
+            let (key, reference) = (key(loaded, args.pairs)?, reference(args, loaded, budget, &bar)?);
+            let points = first.iter().map(|result| result.point(&reference)).collect();
+            SavedScene { key, reference, points }
+        }
     };
     let list = in_order(candidates(has_measured(loaded), overhangs(loaded), args.combinations));
     bar.set_length(list.len() as u64);
@@ -123,7 +164,7 @@ fn one_scene(args: &ReportArgs, loaded: &LoadedScene, progress: &mut SavedProgre
             continue;
         }
         bar.set_message(candidate.cli_args());
-        state.points.push(measure(loaded, candidate, &state.reference)?.0);
+        state.points.push(time(loaded, candidate)?.point(&state.reference));
         progress.scenes.insert(loaded.name.clone(), state);
         save(&args.output, progress)?;
         state = match progress.scenes.remove(&loaded.name) {

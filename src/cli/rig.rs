@@ -15,8 +15,8 @@ use crate::pipeline::SlabOutcome;
 use crate::reference::photons::{LobeSettings, TrueLobe};
 use crate::render::image::pixels::Image;
 use crate::render::image::tone_map::{ToneCurve, ToneMap};
-use crate::scene::{LoadedScene, Switch};
-use crate::slab::Walk;
+use crate::scene::Switch;
+use crate::slab::ChannelSlab;
 use crate::slab::capture::radiance::DotLight;
 use crate::slab::capture::rig::{self, Dots, Rig, RigCamera};
 use crate::slab::capture::simulated::add_noise;
@@ -61,8 +61,13 @@ pub fn run(args: &RigArgs) -> Result<()> {
     };
     args.scene.warn(&outcome.health);
     drop(watch);
-    let described = Rig { eta: outcome.slab.optics.eta.x, ..described };
-    let source = Source::new(args, &loaded, &outcome, &described, &cancel)?;
+    let spec = loaded.scene.slab.as_ref();
+    let bounces = match &outcome.svbtdf {
+        Some(sheet) => sheet.bounced.is_some(),
+        None => spec.is_some_and(|slab| slab.bounces == Switch::On),
+    };
+    let described = Rig { eta: outcome.slab.optics.eta.x, bounces, ..described };
+    let source = Source::new(args, &outcome, &described, &cancel)?;
     let images = photograph(args, &described, &source, outcome.settings.seed)?;
     replace_file(&args.output.join(rig::FILE), described.to_toml()?.as_bytes())?;
     report(args, images)
@@ -104,6 +109,7 @@ fn rig_of(args: &RigArgs) -> Rig {
         monitor: [1.0; 3],
         saturation: None,
         pixels: None,
+        bounces: true,
         dots,
         cameras: (0..usize::from(args.cameras)).map(camera).collect(),
     }
@@ -117,11 +123,10 @@ enum Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    fn new(args: &RigArgs, loaded: &LoadedScene, outcome: &'a SlabOutcome, rig: &Rig, cancel: &Cancel) -> Result<Self> {
+    fn new(args: &RigArgs, outcome: &'a SlabOutcome, rig: &Rig, cancel: &Cancel) -> Result<Self> {
         if args.source == RigSource::Model {
             return Ok(Self::Slab(outcome));
         }
-        let bounces = loaded.scene.slab.as_ref().is_some_and(|slab| slab.bounces == Switch::On);
         let settings =
             LobeSettings { side: TRUTH_SIDE, photons: TRUTH_PHOTONS, target: 5e-3, seed: outcome.settings.seed };
         let slab = outcome.slab.turned();
@@ -135,9 +140,9 @@ impl<'a> Source<'a> {
                     channels[k] = channels[known].clone();
                     continue;
                 }
-                let walk = Walk { top: &slab.top, bottom: &slab.bottom, channel };
+                let walk = ChannelSlab { top: &slab.top, bottom: &slab.bottom, channel };
                 let traced = TrueLobe::trace(&walk, from, &settings, cancel)?;
-                channels[k] = if bounces { traced.all.values } else { traced.single.values };
+                channels[k] = if rig.bounces { traced.all.values } else { traced.single.values };
             }
             Ok(channels)
         };

@@ -13,7 +13,7 @@ use crate::base::{Cancel, Error, InputError, replace_file};
 use crate::pipeline::SlabOutcome;
 use crate::reference::photons::{LobeSettings, Totals, TrueLobe};
 use crate::scene::{LoadedScene, Switch};
-use crate::slab::{DiscLobe, Method, Slab, Walk, walter};
+use crate::slab::{ChannelSlab, DiscLobe, Method, Slab, walter};
 
 /// Cells per side of the square around the disc.
 const SIDE: usize = 96;
@@ -215,7 +215,7 @@ fn truth(loaded: &LoadedScene, outcome: &SlabOutcome, i: DVec3, cancel: &Cancel)
     let mut of_channel = [0; 3];
     let mut failed = None;
     slab.optics.per_channel_indexed(|k, channel| {
-        let walk = Walk { top: &slab.top, bottom: &slab.bottom, channel };
+        let walk = ChannelSlab { top: &slab.top, bottom: &slab.bottom, channel };
         match TrueLobe::trace(&walk, i, &settings, cancel) {
             Ok(lobe) => lobes.push(lobe),
             Err(error) => failed = Some(error),

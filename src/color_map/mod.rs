@@ -5,6 +5,7 @@ mod distribution;
 pub mod filter;
 pub mod heights;
 pub mod layers;
+pub mod naive;
 pub mod normal;
 pub mod pixel;
 mod prefiltered;

@@ -111,7 +111,7 @@ pub fn surface(inputs: &HealthInputs, lobe_deg: Option<f32>) -> SurfaceHealth {
         facets: facets.len(),
         is_exact: facets.replicates.is_empty(),
         triangles_left_out: facets.skipped_triangles,
-        largest_color_weight: inputs.max_color_weight.max_element(),
+        largest_color_weight: inputs.color.max().max_element(),
         has_holes: !inputs.closes_plane,
         fewest_visible_facets: facets.len(),
         facets_in_a_lobe: lobe_deg.and_then(|degrees| facets_within(&facets.normals, degrees.to_radians())),

@@ -3,8 +3,9 @@
 //! Every [`crate::pipeline::Outcome`] holds its [`HealthInputs`]. The [`Health`] is measured from them on first use, so
 //! that drafts of the editor do not wait for it.
 
-mod measure;
 mod capture;
+pub mod color_map;
+mod measure;
 mod slab;
 mod warnings;
 
@@ -12,12 +13,11 @@ pub use slab::SlabHealthInputs;
 
 use std::sync::Arc;
 
-use glam::Vec3;
 use serde::Serialize;
 
 use crate::brdf::{Material, MaterialAssignment};
 use crate::effective::{EffectiveBrdf, ErrorBound, ErrorEstimate};
-use crate::geometry::{Facets, TileMesh};
+use crate::geometry::{ColorField, Facets, TileMesh};
 use crate::metrics::Errors;
 use crate::visibility::{PackedVisibility, Visibility};
 
@@ -30,8 +30,8 @@ pub struct HealthInputs {
     /// Names of the materials, in their order.
     pub names: Vec<String>,
     pub closes_plane: bool,
-    /// Largest weight of the colour image per channel; 1 without an image.
-    pub max_color_weight: Vec3,
+    /// Colours of the tile below those of its materials.
+    pub color: ColorField,
 }
 
 /// Visibility that a health is measured from.
@@ -168,8 +168,7 @@ impl Health {
         estimate: Option<ErrorEstimate>,
         limits: Limits,
     ) -> Self {
-        let (measured, materials) =
-            measure::materials(&inputs.materials.materials, &inputs.names, inputs.max_color_weight);
+        let (measured, materials) = measure::materials(&inputs.materials.materials, &inputs.names, inputs.color.max());
         let lobe = materials.iter().filter_map(|material| material.narrowest_lobe_deg).reduce(f32::min);
         let conserving = materials.iter().all(|material| material.largest_albedo <= 1.0);
         let mut health = Self {
@@ -181,6 +180,9 @@ impl Health {
             materials,
         };
         health.warnings = warnings::of(&health, limits, conserving);
+        if let ColorField::Mapped { map, .. } = &inputs.color {
+            health.warnings.extend(color_map::warnings(map));
+        }
         health.warnings.extend(estimate.and_then(|estimate| warnings::of_error(&estimate, limits)));
         health
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{ExportResolution, mitsuba, radiance_slab, slab_npz};
+use super::{ExportOptions, mitsuba, radiance_slab, slab_npz};
 use crate::base::{InputError, Progress, Result};
 use crate::scene::LoadedScene;
 use crate::slab::Slab;
@@ -10,7 +10,7 @@ use crate::slab::Slab;
 /// A format of slabs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SlabFormat {
-    /// Klems matrices for Radiance.
+    /// Klems matrices or tensor trees for Radiance.
     Radiance,
     Npz,
     /// A scene of Mitsuba 3.
@@ -50,17 +50,17 @@ impl SlabFormat {
         self,
         slab: &Slab,
         loaded: &LoadedScene,
-        resolution: ExportResolution,
+        options: &ExportOptions,
         path: &Path,
         progress: &Progress<'_>,
     ) -> Result<SlabWritten> {
         Ok(match self {
             Self::Radiance => {
-                let (note, pairs) = radiance_slab::write(slab, loaded, path, progress)?;
+                let (note, pairs) = radiance_slab::write(slab, loaded, options, path, progress)?;
                 SlabWritten { note: Some(note), pairs }
             }
             Self::Npz => {
-                let pairs = slab_npz::write(slab, loaded, resolution, path, progress)?;
+                let pairs = slab_npz::write(slab, loaded, options.resolution.unwrap_or_default(), path, progress)?;
                 SlabWritten { note: None, pairs }
             }
             Self::Mitsuba => {

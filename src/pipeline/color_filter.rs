@@ -15,11 +15,12 @@ use crate::color_map::layers::{DrivenMap, Layer, LayeredMap, ResolvedDriver, Sou
 use crate::color_map::slopes::{Focus, SlopeDriver, Slopes, direction};
 use crate::color_map::statistics::{Footprint, PlaceMap, RankedHeights};
 use crate::color_map::{Normal, PrefilteredTable, Stop, StopMap};
+use crate::diagnostics;
 use crate::geometry::relief::slope_of;
 use crate::geometry::{ColorField, Facets};
 use crate::math::directions::half_vector;
 use crate::plan::Refinement;
-use crate::scene::{ColorMap, Combine, Gaussianize, HeightDistribution, LoadedScene, StopEvaluation, StopUnit};
+use crate::scene::{ColorMap, Combine, HeightDistribution, LoadedScene, StopEvaluation, StopUnit};
 use crate::visibility::Visibility;
 
 /// The colour map of a scene with everything that its means depend on.
@@ -245,25 +246,7 @@ impl ColorFilter {
 
     /// Warnings about the filter, each with a remedy.
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        for (index, layer) in self.map.layers.iter().enumerate() {
-            let (Some(map), Source::Place(place)) = (self.place_map(index), &layer.mapped.driver.source) else {
-                continue;
-            };
-            let error = (map.map().mean(&map.whole()) - place.plain_mean(&layer.mapped.map)).abs().max_element();
-            if self.spec.gaussianize == Gaussianize::Off && error > MAX_FAR_ERROR {
-                warnings.push(format!(
-                    "the driver of layer `{}` is far from normal: its mean colour is wrong by {error:.3}; set gaussianize = \"auto\"",
-                    layer.name
-                ));
-            }
-            if self.spec.taps == 1 {
-                warnings.push(format!(
-                    "one read of layer `{}` is wrong by up to 0.06 where a pixel is as wide as its structure; set taps = 4 or 16",
-                    layer.name
-                ));
-            }
-        }
+        let mut warnings = diagnostics::color_map::warnings(&self.map);
         if self.spec.distribution == HeightDistribution::Smith
             && self.spec.surface.is_none()
             && self.map.is_of_surface()
@@ -389,8 +372,6 @@ impl ColorFilter {
     }
 }
 
-/// Largest error of the mean colour of a driver whose values are not ranked.
-const MAX_FAR_ERROR: f64 = 0.01;
 /// Largest difference of the mean visible height from that of Smith's surface [deviations]: about 0.02 in colour.
 const MAX_SMITH_ERROR: f64 = 0.15;
 /// Polar angle and azimuth of light and view at which Smith's heights are compared [rad].

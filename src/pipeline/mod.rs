@@ -57,7 +57,7 @@ use crate::effective::{Direct, EffectiveBrdf, Representation};
 use crate::geometry::{Facets, TileMesh};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
 use crate::metrics::Errors;
-use crate::plan::{Preset, Refinement, Settings, VisibilityAlgorithm};
+use crate::plan::{Preset, ProductMethod, Refinement, Settings, VisibilityAlgorithm};
 use crate::reference::Reference;
 use crate::scene::{LoadedScene, Scene, Switch};
 use crate::visibility::Visibility;
@@ -266,8 +266,10 @@ impl Pipeline {
             names: material_names(scene, &tile.mesh, &materials)?,
             materials: materials.value,
             closes_plane: tile.mesh.closes_plane,
-            max_color_weight: tile.mesh.color.max(),
+            color: tile.mesh.color.clone(),
         };
+        // Factors that are asked for are used whatever their error is.
+        let asks_for_factors = is_low_rank && settings.method == ProductMethod::LowRank;
         Ok(Outcome {
             brdf,
             plan,
@@ -278,7 +280,7 @@ impl Pipeline {
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),
-            close_to_bound,
+            close_to_bound: close_to_bound || asks_for_factors,
             direct: Some(ExaminedSum { direct, tile, material_of_slot, algorithm, env: self.env.clone() }),
             estimator: Arc::default(),
         })

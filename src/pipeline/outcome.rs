@@ -37,7 +37,7 @@ pub struct Outcome {
     /// The direct sum whose error is estimated; absent with the paper's method.
     pub(super) direct: Option<ExaminedSum>,
     pub(super) estimator: Arc<OnceLock<ErrorEstimator>>,
-    /// True if the quick estimate was too close to the bound to rule refinement out.
+    /// True if the quick estimate was too close to the bound to rule refinement out, or if factors were asked for.
     pub(super) close_to_bound: bool,
 }
 

@@ -50,7 +50,7 @@ impl Pipeline {
             materials: Arc::new(MaterialAssignment { material_of_slot, materials: materials.materials.clone() }),
             names,
             closes_plane: tile.mesh.closes_plane,
-            max_color_weight: tile.mesh.color.max(),
+            color: tile.mesh.color.clone(),
         };
         Ok(Outcome {
             brdf,

@@ -4,7 +4,9 @@
 
 use super::algorithm::{SHALLOW_PART, maps_ms, max_blocked_part, scan_ms};
 use super::context::Context;
-use super::{Effect, EffectKind, FAINT_FRACTION, Preset, VisibilityAlgorithm, VisibilityMethod, is_on, methods};
+use super::{
+    Effect, EffectKind, FAINT_FRACTION, LeftOut, Preset, VisibilityAlgorithm, VisibilityMethod, is_on, methods,
+};
 use crate::interreflection::predicted_share;
 use crate::scene::{Effects, Switch};
 
@@ -24,11 +26,12 @@ pub(super) struct Decision {
     predicted_ms: f64,
     /// An upper bound of the relative L2 change of `f̄` if the effect were turned on.
     bound: Option<f64>,
+    left_out: Option<LeftOut>,
 }
 
 impl Decision {
     pub fn new(on: bool, reason: impl Into<String>) -> Self {
-        Self { on, reason: reason.into(), predicted_ms: 0.0, bound: None }
+        Self { on, reason: reason.into(), predicted_ms: 0.0, bound: None, left_out: None }
     }
 
     pub fn costs(self, predicted_ms: f64) -> Self {
@@ -37,6 +40,10 @@ impl Decision {
 
     pub fn changes_at_most(self, bound: f64) -> Self {
         Self { bound: Some(bound), ..self }
+    }
+
+    fn leaves_out(self, left_out: Option<LeftOut>) -> Self {
+        Self { left_out, ..self }
     }
 }
 
@@ -116,7 +123,7 @@ pub(super) fn decide_all(context: &Context<'_>) -> Vec<Effect> {
     let mut forced = context.settings.effects.clone();
     let mut decide = |row: &Row| {
         let switch = row.switch.map_or(Switch::Auto, |field| *field(&mut forced));
-        let Decision { on, reason, predicted_ms, bound } = (row.decide)(context, switch);
+        let Decision { on, reason, predicted_ms, bound, left_out } = (row.decide)(context, switch);
         Effect {
             name: row.name,
             kind: row.kind,
@@ -126,6 +133,7 @@ pub(super) fn decide_all(context: &Context<'_>) -> Vec<Effect> {
             measured_ms: None,
             forced: switch != Switch::Auto,
             bound: bound.filter(|_| !on && switch == Switch::Auto),
+            left_out,
         }
     };
     ROWS.iter().map(&mut decide).collect()
@@ -247,11 +255,13 @@ fn interreflection(context: &Context<'_>, switch: Switch) -> Decision {
         format!("{estimate}; left out, as in the paper")
     } else {
         format!(
-            "{estimate}, more than the tolerance of {:.1} %; left out, as in the paper's definition of f̄: ask with --effect interreflection=on ({ms:.0} ms)",
+            "{estimate}, more than the tolerance of {:.1} %; left out, as in the paper's definition of f̄",
             settings.tolerance * 100.0
         )
     };
-    let decision = Decision::new(on, reason).costs(if on { ms } else { 0.0 });
+    let is_missing = !on && !features.flat && features.materials > 0 && share > settings.tolerance;
+    let left_out = is_missing.then_some(LeftOut { share, tolerance: settings.tolerance, predicted_ms: ms });
+    let decision = Decision::new(on, reason).costs(if on { ms } else { 0.0 }).leaves_out(left_out);
     // The estimate is no bound, unless there is nothing to add.
     if features.flat { decision.changes_at_most(ROUNDING) } else { decision }
 }

@@ -54,6 +54,20 @@ pub struct Effect {
     /// An upper bound of the relative L2 change of `f̄` if the effect, which is off by itself, were turned on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound: Option<f64>,
+    /// Light that is missing because the effect is off, if it may be more than the preset's tolerance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<LeftOut>,
+}
+
+/// Light that an effect would add.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// The largest estimated part of the light that is reflected directly.
+    pub share: f64,
+    /// The part that the preset tolerates.
+    pub tolerance: f64,
+    /// Milliseconds that the effect would take.
+    pub predicted_ms: f64,
 }
 
 /// The decisions for one scene.

@@ -175,7 +175,11 @@ fn interreflection_is_estimated_but_never_on_by_itself() {
     let plan = Plan::new(&features, &Settings::of_preset(Preset::Standard), &Costs::default());
     let effect = plan.effects.iter().find(|effect| effect.name == "interreflection").unwrap();
     assert!(!plan.interreflection && !effect.on);
-    assert!(effect.reason.contains("--effect interreflection=on"), "{}", effect.reason);
+    let left_out = effect.left_out.unwrap();
+    assert!(left_out.share > left_out.tolerance && left_out.predicted_ms > 0.0, "{left_out:?}");
+    let flat = SceneFeatures { flat: true, ..features };
+    let plan = Plan::new(&flat, &Settings::of_preset(Preset::Standard), &Costs::default());
+    assert!(plan.effects.iter().all(|effect| effect.left_out.is_none()), "a flat tile leaves nothing out");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The ray-cast reference with its standard error: the sum over facets, and paths between facets.
 
 pub mod color_map;
+mod few_pairs;
 mod paths;
 pub mod photons;
 mod ray_cast;

@@ -51,7 +51,7 @@ pub struct Reference<'a> {
 
 /// Sums over the passes of one pair: `S = Σ ΔA V V f`, `a_v`, and their second moments.
 #[derive(Debug, Clone, Copy, Default)]
-struct Moments {
+pub(super) struct Moments {
     s: DVec3,
     a: f64,
     ss: DVec3,
@@ -60,6 +60,15 @@ struct Moments {
 }
 
 impl Moments {
+    /// Adds the sums of one pass.
+    pub(super) fn add(&mut self, s: DVec3, a: f64) {
+        self.s += s;
+        self.a += a;
+        self.ss += s * s;
+        self.sa += s * a;
+        self.aa += a * a;
+    }
+
     fn estimate(&self, passes: usize) -> Estimate {
         if self.a <= 0.0 {
             return Estimate::default();
@@ -71,6 +80,40 @@ impl Moments {
         let error = (residual / (n * (n - 1.0).max(1.0))).map(f64::sqrt) / (self.a / n);
         Estimate { f_bar: ratio.as_vec3(), standard_error: error.as_vec3() }
     }
+}
+
+/// Number of shifts between the first passes of two successive seeds.
+const PASSES_PER_SEED: u64 = 4096;
+
+/// Runs passes until their standard error is below the target or `progress` returns false. `pass(number, shift, moments)`
+/// adds the sums of one pass.
+///
+/// The passes shift one low-discrepancy sequence. Together they are more accurate than independent passes, so the
+/// standard error is an upper estimate.
+pub(super) fn in_passes(
+    pairs: &[Pair],
+    settings: &ReferenceSettings,
+    mut progress: impl FnMut(usize, f64) -> bool,
+    mut pass: impl FnMut(u64, SampleShift, &mut [Moments]),
+) -> Vec<Estimate> {
+    let mut moments = vec![Moments::default(); pairs.len()];
+    let mut estimates = vec![Estimate::default(); pairs.len()];
+    for passes in 1..=settings.max_passes.max(MIN_PASSES) {
+        let number = passes as u64 - 1;
+        let shift = SampleShift::from_seed(settings.seed.wrapping_mul(PASSES_PER_SEED).wrapping_add(number));
+        pass(number, shift, &mut moments);
+        let (mut error, mut norm) = (0.0, 0.0);
+        for (estimate, moments) in estimates.iter_mut().zip(&moments) {
+            *estimate = moments.estimate(passes);
+            error += estimate.standard_error.as_dvec3().length_squared();
+            norm += estimate.f_bar.as_dvec3().length_squared();
+        }
+        let relative = if error == 0.0 { 0.0 } else { (error / norm).sqrt() };
+        if !progress(passes, relative) || (passes >= MIN_PASSES && relative < settings.target) {
+            break;
+        }
+    }
+    estimates
 }
 
 impl<'a> Reference<'a> {
@@ -95,49 +138,28 @@ impl<'a> Reference<'a> {
         &self,
         pairs: &[Pair],
         settings: &ReferenceSettings,
-        mut progress: impl FnMut(usize, f64) -> bool,
+        progress: impl FnMut(usize, f64) -> bool,
     ) -> Vec<Estimate> {
-        let mut moments = vec![Moments::default(); pairs.len()];
-        let mut estimates = vec![Estimate::default(); pairs.len()];
         let sampler = FacetSampler::new(self.mesh);
-        for pass in 0..settings.max_passes.max(MIN_PASSES) {
-            // The passes shift one low-discrepancy sequence. Together they are more accurate than independent passes,
-            // so the standard error is an upper estimate.
-            let shift = SampleShift::from_seed(settings.seed.wrapping_mul(4096).wrapping_add(pass as u64));
+        in_passes(pairs, settings, progress, |pass, shift, all_moments| {
             let mut facets = sampler.sample(self.mesh, settings.facets, shift);
             facets.sort_for_sums();
             let sum = FacetSum::new(&facets, &self.material_of_slot, &self.materials);
             let origins = lifted_origins(&facets, self.mesh.size);
             let paths = (self.bounces > 0)
                 .then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, &self.materials, self.bounces));
-            moments.par_iter_mut().zip(pairs).enumerate().for_each_init(
+            all_moments.par_iter_mut().zip(pairs).enumerate().for_each_init(
                 || (vec![0.0_f32; facets.len()], vec![0.0_f32; facets.len()]),
                 |(v_i, v_o), (at, (moments, pair))| {
                     let (mut s, a) = self.one_pass(&facets, &sum, &origins, *pair, v_i, v_o);
                     if let Some(paths) = &paths {
-                        let seed = settings.seed ^ (pass as u64) << 40 ^ (at as u64) << 8;
+                        let seed = settings.seed ^ pass << 40 ^ (at as u64) << 8;
                         s += paths.trace(&facets, &origins, v_o, *pair, seed);
                     }
-                    moments.s += s;
-                    moments.a += a;
-                    moments.ss += s * s;
-                    moments.sa += s * a;
-                    moments.aa += a * a;
+                    moments.add(s, a);
                 },
             );
-            let passes = pass + 1;
-            let (mut error, mut norm) = (0.0, 0.0);
-            for (estimate, moments) in estimates.iter_mut().zip(&moments) {
-                *estimate = moments.estimate(passes);
-                error += estimate.standard_error.as_dvec3().length_squared();
-                norm += estimate.f_bar.as_dvec3().length_squared();
-            }
-            let relative = if error == 0.0 { 0.0 } else { (error / norm).sqrt() };
-            if !progress(passes, relative) || (passes >= MIN_PASSES && relative < settings.target) {
-                break;
-            }
-        }
-        estimates
+        })
     }
 
     /// Computes `(Σ ΔA V V f, a_v)` over one set of facets.

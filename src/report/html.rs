@@ -49,18 +49,22 @@ pub fn page(report: &Report) -> String {
 fn section(html: &mut String, scene: &SceneReport) {
     let _ = write!(
         html,
-        "<h2>{}</h2><p class='soft'>Reference: {} direction pairs up to 85°, {} passes in {} s; its standard error is {} % relative L2. Errors of this size or below cannot be distinguished from it.{}</p>",
+        "<h2>{}</h2><p class='soft'>{}{}</p>",
         escape(&scene.name),
-        scene.pairs,
-        scene.reference_passes,
-        number(scene.reference_seconds),
-        number(scene.reference_error * 100.0),
+        reference(scene),
         if scene.left_out > 0 {
             format!(" {} settings were left out because the time was over.", scene.left_out)
         } else {
             String::new()
         }
     );
+    if !scene.has_reference() {
+        html.push_str("<div class='grid-of'>");
+        card(html, "Error against time", &error_against_time(scene));
+        html.push_str("</div>");
+        table(html, scene);
+        return;
+    }
     html.push_str("<ul>");
     for sentence in conclusions::of(scene) {
         let _ = write!(html, "<li>{}</li>", escape(&sentence));
@@ -78,6 +82,19 @@ fn section(html: &mut String, scene: &SceneReport) {
     }
     html.push_str("</div>");
     table(html, scene);
+}
+
+fn reference(scene: &SceneReport) -> String {
+    if !scene.has_reference() {
+        return "The reference is not computed yet. The errors are those that the results state; bars span half to one and a half times of them. Load this page again to see them against the reference.".to_owned();
+    }
+    format!(
+        "Reference: {} direction pairs up to 85°, {} passes in {} s; its standard error is {} % relative L2, which is subtracted in squares. Bars show what is left of it.",
+        scene.pairs,
+        scene.reference_passes,
+        number(scene.reference_seconds),
+        number(scene.reference_error * 100.0)
+    )
 }
 
 fn card(html: &mut String, title: &str, body: &str) {
@@ -106,7 +123,11 @@ fn title(point: &SweepPoint) -> String {
 
 /// Relative L2 error in percent as it is drawn, at least 0.01.
 fn percent(point: &SweepPoint) -> f64 {
-    (point.rel_l2 * 100.0).max(0.01)
+    drawn(point.rel_l2)
+}
+
+fn drawn(rel_l2: f64) -> f64 {
+    (rel_l2 * 100.0).max(0.01)
 }
 
 fn axes(points: &[SweepPoint]) -> (LogAxis, LogAxis) {
@@ -121,12 +142,18 @@ fn error_against_time(scene: &SceneReport) -> String {
         scene.points.iter().filter(|point| point.preset != "wu2011" && point.preset != "reference").collect();
     let front: Vec<(f64, f64)> = pareto(&ours).into_iter().map(|k| (ours[k].ms, percent(ours[k]))).collect();
     chart.line(&front, COLORS[4], false);
+    let color = |point: &SweepPoint| match point.family {
+        Family::Preset => COLORS[5],
+        Family::Combination => COLORS[7],
+        Family::QualityScale => COLORS[2],
+        Family::Setting(_) => COLORS[0],
+    };
+    for point in &scene.points {
+        let ends = [-1.0, 1.0].map(|side| drawn(point.rel_l2 + side * point.rel_l2_std_error));
+        chart.error_bar(point.ms, ends, color(point));
+    }
     for point in scene.points.iter().filter(|point| point.family != Family::Preset) {
-        let color = match point.family {
-            Family::Combination => COLORS[7],
-            Family::QualityScale => COLORS[2],
-            _ => COLORS[0],
-        };
+        let color = color(point);
         chart.dot(point.ms, percent(point), 3.5, color, &title(point));
     }
     for point in scene.points.iter().filter(|point| point.family == Family::Preset) {

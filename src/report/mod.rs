@@ -66,12 +66,34 @@ pub struct SceneReport {
     pub pairs: usize,
     /// Relative L2 of the standard errors of the reference.
     pub reference_error: f64,
+    /// 0 if the reference is not computed yet, so that the points have the errors that results state.
     pub reference_passes: usize,
     pub reference_seconds: f64,
     pub points: Vec<SweepPoint>,
     pub thumbnails: Vec<Thumbnail>,
     /// Number of candidates that the time limit left out.
     pub left_out: usize,
+}
+
+impl SceneReport {
+    /// A report whose points have the errors that results state.
+    pub fn without_reference(name: &str, pairs: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            pairs,
+            reference_error: 0.0,
+            reference_passes: 0,
+            reference_seconds: 0.0,
+            points: Vec::new(),
+            thumbnails: Vec::new(),
+            left_out: 0,
+        }
+    }
+
+    /// Returns true if the errors of the points are measured against a reference.
+    pub fn has_reference(&self) -> bool {
+        self.reference_passes > 0
+    }
 }
 
 /// The whole report.
@@ -90,12 +112,14 @@ impl Report {
 
     /// The report as a table with one row per candidate.
     pub fn csv(&self) -> String {
-        let mut text = "scene,family,settings,ms,query_us,rel_l2,psnr_db,albedo_error,form\n".to_owned();
+        let mut text =
+            "scene,family,settings,ms,query_us,rel_l2,psnr_db,albedo_error,form,rel_l2_std_error,is_stated\n"
+                .to_owned();
         for point in self.scenes.iter().flat_map(|scene| &scene.points) {
             let family = csv_family(&point.family);
             let _ = writeln!(
                 text,
-                "{},{family},{},{:.3},{:.3},{:.6},{:.2},{:.6},{}",
+                "{},{family},{},{:.3},{:.3},{:.6},{:.2},{:.6},{},{:.6},{}",
                 quoted(&point.scene),
                 quoted(&point.settings),
                 point.ms,
@@ -103,7 +127,9 @@ impl Report {
                 point.rel_l2,
                 point.psnr_db,
                 point.albedo_error,
-                quoted(&point.representation)
+                quoted(&point.representation),
+                point.rel_l2_std_error,
+                point.is_stated
             );
         }
         text
@@ -124,7 +150,7 @@ impl Report {
                     "reference_passes": scene.reference_passes,
                     "reference_seconds": scene.reference_seconds,
                     "left_out": scene.left_out,
-                    "conclusions": conclusions::of(scene),
+                    "conclusions": if scene.has_reference() { conclusions::of(scene) } else { Vec::new() },
                 })
             })
             .collect();

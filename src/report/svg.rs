@@ -119,6 +119,17 @@ impl Chart {
         );
     }
 
+    /// Draws a vertical error bar.
+    pub fn error_bar(&mut self, x: f64, [low, high]: [f64; 2], color: &str) {
+        let x = self.px(x);
+        let _ = write!(
+            self.body,
+            "<line x1='{x:.1}' x2='{x:.1}' y1='{:.1}' y2='{:.1}' stroke='{color}' stroke-opacity='0.5'/>",
+            self.py(low),
+            self.py(high)
+        );
+    }
+
     /// Writes text beside a point.
     pub fn label(&mut self, x: f64, y: f64, color: &str, text: &str) {
         let (px, anchor) =

@@ -76,6 +76,15 @@ impl Background {
         })
     }
 
+    /// The distance of the plane; `None` without a plane.
+    pub fn distance_mut(&mut self) -> Option<&mut f32> {
+        match self {
+            Self::Checkerboard(board) => Some(&mut board.distance),
+            Self::Image(image) => Some(&mut image.distance),
+            Self::Environment {} => None,
+        }
+    }
+
     /// The file that the background names.
     pub fn path(&self) -> Option<&Path> {
         match self {

@@ -1,30 +1,30 @@
 //! Light that is reflected inside the slab before it leaves, and the light that masking removes, as tables.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::even_numbers::EvenNumbers;
 use super::ndf::Ndf;
 use super::optics::{Channel, Optics};
-use super::walk::{Exit, Walk};
+use super::ring_table::{
+    RINGS, RingTable, TURNS, edge, projected_solid_angle, ring_of, ring_taps, transposed, turn_of,
+};
+use super::walk::{ChannelSlab, Exit};
 use crate::base::{Cancel, Result};
 
-/// Rings of the polar angle, for the light and for the viewer.
-const RINGS: usize = 24;
 /// Photons per ring between smooth faces; they spread over the angles of the ring.
 const SMOOTH_PHOTONS: usize = 512;
-/// Steps of the azimuth between light and viewer, 0 to 180°.
-const TURNS: usize = 12;
 
 /// Light of one channel that was reflected inside, from above, averaged over the azimuth of the light.
 #[derive(Debug, Clone, PartialEq)]
 struct ChannelTable {
-    /// BTDF and BRDF [1/sr] by ring of the light, ring of the viewer and azimuth.
-    transmitted: Vec<f32>,
-    reflected: Vec<f32>,
+    /// BTDF and BRDF [1/sr].
+    transmitted: RingTable,
+    reflected: RingTable,
     /// Parts of the light of each ring, over the azimuth of the light.
     parts: Vec<RingParts>,
     /// Mean of the masked part over all directions of the light, by projected solid angle.
@@ -127,7 +127,8 @@ pub struct Inner {
 }
 
 impl Inner {
-    /// Traces `photons` photons per ring and channel, with a fixed seed.
+    /// Traces at most `photons` photons per ring and channel, with a fixed seed. Rings near the normal, of which little light is
+    /// reflected inside, get fewer.
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
@@ -144,7 +145,7 @@ impl Inner {
         });
         let table = |channel: &Channel| {
             cancel.check()?;
-            Ok(ChannelTable::new(&Walk { top, bottom, channel: *channel }, photons, seed, cancel))
+            Ok(ChannelTable::new(&ChannelSlab { top, bottom, channel: *channel }, photons, seed, cancel))
         };
         let tables = channels.iter().map(table).collect::<Result<Vec<_>>>()?;
         cancel.check()?;
@@ -161,7 +162,7 @@ impl Inner {
     pub fn btdf(&self, i: DVec3, o: DVec3) -> DVec3 {
         self.per_channel(|table| {
             let scale = table.relative(i, |parts| &parts.transmitted);
-            scale * table.read(&table.transmitted, i, o) + 0.5 * table.part(i, |parts| &parts.masked) / PI
+            scale * table.transmitted.read(i, o) + 0.5 * table.part(i, |parts| &parts.masked) / PI
         })
     }
 
@@ -172,7 +173,7 @@ impl Inner {
             // The product is reciprocal, and its integral over the viewers is half of the masked part.
             let part = if table.mean_masked > 0.0 { masked(i) * masked(o) / table.mean_masked } else { 0.0 };
             let scale = |w: DVec3| table.relative(w, |parts| &parts.reflected);
-            scale(i) * scale(o) * table.read(&table.reflected, i, o) + 0.5 * part / PI
+            scale(i) * scale(o) * table.reflected.read(i, o) + 0.5 * part / PI
         })
     }
 
@@ -193,55 +194,46 @@ impl Inner {
         self.tables.iter().flat_map(|table| &table.parts[..rings]).map(|parts| parts.masked.mean()).fold(0.0, f64::max)
     }
 
+    /// BTDF [1/sr] of the light of the first channel that bounced inside, averaged over the azimuth of the light.
+    pub(super) fn bounced(&self) -> &RingTable {
+        &self.tables[0].transmitted
+    }
+
     /// Size in memory [bytes].
     pub fn bytes(&self) -> usize {
-        self.tables.iter().map(|table| 4 * (table.transmitted.len() + table.reflected.len())).sum()
+        self.tables.len() * 2 * RingTable::LEN * size_of::<f32>()
     }
 }
 
 /// Sums of one ring of the light.
 struct RingSums {
+    photons: usize,
     transmitted: Vec<f64>,
     reflected: Vec<f64>,
     parts: RingParts,
 }
 
 impl ChannelTable {
-    fn new(walk: &Walk<'_>, photons: usize, seed: u64, cancel: &Cancel) -> Self {
+    fn new(walk: &ChannelSlab<'_>, photons: usize, seed: u64, cancel: &Cancel) -> Self {
         let rings: Vec<RingSums> =
             (0..RINGS).into_par_iter().map(|ring| trace_ring(walk, ring, photons, seed, cancel)).collect();
-        let per_bin = |ring: usize| projected_solid_angle(ring) / TURNS as f64 * photons as f64;
+        let per_bin = |ring: usize| projected_solid_angle(ring) / TURNS as f64;
         let values = |sums: &dyn Fn(&RingSums) -> &[f64]| -> Vec<f64> {
-            rings
-                .iter()
-                .flat_map(|ring| sums(ring).iter().enumerate().map(|(k, sum)| sum / per_bin(k / TURNS)))
-                .collect()
+            let of_ring = |ring: &RingSums| {
+                let values = sums(ring).iter().enumerate();
+                values.map(|(k, sum)| sum / (per_bin(k / TURNS) * ring.photons as f64)).collect::<Vec<f64>>()
+            };
+            rings.iter().flat_map(of_ring).collect()
         };
         let transmitted = values(&|ring| &ring.transmitted);
         let one_way = values(&|ring| &ring.reflected);
         // Reflection is reciprocal: both ways estimate one value.
-        let other = |k: usize| (k / TURNS % RINGS * RINGS + k / TURNS / RINGS) * TURNS + k % TURNS;
-        let reflected = (0..one_way.len()).map(|k| (0.5 * (one_way[k] + one_way[other(k)])) as f32).collect();
+        let reflected = (0..one_way.len()).map(|k| (0.5 * (one_way[k] + one_way[transposed(k)])) as f32).collect();
         let mut parts: Vec<RingParts> = rings.iter().map(|ring| ring.parts).collect();
         drop_noise(&mut parts);
         let mean_masked = (0..RINGS).map(|ring| projected_solid_angle(ring) / PI * parts[ring].masked.mean()).sum();
-        Self { transmitted: transmitted.iter().map(|value| *value as f32).collect(), reflected, parts, mean_masked }
-    }
-
-    /// Reads a table at polar angles and the azimuth between the directions of travel of straight light, linearly.
-    fn read(&self, values: &[f32], i: DVec3, o: DVec3) -> f64 {
-        let (a, b) = (ring_taps(i), ring_taps(o));
-        let turn = turn(i, o) / PI * TURNS as f64 - 0.5;
-        let (low, t) = (turn.floor(), turn - turn.floor());
-        let turns = [low.max(0.0) as usize, (low + 1.0).min((TURNS - 1) as f64) as usize];
-        let mut sum = 0.0;
-        for (ring_i, u) in a {
-            for (ring_o, v) in b {
-                let at = (ring_i * RINGS + ring_o) * TURNS;
-                sum += u * v * ((1.0 - t) * f64::from(values[at + turns[0]]) + t * f64::from(values[at + turns[1]]));
-            }
-        }
-        sum
+        let transmitted = RingTable::new(transmitted.iter().map(|value| *value as f32).collect());
+        Self { transmitted, reflected: RingTable::new(reflected), parts, mean_masked }
     }
 
     /// A part of light from `i`, interpolated between the rings.
@@ -257,46 +249,30 @@ impl ChannelTable {
     }
 }
 
-/// Angle between the azimuths of `-i` and `o`, 0 to π.
-fn turn(i: DVec3, o: DVec3) -> f64 {
-    let (a, b) = (-i.truncate(), o.truncate());
-    if a.length_squared() * b.length_squared() <= 1e-24 { FRAC_PI_2 } else { a.perp_dot(b).atan2(a.dot(b)).abs() }
-}
-
-/// The two rings around a direction, with weights.
-fn ring_taps(w: DVec3) -> [(usize, f64); 2] {
-    let theta = w.z.abs().min(1.0).acos();
-    let at = (theta / FRAC_PI_2 * RINGS as f64 - 0.5).clamp(0.0, (RINGS - 1) as f64);
-    let low = (at as usize).min(RINGS - 2);
-    [(low, 1.0 - (at - low as f64)), (low + 1, at - low as f64)]
-}
-
-/// Squared sine of the lower edge of a ring.
-fn edge(ring: usize) -> f64 {
-    (ring as f64 / RINGS as f64 * FRAC_PI_2).sin().powi(2)
-}
-
-/// Projected solid angle of a ring [sr].
-fn projected_solid_angle(ring: usize) -> f64 {
-    PI * (edge(ring + 1) - edge(ring))
-}
+/// Part of the photons that the innermost ring gets; the share grows evenly to 1 of the outermost.
+const LEAST_SHARE: f64 = 0.25;
 
 /// Traces photons from one ring, spread evenly over its projected solid angle.
-fn trace_ring(walk: &Walk<'_>, ring: usize, photons: usize, seed: u64, cancel: &Cancel) -> RingSums {
+fn trace_ring(walk: &ChannelSlab<'_>, ring: usize, photons: usize, seed: u64, cancel: &Cancel) -> RingSums {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(ring as u64);
+    let share = LEAST_SHARE + (1.0 - LEAST_SHARE) * (ring + 1) as f64 / RINGS as f64;
+    let photons = ((share * photons as f64).ceil() as usize).max(1);
+    let shift = std::array::from_fn(|_| rng.random());
     let bins = RINGS * TURNS;
-    let mut sums = RingSums { transmitted: vec![0.0; bins], reflected: vec![0.0; bins], parts: RingParts::default() };
+    let mut sums =
+        RingSums { photons, transmitted: vec![0.0; bins], reflected: vec![0.0; bins], parts: RingParts::default() };
     let (low, high) = (edge(ring), edge(ring + 1));
     for photon in 0..photons {
         if photon % 4096 == 0 && cancel.is_set() {
             break;
         }
-        let square: f64 = low + (high - low) * rng.random::<f64>();
-        let (y, x) = (TAU * rng.random::<f64>()).sin_cos();
+        let mut numbers = EvenNumbers::new(photon, &shift, &mut rng);
+        let square: f64 = low + (high - low) * numbers.random::<f64>();
+        let (y, x) = (TAU * numbers.random::<f64>()).sin_cos();
         let i = DVec3::new(square.sqrt() * x, square.sqrt() * y, (1.0 - square).max(0.0).sqrt());
         let (mut after_bounces, mut through, mut back) = (0.0, 0.0, 0.0);
-        let losses = walk.run(i, &mut rng, |exit| {
+        let losses = walk.run(i, &mut numbers, |exit| {
             let Exit { direction, weight, bounces, is_straight } = exit;
             let is_below = direction.z < 0.0;
             if is_below && bounces > 0 {
@@ -306,11 +282,9 @@ fn trace_ring(walk: &Walk<'_>, ring: usize, photons: usize, seed: u64, cancel: &
             if is_straight || bounces == 0 {
                 return;
             }
-            let ring = ((direction.z.abs().min(1.0).acos() / FRAC_PI_2 * RINGS as f64) as usize).min(RINGS - 1);
-            let step = ((turn(i, direction) / PI * TURNS as f64) as usize).min(TURNS - 1);
             let side = if is_below { &mut sums.transmitted } else { &mut sums.reflected };
             *(if is_below { &mut through } else { &mut back }) += weight;
-            side[ring * TURNS + step] += weight;
+            side[ring_of(direction) * TURNS + turn_of(i, direction)] += weight;
         });
         let values = [losses.absorbed, losses.masked, losses.first_total_reflection, after_bounces, through, back];
         let basis = Harmonics::basis(i);

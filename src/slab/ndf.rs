@@ -92,6 +92,11 @@ impl Ndf {
         self.level >= 1.0
     }
 
+    /// Returns true if the slopes are the same at every azimuth.
+    pub fn is_round(&self) -> bool {
+        self.is_smooth() || self.only_ellipse().is_some_and(Ellipse::is_round)
+    }
+
     /// Density of the slopes that are not level; its integral is [`Self::rough`]. Points are tents of a small width.
     pub fn density(&self, m: DVec2) -> f64 {
         let width = self.point_width;
@@ -137,6 +142,13 @@ impl Ndf {
             None if self.level <= 0.0 => (self.spread.slope(1.0, v), false),
             _ => (DVec2::ZERO, true),
         }
+    }
+
+    /// The slope of a facet that the direction `w`, up or down, sees, at a point of the unit square. Random points give facets by
+    /// their areas as seen along `w`. `None` unless all slopes are those of a GGX distribution.
+    pub fn visible_slope(&self, w: DVec3, u: f64, v: f64) -> Option<DVec2> {
+        let ellipse = self.only_ellipse().filter(|_| self.level <= 0.0)?;
+        ellipse.visible_slope(if w.z < 0.0 { -w } else { w }, u, v)
     }
 
     /// `count` evenly spread slopes of the spread part and all points, with their masses: the rough part of the face.

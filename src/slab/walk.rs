@@ -6,10 +6,11 @@ use rand::{Rng, RngExt};
 use super::fresnel::{reflectance, refract};
 use super::ndf::{Ndf, normal};
 use super::optics::Channel;
+use super::spread::r2;
 
-/// Two faces and one colour channel of the material between them.
+/// A slab in one colour channel, through which photons walk: two faces and the material between them.
 #[derive(Debug, Clone, Copy)]
-pub struct Walk<'a> {
+pub struct ChannelSlab<'a> {
     pub top: &'a Ndf,
     pub bottom: &'a Ndf,
     pub channel: Channel,
@@ -28,9 +29,9 @@ pub struct Exit {
     pub is_straight: bool,
 }
 
-/// Parts of a photon that do not leave.
+/// Parts of a photon by what became of them. Light of `first_total_reflection` may leave later.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Losses {
+pub struct Tally {
     pub absorbed: f64,
     /// Light that Smith's masking blocks after a facet, or that a facet sends into the face.
     pub masked: f64,
@@ -49,19 +50,49 @@ pub(crate) struct Scattering {
     pub is_total: bool,
 }
 
-/// Weight below which a photon ends; what is left counts as masked.
+/// Weight below which a photon between level facets ends.
 const LEAST_WEIGHT: f64 = 1e-5;
+/// Weight below which one of several photons goes on with this weight and stands for the others.
+const ROULETTE: f64 = 0.02;
+/// Vertical component below which light is steep, and the facets of which steep light meets one.
+const STEEP: f64 = 0.7;
+const CANDIDATES: usize = 8;
 /// Largest number of reflections inside.
 const MAX_BOUNCES: usize = 256;
 
 /// Scatters light of weight `weight` that travels along `d` at a random facet. `eta` is the index behind over that before.
 ///
-/// Facets are drawn by base area and weighted by `(w·h)+ / (h.z w.z (1 + Λ(w)))`, whose mean is 1.
+/// Facets of GGX are drawn by the area that the light sees. Others are drawn by base area and weighted by the area that the
+/// light sees over its mean, `(w·h)+ / (h.z w.z (1 + Λ(w)))`. Light that is steep meets one of several such facets, chosen by
+/// their areas, because the area of a single one then varies much.
 pub(crate) fn scatter(face: &Ndf, d: DVec3, weight: f64, eta: f64, rng: &mut impl Rng) -> Scattering {
-    let (slope, is_level) = face.facet(rng.random(), rng.random());
-    scatter_at(face, (slope, is_level), d, weight, eta)
+    let (u, v) = (rng.random(), rng.random());
+    if let Some(slope) = face.visible_slope(-d, u, v) {
+        return scatter_at(face, (slope, false), d, weight, eta);
+    }
+    let k = d.truncate() / d.z.abs().max(1e-12).copysign(d.z);
+    let seen = |slope: DVec2| (1.0 + k.dot(slope)).max(0.0);
+    let mean = (1.0 + face.signed_lambda(-d)).max(1e-9);
+    if d.z.abs() >= STEEP || face.is_smooth() {
+        let facet = face.facet(u, v);
+        return scatter_at(face, facet, d, weight * seen(facet.0) / mean, eta);
+    }
+    let candidates: [(DVec2, bool); CANDIDATES] = std::array::from_fn(|j| {
+        let [x, y] = r2(j);
+        face.facet((u + x).fract(), (v + y).fract())
+    });
+    let areas = candidates.map(|(slope, _)| seen(slope));
+    let sum: f64 = areas.iter().sum();
+    let mut left = sum * rng.random::<f64>();
+    let chosen = areas.iter().position(|area| {
+        left -= area;
+        left < 0.0
+    });
+    let facet = candidates[chosen.unwrap_or(0)];
+    scatter_at(face, facet, d, weight * sum / (CANDIDATES as f64 * mean), eta)
 }
 
+/// Scatters light at a facet. `weight` is that of the light on the facet.
 fn scatter_at(face: &Ndf, (slope, is_level): (DVec2, bool), d: DVec3, weight: f64, eta: f64) -> Scattering {
     let up = normal(slope);
     let h = if d.z < 0.0 { up } else { -up };
@@ -70,8 +101,6 @@ fn scatter_at(face: &Ndf, (slope, is_level): (DVec2, bool), d: DVec3, weight: f6
     if c <= 0.0 {
         return result;
     }
-    let area = (1.0 + face.signed_lambda(-d)).max(1e-9);
-    let weight = weight * c / (up.z * d.z.abs().max(1e-12) * area);
     let r = reflectance(c, eta);
     result.is_total = r >= 1.0;
     let mut leave = |direction: Option<DVec3>, part: f64, is_down: bool| {
@@ -90,16 +119,16 @@ fn scatter_at(face: &Ndf, (slope, is_level): (DVec2, bool), d: DVec3, weight: f6
     result
 }
 
-impl Walk<'_> {
+impl ChannelSlab<'_> {
     /// Follows a photon of weight 1 from the direction `i` above. At each facet it splits into the light that leaves, which
     /// is reported to `exit`, and the light that stays inside.
-    pub fn run(&self, i: DVec3, rng: &mut impl Rng, mut exit: impl FnMut(Exit)) -> Losses {
-        let mut losses = Losses::default();
+    pub fn run(&self, i: DVec3, rng: &mut impl Rng, mut exit: impl FnMut(Exit)) -> Tally {
+        let mut losses = Tally::default();
         let eta = self.channel.eta;
         if self.channel.is_clear() {
             let part = self.channel.transmission(-i);
             exit(Exit { direction: -i, weight: part, bounces: 0, is_straight: true });
-            return Losses { absorbed: 1.0 - part, ..losses };
+            return Tally { absorbed: 1.0 - part, ..losses };
         }
         let entered = scatter(self.top, -i, 1.0, eta, rng);
         let mut is_straight = entered.is_level;
@@ -113,11 +142,19 @@ impl Walk<'_> {
             let part = self.channel.transmission(d);
             losses.absorbed += weight * (1.0 - part);
             let weight = weight * part;
-            if weight < LEAST_WEIGHT {
+            let weight = if weight >= ROULETTE {
+                weight
+            } else if is_straight {
                 // Light between level facets has a closed form, which leaves nothing.
-                losses.masked += if is_straight { 0.0 } else { weight };
+                if weight < LEAST_WEIGHT {
+                    return losses;
+                }
+                weight
+            } else if ROULETTE * rng.random::<f64>() < weight {
+                ROULETTE
+            } else {
                 return losses;
-            }
+            };
             let face = if d.z < 0.0 { self.bottom } else { self.top };
             let met = scatter(face, d, weight, 1.0 / eta, rng);
             is_straight &= met.is_level;
@@ -152,7 +189,7 @@ mod tests {
         for (top, bottom) in [(&ggx, &uneven), (&points, &ggx), (&uneven, &points)] {
             for degrees in [0.0, 45.0, 75.0, 85.0_f64] {
                 let (sin, cos) = degrees.to_radians().sin_cos();
-                let walk = Walk { top, bottom, channel: Channel { eta: 1.5, depth: 0.2 } };
+                let walk = ChannelSlab { top, bottom, channel: Channel { eta: 1.5, depth: 0.2 } };
                 let mut rng = ChaCha8Rng::seed_from_u64(5);
                 let count = 20_000;
                 let (mut sum, mut square) = (0.0, 0.0);

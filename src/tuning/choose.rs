@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::candidates::{Candidate, with_settings};
 use super::quality_scale::{self, FINEST};
-use super::target_reference::TargetReference;
+use super::target_reference::{CheckedError, Peak, TargetReference};
 use crate::base::{Cancel, Result};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::scene::LoadedScene;
@@ -31,14 +31,14 @@ pub struct Measurement {
     /// PSNR without the error of the reference [dB]. It is infinite if there is no error or none was measured.
     pub psnr_db: f64,
     pub rel_l2: f64,
-    /// Standard error of the PSNR [dB]. A few bright pairs may cause most of the error, and another set may lack them.
+    /// Standard error of the PSNR on other pairs [dB].
     pub psnr_std_error_db: f64,
 }
 
 impl Measurement {
     /// PSNR that other pairs reach in two of three cases [dB].
     fn safe_db(&self) -> f64 {
-        self.psnr_db - 0.5 * self.psnr_std_error_db
+        self.psnr_db - 0.43 * self.psnr_std_error_db
     }
 }
 
@@ -81,17 +81,27 @@ impl Chosen {
     }
 }
 
-/// Quality level at which a search for a PSNR begins.
-const FIRST_LEVEL: f64 = 4.0;
+/// Quality level at which a search for a PSNR begins: 2,048 facets, which show the peak.
+const FIRST_LEVEL: f64 = 7.0;
+/// Coarsest quality level for a PSNR: 64 facets. Six replicates of fewer than ten facets do not show the error of their sum.
+const COARSEST_LEVEL: f64 = 2.0;
 /// PSNR that a quality level more usually gains [dB]: the error falls with about the 0.75th power of the number of facets.
 const DB_PER_LEVEL: f64 = 4.5;
-/// Largest step between quality levels whose stated errors are compared. Larger steps would overshoot: on smooth tiles
-/// errors fall faster.
+/// Range of the PSNR that a quality level more is taken to gain, where two stated errors show it [dB].
+const MIN_DB_PER_LEVEL: f64 = 3.0;
+const MAX_DB_PER_LEVEL: f64 = 9.0;
+/// Largest step between quality levels. Larger steps would overshoot: on smooth tiles errors fall faster.
 const MAX_STEP: f64 = 3.0;
 /// Smallest step between quality levels.
 const STEP: f64 = 0.25;
+/// A PSNR that exceeds the target by at most this is not lowered [dB].
+const ENOUGH_DB: f64 = 3.0;
+/// A stated PSNR may be below the target by this [dB]. Stated errors tend to be too large, and the check decides.
+const SLACK_DB: f64 = 1.0;
+/// Largest number of quality levels that state their error.
+const MAX_STATED: usize = 6;
 /// Largest number of quality levels that are compared with a reference.
-const MAX_CHECKS: usize = 6;
+const MAX_CHECKS: usize = 5;
 
 /// Chooses settings for a target. `progress` receives a description of each step.
 ///
@@ -119,6 +129,8 @@ struct Search<'a> {
     /// Time of the mesh, which is a part of every edit [ms].
     geometry_ms: f64,
     measurements: Vec<Measurement>,
+    /// The last quality level that was computed, its result and its time [ms].
+    last: Option<(f64, Outcome, f64)>,
 }
 
 impl<'a> Search<'a> {
@@ -128,11 +140,14 @@ impl<'a> Search<'a> {
         let outcome = pipeline.effective(&with_settings(loaded, &quality_scale::candidate_at(0.0, false))?)?;
         let overhangs = outcome.plan.overhangs();
         let geometry_ms = outcome.times.iter().filter(|(name, _)| *name == "geometry").map(|(_, ms)| ms).sum();
-        Ok(Self { loaded, pipeline, overhangs, geometry_ms, measurements: Vec::new() })
+        Ok(Self { loaded, pipeline, overhangs, geometry_ms, measurements: Vec::new(), last: None })
     }
 
     /// Computes the scene at a quality level; returns it with the milliseconds from a geometry edit.
     fn build(&mut self, level: f64, runs: usize) -> Result<(Outcome, f64)> {
+        if let Some((_, outcome, ms)) = self.last.as_ref().filter(|(last, ..)| *last == level && runs == 1) {
+            return Ok((outcome.clone(), *ms));
+        }
         let mut scene = with_settings(self.loaded, &quality_scale::candidate_at(level, self.overhangs))?;
         let seed = scene.scene.quality.seed;
         let mut times = Vec::with_capacity(runs);
@@ -148,56 +163,77 @@ impl<'a> Search<'a> {
         let outcome = self.pipeline.effective(&scene)?;
         times.push(start.elapsed().as_secs_f64() * 1e3);
         times.sort_by(f64::total_cmp);
-        Ok((outcome, self.geometry_ms + times[times.len() / 2]))
+        let ms = self.geometry_ms + times[times.len() / 2];
+        self.last = Some((level, outcome.clone(), ms));
+        Ok((outcome, ms))
     }
 
-    /// A quality level whose stated PSNR is about `db`, or the finest one, and the result there.
-    fn level_by_stated_error(&mut self, db: f64, progress: &mut impl FnMut(&str)) -> Result<(f64, Outcome)> {
-        let (mut level, mut low) = (FIRST_LEVEL, -MAX_STEP);
-        loop {
+    /// The coarsest quality level whose stated PSNR was found to be about `db` or more, or the finest one.
+    fn level_by_stated_error(&mut self, db: f64, peak: Peak, progress: &mut impl FnMut(&str)) -> Result<f64> {
+        // Levels that state less and at least the target, with what they state.
+        let (mut below, mut above) = (None::<(f64, f64)>, None::<(f64, f64)>);
+        let (mut level, mut db_per_level) = (FIRST_LEVEL, DB_PER_LEVEL);
+        for _ in 0..MAX_STATED {
             let outcome = self.build(level, 1)?.0;
-            let stated = outcome.errors().and_then(|errors| errors.estimate().psnr_db).unwrap_or(f64::INFINITY);
+            let stated = peak.stated_db(&outcome);
             progress(&format!("{} facets: {stated:.1} dB stated", outcome.settings.facets));
-            let step = ((db - stated) / DB_PER_LEVEL).clamp(-MAX_STEP, FINEST);
+            if stated < db - SLACK_DB {
+                below = Some((level, stated));
+            } else {
+                above = Some((level, stated));
+            }
+            let excess = stated - db;
+            let is_near = (-SLACK_DB..=ENOUGH_DB).contains(&excess);
+            if is_near || level == FINEST && excess < 0.0 || level == COARSEST_LEVEL && excess > 0.0 {
+                break;
+            }
+            if let (Some(below), Some(above)) = (below, above) {
+                let slope = (above.1 - below.1) / (above.0 - below.0);
+                db_per_level = slope.clamp(MIN_DB_PER_LEVEL, MAX_DB_PER_LEVEL);
+            }
             // If no level is expected to reach the target, only the finest one is tried.
-            let step = if level + step >= FINEST { FINEST - level } else { step.min(MAX_STEP) };
-            if step.abs() <= 2.0 * STEP || level + step <= low {
-                return Ok((level, outcome));
+            let step = (0.5 * SLACK_DB - excess) / db_per_level;
+            let next = if level + step >= FINEST { FINEST } else { level + step.clamp(-MAX_STEP, MAX_STEP) };
+            let least = below.map_or(COARSEST_LEVEL, |(level, _)| level + STEP);
+            let most = above.map_or(FINEST, |(level, _)| level - STEP);
+            if least > most {
+                break;
             }
-            if step > 0.0 {
-                low = level;
-            }
-            level = (level + step).clamp(0.0, FINEST);
+            level = next.clamp(least, most);
         }
+        Ok(above.map_or(level, |(level, _)| level))
     }
 
     /// The coarsest quality level that was found to reach `db`, or the best one.
     fn cheapest_with_psnr(&mut self, db: f64, progress: &mut impl FnMut(&str)) -> Result<Measurement> {
-        let (mut level, outcome) = self.level_by_stated_error(db, progress)?;
-        let stated = outcome.errors().and_then(|errors| errors.estimate().psnr_db).unwrap_or(db);
-        let reference = TargetReference::new(&self.pipeline, self.loaded, &outcome, db.min(stated), progress)?;
+        let peak = Peak::of(&self.build(FIRST_LEVEL, 1)?.0);
+        let mut level = self.level_by_stated_error(db, peak, progress)?;
+        let stated = peak.stated_db(&self.build(level, 1)?.0);
+        let reference = TargetReference::new(&self.pipeline, self.loaded, peak, db.min(stated), progress)?;
         // Levels that are known to miss and to reach the target, and the best of those that miss.
-        let (mut misses, mut reaches, mut best) = (-STEP, None::<Measurement>, None::<Measurement>);
+        let (mut misses, mut reaches, mut best) = (COARSEST_LEVEL - STEP, None::<Measurement>, None::<Measurement>);
         loop {
             let (outcome, ms) = self.build(level, 1)?;
-            let (psnr_db, psnr_std_error_db, rel_l2) = reference.errors(&outcome);
+            let CheckedError { psnr_db, psnr_std_error_db, rel_l2 } = reference.errors(&outcome);
             let measured = Measurement { level, ms, psnr_db, rel_l2, psnr_std_error_db };
             progress(&format!("{} facets: {psnr_db:.1} dB", outcome.settings.facets));
             self.measurements.push(measured);
-            // Levels are multiples of the smallest step, so that nearly equal ones are not tried.
-            let steps = ((db - measured.safe_db()) / (DB_PER_LEVEL * STEP)).clamp(-MAX_STEP / STEP, MAX_STEP / STEP);
-            let next = level + STEP * steps.ceil();
-            if measured.safe_db() >= db {
+            let excess = measured.safe_db() - db;
+            if excess >= 0.0 {
                 reaches = Some(measured);
             } else {
                 misses = f64::max(misses, level);
                 best = best.filter(|best| best.safe_db() > measured.safe_db()).or(Some(measured));
             }
             let (least, most) = (misses + STEP, reaches.map_or(FINEST, |measured| measured.level - STEP));
-            if least > most || next == level || self.measurements.len() >= MAX_CHECKS {
+            let is_near = (0.0..=ENOUGH_DB).contains(&excess);
+            if least > most || is_near || self.measurements.len() >= MAX_CHECKS {
                 return Ok(reaches.or(best).unwrap_or(measured));
             }
-            level = next.clamp(least, most);
+            // Levels are multiples of the smallest step, so that nearly equal ones are not tried.
+            let steps = (SLACK_DB - excess) / (DB_PER_LEVEL * STEP);
+            let steps = steps.clamp(-MAX_STEP / STEP, MAX_STEP / STEP).ceil();
+            level = (level + STEP * steps).clamp(least, most);
         }
     }
 
@@ -281,6 +317,21 @@ mod tests {
         assert_eq!(coarsest.reached.level, 0.0);
         assert!(!coarsest.reaches_target);
         assert!(coarsest.summary().contains("no coarser quality level"), "{}", coarsest.summary());
+    }
+
+    #[test]
+    fn a_psnr_that_every_level_exceeds_takes_the_coarsest_level() {
+        let loaded = crate::scene::open("table4_teapot", &[]).unwrap();
+        let coarsest = choose(&loaded, Target::Psnr(10.0), &Cancel::default(), |_| {}).unwrap();
+        assert!(coarsest.reaches_target && coarsest.reached.level == COARSEST_LEVEL, "{:?}", coarsest.measurements);
+    }
+
+    #[test]
+    fn a_level_that_is_computed_already_keeps_its_time() {
+        let loaded = crate::scene::open("fig4b_bicolor_cup", &[]).unwrap();
+        let mut search = Search::new(&loaded, &Cancel::default()).unwrap();
+        let ms = search.build(5.0, 1).unwrap().1;
+        assert_eq!(search.build(5.0, 1).unwrap().1.to_bits(), ms.to_bits());
     }
 
     #[test]

@@ -6,3 +6,4 @@ pub mod progressive;
 pub mod quality_scale;
 pub mod sweep;
 mod target_reference;
+pub mod timed_result;

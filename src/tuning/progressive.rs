@@ -4,9 +4,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::base::Result;
-use crate::effective::{EffectiveBrdf, ErrorEstimate};
+use crate::effective::{EffectiveBrdf, ErrorEstimator};
 use crate::metrics::{Pair, mirror_biased_pairs};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Outcome, Pipeline};
 use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
 
@@ -20,7 +20,7 @@ pub struct ProgressiveReference {
 }
 
 /// Errors of `f̄` against the reference, and the standard error of each.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ReferenceErrors {
     /// Relative L2 without the part that the standard error of the reference explains.
     pub rel_l2: f64,
@@ -33,9 +33,10 @@ pub struct ReferenceErrors {
 }
 
 impl ReferenceErrors {
-    /// Errors that a result states without a reference. The error bars span half and
-    /// one and a half times the estimate.
-    pub fn stated(estimate: &ErrorEstimate) -> Self {
+    /// Errors that a result states without a reference, or none if it states none. The error bars span half and one and a
+    /// half times the estimate.
+    pub fn stated(outcome: &Outcome) -> Self {
+        let estimate = outcome.errors().map(ErrorEstimator::estimate).unwrap_or_default();
         Self {
             rel_l2: estimate.rel_l2,
             rel_l2_std_error: 0.5 * estimate.rel_l2,
@@ -43,6 +44,36 @@ impl ReferenceErrors {
             psnr_std_error_db: 3.0,
             std_error: 0.0,
             batches: 0,
+        }
+    }
+
+    /// Errors of values against a reference: its values and their variances. `batches` is at least 1.
+    pub fn measured(values: &[Vec3], reference: impl Iterator<Item = (DVec3, DVec3)>, batches: usize) -> Self {
+        let (mut squares, mut noise, mut spread, mut norm, mut peak) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
+        for (value, (exact, variance)) in values.iter().zip(reference) {
+            let difference = value.as_dvec3() - exact;
+            squares += difference.length_squared();
+            noise += variance.element_sum();
+            // Var (x - r)² = 4 (x - r)² σ² + 2 σ⁴.
+            spread += (4.0 * difference * difference * variance + 2.0 * variance * variance).element_sum();
+            norm += exact.length_squared();
+            peak = peak.max(exact.max_element());
+        }
+        if norm == 0.0 {
+            return Self { batches, ..Self::default() };
+        }
+        let std_error = (noise / norm).sqrt();
+        let rel_l2 = ((squares - noise).max(0.1 * noise).min(squares) / norm).sqrt().max(1e-9);
+        let rel_l2_std_error = spread.sqrt() / norm / (2.0 * rel_l2);
+        let peak_db = 20.0 * (peak / (norm / (3 * values.len()) as f64).sqrt()).log10();
+        let db = |x: f64| 20.0 * x.log10();
+        Self {
+            rel_l2,
+            rel_l2_std_error,
+            psnr_db: peak_db - db(rel_l2),
+            psnr_std_error_db: db(1.0 + rel_l2_std_error / rel_l2),
+            std_error,
+            batches,
         }
     }
 
@@ -86,41 +117,8 @@ impl ProgressiveReference {
     pub fn compare(&self, brdf: &EffectiveBrdf) -> ReferenceErrors {
         let values: Vec<Vec3> = self.pairs.par_iter().map(|pair| brdf.eval(pair.i, pair.o)).collect();
         let n = self.batches.max(1) as f64;
-        let (mut squares, mut noise, mut spread, mut norm, mut peak) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
-        for (value, (sum, variance)) in values.iter().zip(self.sums.iter().zip(&self.variances)) {
-            let (exact, variance) = (*sum / n, *variance / (n * n));
-            let difference = value.as_dvec3() - exact;
-            squares += difference.length_squared();
-            noise += variance.element_sum();
-            // Var (x - r)² = 4 (x - r)² σ² + 2 σ⁴.
-            spread += (4.0 * difference * difference * variance + 2.0 * variance * variance).element_sum();
-            norm += exact.length_squared();
-            peak = peak.max(exact.max_element());
-        }
-        if norm == 0.0 {
-            let none = ReferenceErrors {
-                rel_l2: 0.0,
-                rel_l2_std_error: 0.0,
-                psnr_db: 0.0,
-                psnr_std_error_db: 0.0,
-                std_error: 0.0,
-                batches: 0,
-            };
-            return ReferenceErrors { batches: self.batches, ..none };
-        }
-        let std_error = (noise / norm).sqrt();
-        let rel_l2 = ((squares - noise).max(0.1 * noise).min(squares) / norm).sqrt().max(1e-9);
-        let rel_l2_std_error = spread.sqrt() / norm / (2.0 * rel_l2);
-        let peak_db = 20.0 * (peak / (norm / (3 * values.len()) as f64).sqrt()).log10();
-        let db = |x: f64| 20.0 * x.log10();
-        ReferenceErrors {
-            rel_l2,
-            rel_l2_std_error,
-            psnr_db: peak_db - db(rel_l2),
-            psnr_std_error_db: db(1.0 + rel_l2_std_error / rel_l2),
-            std_error,
-            batches: self.batches,
-        }
+        let reference = self.sums.iter().zip(&self.variances).map(|(sum, variance)| (*sum / n, *variance / (n * n)));
+        ReferenceErrors::measured(&values, reference, self.batches)
     }
 }
 

@@ -3,15 +3,13 @@
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::candidates::{Candidate, Family, with_settings};
+use super::candidates::Family;
+use super::progressive::ReferenceErrors;
 use crate::base::Result;
-use crate::effective::Reflectance;
 use crate::math::directions::from_angles;
-use crate::metrics::{Errors, Pair, compare, mirror_biased_pairs};
-use crate::pipeline::Outcome;
+use crate::metrics::{Pair, compare, mirror_biased_pairs};
 use crate::plan::Preset;
 use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
@@ -25,6 +23,7 @@ pub const BANDS_DEG: [f32; 4] = [30.0, 55.0, 70.0, 85.0];
 pub struct ReferenceValues {
     pub pairs: Vec<Pair>,
     pub f_bar: Vec<Vec3>,
+    pub standard_errors: Vec<Vec3>,
     /// Relative L2 of the standard errors.
     #[serde(rename = "own")]
     pub std_error: f64,
@@ -38,6 +37,8 @@ pub struct ReferenceValues {
     first_albedo: usize,
 }
 
+/// Seed of the pairs.
+pub(super) const PAIRS_SEED: u64 = 20_110_801;
 /// Angles of the lights whose directional albedo is compared [degrees].
 const ALBEDO_LIGHTS_DEG: [f32; 3] = [10.0, 45.0, 75.0];
 /// View directions over which an albedo is summed.
@@ -55,7 +56,7 @@ impl ReferenceValues {
         settings: &ReferenceSettings,
         mut progress: impl FnMut(usize, f64) -> bool,
     ) -> Result<Self> {
-        let mut pairs = mirror_biased_pairs(count, 20_110_801);
+        let mut pairs = mirror_biased_pairs(count, PAIRS_SEED);
         for light in ALBEDO_LIGHTS_DEG {
             let i = from_angles(light.to_radians(), 0.4);
             pairs.extend((0..ALBEDO_VIEWS).map(|k| Pair { i, o: cosine_direction(k) }));
@@ -69,15 +70,20 @@ impl ReferenceValues {
             })
         })?;
         let f_bar: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar).collect();
-        let upper: Vec<Vec3> = estimates.iter().map(|estimate| estimate.f_bar + estimate.standard_error).collect();
+        let standard_errors: Vec<Vec3> = estimates.iter().map(|estimate| estimate.standard_error).collect();
+        let upper: Vec<Vec3> = f_bar.iter().zip(&standard_errors).map(|(f_bar, error)| *f_bar + *error).collect();
         let std_error_db = compare(&upper, &f_bar).psnr_db.min(MAX_DB);
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Self { pairs, f_bar, std_error, std_error_db, passes, seconds, first_albedo: count })
+        Ok(Self { pairs, f_bar, standard_errors, std_error, std_error_db, passes, seconds, first_albedo: count })
     }
 
     /// Errors over all pairs except those of the albedos.
-    pub fn errors(&self, values: &[Vec3]) -> Errors {
-        compare(&values[..self.first_albedo], &self.f_bar[..self.first_albedo])
+    pub fn errors(&self, values: &[Vec3]) -> ReferenceErrors {
+        let reference = self.f_bar.iter().zip(&self.standard_errors).map(|(f_bar, error)| {
+            let error = error.as_dvec3();
+            (f_bar.as_dvec3(), error * error)
+        });
+        ReferenceErrors::measured(&values[..self.first_albedo], reference, self.passes)
     }
 
     /// Relative L2 in each band of [`BANDS_DEG`].
@@ -130,7 +136,11 @@ pub struct SweepPoint {
     /// Microseconds per direction pair on one thread.
     pub query_us: f64,
     pub rel_l2: f64,
+    /// Standard error of `rel_l2`.
+    pub rel_l2_std_error: f64,
     pub psnr_db: f64,
+    /// The errors are those that the result states without a reference; the two fields that follow are 0.
+    pub is_stated: bool,
     /// Largest relative error of a directional albedo.
     pub albedo_error: f64,
     pub rel_l2_by_angle: [f64; BANDS_DEG.len()],
@@ -141,84 +151,7 @@ pub struct SweepPoint {
 }
 
 /// PSNR that stands for no difference, because JSON has no infinity [dB].
-const MAX_DB: f64 = 300.0;
-
-/// Largest number of timed runs. Their median is reported.
-const MAX_RUNS: usize = 5;
-/// Time after which no further run starts [s].
-const ENOUGH_SECONDS: f64 = 1.5;
-/// Duration of a first run above which it is the only run [s].
-const LONG_SECONDS: f64 = 2.0;
-
-/// Times a geometry edit at a candidate's settings and compares the result with the reference.
-///
-/// # Errors
-/// Returns the errors of [`Pipeline::effective`].
-pub fn measure(
-    loaded: &LoadedScene,
-    candidate: &Candidate,
-    reference: &ReferenceValues,
-) -> Result<(SweepPoint, Outcome)> {
-    let scene = with_settings(loaded, candidate)?;
-    let mut edited = scene.clone();
-    let edits = edited.scene.nudge_geometry().is_some();
-    let mut pipeline = crate::gpu::pipeline();
-    let mut runs: Vec<(f64, Vec<(&'static str, f64)>)> = Vec::new();
-    let started = Instant::now();
-    let mut outcome = pipeline.effective(&scene)?;
-    let first = started.elapsed().as_secs_f64();
-    if first > LONG_SECONDS && candidate.preset != Preset::Wu2011.name() {
-        // A warm-up changes a long run little. The tables of `wu2011` are the exception: an edit reuses most of them.
-        runs.push((first * 1e3, outcome.times.clone()));
-    }
-    while runs.is_empty() || runs.len() < MAX_RUNS && started.elapsed().as_secs_f64() < ENOUGH_SECONDS {
-        // Only the edit back to this scene is timed.
-        if edits {
-            pipeline.effective(&edited)?;
-        } else {
-            pipeline = crate::gpu::pipeline();
-        }
-        let start = Instant::now();
-        outcome = pipeline.effective(&scene)?;
-        runs.push((start.elapsed().as_secs_f64() * 1e3, outcome.times.clone()));
-    }
-    runs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (ms, times) = runs.swap_remove(runs.len() / 2);
-    let values: Vec<Vec3> = reference.pairs.par_iter().map(|pair| outcome.brdf.eval(pair.i, pair.o)).collect();
-    let errors = reference.errors(&values);
-    let point = SweepPoint {
-        scene: loaded.name.clone(),
-        settings: candidate.cli_args(),
-        family: candidate.family.clone(),
-        preset: candidate.preset.to_owned(),
-        ms,
-        query_us: query_us(&outcome, reference),
-        rel_l2: errors.rel_l2,
-        psnr_db: errors.psnr_db.min(MAX_DB),
-        albedo_error: reference.albedo_error(&values),
-        rel_l2_by_angle: reference.by_angle(&values),
-        stages: times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),
-        representation: outcome.brdf.representation.describe(),
-    };
-    Ok((point, outcome))
-}
-
-/// Microseconds per pair on one thread. All lights of a view are evaluated together, as in rendering.
-fn query_us(outcome: &Outcome, reference: &ReferenceValues) -> f64 {
-    const LIGHTS: usize = 8;
-    let lights: Vec<Vec3> = reference.pairs.iter().take(LIGHTS).map(|pair| pair.i).collect();
-    let mut out = vec![Vec3::ZERO; lights.len()];
-    let start = Instant::now();
-    let mut views = 0;
-    for pair in reference.pairs.iter().take(64) {
-        outcome.brdf.eval_lights(&lights, pair.o, &mut out);
-        views += 1;
-        if start.elapsed().as_secs_f64() > 0.1 {
-            break;
-        }
-    }
-    start.elapsed().as_secs_f64() * 1e6 / (views * lights.len()).max(1) as f64
-}
+pub(super) const MAX_DB: f64 = 300.0;
 
 /// Indices of the Pareto front in order of time: no other point is both faster and more accurate.
 pub fn pareto(points: &[&SweepPoint]) -> Vec<usize> {
@@ -243,6 +176,8 @@ pub fn reference_point(scene: &str, reference: &ReferenceValues) -> SweepPoint {
         ms: reference.seconds * 1e3,
         query_us: reference.seconds * 1e6 / reference.pairs.len().max(1) as f64,
         rel_l2: reference.std_error,
+        rel_l2_std_error: 0.0,
+        is_stated: false,
         psnr_db: reference.std_error_db,
         albedo_error: reference.std_error,
         rel_l2_by_angle: [reference.std_error; BANDS_DEG.len()],
@@ -269,7 +204,9 @@ mod tests {
             ms,
             query_us: 0.0,
             rel_l2,
+            rel_l2_std_error: 0.0,
             psnr_db: 0.0,
+            is_stated: false,
             albedo_error: 0.0,
             rel_l2_by_angle: [0.0; BANDS_DEG.len()],
             stages: Vec::new(),

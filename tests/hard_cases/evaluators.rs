@@ -59,7 +59,7 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
         names: vec!["default".to_owned(); materials.materials.len()],
         materials: Arc::new(materials),
         closes_plane: mesh.closes_plane,
-        max_color_weight: mesh.color.max(),
+        color: mesh.color.clone(),
     };
     let limits = Limits { max_rank: 64, tolerance: 0.12, preset: "wu2011", error: None };
     let mut health = Health::of(&brdf, &inputs, None, None, limits);

@@ -6,7 +6,6 @@ use crate::export::RadianceBasis;
 use crate::export::tile::TileOptions;
 use eframe::egui::{self, Context, DragValue, Grid, Ui};
 
-use crate::app::theme;
 use crate::app::worker::TableChoice;
 
 /// The button that ended an export dialog.
@@ -41,12 +40,12 @@ pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<
         }
         let checked = choice.resolution(path).map_or(Ok(()), |resolution| resolution.check());
         if let Err(error) = &checked {
-            ui.colored_label(theme::WARNING, error.to_string());
+            ui.colored_label(ui.visuals().warn_fg_color, error.to_string());
         }
         if !matches!(ending.as_str(), "npz" | "csv" | "exr") {
             ui.weak("A text file beside it describes the conventions and the error of the table.");
         }
-        ui.weak("The export uses the scene's quality. Progress and Cancel are in the status line.");
+        ui.weak("The export uses the scene's quality. Progress and Cancel are at the foot of the window.");
         checked.is_ok()
     })
 }

@@ -211,7 +211,7 @@ impl FileDialog {
         }
         chosen |= field.inner.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         if let Some(error) = &self.error {
-            ui.colored_label(super::super::theme::WARNING, error);
+            ui.colored_label(ui.visuals().warn_fg_color, error);
         }
         let mut left = false;
         ui.horizontal(|ui| {

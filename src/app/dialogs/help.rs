@@ -4,7 +4,7 @@ use eframe::egui::{self, Context, Grid, RichText, ScrollArea};
 
 use crate::app::actions;
 
-const TASKS: [(&str, &str); 10] = [
+const TASKS: [(&str, &str); 13] = [
     (
         "Make a blue velvet",
         "Search the gallery for \"velvet\" and click a scene. Under Materials, set the colour of \"Default\" to \
@@ -32,13 +32,28 @@ const TASKS: [(&str, &str); 10] = [
     (
         "See through frosted glass",
         "Search the gallery for \"slab\" and click a scene, or unfold Slab and tick its box. Top and Bottom are the two \
-         faces: smooth, rough, or a tile. Drag Distance to move the background away, which blurs it. Below the tile, drag \
+         faces: smooth, rough, or a tile. Drag Distance, or drag in the view with Ctrl, to move the background away, which blurs it. Below the tile, drag \
          the light on the disc: the curves show the transmitted light by each method, and photons as the truth.",
     ),
     (
         "See how far off the result is",
-        "The status line states the error once the image rests. Unfold Accuracy to see PSNR against time for faster and \
-         finer settings, and to compare with a reference.",
+        "The strip at the foot states accuracy and time once the image rests. Press Measure there, or F6 for the chart of \
+         PSNR against time, which also compares with a reference.",
+    ),
+    (
+        "Make it faster or finer",
+        "Press Measure at the foot. Faster and Finer then show what other settings cost; a click takes them. In the chart \
+         (F6), a click on a point takes its settings.",
+    ),
+    (
+        "See what is simulated and what is left out",
+        "If light is missing that may matter, the strip at the foot says so: click \"left out\" and then Add. Effects (F6) \
+         gives the reason for each effect, and forces it on or off.",
+    ),
+    (
+        "Compare with the truth",
+        "For a slab or a colour map, press M. The view shows three methods beside each other; drag the lines between them. \
+         The truth is added up while you look, and states its standard error.",
     ),
     (
         "Use a measured BRDF",

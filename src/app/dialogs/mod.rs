@@ -51,9 +51,18 @@ pub enum Dialog {
     },
 }
 
-/// Draws a question. Returns the index of the chosen answer; closing the dialog chooses the last one.
+impl Dialog {
+    /// Returns true if the editor waits for an answer: nothing else takes keys until then.
+    pub fn is_modal(&self) -> bool {
+        !matches!(self, Self::Help)
+    }
+}
+
+/// Draws a question. Returns the index of the chosen answer; closing the dialog chooses the last one. The first answer has
+/// the focus, so that Enter chooses it.
 pub fn question(ctx: &Context, title: &str, text: &str, answers: &[&str]) -> Option<usize> {
     let mut chosen = None;
+    let mut buttons = Vec::new();
     let modal = egui::Modal::new(egui::Id::unique(("question", title))).show(ctx, |ui| {
         ui.set_width(420.0);
         ui.heading(title);
@@ -62,12 +71,18 @@ pub fn question(ctx: &Context, title: &str, text: &str, answers: &[&str]) -> Opt
         ui.add_space(10.0);
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             for (at, label) in answers.iter().enumerate() {
-                if ui.button(*label).clicked() {
+                let button = ui.button(*label);
+                if button.clicked() {
                     chosen = Some(at);
                 }
+                buttons.push(button);
             }
         });
     });
+    // The control that had the focus when the question came must not receive keys.
+    if let Some(first) = buttons.first().filter(|_| !buttons.iter().any(|button| button.has_focus())) {
+        first.request_focus();
+    }
     if modal.should_close() && chosen.is_none() {
         chosen = Some(answers.len() - 1);
     }

@@ -9,13 +9,15 @@ use crate::tuning::quality_scale;
 use eframe::egui::{self, Context, Slider, TextureHandle, TextureOptions, Ui, vec2};
 
 use super::{accuracy_chart, fields};
-use crate::app::worker::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult};
+use crate::app::worker::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, without_settings};
 
 /// State of the panel between frames.
 #[derive(Default)]
 pub struct AccuracyState {
-    /// True while the panel is unfolded. The chart is measured only then.
+    /// True while the panel is unfolded. The chart is measured then, or if it is wanted.
     pub open: bool,
+    /// True if the user asked for the chart of this scene with the panel folded.
+    pub wanted: bool,
     /// True if the worker keeps refining the reference.
     pub comparing: bool,
     /// True while a measurement of each effect, on and off, is requested or running.
@@ -25,6 +27,11 @@ pub struct AccuracyState {
     /// The last request: version, `comparing`, `measuring`, and whether the image was final.
     requested: Option<(u64, bool, bool, bool)>,
     levels: Vec<AccuracyPoint>,
+    /// Scenes without settings: that of the last request, and that of the levels.
+    requested_of: Option<Box<LoadedScene>>,
+    levels_of: Option<Box<LoadedScene>>,
+    /// Version that was compared with the scene of the levels, and whether it is the same.
+    freshness: Option<(u64, bool)>,
     current: Option<(u64, AccuracyPoint)>,
     /// Document version, difference image, mean ΔE, and the noise in that mean.
     difference: Option<(u64, TextureHandle, f32, Option<f32>)>,
@@ -36,14 +43,16 @@ impl AccuracyState {
     /// Returns the job for a document version, unless that job is the last request. Before the image is final, only an
     /// empty chart is measured, and only at the fastest levels.
     pub fn job(&mut self, version: u64, loaded: &Arc<LoadedScene>, is_final: bool) -> Option<AccuracyJob> {
+        self.examine(version, loaded);
         let wanted = (version, self.comparing, self.measuring, is_final);
         let may_start = is_final || self.open && self.levels.is_empty();
-        if !(self.open || self.measuring) || !may_start || self.requested == Some(wanted) {
+        if !self.is_needed() || !may_start || self.requested == Some(wanted) {
             return None;
         }
         self.requested = Some(wanted);
+        self.requested_of = Some(Box::new(without_settings(loaded)));
         self.error = None;
-        let chart = match (self.open, is_final) {
+        let chart = match (self.open || self.wanted, is_final) {
             (false, _) => AccuracyChart::None,
             (true, false) => AccuracyChart::First,
             (true, true) => AccuracyChart::Whole,
@@ -52,8 +61,65 @@ impl AccuracyState {
         Some(AccuracyJob { version, loaded: loaded.clone(), chart, compare, effects })
     }
 
+    fn is_needed(&self) -> bool {
+        self.open || self.wanted || self.measuring
+    }
+
+    /// Compares a version with the scene of the levels. The chart of another scene is no longer wanted.
+    fn examine(&mut self, version: u64, loaded: &LoadedScene) {
+        if self.freshness.is_some_and(|(examined, _)| examined == version) {
+            return;
+        }
+        let is_fresh = self.levels_of.as_ref().is_some_and(|of| **of == without_settings(loaded));
+        self.freshness = Some((version, is_fresh));
+        self.wanted &= is_fresh || self.levels_of.is_none();
+    }
+
+    /// Returns true if the levels belong to a version of the document.
+    pub fn is_fresh(&self, version: u64) -> bool {
+        self.freshness == Some((version, true))
+    }
+
+    /// Returns true while the worker measures.
+    pub fn is_active(&self) -> bool {
+        self.activity.is_some()
+    }
+
+    /// The point of the settings of a version, if it was measured.
+    pub fn now(&self, version: u64) -> Option<AccuracyPoint> {
+        self.current.filter(|(measured, _)| *measured == version).map(|(_, point)| point)
+    }
+
+    /// The levels that are next to the settings of a version on the front: the faster and the finer one.
+    pub fn neighbours(&self, version: u64) -> [Option<AccuracyPoint>; 2] {
+        let Some(now) = self.now(version).filter(|_| self.is_fresh(version)) else { return [None; 2] };
+        let points: Vec<&AccuracyPoint> = self.levels.iter().collect();
+        let front = accuracy_chart::front(&points);
+        let faster = front.iter().rev().find(|point| point.ms < NEARER * now.ms);
+        let finer = front.iter().find(|point| point.compared.psnr_db > now.compared.psnr_db + FINER_DB);
+        [faster, finer].map(|point| point.map(|point| **point))
+    }
+
+    /// The most accurate level that is finer and not slower than the settings of a version.
+    pub fn better(&self, version: u64) -> Option<AccuracyPoint> {
+        let now = self.now(version).filter(|_| self.is_fresh(version))?;
+        let beats = |point: &&AccuracyPoint| {
+            let (level, own) = (&point.compared, &now.compared);
+            let noise = level.psnr_std_error_db + own.psnr_std_error_db;
+            point.ms < now.ms && level.psnr_db > own.psnr_db + noise.max(FINER_DB)
+        };
+        self.levels.iter().filter(beats).max_by(|a, b| a.compared.psnr_db.total_cmp(&b.compared.psnr_db)).copied()
+    }
+
+    /// Sets the points as if a version of the document had been measured.
+    #[cfg(test)]
+    pub fn record(&mut self, version: u64, levels: Vec<AccuracyPoint>, current: AccuracyPoint) {
+        (self.levels, self.current, self.freshness) = (levels, Some((version, current)), Some((version, true)));
+    }
+
     /// Forgets the chart of the last document.
     pub fn forget(&mut self) {
+        (self.levels_of, self.freshness, self.wanted) = (None, None, false);
         (self.requested, self.current, self.costs, self.difference) = (None, None, None, None);
         self.levels.clear();
     }
@@ -61,7 +127,7 @@ impl AccuracyState {
     /// Returns true if the running job belongs to another document version, or if nothing needs it any longer.
     pub fn is_late(&mut self, version: u64) -> bool {
         let late = self.activity.is_some()
-            && (!(self.open || self.measuring) || self.requested.is_some_and(|(requested, ..)| requested != version));
+            && (!self.is_needed() || self.requested.is_some_and(|(requested, ..)| requested != version));
         if late {
             self.activity = None;
             self.requested = None;
@@ -72,7 +138,10 @@ impl AccuracyState {
     pub fn receive(&mut self, ctx: &Context, result: AccuracyResult) {
         match result {
             AccuracyResult::Doing(what) => self.activity = Some(what),
-            AccuracyResult::Levels(levels) => self.levels = levels,
+            AccuracyResult::Levels(levels) => {
+                self.levels = levels;
+                (self.levels_of, self.freshness) = (self.requested_of.clone(), None);
+            }
             AccuracyResult::Current(version, point) => self.current = Some((version, point)),
             AccuracyResult::Difference(version, shown) => {
                 let texture = ctx.load_texture("difference", shown.image, TextureOptions::NEAREST);
@@ -90,7 +159,7 @@ impl AccuracyState {
                 }
             }
             AccuracyResult::Failed(text) => {
-                (self.activity, self.error, self.measuring) = (None, Some(text), false);
+                (self.activity, self.error, self.measuring, self.wanted) = (None, Some(text), false, false);
             }
         }
     }
@@ -111,10 +180,40 @@ impl AccuracyState {
     }
 }
 
+/// Factor on the time, and difference of PSNR [dB], from which settings count as faster and finer.
+const NEARER: f64 = 0.9;
+const FINER_DB: f64 = 0.5;
+/// Uncertainty of an error that a result states itself [dB].
+pub const STATED_DB: f64 = 3.0;
+
+/// Sets the quality to that of a measured level.
+pub fn take(scene: &mut Scene, facets: usize, effects: &[Effect]) {
+    take_level(scene, quality_scale::level_of_facets(facets), effects);
+}
+
+fn take_level(scene: &mut Scene, level: f64, effects: &[Effect]) {
+    let overhangs = effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
+    let candidate = quality_scale::candidate_at(level, overhangs);
+    let plain = Quality {
+        preset: candidate.preset.to_owned(),
+        seed: scene.quality.seed,
+        backend: scene.quality.backend.clone(),
+        ..Quality::default()
+    };
+    let bare = Scene { quality: plain, ..scene.clone() };
+    if let Ok(walked) = bare.with_quality(&candidate.set) {
+        *scene = walked;
+    }
+}
+
+/// Errors and time of a point in words.
+pub fn describe_point(point: &AccuracyPoint) -> String {
+    accuracy_chart::describe(point)
+}
+
 /// Draws the panel. The slider changes the scene's settings.
 pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[Effect], version: u64) {
     state.open = true;
-    let overhangs = effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
     let settings = Settings::of(scene);
     let mut level = quality_scale::level_of_facets(settings.facets);
     let tip = "Quality levels: each balances the numbers of facets and of directions. Finer takes longer.";
@@ -123,22 +222,27 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[
         ui.add(Slider::new(&mut level, 0.0..=quality_scale::FINEST).show_value(false)).changed()
     });
     if changed {
-        let candidate = quality_scale::candidate_at(level, overhangs);
-        let plain = Quality {
-            preset: candidate.preset.to_owned(),
-            seed: scene.quality.seed,
-            backend: scene.quality.backend.clone(),
-            ..Quality::default()
-        };
-        let bare = Scene { quality: plain, ..scene.clone() };
-        if let Ok(walked) = bare.with_quality(&candidate.set) {
-            *scene = walked;
-        }
+        take_level(scene, level, effects);
     }
-    let current = state.current.filter(|(measured, _)| *measured == version).map(|(_, point)| point);
+    let current = state.now(version);
+    if let Some(better) = state.better(version) {
+        ui.horizontal_wrapped(|ui| {
+            let (psnr, ms) = (better.compared.psnr_db, accuracy_chart::milliseconds(better.ms));
+            ui.label(format!("Finer and faster exists: {psnr:.0} dB in {ms}."));
+            if ui.button("Use").on_hover_text(describe_point(&better)).clicked() {
+                take(scene, better.facets, effects);
+            }
+        });
+    }
     let text = current.map_or_else(|| format!("{} facets", settings.facets), |point| accuracy_chart::describe(&point));
     ui.label(text);
-    accuracy_chart::ui(ui, &state.levels, current.as_ref());
+    let is_stale = !state.levels.is_empty() && !state.is_fresh(version);
+    if let Some(point) = accuracy_chart::ui(ui, &state.levels, current.as_ref(), is_stale) {
+        take(scene, point.facets, effects);
+    }
+    if is_stale {
+        ui.weak("The grey curve is from before the edit.");
+    }
     ui.horizontal(|ui| {
         ui.toggle_value(&mut state.comparing, "Compare with reference").on_hover_text(
             "Refines a reference in the background. The error bars narrow, and an image shows the difference",

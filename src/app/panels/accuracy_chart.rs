@@ -56,9 +56,14 @@ fn log_ms(point: &AccuracyPoint) -> f64 {
     point.ms.max(1e-3).log10()
 }
 
-/// Draws PSNR [dB] against time [ms, logarithmic].
-pub fn ui(ui: &mut Ui, levels: &[AccuracyPoint], current: Option<&AccuracyPoint>) {
-    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::hover());
+/// Draws PSNR [dB] against time [ms, logarithmic]; a stale curve is grey. Returns the level that the user clicked.
+pub fn ui(
+    ui: &mut Ui,
+    levels: &[AccuracyPoint],
+    current: Option<&AccuracyPoint>,
+    is_stale: bool,
+) -> Option<AccuracyPoint> {
+    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Accuracy chart"));
     let painter = ui.painter().with_clip_rect(area);
     painter.rect_filled(area, 4.0, ui.visuals().extreme_bg_color);
@@ -68,19 +73,27 @@ pub fn ui(ui: &mut Ui, levels: &[AccuracyPoint], current: Option<&AccuracyPoint>
     if all.is_empty() {
         let font = FontId::proportional(TEXT + 1.0);
         painter.text(area.center(), Align2::CENTER_CENTER, "Measuring the first settings", font, weak);
-        return;
+        return None;
     }
     let plot = Rect::from_min_max(area.min + vec2(LEFT, 8.0), area.max - vec2(10.0, BOTTOM));
     let axes = Axes::new(plot, &all);
+    let color = if is_stale { weak } else { LEVEL };
     grid(ui, &painter, &axes, area);
-    painter.add(Shape::line(front(&all).into_iter().map(|point| axes.at(point)).collect(), Stroke::new(1.5, LEVEL)));
+    painter.add(Shape::line(front(&all).into_iter().map(|point| axes.at(point)).collect(), Stroke::new(1.5, color)));
     for point in levels.iter().filter(|point| point.compared.psnr_db.is_finite()) {
-        mark(&painter, &axes, point, 3.0, LEVEL);
+        mark(&painter, &axes, point, 3.0, color);
     }
     if let Some(point) = current.filter(|point| point.compared.psnr_db.is_finite()) {
         mark(&painter, &axes, point, 5.0, CURRENT);
     }
+    let clicked = response.interact_pointer_pos().filter(|_| response.clicked() && !is_stale);
+    let distance = |at: Pos2, point: &AccuracyPoint| axes.at(point).distance(at);
+    let taken = clicked.and_then(|at| {
+        let nearest = levels.iter().min_by(|a, b| distance(at, a).total_cmp(&distance(at, b)));
+        nearest.filter(|point| distance(at, point) < NEAR).copied()
+    });
     tooltip(response, &axes, levels, current);
+    taken
 }
 
 /// Draws ticks with their numbers, and the names of the axes.
@@ -118,7 +131,7 @@ fn grid(ui: &Ui, painter: &egui::Painter, axes: &Axes, area: Rect) {
 }
 
 /// The Pareto front: points that no other point beats in both time and accuracy, the fastest first.
-fn front<'a>(points: &[&'a AccuracyPoint]) -> Vec<&'a AccuracyPoint> {
+pub fn front<'a>(points: &[&'a AccuracyPoint]) -> Vec<&'a AccuracyPoint> {
     let mut front: Vec<&AccuracyPoint> = points.to_vec();
     front.sort_by(|a, b| a.ms.total_cmp(&b.ms));
     let mut best = f64::NEG_INFINITY;
@@ -143,14 +156,17 @@ fn mark(painter: &egui::Painter, axes: &Axes, point: &AccuracyPoint, radius: f32
     painter.circle_filled(at, radius, color);
 }
 
+const LEVEL_NAME: &str = "Quality level";
+
 /// Describes the point under the pointer, or the chart.
 fn tooltip(response: Response, axes: &Axes, levels: &[AccuracyPoint], current: Option<&AccuracyPoint>) {
     let distance = |point: &AccuracyPoint| response.hover_pos().map_or(f32::INFINITY, |at| axes.at(point).distance(at));
     let all = current.map(|point| (point, "This scene's settings")).into_iter();
-    let all = all.chain(levels.iter().map(|point| (point, "Quality level")));
+    let all = all.chain(levels.iter().map(|point| (point, LEVEL_NAME)));
     let nearest =
         all.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0))).filter(|(point, _)| distance(point) < NEAR);
     let text = match nearest {
+        Some((point, name)) if name == LEVEL_NAME => format!("{name}: {}. Click to use it.", describe(point)),
         Some((point, name)) => format!("{name}: {}", describe(point)),
         None => "PSNR against the time from a geometry edit to the effective BRDF. Blue: quality levels. Orange: this scene. \
                  Hollow points state their errors themselves; filled points are compared with a reference, and their bars \
@@ -177,6 +193,6 @@ pub fn describe(point: &AccuracyPoint) -> String {
     format!("{} facets: {errors}, {}", point.facets, milliseconds(point.ms))
 }
 
-fn milliseconds(ms: f64) -> String {
+pub fn milliseconds(ms: f64) -> String {
     if ms < 1000.0 { format!("{ms:.1} ms") } else { format!("{:.2} s", ms * 1e-3) }
 }

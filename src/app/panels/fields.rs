@@ -18,6 +18,8 @@ pub struct PanelContext {
     pub browse: Option<&'static str>,
     /// Message about an invalid value.
     pub error: Option<String>,
+    /// The field that has no effect at present, and why.
+    pub ignored: Option<(&'static str, &'static str)>,
 }
 
 /// Draws controls for all fields of a table except `skip`, and writes edits into the table.
@@ -66,7 +68,11 @@ pub fn caption_row<R>(
     context: &mut PanelContext,
     control: impl FnOnce(&mut Ui, &mut PanelContext) -> R,
 ) -> R {
-    row(ui, &caption(field), &tooltip(field, context), |ui| control(ui, context))
+    let Some((_, why)) = context.ignored.filter(|(key, _)| *key == field.key) else {
+        return row(ui, &caption(field), &tooltip(field, context), |ui| control(ui, context));
+    };
+    let tip = format!("{}\nInactive: {why}.", tooltip(field, context));
+    row(ui, &caption(field), &tip, |ui| ui.add_enabled_ui(false, |ui| control(ui, context)).inner)
 }
 
 /// Returns the field's caption.

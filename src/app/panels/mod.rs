@@ -5,7 +5,7 @@ mod accuracy_chart;
 mod alternatives;
 pub mod color_map;
 mod controls;
-mod effects;
+pub mod effects;
 pub mod fields;
 pub mod large_scale;
 pub mod materials;
@@ -37,8 +37,19 @@ pub struct PanelRequests {
     pub error: Option<String>,
 }
 
+/// The sections that the panel shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Tab {
+    /// Surface, materials, object, light and camera.
+    #[default]
+    Scene,
+    /// Quality, accuracy and effects.
+    Cost,
+}
+
 /// State of the displayed image, for the sections that measure it.
 pub struct PanelInputs<'a> {
+    pub tab: &'a mut Tab,
     pub accuracy: &'a mut AccuracyState,
     pub color_map: &'a mut ColorMapState,
     /// The plan of the displayed image.
@@ -49,7 +60,7 @@ pub struct PanelInputs<'a> {
     pub is_new: bool,
 }
 
-/// Draws all sections and writes the edits into `scene`.
+/// Draws the sections of the open tab and writes the edits into `scene`.
 pub fn ui(
     ui: &mut Ui,
     scene: &mut Scene,
@@ -62,12 +73,29 @@ pub fn ui(
     let (mut material, mut driver_image, mut slab_file) = (None, None, None);
     // A wide row must not widen the panel.
     ui.set_max_width(ui.available_width());
+    inputs.accuracy.open = false;
+    inputs.color_map.open = false;
+    ui.horizontal(|ui| {
+        for (tab, name, tip) in [
+            (Tab::Scene, "Scene", "Surface, materials, object, light and camera (F5)"),
+            (Tab::Cost, "Cost", "Quality, accuracy against time, and effects (F6)"),
+        ] {
+            ui.selectable_value(inputs.tab, tab, name).on_hover_text(tip);
+        }
+    });
+    ui.separator();
+    if *inputs.tab == Tab::Cost {
+        let state = inputs.accuracy;
+        section(ui, "Accuracy", true, |ui| accuracy::ui(ui, scene, state, inputs.effects, inputs.version));
+        section(ui, "Effects", true, |ui| effects::ui(ui, scene, inputs.effects, state, inputs.version));
+        section(ui, "Quality", false, |ui| large_scale::quality_ui(ui, &mut scene.quality, &mut context));
+        return PanelRequests { browse: context.browse, error: context.error, ..PanelRequests::default() };
+    }
     // A scene of the gallery unfolds what it shows.
     let unfolds = |used: bool| inputs.is_new.then_some(used);
     let (shows_map, shows_slab) = (scene.color_map.is_some(), scene.slab.is_some());
     section(ui, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut context));
     section(ui, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut context));
-    inputs.color_map.open = false;
     foldable(ui, "Colour map", shows_map, unfolds(shows_map), |ui| {
         driver_image = color_map::ui(ui, scene, inputs.color_map, &mut context);
     });
@@ -75,10 +103,6 @@ pub fn ui(
     section(ui, "Object", true, |ui| large_scale::object_ui(ui, scene, &mut context));
     section(ui, "Light", true, |ui| large_scale::light_ui(ui, &mut scene.light, &mut context));
     section(ui, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));
-    section(ui, "Quality", false, |ui| large_scale::quality_ui(ui, &mut scene.quality, &mut context));
-    inputs.accuracy.open = false;
-    section(ui, "Accuracy", false, |ui| accuracy::ui(ui, scene, inputs.accuracy, inputs.effects, inputs.version));
-    section(ui, "Effects", false, |ui| effects::ui(ui, scene, inputs.effects, inputs.accuracy, inputs.version));
     PanelRequests { browse: context.browse, material, driver_image, slab_file, error: context.error }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::scene::{Field, Geometry, Heightfield, Painted, Scene, Tile};
+use crate::scene::{Field, Geometry, GrooveProfile, Heightfield, Painted, Scene, Tile};
 use eframe::egui::Ui;
 use toml::{Table, Value};
 
@@ -30,7 +30,9 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, context
         && let Ok(mut table) = Table::try_from(&scene.tile.geometry)
     {
         let before = table.clone();
+        context.ignored = ignored(&scene.tile.geometry);
         fields::table_ui(ui, &mut table, &kind.fields, &[], context);
+        context.ignored = None;
         if table != before
             && let Ok(geometry) = table.try_into::<Geometry>()
         {
@@ -38,6 +40,17 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, context
         }
     }
     tile_ui(ui, &mut scene.tile, context);
+}
+
+/// The parameter that the profile of grooves ignores, and why.
+fn ignored(geometry: &Geometry) -> Option<(&'static str, &'static str)> {
+    let Geometry::Grooves(grooves) = geometry else { return None };
+    match grooves.profile {
+        GrooveProfile::Trapezoid => None,
+        GrooveProfile::V => Some(("bottom_width", "V-shaped grooves have no bottom")),
+        GrooveProfile::Rectangular => Some(("side_angle_deg", "the sides of rectangular grooves are vertical")),
+        GrooveProfile::U => Some(("side_angle_deg", "U-shaped grooves are rounded")),
+    }
 }
 
 /// Returns a family with initial parameters; `None` for a mesh, which needs a file.

@@ -1,12 +1,14 @@
 //! The editor without a window: frames run as in a window, with the same workers.
 
 mod color_map;
+mod cost_strip;
 mod disk;
 mod documents;
 mod errors;
 mod exports;
 mod interface;
 mod latency;
+mod methods;
 mod newcomer;
 mod painting;
 mod slab;

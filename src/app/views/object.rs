@@ -4,24 +4,28 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::effective::{EffectiveBrdf, ErrorEstimate};
-use crate::scene::{Camera, OBJECT_KINDS, Scene};
+use crate::plan::Effect;
+use crate::scene::{Background, Camera, OBJECT_KINDS, Scene};
 use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureId, TextureOptions, Ui,
     pos2, vec2,
 };
 
+use super::methods::MethodsState;
 use super::spinner::spinner;
 use super::wipe::ComparisonImage;
+use super::zoom::zoom;
 use crate::app::actions::Action;
 use crate::app::panels::fields::display_name;
 use crate::app::worker::{DisplayImage, GpuImage, Grade, RenderedPreview};
 
-/// Minimum distance of the camera, in radii of the object. Zooming further narrows the field of view.
-const MIN_DISTANCE: f32 = 2.2;
 /// Delay before the view reports that an image is being computed [s].
 const PROGRESS_DELAY: f32 = 0.33;
-/// Below this field of view [degrees], zooming out widens it and does not move the camera.
-const NARROW_FOV: f32 = 14.0;
+/// Logarithm of the factor on the background's distance per point that the pointer moves.
+const BACKGROUND_SPEED: f32 = 0.01;
+/// Distances of a background that is dragged [world units].
+const NEAR_BACKGROUND: f32 = 1e-3;
+const FAR_BACKGROUND: f32 = 1e3;
 /// Margin that the view leaves to the drag handles of the panels [points].
 const HANDLE_MARGIN: f32 = 6.0;
 
@@ -60,6 +64,8 @@ pub struct ObjectView {
     pub stopped: Option<u64>,
     /// The error that a BRDF states.
     pub stated: Option<(Arc<EffectiveBrdf>, ErrorEstimate)>,
+    /// The plan of the last refined image.
+    pub refined_effects: Option<Vec<Effect>>,
     /// The version that could not be rendered.
     pub failed: Option<u64>,
     /// Image A, which the view compares with the current one.
@@ -93,6 +99,9 @@ impl ObjectView {
         }
         if preview.grade == Grade::Final {
             self.activity = None;
+        }
+        if preview.grade >= Grade::Refining {
+            self.refined_effects = Some(preview.effects.clone());
         }
         // If A was stored before its image was final, the final image replaces it.
         if let Some(comparison) = &mut self.comparison
@@ -146,8 +155,9 @@ impl ObjectView {
         }
     }
 
-    /// Draws the image, and moves the scene's camera and light with the pointer. Returns the size in pixels.
-    pub fn ui(&mut self, ui: &mut Ui, scene: &mut Scene) -> [usize; 2] {
+    /// Draws the image, and moves the scene's camera and light with the pointer. Images by other methods lie over it, if they
+    /// are of the given version. Returns the size in pixels.
+    pub fn ui(&mut self, ui: &mut Ui, scene: &mut Scene, methods: Option<(&mut MethodsState, u64)>) -> [usize; 2] {
         let size = ui.available_size().max(vec2(64.0, 64.0));
         let (id, area) = ui.allocate_space(size);
         // The margin keeps the edges of the neighbouring panels draggable.
@@ -162,9 +172,17 @@ impl ObjectView {
             self.placeholder_ui(ui, area);
         }
         self.progress_ui(ui, area);
-        self.wipe_ui(ui, area);
-        let on_wipe =
-            self.comparison.is_some() && response.interact_pointer_pos().is_some_and(|at| self.is_on_wipe(area, at));
+        let press = response.interact_pointer_pos();
+        let on_wipe = match methods {
+            Some((methods, version)) => {
+                methods.ui(ui, area, version);
+                press.is_some_and(|at| methods.is_on_line(area, at))
+            }
+            None => {
+                self.wipe_ui(ui, area);
+                self.comparison.is_some() && press.is_some_and(|at| self.is_on_wipe(area, at))
+            }
+        };
         if !on_wipe {
             navigate(ui, &response, scene, area, self.preview.as_ref().map_or(4.0, |preview| preview.distance));
         }
@@ -208,9 +226,9 @@ impl ObjectView {
     }
 
     /// Draws the toolbar above the view.
-    pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene) -> Option<Action> {
+    pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene, compares_methods: bool) -> Option<Action> {
         let mut action = None;
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.name_inputs("Object", |ui| object_ui(ui, scene));
             ui.name_inputs("Exposure", |ui| exposure_ui(ui, scene));
@@ -233,6 +251,12 @@ impl ObjectView {
                 if ui.selectable_label(on, name).on_hover_text(tip).clicked() {
                     action = Some(choice);
                 }
+            }
+            let tip = "Show the methods for this scene beside each other, with the truth and its standard error (M)";
+            if MethodsState::applies_to(scene)
+                && ui.selectable_label(compares_methods, "Methods").on_hover_text(tip).clicked()
+            {
+                action = Some(Action::Methods);
             }
             if self.comparison.is_some()
                 && ui.button("Back to A").on_hover_text("Undo all edits since A in one step").clicked()
@@ -274,12 +298,16 @@ pub(super) fn covered(area: Rect, image: egui::Vec2) -> Rect {
 }
 
 /// Applies pointer input. Dragging turns the object, and the middle button moves it. Shift-drag or the right button
-/// turns the light, and scrolling zooms.
+/// turns the light, Ctrl-drag moves the background of a slab away or near, and scrolling zooms.
 fn navigate(ui: &Ui, response: &Response, scene: &mut Scene, area: Rect, distance: f32) {
     let delta = response.drag_delta();
     let shift = ui.input(|input| input.modifiers.shift);
     let light = response.dragged_by(PointerButton::Secondary) || response.dragged_by(PointerButton::Primary) && shift;
-    if light && delta.x != 0.0 {
+    let moves_background = response.dragged_by(PointerButton::Primary) && ui.input(|input| input.modifiers.command);
+    let background = scene.background.as_mut().filter(|_| moves_background).and_then(Background::distance_mut);
+    if let Some(distance) = background {
+        *distance = ((distance.max(NEAR_BACKGROUND)) * (-delta.y * BACKGROUND_SPEED).exp()).min(FAR_BACKGROUND);
+    } else if light && delta.x != 0.0 {
         scene.light.rotation_deg = wrapped(scene.light.rotation_deg + delta.x * 0.5);
     } else if response.dragged_by(PointerButton::Middle) && delta != egui::Vec2::ZERO {
         let camera = scene.camera.get_or_insert_default();
@@ -313,20 +341,6 @@ pub fn frame(scene: &mut Scene) {
         camera.distance = 0.0;
         camera.pan = glam::Vec2::ZERO;
         camera.fov_deg = Camera::default().fov_deg;
-    }
-}
-
-/// Scales the camera's distance by a factor. Near the object the field of view narrows instead, until single tiles are
-/// visible.
-fn zoom(scene: &mut Scene, factor: f32, distance: f32) {
-    let camera = scene.camera.get_or_insert_default();
-    let from = if camera.distance > 0.0 { camera.distance } else { distance };
-    let narrows = factor < 1.0 && from * factor < MIN_DISTANCE || factor > 1.0 && camera.fov_deg < NARROW_FOV;
-    if narrows {
-        camera.fov_deg = (camera.fov_deg * factor).clamp(1.0, Camera::default().fov_deg.max(camera.fov_deg));
-        camera.distance = from;
-    } else {
-        camera.distance = (from * factor).clamp(MIN_DISTANCE.min(from), 60.0);
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::base::{Error, Result};
-use crate::effective::{EffectiveBrdf, ErrorEstimator};
+use crate::effective::EffectiveBrdf;
 use crate::pipeline::{Outcome, Pipeline};
 use crate::render::Image;
 use crate::report::{EffectCost, ThumbnailRenderer, heat, measure_effects};
@@ -254,12 +254,11 @@ impl AccuracyWorker {
 
 /// The point of a result by its stated error.
 fn stated_point(outcome: &Outcome, ms: f64) -> AccuracyPoint {
-    let estimate = outcome.errors().map(ErrorEstimator::estimate).unwrap_or_default();
-    AccuracyPoint { facets: outcome.settings.facets, ms, compared: ReferenceErrors::stated(&estimate) }
+    AccuracyPoint { facets: outcome.settings.facets, ms, compared: ReferenceErrors::stated(outcome) }
 }
 
 /// The inputs of the reference and of the levels: the scene without settings, object, light and camera.
-fn without_settings(loaded: &LoadedScene) -> LoadedScene {
+pub fn without_settings(loaded: &LoadedScene) -> LoadedScene {
     let mut key = loaded.clone();
     key.scene.quality = Quality { seed: key.scene.quality.seed, ..Quality::default() };
     key.scene.camera = None;

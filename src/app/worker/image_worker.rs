@@ -106,7 +106,7 @@ impl ImageWorker {
     /// Renders a draft whose visibility and facet sum the GPU computes, at the finest level that meets the time limit.
     fn render_gpu_draft(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<Option<RenderedPreview>> {
         let on_gpu = self.backend != "cpu" && self.renderer.is_hardware();
-        if !on_gpu || self.renderer.is_close(&camera(&job.loaded), job.size) {
+        if !on_gpu || self.renderer.is_close(&camera(&job.loaded), job.size, false) {
             return Ok(None);
         }
         let Some(tile) = self.gpu_drafts.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
@@ -257,7 +257,9 @@ impl ImageWorker {
         let camera = camera(&job.loaded);
         let tone_map = ToneMap::new(&camera)?;
         let build_caches = samples_per_side > 1;
-        if self.renderer.is_close(&camera, size) {
+        // Drafts of distant colour maps have `f̄`, because the statistics of a tile take longer than a draft may.
+        let has_color_map = build_caches && job.loaded.scene.color_map.is_some();
+        if self.renderer.is_close(&camera, size, has_color_map) {
             self.prepare_close_up(&job.loaded)?;
         } else {
             self.close = None;
@@ -338,7 +340,7 @@ impl ImageWorker {
 }
 
 /// The view's size, reduced to the largest size that is rendered.
-fn fitting(size: [usize; 2], max_pixels: f64) -> [usize; 2] {
+pub(super) fn fitting(size: [usize; 2], max_pixels: f64) -> [usize; 2] {
     let size = size.map(|side| side.clamp(24, 8192));
     let longest = size[0].max(size[1]) as f64;
     let scale = (max_pixels / (size[0] * size[1]) as f64).sqrt().min(MAX_SIDE / longest).min(1.0);

@@ -1,5 +1,5 @@
 //! Background work of the editor, with one thread per task: draft, refined image, tile, lobe plot, thumbnails,
-//! accuracy, values of colour maps, lobe of a slab, export, recovery file.
+//! accuracy, values of colour maps, lobe of a slab, methods beside each other, export, recovery file.
 
 mod accuracy;
 mod color_map;
@@ -8,6 +8,7 @@ mod gpu_drafts;
 mod gpu_state;
 mod image_worker;
 mod lobe;
+mod methods;
 mod preview_renderer;
 mod rendered_preview;
 mod runner;
@@ -28,12 +29,13 @@ use crate::pipeline::Pipeline;
 
 use super::document::Snapshot;
 
-pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult};
+pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, without_settings};
 pub use color_map::{ColorMapJob, ColorMapResult, DriverValues, REACH as HISTOGRAM_REACH};
 pub use export::{ExportJob, ExportKind, ExportResult, TableChoice};
 #[cfg(test)]
 pub use gpu_state::LOSE_GPU;
 pub use lobe::{LobeJob, LobePlot, logarithmic};
+pub use methods::{MethodImage, MethodsJob, MethodsResult};
 pub use rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 pub use runner::Worker;
 pub use screen::{GpuImage, Screen};
@@ -162,6 +164,17 @@ pub fn spawn_slab_lobe(report: impl Fn(SlabLobeResult) + Clone + Send + Sync + '
     let panicked = move |text: String| report_fault(SlabLobeResult::Failed(format!("a fault in the program ({text})")));
     // One thread, because the image of the slab takes the others.
     Worker::spawn("slab lobe", 1, Pipeline::new, work, panicked).ok()
+}
+
+/// Starts the thread that renders a scene by several methods.
+pub fn spawn_methods(report: impl Fn(MethodsResult) + Clone + Send + Sync + 'static) -> Option<Worker<MethodsJob>> {
+    let report_fault = report.clone();
+    let work = move |state: &mut methods::MethodsWorker, job: MethodsJob, context: &runner::JobContext<MethodsJob>| {
+        state.work(&job, context, &report);
+    };
+    let panicked =
+        move |text: String| report_fault(MethodsResult::Failed(u64::MAX, format!("a fault in the program ({text})")));
+    Worker::spawn("methods", 0, methods::MethodsWorker::default, work, panicked).ok()
 }
 
 /// Starts the thread that writes exports.

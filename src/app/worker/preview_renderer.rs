@@ -12,6 +12,7 @@ use crate::render::image::render::RenderTimes;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
+use crate::render::tile_view::filtered::Corrections;
 use crate::render::tile_view::{ShadedMaterials, TileScene, on_object};
 use crate::render::{CameraView, RenderInput, RenderScene, Rendered};
 use crate::scene::{Camera, LoadedScene};
@@ -170,17 +171,18 @@ impl PreviewRenderer {
             let materials =
                 ShadedMaterials { material_of_slot: &assignment.material_of_slot, materials: &assignment.materials };
             let input = render_input(scene, request, &exact, &background);
-            tile.blend_into(&mut rendered.image, &input, materials, cancel)?;
+            let corrections = if request.build_caches { Corrections::Measured } else { Corrections::Known };
+            tile.blend_into(&mut rendered.image, &input, materials, corrections, cancel)?;
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
         }
         Ok((rendered, table_ms))
     }
 
     /// Returns true if the camera is so close that the tiles themselves are visible.
-    pub fn is_close(&self, camera: &Camera, size: [usize; 2]) -> bool {
+    pub fn is_close(&self, camera: &Camera, size: [usize; 2], has_color_map: bool) -> bool {
         let of = |scene: &RenderScene| {
             CameraView::new(camera, scene.mesh(), size)
-                .is_ok_and(|view| on_object::tiles_are_visible(&view, scene.mesh()))
+                .is_ok_and(|view| on_object::tiles_are_visible(&view, scene.mesh(), has_color_map))
         };
         self.scene.as_ref().is_some_and(of)
     }

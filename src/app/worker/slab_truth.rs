@@ -3,7 +3,7 @@
 use crate::base::{Cancel, Result};
 use crate::pipeline::SlabOutcome;
 use crate::reference::photons::{Bins, LobeSettings, TrueLobe};
-use crate::slab::{Channel, Slab, Walk};
+use crate::slab::{Channel, ChannelSlab, Slab};
 use glam::{DVec2, DVec3};
 
 use super::slab_lobe::{LobeCurve, SIDE, STEPS, plane_direction};
@@ -72,7 +72,7 @@ impl<'a> Truth<'a> {
         let settings = LobeSettings { side: SIDE, photons: PHOTONS, target: 0.0, seed };
         self.batches += 1;
         for (channel, weight) in &self.channels {
-            let walk = Walk { top: &self.slab.top, bottom: &self.slab.bottom, channel: *channel };
+            let walk = ChannelSlab { top: &self.slab.top, bottom: &self.slab.bottom, channel: *channel };
             let lobe = TrueLobe::trace(&walk, self.i, &settings, cancel)?;
             let bins = if self.bounces { &lobe.all } else { &lobe.single };
             let sums = self.sums.values.iter_mut().zip(&mut self.sums.variances);

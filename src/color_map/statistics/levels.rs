@@ -3,8 +3,9 @@
 use glam::{DVec2, UVec2};
 use rayon::prelude::*;
 
-/// Deviation of the Gaussian low-pass of a pixel of width 1. A box pixel has 0.29.
-pub const LOW_PASS: f64 = 0.3;
+/// Deviation of the Gaussian low-pass of a pixel of width 1. With the blur of bilinear reads between texels, whose variance
+/// is a sixth of a texel's square, it has the deviation of a box, 0.29.
+pub const LOW_PASS: f64 = 0.27;
 /// Texels of a level per width of its pixel. The low-pass leaves nothing that bilinear reads of these texels miss.
 const TEXELS_PER_PIXEL: f64 = 4.0;
 /// Width of the last level's pixel in periods, at which nothing but the mean is left.

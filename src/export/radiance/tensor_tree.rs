@@ -62,7 +62,7 @@ fn direction(square: [f64; 2]) -> DVec3 {
 }
 
 /// Returns the number of cells along a side for a requested resolution: about the same number of directions.
-fn side_of(resolution: Option<ExportResolution>) -> usize {
+pub(super) fn side_of(resolution: Option<ExportResolution>) -> usize {
     let Some(resolution) = resolution else { return SIDE };
     let side = ((resolution.theta_i * resolution.phi_i) as f64).sqrt();
     let [min, max] = SIDES;
@@ -70,13 +70,13 @@ fn side_of(resolution: Option<ExportResolution>) -> usize {
 }
 
 /// Returns the cell of a direction, y fastest.
-fn cell(side: usize, x: f64, y: f64) -> usize {
+pub(super) fn cell(side: usize, x: f64, y: f64) -> usize {
     let [x, y] = square_of_disk([x, y]).map(|at| ((at * side as f64) as usize).min(side - 1));
     x * side + y
 }
 
 /// Returns the direction at the middle of part `part` (of `parts²`) of a cell.
-fn part_of_cell(side: usize, cell: usize, part: usize, parts: usize) -> DVec3 {
+pub(super) fn part_of_cell(side: usize, cell: usize, part: usize, parts: usize) -> DVec3 {
     let at = |k: usize, part: usize| ((k * parts + part) as f64 + 0.5) / (side * parts) as f64;
     direction([at(cell / side, part / parts), at(cell % side, part % parts)])
 }
@@ -164,24 +164,7 @@ pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
     let side = side_of(task.options.resolution);
     let brdf = task.brdf;
     let rows: Vec<Vec<Vec3>> = in_parallel(side * side, task.progress, |incident| one_incident(brdf, side, incident))?;
-    // Radiance reads chromaticity instead of X and Z from tensor trees.
-    let chromaticity = |value: &Vec3| {
-        let sum = value.x + 15.0 * value.y + 3.0 * value.z;
-        if sum > 0.0 { [4.0 * value.x / sum, 9.0 * value.y / sum] } else { EQUAL_ENERGY }
-    };
-    let tree = |of: &dyn Fn(&Vec3) -> f32| {
-        let values: Vec<f32> = rows.iter().flatten().map(of).collect();
-        let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
-        let mut text = String::new();
-        TensorTree { side, values, tolerance: TOLERANCE * mean }.branch([0; 4], side, &mut text);
-        text.push('\n');
-        text
-    };
-    let channels = [
-        ("CIE-u", tree(&|value| chromaticity(value)[0])),
-        ("Visible", tree(&|value| value.y)),
-        ("CIE-v", tree(&|value| chromaticity(value)[1])),
-    ];
+    let channels = channels(side, &rows);
     let read = |i: Vec3, o: Vec3| {
         let row = &rows[cell(side, f64::from(-o.x), f64::from(-o.y))];
         rgb(row[cell(side, f64::from(i.x), f64::from(i.y))]) * i.z
@@ -195,11 +178,34 @@ pub fn tabulate(task: &ExportTask<'_>) -> io::Result<(Content, Written)> {
     ];
     let reading = reading_error(task.brdf, read);
     let written = Written { pairs: side.pow(4), reading, conventions, anisotropy_lost: None };
-    let definition = "<IncidentDataStructure>TensorTree4</IncidentDataStructure>\n".to_owned();
-    Ok((Content { definition, basis: BASIS, channels, black: "{0}\n".to_owned() }, written))
+    Ok((Content { definition: DEFINITION.to_owned(), basis: BASIS, channels, black: "{0}\n".to_owned() }, written))
 }
 
-const BASIS: &str = "<AngleBasis>LBNL/Shirley-Chiu</AngleBasis>";
+/// The trees of the channels of rows of CIE X, Y and Z by incident, then by leaving cell, with the channels' names.
+pub(super) fn channels(side: usize, rows: &[Vec<Vec3>]) -> [(&'static str, String); 3] {
+    // Radiance reads chromaticity instead of X and Z from tensor trees.
+    let chromaticity = |value: &Vec3| {
+        let sum = value.x + 15.0 * value.y + 3.0 * value.z;
+        if sum > 0.0 { [4.0 * value.x / sum, 9.0 * value.y / sum] } else { EQUAL_ENERGY }
+    };
+    let tree = |of: &dyn Fn(&Vec3) -> f32| {
+        let values: Vec<f32> = rows.iter().flatten().map(of).collect();
+        let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
+        let mut text = String::new();
+        TensorTree { side, values, tolerance: TOLERANCE * mean }.branch([0; 4], side, &mut text);
+        text.push('\n');
+        text
+    };
+    [
+        ("CIE-u", tree(&|value| chromaticity(value)[0])),
+        ("Visible", tree(&|value| value.y)),
+        ("CIE-v", tree(&|value| chromaticity(value)[1])),
+    ]
+}
+
+pub(super) const BASIS: &str = "<AngleBasis>LBNL/Shirley-Chiu</AngleBasis>";
+/// The data definition of the file.
+pub(super) const DEFINITION: &str = "<IncidentDataStructure>TensorTree4</IncidentDataStructure>\n";
 
 #[cfg(test)]
 mod tests {

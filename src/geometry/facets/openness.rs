@@ -58,6 +58,13 @@ impl Openness {
         openness
     }
 
+    /// The openness of the part of the surface that holds a facet, above 0.
+    pub fn of(&self, facets: &Facets, facet: usize) -> f64 {
+        let openness = self.values[self.bin(facets, facet)];
+        // All values are 0 if no tested facet is visible.
+        if openness > 0.0 { openness } else { 1.0 }
+    }
+
     fn bin(&self, facets: &Facets, facet: usize) -> usize {
         let (position, normal) = (facets.positions[facet], facets.normals[facet]);
         let height = ((position.z - self.low) / self.height.max(f32::MIN_POSITIVE) * HEIGHTS as f32) as usize;

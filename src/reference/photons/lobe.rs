@@ -6,16 +6,16 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::base::{Cancel, Result};
-use crate::slab::{Exit, Losses, Walk};
+use crate::slab::{ChannelSlab, Exit, Tally};
 
 /// Traces photons of one direction and colour channel.
 pub trait PhotonSource: Sync {
     /// Follows a photon of weight 1 and reports all light that leaves.
-    fn photon(&self, i: DVec3, rng: &mut ChaCha8Rng, exit: &mut dyn FnMut(Exit)) -> Losses;
+    fn photon(&self, i: DVec3, rng: &mut ChaCha8Rng, exit: &mut dyn FnMut(Exit)) -> Tally;
 }
 
-impl PhotonSource for Walk<'_> {
-    fn photon(&self, i: DVec3, rng: &mut ChaCha8Rng, exit: &mut dyn FnMut(Exit)) -> Losses {
+impl PhotonSource for ChannelSlab<'_> {
+    fn photon(&self, i: DVec3, rng: &mut ChaCha8Rng, exit: &mut dyn FnMut(Exit)) -> Tally {
         self.run(i, rng, exit)
     }
 }

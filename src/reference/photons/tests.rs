@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::lobe::{LobeSettings, TrueLobe, cell_means};
 use super::{PairSettings, PairTruth};
 use crate::base::Cancel;
-use crate::slab::{Channel, Inner, Ndf, Optics, Profile, Slab, Walk};
+use crate::slab::{Channel, ChannelSlab, Inner, Ndf, Optics, Profile, Slab};
 
 fn polar(degrees: f64) -> DVec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
@@ -27,7 +27,7 @@ fn slab(top: &Arc<Ndf>, bottom: &Arc<Ndf>) -> Slab {
 }
 
 fn truth(slab: &Slab, degrees: f64, photons: usize) -> TrueLobe {
-    let walk = Walk { top: &slab.top, bottom: &slab.bottom, channel: slab.optics.channel(0) };
+    let walk = ChannelSlab { top: &slab.top, bottom: &slab.bottom, channel: slab.optics.channel(0) };
     let settings = LobeSettings { photons, target: 0.01, ..LobeSettings::default() };
     TrueLobe::trace(&walk, polar(degrees), &settings, &Cancel::default()).unwrap()
 }
@@ -194,7 +194,7 @@ fn all_light_with_bounces_is_within_eight_per_cent_and_its_total_within_two_to_7
 fn a_flat_slab_of_photons_has_the_closed_transmittance() {
     let flat = Ndf::smooth();
     for degrees in [0.0, 45.0, 75.0, 85.0, 89.0] {
-        let walk = Walk { top: &flat, bottom: &flat, channel: Channel { eta: 1.5, depth: 0.0 } };
+        let walk = ChannelSlab { top: &flat, bottom: &flat, channel: Channel { eta: 1.5, depth: 0.0 } };
         let settings = LobeSettings { photons: 1, ..LobeSettings::default() };
         let lobe = TrueLobe::trace(&walk, polar(degrees), &settings, &Cancel::default()).unwrap();
         let r = crate::slab::fresnel::reflectance(polar(degrees).z, 1.5);

@@ -10,7 +10,7 @@ use super::lobe::PhotonSource;
 use crate::base::{InputError, Result};
 use crate::geometry::{PeriodicGrid, TileMesh};
 use crate::slab::fresnel::{reflectance, refract};
-use crate::slab::{Channel, Exit, Losses};
+use crate::slab::{Channel, Exit, Tally};
 
 /// A tile as a face of a slab, with its rays.
 #[derive(Debug, Clone)]
@@ -111,9 +111,9 @@ fn pass_level(d: DVec3, position: Vec2, eta: f64, rng: &mut ChaCha8Rng) -> Passa
 }
 
 impl PhotonSource for TileSlab {
-    fn photon(&self, i: DVec3, rng: &mut ChaCha8Rng, exit: &mut dyn FnMut(Exit)) -> Losses {
+    fn photon(&self, i: DVec3, rng: &mut ChaCha8Rng, exit: &mut dyn FnMut(Exit)) -> Tally {
         let eta = self.channel.eta;
-        let mut losses = Losses::default();
+        let mut losses = Tally::default();
         let (mut direction, mut weight, mut hits, mut at_top) = (-i, 1.0, 0, true);
         let mut position = Vec2::ZERO;
         let is_level = self.top.is_none() && self.bottom.is_none();

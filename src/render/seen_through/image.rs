@@ -47,7 +47,7 @@ pub struct Places {
 
 /// Points per task.
 const CHUNK: usize = 256;
-/// Part of a lobe below which its tail is not read.
+/// Part of the light below which the tail of a lobe is not read.
 const LEAST_TAIL: f32 = 0.02;
 /// Deviation of an even distribution over an interval of width 1.
 const BOX: f32 = 0.288_675_13;
@@ -151,7 +151,7 @@ impl<'a, S: VaryingSurface> Point<'a, S> {
                 }
                 let mean = direction(lobe, side);
                 let mut value = self.read(mean, &self.kernel(mean, lobe.covariance));
-                if lobe.tail > LEAST_TAIL {
+                if lobe.tail * lobe.part.max_element() > LEAST_TAIL {
                     let wide = lobe.covariance.map(|value| value * ViewLobe::TAIL);
                     value += lobe.tail * (self.read(mean, &self.kernel(mean, wide)) - value);
                 }
@@ -256,7 +256,7 @@ struct PathKernels {
     /// Inverse of the covariance: xx, xy and yy.
     inverse: [f32; 3],
     /// The symmetric matrix that draws paths towards the mean: xx, xy and yy.
-    drawn: [f32; 3],
+    contraction: [f32; 3],
     kernels: [BackdropKernel; SPARSE.len() + 1],
 }
 
@@ -271,8 +271,8 @@ impl PathKernels {
             kernel(lobe.covariance.map(|value| value * scale.min(ViewLobe::TAIL)))
         };
         let kernels: [BackdropKernel; SPARSE.len() + 1] = std::array::from_fn(of_step);
-        let drawn = drawn(lobe.covariance, part_of(paths) * kernels[0].share(below));
-        Self { mean: lobe.mean, inverse, drawn, kernels }
+        let contraction = contraction(lobe.covariance, part_of(paths) * kernels[0].share(below));
+        Self { mean: lobe.mean, inverse, contraction, kernels }
     }
 
     fn at(&self, direction: Vec3) -> (Vec3, &BackdropKernel) {
@@ -280,15 +280,15 @@ impl PathKernels {
         let [xx, xy, yy] = self.inverse;
         let square = xx * d.x * d.x + 2.0 * xy * d.x * d.y + yy * d.y * d.y;
         let kernel = &self.kernels[SPARSE.iter().filter(|bound| square > **bound).count()];
-        let [xx, xy, yy] = self.drawn;
+        let [xx, xy, yy] = self.contraction;
         let at = self.mean + Vec2::new(xx * d.x + xy * d.y, xy * d.x + yy * d.y);
         (at.extend((1.0 - at.length_squared()).max(1e-6).sqrt().copysign(direction.z)), kernel)
     }
 }
 
-/// The matrix M with `M C Mᵀ = C - part λ I`, for the covariance C and its smaller variance λ: the variance that round
+/// The matrix M that contracts directions of paths about the mean, with `M C Mᵀ = C - part λ I`, for the covariance C and its smaller variance λ: the variance that round
 /// footprints of this size add.
-fn drawn([xx, xy, yy]: [f32; 3], part: f32) -> [f32; 3] {
+fn contraction([xx, xy, yy]: [f32; 3], part: f32) -> [f32; 3] {
     let (middle, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let radius = (half * half + xy * xy).sqrt();
     let (major, minor) = (middle + radius, (middle - radius).max(0.0));

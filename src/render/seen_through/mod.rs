@@ -4,6 +4,8 @@
 //! because the slab is thin, and the object casts no shadow on what lies behind it.
 
 mod backdrop;
+#[cfg(test)]
+mod comparison_tests;
 mod image;
 mod pyramid;
 mod scene;

@@ -1,5 +1,7 @@
 //! An image at many resolutions, read with Gaussian footprints of any shape.
 
+use std::sync::LazyLock;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -153,18 +155,25 @@ fn wrapped(k: i32, n: usize) -> usize {
 impl Kernel {
     /// Spreads reads along `deviation`, which is `ratio` times the footprint of one read.
     fn spread(&mut self, deviation: Vec2, ratio: f32) {
-        let count = (((2.4 * ratio).ceil() as usize) | 1).clamp(3, MAX_PROBES);
-        // The reads reach over 2.2 deviations to either side.
-        let step = 4.4 / (count - 1) as f32;
-        let at = |k: usize| (k as f32 - 0.5 * (count - 1) as f32) * step;
-        let weights: Vec2 = (0..count).map(|k| Vec2::new(1.0, at(k) * at(k)) * (-0.5 * at(k) * at(k)).exp()).sum();
-        // The reads have exactly the variance that is asked for.
-        let widen = (weights.x / weights.y).sqrt();
-        self.count = count;
-        for k in 0..count {
-            self.probes[k] = (deviation * (at(k) * widen), (-0.5 * at(k) * at(k)).exp() / weights.x);
+        self.count = (((2.4 * ratio).ceil() as usize) | 1).clamp(3, MAX_PROBES);
+        for (probe, (at, weight)) in self.probes.iter_mut().zip(&READS[self.count / 2 - 1]) {
+            *probe = (deviation * *at, *weight);
         }
     }
+}
+
+/// Places [deviations] and weights of 3, 5, 7 and 9 reads along a line.
+static READS: LazyLock<[Vec<(f32, f32)>; MAX_PROBES / 2]> = LazyLock::new(|| std::array::from_fn(|k| reads(2 * k + 3)));
+
+/// Places [deviations] and weights of `count` reads along a line.
+fn reads(count: usize) -> Vec<(f32, f32)> {
+    // The reads reach over 2.2 deviations to either side.
+    let step = 4.4 / (count - 1) as f32;
+    let at = |k: usize| (k as f32 - 0.5 * (count - 1) as f32) * step;
+    let weights: Vec2 = (0..count).map(|k| Vec2::new(1.0, at(k) * at(k)) * (-0.5 * at(k) * at(k)).exp()).sum();
+    // The reads have exactly the variance that is asked for.
+    let widen = (weights.x / weights.y).sqrt();
+    (0..count).map(|k| (at(k) * widen, (-0.5 * at(k) * at(k)).exp() / weights.x)).collect()
 }
 
 impl Level {

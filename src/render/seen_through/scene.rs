@@ -6,13 +6,14 @@ use glam::Vec2;
 
 use super::{Backdrop, BuildBackdrop, BuildView, Places, SeenThrough, render};
 use crate::base::{Cancel, Result};
+use crate::effective::VaryingSurface;
 use crate::pipeline::{Pipeline, SlabOutcome, StageTimes};
 use crate::render::lighting::environment::Environment;
 use crate::render::lighting::lights;
 use crate::render::stages::LoadEnvironment;
 use crate::render::{CameraView, DirectionalLight, RenderScene, Rendered};
 use crate::scene::LoadedScene;
-use crate::slab::{Slab, SlabView};
+use crate::slab::{BtdfView, Slab, SlabView};
 
 /// A slab and what lies behind it. Images from several cameras share it.
 #[derive(Debug, Clone)]
@@ -26,7 +27,8 @@ pub struct SlabScene {
     repeat: Vec2,
     /// Paths per point; 0 for drafts.
     pub paths: usize,
-    seed: u64,
+    /// Seed of the paths.
+    pub seed: u64,
     /// The stages that ran to prepare the view and what lies behind.
     pub times: StageTimes,
 }
@@ -87,11 +89,31 @@ impl SlabScene {
         samples_per_side: usize,
         cancel: &Cancel,
     ) -> Result<Rendered> {
-        render(&SeenThrough {
+        render(&self.input(&*self.view, render_scene, size, samples_per_side, cancel))
+    }
+
+    /// Renders the object with the transmitted light of the slab's BTDF, in place of paths through both faces.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn render_btdf(&self, render_scene: &RenderScene, size: [usize; 2], cancel: &Cancel) -> Result<Rendered> {
+        let view = BtdfView::new(self.slab.clone(), self.view.clone());
+        render(&self.input(&view, render_scene, size, 1, cancel))
+    }
+
+    fn input<'a, S: VaryingSurface>(
+        &'a self,
+        surface: &'a S,
+        render_scene: &'a RenderScene,
+        size: [usize; 2],
+        samples_per_side: usize,
+        cancel: &Cancel,
+    ) -> SeenThrough<'a, S> {
+        SeenThrough {
             mesh: render_scene.mesh(),
             camera: &render_scene.camera,
             backdrop: &self.backdrop,
-            surface: &*self.view,
+            surface,
             places: self.places(render_scene),
             reflectance: &*self.slab,
             transmittance: &*self.slab,
@@ -101,7 +123,7 @@ impl SlabScene {
             paths: self.paths,
             seed: self.seed,
             cancel: cancel.clone(),
-        })
+        }
     }
 
     /// A captured sheet lies over the x and y of the object.

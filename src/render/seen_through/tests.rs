@@ -34,7 +34,7 @@ fn rendered(loaded: &LoadedScene, paths: usize, size: [usize; 2]) -> Image {
     scene.render(&render_scene, size, 1, &Cancel::default()).unwrap().image
 }
 
-fn rms(a: &Image, b: &Image) -> f32 {
+pub(super) fn rms(a: &Image, b: &Image) -> f32 {
     let grey = |v: Vec3| v.element_sum() / 3.0;
     let squares = a.pixels.iter().zip(&b.pixels).map(|(a, b)| grey(*a - *b).powi(2));
     (squares.sum::<f32>() / a.pixels.len() as f32).sqrt()
@@ -111,11 +111,15 @@ fn white_surroundings_without_absorption_are_white_through_a_slab_within_2_per_c
                 let image = rendered(&loaded, paths, [48, 48]);
                 let worst = image.pixels.iter().map(|p| (*p - 1.0).abs().max_element()).fold(0.0, f32::max);
                 let mean = image.pixels.iter().map(|p| p.x).sum::<f32>() / 2304.0;
-                println!("{name}, {paths} paths: mean {mean}, worst {worst}");
+                let beyond = image.pixels.iter().filter(|p| (**p - 1.0).abs().max_element() > 0.02).count() as f32;
+                println!("{name}, {paths} paths: mean {mean}, worst {worst}, beyond 2 %: {:.2} %", beyond / 23.04);
                 assert!((mean - 1.0).abs() < 0.005, "{name}, {paths} paths: {mean}");
                 let squares: f32 = image.pixels.iter().map(|p| (p.x - 1.0).powi(2)).sum();
                 let rms = (squares / 2304.0).sqrt();
                 assert!(rms < 0.03, "{name}, {paths} paths: RMS {rms}, the worst pixel {worst}");
+                // 64 paths are noisy at the rim of the sphere, most of all those of GGX.
+                let bound = if paths == 0 { 0.0 } else { 0.15 };
+                assert!(beyond <= bound * 2304.0, "{name}, {paths} paths: {beyond} pixels of 2304 are off by over 2 %");
             }
         }
     }

@@ -5,6 +5,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::filtered::Corrections;
 use super::{ShadedMaterials, TileScene};
 use crate::base::{Cancel, Result};
 use crate::geometry::Hit;
@@ -16,6 +17,8 @@ use crate::render::{CameraView, GBuffer, Image, ObjectMesh, RenderInput};
 pub const TILE_RADII: f32 = 0.012;
 /// Size of a tile in pixels at which its geometry starts to blend in, and at which it replaces the effective BRDF.
 const BLEND_PIXELS: [f32; 2] = [10.0, 28.0];
+/// Size of a tile in pixels below which no colour map leaves structure in a pixel.
+const LEAST_FILTERED: f32 = 0.125;
 
 /// Returns the blend weight (0 to 1) of the tile's geometry for a tile of this size in pixels.
 fn weight(pixels: f32) -> f32 {
@@ -23,17 +26,19 @@ fn weight(pixels: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Returns whether the nearest tiles that an object can have in a view are large enough to be visible.
-pub fn tiles_are_visible(view: &CameraView, mesh: &ObjectMesh) -> bool {
+/// Returns whether the nearest tiles that an object can have in a view are large enough to be visible. Under a colour map
+/// they are so from much further away, because every pixel filters them.
+pub fn tiles_are_visible(view: &CameraView, mesh: &ObjectMesh, has_color_map: bool) -> bool {
     let radius = mesh.bounds.radius;
     let nearest = ((view.eye - mesh.bounds.center).length() - radius).max(view.near);
-    weight(TILE_RADII * radius / (view.pixel_extent() * nearest)) > 0.0
+    let pixels = TILE_RADII * radius / (view.pixel_extent() * nearest);
+    if has_color_map { pixels > LEAST_FILTERED } else { weight(pixels) > 0.0 }
 }
 
 impl TileScene {
     /// Blends the tile's own geometry into an image rendered from `input`. It returns at once if no tile is large
     /// enough to be visible. Under a colour map, every pixel shows the low-passed tile instead
-    /// ([`FilteredTile::shade_into`](super::filtered::FilteredTile::shade_into)).
+    /// ([`FilteredTile::shade_into`](super::filtered::FilteredTile::shade_into)), with these corrections.
     ///
     /// # Errors
     /// An invalid camera, or [`crate::base::Error::Cancelled`].
@@ -42,13 +47,14 @@ impl TileScene {
         image: &mut Image,
         input: &RenderInput,
         materials: ShadedMaterials<'_>,
+        corrections: Corrections,
         cancel: &Cancel,
     ) -> Result<()> {
         if let Some(filtered) = self.filtered() {
-            return filtered.shade_into(image, input, materials, None, cancel);
+            return filtered.shade_into(image, input, materials, corrections, cancel);
         }
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
-        if !tiles_are_visible(&view, input.mesh) {
+        if !tiles_are_visible(&view, input.mesh, false) {
             return Ok(());
         }
         let radius = input.mesh.bounds.radius;

@@ -123,7 +123,7 @@ fn tiles_are_visible_up_close_and_the_image_keeps_its_brightness() {
         };
         let far = render(&input).unwrap().image;
         let mut near = far.clone();
-        tile.blend_into(&mut near, &input, shaded, &Cancel::default()).unwrap();
+        tile.blend_into(&mut near, &input, shaded, filtered::Corrections::Measured, &Cancel::default()).unwrap();
         assert_eq!(near != far, changes, "{fov_deg}");
         let mean = |image: &Image| image.pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / 57600.0;
         assert!((mean(&near) / mean(&far) - 1.0).abs() < 0.05, "{} {}", mean(&near), mean(&far));

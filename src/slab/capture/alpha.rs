@@ -1,7 +1,10 @@
 //! The parts of a point's model other than its distribution of slopes: α, the smoothness, and the roughness of masking.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
+use super::bounced::{Bounced, fit_without};
 use super::fit::{Equation, PointFit, Symmetry, View};
 use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 
@@ -13,6 +16,8 @@ pub struct Fitted {
     pub scale: f64,
     /// Relative L2 of the model against the samples.
     pub residual: f64,
+    /// BTDF [1/sr] of light reflected inside that Eq. 14 took for diffuse, per scale.
+    pub floor: f64,
 }
 
 /// Settings of a fit.
@@ -24,6 +29,8 @@ pub struct FitSettings {
     pub smooth: f64,
     /// A known α.
     pub alpha: Option<f64>,
+    /// Light that is reflected inside; absent if the samples hold none.
+    pub bounced: Option<Arc<Bounced>>,
 }
 
 /// Steps of α that are compared first, and the width of the interval at which golden section between two of them ends.
@@ -44,8 +51,14 @@ const MAX_GROWTH: f64 = 0.01;
 /// moves as in the paper, hardly moves where the distribution is narrow in the plane of incidence.
 ///
 /// Several cameras take the α of the least Eq. 15 without any symmetry, because one camera cannot tell α from skewness.
+/// Light that is reflected inside the slab is taken from the samples by the model, which is then fitted again.
 /// `None` if no sample above 0 lies in the grid of slopes.
 pub fn fit_point(views: &[View], settings: &FitSettings) -> Option<Fitted> {
+    fit_without(views, settings.bounced.as_ref(), |views| fit_lobe(views, settings))
+}
+
+/// Fits samples without light that is reflected inside.
+fn fit_lobe(views: &[View], settings: &FitSettings) -> Option<Fitted> {
     let fit = PointFit::new(views, &settings.optics, settings.grid)?;
     let alpha = match settings.alpha {
         Some(alpha) => alpha,
@@ -59,7 +72,7 @@ pub fn fit_point(views: &[View], settings: &FitSettings) -> Option<Fitted> {
     };
     let residual = fit.residual(alpha, &x);
     let (model, scale) = fit.model(alpha, x);
-    (scale > 0.0 && residual.is_finite()).then_some(Fitted { model, scale, residual })
+    (scale > 0.0 && residual.is_finite()).then_some(Fitted { model, scale, residual, floor: 0.0 })
 }
 
 /// The second pass of one camera: the free distribution if it predicts held-out samples better than the symmetric one, and

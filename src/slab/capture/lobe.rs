@@ -150,6 +150,18 @@ impl PointModel {
         (mass, mean, (second / mass - mean * mean).max(DVec2::ZERO))
     }
 
+    /// Roughness of the isotropic Beckmann face with the same variance of slopes.
+    pub fn roughness(&self) -> f64 {
+        let (mut mass, mut first, mut second) = (0.0, DVec2::ZERO, 0.0);
+        for (k, ln) in self.ln_density.iter().enumerate() {
+            let (m, part) = (self.grid.node(k), ln.exp());
+            mass += part;
+            first += part * m;
+            second += part * m.length_squared();
+        }
+        if mass > 0.0 { (second / mass - (first / mass).length_squared()).max(0.0).sqrt() } else { 0.0 }
+    }
+
     /// Scales the density to the mass 1 and returns the mass that it had; 0 if it had none.
     pub fn normalise(&mut self) -> f64 {
         let mass = self.moments().0;

@@ -4,6 +4,7 @@
 //! Columns of images run along +x and rows along +y. Lengths are metres.
 
 pub mod alpha;
+pub mod bounced;
 pub mod clusters;
 pub mod fit;
 #[cfg(test)]

@@ -62,7 +62,7 @@ impl Pattern {
         }
         let models = self.materials().iter().map(|material| model(grid, material)).collect();
         let optics = LobeOptics::new(self.eta(), 0.2);
-        Svbtdf { size, optics, grid, models, neighbours: MIXED, index, weight, scale, diffuse }
+        Svbtdf { size, optics, grid, models, neighbours: MIXED, index, weight, scale, diffuse, bounced: None }
     }
 
     /// Index of refraction (Table 1 of Dai et al. 2009).

@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
+use super::bounced::AboveFloor;
 use super::clusters::non_negative;
 use super::fit::{Sample, View};
 use super::lobe::{LobeOptics, PointModel};
@@ -108,15 +109,22 @@ impl Point {
     }
 
     /// The combination of models that is nearest to the samples inside the squares of directions (Eq. 21), without negative
-    /// weights.
-    pub fn mixed(&self, optics: &LobeOptics, directions: &[DirectionGrid], models: &[&PointModel]) -> Mixture {
+    /// weights. `bounced` is the light that is reflected inside, beside the lobes of the models.
+    pub fn mixed(
+        &self,
+        optics: &LobeOptics,
+        directions: &[DirectionGrid],
+        models: &[&PointModel],
+        bounced: Option<&AboveFloor>,
+    ) -> Mixture {
         let count = models.len();
         let (mut gram, mut right, mut power) = (vec![0.0; count * count], vec![0.0; count], 0.0);
         for (View { o, samples }, grid) in self.views.iter().zip(directions) {
             let inside = samples.iter().filter(|sample| sample.btdf.is_finite() && grid.holds(sample.i.truncate()));
             for sample in inside {
                 let Some(terms) = optics.terms(sample.i, *o) else { continue };
-                let values: Vec<f64> = models.iter().map(|model| model.btdf(&terms)).collect();
+                let inside = bounced.map_or(0.0, |bounced| bounced.read(sample.i, *o));
+                let values: Vec<f64> = models.iter().map(|model| model.btdf(&terms) + inside).collect();
                 for (a, value) in values.iter().enumerate() {
                     values.iter().enumerate().for_each(|(b, other)| gram[a * count + b] += value * other);
                     right[a] += value * sample.btdf;

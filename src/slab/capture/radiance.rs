@@ -38,14 +38,15 @@ const LOWEST_COUNT: usize = 5;
 /// part has no dark value there, and the least of noisy values is too small. Here, the dots of at least the median
 /// irradiance count, whose values have the least noise, and the median of the lowest 5 % of them is taken.
 pub fn diffuse_part(values: &[(f64, f64)]) -> f64 {
-    let mut irradiances: Vec<f64> = values.iter().map(|(irradiance, _)| *irradiance).collect();
-    irradiances.sort_by(f64::total_cmp);
-    let Some(median) = irradiances.get(irradiances.len() / 2) else { return 0.0 };
-    let strong = values.iter().filter(|(irradiance, _)| irradiance >= median);
-    let mut lowest: Vec<f64> = strong.map(|(_, btdf)| *btdf).collect();
-    let count = ((LOWEST * lowest.len() as f64) as usize).max(LOWEST_COUNT).min(lowest.len());
-    lowest.sort_by(f64::total_cmp);
-    lowest.get(count / 2).map_or(0.0, |value| value.max(0.0))
+    if values.is_empty() {
+        return 0.0;
+    }
+    let of_rank = |mut values: Vec<f64>, rank: usize| *values.select_nth_unstable_by(rank, f64::total_cmp).1;
+    let median = of_rank(values.iter().map(|(irradiance, _)| *irradiance).collect(), values.len() / 2);
+    let strong: Vec<f64> =
+        values.iter().filter(|(irradiance, _)| *irradiance >= median).map(|(_, btdf)| *btdf).collect();
+    let count = ((LOWEST * strong.len() as f64) as usize).max(LOWEST_COUNT).min(strong.len());
+    if strong.is_empty() { 0.0 } else { of_rank(strong, count / 2).max(0.0) }
 }
 
 #[cfg(test)]

@@ -34,9 +34,16 @@ pub struct Rig {
     /// Columns and rows of rectified images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixels: Option<[usize; 2]>,
+    /// False if the images hold no light that was reflected inside, as images of a model may.
+    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    pub bounces: bool,
     pub dots: Dots,
     #[serde(rename = "camera")]
     pub cameras: Vec<RigCamera>,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn ones() -> [f64; 3] {
@@ -126,6 +133,7 @@ fn fields() -> Vec<Field> {
         optional("monitor", FieldShape::Vector { length: 3, min: 1e-12, max: 1e12 }, "intensity of a dot per channel"),
         optional("saturation", number(1e-9, 1e12), "value of an image at which a channel is saturated"),
         optional("pixels", FieldShape::List { of: &COUNT, min: 2, max: 2 }, "size of rectified images"),
+        optional("bounces", FieldShape::Bool, "false if the images hold no light that was reflected inside"),
         Field::required("dots", FieldShape::Table(dot_fields), "the places of the dots on the monitor"),
         Field::required("camera", FieldShape::List { of: &CAMERA, min: 1, max: 8 }, "the cameras, as [[camera]]"),
     ]
@@ -272,7 +280,11 @@ mod tests {
     #[test]
     fn a_rig_comes_back_from_its_text_and_its_dots_run_along_x_first() {
         let rig = Rig::parse(TEXT).unwrap();
-        assert_eq!(Rig::parse(&rig.to_toml().unwrap()).unwrap(), rig);
+        assert!(rig.bounces);
+        let of_a_model = Rig { bounces: false, ..rig.clone() };
+        for rig in [&rig, &of_a_model] {
+            assert_eq!(Rig::parse(&rig.to_toml().unwrap()).unwrap(), *rig);
+        }
         let dots = rig.dots();
         assert_eq!((dots.len(), dots[0], dots[5]), (6, DVec2::new(-0.1, -0.05), DVec2::new(0.1, 0.05)));
         assert!((dots[1] - DVec2::new(0.0, -0.05)).length() < 1e-15);

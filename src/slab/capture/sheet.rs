@@ -1,11 +1,13 @@
 //! Capture of a whole sheet: from a folder of photographs to an SVBTDF.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::alpha::{FitSettings, Fitted, Shadowing, choose_smoothness, fit_point, shadowing};
+use super::bounced::{AboveFloor, Bounced, SheetBounces};
 use super::clusters::{LobeSlices, nearest, representatives};
 use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 use super::photographs::Photographs;
@@ -136,12 +138,15 @@ impl Measured {
 }
 
 /// The weights of representatives for each pixel.
+#[derive(Default)]
 struct Interpolation {
     neighbours: usize,
     index: Vec<u32>,
     weight: Vec<f32>,
     /// `k_s` of the channel mean.
     scale: Vec<f64>,
+    /// Part of the diffuse BTDF that is light reflected inside, per scale.
+    floor: Vec<f64>,
     residual: Vec<f32>,
 }
 
@@ -153,7 +158,8 @@ impl<'a> Sheet<'a> {
         let count = photographs.size.element_product() as usize;
         let optics = LobeOptics::new(rig.eta, SHADOWING);
         let grid = SlopeGrid { side: SIDE, span: 1.0 };
-        let fit = FitSettings { optics, grid, smooth: 1.0, alpha: settings.alpha };
+        let bounced = if rig.bounces { Some(Arc::new(Bounced::new(rig.eta, cancel)?)) } else { None };
+        let fit = FitSettings { optics, grid, smooth: 1.0, alpha: settings.alpha, bounced };
         let figures = Figures {
             pixels: [photographs.size.x as usize, photographs.size.y as usize],
             dots: dots.len(),
@@ -308,9 +314,10 @@ impl<'a> Sheet<'a> {
         self.figures.dark = 1.0 - self.figures.representatives as f64 / all.len().max(1) as f64;
         let residual = all.iter().map(|fit| fit.as_ref().map_or(0.0, |fit| fit.residual as f32)).collect();
         let scale: Vec<f64> = all.iter().map(|fit| fit.as_ref().map_or(0.0, |fit| fit.scale)).collect();
+        let floor = all.iter().map(|fit| fit.as_ref().map_or(0.0, |fit| fit.floor)).collect();
         let models = all.into_iter().map(|fit| fit.map_or_else(|| self.level_model(), |fit| fit.model)).collect();
         let (index, weight) = ((0..scale.len() as u32).collect(), vec![1.0; scale.len()]);
-        let parts = Interpolation { neighbours: 1, index, weight, scale, residual };
+        let parts = Interpolation { neighbours: 1, index, weight, scale, floor, residual };
         Ok(self.assembled(&measured, models, parts))
     }
 
@@ -343,16 +350,20 @@ impl<'a> Sheet<'a> {
             _ => nearest(slices, &of_representatives, near),
         };
         let mut measured = Measured::default();
-        let (weight, scale, residual) = (Vec::new(), Vec::new(), Vec::new());
-        let mut parts = Interpolation { neighbours: near, index, weight, scale, residual };
+        let mut parts = Interpolation { neighbours: near, index, ..Interpolation::default() };
         self.for_all(progress, |pixels, points| {
             let mix = |(pixel, point): (&usize, &Point)| {
                 let own = &parts.index[pixel * near..(pixel + 1) * near];
                 let own: Vec<&PointModel> = own.iter().map(|k| &models[*k as usize]).collect();
-                point.mixed(&self.fit.optics, &self.directions, &own)
+                // The nearest representative stands for all: its light differs little from theirs.
+                let bounced = self.fit.bounced.as_ref();
+                let light = bounced.map(|bounced| AboveFloor::new(bounced.of_model(own[0]), &point.views));
+                let mixture = point.mixed(&self.fit.optics, &self.directions, &own, light.as_ref());
+                (mixture, light.map_or(0.0, |light| light.floor))
             };
             let found: Vec<_> = pixels.par_iter().zip(points.par_iter()).map(mix).collect();
-            for Mixture { weights, scale, residual } in found {
+            for (Mixture { weights, scale, residual }, floor) in found {
+                parts.floor.push(floor);
                 parts.weight.extend(weights);
                 parts.scale.push(scale);
                 parts.residual.push(residual);
@@ -365,14 +376,18 @@ impl<'a> Sheet<'a> {
     fn assembled(mut self, measured: &Measured, models: Vec<PointModel>, parts: Interpolation) -> Captured {
         let scale: Vec<Vec3> =
             parts.scale.iter().zip(&measured.tint).map(|(scale, tint)| (*scale * *tint).as_vec3()).collect();
-        let diffuse: Vec<Vec3> = measured.diffuse.iter().map(|value| value.as_vec3()).collect();
+        let even = |((diffuse, scale), floor): ((&DVec3, &Vec3), &f64)| {
+            (diffuse.as_vec3() - *scale * *floor as f32).max(Vec3::ZERO)
+        };
+        let diffuse: Vec<Vec3> = measured.diffuse.iter().zip(&scale).zip(&parts.floor).map(even).collect();
         let lobes = scale.iter().map(|value| f64::from(value.element_sum())).sum::<f64>();
         let even = std::f64::consts::PI * diffuse.iter().map(|value| f64::from(value.element_sum())).sum::<f64>();
         self.figures.diffuse = if even > 0.0 { even / (even + lobes) } else { 0.0 };
         let optics = LobeOptics::new(self.photographs.rig.eta, self.fit.optics.shadowing);
         let Interpolation { neighbours, index, weight, residual, .. } = parts;
         let (size, grid) = (self.figures.pixels, self.fit.grid);
-        let svbtdf = Svbtdf { size, optics, grid, models, neighbours, index, weight, scale, diffuse };
+        let bounced = self.fit.bounced.clone().map(|light| SheetBounces::new(light, &models));
+        let svbtdf = Svbtdf { size, optics, grid, models, neighbours, index, weight, scale, diffuse, bounced };
         Captured { svbtdf, residual, figures: self.figures }
     }
 }

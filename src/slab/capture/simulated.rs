@@ -129,7 +129,7 @@ impl KnownPoint {
     pub fn recovered(&self, cameras: &[f64], noise: f64) -> Option<Recovered> {
         let views: Vec<View> = cameras.iter().map(|theta| self.photographed(*theta, noise)).collect();
         let grid = SlopeGrid { side: 32, span: 1.0 };
-        let settings = FitSettings { optics: self.optics.clone(), grid, smooth: 1.0, alpha: None };
+        let settings = FitSettings { optics: self.optics.clone(), grid, smooth: 1.0, alpha: None, bounced: None };
         let smooth = choose_smoothness(std::slice::from_ref(&views), &settings);
         let fitted = fit_point(&views, &FitSettings { smooth, ..settings })?;
         let error = self.error_at_new_views(|terms| fitted.scale * fitted.model.btdf(terms));
@@ -189,5 +189,6 @@ pub fn varying_sheet(size: [usize; 2]) -> Svbtdf {
         weight,
         scale: vec![Vec3::new(0.9, 0.8, 0.7); pixels],
         diffuse: vec![Vec3::splat(DIFFUSE as f32); pixels],
+        bounced: None,
     }
 }

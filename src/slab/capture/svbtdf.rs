@@ -2,10 +2,13 @@
 
 use std::io;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::super::dual::blend;
+use super::super::ring_table::{RINGS, RingTable, TURNS};
+use super::bounced::{ALPHAS, Bounced, ROUGHNESSES, SheetBounces};
 use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 use crate::base::npz::{Arrays, array, arrays};
 use crate::base::zip::ZipWriter;
@@ -38,6 +41,8 @@ pub struct Svbtdf {
     /// `k_s` and `ρ_d` [1/sr] of Eq. 13 for each pixel.
     pub scale: Vec<Vec3>,
     pub diffuse: Vec<Vec3>,
+    /// Light that is reflected inside, as a part of `scale` beside the lobe; absent if the lobe holds it.
+    pub bounced: Option<SheetBounces>,
 }
 
 /// The far appearance of an SVBTDF: the mean over its pixels.
@@ -47,6 +52,8 @@ pub struct MeanBtdf {
     /// Representatives with their part of the mean lobe.
     models: Vec<(PointModel, DVec3)>,
     diffuse: DVec3,
+    /// Light that is reflected inside, per channel.
+    bounced: Option<[RingTable; 3]>,
 }
 
 impl Svbtdf {
@@ -56,11 +63,16 @@ impl Svbtdf {
         at(place.y, self.size[1]) * self.size[0] + at(place.x, self.size[0])
     }
 
-    /// The representatives of a pixel with their weights.
-    fn parts(&self, pixel: usize) -> impl Iterator<Item = (&PointModel, f64)> {
+    /// Indices of the representatives of a pixel with their weights.
+    fn indices(&self, pixel: usize) -> impl Iterator<Item = (usize, f64)> {
         let range = pixel * self.neighbours..(pixel + 1) * self.neighbours;
         let parts = self.index[range.clone()].iter().zip(&self.weight[range]);
-        parts.filter(|(_, weight)| **weight > 0.0).map(|(k, weight)| (&self.models[*k as usize], f64::from(*weight)))
+        parts.filter(|(_, weight)| **weight > 0.0).map(|(k, weight)| (*k as usize, f64::from(*weight)))
+    }
+
+    /// The representatives of a pixel with their weights.
+    fn parts(&self, pixel: usize) -> impl Iterator<Item = (&PointModel, f64)> {
+        self.indices(pixel).map(|(k, weight)| (&self.models[k], weight))
     }
 
     /// The model of a pixel: α and D are interpolated between its representatives (Eq. 20). Its scale is left out.
@@ -74,8 +86,8 @@ impl Svbtdf {
         self.parts(pixel).map(|(model, weight)| weight * model.alpha).sum::<f64>().clamp(0.0, 1.0)
     }
 
-    /// BTDF [1/sr] of a pixel for directions on opposite sides of the sheet: that of its [`Self::model`], scaled and with
-    /// the diffuse part.
+    /// BTDF [1/sr] of a pixel for directions on opposite sides of the sheet: that of its [`Self::model`] and of the light that
+    /// is reflected inside, scaled and with the diffuse part.
     pub fn btdf(&self, pixel: usize, i: DVec3, o: DVec3) -> DVec3 {
         let Some((i, o)) = from_above(i, o) else { return DVec3::ZERO };
         let lobe = self.optics.terms(i, o).map_or(0.0, |terms| {
@@ -93,7 +105,11 @@ impl Svbtdf {
             let top = part(terms.ln_top, terms.slope_top);
             blend(top, part(terms.ln_bottom, terms.slope_bottom), self.alpha(pixel))
         });
-        self.scale[pixel].as_dvec3() * lobe + self.diffuse[pixel].as_dvec3()
+        let bounced = self.bounced.as_ref().map_or(0.0, |bounced| {
+            let roughness = bounced.roughness(self.indices(pixel));
+            bounced.light.btdf(roughness, self.alpha(pixel), i, o)
+        });
+        self.scale[pixel].as_dvec3() * (lobe + bounced) + self.diffuse[pixel].as_dvec3()
     }
 
     /// The mean over the pixels. The weights of a pixel also interpolate the lobes of its representatives (Eq. 21), so that
@@ -107,14 +123,23 @@ impl Svbtdf {
                 parts[*index as usize] += f64::from(*weight) / pixels * scale.as_dvec3();
             }
         }
+        let bounced = self.bounced.as_ref().map(|bounced| {
+            let slab =
+                |(k, part): (usize, &DVec3)| (bounced.roughness([(k, 1.0)].into_iter()), self.models[k].alpha, *part);
+            let slabs: Vec<(f64, f64, DVec3)> = parts.iter().enumerate().map(slab).collect();
+            [0, 1, 2].map(|channel| {
+                bounced.light.mean(slabs.iter().map(|(roughness, alpha, part)| (*roughness, *alpha, part[channel])))
+            })
+        });
         let models = self.models.iter().cloned().zip(parts).filter(|(_, part)| *part != DVec3::ZERO).collect();
         let diffuse = self.diffuse.iter().map(|value| value.as_dvec3()).sum::<DVec3>() / pixels;
-        MeanBtdf { optics: self.optics.clone(), models, diffuse }
+        MeanBtdf { optics: self.optics.clone(), models, diffuse, bounced }
     }
 
     /// Writes the arrays `ndf[model, y, x]` (the exponential of the coefficients of a biquadratic B-spline), `alpha[model]`,
     /// `index[row, column, neighbour]` (u32), `weight[row, column, neighbour]`, `scale[row, column, rgb]`,
-    /// `diffuse[row, column, rgb]` and the scalars `span`, `eta` and `shadowing`; f32 but for the indices.
+    /// `diffuse[row, column, rgb]` and the scalars `span`, `eta` and `shadowing`; f32 but for the indices. `bounced[roughness,
+    /// alpha, ring, ring, azimuth]` holds the light that is reflected inside, if any.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -142,6 +167,10 @@ impl Svbtdf {
         for (name, value) in [("span", self.grid.span), ("eta", self.optics.eta), ("shadowing", self.optics.shadowing)]
         {
             floats(zip, name, &[], &[value as f32])?;
+        }
+        if let Some(bounced) = &self.bounced {
+            let values: Vec<f32> = bounced.light.tables().iter().flat_map(RingTable::values).copied().collect();
+            floats(zip, "bounced", &BOUNCED_SHAPE, &values)?;
         }
         Ok(())
     }
@@ -190,7 +219,14 @@ impl Svbtdf {
             alpha: f64::from(*alpha),
             ln_density: values.iter().map(|value| f64::from(*value).ln().max(LEAST_LN)).collect(),
         };
-        let models = ndf.chunks_exact(side * side).zip(&alpha).map(model).collect();
+        let models: Vec<PointModel> = ndf.chunks_exact(side * side).zip(&alpha).map(model).collect();
+        let bounced = if arrays.contains_key("bounced") {
+            let values = of_shape(arrays, "bounced", &BOUNCED_SHAPE, 0.0, 1e18)?;
+            let tables = values.chunks_exact(RingTable::LEN).map(|table| RingTable::new(table.to_vec())).collect();
+            Some(SheetBounces::new(Arc::new(Bounced::of_tables(tables)), &models))
+        } else {
+            None
+        };
         Ok(Self {
             size: [width, height],
             optics: LobeOptics::new(eta, shadowing),
@@ -201,6 +237,7 @@ impl Svbtdf {
             weight,
             scale: bytemuck::cast_slice(&scale).to_vec(),
             diffuse: bytemuck::cast_slice(&diffuse).to_vec(),
+            bounced,
         })
     }
 }
@@ -215,8 +252,12 @@ impl MeanBtdf {
     /// BTDF [1/sr] for directions on opposite sides of the sheet.
     pub fn btdf(&self, i: DVec3, o: DVec3) -> DVec3 {
         let Some((i, o)) = from_above(i, o) else { return DVec3::ZERO };
-        let Some(terms) = self.optics.terms(i, o) else { return self.diffuse };
-        self.models.iter().map(|(model, part)| *part * model.btdf(&terms)).sum::<DVec3>() + self.diffuse
+        let inside = self.bounced.as_ref().map_or(DVec3::ZERO, |channels| {
+            DVec3::from_array([0, 1, 2].map(|channel: usize| channels[channel].read(i, o)))
+        });
+        let even = self.diffuse + inside;
+        let Some(terms) = self.optics.terms(i, o) else { return even };
+        self.models.iter().map(|(model, part)| *part * model.btdf(&terms)).sum::<DVec3>() + even
     }
 
     /// The sheet turned over: the top is the bottom, and all slopes are turned by 180°.
@@ -225,7 +266,8 @@ impl MeanBtdf {
             let ln_density = model.ln_density.iter().rev().copied().collect();
             (PointModel { alpha: 1.0 - model.alpha, ln_density, ..model.clone() }, *part)
         };
-        Self { models: self.models.iter().map(turn).collect(), ..self.clone() }
+        let bounced = self.bounced.as_ref().map(|channels| [0, 1, 2].map(|k: usize| channels[k].transposed()));
+        Self { models: self.models.iter().map(turn).collect(), bounced, ..self.clone() }
     }
 
     /// Number of representatives.
@@ -249,6 +291,9 @@ impl MeanBtdf {
         if total > 0.0 { (squares / total).sqrt() } else { 0.0 }
     }
 }
+
+/// Shape of the light that is reflected inside.
+const BOUNCED_SHAPE: [usize; 5] = [ROUGHNESSES, ALPHAS, RINGS, RINGS, TURNS];
 
 const EXPECTED: &str = "an .npz that `biscale capture` wrote";
 

@@ -1,7 +1,11 @@
 //! The file of a captured sheet, its pixels and its mean.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3, Vec3};
 
+use super::super::ring_table::RingTable;
+use super::bounced::{ALPHAS, Bounced, ROUGHNESSES, SheetBounces};
 use super::lobe::{LobeOptics, PointModel, SlopeGrid};
 use super::svbtdf::Svbtdf;
 
@@ -25,6 +29,7 @@ fn sheet() -> Svbtdf {
         weight: (0..6).flat_map(|k| [0.125 * k as f32, 1.0 - 0.125 * k as f32]).collect(),
         scale: (0..6).map(|k| Vec3::new(0.5, 0.6, 0.1 * k as f32)).collect(),
         diffuse: vec![Vec3::splat(0.02); 6],
+        bounced: None,
     }
 }
 
@@ -64,6 +69,43 @@ fn a_pixel_has_the_lobe_of_its_model_and_a_pair_turned_round_has_the_same() {
     }
     assert_eq!(sheet.btdf(0, i, -o), DVec3::ZERO);
     assert_eq!(sheet.pixel_at(DVec2::new(1.4, -0.1)), 4);
+}
+
+/// The sheet with light that is reflected inside.
+fn with_light() -> Svbtdf {
+    let table =
+        |k: usize| RingTable::new((0..RingTable::LEN).map(|j| 0.1 + 0.01 * ((j + 7 * k) % 13) as f32).collect());
+    let light = Arc::new(Bounced::of_tables((0..ROUGHNESSES * ALPHAS).map(table).collect()));
+    let sheet = sheet();
+    Svbtdf { bounced: Some(SheetBounces::new(light, &sheet.models)), ..sheet }
+}
+
+#[test]
+fn light_reflected_inside_is_added_to_pixels_and_their_mean_and_comes_back_from_a_file() {
+    let (plain, sheet) = (sheet(), with_light());
+    let (i, o) = pair();
+    let bounced = sheet.bounced.as_ref().unwrap();
+    let mut expected = DVec3::ZERO;
+    for pixel in 0..6 {
+        let weights = [0, 1].map(|k| f64::from(sheet.weight[2 * pixel + k]));
+        let roughness = [0, 1].map(|k: usize| sheet.models[k].roughness());
+        let both = (weights[0] * roughness[0].powi(2) + weights[1] * roughness[1].powi(2)).sqrt();
+        let light = bounced.light.btdf(both, sheet.model(pixel).alpha, i, o);
+        let added = sheet.btdf(pixel, i, o) - plain.btdf(pixel, i, o);
+        assert!((added - light * sheet.scale[pixel].as_dvec3()).length() < 1e-6, "{pixel}: {added}");
+        let of_models = [0, 1].map(|k: usize| bounced.light.btdf(roughness[k], sheet.models[k].alpha, i, o));
+        expected += sheet.scale[pixel].as_dvec3() * (weights[0] * of_models[0] + weights[1] * of_models[1]) / 6.0;
+    }
+    let added = sheet.mean().btdf(i, o) - plain.mean().btdf(i, o);
+    assert!((added - expected).length() < 1e-5, "{added} {expected}");
+    let over = DVec3::new(1.0, 1.0, -1.0);
+    let turned = sheet.mean().turned().btdf(o * over, i * over);
+    assert!((turned - sheet.mean().btdf(i, o)).length() < 1e-6 * turned.length());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    sheet.write(&path).unwrap();
+    let read = Svbtdf::read(&path).unwrap();
+    assert_eq!(read.bounced.unwrap().light.tables(), bounced.light.tables());
 }
 
 #[test]

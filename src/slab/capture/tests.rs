@@ -56,7 +56,8 @@ fn with_alpha_known_the_distribution_comes_back_and_read_as_printed_in_eq_11_it_
     let known = beckmann(0.2, 0.3, 0.5);
     let view = known.photographed(45.0, 0.0);
     let grid = SlopeGrid { side: 32, span: 1.0 };
-    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 0.03, alpha: Some(0.5) };
+    let settings =
+        FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 0.03, alpha: Some(0.5), bounced: None };
     let fit = PointFit::new(std::slice::from_ref(&view), &settings.optics, grid).unwrap();
     let x = fit.solve(0.5, 0.03, Symmetry::Exact, |_| true).unwrap();
     let (model, scale) = fit.model(0.5, x);
@@ -80,7 +81,7 @@ fn the_roughness_of_masking_is_undetermined_beside_the_distribution() {
     let known = beckmann(0.2, 0.2, 0.5);
     let view = known.photographed(45.0, 0.01);
     let grid = SlopeGrid { side: 32, span: 0.7 };
-    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 0.1, alpha: None };
+    let settings = FitSettings { optics: LobeOptics::new(1.5, 0.2), grid, smooth: 0.1, alpha: None, bounced: None };
     let fitted = super::alpha::fit_point(std::slice::from_ref(&view), &settings).unwrap();
     let found = shadowing(std::slice::from_ref(&view), &settings, &fitted);
     // The model of the true roughness reproduces it, but others fit as well.

@@ -89,17 +89,67 @@ impl Bundle {
     }
 }
 
+/// Steps from the middle of the disc to its rim, of slabs that are the same at every azimuth.
+const RADII: usize = 65;
+/// Paths per step.
+const ROUND_PATHS: usize = 512;
+
+/// Symmetries of the lobes of a slab.
+enum Symmetry {
+    None,
+    /// Turned by 180°, the slab is the same.
+    Opposite,
+    /// Turned by any angle, the slab is the same.
+    Round,
+}
+
+impl Symmetry {
+    fn of(slab: &Slab) -> Self {
+        let faces = [&slab.top, &slab.bottom];
+        if faces.iter().all(|face| face.is_round()) {
+            return Self::Round;
+        }
+        let is_opposite = faces.iter().all(|face| face.is_smooth() || face.only_ellipse().is_some());
+        if is_opposite { Self::Opposite } else { Self::None }
+    }
+}
+
 impl LobeTable {
     pub fn new(faces: &Faces, slab: &Slab) -> Self {
-        let node = |k: usize| {
+        let at = |k: usize| {
             let at = Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) * (2.0 / (SIDE - 1) as f32) - 1.0;
-            let at = at.clamp_length_max(RIM);
+            at.clamp_length_max(RIM)
+        };
+        let lobes_at = |at: Vec2, paths: usize| {
             let square = at.length_squared();
             let o = (2.0 * at / (1.0 + square)).extend((1.0 - square) / (1.0 + square));
             let straight = slab.straight(o.as_dvec3()).map(|part| part.as_vec3());
-            lobes(faces, o, straight)
+            lobes(faces, o, straight, paths)
         };
-        Self { nodes: (0..SIDE * SIDE).into_par_iter().map(node).collect() }
+        let first = |count: usize| (0..count).into_par_iter().map(|k| lobes_at(at(k), PATHS)).collect::<Vec<_>>();
+        let all = SIDE * SIDE;
+        let nodes = match Symmetry::of(slab) {
+            Symmetry::None => first(all),
+            Symmetry::Opposite => {
+                let half = first(all / 2 + 1);
+                (0..all).map(|k| if k <= all / 2 { half[k] } else { turned(&half[all - 1 - k], Vec2::NEG_X) }).collect()
+            }
+            Symmetry::Round => {
+                let radius = |k: usize| k as f32 * RIM / (RADII - 1) as f32;
+                let radial: Vec<_> =
+                    (0..RADII).into_par_iter().map(|k| lobes_at(Vec2::new(radius(k), 0.0), ROUND_PATHS)).collect();
+                let node = |k: usize| {
+                    let step = at(k).length() / RIM * (RADII - 1) as f32;
+                    let low = (step as usize).min(RADII - 2);
+                    let mut sum = ViewLobes::default();
+                    add_all(&mut sum, &radial[low], 1.0 - (step - low as f32));
+                    add_all(&mut sum, &radial[low + 1], step - low as f32);
+                    turned(&sum, at(k).try_normalize().unwrap_or(Vec2::X))
+                };
+                (0..all).map(node).collect()
+            }
+        };
+        Self { nodes }
     }
 
     /// The lobes of a viewer, interpolated.
@@ -113,17 +163,35 @@ impl LobeTable {
             [(k, (1.0 - s) * (1.0 - t)), (k + 1, s * (1.0 - t)), (k + SIDE, (1.0 - s) * t), (k + SIDE + 1, s * t)];
         let mut sum = ViewLobes::default();
         for (k, weight) in taps {
-            let node = &self.nodes[k];
-            add(&mut sum.transmitted, &node.transmitted, weight);
-            add(&mut sum.reflected, &node.reflected, weight);
-            for side in 0..2 {
-                sum.even[side] += weight * node.even[side];
-                sum.straight[side] += weight * node.straight[side];
-            }
+            add_all(&mut sum, &self.nodes[k], weight);
         }
         sum.transmitted.mean -= o.truncate();
         sum.reflected.mean -= o.truncate();
         sum
+    }
+}
+
+/// The lobes turned about the normal, by the direction that the x axis becomes.
+fn turned(lobes: &ViewLobes, axis: Vec2) -> ViewLobes {
+    let turn = |lobe: &ViewLobe| {
+        let [xx, xy, yy] = lobe.covariance;
+        let (c, s) = (axis.x, axis.y);
+        let covariance = [
+            c * c * xx - 2.0 * c * s * xy + s * s * yy,
+            c * s * (xx - yy) + (c * c - s * s) * xy,
+            s * s * xx + 2.0 * c * s * xy + c * c * yy,
+        ];
+        ViewLobe { mean: axis.rotate(lobe.mean), covariance, ..*lobe }
+    };
+    ViewLobes { transmitted: turn(&lobes.transmitted), reflected: turn(&lobes.reflected), ..*lobes }
+}
+
+fn add_all(sum: &mut ViewLobes, lobes: &ViewLobes, weight: f32) {
+    add(&mut sum.transmitted, &lobes.transmitted, weight);
+    add(&mut sum.reflected, &lobes.reflected, weight);
+    for side in 0..2 {
+        sum.even[side] += weight * lobes.even[side];
+        sum.straight[side] += weight * lobes.straight[side];
     }
 }
 
@@ -135,9 +203,9 @@ fn add(sum: &mut ViewLobe, lobe: &ViewLobe, weight: f32) {
 }
 
 /// The lobes of one viewer, from paths. Light from behind that was reflected inside counts as even.
-fn lobes(faces: &Faces, o: Vec3, straight: [Vec3; 2]) -> ViewLobes {
+fn lobes(faces: &Faces, o: Vec3, straight: [Vec3; 2], paths: usize) -> ViewLobes {
     let (mut transmitted, mut reflected, mut bounced) = (Bundle::default(), Bundle::default(), Vec3::ZERO);
-    let viewer = Viewer { o, paths: PATHS, seed: 0 };
+    let viewer = Viewer { o, paths, seed: 0 };
     let from = -o.truncate();
     let mut even = faces.follow(&viewer, |end| match end.kind {
         PathKind::Transmitted => transmitted.add(end.direction, from, end.weight),
@@ -146,4 +214,40 @@ fn lobes(faces: &Faces, o: Vec3, straight: [Vec3; 2]) -> ViewLobes {
     });
     even[0] += bounced;
     ViewLobes { transmitted: transmitted.lobe(), reflected: reflected.lobe(), even, straight }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::DVec2;
+
+    use super::*;
+    use crate::slab::{Ndf, Optics, Profile, SlabView};
+
+    #[test]
+    fn symmetric_slabs_have_the_lobes_of_each_viewer() {
+        let face = |x: f64, y: f64, angle: f64| Arc::new(Ndf::analytic(Profile::Beckmann, DVec2::new(x, y), angle));
+        let cases = [(face(0.2, 0.2, 0.0), face(0.1, 0.1, 0.0)), (face(0.1, 0.3, 0.5), Arc::new(Ndf::smooth()))];
+        for (top, bottom) in cases {
+            let slab = Arc::new(Slab::new(top, bottom, Optics::default(), 64));
+            let view = SlabView::new(slab.clone());
+            let super::super::Source::Faces { faces, lobes: table } = &view.source else { panic!("no faces") };
+            // Nodes on all sides of the middle.
+            for node in [8 * SIDE + 12, 12 * SIDE + 24, 22 * SIDE + 10, 25 * SIDE + 19] {
+                let at = Vec2::new((node % SIDE) as f32, (node / SIDE) as f32) * (2.0 / (SIDE - 1) as f32) - 1.0;
+                let at = at.clamp_length_max(RIM);
+                let square = at.length_squared();
+                let o = (2.0 * at / (1.0 + square)).extend((1.0 - square) / (1.0 + square));
+                let (found, expected) = (table.nodes[node], lobes(faces, o, [Vec3::ZERO; 2], ROUND_PATHS));
+                let (a, b) = (found.transmitted, expected.transmitted);
+                let width = (b.covariance[0] + b.covariance[2]).sqrt();
+                assert!((a.part - b.part).length() < 0.03, "{o}: {} {}", a.part, b.part);
+                assert!((a.mean - b.mean).length() < 0.15 * width, "{o}: {} {} of {width}", a.mean, b.mean);
+                for k in 0..3 {
+                    assert!((a.covariance[k] - b.covariance[k]).abs() < 0.25 * width * width, "{o}: {a:?} {b:?}");
+                }
+            }
+        }
+    }
 }

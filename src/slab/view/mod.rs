@@ -1,5 +1,6 @@
 //! A slab as a viewer sees through it: paths from the viewer through facets of both faces, and the lobes that they make.
 
+mod btdf;
 mod face_samples;
 mod lobe_table;
 mod sheet;
@@ -9,6 +10,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
+pub use self::btdf::BtdfView;
 use self::face_samples::FaceSamples;
 use self::lobe_table::LobeTable;
 use self::sheet::{SheetPoint, SheetView};

@@ -21,7 +21,7 @@ const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549
 /// Density of slopes below which a node counts as empty.
 const LEAST: f32 = 1e-30;
 
-/// A sheet prepared for images. It has no reflection, and light that is reflected inside is part of its lobes.
+/// A sheet prepared for images. It has no reflection. Light that is reflected inside counts as even.
 #[derive(Debug, Clone)]
 pub(super) struct SheetView {
     sheet: Arc<Svbtdf>,
@@ -140,20 +140,33 @@ impl SheetPoint<'_> {
         self.diffuse += share * sheet.diffuse[pixel];
     }
 
-    /// The parts of even light: the diffuse part, from behind.
-    fn even(&self) -> [Vec3; 2] {
-        [PI * self.diffuse, Vec3::ZERO]
+    /// Roughness of the virtual face along both axes together, from moments of its slopes.
+    fn roughness([x, y, xx, _, yy]: [f32; 5]) -> f64 {
+        f64::from(xx + yy - x * x - y * y).max(0.0).sqrt()
+    }
+
+    /// The parts of even light towards a viewer: the diffuse part and the light that is reflected inside, from behind.
+    fn even(&self, o: Vec3) -> [Vec3; 2] {
+        let bounced = self.view.sheet.bounced.as_ref().map_or(0.0, |bounced| {
+            bounced.light.total(Self::roughness(self.moments()), self.alpha.into(), o.as_dvec3()) as f32
+        });
+        [PI * self.diffuse + self.scale * bounced, Vec3::ZERO]
+    }
+
+    /// Mean and raw second moments of the slopes.
+    fn moments(&self) -> [f32; 5] {
+        let mut sums = [0.0; 5];
+        for (model, weight) in &self.parts {
+            sums.iter_mut().zip(self.view.moments[*model]).for_each(|(sum, value)| *sum += weight * value);
+        }
+        sums
     }
 
     /// The lobe to first order in the slopes: a facet of slope `m` deflects the tangential direction by
     /// `(√(η² - sin²θ) - cos θ) m`.
     pub fn lobes(&self, o: Vec3) -> ViewLobes {
         let optics = &self.view.sheet.optics;
-        let mut sums = [0.0; 5];
-        for (model, weight) in &self.parts {
-            sums.iter_mut().zip(self.view.moments[*model]).for_each(|(sum, value)| *sum += weight * value);
-        }
-        let [x, y, xx, xy, yy] = sums;
+        let [x, y, xx, xy, yy] = self.moments();
         let eta = optics.eta as f32;
         let turn = (eta * eta - 1.0 + o.z * o.z).max(0.0).sqrt() - o.z;
         let wide = turn * turn;
@@ -168,7 +181,7 @@ impl SheetPoint<'_> {
             covariance: [wide * (xx - x * x).max(0.0), wide * (xy - x * y), wide * (yy - y * y).max(0.0)],
             tail: 0.0,
         };
-        ViewLobes { transmitted, even: self.even(), ..ViewLobes::default() }
+        ViewLobes { transmitted, even: self.even(o), ..ViewLobes::default() }
     }
 
     /// Reports the ends of the paths of a viewer above. Slopes are drawn from the interpolated density, and refracted at the
@@ -191,7 +204,7 @@ impl SheetPoint<'_> {
                 end(PathEnd { kind: PathKind::Transmitted, direction: direction.as_vec3(), weight });
             }
         }
-        self.even()
+        self.even(viewer.o)
     }
 
     /// The direction of light from the viewer that meets a facet of the virtual slope at the top, or at the bottom.
@@ -304,54 +317,5 @@ fn pick(cumulative: &[f32], u: f32) -> (usize, f32) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::slab::capture::simulated::varying_sheet;
-
-    /// The light that arrives from directions below, by the BTDF at pixel centres: radiance `1 + d.x + d.y²`.
-    fn integrated(sheet: &Svbtdf, pixel: usize, o: DVec3) -> f64 {
-        let side = 400;
-        let mut sum = 0.0;
-        for k in 0..side * side {
-            let p = (DVec2::new((k % side) as f64, (k / side) as f64) + 0.5) * (2.0 / side as f64) - 1.0;
-            if p.length_squared() < 1.0 {
-                let d = p.extend(-(1.0 - p.length_squared()).sqrt());
-                sum += (sheet.btdf(pixel, o, d).x - f64::from(sheet.diffuse[pixel].x)) * (1.0 + d.x + d.y * d.y);
-            }
-        }
-        sum * (2.0 / side as f64).powi(2)
-    }
-
-    #[test]
-    fn paths_and_lobes_of_a_captured_sheet_gather_the_light_of_its_btdf() {
-        let sheet = Arc::new(varying_sheet([6, 4]));
-        let view = SheetView::new(sheet.clone());
-        for (pixel, degrees) in [(0, 0.0), (9, 30.0), (17, 60.0_f32)] {
-            let place = (Vec2::new((pixel % 6) as f32, (pixel / 6) as f32) + 0.5) / Vec2::new(6.0, 4.0);
-            let point = view.at(place);
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            let viewer = Viewer { o: Vec3::new(0.6 * sin, 0.8 * sin, cos), paths: 4096, seed: 7 };
-            let expected = integrated(&sheet, pixel, viewer.o.as_dvec3());
-            let mut sum = 0.0;
-            let even = point.follow(&viewer, |end| {
-                sum += f64::from(end.weight.x * (1.0 + end.direction.x + end.direction.y.powi(2)));
-            });
-            assert!((sum / expected - 1.0).abs() < 0.01, "{pixel}: {sum} {expected}");
-            assert!((even[0].x - PI * sheet.diffuse[pixel].x).abs() < 1e-6 && even[1] == Vec3::ZERO);
-            let ViewLobe { part, mean, covariance, .. } = point.lobes(viewer.o).transmitted;
-            let draft = f64::from(part.x * (1.0 + mean.x + mean.y.powi(2) + covariance[2]));
-            assert!((draft / expected - 1.0).abs() < 0.1, "{pixel}: draft {draft}, {expected}");
-        }
-    }
-
-    #[test]
-    fn places_between_pixels_are_interpolated_and_the_sheet_repeats() {
-        let sheet = Arc::new(varying_sheet([8, 8]));
-        let view = SheetView::new(sheet.clone());
-        let alpha = |x: f32| view.at(Vec2::new(x, 0.3)).alpha;
-        assert!((alpha(0.25) - 0.5 * (alpha(0.1875) + alpha(0.3125))).abs() < 1e-6);
-        assert!((alpha(1.1) - alpha(0.1)).abs() < 1e-6 && (alpha(-0.9) - alpha(0.1)).abs() < 1e-6);
-        let weights: f32 = view.at(Vec2::splat(0.77)).parts.iter().map(|part| part.1).sum();
-        assert!((weights - 1.0).abs() < 1e-5, "{weights}");
-    }
-}
+#[path = "sheet_tests.rs"]
+mod tests;

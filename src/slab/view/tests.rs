@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::effective::PathKind;
-use crate::slab::{Channel, Inner, Ndf, Optics, Profile, Walk};
+use crate::slab::{Channel, ChannelSlab, Inner, Ndf, Optics, Profile};
 
 fn slab(top: Ndf, bottom: Ndf, eta: f64, bounces: bool) -> Arc<Slab> {
     let optics = Optics { eta: DVec3::splat(eta), ..Optics::default() };
@@ -50,7 +50,7 @@ fn paths_have_the_parts_and_the_mean_direction_of_photons() {
         for degrees in [0.0, 50.0, 75.0_f32] {
             let viewer = viewer(degrees, 40_000);
             let (found, mean, even) = parts(&view, &viewer);
-            let walk = Walk { top: &slab.top, bottom: &slab.bottom, channel: Channel { eta: 1.5, depth: 0.0 } };
+            let walk = ChannelSlab { top: &slab.top, bottom: &slab.bottom, channel: Channel { eta: 1.5, depth: 0.0 } };
             let mut rng = ChaCha8Rng::seed_from_u64(3);
             let photons = 100_000;
             let (mut expected, mut expected_mean, mut masked) = ([0.0; 3], DVec3::ZERO, 0.0);

@@ -1,4 +1,4 @@
-//! Paths from a viewer above the slab. They are those of [`Walk`](crate::slab::Walk) in single precision, with slopes
+//! Paths from a viewer above the slab. They are those of [`ChannelSlab`](crate::slab::ChannelSlab) in single precision, with slopes
 //! drawn in advance.
 
 use glam::{Vec2, Vec3};

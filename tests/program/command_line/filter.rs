@@ -116,3 +116,22 @@ fn tables_and_comparisons_are_written_and_state_their_errors() {
     assert!(rms(2) < 0.5 * rms(0) && rms(1) == 0.0, "{report}");
     assert_eq!(folder.files(), ["s.png", "scene.toml", "t.exr", "t.npz"]);
 }
+
+#[test]
+fn a_texture_with_a_texel_that_is_no_number_is_refused_with_the_file_and_the_texel() {
+    let folder = CommandLine::new();
+    let value = |x: usize, y: usize| if (x, y) == (2, 1) { f32::NAN } else { 0.5 };
+    exr::prelude::write_rgb_file(folder.path("holes.exr"), 4, 3, |x, y| (value(x, y), 0.5, 0.5)).unwrap();
+    folder.write("q.csv", "u,v,width_u,width_v,angle\n0,0,0.1,0.1,0\n");
+    folder.write(
+        "scene.toml",
+        "[tile]\ngeometry = { kind = \"flat\" }\n[color_map]\n[[color_map.layer]]\n\
+         driver = { kind = \"texture\", path = \"holes.exr\" }\nstops = [[0, 0], [1, 1]]\n",
+    );
+    for arguments in
+        [vec!["filter", "scene.toml", "--queries", "q.csv", "-o", "out"], vec!["render", "scene.toml", "-o", "out.png"]]
+    {
+        folder.assert_refused(&arguments, &["holes.exr", "NaN", "pixel"]);
+    }
+    assert_eq!(folder.files(), ["holes.exr", "q.csv", "scene.toml"]);
+}

@@ -178,10 +178,6 @@ fn bad_slabs_are_refused_with_key_found_and_expected() {
     folder.assert_refused(&["fit", "slab.toml", "-o", "out.png"], &["output", "render"]);
     folder.assert_refused(&["export", "slab.toml", "-o", "out.csv"], &["out.csv", ".npz"]);
     folder.assert_refused(&["export", "slab.toml", "-o", "out_mitsuba.xml"], &["slab.top.kind", "tile", "ggx"]);
-    folder.assert_refused(
-        &["export", "slab.toml", "-o", "out.xml", "--radiance", "tensor-tree"],
-        &["--radiance", "klems"],
-    );
     folder.assert_refused(&["transmit", "default", "--json"], &["default", "slab", "nothing"]);
     folder.assert_refused(&["transmit", "slab.toml"], &["--output"]);
     folder.assert_refused(&["transmit", "slab.toml", "-o", "out.gif"], &["out.gif", ".csv or .png"]);

@@ -178,6 +178,7 @@ pub fn svbtdfs() -> Vec<Vec<u8>> {
         weight: [0.25, 0.75].repeat(4),
         scale: vec![glam::Vec3::ONE; 4],
         diffuse: vec![glam::Vec3::splat(0.1); 4],
+        bounced: None,
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.npz");

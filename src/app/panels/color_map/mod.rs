@@ -9,10 +9,11 @@ mod stop_row;
 mod stops_bar;
 
 use crate::scene::{ColorLayer, ColorMap, Combine, GaussianSurface, Geometry, Scene};
-use eframe::egui::{self, RichText, Ui};
+use eframe::egui::{self, RichText, Slider, SliderClamping, Ui};
 
 use super::fields::PanelContext;
 use super::large_scale::edit;
+use crate::app::views::zoom::TileScale;
 
 #[cfg(test)]
 pub use driver::initial;
@@ -36,6 +37,9 @@ pub fn ui(
     if ui.checkbox(&mut has_map, "Colours by height, slope or noise").on_hover_text(tip).changed() {
         scene.color_map =
             has_map.then(|| ColorMap { layer: vec![layer::new("layer 1", has_relief(scene))], ..ColorMap::default() });
+    }
+    if scene.color_map.is_some() {
+        zoom_ui(ui, scene, state.scale);
     }
     let relief = has_relief(scene);
     let map = scene.color_map.as_mut()?;
@@ -72,6 +76,24 @@ pub fn ui(
     }
     whole_map_ui(ui, map, context);
     browse
+}
+
+/// Draws the slider of the zoom, from a distance at which the colours are averaged to single creases.
+fn zoom_ui(ui: &mut Ui, scene: &mut Scene, scale: Option<TileScale>) {
+    let Some(scale) = scale else { return };
+    let mut camera = scene.camera.clone().unwrap_or_default();
+    let mut pixels = scale.pixels(&camera);
+    let (least, most) = scale.range();
+    let tip = "Zooms the view: size of a tile in pixels where the object is nearest. Every distance shows the mean of the \
+               colours that a pixel holds.";
+    let changed = super::fields::row(ui, "Pixels per tile", tip, |ui| {
+        let slider = Slider::new(&mut pixels, least..=most).logarithmic(true).max_decimals(1);
+        ui.add(slider.clamping(SliderClamping::Never)).changed()
+    });
+    if changed {
+        scale.set(&mut camera, pixels);
+        scene.camera = Some(camera);
+    }
 }
 
 fn is_free(map: &ColorMap, name: &str) -> bool {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::app::views::zoom::TileScale;
 use crate::app::worker::{ColorMapJob, ColorMapResult, DriverValues};
 use crate::scene::{ColorLayer, Driver, GaussianSurface, HeightDistribution, LoadedScene, MaterialSpec, Painted, Tile};
 use glam::Vec3;
@@ -18,6 +19,8 @@ pub struct ColorMapState {
     /// True while the panel is unfolded. Values are measured only then.
     pub open: bool,
     pub error: Option<String>,
+    /// Size of the tiles in the object view; absent until it shows an image.
+    pub scale: Option<TileScale>,
     values: Vec<DriverValues>,
     /// Document version and picked directions that were examined last.
     examined: Option<(u64, Picked)>,

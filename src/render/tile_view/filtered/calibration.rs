@@ -1,13 +1,15 @@
 //! Corrections that bring the mean of the pixels over a tile to `f̄` at every width, measured on the tile itself.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::{Arc, PoisonError};
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::object::PixelOnTile;
+use super::object::{PixelOnTile, above};
 use super::radiance::PixelMaterials;
 use super::surface::FilteredTile;
+use crate::base::{Cancel, Result};
 use crate::color_map::slopes::direction;
 use crate::effective::Reflectance;
 
@@ -18,42 +20,71 @@ const APART: [f64; 5] = [0.0, 30.0, 75.0, 125.0, 180.0];
 const AZIMUTHS: usize = 8;
 /// Pixels along a side of the tile: per width of a pixel, and their bounds.
 const PER_WIDTH: f64 = 1.5;
-const SIDES: (f64, f64) = (12.0, 32.0);
+const SIDES: (f64, f64) = (12.0, 24.0);
 /// Bound of a correction.
-const MOST: f32 = 2.0;
+const MOST: f64 = 2.0;
+/// Polar angles of light and viewer at which an `f̄` is recognized [rad].
+const PROBES: [[f64; 2]; 4] = [[0.2, 0.4], [0.9, 0.5], [1.2, 1.3], [0.6, 1.0]];
 
 /// Corrections of pixels by width and directions. Widths that were not measured have none.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Calibration {
+    /// `f̄` at a few pairs of directions, to which the corrections belong.
+    of: Vec<Vec3>,
     /// Corrections of each level: light fastest, then view.
-    levels: Vec<Option<Vec<Vec3>>>,
+    levels: Vec<Option<Arc<Vec<Vec3>>>>,
+}
+
+/// Where the corrections of an image come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Corrections {
+    /// Those that are missing are measured, which takes longer than a draft may.
+    Measured,
+    /// Widths whose corrections are not known have none.
+    Known,
+}
+
+impl FilteredTile {
+    /// The corrections that are known so far.
+    pub(super) fn known_calibration(&self) -> Calibration {
+        self.calibration.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The corrections of pixels between two widths [tile units]. Those that are not known yet are measured and kept.
+    ///
+    /// # Errors
+    /// [`crate::base::Error::Cancelled`].
+    pub fn calibrated(
+        &self,
+        materials: &PixelMaterials<'_>,
+        reflectance: &dyn Reflectance,
+        widths: (f64, f64),
+        cancel: &Cancel,
+    ) -> Result<Calibration> {
+        let of = PROBES.map(|[i, o]| {
+            let mut value = [Vec3::ZERO];
+            reflectance.eval_lights(&[direction(i, 0.3).as_vec3()], direction(o, 1.7).as_vec3(), &mut value);
+            value[0]
+        });
+        let mut kept = self.calibration.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.of != of {
+            *kept = Calibration { of: of.to_vec(), levels: vec![None; self.levels()] };
+        }
+        let (first, last) = (self.level(widths.0).finer, (self.level(widths.1).finer + 1).min(self.levels() - 1));
+        let missing: Vec<usize> =
+            (first..=last).filter(|level| kept.levels[*level].is_none() && self.width(*level) < self.far()).collect();
+        let corrections = measured(self, materials, reflectance, &missing, cancel)?;
+        for (level, corrections) in missing.into_iter().zip(corrections) {
+            kept.levels[level] = Some(Arc::new(corrections));
+        }
+        Ok(kept.clone())
+    }
 }
 
 impl Calibration {
     /// No correction at any width.
     pub fn none() -> Self {
-        Self { levels: Vec::new() }
-    }
-
-    /// Measures the corrections of pixels between two widths [tile units], apart from those that are known.
-    pub fn measure(
-        &mut self,
-        tile: &FilteredTile,
-        materials: &PixelMaterials<'_>,
-        reflectance: &dyn Reflectance,
-        widths: (f64, f64),
-    ) {
-        let levels = tile.levels();
-        self.levels.resize(levels, None);
-        let (first, last) = (tile.level(widths.0).finer, tile.level(widths.1).finer + 1);
-        for level in first..=last.min(levels - 1) {
-            if self.levels[level].is_none() && tile.width(level) < tile.far() {
-                let corrections = POLAR
-                    .iter()
-                    .flat_map(|view| of_view(tile, materials, reflectance, tile.width(level), view.to_radians()));
-                self.levels[level] = Some(corrections.collect());
-            }
-        }
+        Self::default()
     }
 
     /// The correction of a pixel of this width.
@@ -74,44 +105,119 @@ fn lights(azimuth: f64, side: f64) -> Vec<Vec3> {
     APART.iter().flat_map(|apart| light(*apart)).collect()
 }
 
-/// Corrections of a view at all nodes of the light: the mean of `f̄` over that of the pixels.
-fn of_view(
+/// Viewers at one polar angle, each with its lights and `f̄`.
+struct Viewers(Vec<(DVec3, Vec<Vec3>, Vec<Vec3>)>);
+
+/// Values of pixels along rows: for each pixel those of all lights, without and with the part that `f̄` has in them.
+type Values = Vec<Vec<DVec3>>;
+
+impl Viewers {
+    fn new(reflectance: &dyn Reflectance, theta: f64) -> Self {
+        let viewer = |k: usize| {
+            let azimuth = TAU * k as f64 / AZIMUTHS as f64;
+            let (o, lights) = (
+                above(direction(theta, azimuth).as_vec3()),
+                lights(azimuth, if k.is_multiple_of(2) { 1.0 } else { -1.0 }),
+            );
+            let mut far = vec![Vec3::ZERO; lights.len()];
+            reflectance.eval_lights(&lights, o.as_vec3(), &mut far);
+            (o, lights, far)
+        };
+        Self((0..AZIMUTHS).map(viewer).collect())
+    }
+
+    /// The viewer of a pixel: neighbours in a row and in a column have different azimuths.
+    fn of_pixel(&self, x: usize, y: usize) -> &(DVec3, Vec<Vec3>, Vec<Vec3>) {
+        &self.0[(x + 3 * y) % AZIMUTHS]
+    }
+
+    /// Values of `counts` pixels of a width over the tile. The mean over a tile is that of parts of pixels, whatever
+    /// their number.
+    fn values(&self, tile: &FilteredTile, materials: &PixelMaterials<'_>, width: f64, counts: DVec2) -> Values {
+        let [columns, rows] = [counts.x as usize, counts.y as usize];
+        let ratios: Vec<Vec<DVec3>> = self
+            .0
+            .iter()
+            .map(|(o, lights, far)| {
+                let mut ratios = vec![DVec3::ONE; lights.len()];
+                tile.times_far(lights, *o, width, materials, far, &mut ratios);
+                ratios
+            })
+            .collect();
+        let pixel = |k: usize| {
+            let (x, y) = (k % columns, k / columns);
+            let (o, lights, _) = self.of_pixel(x, y);
+            let centre = (DVec2::new(x as f64, y as f64) + 0.5) / counts * tile.size();
+            let mut values = vec![DVec3::ZERO; lights.len()];
+            tile.add_part(&PixelOnTile { centre, width }, lights, *o, materials, &mut values);
+            values.iter_mut().zip(&ratios[(x + 3 * y) % AZIMUTHS]).for_each(|(value, ratio)| *value *= *ratio);
+            values
+        };
+        (0..columns * rows).into_par_iter().with_min_len(8).map(pixel).collect()
+    }
+
+    /// `f̄` of each of these pixels.
+    fn far(&self, counts: DVec2) -> impl Iterator<Item = &Vec<Vec3>> + Clone {
+        let columns = counts.x as usize;
+        (0..columns * counts.y as usize).map(move |k| &self.of_pixel(k % columns, k / columns).2)
+    }
+}
+
+/// Corrections of levels at all nodes: the mean of `f̄` over that of the pixels.
+fn measured(
     tile: &FilteredTile,
     materials: &PixelMaterials<'_>,
     reflectance: &dyn Reflectance,
-    width: f64,
-    theta: f64,
-) -> Vec<Vec3> {
-    let views: Vec<(Vec3, Vec<Vec3>, Vec<Vec3>)> = (0..AZIMUTHS)
-        .map(|k| {
-            let azimuth = TAU * k as f64 / AZIMUTHS as f64;
-            let (o, lights) =
-                (direction(theta, azimuth).as_vec3(), lights(azimuth, if k % 2 == 0 { 1.0 } else { -1.0 }));
-            let mut far = vec![Vec3::ZERO; lights.len()];
-            reflectance.eval_lights(&lights, o, &mut far);
-            (o, lights, far)
-        })
-        .collect();
-    let counts = (tile.size() * PER_WIDTH / width).ceil().clamp(DVec2::splat(SIDES.0), DVec2::splat(SIDES.1));
-    let [columns, rows] = [counts.x as usize, counts.y as usize];
-    let none = Calibration::none();
-    let pixel = |k: usize| -> Vec<[Vec3; 2]> {
-        let place = (DVec2::new((k % columns) as f64, (k / columns) as f64) + 0.5) / counts;
-        // Neighbours in a row and in a column have different azimuths.
-        let (o, lights, far) = &views[(k % columns + 3 * (k / columns)) % AZIMUTHS];
-        let mut values = far.clone();
-        let pixel = PixelOnTile { centre: place * tile.size(), width };
-        tile.eval_lights(&pixel, lights, *o, materials, &none, &mut values);
-        values.into_iter().zip(far).map(|(value, far)| [value, *far]).collect()
-    };
-    let pixels: Vec<Vec<[Vec3; 2]>> = (0..columns * rows).into_par_iter().with_min_len(8).map(pixel).collect();
-    let correction = |light: usize| {
-        let sum = |k: usize| pixels.iter().map(|values| values[light][k].as_dvec3()).sum::<DVec3>();
-        let (ours, exact) = (sum(0), sum(1));
-        let least = DVec3::splat(1e-9 + 1e-4 * exact.max_element());
-        ((exact + least) / (ours + least)).as_vec3().clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST))
-    };
-    (0..POLAR.len() * APART.len()).map(correction).collect()
+    levels: &[usize],
+    cancel: &Cancel,
+) -> Result<Vec<Vec<Vec3>>> {
+    let mut corrections = vec![Vec::new(); levels.len()];
+    if levels.is_empty() {
+        return Ok(corrections);
+    }
+    for theta in POLAR {
+        let viewers = Viewers::new(reflectance, theta.to_radians());
+        let most = DVec2::splat(SIDES.1);
+        let mut points: Option<Values> = None;
+        for (level, corrections) in levels.iter().zip(&mut corrections) {
+            cancel.check()?;
+            let width = tile.width(*level);
+            let counts = (tile.size() * PER_WIDTH / width).ceil().clamp(DVec2::splat(SIDES.0), most);
+            let values = viewers.values(tile, materials, width, counts);
+            // Fewer pixels than there is structure: points of the surface, whose mean is `f̄`, tell by how much the places
+            // of the pixels are off.
+            let points =
+                (counts == most).then(|| &*points.get_or_insert_with(|| viewers.values(tile, materials, 0.0, most)));
+            corrections.extend((0..POLAR.len() * APART.len()).map(|light| {
+                let far = || viewers.far(counts).map(|far| far[light].as_dvec3());
+                let at = |values: &Values| values.iter().map(|values| values[light]).collect::<Vec<_>>();
+                correction(far(), &at(&values), points.map(at).as_deref())
+            }));
+        }
+    }
+    // A cancelled `f̄` may be zero.
+    cancel.check()?;
+    Ok(corrections)
+}
+
+/// The mean of `far` over that of `values`. `points` have the mean of `far` and vary together with the values: the part of
+/// their error that the values share is taken off.
+fn correction(far: impl Iterator<Item = DVec3> + Clone, values: &[DVec3], points: Option<&[DVec3]>) -> Vec3 {
+    let count = values.len() as f64;
+    let exact = far.clone().sum::<DVec3>() / count;
+    let mut ours = values.iter().sum::<DVec3>() / count;
+    if let Some(points) = points {
+        let off = points.iter().sum::<DVec3>() / count - exact;
+        let (mut shared, mut own) = (DVec3::ZERO, DVec3::splat(f64::MIN_POSITIVE));
+        for ((far, value), point) in far.zip(values).zip(points) {
+            let point = *point - far - off;
+            shared += point * (*value - far - (ours - exact));
+            own += point * point;
+        }
+        ours -= off * (shared / own).clamp(DVec3::ZERO, DVec3::ONE);
+    }
+    let least = DVec3::splat(1e-9 + 1e-4 * exact.max_element());
+    ((exact + least) / (ours + least).max(least)).clamp(DVec3::splat(1.0 / MOST), DVec3::splat(MOST)).as_vec3()
 }
 
 /// The node below a value, and the part of the way to the next.

@@ -2,6 +2,7 @@
 //! geometry, and the rest is filtered in the plane of its slope. Far away nothing but `f̄` is left, without a transition.
 
 mod calibration;
+mod methods;
 mod object;
 mod radiance;
 mod surface;
@@ -9,7 +10,7 @@ mod surface;
 mod tests;
 mod zoom;
 
-pub use calibration::Calibration;
+pub use calibration::{Calibration, Corrections};
 pub use object::PixelOnTile;
 pub use radiance::PixelMaterials;
 pub use surface::FilteredTile;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::calibration::Calibration;
+use super::calibration::{Calibration, Corrections};
 use super::radiance::{PixelMaterials, PixelReflectance};
 use super::surface::FilteredTile;
 use crate::base::{Cancel, Result};
@@ -19,6 +19,8 @@ const LOWEST: f64 = 0.02;
 const MAX_PARTS: f64 = 4.0;
 /// Bound of the factor by which the model of the relief is brought to `f̄`.
 const MOST_CORRECTION: f64 = 16.0;
+/// Pixels that filter away less than this part of the slopes' variance are not corrected.
+const LEAST_LEFT: f64 = 1e-3;
 
 /// A pixel's part of the plane of the tile.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +38,17 @@ fn parts(width: f64, cosine: f64) -> (f64, f64) {
     (parts, width * (stretch / parts).max(1.0))
 }
 
+/// A direction to a viewer, kept above the plane of the tile.
+pub(super) fn above(o: Vec3) -> DVec3 {
+    let o = o.as_dvec3();
+    DVec3::new(o.x, o.y, o.z.max(LOWEST)).normalize_or(DVec3::Z)
+}
+
+/// The width of a part of a pixel at this cosine of the viewer.
+pub(super) fn part_width(width: f64, cosine: f64) -> f64 {
+    parts(width, cosine).1
+}
+
 impl FilteredTile {
     /// Replaces `f̄` of lights by the reflectance of a pixel [1/sr], the lights' cosines included. `far` holds `f̄` and
     /// is not changed if the tile is far away. Directions are unit vectors in the tile frame, above the horizon.
@@ -48,44 +61,78 @@ impl FilteredTile {
         calibration: &Calibration,
         far: &mut [Vec3],
     ) {
-        let o = o.as_dvec3();
-        let o = DVec3::new(o.x, o.y, o.z.max(LOWEST)).normalize_or(DVec3::Z);
+        let o = above(o);
         let (parts, width) = parts(pixel.width, o.z);
         let length = pixel.width / o.z;
         if width >= self.far() || !width.is_finite() {
             return;
         }
-        let (axes, terms) = (self.map().slope_axes(), self.map().count());
         let along = o.truncate().normalize_or(DVec2::X);
         let mut values = vec![DVec3::ZERO; lights.len()];
         for part in 0..parts as usize {
             let offset = (part as f64 - 0.5 * (parts - 1.0)) * length / parts;
-            let at = self.seen_through(pixel.centre + along * offset, o, width);
-            let content = self.content(at, width);
-            let reflectance = PixelReflectance::new(&content, materials, axes, terms, o);
-            for (value, light) in values.iter_mut().zip(lights) {
-                let i = light.as_dvec3();
-                let lit = self.lit(at, i, width);
-                if lit > 0.0 {
-                    *value += reflectance.towards(i) * (lit / parts);
-                }
+            self.add_part(
+                &PixelOnTile { centre: pixel.centre + along * offset, width },
+                lights,
+                o,
+                materials,
+                &mut values,
+            );
+        }
+        self.times_far(lights, o, width, materials, far, &mut values);
+        for ((far, value), light) in far.iter_mut().zip(&values).zip(lights) {
+            *far = (*value / parts).as_vec3() * calibration.at(self, width, light.as_dvec3(), o);
+        }
+    }
+
+    /// Adds the reflectance of a part of a pixel that is as long as wide, by the model of the relief alone.
+    pub(super) fn add_part(
+        &self,
+        part: &PixelOnTile,
+        lights: &[Vec3],
+        o: DVec3,
+        materials: &PixelMaterials<'_>,
+        values: &mut [DVec3],
+    ) {
+        let at = self.seen_through(part.centre, o, part.width);
+        let content = self.content(at, part.width);
+        let reflectance = PixelReflectance::new(&content, materials, self.map().slope_axes(), self.map().count(), o);
+        for (value, light) in values.iter_mut().zip(lights) {
+            let i = light.as_dvec3();
+            let lit = self.lit(at, i, part.width);
+            if lit > 0.0 {
+                *value += reflectance.towards(i) * lit;
             }
         }
-        // Where all slopes are filtered away, the model must agree with `f̄`, of which it is an approximation.
-        let (whole, left) = (self.whole(), self.left(width));
-        let model = PixelReflectance::new(&whole, materials, axes, terms, o);
-        for ((far, value), light) in far.iter_mut().zip(&values).zip(lights) {
+    }
+
+    /// Brings values of pixels of this width to `f̄` as far as they filter slopes away: where all slopes are, the model
+    /// must agree with `f̄`, of which it is an approximation.
+    pub(super) fn times_far(
+        &self,
+        lights: &[Vec3],
+        o: DVec3,
+        width: f64,
+        materials: &PixelMaterials<'_>,
+        far: &[Vec3],
+        values: &mut [DVec3],
+    ) {
+        let left = self.left(width);
+        if left < LEAST_LEFT {
+            return;
+        }
+        let whole = self.whole();
+        let model = PixelReflectance::new(&whole, materials, self.map().slope_axes(), self.map().count(), o);
+        for ((far, value), light) in far.iter().zip(values).zip(lights) {
             let (exact, model) = (far.as_dvec3(), model.towards(light.as_dvec3()));
             let least = DVec3::splat(1e-9 + 1e-4 * exact.max_element());
             let ratio = ((exact + least) / (model + least))
                 .clamp(DVec3::splat(1.0 / MOST_CORRECTION), DVec3::splat(MOST_CORRECTION));
-            let correction = calibration.at(self, width, light.as_dvec3(), o);
-            *far = (*value * ratio.powf(left)).as_vec3() * correction;
+            *value *= ratio.powf(left);
         }
     }
 
-    /// Replaces `f̄` by what each pixel of an image holds. Edges keep the samples of the image. A `calibration` is extended
-    /// by the widths of the image; without one, only distant pixels agree with `f̄` on average.
+    /// Replaces `f̄` by what each pixel of an image holds. Edges keep the samples of the image.
     ///
     /// # Errors
     /// An invalid camera, or [`crate::base::Error::Cancelled`].
@@ -94,41 +141,68 @@ impl FilteredTile {
         image: &mut Image,
         input: &RenderInput,
         materials: ShadedMaterials<'_>,
-        calibration: Option<&mut Calibration>,
+        corrections: Corrections,
         cancel: &Cancel,
     ) -> Result<()> {
         let view = CameraView::new(input.camera, input.mesh, input.size)?;
-        let radius = input.mesh.bounds.radius;
-        let scale = self.size().min_element() / f64::from(TILE_RADII * radius);
+        let scale = scale_of(self.size(), input);
+        let nearest = ((view.eye - input.mesh.bounds.center).length() - input.mesh.bounds.radius).max(view.near);
         let width_at = |depth: f32| scale * f64::from(view.pixel_extent() * depth);
-        let nearest = ((view.eye - input.mesh.bounds.center).length() - radius).max(view.near);
         if width_at(nearest) >= self.far() {
             return Ok(());
         }
         let points = visible_points(input.mesh, &view, input.samples_per_side);
-        let Some(anchor) = anchor(input, &view, &points) else { return Ok(()) };
+        let materials = PixelMaterials::new(materials);
+        let Some(widths) = widths(&points, view.eye, &width_at) else { return Ok(()) };
+        let calibration = &match corrections {
+            Corrections::Measured => self.calibrated(&materials, input.reflectance, widths, cancel)?,
+            Corrections::Known => self.known_calibration(),
+        };
+        let tile_pixels = TilePixels { view, points, scale, far: self.far() };
+        tile_pixels.replace(image, input, cancel, |_, pixel, lights, o, values| {
+            self.eval_lights(pixel, lights, o, &materials, calibration, values);
+        })
+    }
+}
+
+/// Tile units per world unit on the object.
+pub(super) fn scale_of(tile_size: DVec2, input: &RenderInput) -> f64 {
+    tile_size.min_element() / f64::from(TILE_RADII * input.mesh.bounds.radius)
+}
+
+/// The points of an object in an image, and the pixels that they are on its tiles.
+pub(super) struct TilePixels {
+    pub view: CameraView,
+    pub points: ShadingPoints,
+    /// Tile units per world unit.
+    pub scale: f64,
+    /// Width of a pixel [tile units] from which it keeps `f̄`.
+    pub far: f64,
+}
+
+impl TilePixels {
+    /// Replaces `f̄` in an image. `shade` receives the number of a point, its pixel, the directions to the lights that it
+    /// sees and to the viewer, and their `f̄`, which it replaces.
+    pub fn replace(
+        &self,
+        image: &mut Image,
+        input: &RenderInput,
+        cancel: &Cancel,
+        shade: impl Fn(usize, &PixelOnTile, &[Vec3], Vec3, &mut [Vec3]) + Sync,
+    ) -> Result<()> {
+        let Self { view, points, scale, far } = self;
+        let Some(anchor) = anchor(input, view, points) else { return Ok(()) };
         let visibility = input
             .occluder
-            .map(|occluder| occluder.visible_lights(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
-        let materials = PixelMaterials::new(materials);
-        let none = Calibration::none();
-        let calibration = match calibration {
-            Some(calibration) => {
-                if let Some(widths) = widths(&points, view.eye, &width_at) {
-                    calibration.measure(self, &materials, input.reflectance, widths);
-                }
-                &*calibration
-            }
-            None => &none,
-        };
+            .map(|occluder| occluder.visible_lights(input.mesh, points, input.lights, view.eye, input.shadow_cache));
         let changes: Vec<Vec3> = (0..points.len())
             .into_par_iter()
             .with_min_len(64)
             .map(|point| {
                 let (position, z, x) = (points.positions[point], points.normals[point], points.tangents[point]);
                 let depth = (view.eye - position).length();
-                let width = width_at(depth);
-                if width >= self.far() || cancel.is_set() {
+                let width = scale * f64::from(view.pixel_extent() * depth);
+                if width >= *far || cancel.is_set() {
                     return Vec3::ZERO;
                 }
                 let y = z.cross(x);
@@ -146,8 +220,8 @@ impl FilteredTile {
                 let mut far = vec![Vec3::ZERO; directions.len()];
                 input.reflectance.eval_lights(&directions, o, &mut far);
                 let mut near = far.clone();
-                let centre = anchor.along_surface(position).as_dvec2() * scale;
-                self.eval_lights(&PixelOnTile { centre, width }, &directions, o, &materials, calibration, &mut near);
+                let centre = anchor.along_surface(position).as_dvec2() * *scale;
+                shade(point, &PixelOnTile { centre, width }, &directions, o, &mut near);
                 near.iter().zip(&far).zip(&irradiances).map(|((near, far), e)| (*near - *far) * *e).sum()
             })
             .collect();

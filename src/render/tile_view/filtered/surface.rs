@@ -1,10 +1,11 @@
 //! The low-passed height field of a tile, what its low-pass leaves out, and rays against it.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use glam::{DMat2, DVec2, DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::calibration::Calibration;
 use crate::color_map::layers::LayeredMap;
 use crate::color_map::pixel::{PixelColors, PixelMap};
 use crate::color_map::slopes::Slopes;
@@ -24,8 +25,9 @@ const INVISIBLE: f64 = 0.02;
 /// Largest number of steps of a ray.
 const MAX_STEPS: f64 = 400.0;
 
-/// Channels of the relief's levels: moments of heights and slopes.
+/// Channels of the relief's levels: moments of heights and slopes. The slopes' means are two channels from [`SLOPE`] on.
 const HEIGHT: usize = 0;
+const SLOPE: usize = 2;
 const CHANNELS: usize = 7;
 
 /// A tile under a colour map, ready for pixels of any width.
@@ -46,6 +48,8 @@ pub struct FilteredTile {
     whole: ReliefLeft,
     /// Width of a pixel [tile units] from which the tile is far away.
     far: f64,
+    /// Corrections of the widths that were needed so far.
+    pub(super) calibration: Mutex<Calibration>,
 }
 
 /// Heights and slopes within a pixel.
@@ -85,15 +89,26 @@ impl FilteredTile {
         let all = |level: usize| LevelAt { finer: level, weight: 0.0 };
         let base = samples.base;
         let whole = ReliefLeft::of(relief.at(DVec2::ZERO, all(relief.count() - 1)), base);
-        let mut tile =
-            Self { size, base, relief, ranges: vec![], bends: vec![], left: vec![], tints, map, whole, far: 0.0 };
+        let mut tile = Self {
+            size,
+            base,
+            relief,
+            ranges: vec![],
+            bends: vec![],
+            left: vec![],
+            tints,
+            map,
+            whole,
+            far: 0.0,
+            calibration: Mutex::default(),
+        };
         let total = whole.slopes.covariance[0] + whole.slopes.covariance[2];
         for level in 0..tile.relief.count() {
             let (count, values) = tile.relief.values(level);
             let heights = values.iter().map(|value| f64::from(value[HEIGHT]));
             tile.ranges.push(heights.fold((f64::MAX, f64::MIN), |(low, high), h| (low.min(h), high.max(h))));
             tile.bends.push(bend(count, values, size));
-            let kept = structure(values, 1) + structure(values, 2);
+            let kept = structure(values, SLOPE) + structure(values, SLOPE + 1);
             // A flat tile fades as its longest wave does.
             let flat = || 1.0 - (-0.5 * (std::f64::consts::TAU * 0.3 * tile.relief.width(level)).powi(2)).exp();
             tile.left.push(if total > 0.0 { (1.0 - kept / total).clamp(0.0, 1.0) } else { flat() });
@@ -107,7 +122,7 @@ impl FilteredTile {
         let is_invisible = |level: usize| {
             let (_, values) = self.relief.values(level);
             let heights = structure(values, HEIGHT).sqrt();
-            let kept = structure(values, 1) + structure(values, 2);
+            let kept = structure(values, SLOPE) + structure(values, SLOPE + 1);
             let width = self.relief.width(level);
             heights <= INVISIBLE * self.whole.heights.deviation
                 && kept.sqrt() <= INVISIBLE * slopes.sqrt()
@@ -165,14 +180,23 @@ impl FilteredTile {
 
     /// The content of a pixel of this width at a place of the tile [tile units].
     pub(super) fn content(&self, at: DVec2, width: f64) -> PixelContent<'_> {
-        let (place, level) = (at / self.size, self.relief.of_width(width));
+        let place = at / self.size;
         let tint = |(slot, tint): &(u16, Levels<3>)| (*slot, Vec3::from(tint.at(place, tint.of_width(width))));
-        let footprint = Footprint { centre: place, covariance: self.covariance(width) };
         PixelContent {
-            relief: ReliefLeft::of(self.relief.at(place, level), self.base),
+            relief: self.relief_left(at, width),
             tints: self.tints.iter().map(tint).filter(|(_, tint)| *tint != Vec3::ZERO).collect(),
-            colors: self.map.at(Some(&footprint)),
+            colors: self.map.at(Some(&self.footprint(at, width))),
         }
+    }
+
+    /// Heights and slopes within a pixel of this width at a place [tile units].
+    pub(super) fn relief_left(&self, at: DVec2, width: f64) -> ReliefLeft {
+        ReliefLeft::of(self.relief.at(at / self.size, self.relief.of_width(width)), self.base)
+    }
+
+    /// The footprint of a pixel of this width at a place [tile units].
+    pub(super) fn footprint(&self, at: DVec2, width: f64) -> Footprint {
+        Footprint { centre: at / self.size, covariance: self.covariance(width) }
     }
 
     /// The content of a pixel far away.
@@ -241,12 +265,12 @@ impl FilteredTile {
             let rise = self.height(at + t * distance, level) - start;
             horizon = horizon.max(rise / distance);
         }
-        // Across a pixel the horizon changes with the slope.
-        let change = 0.5 * width * self.between(&self.bends, level);
-        if cot - horizon >= change || horizon == f64::NEG_INFINITY {
+        // Across a pixel the horizon changes as the slope does; a box has this deviation.
+        let change = width / 12.0_f64.sqrt() * self.between(&self.bends, level);
+        if cot - horizon >= 3.0 * change || horizon == f64::NEG_INFINITY {
             return 1.0;
         }
-        normal::cdf(2.5 * (cot - horizon) / change.max(1e-9)).clamp(0.0, 1.0)
+        normal::cdf((cot - horizon) / change.max(1e-9)).clamp(0.0, 1.0)
     }
 }
 
@@ -274,7 +298,7 @@ fn bend(count: UVec2, values: &[[f32; CHANNELS]], size: DVec2) -> f64 {
     let [width, height] = count.to_array().map(|count| count as usize);
     let texel = size / count.as_dvec2();
     let change = |a: &[f32; CHANNELS], b: &[f32; CHANNELS], length: f64| {
-        (DVec2::new(f64::from(a[1] - b[1]), f64::from(a[2] - b[2])) / length).length_squared()
+        (DVec2::new(f64::from(a[SLOPE] - b[SLOPE]), f64::from(a[SLOPE + 1] - b[SLOPE + 1])) / length).length_squared()
     };
     let of = |k: usize| {
         let (x, y) = (k % width, k / width);

@@ -7,6 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Calibration, FilteredTile, PixelMaterials, PixelOnTile};
+use crate::base::Cancel;
 use crate::brdf::MaterialAssignment;
 use crate::color_map::slopes::direction;
 use crate::effective::EffectiveBrdf;
@@ -56,9 +57,9 @@ impl Scene {
     /// Measures the corrections of all widths.
     fn calibrated(loaded: &LoadedScene) -> Self {
         let mut scene = Self::new(loaded);
-        let mut calibration = Calibration::none();
         let materials = PixelMaterials::new(scene.shaded());
-        calibration.measure(scene.filtered(), &materials, &*scene.brdf, (0.0, f64::MAX));
+        let widths = (0.0, f64::MAX);
+        let calibration = scene.filtered().calibrated(&materials, &*scene.brdf, widths, &Cancel::default()).unwrap();
         scene.calibration = calibration;
         scene
     }
@@ -86,7 +87,7 @@ impl Scene {
     /// The mean over the whole tile of pixels of this width.
     fn mean(&self, at: Directions, width: f64) -> DVec3 {
         use rayon::prelude::*;
-        let count = (2.0 / width).ceil().clamp(16.0, 64.0) as usize;
+        let count = (3.0 / width).ceil().clamp(16.0, 96.0) as usize;
         let centre = |k: usize| (DVec2::new((k % count) as f64, (k / count) as f64) + 0.5) / count as f64;
         let values: Vec<DVec3> = (0..count * count).into_par_iter().map(|k| self.pixel(at, centre(k), width)).collect();
         values.iter().sum::<DVec3>() / values.len() as f64

@@ -3,8 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::calibration::Calibration;
-use super::object::PixelOnTile;
+use super::object::{PixelOnTile, part_width};
 use super::radiance::PixelMaterials;
 use super::surface::FilteredTile;
 use crate::base::{Cancel, InputError, Result};
@@ -105,7 +104,6 @@ impl ZoomTarget {
         tile: &FilteredTile,
         materials: ShadedMaterials<'_>,
         reflectance: &dyn Reflectance,
-        calibration: &Calibration,
         pixels_per_tile: f64,
         cancel: &Cancel,
     ) -> Result<DVec3> {
@@ -113,6 +111,8 @@ impl ZoomTarget {
         reflectance.eval_lights(&self.lights, self.o, &mut far);
         let materials = PixelMaterials::new(materials);
         let width = tile.size().min_element() / pixels_per_tile;
+        let widest = part_width(width, f64::from(self.o.z));
+        let calibration = tile.calibrated(&materials, reflectance, (widest, widest), cancel)?;
         let counts = (tile.size() * 2.0 / width).ceil().clamp(DVec2::splat(FEWEST), DVec2::splat(MOST));
         let [columns, rows] = [counts.x as usize, counts.y as usize];
         let radiance = |k: usize| -> DVec3 {
@@ -122,7 +122,7 @@ impl ZoomTarget {
             let place = (DVec2::new((k % columns) as f64, (k / columns) as f64) + 0.5) / counts;
             let mut values = far.clone();
             let pixel = PixelOnTile { centre: place * tile.size(), width };
-            tile.eval_lights(&pixel, &self.lights, self.o, &materials, calibration, &mut values);
+            tile.eval_lights(&pixel, &self.lights, self.o, &materials, &calibration, &mut values);
             values.iter().zip(&self.irradiances).map(|(value, e)| (*value * *e).as_dvec3()).sum()
         };
         // The order of the sum does not depend on the number of threads.

@@ -1,18 +1,9 @@
-//! Slopes that are seen and lit on a surface with Gaussian slopes (Heitz et al. 2013, Sec. 5.2).
-
-use std::f64::consts::FRAC_PI_2;
+//! The density of slopes weighted by what is visible, lit and reflected: quadrature over slopes.
 
 use glam::{DVec2, DVec3};
 
-use super::{Normal, Tabulated, normal};
-
-/// Normally distributed slopes `(∂h/∂x, ∂h/∂y)`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Slopes {
-    pub mean: DVec2,
-    /// Covariance: xx, xy, yy.
-    pub covariance: [f64; 3],
-}
+use super::Slopes;
+use crate::color_map::{Tabulated, normal};
 
 /// A direction in which the slopes' density is narrow: the lobe of a glossy BRDF.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,101 +14,7 @@ pub struct Focus {
     pub width: f64,
 }
 
-/// The polar angle's cotangent and the azimuth's unit vector of a direction. The horizon has cotangent 0, and so has
-/// every direction below it.
-pub fn cotangent(direction: DVec3) -> (f64, DVec2) {
-    let across = direction.truncate();
-    let sine = across.length();
-    if sine == 0.0 {
-        return (f64::INFINITY, DVec2::X);
-    }
-    (direction.z.max(0.0) / sine, across / sine)
-}
-
-/// A direction from its polar angle and azimuth [rad]. Angles at or beyond the horizon lie on it exactly.
-pub fn direction(theta: f64, phi: f64) -> DVec3 {
-    let (sin_phi, cos_phi) = phi.sin_cos();
-    let (sine, cosine) = if theta.abs() >= FRAC_PI_2 { (1.0, 0.0) } else { theta.sin_cos() };
-    DVec3::new(sine * cos_phi, sine * sin_phi, cosine)
-}
-
 impl Slopes {
-    /// Variance along a unit vector.
-    pub fn variance_along(&self, t: DVec2) -> f64 {
-        (t.x * self.times(t).x + t.y * self.times(t).y).max(0.0)
-    }
-
-    /// The covariance times a vector.
-    fn times(&self, t: DVec2) -> DVec2 {
-        let [xx, xy, yy] = self.covariance;
-        DVec2::new(xx * t.x + xy * t.y, xy * t.x + yy * t.y)
-    }
-
-    /// `(cot θ - mean along the azimuth) / deviation along it`, of which masking and visible slopes are functions. Infinite
-    /// for slopes that do not vary and face the direction.
-    pub fn nu(&self, direction: DVec3) -> f64 {
-        let (cot, t) = cotangent(direction);
-        let (above, deviation) = (cot - self.mean.dot(t), self.variance_along(t).sqrt());
-        if deviation > 0.0 {
-            above / deviation
-        } else if above > 0.0 {
-            f64::INFINITY
-        } else {
-            0.0
-        }
-    }
-
-    /// Λ of a direction (Eq. 3).
-    pub fn lambda(&self, direction: DVec3) -> f64 {
-        super::heights::lambda(self.nu(direction))
-    }
-
-    /// The slopes that a viewer sees: density `p(s) (cot θ - s·t)+`, as its mean and covariance, which are exact for any
-    /// mean and covariance.
-    pub fn visible(&self, o: DVec3) -> Self {
-        let (_, t) = cotangent(o);
-        let deviation = self.variance_along(t).sqrt();
-        let nu = self.nu(o);
-        if !(deviation > 0.0 && nu < 1e8) {
-            return *self;
-        }
-        let (mean, variance) = visible_moments(nu);
-        // In deviations, slopes towards the viewer are -s·t.
-        let shift = self.times(t) / deviation;
-        let change = variance - 1.0;
-        let [xx, xy, yy] = self.covariance;
-        Self {
-            mean: self.mean - shift * mean,
-            covariance: [
-                (xx + shift.x * shift.x * change).max(0.0),
-                xy + shift.x * shift.y * change,
-                (yy + shift.y * shift.y * change).max(0.0),
-            ],
-        }
-    }
-
-    /// The product of this density with a normal one of a variance about a slope: its mass, and the normalized product.
-    pub fn times_normal(&self, centre: DVec2, variance: f64) -> (f64, Self) {
-        let [xx, xy, yy] = self.covariance;
-        // Σ (Σ + v)⁻¹ maps the distance of the centres and the variance alike.
-        let (a, d) = (xx + variance, yy + variance);
-        let determinant = (a * d - xy * xy).max(f64::MIN_POSITIVE);
-        let inverse = [d / determinant, -xy / determinant, a / determinant];
-        let solve = |t: DVec2| DVec2::new(inverse[0] * t.x + inverse[1] * t.y, inverse[1] * t.x + inverse[2] * t.y);
-        let away = centre - self.mean;
-        let mass = (-0.5 * away.dot(solve(away))).exp() / (std::f64::consts::TAU * determinant.sqrt());
-        let (x, y) = (solve(DVec2::X), solve(DVec2::Y));
-        let narrowed = [variance * self.times(x).x, variance * self.times(x).y, variance * self.times(y).y];
-        let covariance = [narrowed[0].max(0.0), narrowed[1], narrowed[2].max(0.0)];
-        (mass, Self { mean: self.mean + self.times(solve(away)), covariance })
-    }
-
-    /// The driver of a slope layer, the slope `-∂h/∂a` along an azimuth [rad].
-    pub fn driver(&self, azimuth: f64) -> Normal {
-        let e = DVec2::from_angle(azimuth);
-        Normal { mean: -self.mean.dot(e), deviation: self.variance_along(e).sqrt() }
-    }
-
     /// The distribution of `driver` under the density `p(s) weight(s)`, a channel at a time: the weight of a coloured
     /// BRDF differs between channels. `focus` adds nodes where the weight is narrow. `None` for a channel without mass.
     pub fn weighted(
@@ -303,73 +200,22 @@ fn steps(nodes: &[f64]) -> impl Iterator<Item = (f64, f64)> {
     (0..nodes.len()).map(|k| (nodes[k], 0.5 * (nodes[(k + 1).min(nodes.len() - 1)] - nodes[k.saturating_sub(1)])))
 }
 
-/// Mean and variance of z under the density `φ(z) (ν + z)+`, normalized.
-pub fn visible_moments(nu: f64) -> (f64, f64) {
-    if nu < -30.0 {
-        // Only facets far from the mean are seen, and the difference of large terms would be left.
-        let u = 1.0 / (nu * nu);
-        return (-nu * (1.0 + 2.0 * u), 2.0 * u);
-    }
-    if nu > 38.0 {
-        return (1.0 / nu, 1.0);
-    }
-    let mills = normal::mills(nu);
-    let mean = if nu < -5.0 { normal::cdf(nu) / normal::ramp(nu) } else { 1.0 / (nu + mills) };
-    (mean, (1.0 + mills * mean - mean * mean).max(0.0))
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    use super::super::stops::tests::map;
-    use super::super::{Distribution, normal};
+    use super::super::direction;
     use super::*;
+    use crate::color_map::Distribution;
+    use crate::color_map::stops::tests::map;
 
-    const GENERAL: Slopes = Slopes { mean: DVec2::new(0.15, -0.1), covariance: [0.09, 0.03, 0.05] };
+    pub(in super::super) const GENERAL: Slopes =
+        Slopes { mean: DVec2::new(0.15, -0.1), covariance: [0.09, 0.03, 0.05] };
 
-    fn sample(slopes: &Slopes, random: &mut ChaCha8Rng) -> DVec2 {
+    pub(in super::super) fn sample(slopes: &Slopes, random: &mut ChaCha8Rng) -> DVec2 {
         let mut draw = || normal::quantile(random.random::<f64>().max(1e-300));
         Frame::new(slopes, DVec2::X).slope(draw(), draw())
-    }
-
-    #[test]
-    fn visible_slopes_have_the_mean_and_covariance_of_samples_weighted_by_projected_area() {
-        let mut random = ChaCha8Rng::seed_from_u64(2);
-        for (theta, phi) in [(50.0_f64, 40.0_f64), (80.0, 200.0), (20.0, 0.0)] {
-            let o = direction(theta.to_radians(), phi.to_radians());
-            let mut sums = [0.0; 6];
-            for _ in 0..600_000 {
-                let s = sample(&GENERAL, &mut random);
-                let w = (o.z - s.dot(o.truncate())).max(0.0);
-                for (sum, value) in sums.iter_mut().zip([1.0, s.x, s.y, s.x * s.x, s.x * s.y, s.y * s.y]) {
-                    *sum += w * value;
-                }
-            }
-            let [mass, x, y, xx, xy, yy] = sums.map(|sum| sum / sums[0]);
-            assert_eq!(mass, 1.0);
-            let ours = GENERAL.visible(o);
-            assert!((ours.mean - DVec2::new(x, y)).length() < 1.5e-3, "{theta}: {} {x} {y}", ours.mean);
-            for (ours, exact) in ours.covariance.iter().zip([xx - x * x, xy - x * y, yy - y * y]) {
-                assert!((ours - exact).abs() < 1e-3, "{theta}");
-            }
-            let quadrature = GENERAL.weighted_moments(None, &|s| (o.z - s.dot(o.truncate())).max(0.0)).unwrap();
-            assert!((ours.mean - quadrature.mean).length() < 1e-3);
-        }
-    }
-
-    #[test]
-    fn visible_slopes_keep_the_projected_area_of_the_mean_plane() {
-        // Facets together cover, along the view, what the mean plane covers: ∫ p(s) (cot θ - s·t) = cot θ - s̄·t, of
-        // which the visible part is what masking leaves: M τ / (1 + Λ) = cot θ - s̄·t.
-        for theta in [10.0_f64, 45.0, 70.0, 80.0] {
-            let o = direction(theta.to_radians(), 0.7);
-            let (cot, t) = cotangent(o);
-            let nu = GENERAL.nu(o);
-            let seen = normal::ramp(nu) * GENERAL.variance_along(t).sqrt() / (1.0 + GENERAL.lambda(o));
-            assert!((seen / (cot - GENERAL.mean.dot(t)) - 1.0).abs() < 1e-9, "{theta}");
-        }
     }
 
     #[test]
@@ -433,27 +279,6 @@ mod tests {
             assert!((ours - sum / mass).abs().max_element() < 4.0 * error, "{driver:?}: {ours} {}", sum / mass);
             let pointwise = GENERAL.weighted_color(None, &weight, &|s| map.color(driver.value(s))).unwrap();
             assert!((ours - pointwise).abs().max_element() < 0.02, "{driver:?}: {ours} {pointwise}");
-        }
-    }
-
-    #[test]
-    fn visible_moments_are_smooth_and_finite_from_above_to_far_behind_the_plane() {
-        for nu in [-30.0, -5.0, 38.0] {
-            let (a, b) = (visible_moments(nu - 1e-6), visible_moments(nu + 1e-6));
-            assert!((a.0 / b.0 - 1.0).abs() < 1e-3 && (a.1 - b.1).abs() < 2e-3, "{nu}: {a:?} {b:?}");
-        }
-        for nu in [-1e6, -40.0, -1.0, 0.0, 3.0, 1e8, f64::INFINITY] {
-            let (mean, variance) = visible_moments(nu);
-            assert!(mean.is_finite() && (0.0..=1.0).contains(&variance), "{nu}: {mean} {variance}");
-        }
-        let (mean, variance) = visible_moments(0.0);
-        assert!((mean - 1.2533).abs() < 1e-4 && (variance - 0.4292).abs() < 1e-4);
-        let singular = Slopes { mean: DVec2::ZERO, covariance: [0.1, 0.0, 0.0] };
-        for theta in [0.0, 0.7, 1.57, FRAC_PI_2] {
-            for phi in [0.0, FRAC_PI_2] {
-                let seen = singular.visible(direction(theta, phi));
-                assert!(seen.mean.is_finite() && seen.covariance.iter().all(|c| c.is_finite()));
-            }
         }
     }
 }
