@@ -92,7 +92,7 @@ fn error(known: &Svbtdf, found: &Svbtdf, pixel: usize) -> f64 {
     (difference / norm).sqrt()
 }
 
-/// What a run of the program used.
+/// Memory and time of a run of the program.
 struct Used {
     /// Peak resident memory [bytes].
     memory: u64,

@@ -24,8 +24,8 @@ const QUICK_PAIRS: PairCount = PairCount { min: 16, min_effective: 1.5 };
 const MAX_PAIRS: usize = 6400;
 /// Seed of these pairs.
 const PAIRS_SEED: u64 = 20_261_123;
-/// Factor within which an estimate is taken to be right. Estimates from six replicates and 200 pairs of tiles whose error
-/// is near a bound are within it in two of three cases (`cargo bench --bench measure -- errors`).
+/// Factor by which the true error may exceed an estimate. With it, no hard tile is out of its bound without a warning
+/// (`cargo bench --bench measure -- errors`).
 const UNCERTAINTY: f64 = 1.25;
 /// The variance of a sum over systematic samples falls with the number of facets to this power: 1 for random samples, 2
 /// for smooth integrands.

@@ -130,8 +130,21 @@ impl Outcome {
 
     /// The health of the result. The first call measures it: some hundredths of a second at draft.
     pub fn health(&self) -> &Health {
-        let limits = limits(&self.settings);
-        let estimate = self.close_to_bound.then(|| self.errors()).flatten().map(ErrorEstimator::estimate);
+        let errors = if self.close_to_bound { self.errors() } else { None };
+        self.health_with(errors)
+    }
+
+    /// The health of the result, as [`Outcome::health`].
+    ///
+    /// # Errors
+    /// [`crate::base::Error::Cancelled`], if the error of the result has to be estimated.
+    pub fn health_unless(&self, cancel: &Cancel) -> Result<&Health> {
+        let errors = if self.close_to_bound { self.errors_unless(cancel)? } else { None };
+        Ok(self.health_with(errors))
+    }
+
+    fn health_with(&self, errors: Option<&ErrorEstimator>) -> &Health {
+        let (limits, estimate) = (limits(&self.settings), errors.map(ErrorEstimator::estimate));
         self.examined.get_or_init(|| Health::of(&self.brdf, &self.health_inputs, self.factored, estimate, limits))
     }
 }

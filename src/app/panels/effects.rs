@@ -12,7 +12,7 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, effects: &[Effect], state: &mut Accura
     let kind = |name: &str| effects.iter().find(|effect| effect.name == name).map(|effect| effect.kind);
     let is_physics = |name: &&str| kind(name).is_none_or(|kind| kind == EffectKind::Physics);
     let mut physics: Vec<&'static str> = effect_names().filter(is_physics).collect();
-    // What is left out comes first.
+    // Effects that are left out come first.
     physics.sort_by_key(|name| !effects.iter().any(|effect| effect.name == *name && effect.left_out.is_some()));
     for name in physics {
         effect_ui(ui, scene, name, effects, state, version);
@@ -94,7 +94,7 @@ fn effect_ui(
     ui.add_space(3.0);
 }
 
-/// What an effect costs and changes.
+/// Describes the cost of an effect and the change that it makes.
 fn describe_cost(ms: f64, delta_e: f64, rel_l2: f64) -> String {
     format!("Measured: {ms:+.1} ms, mean ΔE {delta_e:.1}, changes the effective BRDF by {:.2} %", 100.0 * rel_l2)
 }

@@ -1,6 +1,7 @@
 //! The editor without a window: frames run as in a window, with the same workers.
 
 mod color_map;
+mod cost;
 mod cost_strip;
 mod disk;
 mod documents;

@@ -203,7 +203,7 @@ impl ImageWorker {
         let full = self.affordable(job.size, 1, FINAL_MS);
         let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), 1, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
-        preview.warnings.clone_from(&outcome.health().warnings);
+        preview.warnings.clone_from(&outcome.health_unless(context.cancel)?.warnings);
         // An image that is only on the GPU is rendered again if its tone map changes.
         let last = preview.radiance.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, preview.clone()));
         *lock(&self.shared.last) = last;

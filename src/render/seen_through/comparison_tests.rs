@@ -167,7 +167,7 @@ fn figure_7_by_the_slab_by_one_refraction_by_one_lobe_and_by_very_many_paths() {
     assert!(means.iter().all(|mean| (mean / means[0] - 1.0).abs() < 0.3), "{means:?}");
 }
 
-/// What all images share.
+/// The inputs that all images share.
 struct Frame<'a> {
     render_scene: &'a RenderScene,
     backdrop: &'a Backdrop,
