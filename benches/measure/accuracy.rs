@@ -51,7 +51,7 @@ pub fn accuracy(presets: Option<&str>, print: &mut dyn FnMut(String)) -> Result<
                     let as_eval = ReferenceSettings {
                         facets: preset.reference_facets,
                         max_passes: preset.reference_passes,
-                        target: 2e-3,
+                        target: preset.reference_target,
                         seed: preset.seed,
                     };
                     (reference(&pipeline, &scene, &pairs, &as_eval).0, "reference".to_owned())

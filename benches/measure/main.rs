@@ -16,6 +16,8 @@ mod factored;
 mod hard_tiles;
 mod in_tests;
 mod interpolation;
+mod interreflection;
+mod rays;
 mod shading_tables;
 mod slabs;
 mod table;
@@ -72,6 +74,11 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
         Source::Test(InTests { binary: &["--test", "hard_cases"], test: "the_table_of_all_cases_and_evaluators" }),
     ),
     ("interpolation", "errors of low-rank factors by interpolation alone", Source::Here(interpolation)),
+    (
+        "interreflection",
+        "error and time of interreflection against path tracing: minutes",
+        Source::Here(interreflection),
+    ),
     ("latency", "time from an edit in the editor to its images", in_lib("latency_from_a_slider")),
     (
         "latency-stops",
@@ -81,6 +88,7 @@ const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("lobes", "nanoseconds per facet of each analytic lobe", in_lib("nanoseconds_per_facet")),
     ("map-resolution", "error and time of shadow maps against resolution", in_lib("resolution_against_error")),
     ("map-speed", "speed of shadow maps on the CPU and on the GPU", in_lib("speed_of_the_cpu_and_of_the_gpu")),
+    ("rays", "millions of rays per second on five tiles (and writes them to a FOLDER)", Source::Here(rays)),
     (
         "seen-through",
         "errors of images seen through slabs against 4096 paths: a minute",
@@ -134,9 +142,22 @@ fn few_facets(_: Option<&str>, table: &mut Table) -> Result<(), String> {
     clustered_sums::few_facets(&mut |line| table.line(line))
 }
 
+fn interreflection(part: Option<&str>, table: &mut Table) -> Result<(), String> {
+    match part {
+        // The page holds all cases.
+        Some(_) => interreflection::interreflection(part, &mut |line| println!("{line}")),
+        None => interreflection::interreflection(None, &mut |line| table.line(line)),
+    }
+}
+
 fn interpolation(_: Option<&str>, table: &mut Table) -> Result<(), String> {
     interpolation::interpolation(&mut |line| table.line(line));
     Ok(())
+}
+
+/// The page holds the figures of either form.
+fn rays(folder: Option<&str>, table: &mut Table) -> Result<(), String> {
+    rays::rays(folder, &mut |line| table.line(line))
 }
 
 fn capture(_: Option<&str>, table: &mut Table) -> Result<(), String> {

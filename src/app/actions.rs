@@ -11,6 +11,7 @@ pub enum Action {
     Open,
     OpenFile(PathBuf),
     OpenShipped(String),
+    OpenCapture,
     Reload,
     Save,
     SaveAs,
@@ -67,6 +68,7 @@ const fn plain(key: Key) -> Option<KeyboardShortcut> {
 pub const ENTRIES: &[ActionEntry] = &[
     entry(Action::New, "New", command(Key::N)),
     entry(Action::Open, "Open…", command(Key::O)),
+    entry(Action::OpenCapture, "Open a capture folder…", None),
     entry(Action::Reload, "Reload from disk", None),
     entry(Action::Save, "Save", command(Key::S)),
     entry(Action::SaveAs, "Save as…", shifted(Key::S)),

@@ -13,10 +13,11 @@ use super::editor::Editor;
 use super::layout::{OBJECT_PART, is_narrow};
 use super::messages::Level;
 use super::worker::{
-    AccuracyJob, AccuracyResult, ColorMapJob, ColorMapResult, ExportJob, ExportResult, GpuShare, Grade, ImageJob,
-    ImageResult, LobeJob, LobePlot, MethodsJob, MethodsResult, PreviewWorkers, RenderedPreview, SceneThumbnail,
-    SlabLobeJob, SlabLobeResult, ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy, spawn_autosave,
-    spawn_color_map, spawn_export, spawn_lobe, spawn_methods, spawn_slab_lobe, spawn_thumbnail, spawn_tile,
+    AccuracyJob, AccuracyResult, CaptureJob, CaptureResult, ColorMapJob, ColorMapResult, ExportJob, ExportResult,
+    GpuShare, ImageJob, ImageResult, LobeJob, LobePlot, MethodsJob, MethodsResult, PreviewWorkers, SceneThumbnail,
+    SlabLobeJob, SlabLobeResult, TargetJob, TargetResult, ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy,
+    spawn_autosave, spawn_capture, spawn_color_map, spawn_export, spawn_lobe, spawn_methods, spawn_slab_lobe,
+    spawn_target, spawn_thumbnail, spawn_tile,
 };
 
 /// Height of menu, toolbar and status line [points].
@@ -32,6 +33,8 @@ enum JobResult {
     Thumbnail(SceneThumbnail),
     Export(ExportResult),
     Accuracy(AccuracyResult),
+    Target(TargetResult),
+    Capture(CaptureResult),
     ColorMap(ColorMapResult),
     SlabLobe(SlabLobeResult),
     Methods(MethodsResult),
@@ -43,18 +46,20 @@ pub struct BackgroundJobs {
     pub images: Option<PreviewWorkers>,
     tiles: Option<Worker<TileJob>>,
     lobes: Option<Worker<LobeJob>>,
-    thumbnails: Option<Worker<ThumbnailJob>>,
+    pub(super) thumbnails: Option<Worker<ThumbnailJob>>,
     pub exports: Option<Worker<ExportJob>>,
-    accuracy: Option<Worker<AccuracyJob>>,
+    pub(super) accuracy: Option<Worker<AccuracyJob>>,
+    pub(super) targets: Option<Worker<TargetJob>>,
+    pub(super) captures: Option<Worker<CaptureJob>>,
     color_map: Option<Worker<ColorMapJob>>,
     slab_lobes: Option<Worker<SlabLobeJob>>,
-    methods: Option<Worker<MethodsJob>>,
+    pub(super) methods: Option<Worker<MethodsJob>>,
     autosaver: Option<Worker<Snapshot>>,
     /// The last version in the recovery file, and the earliest time of the next one.
     autosaved: (u64, f64),
     results: Receiver<JobResult>,
     /// A version of the document in the form that workers read.
-    loaded: Option<(u64, Arc<LoadedScene>)>,
+    pub(super) loaded: Option<(u64, Arc<LoadedScene>)>,
     /// The first image is shown, or cannot be computed; from then on, other jobs are submitted.
     opened: bool,
     /// A job whose refinement is not submitted yet.
@@ -73,7 +78,10 @@ impl BackgroundJobs {
         let (to_tile, to_lobe, to_gallery, to_export, to_save) =
             (send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
         let (to_chart, to_map, to_slab, to_methods) = (send.clone(), send.clone(), send.clone(), send.clone());
+        let (to_target, to_capture) = (send.clone(), send.clone());
         let accuracy = spawn_accuracy(move |result| to_chart(JobResult::Accuracy(result)));
+        let targets = spawn_target(move |result| to_target(JobResult::Target(result)));
+        let captures = spawn_capture(move |result| to_capture(JobResult::Capture(result)));
         let color_map = spawn_color_map(move |result| to_map(JobResult::ColorMap(result)));
         let slab_lobes = spawn_slab_lobe(move |result| to_slab(JobResult::SlabLobe(result)));
         let methods = spawn_methods(move |result| to_methods(JobResult::Methods(result)));
@@ -90,6 +98,8 @@ impl BackgroundJobs {
             thumbnails,
             exports,
             accuracy,
+            targets,
+            captures,
             color_map,
             slab_lobes,
             methods,
@@ -111,6 +121,8 @@ impl BackgroundJobs {
         self.thumbnails.into_iter().for_each(|worker| worker.finish(longest));
         self.exports.into_iter().for_each(|worker| worker.finish(longest));
         self.accuracy.into_iter().for_each(|worker| worker.finish(longest));
+        self.targets.into_iter().for_each(|worker| worker.finish(longest));
+        self.captures.into_iter().for_each(|worker| worker.finish(longest));
         self.color_map.into_iter().for_each(|worker| worker.finish(longest));
         self.slab_lobes.into_iter().for_each(|worker| worker.finish(longest));
         self.methods.into_iter().for_each(|worker| worker.finish(longest));
@@ -118,59 +130,6 @@ impl BackgroundJobs {
 }
 
 impl Editor {
-    /// Submits thumbnails while no other job waits.
-    pub(super) fn fill_gallery(&mut self) {
-        let is_refined =
-            |preview: &RenderedPreview| preview.grade >= Grade::Refining && preview.version == self.document.version();
-        let idle = self.object.preview.as_deref().is_some_and(is_refined) && self.exporting.is_none();
-        let Some(worker) = &self.background.thumbnails else { return };
-        if idle && self.settings.gallery {
-            if let Some(job) = self.gallery.job() {
-                worker.submit(job);
-            }
-        } else if self.gallery.is_waiting() {
-            worker.cancel();
-            self.gallery.interrupted();
-        }
-    }
-
-    /// Submits a measurement of accuracy if the panel is open: of the first points at once, of all when the image is final.
-    pub(super) fn measure_accuracy(&mut self) {
-        let version = self.document.version();
-        let Some(worker) = &self.background.accuracy else { return };
-        if self.accuracy.is_late(version) {
-            worker.cancel();
-        }
-        let is_shown = self.object.preview.is_some() && self.exporting.is_none();
-        let is_final = self.shows_final_image();
-        if let (true, Some((_, loaded))) = (is_shown, &self.background.loaded)
-            && let Some(job) = self.accuracy.job(version, loaded, is_final)
-        {
-            worker.submit(job);
-        }
-    }
-
-    fn shows_final_image(&self) -> bool {
-        let version = self.document.version();
-        let preview = self.object.preview.as_deref();
-        preview.is_some_and(|preview| preview.grade == Grade::Final && preview.version == version)
-    }
-
-    /// Submits the images of the scene's methods once its own image is final, and cancels those that are late.
-    pub(super) fn compare_methods(&mut self) {
-        let version = self.document.version();
-        let Some(worker) = &self.background.methods else { return };
-        if self.methods.is_late(version) {
-            worker.cancel();
-        }
-        let is_final = self.shows_final_image() && self.exporting.is_none();
-        if let Some((_, loaded)) = &self.background.loaded
-            && let Some(job) = self.methods.job(version, loaded, self.size, is_final)
-        {
-            worker.submit(job);
-        }
-    }
-
     /// Submits unsaved work for the recovery file, some seconds after the edit.
     pub(super) fn update_recovery(&mut self, ctx: &Context) {
         let Some(recovery) = &self.recovery else { return };
@@ -310,6 +269,8 @@ impl Editor {
                 JobResult::Lobe(plot) => self.lobe.receive(ctx, plot),
                 JobResult::Thumbnail(thumbnail) => self.gallery.receive(ctx, thumbnail),
                 JobResult::Accuracy(result) => self.accuracy.receive(ctx, result),
+                JobResult::Target(result) => self.targets.receive(result),
+                JobResult::Capture(result) => self.capture.receive(ctx, result),
                 JobResult::ColorMap(result) => self.color_map.receive(result),
                 JobResult::SlabLobe(result) => self.slab_lobe.receive(ctx, result),
                 JobResult::Methods(result) => self.methods.receive(ctx, result),
@@ -360,7 +321,7 @@ impl Editor {
             self.gpu_error = Some(why.to_owned());
             let text = format!(
                 "The GPU failed ({why}). Your document is kept, and the CPU renders the images. To try the GPU again, \
-                 set Quality, Backend to Cpu and back to Auto."
+                 set Quality, Backend to CPU and back to Auto."
             );
             self.messages.put(Level::Error, "gpu", text);
         }
@@ -370,7 +331,8 @@ impl Editor {
     #[cfg(test)]
     pub fn is_busy(&self) -> bool {
         self.object.preview.as_ref().is_none_or(|preview| {
-            preview.grade != Grade::Final || Some(preview.version) != self.object.requested.map(|(version, _)| version)
+            preview.grade != super::worker::Grade::Final
+                || Some(preview.version) != self.object.requested.map(|(version, _)| version)
         })
     }
 }

@@ -14,6 +14,7 @@ use super::messages::{Level, Messages};
 use super::paint::Stroke;
 use super::panels::{self, materials};
 use super::theme;
+use super::views::capture::CaptureState;
 use super::views::gallery::Gallery;
 use super::views::lobe::LobeState;
 use super::views::methods::MethodsState;
@@ -45,8 +46,12 @@ pub struct Editor {
     pub slab_lobe: SlabLobeState,
     pub methods: MethodsState,
     pub accuracy: panels::AccuracyState,
+    pub targets: panels::TargetState,
+    pub capture: CaptureState,
     /// The sections that the parameters show.
     pub tab: panels::Tab,
+    /// Title of a section of the parameters that unfolds and comes into view.
+    pub(super) reveal: Option<&'static str>,
     pub color_map: panels::ColorMapState,
     /// The document was opened in this frame.
     pub(super) is_new: bool,
@@ -75,6 +80,8 @@ pub struct Editor {
     pub(super) window_width: f32,
     /// The gallery lies over the object in a narrow window.
     pub(super) drawer: bool,
+    /// True once a message names the effects that the scene leaves out.
+    pub(super) noted_left_out: bool,
     /// The GPU failure that was reported last.
     pub(super) gpu_error: Option<String>,
 }
@@ -111,7 +118,10 @@ impl Editor {
             slab_lobe: SlabLobeState::default(),
             methods: MethodsState::default(),
             accuracy: panels::AccuracyState::default(),
+            targets: panels::TargetState::default(),
+            capture: CaptureState::default(),
             tab: panels::Tab::default(),
+            reveal: None,
             color_map: panels::ColorMapState::default(),
             is_new: false,
             exchanged: false,
@@ -125,6 +135,7 @@ impl Editor {
             copied: None,
             window_width: 0.0,
             drawer: false,
+            noted_left_out: false,
             gpu_error: None,
             size: [64, 64],
             pointer: Vec::new(),
@@ -145,6 +156,8 @@ impl Editor {
         self.methods.move_to();
         self.gallery = Gallery::default();
         self.accuracy = panels::AccuracyState::default();
+        self.targets = panels::TargetState::default();
+        self.capture = CaptureState::default();
         self.color_map = panels::ColorMapState::default();
         self.exporting = None;
         self.title.clear();
@@ -209,11 +222,14 @@ impl Editor {
             self.object.preview.as_ref().map(|preview| TileScale { framing: preview.distance, height });
         let requests = self.parameters_ui(ui, &mut scene, window);
         let large = self.views_ui(ui, &mut scene, window);
-        if self.messages.ui(&ctx, large) == Some(WELCOME) {
+        let reply = self.messages.ui(&ctx, large);
+        if reply.is_some_and(|reply| reply.source == WELCOME) {
             self.settings.welcomed = true;
             self.settings.save(self.folder.as_deref());
         }
         self.apply_edit(scene);
+        reply.iter().for_each(|reply| self.answer_left_out(reply));
+        self.note_left_out();
         self.apply_requests(&ctx, requests);
         if let Some(action) = self.from_view.take() {
             self.execute(&ctx, action);
@@ -224,6 +240,8 @@ impl Editor {
         for action in action.into_iter().chain(from_menu).chain(from_gallery) {
             self.execute(&ctx, action);
         }
+        self.capture.ui(&ctx);
+        self.read_capture();
         self.dialogs(&ctx);
         if !ctx.input(|input| input.pointer.any_down()) && !ctx.text_edit_focused() {
             self.document.rest();
@@ -231,6 +249,7 @@ impl Editor {
         self.submit_jobs(&ctx);
         self.update_recovery(&ctx);
         self.fill_gallery();
+        self.search_for_targets();
         self.measure_accuracy();
         self.compare_methods();
     }

@@ -33,6 +33,7 @@ impl Editor {
         match action {
             Action::New => self.open("default"),
             Action::Open => self.browse(Purpose::OpenScene, ""),
+            Action::OpenCapture => self.browse(Purpose::Capture, ""),
             Action::OpenFile(path) => self.open(&path.to_string_lossy()),
             Action::OpenShipped(name) => self.open(&name),
             Action::Reload => {
@@ -157,7 +158,11 @@ impl Editor {
         // Version numbers continue, so that an image of the old document never matches the new one.
         self.document.start_at(version);
         self.accuracy.forget();
+        self.targets.forget();
         self.object.refined_effects = None;
+        self.noted_left_out = false;
+        self.messages.clear("left out");
+        self.object.warnings.clear();
         self.is_new = true;
         self.scene_changed();
     }

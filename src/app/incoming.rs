@@ -6,10 +6,11 @@ use std::sync::Arc;
 use crate::base::Result;
 use crate::export::tile::TileOptions;
 use crate::scene::{BrdfSpec, Geometry};
+use crate::slab::capture::rig;
 use eframe::egui::Context;
 
 use super::actions::Action;
-use super::dialogs::{Dialog, Purpose};
+use super::dialogs::{Dialog, FileUse, Offer, Purpose};
 use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
@@ -56,8 +57,18 @@ impl Editor {
         let mut scene = (**self.document.scene()).clone();
         let relative = self.relative_path(&path);
         match purpose {
-            Purpose::OpenScene => return self.execute_now(ctx, Action::OpenFile(path)),
+            Purpose::OpenScene => match Offer::of(&path) {
+                Some(offer) => {
+                    self.dialog = Some(Dialog::Offer(offer));
+                    return;
+                }
+                None => return self.execute_now(ctx, Action::OpenFile(path)),
+            },
             Purpose::SaveScene => return self.save(&path),
+            Purpose::Capture => {
+                self.capture.open(path.parent().map(Path::to_owned).unwrap_or_default());
+                return;
+            }
             Purpose::Measured { material, term } => match materials::measured(&relative) {
                 Some(measured) => {
                     let name = scene.materials.get(material).map(|material| material.name.clone());
@@ -152,10 +163,26 @@ impl Editor {
         self.messages.put(Level::Error, "open", text);
     }
 
+    /// Uses a file in the open scene.
+    pub(super) fn use_as(&mut self, ctx: &Context, path: &Path, used: FileUse) {
+        let purpose = match used {
+            FileUse::Material => return self.dropped(ctx, path.to_owned()),
+            FileUse::Tile => Purpose::TileMesh,
+            FileUse::Object => Purpose::ObjectMesh,
+            FileUse::Environment => Purpose::Environment,
+            FileUse::Heights => Purpose::Paint(PaintLayer::Heights),
+            FileUse::Colors => Purpose::Paint(PaintLayer::Colors),
+        };
+        self.use_file(ctx, purpose, path.to_owned());
+    }
+
     /// Uses a file that was dropped on the window, depending on its extension.
     pub(super) fn dropped(&mut self, ctx: &Context, path: PathBuf) {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
         match ending.as_str() {
+            "toml" if path.file_name().is_some_and(|name| name == rig::FILE) => {
+                self.use_file(ctx, Purpose::Capture, path)
+            }
             "toml" => self.execute(ctx, Action::OpenFile(path)),
             "binary" | "bsdf" | "bin" | "npz" => {
                 let mut scene = (**self.document.scene()).clone();

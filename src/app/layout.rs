@@ -9,10 +9,10 @@ use super::actions::Action;
 use super::editor::Editor;
 use super::panels::{self, PanelRequests};
 use super::pick;
-use super::views::brushes;
 use super::views::methods::MethodsState;
 use super::views::slab_lobe;
 use super::views::tile::{self, TileMode};
+use super::views::{brushes, difference, section};
 
 /// Windows narrower than this have the tile under the object, and the gallery over it [points].
 const NARROW: f32 = 1300.0;
@@ -109,12 +109,26 @@ impl Editor {
         let shown = panel.size_range(PARAMETERS[0]..=widest).show(ui, |ui| {
             let painted = self.document.painted().clone();
             let scroll = ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                let effects = self.object.preview.as_ref().map_or(&[][..], |preview| &preview.effects);
+                let (effects, stages) = (self.object.effects(), &self.object.stages[..]);
                 let version = self.document.version();
-                let (accuracy, color_map) = (&mut self.accuracy, &mut self.color_map);
+                let file = self.document.path.as_ref().map(|path| path.to_string_lossy().into_owned());
+                let file = file.as_deref().unwrap_or(&self.document.name);
+                let (accuracy, targets, color_map) = (&mut self.accuracy, &mut self.targets, &mut self.color_map);
                 let is_new = std::mem::take(&mut self.is_new);
                 let tab = &mut self.tab;
-                let shown = panels::PanelInputs { tab, accuracy, color_map, effects, version, is_new };
+                let reveal = &mut self.reveal;
+                let shown = panels::PanelInputs {
+                    tab,
+                    accuracy,
+                    targets,
+                    color_map,
+                    effects,
+                    stages,
+                    version,
+                    file,
+                    reveal,
+                    is_new,
+                };
                 panels::ui(ui, scene, &painted, &self.document.name, &self.slots, shown)
             });
             scroll.inner
@@ -177,7 +191,13 @@ impl Editor {
         });
         let version = self.document.version();
         let methods = Some(&mut self.methods).filter(|methods| methods.on && MethodsState::applies_to(scene));
+        let area = ui.available_rect_before_wrap();
         self.size = self.object.ui(ui, scene, methods.map(|methods| (methods, version)));
+        if self.accuracy.large
+            && let Some(shown) = self.accuracy.shown_difference(version)
+        {
+            self.accuracy.large = difference::ui(ui, area, &shown.texture, &shown.caption);
+        }
         self.pick();
     }
 
@@ -214,7 +234,7 @@ impl Editor {
             let size = tile::size_above(ui, 330.0);
             ui.allocate_ui(size, |ui| self.object_ui(ui, scene));
         } else {
-            let around = if scene.slab.is_some() { slab_lobe::AROUND } else { 90.0 };
+            let around = if scene.slab.is_some() { slab_lobe::AROUND } else { 90.0 + section::AROUND };
             let below = if self.tile.painting { 300.0 } else { 0.5 * ui.available_width() + around };
             self.tile_ui(ui, scene, below);
         }
@@ -231,6 +251,9 @@ impl Editor {
         } else if scene.slab.is_some() {
             self.slab_lobe.ui(ui, &mut self.lobe.light, &mut self.lobe.log);
         } else {
+            let shown = self.tile.rendered.as_ref().map(|rendered| &*rendered.section);
+            section::ui(ui, shown, &scene.tile.unit);
+            ui.add_space(4.0);
             self.lobe.ui(ui);
         }
     }

@@ -62,6 +62,7 @@ impl Editor {
                 }
             });
         });
+        items(ui, &[Action::OpenCapture], chosen);
         ui.add_enabled_ui(self.document.path.is_some(), |ui| items(ui, &[Action::Reload], chosen));
         ui.separator();
         items(ui, &[Action::Save, Action::SaveAs], chosen);

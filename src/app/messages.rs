@@ -11,7 +11,7 @@ use super::theme;
 pub enum Level {
     /// Disappears after the time that reading it takes.
     Note,
-    /// First steps; stays until the user closes it.
+    /// First steps and offers; stays until the user closes or answers it.
     Guide,
     /// Stays until the user closes it or its cause is gone.
     Error,
@@ -23,6 +23,8 @@ struct Message {
     /// A new message of the same source replaces this one, and a success of the source removes it.
     source: &'static str,
     text: String,
+    /// Buttons that answer the message.
+    buttons: &'static [&'static str],
     /// Time at which a note disappears [s, interface clock]; absent until the note is visible.
     until: Option<f64>,
 }
@@ -34,11 +36,17 @@ impl Message {
     }
 }
 
-/// Maximum number of visible messages; a button shows the others.
-const MAX_VISIBLE: usize = 3;
 /// Time that a note stays after the pointer has left it [s].
 const AFTER_HOVER: f64 = 3.0;
 const MARGIN: f32 = 8.0;
+
+/// The answer of the user to a message, which is closed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reply {
+    pub source: &'static str,
+    /// Index of the button; `None` if the user closed the message.
+    pub button: Option<usize>,
+}
 
 /// The messages of the editor.
 #[derive(Debug, Default)]
@@ -50,21 +58,34 @@ pub struct Messages {
 
 impl Messages {
     pub fn put(&mut self, level: Level, source: &'static str, text: impl Into<String>) {
+        self.put_with(level, source, text, &[]);
+    }
+
+    /// Puts a message with buttons.
+    pub fn put_with(
+        &mut self,
+        level: Level,
+        source: &'static str,
+        text: impl Into<String>,
+        buttons: &'static [&'static str],
+    ) {
         self.clear(source);
-        self.list.push(Message { level, source, text: text.into(), until: None });
+        self.list.push(Message { level, source, text: text.into(), buttons, until: None });
     }
 
     pub fn clear(&mut self, source: &str) {
         self.list.retain(|message| message.source != source);
     }
 
+    /// Texts of all messages but the offer to add what a scene leaves out, which is no complaint.
     #[cfg(test)]
     pub fn texts(&self) -> Vec<&str> {
-        self.list.iter().map(|message| message.text.as_str()).collect()
+        let complaints = self.list.iter().filter(|message| message.source != super::left_out::SOURCE);
+        complaints.map(|message| message.text.as_str()).collect()
     }
 
-    /// Shows the messages over the bottom of `over`. Returns the source of a message that the user closed.
-    pub fn ui(&mut self, ctx: &Context, over: Rect) -> Option<&'static str> {
+    /// Shows the messages over the bottom of `over`. Returns the answer of the user.
+    pub fn ui(&mut self, ctx: &Context, over: Rect) -> Option<Reply> {
         let now = ctx.time();
         self.list.retain(|message| message.until.is_none_or(|until| now < until));
         let (visible, hidden) = self.visible();
@@ -90,19 +111,20 @@ impl Messages {
             let height = (over.height() - 2.0 * MARGIN - 30.0).max(30.0);
             ScrollArea::vertical().max_height(height).show(ui, |ui| closed = self.lines_ui(ui, visible, now));
         });
-        let closed = closed.map(|at| self.list.remove(at))?;
+        let (at, button) = closed?;
+        let closed = self.list.remove(at);
         self.list.retain(|message| message.text != closed.text);
-        Some(closed.source)
+        Some(Reply { source: closed.source, button })
     }
 
-    /// Draws the lines of messages. Returns the index of the one that the user closed.
-    fn lines_ui(&mut self, ui: &mut Ui, visible: Vec<usize>, now: f64) -> Option<usize> {
+    /// Draws the lines of messages. Returns the index of the one that the user closed, and that of its button.
+    fn lines_ui(&mut self, ui: &mut Ui, visible: Vec<usize>, now: f64) -> Option<(usize, Option<usize>)> {
         let mut closed = None;
         for at in visible {
             let message = &mut self.list[at];
-            let (shown, close) = line(ui, message);
-            if close {
-                closed = Some(at);
+            let (shown, answer) = line(ui, message);
+            if let Some(button) = answer {
+                closed = Some((at, button));
             }
             if message.level == Level::Note {
                 let full = now + message.seconds();
@@ -116,25 +138,29 @@ impl Messages {
         closed
     }
 
-    /// Indices of the visible messages, in the order of arrival, and the number of hidden ones. Errors and the newest
-    /// messages have priority.
+    /// Indices of the visible messages, in the order of arrival, and the number of hidden ones. One message is visible: the
+    /// newest error, else the newest note, else the newest of the first steps and offers. A button shows the others.
     fn visible(&self) -> (Vec<usize>, usize) {
         let is_first = |at: &usize| !self.list[..*at].iter().any(|before| before.text == self.list[*at].text);
         // Two workers may report the same error.
         let mut order: Vec<usize> = (0..self.list.len()).filter(is_first).collect();
         let all = order.len();
-        if !self.unfolded && all > MAX_VISIBLE {
-            order.sort_by_key(|&at| (self.list[at].level != Level::Error, std::cmp::Reverse(at)));
-            order.truncate(MAX_VISIBLE);
-            order.sort_unstable();
+        if !self.unfolded {
+            let rank = |level| match level {
+                Level::Error => 0,
+                Level::Note => 1,
+                Level::Guide => 2,
+            };
+            order.sort_by_key(|&at| (rank(self.list[at].level), std::cmp::Reverse(at)));
+            order.truncate(1);
         }
         let hidden = all - order.len();
         (order, hidden)
     }
 }
 
-/// Shows one message; returns true if the user closed it.
-fn line(ui: &mut Ui, message: &Message) -> (Response, bool) {
+/// Shows one message. Returns the button by which the user closed it; `None` inside stands for the cross.
+fn line(ui: &mut Ui, message: &Message) -> (Response, Option<Option<usize>>) {
     let color = match message.level {
         Level::Note | Level::Guide => theme::ACCENT,
         Level::Error => theme::warning(ui.visuals()),
@@ -150,10 +176,16 @@ fn line(ui: &mut Ui, message: &Message) -> (Response, bool) {
             let right = egui::Layout::right_to_left(egui::Align::Center);
             let inner = ui.with_layout(right, |ui| {
                 let close = ui.add(egui::Button::new("×").fill(Color32::TRANSPARENT)).on_hover_text("Close");
+                let mut answer = close.clicked().then_some(None);
+                for (at, name) in message.buttons.iter().enumerate().rev() {
+                    if ui.button(*name).clicked() {
+                        answer = Some(Some(at));
+                    }
+                }
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                     ui.add(egui::Label::new(message.text.as_str()).wrap());
                 });
-                close.clicked()
+                answer
             });
             inner.inner
         });

@@ -14,22 +14,41 @@ fn harness() -> Harness<'static, Messages> {
     )
 }
 
+fn repaint_delay(harness: &Harness<'_, Messages>) -> f64 {
+    harness.output().viewport_output[&ViewportId::ROOT].repaint_delay.as_secs_f64()
+}
+
 #[test]
-fn notes_disappear_after_their_reading_time_and_errors_and_first_steps_stay() {
+fn notes_disappear_after_their_reading_time_and_first_steps_stay() {
     let mut harness = harness();
     harness.state_mut().put(Level::Note, "a", "Wrote a file.");
-    harness.state_mut().put(Level::Error, "b", "Not saved.");
     harness.state_mut().put(Level::Guide, "c", "First steps.");
     harness.run_steps(4);
-    assert_eq!(harness.state().texts().len(), 3);
+    assert_eq!(harness.state().texts().len(), 2);
     // No frame is painted until the note disappears.
-    let delay = harness.output().viewport_output[&ViewportId::ROOT].repaint_delay.as_secs_f64();
+    let delay = repaint_delay(&harness);
     assert!((1.0..10.0).contains(&delay), "{delay}");
     // Each step takes a quarter of a second.
     harness.run_steps(40);
-    assert_eq!(harness.state().texts(), ["Not saved.", "First steps."]);
-    let delay = harness.output().viewport_output[&ViewportId::ROOT].repaint_delay.as_secs_f64();
+    assert_eq!(harness.state().texts(), ["First steps."]);
+    let delay = repaint_delay(&harness);
     assert!(delay > 1e6, "without changes no frame is painted: {delay}");
+}
+
+#[test]
+fn the_reading_time_of_a_note_behind_an_error_begins_once_the_error_is_gone() {
+    let mut harness = harness();
+    harness.state_mut().put(Level::Error, "b", "Not saved.");
+    harness.state_mut().put(Level::Note, "a", "Wrote a file.");
+    harness.run_steps(40);
+    assert_eq!(harness.state().texts(), ["Not saved.", "Wrote a file."]);
+    let delay = repaint_delay(&harness);
+    assert!(delay > 1e6, "nothing disappears while the error stays: {delay}");
+    harness.state_mut().clear("b");
+    harness.run_steps(4);
+    assert_eq!(harness.state().texts(), ["Wrote a file."]);
+    harness.run_steps(40);
+    assert!(harness.state().texts().is_empty());
 }
 
 #[test]
@@ -46,7 +65,7 @@ fn a_note_under_the_pointer_stays() {
 }
 
 #[test]
-fn many_messages_are_few_lines_with_the_errors_first_and_the_rest_behind_a_button() {
+fn one_message_is_visible_errors_first_and_a_button_shows_the_others() {
     let mut harness = harness();
     for (source, text) in [("a", "one"), ("b", "two"), ("c", "three"), ("d", "four"), ("e", "one")] {
         let level = if source == "a" { Level::Error } else { Level::Note };
@@ -56,11 +75,11 @@ fn many_messages_are_few_lines_with_the_errors_first_and_the_rest_behind_a_butto
     let visible = |harness: &Harness<'_, Messages>| {
         ["one", "two", "three", "four"].map(|text| harness.query_all_by_label(text).count())
     };
-    assert_eq!(visible(&harness), [1, 0, 1, 1]);
-    harness.get_by_label("1 more").click();
+    assert_eq!(visible(&harness), [1, 0, 0, 0]);
+    harness.get_by_label("3 more").click();
     harness.run_steps(3);
     assert_eq!(visible(&harness), [1, 1, 1, 1]);
     harness.get_by_label("Show fewer messages").click();
     harness.run_steps(3);
-    assert_eq!(visible(&harness), [1, 0, 1, 1]);
+    assert_eq!(visible(&harness), [1, 0, 0, 0]);
 }

@@ -13,6 +13,8 @@ mod editor;
 mod execute;
 mod incoming;
 mod layout;
+mod left_out;
+mod measurements;
 mod menu;
 mod messages;
 mod paint;
@@ -22,6 +24,7 @@ mod pick;
 mod results;
 mod start_times;
 mod status;
+mod status_state;
 #[cfg(test)]
 mod tests;
 mod theme;

@@ -6,7 +6,7 @@ use eframe::egui::Context;
 
 use super::actions::Action;
 use super::dialogs::export::{self, ExportDecision};
-use super::dialogs::{self, Dialog};
+use super::dialogs::{self, Dialog, Offer};
 use super::document::RecoveredDocument;
 use super::editor::Editor;
 use super::messages::Level;
@@ -16,6 +16,7 @@ impl Editor {
     /// Shows the open dialog and closes it when it has a result.
     pub(super) fn dialogs(&mut self, ctx: &Context) {
         let Some(mut dialog) = self.dialog.take() else { return };
+        let left_out = self.left_out_line();
         let is_closed = match &mut dialog {
             Dialog::Files(files) => match files.ui(ctx) {
                 Some(path) => {
@@ -27,12 +28,13 @@ impl Editor {
                 None => false,
             },
             Dialog::Unsaved(action) => self.unsaved(ctx, action),
+            Dialog::Offer(offer) => self.offered(ctx, offer),
             Dialog::Help => !dialogs::help_ui(ctx),
             Dialog::About => about(ctx),
             Dialog::Recover(found) => self.recover(ctx, found),
             Dialog::ChangedOnDisk { saving } => self.changed_on_disk(ctx, *saving),
             Dialog::Table { path, choice } => {
-                let result = export::table_ui(ctx, path, choice);
+                let result = export::table_ui(ctx, path, choice, left_out.as_deref());
                 self.exported(result, path, ExportKind::Table(*choice))
             }
             Dialog::Fit { path } => {
@@ -68,6 +70,17 @@ impl Editor {
             }
             1 => self.execute_now(ctx, action.clone()),
             _ => {}
+        }
+        true
+    }
+
+    fn offered(&mut self, ctx: &Context, offer: &Offer) -> bool {
+        let name = offer.path.file_name().unwrap_or_default().to_string_lossy();
+        let text = format!("{name} is {}. The open scene can use it.", offer.kind);
+        let answers: Vec<&str> = offer.uses.iter().map(|(button, _)| *button).chain(["Cancel"]).collect();
+        let Some(chosen) = dialogs::question(ctx, "Not a scene", &text, &answers) else { return false };
+        if let Some((_, used)) = offer.uses.get(chosen) {
+            self.use_as(ctx, &offer.path, *used);
         }
         true
     }

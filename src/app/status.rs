@@ -1,30 +1,35 @@
 //! The strip at the foot: state and cost of the image, settings that are faster or finer, and what is left out.
 //!
-//! A narrow window drops fields by their rank, but never the state and never what is left out.
+//! A narrow window drops fields by their rank, but never the state and never what is left out. The state and the settings
+//! have places of fixed width, so that nothing moves while results arrive.
 
 use eframe::egui::{self, Button, FontId, Label, RichText, TextStyle, Ui, vec2};
 
 use super::editor::Editor;
 use super::panels::accuracy;
-use super::panels::effects::caption;
-use super::panels::fields::display_name;
+use super::panels::place_of_remedy;
+use super::status_state::time;
 use super::theme;
-use super::views::spinner::spinner;
-use super::worker::{AccuracyPoint, Grade, RenderedPreview};
-use crate::effective::ErrorEstimate;
-use crate::plan::{Effect, LeftOut, switch_mut};
-use crate::scene::Switch;
+use super::worker::{AccuracyPoint, RenderedPreview};
+use crate::plan::Effect;
 
 /// Width of a separator with its spacing, of the padding of a button, and of the dot before the state [points].
 const SEPARATOR: f32 = 20.0;
 const PADDING: f32 = 14.0;
 const DOT: f32 = 20.0;
+/// Widths of the places of the state, and of faster or finer settings [points].
+const STATE: f32 = 310.0;
+const SETTINGS: f32 = 158.0;
+/// Width of a menu of texts [points].
+const MENU: f32 = 400.0;
 
 /// A field behind the state.
 struct Field {
     text: String,
     /// Fields of a higher rank are dropped first; rank 0 is never dropped.
     rank: u8,
+    /// Width of its place [points], if that does not follow the text.
+    fixed: Option<f32>,
     kind: FieldKind,
 }
 
@@ -32,6 +37,8 @@ enum FieldKind {
     /// Settings that a click takes.
     Take(AccuracyPoint),
     Measure,
+    /// A text that says why there are no such settings.
+    Text,
     LeftOut,
     Warnings,
     Notes,
@@ -39,14 +46,6 @@ enum FieldKind {
 }
 
 impl Editor {
-    fn stop_refining(&mut self) {
-        if let Some(images) = &self.background.images {
-            images.stop();
-        }
-        self.object.activity = None;
-        self.object.stopped = Some(self.document.version());
-    }
-
     pub(super) fn status_ui(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             let Some(preview) = self.object.preview.clone() else {
@@ -59,11 +58,19 @@ impl Editor {
             };
             let fields = self.fields(&preview);
             let reserved: f32 = fields.iter().filter(|field| field.rank == 0).map(|field| field.width(ui)).sum();
-            self.state_ui(ui, &preview, reserved);
+            let state = vec2(STATE.min(ui.available_width() - reserved).max(60.0), ui.spacing().interact_size.y);
+            self.place(ui, state, |editor, ui| editor.state_ui(ui, &preview));
             self.export_ui(ui);
             for field in that_fit(fields, ui) {
-                ui.separator();
-                self.field_ui(ui, &field, &preview);
+                // A place without a text is no field.
+                ui.add_visible(!field.text.is_empty(), egui::Separator::default());
+                match field.fixed {
+                    Some(width) => {
+                        let size = vec2(width, ui.spacing().interact_size.y);
+                        self.place(ui, size, |editor, ui| editor.field_ui(ui, &field, &preview));
+                    }
+                    None => self.field_ui(ui, &field, &preview),
+                }
             }
             if ui.available_width() > 3.0 * SEPARATOR {
                 ui.separator();
@@ -75,87 +82,38 @@ impl Editor {
         });
     }
 
-    /// Draws what the image shows, or what is being computed. `reserved` points stay free behind it.
-    fn state_ui(&mut self, ui: &mut Ui, preview: &RenderedPreview, reserved: f32) {
-        let is_failed = self.object.failed == Some(self.document.version());
-        let is_pending = self.object.requested_at.is_some();
-        if is_failed {
-            ui.label("Shows the last image that could be computed: see the message");
-        } else if !is_pending && preview.grade == Grade::Final {
-            let (dot, _) = ui.allocate_exact_size(vec2(12.0, 12.0), egui::Sense::hover());
-            ui.painter().circle_filled(dot.center(), 4.0, egui::Color32::from_rgb(96, 176, 96));
-            let text = format!("{} · {}", display_name(preview.preset), self.cost(preview));
-            let width = text_width(ui, &text).min(ui.available_width() - reserved).max(60.0);
-            let height = ui.spacing().interact_size.y;
-            ui.allocate_ui(vec2(width + 1.0, height), |ui| {
-                ui.add(Label::new(text).truncate()).on_hover_text(self.cost_tip());
-            });
-        } else if let Some(doing) = self.object.activity {
-            spinner(ui, 13.0, ui.visuals().strong_text_color());
-            ui.label(doing);
-            if ui.small_button("Stop").on_hover_text("Keep the current image and stop refining it").clicked() {
-                self.stop_refining();
-            }
-        } else if self.object.stopped == Some(preview.version) {
-            ui.label("Stopped before the final image");
-        } else {
-            spinner(ui, 13.0, ui.visuals().strong_text_color());
-            ui.label("Updating");
-        }
-    }
-
-    /// Accuracy and time of an edit at the scene's settings: as measured, else as stated and forecast.
-    fn cost(&self, preview: &RenderedPreview) -> String {
-        let version = self.document.version();
-        if self.document.scene().slab.is_some() {
-            return "slab".to_owned();
-        }
-        if let Some(point) = self.accuracy.now(version) {
-            return describe(&point);
-        }
-        let forecast: f64 = self.effects(preview).iter().filter(|effect| effect.on).map(cost_of).sum();
-        let time = if forecast > 0.0 { format!(" · ~{}", time(forecast)) } else { String::new() };
-        let accuracy = match self.object.stated_error().and_then(|error| error.psnr_db) {
-            Some(psnr) => format!("{psnr:.0} ± {:.0} dB stated", accuracy::STATED_DB),
-            None => "accuracy not measured".to_owned(),
-        };
-        format!("{accuracy}{time}")
-    }
-
-    fn cost_tip(&self) -> String {
-        let measured = "PSNR of the effective BRDF against the reference, of what is simulated, and the time from an edit of \
-                        the geometry to the effective BRDF.";
-        match self.object.stated_error() {
-            Some(error) => format!("{measured}\n{}", error_parts(&error)),
-            None => measured.to_owned(),
-        }
-    }
-
-    /// The plan of the refined image, so that drafts do not change what is left out.
-    fn effects<'a>(&'a self, preview: &'a RenderedPreview) -> &'a [Effect] {
-        self.object.refined_effects.as_deref().unwrap_or(&preview.effects)
+    /// Draws in a place of fixed size.
+    fn place(&mut self, ui: &mut Ui, size: egui::Vec2, content: impl FnOnce(&mut Self, &mut Ui)) {
+        let (area, _) = ui.allocate_exact_size(size, egui::Sense::hover());
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(area).layout(layout));
+        inner.set_clip_rect(area.intersect(ui.clip_rect()));
+        content(self, &mut inner);
     }
 
     fn fields(&self, preview: &RenderedPreview) -> Vec<Field> {
-        let field = |text: String, rank: u8, kind: FieldKind| Field { text, rank, kind };
+        let field = |text: String, rank: u8, kind: FieldKind| Field { text, rank, fixed: None, kind };
         let mut fields = Vec::new();
-        let is_measurable = self.document.scene().slab.is_none();
-        let [faster, finer] = self.accuracy.neighbours(self.document.version());
-        for (name, point) in [("Faster", faster), ("Finer", finer)] {
-            if let Some(point) = point {
-                fields.push(field(format!("{name}: {}", describe(&point)), 3, FieldKind::Take(point)));
+        let (version, is_measurable) = (self.document.version(), self.document.scene().slab.is_none());
+        if is_measurable {
+            let is_measured = self.accuracy.now(version).is_some();
+            for (at, point) in self.accuracy.neighbours(version).into_iter().enumerate() {
+                let name = ["Faster", "Finer"][at];
+                let (text, kind) = match point {
+                    Some(point) => (format!("{name}: {}", briefly(&point)), FieldKind::Take(point)),
+                    None if is_measured => (format!("{name}: none"), FieldKind::Text),
+                    None if at > 0 => (String::new(), FieldKind::Text),
+                    None => ("Measure".to_owned(), FieldKind::Measure),
+                };
+                fields.push(Field { text, rank: 2 + at as u8, fixed: Some(SETTINGS), kind });
             }
         }
-        if is_measurable && self.accuracy.now(self.document.version()).is_none() {
-            let text = if self.accuracy.is_active() { "Measuring" } else { "Measure" };
-            fields.push(field(text.to_owned(), 2, FieldKind::Measure));
+        let left_out = self.left_out();
+        if !left_out.is_empty() {
+            fields.push(field(format!("{} left out", count(left_out.len(), "effect")), 0, FieldKind::LeftOut));
         }
-        let left_out = self.effects(preview).iter().filter(|effect| effect.left_out.is_some()).count();
-        if left_out > 0 {
-            fields.push(field(format!("{} left out", count(left_out, "effect")), 0, FieldKind::LeftOut));
-        }
-        if !preview.warnings.is_empty() {
-            fields.push(field(count(preview.warnings.len(), "warning"), 1, FieldKind::Warnings));
+        if !self.object.warnings.is_empty() {
+            fields.push(field(count(self.object.warnings.len(), "warning"), 1, FieldKind::Warnings));
         }
         if !preview.notes.is_empty() {
             fields.push(field(count(preview.notes.len(), "note"), 5, FieldKind::Notes));
@@ -170,7 +128,7 @@ impl Editor {
         match &field.kind {
             FieldKind::Take(point) => {
                 let tip = format!("Use these settings: {}", accuracy::describe_point(point));
-                if ui.add(Button::new(text).frame(false)).on_hover_text(tip).clicked() {
+                if ui.add(Button::new(text).frame(false).truncate()).on_hover_text(tip).clicked() {
                     let mut scene = (**self.document.scene()).clone();
                     accuracy::take(&mut scene, point.facets, &preview.effects);
                     self.document.edit_as("Quality", scene);
@@ -178,18 +136,26 @@ impl Editor {
             }
             FieldKind::Measure => {
                 let tip = "Measure accuracy and time of these and of faster and finer settings in the background";
-                let is_idle = !self.accuracy.is_active();
-                if ui.add_enabled(is_idle, Button::new(text).small()).on_hover_text(tip).clicked() {
+                if let Some(activity) = &self.accuracy.activity {
+                    ui.add(Label::new(RichText::new(format!("Measuring: {activity}")).weak()).truncate());
+                } else if ui.add(Button::new(text).small()).on_hover_text(tip).clicked() {
                     self.accuracy.wanted = true;
                 }
             }
-            FieldKind::LeftOut => self.left_out_ui(ui, text, preview),
+            FieldKind::Text => {
+                ui.weak(text);
+            }
+            FieldKind::LeftOut => self.left_out_ui(ui, text),
             FieldKind::Warnings => {
                 let text = RichText::new(text).color(theme::warning(ui.visuals())).strong();
-                ui.menu_button(text, |ui| list_ui(ui, &preview.warnings));
+                text_menu(ui, text, |ui| self.warnings_ui(ui));
             }
             FieldKind::Notes => {
-                ui.menu_button(text, |ui| list_ui(ui, &preview.notes));
+                text_menu(ui, text, |ui| {
+                    for note in &preview.notes {
+                        ui.label(note);
+                    }
+                });
             }
             FieldKind::Processor => {
                 let tip = format!("The processor that shades the image: {}", preview.rendered_on);
@@ -198,35 +164,15 @@ impl Editor {
         }
     }
 
-    /// Draws the chip of the light that is missing, with a button that adds it.
-    fn left_out_ui(&mut self, ui: &mut Ui, text: &str, preview: &RenderedPreview) {
-        let missing: Vec<(&'static str, LeftOut)> =
-            self.effects(preview).iter().filter_map(|effect| Some((effect.name, effect.left_out?))).collect();
-        let mut added = None;
-        let text = RichText::new(text).color(theme::warning(ui.visuals())).strong();
-        ui.menu_button(text, |ui| {
-            ui.set_max_width(360.0);
-            for (name, left_out) in &missing {
-                ui.label(format!(
-                    "{} is left out: up to {:.0} % of the light that is reflected directly, more than the tolerance of \
-                     {:.1} %. It takes about {}. The dB are those of what is simulated.",
-                    caption(name),
-                    100.0 * left_out.share,
-                    100.0 * left_out.tolerance,
-                    time(left_out.predicted_ms)
-                ));
-                if ui.button("Add").on_hover_text("Simulate it; one undo step").clicked() {
-                    added = Some(*name);
-                    ui.close();
-                }
+    /// Lists the warnings, each with a button that shows where its remedy is.
+    fn warnings_ui(&mut self, ui: &mut Ui) {
+        for warning in &self.object.warnings {
+            ui.label(warning);
+            let (tab, section) = place_of_remedy(warning);
+            if ui.button("Show").on_hover_text(format!("Open {section} of the parameters")).clicked() {
+                (self.tab, self.reveal) = (tab, Some(section));
+                ui.close();
             }
-        });
-        if let Some(name) = added {
-            let mut scene = (**self.document.scene()).clone();
-            if let Some(switch) = switch_mut(&mut scene.effects, name) {
-                *switch = Switch::On;
-            }
-            self.document.edit_as(&format!("Add {}", caption(name).to_lowercase()), scene);
         }
     }
 
@@ -245,7 +191,7 @@ impl Editor {
 
 impl Field {
     fn width(&self, ui: &Ui) -> f32 {
-        text_width(ui, &self.text) + SEPARATOR + PADDING
+        SEPARATOR + self.fixed.unwrap_or_else(|| text_width(ui, &self.text) + PADDING)
     }
 }
 
@@ -267,54 +213,27 @@ fn that_fit(mut fields: Vec<Field>, ui: &Ui) -> Vec<Field> {
     fields
 }
 
-fn list_ui(ui: &mut Ui, texts: &[String]) {
-    ui.set_max_width(420.0);
-    for text in texts {
-        ui.label(text);
-    }
+/// Draws a button that opens texts and buttons. The layout of menus would space words out.
+pub fn text_menu(ui: &mut Ui, name: impl Into<egui::WidgetText>, content: impl FnOnce(&mut Ui)) {
+    ui.menu_button(name.into(), |ui| {
+        ui.set_max_width(MENU);
+        ui.with_layout(egui::Layout::top_down(egui::Align::Min), content);
+    });
 }
 
 fn count(number: usize, what: &str) -> String {
     if number == 1 { format!("1 {what}") } else { format!("{number} {what}s") }
 }
 
-/// Accuracy and time of a measured point.
-fn describe(point: &AccuracyPoint) -> String {
-    let compared = &point.compared;
-    let accuracy = match compared.psnr_db {
-        psnr if !psnr.is_finite() => "exact".to_owned(),
-        psnr if compared.is_stated() => format!("{psnr:.0} ± {:.0} dB stated", compared.psnr_std_error_db),
-        psnr => format!("{psnr:.0} ± {:.1} dB", compared.psnr_std_error_db),
-    };
-    format!("{accuracy} · {}", time(point.ms))
-}
-
-fn cost_of(effect: &Effect) -> f64 {
-    effect.measured_ms.unwrap_or(effect.predicted_ms)
-}
-
-/// Explains a stated error.
-fn error_parts(error: &ErrorEstimate) -> String {
-    format!(
-        "The result states an error of about {}: facets {:.2} %, visibility {:.2} %, low-rank factors {:.2} %. Interreflection \
-         is not examined.",
-        error.describe(),
-        100.0 * error.facets,
-        100.0 * error.visibility,
-        100.0 * error.table
-    )
-}
-
 fn stages(preview: &RenderedPreview) -> Vec<String> {
     preview.stages.iter().map(|(name, ms)| format!("{name} {}", time(*ms))).collect()
 }
 
-fn time(ms: f64) -> String {
-    match ms {
-        ms if ms < 10.0 => format!("{ms:.1} ms"),
-        ms if ms < 1000.0 => format!("{ms:.0} ms"),
-        ms => format!("{:.1} s", ms / 1e3),
-    }
+/// PSNR and time of a point.
+fn briefly(point: &AccuracyPoint) -> String {
+    let psnr = point.compared.psnr_db;
+    let accuracy = if psnr.is_finite() { format!("{psnr:.0} dB") } else { "exact".to_owned() };
+    format!("{accuracy} · {}", time(point.ms))
 }
 
 /// Lists every effect with its state and reason.

@@ -4,6 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use super::{Error, Result};
 
 /// A flag that a long operation checks between its steps. Clones share the flag. The operation may also count its
@@ -66,6 +68,35 @@ impl Cancel {
         Self { not_before: Instant::now().checked_add(delay), ..self.clone() }
     }
 
+    /// Calls `work` for every index in parallel and returns the results in order. The operation `name` counts blocks of
+    /// indices.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    pub fn map<T: Clone + Default + Send>(
+        &self,
+        name: &'static str,
+        count: usize,
+        work: impl Fn(usize) -> T + Sync,
+    ) -> Result<Vec<T>> {
+        /// Indices per block.
+        const BLOCK: usize = 64;
+        self.begin(name);
+        let mut results = vec![T::default(); count];
+        results.par_chunks_mut(BLOCK).enumerate().for_each(|(block, results)| {
+            for (k, result) in results.iter_mut().enumerate() {
+                if self.is_set() {
+                    return;
+                }
+                *result = work(block * BLOCK + k);
+            }
+            self.step(count.div_ceil(BLOCK));
+        });
+        self.end();
+        self.check()?;
+        Ok(results)
+    }
+
     /// Returns an error if the flag is set.
     ///
     /// # Errors
@@ -87,6 +118,19 @@ mod tests {
         cancel.set();
         assert!(cancel.is_set() && short.is_set() && !long.is_set());
         assert!(short.check().is_err() && long.check().is_ok());
+    }
+
+    #[test]
+    fn a_parallel_operation_returns_results_in_order_or_is_cancelled_between_two_of_them() {
+        let cancel = Cancel::default();
+        assert_eq!(cancel.map("squares", 1000, |k| k * k).unwrap(), (0..1000).map(|k| k * k).collect::<Vec<_>>());
+        let stop = |k: usize| {
+            if k == 10 {
+                cancel.set();
+            }
+        };
+        assert!(matches!(cancel.map("stopped", 1000, stop), Err(Error::Cancelled)));
+        assert!(cancel.running().is_none());
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub struct Cli {
 pub enum Command {
     /// Open the editor, as the program does without a command.
     Edit {
-        /// A scene file, or the name of a shipped scene.
+        /// A scene file, the name of a shipped scene, or `-` for a scene on standard input.
         scene: Option<String>,
         /// Print on standard error the milliseconds from the start of the program to the window, the GPU and the first
         /// image; then quit.
@@ -75,7 +75,7 @@ pub enum BackendArg {
 
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A scene file, or the name of a shipped scene (see `biscale materials`).
+    /// A scene file, the name of a shipped scene (see `biscale materials`), or `-` for a scene on standard input.
     pub scene: String,
     /// Override any field of the scene: `--set material.default.brdf.roughness=0.3` (repeatable).
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
@@ -375,7 +375,7 @@ pub struct ProfileArgs {
 
 #[derive(Debug, Args)]
 pub struct ReportArgs {
-    /// Scene files, or names of shipped scenes.
+    /// Scene files, names of shipped scenes, or `-` for a scene on standard input.
     #[arg(required = true)]
     pub scenes: Vec<String>,
     /// Folder for report.html, report.csv and report.json. An interrupted run continues from the files in it.

@@ -7,21 +7,19 @@ use std::path::Path;
 use crate::base::csv::CsvFile;
 use crate::base::{Error, require_finite};
 use crate::diagnostics::Health;
-use crate::effective::{ErrorEstimate, ErrorEstimator, Reflectance};
-use crate::math::directions::from_angles;
+use crate::effective::{ErrorEstimate, ErrorEstimator};
+use crate::math::directions::direction_of_angles;
 use crate::metrics::Pair;
 use crate::pipeline::Pipeline;
 use crate::plan::{Preset, Settings};
-use crate::reference::ReferenceSettings;
 use crate::scene::LoadedScene;
 use anyhow::Result;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::EvalArgs;
 use super::watch::Watch;
-use super::{cache, check_outputs, print_json, slab};
+use super::{cache, check_outputs, print_json};
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o";
 
@@ -32,6 +30,7 @@ struct Row {
 
 pub fn run(args: &EvalArgs) -> Result<()> {
     let (loaded, rows) = args.scene.open(|loaded| {
+        args.scene.check_input("--pairs", &args.pairs)?;
         check_outputs(&args.scene.scene, loaded, &[&args.pairs], [&args.output])?;
         Ok(read(&args.pairs)?)
     })?;
@@ -76,8 +75,11 @@ struct Evaluation {
 }
 
 fn of_slab(args: &EvalArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, rows: &[Row]) -> Result<Evaluation> {
-    let directions: Vec<(DVec3, DVec3)> = rows.iter().map(Row::any_side).collect();
-    let slab = slab::eval(pipeline, loaded, &directions, args.scene.quiet)?;
+    let directions: Vec<(DVec3, DVec3)> = rows.iter().map(Row::directions).collect();
+    let watch = Watch::new(args.scene.quiet);
+    pipeline.set_cancel(watch.cancel());
+    let slab = pipeline.slab_values(loaded, &directions)?;
+    drop(watch);
     args.scene.warn(&slab.health);
     let (values, errors, representation, health) = (slab.values, slab.errors, slab.representation, slab.health);
     Ok(Evaluation { values, errors, representation, error: None, health })
@@ -91,40 +93,44 @@ fn of_reference(
     rows: &[Row],
 ) -> Result<Evaluation> {
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
-    let reference = ReferenceSettings {
-        facets: settings.reference_facets,
-        max_passes: settings.reference_passes,
-        target: 2e-3,
-        seed: settings.seed,
-    };
     let bar = progress(settings.reference_passes, args.scene.quiet);
-    let estimates = pipeline.with_reference(loaded, |evaluator| {
-        evaluator.estimate(&pairs, &reference, |passes, error| {
-            bar.set_position(passes as u64);
-            bar.set_message(format!("standard error {:.2} %", error * 100.0));
-            true
-        })
+    let mut reached = (0, 0.0);
+    let estimates = pipeline.reference(loaded, &pairs, None, |passes, error| {
+        reached = (passes, error);
+        bar.set_position(passes as u64);
+        bar.set_message(format!("standard error {:.2} %", error * 100.0));
+        true
     })?;
     bar.finish_and_clear();
-    let health = pipeline.input_health(loaded)?;
+    let mut health = pipeline.input_health(loaded)?;
+    health.warnings.extend(missed_target(settings, reached));
     args.scene.warn(&health);
     let (values, errors) = estimates.iter().map(|estimate| (estimate.f_bar, estimate.standard_error)).unzip();
     Ok(Evaluation { values, errors, representation: "reference sum".to_owned(), error: None, health })
+}
+
+/// A warning if the reference ended at its largest number of passes, with a larger error than its target.
+fn missed_target(settings: &Settings, (passes, error): (usize, f64)) -> Option<String> {
+    let Settings { reference_target: target, reference_facets: facets, .. } = *settings;
+    (error > target).then(|| {
+        let samples = (passes * facets) as f64 * (error / target).powi(2);
+        format!(
+            "the reference has a standard error of {:.2} % after {passes} passes, more than its target of {:.2} %: it needs \
+             about {samples:.0} reference_samples",
+            error * 100.0,
+            target * 100.0
+        )
+    })
 }
 
 fn of_outcome(args: &EvalArgs, pipeline: &mut Pipeline, loaded: &LoadedScene, rows: &[Row]) -> Result<Evaluation> {
     let watch = Watch::new(args.scene.quiet);
     pipeline.set_cancel(watch.cancel());
     let outcome = pipeline.effective(loaded)?;
-    drop(watch);
     args.scene.notes(&outcome);
     let pairs: Vec<Pair> = rows.iter().map(Row::pair).collect();
-    let value = |pair: &Pair| {
-        let mut out = [Vec3::ZERO];
-        outcome.brdf.eval_lights(&[pair.i], pair.o, &mut out);
-        out[0]
-    };
-    let values = pairs.par_iter().map(value).collect();
+    let values = outcome.brdf.eval_pairs(&pairs, &watch.cancel())?;
+    drop(watch);
     let estimator = if args.standard_error || args.scene.json { outcome.errors() } else { None };
     let errors = estimator.filter(|_| args.standard_error).map(|estimator| estimator.standard_errors(&pairs));
     Ok(Evaluation {
@@ -179,31 +185,22 @@ fn progress(passes: usize, quiet: bool) -> indicatif::ProgressBar {
 }
 
 impl Row {
-    /// Directions on any side, with polar angles up to π.
-    fn any_side(&self) -> (DVec3, DVec3) {
+    /// Directions towards the light and the viewer.
+    fn directions(&self) -> (DVec3, DVec3) {
         let [theta_i, phi_i, theta_o, phi_o] = self.angles;
-        let direction = |theta: f64, phi: f64| {
-            let (sin_theta, cos_theta) = theta.sin_cos();
-            let (sin_phi, cos_phi) = phi.sin_cos();
-            // The cosine of the nearest number to π/2 is not 0.
-            let z = if cos_theta.abs() < 1e-15 { 0.0 } else { cos_theta };
-            DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, z)
-        };
-        (direction(theta_i, phi_i), direction(theta_o, phi_o))
+        (direction_of_angles(theta_i, phi_i), direction_of_angles(theta_o, phi_o))
     }
 
+    /// As [`Row::directions`]. Directions at and below the horizon have no light.
     fn pair(&self) -> Pair {
-        let [theta_i, phi_i, theta_o, phi_o] = self.angles;
-        let direction = |theta: f64, phi: f64| -> Vec3 {
-            // Rounding must not lift a direction that is at or below the horizon.
-            if theta.abs() >= std::f64::consts::FRAC_PI_2 {
-                return from_angles(theta as f32, phi as f32).with_z(0.0);
-            }
-            let (sin_theta, cos_theta) = theta.sin_cos();
-            let (sin_phi, cos_phi) = phi.sin_cos();
-            glam::DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta).as_vec3()
+        let (i, o) = self.directions();
+        // The cosine of an angle beyond a turn may be positive.
+        let bounded = |direction: DVec3, theta: f64| {
+            let direction = direction.as_vec3();
+            let is_above = theta.abs() < std::f64::consts::FRAC_PI_2;
+            if is_above { direction } else { direction.with_z(direction.z.min(0.0)) }
         };
-        Pair { i: direction(theta_i, phi_i), o: direction(theta_o, phi_o) }
+        Pair { i: bounded(i, self.angles[0]), o: bounded(o, self.angles[2]) }
     }
 }
 

@@ -21,8 +21,9 @@ use super::{cache, check_outputs, print_json, progress_bar, progress_on};
 /// Relative L2 of a table that is read back, above which its lobes are mostly wrong.
 const MAX_RESAMPLING_ERROR: f64 = 0.5;
 
+/// A written table as `--json` prints it.
 #[derive(Serialize)]
-struct Report<'a> {
+pub struct Report {
     output: String,
     /// The text file beside the table.
     note: Option<String>,
@@ -41,7 +42,7 @@ struct Report<'a> {
     reflectance: Vec<[f32; 5]>,
     /// Estimated error of the effective BRDF.
     error: Option<ErrorEstimate>,
-    health: &'a Health,
+    health: Health,
 }
 
 pub fn run(args: &ExportArgs) -> Result<()> {
@@ -107,37 +108,47 @@ fn check_slab(args: &ExportArgs, loaded: &LoadedScene) -> Result<(), crate::Erro
     Ok(())
 }
 
-/// Prints size, errors and reflectances of a table, as JSON or in words on standard error.
-fn print_report(args: &ExportArgs, outcome: &Outcome, report: &ExportReport) -> Result<()> {
-    let reading = &report.reading;
-    let mut health = outcome.health().clone();
-    if !(0.0..=MAX_RESAMPLING_ERROR).contains(&reading.errors.rel_l2) {
-        let warning = "the table misses most of the highlights: raise --resolution or the roughness, or choose a \
-                       format that adapts to lobes (.bsdf, --radiance tensor-tree)"
-            .to_owned();
-        if !args.scene.quiet {
-            print_on_stderr(format_args!("warning: {warning}"));
-        }
-        health.warnings.push(warning);
-    }
-    if args.scene.json {
-        return print_json(&Report {
-            output: args.output.display().to_string(),
-            note: report.note.as_ref().map(|note| note.display().to_string()),
-            pairs: report.pairs,
-            bytes: report.bytes,
+impl Report {
+    /// The report on a table of `outcome` at `output`.
+    pub fn new(output: &Path, outcome: &Outcome, written: &ExportReport) -> Self {
+        let reading = &written.reading;
+        let mut health = outcome.health().clone();
+        health.warnings.extend(warning(written).map(str::to_owned));
+        Self {
+            output: output.display().to_string(),
+            note: written.note.as_ref().map(|note| note.display().to_string()),
+            pairs: written.pairs,
+            bytes: written.bytes,
             resampling_mean: reading.mean,
             resampling_rel_l2: reading.errors.rel_l2,
             resampling_psnr_db: reading.errors.psnr_db,
-            anisotropy_lost: report.anisotropy_lost,
+            anisotropy_lost: written.anisotropy_lost,
             representation: outcome.brdf.representation.describe(),
             error: outcome.errors().map(ErrorEstimator::estimate),
-            health: &health,
-            reflectance: report.reflectances.rows(),
-        });
+            health,
+            reflectance: written.reflectances.rows(),
+        }
+    }
+}
+
+/// The warning on a table that is read with a large error.
+fn warning(written: &ExportReport) -> Option<&'static str> {
+    (!(0.0..=MAX_RESAMPLING_ERROR).contains(&written.reading.errors.rel_l2)).then_some(
+        "the table misses most of the highlights: raise --resolution or the roughness, or choose a format that adapts to \
+         lobes (.bsdf, --radiance tensor-tree)",
+    )
+}
+
+/// Prints size, errors and reflectances of a table, as JSON or in words on standard error.
+fn print_report(args: &ExportArgs, outcome: &Outcome, written: &ExportReport) -> Result<()> {
+    if let (Some(warning), false) = (warning(written), args.scene.quiet) {
+        print_on_stderr(format_args!("warning: {warning}"));
+    }
+    if args.scene.json {
+        return print_json(&Report::new(&args.output, outcome, written));
     }
     if !args.scene.quiet {
-        describe(report);
+        describe(written);
     }
     Ok(())
 }
@@ -185,7 +196,7 @@ fn of_slab(args: &ExportArgs, loaded: &LoadedScene, outcome: &SlabOutcome, optio
             "pairs": written.pairs,
             "transmitted": transmitted.to_array(),
             "reflected": reflected.to_array(),
-            "form": super::slab::describe(outcome),
+            "form": outcome.describe(),
             "health": outcome.health,
         }));
     }

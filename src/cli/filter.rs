@@ -38,6 +38,7 @@ pub fn run(args: &FilterArgs) -> Result<()> {
     let outputs: Vec<&PathBuf> = [&args.output, &args.table, &args.side_by_side].into_iter().flatten().collect();
     let inputs: Vec<&Path> = args.queries.iter().map(PathBuf::as_path).collect();
     let (loaded, queries) = args.scene.open(|loaded| {
+        inputs.iter().try_for_each(|path| args.scene.check_input("--queries", path))?;
         check_outputs(&args.scene.scene, loaded, &inputs, &outputs)?;
         Ok(args.queries.as_deref().map(Queries::read).transpose()?)
     })?;

@@ -3,16 +3,17 @@
 use std::io::Write;
 use std::path::Path;
 
-use crate::base::{Error, InputError, replace_file};
-use crate::effective::Reflectance;
+use crate::base::{Error, InputError, Progress, replace_file};
+use crate::effective::{EffectiveBrdf, Reflectance};
 use crate::fit;
-use crate::fit::{Fit, Model};
+use crate::fit::{Fit, Model, ThinFit};
 use crate::pipeline::SlabOutcome;
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::render;
 use crate::render::{Image, RenderScene};
 use crate::scene::LoadedScene;
+use crate::slab::Slab;
 use anyhow::Result;
 use glam::Vec3;
 use serde::Serialize;
@@ -21,8 +22,9 @@ use super::FitArgs;
 use super::watch::Watch;
 use super::{check_outputs, print_json, progress_bar, progress_on};
 
+/// A fitted model as `--json` prints it.
 #[derive(Serialize)]
-struct Report {
+pub struct Report {
     model: &'static str,
     rel_l2: f64,
     psnr_db: f64,
@@ -59,13 +61,12 @@ pub fn run(args: &FitArgs) -> Result<()> {
     let mut fits = Vec::new();
     let mut reports = Vec::new();
     for model in Model::ALL {
-        let start = std::time::Instant::now();
         let bar = progress_bar("fitting", args.scene.quiet);
-        let fitted = fit::fit(&outcome.brdf, model, &progress_on(&bar));
+        let fitted = fit_model(&outcome.brdf, model, &progress_on(&bar));
         bar.finish_and_clear();
-        let fitted = fitted?;
-        reports.push(report(&fitted, start.elapsed().as_secs_f64()));
+        let (fitted, report) = fitted?;
         fits.push(fitted);
+        reports.push(report);
     }
     // The files for other programs hold the last model, the GGX base.
     let Some(base) = fits.last() else { return Ok(()) };
@@ -104,6 +105,17 @@ pub fn run(args: &FitArgs) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Fits a model, and reports its parameters and errors.
+///
+/// # Errors
+/// As [`fit::fit`].
+pub fn fit_model(brdf: &EffectiveBrdf, model: Model, progress: &Progress<'_>) -> Result<(Fit, Report)> {
+    let start = std::time::Instant::now();
+    let fitted = fit::fit(brdf, model, progress)?;
+    let report = report(&fitted, start.elapsed().as_secs_f64());
+    Ok((fitted, report))
 }
 
 fn report(fit: &Fit, seconds: f64) -> Report {
@@ -166,25 +178,15 @@ fn side_by_side(render_scene: &RenderScene, materials: &[&dyn Reflectance], size
     Ok(sheet)
 }
 
-/// Fits a thin surface to a slab.
+/// Fits a thin surface to a slab, and writes it.
 fn of_slab(args: &FitArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Result<()> {
     args.scene.warn(&outcome.health);
     let slab = &outcome.slab;
     let bar = progress_bar("fitting", args.scene.quiet);
-    let straight = slab.straight(glam::DVec3::Z)[0].as_vec3();
-    let eta = (slab.optics.eta.element_sum() / 3.0) as f32;
-    let fitted = fit::fit_thin(&**slab, eta, straight, &progress_on(&bar));
+    let fitted = fit_slab(slab, &progress_on(&bar));
     bar.finish_and_clear();
     let fitted = fitted?;
-    let report = serde_json::json!({
-        "model": "thin GGX transmission",
-        "rel_l2": fitted.errors.rel_l2,
-        "psnr_db": fitted.errors.psnr_db,
-        "roughness": fitted.alpha,
-        "eta": fitted.eta,
-        "color": fitted.color.to_array(),
-        "straight": fitted.straight.to_array(),
-    });
+    let report = slab_report(&fitted);
     for path in &args.output {
         let text = match kind(path)? {
             OutputKind::Gltf => fit::thin_gltf(&fitted, &loaded.name),
@@ -205,4 +207,27 @@ fn of_slab(args: &FitArgs, loaded: &LoadedScene, outcome: &SlabOutcome) -> Resul
         fitted.errors.psnr_db
     )?;
     Ok(())
+}
+
+/// Fits a thin surface to a slab.
+///
+/// # Errors
+/// As [`fit::fit_thin`].
+pub fn fit_slab(slab: &Slab, progress: &Progress<'_>) -> Result<ThinFit> {
+    let straight = slab.straight(glam::DVec3::Z)[0].as_vec3();
+    let eta = (slab.optics.eta.element_sum() / 3.0) as f32;
+    Ok(fit::fit_thin(slab, eta, straight, progress)?)
+}
+
+/// A fitted thin surface as `--json` prints it.
+pub fn slab_report(fitted: &ThinFit) -> serde_json::Value {
+    serde_json::json!({
+        "model": "thin GGX transmission",
+        "rel_l2": fitted.errors.rel_l2,
+        "psnr_db": fitted.errors.psnr_db,
+        "roughness": fitted.alpha,
+        "eta": fitted.eta,
+        "color": fitted.color.to_array(),
+        "straight": fitted.straight.to_array(),
+    })
 }

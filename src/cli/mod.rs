@@ -14,6 +14,7 @@ pub mod materials;
 pub mod plan;
 pub mod profile;
 mod profile_slab;
+mod program;
 pub mod render;
 mod render_path;
 mod render_zoom;
@@ -23,12 +24,12 @@ mod slab;
 pub mod tile;
 mod to_image;
 pub mod transmit;
-mod watch;
+pub mod watch;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Cancel, Error, check_output, print_on_stderr};
+use crate::base::{Cancel, Error, InputError, check_output, print_on_stderr};
 use crate::diagnostics::Health;
 use crate::pipeline::Outcome;
 use crate::scene;
@@ -38,6 +39,7 @@ use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub use self::args::*;
+pub use self::program::{main, main_of_process, no_editor};
 
 /// Runs a subcommand other than `edit`, which the layer above runs.
 ///
@@ -47,7 +49,7 @@ pub fn run(command: Command) -> Result<()> {
     #[cfg(target_os = "linux")]
     set_runtime_folder();
     match command {
-        Command::Edit { .. } => anyhow::bail!("this program was built without the editor (feature `editor`)"),
+        Command::Edit { scene, .. } => no_editor(scene.as_deref()),
         Command::Render(args) => render::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Export(args) => export::run(&args),
@@ -108,13 +110,25 @@ impl SceneArgs {
             set.push(format!("quality.seed={seed}"));
         }
         set.extend(self.effects.iter().cloned());
-        let loaded = scene::open(&self.scene, &set)?;
+        let loaded = scene::open_argument(&self.scene, &set)?;
         let prepared = prepare(&loaded)?;
         let loaded = match self.target() {
             Some(target) => self.choose(&loaded, target)?,
             None => loaded,
         };
         Ok((loaded, prepared))
+    }
+
+    /// Checks that a file of the command and the scene are not both on standard input.
+    ///
+    /// # Errors
+    /// Both are.
+    pub fn check_input(&self, option: &str, path: &Path) -> Result<()> {
+        if path == Path::new("-") && scene::is_standard_input(&self.scene) {
+            let expected = "a file, because the scene is on standard input";
+            return Err(Error::from(InputError::new(option, "`-`", expected)).into());
+        }
+        Ok(())
     }
 
     fn target(&self) -> Option<Target> {

@@ -15,6 +15,9 @@ use serde::Serialize;
 use super::watch::Watch;
 use super::{PlanArgs, print_json};
 
+/// Runs of an effect on and off, and of one that is slow.
+const RUNS: [u64; 2] = [5, 1];
+
 #[derive(Serialize)]
 struct Report<'a> {
     effects: &'a [crate::plan::Effect],
@@ -42,7 +45,7 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     drop(watch);
     let measured = if args.measure {
         let bar = if args.scene.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
-        let costs = measure_effects(&loaded, &Cancel::default(), |name| {
+        let costs = measure_effects(&loaded, RUNS, &Cancel::default(), |name| {
             bar.set_message(format!("with and without {name}"));
             bar.tick();
         })?;

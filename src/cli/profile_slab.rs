@@ -5,7 +5,6 @@ use std::time::Instant;
 use anyhow::Result;
 
 use super::profile::{TimedRuns, no_parameter};
-use super::slab::describe;
 use super::{EditArg, ProfileArgs};
 use crate::base::{Cancel, Error, InputError};
 use crate::pipeline::{Pipeline, StageTimes};
@@ -22,7 +21,7 @@ pub(super) fn measure(args: &ProfileArgs, loaded: &LoadedScene) -> Result<TimedR
     let parameter = edit(args.edit, &mut edited)?;
     let mut pipeline = Pipeline::new();
     let outcome = pipeline.slab(loaded)?;
-    let mut representation = describe(&outcome);
+    let mut representation = outcome.describe();
     let shows = args.image || args.edit == Some(EditArg::Camera);
     let view = if shows {
         let render_scene = RenderScene::with(&pipeline, loaded)?;

@@ -114,12 +114,14 @@ pub mod on_gpu {
     use super::RenderPath;
     use crate::base::{Cancel, Error, GpuError};
     use crate::effective::EffectiveBrdf;
+    use crate::gpu::seen_through::GpuSeenThrough;
     use crate::gpu::{Gpu, GpuRenderer, Tier};
     use crate::pipeline::{Outcome, ShadingBrdf};
     use crate::plan::Backend;
     use crate::render::image::render::RenderTimes;
     use crate::render::image::shading::ImageBackground;
     use crate::render::image::tone_map::ToneMap;
+    use crate::render::seen_through::SlabScene;
     use crate::render::{RenderInput, RenderScene, Rendered, render};
 
     /// A GPU with the object and the shading BRDF of a scene.
@@ -136,7 +138,8 @@ pub mod on_gpu {
     impl OnGpu {
         pub fn render_path(scene: &RenderScene, outcome: &Outcome) -> Result<RenderPath> {
             let required = outcome.settings.backend == Backend::Gpu;
-            let Some(gpu) = open(outcome)? else { return Ok(RenderPath::Cpu { refused: None }) };
+            let backend = outcome.settings.backend;
+            let Some(gpu) = open(backend)? else { return Ok(RenderPath::Cpu { refused: None }) };
             let renderer =
                 |brdf: &EffectiveBrdf| GpuRenderer::with_material(&gpu, scene.mesh(), scene.occluder(), brdf);
             let table = outcome.shading_brdf(&Cancel::default())?;
@@ -183,9 +186,32 @@ pub mod on_gpu {
         }
     }
 
-    /// Opens the GPU that the scene's backend asks for; `None` if the CPU is to be used.
-    pub fn open(outcome: &Outcome) -> Result<Option<Gpu>> {
-        let backend = outcome.settings.backend;
+    /// Draws a draft of what is seen through a slab; `None` if the CPU is to draw it. Also returns the name of the adapter.
+    ///
+    /// # Errors
+    /// The backend is `gpu` and no adapter can be used, or the GPU fails.
+    pub fn seen_through(
+        backend: Backend,
+        scene: &SlabScene,
+        render_scene: &RenderScene,
+        (size, samples_per_side): ([usize; 2], usize),
+    ) -> Result<Option<(Rendered, String)>> {
+        // Refined images and captured sheets are drawn by the CPU.
+        if scene.draft_lobes().is_none() {
+            return Ok(None);
+        }
+        let Some(gpu) = open(backend)? else { return Ok(None) };
+        let drawn = GpuSeenThrough::new(&gpu, scene)
+            .map_err(Error::from)
+            .and_then(|drawing| drawing.render(&gpu, render_scene, size, samples_per_side));
+        match drawn {
+            Err(Error::Failed(_) | Error::Gpu(_)) if backend != Backend::Gpu => Ok(None),
+            drawn => Ok(Some((drawn?, gpu.description()))),
+        }
+    }
+
+    /// Opens the GPU that a backend asks for; `None` if the CPU is to be used.
+    pub fn open(backend: Backend) -> Result<Option<Gpu>> {
         if backend == Backend::Cpu {
             return Ok(None);
         }

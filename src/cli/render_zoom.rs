@@ -55,7 +55,7 @@ pub struct MappedTile {
 }
 
 impl MappedTile {
-    /// `None` if the scene has no colour map, or if its tile overhangs: pixels then have `f̄` at every distance.
+    /// `None` if the scene has no colour map: pixels then have `f̄` at every distance.
     ///
     /// # Errors
     /// The errors of the pipeline.
@@ -89,13 +89,8 @@ impl MappedTile {
 }
 
 /// The error of a scene that cannot be zoomed.
-fn no_map(loaded: &LoadedScene) -> Error {
-    let (place, found) = match &loaded.scene.color_map {
-        None => ("color_map", "nothing"),
-        Some(map) if map.surface.is_some() => ("color_map.surface", "an analytic surface"),
-        Some(_) => ("tile.geometry", "a tile with overhangs"),
-    };
-    InputError::new(place, found, "a colour map on a tile that is a height field").into()
+fn no_map() -> Error {
+    InputError::new("color_map", "nothing", "a colour map, which `--zoom` shows from far to near").into()
 }
 
 pub fn run(args: &RenderArgs, zoom: &Zoom) -> Result<()> {
@@ -104,8 +99,8 @@ pub fn run(args: &RenderArgs, zoom: &Zoom) -> Result<()> {
     pipeline.set_cache(cache.clone());
     let folder = &args.output;
     let (loaded, (mut scene, target)) = args.scene.open(|loaded| {
-        if loaded.scene.color_map.as_ref().is_none_or(|map| map.surface.is_some()) {
-            return Err(no_map(loaded).into());
+        if loaded.scene.color_map.is_none() {
+            return Err(no_map().into());
         }
         if folder.is_dir() {
             check_outputs(&args.scene.scene, loaded, &[], [folder.join("zoom.csv")])?;
@@ -122,8 +117,8 @@ pub fn run(args: &RenderArgs, zoom: &Zoom) -> Result<()> {
     let tone_map = ToneMap::new(&scene.camera)?;
     let outcome = pipeline.effective(&loaded)?;
     args.scene.notes(&outcome);
-    let Some(mapped) = MappedTile::of(&pipeline, &loaded)? else { return Err(no_map(&loaded).into()) };
-    let Some(tile) = mapped.filtered() else { return Err(no_map(&loaded).into()) };
+    let Some(mapped) = MappedTile::of(&pipeline, &loaded)? else { return Err(no_map().into()) };
+    let Some(tile) = mapped.filtered() else { return Err(no_map().into()) };
     let mut path = RenderPath::of(&scene, &outcome)?;
     let brdf = path.shading_brdf(&outcome, &watch.cancel())?.brdf;
     std::fs::create_dir_all(folder).map_err(|error| {

@@ -45,7 +45,7 @@ const REFERENCE_SHARE: f64 = 0.35;
 
 pub fn run(args: &ReportArgs) -> Result<()> {
     let scenes: Vec<LoadedScene> =
-        args.scenes.iter().map(|name| scene::open(name, &args.set)).collect::<crate::base::Result<_>>()?;
+        args.scenes.iter().map(|name| scene::open_argument(name, &args.set)).collect::<crate::base::Result<_>>()?;
     std::fs::create_dir_all(&args.output).map_err(|error| {
         Error::from(InputError::new("output", error, "a folder that can be created and written").in_file(&args.output))
     })?;

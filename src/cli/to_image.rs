@@ -106,7 +106,7 @@ mod on_gpu {
     impl Renderer {
         /// Opens the GPU that the scene's backend asks for; `None` if the CPU is to be used.
         pub fn open(scene: &RenderScene, outcome: &Outcome, size: [usize; 2]) -> Result<Option<Self>> {
-            let Some(gpu) = render_path::on_gpu::open(outcome)? else { return Ok(None) };
+            let Some(gpu) = render_path::on_gpu::open(outcome.settings.backend)? else { return Ok(None) };
             let renderer = GpuRenderer::new(&gpu, scene.mesh(), scene.occluder()).map_err(Error::from)?;
             let image = crate::gpu::render::image::image(&gpu, size).map_err(Error::from)?;
             let view = image.create_view(&wgpu::TextureViewDescriptor::default());

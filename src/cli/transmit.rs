@@ -103,7 +103,7 @@ pub fn run(args: &TransmitArgs) -> Result<()> {
             return Err(Error::from(error.in_file(&args.scene.scene)).into());
         }
         if args.method.is_some_and(|method| method != TransmitMethod::Dual) {
-            super::slab::require_faces(loaded, "a method other than `dual`")?;
+            crate::pipeline::require_faces(loaded, "a method other than `dual`")?;
         }
         if args.output.as_deref() == Some(Path::new("-")) {
             return Err(Error::from(InputError::new("output", "`-`", "a file that ends in .csv or .png")).into());

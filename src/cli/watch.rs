@@ -29,7 +29,7 @@ impl Watch {
     pub fn new(quiet: bool) -> Self {
         let cancel = Cancel::default();
         if quiet {
-            return Self { cancel, end: None, thread: None };
+            return Self::unseen(cancel);
         }
         let (end, ended) = channel::<()>();
         let watched = cancel.clone();
@@ -43,6 +43,11 @@ impl Watch {
         // Without a thread, nothing is shown.
         let thread = std::thread::Builder::new().name("watch".to_owned()).spawn(show).ok();
         Self { cancel, end: Some(end), thread }
+    }
+
+    /// Shows nothing, for a caller that reads `cancel` itself.
+    pub fn unseen(cancel: Cancel) -> Self {
+        Self { cancel, end: None, thread: None }
     }
 
     /// The handle that the watched computation takes.
@@ -106,6 +111,7 @@ fn label(name: &'static str) -> &'static str {
     match name {
         "picture_table" => "the table that images read",
         "bases" | "rows" | "factors" => "the factorization",
+        "pairs" => "the evaluation",
         name => name,
     }
 }

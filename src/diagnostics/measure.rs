@@ -192,9 +192,10 @@ pub fn result(brdf: &EffectiveBrdf, inputs: &HealthInputs, lobe_deg: Option<f32>
     }
     health.reciprocity_residual = if difference > 0.0 { (difference / power).sqrt() } else { 0.0 };
     if let Some(grid) = grid_for(lobe_deg) {
-        let (albedo, at) = largest_effective_albedo(brdf, grid);
+        let EffectiveAlbedo { largest: albedo, at, mean } = effective_albedo(brdf, grid);
         health.largest_albedo = Some(albedo);
         health.largest_albedo_at_deg = at;
+        health.mean_albedo = Some(mean);
         health.unsound_values += usize::from(!albedo.is_finite());
     }
     health
@@ -207,22 +208,36 @@ fn grid_for(lobe_deg: Option<f32>) -> Option<PolarGrid> {
     (rings <= MAX_RINGS).then(|| PolarGrid::new(rings, (13 * rings).div_ceil(4)))
 }
 
-/// The largest `∫ f̄(i,o) dω_i` of any channel over a few viewers, and the viewer (theta, phi) [degrees].
-fn largest_effective_albedo(brdf: &EffectiveBrdf, grid: PolarGrid) -> (f32, [f32; 2]) {
+/// `∫ f̄(i,o) dω_i` over a few viewers.
+struct EffectiveAlbedo {
+    /// The largest of any channel, and its viewer (theta, phi) [degrees].
+    largest: f32,
+    at: [f32; 2],
+    /// Mean over channels and viewers, weighted by projected solid angles.
+    mean: f32,
+}
+
+fn effective_albedo(brdf: &EffectiveBrdf, grid: PolarGrid) -> EffectiveAlbedo {
     let viewers: Vec<[f32; 2]> =
         [0.0_f32, 30.0, 60.0, 80.0].iter().flat_map(|&theta| [[theta, 20.0], [theta, 110.0]]).skip(1).collect();
-    let albedos: Vec<f32> = viewers
+    let albedos: Vec<Vec3> = viewers
         .par_iter()
         .map(|[theta, phi]| {
             let (lights, solid_angles) = lights_around(phi / 360.0 * TAU + PI, grid);
             let mut values = vec![Vec3::ZERO; lights.len()];
             brdf.eval_lights(&lights, from_angles(theta.to_radians(), phi / 360.0 * TAU), &mut values);
             let sum: DVec3 = values.iter().zip(solid_angles).map(|(v, part)| v.as_dvec3() * f64::from(part)).sum();
-            sum.max_element() as f32
+            sum.as_vec3()
         })
         .collect();
-    let largest = albedos.iter().zip(viewers).max_by(|a, b| a.0.total_cmp(b.0));
-    largest.map_or((0.0, [0.0; 2]), |(albedo, at)| (*albedo, at))
+    let weights = viewers.iter().map(|[theta, _]| (2.0 * theta.to_radians()).sin());
+    let [sum, total] = albedos
+        .iter()
+        .zip(weights)
+        .fold([0.0; 2], |[sum, total], (albedo, weight)| [sum + weight * albedo.element_sum() / 3.0, total + weight]);
+    let largest = albedos.iter().map(|albedo| albedo.max_element()).zip(viewers).max_by(|a, b| a.0.total_cmp(&b.0));
+    let (largest, at) = largest.unwrap_or_default();
+    EffectiveAlbedo { largest, at, mean: sum / total }
 }
 
 /// The lights of a grid with their solid angles. They are four times as dense at `azimuth` as on average, because half
@@ -296,7 +311,7 @@ mod tests {
                 let materials = materials(&outcome.health_inputs.materials.materials, &[], Vec3::ONE).1;
                 let grid = grid_for(materials[0].narrowest_lobe_deg).unwrap();
                 let [albedo, exact] =
-                    [grid, PolarGrid::new(96, 320)].map(|grid| largest_effective_albedo(&outcome.brdf, grid).0);
+                    [grid, PolarGrid::new(96, 320)].map(|grid| effective_albedo(&outcome.brdf, grid).largest);
                 let error = (albedo / exact - 1.0).abs();
                 eprintln!("{brdf} {geometry}: {} rings, {:.3} %", grid.rings, 100.0 * error);
                 assert_eq!(grid.rings, rings, "{brdf}");

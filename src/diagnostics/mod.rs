@@ -13,6 +13,7 @@ pub use slab::SlabHealthInputs;
 
 use std::sync::Arc;
 
+use glam::Vec2;
 use serde::Serialize;
 
 use crate::brdf::{Material, MaterialAssignment};
@@ -30,6 +31,8 @@ pub struct HealthInputs {
     /// Names of the materials, in their order.
     pub names: Vec<String>,
     pub closes_plane: bool,
+    /// Size of the tile [tile units].
+    pub size: Vec2,
     /// Colours of the tile below those of its materials.
     pub color: ColorField,
 }
@@ -117,6 +120,8 @@ pub struct ResultHealth {
     pub largest_albedo: Option<f32>,
     /// Direction of that viewer (theta, phi) [degrees].
     pub largest_albedo_at_deg: [f32; 2],
+    /// Mean over the channels of the part of uniform light that is reflected.
+    pub mean_albedo: Option<f32>,
     /// Largest `|a_v / (A cos θ) - 1|` up to 80°, which shows the error of the sampling.
     pub projected_area_error: Option<f64>,
     /// Direction of that error (theta, phi) [degrees].
@@ -182,6 +187,7 @@ impl Health {
         health.warnings = warnings::of(&health, limits, conserving);
         if let ColorField::Mapped { map, .. } = &inputs.color {
             health.warnings.extend(color_map::warnings(map));
+            health.warnings.extend(color_map::finer_than_facets(&inputs.facets, inputs.size));
         }
         health.warnings.extend(estimate.and_then(|estimate| warnings::of_error(&estimate, limits)));
         health

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::{Direct, LowRank, Reflectance, ShadingTable, Wu2011};
+use crate::base::{Cancel, Result};
 use crate::interreflection::InterreflectionTable;
+use crate::metrics::Pair;
 
 /// A representation of `G`.
 #[derive(Debug, Clone)]
@@ -60,6 +62,14 @@ impl EffectiveBrdf {
         let mut out = [Vec3::ZERO];
         self.eval_lights(&[i], o, &mut out);
         out[0]
+    }
+
+    /// `f̄` at each pair, in parallel.
+    ///
+    /// # Errors
+    /// [`crate::base::Error::Cancelled`].
+    pub fn eval_pairs(&self, pairs: &[Pair], cancel: &Cancel) -> Result<Vec<Vec3>> {
+        cancel.map("pairs", pairs.len(), |k| self.eval(pairs[k].i, pairs[k].o))
     }
 
     /// `G(i,o) = a_v(o) f̄(i,o) / A` [1/sr], which is reciprocal and bounded; tables store this quantity.

@@ -2,9 +2,9 @@
 //!
 //! Facets are divided into replicates, each of which is a systematic sample of the whole surface. Their spread shows how
 //! the error of the facets is distributed over direction pairs. Its size follows from the difference from a second sample
-//! of fewer facets, because replicates are less even than the whole sample. Visibility from a half and from a quarter of
-//! the azimuths shows the order and the error of interpolation between azimuths (Richardson 1911), and a soft step of half
-//! the width that of the soft step.
+//! of fewer facets, because replicates are less even than the whole sample. Visibility from a half and from a quarter
+//! of the azimuths shows the order and the error of interpolation between azimuths (Richardson 1911), and a soft step of
+//! half the width that of the soft step.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -33,6 +33,15 @@ pub(crate) const FACETS_POWER: f64 = 1.5;
 /// The second sample has fewer facets by this factor. With a factor of 2 the stated error depends little on
 /// [`FACETS_POWER`]: by 14 % if the true power is 1 or 2.
 pub(crate) const SECOND_SAMPLE_DIVISOR: usize = 2;
+/// Orders at which the error of visibility falls with the resolution: the first where horizons jump, the second where they
+/// are smooth. Refinement, which has no second sample, counts on no more than the first; a stated error on a typical one.
+const LEAST_ORDER: f64 = 1.0;
+const TYPICAL_ORDER: f64 = 1.5;
+const MOST_ORDER: f64 = 2.0;
+/// Variance of a sum over systematic samples, relative to random ones, on many tiles; and the weight of this value against
+/// that of a tile. The tile's own value comes from a single difference of samples, which may be small by chance.
+const TYPICAL_VARIANCE: f64 = 0.2;
+const TYPICAL_WEIGHT: f64 = 0.3;
 /// Resolutions that show the error of visibility: a half and a quarter of the azimuths, and a soft step of half the
 /// width.
 const HALF: Resolution = Resolution { azimuth_step: 2, softness: 1.0 };
@@ -106,6 +115,8 @@ pub struct ErrorEstimator {
     replicates: Vec<(Vec<usize>, FacetSum)>,
     /// Ratio of the error of interpolation between azimuths to its difference from that of half of the azimuths.
     azimuth_ratio: f64,
+    /// Ratio of the error of the soft step to its difference from that of half the width.
+    soft_step_ratio: f64,
     /// Variance of `f̄` relative to what the spread of the replicates would show if they were random samples.
     variance_ratio: f64,
     estimate: ErrorEstimate,
@@ -119,8 +130,8 @@ struct Deviations {
     replicates: [DVec3; REPLICATES],
     /// `f̄` with half of the azimuths less `f̄`, and with a quarter less `f̄` with half.
     coarse: [DVec3; 2],
-    /// Twice `f̄` with a soft step of half the width less `f̄`: the error of the soft step is of first order.
-    soft_step: DVec3,
+    /// `f̄` with a soft step of half the width less `f̄`.
+    sharper: DVec3,
     /// `f̄` of the second sample less `f̄`.
     second: DVec3,
 }
@@ -259,8 +270,14 @@ impl ErrorEstimator {
         };
         let replicates = if facets.replicates.is_empty() { Vec::new() } else { (0..REPLICATES).map(sum_of).collect() };
         let estimate = ErrorEstimate::of_table(table);
-        let mut estimator =
-            Self { direct: direct.clone(), replicates, azimuth_ratio: 1.0, variance_ratio: 1.0, estimate };
+        let mut estimator = Self {
+            direct: direct.clone(),
+            replicates,
+            azimuth_ratio: 1.0,
+            soft_step_ratio: 1.0,
+            variance_ratio: 1.0,
+            estimate,
+        };
         estimator.examine(second, table);
         estimator
     }
@@ -275,7 +292,8 @@ impl ErrorEstimator {
         let of = |deviations: Deviations| {
             let facets = deviations.random_variance() * self.variance_ratio;
             let azimuths = deviations.coarse[0] * self.azimuth_ratio;
-            let visibility = azimuths * azimuths + deviations.soft_step * deviations.soft_step;
+            let soft_step = deviations.sharper * self.soft_step_ratio;
+            let visibility = azimuths * azimuths + soft_step * soft_step;
             let table = deviations.f_bar * self.estimate.table;
             (facets + visibility + table * table).map(f64::sqrt).as_vec3()
         };
@@ -293,20 +311,36 @@ impl ErrorEstimator {
         if second.is_some() && random > 0.0 {
             // The squared difference of two samples has the sum of their variances as its expectation.
             let variances = 1.0 + (SECOND_SAMPLE_DIVISOR as f64).powf(FACETS_POWER);
-            self.variance_ratio = total(&|at| at.second.length_squared()) / variances / random;
+            let found = total(&|at| at.second.length_squared()) / variances / random;
+            self.variance_ratio = found + TYPICAL_WEIGHT * (TYPICAL_VARIANCE - found);
         }
         let variance = random * self.variance_ratio;
-        let [half, quarter] = [0, 1].map(|k| total(&|at| at.coarse[k].length_squared()).sqrt());
-        // Second order for smooth horizons, and first order where horizons jump.
-        let order = if half > 0.0 && quarter > 0.0 { (quarter / half).log2().clamp(1.0, 2.0) } else { 1.0 };
-        self.azimuth_ratio = 1.0 / (2.0_f64.powf(order) - 1.0);
+        let size = |of: &dyn Fn(&Deviations) -> DVec3| total(&|at| of(at).length_squared()).sqrt();
+        let [half, quarter] = [0, 1].map(|k| size(&|at| at.coarse[k]));
+        let least_order = if second.is_some() { TYPICAL_ORDER } else { LEAST_ORDER };
+        let order = if half > 0.0 && quarter > 0.0 { (quarter / half).log2() } else { least_order };
+        self.azimuth_ratio = 1.0 / (2.0_f64.powf(order.clamp(least_order, MOST_ORDER)) - 1.0);
+        let sharper = size(&|at| at.sharper);
+        self.soft_step_ratio = 1.0 / (1.0 - 2.0_f64.powf(-least_order));
         let relative = |squares: f64| (squares / totals.norm).sqrt();
         let azimuths = self.azimuth_ratio * relative(half * half);
-        let soft_step = relative(total(&|at| at.soft_step.length_squared()));
+        let soft_step = self.soft_step_ratio * relative(sharper * sharper);
         let (facets, visibility) = (relative(variance), azimuths.hypot(soft_step));
         let rel_l2 = facets.hypot(visibility).hypot(table);
         let psnr_db = totals.psnr_db(rel_l2);
         self.estimate = ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, azimuths, soft_step };
+    }
+
+    /// The change of `f̄` from the resolution of the result to the first of others, and from each to the next.
+    fn changes<const N: usize>(&self, resolutions: [Resolution; N], f_bar: DVec3, pair: Pair) -> [DVec3; N] {
+        let mut before = f_bar;
+        resolutions.map(|resolution| {
+            if !self.direct.visibility.has_azimuth_step(resolution.azimuth_step) {
+                return DVec3::ZERO;
+            }
+            let f_bar = f_bar_at(&self.direct, resolution, pair);
+            f_bar - std::mem::replace(&mut before, f_bar)
+        })
     }
 
     fn deviations(&self, second: Option<&Direct>, pair: Pair) -> Deviations {
@@ -339,17 +373,8 @@ impl ErrorEstimator {
             let area = second.sums(&[i], o, |_, sum| reflected = sum);
             deviations.second = if area > 0.0 { reflected / area } else { DVec3::ZERO } - deviations.f_bar;
         }
-        let mut finer = deviations.f_bar;
-        for (resolution, deviation) in [HALF, QUARTER].into_iter().zip(&mut deviations.coarse) {
-            if self.direct.visibility.has_azimuth_step(resolution.azimuth_step) {
-                let f_bar = f_bar_at(&self.direct, resolution, pair);
-                *deviation = f_bar - finer;
-                finer = f_bar;
-            }
-        }
-        if self.direct.visibility.has_azimuth_step(SHARPER.azimuth_step) {
-            deviations.soft_step = 2.0 * (f_bar_at(&self.direct, SHARPER, pair) - deviations.f_bar);
-        }
+        deviations.coarse = self.changes([HALF, QUARTER], deviations.f_bar, pair);
+        [deviations.sharper] = self.changes([SHARPER], deviations.f_bar, pair);
         deviations
     }
 }

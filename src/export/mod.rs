@@ -33,9 +33,10 @@ use crate::effective::EffectiveBrdf;
 
 pub use grid::ExportResolution;
 pub use meta::ExportMeta;
-pub use note::Reflectances;
+pub use note::{Reflectances, reflectances};
 pub use radiance::RadianceBasis;
 pub use radiance::slab as radiance_slab;
+pub use rgl::sampling::{DirectionSampler, Sampled};
 pub use sampler::ReadingError;
 
 use meta::Description;
@@ -256,15 +257,37 @@ pub fn write_csv(
     out: &mut dyn Write,
     progress: &Progress<'_>,
 ) -> Result<()> {
-    if let Some(resolution) = &options.resolution {
+    to_stream(&ExportTask { brdf, meta, options, progress }, out, csv::write)
+}
+
+/// The content of an `.npz` file.
+///
+/// # Errors
+/// A resolution out of range, or [`Error::Cancelled`].
+pub fn npz_bytes(
+    brdf: &EffectiveBrdf,
+    meta: &ExportMeta,
+    options: &ExportOptions,
+    progress: &Progress<'_>,
+) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    to_stream(&ExportTask { brdf, meta, options, progress }, &mut bytes, npz::write)?;
+    Ok(bytes)
+}
+
+fn to_stream(
+    task: &ExportTask<'_>,
+    out: &mut dyn Write,
+    write: impl Fn(&ExportTable, &Description<'_>, &mut dyn Write) -> io::Result<()>,
+) -> Result<()> {
+    if let Some(resolution) = &task.options.resolution {
         resolution.check()?;
     }
     let mut buffered = BufWriter::new(out);
-    let task = ExportTask { brdf, meta, options, progress };
-    match on_grid(&task, &mut buffered, csv::write).and_then(|_| buffered.flush()) {
+    match on_grid(task, &mut buffered, write).and_then(|_| buffered.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             // An error of this crate is passed on.
-            Err(error.downcast::<Error>().unwrap_or_else(|error| Error::failed(format!("standard output: {error}"))))
+            Err(error.downcast::<Error>().unwrap_or_else(|error| Error::failed(format!("the stream: {error}"))))
         }
         _ => Ok(()),
     }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::meta::{FRAME, PROGRAM};
 use super::{ExportTask, Written};
+use crate::base::{Cancel, Result};
 use crate::effective::{EffectiveBrdf, Reflectance};
 use crate::math::directions::from_angles;
 
@@ -29,16 +30,9 @@ const RINGS: usize = 90;
 const AZIMUTHS: usize = 120;
 
 impl Reflectances {
-    /// Computes the reflectances. By reciprocity, the integral of `f̄(i, o)` over all `i` is the reflectance for light
-    /// from `o`.
+    /// Computes the reflectances.
     pub fn of(brdf: &EffectiveBrdf) -> Self {
-        let (lights, solid_angles) = hemisphere();
-        let reflectance = |o: Vec3| -> Vec3 {
-            let mut values = vec![Vec3::ZERO; lights.len()];
-            brdf.eval_lights(&lights, o, &mut values);
-            let sum: DVec3 = values.iter().zip(&solid_angles).map(|(value, w)| value.as_dvec3() * *w).sum();
-            sum.as_vec3()
-        };
+        let hemisphere = Hemisphere::new();
         let directions: Vec<[f32; 2]> = THETAS
             .iter()
             .flat_map(|&theta| PHIS.iter().map(move |&phi| [theta, phi]))
@@ -46,7 +40,9 @@ impl Reflectances {
             .collect();
         let of_direction: Vec<_> = directions
             .into_par_iter()
-            .map(|[theta, phi]| ([theta, phi], reflectance(from_angles(theta.to_radians(), phi.to_radians()))))
+            .map(|[theta, phi]| {
+                ([theta, phi], hemisphere.reflectance(brdf, from_angles(theta.to_radians(), phi.to_radians())))
+            })
             .collect();
         // Weights are proportional to the projected solid angle of a ring.
         let weight = |theta: f32| (2.0 * theta.to_radians()).sin() / if theta == 0.0 { 1.0 } else { 2.0 };
@@ -69,18 +65,43 @@ impl Reflectances {
     }
 }
 
-/// Returns the directions at the middles of cells, and the solid angle of each cell.
-fn hemisphere() -> (Vec<Vec3>, Vec<f64>) {
-    let cells = (0..RINGS).flat_map(|ring| (0..AZIMUTHS).map(move |step| (ring, step)));
-    cells
-        .map(|(ring, step)| {
-            let edge = |k: usize| k as f32 / RINGS as f32 * FRAC_PI_2;
-            let theta = 0.5 * (edge(ring) + edge(ring + 1));
-            let phi = (step as f32 + 0.5) / AZIMUTHS as f32 * TAU;
-            let band = f64::from(edge(ring)).cos() - f64::from(edge(ring + 1)).cos();
-            (from_angles(theta, phi), band * f64::from(TAU) / AZIMUTHS as f64)
-        })
-        .unzip()
+/// Directional-hemispherical reflectances of light from directions.
+///
+/// # Errors
+/// [`crate::base::Error::Cancelled`].
+pub fn reflectances(brdf: &EffectiveBrdf, directions: &[Vec3], cancel: &Cancel) -> Result<Vec<Vec3>> {
+    let hemisphere = Hemisphere::new();
+    cancel.map("reflectances", directions.len(), |k| hemisphere.reflectance(brdf, directions[k]))
+}
+
+/// The directions at the middles of cells, and the solid angle of each cell.
+struct Hemisphere {
+    directions: Vec<Vec3>,
+    solid_angles: Vec<f64>,
+}
+
+impl Hemisphere {
+    fn new() -> Self {
+        let cells = (0..RINGS).flat_map(|ring| (0..AZIMUTHS).map(move |step| (ring, step)));
+        let (directions, solid_angles) = cells
+            .map(|(ring, step)| {
+                let edge = |k: usize| k as f32 / RINGS as f32 * FRAC_PI_2;
+                let theta = 0.5 * (edge(ring) + edge(ring + 1));
+                let phi = (step as f32 + 0.5) / AZIMUTHS as f32 * TAU;
+                let band = f64::from(edge(ring)).cos() - f64::from(edge(ring + 1)).cos();
+                (from_angles(theta, phi), band * f64::from(TAU) / AZIMUTHS as f64)
+            })
+            .unzip();
+        Self { directions, solid_angles }
+    }
+
+    /// The integral of `f̄(i, o)` over all `i`, which by reciprocity is the reflectance for light from `o`.
+    fn reflectance(&self, brdf: &EffectiveBrdf, o: Vec3) -> Vec3 {
+        let mut values = vec![Vec3::ZERO; self.directions.len()];
+        brdf.eval_lights(&self.directions, o, &mut values);
+        let sum: DVec3 = values.iter().zip(&self.solid_angles).map(|(value, w)| value.as_dvec3() * *w).sum();
+        sum.as_vec3()
+    }
 }
 
 /// Returns the text of the note on a file.
@@ -96,6 +117,10 @@ pub(super) fn text(task: &ExportTask<'_>, path: &Path, written: &Written, reflec
     put("How to read it");
     written.conventions.iter().for_each(|line| put(&format!("- {line}")));
     put(&format!("- Frame: {FRAME}."));
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bsdf")) {
+        let file = name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
+        put(&format!("- Mitsuba 3: <bsdf type=\"measured\"><string name=\"filename\" value=\"{file}\"/></bsdf>"));
+    }
     put(
         "- x is the tangent (tile x, along u of a surface), y the bitangent (tile y, along v); put the same frame on the object.",
     );

@@ -9,10 +9,6 @@ use super::{Gpu, GpuError};
 use crate::color_map::reads::{self, Within};
 use crate::color_map::{DEVIATIONS, MEANS, PrefilteredTable};
 
-/// Threads of a workgroup, and the largest number of workgroups along an axis of a dispatch.
-const THREADS: u32 = 64;
-const MAX_GROUPS: u32 = 65_535;
-
 /// A prefiltered table on the GPU (16-bit floats, 512 kB), and the pipeline that reads it.
 #[derive(Debug)]
 pub struct GpuColorReads {
@@ -105,17 +101,7 @@ impl GpuColorReads {
         let table = std::iter::once(wgpu::BindingResource::TextureView(&self.table));
         let bound: Vec<_> = table.chain(buffers.map(wgpu::Buffer::as_entire_binding)).collect();
         let group = gpu.group("color map", &self.layout, &bound)?;
-        let groups = (pixels.len() as u32).div_ceil(THREADS);
-        gpu.checked("reading a color map", || {
-            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1);
-            drop(pass);
-            gpu.queue.submit([encoder.finish()]);
-            Ok(())
-        })?;
+        gpu.run_over(pixels.len() as u32, &self.pipeline, &group, "reading a color map")?;
         let colors: Vec<[f32; 4]> = gpu.read(&colors)?;
         Ok(colors.iter().map(|color| Vec3::from_slice(color)).collect())
     }

@@ -9,6 +9,8 @@ pub mod device;
 #[cfg(feature = "gpu")]
 pub mod render;
 #[cfg(feature = "gpu")]
+pub mod seen_through;
+#[cfg(feature = "gpu")]
 pub mod shading;
 #[cfg(feature = "gpu")]
 pub mod visibility;

@@ -1,13 +1,13 @@
 //! Interreflection: light that facets send to each other before it leaves the tile. The paper leaves it out (Wu et al.
 //! 2011, Sec. 6, Fig. 12).
 //!
-//! One bounce (light, facet, facet, viewer) evaluates the BRDFs of both facets. With more bounces, the first and the
-//! last facet keep their BRDFs, and the facets between reflect as diffuse surfaces of the same albedo. The result is
-//! smooth, so a coarse table over light and view directions stores it. The table is symmetric, as `G` is, and its
-//! values are added to the direct reflection.
+//! Rays from facets find the points that send light to them, and random walks from these points collect the light of
+//! all directions of a table at once. Every facet of a walk reflects by its own BRDF. The table over light and view
+//! directions is symmetric, as `G` is, and its values are added to the direct reflection.
 
-mod bounces;
+mod gather;
 mod mirrored;
+mod sampler;
 mod table;
 mod transport;
 
@@ -16,9 +16,10 @@ mod tests;
 
 use glam::Vec3;
 
-pub use bounces::{gather, is_grey};
+pub use gather::{gather, is_grey};
+pub(crate) use sampler::LobeSampler;
 pub use table::InterreflectionTable;
-pub use transport::Transport;
+pub use transport::{Tracer, Transport, Vertex};
 
 use crate::brdf::Brdf;
 use crate::math::directions::PolarGrid;
@@ -28,9 +29,9 @@ use crate::math::directions::PolarGrid;
 pub struct InterreflectionSettings {
     /// Number of elements: the facets that send and receive light.
     pub elements: usize,
-    /// Rays per element; even.
+    /// Rays per element.
     pub rays: usize,
-    /// Number of bounces; at least one.
+    /// Largest number of bounces; at least one.
     pub bounces: usize,
     /// Nodes of the table.
     pub grid: PolarGrid,

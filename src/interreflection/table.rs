@@ -1,4 +1,4 @@
-//! The interreflected part of `G` on a coarse grid.
+//! The interreflected part of `G` on a grid.
 
 use glam::{DVec3, Vec3};
 
@@ -32,18 +32,19 @@ impl InterreflectionTable {
     /// horizon.
     pub fn eval_lights(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) {
         let n = self.grid.len();
-        let to_viewer = self.grid.taps(o);
+        let to_viewer = self.grid.cubic_taps(o);
         for (k, &i) in lights.iter().enumerate() {
             let mut value = Vec3::ZERO;
             if i.z > 0.0 && o.z > 0.0 {
-                let to_light = self.grid.taps(i);
+                let to_light = self.grid.cubic_taps(i);
                 for (row, row_weight) in to_viewer {
                     let row = &self.values[row * n..(row + 1) * n];
                     let along: Vec3 = to_light.iter().map(|&(column, weight)| row[column] * weight).sum();
                     value += along * row_weight;
                 }
             }
-            out(k, value.as_dvec3());
+            // A cubic may be below zero; no reflected light is.
+            out(k, value.max(Vec3::ZERO).as_dvec3());
         }
     }
 }

@@ -2,9 +2,14 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
-use super::predicted_share;
+use super::sampler::LobeSampler;
+use super::{Tracer, Vertex, predicted_share};
 use crate::effective::EffectiveBrdf;
+use crate::geometry::{FacetSampler, PeriodicGrid, SampleShift, is_facet_visible, lifted_origins};
 use crate::math::directions::{PolarGrid, from_angles};
 use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::pipeline::Pipeline;
@@ -95,13 +100,15 @@ fn a_path_traced_white_cavity_returns_one_within_its_error_bars() {
 }
 
 #[test]
-fn matrices_agree_with_path_tracing_for_diffuse_and_glossy_facets() {
+fn walks_agree_with_path_tracing_for_diffuse_and_glossy_facets() {
     let pairs = mirror_biased_pairs(48, 9);
     let colored = r#"{ kind = "lambertian", albedo = [0.9, 0.5, 0.2] }"#;
     let glossy = r#"{ kind = "cook_torrance", roughness = 0.4, f0 = [0.9, 0.6, 0.3] }"#;
     // Four normals give kinks between the table's nodes, the hardest case for the table.
     let pyramids = r#"{ kind = "pyramids", height = 0.5 }"#;
-    for (geometry, brdf, bounces) in [(DEEP, colored, 3), (DEEP, glossy, 1), (pyramids, colored, 1)] {
+    for (geometry, brdf, bounces, bound) in
+        [(DEEP, colored, 3, 0.05), (DEEP, glossy, 1, 0.05), (pyramids, colored, 1, 0.13)]
+    {
         let scene = open(geometry, brdf, &format!("interreflection = \"on\"\nbounces = {bounces}"));
         let plain = effective(geometry, brdf, "");
         let outcome = Pipeline::new().effective(&scene).unwrap();
@@ -121,9 +128,121 @@ fn matrices_agree_with_path_tracing_for_diffuse_and_glossy_facets() {
         eprintln!("{brdf}, {bounces} bounces: error {error:.4}, noise {noise:.4}, added by bounces {added:.4}");
         assert!(added > 0.02, "a case without interreflection tests nothing: {added}");
         assert!(
-            (error * error - noise * noise).max(0.0).sqrt() < 0.02 + 0.13 * added,
+            (error * error - noise * noise).max(0.0).sqrt() < 0.02 + bound * added,
             "{brdf}: error {error} of {added}, noise {noise}"
         );
+    }
+}
+
+/// `f̄` of the light that was reflected by two facets or more, by path tracing with exact visibility in f64 sums: walks
+/// from the viewer, with the light seen from every vertex.
+fn traced(scene: &LoadedScene, pair: Pair, passes: u64) -> (f64, f64) {
+    let pipeline = Pipeline::new();
+    let (mesh, assignment) = (pipeline.mesh(scene).unwrap(), pipeline.materials(scene).unwrap());
+    let material = &assignment.materials[assignment.material_of_slot[0]];
+    let (grid, sampler) = (PeriodicGrid::new(&mesh), LobeSampler::new(&material.brdf));
+    let pass = |seed: u64| {
+        let facets = FacetSampler::new(&mesh).sample(&mesh, 8192, SampleShift::from_seed(seed));
+        let tracer = Tracer::new(&mesh, &facets, &[0]);
+        let origins = lifted_origins(&facets, mesh.size);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut total = 0.0_f64;
+        for (s, &origin) in origins.iter().enumerate() {
+            let (mut at, mut to) = (
+                Vertex {
+                    origin,
+                    normal: facets.normals[s],
+                    geometric_normal: facets.geometric_normals[s],
+                    triangle: facets.triangles[s],
+                    element: 0,
+                },
+                pair.o,
+            );
+            if !is_facet_visible(&grid, &facets, s, pair.o) {
+                continue;
+            }
+            let mut weight = Vec3::splat(facets.areas[s] * at.normal.dot(to));
+            for _ in 0..64 {
+                let numbers = [rng.random(), rng.random(), rng.random()];
+                let Some((away, factor)) = sampler.sample(&material.brdf, at.normal, to, numbers) else { break };
+                let Some(next) = tracer.trace(at.origin, away, at.triangle) else { break };
+                (at, to, weight) = (next, -away, weight * factor);
+                let is_lit = at.normal.dot(pair.i) > 0.0 && !grid.is_blocked(at.origin, pair.i, at.triangle);
+                if is_lit {
+                    total += f64::from((weight * material.brdf.f(at.normal, pair.i, to)).x / at.normal.dot(to));
+                }
+            }
+        }
+        total / f64::from(mesh.base_area() * pair.o.z)
+    };
+    let values: Vec<f64> = (0..passes).into_par_iter().map(pass).collect();
+    let mean = values.iter().sum::<f64>() / passes as f64;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (passes - 1) as f64;
+    (mean, (variance / passes as f64).sqrt())
+}
+
+#[test]
+fn the_reference_follows_narrow_lobes_between_facets() {
+    // Most light of these grooves bounces along narrow lobes, which paths in proportion to the cosine hardly ever meet.
+    let grooves =
+        r#"{ kind = "grooves", profile = "v", count = 2, depth = 0.25, side_angle_deg = 45, rotation_deg = 0 }"#;
+    let scene = open(grooves, r#"{ kind = "ggx", roughness = 0.1, f0 = 1 }"#, "interreflection = \"on\"");
+    let pairs = mirror_biased_pairs(24, 12);
+    let settings = ReferenceSettings { facets: 1024, max_passes: 12, target: 1e-6, seed: 3 };
+    let pipeline = Pipeline::new();
+    let estimates =
+        pipeline.with_reference(&scene, |reference| reference.estimate(&pairs, &settings, |_, _| true)).unwrap();
+    let outcome = pipeline.effective(&scene).unwrap();
+    let got: f64 = estimates.iter().map(|estimate| f64::from(estimate.f_bar.x)).sum();
+    let noise = estimates.iter().map(|estimate| f64::from(estimate.standard_error.x).powi(2)).sum::<f64>().sqrt();
+    let expected: f64 = pairs.iter().map(|pair| f64::from(outcome.brdf.eval(pair.i, pair.o).x)).sum();
+    assert!(noise < 0.02 * got, "{got} ± {noise}");
+    assert!((got - expected).abs() < 3.0 * noise + 0.02 * expected, "{got} ± {noise} instead of {expected}");
+}
+
+#[test]
+fn glossy_grooves_agree_with_path_tracing_after_all_bounces() {
+    // 64 % of the light of such a groove was reflected more than once.
+    let grooves =
+        r#"{ kind = "grooves", profile = "v", count = 2, depth = 0.25, side_angle_deg = 45, rotation_deg = 0 }"#;
+    let pairs = mirror_biased_pairs(8, 12);
+    for brdf in [
+        r#"{ kind = "ggx", roughness = 0.2, f0 = 1 }"#,
+        r#"[{ kind = "lambertian", albedo = 0.4 }, { kind = "ggx", roughness = 0.2, f0 = 0.5 }]"#,
+    ] {
+        let scene = open(grooves, brdf, "interreflection = \"on\"");
+        let (on, off) = (effective(grooves, brdf, "interreflection = \"on\""), effective(grooves, brdf, ""));
+        let (mut error, mut noise, mut norm) = (0.0, 0.0, 0.0);
+        for pair in &pairs {
+            let (right, deviation) = traced(&scene, *pair, 4);
+            let got = f64::from((on.eval(pair.i, pair.o) - off.eval(pair.i, pair.o)).x);
+            error += (got - right).powi(2);
+            noise += deviation.powi(2);
+            norm += right.powi(2);
+        }
+        let [error, noise] = [error, noise].map(|sum: f64| (sum / norm).sqrt());
+        eprintln!("{brdf}: {error:.4}, noise {noise:.4}");
+        assert!(error < 0.03 + 2.0 * noise && noise < 0.02, "{brdf}: {error}, noise {noise}");
+    }
+}
+
+#[test]
+fn white_tiles_return_no_more_than_they_receive() {
+    for (geometry, brdf) in [
+        (DEEP, WHITE),
+        (r#"{ kind = "pyramids", height = 0.5 }"#, WHITE),
+        (DEEP, r#"{ kind = "ggx", roughness = 0.3, f0 = 1 }"#),
+    ] {
+        let tile = effective(geometry, brdf, "interreflection = \"on\"");
+        let flat = effective(r#"{ kind = "flat" }"#, brdf, "");
+        let angles = [0.0_f32, 0.3, 0.6, 0.9, 1.2, 1.4];
+        let most = angles.iter().map(|theta| furnace(&flat, from_angles(*theta, 0.2))).fold(0.0, f64::max);
+        for theta in angles {
+            let returned = furnace(&tile, from_angles(theta, 0.7));
+            eprintln!("{geometry}, {brdf}, {theta}: {returned:.3} of at most {most:.3}");
+            // The facets and their visibility have errors of up to 2 % at grazing views of pyramids.
+            assert!(returned <= most.min(1.0) + 0.025, "{geometry}, {brdf}, {theta}: {returned}, flat {most}");
+        }
     }
 }
 
@@ -167,7 +286,7 @@ fn stages_of_interreflection_run_only_if_it_is_on_and_facets_see_each_other() {
 }
 
 #[test]
-fn a_colour_edit_does_not_cast_rays_again() {
+fn a_colour_edit_does_not_cast_the_first_rays_again() {
     let pipeline = Pipeline::new();
     let mut loaded = open(DEEP, WHITE, "interreflection = \"on\"");
     pipeline.effective(&loaded).unwrap();

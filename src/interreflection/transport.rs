@@ -1,29 +1,63 @@
 //! Rays between points of the surface.
 
+use std::f32::consts::FRAC_1_PI;
+use std::fmt;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::sampler::{from_cosine, from_solid_angle};
 use crate::base::{Cancel, Result};
 use crate::geometry::facets::kd_tree::KdTree;
-use crate::geometry::{Facets, PeriodicGrid, TileMesh, lifted_origins};
-use crate::math::directions::from_angles;
+use crate::geometry::{Facets, Hit, PeriodicGrid, TileMesh, lifted_origins};
 
-/// Marker of a ray without a hit: it leaves the tile or hits the back of a triangle, which does not reflect.
-pub const NO_HIT: u32 = u32::MAX;
+/// Distance by which the origin of a ray is lifted off the surface, in units of the tile's diagonal.
+const LIFT: f32 = 2e-6;
 
-/// Elements, which are a subset of the facets, and rays between them.
-#[derive(Debug, Clone)]
+/// Spacings by which an element counts as farther away if its normal is perpendicular to that of a point. They keep the
+/// two walls of a crease, and the two sides of a thin sheet, apart.
+const TURN_SPACINGS: f32 = 3.0;
+
+/// A point of the surface at which light is reflected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vertex {
+    /// The origin of rays from this point, lifted off the reflecting side.
+    pub origin: Vec3,
+    pub normal: Vec3,
+    pub geometric_normal: Vec3,
+    pub triangle: u32,
+    /// The nearest element. Its facet has the visibility, the slot and the colour of the vertex.
+    pub element: u32,
+}
+
+/// Finds the points at which rays through the endless tiling meet its reflecting side.
+pub struct Tracer {
+    grid: PeriodicGrid,
+    tree: KdTree,
+    /// Geometric normals of the triangles, and normals of their corners if they are smooth.
+    normals: Vec<Vec3>,
+    corner_normals: Option<Vec<[Vec3; 3]>>,
+    size: Vec2,
+    bottom: f32,
+    element_normals: Vec<Vec3>,
+    /// Amount that a perpendicular normal adds to a squared distance.
+    turn_penalty: f32,
+}
+
+/// Elements, which are a subset of the facets, and the first rays of the walks from them.
+#[derive(Debug)]
 pub struct Transport {
+    pub tracer: Tracer,
     /// The facet of each element.
     pub facets: Vec<u32>,
     /// Surface area that each element represents.
     pub areas: Vec<f32>,
-    /// Rays per element. All have equal weight, because their density follows the cosine.
+    /// Rays per element. [`first_density`] is their density.
     pub rays: usize,
     /// Direction of ray `element * rays + k`, away from the element.
     pub directions: Vec<Vec3>,
-    /// The element that each ray hits, or [`NO_HIT`].
-    pub hits: Vec<u32>,
+    /// The point that each ray hits; `None` if it leaves the tile or hits a back side, which does not reflect.
+    pub hits: Vec<Option<Vertex>>,
 }
 
 impl Transport {
@@ -40,65 +74,114 @@ impl Transport {
         let chosen_area: f64 = chosen.iter().map(|facet| f64::from(facets.areas[*facet as usize])).sum();
         let scale = total / chosen_area.max(f64::MIN_POSITIVE);
         let areas = chosen.iter().map(|facet| (f64::from(facets.areas[*facet as usize]) * scale) as f32).collect();
-        let area = (total / chosen.len().max(1) as f64) as f32;
-        let grid = PeriodicGrid::new(mesh);
-        let bottom = mesh.z_range().0;
+        let tracer = Tracer::new(mesh, facets, &chosen);
         let origins = lifted_origins(facets, mesh.size);
-        // Points are moved off the surface so that a search for the nearest element keeps the two sides of a thin
-        // sheet, or the two walls of a crease, apart.
-        let offset = area.max(0.0).sqrt();
-        let tree = {
-            let position = |&s: &u32| {
-                let s = s as usize;
-                wrap(facets.positions[s] + facets.geometric_normals[s] * offset, mesh.size)
-            };
-            KdTree::new(&chosen.iter().map(position).collect::<Vec<_>>(), mesh.size)
-        };
-        let normals: Vec<Vec3> = (0..mesh.triangles.len()).map(|t| mesh.geometric_normal(t)).collect();
         let mut directions = vec![Vec3::Z; chosen.len() * rays];
-        let mut hits = vec![NO_HIT; chosen.len() * rays];
+        let mut hits = vec![None; chosen.len() * rays];
         directions.par_chunks_mut(rays).zip(hits.par_chunks_mut(rays)).zip(&chosen).enumerate().for_each(
             |(element, ((directions, hits), &facet))| {
                 if cancel.is_set() {
                     return;
                 }
                 let s = facet as usize;
-                let (normal, geometric) = (facets.normals[s], facets.geometric_normals[s]);
                 for (k, (direction, hit)) in directions.iter_mut().zip(hits).enumerate() {
-                    *direction = cosine_direction(normal, k, rays, element);
-                    if direction.dot(geometric) <= 0.0 {
-                        continue;
-                    }
-                    let Some(found) = grid.first_hit(origins[s], *direction, facets.triangles[s], bottom) else {
-                        continue;
-                    };
-                    let facing = normals[found.triangle as usize];
-                    if facing.dot(*direction) < 0.0 {
-                        *hit = tree.nearest(wrap(found.position + facing * offset, mesh.size)).unwrap_or(NO_HIT);
+                    *direction = first_direction(facets.normals[s], (element * rays + k) as u64);
+                    if direction.dot(facets.geometric_normals[s]) > 0.0 {
+                        *hit = tracer.trace(origins[s], *direction, facets.triangles[s]);
                     }
                 }
             },
         );
         cancel.check()?;
-        Ok(Self { facets: chosen, areas, rays, directions, hits })
+        Ok(Self { tracer, facets: chosen, areas, rays, directions, hits })
     }
 
     /// Fraction of all rays that hit an element.
     pub fn hit_fraction(&self) -> f64 {
-        self.hits.iter().filter(|hit| **hit != NO_HIT).count() as f64 / self.hits.len().max(1) as f64
+        self.hits.iter().flatten().count() as f64 / self.hits.len().max(1) as f64
     }
 }
 
-/// The k-th of `rays` cosine-weighted directions about `normal`. The set of directions is rotated and shifted from
-/// element to element.
-fn cosine_direction(normal: Vec3, k: usize, rays: usize, element: usize) -> Vec3 {
-    // The R2 sequence shifts the set of each element; the golden angle separates the azimuths within a set.
-    let shift = |step: f64| ((element as f64 + 0.5) * step).fract();
-    let height = ((k as f64 + shift(0.754_877_666_246_692_8)) / rays as f64).min(1.0 - 1e-6);
-    let turns = (k as f64 * 0.618_033_988_749_895 + shift(0.569_840_290_998_053_3)).fract();
-    let local = from_angles((height.sqrt().asin()) as f32, turns as f32 * std::f32::consts::TAU);
-    let (x, y) = normal.any_orthonormal_pair();
-    (x * local.x + y * local.y + normal * local.z).normalize_or(normal)
+impl Tracer {
+    /// Prepares rays. A vertex is assigned the nearest of `elements`, which are indices of facets.
+    pub(super) fn new(mesh: &TileMesh, facets: &Facets, elements: &[u32]) -> Self {
+        let area: f64 = facets.areas.iter().map(|area| f64::from(*area)).sum();
+        let spacing = (area / elements.len().max(1) as f64).sqrt() as f32;
+        let positions: Vec<Vec3> = elements.iter().map(|s| wrap(facets.positions[*s as usize], mesh.size)).collect();
+        Self {
+            grid: PeriodicGrid::new(mesh),
+            tree: KdTree::new(&positions, mesh.size),
+            element_normals: elements.iter().map(|s| facets.geometric_normals[*s as usize]).collect(),
+            turn_penalty: (TURN_SPACINGS * spacing).powi(2),
+            normals: (0..mesh.triangles.len()).map(|triangle| mesh.geometric_normal(triangle)).collect(),
+            corner_normals: mesh.corner_normals.clone(),
+            size: mesh.size,
+            bottom: mesh.z_range().0,
+        }
+    }
+
+    /// The point that a ray meets first, or `None` if it leaves the tile or meets a back side. The triangle `own` is
+    /// ignored if `origin` lies on it.
+    pub fn trace(&self, origin: Vec3, direction: Vec3, own: u32) -> Option<Vertex> {
+        let hit = self.grid.first_hit(origin, direction, own, self.bottom)?;
+        let geometric_normal = self.normals[hit.triangle as usize];
+        if geometric_normal.dot(direction) >= 0.0 {
+            return None;
+        }
+        let position = wrap(hit.position, self.size);
+        let turn = |element: u32| 1.0 - geometric_normal.dot(self.element_normals[element as usize]);
+        let element = self.tree.nearest_by(position, |element| self.turn_penalty * turn(element).max(0.0))?;
+        Some(Vertex {
+            origin: position + geometric_normal * (LIFT * self.size.length()),
+            normal: self.smooth_normal(&hit).unwrap_or(geometric_normal),
+            geometric_normal,
+            triangle: hit.triangle,
+            element,
+        })
+    }
+
+    fn smooth_normal(&self, hit: &Hit) -> Option<Vec3> {
+        let [a, b, c] = self.corner_normals.as_ref()?[hit.triangle as usize];
+        let [v, w] = hit.barycentric;
+        (a * (1.0 - v - w) + b * v + c * w).try_normalize()
+    }
+}
+
+impl fmt::Debug for Tracer {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Tracer").field("triangles", &self.normals.len()).finish_non_exhaustive()
+    }
+}
+
+/// The part of the first rays whose density follows the cosine. The others are uniform in solid angle, because a glossy
+/// lobe times both cosines does not fall with the cosine.
+const COSINE_PART: f32 = 0.5;
+
+/// Direction of ray `number` about `normal`.
+fn first_direction(normal: Vec3, number: u64) -> Vec3 {
+    // Facets follow another sequence (R2), so that points and directions are not correlated.
+    let (u, v) = (radical_inverse(number, 2) as f32, radical_inverse(number, 3) as f32);
+    if u < COSINE_PART {
+        from_cosine(normal, u / COSINE_PART, v)
+    } else {
+        from_solid_angle(normal, (u - COSINE_PART) / (1.0 - COSINE_PART), v)
+    }
+}
+
+/// Density of the directions of first rays at a cosine to the normal.
+pub(super) fn first_density(cosine: f32) -> f32 {
+    COSINE_PART * cosine * FRAC_1_PI + (1.0 - COSINE_PART) * 0.5 * FRAC_1_PI
+}
+
+/// The digits of a number in some base, mirrored at the point (van der Corput 1935).
+fn radical_inverse(mut number: u64, base: u64) -> f64 {
+    let (mut value, mut digit) = (0.0, 1.0 / base as f64);
+    while number > 0 {
+        value += (number % base) as f64 * digit;
+        number /= base;
+        digit /= base as f64;
+    }
+    value
 }
 
 fn wrap(position: Vec3, size: Vec2) -> Vec3 {
@@ -111,20 +194,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn directions_between_facets_pass_the_chi_squared_test_for_the_cosine() {
-        const RAYS: usize = 16;
+    fn first_directions_pass_the_chi_squared_test_for_their_density() {
+        const RAYS: u64 = 16 * 8192;
         for normal in [Vec3::Z, crate::math::directions::from_angles(1.1, 2.0)] {
             let (x, y) = normal.any_orthonormal_pair();
             let mut counts = vec![0.0; 8 * 16];
-            for (element, k) in (0..8192).flat_map(|element| (0..RAYS).map(move |k| (element, k))) {
-                let d = cosine_direction(normal, k, RAYS, element);
+            for number in 0..RAYS {
+                let d = first_direction(normal, number);
                 let at = |axis: Vec3| f64::from(d.dot(axis));
-                let ring = (8.0 * (at(x).powi(2) + at(y).powi(2))).clamp(0.0, 7.0) as usize;
+                // Rings of equal solid angle.
+                let ring = (8.0 * (1.0 - at(normal))).clamp(0.0, 7.0) as usize;
                 let sector = (16.0 * (at(y).atan2(at(x)) / std::f64::consts::TAU + 1.0).fract()) as usize;
                 counts[16 * ring + sector.min(15)] += 1.0;
             }
+            // The density is linear in the cosine, so its value in the middle of a ring is its mean.
+            let expected = |bin: usize| f64::from(first_density(1.0 - (bin as f32 / 16.0).floor() / 8.0 - 0.0625));
             // Šidák's correction: two tests at a joint level of 0.01.
-            let p = crate::testing::chi_square::p_value(&counts, &vec![1.0; counts.len()]);
+            let p = crate::testing::chi_square::p_value(&counts, &(0..128).map(expected).collect::<Vec<_>>());
             assert!(p > 1.0 - 0.99_f64.sqrt(), "{normal}: {p}");
         }
     }

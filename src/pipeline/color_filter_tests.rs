@@ -120,7 +120,7 @@ fn seen_along_the_light_nothing_is_in_shadow() {
 }
 
 #[test]
-fn an_edit_of_a_stop_recomputes_neither_drivers_nor_ranks_nor_visibility() {
+fn an_edit_of_a_stop_recomputes_neither_mesh_nor_facets_nor_drivers_nor_ranks_nor_visibility() {
     let noise = "{ kind = \"noise\", cells = 4 }";
     let map = |value: f64| {
         format!(
@@ -134,11 +134,12 @@ fn an_edit_of_a_stop_recomputes_neither_drivers_nor_ranks_nor_visibility() {
         pipeline
             .runs()
             .into_iter()
-            .filter(|(name, _)| matches!(*name, "visibility" | "color_drivers" | "color_heights"))
+            .filter(|(name, _)| !name.starts_with("slab") && *name != "color_tile" && *name != "color_facets")
             .collect::<Vec<_>>()
     };
     let first = runs(0.1);
-    assert!(first.iter().all(|(_, count)| *count == 1), "{first:?}");
+    let counted = ["geometry", "facets", "visibility", "color_drivers", "color_relief", "color_heights"];
+    assert!(counted.iter().all(|name| first.contains(&(*name, 1))), "{first:?}");
     assert_eq!(runs(0.4), first);
 }
 
@@ -152,6 +153,21 @@ fn a_scene_without_a_colour_map_runs_none_of_its_stages_and_its_effect_is_off() 
     assert!(pipeline.color_filter(&plain).unwrap_err().to_string().contains("color_map"));
     let mapped = Pipeline::new().effective(&smooth(64, 6, "draft", &layer("{ kind = \"height\" }", RAMP))).unwrap();
     assert!(mapped.plan.is_on("color_map_filtering"));
+}
+
+#[test]
+fn a_map_that_is_finer_than_the_facets_is_named_with_a_number_of_facets_that_resolves_it() {
+    let map = |cells: u32| layer(&format!("{{ kind = \"noise\", basis = \"gaussian\", cells = {cells} }}"), BANDS);
+    let warning = |cells: u32, facets: usize| {
+        let mut loaded = smooth(64, 6, "draft", &map(cells));
+        loaded.scene.quality.facets = Some(facets);
+        let outcome = Pipeline::new().effective(&loaded).unwrap();
+        outcome.health().warnings.iter().find(|warning| warning.contains("finer than the facets")).cloned()
+    };
+    assert_eq!(warning(4, 512), None);
+    let named = warning(32, 512).unwrap();
+    assert!(named.contains("quality.facets = 2048") && named.contains(" % of their variance"), "{named}");
+    assert_eq!(warning(32, 8192), None);
 }
 
 #[test]

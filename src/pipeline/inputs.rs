@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::features::Surface;
-use super::stages::{FacetsRole, FindMirrorPlanes, SampleFacets, TileShape};
+use super::stages::{FacetsRole, FindMirrorPlanes, TileShape};
 use super::{Keyed, Pipeline, StageTimes};
 use crate::base::Result;
 use crate::brdf::MaterialAssignment;
@@ -59,7 +59,7 @@ impl Pipeline {
             }
         };
         let materials = self.assignment(loaded, &tile, times)?;
-        let facets = self.get(SampleFacets { tile: &tile, settings: &settings, role }, times)?;
+        let facets = self.facets(&tile, &settings, role, times)?;
         let material_of_slot = grouped(&materials.material_of_slot, &facets, &settings);
         let mut sum = FacetSum::new(&facets, &material_of_slot, &materials.materials);
         sum.force(&facets, &settings.effects);

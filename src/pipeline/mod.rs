@@ -17,9 +17,11 @@ mod gpu_tile;
 mod inputs;
 mod low_rank;
 mod outcome;
+mod reference;
 mod refine;
 mod shading;
 mod slab;
+mod slab_values;
 mod stage;
 mod stages;
 #[cfg(test)]
@@ -42,12 +44,12 @@ use self::refine::RefinedSum;
 pub use self::shading::ShadingBrdf;
 use self::shading::{LastShading, Shading, ShadingKeys};
 pub use self::slab::SlabOutcome;
-use self::slab::refuse_slab;
+pub use self::slab_values::{PHOTON_TARGET, SlabValues, require_faces};
 pub use self::stage::{Codec, Keyed, Stage, StageTimes};
 use self::stage::{Memo, elapsed_ms, lock};
 use self::stages::{
-    BuildTile, CastTransport, ComputeVisibility, FindMirrorPlanes, Interreflect, LoadMaterials, PaperTables,
-    SampleDrivers, SampleFacets, TileShape,
+    BuildTile, CastTransport, ColorFacets, ColorTile, ComputeVisibility, FacetsRole, FindMirrorPlanes, Interreflect,
+    LoadMaterials, MeasureRelief, PaperTables, SampleDrivers, SampleFacets, TileShape,
 };
 use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
@@ -58,8 +60,7 @@ use crate::geometry::{Facets, TileMesh};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
 use crate::metrics::Errors;
 use crate::plan::{Preset, ProductMethod, Refinement, Settings, VisibilityAlgorithm};
-use crate::reference::Reference;
-use crate::scene::{LoadedScene, Scene, Switch};
+use crate::scene::{LoadedScene, Scene};
 use crate::visibility::Visibility;
 
 /// Computes effective BRDFs. Clones share the memo.
@@ -142,6 +143,9 @@ impl Pipeline {
             stages::CorrelateFaces::NAME,
             stages::TraceInner::NAME,
             SampleDrivers::NAME,
+            MeasureRelief::NAME,
+            ColorTile::NAME,
+            ColorFacets::NAME,
             stages::MeasureHeights::NAME,
         ];
         names.into_iter().map(|name| (name, self.memo.runs(name))).collect()
@@ -153,11 +157,28 @@ impl Pipeline {
     }
 
     fn tile(&self, loaded: &LoadedScene, times: &mut StageTimes) -> Result<Keyed<TileShape>> {
-        let drivers = match &loaded.scene.color_map {
-            Some(map) => Some(self.get(SampleDrivers::new(loaded, map, &self.env), times)?),
-            None => None,
+        let tile = &self.get(BuildTile::new(loaded, &self.env), times)?;
+        let Some(map) = &loaded.scene.color_map else { return Ok(tile.clone()) };
+        let drivers = &self.get(SampleDrivers::new(loaded, map, &self.env), times)?;
+        let relief = &self.get(MeasureRelief { tile, surface: map.surface.as_ref() }, times)?;
+        self.get(ColorTile { tile, map, drivers, relief }, times)
+    }
+
+    /// The facets of a tile. An edit of a colour map keeps their places.
+    fn facets(
+        &self,
+        tile: &Keyed<TileShape>,
+        settings: &Settings,
+        role: FacetsRole,
+        times: &mut StageTimes,
+    ) -> Result<Keyed<Facets>> {
+        // The facet of a level tile has the mean colour of the tile. Bins lose the interpolated normals.
+        let keeps_places = !tile.flat && (settings.normal_bins.is_none() || tile.mesh.corner_normals.is_none());
+        let Some(below) = tile.below.as_ref().filter(|_| keeps_places) else {
+            return self.get(SampleFacets { tile, settings, role }, times);
         };
-        self.get(BuildTile::new(loaded, drivers.as_ref(), &self.env), times)
+        let facets = &self.get(SampleFacets { tile: below, settings, role }, times)?;
+        self.get(ColorFacets { tile, facets, settings, role }, times)
     }
 
     fn assignment(
@@ -266,6 +287,7 @@ impl Pipeline {
             names: material_names(scene, &tile.mesh, &materials)?,
             materials: materials.value,
             closes_plane: tile.mesh.closes_plane,
+            size: tile.mesh.size,
             color: tile.mesh.color.clone(),
         };
         // Factors that are asked for are used whatever their error is.
@@ -366,21 +388,6 @@ impl Pipeline {
         let names = material_names(&loaded.scene, &tile.mesh, &materials)?;
         let settings = Settings::from_quality(&loaded.scene.quality);
         Ok(Health::of_input(&tile.mesh, &materials.materials, &names, limits(&settings)))
-    }
-
-    /// Calls `work` with a reference evaluator of the scene.
-    ///
-    /// # Errors
-    /// As [`Pipeline::effective`].
-    pub fn with_reference<T>(&self, loaded: &LoadedScene, work: impl FnOnce(&Reference<'_>) -> T) -> Result<T> {
-        refuse_slab(loaded)?;
-        let mut times = StageTimes::new();
-        let tile = self.tile(loaded, &mut times)?;
-        let assignment = self.assignment(loaded, &tile, &mut times)?;
-        let effects = &loaded.scene.effects;
-        let bounces = if effects.interreflection == Switch::On { effects.bounces } else { 0 };
-        let reference = Reference::new(&tile.mesh, &assignment.material_of_slot, &assignment.materials);
-        Ok(work(&reference.with_bounces(bounces)))
     }
 }
 

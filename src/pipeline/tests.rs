@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::low_rank::FactorInputs;
 use super::stages::{BuildTile, ComputeVisibility, FacetsRole, LoadMaterials, SampleFacets, TileShape};
-use super::{Env, Keyed, Outcome, Pipeline, Stage};
+use super::{Env, Keyed, Outcome, Pipeline, Stage, StageTimes};
 use crate::base::Cancel;
 use crate::brdf::{Brdf, Material, Measured, MeasuredReport, Term};
 use crate::cache::{Cache, Key, KeyBuilder, Stored, Writer};
@@ -169,7 +169,8 @@ fn keyed<T>(number: u32, value: T) -> Keyed<T> {
 fn shape(scene: &str, number: u32) -> TileShape {
     let mesh = Pipeline::new().mesh(&scene::open(scene, &[]).unwrap()).unwrap();
     let surface = Key::of_numbers(&[number]);
-    TileShape { mesh, surface, flat: false, height_field: true, steepest: 1.0, colors_place_facets: false }
+    let below = None;
+    TileShape { mesh, below, surface, flat: false, height_field: true, steepest: 1.0, colors_place_facets: false }
 }
 
 #[test]
@@ -180,7 +181,7 @@ fn each_input_of_the_tile_changes_its_key() {
     std::fs::write(&path, "one").unwrap();
     let mut loaded = scene::open("table4_plate", &[]).unwrap();
     loaded.scene.tile.color_path = Some(path.clone());
-    let key = |loaded: &LoadedScene| key_of(&BuildTile::new(loaded, None, &env));
+    let key = |loaded: &LoadedScene| key_of(&BuildTile::new(loaded, &env));
     let same = key(&loaded);
     assert_eq!(same, key(&loaded));
     let with = |change: &dyn Fn(&mut LoadedScene)| {
@@ -242,6 +243,22 @@ fn each_input_of_the_facets_changes_their_key() {
         ("the paper's facets", with(0, &|settings| settings.preset = Preset::Wu2011)),
         ("mean colours", with(0, &|settings| settings.effects.color_weights = Switch::Off)),
     ]);
+}
+
+#[test]
+fn facets_that_a_map_colours_afterwards_are_those_that_are_sampled_with_it() {
+    let (pipeline, mut times) = (Pipeline::new(), StageTimes::new());
+    for name in ["fig1c_slopes_color_map", "fig10_snake_color_map", "fig6_non_normal_color_map"] {
+        let mut loaded = scene::open(name, &[]).unwrap();
+        loaded.scene.quality.facets = Some(500);
+        for bins in [None, Some(64)] {
+            let settings = Settings { normal_bins: bins, ..Settings::of(&loaded.scene) };
+            let tile = pipeline.tile(&loaded, &mut times).unwrap();
+            let facets = pipeline.facets(&tile, &settings, FacetsRole::Main, &mut times).unwrap();
+            let at_once = SampleFacets { tile: &tile, settings: &settings, role: FacetsRole::Main };
+            assert_eq!(*facets.value, at_once.run(&Env::default()).unwrap(), "{name} {bins:?}");
+        }
+    }
 }
 
 #[test]

@@ -50,6 +50,7 @@ impl Pipeline {
             materials: Arc::new(MaterialAssignment { material_of_slot, materials: materials.materials.clone() }),
             names,
             closes_plane: tile.mesh.closes_plane,
+            size: tile.mesh.size,
             color: tile.mesh.color.clone(),
         };
         Ok(Outcome {

@@ -228,9 +228,10 @@ fn overhangs(context: &Context<'_>, _: Switch) -> Decision {
     }
 }
 
-/// A ray from facet to facet, and one lobe of it towards one node of the table [ns].
-const RAY_NS: f64 = 1500.0;
-const LOBE_NS: f64 = 60.0;
+/// A ray from facet to facet, one lobe of it towards one node of the table, and its part of one pair of nodes [ns].
+const RAY_NS: f64 = 1000.0;
+const LOBE_NS: f64 = 1.5;
+const PRODUCT_NS: f64 = 0.05;
 
 /// Interreflection is on only if asked for. By default `f̄` is the paper's Eq. 7, which leaves it out and which other
 /// programs compute as well; the estimate says how much is missing.
@@ -240,8 +241,12 @@ fn interreflection(context: &Context<'_>, switch: Switch) -> Decision {
     let share = predicted_share(features.albedo, hidden);
     let exchange = settings.interreflection();
     let rays = (exchange.elements * exchange.rays) as f64;
-    let lobes = rays * hidden * 2.0 * exchange.grid.len() as f64;
-    let ms = (rays * RAY_NS + lobes * LOBE_NS) * 1e-6 / costs.threads;
+    // Each ray that meets a facet begins a walk over `1 + share` facets.
+    let (walks, steps, nodes) = (rays * hidden, 1.0 + share, exchange.grid.len() as f64);
+    let pairs = nodes * nodes
+        / features.mirrors.unwrap_or_default().map(|plane| if plane { 2.0 } else { 1.0 }).iter().product::<f64>();
+    let per_walk = steps * (RAY_NS + nodes * LOBE_NS) + nodes * LOBE_NS + pairs * PRODUCT_NS;
+    let ms = (rays * RAY_NS + walks * per_walk) * 1e-6 / costs.threads;
     let estimate = format!("estimated to add up to {:.0} % to what is reflected directly", share * 100.0);
     let reason = if features.flat {
         "the tile is flat: no facet sees another".to_owned()
@@ -250,7 +255,10 @@ fn interreflection(context: &Context<'_>, switch: Switch) -> Decision {
     } else if settings.preset == Preset::Wu2011 {
         "the paper leaves it out".to_owned()
     } else if on {
-        format!("{estimate}; {} bounces from {} rays of {} facets", exchange.bounces, exchange.rays, exchange.elements)
+        format!(
+            "{estimate}; up to {} bounces from {} rays of {} facets",
+            exchange.bounces, exchange.rays, exchange.elements
+        )
     } else if switch == Switch::Off || share <= settings.tolerance {
         format!("{estimate}; left out, as in the paper")
     } else {

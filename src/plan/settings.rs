@@ -99,6 +99,8 @@ pub struct Settings {
     pub image_tolerance: (f64, f64),
     pub reference_facets: usize,
     pub reference_passes: usize,
+    /// Relative L2 of the standard errors at which the reference ends.
+    pub reference_target: f64,
     pub backend: Backend,
     pub seed: u64,
     /// The most facets to which a result may be refined, to keep its error within [`Settings::error_bound`]. `None` if
@@ -186,6 +188,7 @@ impl Settings {
         if let Some(samples) = quality.reference_samples {
             settings.reference_passes = samples.div_ceil(settings.reference_facets).max(2);
         }
+        settings.reference_target = f64::from(quality.reference_target);
         settings.slab_facets = quality.slab_facets;
         settings.paths = quality.paths;
         settings.colors = quality.colors.or(settings.colors);
@@ -224,6 +227,7 @@ impl Settings {
             image_tolerance: (0.08, 38.0),
             reference_facets: 16_384,
             reference_passes: 32,
+            reference_target: 0.002,
             backend: Backend::Auto,
             seed: 1,
             max_refined_facets: Some(131_072),
@@ -292,9 +296,9 @@ impl Settings {
     /// The resolution of interreflection.
     pub fn interreflection(&self) -> InterreflectionSettings {
         let (elements, rays, grid) = match self.preset {
-            Preset::Draft => (1024, 16, PolarGrid::new(6, 16)),
-            Preset::Standard | Preset::Wu2011 => (4096, 16, PolarGrid::new(8, 24)),
-            Preset::Fine | Preset::Reference => (8192, 32, PolarGrid::new(12, 36)),
+            Preset::Draft => (2048, 6, PolarGrid::new(8, 24)),
+            Preset::Standard | Preset::Wu2011 => (6144, 6, PolarGrid::new(12, 36)),
+            Preset::Fine | Preset::Reference => (16_384, 12, PolarGrid::new(16, 48)),
         };
         let elements = elements.min(self.facets);
         InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }

@@ -5,9 +5,11 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::paths::Paths;
+use crate::base::Cancel;
 use crate::brdf::Material;
 use crate::effective::FacetSum;
 use crate::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh, lifted_origins};
+use crate::interreflection::LobeSampler;
 use crate::metrics::Pair;
 
 /// Work and accuracy of a reference.
@@ -47,6 +49,9 @@ pub struct Reference<'a> {
     pub(super) materials: Vec<Material>,
     /// Number of reflections between facets. The paper's definition has none.
     pub(super) bounces: usize,
+    /// Samplers of the materials' lobes, for bounces.
+    samplers: Vec<LobeSampler>,
+    cancel: Cancel,
 }
 
 /// Sums over the passes of one pair: `S = Σ ΔA V V f`, `a_v`, and their second moments.
@@ -124,12 +129,20 @@ impl<'a> Reference<'a> {
             material_of_slot: material_of_slot.to_vec(),
             materials: materials.to_vec(),
             bounces: 0,
+            samplers: Vec::new(),
+            cancel: Cancel::default(),
         }
+    }
+
+    /// After `cancel` is set, estimates end early and must not be used.
+    pub fn with_cancel(self, cancel: Cancel) -> Self {
+        Self { cancel, ..self }
     }
 
     /// Adds light that is reflected between facets up to `bounces` times.
     pub fn with_bounces(self, bounces: usize) -> Self {
-        Self { bounces, ..self }
+        let brdfs = self.materials.iter().filter(|_| bounces > 0).map(|material| &material.brdf);
+        Self { bounces, samplers: brdfs.map(LobeSampler::new).collect(), ..self }
     }
 
     /// Estimates `f̄` at each pair. After each pass it calls `progress(passes, relative L2 of the standard errors)`,
@@ -146,11 +159,15 @@ impl<'a> Reference<'a> {
             facets.sort_for_sums();
             let sum = FacetSum::new(&facets, &self.material_of_slot, &self.materials);
             let origins = lifted_origins(&facets, self.mesh.size);
+            let materials = (&self.materials[..], &self.samplers[..]);
             let paths = (self.bounces > 0)
-                .then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, &self.materials, self.bounces));
+                .then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, materials, self.bounces));
             all_moments.par_iter_mut().zip(pairs).enumerate().for_each_init(
                 || (vec![0.0_f32; facets.len()], vec![0.0_f32; facets.len()]),
                 |(v_i, v_o), (at, (moments, pair))| {
+                    if self.cancel.is_set() {
+                        return;
+                    }
                     let (mut s, a) = self.one_pass(&facets, &sum, &origins, *pair, v_i, v_o);
                     if let Some(paths) = &paths {
                         let seed = settings.seed ^ pass << 40 ^ (at as u64) << 8;

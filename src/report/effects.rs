@@ -23,6 +23,8 @@ pub struct EffectCost {
     pub on_ms: f64,
     /// Time with the effect off [ms].
     pub off_ms: f64,
+    /// Standard error of the difference between both [ms]; `None` after a single run.
+    pub std_error_ms: Option<f64>,
     /// Time with the plan's own choice [ms]. It differs from one of the other two only by timing noise.
     pub auto_ms: f64,
     /// Relative L2 between `f̄` with and without the effect.
@@ -44,19 +46,19 @@ struct Runner {
     times: Vec<f64>,
 }
 
-/// Number of timed runs. The median is reported.
-const RUNS: u64 = 5;
-/// Duration of a first run above which only one run is timed [ms].
+/// Duration of a first run above which an effect counts as slow [ms].
 const SLOW_MS: f64 = 1500.0;
 /// Direction pairs for the change of `f̄`.
 const PAIRS: usize = 128;
 
-/// Measures every effect that can be forced. `progress` receives its name.
+/// Measures every effect that can be forced, as the median of `runs`: their usual number, and that of an effect that is
+/// slow. `progress` receives the effect's name.
 ///
 /// # Errors
 /// Returns the errors of [`Pipeline::effective`], or an error if the object or the environment cannot be used.
 pub fn measure_effects(
     loaded: &LoadedScene,
+    runs: [u64; 2],
     cancel: &Cancel,
     mut progress: impl FnMut(&str),
 ) -> Result<Vec<EffectCost>> {
@@ -77,18 +79,20 @@ pub fn measure_effects(
         // The three take turns, so that other load on the machine affects them alike. The last run uses the scene's own
         // seed.
         let slow = runners.iter().any(|runner| runner.first_ms > SLOW_MS);
-        for run in (0..if slow { 1 } else { RUNS }).rev() {
+        for run in (0..runs[usize::from(slow)].max(1)).rev() {
             for runner in &mut runners {
                 runner.run(run, cancel)?;
             }
         }
         let [on, auto, off] = &mut runners[..] else { continue };
+        let differences: Vec<f64> = on.times.iter().zip(&off.times).map(|(on, off)| on - off).collect();
         let mut delta_e = on.renderer.difference(&on.image, &off.image);
         delta_e.sort_by(f32::total_cmp);
         costs.push(EffectCost {
             name,
             on_ms: on.median_ms(),
             off_ms: off.median_ms(),
+            std_error_ms: std_error(&differences),
             auto_ms: auto.median_ms(),
             rel_l2: compare(&off.values(), &on.values()).rel_l2,
             mean_delta_e: f64::from(delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32),
@@ -96,6 +100,14 @@ pub fn measure_effects(
         });
     }
     Ok(costs)
+}
+
+/// Standard error of the mean; `None` for fewer than two values.
+fn std_error(values: &[f64]) -> Option<f64> {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    (values.len() > 1).then(|| (squares / (count - 1.0) / count).sqrt())
 }
 
 impl Runner {
@@ -130,5 +142,18 @@ impl Runner {
     fn values(&self) -> Vec<Vec3> {
         let pairs = mirror_biased_pairs(PAIRS, 20_110_801);
         pairs.par_iter().map(|pair| self.outcome.brdf.eval(pair.i, pair.o)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_standard_error_of_a_mean_needs_two_values() {
+        assert_eq!(std_error(&[7.0]), None);
+        // Deviation √(2/2) = 1 of the values, √3 less of their mean.
+        let error = std_error(&[1.0, 2.0, 3.0]).unwrap();
+        assert!((error - 3.0_f64.sqrt().recip()).abs() < 1e-12, "{error}");
     }
 }

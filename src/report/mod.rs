@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use serde::{Deserialize, Serialize};
 
 pub use effects::{EffectCost, measure_effects};
-pub use thumbnails::{ThumbnailRenderer, difference_png, heat};
+pub use thumbnails::{FULL_SCALE, ThumbnailRenderer, difference_png, heat};
 
 use crate::tuning::candidates::Family;
 use crate::tuning::sweep::SweepPoint;

@@ -34,8 +34,8 @@ scene_table! {
         black_materials: Switch = Switch::Auto, SWITCH, "";
         /// Interreflection between facets. Auto means off, because the paper's definition excludes it.
         interreflection: Switch = Switch::Auto, SWITCH, "";
-        /// Number of bounces that interreflection follows.
-        bounces: usize = 4, FieldShape::Integer { min: 1, max: 64 }, "";
+        /// Largest number of bounces that interreflection follows.
+        bounces: usize = 64, FieldShape::Integer { min: 1, max: 64 }, "";
         /// Mirror planes of the tile halve the directions to compute; on assumes that the tile has both planes.
         mirror_symmetry: Switch = Switch::Auto, SWITCH, "";
         /// Dependence of the result on the tile's rotation; off exports `.bsdf` over three angles instead of four.

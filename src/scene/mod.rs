@@ -7,9 +7,11 @@ mod background;
 mod check;
 mod color;
 mod color_map;
+mod editable;
 mod edits;
 mod effects;
 pub mod files;
+mod key_list;
 mod load;
 mod material;
 mod overrides;
@@ -40,8 +42,10 @@ pub use color_map::{
     HeightDistribution, HeightDriver, LayerWeight, MAX_CELLS, NoiseBasis, NoiseDriver, SlopeAlong, Steepness,
     StopEvaluation, StopUnit, TextureDriver, WeightedDriver,
 };
+pub use editable::{EditableScene, SceneBundle};
 pub use effects::{Effects, Switch};
-pub use load::{LoadedScene, load, load_with_overrides, open, parse, parse_table};
+pub use key_list::{KeyEntry, keys_of};
+pub use load::{LoadedScene, is_standard_input, load, load_with_overrides, open, open_argument, parse, parse_table};
 pub use material::{BrdfSpec, MAX_COLOR, MaterialSpec, TermSpec};
 pub use painted::{Painted, Pixels};
 pub use quality::{BACKENDS, INTERPOLATIONS, METHODS, PRESETS, Quality, VISIBILITIES};

@@ -12,10 +12,22 @@ use crate::base::{Error, InputError, Result};
 /// The value is TOML, or else a bare text. A new `kind` drops the keys that only the old kind has. A `path` turns an
 /// analytic BRDF into a measured one; the file's extension selects its kind.
 pub fn apply(root: &mut Table, text: &str) -> Result<()> {
-    let (keys, mut value) = split(text)?;
+    let place = || format!("--set {text}");
+    let (keys, value) = split(text).ok_or_else(|| InputError::new(place(), format!("`{text}`"), "key.path=value"))?;
+    set(root, &keys, value, place)
+}
+
+/// Applies one override whose value is not a text. Errors name the key.
+pub fn apply_value(root: &mut Table, key: &str, value: Value) -> Result<()> {
+    let place = || key.to_owned();
+    let keys = split_key(key).ok_or_else(|| InputError::new(place(), format!("`{key}`"), "key.path"))?;
+    set(root, &keys, value, place)
+}
+
+fn set(root: &mut Table, keys: &[&str], mut value: Value, place: impl Fn() -> String) -> Result<()> {
     absolutize(keys.last().copied().unwrap_or_default(), &mut value);
-    set_in_table(root, &keys, &value).map_err(|(found, expected, hint)| {
-        let error = InputError::new(format!("--set {text}"), found, expected);
+    set_in_table(root, keys, &value).map_err(|(found, expected, hint)| {
+        let error = InputError::new(place(), found, expected);
         Error::from(match hint {
             Some(hint) => error.with_hint(hint),
             None => error,
@@ -25,7 +37,7 @@ pub fn apply(root: &mut Table, text: &str) -> Result<()> {
 
 /// Returns true if this override sets the place of a problem, a part of it, or a table that contains it.
 pub fn touches(text: &str, path: &[PathStep]) -> bool {
-    let Ok((keys, _)) = split(text) else {
+    let Some((keys, _)) = split(text) else {
         return false;
     };
     !path.is_empty()
@@ -35,14 +47,15 @@ pub fn touches(text: &str, path: &[PathStep]) -> bool {
         })
 }
 
-fn split(text: &str) -> Result<(Vec<&str>, Value)> {
-    let input_error = || InputError::new(format!("--set {text}"), format!("`{text}`"), "key.path=value");
-    let (key, value) = text.split_once('=').ok_or_else(input_error)?;
+fn split(text: &str) -> Option<(Vec<&str>, Value)> {
+    let (key, value) = text.split_once('=')?;
+    Some((split_key(key)?, parse_value(value.trim())))
+}
+
+/// The parts of a key; `None` if one is empty.
+pub(super) fn split_key(key: &str) -> Option<Vec<&str>> {
     let keys: Vec<&str> = key.trim().split('.').map(str::trim).collect();
-    if keys.iter().any(|key| key.is_empty()) {
-        return Err(input_error().into());
-    }
-    Ok((keys, parse_value(value.trim())))
+    keys.iter().all(|key| !key.is_empty()).then_some(keys)
 }
 
 fn parse_value(text: &str) -> Value {

@@ -62,9 +62,11 @@ scene_table! {
         /// Interpolation between the nodes of low-rank factors and shading tables: cubic or linear.
         #[serde(skip_serializing_if = "Option::is_none")]
         interpolation: Option<String> = None, FieldShape::Choice(INTERPOLATIONS), "";
-        /// Number of rays or samples per direction pair of the reference.
+        /// Largest number of rays or samples per direction pair of the reference.
         #[serde(skip_serializing_if = "Option::is_none")]
         reference_samples: Option<usize> = None, FieldShape::Integer { min: 16, max: 1_000_000_000 }, "";
+        /// Relative L2 of the standard errors at which the reference ends.
+        reference_target: f32 = 0.002, number(1e-5, 1.0), "";
         /// Number of facets that the method `faces` of a slab sums; 0: the method `auto` never sums.
         #[serde(skip_serializing_if = "Option::is_none")]
         slab_facets: Option<usize> = None, FieldShape::Integer { min: 0, max: 65_536 }, "";

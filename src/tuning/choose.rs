@@ -58,10 +58,14 @@ pub struct Chosen {
 }
 
 impl Chosen {
+    /// The command-line options that repeat the choice.
+    pub fn options(&self) -> String {
+        format!("{} --seed {}", self.candidate.cli_args(), self.scene.scene.quality.seed)
+    }
+
     /// One line with the target, what was reached, and the command-line options that repeat the choice.
     pub fn summary(&self) -> String {
-        let seed = self.scene.scene.quality.seed;
-        let options = format!("{} --seed {seed}", self.candidate.cli_args());
+        let options = self.options();
         let Measurement { ms, psnr_db, rel_l2, psnr_std_error_db, .. } = self.reached;
         match self.target {
             Target::Psnr(asked) => {
@@ -124,6 +128,7 @@ pub fn choose(loaded: &LoadedScene, target: Target, cancel: &Cancel, mut progres
 
 struct Search<'a> {
     loaded: &'a LoadedScene,
+    cancel: &'a Cancel,
     pipeline: Pipeline,
     overhangs: bool,
     /// Time of the mesh, which is a part of every edit [ms].
@@ -134,13 +139,13 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(loaded: &'a LoadedScene, cancel: &Cancel) -> Result<Self> {
+    fn new(loaded: &'a LoadedScene, cancel: &'a Cancel) -> Result<Self> {
         let mut pipeline = crate::gpu::pipeline();
         pipeline.set_cancel(cancel.clone());
         let outcome = pipeline.effective(&with_settings(loaded, &quality_scale::candidate_at(0.0, false))?)?;
         let overhangs = outcome.plan.overhangs();
         let geometry_ms = outcome.times.iter().filter(|(name, _)| *name == "geometry").map(|(_, ms)| ms).sum();
-        Ok(Self { loaded, pipeline, overhangs, geometry_ms, measurements: Vec::new(), last: None })
+        Ok(Self { loaded, cancel, pipeline, overhangs, geometry_ms, measurements: Vec::new(), last: None })
     }
 
     /// Computes the scene at a quality level; returns it with the milliseconds from a geometry edit.
@@ -168,13 +173,21 @@ impl<'a> Search<'a> {
         Ok((outcome, ms))
     }
 
+    /// The scene at a quality level with its stated error, and the milliseconds from a geometry edit.
+    fn build_stated(&mut self, level: f64) -> Result<(Outcome, f64)> {
+        let (outcome, ms) = self.build(level, 1)?;
+        // Unlike a later estimate, this one can be cancelled.
+        outcome.errors_unless(self.cancel)?;
+        Ok((outcome, ms))
+    }
+
     /// The coarsest quality level whose stated PSNR was found to be about `db` or more, or the finest one.
     fn level_by_stated_error(&mut self, db: f64, peak: Peak, progress: &mut impl FnMut(&str)) -> Result<f64> {
         // Levels that state less and at least the target, with what they state.
         let (mut below, mut above) = (None::<(f64, f64)>, None::<(f64, f64)>);
         let (mut level, mut db_per_level) = (FIRST_LEVEL, DB_PER_LEVEL);
         for _ in 0..MAX_STATED {
-            let outcome = self.build(level, 1)?.0;
+            let outcome = self.build_stated(level)?.0;
             let stated = peak.stated_db(&outcome);
             progress(&format!("{} facets: {stated:.1} dB stated", outcome.settings.facets));
             if stated < db - SLACK_DB {
@@ -208,12 +221,13 @@ impl<'a> Search<'a> {
     fn cheapest_with_psnr(&mut self, db: f64, progress: &mut impl FnMut(&str)) -> Result<Measurement> {
         let peak = Peak::of(&self.build(FIRST_LEVEL, 1)?.0);
         let mut level = self.level_by_stated_error(db, peak, progress)?;
-        let stated = peak.stated_db(&self.build(level, 1)?.0);
-        let reference = TargetReference::new(&self.pipeline, self.loaded, peak, db.min(stated), progress)?;
+        let stated = peak.stated_db(&self.build_stated(level)?.0);
+        let error = (peak, db.min(stated));
+        let reference = TargetReference::new(&self.pipeline, self.loaded, error, self.cancel, progress)?;
         // Levels that are known to miss and to reach the target, and the best of those that miss.
         let (mut misses, mut reaches, mut best) = (COARSEST_LEVEL - STEP, None::<Measurement>, None::<Measurement>);
         loop {
-            let (outcome, ms) = self.build(level, 1)?;
+            let (outcome, ms) = self.build_stated(level)?;
             let CheckedError { psnr_db, psnr_std_error_db, rel_l2 } = reference.errors(&outcome);
             let measured = Measurement { level, ms, psnr_db, rel_l2, psnr_std_error_db };
             progress(&format!("{} facets: {psnr_db:.1} dB", outcome.settings.facets));
@@ -329,7 +343,8 @@ mod tests {
     #[test]
     fn a_level_that_is_computed_already_keeps_its_time() {
         let loaded = crate::scene::open("fig4b_bicolor_cup", &[]).unwrap();
-        let mut search = Search::new(&loaded, &Cancel::default()).unwrap();
+        let cancel = Cancel::default();
+        let mut search = Search::new(&loaded, &cancel).unwrap();
         let ms = search.build(5.0, 1).unwrap().1;
         assert_eq!(search.build(5.0, 1).unwrap().1.to_bits(), ms.to_bits());
     }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::base::Result;
+use crate::base::{Cancel, Result};
 use crate::metrics::{Pair, compare, mirror_biased_pairs, upper_errors};
 use crate::pipeline::{Outcome, Pipeline};
 use crate::reference::ReferenceSettings;
@@ -56,8 +56,8 @@ impl TargetReference {
     pub fn new(
         pipeline: &Pipeline,
         loaded: &LoadedScene,
-        peak: Peak,
-        db: f64,
+        (peak, db): (Peak, f64),
+        cancel: &Cancel,
         progress: &mut impl FnMut(&str),
     ) -> Result<Self> {
         let pairs = mirror_biased_pairs(PAIRS, PAIRS_SEED);
@@ -69,9 +69,10 @@ impl TargetReference {
             reference.estimate_few_pairs(&pairs, &settings, |passes, error| {
                 std_error = error;
                 progress(&format!("reference, {passes} passes, standard error {:.2} %", error * 100.0));
-                passes < MIN_PASSES || error > enough
+                !cancel.is_set() && (passes < MIN_PASSES || error > enough)
             })
         })?;
+        cancel.check()?;
         Ok(Self { pairs, f_bar: estimates.iter().map(|estimate| estimate.f_bar).collect(), std_error, peak })
     }
 

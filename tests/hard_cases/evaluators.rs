@@ -59,6 +59,7 @@ pub fn all(case: &Case, folder: &Path, m_directions: Option<usize>) -> Vec<Evalu
         names: vec!["default".to_owned(); materials.materials.len()],
         materials: Arc::new(materials),
         closes_plane: mesh.closes_plane,
+        size: mesh.size,
         color: mesh.color.clone(),
     };
     let limits = Limits { max_rank: 64, tolerance: 0.12, preset: "wu2011", error: None };

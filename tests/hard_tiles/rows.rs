@@ -105,7 +105,8 @@ pub fn all() -> Vec<HardTile> {
         spotted("mirrors on pyramids", PYRAMIDS, images::discs(512, 40, 3.0, 5)),
         // Thin stripes.
         striped("white stripe", 1, 0.0003, WHITE, BLACK),
-        striped("64 white stripes", 64, 0.0003, WHITE, BLACK),
+        // A power of two, so that the stripes' edges are exact in `f32`.
+        striped("64 white stripes", 64, 1.0 / 4096.0, WHITE, BLACK),
         striped("mirror stripes", 3, 0.001, MIRROR, MATTE),
         striped("black stripe", 1, 0.0003, BLACK, WHITE),
         // Grooves and fins.

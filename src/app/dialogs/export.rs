@@ -28,8 +28,13 @@ fn footer(ui: &mut Ui, valid: bool, decision: &mut Option<ExportDecision>) {
     });
 }
 
-/// Draws the dialog of a table export, with its resolution.
-pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<ExportDecision> {
+/// Draws the dialog of a table export, with its resolution. `left_out` says which light the table lacks.
+pub fn table_ui(
+    ctx: &Context,
+    path: &Path,
+    choice: &mut TableChoice,
+    left_out: Option<&str>,
+) -> Option<ExportDecision> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     export_dialog(ctx, "Export the BRDF as a table", path, |ui| {
         match ending.as_str() {
@@ -44,6 +49,9 @@ pub fn table_ui(ctx: &Context, path: &Path, choice: &mut TableChoice) -> Option<
         }
         if !matches!(ending.as_str(), "npz" | "csv" | "exr") {
             ui.weak("A text file beside it describes the conventions and the error of the table.");
+        }
+        if let Some(left_out) = left_out {
+            ui.colored_label(ui.visuals().warn_fg_color, left_out);
         }
         ui.weak("The export uses the scene's quality. Progress and Cancel are at the foot of the window.");
         checked.is_ok()

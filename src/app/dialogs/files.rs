@@ -21,6 +21,8 @@ pub enum Purpose {
     DriverImage(DriverPlace),
     /// A file of the slab.
     Slab(SlabFile),
+    /// The rig of a folder of photographs.
+    Capture,
     /// An image to paint on.
     Paint(PaintLayer),
     TileMesh,
@@ -43,6 +45,7 @@ impl Purpose {
             Self::Slab(SlabFile::Tile { .. }) => "Open a scene whose tile is the face",
             Self::Slab(SlabFile::Svbtdf) => "Open a captured sheet",
             Self::Slab(SlabFile::Background) => "Open an image for the background",
+            Self::Capture => "Open the rig.toml of a capture folder",
             Self::Paint(PaintLayer::Heights) => "Open an image of heights",
             Self::Paint(PaintLayer::Colors) => "Open an image of colours",
             Self::Paint(PaintLayer::Slots) => "Open an image of materials",
@@ -60,7 +63,7 @@ impl Purpose {
 
     pub fn endings(&self) -> &'static [&'static str] {
         match self {
-            Self::OpenScene | Self::SaveScene | Self::Slab(SlabFile::Tile { .. }) => &["toml"],
+            Self::OpenScene | Self::SaveScene | Self::Capture | Self::Slab(SlabFile::Tile { .. }) => &["toml"],
             Self::Slab(SlabFile::Table { .. }) => &["csv"],
             Self::Slab(SlabFile::Svbtdf) => &["npz"],
             Self::Slab(SlabFile::Background) => &["png", "jpg", "jpeg", "hdr", "exr"],

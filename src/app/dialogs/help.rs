@@ -4,7 +4,7 @@ use eframe::egui::{self, Context, Grid, RichText, ScrollArea};
 
 use crate::app::actions;
 
-const TASKS: [(&str, &str); 13] = [
+const TASKS: [(&str, &str); 15] = [
     (
         "Make a blue velvet",
         "Search the gallery for \"velvet\" and click a scene. Under Materials, set the colour of \"Default\" to \
@@ -46,9 +46,19 @@ const TASKS: [(&str, &str); 13] = [
          (F6), a click on a point takes its settings.",
     ),
     (
+        "Reach an accuracy or keep a time",
+        "Press F6 and type a PSNR into At least, or milliseconds into At most, and press Enter. The search runs in the \
+         background. Use gives the scene the settings that it found; Copy as command copies a command that repeats them.",
+    ),
+    (
         "See what is simulated and what is left out",
         "If light is missing that may matter, the strip at the foot says so: click \"left out\" and then Add. Effects (F6) \
-         gives the reason for each effect, and forces it on or off.",
+         gives the reason for each effect, and forces it on or off. Measure each times every effect on and off.",
+    ),
+    (
+        "Look into photographs of a sheet",
+        "Choose File, Open a capture folder, and its rig.toml. Pick a pixel of the photograph: the monitor shows the light of \
+         each dot there, and below it stand a slice of the data with its model, and the slopes of the faces.",
     ),
     (
         "Compare with the truth",

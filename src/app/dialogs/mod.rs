@@ -4,6 +4,7 @@ pub mod export;
 mod files;
 mod formats;
 mod help;
+mod offer;
 
 use std::path::PathBuf;
 
@@ -12,6 +13,7 @@ use eframe::egui::{self, Context};
 
 pub use files::{FileDialog, Purpose};
 pub use help::help_ui;
+pub use offer::{FileUse, Offer};
 
 use super::actions::Action;
 use super::document::RecoveredDocument;
@@ -23,6 +25,8 @@ pub enum Dialog {
     Files(FileDialog),
     /// The question about unsaved changes before this action.
     Unsaved(Action),
+    /// A file that the open scene can use.
+    Offer(Offer),
     Help,
     About,
     /// Documents that a crash left behind.

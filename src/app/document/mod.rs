@@ -56,9 +56,9 @@ impl Document {
         Self { opened: state.clone(), state, history, base_dir, path, name, saved, stamp, version: 1 }
     }
 
-    /// Opens a scene file, or a shipped scene by name. A shipped scene has no file.
+    /// Opens a scene file, a shipped scene by name, or standard input (`-`). Only a scene file has a path.
     pub fn open(path_or_name: &str) -> Result<Self> {
-        let loaded = scene::open(path_or_name, &[])?;
+        let loaded = scene::open_argument(path_or_name, &[])?;
         let path = Path::new(path_or_name);
         Ok(Self::new(loaded, path.is_file().then(|| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))))
     }

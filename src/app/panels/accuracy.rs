@@ -1,14 +1,14 @@
-//! Accuracy against time: a slider over quality levels, a chart of the open scene, and a comparison with a reference.
+//! State of the measurements of accuracy against time: requests to the worker and what it reported.
 
 use std::sync::Arc;
 
-use crate::plan::{Effect, Settings};
+use crate::plan::Effect;
 use crate::report::EffectCost;
 use crate::scene::{LoadedScene, Quality, Scene};
 use crate::tuning::quality_scale;
-use eframe::egui::{self, Context, Slider, TextureHandle, TextureOptions, Ui, vec2};
+use eframe::egui::{Context, TextureHandle, TextureOptions};
 
-use super::{accuracy_chart, fields};
+use super::accuracy_chart;
 use crate::app::worker::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, without_settings};
 
 /// State of the panel between frames.
@@ -26,17 +26,26 @@ pub struct AccuracyState {
     pub costs: Option<(u64, Vec<EffectCost>)>,
     /// The last request: version, `comparing`, `measuring`, and whether the image was final.
     requested: Option<(u64, bool, bool, bool)>,
-    levels: Vec<AccuracyPoint>,
+    pub(super) levels: Vec<AccuracyPoint>,
     /// Scenes without settings: that of the last request, and that of the levels.
     requested_of: Option<Box<LoadedScene>>,
     levels_of: Option<Box<LoadedScene>>,
     /// Version that was compared with the scene of the levels, and whether it is the same.
     freshness: Option<(u64, bool)>,
     current: Option<(u64, AccuracyPoint)>,
-    /// Document version, difference image, mean ΔE, and the noise in that mean.
-    difference: Option<(u64, TextureHandle, f32, Option<f32>)>,
-    activity: Option<&'static str>,
-    error: Option<String>,
+    difference: Option<(u64, ShownDifference)>,
+    /// The object's view shows the difference image.
+    pub large: bool,
+    /// The settings that the worker measures, in words.
+    pub activity: Option<String>,
+    pub(super) error: Option<String>,
+}
+
+/// The difference between the scene's image and a more accurate one.
+pub struct ShownDifference {
+    pub texture: TextureHandle,
+    /// The mean ΔE in words.
+    pub caption: String,
 }
 
 impl AccuracyState {
@@ -51,7 +60,7 @@ impl AccuracyState {
         }
         self.requested = Some(wanted);
         self.requested_of = Some(Box::new(without_settings(loaded)));
-        self.error = None;
+        (self.error, self.activity) = (None, Some("Starting".to_owned()));
         let chart = match (self.open || self.wanted, is_final) {
             (false, _) => AccuracyChart::None,
             (true, false) => AccuracyChart::First,
@@ -78,11 +87,6 @@ impl AccuracyState {
     /// Returns true if the levels belong to a version of the document.
     pub fn is_fresh(&self, version: u64) -> bool {
         self.freshness == Some((version, true))
-    }
-
-    /// Returns true while the worker measures.
-    pub fn is_active(&self) -> bool {
-        self.activity.is_some()
     }
 
     /// The point of the settings of a version, if it was measured.
@@ -135,6 +139,23 @@ impl AccuracyState {
         late
     }
 
+    /// Costs of the effects in a version, if they were measured.
+    pub fn costs_of(&self, version: u64) -> Option<&[EffectCost]> {
+        self.costs.as_ref().filter(|(measured, _)| *measured == version).map(|(_, costs)| &costs[..])
+    }
+
+    /// Ends the running job, which is requested again later. Returns true if a job was running.
+    pub fn pause(&mut self) -> bool {
+        self.requested = None;
+        self.activity.take().is_some()
+    }
+
+    /// The difference image of a version, while a reference is compared.
+    pub fn shown_difference(&self, version: u64) -> Option<&ShownDifference> {
+        let (_, shown) = self.difference.as_ref().filter(|(measured, _)| *measured == version)?;
+        self.comparing.then_some(shown)
+    }
+
     pub fn receive(&mut self, ctx: &Context, result: AccuracyResult) {
         match result {
             AccuracyResult::Doing(what) => self.activity = Some(what),
@@ -145,7 +166,13 @@ impl AccuracyState {
             AccuracyResult::Current(version, point) => self.current = Some((version, point)),
             AccuracyResult::Difference(version, shown) => {
                 let texture = ctx.load_texture("difference", shown.image, TextureOptions::NEAREST);
-                self.difference = Some((version, texture, shown.mean, shown.noise));
+                let caption = match shown.noise {
+                    Some(noise) => {
+                        format!("Difference from the reference: mean ΔE {:.2}, of which noise {noise:.2}", shown.mean)
+                    }
+                    None => format!("Difference from 65,536 facets: mean ΔE {:.2}", shown.mean),
+                };
+                self.difference = Some((version, ShownDifference { texture, caption }));
             }
             AccuracyResult::Effects(version, costs) => {
                 self.measuring = false;
@@ -191,7 +218,7 @@ pub fn take(scene: &mut Scene, facets: usize, effects: &[Effect]) {
     take_level(scene, quality_scale::level_of_facets(facets), effects);
 }
 
-fn take_level(scene: &mut Scene, level: f64, effects: &[Effect]) {
+pub(super) fn take_level(scene: &mut Scene, level: f64, effects: &[Effect]) {
     let overhangs = effects.iter().any(|effect| effect.name == "overhangs" && effect.on);
     let candidate = quality_scale::candidate_at(level, overhangs);
     let plain = Quality {
@@ -209,71 +236,4 @@ fn take_level(scene: &mut Scene, level: f64, effects: &[Effect]) {
 /// Errors and time of a point in words.
 pub fn describe_point(point: &AccuracyPoint) -> String {
     accuracy_chart::describe(point)
-}
-
-/// Draws the panel. The slider changes the scene's settings.
-pub fn ui(ui: &mut Ui, scene: &mut Scene, state: &mut AccuracyState, effects: &[Effect], version: u64) {
-    state.open = true;
-    let settings = Settings::of(scene);
-    let mut level = quality_scale::level_of_facets(settings.facets);
-    let tip = "Quality levels: each balances the numbers of facets and of directions. Finer takes longer.";
-    let changed = fields::row(ui, "Faster - finer", tip, |ui| {
-        ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);
-        ui.add(Slider::new(&mut level, 0.0..=quality_scale::FINEST).show_value(false)).changed()
-    });
-    if changed {
-        take_level(scene, level, effects);
-    }
-    let current = state.now(version);
-    if let Some(better) = state.better(version) {
-        ui.horizontal_wrapped(|ui| {
-            let (psnr, ms) = (better.compared.psnr_db, accuracy_chart::milliseconds(better.ms));
-            ui.label(format!("Finer and faster exists: {psnr:.0} dB in {ms}."));
-            if ui.button("Use").on_hover_text(describe_point(&better)).clicked() {
-                take(scene, better.facets, effects);
-            }
-        });
-    }
-    let text = current.map_or_else(|| format!("{} facets", settings.facets), |point| accuracy_chart::describe(&point));
-    ui.label(text);
-    let is_stale = !state.levels.is_empty() && !state.is_fresh(version);
-    if let Some(point) = accuracy_chart::ui(ui, &state.levels, current.as_ref(), is_stale) {
-        take(scene, point.facets, effects);
-    }
-    if is_stale {
-        ui.weak("The grey curve is from before the edit.");
-    }
-    ui.horizontal(|ui| {
-        ui.toggle_value(&mut state.comparing, "Compare with reference").on_hover_text(
-            "Refines a reference in the background. The error bars narrow, and an image shows the difference",
-        );
-        if let Some(activity) = state.activity {
-            ui.spinner();
-            ui.weak(activity);
-        }
-    });
-    if let Some(point) = current.filter(|_| state.comparing) {
-        ui.weak(format!(
-            "Standard error of the reference: {:.2} % after {} passes",
-            point.compared.std_error * 100.0,
-            4 * point.compared.batches
-        ));
-    }
-    if let Some((measured, texture, mean, noise)) = &state.difference
-        && *measured == version
-        && state.comparing
-    {
-        let side = ui.available_width().min(220.0);
-        ui.add(egui::Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text("Difference image"));
-        let text = match noise {
-            Some(noise) => {
-                format!("Difference from the reference: mean ΔE {mean:.2}, of which noise {noise:.2}")
-            }
-            None => format!("Difference from 65,536 facets: mean ΔE {mean:.2}"),
-        };
-        ui.weak(format!("{text}. White is ΔE 10. ΔE 2 is just visible"));
-    }
-    if let Some(error) = &state.error {
-        ui.colored_label(ui.visuals().error_fg_color, error);
-    }
 }

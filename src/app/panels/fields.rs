@@ -18,6 +18,8 @@ pub struct PanelContext {
     pub browse: Option<&'static str>,
     /// Message about an invalid value.
     pub error: Option<String>,
+    /// Values in force of fields that are not set.
+    pub in_force: Vec<(&'static str, String)>,
     /// The field that has no effect at present, and why.
     pub ignored: Option<(&'static str, &'static str)>,
 }
@@ -52,7 +54,9 @@ pub fn field_ui(ui: &mut Ui, table: &mut Table, field: &Field, context: &mut Pan
                 }
             }
             _ => {
-                let button = ui.add(egui::Button::new(RichText::new("automatic").weak()).frame(false));
+                let in_force = context.in_force.iter().find(|(key, _)| *key == field.key);
+                let text = in_force.map_or_else(|| "automatic".to_owned(), |(_, value)| format!("automatic: {value}"));
+                let button = ui.add(egui::Button::new(RichText::new(text).weak()).frame(false));
                 if button.on_hover_text("Click to set a value").clicked() {
                     table.insert(field.key.to_owned(), start.clone());
                 }
@@ -82,6 +86,7 @@ pub(super) fn caption(field: &Field) -> String {
         "color_path" => "Colour image".to_owned(),
         "slot_path" => "Material image".to_owned(),
         "color" => "Colour".to_owned(),
+        "colors" if field.doc.contains("directions") => "Colour directions".to_owned(),
         "colors" => "Colours".to_owned(),
         "f0" => "Reflectance".to_owned(),
         "eta" => "Index".to_owned(),
@@ -109,6 +114,18 @@ pub fn row<R>(ui: &mut Ui, caption: &str, tip: &str, control: impl FnOnce(&mut U
     let used = row.min_rect().height().max(height);
     ui.allocate_rect(egui::Rect::from_min_size(row_rect.min, egui::vec2(row_rect.width(), used)), egui::Sense::hover());
     result
+}
+
+/// Draws in a place that is at least some rows of text high, so that what lies below does not move.
+pub fn reserved<R>(ui: &mut Ui, rows: f32, content: impl FnOnce(&mut Ui) -> R) -> R {
+    let text = rows * (ui.text_style_height(&egui::TextStyle::Body) + ui.spacing().item_spacing.y);
+    // A row may hold a button.
+    let height = text.max(ui.spacing().interact_size.y);
+    let inner = ui.scope(|ui| {
+        ui.set_min_size(egui::vec2(ui.available_width(), height));
+        content(ui)
+    });
+    inner.inner
 }
 
 fn tooltip(field: &Field, context: &PanelContext) -> String {
@@ -156,6 +173,7 @@ pub fn display_name(name: &str) -> String {
         "utia" => return "Measured (UTIA)".to_owned(),
         "npz" => return "Table (.npz)".to_owned(),
         "ggx" => return "GGX".to_owned(),
+        "cpu" | "gpu" => return name.to_uppercase(),
         "heightfield" => return "Height field".to_owned(),
         "blinn_phong" => return "Blinn-Phong".to_owned(),
         "cook_torrance" => return "Cook-Torrance".to_owned(),

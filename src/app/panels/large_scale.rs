@@ -1,5 +1,6 @@
 //! Panels of the large scale: object, light, camera, quality.
 
+use crate::plan::Settings;
 use crate::scene::{Camera, Light, Object, Quality, Scene};
 use eframe::egui::{self, Ui};
 use serde::Serialize;
@@ -94,7 +95,8 @@ pub fn quality_ui(ui: &mut Ui, quality: &mut Quality, context: &mut PanelContext
     let (first, settings): (Vec<_>, Vec<_>) =
         fields.into_iter().partition(|field| matches!(field.key, "preset" | "backend"));
     edit(ui, quality, &first, &[], context);
-    egui::CollapsingHeader::new("Settings").show(ui, |ui| {
+    context.in_force = in_force(quality);
+    egui::CollapsingHeader::new("Advanced").show(ui, |ui| {
         ui.weak("A value that is set here overrides the preset.");
         edit(ui, quality, &settings, &["grid"], context);
         if ui.button("Back to the preset").clicked() {
@@ -106,6 +108,22 @@ pub fn quality_ui(ui: &mut Ui, quality: &mut Quality, context: &mut PanelContext
             };
         }
     });
+}
+
+/// Values of the settings that the preset decides, as far as they are numbers.
+fn in_force(quality: &Quality) -> Vec<(&'static str, String)> {
+    let settings = Settings::from_quality(quality);
+    let number = |value: f64| fields::format_number(value);
+    vec![
+        ("facets", settings.facets.to_string()),
+        ("azimuths", settings.horizon_azimuths.to_string()),
+        ("rings", settings.map_grid.rings.to_string()),
+        ("normal_bins", settings.normal_bins.map_or_else(|| "none".to_owned(), |bins| bins.to_string())),
+        ("keep_m", number(settings.keep_m)),
+        ("keep_n", number(settings.keep_n)),
+        ("reference_samples", (settings.reference_facets * settings.reference_passes).to_string()),
+        ("penumbra_deg", format!("{}°", number(f64::from(settings.penumbra.to_degrees())))),
+    ]
 }
 
 /// Draws a table of the scene from its catalogue fields, and applies the edits.

@@ -2,6 +2,7 @@
 
 pub mod accuracy;
 mod accuracy_chart;
+mod accuracy_ui;
 mod alternatives;
 pub mod color_map;
 mod controls;
@@ -12,7 +13,9 @@ pub mod materials;
 mod matrix;
 pub mod paints;
 pub mod slab;
+mod stage_bars;
 pub mod surface;
+mod targets;
 
 use crate::plan::Effect;
 use crate::scene::{Painted, Scene};
@@ -22,6 +25,7 @@ pub use accuracy::AccuracyState;
 pub use color_map::{ColorMapState, DriverPlace};
 pub use fields::PanelContext;
 pub use slab::SlabFile;
+pub use targets::TargetState;
 
 /// Requests of the panel to the editor.
 #[derive(Debug, Default)]
@@ -51,11 +55,18 @@ pub enum Tab {
 pub struct PanelInputs<'a> {
     pub tab: &'a mut Tab,
     pub accuracy: &'a mut AccuracyState,
+    pub targets: &'a mut TargetState,
     pub color_map: &'a mut ColorMapState,
-    /// The plan of the displayed image.
+    /// The plan of the refined image.
     pub effects: &'a [Effect],
+    /// Milliseconds of the stages from the last edit to its refined image.
+    pub stages: &'a [(&'static str, f64)],
     /// Version of the document.
     pub version: u64,
+    /// The path or the name by which the command line opens the scene.
+    pub file: &'a str,
+    /// Title of a section that unfolds and comes into view.
+    pub reveal: &'a mut Option<&'static str>,
     /// True in the first frame of a document: sections that its scene uses unfold.
     pub is_new: bool,
 }
@@ -71,6 +82,7 @@ pub fn ui(
 ) -> PanelRequests {
     let mut context = PanelContext { unit: scene.tile.unit.clone(), ..PanelContext::default() };
     let (mut material, mut driver_image, mut slab_file) = (None, None, None);
+    let reveal = inputs.reveal;
     // A wide row must not widen the panel.
     ui.set_max_width(ui.available_width());
     inputs.accuracy.open = false;
@@ -85,38 +97,67 @@ pub fn ui(
     });
     ui.separator();
     if *inputs.tab == Tab::Cost {
-        let state = inputs.accuracy;
-        section(ui, "Accuracy", true, |ui| accuracy::ui(ui, scene, state, inputs.effects, inputs.version));
-        section(ui, "Effects", true, |ui| effects::ui(ui, scene, inputs.effects, state, inputs.version));
-        section(ui, "Quality", false, |ui| large_scale::quality_ui(ui, &mut scene.quality, &mut context));
+        let (state, at) = (inputs.accuracy, (inputs.version, inputs.file));
+        section(ui, reveal, "Accuracy", true, |ui| {
+            accuracy_ui::ui(ui, scene, (state, inputs.targets), inputs.effects, at)
+        });
+        section(ui, reveal, "Time", true, |ui| stage_bars::ui(ui, inputs.stages));
+        section(ui, reveal, "Effects", true, |ui| effects::ui(ui, scene, inputs.effects, state, inputs.version));
+        section(ui, reveal, "Quality", false, |ui| large_scale::quality_ui(ui, &mut scene.quality, &mut context));
         return PanelRequests { browse: context.browse, error: context.error, ..PanelRequests::default() };
     }
     // A scene of the gallery unfolds what it shows.
     let unfolds = |used: bool| inputs.is_new.then_some(used);
     let (shows_map, shows_slab) = (scene.color_map.is_some(), scene.slab.is_some());
-    section(ui, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut context));
-    section(ui, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut context));
-    foldable(ui, "Colour map", shows_map, unfolds(shows_map), |ui| {
+    section(ui, reveal, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut context));
+    section(ui, reveal, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut context));
+    foldable(ui, reveal, "Colour map", shows_map, unfolds(shows_map), |ui| {
         driver_image = color_map::ui(ui, scene, inputs.color_map, &mut context);
     });
-    foldable(ui, "Slab", shows_slab, unfolds(shows_slab), |ui| slab_file = slab::ui(ui, scene, &mut context));
-    section(ui, "Object", true, |ui| large_scale::object_ui(ui, scene, &mut context));
-    section(ui, "Light", true, |ui| large_scale::light_ui(ui, &mut scene.light, &mut context));
-    section(ui, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));
+    foldable(ui, reveal, "Slab", shows_slab, unfolds(shows_slab), |ui| slab_file = slab::ui(ui, scene, &mut context));
+    section(ui, reveal, "Object", true, |ui| large_scale::object_ui(ui, scene, &mut context));
+    section(ui, reveal, "Light", true, |ui| large_scale::light_ui(ui, &mut scene.light, &mut context));
+    section(ui, reveal, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));
     PanelRequests { browse: context.browse, material, driver_image, slab_file, error: context.error }
 }
 
-fn section(ui: &mut Ui, title: &str, open: bool, body: impl FnOnce(&mut Ui)) {
-    foldable(ui, title, open, None, body);
+fn section(ui: &mut Ui, reveal: &mut Option<&'static str>, title: &str, open: bool, body: impl FnOnce(&mut Ui)) {
+    foldable(ui, reveal, title, open, None, body);
 }
 
-/// Draws a section. `unfold` folds or unfolds it in this frame.
-fn foldable(ui: &mut Ui, title: &str, open: bool, unfold: Option<bool>, body: impl FnOnce(&mut Ui)) {
+/// Draws a section. `unfold` folds or unfolds it in this frame. The section to `reveal` unfolds and comes into view.
+fn foldable(
+    ui: &mut Ui,
+    reveal: &mut Option<&'static str>,
+    title: &str,
+    open: bool,
+    unfold: Option<bool>,
+    body: impl FnOnce(&mut Ui),
+) {
+    let is_revealed = reveal.take_if(|name| *name == title).is_some();
+    let unfold = if is_revealed { Some(true) } else { unfold };
     let header = egui::CollapsingHeader::new(RichText::new(title).heading()).id_salt(title);
-    header.default_open(open).open(unfold).show_unindented(ui, |ui| {
+    let shown = header.default_open(open).open(unfold).show_unindented(ui, |ui| {
         ui.add_space(2.0);
         body(ui);
         ui.add_space(6.0);
     });
+    if is_revealed {
+        shown.header_response.scroll_to_me(Some(egui::Align::TOP));
+    }
     ui.separator();
+}
+
+/// The tab and the section that hold the remedy of a warning.
+pub fn place_of_remedy(warning: &str) -> (Tab, &'static str) {
+    let names = |words: &[&str]| words.iter().any(|word| warning.contains(word));
+    if names(&["nterreflection"]) {
+        (Tab::Cost, "Effects")
+    } else if names(&["quality.", "preset"]) {
+        (Tab::Cost, "Quality")
+    } else if names(&["material", "albedo", "oughness", "BRDF"]) {
+        (Tab::Scene, "Materials")
+    } else {
+        (Tab::Scene, "Surface")
+    }
 }

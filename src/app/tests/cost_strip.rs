@@ -13,7 +13,7 @@ use crate::scene::{self, Switch};
 use crate::tuning::progressive::ReferenceErrors;
 
 /// Grooves that are so deep that much light is reflected between their sides.
-fn deep(switch: &str) -> Document {
+pub fn deep(switch: &str) -> Document {
     let text = format!(
         "{}[effects]\ninterreflection = \"{switch}\"\n",
         super::QUICK.replace("count = 2", "count = 2, depth = 0.9").replace("f0 = 0.8", "f0 = 1.0")
@@ -23,7 +23,7 @@ fn deep(switch: &str) -> Document {
     Document::new(loaded, None)
 }
 
-fn of_size(document: Document, width: f32, height: f32) -> Harness<'static, Option<Editor>> {
+pub fn of_size(document: Document, width: f32, height: f32) -> Harness<'static, Option<Editor>> {
     let mut harness = harness(document);
     harness.set_size(vec2(width, height));
     harness.run_steps(3);
@@ -32,7 +32,7 @@ fn of_size(document: Document, width: f32, height: f32) -> Harness<'static, Opti
     harness
 }
 
-fn point(facets: usize, ms: f64, psnr_db: f64) -> AccuracyPoint {
+pub fn point(facets: usize, ms: f64, psnr_db: f64) -> AccuracyPoint {
     let (rel_l2, rel_l2_std_error, psnr_std_error_db) = (0.01, 0.001, 0.4);
     let compared =
         ReferenceErrors { rel_l2, rel_l2_std_error, psnr_db, psnr_std_error_db, std_error: 0.001, batches: 2 };
@@ -70,7 +70,9 @@ fn accuracy_and_what_is_left_out_are_inside_the_window_at_both_sizes() {
 
 #[test]
 fn the_chip_adds_the_effect_in_one_undo_step_and_then_is_absent() {
-    let mut harness = of_size(deep("auto"), 1200.0, 800.0);
+    let mut harness = of_size(deep("off"), 1200.0, 800.0);
+    harness.get_by_label("Keep out").click();
+    harness.run_steps(3);
     harness.get_by_label("1 effect left out").click();
     harness.run_steps(3);
     harness.get_by_label("Add").click();
@@ -98,7 +100,7 @@ fn faster_and_finer_settings_are_taken_by_a_click_and_undone_in_one_step() {
     harness.run_steps(2);
     assert!(harness.query_by_label_contains("52 ± 0.4 dB · 410 ms").is_some());
     let before = editor(&mut harness).document.scene().quality.clone();
-    harness.get_by_label("Faster: 47 ± 0.4 dB · 24 ms").click();
+    harness.get_by_label("Faster: 47 dB · 24 ms").click();
     harness.run_steps(2);
     assert_eq!(editor(&mut harness).document.scene().quality.facets, Some(1024));
     editor(&mut harness).document.undo();
@@ -109,8 +111,8 @@ fn faster_and_finer_settings_are_taken_by_a_click_and_undone_in_one_step() {
     let version = editor(&mut harness).document.version();
     editor(&mut harness).accuracy.record(version, vec![point(4096, 1300.0, 61.0)], point(128, 410.0, 52.0));
     harness.run_steps(2);
-    assert!(harness.query_by_label_contains("Faster").is_none());
-    harness.get_by_label("Finer: 61 ± 0.4 dB · 1.3 s").click();
+    assert!(harness.query_by_label("Faster: none").is_some());
+    harness.get_by_label("Finer: 61 dB · 1.3 s").click();
     harness.run_steps(2);
     assert_eq!(editor(&mut harness).document.scene().quality.facets, Some(4096));
 }
@@ -174,4 +176,30 @@ fn messages_never_cover_the_strip() {
         let messages = harness.ctx.memory(|memory| memory.area_rect(eframe::egui::Id::unique("messages"))).unwrap();
         assert!(messages.bottom() <= strip.top() && messages.height() > 30.0, "{messages:?} {strip:?}");
     }
+}
+
+#[test]
+fn a_note_offers_once_what_is_left_out_and_the_export_dialog_repeats_it() {
+    let mut harness = of_size(deep("off"), 1440.0, 900.0);
+    let line = "Interreflection is left out: up to ";
+    assert!(harness.query_by_label_contains(line).is_some());
+    harness.get_by_label("Keep out").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains(line).is_none());
+    let mut scene = (**editor(&mut harness).document.scene()).clone();
+    scene.tile.unit = "um".to_owned();
+    editor(&mut harness).document.edit(scene);
+    harness.run_steps(2);
+    settle(&mut harness);
+    assert!(harness.query_by_label_contains(line).is_none(), "the note comes once per scene");
+    let choice = crate::app::worker::TableChoice::default();
+    editor(&mut harness).dialog = Some(crate::app::dialogs::Dialog::Table { path: "a.npz".into(), choice });
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains(line).is_some());
+    let mut harness = of_size(deep("off"), 1440.0, 900.0);
+    harness.get_by_label("Add").click();
+    harness.run_steps(3);
+    assert_eq!(editor(&mut harness).document.scene().effects.interreflection, Switch::On);
+    assert_eq!(editor(&mut harness).document.history().len(), 1);
+    assert!(harness.query_by_label_contains(line).is_none());
 }

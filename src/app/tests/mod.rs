@@ -1,8 +1,10 @@
 //! The editor without a window: frames run as in a window, with the same workers.
 
+mod capture;
 mod color_map;
 mod cost;
 mod cost_strip;
+mod details;
 mod disk;
 mod documents;
 mod errors;
@@ -14,6 +16,8 @@ mod newcomer;
 mod painting;
 mod slab;
 mod soak;
+mod stability;
+mod targets;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -91,6 +95,17 @@ fn harness(document: Document) -> Harness<'static, Option<Editor>> {
 
 fn editor<'a>(harness: &'a mut Harness<'static, Option<Editor>>) -> &'a mut Editor {
     harness.state_mut().as_mut().unwrap()
+}
+
+/// Runs frames until a condition holds.
+fn wait_until(harness: &mut Harness<'static, Option<Editor>>, is_done: impl Fn(&Editor) -> bool) {
+    let start = Instant::now();
+    while !is_done(editor(harness)) {
+        harness.step();
+        assert!(start.elapsed() < Duration::from_secs(300), "the condition does not come true");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    harness.run_steps(3);
 }
 
 /// Runs frames until the final image of the open document is displayed.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::effective::{EffectiveBrdf, ErrorEstimate};
 use crate::plan::Effect;
-use crate::scene::{Background, Camera, OBJECT_KINDS, Scene};
+use crate::scene::{Background, Camera, Scene};
 use eframe::egui::{
     self, Color32, CursorIcon, PointerButton, Rect, Response, Sense, TextureHandle, TextureId, TextureOptions, Ui,
     pos2, vec2,
@@ -15,8 +15,6 @@ use super::methods::MethodsState;
 use super::spinner::spinner;
 use super::wipe::ComparisonImage;
 use super::zoom::zoom;
-use crate::app::actions::Action;
-use crate::app::panels::fields::display_name;
 use crate::app::worker::{DisplayImage, GpuImage, Grade, RenderedPreview};
 
 /// Delay before the view reports that an image is being computed [s].
@@ -28,6 +26,8 @@ const NEAR_BACKGROUND: f32 = 1e-3;
 const FAR_BACKGROUND: f32 = 1e3;
 /// Margin that the view leaves to the drag handles of the panels [points].
 const HANDLE_MARGIN: f32 = 6.0;
+/// Stages of the image alone.
+const IMAGE_STAGES: [&str; 5] = ["picture table", "g-buffer", "shadows", "shading", "tone"];
 
 /// The texture that the view draws.
 enum Texture {
@@ -66,6 +66,10 @@ pub struct ObjectView {
     pub stated: Option<(Arc<EffectiveBrdf>, ErrorEstimate)>,
     /// The plan of the last refined image.
     pub refined_effects: Option<Vec<Effect>>,
+    /// The warnings of the last final image. Other images have none.
+    pub warnings: Vec<String>,
+    /// Milliseconds of the stages from the last edit to its refined image.
+    pub stages: Vec<(&'static str, f64)>,
     /// The version that could not be rendered.
     pub failed: Option<u64>,
     /// Image A, which the view compares with the current one.
@@ -99,9 +103,11 @@ impl ObjectView {
         }
         if preview.grade == Grade::Final {
             self.activity = None;
+            self.warnings.clone_from(&preview.warnings);
         }
         if preview.grade >= Grade::Refining {
             self.refined_effects = Some(preview.effects.clone());
+            self.note_stages(&preview.stages);
         }
         // If A was stored before its image was final, the final image replaces it.
         if let Some(comparison) = &mut self.comparison
@@ -114,6 +120,25 @@ impl ObjectView {
         // Plots show the last known BRDF until the next one arrives.
         preview.brdf = preview.brdf.or_else(|| self.preview.as_ref().and_then(|last| last.brdf.clone()));
         self.preview = Some(preview);
+    }
+
+    /// Replaces the times of stages by those of a refined image. If only the image was rendered again, the other times stay.
+    fn note_stages(&mut self, stages: &[(&'static str, f64)]) {
+        if stages.iter().any(|(name, _)| !IMAGE_STAGES.contains(name)) {
+            self.stages.clear();
+        }
+        for (name, ms) in stages {
+            match self.stages.iter_mut().find(|(noted, _)| noted == name) {
+                Some(noted) => noted.1 = *ms,
+                None => self.stages.push((*name, *ms)),
+            }
+        }
+    }
+
+    /// The plan of the refined image, because drafts leave out more. Until it exists, that of the displayed image.
+    pub fn effects(&self) -> &[Effect] {
+        let shown = || self.preview.as_ref().map(|preview| &preview.effects[..]);
+        self.refined_effects.as_deref().or_else(shown).unwrap_or_default()
     }
 
     /// The stated error of the displayed BRDF, once it is known.
@@ -223,70 +248,6 @@ impl ObjectView {
         let text = format!("Computing, {:.0} s", since.elapsed().as_secs_f32());
         let font = egui::FontId::proportional(12.0);
         ui.painter().text(note.left_center() + vec2(28.0, 0.0), egui::Align2::LEFT_CENTER, text, font, Color32::WHITE);
-    }
-
-    /// Draws the toolbar above the view.
-    pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene, compares_methods: bool) -> Option<Action> {
-        let mut action = None;
-        ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 4.0;
-            ui.name_inputs("Object", |ui| object_ui(ui, scene));
-            ui.name_inputs("Exposure", |ui| exposure_ui(ui, scene));
-            ui.separator();
-            for (choice, name, tip, on) in [
-                (Action::Frame, "Frame", "Show the whole object (F)", false),
-                (
-                    Action::Snapshot,
-                    "A/B",
-                    "Store this image as A and compare later ones with it (B)",
-                    self.comparison.is_some(),
-                ),
-                (
-                    Action::Pick,
-                    "Pick",
-                    "Point at the object to see how it reflects there, and what each facet contributes (I)",
-                    self.picking,
-                ),
-            ] {
-                if ui.selectable_label(on, name).on_hover_text(tip).clicked() {
-                    action = Some(choice);
-                }
-            }
-            let tip = "Show the methods for this scene beside each other, with the truth and its standard error (M)";
-            if MethodsState::applies_to(scene)
-                && ui.selectable_label(compares_methods, "Methods").on_hover_text(tip).clicked()
-            {
-                action = Some(Action::Methods);
-            }
-            if self.comparison.is_some()
-                && ui.button("Back to A").on_hover_text("Undo all edits since A in one step").clicked()
-            {
-                action = Some(Action::BackToA);
-            }
-        });
-        action
-    }
-}
-
-fn object_ui(ui: &mut Ui, scene: &mut Scene) {
-    let combo = egui::ComboBox::from_id_salt("object here").selected_text(display_name(&scene.object.kind)).width(90.0);
-    combo.show_ui(ui, |ui| {
-        for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
-            if ui.selectable_label(scene.object.kind == *kind, display_name(kind)).clicked() {
-                (*kind).clone_into(&mut scene.object.kind);
-                scene.object.path = None;
-            }
-        }
-    });
-}
-
-fn exposure_ui(ui: &mut Ui, scene: &mut Scene) {
-    let camera = scene.camera.clone().unwrap_or_default();
-    let mut exposure = camera.exposure_ev;
-    let drag = egui::DragValue::new(&mut exposure).range(-10.0..=10.0).speed(0.03).suffix(" EV").max_decimals(2);
-    let response = ui.add(drag).on_hover_text("Exposure: drag sideways");
-    if response.changed() && exposure.is_finite() {
-        scene.camera = Some(Camera { exposure_ev: exposure, ..camera });
     }
 }
 

@@ -14,6 +14,10 @@ use super::pointer::{self, Pointer};
 use crate::app::paint::Brush;
 use crate::app::worker::{RenderedTile, TileDisplay, TileJob};
 
+/// Azimuth and elevation of the viewer when the view opens [degrees]. Nearly along y, the bottoms of deep grooves are visible.
+const AZIMUTH_DEG: f32 = -74.0;
+const ELEVATION_DEG: f32 = 35.0;
+
 /// Inputs of a tile image.
 type Inputs = (Tile, Vec<MaterialSpec>, Painted, Option<(Light, Option<Camera>)>);
 
@@ -56,8 +60,8 @@ pub enum TileMode {
 impl Default for TileState {
     fn default() -> Self {
         Self {
-            azimuth: -1.15,
-            elevation: 0.82,
+            azimuth: AZIMUTH_DEG.to_radians(),
+            elevation: ELEVATION_DEG.to_radians(),
             span: 1.7,
             center: Vec2::splat(0.5),
             show: TileMode::Clay,
@@ -247,6 +251,8 @@ impl TileState {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             ui.spacing_mut().button_padding.x = 5.0;
+            ui.strong("Tile");
+            ui.add_space(4.0);
             if self.picked.is_some() {
                 let tip = "Contribution of each place to the reflection at the picked point of the object";
                 if ui.selectable_label(self.show == TileMode::Contribution, "Picked").on_hover_text(tip).clicked() {

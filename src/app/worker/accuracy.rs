@@ -4,11 +4,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::app::views::difference;
 use crate::base::{Error, Result};
 use crate::effective::EffectiveBrdf;
 use crate::pipeline::{Outcome, Pipeline};
+use crate::plan::effect_names;
 use crate::render::Image;
-use crate::report::{EffectCost, ThumbnailRenderer, heat, measure_effects};
+use crate::report::{EffectCost, ThumbnailRenderer, measure_effects};
 use crate::scene::{LoadedScene, Quality};
 use crate::tuning::candidates::with_settings;
 use crate::tuning::progressive::{ProgressiveReference, ReferenceErrors};
@@ -50,7 +52,8 @@ pub struct AccuracyPoint {
 /// A report of the worker that measures accuracy.
 #[derive(Debug, Clone)]
 pub enum AccuracyResult {
-    Doing(&'static str),
+    /// The settings that are being measured.
+    Doing(String),
     /// All quality levels measured so far.
     Levels(Vec<AccuracyPoint>),
     /// The settings of a version of the document.
@@ -82,6 +85,8 @@ const FINEST: f64 = 12.0;
 const PAIRS: usize = 96;
 /// Batches of the reference for the chart, and for the comparison.
 const BATCHES: [usize; 2] = [2, 24];
+/// Runs of an effect on and off, and of one that is slow.
+const EFFECT_RUNS: [u64; 2] = [3, 3];
 /// Number of noisy reference images that are averaged.
 const IMAGES: u64 = 24;
 
@@ -128,8 +133,11 @@ impl AccuracyWorker {
         }
         self.pipeline.set_cancel(context.cancel.clone());
         if job.effects {
-            report(AccuracyResult::Doing("Each effect on and off"));
-            let costs = measure_effects(&job.loaded, context.cancel, |_| {})?;
+            let (mut done, all) = (0, effect_names().count());
+            let costs = measure_effects(&job.loaded, EFFECT_RUNS, context.cancel, |name| {
+                done += 1;
+                report(AccuracyResult::Doing(format!("{done} of {all}: {}", name.replace('_', " "))));
+            })?;
             report(AccuracyResult::Effects(job.version, costs));
         }
         match job.chart {
@@ -146,7 +154,7 @@ impl AccuracyWorker {
         let mut current = stated_point(&outcome, ms);
         report(AccuracyResult::Current(job.version, current));
         self.measure_levels(job, &LEVELS, outcome.plan.overhangs(), context, report)?;
-        report(AccuracyResult::Doing("Reference"));
+        report(AccuracyResult::Doing("Reference".to_owned()));
         let mut reference = self.reference.take().unwrap_or_else(|| ProgressiveReference::new(PAIRS));
         while reference.batches < BATCHES[0] {
             reference.refine(&mut self.pipeline, &job.loaded)?;
@@ -177,12 +185,12 @@ impl AccuracyWorker {
         context: &JobContext<AccuracyJob>,
         report: &dyn Fn(AccuracyResult),
     ) -> Result<()> {
-        for &level in levels {
+        for (at, &level) in levels.iter().enumerate() {
             if self.levels.iter().any(|measured| measured.level == level) {
                 continue;
             }
             context.cancel.check()?;
-            report(AccuracyResult::Doing("Faster and finer settings"));
+            report(AccuracyResult::Doing(format!("Settings {} of {}", at + 1, levels.len())));
             let scene = with_settings(&job.loaded, &quality_scale::candidate_at(level, overhangs))?;
             let ms = self.edit_ms(&scene)?;
             let outcome = self.pipeline.effective(&scene)?;
@@ -204,12 +212,12 @@ impl AccuracyWorker {
         outcome: &Outcome,
         mut current: AccuracyPoint,
     ) -> Result<()> {
-        report(AccuracyResult::Doing("Refining the reference"));
         let thumbnails = ThumbnailRenderer::new(&job.loaded)?;
         let current_image = thumbnails.image(&*outcome.brdf)?;
         let mut mean = MeanImage::default();
         for seed in 0..IMAGES {
             context.cancel.check()?;
+            report(AccuracyResult::Doing(format!("Reference {} of {IMAGES}", seed + 1)));
             let sample = self.pipeline.with_reference(&job.loaded, |reference| {
                 thumbnails.reference_image(reference, seed, context.cancel)
             })??;
@@ -222,13 +230,13 @@ impl AccuracyWorker {
                     let finest = thumbnails.image(&*self.pipeline.effective(&fine)?.brdf)?;
                     report(AccuracyResult::Difference(
                         job.version,
-                        difference(&thumbnails, &current_image, &finest, None),
+                        compared(&thumbnails, &current_image, &finest, None),
                     ));
                 }
                 None => {}
             }
             if let Some((mean_image, noise)) = mean.mean_and_noise(&thumbnails) {
-                let shown = difference(&thumbnails, &current_image, &mean_image, Some(noise));
+                let shown = compared(&thumbnails, &current_image, &mean_image, Some(noise));
                 report(AccuracyResult::Difference(job.version, shown));
             }
             if reference.batches < BATCHES[1] {
@@ -304,15 +312,12 @@ fn average(delta_e: &[f32]) -> f32 {
     delta_e.iter().sum::<f32>() / delta_e.len().max(1) as f32
 }
 
-fn difference(thumbnails: &ThumbnailRenderer, current: &Image, reference: &Image, noise: Option<f32>) -> Difference {
+fn compared(thumbnails: &ThumbnailRenderer, current: &Image, reference: &Image, noise: Option<f32>) -> Difference {
     let delta_e = thumbnails.difference(current, reference);
     Difference { image: Arc::new(image(current.width, current.height, &delta_e)), mean: average(&delta_e), noise }
 }
 
 fn image(width: usize, height: usize, delta_e: &[f32]) -> ColorImage {
-    let color = |delta: &f32| {
-        let [r, g, b] = heat(*delta).to_array().map(crate::render::image::tone_map::srgb_byte);
-        eframe::egui::Color32::from_rgb(r, g, b)
-    };
-    ColorImage::new([width, height], delta_e.iter().map(color).collect())
+    let pixels = delta_e.iter().map(|delta_e| difference::color(*delta_e)).collect();
+    ColorImage::new([width, height], pixels)
 }

@@ -11,6 +11,7 @@ use crate::render::image::tone_map::ToneMap;
 use crate::render::tile_view::TileScene;
 use crate::scene::{Camera, LoadedScene};
 
+use super::dark;
 use super::gpu_drafts::{GpuDrafts, as_preset};
 use super::preview_renderer::{CloseUpTile, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
@@ -106,7 +107,9 @@ impl ImageWorker {
     /// Renders a draft whose visibility and facet sum the GPU computes, at the finest level that meets the time limit.
     fn render_gpu_draft(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<Option<RenderedPreview>> {
         let on_gpu = self.backend != "cpu" && self.renderer.is_hardware();
-        if !on_gpu || self.renderer.is_close(&camera(&job.loaded), job.size, false) {
+        let shows_tile =
+            has_analytic_surface(&job.loaded) || self.renderer.is_close(&camera(&job.loaded), job.size, false);
+        if !on_gpu || shows_tile {
             return Ok(None);
         }
         let Some(tile) = self.gpu_drafts.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
@@ -203,7 +206,9 @@ impl ImageWorker {
         let full = self.affordable(job.size, 1, FINAL_MS);
         let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), 1, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
-        preview.warnings.clone_from(&outcome.health_unless(context.cancel)?.warnings);
+        let health = outcome.health_unless(context.cancel)?;
+        preview.warnings.clone_from(&health.warnings);
+        preview.warnings.extend(dark::hint(health, &outcome.plan.effects));
         // An image that is only on the GPU is rendered again if its tone map changes.
         let last = preview.radiance.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, preview.clone()));
         *lock(&self.shared.last) = last;
@@ -259,7 +264,7 @@ impl ImageWorker {
         let build_caches = samples_per_side > 1;
         // Drafts of distant colour maps have `f̄`, because the statistics of a tile take longer than a draft may.
         let has_color_map = build_caches && job.loaded.scene.color_map.is_some();
-        if self.renderer.is_close(&camera, size, has_color_map) {
+        if has_analytic_surface(&job.loaded) || self.renderer.is_close(&camera, size, has_color_map) {
             self.prepare_close_up(&job.loaded)?;
         } else {
             self.close = None;
@@ -337,6 +342,11 @@ impl ImageWorker {
         let part = parts.into_iter().find(|part| 1.0 / part <= scale).unwrap_or(8.0);
         full.map(|side| ((side as f64 / part).round() as usize).max(24))
     }
+}
+
+/// Returns true if images show an analytic surface at every distance, and `f̄` at none.
+fn has_analytic_surface(loaded: &LoadedScene) -> bool {
+    loaded.scene.color_map.as_ref().is_some_and(|map| map.surface.is_some())
 }
 
 /// The view's size, reduced to the largest size that is rendered.

@@ -263,9 +263,9 @@ fn map_methods(
 ) -> Result<[Box<dyn Method>; 3]> {
     let object = Arc::new(MappedObject::new(pipeline, loaded, size, cancel)?);
     let map = match &object.tile.mesh.color {
-        ColorField::Mapped { map, .. } if object.tile.filtered().is_some() => NaiveMap::new(map),
+        ColorField::Mapped { map, .. } if !map.is_analytic => NaiveMap::new(map),
         _ => {
-            let expected = "a colour map on a tile that is a height field";
+            let expected = "a colour map of the tile's own surface, which rays can meet";
             return Err(InputError::new("color_map", "a map whose pixels cannot be filtered", expected).into());
         }
     };

@@ -1,8 +1,10 @@
 //! Background work of the editor, with one thread per task: draft, refined image, tile, lobe plot, thumbnails,
-//! accuracy, values of colour maps, lobe of a slab, methods beside each other, export, recovery file.
+//! accuracy, settings for targets, captured photographs, values of colour maps, lobe of a slab, methods beside each other, export, recovery file.
 
 mod accuracy;
+mod capture;
 mod color_map;
+mod dark;
 mod export;
 mod gpu_drafts;
 mod gpu_state;
@@ -13,10 +15,12 @@ mod preview_renderer;
 mod rendered_preview;
 mod runner;
 mod screen;
+mod section;
 mod shared;
 mod slab_image;
 mod slab_lobe;
 mod slab_truth;
+mod target;
 mod thumbnail;
 mod tile_image_worker;
 mod tone;
@@ -24,12 +28,14 @@ mod tone;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::base::Running;
 use crate::cache::Cache;
 use crate::pipeline::Pipeline;
 
 use super::document::Snapshot;
 
 pub use accuracy::{AccuracyChart, AccuracyJob, AccuracyPoint, AccuracyResult, without_settings};
+pub use capture::{CaptureJob, CaptureResult, ShownCapture};
 pub use color_map::{ColorMapJob, ColorMapResult, DriverValues, REACH as HISTOGRAM_REACH};
 pub use export::{ExportJob, ExportKind, ExportResult, TableChoice};
 #[cfg(test)]
@@ -39,8 +45,10 @@ pub use methods::{MethodImage, MethodsJob, MethodsResult};
 pub use rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 pub use runner::Worker;
 pub use screen::{GpuImage, Screen};
+pub use section::Section;
 pub use shared::GpuShare;
 pub use slab_lobe::{LobeCurve, SlabLobe, SlabLobeJob, SlabLobeResult};
+pub use target::{FoundSettings, TargetJob, TargetNews, TargetResult};
 pub use thumbnail::{SceneThumbnail, ThumbnailJob};
 pub use tile_image_worker::{RenderedTile, TileDisplay, TileJob, TileResult};
 
@@ -117,6 +125,11 @@ impl PreviewWorkers {
         self.refine.finish(longest);
     }
 
+    /// The computation that runs at present.
+    pub fn running(&self) -> Option<Running> {
+        self.refine.running().or_else(|| self.draft.running())
+    }
+
     /// Cancels refinement; the current image stays.
     pub fn stop(&self) {
         self.refine.cancel();
@@ -143,6 +156,31 @@ pub fn spawn_accuracy(report: impl Fn(AccuracyResult) + Clone + Send + Sync + 's
         };
     let panicked = move |text: String| report_fault(AccuracyResult::Failed(format!("a fault in the program ({text})")));
     Worker::spawn("accuracy", 0, accuracy::AccuracyWorker::default, work, panicked).ok()
+}
+
+/// Starts the thread that searches settings for targets.
+pub fn spawn_target(report: impl Fn(TargetResult) + Clone + Send + Sync + 'static) -> Option<Worker<TargetJob>> {
+    let report_fault = report.clone();
+    let work = move |_: &mut (), job: TargetJob, context: &runner::JobContext<TargetJob>| {
+        target::work(&job, context, &report);
+    };
+    let panicked = move |text: String| {
+        let news = TargetNews::Failed(format!("a fault in the program ({text})"));
+        report_fault(TargetResult { serial: None, news });
+    };
+    Worker::spawn("target", 0, || (), work, panicked).ok()
+}
+
+/// Starts the thread that reads folders of photographs.
+pub fn spawn_capture(report: impl Fn(CaptureResult) + Clone + Send + Sync + 'static) -> Option<Worker<CaptureJob>> {
+    let report_fault = report.clone();
+    let work = move |state: &mut capture::CaptureWorker, job: CaptureJob, context: &runner::JobContext<CaptureJob>| {
+        state.work(job, context, &report);
+    };
+    let panicked = move |text: String| {
+        report_fault(CaptureResult::Failed(None, format!("a fault in the program ({text})")));
+    };
+    Worker::spawn("capture", 0, capture::CaptureWorker::default, work, panicked).ok()
 }
 
 /// Starts the thread that measures the drivers of colour maps.

@@ -170,7 +170,13 @@ impl PreviewRenderer {
             let start = Instant::now();
             let materials =
                 ShadedMaterials { material_of_slot: &assignment.material_of_slot, materials: &assignment.materials };
-            let input = render_input(scene, request, &exact, &background);
+            // Only pixels under a colour map read `f̄`: from the representation that images read.
+            let brdf = match tile.filtered() {
+                Some(_) => outcome.shading_brdf(cancel)?.brdf,
+                None => outcome.brdf.clone(),
+            };
+            let reflectance = Cancellable { brdf: &brdf, cancel };
+            let input = render_input(scene, request, &reflectance, &background);
             let corrections = if request.build_caches { Corrections::Measured } else { Corrections::Known };
             tile.blend_into(&mut rendered.image, &input, materials, corrections, cancel)?;
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;

@@ -7,7 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::base::{Cancel, threads};
+use crate::base::{Cancel, Running, threads};
 
 /// Context of a job: its cancel flag and the queue that it came from.
 pub struct JobContext<'a, J> {
@@ -141,6 +141,11 @@ fn message(panic: &(dyn Any + Send)) -> String {
 }
 
 impl<J> Worker<J> {
+    /// The computation of the running job.
+    pub fn running(&self) -> Option<Running> {
+        self.mailbox.lock().running.as_ref().and_then(Cancel::running)
+    }
+
     fn close(&self) {
         let mut state = self.mailbox.lock();
         state.closed = true;

@@ -16,6 +16,7 @@ use eframe::egui::ColorImage;
 use glam::Vec3;
 
 use super::runner::JobContext;
+use super::section::Section;
 use super::tone::color_image;
 
 /// Number of facets in the overlay.
@@ -51,6 +52,7 @@ pub struct TileJob {
 pub struct RenderedTile {
     pub image: Arc<ColorImage>,
     pub tile: Arc<TileScene>,
+    pub section: Arc<Section>,
     pub facets: Option<Arc<Facets>>,
 }
 
@@ -71,7 +73,7 @@ fn key(loaded: &LoadedScene) -> Key {
 #[derive(Default)]
 pub struct TileImageWorker {
     pipeline: Pipeline,
-    tile: Option<(Key, Arc<TileScene>)>,
+    tile: Option<(Key, Arc<TileScene>, Arc<Section>)>,
     facets: Option<(Key, Arc<Facets>)>,
     lights: Option<((Light, std::path::PathBuf), Vec<DirectionalLight>)>,
     /// Milliseconds per pixel.
@@ -87,7 +89,7 @@ impl TileImageWorker {
     }
 
     fn steps(&mut self, job: &TileJob, context: &JobContext<TileJob>, report: &dyn Fn(TileResult)) -> Result<()> {
-        let tile = self.tile(&job.loaded)?;
+        let (tile, section) = self.tile(&job.loaded)?;
         let MaterialAssignment { material_of_slot, materials } = self.pipeline.materials(&job.loaded)?;
         let shaded_materials = ShadedMaterials { material_of_slot: &material_of_slot, materials: &materials };
         let facets = if job.facets { Some(self.facets(job, &tile)) } else { None };
@@ -105,22 +107,23 @@ impl TileImageWorker {
             let ms = start.elapsed().as_secs_f64() * 1e3;
             self.cost = ms / (view.size[0] * view.size[1]) as f64;
             let image = Arc::new(color_image(&image, &tone_map));
-            let (tile, facets) = (tile.clone(), facets.clone());
-            report(TileResult::Rendered(Box::new(RenderedTile { image, tile, facets })));
+            let (tile, section, facets) = (tile.clone(), section.clone(), facets.clone());
+            report(TileResult::Rendered(Box::new(RenderedTile { image, tile, section, facets })));
         }
         Ok(())
     }
 
-    fn tile(&mut self, loaded: &LoadedScene) -> Result<Arc<TileScene>> {
+    fn tile(&mut self, loaded: &LoadedScene) -> Result<(Arc<TileScene>, Arc<Section>)> {
         let key = key(loaded);
-        if let Some((last, tile)) = &self.tile
+        if let Some((last, tile, section)) = &self.tile
             && *last == key
         {
-            return Ok(tile.clone());
+            return Ok((tile.clone(), section.clone()));
         }
         let tile = Arc::new(TileScene::new(Arc::new(self.pipeline.mesh(loaded)?)));
-        self.tile = Some((key, tile.clone()));
-        Ok(tile)
+        let section = Arc::new(Section::of(&tile.mesh));
+        self.tile = Some((key, tile.clone(), section.clone()));
+        Ok((tile, section))
     }
 
     fn facets(&mut self, job: &TileJob, tile: &TileScene) -> Arc<Facets> {

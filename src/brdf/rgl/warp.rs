@@ -93,8 +93,12 @@ impl SliceBlend {
         Self { slices: [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)] }
     }
 
+    /// The slices and their weights, which sum to one.
+    pub(crate) fn slices(self) -> [(usize, f64); 4] {
+        self.slices
+    }
+
     /// A blend of one slice only.
-    #[cfg(test)]
     pub(crate) fn only(slice: usize) -> Self {
         Self { slices: [(slice, 1.0), (slice, 0.0), (slice, 0.0), (slice, 0.0)] }
     }
@@ -174,6 +178,13 @@ impl Warp {
         // In a row of zeros, any number is valid.
         let across = if row_total > 0.0 { lerp(partial[0], partial[1], y) / row_total } else { at[0] };
         [across.clamp(0.0, 1.0), (below + part(total[0], total[1], y)).clamp(0.0, 1.0)]
+    }
+
+    /// The density of one slice per unit of the square.
+    pub(crate) fn density(&self, slice: usize, at: [f64; 2]) -> f64 {
+        let Grid { width, height } = self.grid;
+        let cells = ((width - 1) * (height - 1)) as f64;
+        self.grid.eval(&self.density[slice * self.grid.len()..][..self.grid.len()], at) * cells
     }
 
     /// Maps uniform numbers by the warp of one slice. Returns the point and the density there, per unit of the square.

@@ -5,6 +5,7 @@
 //! the cosine of the other direction, which is exactly `f̄`. Samples lie on half vectors, because lobes depend little
 //! on the other angles there. A warp makes the samples dense where normals are frequent.
 
+pub mod sampling;
 mod slices;
 
 use std::io::{self, Write};

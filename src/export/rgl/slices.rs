@@ -88,7 +88,7 @@ fn vertices(grid: Grid) -> impl Iterator<Item = [f64; 2]> + Clone {
 }
 
 /// Returns `dω_h / du`, the solid angle of half vectors per unit of the square.
-fn solid_angle([x, _]: [f64; 2]) -> f64 {
+pub(super) fn solid_angle([x, _]: [f64; 2]) -> f64 {
     2.0 * PI * PI * x * (x * x * FRAC_PI_2).sin()
 }
 
@@ -115,7 +115,7 @@ fn reflect(brdf: &EffectiveBrdf, viewer: DVec3, halves: &[DVec3]) -> Vec<DVec3> 
     values.into_iter().map(|value| value.as_dvec3()).collect()
 }
 
-fn reflected(viewer: DVec3, half: DVec3) -> DVec3 {
+pub(super) fn reflected(viewer: DVec3, half: DVec3) -> DVec3 {
     2.0 * viewer.dot(half) * half - viewer
 }
 

@@ -68,7 +68,9 @@ fn an_isotropic_tile_is_tabulated_over_three_angles() {
     let table = RglTable::from_fields(&TensorFile::read(&path).unwrap()).unwrap();
     assert!(table.is_isotropic() && table.phi_i == [0.0]);
     assert!(three.reading.mean < 0.02, "{:?}", three.reading);
-    assert!(std::fs::read_to_string(three.note.unwrap()).unwrap().contains("isotropic"));
+    let note = std::fs::read_to_string(three.note.unwrap()).unwrap();
+    assert!(note.contains("isotropic"));
+    assert!(note.contains("<bsdf type=\"measured\"><string name=\"filename\" value=\"a.bsdf\"/></bsdf>"), "{note}");
     assert!(crate::brdf::rgl::load(&path).is_ok());
     let four = write(&brdf, &meta(), &sized(size), &path, &never_cancel).unwrap();
     assert_eq!(three.pairs * 49, four.pairs);

@@ -20,14 +20,19 @@ impl KdTree {
     /// Index of the point nearest to `query` modulo the tile. Of two points at the same distance, the lower index is
     /// returned.
     pub fn nearest(&self, query: Vec3) -> Option<u32> {
+        self.nearest_by(query, |_| 0.0)
+    }
+
+    /// As [`KdTree::nearest`], with a penalty (at least 0) that is added to the squared distance of each point.
+    pub fn nearest_by(&self, query: Vec3, penalty: impl Fn(u32) -> f32) -> Option<u32> {
         let mut best = (f32::INFINITY, u32::MAX);
-        search(&self.nodes, query, 0, &mut best);
+        search(&self.nodes, query, 0, &penalty, &mut best);
         for step in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)] {
             let moved = query + (Vec2::new(step.0 as f32, step.1 as f32) * self.size).extend(0.0);
             // A copy of the query is at least as far from all points as from the tile, because points lie in the tile.
             let nearest_in_tile = moved.truncate().clamp(Vec2::ZERO, self.size);
             if moved.truncate().distance_squared(nearest_in_tile) <= best.0 {
-                search(&self.nodes, moved, 0, &mut best);
+                search(&self.nodes, moved, 0, &penalty, &mut best);
             }
         }
         (best.1 != u32::MAX).then_some(best.1)
@@ -46,21 +51,21 @@ fn arrange(nodes: &mut [(Vec3, u32)], depth: usize) {
     arrange(&mut upper[1..], depth + 1);
 }
 
-fn search(nodes: &[(Vec3, u32)], query: Vec3, depth: usize, best: &mut (f32, u32)) {
+fn search(nodes: &[(Vec3, u32)], query: Vec3, depth: usize, penalty: &impl Fn(u32) -> f32, best: &mut (f32, u32)) {
     let middle = nodes.len() / 2;
     let Some(&(point, number)) = nodes.get(middle) else {
         return;
     };
-    let distance = point.distance_squared(query);
+    let distance = point.distance_squared(query) + penalty(number);
     if distance < best.0 || (distance == best.0 && number < best.1) {
         *best = (distance, number);
     }
     let (lower, upper) = (&nodes[..middle], &nodes[middle + 1..]);
     let across = query[depth % 3] - point[depth % 3];
     let (near, far) = if across < 0.0 { (lower, upper) } else { (upper, lower) };
-    search(near, query, depth + 1, best);
+    search(near, query, depth + 1, penalty, best);
     if across * across <= best.0 {
-        search(far, query, depth + 1, best);
+        search(far, query, depth + 1, penalty, best);
     }
 }
 

@@ -1,8 +1,7 @@
 //! First hits of rays in the endless tiling, for images of the tile and for interreflection.
 
-use glam::Vec3;
+use glam::{IVec2, Vec3};
 
-use super::periodic_grid::CellWalk;
 use crate::geometry::PeriodicGrid;
 
 /// The point at which a ray meets the surface.
@@ -26,36 +25,40 @@ impl PeriodicGrid {
         if to.z >= 0.0 {
             return None;
         }
-        // Nothing is above the top, so the walk starts there.
-        let start = ((self.top - origin.z) / to.z).max(0.0);
-        let origin = origin + to * start;
+        if to.truncate().length_squared() < 1e-16 * to.length_squared() {
+            return self.nearest_below(origin, to, bottom);
+        }
+        // Nothing is above the top, so the ray starts there. It starts a little earlier, because the surface may be there.
+        let lift = 1e-5 * self.tile_size.max_element();
+        let above = (self.top - origin.z) / to.z;
+        let mut start = origin + to * above.max(0.0);
+        if above > 0.0 {
+            start.z = self.top;
+        }
+        let end = (bottom - start.z) / to.z * (1.0 + 1e-5) + 2.0 * lift;
+        (end > 0.0).then(|| self.rays().first_hit(start - to * lift, to, u32::MAX, end))?
+    }
+
+    /// [`PeriodicGrid::nearest`] for a vertical ray, which stays in one cell.
+    fn nearest_below(&self, origin: Vec3, to: Vec3, bottom: f32) -> Option<Hit> {
+        let origin = origin + to * ((self.top - origin.z) / to.z).max(0.0);
         let max_distance = (bottom - origin.z) / to.z;
-        let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
+        if max_distance < 0.0 {
+            return None;
+        }
+        let slack = 1e-6 * self.tile_size.max_element();
+        let allowed = -slack..=max_distance * (1.0 + 1e-5) + slack;
+        let cell = (origin.truncate() / self.cell_size).floor().as_ivec2();
+        let tile = IVec2::new(cell.x.div_euclid(self.cells.x), cell.y.div_euclid(self.cells.y));
+        let local = cell - tile * self.cells;
         let mut best: Option<(f32, Hit)> = None;
-        let nearest_allowed = -1e-6 * self.tile_size.max_element();
-        for _ in 0..MAX_CELLS {
-            if walk.entered > max_distance {
-                break;
-            }
-            let (cell, tile) = walk.cell();
-            if self.z_max[cell] >= origin.z + max_distance * to.z {
-                for &entry in self.entries(cell) {
-                    let corners = self.copy_corners(entry, tile);
-                    if let Some((t, v, w)) = intersect(origin, to, corners)
-                        && t >= nearest_allowed
-                        && best.is_none_or(|(nearest, _)| t < nearest)
-                    {
-                        let hit = Hit { triangle: entry.triangle, position: origin + to * t, barycentric: [v, w] };
-                        best = Some((t, hit));
-                    }
-                }
-            }
-            if to.truncate().length_squared() < 1e-16 {
-                break;
-            }
-            walk.advance();
-            if best.is_some_and(|(nearest, _)| nearest <= walk.entered) {
-                break;
+        for &entry in self.entries((local.y * self.cells.x + local.x) as usize) {
+            if let Some((t, v, w)) = intersect(origin, to, self.copy_corners(entry, tile))
+                && allowed.contains(&t)
+                && best.is_none_or(|(nearest, _)| t < nearest)
+            {
+                let hit = Hit { triangle: entry.triangle, position: origin + to * t, barycentric: [v, w] };
+                best = Some((t, hit));
             }
         }
         best.map(|(_, hit)| hit)
@@ -71,40 +74,12 @@ impl PeriodicGrid {
         let limit = if speed > 1e-8 { MAX_TILES * self.tile_size.max_element() / speed } else { f32::INFINITY };
         // The slack finds a floor that lies exactly at the bottom.
         let max_distance = slab.min(limit) * (1.0 + 1e-4) + 1e-5 * self.tile_size.max_element();
-        let mut walk = CellWalk::new(self, origin.truncate(), to.truncate());
-        let mut best: Option<(f32, Hit)> = None;
-        while walk.entered <= max_distance {
-            let (cell, tile) = walk.cell();
-            let lowest = if to.z > 0.0 { origin.z + walk.entered * to.z } else { f32::NEG_INFINITY };
-            if self.z_max[cell] >= lowest {
-                for &entry in self.entries(cell) {
-                    let corners = self.copy_corners(entry, tile);
-                    if let Some((t, v, w)) = intersect(origin, to, corners)
-                        && t > 0.0
-                        && best.is_none_or(|(nearest, _)| t < nearest)
-                        && !(entry.triangle == own && self.lies_on(origin, corners))
-                    {
-                        let hit = Hit { triangle: entry.triangle, position: origin + to * t, barycentric: [v, w] };
-                        best = Some((t, hit));
-                    }
-                }
-            }
-            if speed < 1e-8 {
-                break;
-            }
-            walk.advance();
-            if best.is_some_and(|(nearest, _)| nearest <= walk.entered) {
-                break;
-            }
-        }
-        best.map(|(_, hit)| hit)
+        self.rays().first_hit(origin, to, own, max_distance)
     }
 }
 
 /// Maximum horizontal distance of a ray, in tiles.
 const MAX_TILES: f32 = 64.0;
-/// Maximum number of cells that a ray visits.
-const MAX_CELLS: usize = 1 << 16;
 
 /// Intersects a ray with a triangle from either side: distance along the ray and weights of the second and third corner
 /// (Möller and Trumbore 1997).

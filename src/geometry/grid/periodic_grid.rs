@@ -1,4 +1,6 @@
-//! A planar grid of the periodic tile's triangles. Rays and vertical slices walk its cells.
+//! A planar grid of the periodic tile's triangles. Vertical slices walk its cells; rays descend a hierarchy.
+
+use std::sync::OnceLock;
 
 use glam::{IVec2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -6,6 +8,7 @@ use rayon::prelude::*;
 use super::cell_lists::{CellEntry, CellLists, MIN_ITEMS_PER_TASK, highest};
 use crate::base::Cancel;
 use crate::geometry::TileMesh;
+use crate::geometry::hierarchy::TileHierarchy;
 
 /// A uniform grid over one period. Each cell lists every periodic copy of a triangle that reaches into it in xy.
 #[derive(Debug)]
@@ -24,9 +27,11 @@ pub struct PeriodicGrid {
     pub(crate) corners: Vec<[Vec3; 3]>,
     /// Stops slices when it is set.
     pub(crate) cancel: Cancel,
+    /// The hierarchy that rays descend, built for the first ray.
+    rays: OnceLock<TileHierarchy>,
 }
 
-/// Mean number of triangles per cell, for rays.
+/// Mean number of triangles per cell, for vertical rays.
 const TRIANGLES_PER_CELL: f32 = 4.0;
 /// Mean number of triangles per cell, for slices. It is larger than for rays because slices test eight triangles at
 /// once.
@@ -40,7 +45,7 @@ impl PeriodicGrid {
         self
     }
 
-    /// Builds the grid for rays. Triangles with corners that are not finite, or without area, block nothing.
+    /// Builds a grid with small cells. Triangles with corners that are not finite, or without area, block nothing.
     pub fn new(mesh: &TileMesh) -> Self {
         Self::with_cells(mesh, TRIANGLES_PER_CELL)
     }
@@ -82,7 +87,23 @@ impl PeriodicGrid {
         let top = solid.iter().map(|&t| highest(&corners[t as usize])).fold(f32::NEG_INFINITY, f32::max);
         let CellLists { starts, entries, z_max } = CellLists::new(&corners, solid, cells, cell_size);
         let cancel = Cancel::default();
-        Self { tile_size: mesh.size, cells, cell_size, starts, entries, z_max, top, corners, cancel }
+        Self {
+            tile_size: mesh.size,
+            cells,
+            cell_size,
+            starts,
+            entries,
+            z_max,
+            top,
+            corners,
+            cancel,
+            rays: OnceLock::new(),
+        }
+    }
+
+    /// The hierarchy of the triangles, for rays.
+    pub(super) fn rays(&self) -> &TileHierarchy {
+        self.rays.get_or_init(|| TileHierarchy::new(&self.corners, self.tile_size))
     }
 
     /// The cell of a point of the plane, in the base period.

@@ -99,4 +99,28 @@ impl Gpu {
             Ok(self.device.create_compute_pipeline(&description))
         })
     }
+
+    /// Runs a compute shader of one group of bindings and 64 threads a workgroup for `count` elements, and submits it. Where
+    /// they exceed one row of workgroups, the shader counts rows by `num_workgroups`.
+    pub fn run_over(
+        &self,
+        count: u32,
+        pipeline: &wgpu::ComputePipeline,
+        group: &wgpu::BindGroup,
+        during: &str,
+    ) -> Result<(), GpuError> {
+        const THREADS: u32 = 64;
+        const MAX_GROUPS: u32 = 65_535;
+        let groups = count.div_ceil(THREADS);
+        self.checked(during, || {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1);
+            drop(pass);
+            self.queue.submit([encoder.finish()]);
+            Ok(())
+        })
+    }
 }

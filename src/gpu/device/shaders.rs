@@ -33,6 +33,7 @@ pub const SHADERS: &[(&str, &str)] = shaders! {
         "table_of_subsets", "table_of_sum", "table_pairs", "table_values", "two_lobes";
     "color_map": "color_pixels", "color_reads";
     "render": "gbuffer", "image", "light_rays";
+    "seen_through": "backdrop", "pyramid", "seen_through";
 };
 
 const IMPORT: &str = "//!import ";

@@ -6,7 +6,7 @@ mod hemisphere_pair_grid;
 mod paraboloid;
 mod polar_grid;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 pub use half_difference::HalfDifferenceGrid;
 pub use hemisphere_pair_grid::{GridCoordinates, HemispherePairGrid};
@@ -18,6 +18,22 @@ pub fn from_angles(theta: f32, phi: f32) -> Vec3 {
     let (sin_theta, cos_theta) = theta.sin_cos();
     let (sin_phi, cos_phi) = phi.sin_cos();
     Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
+}
+
+/// The unit vector at `theta`, up to π from +z, and `phi` from +x towards +y, in double precision.
+pub fn direction_of_angles(theta: f64, phi: f64) -> DVec3 {
+    let (sin_theta, cos_theta) = theta.sin_cos();
+    let (sin_phi, cos_phi) = phi.sin_cos();
+    // The cosine of the nearest number to π/2 is not 0.
+    let z = if cos_theta.abs() < 1e-15 { 0.0 } else { cos_theta };
+    DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, z)
+}
+
+/// The inverse of [`direction_of_angles`], with `phi` in `[0, 2π)`.
+pub fn angles_of_direction(direction: DVec3) -> (f64, f64) {
+    let theta = direction.x.hypot(direction.y).atan2(direction.z);
+    let phi = direction.y.atan2(direction.x);
+    (theta, if phi < 0.0 { (phi + std::f64::consts::TAU).min(std::f64::consts::TAU.next_down()) } else { phi })
 }
 
 /// `(theta, phi)` of a unit vector, `phi` in `[0, 2π)`; accurate near the pole.

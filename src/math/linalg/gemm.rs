@@ -50,6 +50,34 @@ pub fn multiply_transposed(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c
     }
 }
 
+/// `c += aᵀ b` for row-major `a: k x m` and `b: k x n`, whose rows are `strides` apart, and `c: m x n` in f64;
+/// sequential. The product itself is in f32.
+pub fn add_outer_products(k: usize, [m, n]: [usize; 2], [a, b]: [&[f32]; 2], strides: [usize; 2], c: &mut [f64]) {
+    let fits = |values: &[f32], stride: usize, width: usize| k == 0 || values.len() >= (k - 1) * stride + width;
+    assert!(fits(a, strides[0], m) && fits(b, strides[1], n) && c.len() >= m * n, "slices hold the matrices");
+    let mut product = vec![0.0_f32; m * n];
+    // SAFETY: the assertion above checks the lengths, and `a` is read with its strides swapped.
+    unsafe {
+        matrixmultiply::sgemm(
+            m,
+            k,
+            n,
+            1.0,
+            a.as_ptr(),
+            1,
+            strides[0] as isize,
+            b.as_ptr(),
+            strides[1] as isize,
+            1,
+            0.0,
+            product.as_mut_ptr(),
+            n as isize,
+            1,
+        );
+    }
+    c.iter_mut().zip(&product).for_each(|(sum, new)| *sum += f64::from(*new));
+}
+
 /// `c = a b` with the rows of `a` and `c` distributed over threads; every row has the same bits as from [`multiply`].
 pub fn multiply_parallel(m: usize, k: usize, n: usize, a: &[f32], b: &[f32], c: &mut [f32]) {
     const ROWS: usize = 64;

@@ -17,6 +17,8 @@ pub(crate) trait SimdF32x8:
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn less(self, other: Self) -> Self::Mask;
+    /// Whether `self <= other`.
+    fn up_to(self, other: Self) -> Self::Mask;
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
@@ -28,6 +30,13 @@ pub(crate) trait SimdF32x8:
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(32))]
 pub(crate) struct F32x8Array(pub [Vec4; 2]);
+
+impl From<[f32; 8]> for F32x8Array {
+    #[inline(always)]
+    fn from([a, b, c, d, e, f, g, h]: [f32; 8]) -> Self {
+        Self([Vec4::new(a, b, c, d), Vec4::new(e, f, g, h)])
+    }
+}
 
 impl F32x8Array {
     pub fn splat(value: f32) -> Self {
@@ -92,6 +101,10 @@ impl SimdF32x8 for F32x8Array {
     #[inline(always)]
     fn less(self, other: Self) -> Self::Mask {
         halves(self.0, other.0, Vec4::cmplt)
+    }
+    #[inline(always)]
+    fn up_to(self, other: Self) -> Self::Mask {
+        halves(self.0, other.0, Vec4::cmple)
     }
     #[inline(always)]
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
@@ -185,6 +198,10 @@ mod avx {
         #[inline(always)]
         fn less(self, other: Self) -> Self::Mask {
             unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) }
+        }
+        #[inline(always)]
+        fn up_to(self, other: Self) -> Self::Mask {
+            unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) }
         }
         #[inline(always)]
         fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {

@@ -315,3 +315,68 @@ multiversion! {
         }
     }
 }
+
+#[inline(always)]
+fn around<const C: usize, V: Value>(
+    [n, away]: [Vec3; 2],
+    to: [&[f32]; 3],
+    visibility: &[f32],
+    tints: [[f32; 2]; C],
+    out: &mut [f32],
+    value: impl Fn(f32) -> V,
+) {
+    let count = visibility.len();
+    let (to, mut rows) = (to.map(|x| &x[..count]), out.chunks_exact_mut(count));
+    let mut rows: [&mut [f32]; C] = std::array::from_fn(|_| rows.next().unwrap_or_default());
+    for start in (0..count).step_by(LANES) {
+        let [x, y, z, v] = [lane(to[0], start), lane(to[1], start), lane(to[2], start), lane(visibility, start)];
+        let (mut values, mut weights) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        for l in 0..LANES {
+            let i = Vec3::new(x[l], y[l], z[l]);
+            let (sx, sy, sz) = (i.x + away.x, i.y + away.y, i.z + away.z);
+            let squared = (sx * sx + sy * sy + sz * sz).max(1e-12);
+            let inverse = 1.0 / squared.sqrt();
+            let i_dot_h = 0.5 * squared * inverse;
+            let h = Vec3::new(sx * inverse, sy * inverse, sz * inverse);
+            let pair = PairVectors { i, o: away, h, i_dot_h };
+            let input = lobe_input(&pair, n.x, n.y, n.z);
+            let f = value(masking(&pair)).at(input);
+            values[l] = if input.is_lit() { f * v[l] } else { 0.0 };
+            let t = (1.0 - i_dot_h).max(0.0);
+            weights[l] = t * t * t * t * t;
+        }
+        for (row, [facing, grazing]) in rows.iter_mut().zip(tints) {
+            let end = (start + LANES).min(count);
+            for (l, out) in row[start..end].iter_mut().enumerate() {
+                *out += values[l] * (facing + (grazing - facing) * weights[l]);
+            }
+        }
+    }
+}
+
+multiversion! {
+    /// `out[c][k] += tint_c(i·h) visibility[k] lobe(n, to_k, away)` for one normal, one direction `away`, and many
+    /// others. A tint is linear in `(1 - i·h)^5`; `tints` holds its values at 0 and at 1. `out` has a row per channel.
+    pub fn add_lobes_around<const C: usize>(
+        lobe: Lobe,
+        vectors: [glam::Vec3; 2],
+        to: [&[f32]; 3],
+        visibility: &[f32],
+        tints: [[f32; 2]; C],
+        out: &mut [f32],
+    ) {
+        match lobe {
+            Lobe::Lambertian => around(vectors, to, visibility, tints, out, |_| Lambertian),
+            Lobe::BlinnPhong { half_exponent, scale } => {
+                around(vectors, to, visibility, tints, out, |_| BlinnPhong { half_exponent, scale })
+            }
+            Lobe::CookTorrance { inverse_m2, scale } => {
+                around(vectors, to, visibility, tints, out, |masking| CookTorrance { inverse_m2, scale, masking })
+            }
+            Lobe::Ward { inverse_alpha2, scale } => {
+                around(vectors, to, visibility, tints, out, |_| Ward { inverse_alpha2, scale })
+            }
+            Lobe::Ggx { alpha2, scale } => around(vectors, to, visibility, tints, out, |_| Ggx { alpha2, scale }),
+        }
+    }
+}

@@ -341,3 +341,27 @@ fn visible_areas_are_the_plain_sums_for_runs_of_any_length() {
         }
     }
 }
+
+#[test]
+fn lobes_around_a_direction_are_those_of_the_defining_terms() {
+    let to = directions(203, 0.3, 1.57);
+    let parts = split(&to);
+    let parts = [&parts[0][..], &parts[1], &parts[2]];
+    let visibility: Vec<f32> = (0..203).map(|k| uniform(k, 0.2)).collect();
+    let tints = [[0.5, 1.0], [0.2, 0.9]];
+    for (lobe, term) in lobes() {
+        for (normal, away) in directions(20, 0.4, 1.0).into_iter().zip(directions(20, 0.8, 1.5)) {
+            let mut out = vec![1.0; 2 * 203];
+            add_lobes_around::<2>(lobe, [normal, away], parts, &visibility, tints, &mut out);
+            for (k, to) in to.iter().enumerate() {
+                let angles = LobeAngles::new(normal, away, *to, crate::math::directions::half_vector(away, *to));
+                let weight = crate::brdf::schlick_weight(angles.i_dot_h);
+                for (c, [facing, grazing]) in tints.into_iter().enumerate() {
+                    let right = term.lobe_cos(&angles) * visibility[k] * (facing + (grazing - facing) * weight);
+                    let error = (out[203 * c + k] - 1.0 - right).abs();
+                    assert!(error <= 2e-3 * right + 2e-5, "{lobe:?}, {normal}, {away}, {to}: {right}, off by {error}");
+                }
+            }
+        }
+    }
+}

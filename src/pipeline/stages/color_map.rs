@@ -1,23 +1,25 @@
-//! Stages of colour maps: the samples of textures and noise. A scene without `[color_map]` runs none of them.
+//! Stages of colour maps: the samples of textures and noise, and the colours of the tile and of its facets. A scene
+//! without `[color_map]` runs none of them.
 
 use std::sync::Arc;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
-use super::TileShape;
 use super::tile::hash_sampling_into;
+use super::{FacetsRole, TileShape};
 use crate::base::Result;
 use crate::cache::{Key, KeyBuilder};
 use crate::color_map::Normal;
-use crate::color_map::layers::LayeredMap;
+use crate::color_map::layers::{LayeredMap, Relief};
 use crate::color_map::statistics::{DriverGrid, PlaceDriver, RankedHeights};
-use crate::geometry::image_file;
+use crate::effective::mean_colors;
 use crate::geometry::relief::{relief, relief_of_surface};
-use crate::geometry::{Facets, TileMesh};
+use crate::geometry::{ColorField, Facets, image_file};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage};
 use crate::plan::Settings;
-use crate::scene::{ColorLayer, ColorMap, Driver, LoadedScene};
+use crate::scene::{ColorLayer, ColorMap, Driver, GaussianSurface, LoadedScene, Switch};
 
 /// The samples of each texture and noise of a scene's colour map.
 #[derive(Debug, Default)]
@@ -26,12 +28,6 @@ pub struct PlaceDrivers(Vec<(Driver, Arc<PlaceDriver>)>);
 impl PlaceDrivers {
     fn find(&self, driver: &Driver) -> Option<Arc<PlaceDriver>> {
         self.0.iter().find(|(known, _)| known == driver).map(|(_, place)| place.clone())
-    }
-
-    /// The colour map of a scene on its tile.
-    pub fn resolve(&self, spec: &ColorMap, mesh: &TileMesh) -> LayeredMap {
-        let relief = spec.surface.as_ref().map_or_else(|| relief(mesh), relief_of_surface);
-        LayeredMap::new(spec, relief, &|driver| self.find(driver))
     }
 }
 
@@ -83,6 +79,93 @@ impl Stage for SampleDrivers<'_> {
     }
 }
 
+/// Measures heights and slopes of the surface that a colour map is on. Stops are no input.
+pub struct MeasureRelief<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub surface: Option<&'a GaussianSurface>,
+}
+
+impl Stage for MeasureRelief<'_> {
+    type Output = Relief;
+    const NAME: &'static str = "color_relief";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("tile", &self.tile.surface).debug("analytic", &self.surface);
+    }
+
+    fn run(&self, _: &Env) -> Result<Relief> {
+        Ok(self.surface.map_or_else(|| relief(&self.tile.mesh), relief_of_surface))
+    }
+}
+
+/// Lays the colour map of a scene over its tile.
+pub struct ColorTile<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub map: &'a ColorMap,
+    pub drivers: &'a Keyed<PlaceDrivers>,
+    pub relief: &'a Keyed<Relief>,
+}
+
+impl Stage for ColorTile<'_> {
+    type Output = TileShape;
+    const NAME: &'static str = "color_tile";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        let Self { tile, map, drivers, relief } = self;
+        key.key("tile", &tile.key).key("drivers", &drivers.key).key("relief", &relief.key);
+        key.debug("layers", &(&map.combine, &map.layer, &map.surface));
+    }
+
+    fn run(&self, _: &Env) -> Result<TileShape> {
+        let Self { tile, map, drivers, relief } = self;
+        let map = LayeredMap::new(map, *relief.value, &|driver| drivers.find(driver));
+        let mut mesh = tile.mesh.clone();
+        mesh.color = ColorField::Mapped { map: Arc::new(map), below: Box::new(mesh.color) };
+        let TileShape { surface, flat, height_field, steepest, colors_place_facets, .. } = *tile.value;
+        let below = Some((*tile).clone());
+        Ok(TileShape { mesh, below, surface, flat, height_field, steepest, colors_place_facets })
+    }
+}
+
+/// Gives facets of the tile without its colour map the colours of the map. The places of facets do not depend on it.
+pub struct ColorFacets<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub facets: &'a Keyed<Facets>,
+    pub settings: &'a Settings,
+    pub role: FacetsRole,
+}
+
+impl Stage for ColorFacets<'_> {
+    type Output = Facets;
+    const NAME: &'static str = "color_facets";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("tile", &self.tile.key).key("facets", &self.facets.key);
+        key.flags("mean colors", [self.settings.effects.color_weights == Switch::Off]);
+    }
+
+    fn slot(&self) -> &'static str {
+        match self.role {
+            FacetsRole::Main => Self::NAME,
+            FacetsRole::Clusters => "coloured facets of clusters",
+            FacetsRole::Refined => "refined coloured facets",
+        }
+    }
+
+    fn run(&self, _: &Env) -> Result<Facets> {
+        let mesh = &self.tile.mesh;
+        let mut facets = (*self.facets.value).clone();
+        // Bins change the normals that reflect, but not those by which a map colours.
+        let normals = if mesh.corner_normals.is_some() { &facets.normals } else { &facets.geometric_normals };
+        let color = |(position, normal): (&Vec3, &Vec3)| mesh.color.at(*position, *normal, mesh.size);
+        facets.colors = facets.positions.par_iter().zip(normals).with_min_len(512).map(color).collect();
+        if self.settings.effects.color_weights == Switch::Off {
+            mean_colors(&mut facets);
+        }
+        Ok(facets)
+    }
+}
+
 /// Ranks the heights of the facets. Neither stops nor visibility are inputs.
 pub struct MeasureHeights<'a> {
     pub tile: &'a Keyed<TileShape>,
@@ -95,9 +178,7 @@ impl Stage for MeasureHeights<'_> {
     const NAME: &'static str = "color_heights";
 
     fn hash_into(&self, key: &mut KeyBuilder) {
-        // As for visibility: colours matter only if they decide where facets are.
-        let colored = self.tile.colors_place_facets;
-        key.key("surface", if colored { &self.tile.key } else { &self.tile.surface });
+        key.key("surface", &self.tile.placing_key());
         hash_sampling_into(self.settings, key);
     }
 

@@ -54,7 +54,7 @@ impl<'a> BuildFace<'a> {
             _ => None,
         };
         let file = match (&tile, face) {
-            (Some(tile), _) => Some(BuildTile::new(tile, None, env).surface()),
+            (Some(tile), _) => Some(BuildTile::new(tile, env).surface()),
             (None, SlabFace::Table(table)) => Some(env.file_key(&loaded.base_dir, &table.path)),
             _ => None,
         };

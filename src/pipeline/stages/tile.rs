@@ -1,7 +1,5 @@
 //! The first stages: the tile's mesh, the materials of its slots, and its facets.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -11,17 +9,18 @@ use crate::cache::{Key, KeyBuilder};
 use crate::effective::mean_colors;
 use crate::geometry::facets::openness::Openness;
 use crate::geometry::facets::strata::colors_place_facets;
-use crate::geometry::{self, ColorField, FacetSampler, Facets, SampleShift, TileMesh};
+use crate::geometry::{self, FacetSampler, Facets, SampleShift, TileMesh};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage, lock};
-use crate::pipeline::stages::PlaceDrivers;
 use crate::plan::{Preset, Settings};
-use crate::scene::{BrdfSpec, ColorMap, Geometry, Heightfield, LoadedScene, Switch, TermSpec};
+use crate::scene::{BrdfSpec, Geometry, Heightfield, LoadedScene, Switch, TermSpec};
 
 /// The mesh of a tile, and properties of it that later stages need.
 #[derive(Debug)]
 pub struct TileShape {
     pub mesh: TileMesh,
+    /// The tile without its colour map, if it has one.
+    pub below: Option<Keyed<TileShape>>,
     /// The key of the surface and its slots: of everything but colours and the unit of length.
     pub surface: Key,
     pub flat: bool,
@@ -33,20 +32,28 @@ pub struct TileShape {
     pub colors_place_facets: bool,
 }
 
-/// Builds the mesh of a scene's tile.
+impl Keyed<TileShape> {
+    /// The key of all that decides where facets are. Colours do so only if the image has rare bright texels.
+    pub fn placing_key(&self) -> Key {
+        match &self.below {
+            _ if !self.colors_place_facets => self.surface,
+            Some(below) => below.key,
+            None => self.key,
+        }
+    }
+}
+
+/// Builds the mesh of a scene's tile, without its colour map.
 pub struct BuildTile<'a> {
     loaded: &'a LoadedScene,
     /// The key of everything but colours and the unit of length.
     surface: Key,
     colors: [Option<Key>; 2],
-    /// The scene's colour map and the samples of its drivers.
-    color_map: Option<(&'a ColorMap, &'a Keyed<PlaceDrivers>)>,
 }
 
 impl<'a> BuildTile<'a> {
-    pub fn new(loaded: &'a LoadedScene, drivers: Option<&'a Keyed<PlaceDrivers>>, env: &Env) -> Self {
+    pub fn new(loaded: &'a LoadedScene, env: &Env) -> Self {
         let LoadedScene { scene, base_dir, painted, .. } = loaded;
-        let color_map = scene.color_map.as_ref().zip(drivers);
         let tile = &scene.tile;
         let mut key = KeyBuilder::of_stage("surface");
         key.numbers("size", &[tile.size]);
@@ -81,7 +88,7 @@ impl<'a> BuildTile<'a> {
         }
         let file = tile.color_path.as_ref().map(|path| env.file_key(base_dir, path));
         let image = painted.colors.as_ref().map(|image| env.image_key(image));
-        Self { loaded, surface: key.finish(), colors: [file, image], color_map }
+        Self { loaded, surface: key.finish(), colors: [file, image] }
     }
 
     /// The key of everything but colours and the unit of length.
@@ -103,25 +110,19 @@ impl Stage for BuildTile<'_> {
                 key.key("image", image);
             }
         }
-        if let Some((map, drivers)) = self.color_map {
-            key.debug("layers", &(&map.combine, &map.layer, &map.surface)).key("drivers", &drivers.key);
-        }
     }
 
     fn run(&self, _: &Env) -> Result<TileShape> {
         let LoadedScene { scene, base_dir, painted, .. } = self.loaded;
-        let mut mesh = geometry::build_painted(&scene.tile, base_dir, painted)?;
-        if let Some((map, drivers)) = self.color_map {
-            let map = Arc::new(drivers.resolve(map, &mesh));
-            mesh.color = ColorField::Mapped { map, below: Box::new(std::mem::take(&mut mesh.color)) };
-        }
+        let mesh = geometry::build_painted(&scene.tile, base_dir, painted)?;
         let (low, high) = mesh.z_range();
         let flat = high - low <= 1e-7 * mesh.size.max_element();
         let is_of_file = matches!(scene.tile.geometry, Geometry::Mesh(_));
         let height_field = mesh.is_height_field() || !is_of_file && mesh.closes_plane && nothing_faces_down(&mesh);
         let steepest = steepest(&mesh);
         let colors_place_facets = colors_place_facets(&mesh);
-        Ok(TileShape { mesh, surface: self.surface, flat, height_field, steepest, colors_place_facets })
+        let below = None;
+        Ok(TileShape { mesh, below, surface: self.surface, flat, height_field, steepest, colors_place_facets })
     }
 }
 

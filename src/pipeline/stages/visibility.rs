@@ -28,9 +28,7 @@ impl Stage for ComputeVisibility<'_> {
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         let settings = self.settings;
-        // Colours do not change visibility, unless they decide where facets are.
-        let colored = self.tile.colors_place_facets;
-        key.key("surface", if colored { &self.tile.key } else { &self.tile.surface });
+        key.key("surface", &self.tile.placing_key());
         hash_sampling_into(settings, key);
         key.counts("algorithm", [self.algorithm as usize]);
         key.counts("azimuths", [settings.horizon_azimuths, settings.slice_azimuths]);

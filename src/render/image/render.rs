@@ -42,6 +42,15 @@ pub struct RenderTimes {
     pub shading_ms: f64,
 }
 
+impl RenderTimes {
+    /// The times of an image without shadows that is finished now.
+    pub(crate) fn without_shadows(start: Instant, after_gbuffer: Instant) -> Self {
+        let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
+        let (gbuffer_ms, shading_ms) = (ms(start, after_gbuffer), ms(after_gbuffer, Instant::now()));
+        Self { gbuffer_ms, shading_ms, ..Self::default() }
+    }
+}
+
 /// A rendered image and its statistics.
 #[derive(Debug, Clone, Default)]
 pub struct Rendered {

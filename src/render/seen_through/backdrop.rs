@@ -147,6 +147,11 @@ impl Backdrop {
         backdrop
     }
 
+    /// The plane, and the maps of the environment and of even light with their rotations [rad].
+    pub fn maps(&self) -> (Option<&Plane>, [(&Pyramid, f32); 2]) {
+        (self.plane.as_ref(), [&self.environment, &self.even].map(|map| (&map.pyramid, map.rotation)))
+    }
+
     /// The map of even light: cosine-weighted means of coarse radiances, in which the plane has its mean radiance.
     fn even_map(&self) -> Pyramid {
         let [width, height] = EVEN_SIZE;

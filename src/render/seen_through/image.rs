@@ -73,12 +73,7 @@ pub fn render<S: VaryingSurface>(input: &SeenThrough<'_, S>) -> Result<Rendered>
     });
     input.cancel.check()?;
     let image = gather_over(&points, &radiance, view.size, |pixel| behind_pixel(input.backdrop, &view, pixel));
-    let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
-    let times = RenderTimes {
-        gbuffer_ms: ms(start, after_gbuffer),
-        shading_ms: ms(after_gbuffer, Instant::now()),
-        ..RenderTimes::default()
-    };
+    let times = RenderTimes::without_shadows(start, after_gbuffer);
     Ok(Rendered { image, times, points: points.len() })
 }
 

@@ -57,6 +57,15 @@ impl Pyramid {
         self.levels[0].size
     }
 
+    /// Size and texels of each resolution, from the finest.
+    pub fn levels(&self) -> impl Iterator<Item = ([usize; 2], &[Vec3])> {
+        self.levels.iter().map(|level| (level.size, &level.texels[..]))
+    }
+
+    pub fn wraps_y(&self) -> bool {
+        self.wraps_y
+    }
+
     /// The mean over all texels.
     pub fn mean(&self) -> Vec3 {
         self.levels.last().map_or(Vec3::ZERO, |level| level.texels[0])
@@ -153,6 +162,11 @@ fn wrapped(k: i32, n: usize) -> usize {
 }
 
 impl Kernel {
+    /// Places [deviations] and weights of 3, 5, 7 and 9 reads along a line.
+    pub fn reads() -> &'static [Vec<(f32, f32)>] {
+        &*READS
+    }
+
     /// Spreads reads along `deviation`, which is `ratio` times the footprint of one read.
     fn spread(&mut self, deviation: Vec2, ratio: f32) {
         self.count = (((2.4 * ratio).ceil() as usize) | 1).clamp(3, MAX_PROBES);

@@ -6,7 +6,7 @@ use glam::Vec2;
 
 use super::{Backdrop, BuildBackdrop, BuildView, Places, SeenThrough, render};
 use crate::base::{Cancel, Result};
-use crate::effective::VaryingSurface;
+use crate::effective::{VaryingSurface, ViewLobes};
 use crate::pipeline::{Pipeline, SlabOutcome, StageTimes};
 use crate::render::lighting::environment::Environment;
 use crate::render::lighting::lights;
@@ -132,6 +132,16 @@ impl SlabScene {
         let origin = positions().reduce(Vec2::min).unwrap_or(Vec2::ZERO);
         let extent = positions().reduce(Vec2::max).unwrap_or(Vec2::ONE) - origin;
         Places { origin, scale: self.repeat / extent.max(Vec2::splat(f32::MIN_POSITIVE)) }
+    }
+
+    /// The backdrop of the object, and its surroundings.
+    pub fn behind(&self) -> &Backdrop {
+        &self.backdrop
+    }
+
+    /// The table of lobes from which drafts are made; `None` if an image needs more than the table.
+    pub fn draft_lobes(&self) -> Option<&[ViewLobes]> {
+        if self.paths == 0 && self.lights.is_empty() { self.view.lobe_nodes() } else { None }
     }
 
     /// The slab as a viewer sees it.

@@ -110,7 +110,7 @@ impl TileScene {
         Self { mesh, grid, bottom, filtered: OnceLock::new() }
     }
 
-    /// The tile under its colour map at every distance; `None` without a map, or if the tile overhangs.
+    /// The tile under its colour map at every distance; `None` without a map.
     pub fn filtered(&self) -> Option<&FilteredTile> {
         self.filtered.get_or_init(|| FilteredTile::new(self)).as_ref()
     }

@@ -12,13 +12,13 @@ use super::svbtdf::Svbtdf;
 use crate::base::Cancel;
 
 /// Places of dots, pixels and the radiance of each.
-struct Case<'a> {
-    dots: &'a str,
-    pixels: [usize; 2],
-    radiance: &'a (dyn Fn(usize, usize, f64) -> f32 + Sync),
+pub(crate) struct Case<'a> {
+    pub dots: &'a str,
+    pub pixels: [usize; 2],
+    pub radiance: &'a (dyn Fn(usize, usize, f64) -> f32 + Sync),
 }
 
-const GRID: &str = "count = [12, 12], from = [-0.09, -0.05], to = [0.01, 0.05]";
+pub(crate) const GRID: &str = "count = [12, 12], from = [-0.09, -0.05], to = [0.01, 0.05]";
 
 /// Writes the images of a case. The last argument of its radiance is the one of a Beckmann sheet with a diffuse part.
 fn photographed(folder: &Path, case: &Case<'_>) -> Rig {
@@ -45,6 +45,12 @@ fn photographed(folder: &Path, case: &Case<'_>) -> Rig {
             .unwrap();
     }
     rig
+}
+
+/// Writes the images of a case and the `rig.toml` of a model without inner reflections.
+pub(crate) fn write_folder(folder: &Path, case: &Case<'_>) {
+    let rig = Rig { bounces: false, ..photographed(folder, case) };
+    std::fs::write(folder.join(super::rig::FILE), rig.to_toml().unwrap()).unwrap();
 }
 
 fn captured(case: &Case<'_>, settings: &CaptureSettings) -> Captured {

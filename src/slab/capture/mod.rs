@@ -8,7 +8,8 @@ pub mod bounced;
 pub mod clusters;
 pub mod fit;
 #[cfg(test)]
-mod hard_cases_tests;
+pub(crate) mod hard_cases_tests;
+pub mod inspection;
 pub mod lobe;
 pub mod patterns;
 pub mod photographs;

@@ -112,11 +112,11 @@ pub fn capture(
 }
 
 /// A sheet, and what all its points share.
-struct Sheet<'a> {
+pub(super) struct Sheet<'a> {
     photographs: &'a Photographs<'a>,
     dots: Vec<DVec2>,
     settings: &'a CaptureSettings,
-    fit: FitSettings,
+    pub(super) fit: FitSettings,
     /// Squares of directions of the slices, per camera.
     directions: Vec<DirectionGrid>,
     figures: Figures,
@@ -152,7 +152,11 @@ struct Interpolation {
 
 impl<'a> Sheet<'a> {
     /// Decides the spans and the smoothness from some points.
-    fn new(photographs: &'a Photographs<'a>, settings: &'a CaptureSettings, cancel: &'a Cancel) -> Result<Self> {
+    pub(super) fn new(
+        photographs: &'a Photographs<'a>,
+        settings: &'a CaptureSettings,
+        cancel: &'a Cancel,
+    ) -> Result<Self> {
         let rig = photographs.rig;
         let dots = rig.dots();
         let count = photographs.size.element_product() as usize;

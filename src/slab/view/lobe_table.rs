@@ -7,7 +7,7 @@ use super::Faces;
 use crate::effective::{PathKind, ViewLobe, ViewLobes, Viewer};
 use crate::slab::Slab;
 
-/// Nodes per side of the square around the disc of stereographic coordinates.
+/// Nodes per side of the square around the disc of stereographic coordinates, as in `seen_through.wgsl`.
 const SIDE: usize = 33;
 /// Paths per node.
 const PATHS: usize = 256;
@@ -150,6 +150,10 @@ impl LobeTable {
             }
         };
         Self { nodes }
+    }
+
+    pub fn nodes(&self) -> &[ViewLobes] {
+        &self.nodes
     }
 
     /// The lobes of a viewer, interpolated.

@@ -97,6 +97,17 @@ impl SlabView {
     }
 }
 
+impl SlabView {
+    /// Lobes at 33 x 33 directions of the viewer, over the square around the disc of stereographic coordinates. Means
+    /// are relative to the straight direction. `None` for a captured sheet, whose lobes vary.
+    pub fn lobe_nodes(&self) -> Option<&[ViewLobes]> {
+        match &self.source {
+            Source::Faces { lobes, .. } => Some(lobes.nodes()),
+            Source::Sheet(_) => None,
+        }
+    }
+}
+
 impl VaryingSurface for SlabView {
     type Point<'a> = SlabPoint<'a>;
 

@@ -129,3 +129,18 @@ fn another_seed_moves_the_facets() {
     let run = |seed| folder.text(&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "-", "--quiet", "--seed", seed]);
     assert_ne!(run("1"), run("2"));
 }
+
+#[test]
+fn a_reference_that_misses_its_target_says_so_and_succeeds() {
+    let folder = CommandLine::new();
+    folder.write("scene.toml", GROOVES);
+    folder.write("pairs.csv", PAIRS);
+    let missed = |target: &str| {
+        let target = format!("quality.reference_target={target}");
+        let few = ["--quality", "reference", "--set", "quality.reference_samples=16", "--set", &target, "--json"];
+        let output = folder.run(&[&["eval", "scene.toml", "--pairs", "pairs.csv", "-o", "out.csv"], &few[..]].concat());
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stdout).contains("reference_samples")
+    };
+    assert!(missed("1e-5") && !missed("1"));
+}

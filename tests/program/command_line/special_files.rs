@@ -107,19 +107,40 @@ fn a_pipe_in_the_place_of_a_cached_result_is_replaced() {
     assert!(entries().iter().all(|entry| entry.is_file()), "the results are cached again");
 }
 
+/// Runs `eval` with a file of the folder on standard input.
+fn eval_with_input(folder: &CommandLine, scene: &str, pairs: &str, input: &str) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_biscale"))
+        .args(["eval", scene, "--pairs", pairs, "-o", "-", "--quiet"])
+        .current_dir(folder.path(""))
+        .env("BISCALE_CACHE", "off")
+        .stdin(std::fs::File::open(folder.path(input)).unwrap())
+        .output()
+        .unwrap()
+}
+
 #[test]
-fn pairs_are_read_from_standard_input() {
+fn pairs_or_the_scene_are_read_from_standard_input() {
     let folder = CommandLine::new();
     folder.write("grooves.toml", GROOVES);
     folder.write("pairs.csv", PAIRS);
-    let input = std::fs::File::open(folder.path("pairs.csv")).unwrap();
-    let piped = Command::new(env!("CARGO_BIN_EXE_biscale"))
-        .args(["eval", "grooves.toml", "--pairs", "-", "-o", "-", "--quiet"])
-        .current_dir(folder.path(""))
-        .env("BISCALE_CACHE", "off")
-        .stdin(input)
-        .output()
-        .unwrap();
     let expected = folder.text(&["eval", "grooves.toml", "--pairs", "pairs.csv", "-o", "-", "--quiet"]);
-    assert_eq!(String::from_utf8(piped.stdout).unwrap(), expected);
+    for (scene, pairs, input) in [("grooves.toml", "-", "pairs.csv"), ("-", "pairs.csv", "grooves.toml")] {
+        let piped = eval_with_input(&folder, scene, pairs, input);
+        assert_eq!(String::from_utf8(piped.stdout).unwrap(), expected);
+    }
+}
+
+#[test]
+fn a_scene_on_standard_input_is_refused_by_its_line_and_beside_pairs_on_standard_input() {
+    let folder = CommandLine::new();
+    folder.write("wrong.toml", "[tile]\ngeometry = 3\n");
+    folder.write("grooves.toml", GROOVES);
+    folder.write("pairs.csv", PAIRS);
+    for (pairs, input, part) in
+        [("pairs.csv", "wrong.toml", "standard input: line 2"), ("-", "grooves.toml", "--pairs")]
+    {
+        let refused = eval_with_input(&folder, "-", pairs, input);
+        let message = String::from_utf8_lossy(&refused.stderr);
+        assert!(refused.status.code() == Some(2) && message.contains(part), "{message}");
+    }
 }

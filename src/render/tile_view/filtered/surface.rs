@@ -6,7 +6,7 @@ use glam::{DMat2, DVec2, DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::calibration::Calibration;
-use crate::color_map::layers::LayeredMap;
+use crate::color_map::layers::{LayeredMap, Relief};
 use crate::color_map::pixel::{PixelColors, PixelMap};
 use crate::color_map::slopes::Slopes;
 use crate::color_map::statistics::{Footprint, LevelAt, Levels};
@@ -48,6 +48,8 @@ pub struct FilteredTile {
     whole: ReliefLeft,
     /// Width of a pixel [tile units] from which the tile is far away.
     far: f64,
+    /// True if the relief is that of an analytic surface, of which `f̄` knows nothing.
+    pub(super) is_analytic: bool,
     /// Corrections of the widths that were needed so far.
     pub(super) calibration: Mutex<Calibration>,
 }
@@ -70,14 +72,15 @@ pub(super) struct PixelContent<'a> {
 }
 
 impl FilteredTile {
-    /// `None` if the tile has no colour map, if it overhangs, or if the map is that of an analytic surface.
+    /// `None` if the tile has no colour map. The height field of a tile that overhangs is what is visible from straight
+    /// above. An analytic surface lies within every pixel.
     pub fn new(tile: &TileScene) -> Option<Self> {
         let ColorField::Mapped { map, below } = &tile.mesh.color else { return None };
-        if map.is_analytic || !tile.mesh.is_height_field() {
-            return None;
-        }
         let grid = tile.mesh.height_grid.as_ref().map_or(UVec2::splat(SAMPLES), |grid| grid.size);
-        let samples = Samples::new(tile, grid.clamp(UVec2::ONE, UVec2::splat(MAX_SAMPLES)), below);
+        let mut samples = Samples::new(tile, grid.clamp(UVec2::ONE, UVec2::splat(MAX_SAMPLES)), below);
+        if map.is_analytic {
+            samples.replace_relief(&map.relief);
+        }
         Some(Self::of_samples(map, tile.mesh.size.as_dvec2(), samples))
     }
 
@@ -85,7 +88,7 @@ impl FilteredTile {
         let relief = Levels::new(size, samples.size, samples.relief);
         let tints = samples.tints.into_iter().map(|(slot, tints)| (slot, Levels::new(size, samples.size, tints)));
         let tints: Vec<_> = tints.collect();
-        let map = PixelMap::new(map);
+        let (is_analytic, map) = (map.is_analytic, PixelMap::new(map));
         let all = |level: usize| LevelAt { finer: level, weight: 0.0 };
         let base = samples.base;
         let whole = ReliefLeft::of(relief.at(DVec2::ZERO, all(relief.count() - 1)), base);
@@ -100,6 +103,7 @@ impl FilteredTile {
             map,
             whole,
             far: 0.0,
+            is_analytic,
             calibration: Mutex::default(),
         };
         let total = whole.slopes.covariance[0] + whole.slopes.covariance[2];
@@ -113,7 +117,8 @@ impl FilteredTile {
             let flat = || 1.0 - (-0.5 * (std::f64::consts::TAU * 0.3 * tile.relief.width(level)).powi(2)).exp();
             tile.left.push(if total > 0.0 { (1.0 - kept / total).clamp(0.0, 1.0) } else { flat() });
         }
-        tile.far = tile.far_width(total);
+        // No pixel of an analytic surface has `f̄`, which is that of the facets.
+        tile.far = if is_analytic { f64::INFINITY } else { tile.far_width(total) };
         tile
     }
 
@@ -374,6 +379,17 @@ impl Samples {
         };
         let relief = texels.iter().map(moments).collect();
         Self { size, base, relief, tints: slots.into_iter().map(tint).collect() }
+    }
+}
+
+impl Samples {
+    /// Heights and slopes of an analytic surface at every place, in place of those of the tile.
+    fn replace_relief(&mut self, relief: &Relief) {
+        let Relief { height, slopes, .. } = relief;
+        let (s, [xx, xy, yy]) = (slopes.mean, slopes.covariance);
+        self.base = height.mean;
+        let moments = [0.0, height.deviation.powi(2), s.x, s.y, xx + s.x * s.x, xy + s.x * s.y, yy + s.y * s.y];
+        self.relief.fill(moments.map(|moment| moment as f32));
     }
 }
 

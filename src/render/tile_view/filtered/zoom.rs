@@ -17,7 +17,7 @@ use crate::render::{CameraView, RenderScene};
 use crate::scene::Camera;
 
 /// Pixels along a side of the tile over which the mean is taken: twice as many as lie beside each other, within bounds.
-const FEWEST: f64 = 32.0;
+const FEWEST: f64 = 40.0;
 const MOST: f64 = 96.0;
 
 /// The middle of an image, towards which a zoom goes: its frame and the lights that it sees.

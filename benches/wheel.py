@@ -1,0 +1,159 @@
+"""Measures the Python package.
+
+    python benches/wheel.py versions WHEEL PYTHON...    installs the wheel for each interpreter, and compares all shipped scenes
+    python benches/wheel.py speed                       calls from Python beside the work that they contain
+    python benches/wheel.py batch [ROWS]                materials per second of `biscale.batch`, with 1 and more processes
+
+`versions` needs BISCALE, the program that it compares with; the others need the package, and `batch` its extras.
+"""
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+#: Evaluates the pairs of a file for every shipped scene and prints seconds, and a hash of the bits.
+EVALUATE = """
+import hashlib, sys, time
+import numpy as np
+start = time.perf_counter()
+import biscale as bs
+imported = time.perf_counter() - start
+theta_i, phi_i, theta_o, phi_o = np.loadtxt(sys.argv[1], delimiter=",", skiprows=1).T
+wi, wo = bs.from_angles(theta_i, phi_i), bs.from_angles(theta_o, phi_o)
+bits, start = hashlib.sha256(), time.perf_counter()
+for name in bs.scenes():
+    bits.update(bs.Scene(name).effective(quality="draft", backend="cpu").eval(wi, wo).astype("f4").tobytes())
+print(sys.version.split()[0], np.__version__, imported, time.perf_counter() - start, bits.hexdigest())
+"""
+
+
+def pairs_file(folder):
+    """Writes 500 pairs of directions."""
+    import random
+
+    generator = random.Random(1)
+    path = Path(folder) / "pairs.csv"
+    rows = (",".join(repr(generator.random() * top) for top in (1.5, 6.28, 1.5, 6.28)) for _ in range(500))
+    path.write_text("theta_i,phi_i,theta_o,phi_o\n" + "\n".join(rows) + "\n")
+    return path
+
+
+def command_bits(python, pairs):
+    """The hash of the values that the program prints for every shipped scene."""
+    code = """
+import hashlib, os, subprocess, sys
+import numpy as np
+import biscale as bs
+bits = hashlib.sha256()
+for name in bs.scenes():
+    run = [os.environ["BISCALE"], "eval", name, "--pairs", sys.argv[1], "-o", "-", "--quality", "draft", "--backend", "cpu", "--quiet"]
+    text = subprocess.run(run, capture_output=True, text=True, check=True, env={**os.environ, "BISCALE_CACHE": "off"}).stdout
+    bits.update(np.array([line.split(",")[4:] for line in text.splitlines()[1:]]).astype("f4").tobytes())
+print(bits.hexdigest())
+"""
+    return subprocess.run([python, "-c", code, pairs], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def versions(wheel, interpreters):
+    print("| Python | NumPy | imported [ms] | all shipped scenes, 500 pairs each [s] | bits of the command |")
+    print("|---|---|---|---|---|")
+    expected = None
+    with tempfile.TemporaryDirectory() as folder:
+        pairs = pairs_file(folder)
+        for k, interpreter in enumerate(interpreters):
+            place = Path(folder) / f"venv{k}"
+            subprocess.run([interpreter, "-m", "venv", place], check=True)
+            python = place / "bin" / "python"
+            subprocess.run([python, "-m", "pip", "install", "-q", "--disable-pip-version-check", wheel], check=True)
+            expected = expected or command_bits(python, pairs)
+            run = subprocess.run([python, "-c", EVALUATE, pairs], capture_output=True, text=True, check=True)
+            version, numpy, imported, seconds, bits = run.stdout.split()
+            same = "equal" if bits == expected else "DIFFERENT"
+            print(f"| {version} | {numpy} | {1e3 * float(imported):.1f} | {float(seconds):.1f} | {same} |")
+
+
+def best(call, repeats):
+    """The shortest time of several calls [ms]."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        times.append(1e3 * (time.perf_counter() - start))
+    return min(times)
+
+
+def speed():
+    import biscale as bs
+
+    brdf = bs.Scene("table4_cup").effective(quality="standard", backend="cpu")
+    wi, wo = bs.mirror_biased_pairs(100_000, 1)
+    wi, wo = (array.repeat(10, axis=0) for array in (wi, wo))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    million = best(lambda: brdf.eval(wi, wo), 2)
+    peak = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+
+    def given_up():
+        try:
+            brdf.eval(wi, wo, progress=lambda part: False)
+        except bs.Cancelled:
+            pass
+
+    # The call looks at its progress after 20 ms for the first time.
+    outside = best(given_up, 5) - 20
+    print(f"a million pairs of table4_cup: {million:.0f} ms, of which {outside:.0f} ms outside of the evaluation; {peak:.0f} MB more")
+    scene = bs.Scene("default")
+    few = (wi[:300], wo[:300])
+    state = {"step": 0}
+
+    def edit():
+        state["step"] += 1
+        scene["material.default.brdf.roughness"] = 0.2 + 0.001 * (state["step"] % 100)
+        state["brdf"] = scene.effective(quality="standard", backend="cpu")
+        state["brdf"].eval(*few)
+
+    whole = best(edit, 50)
+    brdf = state["brdf"]
+    inside = sum(brdf.times_ms.values()) + best(lambda: brdf.eval(*few), 50)
+    print(f"an edit of a roughness and 300 pairs: {whole:.2f} ms, of which {whole - inside:.2f} ms are neither stages nor evaluation")
+
+
+def batch(rows):
+    from distributed import Client, LocalCluster
+
+    from biscale import batch as batches
+
+    print("| quality | processes | materials per second |")
+    print("|---|---|---|")
+    os.environ["RAYON_NUM_THREADS"] = "1"
+    for quality in ("draft", "standard"):
+        spec = {
+            "base": ["default", "table4_teapot"],
+            "count": rows,
+            "sample": {
+                "material.default.brdf.roughness": {"uniform": [0.1, 0.6]},
+                "tile.geometry.rotation_deg": {"uniform": [0.0, 30.0]},
+            },
+            "output": {"directions": 4096, "quality": quality},
+        }
+        for count in sorted({1, os.cpu_count() or 1}):
+            with tempfile.TemporaryDirectory() as folder:
+                with LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+                    with Client(cluster) as client:
+                        made = batches.run(spec, folder, client, progress=False)
+            print(f"| {quality} | {count} | {made.made / made.seconds:.1f} |")
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["versions", wheel, *interpreters] if interpreters:
+            versions(wheel, interpreters)
+        case ["speed"]:
+            speed()
+        case ["batch", *rows]:
+            batch(int(rows[0]) if rows else 400)
+        case _:
+            sys.exit(__doc__)

@@ -1,0 +1,308 @@
+//! The light that leaves the tile after it was reflected by two facets or more.
+
+use glam::Vec3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::mirrored::MirroredNodes;
+use super::sampler::LobeSampler;
+use super::transport::{Vertex, first_density};
+use super::{InterreflectionSettings, InterreflectionTable, Transport};
+use crate::base::{Cancel, Result};
+use crate::brdf::{LobeAngles, Material, Term, analytic_lobe};
+use crate::geometry::{Facets, TileMesh};
+use crate::math::directions::half_vector;
+use crate::math::linalg::gemm::add_outer_products;
+use crate::math::simd::{Lobe, add_lobes_around};
+use crate::visibility::Visibility;
+
+/// Rays per matrix product.
+const BLOCK: usize = 2048;
+/// Viewers per task of a matrix product.
+const ROWS: usize = 64;
+/// Lower limit of the cosine that a lobe is divided by. It bounds the contribution of rays along their own surface.
+const MIN_COSINE: f32 = 1e-3;
+/// Walks whose weight is below this are continued at random, with a weight of this.
+const MIN_WEIGHT: f32 = 0.5;
+/// The same at hidden elements, as between the threads of a weave: few walks return from there.
+const MIN_HIDDEN_WEIGHT: f32 = 4.0;
+/// Openness below which an element counts as hidden.
+const HIDDEN: f32 = 0.05;
+
+/// Inputs of the walks.
+struct Exchange<'a> {
+    facets: &'a Facets,
+    transport: &'a Transport,
+    /// Material and colour of each element.
+    materials: Vec<&'a Reflector>,
+    colors: Vec<Vec3>,
+    /// Components of the node directions, and the visibility of every element (row) along them.
+    nodes: [Vec<f32>; 3],
+    visibility: Vec<f32>,
+    /// Mean visibility of each element over the nodes.
+    openness: Vec<f32>,
+    /// Indices and components of the nodes that are viewers.
+    viewers: &'a [usize],
+    viewer_nodes: [Vec<f32>; 3],
+    channels: usize,
+    bounces: usize,
+}
+
+/// A material with what walks need.
+struct Reflector {
+    material: Material,
+    lobes: Vec<Option<Lobe>>,
+    sampler: LobeSampler,
+}
+
+/// Computes `G` of interreflection by walks over the surface.
+///
+/// Ray `r` starts at a facet `x` along `ω` with density `p` and meets the surface at `y`. With `L(y, i)` the radiance
+/// that `y` sends back to `x` per unit irradiance from the light `i`, `G(o, i) = 1/A Σ_r ΔA/(K p) f(x; ω, o) V(x, o)
+/// L(y, i)`, where `f` includes both cosines. A random walk from `y` estimates `L` for all lights at once: each vertex
+/// `z`, reached against the direction `ω_z`, adds its weight times `f(z; ω_z, i) / (n·ω_z) V(z, i)`. The steps of a walk
+/// follow the BRDF of each facet ([`LobeSampler`]). A vertex has the visibility of the nearest element.
+///
+/// # Errors
+/// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
+pub fn gather(
+    mesh: &TileMesh,
+    facets: &Facets,
+    visibility: &Visibility,
+    transport: &Transport,
+    (material_of_slot, materials): (&[usize], &[Material]),
+    settings: &InterreflectionSettings,
+    cancel: &Cancel,
+) -> Result<InterreflectionTable> {
+    let mirrored = MirroredNodes::new(settings.grid, settings.mirrors);
+    let reflectors: Vec<Reflector> = materials.iter().map(Reflector::new).collect();
+    let directions = (&settings.grid.directions()[..], &mirrored.computed[..]);
+    let surface = (facets, visibility, transport);
+    let exchange = Exchange::new(surface, (material_of_slot, &reflectors), directions, settings.bounces);
+    let (nodes, viewers, channels) = (exchange.nodes[0].len(), exchange.viewers.len(), exchange.channels);
+    let g = exchange.sum(cancel)?;
+    let scale = 1.0 / f64::from(mesh.base_area());
+    let at = |o: usize, i: usize, c: usize| {
+        let (viewer, light) = mirrored.original_of(o, i);
+        (g[(c.min(channels - 1) * viewers + viewer) * nodes + light] * scale) as f32
+    };
+    let pairs = (0..nodes * nodes).map(|pair| (pair / nodes, pair % nodes));
+    let raw: Vec<Vec3> = pairs.map(|(o, i)| Vec3::new(at(o, i, 0), at(o, i, 1), at(o, i, 2))).collect();
+    Ok(InterreflectionTable::new(settings.grid, &raw, transport.hit_fraction()))
+}
+
+impl Reflector {
+    fn new(material: &Material) -> Self {
+        Self {
+            material: material.clone(),
+            lobes: material.brdf.terms.iter().map(analytic_lobe).collect(),
+            sampler: LobeSampler::new(&material.brdf),
+        }
+    }
+}
+
+impl<'a> Exchange<'a> {
+    fn new(
+        (facets, visibility, transport): (&'a Facets, &Visibility, &'a Transport),
+        (material_of_slot, all): (&[usize], &'a [Reflector]),
+        (nodes, viewers): (&[Vec3], &'a [usize]),
+        bounces: usize,
+    ) -> Self {
+        let elements = &transport.facets;
+        let materials: Vec<&Reflector> =
+            elements.iter().map(|s| &all[material_of_slot[usize::from(facets.slots[*s as usize])]]).collect();
+        let colors: Vec<Vec3> =
+            elements.iter().zip(&materials).map(|(s, of)| facets.colors[*s as usize] * of.material.color).collect();
+        let achromatic =
+            colors.iter().all(|color| has_no_hue(*color)) && materials.iter().all(|of| is_grey(&of.material));
+        let visibility = visible_from(visibility, elements, nodes);
+        Self {
+            facets,
+            transport,
+            materials,
+            colors,
+            openness: visibility.chunks(nodes.len()).map(|row| row.iter().sum::<f32>() / nodes.len() as f32).collect(),
+            visibility,
+            viewer_nodes: [0, 1, 2].map(|axis| viewers.iter().map(|node| nodes[*node][axis]).collect()),
+            nodes: [0, 1, 2].map(|axis| nodes.iter().map(|node| node[axis]).collect()),
+            viewers,
+            channels: if achromatic { 1 } else { 3 },
+            bounces,
+        }
+    }
+
+    /// The sums over all rays, a matrix of viewers and lights per channel.
+    fn sum(&self, cancel: &Cancel) -> Result<Vec<f64>> {
+        let (nodes, viewers, channels) = (self.nodes[0].len(), self.viewers.len(), self.channels);
+        let rays = self.transport.rays;
+        let useful: Vec<u32> = (0..self.transport.hits.len())
+            .filter(|ray| {
+                let hit = self.transport.hits[*ray];
+                let element = ray / rays;
+                let reflects = !self.is_black(element) && self.openness[element] > 0.0;
+                reflects && hit.is_some_and(|hit| !self.is_black(hit.element as usize))
+            })
+            .map(|ray| ray as u32)
+            .collect();
+        let mut g = vec![0.0_f64; channels * viewers * nodes];
+        let mut to_viewer = vec![0.0_f32; BLOCK * channels * viewers];
+        let mut from_light = vec![0.0_f32; BLOCK * channels * nodes];
+        for block in useful.chunks(BLOCK) {
+            cancel.check()?;
+            to_viewer
+                .par_chunks_mut(channels * viewers)
+                .zip(from_light.par_chunks_mut(channels * nodes))
+                .zip(block)
+                .for_each(|((to_viewer, from_light), &ray)| self.fill(ray as usize, to_viewer, from_light));
+            for c in 0..channels {
+                let sums = &mut g[c * viewers * nodes..(c + 1) * viewers * nodes];
+                sums.par_chunks_mut(ROWS * nodes).enumerate().for_each(|(task, sums)| {
+                    let rows = sums.len() / nodes;
+                    let a = &to_viewer[c * viewers + task * ROWS..];
+                    let b = &from_light[c * nodes..];
+                    let strides = [channels * viewers, channels * nodes];
+                    add_outer_products(block.len(), [rows, nodes], [a, b], strides, sums);
+                });
+            }
+        }
+        Ok(g)
+    }
+
+    /// Writes what one ray sends to each viewer, and what it carries from each light.
+    fn fill(&self, ray: usize, to_viewer: &mut [f32], from_light: &mut [f32]) {
+        to_viewer.fill(0.0);
+        from_light.fill(0.0);
+        let Transport { facets, hits, directions, areas, rays, .. } = self.transport;
+        let (element, away) = (ray / rays, directions[ray]);
+        let Some(mut at) = hits[ray] else { return };
+        let normal = self.facets.normals[facets[element] as usize];
+        let cosine = normal.dot(away).max(MIN_COSINE);
+        // `add_lobe` divides by the cosine.
+        let scale = areas[element] * cosine / (*rays as f32 * first_density(cosine));
+        let row = self.visible(element);
+        let visibility: Vec<f32> = self.viewers.iter().map(|node| row[*node]).collect();
+        let viewers = (&self.viewer_nodes, visibility.as_slice());
+        self.add_lobe(element, [normal, away], Vec3::splat(scale), viewers, to_viewer);
+        let mut rng = ChaCha8Rng::seed_from_u64(ray as u64);
+        let (mut towards, mut weight) = (-away, Vec3::ONE);
+        for bounce in 1..=self.bounces {
+            let element = at.element as usize;
+            let lights = (&self.nodes, self.visible(element));
+            if self.openness[element] > 0.0 {
+                self.add_lobe(element, [at.normal, towards], weight, lights, from_light);
+            }
+            if bounce < self.bounces {
+                let Some(next) = self.step(&at, towards, &mut weight, &mut rng) else { break };
+                (at, towards) = next;
+            }
+        }
+    }
+
+    /// The visibility of an element along each node.
+    fn visible(&self, element: usize) -> &[f32] {
+        let nodes = self.nodes[0].len();
+        &self.visibility[element * nodes..(element + 1) * nodes]
+    }
+
+    /// One step of a walk: the next point, and the direction back from it. Multiplies the weight of the walk.
+    fn step(&self, at: &Vertex, towards: Vec3, weight: &mut Vec3, rng: &mut ChaCha8Rng) -> Option<(Vertex, Vec3)> {
+        let Reflector { material, sampler, .. } = self.materials[at.element as usize];
+        let numbers = [rng.random(), rng.random(), rng.random()];
+        let (direction, factor) = sampler.sample(&material.brdf, at.normal, towards, numbers)?;
+        *weight *= factor * self.colors[at.element as usize];
+        let is_hidden = self.openness[at.element as usize] < HIDDEN;
+        let survival = weight.max_element() / if is_hidden { MIN_HIDDEN_WEIGHT } else { MIN_WEIGHT };
+        if survival < 1.0 {
+            if rng.random::<f32>() >= survival {
+                return None;
+            }
+            *weight /= survival;
+        }
+        if direction.dot(at.geometric_normal) <= 0.0 {
+            return None;
+        }
+        let next = self.transport.tracer.trace(at.origin, direction, at.triangle)?;
+        (next.normal.dot(direction) < 0.0).then_some((next, -direction))
+    }
+
+    /// Adds `weight · f(away, node)/(n·away) · V(node)` of an element for some nodes: the radiance that it sends along
+    /// `away` per unit irradiance from a node or, for a viewer at the node, the weight of light that arrives along
+    /// `-away`.
+    fn add_lobe(
+        &self,
+        element: usize,
+        [normal, away]: [Vec3; 2],
+        weight: Vec3,
+        (nodes, visibility): (&[Vec<f32>; 3], &[f32]),
+        out: &mut [f32],
+    ) {
+        let cosine = normal.dot(away);
+        if cosine <= 0.0 {
+            return;
+        }
+        let Reflector { material, lobes, .. } = self.materials[element];
+        let scale = weight * self.colors[element] / cosine.max(MIN_COSINE);
+        let count = visibility.len();
+        for (term, lobe) in material.brdf.terms.iter().zip(lobes) {
+            if let Some(lobe) = lobe {
+                let [below, at_grazing] = [term.tint(1.0) * scale, term.tint(0.0) * scale];
+                let to = nodes.each_ref().map(Vec::as_slice);
+                if self.channels == 1 {
+                    let tints = [[below.x, at_grazing.x]];
+                    add_lobes_around::<1>(*lobe, [normal, away], to, visibility, tints, out);
+                } else {
+                    let tints = [0, 1, 2].map(|c| [below[c], at_grazing[c]]);
+                    add_lobes_around::<3>(*lobe, [normal, away], to, visibility, tints, out);
+                }
+                continue;
+            }
+            for (k, v) in visibility.iter().enumerate().filter(|(_, v)| **v > 0.0) {
+                let to = Vec3::new(nodes[0][k], nodes[1][k], nodes[2][k]);
+                if normal.dot(to) > 0.0 {
+                    let f = term.f_cos(&LobeAngles::new(normal, away, to, half_vector(away, to))) * scale * *v;
+                    for c in 0..self.channels {
+                        out[c * count + k] += f[c];
+                    }
+                }
+            }
+        }
+    }
+
+    fn is_black(&self, element: usize) -> bool {
+        self.colors[element] == Vec3::ZERO
+    }
+}
+
+/// The visibility of each element (row) along each node.
+fn visible_from(visibility: &Visibility, elements: &[u32], nodes: &[Vec3]) -> Vec<f32> {
+    let facets = visibility.facets();
+    let columns: Vec<Vec<f32>> = nodes
+        .par_iter()
+        .map_init(
+            || vec![0.0; facets],
+            |all, &node| {
+                visibility.fill(node, 0..facets, all);
+                elements.iter().map(|&s| all[s as usize]).collect()
+            },
+        )
+        .collect();
+    let mut rows = vec![0.0; elements.len() * nodes.len()];
+    rows.par_chunks_mut(nodes.len()).enumerate().for_each(|(element, row)| {
+        row.iter_mut().zip(&columns).for_each(|(value, column)| *value = column[element]);
+    });
+    rows
+}
+
+fn has_no_hue(color: Vec3) -> bool {
+    color.max_element() - color.min_element() <= 1e-6 * color.max_element()
+}
+
+/// Returns true if a material reflects all channels alike. Measured BRDFs count as coloured.
+pub fn is_grey(material: &Material) -> bool {
+    has_no_hue(material.color)
+        && material.brdf.terms.iter().all(|term| match term {
+            Term::Measured(_) => false,
+            _ => has_no_hue(term.tint(0.0)) && has_no_hue(term.tint(1.0)),
+        })
+}
