@@ -94,11 +94,12 @@ def interrupt(part):
 try:
     t.long_scene().effective(**t.LONG, progress=interrupt)
 except KeyboardInterrupt:
-    print(parts[-1])
+    print(len(parts))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=os.path.dirname(__file__), timeout=60)
     assert done.returncode == 0, done.stderr
-    assert float(done.stdout) < 0.9
+    # The next look at signals ends it, however far it is.
+    assert int(done.stdout) in (2, 3)
 
 
 def resident():
