@@ -27,6 +27,8 @@ mi.set_variant("llvm_ad_rgb")
 ROUGHNESS, REPEAT, GOLDEN = 0.2, 13, 0.6180339887
 # A white material has a Fresnel factor of 1 in both programs.
 GLOSSY = f'material=[{{ name = "default", brdf = {{ kind = "ggx", roughness = {ROUGHNESS}, f0 = 1 }} }}]'
+# Mitsuba follows one reflection.
+DIRECT = ("--effect", "interreflection=off")
 SCENES = ["table4_plate", "table4_skirt", "table4_pillow", "klems"]
 RAYS = [16, 64, 256, 1024, 4096, 16384]
 # Most rays of one launch.
@@ -107,7 +109,7 @@ def compare(name, folder, options):
         table.row(by, setting, f"{seconds:.3f}", f"{psnr(values, truth):.1f}", f"{100 * rel_l2(values, truth):.2f} %")
         return seconds, psnr(values, truth)
     def eval_with(*flags):
-        return lambda: evaluate(name, pairs, folder, "--set", GLOSSY, "--backend", "cpu", *flags)[:, 1]
+        return lambda: evaluate(name, pairs, folder, "--set", GLOSSY, "--backend", "cpu", *DIRECT, *flags)[:, 1]
     ours = [row("biscale", preset, *timed(eval_with("--quality", preset))) for preset in ["draft", "standard", "fine"]]
     fewer = [rays for rays in RAYS if 4 * rays <= options.truth_rays]
     theirs = [row("Mitsuba", f"{rays} rays", *timed(lambda: traced(scene, top, pairs, rays, 3))) for rays in fewer]

@@ -24,6 +24,8 @@ from common import BISCALE, ROOT, Table, biscale, evaluate, np, random_pairs, re
 
 SCENES = ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"]
 EDITS = [("geometry", "standard"), ("geometry", "draft"), ("brdf", "standard"), ("color", "standard"), ("camera", "standard")]
+# The paper leaves interreflection out.
+DIRECT = ("--effect", "interreflection=off")
 PAINTS = ["gold-metallic-paint", "silver-paint", "pearl-paint", "blue-metallic-paint"]
 
 
@@ -40,7 +42,7 @@ def yardstick_ms():
 
 
 def profile(scene, *options):
-    out, _ = biscale("profile", scene, "--backend", "cpu", "--repeat", 5, "--json", "--quiet", *options)
+    out, _ = biscale("profile", scene, "--backend", "cpu", "--repeat", 5, "--json", "--quiet", *DIRECT, *options)
     return json.loads(out)["total_ms"]
 
 
@@ -49,11 +51,11 @@ def errors(qualities):
     pairs = random_pairs(200)
     found = {}
     with tempfile.TemporaryDirectory() as folder:
-        references = [evaluate(scene, pairs, folder, "--quality", "reference") for scene in SCENES]
+        references = [evaluate(scene, pairs, folder, "--quality", "reference", *DIRECT) for scene in SCENES]
         for quality in qualities:
             found[quality] = []
             for scene, reference in zip(SCENES, references):
-                difference = evaluate(scene, pairs, folder, "--quality", quality, "--backend", "cpu") - reference
+                difference = evaluate(scene, pairs, folder, "--quality", quality, "--backend", "cpu", *DIRECT) - reference
                 psnr = 20 * np.log10(reference.max() / np.sqrt(np.mean(difference**2)))
                 found[quality].append((psnr, 100 * np.linalg.norm(difference) / np.linalg.norm(reference)))
     return found

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing measurement may panic")]
 
 mod accuracy;
+mod bounced_share;
 mod budgets;
 mod capture;
 mod capture_sheet;
@@ -45,6 +46,11 @@ const fn in_lib(test: &'static str) -> Source {
 
 const MEASUREMENTS: &[(&str, &str, Source)] = &[
     ("accuracy", "errors of the presets (or of a list of presets) on four tiles: half an hour", Source::Here(accuracy)),
+    (
+        "bounced-share",
+        "the share of bounced light that decides, and what interreflection takes: a minute",
+        Source::Here(bounced_share),
+    ),
     ("budgets", "time that a budget leads to on ten scenes", Source::Here(budgets)),
     ("brdf", "nanoseconds per evaluation of each BRDF", in_lib("nanoseconds_per_evaluation")),
     ("cache-costs", "milliseconds of the disk cache", in_lib("costs_of_caching")),
@@ -147,6 +153,14 @@ fn interreflection(part: Option<&str>, table: &mut Table) -> Result<(), String> 
         // The page holds all cases.
         Some(_) => interreflection::interreflection(part, &mut |line| println!("{line}")),
         None => interreflection::interreflection(None, &mut |line| table.line(line)),
+    }
+}
+
+fn bounced_share(part: Option<&str>, table: &mut Table) -> Result<(), String> {
+    match part {
+        // The page holds all scenes.
+        Some(_) => bounced_share::bounced_share(part, &mut |line| println!("{line}")),
+        None => bounced_share::bounced_share(None, &mut |line| table.line(line)),
     }
 }
 

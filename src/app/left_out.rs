@@ -77,6 +77,6 @@ impl Editor {
 }
 
 fn line(name: &str, left_out: &LeftOut) -> String {
-    let (share, ms) = (100.0 * left_out.share, time(left_out.predicted_ms));
-    format!("{} is left out: up to {share:.0} % of the light. It takes about {ms}.", caption(name))
+    let (share, error, ms) = (100.0 * left_out.share, 100.0 * left_out.std_error, time(left_out.predicted_ms));
+    format!("{} is left out: {share:.0} ± {error:.0} % of the light. It takes about {ms}.", caption(name))
 }

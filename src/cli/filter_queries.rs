@@ -266,8 +266,8 @@ fn no_truth() -> Error {
     InputError::new("color_map.surface", "an analytic surface with --method truth", expected).into()
 }
 
-/// The reference's colour of what is seen and lit, and `f̄`, at pairs of directions: the ratio of the reference with and
-/// without colours.
+/// The reference's colour of what is seen and lit, and `f̄` without interreflection, at pairs of directions: the ratio of
+/// the reference with and without colours.
 pub fn true_colors(
     pipeline: &Pipeline,
     loaded: &LoadedScene,
@@ -276,6 +276,7 @@ pub fn true_colors(
 ) -> Result<Vec<(DVec3, Vec3)>> {
     let settings = ReferenceSettings { facets, max_passes: 4, target: 0.0, seed: loaded.scene.quality.seed };
     let estimate = |reference: &Reference<'_>| reference.estimate(pairs, &settings, |_, _| true);
+    let loaded = &loaded.without_interreflection();
     let colored = pipeline.with_reference(loaded, estimate)?;
     let mut white = loaded.clone();
     white.scene.color_map = None;

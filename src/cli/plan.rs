@@ -129,8 +129,8 @@ fn print_effects(out: &mut impl Write, effects: &[crate::plan::Effect]) -> Resul
             Some(_) => " (turning it on changes nothing)".to_owned(),
             None => String::new(),
         };
-        let remedy = match effect.left_out.filter(|_| !effect.forced) {
-            Some(left_out) => format!(": ask with --effect {}=on ({:.0} ms)", effect.name, left_out.predicted_ms),
+        let remedy = match effect.left_out {
+            Some(left_out) => format!(" (--effect {}=on adds it in {:.0} ms)", effect.name, left_out.predicted_ms),
             None => String::new(),
         };
         writeln!(

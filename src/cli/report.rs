@@ -44,7 +44,7 @@ const FILES: [&str; 4] = ["report.html", "report.csv", "report.json", PROGRESS_F
 const REFERENCE_SHARE: f64 = 0.35;
 
 pub fn run(args: &ReportArgs) -> Result<()> {
-    let scenes: Vec<LoadedScene> =
+    let mut scenes: Vec<LoadedScene> =
         args.scenes.iter().map(|name| scene::open_argument(name, &args.set)).collect::<crate::base::Result<_>>()?;
     std::fs::create_dir_all(&args.output).map_err(|error| {
         Error::from(InputError::new("output", error, "a folder that can be created and written").in_file(&args.output))
@@ -54,6 +54,9 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         // All files of all scenes are read before the first scene is measured, which takes minutes.
         crate::gpu::pipeline().materials(loaded)?;
         RenderScene::new(loaded)?;
+    }
+    for loaded in &mut scenes {
+        *loaded = crate::gpu::pipeline().with_same_light(loaded)?;
     }
     let machine = Machine::here();
     let mut progress = resume(&args.output, &machine);

@@ -143,4 +143,17 @@ impl Reflectance for EffectiveBrdf {
             *value *= scale;
         }
     }
+
+    fn eval_bounced(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        let area = match &self.representation {
+            Representation::Interreflecting(direct, table) => {
+                table.eval_lights(lights, o, |k, g| out[k] = (g * self.base_area).as_vec3());
+                direct.sums(&[], o, |_, _| {})
+            }
+            Representation::Table(table) => table.bounced_sums(lights, o, |k, sum| out[k] = sum.as_vec3()),
+            _ => 0.0,
+        };
+        let scale = if area > 1e-12 * self.base_area { (1.0 / area) as f32 } else { 0.0 };
+        out.iter_mut().take(lights.len()).for_each(|value| *value *= scale);
+    }
 }

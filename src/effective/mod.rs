@@ -39,6 +39,12 @@ pub trait Reflectance: Sync {
     /// Writes `out[k] = f̄(lights[k], o)` [1/sr], the light's cosine included; 0 if a direction is below the horizon.
     /// Directions are unit vectors in the tangent frame (x, y along the tile, z the surface normal).
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
+
+    /// As [`Reflectance::eval_lights`], of the light that several facets reflected, which a close-up of the tile does not
+    /// compute itself.
+    fn eval_bounced(&self, lights: &[Vec3], _: Vec3, out: &mut [Vec3]) {
+        out[..lights.len()].fill(Vec3::ZERO);
+    }
 }
 
 /// Light that passes through a surface to its other side. Rendering knows nothing else of a slab.

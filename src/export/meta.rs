@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::{ExportTask, Reflectances};
 use crate::metrics::Errors;
 use crate::pipeline::Outcome;
+use crate::plan::Plan;
 use crate::scene::LoadedScene;
 
 /// Name and version of this program.
@@ -50,7 +51,7 @@ impl ExportMeta {
             tile_unit: tile.unit.clone(),
             closes_plane,
             isotropic: !outcome.plan.is_on("anisotropy"),
-            notes: outcome.notes.iter().cloned().chain(stated).collect(),
+            notes: outcome.notes.iter().cloned().chain(stated).chain(bounced_light(&outcome.plan)).collect(),
         }
     }
 
@@ -62,6 +63,13 @@ impl ExportMeta {
             "the tile leaves holes: a_v(o) / A is measured and may be less than cos(theta_o)"
         }
     }
+}
+
+/// Which light the table holds: what the plan decided about interreflection.
+fn bounced_light(plan: &Plan) -> Option<String> {
+    let effect = plan.effects.iter().find(|effect| effect.name == "interreflection")?;
+    let state = if effect.on { "included" } else { "not included" };
+    Some(format!("light that parts of the tile reflect onto each other is {state}: {}", effect.reason))
 }
 
 /// Everything that is written beside the numbers. It is the same in every run.

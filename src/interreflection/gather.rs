@@ -35,7 +35,7 @@ struct Exchange<'a> {
     facets: &'a Facets,
     transport: &'a Transport,
     /// Material and colour of each element.
-    materials: Vec<&'a Reflector>,
+    materials: Vec<&'a Reflector<'a>>,
     colors: Vec<Vec3>,
     /// Components of the node directions, and the visibility of every element (row) along them.
     nodes: [Vec<f32>; 3],
@@ -50,10 +50,10 @@ struct Exchange<'a> {
 }
 
 /// A material with what walks need.
-struct Reflector {
-    material: Material,
+struct Reflector<'a> {
+    material: &'a Material,
     lobes: Vec<Option<Lobe>>,
-    sampler: LobeSampler,
+    sampler: &'a LobeSampler,
 }
 
 /// Computes `G` of interreflection by walks over the surface.
@@ -71,12 +71,12 @@ pub fn gather(
     facets: &Facets,
     visibility: &Visibility,
     transport: &Transport,
-    (material_of_slot, materials): (&[usize], &[Material]),
+    (material_of_slot, materials, samplers): (&[usize], &[Material], &[LobeSampler]),
     settings: &InterreflectionSettings,
     cancel: &Cancel,
 ) -> Result<InterreflectionTable> {
     let mirrored = MirroredNodes::new(settings.grid, settings.mirrors);
-    let reflectors: Vec<Reflector> = materials.iter().map(Reflector::new).collect();
+    let reflectors: Vec<Reflector> = materials.iter().zip(samplers).map(Reflector::new).collect();
     let directions = (&settings.grid.directions()[..], &mirrored.computed[..]);
     let surface = (facets, visibility, transport);
     let exchange = Exchange::new(surface, (material_of_slot, &reflectors), directions, settings.bounces);
@@ -92,30 +92,26 @@ pub fn gather(
     Ok(InterreflectionTable::new(settings.grid, &raw, transport.hit_fraction()))
 }
 
-impl Reflector {
-    fn new(material: &Material) -> Self {
-        Self {
-            material: material.clone(),
-            lobes: material.brdf.terms.iter().map(analytic_lobe).collect(),
-            sampler: LobeSampler::new(&material.brdf),
-        }
+impl<'a> Reflector<'a> {
+    fn new((material, sampler): (&'a Material, &'a LobeSampler)) -> Self {
+        Self { material, lobes: material.brdf.terms.iter().map(analytic_lobe).collect(), sampler }
     }
 }
 
 impl<'a> Exchange<'a> {
     fn new(
         (facets, visibility, transport): (&'a Facets, &Visibility, &'a Transport),
-        (material_of_slot, all): (&[usize], &'a [Reflector]),
+        (material_of_slot, all): (&[usize], &'a [Reflector<'a>]),
         (nodes, viewers): (&[Vec3], &'a [usize]),
         bounces: usize,
     ) -> Self {
         let elements = &transport.facets;
-        let materials: Vec<&Reflector> =
+        let materials: Vec<&Reflector<'_>> =
             elements.iter().map(|s| &all[material_of_slot[usize::from(facets.slots[*s as usize])]]).collect();
         let colors: Vec<Vec3> =
             elements.iter().zip(&materials).map(|(s, of)| facets.colors[*s as usize] * of.material.color).collect();
         let achromatic =
-            colors.iter().all(|color| has_no_hue(*color)) && materials.iter().all(|of| is_grey(&of.material));
+            colors.iter().all(|color| has_no_hue(*color)) && materials.iter().all(|of| is_grey(of.material));
         let visibility = visible_from(visibility, elements, nodes);
         Self {
             facets,

@@ -8,6 +8,7 @@
 mod gather;
 mod mirrored;
 mod sampler;
+mod share;
 mod table;
 mod transport;
 
@@ -17,7 +18,8 @@ mod tests;
 use glam::Vec3;
 
 pub use gather::{gather, is_grey};
-pub(crate) use sampler::LobeSampler;
+pub use sampler::LobeSampler;
+pub use share::{BouncedShare, measure as measure_share};
 pub use table::InterreflectionTable;
 pub use transport::{Tracer, Transport, Vertex};
 
@@ -49,12 +51,4 @@ pub fn mean_albedo(brdf: &Brdf, rings: usize, samples: usize) -> Vec3 {
         brdf.directional_albedo(sine.asin(), samples)
     };
     ((0..rings).map(ring).sum::<Vec3>() / rings as f32).clamp(Vec3::ZERO, Vec3::ONE)
-}
-
-/// Predicts the light that interreflection adds, relative to direct reflection, for facets of albedo `ρ` that see each
-/// other in the fraction `h` (`hidden`) of their hemisphere. It is `Σ (ρ h)^k`, the mean over a tile under uniform
-/// light.
-pub fn predicted_share(albedo: f64, hidden: f64) -> f64 {
-    let once = (albedo * hidden).clamp(0.0, 0.999);
-    once / (1.0 - once)
 }

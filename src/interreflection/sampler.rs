@@ -20,7 +20,7 @@ const MIN_COSINE_PROBABILITY: f32 = 0.1;
 /// Samples directions for one BRDF: cosine-weighted for its Lambertian terms; by the half vector, from a table, for all
 /// others (as Lawrence et al. 2004 do with factors). The density is the mixture of both.
 #[derive(Debug)]
-pub(crate) struct LobeSampler {
+pub struct LobeSampler {
     rows: Vec<Row>,
 }
 

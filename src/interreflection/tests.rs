@@ -1,5 +1,6 @@
 use std::f64::consts::PI;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
@@ -7,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::sampler::LobeSampler;
-use super::{Tracer, Vertex, predicted_share};
+use super::{Tracer, Vertex};
 use crate::effective::EffectiveBrdf;
 use crate::geometry::{FacetSampler, PeriodicGrid, SampleShift, is_facet_visible, lifted_origins};
 use crate::math::directions::{PolarGrid, from_angles};
@@ -51,7 +52,7 @@ fn a_white_cavity_returns_what_it_receives_as_bounces_grow() {
         let brdf = effective(DEEP, WHITE, effects);
         views.map(|o| furnace(&brdf, o))
     };
-    let direct = with("");
+    let direct = with("interreflection = \"off\"");
     let mut last = direct;
     for bounces in [1, 2, 8] {
         let sums = with(&format!("interreflection = \"on\"\nbounces = {bounces}"));
@@ -110,7 +111,7 @@ fn walks_agree_with_path_tracing_for_diffuse_and_glossy_facets() {
         [(DEEP, colored, 3, 0.05), (DEEP, glossy, 1, 0.05), (pyramids, colored, 1, 0.13)]
     {
         let scene = open(geometry, brdf, &format!("interreflection = \"on\"\nbounces = {bounces}"));
-        let plain = effective(geometry, brdf, "");
+        let plain = effective(geometry, brdf, "interreflection = \"off\"");
         let outcome = Pipeline::new().effective(&scene).unwrap();
         let settings = ReferenceSettings { facets: 1024, max_passes: 8, target: 1e-6, seed: 3 };
         let right = Pipeline::new()
@@ -143,7 +144,7 @@ fn traced(scene: &LoadedScene, pair: Pair, passes: u64) -> (f64, f64) {
     let (grid, sampler) = (PeriodicGrid::new(&mesh), LobeSampler::new(&material.brdf));
     let pass = |seed: u64| {
         let facets = FacetSampler::new(&mesh).sample(&mesh, 8192, SampleShift::from_seed(seed));
-        let tracer = Tracer::new(&mesh, &facets, &[0]);
+        let tracer = Tracer::new((&mesh, Arc::new(PeriodicGrid::new(&mesh))), &facets, &[0]);
         let origins = lifted_origins(&facets, mesh.size);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut total = 0.0_f64;
@@ -211,7 +212,10 @@ fn glossy_grooves_agree_with_path_tracing_after_all_bounces() {
         r#"[{ kind = "lambertian", albedo = 0.4 }, { kind = "ggx", roughness = 0.2, f0 = 0.5 }]"#,
     ] {
         let scene = open(grooves, brdf, "interreflection = \"on\"");
-        let (on, off) = (effective(grooves, brdf, "interreflection = \"on\""), effective(grooves, brdf, ""));
+        let (on, off) = (
+            effective(grooves, brdf, "interreflection = \"on\""),
+            effective(grooves, brdf, "interreflection = \"off\""),
+        );
         let (mut error, mut noise, mut norm) = (0.0, 0.0, 0.0);
         for pair in &pairs {
             let (right, deviation) = traced(&scene, *pair, 4);
@@ -277,12 +281,12 @@ fn stages_of_interreflection_run_only_if_it_is_on_and_facets_see_each_other() {
         let outcome = pipeline.effective(&open(geometry, WHITE, effects)).unwrap();
         let count = |wanted: &str| pipeline.runs().iter().find(|(name, _)| *name == wanted).unwrap().1;
         assert_eq!(count("transport") > 0, outcome.plan.interreflection);
-        [count("transport"), count("interreflection"), count("visibility")]
+        [count("bounced_share"), count("transport"), count("interreflection"), count("visibility")]
     };
-    assert_eq!(runs(DEEP, ""), [0, 0, 1]);
-    assert_eq!(runs(DEEP, "interreflection = \"off\""), [0, 0, 1]);
-    assert_eq!(runs(DEEP, "interreflection = \"on\""), [1, 1, 1]);
-    assert_eq!(runs(r#"{ kind = "flat" }"#, "interreflection = \"on\""), [0, 0, 0]);
+    assert_eq!(runs(DEEP, ""), [1, 1, 1, 1]);
+    assert_eq!(runs(DEEP, "interreflection = \"off\""), [1, 0, 0, 1]);
+    assert_eq!(runs(DEEP, "interreflection = \"on\""), [0, 1, 1, 1]);
+    assert_eq!(runs(r#"{ kind = "flat" }"#, "interreflection = \"on\""), [0, 0, 0, 0]);
 }
 
 #[test]
@@ -296,11 +300,4 @@ fn a_colour_edit_does_not_cast_the_first_rays_again() {
     assert!(names.contains(&"interreflection") && !names.contains(&"transport"), "{names:?}");
     let sum = outcome.brdf.eval(Vec3::Z, from_angles(0.5, 0.3)).as_dvec3();
     assert!(sum.cmpgt(DVec3::ZERO).all() && sum.x > sum.y && sum.y > sum.z);
-}
-
-#[test]
-fn the_predicted_share_is_that_of_a_geometric_series() {
-    assert_eq!(predicted_share(0.5, 0.0), 0.0);
-    assert!((predicted_share(0.8, 0.5) - 0.4 / 0.6).abs() < 1e-12);
-    assert!(predicted_share(1.0, 1.0).is_finite());
 }

@@ -2,6 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 use std::fmt;
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -32,7 +33,7 @@ pub struct Vertex {
 
 /// Finds the points at which rays through the endless tiling meet its reflecting side.
 pub struct Tracer {
-    grid: PeriodicGrid,
+    grid: Arc<PeriodicGrid>,
     tree: KdTree,
     /// Geometric normals of the triangles, and normals of their corners if they are smooth.
     normals: Vec<Vec3>,
@@ -65,7 +66,13 @@ impl Transport {
     ///
     /// # Errors
     /// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
-    pub fn new(mesh: &TileMesh, facets: &Facets, elements: usize, rays: usize, cancel: &Cancel) -> Result<Self> {
+    pub fn new(
+        (mesh, grid): (&TileMesh, Arc<PeriodicGrid>),
+        facets: &Facets,
+        elements: usize,
+        rays: usize,
+        cancel: &Cancel,
+    ) -> Result<Self> {
         let stride = facets.len().div_ceil(elements.max(1)).max(1);
         // Facets are sorted by normal, so every n-th facet is an even sample of them.
         let chosen: Vec<u32> = (stride / 2..facets.len()).step_by(stride).map(|s| s as u32).collect();
@@ -74,7 +81,7 @@ impl Transport {
         let chosen_area: f64 = chosen.iter().map(|facet| f64::from(facets.areas[*facet as usize])).sum();
         let scale = total / chosen_area.max(f64::MIN_POSITIVE);
         let areas = chosen.iter().map(|facet| (f64::from(facets.areas[*facet as usize]) * scale) as f32).collect();
-        let tracer = Tracer::new(mesh, facets, &chosen);
+        let tracer = Tracer::new((mesh, grid), facets, &chosen);
         let origins = lifted_origins(facets, mesh.size);
         let mut directions = vec![Vec3::Z; chosen.len() * rays];
         let mut hits = vec![None; chosen.len() * rays];
@@ -104,12 +111,12 @@ impl Transport {
 
 impl Tracer {
     /// Prepares rays. A vertex is assigned the nearest of `elements`, which are indices of facets.
-    pub(super) fn new(mesh: &TileMesh, facets: &Facets, elements: &[u32]) -> Self {
+    pub(super) fn new((mesh, grid): (&TileMesh, Arc<PeriodicGrid>), facets: &Facets, elements: &[u32]) -> Self {
         let area: f64 = facets.areas.iter().map(|area| f64::from(*area)).sum();
         let spacing = (area / elements.len().max(1) as f64).sqrt() as f32;
         let positions: Vec<Vec3> = elements.iter().map(|s| wrap(facets.positions[*s as usize], mesh.size)).collect();
         Self {
-            grid: PeriodicGrid::new(mesh),
+            grid,
             tree: KdTree::new(&positions, mesh.size),
             element_normals: elements.iter().map(|s| facets.geometric_normals[*s as usize]).collect(),
             turn_penalty: (TURN_SPACINGS * spacing).powi(2),

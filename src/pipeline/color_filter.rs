@@ -26,7 +26,7 @@ use crate::visibility::Visibility;
 /// The colour map of a scene with everything that its means depend on.
 #[derive(Debug)]
 pub struct ColorFilter {
-    /// `f̄` with the colours of the map on the facets.
+    /// `f̄` with the colours of the map on the facets, without interreflection.
     pub outcome: Outcome,
     pub map: Arc<LayeredMap>,
     spec: ColorMap,
@@ -54,7 +54,7 @@ pub struct PairColor {
 }
 
 impl Pipeline {
-    /// The filtered colour map of a scene and its effective BRDF.
+    /// The filtered colour map of a scene and its effective BRDF, both without interreflection.
     ///
     /// # Errors
     /// The errors of [`Pipeline::effective`]; the scene has no colour map; or it asks for Smith's distribution of a tile
@@ -63,6 +63,7 @@ impl Pipeline {
         let Some(spec) = &loaded.scene.color_map else {
             return Err(InputError::new("color_map", "nothing", "a table `[color_map]` with layers").into());
         };
+        let loaded = &loaded.without_interreflection();
         let outcome = self.effective(loaded)?;
         let mut times = StageTimes::new();
         let inputs = self.tile_inputs(loaded, Processor::Cpu(Refinement::NONE), &mut times)?;

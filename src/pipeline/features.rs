@@ -21,13 +21,12 @@ pub(super) struct Surface<'a> {
     pub material_of_slot: &'a [usize],
     pub materials: &'a [Material],
     pub settings: &'a Settings,
-    /// Planes x = const and y = const that mirror the tile; `None` if they were not looked for.
-    pub mirrors: Option<[bool; 2]>,
     /// True if the plan needs the cost of slicing under overhangs.
     pub wants_scan_work: bool,
 }
 
 impl Pipeline {
+    /// The properties that take no rays: mirror planes and bounced light are not looked for.
     pub(super) fn features(&self, surface: &Surface<'_>) -> Result<SceneFeatures> {
         let Surface { scene, tile, facets, sum, materials, settings, .. } = *surface;
         let needs_maps = !tile.flat && (!tile.height_field || settings.visibility_method != VisibilityMethod::Auto);
@@ -50,7 +49,8 @@ impl Pipeline {
             |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
         Ok(SceneFeatures {
             flat: tile.flat,
-            mirrors: surface.mirrors,
+            mirrors: None,
+            bounced: None,
             steepest: tile.steepest,
             albedo: used.iter().map(|&k| albedo(&materials[k])).fold(0.0, f64::max),
             grey: used.iter().all(|&k| crate::interreflection::is_grey(&materials[k])) && !sum.colors_vary(),

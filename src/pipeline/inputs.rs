@@ -3,13 +3,16 @@
 use std::sync::Arc;
 
 use super::features::Surface;
-use super::stages::{FacetsRole, FindMirrorPlanes, TileShape};
+use super::stages::{
+    BuildCells, FacetsRole, FindMirrorPlanes, MeasureBouncedShare, PrepareSamplers, Reflection, TileShape,
+};
 use super::{Keyed, Pipeline, StageTimes};
 use crate::base::Result;
 use crate::brdf::MaterialAssignment;
+use crate::cache::Key;
 use crate::effective::FacetSum;
 use crate::geometry::Facets;
-use crate::plan::{Costs, Plan, Refinement, Settings};
+use crate::plan::{Costs, Plan, Refinement, SceneFeatures, Settings};
 use crate::scene::{LoadedScene, Switch};
 
 /// The processor that computes visibility and product.
@@ -71,29 +74,37 @@ impl Pipeline {
             material_of_slot: &material_of_slot,
             materials: &materials.materials,
             settings: &settings,
-            mirrors: self.mirrors_of_interreflection(&tile, &settings, times)?,
             wants_scan_work: matches!(processor, Processor::Cpu(_)),
         };
-        let plan = Plan::new(&self.features(&surface)?, &settings, &Costs::default());
+        let mut features = self.features(&surface)?;
+        self.examine_bounces(&mut features, &surface, materials.key, times)?;
+        let plan = Plan::new(&features, &settings, &Costs::default());
         let sum = Arc::new(sum);
         let refined = role == FacetsRole::Refined;
         Ok(TileInputs { tile, settings, materials, facets, material_of_slot, sum, plan, refined })
     }
 
-    /// The mirror planes of the tile, which are looked for only if interreflection would use them.
-    fn mirrors_of_interreflection(
+    /// Measures the share of bounced light if the plan needs it, and looks for mirror planes if interreflection uses
+    /// them.
+    fn examine_bounces(
         &self,
-        tile: &Keyed<TileShape>,
-        settings: &Settings,
+        features: &mut SceneFeatures,
+        surface: &Surface<'_>,
+        assignment: Key,
         times: &mut StageTimes,
-    ) -> Result<Option<[bool; 2]>> {
-        let effects = &settings.effects;
-        match (effects.interreflection, effects.mirror_symmetry) {
-            (Switch::On, Switch::Auto) if !tile.flat => {
-                Ok(Some(*self.get(FindMirrorPlanes { tile, cells: None }, times)?))
-            }
-            _ => Ok(None),
+    ) -> Result<()> {
+        let Surface { tile, material_of_slot, materials, settings, .. } = *surface;
+        if features.needs_bounced_share(settings) {
+            let samplers = &self.get(PrepareSamplers { materials }, times)?;
+            let reflection = &Reflection { assignment, material_of_slot, materials, samplers };
+            let grid = &self.get(BuildCells { tile }, times)?;
+            features.bounced = Some(*self.get(MeasureBouncedShare { tile, grid, reflection }, times)?);
         }
+        if features.interreflects(settings) && settings.effects.mirror_symmetry == Switch::Auto {
+            let grid = &self.get(BuildCells { tile }, times)?;
+            features.mirrors = Some(*self.get(FindMirrorPlanes { tile, cells: Some(grid) }, times)?);
+        }
+        Ok(())
     }
 }
 

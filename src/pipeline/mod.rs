@@ -48,8 +48,9 @@ pub use self::slab_values::{PHOTON_TARGET, SlabValues, require_faces};
 pub use self::stage::{Codec, Keyed, Stage, StageTimes};
 use self::stage::{Memo, elapsed_ms, lock};
 use self::stages::{
-    BuildTile, CastTransport, ColorFacets, ColorTile, ComputeVisibility, FacetsRole, FindMirrorPlanes, Interreflect,
-    LoadMaterials, MeasureRelief, PaperTables, SampleDrivers, SampleFacets, TileShape,
+    BuildCells, BuildTile, CastTransport, ColorFacets, ColorTile, ComputeVisibility, FacetsRole, FindMirrorPlanes,
+    Interreflect, LoadMaterials, MeasureBouncedShare, MeasureRelief, PaperTables, PrepareSamplers, Reflection,
+    SampleDrivers, SampleFacets, TileShape,
 };
 use crate::base::{Cancel, Result};
 use crate::brdf::MaterialAssignment;
@@ -134,7 +135,9 @@ impl Pipeline {
             LoadMaterials::NAME,
             ComputeVisibility::NAME,
             FindMirrorPlanes::NAME,
-            stages::BuildCells::NAME,
+            BuildCells::NAME,
+            PrepareSamplers::NAME,
+            MeasureBouncedShare::NAME,
             CastTransport::NAME,
             Interreflect::NAME,
             PaperTables::NAME,
@@ -344,19 +347,13 @@ impl Pipeline {
         times: &mut StageTimes,
     ) -> Result<Arc<InterreflectionTable>> {
         let VisibleSurface { tile, facets, visibility, assignment, material_of_slot } = *surface;
-        let settings = InterreflectionSettings { mirrors, ..settings.interreflection() };
-        let transport = self.get(CastTransport { tile, facets, settings: &settings }, times)?;
-        let gather = Interreflect {
-            tile,
-            facets,
-            visibility,
-            transport: &transport,
-            assignment: assignment.key,
-            material_of_slot,
-            materials: &assignment.materials,
-            settings: &settings,
-        };
-        Ok(self.get(gather, times)?.value)
+        let settings = &InterreflectionSettings { mirrors, ..settings.interreflection() };
+        let materials = &assignment.materials[..];
+        let samplers = &self.get(PrepareSamplers { materials }, times)?;
+        let grid = &self.get(BuildCells { tile }, times)?.value;
+        let transport = &self.get(CastTransport { tile, grid, facets, settings }, times)?;
+        let reflection = &Reflection { assignment: assignment.key, material_of_slot, materials, samplers };
+        Ok(self.get(Interreflect { tile, facets, visibility, transport, reflection, settings }, times)?.value)
     }
 
     /// The tile's mesh.

@@ -159,4 +159,8 @@ impl Reflectance for Outcome {
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
         self.brdf.eval_lights(lights, o, out);
     }
+
+    fn eval_bounced(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        self.brdf.eval_bounced(lights, o, out);
+    }
 }

@@ -1,5 +1,6 @@
 //! The reference of a scene.
 
+use super::inputs::Processor;
 use super::slab::refuse_slab;
 use super::{Pipeline, StageTimes};
 use crate::base::Result;
@@ -42,9 +43,26 @@ impl Pipeline {
         let mut times = StageTimes::new();
         let tile = self.tile(loaded, &mut times)?;
         let assignment = self.assignment(loaded, &tile, &mut times)?;
-        let effects = &loaded.scene.effects;
-        let bounces = if effects.interreflection == Switch::On { effects.bounces } else { 0 };
+        let bounces = if self.interreflects(loaded)? { loaded.scene.effects.bounces } else { 0 };
         let reference = Reference::new(&tile.mesh, &assignment.material_of_slot, &assignment.materials);
         Ok(work(&reference.with_bounces(bounces).with_cancel(self.env.cancel.clone())))
+    }
+    /// Returns true if the result of the scene holds light that facets send to each other.
+    ///
+    /// # Errors
+    /// As [`Pipeline::effective`].
+    pub fn interreflects(&self, loaded: &LoadedScene) -> Result<bool> {
+        let processor = Processor::Gpu { max_facets: None };
+        Ok(self.tile_inputs(loaded, processor, &mut StageTimes::new())?.plan.interreflection)
+    }
+
+    /// The scene with its own decision on interreflection forced, so that every preset computes the same light.
+    ///
+    /// # Errors
+    /// As [`Pipeline::effective`].
+    pub fn with_same_light(&self, loaded: &LoadedScene) -> Result<LoadedScene> {
+        let mut same = loaded.clone();
+        same.scene.effects.interreflection = if self.interreflects(loaded)? { Switch::On } else { Switch::Off };
+        Ok(same)
     }
 }

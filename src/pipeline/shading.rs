@@ -131,12 +131,12 @@ impl Shading {
         }
         let start = Instant::now();
         let mut times = StageTimes::new();
-        let (brdf, errors) = self.first_close_enough(cancel, &mut times)?;
+        let (unmerged, errors) = self.first_close_enough(cancel, &mut times)?;
+        let brdf = self.with_bounced_columns(&unmerged, cancel)?;
         let was_cached = !times.is_empty() && times.iter().all(|(name, _)| *name == Tabulate::CACHED);
         let shading = ShadingBrdf { brdf, errors, ms: elapsed_ms(start), was_cached };
         *computed = Some(shading.clone());
-        *lock(&self.last) =
-            Some(LastShading { surface: self.keys.surface, lobes: self.keys.lobes, brdf: shading.brdf.clone() });
+        *lock(&self.last) = Some(LastShading { surface: self.keys.surface, lobes: self.keys.lobes, brdf: unmerged });
         Ok(shading)
     }
 
@@ -159,6 +159,22 @@ impl Shading {
         }
         let (table, errors) = self.table(reused, &check, cancel, times)?;
         Ok((table.map_or_else(|| self.exact.clone(), Arc::new), errors))
+    }
+
+    /// A table that also holds the light that facets send to each other, so that images read one table and a GPU can
+    /// read it. It is not taken if it is too coarse for this light.
+    fn with_bounced_columns(&self, brdf: &Arc<EffectiveBrdf>, cancel: &Cancel) -> Result<Arc<EffectiveBrdf>> {
+        let Representation::Interreflecting(direct, bounced) = &brdf.representation else { return Ok(brdf.clone()) };
+        let Representation::Table(table) = &**direct else { return Ok(brdf.clone()) };
+        let sum = |i: Vec3, o: Vec3| {
+            let mut sum = DVec3::ZERO;
+            bounced.eval_lights(&[i], o, |_, g| sum = g * brdf.base_area);
+            sum
+        };
+        let representation = Representation::Table(table.plus_bounced(sum, cancel)?);
+        let merged = EffectiveBrdf { representation, base_area: brdf.base_area };
+        let is_close = self.is_close(Check::new(&self.exact, self.seed).errors(&merged));
+        Ok(if is_close { Arc::new(merged) } else { brdf.clone() })
     }
 
     /// A sum over a strided subset of the facets, if it is close enough.

@@ -42,15 +42,13 @@ impl<'a> Context<'a> {
             algorithm: VisibilityAlgorithm::choose(features, settings),
             try_low_rank: false,
             try_shading_table: false,
-            interreflection: false,
+            interreflection: features.interreflects(settings),
         };
         context.try_low_rank = context.wants_low_rank();
         let table_pays = context.table_cost().is_some_and(|cost| {
             !features.flat && cost.compute_ms + cost.image_ms < context.direct_image_ms(costs.threads)
         });
         context.try_shading_table = is_on(settings.effects.picture_table, table_pays);
-        let can_interreflect = !features.flat && features.materials > 0 && settings.preset != Preset::Wu2011;
-        context.interreflection = can_interreflect && settings.effects.interreflection == Switch::On;
         context
     }
 
@@ -125,11 +123,5 @@ impl<'a> Context<'a> {
             Switch::On => [true; 2],
             Switch::Off => [false; 2],
         }
-    }
-
-    /// The part of all directions in which facets see each other: `1 - A/S` for a surface that closes the plane,
-    /// because every ray of uniform light ends on it once. For other surfaces it is a guess.
-    pub fn hidden_directions(&self) -> f64 {
-        if self.features.flat { 0.0 } else { (1.0 - 1.0 / self.features.area_ratio.max(1.0)).clamp(0.0, 1.0) }
     }
 }

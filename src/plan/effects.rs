@@ -5,9 +5,8 @@
 use super::algorithm::{SHALLOW_PART, maps_ms, max_blocked_part, scan_ms};
 use super::context::Context;
 use super::{
-    Effect, EffectKind, FAINT_FRACTION, LeftOut, Preset, VisibilityAlgorithm, VisibilityMethod, is_on, methods,
+    Effect, EffectKind, FAINT_FRACTION, LeftOut, VisibilityAlgorithm, VisibilityMethod, interreflection, is_on, methods,
 };
-use crate::interreflection::predicted_share;
 use crate::scene::{Effects, Switch};
 
 /// An effect and the function that decides it.
@@ -42,7 +41,7 @@ impl Decision {
         Self { bound: Some(bound), ..self }
     }
 
-    fn leaves_out(self, left_out: Option<LeftOut>) -> Self {
+    pub fn leaves_out(self, left_out: Option<LeftOut>) -> Self {
         Self { left_out, ..self }
     }
 }
@@ -63,7 +62,7 @@ static ROWS: &[Row] = &[
         name: "interreflection",
         kind: Physics,
         switch: Some(|effects| &mut effects.interreflection),
-        decide: interreflection,
+        decide: interreflection::decide,
     },
     Row { name: "self_shadow", kind: Physics, switch: Some(|effects| &mut effects.self_shadow), decide: self_shadow },
     Row { name: "anisotropy", kind: Physics, switch: Some(|effects| &mut effects.anisotropy), decide: anisotropy },
@@ -226,52 +225,6 @@ fn overhangs(context: &Context<'_>, _: Switch) -> Decision {
     } else {
         Decision::new(true, "surfaces overhang: more than one horizon per azimuth")
     }
-}
-
-/// A ray from facet to facet, one lobe of it towards one node of the table, and its part of one pair of nodes [ns].
-const RAY_NS: f64 = 1000.0;
-const LOBE_NS: f64 = 1.5;
-const PRODUCT_NS: f64 = 0.05;
-
-/// Interreflection is on only if asked for. By default `f̄` is the paper's Eq. 7, which leaves it out and which other
-/// programs compute as well; the estimate says how much is missing.
-fn interreflection(context: &Context<'_>, switch: Switch) -> Decision {
-    let Context { features, settings, costs, interreflection: on, .. } = *context;
-    let hidden = context.hidden_directions();
-    let share = predicted_share(features.albedo, hidden);
-    let exchange = settings.interreflection();
-    let rays = (exchange.elements * exchange.rays) as f64;
-    // Each ray that meets a facet begins a walk over `1 + share` facets.
-    let (walks, steps, nodes) = (rays * hidden, 1.0 + share, exchange.grid.len() as f64);
-    let pairs = nodes * nodes
-        / features.mirrors.unwrap_or_default().map(|plane| if plane { 2.0 } else { 1.0 }).iter().product::<f64>();
-    let per_walk = steps * (RAY_NS + nodes * LOBE_NS) + nodes * LOBE_NS + pairs * PRODUCT_NS;
-    let ms = (rays * RAY_NS + walks * per_walk) * 1e-6 / costs.threads;
-    let estimate = format!("estimated to add up to {:.0} % to what is reflected directly", share * 100.0);
-    let reason = if features.flat {
-        "the tile is flat: no facet sees another".to_owned()
-    } else if features.materials == 0 {
-        "nothing reflects".to_owned()
-    } else if settings.preset == Preset::Wu2011 {
-        "the paper leaves it out".to_owned()
-    } else if on {
-        format!(
-            "{estimate}; up to {} bounces from {} rays of {} facets",
-            exchange.bounces, exchange.rays, exchange.elements
-        )
-    } else if switch == Switch::Off || share <= settings.tolerance {
-        format!("{estimate}; left out, as in the paper")
-    } else {
-        format!(
-            "{estimate}, more than the tolerance of {:.1} %; left out, as in the paper's definition of f̄",
-            settings.tolerance * 100.0
-        )
-    };
-    let is_missing = !on && !features.flat && features.materials > 0 && share > settings.tolerance;
-    let left_out = is_missing.then_some(LeftOut { share, tolerance: settings.tolerance, predicted_ms: ms });
-    let decision = Decision::new(on, reason).costs(if on { ms } else { 0.0 }).leaves_out(left_out);
-    // The estimate is no bound, unless there is nothing to add.
-    if features.flat { decision.changes_at_most(ROUNDING) } else { decision }
 }
 
 fn self_shadow(context: &Context<'_>, switch: Switch) -> Decision {

@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use crate::interreflection::BouncedShare;
+
 /// The properties of a scene on which the decisions rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneFeatures {
@@ -10,6 +12,8 @@ pub struct SceneFeatures {
     pub steepest: f32,
     /// The largest part of uniform light that a material reflects.
     pub albedo: f64,
+    /// The part of the light that is reflected more than once; `None` if it was not measured.
+    pub bounced: Option<BouncedShare>,
     /// True if all materials reflect all channels alike.
     pub grey: bool,
     /// Planes x = const and y = const that mirror the tile; `None` if they were not looked for.

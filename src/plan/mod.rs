@@ -7,6 +7,7 @@ mod algorithm;
 mod context;
 mod effects;
 mod features;
+mod interreflection;
 mod methods;
 mod refinement;
 mod settings;
@@ -25,6 +26,7 @@ pub use refinement::Refinement;
 pub use settings::{Backend, Preset, ProductMethod, Settings, VisibilityMethod};
 pub use slab::{SlabDecision, SlabFeatures, SlabSettings};
 
+use crate::interreflection::BouncedShare;
 use crate::scene::Switch;
 
 /// The part of the program that an effect belongs to.
@@ -62,8 +64,10 @@ pub struct Effect {
 /// Light that an effect would add.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LeftOut {
-    /// The largest estimated part of the light that is reflected directly.
+    /// The part of the reflected light, the effect included.
     pub share: f64,
+    /// Standard error of `share`.
+    pub std_error: f64,
     /// The part that the preset tolerates.
     pub tolerance: f64,
     /// Milliseconds that the effect would take.
@@ -78,6 +82,8 @@ pub struct Plan {
     pub try_low_rank: bool,
     /// Add the light that facets send to each other.
     pub interreflection: bool,
+    /// The share of bounced light on which the decision rests; `None` if it was not measured.
+    pub bounced: Option<BouncedShare>,
     /// Mirror planes x = const and y = const that save part of the directions.
     pub mirrors: [bool; 2],
     /// Try a table for images first. It must pass its check against the BRDF.
@@ -94,6 +100,7 @@ impl Plan {
             algorithm: context.algorithm,
             try_low_rank: context.try_low_rank,
             interreflection: context.interreflection,
+            bounced: features.bounced,
             mirrors: context.mirrors(),
             try_shading_table: context.try_shading_table,
             effects: effects::decide_all(&context),

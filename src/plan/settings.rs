@@ -293,6 +293,16 @@ impl Settings {
         Some(ErrorBound { rel_l2, psnr_db })
     }
 
+    /// The part of the reflected light that may be missing because interreflection is left out.
+    pub fn bounced_tolerance(&self) -> f64 {
+        match self.preset {
+            Preset::Draft => 0.35,
+            Preset::Standard | Preset::Wu2011 => 0.04,
+            Preset::Fine => 0.015,
+            Preset::Reference => 0.0,
+        }
+    }
+
     /// The resolution of interreflection.
     pub fn interreflection(&self) -> InterreflectionSettings {
         let (elements, rays, grid) = match self.preset {

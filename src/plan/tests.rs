@@ -3,9 +3,10 @@ use std::path::PathBuf;
 use glam::Vec3;
 
 use super::{Costs, EffectKind, Plan, Preset, SceneFeatures, Settings, VisibilityAlgorithm};
+use crate::interreflection::BouncedShare;
 use crate::metrics::{compare, mirror_biased_pairs};
 use crate::pipeline::{Outcome, Pipeline};
-use crate::scene::{self, LoadedScene, Painted};
+use crate::scene::{self, LoadedScene, Painted, Switch};
 
 const GEOMETRIES: [&str; 8] = [
     r#"{ kind = "flat" }"#,
@@ -117,6 +118,7 @@ fn features() -> SceneFeatures {
         flat: false,
         steepest: 0.05,
         albedo: 0.8,
+        bounced: None,
         grey: true,
         mirrors: None,
         height_samples: false,
@@ -169,17 +171,58 @@ fn a_loose_tolerance_drops_the_visibility_of_a_shallow_tile_and_says_why() {
     assert_eq!(plan(0.001).algorithm, VisibilityAlgorithm::HorizonScan);
 }
 
+/// A deep tile whose facets send each other a part of the light, at a preset with a switch.
+fn bouncing(share: f64, preset: Preset, interreflection: Switch) -> (SceneFeatures, Settings) {
+    let bounced = Some(BouncedShare { share, std_error: 0.01 });
+    let effects = scene::Effects { interreflection, ..scene::Effects::default() };
+    (SceneFeatures { area_ratio: 3.0, bounced, ..features() }, Settings { effects, ..Settings::of_preset(preset) })
+}
+
 #[test]
-fn interreflection_is_estimated_but_never_on_by_itself() {
-    let features = SceneFeatures { area_ratio: 3.0, ..features() };
-    let plan = Plan::new(&features, &Settings::of_preset(Preset::Standard), &Costs::default());
-    let effect = plan.effects.iter().find(|effect| effect.name == "interreflection").unwrap();
-    assert!(!plan.interreflection && !effect.on);
-    let left_out = effect.left_out.unwrap();
-    assert!(left_out.share > left_out.tolerance && left_out.predicted_ms > 0.0, "{left_out:?}");
-    let flat = SceneFeatures { flat: true, ..features };
-    let plan = Plan::new(&flat, &Settings::of_preset(Preset::Standard), &Costs::default());
-    assert!(plan.effects.iter().all(|effect| effect.left_out.is_none()), "a flat tile leaves nothing out");
+fn interreflection_is_on_where_it_adds_more_than_the_preset_tolerates() {
+    let is_on = |share, preset, switch| {
+        let (features, settings) = bouncing(share, preset, switch);
+        let plan = Plan::new(&features, &settings, &Costs::default());
+        assert_eq!(plan.interreflection, plan.is_on("interreflection"));
+        plan.interreflection
+    };
+    let tolerances = [(Preset::Draft, 0.35), (Preset::Standard, 0.04), (Preset::Fine, 0.015)];
+    for (preset, tolerance) in tolerances {
+        assert!(is_on(1.01 * tolerance, preset, Switch::Auto), "{preset:?}");
+        assert!(!is_on(0.99 * tolerance, preset, Switch::Auto), "{preset:?}");
+        assert!(is_on(0.0, preset, Switch::On) && !is_on(0.9, preset, Switch::Off), "{preset:?}");
+    }
+    assert!(is_on(0.0, Preset::Reference, Switch::Auto), "the reference follows all light");
+    for switch in [Switch::Auto, Switch::On] {
+        assert!(!is_on(0.9, Preset::Wu2011, switch), "the paper leaves interreflection out");
+    }
+}
+
+#[test]
+fn light_is_left_out_only_if_asked_and_then_the_plan_tells_how_much() {
+    let effect = |switch| {
+        let (features, settings) = bouncing(0.2, Preset::Standard, switch);
+        let plan = Plan::new(&features, &settings, &Costs::default());
+        plan.effects.into_iter().find(|effect| effect.name == "interreflection").unwrap()
+    };
+    let off = effect(Switch::Off);
+    let left_out = off.left_out.unwrap();
+    assert_eq!((left_out.share, left_out.std_error, left_out.tolerance), (0.2, 0.01, 0.04));
+    assert!(left_out.predicted_ms > 0.0 && off.reason.contains("20.0 ± 1.0 %"), "{off:?}");
+    assert!(effect(Switch::Auto).left_out.is_none());
+}
+
+#[test]
+fn the_share_is_measured_only_where_it_decides_or_tells() {
+    let needs = |area_ratio, preset, switch| {
+        let (features, settings) = bouncing(0.0, preset, switch);
+        SceneFeatures { area_ratio, ..features }.needs_bounced_share(&settings)
+    };
+    assert!(needs(3.0, Preset::Standard, Switch::Auto) && needs(3.0, Preset::Standard, Switch::Off));
+    assert!(!needs(3.0, Preset::Standard, Switch::On) && !needs(3.0, Preset::Draft, Switch::Off));
+    assert!(!needs(3.0, Preset::Reference, Switch::Auto) && !needs(3.0, Preset::Wu2011, Switch::Auto));
+    // Facets of a shallow tile hardly see each other.
+    assert!(!needs(1.01, Preset::Standard, Switch::Auto) && needs(1.01, Preset::Fine, Switch::Auto));
 }
 
 #[test]

@@ -32,7 +32,7 @@ scene_table! {
         material_groups: Switch = Switch::Auto, SWITCH, "";
         /// Black materials are included in the sum.
         black_materials: Switch = Switch::Auto, SWITCH, "";
-        /// Interreflection between facets. Auto means off, because the paper's definition excludes it.
+        /// Interreflection between facets. Auto means on where it adds more light than the preset tolerates.
         interreflection: Switch = Switch::Auto, SWITCH, "";
         /// Largest number of bounces that interreflection follows.
         bounces: usize = 64, FieldShape::Integer { min: 1, max: 64 }, "";

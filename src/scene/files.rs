@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Background, BrdfSpec, ColorMap, Driver, Geometry, LayerWeight, LoadedScene, Scene, SlabFace, TermSpec, check,
-    shipped,
+    Background, BrdfSpec, ColorMap, Driver, Geometry, LayerWeight, LoadedScene, Scene, SlabFace, Switch, TermSpec,
+    check, shipped,
 };
 use crate::base::{InputError, Result, regular_file};
 
@@ -49,6 +49,13 @@ fn is_embedded(path: &Path) -> bool {
 }
 
 impl LoadedScene {
+    /// The scene without light that facets send to each other, as in the paper's definition of `f̄`.
+    pub fn without_interreflection(&self) -> Self {
+        let mut direct = self.clone();
+        direct.scene.effects.interreflection = Switch::Off;
+        direct
+    }
+
     /// Paths on disk of all files that the scene names: tile, images, measured BRDFs, object and environment.
     pub fn files(&self) -> Vec<PathBuf> {
         let Scene { tile, materials, object, light, color_map, slab, background, .. } = &self.scene;

@@ -60,7 +60,9 @@ pub struct Chosen {
 impl Chosen {
     /// The command-line options that repeat the choice.
     pub fn options(&self) -> String {
-        format!("{} --seed {}", self.candidate.cli_args(), self.scene.scene.quality.seed)
+        let scene = &self.scene.scene;
+        let light = scene.effects.interreflection.name();
+        format!("{} --seed {} --effect interreflection={light}", self.candidate.cli_args(), scene.quality.seed)
     }
 
     /// One line with the target, what was reached, and the command-line options that repeat the choice.
@@ -118,7 +120,7 @@ pub fn choose(loaded: &LoadedScene, target: Target, cancel: &Cancel, mut progres
         Target::Milliseconds(asked) => search.finest_within(asked, &mut progress)?,
     };
     let candidate = quality_scale::candidate_at(reached.level, search.overhangs);
-    let scene = with_settings(loaded, &candidate)?;
+    let scene = with_settings(&search.loaded, &candidate)?;
     let reaches_target = match target {
         Target::Psnr(asked) => reached.psnr_db >= asked,
         Target::Milliseconds(asked) => reached.ms <= asked,
@@ -127,7 +129,8 @@ pub fn choose(loaded: &LoadedScene, target: Target, cancel: &Cancel, mut progres
 }
 
 struct Search<'a> {
-    loaded: &'a LoadedScene,
+    /// The scene with its own decision on interreflection, so that all quality levels compute the same light.
+    loaded: LoadedScene,
     cancel: &'a Cancel,
     pipeline: Pipeline,
     overhangs: bool,
@@ -139,10 +142,11 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(loaded: &'a LoadedScene, cancel: &'a Cancel) -> Result<Self> {
+    fn new(loaded: &LoadedScene, cancel: &'a Cancel) -> Result<Self> {
         let mut pipeline = crate::gpu::pipeline();
         pipeline.set_cancel(cancel.clone());
-        let outcome = pipeline.effective(&with_settings(loaded, &quality_scale::candidate_at(0.0, false))?)?;
+        let loaded = pipeline.with_same_light(loaded)?;
+        let outcome = pipeline.effective(&with_settings(&loaded, &quality_scale::candidate_at(0.0, false))?)?;
         let overhangs = outcome.plan.overhangs();
         let geometry_ms = outcome.times.iter().filter(|(name, _)| *name == "geometry").map(|(_, ms)| ms).sum();
         Ok(Self { loaded, cancel, pipeline, overhangs, geometry_ms, measurements: Vec::new(), last: None })
@@ -153,7 +157,7 @@ impl<'a> Search<'a> {
         if let Some((_, outcome, ms)) = self.last.as_ref().filter(|(last, ..)| *last == level && runs == 1) {
             return Ok((outcome.clone(), *ms));
         }
-        let mut scene = with_settings(self.loaded, &quality_scale::candidate_at(level, self.overhangs))?;
+        let mut scene = with_settings(&self.loaded, &quality_scale::candidate_at(level, self.overhangs))?;
         let seed = scene.scene.quality.seed;
         let mut times = Vec::with_capacity(runs);
         // A different seed draws different facets. All stages after the mesh run as after an edit of the geometry.
@@ -223,7 +227,7 @@ impl<'a> Search<'a> {
         let mut level = self.level_by_stated_error(db, peak, progress)?;
         let stated = peak.stated_db(&self.build_stated(level)?.0);
         let error = (peak, db.min(stated));
-        let reference = TargetReference::new(&self.pipeline, self.loaded, error, self.cancel, progress)?;
+        let reference = TargetReference::new(&self.pipeline, &self.loaded, error, self.cancel, progress)?;
         // Levels that are known to miss and to reach the target, and the best of those that miss.
         let (mut misses, mut reaches, mut best) = (COARSEST_LEVEL - STEP, None::<Measurement>, None::<Measurement>);
         loop {

@@ -44,7 +44,7 @@ pub fn open(case: &Case, method: &str, folder: &Path) -> LoadedScene {
     }
     let text = format!(
         "[tile]\n{}\n[[material]]\nname = \"default\"\nbrdf = {}\n[quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \
-         \"{method}\"\n",
+         \"{method}\"\n[effects]\ninterreflection = \"off\"\n",
         case.tile, case.brdf
     );
     let scene = scene::parse(&text).unwrap_or_else(|error| panic!("{}: {error}", case.name));

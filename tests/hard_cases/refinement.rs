@@ -10,7 +10,7 @@ use glam::Vec3;
 fn open(geometry: &str, brdf: &str, quality: &str) -> LoadedScene {
     let text = format!(
         "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\nbackend = \
-         \"cpu\"\n{quality}\n"
+         \"cpu\"\n{quality}\n[effects]\ninterreflection = \"off\"\n"
     );
     LoadedScene {
         scene: scene::parse(&text).unwrap(),

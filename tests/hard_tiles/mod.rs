@@ -71,7 +71,8 @@ pub struct TrueValues {
 }
 
 impl HardTile {
-    /// Writes the files of the tile to `folder` and returns its scene on the CPU.
+    /// Writes the files of the tile to `folder` and returns its scene on the CPU, without interreflection, which the closed
+    /// forms leave out.
     pub fn open(&self, folder: &Path, preset: &str, seed: u64) -> LoadedScene {
         for (name, file) in &self.files {
             file.write(&folder.join(name));
@@ -80,7 +81,9 @@ impl HardTile {
         for (name, brdf) in &self.materials {
             text += &format!("[[material]]\nname = \"{name}\"\nbrdf = {brdf}\n");
         }
-        text += &format!("[quality]\npreset = \"{preset}\"\nbackend = \"cpu\"\nseed = {seed}\n");
+        text += &format!(
+            "[quality]\npreset = \"{preset}\"\nbackend = \"cpu\"\nseed = {seed}\n[effects]\ninterreflection = \"off\"\n"
+        );
         let scene = scene::parse(&text).unwrap_or_else(|error| panic!("{}: {error}", self.name));
         LoadedScene { scene, base_dir: folder.to_owned(), name: self.name.to_owned(), painted: Painted::default() }
     }

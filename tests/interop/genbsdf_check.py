@@ -22,7 +22,8 @@ except ImportError as error:
     skip(f"the Radiance checks need `pip install pyradiance numpy` ({error})")
 
 PERIODS, ALBEDO, ROUGHNESS = 17, 0.75, 0.3
-SCENE = ["fig1e_lambertian", "--set", "material.sides.color=[1,1,1]"]
+# Radiance follows one reflection.
+SCENE = ["fig1e_lambertian", "--set", "material.sides.color=[1,1,1]", "--set", "effects.interreflection=off"]
 # Pairs of the glossy check, rays over the period (a lattice), and the angular width of the source.
 PAIRS, RAYS, GOLDEN, SOURCE_DEG = 80, 2000, 0.618034, 0.5
 SLOTS = ["bottom", "sides"]

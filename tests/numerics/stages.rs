@@ -18,6 +18,8 @@ brdf = { kind = "cook_torrance", roughness = 0.3, f0 = 0.9 }
 preset = "draft"
 facets = 512
 backend = "cpu"
+[effects]
+interreflection = "off"
 "#;
     let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
     LoadedScene {

@@ -64,10 +64,10 @@ pub fn untuned() -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Returns a scene on the CPU with one material.
+/// Returns a scene on the CPU with one material, without interreflection, as in the paper's Eq. 7.
 pub fn open(geometry: &str, brdf: &str, preset: &str) -> LoadedScene {
     let source = format!(
-        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\npreset = \"{preset}\"\nbackend = \"cpu\"\n"
+        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\npreset = \"{preset}\"\nbackend = \"cpu\"\n[effects]\ninterreflection = \"off\"\n"
     );
     LoadedScene {
         scene: scene::parse(&source).unwrap(),

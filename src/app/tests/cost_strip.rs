@@ -12,11 +12,14 @@ use crate::app::worker::AccuracyPoint;
 use crate::scene::{self, Switch};
 use crate::tuning::progressive::ReferenceErrors;
 
-/// Grooves that are so deep that much light is reflected between their sides.
+/// Grooves that are so deep that much light is reflected between their sides. A draft would not tell it.
 pub fn deep(switch: &str) -> Document {
     let text = format!(
         "{}[effects]\ninterreflection = \"{switch}\"\n",
-        super::QUICK.replace("count = 2", "count = 2, depth = 0.9").replace("f0 = 0.8", "f0 = 1.0")
+        super::QUICK
+            .replace("count = 2", "count = 2, depth = 0.9")
+            .replace("f0 = 0.8", "f0 = 1.0")
+            .replace("draft", "standard")
     );
     let scene = scene::parse(&text).unwrap();
     let loaded = scene::LoadedScene { scene, base_dir: "".into(), name: "deep".into(), painted: Default::default() };
@@ -181,7 +184,7 @@ fn messages_never_cover_the_strip() {
 #[test]
 fn a_note_offers_once_what_is_left_out_and_the_export_dialog_repeats_it() {
     let mut harness = of_size(deep("off"), 1440.0, 900.0);
-    let line = "Interreflection is left out: up to ";
+    let line = "Interreflection is left out: ";
     assert!(harness.query_by_label_contains(line).is_some());
     harness.get_by_label("Keep out").click();
     harness.run_steps(3);

@@ -127,6 +127,8 @@ impl AccuracyWorker {
         context: &JobContext<AccuracyJob>,
         report: &dyn Fn(AccuracyResult),
     ) -> Result<()> {
+        self.pipeline.set_cancel(context.cancel.clone());
+        let job = &AccuracyJob { loaded: Arc::new(self.pipeline.with_same_light(&job.loaded)?), ..job.clone() };
         let key = without_settings(&job.loaded);
         if self.key.as_deref() != Some(&key) {
             *self = Self { key: Some(Box::new(key)), ..Self::default() };

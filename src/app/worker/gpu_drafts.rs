@@ -64,7 +64,7 @@ impl GpuDrafts {
     fn build(&self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<GpuTile>>> {
         let tile = match PRESETS.get(self.level) {
             Some(preset) if !is_below(loaded, *preset) => pipeline.gpu_tile(&as_preset(loaded, *preset))?,
-            _ => pipeline.gpu_tile(loaded)?,
+            _ => pipeline.gpu_tile(&loaded.without_interreflection())?,
         };
         Ok(tile.map(Arc::new))
     }
@@ -86,9 +86,10 @@ impl GpuDrafts {
     }
 }
 
-/// A copy of the scene at a preset, without the settings that the scene overrides.
+/// A copy of the scene at a preset, without the settings that the scene overrides and without interreflection, which
+/// refined images have.
 pub fn as_preset(loaded: &LoadedScene, preset: Preset) -> LoadedScene {
-    let mut draft = loaded.clone();
+    let mut draft = loaded.without_interreflection();
     let quality = &loaded.scene.quality;
     draft.scene.quality = Quality {
         preset: preset.name().to_owned(),

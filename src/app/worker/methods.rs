@@ -89,7 +89,8 @@ impl MethodsWorker {
         let methods: [Box<dyn Method + '_>; 3] = if job.loaded.scene.slab.is_some() {
             slab_methods(&self.pipelines, &job.loaded, size)?
         } else {
-            map_methods(&self.pipelines, &job.loaded, size, cancel)?
+            // The colour of what is seen and lit does not hold for light that facets send to each other.
+            map_methods(&self.pipelines, &job.loaded.without_interreflection(), size, cancel)?
         };
         let mut means = methods.each_ref().map(|_| MeanImage::default());
         let tone_map = ToneMap::new(&camera(&job.loaded))?;

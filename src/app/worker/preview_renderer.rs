@@ -239,4 +239,10 @@ impl Reflectance for Cancellable<'_> {
             self.brdf.eval_lights(lights, o, out);
         }
     }
+
+    fn eval_bounced(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
+        if !self.cancel.is_set() {
+            self.brdf.eval_bounced(lights, o, out);
+        }
+    }
 }

@@ -48,7 +48,7 @@ pub(crate) const FLAT: &str = "{ kind = \"flat\" }";
 pub(crate) fn open(geometry: &str, brdf: &str, method: &str) -> LoadedScene {
     let text = format!(
         "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\ncolor = [0.9, 0.7, 0.5]\n\
-         [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 300\n"
+         [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"{method}\"\nfacets = 300\n[effects]\ninterreflection = \"off\"\n"
     );
     LoadedScene {
         scene: scene::parse(&text).unwrap(),

@@ -1,10 +1,15 @@
-//! Interreflection: mirror planes that save work, rays between facets, and the light that they carry.
+//! Interreflection: the share of it that decides whether it is computed, mirror planes that save work, rays between
+//! facets, and the light that they carry.
+
+use std::sync::Arc;
 
 use crate::base::Result;
 use crate::brdf::Material;
 use crate::cache::{Key, KeyBuilder};
 use crate::geometry::{Facets, PeriodicGrid, mirror_planes_in};
-use crate::interreflection::{InterreflectionSettings, InterreflectionTable, Transport, gather};
+use crate::interreflection::{
+    BouncedShare, InterreflectionSettings, InterreflectionTable, LobeSampler, Transport, gather, measure_share,
+};
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage};
 use crate::visibility::Visibility;
@@ -31,9 +36,65 @@ impl Stage for FindMirrorPlanes<'_> {
     }
 }
 
+/// The materials of a surface with what walks over it need.
+pub struct Reflection<'a> {
+    /// The key of the materials and their slots.
+    pub assignment: Key,
+    pub material_of_slot: &'a [usize],
+    pub materials: &'a [Material],
+    pub samplers: &'a [LobeSampler],
+}
+
+impl Reflection<'_> {
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("materials", &self.assignment).counts("material of slot", self.material_of_slot.iter().copied());
+    }
+}
+
+/// Prepares the sampling of the materials' lobes.
+pub struct PrepareSamplers<'a> {
+    pub materials: &'a [Material],
+}
+
+impl Stage for PrepareSamplers<'_> {
+    type Output = Vec<LobeSampler>;
+    const NAME: &'static str = "lobe_samplers";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        self.materials.iter().for_each(|material| material.hash_brdf_into(key));
+    }
+
+    fn run(&self, _: &Env) -> Result<Vec<LobeSampler>> {
+        Ok(self.materials.iter().map(|material| LobeSampler::new(&material.brdf)).collect())
+    }
+}
+
+/// Measures the part of the reflected light that was reflected more than once.
+pub struct MeasureBouncedShare<'a> {
+    pub tile: &'a Keyed<TileShape>,
+    pub grid: &'a PeriodicGrid,
+    pub reflection: &'a Reflection<'a>,
+}
+
+impl Stage for MeasureBouncedShare<'_> {
+    type Output = BouncedShare;
+    const NAME: &'static str = "bounced_share";
+
+    fn hash_into(&self, key: &mut KeyBuilder) {
+        key.key("tile", &self.tile.key);
+        self.reflection.hash_into(key);
+    }
+
+    fn run(&self, env: &Env) -> Result<BouncedShare> {
+        let Reflection { material_of_slot, materials, samplers, .. } = *self.reflection;
+        measure_share(&self.tile.mesh, self.grid, material_of_slot, (materials, samplers), &env.cancel)
+    }
+}
+
 /// Casts rays between facets.
 pub struct CastTransport<'a> {
     pub tile: &'a Keyed<TileShape>,
+    pub grid: &'a Arc<PeriodicGrid>,
     pub facets: &'a Keyed<Facets>,
     pub settings: &'a InterreflectionSettings,
 }
@@ -48,7 +109,8 @@ impl Stage for CastTransport<'_> {
     }
 
     fn run(&self, env: &Env) -> Result<Transport> {
-        Transport::new(&self.tile.mesh, self.facets, self.settings.elements, self.settings.rays, &env.cancel)
+        let surface = (&self.tile.mesh, self.grid.clone());
+        Transport::new(surface, self.facets, self.settings.elements, self.settings.rays, &env.cancel)
     }
 }
 
@@ -58,10 +120,7 @@ pub struct Interreflect<'a> {
     pub facets: &'a Keyed<Facets>,
     pub visibility: &'a Keyed<Visibility>,
     pub transport: &'a Keyed<Transport>,
-    /// The key of the materials and their slots.
-    pub assignment: Key,
-    pub material_of_slot: &'a [usize],
-    pub materials: &'a [Material],
+    pub reflection: &'a Reflection<'a>,
     pub settings: &'a InterreflectionSettings,
 }
 
@@ -71,17 +130,18 @@ impl Stage for Interreflect<'_> {
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.key("transport", &self.transport.key).key("visibility", &self.visibility.key);
-        key.key("materials", &self.assignment).counts("material of slot", self.material_of_slot.iter().copied());
+        self.reflection.hash_into(key);
         key.debug("settings", self.settings);
     }
 
     fn run(&self, env: &Env) -> Result<InterreflectionTable> {
+        let Reflection { material_of_slot, materials, samplers, .. } = *self.reflection;
         gather(
             &self.tile.mesh,
             self.facets,
             &self.visibility.value,
             &self.transport.value,
-            (self.material_of_slot, self.materials),
+            (material_of_slot, materials, samplers),
             self.settings,
             &env.cancel,
         )

@@ -10,7 +10,9 @@ mod visibility;
 
 pub(super) use color_map::{ColorFacets, ColorTile, MeasureHeights, MeasureRelief, SampleDrivers};
 pub(super) use factors::{Factorize, LookUpVisibility, TabulateFactors, TabulateForCheck};
-pub(super) use interreflection::{CastTransport, FindMirrorPlanes, Interreflect};
+pub(super) use interreflection::{
+    CastTransport, FindMirrorPlanes, Interreflect, MeasureBouncedShare, PrepareSamplers, Reflection,
+};
 pub(super) use paper::PaperTables;
 pub(super) use slab::{BuildFace, CorrelateFaces, FaceNormals, ReadSvbtdf, TraceInner};
 pub(super) use tile::{BuildTile, FacetsRole, LoadMaterials, SampleFacets, TileShape};

@@ -102,7 +102,7 @@ impl Stage for EstimateScanWork<'_> {
     }
 }
 
-/// Builds the grid of cells with which the GPU cuts the mesh.
+/// Builds the grid of cells in which rays find the triangles of the tile, and with which the GPU cuts the mesh.
 pub struct BuildCells<'a> {
     pub tile: &'a Keyed<TileShape>,
 }
@@ -112,7 +112,7 @@ impl Stage for BuildCells<'_> {
     const NAME: &'static str = "cells";
 
     fn hash_into(&self, key: &mut KeyBuilder) {
-        key.key("tile", &self.tile.key);
+        key.key("surface", &self.tile.surface);
     }
 
     fn run(&self, _: &Env) -> Result<PeriodicGrid> {

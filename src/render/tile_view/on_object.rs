@@ -85,8 +85,15 @@ impl TileScene {
                     light.direction.dot(z) > 0.0
                         && visibility.as_ref().is_none_or(|visibility| visibility.is_lit(point, *k))
                 });
-                let radiance = visible_lights
-                    .map(|(_, light)| self.reflected(&hit, local(light.direction), o, materials) * light.irradiance)
+                let (directions, irradiances): (Vec<Vec3>, Vec<Vec3>) =
+                    visible_lights.map(|(_, light)| (local(light.direction), light.irradiance)).unzip();
+                // Light that facets send to each other is soft: it has its mean over the tile everywhere.
+                let mut bounced = vec![Vec3::ZERO; directions.len()];
+                input.reflectance.eval_bounced(&directions, o, &mut bounced);
+                let radiance = directions
+                    .iter()
+                    .zip(bounced.iter().zip(&irradiances))
+                    .map(|(i, (bounced, irradiance))| (self.reflected(&hit, *i, o, materials) + *bounced) * *irradiance)
                     .sum();
                 (weight, radiance)
             })

@@ -50,7 +50,8 @@ fn every_ray_meets_a_surface_that_closes_the_plane() {
 fn the_mean_over_a_tile_is_the_radiance_of_the_effective_brdf() {
     let source = "[tile]\ngeometry = { kind = \"grooves\", profile = \"v\", count = 2, depth = 0.15 }\n\
         [[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.35, f0 = [0.9, 0.5, 0.2] }\n\
-        [quality]\nbackend = \"cpu\"\nmethod = \"direct\"\npenumbra_deg = 0.1\n";
+        [quality]\nbackend = \"cpu\"\nmethod = \"direct\"\npenumbra_deg = 0.1\n\
+        [effects]\ninterreflection = \"off\"\n";
     let loaded = scene::LoadedScene {
         scene: scene::parse(source).unwrap(),
         base_dir: "".into(),

@@ -106,7 +106,11 @@ fn an_effect_can_be_forced_on_and_off_and_the_plan_shows_it() {
         let plan = folder.json(&[&["plan", "grooves.toml", "--json", "--quiet"], extra].concat());
         plan["effects"].as_array().unwrap().iter().find(|e| e["name"] == name).unwrap().clone()
     };
-    assert_eq!(effect(&[], "interreflection")["on"], false);
+    let off = effect(&["--quality", "standard", "--effect", "interreflection=off"], "interreflection");
+    assert!(off["on"] == false && off["left_out"]["share"].as_f64().unwrap() > 0.04, "{off}");
+    let auto = effect(&["--quality", "standard"], "interreflection");
+    assert!(auto["on"] == true && auto["forced"] == false && auto["reason"].as_str().unwrap().contains('±'), "{auto}");
+    assert_eq!(effect(&["--quality", "wu2011"], "interreflection")["on"], false);
     let on = effect(&["--effect", "interreflection=on"], "interreflection");
     assert!(on["on"] == true && on["forced"] == true && on["measured_ms"].as_f64().unwrap() > 0.0, "{on}");
     assert_eq!(effect(&["--effect", "visibility=off"], "visibility")["on"], false);
@@ -115,7 +119,8 @@ fn an_effect_can_be_forced_on_and_off_and_the_plan_shows_it() {
         let text = folder.text(&[&["eval", "grooves.toml", "--pairs", "pairs.csv", "-o", "-"], extra].concat());
         rows(&text).iter().map(|row| row[4]).sum()
     };
-    assert!(sum(&["--effect", "interreflection=on"]) > 1.01 * sum(&[]), "interreflection adds light");
+    let [on, off] = ["on", "off"].map(|state| sum(&["--effect", &format!("interreflection={state}")]));
+    assert!(on > 1.01 * off, "interreflection adds light");
     let measured = folder.json(&["plan", "grooves.toml", "--json", "--quiet", "--measure", "--quality", "draft"]);
     let costs = measured["measured"].as_array().unwrap();
     let cost = costs.iter().find(|cost| cost["name"] == "interreflection").unwrap();

@@ -76,7 +76,7 @@ impl TileScene {
         let pixels = TilePixels::of(input, self.mesh.size.as_dvec2())?;
         pixels.replace(image, input, cancel, |point, pixel, lights, o, values| {
             let mut random = ChaCha8Rng::seed_from_u64(seed << 32 | point as u64);
-            values.fill(Vec3::ZERO);
+            input.reflectance.eval_bounced(lights, o, values);
             let along = o.truncate().as_dvec2().normalize_or(DVec2::X);
             let stride = lights.len().div_ceil(LIGHTS_PER_RAY);
             let weight = stride as f32 / rays.max(1) as f32;

@@ -1,0 +1,130 @@
+//! The share of bounced light that decides on interreflection, beside that of the full result, and what both take.
+
+use std::time::Instant;
+
+use biscale::effective::EffectiveBrdf;
+use biscale::math::directions::PolarGrid;
+use biscale::pipeline::{Outcome, Pipeline};
+use biscale::scene::{self, LoadedScene, Switch};
+use rayon::prelude::*;
+
+/// Stages that decide whether interreflection is computed, and those that compute it.
+const DECISION: [&str; 3] = ["lobe_samplers", "cells", "bounced_share"];
+const LIGHT: [&str; 3] = ["mirrors", "transport", "interreflection"];
+/// Edits per scene, whose median counts.
+const EDITS: u64 = 5;
+
+/// What one scene takes: the medians of edits of the geometry [ms].
+struct Times {
+    without: f64,
+    decision: f64,
+    light: f64,
+}
+
+/// Prints a row for each shipped scene that reflects, or for those whose name contains `part`.
+///
+/// # Errors
+/// A scene cannot be used.
+pub fn bounced_share(part: Option<&str>, print: &mut dyn FnMut(String)) -> Result<(), String> {
+    print("| scene | share | full result | `standard` | edit without | decision | interreflection |".to_owned());
+    print("|---|---|---|---|---|---|---|".to_owned());
+    let (mut ratios, mut costs) = (Vec::new(), Vec::new());
+    for name in scene::names().filter(|name| part.is_none_or(|part| name.contains(part))) {
+        let loaded = scene::open(name, &[]).map_err(|error| error.to_string())?;
+        if loaded.scene.slab.is_some() {
+            continue;
+        }
+        let [off, on] = [Switch::Off, Switch::On].map(|switch| at(&loaded, switch));
+        let (off, on) = (outcome(&off)?, outcome(&on)?);
+        let Some(told) = off.plan.bounced else {
+            print(format!("| `{name}` | not measured | {:.1} % | off | | | |", 100.0 * share(&off, &on)));
+            continue;
+        };
+        let full = share(&off, &on);
+        let auto = outcome(&at(&loaded, Switch::Auto))?;
+        let times = times(&at(&loaded, Switch::On), &at(&loaded, Switch::Auto))?;
+        let is_on = auto.plan.interreflection;
+        ratios.push((told.share / full).max(full / told.share));
+        if is_on {
+            costs.push((times.decision + times.light) / times.without);
+        }
+        print(format!(
+            "| `{name}` | {:.1} ± {:.1} % | {:.1} % | {} | {:.1} ms | {:.2} ms | {:.1} ms |",
+            100.0 * told.share,
+            100.0 * told.std_error,
+            100.0 * full,
+            if is_on { "on" } else { "off" },
+            times.without,
+            times.decision,
+            times.light
+        ));
+    }
+    ratios.sort_by(f64::total_cmp);
+    costs.sort_by(f64::total_cmp);
+    if let (Some(worst), [.., most]) = (ratios.last(), &costs[..]) {
+        let median = costs[costs.len() / 2];
+        print(String::new());
+        print(format!(
+            "The share and that of the full result differ by a factor of at most {worst:.2}. Where it is on,"
+        ));
+        print(format!(
+            "interreflection takes {median:.2} times the rest of an edit in the median, and {most:.2} times at most."
+        ));
+    }
+    Ok(())
+}
+
+fn at(loaded: &LoadedScene, switch: Switch) -> LoadedScene {
+    let mut scene = loaded.clone();
+    scene.scene.quality.preset = "standard".to_owned();
+    scene.scene.quality.backend = "cpu".to_owned();
+    scene.scene.effects.interreflection = switch;
+    scene
+}
+
+fn outcome(loaded: &LoadedScene) -> Result<Outcome, String> {
+    Pipeline::new().effective(loaded).map_err(|error| format!("{}: {error}", loaded.name))
+}
+
+/// The part of the light that a tile under a uniform sky reflects only with interreflection.
+fn share(off: &Outcome, on: &Outcome) -> f64 {
+    1.0 - albedo(&off.brdf) / albedo(&on.brdf)
+}
+
+fn albedo(brdf: &EffectiveBrdf) -> f64 {
+    let grid = PolarGrid::new(12, 36);
+    let reflected = |o: usize| {
+        let to = grid.direction(o);
+        let from = |i: usize| brdf.eval(grid.direction(i), to).element_sum() * grid.solid_angle(i);
+        f64::from((0..grid.len()).map(from).sum::<f32>() * to.z * grid.solid_angle(o))
+    };
+    (0..grid.len()).into_par_iter().map(reflected).sum()
+}
+
+/// Times of edits of the geometry. Another seed draws other facets, and the last edit changes the height of the tile.
+fn times(on: &LoadedScene, auto: &LoadedScene) -> Result<Times, String> {
+    let mut all: [Vec<f64>; 3] = Default::default();
+    for edit in 0..EDITS {
+        let edited = |loaded: &LoadedScene| {
+            let mut scene = loaded.clone();
+            scene.scene.tile.size *= 1.0 + 1e-3 * (edit + 1) as f32;
+            scene
+        };
+        let start = Instant::now();
+        let with = outcome(&edited(on))?;
+        let whole = start.elapsed().as_secs_f64() * 1e3;
+        let light = sum(&with, &LIGHT);
+        let decided = outcome(&edited(auto))?;
+        let samples = [whole - light - sum(&with, &DECISION), sum(&decided, &DECISION), light];
+        all.iter_mut().zip(samples).for_each(|(all, ms)| all.push(ms));
+    }
+    let [without, decision, light] = all.map(|mut times| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    });
+    Ok(Times { without, decision, light })
+}
+
+fn sum(outcome: &Outcome, stages: &[&str]) -> f64 {
+    outcome.times.iter().filter(|(name, _)| stages.contains(name)).map(|(_, ms)| ms).sum()
+}

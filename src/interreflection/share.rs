@@ -1,0 +1,117 @@
+//! The part of the reflected light that was reflected more than once, from few random walks.
+
+use glam::{Vec2, Vec3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::sampler::{LobeSampler, from_cosine};
+use crate::base::{Cancel, Result};
+use crate::brdf::Material;
+use crate::geometry::{PeriodicGrid, TileMesh};
+
+/// Number of walks. The standard error is about a tenth of the share.
+const WALKS: usize = 512;
+/// Walks per task.
+const TASK: usize = 32;
+/// Most facets of a walk.
+const MAX_FACETS: usize = 64;
+/// Weight below which a walk is continued at random.
+const MIN_WEIGHT: f32 = 0.25;
+/// Steps of the sequence R4 (Roberts 2018): where a walk enters the tile, and its direction.
+const STEPS: [f64; 4] =
+    [0.856_674_883_854_502_9, 0.733_891_856_627_126, 0.628_706_721_030_403_4, 0.538_597_257_224_286_9];
+
+/// The part of the reflected light, under uniform light and seen from all sides, that two facets or more reflected.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BouncedShare {
+    pub share: f64,
+    /// Standard error of `share`. The walks begin at points of a low-discrepancy sequence, so it is an upper estimate.
+    pub std_error: f64,
+}
+
+/// Traces walks that come from a uniform sky, and sums what leaves the tile after one reflection and after more.
+///
+/// # Errors
+/// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
+pub fn measure(
+    mesh: &TileMesh,
+    grid: &PeriodicGrid,
+    material_of_slot: &[usize],
+    (materials, samplers): (&[Material], &[LobeSampler]),
+    cancel: &Cancel,
+) -> Result<BouncedShare> {
+    let walks = Walks { mesh, grid, material_of_slot, materials, samplers, bottom: mesh.z_range().0 };
+    let weights: Vec<[f64; 2]> =
+        (0..WALKS).into_par_iter().with_min_len(TASK).map(|number| walks.reflected(number)).collect();
+    cancel.check()?;
+    Ok(BouncedShare::of(&weights))
+}
+
+impl BouncedShare {
+    /// The share of the second of two weights, and its standard error by the delta method.
+    fn of(weights: &[[f64; 2]]) -> Self {
+        let count = weights.len() as f64;
+        let [once, bounced] = [0, 1].map(|kind| weights.iter().map(|weight| weight[kind]).sum::<f64>() / count);
+        let all = once + bounced;
+        if all <= 0.0 {
+            return Self { share: 0.0, std_error: 0.0 };
+        }
+        let share = bounced / all;
+        let residuals = weights.iter().map(|[once, bounced]| (bounced - share * (once + bounced)).powi(2));
+        Self { share, std_error: (residuals.sum::<f64>() / (count * (count - 1.0))).sqrt() / all }
+    }
+}
+
+/// Inputs of the walks.
+struct Walks<'a> {
+    mesh: &'a TileMesh,
+    grid: &'a PeriodicGrid,
+    material_of_slot: &'a [usize],
+    materials: &'a [Material],
+    samplers: &'a [LobeSampler],
+    bottom: f32,
+}
+
+impl Walks<'_> {
+    /// The weight with which a walk leaves the tile after one reflection, and after more.
+    fn reflected(&self, number: usize) -> [f64; 2] {
+        let [x, y, u, v] = STEPS.map(|step| (0.5 + number as f64 * step).fract() as f32);
+        let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
+        let start = (Vec2::new(x, y) * self.mesh.size).extend(self.grid.top());
+        let mut direction = -from_cosine(Vec3::Z, u, v);
+        let mut weight = Vec3::ONE;
+        let mut hit = self.grid.nearest(start, direction, self.bottom);
+        for facet in 0..MAX_FACETS {
+            let Some(point) = hit.map(|hit| self.mesh.surface_point(&hit)) else { break };
+            if point.geometric_normal.dot(direction) >= 0.0 || point.normal.dot(direction) >= 0.0 {
+                break;
+            }
+            let index = self.material_of_slot[usize::from(point.slot)];
+            let material = &self.materials[index];
+            let numbers = [rng.random(), rng.random(), rng.random()];
+            let sample = self.samplers[index].sample(&material.brdf, point.normal, -direction, numbers);
+            let Some((next, factor)) = sample.filter(|(next, _)| next.dot(point.geometric_normal) > 0.0) else { break };
+            let color = self.mesh.color.at(point.position, point.normal, self.mesh.size);
+            weight *= factor * material.color * color;
+            let mean = weight.element_sum() / 3.0;
+            let survival = (mean / MIN_WEIGHT).min(1.0);
+            if rng.random::<f32>() >= survival {
+                break;
+            }
+            weight /= survival;
+            direction = next;
+            hit = self.grid.first_hit(point.origin, direction, point.triangle, self.bottom);
+            if hit.is_none() && direction.z > 0.0 {
+                let left = f64::from(mean / survival);
+                return if facet == 0 { [left, 0.0] } else { [0.0, left] };
+            }
+        }
+        [0.0; 2]
+    }
+}
+
+#[cfg(test)]
+#[path = "share_tests.rs"]
+mod tests;
