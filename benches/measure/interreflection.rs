@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use biscale::effective::Representation;
 use biscale::metrics::{Pair, mirror_biased_pairs};
 use biscale::pipeline::{Outcome, Pipeline};
 use biscale::reference::ReferenceSettings;
@@ -10,9 +11,10 @@ use biscale::scene::{LoadedScene, Switch};
 
 use crate::tiles::open;
 
-const BRDFS: [(&str, &str, &str); 5] = [
+const BRDFS: [(&str, &str, &str); 6] = [
     ("matte 0.9", r#"{ kind = "lambertian", albedo = 0.9 }"#, "#2563eb"),
     ("matte 0.99", r#"{ kind = "lambertian", albedo = 0.99 }"#, "#0891b2"),
+    ("GGX 0.1", r#"{ kind = "ggx", roughness = 0.1, f0 = 1 }"#, "#475569"),
     ("GGX 0.2", r#"{ kind = "ggx", roughness = 0.2, f0 = 1 }"#, "#d97706"),
     ("GGX 0.5", r#"{ kind = "ggx", roughness = 0.5, f0 = 1 }"#, "#b91c1c"),
     ("mixture", r#"[{ kind = "lambertian", albedo = 0.4 }, { kind = "ggx", roughness = 0.2, f0 = 0.5 }]"#, "#7c3aed"),
@@ -43,6 +45,8 @@ struct Row {
     std_error: f64,
     share: f64,
     presets: Vec<(f64, f64)>,
+    /// Errors that the results of the presets state.
+    stated: Vec<f64>,
     bounces: Vec<(f64, f64)>,
 }
 
@@ -134,7 +138,11 @@ fn measure(name: String, tile: [&str; 2], color: &'static str, pairs: &[Pair]) -
         let error: f64 = pairs.iter().zip(&truth.values).map(error).sum();
         let stages = on.times.iter().filter(|(stage, _)| ["transport", "interreflection"].contains(stage));
         let total: f64 = pairs.iter().map(|pair| value(&on, pair).powi(2)).sum();
-        ((error / norm).sqrt(), stages.map(|(_, ms)| ms).sum::<f64>(), (norm / total).sqrt())
+        let stated = match &on.brdf.representation {
+            Representation::Interreflecting(_, bounced) => bounced.rel_error,
+            _ => 0.0,
+        };
+        ((error / norm).sqrt(), stages.map(|(_, ms)| ms).sum::<f64>(), (norm / total).sqrt(), stated)
     };
     let runs: Vec<_> = PRESETS.iter().map(|preset| run(preset, ALL)).collect();
     let limited = BOUNCES.iter().map(|bounces| run("standard", *bounces));
@@ -143,14 +151,17 @@ fn measure(name: String, tile: [&str; 2], color: &'static str, pairs: &[Pair]) -
         color,
         std_error: truth.std_error,
         share: runs[1].2,
-        presets: runs.iter().map(|(error, ms, _)| (*error, *ms)).collect(),
-        bounces: limited.map(|(error, ms, _)| (error, ms)).collect(),
+        presets: runs.iter().map(|(error, ms, ..)| (*error, *ms)).collect(),
+        stated: runs.iter().map(|(.., stated)| *stated).collect(),
+        bounces: limited.map(|(error, ms, ..)| (error, ms)).collect(),
     }
 }
 
 impl Row {
     fn text(&self) -> String {
-        let cells = self.presets.iter().map(|(error, ms)| format!("{:.2} %, {ms:.0} ms", 100.0 * error));
+        let presets = self.presets.iter().zip(&self.stated);
+        let cells =
+            presets.map(|((error, ms), stated)| format!("{:.2} ({:.1}) %, {ms:.0} ms", 100.0 * error, 100.0 * stated));
         let limited = self.bounces.iter().map(|(error, _)| format!("{:.1} %", 100.0 * error));
         let cells: Vec<String> = cells.chain(limited).collect();
         let (share, noise) = (100.0 * self.share, 100.0 * self.std_error);

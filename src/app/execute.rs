@@ -64,6 +64,10 @@ impl Editor {
                 let name = format!("{}.png", self.document.name);
                 self.browse(Purpose::ExportImage, &name);
             }
+            Action::Sweep => {
+                let name = format!("{}_sweep.toml", self.document.name);
+                self.browse(Purpose::ExportSweep, &name);
+            }
             Action::Quit => self.leaving = true,
             Action::Undo => {
                 self.document.undo();
@@ -75,6 +79,11 @@ impl Editor {
             }
             Action::CopyMaterial => self.copy_material(ctx, 0),
             Action::PasteMaterial => self.paste_material("default"),
+            Action::CopyPython => {
+                ctx.copy_text(super::python_lines::python_lines(&self.document));
+                let text = "Lines of Python that compute this material are in the clipboard (`pip install biscale`).";
+                self.messages.put(Level::Note, "python", text);
+            }
             Action::Frame => {
                 let mut scene = (**self.document.scene()).clone();
                 object::frame(&mut scene);

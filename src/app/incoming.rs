@@ -2,15 +2,17 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::base::Result;
 use crate::export::tile::TileOptions;
+use crate::metrics::mirror_biased_pairs;
 use crate::scene::{BrdfSpec, Geometry};
 use crate::slab::capture::rig;
 use eframe::egui::Context;
 
 use super::actions::Action;
-use super::dialogs::{Dialog, FileUse, Offer, Purpose};
+use super::dialogs::{Dialog, FileUse, Offer, Purpose, Sweep};
 use super::editor::Editor;
 use super::messages::Level;
 use super::panels::{self, materials, surface};
@@ -110,12 +112,31 @@ impl Editor {
                 }
                 return;
             }
+            Purpose::ExportSweep => {
+                let sweep = Sweep::new(&scene, self.document.base_name(), self.material_ms());
+                self.dialog = Some(Dialog::Sweep { path, sweep });
+                return;
+            }
             Purpose::ExportImage => {
                 self.dialog = Some(Dialog::Image { path, width: 1024, height: 1024 });
                 return;
             }
         }
         self.try_edit(scene);
+    }
+
+    /// Milliseconds of the last refined material without its pairs of directions, and of a pair.
+    fn material_ms(&self) -> [f64; 2] {
+        const OF_IMAGES: [&str; 5] = ["picture table", "g-buffer", "shadows", "shading", "tone"];
+        let stages = self.object.stages.iter().filter(|(name, _)| !OF_IMAGES.contains(name));
+        let Some(brdf) = self.object.preview.as_ref().and_then(|preview| preview.brdf.as_ref()) else {
+            return [stages.map(|(_, ms)| ms).sum(), 0.0];
+        };
+        let pairs = mirror_biased_pairs(64, 1);
+        let start = Instant::now();
+        let sum: f32 = pairs.iter().map(|pair| brdf.eval(pair.i, pair.o).x).sum();
+        std::hint::black_box(sum);
+        [stages.map(|(_, ms)| ms).sum(), start.elapsed().as_secs_f64() * 1e3 / pairs.len() as f64]
     }
 
     /// Removes the colour of a material that became a measured paint, so that the paint looks as measured.

@@ -19,6 +19,8 @@ impl Editor {
                 named_item(ui, Action::Redo, redo.as_deref(), &mut chosen);
                 ui.separator();
                 items(ui, &[Action::CopyMaterial, Action::PasteMaterial], &mut chosen);
+                ui.separator();
+                items(ui, &[Action::CopyPython], &mut chosen);
             });
             ui.menu_button("View", |ui| {
                 items(ui, &[Action::Frame, Action::Exchange, Action::Paint, Action::Gallery], &mut chosen);
@@ -67,7 +69,7 @@ impl Editor {
         ui.separator();
         items(ui, &[Action::Save, Action::SaveAs], chosen);
         ui.separator();
-        items(ui, &[Action::ExportTable, Action::ExportTile, Action::ExportImage], chosen);
+        items(ui, &[Action::ExportTable, Action::ExportTile, Action::ExportImage, Action::Sweep], chosen);
         ui.separator();
         items(ui, &[Action::Quit], chosen);
     }

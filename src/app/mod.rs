@@ -21,6 +21,7 @@ mod paint;
 mod painting;
 mod panels;
 mod pick;
+mod python_lines;
 mod results;
 mod start_times;
 mod status;

@@ -45,6 +45,20 @@ impl Editor {
                 let result = export::tile_ui(ctx, path, options);
                 self.exported(result, path, ExportKind::Tile(options.clone()))
             }
+            Dialog::Sweep { path, sweep } => {
+                let result = sweep.ui(ctx, path);
+                if result == Some(ExportDecision::Export) {
+                    match sweep.write(path) {
+                        Ok(command) => {
+                            let text = format!("The command that makes the data set is in the clipboard: {command}");
+                            ctx.copy_text(command);
+                            self.messages.put(Level::Note, "sweep", text);
+                        }
+                        Err(error) => self.messages.put(Level::Error, "sweep", error.to_string()),
+                    }
+                }
+                result.is_some()
+            }
             Dialog::Image { path, width, height } => {
                 let result = export::image_ui(ctx, path, width, height);
                 self.exported(result, path, ExportKind::Image { size: [*width, *height] })

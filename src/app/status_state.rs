@@ -105,12 +105,13 @@ fn cost_of(effect: &Effect) -> f64 {
 /// Explains a stated error.
 fn error_parts(error: &ErrorEstimate) -> String {
     format!(
-        "The result states an error of about {}: facets {:.2} %, visibility {:.2} %, low-rank factors {:.2} %. Interreflection \
-         is not examined.",
+        "The result states an error of about {}: facets {:.2} %, visibility {:.2} %, low-rank factors {:.2} %, \
+         interreflection {:.2} %.",
         error.describe(),
         100.0 * error.facets,
         100.0 * error.visibility,
-        100.0 * error.table
+        100.0 * error.table,
+        100.0 * error.interreflection
     )
 }
 

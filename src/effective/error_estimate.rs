@@ -6,6 +6,8 @@
 //! of the azimuths shows the order and the error of interpolation between azimuths (Richardson 1911), and a soft step of
 //! half the width that of the soft step.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,6 +15,7 @@ use serde::Serialize;
 use super::{Direct, FacetSum};
 use crate::brdf::Material;
 use crate::geometry::{Facets, REPLICATES};
+use crate::interreflection::InterreflectionTable;
 use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
@@ -72,6 +75,8 @@ pub struct ErrorEstimate {
     pub visibility: f64,
     /// Relative L2 of the low-rank factors against the direct sum.
     pub table: f64,
+    /// Relative L2 of the error of the light that facets send to each other, if it is in the result.
+    pub interreflection: f64,
     /// The part of `visibility` that is due to the number of azimuths.
     #[serde(skip)]
     pub azimuths: f64,
@@ -119,6 +124,8 @@ pub struct ErrorEstimator {
     soft_step_ratio: f64,
     /// Variance of `f̄` relative to what the spread of the replicates would show if they were random samples.
     variance_ratio: f64,
+    /// Light that facets send to each other, and the base area of the tile.
+    bounced: Option<(Arc<InterreflectionTable>, f64)>,
     estimate: ErrorEstimate,
 }
 
@@ -134,6 +141,8 @@ struct Deviations {
     sharper: DVec3,
     /// `f̄` of the second sample less `f̄`.
     second: DVec3,
+    /// The part of light that facets send to each other, which `f_bar` lacks.
+    bounced: DVec3,
 }
 
 impl Deviations {
@@ -254,13 +263,14 @@ impl ErrorEstimator {
     /// Examines a direct sum over `facets`. `second` is the sum over a second sample of the surface, with
     /// [`SECOND_SAMPLE_DIVISOR`] times fewer facets. Without it, facets count as random samples: their error then is too large,
     /// by up to a factor of 6, on surfaces of few large triangles. `table` is the relative L2 of factors that stand for the
-    /// sum, or 0.
+    /// sum, or 0. `bounced` is the light that facets send to each other, and the base area of the tile.
     pub fn new(
         direct: &Direct,
         facets: &Facets,
         (material_of_slot, materials): (&[usize], &[Material]),
         second: Option<&Direct>,
         table: f64,
+        bounced: Option<(Arc<InterreflectionTable>, f64)>,
     ) -> Self {
         let sum_of = |replicate: usize| {
             let of_replicate = |s: &usize| usize::from(facets.replicates[*s]) == replicate;
@@ -276,6 +286,7 @@ impl ErrorEstimator {
             azimuth_ratio: 1.0,
             soft_step_ratio: 1.0,
             variance_ratio: 1.0,
+            bounced,
             estimate,
         };
         estimator.examine(second, table);
@@ -295,14 +306,19 @@ impl ErrorEstimator {
             let soft_step = deviations.sharper * self.soft_step_ratio;
             let visibility = azimuths * azimuths + soft_step * soft_step;
             let table = deviations.f_bar * self.estimate.table;
-            (facets + visibility + table * table).map(f64::sqrt).as_vec3()
+            let bounced = deviations.bounced * self.rel_error_of_bounced();
+            (facets + visibility + table * table + bounced * bounced).map(f64::sqrt).as_vec3()
         };
         pairs.par_iter().map(|pair| of(self.deviations(None, *pair))).collect()
     }
 
+    fn rel_error_of_bounced(&self) -> f64 {
+        self.bounced.as_ref().map_or(0.0, |(bounced, _)| bounced.rel_error)
+    }
+
     fn examine(&mut self, second: Option<&Direct>, table: f64) {
-        let all = PAIRS.evaluate(|pair| self.deviations(second, pair), |at| at.f_bar);
-        let totals = Totals::of(all.iter().map(|at| at.f_bar));
+        let all = PAIRS.evaluate(|pair| self.deviations(second, pair), |at| at.f_bar + at.bounced);
+        let totals = Totals::of(all.iter().map(|at| at.f_bar + at.bounced));
         if totals.norm <= 0.0 {
             return;
         }
@@ -326,9 +342,12 @@ impl ErrorEstimator {
         let azimuths = self.azimuth_ratio * relative(half * half);
         let soft_step = self.soft_step_ratio * relative(sharper * sharper);
         let (facets, visibility) = (relative(variance), azimuths.hypot(soft_step));
-        let rel_l2 = facets.hypot(visibility).hypot(table);
+        let bounced = total(&|at| at.bounced.length_squared());
+        let interreflection = self.rel_error_of_bounced() * relative(bounced);
+        let rel_l2 = facets.hypot(visibility).hypot(table).hypot(interreflection);
         let psnr_db = totals.psnr_db(rel_l2);
-        self.estimate = ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, azimuths, soft_step };
+        self.estimate =
+            ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, interreflection, azimuths, soft_step };
     }
 
     /// The change of `f̄` from the resolution of the result to the first of others, and from each to the next.
@@ -363,6 +382,9 @@ impl ErrorEstimator {
             return deviations;
         }
         deviations.f_bar = parts.iter().map(|part| part.1).sum::<DVec3>() / area;
+        if let Some((bounced, base_area)) = &self.bounced {
+            bounced.eval_lights(&[i], o, |_, g| deviations.bounced = g * (base_area / area));
+        }
         if !self.replicates.is_empty() {
             for (deviation, (part_area, reflected)) in deviations.replicates.iter_mut().zip(&parts) {
                 *deviation = (reflected - deviations.f_bar * part_area) * (REPLICATES as f64 / area);

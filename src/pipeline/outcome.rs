@@ -105,7 +105,6 @@ impl Outcome {
 
     /// Estimates the errors of the result. The first call computes a second sample of the facets with their visibility, in
     /// about half of the time of the result, and examines some hundreds of direction pairs. `None` with the paper's method.
-    /// Interreflection and the sampling of its rays are not examined.
     ///
     /// # Errors
     /// [`crate::base::Error::Cancelled`].
@@ -124,7 +123,11 @@ impl Outcome {
         } else {
             Some(examined.second_sample(&self.settings, &materials.materials, cancel)?)
         };
-        let new = || ErrorEstimator::new(&examined.direct, facets, slots, second.as_ref(), table);
+        let bounced = match &self.brdf.representation {
+            Representation::Interreflecting(_, bounced) => Some((bounced.clone(), self.brdf.base_area)),
+            _ => None,
+        };
+        let new = || ErrorEstimator::new(&examined.direct, facets, slots, second.as_ref(), table, bounced);
         Ok(Some(self.estimator.get_or_init(new)))
     }
 

@@ -41,7 +41,7 @@ impl RefinedSum {
             return;
         }
         let slots = (&material_of_slot[..], &materials.materials[..]);
-        self.estimate = Some(ErrorEstimator::new(&self.direct, facets, slots, None, 0.0).estimate());
+        self.estimate = Some(ErrorEstimator::new(&self.direct, facets, slots, None, 0.0, None).estimate());
     }
 
     /// A sentence about raised settings, if any were raised.

@@ -91,7 +91,7 @@ mod tests {
         let visibility = azimuths.hypot(soft_step);
         let rel_l2 = facets.hypot(visibility);
         let psnr_db = Some(40.0);
-        ErrorEstimate { rel_l2, psnr_db, facets, visibility, table: 0.0, azimuths, soft_step }
+        ErrorEstimate { rel_l2, psnr_db, facets, visibility, azimuths, soft_step, ..ErrorEstimate::default() }
     }
 
     #[test]

@@ -2,8 +2,11 @@
 //! systematic sample of the facets, whose density is proportional to what the facets reflect and to their openness.
 
 use glam::{DVec3, Vec3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::paths::Paths;
 use super::ray_cast::{Estimate, Reference, ReferenceSettings, in_passes};
 use crate::geometry::facets::openness::Openness;
 use crate::geometry::{FacetSampler, Facets, lifted_origins};
@@ -21,20 +24,17 @@ struct Pass<'r> {
     openness: Vec<f64>,
     /// The visible projected area is known, so that no rays measure it.
     is_closed: bool,
+    paths: Option<Paths<'r>>,
 }
 
 impl Reference<'_> {
-    /// Estimates `f̄` at each pair as [`Reference::estimate`] does, with far fewer rays. Reflections between facets are
-    /// not sampled by brightness, so with bounces it is the same.
+    /// Estimates `f̄` at each pair as [`Reference::estimate`] does, with far fewer rays and walks.
     pub fn estimate_few_pairs(
         &self,
         pairs: &[Pair],
         settings: &ReferenceSettings,
         progress: impl FnMut(usize, f64) -> bool,
     ) -> Vec<Estimate> {
-        if self.bounces > 0 {
-            return self.estimate(pairs, settings, progress);
-        }
         let sampler = FacetSampler::new(self.mesh);
         let openness = Openness::measure(&sampler, self.mesh);
         let is_closed = self.mesh.closes_plane && self.mesh.corner_normals.is_none();
@@ -42,7 +42,7 @@ impl Reference<'_> {
             let facets = sampler.sample(self.mesh, settings.facets, shift);
             let origins = lifted_origins(&facets, self.mesh.size);
             let openness = (0..facets.len()).map(|s| openness.of(&facets, s)).collect();
-            let pass = Pass { reference: self, facets, origins, openness, is_closed };
+            let pass = Pass { reference: self, facets, origins, openness, is_closed, paths: self.paths() };
             moments.par_iter_mut().zip(pairs).enumerate().for_each(|(at, (moments, pair))| {
                 let start = fraction(settings.seed ^ number << 20 ^ (at as u64) << 40);
                 let (s, a) = pass.sums(*pair, start);
@@ -67,12 +67,21 @@ impl Pass<'_> {
                 sum += weight * reflected[s].as_dvec3();
             }
         });
+        let projected = |s: usize| f64::from(areas[s] * normals[s].dot(o).max(0.0));
+        let seen = (0..self.facets.len()).map(|s| projected(s) * self.openness[s]);
+        if let Some(paths) = &self.paths {
+            let mut rng = ChaCha8Rng::seed_from_u64(start.to_bits());
+            sample(seen.clone(), start, |s, weight| {
+                if self.is_visible(s, o) {
+                    sum += weight * paths.from_facet(&self.facets, self.origins[s], s, Pair { i, o }, &mut rng);
+                }
+            });
+        }
         if self.is_closed {
             return (sum, f64::from(self.reference.mesh.base_area() * o.z));
         }
-        let projected = |s: usize| f64::from(areas[s] * normals[s].dot(o).max(0.0));
         let mut area = 0.0;
-        sample((0..self.facets.len()).map(|s| projected(s) * self.openness[s]), start, |s, weight| {
+        sample(seen, start, |s, weight| {
             if self.is_visible(s, o) {
                 area += weight * projected(s);
             }

@@ -12,6 +12,8 @@ use crate::metrics::Pair;
 
 /// Smallest cosine in a denominator.
 const MIN_COSINE: f32 = 1e-4;
+/// Most walks per pair and pass, which take about as long as the rays of direct reflection.
+const MAX_WALKS: usize = 2048;
 
 /// Traces the paths of one set of facets.
 #[derive(Debug)]
@@ -48,31 +50,32 @@ impl<'a> Paths<'a> {
     }
 
     /// `Σ ΔA L (n·o)` over the facets that are visible from the viewer (`v_o`). `L` is the radiance after one bounce or
-    /// more under unit irradiance.
+    /// more under unit irradiance. Walks start from every n-th of many facets.
     pub fn trace(&self, facets: &Facets, origins: &[Vec3], v_o: &[f32], pair: Pair, seed: u64) -> DVec3 {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut total = DVec3::ZERO;
         if pair.i.z <= 0.0 || pair.o.z <= 0.0 {
-            return total;
+            return DVec3::ZERO;
         }
-        for s in 0..facets.len() {
-            if v_o[s] <= 0.0 {
-                continue;
-            }
-            let material = self.material_of_slot[usize::from(facets.slots[s])];
-            let start = Vertex {
-                origin: origins[s],
-                geometric: facets.geometric_normals[s],
-                normal: facets.normals[s],
-                triangle: facets.triangles[s],
-                material,
-                color: facets.colors[s] * self.materials[material].color,
-            };
-            // The cosine between the first vertex and the viewer is a factor of the sum.
-            let cosine = facets.normals[s].dot(pair.o).max(0.0);
-            total += (self.walk(start, pair, &mut rng) * (facets.areas[s] * cosine)).as_dvec3();
-        }
-        total
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let stride = facets.len().div_ceil(MAX_WALKS).max(1);
+        let starts = (rng.random_range(0..stride)..facets.len()).step_by(stride).filter(|s| v_o[*s] > 0.0);
+        let sum: DVec3 = starts.map(|s| self.from_facet(facets, origins[s], s, pair, &mut rng)).sum();
+        sum * stride as f64
+    }
+
+    /// `ΔA L (n·o)` of a facet by one walk.
+    pub fn from_facet(&self, facets: &Facets, origin: Vec3, s: usize, pair: Pair, rng: &mut ChaCha8Rng) -> DVec3 {
+        let material = self.material_of_slot[usize::from(facets.slots[s])];
+        let start = Vertex {
+            origin,
+            geometric: facets.geometric_normals[s],
+            normal: facets.normals[s],
+            triangle: facets.triangles[s],
+            material,
+            color: facets.colors[s] * self.materials[material].color,
+        };
+        // The cosine between the first vertex and the viewer is a factor of the sum.
+        let cosine = facets.normals[s].dot(pair.o).max(0.0);
+        (self.walk(start, pair, rng) * (facets.areas[s] * cosine)).as_dvec3()
     }
 
     /// Radiance towards the viewer due to light that other facets reflected first.

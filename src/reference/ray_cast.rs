@@ -159,9 +159,7 @@ impl<'a> Reference<'a> {
             facets.sort_for_sums();
             let sum = FacetSum::new(&facets, &self.material_of_slot, &self.materials);
             let origins = lifted_origins(&facets, self.mesh.size);
-            let materials = (&self.materials[..], &self.samplers[..]);
-            let paths = (self.bounces > 0)
-                .then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, materials, self.bounces));
+            let paths = self.paths();
             all_moments.par_iter_mut().zip(pairs).enumerate().for_each_init(
                 || (vec![0.0_f32; facets.len()], vec![0.0_f32; facets.len()]),
                 |(v_i, v_o), (at, (moments, pair))| {
@@ -177,6 +175,12 @@ impl<'a> Reference<'a> {
                 },
             );
         })
+    }
+
+    /// The tracer of light that facets send to each other, if it is followed.
+    pub(super) fn paths(&self) -> Option<Paths<'_>> {
+        let materials = (&self.materials[..], &self.samplers[..]);
+        (self.bounces > 0).then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, materials, self.bounces))
     }
 
     /// Computes `(Σ ΔA V V f, a_v)` over one set of facets.

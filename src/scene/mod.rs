@@ -3,6 +3,7 @@
 //!
 //! [`open`] reads a file or a shipped name; the catalogue ([`Field`]) lists every key with its range and meaning.
 
+mod assignments;
 mod background;
 mod check;
 mod color;
@@ -36,6 +37,7 @@ use std::sync::LazyLock;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+pub use assignments::assignments;
 pub use background::{Background, Checkerboard, ImagePlane};
 pub use color_map::{
     Blend, ColorLayer, ColorMap, Combine, Driver, DriverSum, GaussianSurface, Gaussianize, GradientStop,

@@ -15,7 +15,7 @@ pub enum ExportDecision {
     Cancel,
 }
 
-fn footer(ui: &mut Ui, valid: bool, decision: &mut Option<ExportDecision>) {
+pub(super) fn footer(ui: &mut Ui, valid: bool, decision: &mut Option<ExportDecision>) {
     ui.add_space(8.0);
     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
         let export = ui.add_enabled(valid, egui::Button::new("Export"));

@@ -32,6 +32,7 @@ pub enum Purpose {
     ExportTable,
     ExportTile,
     ExportImage,
+    ExportSweep,
 }
 
 impl Purpose {
@@ -58,12 +59,17 @@ impl Purpose {
             Self::ExportTable => "Export the material",
             Self::ExportTile => "Export the tile",
             Self::ExportImage => "Export the image",
+            Self::ExportSweep => "Save the specification of a sweep",
         }
     }
 
     pub fn endings(&self) -> &'static [&'static str] {
         match self {
-            Self::OpenScene | Self::SaveScene | Self::Capture | Self::Slab(SlabFile::Tile { .. }) => &["toml"],
+            Self::OpenScene
+            | Self::SaveScene
+            | Self::Capture
+            | Self::ExportSweep
+            | Self::Slab(SlabFile::Tile { .. }) => &["toml"],
             Self::Slab(SlabFile::Table { .. }) => &["csv"],
             Self::Slab(SlabFile::Svbtdf) => &["npz"],
             Self::Slab(SlabFile::Background) => &["png", "jpg", "jpeg", "hdr", "exr"],
@@ -79,7 +85,7 @@ impl Purpose {
     }
 
     pub fn saves(&self) -> bool {
-        let exports = matches!(self, Self::ExportTable | Self::ExportTile | Self::ExportImage);
+        let exports = matches!(self, Self::ExportTable | Self::ExportTile | Self::ExportImage | Self::ExportSweep);
         exports || matches!(self, Self::SaveScene | Self::SavePaint(_))
     }
 }

@@ -5,6 +5,7 @@ mod files;
 mod formats;
 mod help;
 mod offer;
+mod sweep;
 
 use std::path::PathBuf;
 
@@ -14,6 +15,7 @@ use eframe::egui::{self, Context};
 pub use files::{FileDialog, Purpose};
 pub use help::help_ui;
 pub use offer::{FileUse, Offer};
+pub use sweep::Sweep;
 
 use super::actions::Action;
 use super::document::RecoveredDocument;
@@ -47,6 +49,10 @@ pub enum Dialog {
     Tile {
         path: PathBuf,
         options: TileOptions,
+    },
+    Sweep {
+        path: PathBuf,
+        sweep: Sweep,
     },
     Image {
         path: PathBuf,

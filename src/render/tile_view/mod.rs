@@ -149,7 +149,6 @@ impl TileScene {
         if width == 0 || height == 0 || width.saturating_mul(height) > 1 << 25 {
             return Err(Error::failed(format!("an image of {width} x {height} pixels is empty or too large")));
         }
-        let palette = shade::Palette::new(materials);
         let mut pixels = vec![background; width * height];
         pixels.par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
             if cancel.is_set() {
@@ -158,7 +157,7 @@ impl TileScene {
             for (column, pixel) in pixels.iter_mut().enumerate() {
                 let at = Vec2::new(column as f32 + 0.5, row as f32 + 0.5);
                 if let Some(hit) = self.hit(view, at) {
-                    *pixel = self.shade(&hit, view.axes()[0], shading, &palette);
+                    *pixel = self.shade(&hit, view.axes()[0], shading, &materials);
                 }
             }
         });

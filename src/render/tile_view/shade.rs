@@ -5,38 +5,17 @@ use glam::Vec3;
 use super::{ShadedMaterials, TileScene, TileShading};
 use crate::brdf::Material;
 use crate::geometry::Hit;
-use crate::math::directions::{from_angles, half_vector};
+use crate::math::directions::half_vector;
 
 /// Height of the start of a ray above the surface, as a fraction of the tile's size.
 const LIFT: f32 = 1e-4;
 
-/// Materials with their colours in clay shading.
-pub(super) struct Palette<'a> {
-    materials: ShadedMaterials<'a>,
-    clay: Vec<Vec3>,
-}
+/// Reflectance of clay.
+const CLAY: f32 = 0.5;
 
-impl<'a> Palette<'a> {
-    pub(super) fn new(materials: ShadedMaterials<'a>) -> Self {
-        Self { materials, clay: materials.materials.iter().map(clay_of).collect() }
-    }
-
-    fn material(&self, slot: u16) -> Option<(usize, &'a Material)> {
-        let index = *self.materials.material_of_slot.get(usize::from(slot))?;
-        Some((index, self.materials.materials.get(index)?))
-    }
-}
-
-/// Returns the diffuse clay colour of a material: the hue that it reflects at moderate angles, at a fixed brightness.
-fn clay_of(material: &Material) -> Vec3 {
-    let i = from_angles(0.6, 0.0);
-    let views = [(0.6, std::f32::consts::PI), (0.3, 0.5), (0.9, 2.0)];
-    let sum: Vec3 =
-        views.iter().map(|&(theta, phi)| material.brdf.f_r(Vec3::Z, i, from_angles(theta, phi)).min(Vec3::ONE)).sum();
-    let hue = sum / sum.max_element().max(1e-6);
-    let color = hue * material.color;
-    // Dark materials stay dark; bright ones are limited.
-    color * (0.62 / color.max_element().max(0.62))
+/// The material of a slot.
+fn material_of<'a>(materials: &ShadedMaterials<'a>, slot: u16) -> Option<&'a Material> {
+    materials.materials.get(*materials.material_of_slot.get(usize::from(slot))?)
 }
 
 impl TileScene {
@@ -59,15 +38,21 @@ impl TileScene {
         to.z > 0.0 && geometric.dot(to) > 0.0 && !self.grid.is_blocked(origin, to, hit.triangle)
     }
 
-    pub(super) fn shade(&self, hit: &Hit, to_viewer: Vec3, shading: &TileShading, palette: &Palette) -> Vec3 {
+    pub(super) fn shade(
+        &self,
+        hit: &Hit,
+        to_viewer: Vec3,
+        shading: &TileShading,
+        materials: &ShadedMaterials<'_>,
+    ) -> Vec3 {
         let (normal, geometric) = self.normals(hit, to_viewer);
         let weight = self.mesh.color.at(hit.position, normal, self.mesh.size);
         let slot = self.mesh.slot_at(hit.triangle as usize, hit.position.truncate());
-        let clay = palette.material(slot).map_or(Vec3::splat(0.5), |(index, _)| palette.clay[index]) * weight;
+        let material = || material_of(materials, slot);
         match shading {
-            TileShading::Clay => clay * self.clay_irradiance(hit, normal, geometric),
+            TileShading::Clay => Vec3::splat(CLAY * self.clay_irradiance(hit, normal, geometric)),
             TileShading::Materials(lights) => {
-                let Some((_, material)) = palette.material(slot) else { return Vec3::ZERO };
+                let Some(material) = material() else { return Vec3::ZERO };
                 let shade = |light: &crate::render::DirectionalLight| {
                     let i = light.direction;
                     if normal.dot(i) <= 0.0 || !self.is_visible(hit, geometric, i) {
@@ -81,7 +66,7 @@ impl TileScene {
             }
             TileShading::Contribution { i, o, scale } => {
                 let grey = Vec3::splat(0.05 + 0.1 * normal.z.max(0.0));
-                let Some((_, material)) = palette.material(slot) else { return grey };
+                let Some(material) = material() else { return grey };
                 if normal.dot(*i) <= 0.0 || normal.dot(*o) <= 0.0 {
                     return grey;
                 }
