@@ -29,7 +29,7 @@ pub fn bounced_share(part: Option<&str>, print: &mut dyn FnMut(String)) -> Resul
     print("| scene | share | full result | `standard` | edit without | decision | interreflection |".to_owned());
     print("|---|---|---|---|---|---|---|".to_owned());
     let (mut ratios, mut costs) = (Vec::new(), Vec::new());
-    for name in scene::names().filter(|name| part.is_none_or(|part| name.contains(part))) {
+    for name in scene::shipped::names().filter(|name| part.is_none_or(|part| name.contains(part))) {
         let loaded = scene::open(name, &[]).map_err(|error| error.to_string())?;
         if loaded.scene.slab.is_some() {
             continue;

@@ -11,8 +11,8 @@ use crate::base::{Cancel, Result};
 use crate::brdf::Material;
 use crate::geometry::{PeriodicGrid, TileMesh};
 
-/// Number of walks. The standard error is about a tenth of the share.
-const WALKS: usize = 512;
+/// Number of walks. The standard error is some tenths of a small share, and a tenth of a large one.
+const WALKS: usize = 1024;
 /// Walks per task.
 const TASK: usize = 32;
 /// Most facets of a walk.

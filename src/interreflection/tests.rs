@@ -285,7 +285,7 @@ fn stages_of_interreflection_run_only_if_it_is_on_and_facets_see_each_other() {
     };
     assert_eq!(runs(DEEP, ""), [1, 1, 1, 1]);
     assert_eq!(runs(DEEP, "interreflection = \"off\""), [1, 0, 0, 1]);
-    assert_eq!(runs(DEEP, "interreflection = \"on\""), [0, 1, 1, 1]);
+    assert_eq!(runs(DEEP, "interreflection = \"on\""), [1, 1, 1, 1]);
     assert_eq!(runs(r#"{ kind = "flat" }"#, "interreflection = \"on\""), [0, 0, 0, 0]);
 }
 

@@ -58,7 +58,7 @@ use crate::cache::{Cache, Key, KeyBuilder};
 use crate::diagnostics::{Health, HealthInputs, VisibilityInput};
 use crate::effective::{Direct, EffectiveBrdf, Representation};
 use crate::geometry::{Facets, TileMesh};
-use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
+use crate::interreflection::{BouncedShare, InterreflectionSettings, InterreflectionTable};
 use crate::metrics::Errors;
 use crate::plan::{Preset, ProductMethod, Refinement, Settings, VisibilityAlgorithm};
 use crate::scene::{LoadedScene, Scene};
@@ -275,7 +275,12 @@ impl Pipeline {
                 assignment: &materials,
                 material_of_slot: &material_of_slot,
             };
-            brdf = brdf.interreflecting(self.interreflection(&surface, &settings, plan.mirrors, &mut times)?);
+            brdf = brdf.interreflecting(self.interreflection(
+                &surface,
+                &settings,
+                (plan.mirrors, plan.bounced),
+                &mut times,
+            )?);
         }
         plan.note_times(&times);
         if let Some(errors) = factored {
@@ -343,11 +348,11 @@ impl Pipeline {
         &self,
         surface: &VisibleSurface<'_>,
         settings: &Settings,
-        mirrors: [bool; 2],
+        (mirrors, bounced): ([bool; 2], Option<BouncedShare>),
         times: &mut StageTimes,
     ) -> Result<Arc<InterreflectionTable>> {
         let VisibleSurface { tile, facets, visibility, assignment, material_of_slot } = *surface;
-        let settings = &InterreflectionSettings { mirrors, ..settings.interreflection() };
+        let settings = &InterreflectionSettings { mirrors, ..settings.interreflection(bounced) };
         let materials = &assignment.materials[..];
         let samplers = &self.get(PrepareSamplers { materials }, times)?;
         let grid = &self.get(BuildCells { tile }, times)?.value;

@@ -17,17 +17,16 @@ impl SceneFeatures {
         if self.flat { 0.0 } else { (1.0 - 1.0 / self.area_ratio.max(1.0)).clamp(0.0, 1.0) }
     }
 
-    /// Returns true if the share of bounced light must be measured to decide. It is not if facets see too little of
-    /// each other to reach half of the tolerance. If interreflection is forced off, the share tells what is missing,
-    /// except in drafts, which previews are.
+    /// Returns true if the share of bounced light must be measured: it decides whether interreflection is computed and with
+    /// how many rays, and tells what is missing. It is not measured if facets see too little of each other to reach half of
+    /// the tolerance, nor for drafts that are forced to leave the light out, which previews are.
     pub fn needs_bounced_share(&self, settings: &Settings) -> bool {
-        let decides_or_tells = match settings.effects.interreflection {
-            Switch::On => false,
-            Switch::Auto => settings.preset != Preset::Reference,
+        let is_used = match settings.effects.interreflection {
+            Switch::On | Switch::Auto => settings.preset != Preset::Reference,
             Switch::Off => settings.preset != Preset::Draft,
         };
         let is_small = self.closes_plane && 1.0 - 1.0 / self.facets_of_walk() < 0.5 * settings.bounced_tolerance();
-        self.can_interreflect(settings) && decides_or_tells && !is_small
+        self.can_interreflect(settings) && is_used && !is_small
     }
 
     /// Returns true if interreflection is computed.
@@ -53,7 +52,7 @@ impl SceneFeatures {
 
     /// Predicted milliseconds of interreflection.
     fn interreflection_ms(&self, settings: &Settings, costs: &Costs) -> f64 {
-        let exchange = settings.interreflection();
+        let exchange = settings.interreflection(self.bounced);
         let rays = (exchange.elements * exchange.rays) as f64;
         let (walks, nodes) = (rays * self.hidden_directions(), exchange.grid.len() as f64);
         let halves = self.mirrors.unwrap_or_default().map(|plane| if plane { 2.0 } else { 1.0 });
@@ -68,7 +67,7 @@ pub(super) fn decide(context: &Context<'_>, switch: Switch) -> Decision {
     let Context { features, settings, costs, interreflection: on, .. } = *context;
     let tolerance = settings.bounced_tolerance();
     let ms = features.interreflection_ms(settings, costs);
-    let exchange = settings.interreflection();
+    let exchange = settings.interreflection(features.bounced);
     let means =
         format!("up to {} bounces from {} rays of {} facets", exchange.bounces, exchange.rays, exchange.elements);
     let measured = features.bounced.map(|bounced| {

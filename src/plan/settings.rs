@@ -1,7 +1,7 @@
 //! Presets and settings: the accuracy of every computation, as typed values.
 
 use crate::effective::{BasisGrid, ErrorBound, Interpolation, LowRankSettings};
-use crate::interreflection::InterreflectionSettings;
+use crate::interreflection::{BouncedShare, InterreflectionSettings};
 use crate::math::directions::{HalfDifferenceGrid, HemispherePairGrid, PolarGrid};
 use crate::scene::{Effects, Quality, Scene};
 
@@ -303,14 +303,19 @@ impl Settings {
         }
     }
 
-    /// The resolution of interreflection.
-    pub fn interreflection(&self) -> InterreflectionSettings {
+    /// The resolution of interreflection. Where it is a small share of the light, fewer elements have the same error in f̄:
+    /// their noise falls with the root of their number.
+    pub fn interreflection(&self, bounced: Option<BouncedShare>) -> InterreflectionSettings {
+        /// Share from which all elements are used, and the smallest part of them.
+        const FULL_SHARE: f64 = 0.25;
+        const LEAST_PART: f64 = 1.0 / 6.0;
         let (elements, rays, grid) = match self.preset {
             Preset::Draft => (2048, 6, PolarGrid::new(8, 24)),
             Preset::Standard | Preset::Wu2011 => (6144, 6, PolarGrid::new(12, 36)),
             Preset::Fine | Preset::Reference => (16_384, 12, PolarGrid::new(16, 48)),
         };
-        let elements = elements.min(self.facets);
+        let part = bounced.map_or(1.0, |bounced| (bounced.share / FULL_SHARE).powi(2).clamp(LEAST_PART, 1.0));
+        let elements = ((elements as f64 * part) as usize).min(self.facets);
         InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
     }
 

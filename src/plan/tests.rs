@@ -213,13 +213,22 @@ fn light_is_left_out_only_if_asked_and_then_the_plan_tells_how_much() {
 }
 
 #[test]
+fn a_small_share_is_computed_with_fewer_elements_and_without_a_share_all_are_used() {
+    let settings = Settings::of_preset(Preset::Standard);
+    let elements = |share: f64| settings.interreflection(Some(BouncedShare { share, std_error: 0.0 })).elements;
+    let all = settings.interreflection(None).elements;
+    assert_eq!([0.02, 0.1, 0.25, 0.9].map(elements), [all / 6, all / 6, all, all]);
+    assert!((all / 6..all).contains(&elements(0.2)));
+}
+
+#[test]
 fn the_share_is_measured_only_where_it_decides_or_tells() {
     let needs = |area_ratio, preset, switch| {
         let (features, settings) = bouncing(0.0, preset, switch);
         SceneFeatures { area_ratio, ..features }.needs_bounced_share(&settings)
     };
     assert!(needs(3.0, Preset::Standard, Switch::Auto) && needs(3.0, Preset::Standard, Switch::Off));
-    assert!(!needs(3.0, Preset::Standard, Switch::On) && !needs(3.0, Preset::Draft, Switch::Off));
+    assert!(needs(3.0, Preset::Standard, Switch::On) && !needs(3.0, Preset::Draft, Switch::Off));
     assert!(!needs(3.0, Preset::Reference, Switch::Auto) && !needs(3.0, Preset::Wu2011, Switch::Auto));
     // Facets of a shallow tile hardly see each other.
     assert!(!needs(1.01, Preset::Standard, Switch::Auto) && needs(1.01, Preset::Fine, Switch::Auto));
