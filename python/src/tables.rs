@@ -1,0 +1,48 @@
+//! The tables that the plugin for Mitsuba reads.
+
+use biscale::effective::{Nodes, ShadingTable};
+use biscale::geometry::mirror_planes;
+use biscale::math::directions::HemispherePairGrid;
+use glam::{DVec3, Vec3};
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::effective::EffectiveBrdf;
+use crate::run::{Access, run};
+
+/// The tables of an effective BRDF: `values` of G over half and difference angles, `areas`, and those of the sampler.
+pub fn renderer_tables<'py>(
+    py: Python<'py>,
+    brdf: &EffectiveBrdf,
+    grid: HemispherePairGrid,
+) -> PyResult<Bound<'py, PyDict>> {
+    let outcome = brdf.opaque(py, "mitsuba")?;
+    let table = run(py, Access::Exclusive, None, |job| {
+        let mut pipeline = brdf.pipeline.clone();
+        pipeline.set_cancel(job.cancel.clone());
+        let mirrors = mirror_planes(&pipeline.mesh(&brdf.loaded)?);
+        let g = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| {
+            out.iter_mut().zip(lights).for_each(|(out, i)| *out = outcome.brdf.g(*i, o).as_dvec3());
+            f64::from(outcome.brdf.relative_projected_area(o))
+        };
+        Ok(ShadingTable::resample(g, Nodes { mirrors, ..Nodes::all(grid) }, &job.cancel)?)
+    })?;
+    let sampler = brdf.sampler(py, outcome, None)?.tables();
+    let tables = PyDict::new(py);
+    let values = table.values().iter().flat_map(|value| value.to_array()).collect();
+    let shape = [grid.rings, grid.azimuths, grid.phi_d, grid.theta_d + 2, 4];
+    tables.set_item("values", PyArray1::from_vec(py, values).reshape(shape)?)?;
+    let (polar, areas) = table.areas();
+    let shape = [polar.ring_count(), polar.azimuths];
+    tables.set_item("areas", PyArray1::from_vec(py, areas.to_vec()).reshape(shape)?)?;
+    tables.set_item("crowding", HemispherePairGrid::CROWDING)?;
+    tables.set_item("phi", sampler.phi)?;
+    tables.set_item("theta", sampler.theta)?;
+    for (name, ([height, width], densities)) in [("luminance", sampler.luminance), ("vndf", sampler.vndf)] {
+        let densities = densities.iter().map(|&density| density as f32).collect();
+        let shape = [sampler.phi.len(), sampler.theta.len(), height, width];
+        tables.set_item(name, PyArray1::from_vec(py, densities).reshape(shape)?)?;
+    }
+    Ok(tables)
+}
