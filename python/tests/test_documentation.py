@@ -1,0 +1,39 @@
+"""Every public name has a docstring, so that the API page (docs/guide/python.md) has no gaps."""
+
+import importlib
+
+import pytest
+
+pdoc = pytest.importorskip("pdoc", reason="the API page is made by pdoc, which is not installed")
+pytest.importorskip("dask", reason="biscale.batch needs dask")
+pytest.importorskip("pyarrow", reason="biscale.batch needs pyarrow")
+
+#: The modules of the API page.
+MODULES = ["biscale", "biscale.batch", "biscale.dataset", "biscale.mitsuba"]
+
+
+def undocumented(member):
+    """Names of a module or class, and of what is in it, that have no docstring of their own."""
+    found = [] if member.docstring.strip() else [member.fullname]
+    if isinstance(member, (pdoc.doc.Module, pdoc.doc.Class)):
+        for name, one in member.members.items():
+            # Python itself documents `args` of exceptions.
+            if not name.startswith("_") and name != "args" and not isinstance(one, pdoc.doc.Module):
+                found += undocumented(one)
+    return found
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_every_public_name_has_a_docstring(name):
+    if name == "biscale.mitsuba":
+        pytest.importorskip("mitsuba", reason="the plugin needs Mitsuba")
+    gaps = undocumented(pdoc.doc.Module(importlib.import_module(name)))
+    assert not gaps, f"without a docstring: {gaps}"
+
+
+def test_a_missing_docstring_is_found(tmp_path, monkeypatch):
+    text = '"""A module."""\n\n\ndef silent(): pass\n\n\nclass Told:\n    """Told."""\n\n    part = 1\n'
+    (tmp_path / "with_gaps.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    module = pdoc.doc.Module(importlib.import_module("with_gaps"))
+    assert undocumented(module) == ["with_gaps.silent", "with_gaps.Told.part"]
