@@ -24,7 +24,7 @@ from ._core import _renderer_tables
 __all__ = ["register"]
 
 #: Numbers of θ_h, φ_h, φ_d and θ_d of the table.
-GRID = (33, 96, 8, 16)
+GRID = (33, 96, 16, 16)
 #: Steps of the polar angle and of the azimuth of the table of projected areas.
 AREAS = (64, 72)
 #: Part of the directions that a cosine lobe draws.

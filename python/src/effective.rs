@@ -77,7 +77,7 @@ impl EffectiveBrdf {
     }
 
     /// The sampler, which the first call tabulates.
-    pub fn sampler(
+    fn sampler(
         &self,
         py: Python<'_>,
         outcome: &Outcome,

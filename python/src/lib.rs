@@ -78,8 +78,9 @@ mod _core {
     fn _renderer_tables<'py>(
         py: Python<'py>,
         brdf: &EffectiveBrdf,
-        (rings, azimuths, phi_d, theta_d): (usize, usize, usize, usize),
+        grid: (usize, usize, usize, usize),
     ) -> PyResult<Bound<'py, PyDict>> {
+        let (rings, azimuths, phi_d, theta_d) = grid;
         renderer_tables(py, brdf, HemispherePairGrid { rings, azimuths, phi_d, theta_d })
     }
 

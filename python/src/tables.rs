@@ -1,6 +1,7 @@
 //! The tables that the plugin for Mitsuba reads.
 
 use biscale::effective::{Nodes, ShadingTable};
+use biscale::export::DirectionSampler;
 use biscale::geometry::mirror_planes;
 use biscale::math::directions::HemispherePairGrid;
 use glam::{DVec3, Vec3};
@@ -18,17 +19,21 @@ pub fn renderer_tables<'py>(
     grid: HemispherePairGrid,
 ) -> PyResult<Bound<'py, PyDict>> {
     let outcome = brdf.opaque(py, "mitsuba")?;
-    let table = run(py, Access::Exclusive, None, |job| {
+    let (table, sampler) = run(py, Access::Exclusive, None, |job| {
         let mut pipeline = brdf.pipeline.clone();
         pipeline.set_cancel(job.cancel.clone());
         let mirrors = mirror_planes(&pipeline.mesh(&brdf.loaded)?);
+        // What `biscale render` reads: close to the BRDF, and faster.
+        let shading = outcome.shading_brdf(&job.cancel)?.brdf;
         let g = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| {
-            out.iter_mut().zip(lights).for_each(|(out, i)| *out = outcome.brdf.g(*i, o).as_dvec3());
-            f64::from(outcome.brdf.relative_projected_area(o))
+            out.iter_mut().zip(lights).for_each(|(out, i)| *out = shading.g(*i, o).as_dvec3());
+            f64::from(shading.relative_projected_area(o))
         };
-        Ok(ShadingTable::resample(g, Nodes { mirrors, ..Nodes::all(grid) }, &job.cancel)?)
+        let table = ShadingTable::resample(g, Nodes { mirrors, ..Nodes::all(grid) }, &job.cancel)?;
+        let isotropic = !outcome.plan.is_on("anisotropy");
+        Ok((table, DirectionSampler::new(&shading, isotropic, &job.progress())?))
     })?;
-    let sampler = brdf.sampler(py, outcome, None)?.tables();
+    let sampler = sampler.tables();
     let tables = PyDict::new(py);
     let values = table.values().iter().flat_map(|value| value.to_array()).collect();
     let shape = [grid.rings, grid.azimuths, grid.phi_d, grid.theta_d + 2, 4];
