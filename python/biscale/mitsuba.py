@@ -29,6 +29,8 @@ GRID = (33, 96, 16, 16)
 AREAS = (64, 72)
 #: Part of the directions that a cosine lobe draws.
 COSINE_PART = 0.1
+#: Least value of G [1/sr] above the horizon.
+LEAST = 1e-9
 #: Properties of the plugin that are no keys of the scene.
 OPTIONS = ("scene", "quality", "seed")
 
@@ -164,7 +166,8 @@ def _make_class() -> type[Any]:
                         weight = weight_ring * weight_azimuth * weight_phi_d
                         for node, weight_node in enumerate(along):
                             total += weight * weight_node * read_four(self.values, start + node, active)
-            return mi.Color3f(dr.maximum(total.x, 0), dr.maximum(total.y, 0), dr.maximum(total.z, 0))
+            # A cubic may be below zero. Mitsuba takes a value of exactly zero for a sample that is not valid.
+            return mi.Color3f(*(dr.maximum(one, LEAST) for one in (total.x, total.y, total.z)))
 
         def _area(self, o: Any, active: Any) -> Any:
             """The visible projected area of the tile over the area of its base."""
