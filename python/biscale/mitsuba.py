@@ -18,15 +18,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from . import InputError, Scene, from_angles
+from . import InputError, Scene
 from ._core import _renderer_tables
 
 __all__ = ["register"]
 
 #: Numbers of θ_h, φ_h, φ_d and θ_d of the table.
-GRID = (33, 96, 16, 16)
-#: Steps of the polar angle and of the azimuth of the table of projected areas.
-AREAS = (64, 72)
+GRID = (41, 72, 16, 12)
+#: Steps of the polar angle of the table of projected areas.
+AREA_STEPS = 60
 #: Part of the directions that a cosine lobe draws.
 COSINE_PART = 0.1
 #: Least value of G [1/sr] above the horizon.
@@ -104,7 +104,8 @@ def _make_class() -> type[Any]:
             tables = _renderer_tables(brdf, GRID)
             self.crowding = float(tables["crowding"])
             self.values = stored(tables["values"])
-            self.areas = stored(_areas(brdf))
+            self.areas = stored(_even(tables["areas"]))
+            self.area_azimuths = tables["areas"].shape[1]
             phi, theta = tables["phi"], tables["theta"]
             self.isotropic = len(phi) == 1
             self.luminance = mi.MarginalContinuous2D2(tables["luminance"], [phi, theta], True, True)
@@ -171,12 +172,12 @@ def _make_class() -> type[Any]:
 
         def _area(self, o: Any, active: Any) -> Any:
             """The visible projected area of the tile over the area of its base."""
-            polar, low = split(dr.acos(dr.clip(o.z, 0, 1)) * (2 * AREAS[0] / dr.pi), AREAS[0] + 1)
-            first, second, a = around(turns(o.y, o.x) * AREAS[1], AREAS[1])
+            polar, low = split(dr.acos(dr.clip(o.z, 0, 1)) * (2 * AREA_STEPS / dr.pi), AREA_STEPS + 1)
+            first, second, a = around(turns(o.y, o.x) * self.area_azimuths, self.area_azimuths)
             ratio = mi.Float(0)
             for ring, weight in ((polar, 1 - low), (polar + 1, low)):
-                ratio += weight * (1 - a) * read(self.areas, ring * AREAS[1] + first, active)
-                ratio += weight * a * read(self.areas, ring * AREAS[1] + second, active)
+                ratio += weight * (1 - a) * read(self.areas, ring * self.area_azimuths + first, active)
+                ratio += weight * a * read(self.areas, ring * self.area_azimuths + second, active)
             return ratio * o.z
 
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
@@ -249,11 +250,13 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, (bool, int, float, str)) else [float(one) for one in np.ravel(value)]
 
 
-def _areas(brdf: Any) -> np.ndarray[Any, Any]:
-    """The projected area over the cosine, on a grid of polar angles and azimuths."""
-    theta = np.minimum(np.linspace(0, np.pi / 2, AREAS[0] + 1), np.radians(89.9))
-    w = from_angles(theta[:, None], np.arange(AREAS[1]) * (2 * np.pi / AREAS[1]))
-    return np.asarray(brdf.projected_area(w) / w[..., 2])
+def _even(areas: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Projected areas over the cosine at even steps of the polar angle, from those at the middles of rings and at the horizon."""
+    rings, azimuths = areas.shape
+    theta = np.concatenate([[0.0], (np.arange(rings - 1) + 0.5) * (np.pi / 2 / (rings - 1)), [np.pi / 2]])
+    known = np.concatenate([np.full((1, azimuths), areas[0].mean()), areas])
+    steps = np.linspace(0, np.pi / 2, AREA_STEPS + 1)
+    return np.stack([np.interp(steps, theta, column) for column in known.T], axis=1)
 
 
 _registered: set[str] = set()
