@@ -24,7 +24,7 @@ from ._core import _renderer_tables
 __all__ = ["register"]
 
 #: Numbers of θ_h, φ_h, φ_d and θ_d of the table.
-GRID = (41, 72, 16, 12)
+GRID = (33, 64, 16, 12)
 #: Steps of the polar angle of the table of projected areas.
 AREA_STEPS = 60
 #: Part of the directions that a cosine lobe draws.

@@ -1,5 +1,7 @@
 //! The tables that the plugin for Mitsuba reads.
 
+use std::sync::Arc;
+
 use biscale::effective::{Nodes, Representation, ShadingTable};
 use biscale::export::DirectionSampler;
 use biscale::geometry::mirror_planes;
@@ -22,15 +24,15 @@ pub fn renderer_tables<'py>(
     let (table, sampler) = run(py, Access::Exclusive, None, |job| {
         let mut pipeline = brdf.pipeline.clone();
         pipeline.set_cancel(job.cancel.clone());
-        let mirrors = mirror_planes(&pipeline.mesh(&brdf.loaded)?);
-        // What `biscale render` reads: close to the BRDF, and faster. Unless it is a table, its error is not symmetric, so that
-        // mirror images would have another error than the original.
+        // What `biscale render` reads: close to the BRDF, and faster.
         let shading = outcome.shading_brdf(&job.cancel)?.brdf;
+        // The error of a sum over fewer facets is not symmetric, even if the tile is.
         let is_table = matches!(shading.direct_representation(), Representation::Table(_));
-        let source = if is_table { &shading } else { &outcome.brdf };
+        let is_symmetric = is_table || Arc::ptr_eq(&shading, &outcome.brdf);
+        let mirrors = if is_symmetric { mirror_planes(&pipeline.mesh(&brdf.loaded)?) } else { [false; 2] };
         let g = |lights: &[Vec3], o: Vec3, out: &mut [DVec3]| {
-            out.iter_mut().zip(lights).for_each(|(out, i)| *out = source.g(*i, o).as_dvec3());
-            f64::from(source.relative_projected_area(o))
+            out.iter_mut().zip(lights).for_each(|(out, i)| *out = shading.g(*i, o).as_dvec3());
+            f64::from(shading.relative_projected_area(o))
         };
         let table = ShadingTable::resample(g, Nodes { mirrors, ..Nodes::all(grid) }, &job.cancel)?;
         let isotropic = !outcome.plan.is_on("anisotropy");
