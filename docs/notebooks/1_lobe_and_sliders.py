@@ -99,13 +99,15 @@ def draw(brdf, theta_deg=30.0, phi_deg=0.0, title=""):
 draw(brdf, title="V-grooves, light at 30°")
 
 # %% [markdown]
-# There is no highlight at the cross: no part of the tile faces up. Each side of the grooves makes a highlight of its own. The side that is
-# tilted towards the light sends it back towards the light, and the other side sends it down, close to the horizon.
+# There is no highlight at the cross, because no part of the tile faces up; the faint light there was reflected twice, by one side of a groove
+# and then by the other. Each side makes a highlight of its own. The side that is tilted towards the light sends it back towards the light,
+# and the other side sends it down, close to the horizon.
 #
 # ## Moving a slider
 #
 # A scene keeps what it has computed. After an edit, only what depends on the edit is computed again. `times_ms` lists the stages that ran:
-# a new depth changes the geometry, a new roughness only the lobes of the facets.
+# a new angle changes the geometry and all that follows from it; a new roughness leaves geometry and visibility as they are. (The stages
+# about bounced light, transport and interreflection compute the light that the sides of the grooves send to each other.)
 
 # %%
 for key, value in [("tile.geometry.side_angle_deg", 20.0), ("material.default.brdf.roughness", 0.15)]:

@@ -69,7 +69,7 @@ def _make_class() -> type[Any]:
         angle = dr.atan2(y, x) * dr.inv_two_pi
         return dr.select(angle < 0, angle + 1, angle)
 
-    class EffectiveBsdf(mi.BSDF):  # type: ignore[misc, name-defined]
+    class EffectiveBsdf(mi.BSDF):  # type: ignore[misc]
         """The plugin `biscale`."""
 
         def __init__(self, properties: Any) -> None:
