@@ -35,205 +35,218 @@ LEAST = 1e-9
 OPTIONS = ("scene", "quality", "seed")
 
 
+def _is_scalar() -> bool:
+    return bool(mi.variant().startswith("scalar"))
+
+
+def _stored(values: np.ndarray[Any, Any]) -> Any:
+    flat = np.ascontiguousarray(values, dtype=np.float32).ravel()
+    return mi.ArrayXf(flat) if _is_scalar() else mi.Float(flat)
+
+
+def _number(values: Any) -> Any:
+    return mi.ArrayXf(values) if _is_scalar() else mi.Float(values)
+
+
+def _read(values: Any, index: Any, active: Any) -> Any:
+    return values[index] if _is_scalar() else dr.gather(mi.Float, values, index, active)
+
+
+def _read_four(values: Any, index: Any, active: Any) -> Any:
+    if _is_scalar():
+        return mi.Vector4f(*(values[4 * index + k] for k in range(4)))
+    return dr.gather(mi.Vector4f, values, index, active)
+
+
+def _split(at: Any, count: int) -> tuple[Any, Any]:
+    """The cell of a coordinate among `count` nodes, and the place in it."""
+    low = mi.UInt32(dr.clip(at, 0, count - 2))
+    return low, at - mi.Float(low)
+
+
+def _around(at: Any, count: int) -> tuple[Any, Any, Any]:
+    """The two nodes around a coordinate on a periodic axis, and the place between them."""
+    low = mi.UInt32(dr.clip(at, 0, count - 1))
+    return low, dr.select(low + 1 == count, 0, low + 1), at - mi.Float(low)
+
+
+def _turns(y: Any, x: Any) -> Any:
+    """The angle of (x, y) in turns, from 0 to 1."""
+    angle = dr.atan2(y, x) * dr.inv_two_pi
+    return dr.select(angle < 0, angle + 1, angle)
+
+
+class _EffectiveBsdf:
+    """The methods of the plugin. The class that has them derives from `mi.BSDF` of one variant."""
+
+    def __init__(self, properties: Any) -> None:
+        mi.BSDF.__init__(self, properties)
+        flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.Anisotropic
+        self.m_components, self.m_flags = [flags], flags
+        self.scene = Scene(properties.get("scene", "default"))
+        self.options = {"quality": properties.get("quality", "standard"), "seed": int(properties.get("seed", 1))}
+        keys = {field["key"].replace(".", "_"): field["key"] for field in self.scene.fields()}
+        edits = {}
+        for name in properties.keys():
+            if name in OPTIONS:
+                continue
+            if name not in keys:
+                expected = "a key of the scene with underscores for dots, or one of " + ", ".join(OPTIONS)
+                text = f"{self.scene.name}: {name}: found an unknown property, expected {expected}"
+                raise InputError(text, field=name, found="an unknown property", expected=expected)
+            edits[keys[name]] = _plain(properties[name])
+        self.scene.set(edits)
+        #: Keys of the scene by the names that `mi.traverse` shows, and their values.
+        self.keys = {}
+        self.numbers = {}
+        # After an edit of a kind, the scene has other keys.
+        for key in (field["key"] for field in self.scene.fields()):
+            value = self.scene[key]
+            if _is_numeric(value):
+                name = key.replace(".", "_")
+                self.keys[name], self.numbers[name] = key, _number(value)
+        self._build()
+
+    def _build(self) -> None:
+        """Computes the tables."""
+        brdf = self.scene.effective(backend="cpu", **self.options)
+        tables = _renderer_tables(brdf, GRID)
+        self.crowding = float(tables["crowding"])
+        self.values = _stored(tables["values"])
+        self.areas = _stored(_even(tables["areas"]))
+        self.area_azimuths = tables["areas"].shape[1]
+        phi, theta = tables["phi"], tables["theta"]
+        self.isotropic = len(phi) == 1
+        self.luminance = mi.MarginalContinuous2D2(tables["luminance"], [phi, theta], True, True)
+        self.vndf = mi.MarginalContinuous2D2(tables["vndf"], [phi, theta], True, True)
+
+    def traverse(self, callback: Any) -> None:
+        for name, value in self.numbers.items():
+            callback.put(name, value, mi.ParamFlags.NonDifferentiable)
+
+    def parameters_changed(self, keys: list[str]) -> None:
+        changed = {}
+        for name in keys or self.numbers:
+            if name in self.numbers:
+                values = [float(value) for value in np.ravel(self.numbers[name])]
+                old = self.scene[self.keys[name]]
+                single = int(values[0]) if isinstance(old, int) else values[0]
+                changed[self.keys[name]] = values if isinstance(old, list) else single
+        self.scene.set(changed)
+        self._build()
+
+    def _g(self, i: Any, o: Any, active: Any) -> Any:
+        """G of light and viewer, interpolated in half and difference angles."""
+        rings, azimuths, phi_ds, steps = GRID
+        half = i + o
+        across = dr.hypot(half.x, half.y)
+        length = dr.maximum(dr.norm(half), 1e-20)
+        sine, cosine = across / length, dr.maximum(half.z / length, 1e-20)
+        pole = across < 1e-7 * length
+        scale = 1 / dr.select(pole, 1, across)
+        ax, ay = dr.select(pole, 1, half.x * scale), dr.select(pole, 0, half.y * scale)
+        # The light in the frame of the half vector.
+        dx = cosine * (ax * i.x + ay * i.y) - sine * i.z
+        dy = ax * i.y - ay * i.x
+        # The square root of (1 - cos θ_d) / (1 - cos θ_max), both divided by sin θ_d.
+        n, m = sine * dr.abs(dx), cosine * dr.hypot(dx, dy)
+        r = dr.hypot(n, m)
+        u = dr.sqrt(dr.minimum(r * (r + n) / ((1 + 0.5 * length) * cosine * cosine), 1))
+        c = 1 + self.crowding
+        step = 2 * u / (c + dr.sqrt(dr.maximum(c * c - 4 * self.crowding * u, 0)))
+        ring = dr.sqrt(dr.minimum(sine * sine / (1 + cosine), 1))
+        sign = dr.select(dy < 0, -1, 1)
+        turn = dr.minimum(dr.atan2(dy * sign, dx * sign) * dr.inv_pi, 1)
+        ring, t = _split(ring * (rings - 1), rings)
+        first, second, a = _around(_turns(ay, ax) * azimuths, azimuths)
+        left, right, d = _around(turn * phi_ds, phi_ds)
+        low, x = _split(dr.minimum(step, 1) * (steps - 1), steps)
+        # Catmull and Rom 1974.
+        along = (
+            x * (-0.5 + x * (1 - 0.5 * x)),
+            1 + x * x * (-2.5 + 1.5 * x),
+            x * (0.5 + x * (2 - 1.5 * x)),
+            x * x * (-0.5 + 0.5 * x),
+        )
+        total = mi.Vector4f(0)
+        for on_ring, weight_ring in ((ring, 1 - t), (ring + 1, t)):
+            for azimuth, weight_azimuth in ((first, 1 - a), (second, a)):
+                for phi_d, weight_phi_d in ((left, 1 - d), (right, d)):
+                    start = ((on_ring * azimuths + azimuth) * phi_ds + phi_d) * (steps + 2) + low
+                    weight = weight_ring * weight_azimuth * weight_phi_d
+                    for node, weight_node in enumerate(along):
+                        total += weight * weight_node * _read_four(self.values, start + node, active)
+        # A cubic may be below zero. Mitsuba takes a value of exactly zero for a sample that is not valid.
+        return mi.Color3f(*(dr.maximum(one, LEAST) for one in (total.x, total.y, total.z)))
+
+    def _area(self, o: Any, active: Any) -> Any:
+        """The visible projected area of the tile over the area of its base."""
+        polar, low = _split(dr.acos(dr.clip(o.z, 0, 1)) * (2 * AREA_STEPS / dr.pi), AREA_STEPS + 1)
+        first, second, a = _around(_turns(o.y, o.x) * self.area_azimuths, self.area_azimuths)
+        ratio = mi.Float(0)
+        for ring, weight in ((polar, 1 - low), (polar + 1, low)):
+            ratio += weight * (1 - a) * _read(self.areas, ring * self.area_azimuths + first, active)
+            ratio += weight * a * _read(self.areas, ring * self.area_azimuths + second, active)
+        return ratio * o.z
+
+    def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        active &= (si.wi.z > 0) & (wo.z > 0)
+        value = self._g(wo, si.wi, active) / dr.maximum(self._area(si.wi, active), 1e-6)
+        return dr.select(active, value, 0)
+
+    def _slice(self, viewer: Any) -> tuple[Any, Any]:
+        """Azimuth and polar angle of the viewer, as the tables of the sampler take them, and the rotation of these."""
+        phi, theta = dr.atan2(viewer.y, viewer.x), dr.acos(dr.clip(viewer.z, 0, 1))
+        return mi.Point2f(0 if self.isotropic else phi, theta), phi if self.isotropic else 0
+
+    def sample(self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
+        active &= si.wi.z > 0
+        at, rotation = self._slice(si.wi)
+        drawn, _ = self.luminance.sample(sample2, at, active)
+        drawn, _ = self.vndf.sample(drawn, at, active)
+        theta, phi = drawn.x * drawn.x * (dr.pi / 2), (2 * drawn.y - 1) * dr.pi + rotation
+        sin_theta, cos_theta = dr.sincos(theta)
+        sin_phi, cos_phi = dr.sincos(phi)
+        half = mi.Vector3f(cos_phi * sin_theta, sin_phi * sin_theta, cos_theta)
+        cosine = dr.dot(half, si.wi)
+        wo = 2 * cosine * half - si.wi
+        from_cosine = sample1 < COSINE_PART
+        active &= from_cosine | (cosine > 0)
+        result = dr.zeros(mi.BSDFSample3f)
+        result.wo = dr.select(from_cosine, mi.warp.square_to_cosine_hemisphere(sample2), wo)
+        active &= result.wo.z > 0
+        result.pdf = self.pdf(context, si, result.wo, active)
+        active &= result.pdf > 0
+        result.eta = 1.0
+        result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+        result.sampled_component = mi.UInt32(0)
+        value = self.eval(context, si, result.wo, active)
+        return result, dr.select(active, value / dr.select(active, result.pdf, 1), 0)
+
+    def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        active &= (si.wi.z > 0) & (wo.z > 0)
+        at, rotation = self._slice(si.wi)
+        half = dr.normalize(si.wi + wo)
+        theta = dr.atan2(dr.hypot(half.x, half.y), half.z)
+        turn = (dr.atan2(half.y, half.x) - rotation) * dr.inv_two_pi + 0.5
+        place = mi.Point2f(dr.sqrt(dr.minimum(theta * (2 / dr.pi), 1)), turn - dr.floor(turn))
+        drawn, density = self.vndf.invert(place, at, active)
+        density *= self.luminance.eval(drawn, at, active)
+        jacobian = 8 * dr.pi**2 * place.x * dr.sin(theta) * dr.dot(si.wi, half)
+        warped = dr.select(jacobian > 0, density / dr.select(jacobian > 0, jacobian, 1), 0)
+        return dr.select(active, COSINE_PART * wo.z * dr.inv_pi + (1 - COSINE_PART) * warped, 0)
+
+    def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
+        return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
+
+    def to_string(self) -> str:
+        return f"biscale[scene = {self.scene.name}]"
+
+
 def _make_class() -> type[Any]:
-    """The plugin of the selected variant."""
-    scalar = mi.variant().startswith("scalar")
-
-    def stored(values: np.ndarray[Any, Any]) -> Any:
-        flat = np.ascontiguousarray(values, dtype=np.float32).ravel()
-        return mi.ArrayXf(flat) if scalar else mi.Float(flat)
-
-    def number(values: Any) -> Any:
-        return mi.ArrayXf(values) if scalar else mi.Float(values)
-
-    def read(values: Any, index: Any, active: Any) -> Any:
-        return values[index] if scalar else dr.gather(mi.Float, values, index, active)
-
-    def read_four(values: Any, index: Any, active: Any) -> Any:
-        if scalar:
-            return mi.Vector4f(*(values[4 * index + k] for k in range(4)))
-        return dr.gather(mi.Vector4f, values, index, active)
-
-    def split(at: Any, count: int) -> tuple[Any, Any]:
-        """The cell of a coordinate among `count` nodes, and the place in it."""
-        low = mi.UInt32(dr.clip(at, 0, count - 2))
-        return low, at - mi.Float(low)
-
-    def around(at: Any, count: int) -> tuple[Any, Any, Any]:
-        """The two nodes around a coordinate on a periodic axis, and the place between them."""
-        low = mi.UInt32(dr.clip(at, 0, count - 1))
-        return low, dr.select(low + 1 == count, 0, low + 1), at - mi.Float(low)
-
-    def turns(y: Any, x: Any) -> Any:
-        """The angle of (x, y) in turns, from 0 to 1."""
-        angle = dr.atan2(y, x) * dr.inv_two_pi
-        return dr.select(angle < 0, angle + 1, angle)
-
-    class EffectiveBsdf(mi.BSDF):  # type: ignore[misc]
-        """The plugin `biscale`."""
-
-        def __init__(self, properties: Any) -> None:
-            mi.BSDF.__init__(self, properties)
-            flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.Anisotropic
-            self.m_components, self.m_flags = [flags], flags
-            self.scene = Scene(properties.get("scene", "default"))
-            self.options = {"quality": properties.get("quality", "standard"), "seed": int(properties.get("seed", 1))}
-            fields = {field["key"].replace(".", "_"): field for field in self.scene.fields()}
-            edits = {}
-            for name in properties.keys():
-                if name in OPTIONS:
-                    continue
-                if name not in fields:
-                    expected = "a key of the scene with underscores for dots, or one of " + ", ".join(OPTIONS)
-                    text = f"{self.scene.name}: {name}: found an unknown property, expected {expected}"
-                    raise InputError(text, field=name, found="an unknown property", expected=expected)
-                edits[fields[name]["key"]] = _plain(properties[name])
-            self.scene.set(edits)
-            #: Keys of the scene by the names that `mi.traverse` shows, and their values.
-            self.keys = {}
-            self.numbers = {}
-            for name, field in fields.items():
-                value = self.scene[field["key"]]
-                if _is_numeric(value):
-                    self.keys[name], self.numbers[name] = field["key"], number(value)
-            self._build()
-
-        def _build(self) -> None:
-            """Computes the tables."""
-            brdf = self.scene.effective(backend="cpu", **self.options)
-            tables = _renderer_tables(brdf, GRID)
-            self.crowding = float(tables["crowding"])
-            self.values = stored(tables["values"])
-            self.areas = stored(_even(tables["areas"]))
-            self.area_azimuths = tables["areas"].shape[1]
-            phi, theta = tables["phi"], tables["theta"]
-            self.isotropic = len(phi) == 1
-            self.luminance = mi.MarginalContinuous2D2(tables["luminance"], [phi, theta], True, True)
-            self.vndf = mi.MarginalContinuous2D2(tables["vndf"], [phi, theta], True, True)
-
-        def traverse(self, callback: Any) -> None:
-            for name, value in self.numbers.items():
-                callback.put(name, value, mi.ParamFlags.NonDifferentiable)
-
-        def parameters_changed(self, keys: list[str]) -> None:
-            changed = {}
-            for name in keys or self.numbers:
-                if name in self.numbers:
-                    values = [float(value) for value in np.ravel(self.numbers[name])]
-                    old = self.scene[self.keys[name]]
-                    single = int(values[0]) if isinstance(old, int) else values[0]
-                    changed[self.keys[name]] = values if isinstance(old, list) else single
-            self.scene.set(changed)
-            self._build()
-
-        def _g(self, i: Any, o: Any, active: Any) -> Any:
-            """G of light and viewer, interpolated in half and difference angles."""
-            rings, azimuths, phi_ds, steps = GRID
-            half = i + o
-            across = dr.hypot(half.x, half.y)
-            length = dr.maximum(dr.norm(half), 1e-20)
-            sine, cosine = across / length, dr.maximum(half.z / length, 1e-20)
-            pole = across < 1e-7 * length
-            scale = 1 / dr.select(pole, 1, across)
-            ax, ay = dr.select(pole, 1, half.x * scale), dr.select(pole, 0, half.y * scale)
-            # The light in the frame of the half vector.
-            dx = cosine * (ax * i.x + ay * i.y) - sine * i.z
-            dy = ax * i.y - ay * i.x
-            # The square root of (1 - cos θ_d) / (1 - cos θ_max), both divided by sin θ_d.
-            n, m = sine * dr.abs(dx), cosine * dr.hypot(dx, dy)
-            r = dr.hypot(n, m)
-            u = dr.sqrt(dr.minimum(r * (r + n) / ((1 + 0.5 * length) * cosine * cosine), 1))
-            c = 1 + self.crowding
-            step = 2 * u / (c + dr.sqrt(dr.maximum(c * c - 4 * self.crowding * u, 0)))
-            ring = dr.sqrt(dr.minimum(sine * sine / (1 + cosine), 1))
-            sign = dr.select(dy < 0, -1, 1)
-            turn = dr.minimum(dr.atan2(dy * sign, dx * sign) * dr.inv_pi, 1)
-            ring, t = split(ring * (rings - 1), rings)
-            first, second, a = around(turns(ay, ax) * azimuths, azimuths)
-            left, right, d = around(turn * phi_ds, phi_ds)
-            low, x = split(dr.minimum(step, 1) * (steps - 1), steps)
-            # Catmull and Rom 1974.
-            along = (
-                x * (-0.5 + x * (1 - 0.5 * x)),
-                1 + x * x * (-2.5 + 1.5 * x),
-                x * (0.5 + x * (2 - 1.5 * x)),
-                x * x * (-0.5 + 0.5 * x),
-            )
-            total = mi.Vector4f(0)
-            for on_ring, weight_ring in ((ring, 1 - t), (ring + 1, t)):
-                for azimuth, weight_azimuth in ((first, 1 - a), (second, a)):
-                    for phi_d, weight_phi_d in ((left, 1 - d), (right, d)):
-                        start = ((on_ring * azimuths + azimuth) * phi_ds + phi_d) * (steps + 2) + low
-                        weight = weight_ring * weight_azimuth * weight_phi_d
-                        for node, weight_node in enumerate(along):
-                            total += weight * weight_node * read_four(self.values, start + node, active)
-            # A cubic may be below zero. Mitsuba takes a value of exactly zero for a sample that is not valid.
-            return mi.Color3f(*(dr.maximum(one, LEAST) for one in (total.x, total.y, total.z)))
-
-        def _area(self, o: Any, active: Any) -> Any:
-            """The visible projected area of the tile over the area of its base."""
-            polar, low = split(dr.acos(dr.clip(o.z, 0, 1)) * (2 * AREA_STEPS / dr.pi), AREA_STEPS + 1)
-            first, second, a = around(turns(o.y, o.x) * self.area_azimuths, self.area_azimuths)
-            ratio = mi.Float(0)
-            for ring, weight in ((polar, 1 - low), (polar + 1, low)):
-                ratio += weight * (1 - a) * read(self.areas, ring * self.area_azimuths + first, active)
-                ratio += weight * a * read(self.areas, ring * self.area_azimuths + second, active)
-            return ratio * o.z
-
-        def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            active &= (si.wi.z > 0) & (wo.z > 0)
-            value = self._g(wo, si.wi, active) / dr.maximum(self._area(si.wi, active), 1e-6)
-            return dr.select(active, value, 0)
-
-        def _slice(self, viewer: Any) -> tuple[Any, Any]:
-            """Azimuth and polar angle of the viewer, as the tables of the sampler take them, and the rotation of these."""
-            phi, theta = dr.atan2(viewer.y, viewer.x), dr.acos(dr.clip(viewer.z, 0, 1))
-            return mi.Point2f(0 if self.isotropic else phi, theta), phi if self.isotropic else 0
-
-        def sample(self, context: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
-            active &= si.wi.z > 0
-            at, rotation = self._slice(si.wi)
-            drawn, _ = self.luminance.sample(sample2, at, active)
-            drawn, _ = self.vndf.sample(drawn, at, active)
-            theta, phi = drawn.x * drawn.x * (dr.pi / 2), (2 * drawn.y - 1) * dr.pi + rotation
-            sin_theta, cos_theta = dr.sincos(theta)
-            sin_phi, cos_phi = dr.sincos(phi)
-            half = mi.Vector3f(cos_phi * sin_theta, sin_phi * sin_theta, cos_theta)
-            cosine = dr.dot(half, si.wi)
-            wo = 2 * cosine * half - si.wi
-            from_cosine = sample1 < COSINE_PART
-            active &= from_cosine | (cosine > 0)
-            result = dr.zeros(mi.BSDFSample3f)
-            result.wo = dr.select(from_cosine, mi.warp.square_to_cosine_hemisphere(sample2), wo)
-            active &= result.wo.z > 0
-            result.pdf = self.pdf(context, si, result.wo, active)
-            active &= result.pdf > 0
-            result.eta = 1.0
-            result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-            result.sampled_component = mi.UInt32(0)
-            value = self.eval(context, si, result.wo, active)
-            return result, dr.select(active, value / dr.select(active, result.pdf, 1), 0)
-
-        def pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            active &= (si.wi.z > 0) & (wo.z > 0)
-            at, rotation = self._slice(si.wi)
-            half = dr.normalize(si.wi + wo)
-            theta = dr.atan2(dr.hypot(half.x, half.y), half.z)
-            turn = (dr.atan2(half.y, half.x) - rotation) * dr.inv_two_pi + 0.5
-            place = mi.Point2f(dr.sqrt(dr.minimum(theta * (2 / dr.pi), 1)), turn - dr.floor(turn))
-            drawn, density = self.vndf.invert(place, at, active)
-            density *= self.luminance.eval(drawn, at, active)
-            jacobian = 8 * dr.pi**2 * place.x * dr.sin(theta) * dr.dot(si.wi, half)
-            warped = dr.select(jacobian > 0, density / dr.select(jacobian > 0, jacobian, 1), 0)
-            return dr.select(active, COSINE_PART * wo.z * dr.inv_pi + (1 - COSINE_PART) * warped, 0)
-
-        def eval_pdf(self, context: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
-
-        def to_string(self) -> str:
-            return f"biscale[scene = {self.scene.name}]"
-
-    return EffectiveBsdf
+    """The plugin of the selected variant. (Mitsuba's classes do not take a second base.)"""
+    methods = {name: value for name, value in vars(_EffectiveBsdf).items() if name not in ("__dict__", "__weakref__")}
+    return type("EffectiveBsdf", (mi.BSDF,), methods)
 
 
 def _is_numeric(value: Any) -> bool:
