@@ -8,6 +8,7 @@
 `versions` needs BISCALE, the program that it compares with; the others need the package, and `batch` its extras.
 """
 
+import itertools
 import os
 import resource
 import subprocess
@@ -160,12 +161,14 @@ def cost(rows):
     os.environ["RAYON_NUM_THREADS"] = "1"
     from biscale import batch as batches
 
-    print("| family | quality | CPU time of a material [ms] | core-hours of a million |")
-    print("|---|---|---|---|")
-    for quality in ("draft", "standard"):
+    print("| quality | interreflection | family | CPU time of a material [ms] | core-hours of a million |")
+    print("|---|---|---|---|---|")
+    for quality, effect in itertools.product(("draft", "standard"), ("off", "by need")):
         whole = []
         for family, (base, ranges) in FAMILIES.items():
             sample = {key: {"uniform": ends} for key, ends in ranges.items()}
+            if effect == "off":
+                sample["effects.interreflection"] = {"choice": ["off"]}
             spec = batches.load({"base": [base], "count": rows, "sample": sample, "output": {"directions": 4096, "quality": quality}})
             start = time.process_time()
             made = batches.evaluate(spec, "cost", list(range(rows)))
@@ -173,8 +176,8 @@ def cost(rows):
             if any(row["state"] != "made" for row in made):
                 sys.exit(next(row["error"] for row in made if row["state"] != "made"))
             whole.append(seconds)
-            print(f"| {family} | {quality} | {1e3 * seconds:.0f} | {1e6 * seconds / 3600:.0f} |")
-        print(f"| a third of each | {quality} | {1e3 * sum(whole) / 3:.0f} | {1e6 * sum(whole) / 3 / 3600:.0f} |")
+            print(f"| {quality} | {effect} | {family} | {1e3 * seconds:.0f} | {1e6 * seconds / 3600:.0f} |", flush=True)
+        print(f"| {quality} | {effect} | a third of each | {1e3 * sum(whole) / 3:.0f} | {1e6 * sum(whole) / 3 / 3600:.0f} |")
     print()
     print("| output | type | bytes of a million [GB] |")
     print("|---|---|---|")

@@ -1,6 +1,11 @@
 """Every public name has a docstring, so that the API page (docs/guide/python.md) has no gaps."""
 
 import importlib
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -29,6 +34,18 @@ def test_every_public_name_has_a_docstring(name):
         pytest.importorskip("mitsuba", reason="the plugin needs Mitsuba")
     gaps = undocumented(pdoc.doc.Module(importlib.import_module(name)))
     assert not gaps, f"without a docstring: {gaps}"
+
+
+def test_the_page_has_the_types_of_the_stub(tmp_path):
+    script = Path(__file__).resolve().parents[1] / "api_page.py"
+    text = script.read_text(encoding="utf-8").replace(', "biscale.mitsuba"]', "]")
+    copy = tmp_path / "python" / "api_page.py"
+    (copy.parent / "biscale").mkdir(parents=True)
+    copy.write_text(text, encoding="utf-8")
+    shutil.copy(script.parent / "biscale" / "_core.pyi", copy.parent / "biscale")
+    subprocess.run([sys.executable, "-W", "error", str(copy), str(tmp_path / "api")], check=True, cwd=tmp_path)
+    page = re.sub("<[^>]+>", "", (tmp_path / "api" / "biscale.html").read_text(encoding="utf-8"))
+    assert re.search(r"eval\(\s*self,\s*wi: numpy.typing.ArrayLike,\s*wo: numpy.typing.ArrayLike", page)
 
 
 def test_a_missing_docstring_is_found(tmp_path, monkeypatch):
