@@ -15,7 +15,7 @@
 # plugin `biscale`, which computes the BRDF of a scene when Mitsuba loads it, and a file for Mitsuba's own material `measured`. This notebook
 # renders shot silk on a sphere both ways, compares the pictures with biscale's own, and changes the weave from Python.
 #
-# It needs `biscale`, `mitsuba` (3.6 or newer) and matplotlib. With an LLVM library Mitsuba evaluates all rays at once; without one, it calls
+# It needs `biscale`, `mitsuba` (3.7 or newer) and matplotlib. With an LLVM library Mitsuba evaluates all rays at once; without one, it calls
 # the plugin for each ray, so that this notebook renders smaller and noisier pictures.
 
 # %%

@@ -60,7 +60,7 @@ pub struct SamplerTables<'a> {
 impl DirectionSampler {
     /// The tables.
     pub fn tables(&self) -> SamplerTables<'_> {
-        let sized = |warp: &'_ Warp| {
+        let sized = |warp: &Warp| {
             let (grid, _) = warp.densities();
             [grid.height, grid.width]
         };
