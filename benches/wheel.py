@@ -3,10 +3,12 @@
     python benches/wheel.py versions WHEEL PYTHON...    installs the wheel for each interpreter, and compares all shipped scenes
     python benches/wheel.py speed                       calls from Python beside the work that they contain
     python benches/wheel.py batch [ROWS]                materials per second of `biscale.batch`, with 1 and more processes
+    python benches/wheel.py cost [ROWS]                 core-hours and bytes of a million materials, from ROWS materials of each family
 
 `versions` needs BISCALE, the program that it compares with; the others need the package, and `batch` its extras.
 """
 
+import itertools
 import os
 import resource
 import subprocess
@@ -147,6 +149,44 @@ def batch(rows):
             print(f"| {quality} | {count} | {made.made / made.seconds:.1f} |")
 
 
+#: A scene of each family, and the keys that vary.
+FAMILIES = {
+    "grooves": ("default", {"tile.geometry.depth": [0.02, 0.4], "material.default.brdf.roughness": [0.1, 0.6]}),
+    "pyramids": ("table4_teapot", {"tile.geometry.height": [0.02, 0.2], "material.default.brdf.roughness": [0.1, 0.6]}),
+    "rods": ("table4_pillow", {"tile.geometry.spread_deg": [5.0, 40.0], "tile.geometry.length": [0.2, 0.4]}),
+}
+
+
+def cost(rows):
+    os.environ["RAYON_NUM_THREADS"] = "1"
+    from biscale import batch as batches
+
+    print("| quality | interreflection | family | CPU time of a material [ms] | core-hours of a million |")
+    print("|---|---|---|---|---|")
+    for quality, effect in itertools.product(("draft", "standard"), ("off", "by need")):
+        whole = []
+        for family, (base, ranges) in FAMILIES.items():
+            sample = {key: {"uniform": ends} for key, ends in ranges.items()}
+            if effect == "off":
+                sample["effects.interreflection"] = {"choice": ["off"]}
+            spec = batches.load({"base": [base], "count": rows, "sample": sample, "output": {"directions": 4096, "quality": quality}})
+            start = time.process_time()
+            made = batches.evaluate(spec, "cost", list(range(rows)))
+            seconds = (time.process_time() - start) / rows
+            if any(row["state"] != "made" for row in made):
+                sys.exit(next(row["error"] for row in made if row["state"] != "made"))
+            whole.append(seconds)
+            print(f"| {quality} | {effect} | {family} | {1e3 * seconds:.0f} | {1e6 * seconds / 3600:.0f} |", flush=True)
+        print(f"| {quality} | {effect} | a third of each | {1e3 * sum(whole) / 3:.0f} | {1e6 * sum(whole) / 3 / 3600:.0f} |")
+    print()
+    print("| output | type | bytes of a million [GB] |")
+    print("|---|---|---|")
+    for name, output in (("4096 pairs", {"directions": 4096}), ("table 12 x 24", {"what": "table", "resolution": [12, 24]})):
+        for dtype in ("float16", "float32"):
+            spec = batches.load({"base": ["default"], "count": 1, "sample": {}, "output": {**output, "dtype": dtype}})
+            print(f"| {name} | {dtype} | {1e-3 * spec.bytes_per_row():.1f} |")
+
+
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["versions", wheel, *interpreters] if interpreters:
@@ -155,5 +195,7 @@ if __name__ == "__main__":
             speed()
         case ["batch", *rows]:
             batch(int(rows[0]) if rows else 400)
+        case ["cost", *rows]:
+            cost(int(rows[0]) if rows else 50)
         case _:
             sys.exit(__doc__)

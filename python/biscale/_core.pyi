@@ -1,3 +1,5 @@
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Any, TypeAlias, final
@@ -13,6 +15,7 @@ __all__ = [
     "mirror_biased_pairs",
     "scenes",
     "_main",
+    "_renderer_tables",
     "_unpickle",
     "__version__",
 ]
@@ -119,4 +122,5 @@ def to_angles(w: ArrayLike) -> tuple[_Floats, _Floats]: ...
 def mirror_biased_pairs(count: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
 def scenes() -> dict[str, str | None]: ...
 def _main(arguments: Sequence[str]) -> int: ...
+def _renderer_tables(brdf: EffectiveBrdf, grid: tuple[int, int, int, int]) -> dict[str, Any]: ...
 def _unpickle(text: str, name: str, files: Sequence[tuple[str, bytes]]) -> Scene: ...

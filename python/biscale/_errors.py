@@ -26,7 +26,9 @@ class InputError(Error, ValueError):
         self.field = field
         """The key (``tile.geometry.depth``), the argument, or the place in the file (``line 12``)."""
         self.found = found
+        """What stood there, in words."""
         self.expected = expected
+        """What would have been valid, in words."""
         self.hint = hint
         """What would correct the input, if that is known."""
 

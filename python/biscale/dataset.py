@@ -19,10 +19,14 @@ class Dataset:
 
     def __init__(self, directory: str | Path) -> None:
         self.directory = Path(directory)
+        """The folder."""
         self.spec = read_spec(self.directory)
+        """The content of `spec.json`: everything that decides the content of the data set."""
         pairs = np.load(self.directory / "pairs.npz")
-        #: Directions of the pairs, towards light and viewer.
-        self.wi, self.wo = pairs["wi"], pairs["wo"]
+        self.wi = pairs["wi"]
+        """Directions of the pairs towards the light, `(pairs, 3)`."""
+        self.wo = pairs["wo"]
+        """Directions of the pairs towards the viewer, `(pairs, 3)`."""
         self._paths = sorted(self.directory.glob("part-*.parquet"))
         counts = [pyarrow.parquet.read_metadata(path).num_rows for path in self._paths]
         self._starts = np.concatenate([[0], np.cumsum(counts)]).tolist()

@@ -27,8 +27,8 @@ use crate::{arrays, values};
 /// computed in single precision.
 #[pyclass(frozen, module = "biscale")]
 pub struct EffectiveBrdf {
-    loaded: LoadedScene,
-    pipeline: Pipeline,
+    pub loaded: LoadedScene,
+    pub pipeline: Pipeline,
     result: Evaluated,
     sampler: OnceLock<DirectionSampler>,
 }
@@ -50,7 +50,7 @@ impl EffectiveBrdf {
     }
 
     /// The result of a scene without a slab.
-    fn opaque(&self, py: Python<'_>, method: &str) -> PyResult<&Outcome> {
+    pub fn opaque(&self, py: Python<'_>, method: &str) -> PyResult<&Outcome> {
         match &self.result {
             Evaluated::Opaque(outcome) => Ok(outcome),
             Evaluated::Slab(_) => {

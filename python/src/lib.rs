@@ -5,6 +5,7 @@ mod effective;
 mod errors;
 mod run;
 mod scene;
+mod tables;
 mod values;
 
 use pyo3::prelude::*;
@@ -15,7 +16,7 @@ mod _core {
     use std::ffi::OsString;
 
     use biscale::cli;
-    use biscale::math::directions::{angles_of_direction, direction_of_angles};
+    use biscale::math::directions::{HemispherePairGrid, angles_of_direction, direction_of_angles};
     use glam::DVec3;
     use pyo3::prelude::*;
     use pyo3::types::{PyDict, PyTuple};
@@ -26,6 +27,7 @@ mod _core {
     #[pymodule_export]
     use crate::scene::Scene;
     use crate::scene::{shipped_scenes, unpickle};
+    use crate::tables::renderer_tables;
 
     /// The version of the package.
     #[pymodule_export]
@@ -69,6 +71,17 @@ mod _core {
     #[pyfunction]
     fn _main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
         py.detach(|| cli::main(arguments, |scene, _| cli::no_editor(scene)))
+    }
+
+    /// The tables that the plugin for Mitsuba reads, on a grid of half and difference angles: numbers of θ_h, φ_h, φ_d and θ_d.
+    #[pyfunction]
+    fn _renderer_tables<'py>(
+        py: Python<'py>,
+        brdf: &EffectiveBrdf,
+        grid: (usize, usize, usize, usize),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (rings, azimuths, phi_d, theta_d) = grid;
+        renderer_tables(py, brdf, HemispherePairGrid { rings, azimuths, phi_d, theta_d })
     }
 
     #[pyfunction]

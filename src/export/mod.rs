@@ -36,7 +36,7 @@ pub use meta::ExportMeta;
 pub use note::{Reflectances, reflectances};
 pub use radiance::RadianceBasis;
 pub use radiance::slab as radiance_slab;
-pub use rgl::sampling::{DirectionSampler, Sampled};
+pub use rgl::sampling::{DirectionSampler, Sampled, SamplerTables};
 pub use sampler::ReadingError;
 
 use meta::Description;

@@ -45,8 +45,10 @@ def bsdf_values(path, pairs):
     return out
 
 
-def sphere(path):
+def sphere(material):
     """Renders the unit sphere with the pole upwards, with the light and the camera of the scene of `ours`."""
+    material = mi.load_dict(material)
+
     def lit_by(towards, irradiance):
         return mi.load_dict({
             "type": "scene",
@@ -64,7 +66,7 @@ def sphere(path):
             "sphere": {
                 "type": "sphere",
                 "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], -90),
-                "material": {"type": "measured", "filename": str(path)},
+                "material": material,
             },
             "light": {
                 "type": "directional",
@@ -105,14 +107,14 @@ def side_by_side(mitsuba_image, our_image):
     return np.concatenate(both, axis=1).astype(np.float32)
 
 
-def chi_squared(path, count):
-    """Returns the smallest p-value over the viewers, and whether all pass at the level of `count` tests."""
+def chi_squared(plugin, properties, count):
+    """Returns the smallest p-value over the viewers, and whether all pass at the level of `count` tests. `properties` is XML."""
     from mitsuba import chi2
 
     least = 1.0
     for theta, phi in VIEWERS:
         wi = direction(np.radians(theta), np.radians(phi)).tolist()
-        sample, pdf = chi2.BSDFAdapter("measured", f'<string name="filename" value="{path}"/>', wi=wi)
+        sample, pdf = chi2.BSDFAdapter(plugin, properties, wi=wi)
         test = chi2.ChiSquareTest(
             domain=chi2.SphericalDomain(), sample_func=sample, pdf_func=pdf, sample_dim=3, sample_count=1_000_000, ires=32, seed=0
         )
@@ -142,7 +144,7 @@ def check_exports(arguments, folder):
         mi.load_dict({"type": "measured", "filename": str(path)})
         loaded = time.time() - start
         error = mean_error(bsdf_values(path, pairs), values)
-        mitsuba_image, our_image = sphere(path), ours(scene, folder)
+        mitsuba_image, our_image = sphere({"type": "measured", "filename": str(path)}), ours(scene, folder)
         mask = inside()
         image_error = mean_error(mitsuba_image[mask], our_image[mask])
         if arguments.pictures:
@@ -152,7 +154,8 @@ def check_exports(arguments, folder):
         p, passes = (1.0, True)
         if chi_works:
             mi.set_variant("llvm_ad_rgb")
-            p, passes = chi_squared(path, len(VIEWERS) * len(arguments.scenes))
+            properties = f'<string name="filename" value="{path}"/>'
+            p, passes = chi_squared("measured", properties, len(VIEWERS) * len(arguments.scenes))
         allowed = f"{limit} %"
         table.check(
             error < float(limit) / 100 and passes and image_error < float(limit) / 100,

@@ -36,10 +36,15 @@ class Result:
     """What a run did."""
 
     made: int = 0
+    """Rows that were made this time."""
     failed: int = 0
+    """Rows that failed this time."""
     kept: int = 0
+    """Rows that were there already."""
     seconds: float = 0.0
+    """The time of the run."""
     complaints: dict[str, int] = field(default_factory=dict)
+    """The number of failed rows by their complaint."""
 
 
 def run(

@@ -76,25 +76,39 @@ class Spec:
     """A checked specification."""
 
     base: list[str]
+    """The scenes that rows start from."""
     count: int
+    """The number of rows."""
     seed: int
+    """The seed of the values of all rows."""
     grid: bool
+    """Whether rows are all combinations of the levels of the keys."""
     sample: dict[str, Distribution]
+    """How the values of each key are drawn."""
     what: list[str]
+    """What is computed: `pairs`, `table`, `image`, `fit`."""
     wi: np.ndarray[Any, Any]
+    """Directions of the pairs towards the light."""
     wo: np.ndarray[Any, Any]
+    """Directions of the pairs towards the viewer."""
     resolution: tuple[int, int]
+    """Steps of theta and phi of a table."""
     size: tuple[int, int]
+    """Width and height of an image."""
     quality: str
+    """The preset."""
     dtype: str
+    """The type of the stored values: `float16` or `float32`."""
     rows_per_file: int
+    """Rows of a file."""
     rows: pa.Table | None
-    #: Pickled scenes by their names in `base`.
+    """The rows, if the specification is a table."""
     scenes: dict[str, Scene] = field(repr=False)
-    #: Range of each key that is drawn from a normal distribution.
+    """The scenes by their names in `base`."""
     limits: dict[str, tuple[float, float]]
-    #: Rows from this one on are not made this time.
+    """The range of each key that is drawn from a normal distribution."""
     end: int
+    """Rows from this one on are not made this time."""
 
     def parts(self) -> int:
         """The number of files."""

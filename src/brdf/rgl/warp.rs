@@ -180,6 +180,11 @@ impl Warp {
         [across.clamp(0.0, 1.0), (below + part(total[0], total[1], y)).clamp(0.0, 1.0)]
     }
 
+    /// The grid, and the density of each slice at its vertices, up to a factor.
+    pub(crate) fn densities(&self) -> (Grid, &[f64]) {
+        (self.grid, &self.density)
+    }
+
     /// The density of one slice per unit of the square.
     pub(crate) fn density(&self, slice: usize, at: [f64; 2]) -> f64 {
         let Grid { width, height } = self.grid;

@@ -44,7 +44,34 @@ pub struct Sampled {
     pub weight: Vec3,
 }
 
+/// The tables of a [`DirectionSampler`], for programs that draw from them themselves.
+#[derive(Debug, Clone, Copy)]
+pub struct SamplerTables<'a> {
+    /// Azimuths of the viewer [rad], from -π to π; only one if a rotation of the tile changes nothing.
+    pub phi: &'a [f64],
+    /// Polar angles of the viewer [rad].
+    pub theta: &'a [f64],
+    /// Height and width of each slice of `luminance`, and its densities, `[phi][theta][y][x]`.
+    pub luminance: ([usize; 2], &'a [f64]),
+    /// The same of `vndf`.
+    pub vndf: ([usize; 2], &'a [f64]),
+}
+
 impl DirectionSampler {
+    /// The tables.
+    pub fn tables(&self) -> SamplerTables<'_> {
+        let sized = |warp: &Warp| {
+            let (grid, _) = warp.densities();
+            [grid.height, grid.width]
+        };
+        SamplerTables {
+            phi: &self.phi,
+            theta: &self.theta,
+            luminance: (sized(&self.luminance), self.luminance.densities().1),
+            vndf: (sized(&self.vndf), self.vndf.densities().1),
+        }
+    }
+
     /// Tabulates the warps. `isotropic` is true if a rotation of the tile changes nothing.
     ///
     /// # Errors
