@@ -272,17 +272,16 @@ impl<'a> Exchange<'a> {
 
 /// The visibility of each element (row) along each node.
 fn visible_from(visibility: &Visibility, elements: &[u32], nodes: &[Vec3]) -> Vec<f32> {
-    let facets = visibility.facets();
-    let columns: Vec<Vec<f32>> = nodes
-        .par_iter()
-        .map_init(
-            || vec![0.0; facets],
-            |all, &node| {
-                visibility.fill(node, 0..facets, all);
-                elements.iter().map(|&s| all[s as usize]).collect()
-            },
-        )
-        .collect();
+    let chosen: Vec<usize> = elements.iter().map(|s| *s as usize).collect();
+    let subset = visibility.subset(&chosen);
+    let column = |node: Vec3| {
+        let visibility = subset.as_ref().unwrap_or(visibility);
+        let mut all = vec![0.0; visibility.facets()];
+        visibility.fill(node, 0..visibility.facets(), &mut all);
+        // Bit maps have no subset.
+        if subset.is_some() { all } else { chosen.iter().map(|s| all[*s]).collect() }
+    };
+    let columns: Vec<Vec<f32>> = nodes.par_iter().map(|node| column(*node)).collect();
     let mut rows = vec![0.0; elements.len() * nodes.len()];
     rows.par_chunks_mut(nodes.len()).enumerate().for_each(|(element, row)| {
         row.iter_mut().zip(&columns).for_each(|(value, column)| *value = column[element]);

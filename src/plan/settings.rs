@@ -307,8 +307,8 @@ impl Settings {
     /// their noise falls with the root of their number.
     pub fn interreflection(&self, bounced: Option<BouncedShare>) -> InterreflectionSettings {
         /// Share from which all elements are used, and the smallest part of them.
-        const FULL_SHARE: f64 = 0.25;
-        const LEAST_PART: f64 = 1.0 / 6.0;
+        const FULL_SHARE: f64 = 0.3;
+        const LEAST_PART: f64 = 0.1;
         let (elements, rays, grid) = match self.preset {
             Preset::Draft => (2048, 6, PolarGrid::new(8, 24)),
             Preset::Standard | Preset::Wu2011 => (6144, 6, PolarGrid::new(12, 36)),
