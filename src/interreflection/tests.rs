@@ -294,7 +294,7 @@ fn a_colour_edit_does_not_cast_the_first_rays_again() {
     let pipeline = Pipeline::new();
     let mut loaded = open(DEEP, WHITE, "interreflection = \"on\"");
     pipeline.effective(&loaded).unwrap();
-    loaded.scene.materials[0].color = Vec3::new(0.5, 0.25, 0.125);
+    loaded.scene.materials[0].color = Vec3::new(0.95, 0.9, 0.85);
     let outcome = pipeline.effective(&loaded).unwrap();
     let names: Vec<&str> = outcome.times.iter().map(|(name, _)| *name).collect();
     assert!(names.contains(&"interreflection") && !names.contains(&"transport"), "{names:?}");

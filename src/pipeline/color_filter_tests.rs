@@ -13,7 +13,7 @@ use crate::scene::Pixels;
 use crate::testing::gaussian_tile::{BANDS, RAMP, hills_under_ripples, layer, loaded, smooth};
 
 fn white(loaded: &LoadedScene) -> LoadedScene {
-    let mut white = loaded.clone();
+    let mut white = loaded.without_interreflection();
     white.scene.color_map = None;
     white
 }
