@@ -73,7 +73,7 @@ impl Pass<'_> {
             let mut rng = ChaCha8Rng::seed_from_u64(start.to_bits());
             sample(seen.clone(), start, |s, weight| {
                 if self.is_visible(s, o) {
-                    sum += weight * paths.from_facet(&self.facets, self.origins[s], s, Pair { i, o }, &mut rng);
+                    sum += weight * paths.walk_from(&self.facets, self.origins[s], s, Pair { i, o }, &mut rng);
                 }
             });
         }

@@ -58,12 +58,12 @@ impl<'a> Paths<'a> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let stride = facets.len().div_ceil(MAX_WALKS).max(1);
         let starts = (rng.random_range(0..stride)..facets.len()).step_by(stride).filter(|s| v_o[*s] > 0.0);
-        let sum: DVec3 = starts.map(|s| self.from_facet(facets, origins[s], s, pair, &mut rng)).sum();
+        let sum: DVec3 = starts.map(|s| self.walk_from(facets, origins[s], s, pair, &mut rng)).sum();
         sum * stride as f64
     }
 
     /// `ΔA L (n·o)` of a facet by one walk.
-    pub fn from_facet(&self, facets: &Facets, origin: Vec3, s: usize, pair: Pair, rng: &mut ChaCha8Rng) -> DVec3 {
+    pub fn walk_from(&self, facets: &Facets, origin: Vec3, s: usize, pair: Pair, rng: &mut ChaCha8Rng) -> DVec3 {
         let material = self.material_of_slot[usize::from(facets.slots[s])];
         let start = Vertex {
             origin,
