@@ -64,6 +64,11 @@ impl Editor {
                 let name = format!("{}.png", self.document.name);
                 self.browse(Purpose::ExportImage, &name);
             }
+            Action::Sweep if self.document.scene().slab.is_some() => {
+                let text =
+                    "biscale.batch computes what a tile reflects, and not what a slab transmits: no sweep of a slab.";
+                self.messages.put(Level::Note, "sweep", text);
+            }
             Action::Sweep => {
                 let name = format!("{}_sweep.toml", self.document.name);
                 self.browse(Purpose::ExportSweep, &name);

@@ -11,6 +11,7 @@ mod sampler;
 mod share;
 mod table;
 mod transport;
+mod walk;
 
 #[cfg(test)]
 mod tests;
@@ -22,6 +23,7 @@ pub use sampler::LobeSampler;
 pub use share::{BouncedShare, measure as measure_share};
 pub use table::InterreflectionTable;
 pub use transport::{Tracer, Transport, Vertex};
+pub use walk::{WalkPoint, WalkedTile};
 
 use crate::brdf::Brdf;
 use crate::math::directions::PolarGrid;

@@ -6,10 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::sampler::{LobeSampler, from_cosine};
+use super::WalkedTile;
+use super::sampler::from_cosine;
 use crate::base::{Cancel, Result};
-use crate::brdf::Material;
-use crate::geometry::{PeriodicGrid, TileMesh};
 
 /// Number of walks. The standard error is some tenths of a small share, and a tenth of a large one.
 const WALKS: usize = 1024;
@@ -35,16 +34,10 @@ pub struct BouncedShare {
 ///
 /// # Errors
 /// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
-pub fn measure(
-    mesh: &TileMesh,
-    grid: &PeriodicGrid,
-    material_of_slot: &[usize],
-    (materials, samplers): (&[Material], &[LobeSampler]),
-    cancel: &Cancel,
-) -> Result<BouncedShare> {
-    let walks = Walks { mesh, grid, material_of_slot, materials, samplers, bottom: mesh.z_range().0 };
-    let weights: Vec<[f64; 2]> =
-        (0..WALKS).into_par_iter().with_min_len(TASK).map(|number| walks.reflected(number)).collect();
+pub fn measure(tile: &WalkedTile<'_>, cancel: &Cancel) -> Result<BouncedShare> {
+    let bottom = tile.mesh.z_range().0;
+    let walks = (0..WALKS).into_par_iter().with_min_len(TASK);
+    let weights: Vec<[f64; 2]> = walks.map(|number| reflected(tile, bottom, number)).collect();
     cancel.check()?;
     Ok(BouncedShare::of(&weights))
 }
@@ -64,52 +57,32 @@ impl BouncedShare {
     }
 }
 
-/// Inputs of the walks.
-struct Walks<'a> {
-    mesh: &'a TileMesh,
-    grid: &'a PeriodicGrid,
-    material_of_slot: &'a [usize],
-    materials: &'a [Material],
-    samplers: &'a [LobeSampler],
-    bottom: f32,
-}
-
-impl Walks<'_> {
-    /// The weight with which a walk leaves the tile after one reflection, and after more.
-    fn reflected(&self, number: usize) -> [f64; 2] {
-        let [x, y, u, v] = STEPS.map(|step| (0.5 + number as f64 * step).fract() as f32);
-        let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
-        let start = (Vec2::new(x, y) * self.mesh.size).extend(self.grid.top());
-        let mut direction = -from_cosine(Vec3::Z, u, v);
-        let mut weight = Vec3::ONE;
-        let mut hit = self.grid.nearest(start, direction, self.bottom);
-        for facet in 0..MAX_FACETS {
-            let Some(point) = hit.map(|hit| self.mesh.surface_point(&hit)) else { break };
-            if point.geometric_normal.dot(direction) >= 0.0 || point.normal.dot(direction) >= 0.0 {
-                break;
-            }
-            let index = self.material_of_slot[usize::from(point.slot)];
-            let material = &self.materials[index];
-            let numbers = [rng.random(), rng.random(), rng.random()];
-            let sample = self.samplers[index].sample(&material.brdf, point.normal, -direction, numbers);
-            let Some((next, factor)) = sample.filter(|(next, _)| next.dot(point.geometric_normal) > 0.0) else { break };
-            let color = self.mesh.color.at(point.position, point.normal, self.mesh.size);
-            weight *= factor * material.color * color;
-            let mean = weight.element_sum() / 3.0;
-            let survival = (mean / MIN_WEIGHT).min(1.0);
-            if rng.random::<f32>() >= survival {
-                break;
-            }
-            weight /= survival;
-            direction = next;
-            hit = self.grid.first_hit(point.origin, direction, point.triangle, self.bottom);
-            if hit.is_none() && direction.z > 0.0 {
-                let left = f64::from(mean / survival);
-                return if facet == 0 { [left, 0.0] } else { [0.0, left] };
-            }
+/// The weight with which a walk leaves the tile after one reflection, and after more.
+fn reflected(tile: &WalkedTile<'_>, bottom: f32, number: usize) -> [f64; 2] {
+    let [x, y, u, v] = STEPS.map(|step| (0.5 + number as f64 * step).fract() as f32);
+    let mut random = ChaCha8Rng::seed_from_u64(number as u64);
+    let start = (Vec2::new(x, y) * tile.mesh.size).extend(tile.grid.top());
+    let mut direction = -from_cosine(Vec3::Z, u, v);
+    let mut weight = Vec3::ONE;
+    let mut hit = tile.grid.nearest(start, direction, bottom);
+    for facet in 0..MAX_FACETS {
+        let Some(at) = hit.and_then(|hit| tile.point(&hit, direction)) else { break };
+        let Some((next, factor)) = tile.reflect(&at, -direction, &mut random) else { break };
+        weight *= factor;
+        let mean = weight.element_sum() / 3.0;
+        let survival = (mean / MIN_WEIGHT).min(1.0);
+        if random.random::<f32>() >= survival {
+            break;
         }
-        [0.0; 2]
+        weight /= survival;
+        direction = next;
+        hit = tile.first_hit(&at, direction, bottom);
+        if hit.is_none() && direction.z > 0.0 {
+            let left = f64::from(mean / survival);
+            return if facet == 0 { [left, 0.0] } else { [0.0, left] };
+        }
     }
+    [0.0; 2]
 }
 
 #[cfg(test)]

@@ -1,10 +1,8 @@
-use std::path::PathBuf;
-
 use super::*;
 use crate::effective::EffectiveBrdf;
+use crate::interreflection::tests::open;
 use crate::math::directions::PolarGrid;
 use crate::pipeline::Pipeline;
-use crate::scene::{self, LoadedScene, Painted};
 
 const GROOVES: &str =
     r#"{ kind = "grooves", profile = "trapezoid", count = 2, depth = 0.3, side_angle_deg = 70, rotation_deg = 0 }"#;
@@ -13,21 +11,9 @@ const RODS: &str = r#"{ kind = "rods", count = 5, radius = 0.06, length = 0.2 }"
 const WHITE: &str = r#"{ kind = "lambertian", albedo = 0.9 }"#;
 const METAL: &str = r#"{ kind = "ggx", roughness = 0.4, f0 = [0.9, 0.7, 0.4] }"#;
 
-fn open(geometry: &str, brdf: &str, effects: &str) -> LoadedScene {
-    let source = format!(
-        "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\nmethod = \"direct\"\nbackend = \"cpu\"\n[effects]\n{effects}\n"
-    );
-    LoadedScene {
-        scene: scene::parse(&source).unwrap(),
-        base_dir: PathBuf::new(),
-        name: "test".to_owned(),
-        painted: Painted::default(),
-    }
-}
-
-/// What a tile under a uniform sky reflects into all directions, in the mean of the channels.
+/// The part of uniform light that a tile reflects, in the mean of the channels.
 fn albedo(brdf: &EffectiveBrdf) -> f64 {
-    let grid = PolarGrid::new(12, 24);
+    let grid = PolarGrid::new(8, 16);
     let nodes = 0..grid.len();
     let reflected = |o: usize| {
         let to = grid.direction(o);

@@ -107,3 +107,60 @@ fn add(sums: &mut [f64; 3], value: Vec3, others: [Vec3; 2]) {
     let squares = [square(value), square(value - others[0]), square(value - others[1])];
     sums.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// A table of a symmetric function of two directions.
+    fn table(of: impl Fn(Vec3, Vec3) -> f32, mut noise: impl FnMut() -> f32) -> InterreflectionTable {
+        let grid = PolarGrid::new(12, 36);
+        let nodes = grid.directions();
+        let pairs = nodes.iter().flat_map(|o| nodes.iter().map(move |i| (*i, *o)));
+        let raw: Vec<Vec3> = pairs.map(|(i, o)| Vec3::splat(of(i, o) * (1.0 + noise()))).collect();
+        InterreflectionTable::new(grid, &raw, 1.0)
+    }
+
+    /// A lobe about the mirror direction.
+    fn lobe(width: f32) -> impl Fn(Vec3, Vec3) -> f32 {
+        move |i, o| i.z * o.z * (-(i.truncate() + o.truncate()).length_squared() / (width * width)).exp()
+    }
+
+    /// Relative L2 of interpolation at random directions.
+    fn true_error(table: &InterreflectionTable, of: impl Fn(Vec3, Vec3) -> f32) -> f64 {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let (mut error, mut norm) = (0.0, 0.0);
+        for _ in 0..20_000 {
+            let [i, o] = [(); 2].map(|()| {
+                crate::math::directions::from_angles(1.4 * random.random::<f32>(), 6.28 * random.random::<f32>())
+            });
+            table.eval_lights(&[i], o, |_, g| error += (g.x - f64::from(of(i, o))).powi(2));
+            norm += f64::from(of(i, o)).powi(2);
+        }
+        (error / norm).sqrt()
+    }
+
+    #[test]
+    fn a_smooth_table_states_hardly_an_error_and_a_narrow_lobe_about_that_of_its_interpolation() {
+        let smooth = table(|i, o| i.z * o.z, || 0.0);
+        assert!(smooth.rel_error < 0.01, "{}", smooth.rel_error);
+        for width in [0.15_f32, 0.2, 0.3, 0.45] {
+            let found = table(lobe(width), || 0.0);
+            let error = true_error(&found, lobe(width));
+            eprintln!("width {width}: stated {:.4}, true {error:.4}", found.rel_error);
+            assert!((error / 2.5..error * 2.5).contains(&found.rel_error), "{width}: {} {error}", found.rel_error);
+        }
+    }
+
+    #[test]
+    fn noise_shows_in_pairs_that_must_be_equal() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        // Uniform noise of deviation 0.1; the mean of two values has 0.071.
+        let noisy = table(|i, o| i.z * o.z, || 0.1 * 12.0_f32.sqrt() * (random.random::<f32>() - 0.5));
+        assert!((0.07..0.11).contains(&noisy.rel_error), "{}", noisy.rel_error);
+        assert_eq!(table(|_, _| 0.0, || 0.0).rel_error, 0.0);
+    }
+}

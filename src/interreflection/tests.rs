@@ -21,7 +21,7 @@ const DEEP: &str =
     r#"{ kind = "grooves", profile = "trapezoid", count = 2, depth = 0.5, side_angle_deg = 80, rotation_deg = 0 }"#;
 const WHITE: &str = r#"{ kind = "lambertian", albedo = 1.0 }"#;
 
-fn open(geometry: &str, brdf: &str, effects: &str) -> LoadedScene {
+pub fn open(geometry: &str, brdf: &str, effects: &str) -> LoadedScene {
     let source = format!(
         "[tile]\ngeometry = {geometry}\n[[material]]\nname = \"default\"\nbrdf = {brdf}\n[quality]\nfacets = 4096\nmethod = \"direct\"\nbackend = \"cpu\"\n[effects]\n{effects}\n"
     );

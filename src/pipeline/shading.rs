@@ -131,50 +131,51 @@ impl Shading {
         }
         let start = Instant::now();
         let mut times = StageTimes::new();
-        let (unmerged, errors) = self.first_close_enough(cancel, &mut times)?;
-        let brdf = self.with_bounced_columns(&unmerged, cancel)?;
+        let Found { brdf, errors, direct_only } = self.first_close_enough(cancel, &mut times)?;
         let was_cached = !times.is_empty() && times.iter().all(|(name, _)| *name == Tabulate::CACHED);
         let shading = ShadingBrdf { brdf, errors, ms: elapsed_ms(start), was_cached };
         *computed = Some(shading.clone());
-        *lock(&self.last) = Some(LastShading { surface: self.keys.surface, lobes: self.keys.lobes, brdf: unmerged });
+        *lock(&self.last) = Some(LastShading { surface: self.keys.surface, lobes: self.keys.lobes, brdf: direct_only });
         Ok(shading)
     }
 
     /// Walks the strategies from the cheapest: a strided subset of the facets, a table, f̄ itself.
-    fn first_close_enough(
-        &self,
-        cancel: &Cancel,
-        times: &mut StageTimes,
-    ) -> Result<(Arc<EffectiveBrdf>, Option<Errors>)> {
+    fn first_close_enough(&self, cancel: &Cancel, times: &mut StageTimes) -> Result<Found> {
         if self.grids.is_empty() {
-            return Ok((self.exact.clone(), None));
+            return Ok(Found::new(self.exact.clone(), None));
         }
         let check = Check::new(&self.exact, self.seed);
         let (reused, has_failed) = self.reuse();
         if let Some((brdf, errors)) = self.strided_subset(&check) {
-            return Ok((Arc::new(brdf), Some(errors)));
+            return Ok(Found::new(Arc::new(brdf), Some(errors)));
         }
         if has_failed {
-            return Ok((self.exact.clone(), None));
+            return Ok(Found::new(self.exact.clone(), None));
         }
-        let (table, errors) = self.table(reused, &check, cancel, times)?;
-        Ok((table.map_or_else(|| self.exact.clone(), Arc::new), errors))
+        match self.table(reused, &check, cancel, times)? {
+            (Some(table), errors) => self.with_bounced_columns(Found::new(Arc::new(table), errors), &check, cancel),
+            (None, errors) => Ok(Found::new(self.exact.clone(), errors)),
+        }
     }
 
-    /// A table that also holds the light that facets send to each other, so that images read one table and a GPU can
-    /// read it. It is not taken if it is too coarse for this light.
-    fn with_bounced_columns(&self, brdf: &Arc<EffectiveBrdf>, cancel: &Cancel) -> Result<Arc<EffectiveBrdf>> {
-        let Representation::Interreflecting(direct, bounced) = &brdf.representation else { return Ok(brdf.clone()) };
-        let Representation::Table(table) = &**direct else { return Ok(brdf.clone()) };
+    /// Adds the light that facets send to each other to a table, so that images read one table and a GPU can read it.
+    /// The table stays as it is if its grid is too coarse for this light.
+    fn with_bounced_columns(&self, found: Found, check: &Check, cancel: &Cancel) -> Result<Found> {
+        let Representation::Interreflecting(direct, bounced) = &found.brdf.representation else { return Ok(found) };
+        let Representation::Table(table) = &**direct else { return Ok(found) };
+        let base_area = found.brdf.base_area;
         let sum = |i: Vec3, o: Vec3| {
             let mut sum = DVec3::ZERO;
-            bounced.eval_lights(&[i], o, |_, g| sum = g * brdf.base_area);
+            bounced.eval_lights(&[i], o, |_, g| sum = g * base_area);
             sum
         };
         let representation = Representation::Table(table.plus_bounced(sum, cancel)?);
-        let merged = EffectiveBrdf { representation, base_area: brdf.base_area };
-        let is_close = self.is_close(Check::new(&self.exact, self.seed).errors(&merged));
-        Ok(if is_close { Arc::new(merged) } else { brdf.clone() })
+        let brdf = EffectiveBrdf { representation, base_area };
+        let errors = check.errors(&brdf);
+        if !self.is_close(errors) {
+            return Ok(found);
+        }
+        Ok(Found { brdf: Arc::new(brdf), errors: Some(errors), direct_only: found.brdf })
     }
 
     /// A sum over a strided subset of the facets, if it is close enough.
@@ -314,6 +315,20 @@ impl Shading {
             (Representation::Table(_), _) => (None, false),
             _ => (None, same_lobes),
         }
+    }
+}
+
+/// What images read.
+struct Found {
+    brdf: Arc<EffectiveBrdf>,
+    errors: Option<Errors>,
+    /// The same without columns of light that facets send to each other, for edits of colours.
+    direct_only: Arc<EffectiveBrdf>,
+}
+
+impl Found {
+    fn new(brdf: Arc<EffectiveBrdf>, errors: Option<Errors>) -> Self {
+        Self { direct_only: brdf.clone(), brdf, errors }
     }
 }
 

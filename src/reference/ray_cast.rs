@@ -9,7 +9,7 @@ use crate::base::Cancel;
 use crate::brdf::Material;
 use crate::effective::FacetSum;
 use crate::geometry::{FacetSampler, Facets, PeriodicGrid, SampleShift, TileMesh, lifted_origins};
-use crate::interreflection::LobeSampler;
+use crate::interreflection::{LobeSampler, WalkedTile};
 use crate::metrics::Pair;
 
 /// Work and accuracy of a reference.
@@ -179,8 +179,9 @@ impl<'a> Reference<'a> {
 
     /// The tracer of light that facets send to each other, if it is followed.
     pub(super) fn paths(&self) -> Option<Paths<'_>> {
-        let materials = (&self.materials[..], &self.samplers[..]);
-        (self.bounces > 0).then(|| Paths::new(self.mesh, &self.grid, &self.material_of_slot, materials, self.bounces))
+        let Self { mesh, grid, material_of_slot, materials, samplers, .. } = self;
+        (self.bounces > 0)
+            .then(|| Paths::new(WalkedTile { mesh, grid, material_of_slot, materials, samplers }, self.bounces))
     }
 
     /// Computes `(Σ ΔA V V f, a_v)` over one set of facets.

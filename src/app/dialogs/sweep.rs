@@ -12,6 +12,9 @@ use crate::scene::{KeyEntry, PRESETS, Scene, keys_of};
 /// Parts of a scene whose numbers describe the material.
 const PARTS: [&str; 3] = ["tile.", "material.", "color_map."];
 
+/// Largest range of a whole number, whose values the specification lists.
+const MAX_CHOICES: f64 = 1000.0;
+
 /// A data set of materials that vary in some keys of a scene.
 #[derive(Debug, Clone)]
 pub struct Sweep {
@@ -65,8 +68,16 @@ impl Sweep {
         let base = quoted(self.base.as_deref().unwrap_or_default());
         let mut text = format!("base = {base}\ncount = {}\nseed = 1\n\n[sample]\n", self.count);
         for SweptKey { entry, range: [low, high], is_log, .. } in self.keys.iter().filter(|key| key.is_on) {
-            let kind = if *is_log { "log" } else { "uniform" };
-            let _ = writeln!(text, "{} = {{ {kind} = [{low:?}, {high:?}] }}", quoted(&entry.key));
+            let drawn = match (entry.kind, is_log) {
+                // Between whole numbers, `uniform` would draw others.
+                ("integer", _) => {
+                    let all: Vec<String> = (*low as i64..=*high as i64).map(|value| value.to_string()).collect();
+                    format!("choice = [{}]", all.join(", "))
+                }
+                (_, true) => format!("log = [{low:?}, {high:?}]"),
+                (_, false) => format!("uniform = [{low:?}, {high:?}]"),
+            };
+            let _ = writeln!(text, "{} = {{ {drawn} }}", quoted(&entry.key));
         }
         let Self { directions, preset, .. } = self;
         let preset = quoted(preset);
@@ -162,6 +173,9 @@ impl SweptKey {
         let value = entry.value.as_ref().and_then(|value| value.as_float().or(value.as_integer().map(|n| n as f64)))?;
         let ends = if value == 0.0 { [least.max(-1.0), most.min(1.0)] } else { [0.5 * value, 2.0 * value] };
         let (low, high) = (ends[0].min(ends[1]).clamp(least, most), ends[0].max(ends[1]).clamp(least, most));
+        if entry.kind == "integer" && most - least > MAX_CHOICES {
+            return None;
+        }
         let range = if entry.kind == "integer" { [low.floor(), high.ceil()] } else { [low, high] };
         Some(Self { entry, is_on: false, range, is_log: false })
     }
@@ -202,6 +216,8 @@ mod tests {
         assert_eq!(spec["base"].as_str(), Some("fig4b_bicolor_cup"));
         assert_eq!(spec["sample"]["tile.geometry.depth"]["log"].as_array().unwrap().len(), 2);
         assert_eq!(spec["sample"].as_table().unwrap().len(), 2);
+        let counts = spec["sample"]["tile.geometry.count"]["choice"].as_array().unwrap();
+        assert!(counts.iter().all(toml::Value::is_integer) && counts.len() > 1, "{counts:?}");
         let (hours, bytes) = sweep.hours_and_bytes();
         assert!((hours - 1000.0 * (10.0 + 40.96) / 3.6e6).abs() < 1e-12 && bytes == 1000.0 * 4096.0 * 6.0);
         sweep.base = None;

@@ -49,7 +49,7 @@ impl ShadingTable {
         (content.values.len() == nodes && content.areas.len() == areas.len()).then(|| Self {
             grid,
             interpolation: Interpolation::Cubic,
-            direct_columns: weights.len(),
+            bounced_weights: Vec::new(),
             weights,
             is_of_sum: true,
             vec4s,

@@ -33,8 +33,8 @@ pub struct ShadingTable {
     /// Interpolation along θ_d; along the other axes it is linear.
     pub interpolation: Interpolation,
     weights: Vec<Weight>,
-    /// Columns that precede those of bounced light, which [`ShadingTable::plus_bounced`] adds.
-    direct_columns: usize,
+    /// As `weights`, but 0 for all columns except those of [`ShadingTable::plus_bounced`]; empty without these.
+    bounced_weights: Vec<Weight>,
     /// True if the columns are those of a sum over facets, false if they are the colours of another representation.
     is_of_sum: bool,
     /// Groups of four columns per node.
@@ -219,7 +219,7 @@ impl ShadingTable {
         Ok(Self {
             grid,
             interpolation: Interpolation::Cubic,
-            direct_columns: weights.len(),
+            bounced_weights: Vec::new(),
             weights,
             is_of_sum,
             vec4s,
@@ -249,6 +249,8 @@ impl ShadingTable {
             0.0
         };
         let bounced = Self::resample(sums, Nodes::all(self.grid), cancel)?;
+        let zeros = vec![Weight::Tint(Tint::Fixed(Vec3::ZERO)); self.weights.len()];
+        let bounced_weights = [zeros, bounced.weights.clone()].concat();
         let weights = [self.weights.clone(), bounced.weights].concat();
         let vec4s = weights.len().div_ceil(4);
         let mut values = vec![Vec4::ZERO; self.values.len() / self.vec4s * vec4s];
@@ -260,8 +262,7 @@ impl ShadingTable {
                 out[column / 4][column % 4] = bounced[channel];
             }
         });
-        let direct_columns = self.weights.len();
-        Ok(Self { weights, direct_columns, vec4s, values: Arc::new(values), ..self.clone() })
+        Ok(Self { weights, bounced_weights, vec4s, values: Arc::new(values), ..self.clone() })
     }
 
     /// Changes the interpolation along θ_d.
@@ -307,20 +308,19 @@ impl ShadingTable {
 
     /// Returns `a_v(o)` and writes `a_v f̄` of each light to `out`.
     pub fn sums(&self, lights: &[Vec3], o: Vec3, out: impl FnMut(usize, DVec3)) -> f64 {
-        self.sums_from(0, lights, o, out)
+        self.weighted_sums(&self.weights, lights, o, out)
     }
 
     /// As [`ShadingTable::sums`], of the light that facets send to each other.
     pub fn bounced_sums(&self, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
-        if self.direct_columns == self.weights.len() {
+        if self.bounced_weights.is_empty() {
             (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
             return 0.0;
         }
-        self.sums_from(self.direct_columns, lights, o, out)
+        self.weighted_sums(&self.bounced_weights, lights, o, out)
     }
 
-    /// The sums of the columns from the number `first`.
-    fn sums_from(&self, first: usize, lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
+    fn weighted_sums(&self, weights: &[Weight], lights: &[Vec3], o: Vec3, mut out: impl FnMut(usize, DVec3)) -> f64 {
         if o.z <= 0.0 {
             (0..lights.len()).for_each(|k| out(k, DVec3::ZERO));
             return 0.0;
@@ -341,8 +341,7 @@ impl ShadingTable {
             let cubic = self.interpolation == Interpolation::Cubic;
             simd::row_sums(&self.values, self.row_grid(), coordinates.columns(), lights.len(), cubic, sums);
             for ((k, &i), sums) in lights.iter().enumerate().zip(sums.chunks(self.vec4s)) {
-                let at = coordinates.i_dot_h(k);
-                let sum = if i.z > 0.0 { self.weighted(first, i, o, at, sums) } else { Vec3::ZERO };
+                let sum = if i.z > 0.0 { weighted(weights, i, o, coordinates.i_dot_h(k), sums) } else { Vec3::ZERO };
                 out(part * GridCoordinates::MAX + k, sum.as_dvec3());
             }
         }
@@ -353,20 +352,18 @@ impl ShadingTable {
         let HemispherePairGrid { rings, azimuths, phi_d, theta_d } = self.grid;
         RowGrid { rings, azimuths, phi_d, stored: theta_d + 2, vec4s: self.vec4s }
     }
+}
 
-    /// `Σ_c w_c T_c` from the column `first`.
-    #[inline(always)]
-    fn weighted(&self, first: usize, i: Vec3, o: Vec3, i_dot_h: f32, sums: &[Vec4]) -> Vec3 {
-        let pair = PairVectors { i, o, h: (i + o) / (2.0 * i_dot_h).max(1e-20), i_dot_h };
-        let mut total = Vec3::ZERO;
-        for (group, (sums, weights)) in sums.iter().zip(self.weights.chunks(4)).enumerate() {
-            // A cubic may be below zero; no sum is.
-            for (k, (sum, weight)) in sums.max(Vec4::ZERO).to_array().into_iter().zip(weights).enumerate() {
-                if 4 * group + k >= first {
-                    total += weight.at(&pair) * sum;
-                }
-            }
+/// `Σ_c w_c T_c`
+#[inline(always)]
+fn weighted(weights: &[Weight], i: Vec3, o: Vec3, i_dot_h: f32, sums: &[Vec4]) -> Vec3 {
+    let pair = PairVectors { i, o, h: (i + o) / (2.0 * i_dot_h).max(1e-20), i_dot_h };
+    let mut total = Vec3::ZERO;
+    for (sums, weights) in sums.iter().zip(weights.chunks(4)) {
+        // A cubic may be below zero; no sum is.
+        for (sum, weight) in sums.max(Vec4::ZERO).to_array().into_iter().zip(weights) {
+            total += weight.at(&pair) * sum;
         }
-        total
     }
+    total
 }

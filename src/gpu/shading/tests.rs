@@ -9,7 +9,9 @@ use super::{GpuLight, GpuMaterial, GpuShading, ShadingParams};
 use crate::base::Cancel;
 use crate::brdf::{Brdf, LobeAngles, Material, Measured, MeasuredReport, Term};
 use crate::effective::shading_table::columns::Weight;
-use crate::effective::{Direct, EffectiveBrdf, FacetSum, Interpolation, Nodes, Representation, ShadingTable};
+use crate::effective::{
+    Direct, EffectiveBrdf, FacetSum, Interpolation, Nodes, Reflectance, Representation, ShadingTable,
+};
 use crate::gpu::render::gbuffer::GpuPoint;
 use crate::gpu::{Gpu, GpuError, GpuRenderer, render_gpu};
 use crate::math::directions::HemispherePairGrid;
@@ -200,6 +202,22 @@ pub(crate) const LOBES: [&str; 5] = [
     "{ kind = \"ward\", roughness = 0.2, specular = [0.3, 0.4, 0.5] }",
     "{ kind = \"ggx\", roughness = 0.2, f0 = [0.04, 0.05, 0.06] }",
 ];
+
+#[test]
+fn a_table_with_bounced_light_gives_the_same_image() {
+    let Some(gpu) = open_gpu() else { return };
+    let ripples = "{ kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.3 }";
+    let mut loaded = open(ripples, LOBES[2], "direct");
+    loaded.scene.effects.interreflection = scene::Switch::On;
+    loaded.scene.effects.picture_table = scene::Switch::On;
+    let outcome = Pipeline::new().effective(&loaded).unwrap();
+    let table = outcome.shading_brdf(&Cancel::default()).unwrap().brdf;
+    assert!(matches!(table.representation, Representation::Table(_)), "one table holds all light");
+    let mut bounced = [Vec3::ZERO];
+    table.eval_bounced(&[Vec3::Z], Vec3::Z, &mut bounced);
+    assert!(bounced[0].min_element() > 0.0);
+    assert_same("bounced light", &gpu, "sphere", &table);
+}
 
 #[test]
 fn direct_sums_give_the_same_image_for_every_lobe_and_visibility() {

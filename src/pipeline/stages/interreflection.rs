@@ -8,7 +8,8 @@ use crate::brdf::Material;
 use crate::cache::{Key, KeyBuilder};
 use crate::geometry::{Facets, PeriodicGrid, mirror_planes_in};
 use crate::interreflection::{
-    BouncedShare, InterreflectionSettings, InterreflectionTable, LobeSampler, Transport, gather, measure_share,
+    BouncedShare, InterreflectionSettings, InterreflectionTable, LobeSampler, Transport, WalkedTile, gather,
+    measure_share,
 };
 use crate::pipeline::Env;
 use crate::pipeline::stage::{Keyed, Stage};
@@ -87,7 +88,8 @@ impl Stage for MeasureBouncedShare<'_> {
 
     fn run(&self, env: &Env) -> Result<BouncedShare> {
         let Reflection { material_of_slot, materials, samplers, .. } = *self.reflection;
-        measure_share(&self.tile.mesh, self.grid, material_of_slot, (materials, samplers), &env.cancel)
+        let tile = WalkedTile { mesh: &self.tile.mesh, grid: self.grid, material_of_slot, materials, samplers };
+        measure_share(&tile, &env.cancel)
     }
 }
 
