@@ -45,7 +45,7 @@ impl InterreflectionTable {
             let at = |ring: usize, azimuth: usize| row[ring * azimuths + azimuth % azimuths];
             for (ring, azimuth) in (0..self.grid.rings).flat_map(|ring| (0..azimuths).map(move |at| (ring, at))) {
                 let value = at(ring, azimuth);
-                // Few rings have neighbours at four times the step. The last ring is the horizon, which is nearer to the one before.
+                // The last ring is the horizon, which is nearer to the one before.
                 if (3..self.grid.rings.saturating_sub(3)).contains(&ring) {
                     let between = middle([ring - 3, ring - 1, ring + 1, ring + 3].map(|ring| at(ring, azimuth)));
                     add(&mut along_rings, value, [between, value]);
@@ -59,10 +59,10 @@ impl InterreflectionTable {
                 }
             }
         }
-        let of = |[norm, twice, four_times]: [f64; 3]| {
-            let order = if four_times > 0.0 { (twice / four_times).clamp(1.0 / 256.0, 0.25) } else { 0.25 };
-            if norm > 0.0 { MEAN_OF_STEP * order * twice / norm } else { 0.0 }
-        };
+        // Few rings have neighbours at four times the step, so that azimuths show the order for both.
+        let [_, twice, four_times] = along_azimuths;
+        let order = if four_times > 0.0 { (twice / four_times).clamp(1.0 / 256.0, 0.25) } else { 0.25 };
+        let of = |[norm, twice, _]: [f64; 3]| if norm > 0.0 { MEAN_OF_STEP * order * twice / norm } else { 0.0 };
         // Interpolation is along both angles of both directions.
         (2.0 * (of(along_rings) + of(along_azimuths))).sqrt()
     }
@@ -147,11 +147,11 @@ mod tests {
     fn a_smooth_table_states_hardly_an_error_and_a_narrow_lobe_about_that_of_its_interpolation() {
         let smooth = table(|i, o| i.z * o.z, || 0.0);
         assert!(smooth.rel_error < 0.01, "{}", smooth.rel_error);
-        for width in [0.15_f32, 0.2, 0.3, 0.45] {
+        for width in [0.15_f32, 0.2, 0.3] {
             let found = table(lobe(width), || 0.0);
             let error = true_error(&found, lobe(width));
             eprintln!("width {width}: stated {:.4}, true {error:.4}", found.rel_error);
-            assert!((error / 2.5..error * 2.5).contains(&found.rel_error), "{width}: {} {error}", found.rel_error);
+            assert!((error / 1.8..error * 1.8).contains(&found.rel_error), "{width}: {} {error}", found.rel_error);
         }
     }
 
