@@ -19,8 +19,10 @@ use crate::visibility::Visibility;
 
 /// Rays per matrix product.
 const BLOCK: usize = 2048;
-/// Viewers per task of a matrix product.
-const ROWS: usize = 64;
+/// Most viewers per task of a matrix product.
+const ROWS: usize = 128;
+/// Elements whose visibility is transposed at once.
+const TRANSPOSED: usize = 16;
 /// Lower limit of the cosine that a lobe is divided by. It bounds the contribution of rays along their own surface.
 const MIN_COSINE: f32 = 1e-3;
 /// Walks whose weight is below this are continued at random, with a weight of this.
@@ -81,15 +83,16 @@ pub fn gather(
     let surface = (facets, visibility, transport);
     let exchange = Exchange::new(surface, (material_of_slot, &reflectors), directions, settings.bounces);
     let (nodes, viewers, channels) = (exchange.nodes[0].len(), exchange.viewers.len(), exchange.channels);
-    let g = exchange.sum(cancel)?;
+    let (g, variance) = exchange.sum(&mirrored.images(), cancel)?;
     let scale = 1.0 / f64::from(mesh.base_area());
-    let at = |o: usize, i: usize, c: usize| {
-        let (viewer, light) = mirrored.original_of(o, i);
-        (g[(c.min(channels - 1) * viewers + viewer) * nodes + light] * scale) as f32
+    let at = |pair: usize| {
+        let (viewer, light) = mirrored.original_of(pair / nodes, pair % nodes);
+        let of = |c: usize| (g[(c.min(channels - 1) * viewers + viewer) * nodes + light] * scale) as f32;
+        Vec3::new(of(0), of(1), of(2))
     };
-    let pairs = (0..nodes * nodes).map(|pair| (pair / nodes, pair % nodes));
-    let raw: Vec<Vec3> = pairs.map(|(o, i)| Vec3::new(at(o, i, 0), at(o, i, 1), at(o, i, 2))).collect();
-    Ok(InterreflectionTable::new(settings.grid, &raw, transport.hit_fraction()))
+    let raw: Vec<Vec3> = (0..nodes * nodes).into_par_iter().map(at).collect();
+    let noise = variance.sqrt() * scale;
+    Ok(InterreflectionTable::new(settings.grid, &raw, noise, transport.hit_fraction()))
 }
 
 impl<'a> Reflector<'a> {
@@ -118,7 +121,10 @@ impl<'a> Exchange<'a> {
             transport,
             materials,
             colors,
-            openness: visibility.chunks(nodes.len()).map(|row| row.iter().sum::<f32>() / nodes.len() as f32).collect(),
+            openness: visibility
+                .par_chunks(nodes.len())
+                .map(|row| sum_of_products(row, |_| 1.0) / nodes.len() as f32)
+                .collect(),
             visibility,
             viewer_nodes: [0, 1, 2].map(|axis| viewers.iter().map(|node| nodes[*node][axis]).collect()),
             nodes: [0, 1, 2].map(|axis| nodes.iter().map(|node| node[axis]).collect()),
@@ -128,8 +134,9 @@ impl<'a> Exchange<'a> {
         }
     }
 
-    /// The sums over all rays, a matrix of viewers and lights per channel.
-    fn sum(&self, cancel: &Cancel) -> Result<Vec<f64>> {
+    /// The sums over all rays, a matrix of viewers and lights per channel, and the sum of the variances of all pairs and
+    /// three channels. `images` is the number of nodes that each viewer stands for.
+    fn sum(&self, images: &[f32], cancel: &Cancel) -> Result<(Vec<f64>, f64)> {
         let (nodes, viewers, channels) = (self.nodes[0].len(), self.viewers.len(), self.channels);
         let rays = self.transport.rays;
         let useful: Vec<u32> = (0..self.transport.hits.len())
@@ -142,27 +149,43 @@ impl<'a> Exchange<'a> {
             .map(|ray| ray as u32)
             .collect();
         let mut g = vec![0.0_f64; channels * viewers * nodes];
-        let mut to_viewer = vec![0.0_f32; BLOCK * channels * viewers];
-        let mut from_light = vec![0.0_f32; BLOCK * channels * nodes];
+        let rows = useful.len().min(BLOCK);
+        let mut to_viewer = vec![0.0_f32; rows * channels * viewers];
+        let mut from_light = vec![0.0_f32; rows * channels * nodes];
+        let mut variance = 0.0;
         for block in useful.chunks(BLOCK) {
             cancel.check()?;
-            to_viewer
+            let of_rays: Vec<f64> = to_viewer
                 .par_chunks_mut(channels * viewers)
                 .zip(from_light.par_chunks_mut(channels * nodes))
                 .zip(block)
-                .for_each(|((to_viewer, from_light), &ray)| self.fill(ray as usize, to_viewer, from_light));
-            for c in 0..channels {
-                let sums = &mut g[c * viewers * nodes..(c + 1) * viewers * nodes];
-                sums.par_chunks_mut(ROWS * nodes).enumerate().for_each(|(task, sums)| {
-                    let rows = sums.len() / nodes;
-                    let a = &to_viewer[c * viewers + task * ROWS..];
+                .map(|((to_viewer, from_light), &ray)| {
+                    self.fill(ray as usize, to_viewer, from_light);
+                    let channels = to_viewer.chunks(viewers).zip(from_light.chunks(nodes));
+                    channels.map(|(a, b)| self.variance(a, b, images)).sum()
+                })
+                .collect();
+            variance += of_rays.iter().sum::<f64>() * 3.0 / channels as f64;
+            let rows = viewers.div_ceil(viewers.div_ceil(ROWS).max(2));
+            g.par_chunks_mut(viewers * nodes).enumerate().for_each(|(c, sums)| {
+                sums.par_chunks_mut(rows * nodes).enumerate().for_each(|(task, sums)| {
+                    let a = &to_viewer[c * viewers + task * rows..];
                     let b = &from_light[c * nodes..];
                     let strides = [channels * viewers, channels * nodes];
-                    add_outer_products(block.len(), [rows, nodes], [a, b], strides, sums);
+                    add_outer_products(block.len(), [sums.len() / nodes, nodes], [a, b], strides, sums);
                 });
-            }
+            });
         }
-        Ok(g)
+        Ok((g, variance))
+    }
+
+    /// What a ray adds to the variance of all pairs, if rays are independent. It contributes `a(o) b(i)`, and the values of
+    /// swapped pairs are averaged: `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|² |b|² + (a·b)²)/2`.
+    fn variance(&self, a: &[f32], b: &[f32], images: &[f32]) -> f64 {
+        let norm = sum_of_products(a, |at| images[at] * a[at]);
+        let product = sum_of_products(a, |at| images[at] * b[self.viewers[at]]);
+        let of_lights = sum_of_products(b, |at| b[at]);
+        0.5 * (f64::from(norm) * f64::from(of_lights) + f64::from(product).powi(2))
     }
 
     /// Writes what one ray sends to each viewer, and what it carries from each light.
@@ -283,10 +306,25 @@ fn visible_from(visibility: &Visibility, elements: &[u32], nodes: &[Vec3]) -> Ve
     };
     let columns: Vec<Vec<f32>> = nodes.par_iter().map(|node| column(*node)).collect();
     let mut rows = vec![0.0; elements.len() * nodes.len()];
-    rows.par_chunks_mut(nodes.len()).enumerate().for_each(|(element, row)| {
-        row.iter_mut().zip(&columns).for_each(|(value, column)| *value = column[element]);
+    // Some elements at once, so that each part of a column is read from memory once.
+    rows.par_chunks_mut(TRANSPOSED * nodes.len()).enumerate().for_each(|(block, rows)| {
+        for (node, column) in columns.iter().enumerate() {
+            let values = &column[block * TRANSPOSED..];
+            rows[node..].iter_mut().step_by(nodes.len()).zip(values).for_each(|(to, value)| *to = *value);
+        }
     });
     rows
+}
+
+/// The scalar product of values with others, in lanes.
+fn sum_of_products(values: &[f32], others: impl Fn(usize) -> f32) -> f32 {
+    let mut lanes = [0.0_f32; 8];
+    for (block, values) in values.chunks(8).enumerate() {
+        for (lane, (sum, value)) in lanes.iter_mut().zip(values).enumerate() {
+            *sum += value * others(8 * block + lane);
+        }
+    }
+    lanes.iter().sum()
 }
 
 fn has_no_hue(color: Vec3) -> bool {

@@ -39,6 +39,13 @@ impl MirroredNodes {
         Self { computed, originals, grid }
     }
 
+    /// The number of nodes that each node of `computed` stands for.
+    pub fn images(&self) -> Vec<f32> {
+        let mut images = vec![0.0; self.computed.len()];
+        self.originals.iter().for_each(|(at, _)| images[*at] += 1.0);
+        images
+    }
+
     /// The entry that has the value of `(row, column)`: a position in `computed`, and a column.
     pub fn original_of(&self, row: usize, column: usize) -> (usize, usize) {
         let (at, reflection) = self.originals[row];

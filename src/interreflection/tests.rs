@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::sampler::LobeSampler;
 use super::{Tracer, Vertex};
-use crate::effective::EffectiveBrdf;
+use crate::effective::{EffectiveBrdf, Representation};
 use crate::geometry::{FacetSampler, PeriodicGrid, SampleShift, is_facet_visible, lifted_origins};
 use crate::math::directions::{PolarGrid, from_angles};
 use crate::metrics::{Pair, mirror_biased_pairs};
@@ -247,6 +247,38 @@ fn white_tiles_return_no_more_than_they_receive() {
             // The facets and their visibility have errors of up to 2 % at grazing views of pyramids.
             assert!(returned <= most.min(1.0) + 0.025, "{geometry}, {brdf}, {theta}: {returned}, flat {most}");
         }
+    }
+}
+
+#[test]
+fn the_stated_error_of_a_smooth_table_is_its_spread_between_seeds() {
+    let [light, view] = [0.2, 0.9].map(|theta| from_angles(theta, 0.4));
+    let pairs: Vec<Pair> =
+        (0..96).map(|k| Pair { i: light, o: from_angles(0.013 * k as f32, 2.4 * k as f32) }).collect();
+    let pairs = pairs.iter().flat_map(|pair| [*pair, Pair { i: view, ..*pair }]);
+    for brdf in [WHITE, r#"{ kind = "ggx", roughness = 0.6, f0 = 1 }"#] {
+        let (mut spread, mut norm, mut stated) = (0.0, 0.0, 0.0);
+        let values = (0..8_u64).map(|seed| {
+            let mut scene = open(DEEP, brdf, "interreflection = \"on\"");
+            scene.scene.quality.seed = seed;
+            let brdf = Pipeline::new().effective(&scene).unwrap().brdf;
+            let Representation::Interreflecting(_, table) = &brdf.representation else { panic!("no interreflection") };
+            stated += table.rel_error / 8.0;
+            let mut values = Vec::new();
+            pairs.clone().for_each(|pair| table.eval_lights(&[pair.i], pair.o, |_, g| values.push(g.x)));
+            values
+        });
+        let values: Vec<Vec<f64>> = values.collect();
+        for pair in 0..values[0].len() {
+            let of_seeds = values.iter().map(|values| values[pair]);
+            let mean = of_seeds.clone().sum::<f64>() / 8.0;
+            spread += of_seeds.map(|value| (value - mean).powi(2)).sum::<f64>() / 7.0;
+            norm += mean * mean;
+        }
+        let spread = (spread / norm).sqrt();
+        eprintln!("{brdf}: spread {spread:.4}, stated {stated:.4}");
+        // Directions are stratified, so that independent rays are an upper estimate.
+        assert!((spread * 0.7..spread * 2.0).contains(&stated), "{brdf}: {spread} {stated}");
     }
 }
 

@@ -303,21 +303,22 @@ impl Settings {
         }
     }
 
-    /// The resolution of interreflection. Where it is a small share of the light, fewer elements have the same error in f̄:
-    /// their noise falls with the root of their number.
+    /// The resolution of interreflection. Where it is a small share of the light, fewer rays have the same error in f̄: their
+    /// noise falls with the root of their number. There are as many elements for any share, because walks read the
+    /// visibility of the nearest one.
     pub fn interreflection(&self, bounced: Option<BouncedShare>) -> InterreflectionSettings {
-        /// Share from which all elements are used, and the smallest part of them.
+        /// Share from which all rays are cast.
         const FULL_SHARE: f64 = 0.3;
-        const LEAST_PART: f64 = 0.125;
         let (elements, rays, grid) = match self.preset {
-            Preset::Draft => (2048, 6, PolarGrid::new(8, 24)),
+            Preset::Draft => (2048, 6_u8, PolarGrid::new(8, 24)),
             Preset::Standard | Preset::Wu2011 => (6144, 6, PolarGrid::new(12, 36)),
             Preset::Fine | Preset::Reference => (16_384, 12, PolarGrid::new(16, 48)),
         };
         // In steps, so that an edit of a colour seldom casts other rays.
         let step = |share: f64| (share / FULL_SHARE).powi(2).log2().round().exp2();
-        let part = bounced.map_or(1.0, |bounced| step(bounced.share).clamp(LEAST_PART, 1.0));
-        let elements = ((elements as f64 * part) as usize).min(self.facets);
+        let part = bounced.map_or(1.0, |bounced| step(bounced.share).min(1.0));
+        let rays = ((f64::from(rays) * part).ceil() as usize).max(1);
+        let elements = elements.min(self.facets);
         InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
     }
 

@@ -213,11 +213,11 @@ fn light_is_left_out_only_if_asked_and_then_the_plan_tells_how_much() {
 }
 
 #[test]
-fn a_small_share_is_computed_with_fewer_elements_and_without_a_share_all_are_used() {
+fn a_small_share_is_computed_with_fewer_rays_and_without_a_share_all_are_cast() {
     let settings = Settings::of_preset(Preset::Standard);
-    let elements = |share: f64| settings.interreflection(Some(BouncedShare { share, std_error: 0.0 })).elements;
-    let all = settings.interreflection(None).elements;
-    assert_eq!([0.0, 0.05, 0.2, 0.22, 0.3, 0.9].map(elements), [all / 8, all / 8, all / 2, all / 2, all, all]);
+    let rays = |share: f64| settings.interreflection(Some(BouncedShare { share, std_error: 0.0 })).rays;
+    assert_eq!(settings.interreflection(None).rays, 6);
+    assert_eq!([0.0, 0.05, 0.15, 0.2, 0.22, 0.3, 0.9].map(rays), [1, 1, 2, 3, 3, 6, 6]);
 }
 
 #[test]
