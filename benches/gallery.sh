@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 
 binary=$(realpath "${1:-target/release/biscale}")
 out=docs/gallery
-limit_bytes=2200000
+limit_bytes=2500000
 
 mkdir -p "$out"
 rm -f "$out"/*.png

@@ -86,7 +86,7 @@ impl Editor {
             Action::PasteMaterial => self.paste_material("default"),
             Action::CopyPython => {
                 ctx.copy_text(super::python_lines::python_lines(&self.document));
-                let text = "Lines of Python that compute this material are in the clipboard (`pip install biscale`).";
+                let text = "Lines of Python that compute this material are in the clipboard. They need the Python package biscale.";
                 self.messages.put(Level::Note, "python", text);
             }
             Action::Frame => {

@@ -124,7 +124,7 @@ impl Sweep {
     }
 
     fn keys_ui(&mut self, ui: &mut Ui) {
-        Grid::new("swept keys").num_columns(4).striped(true).show(ui, |ui| {
+        Grid::new("swept keys").num_columns(5).striped(true).show(ui, |ui| {
             for key in &mut self.keys {
                 let SweptKey { entry, is_on, range, is_log } = key;
                 let name =
@@ -132,13 +132,11 @@ impl Sweep {
                 ui.checkbox(is_on, name).on_hover_text(entry.doc);
                 let [least, most] = entry.range.unwrap_or([f64::MIN, f64::MAX]);
                 let is_whole = entry.kind == "integer";
-                ui.add_enabled_ui(*is_on, |ui| {
-                    for (end, name) in range.iter_mut().zip(["from", "to"]) {
-                        let speed = if is_whole { 0.1 } else { 0.002 * (most - least).min(10.0) };
-                        let drag = DragValue::new(end).range(least..=most).speed(speed).prefix(format!("{name} "));
-                        ui.add(if is_whole { drag.fixed_decimals(0) } else { drag.max_decimals(5) });
-                    }
-                });
+                for (end, name) in range.iter_mut().zip(["from", "to"]) {
+                    let speed = if is_whole { 0.1 } else { 0.002 * (most - least).min(10.0) };
+                    let drag = DragValue::new(end).range(least..=most).speed(speed).prefix(format!("{name} "));
+                    ui.add_enabled(*is_on, if is_whole { drag.fixed_decimals(0) } else { drag.max_decimals(5) });
+                }
                 let can_log = range[0] > 0.0 && !is_whole;
                 *is_log &= can_log;
                 let tip = "Even in the logarithm: as many values between 0.01 and 0.1 as between 0.1 and 1";
@@ -154,11 +152,13 @@ impl Sweep {
             ui.add(DragValue::new(&mut self.count).range(1..=1_000_000_000)).labelled_by(label.id);
             let label = ui.label("Direction pairs each");
             ui.add(DragValue::new(&mut self.directions).range(1..=1_000_000)).labelled_by(label.id);
-            egui::ComboBox::from_label("Quality").selected_text(&self.preset).show_ui(ui, |ui| {
+            let label = ui.label("Quality");
+            let presets = egui::ComboBox::from_id_salt("quality").selected_text(&self.preset).show_ui(ui, |ui| {
                 for preset in PRESETS {
                     ui.selectable_value(&mut self.preset, (*preset).to_owned(), *preset);
                 }
             });
+            presets.response.labelled_by(label.id);
         });
         let (hours, bytes) = self.hours_and_bytes();
         let time = if hours < 1.0 { format!("{:.1} minutes", 60.0 * hours) } else { format!("{hours:.1} hours") };
@@ -167,11 +167,12 @@ impl Sweep {
 }
 
 impl SweptKey {
-    /// A key that is a number, with a range of half to double its value.
+    /// A key that is a number, with a range of half to double its value. An angle of 0 varies in all directions.
     fn new(entry: KeyEntry) -> Option<Self> {
         let [least, most] = entry.range.filter(|_| matches!(entry.kind, "number" | "integer"))?;
         let value = entry.value.as_ref().and_then(|value| value.as_float().or(value.as_integer().map(|n| n as f64)))?;
-        let ends = if value == 0.0 { [least.max(-1.0), most.min(1.0)] } else { [0.5 * value, 2.0 * value] };
+        let about_zero = if entry.unit == "degrees" { [least, most] } else { [-1.0, 1.0] };
+        let ends = if value == 0.0 { about_zero } else { [0.5 * value, 2.0 * value] };
         let (low, high) = (ends[0].min(ends[1]).clamp(least, most), ends[0].max(ends[1]).clamp(least, most));
         if entry.kind == "integer" && most - least > MAX_CHOICES {
             return None;
