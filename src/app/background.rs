@@ -8,6 +8,7 @@ use crate::cache::Cache;
 use crate::scene::LoadedScene;
 use eframe::egui::Context;
 
+use super::dialogs::Dialog;
 use super::document::Snapshot;
 use super::editor::Editor;
 use super::layout::{OBJECT_PART, is_narrow};
@@ -267,7 +268,7 @@ impl Editor {
                 }
                 JobResult::Tile(TileResult::Failed(text)) => self.messages.put(Level::Error, "tile", text),
                 JobResult::Lobe(plot) => self.lobe.receive(ctx, plot),
-                JobResult::Thumbnail(thumbnail) => self.gallery.receive(ctx, thumbnail),
+                JobResult::Thumbnail(thumbnail) => self.receive_thumbnail(ctx, thumbnail),
                 JobResult::Accuracy(result) => self.accuracy.receive(ctx, result),
                 JobResult::Target(result) => self.targets.receive(result),
                 JobResult::Capture(result) => self.capture.receive(ctx, result),
@@ -282,6 +283,17 @@ impl Editor {
                 }
                 JobResult::Image(result) => self.receive_image(ctx, result),
             }
+        }
+    }
+
+    fn receive_thumbnail(&mut self, ctx: &Context, SceneThumbnail { job, image }: SceneThumbnail) {
+        match (job, &mut self.dialog) {
+            (ThumbnailJob::Shipped(name), _) => self.gallery.receive(ctx, name, image),
+            (ThumbnailJob::Variant { seed, at, .. }, Some(Dialog::Vary(variants))) => {
+                variants.receive(ctx, (seed, at), image);
+            }
+            // The dialog is closed.
+            (ThumbnailJob::Variant { .. }, _) => {}
         }
     }
 

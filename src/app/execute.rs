@@ -6,7 +6,7 @@ use crate::scene::MaterialSpec;
 use eframe::egui::{Context, Event, Theme};
 
 use super::actions::Action;
-use super::dialogs::{Dialog, FileDialog, Purpose};
+use super::dialogs::{Dialog, FileDialog, Purpose, Variants};
 use super::document::Document;
 use super::editor::Editor;
 use super::layout::is_narrow;
@@ -89,6 +89,7 @@ impl Editor {
                 let text = "Lines of Python that compute this material are in the clipboard. They need the Python package biscale.";
                 self.messages.put(Level::Note, "python", text);
             }
+            Action::Vary => self.dialog = Some(Dialog::Vary(Variants::new(self.document.scene()))),
             Action::Frame => {
                 let mut scene = (**self.document.scene()).clone();
                 object::frame(&mut scene);

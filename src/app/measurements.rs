@@ -1,5 +1,6 @@
 //! Submission of work that waits for the image: thumbnails, measurements, searches for targets, comparisons of methods.
 
+use super::dialogs::Dialog;
 use super::editor::Editor;
 use super::worker::{Grade, RenderedPreview};
 
@@ -10,6 +11,14 @@ impl Editor {
             |preview: &RenderedPreview| preview.grade >= Grade::Refining && preview.version == self.document.version();
         let idle = self.object.preview.as_deref().is_some_and(is_refined) && self.exporting.is_none();
         let Some(worker) = &self.background.thumbnails else { return };
+        if let Some(Dialog::Vary(variants)) = &mut self.dialog {
+            // A new job cancels that of the gallery.
+            self.gallery.interrupted();
+            if let Some(job) = variants.job(|| self.document.loaded()) {
+                worker.submit(job);
+            }
+            return;
+        }
         if idle && self.settings.gallery {
             if let Some(job) = self.gallery.job() {
                 worker.submit(job);

@@ -20,7 +20,7 @@ impl Editor {
                 ui.separator();
                 items(ui, &[Action::CopyMaterial, Action::PasteMaterial], &mut chosen);
                 ui.separator();
-                items(ui, &[Action::CopyPython], &mut chosen);
+                items(ui, &[Action::Vary, Action::CopyPython], &mut chosen);
             });
             ui.menu_button("View", |ui| {
                 items(ui, &[Action::Frame, Action::Exchange, Action::Paint, Action::Gallery], &mut chosen);

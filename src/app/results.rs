@@ -59,6 +59,16 @@ impl Editor {
                 }
                 result.is_some()
             }
+            Dialog::Vary(variants) => match variants.ui(ctx) {
+                Some(taken) => {
+                    if let Some(scene) = taken {
+                        self.document.edit_as("Vary", scene);
+                        self.scene_changed();
+                    }
+                    true
+                }
+                None => false,
+            },
             Dialog::Image { path, width, height } => {
                 let result = export::image_ui(ctx, path, width, height);
                 self.exported(result, path, ExportKind::Image { size: [*width, *height] })

@@ -22,6 +22,7 @@ mod schema;
 pub mod shipped;
 pub mod slab;
 mod tile;
+mod variants;
 mod view;
 
 #[cfg(test)]
@@ -57,6 +58,7 @@ pub use tile::{
     Arrangement, Backing, CrossSection, Flat, FlatPattern, FloatPattern, Geometry, GrooveProfile, Grooves, Heightfield,
     MeshFile, Pyramids, Rods, Tile, Weave, WeavePattern,
 };
+pub use variants::{describes_material, variant};
 pub use view::{Camera, DirectionalSpec, Light, OBJECT_KINDS, Object, TONE_MAPS};
 
 use check::{PathStep, Problem};

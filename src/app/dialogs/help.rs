@@ -75,6 +75,10 @@ const TASKS: [(&str, &str); 15] = [
          RGL (.bsdf). A text file beside it describes the conventions.",
     ),
     (
+        "Look for other forms of a material",
+        "Press V. Nine variants differ from the material by up to 20 %; a click takes one.",
+    ),
+    (
         "Compare two versions",
         "Press B to store the current image as A, and continue editing. Drag the line between A and the current image.",
     ),

@@ -6,6 +6,7 @@ mod formats;
 mod help;
 mod offer;
 mod sweep;
+mod vary;
 
 use std::path::PathBuf;
 
@@ -16,6 +17,7 @@ pub use files::{FileDialog, Purpose};
 pub use help::help_ui;
 pub use offer::{FileUse, Offer};
 pub use sweep::Sweep;
+pub use vary::Variants;
 
 use super::actions::Action;
 use super::document::RecoveredDocument;
@@ -54,6 +56,7 @@ pub enum Dialog {
         path: PathBuf,
         sweep: Sweep,
     },
+    Vary(Variants),
     Image {
         path: PathBuf,
         width: usize,

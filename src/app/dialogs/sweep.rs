@@ -7,10 +7,7 @@ use eframe::egui::{self, Context, DragValue, Grid, Id, ScrollArea, Ui};
 
 use super::export::{ExportDecision, footer};
 use crate::base::{Result, replace_file};
-use crate::scene::{KeyEntry, PRESETS, Scene, keys_of};
-
-/// Parts of a scene whose numbers describe the material.
-const PARTS: [&str; 3] = ["tile.", "material.", "color_map."];
+use crate::scene::{KeyEntry, PRESETS, Scene, describes_material, keys_of};
 
 /// Largest range of a whole number, whose values the specification lists.
 const MAX_CHOICES: f64 = 1000.0;
@@ -42,9 +39,8 @@ impl Sweep {
     /// A sweep over the numbers of a scene, none of which vary yet. `ms` is the time of one material without its pairs of
     /// directions, and of a pair.
     pub fn new(scene: &Scene, base: Option<String>, ms: [f64; 2]) -> Self {
-        let is_material = |entry: &KeyEntry| PARTS.iter().any(|part| entry.key.starts_with(part));
-        let keys =
-            keys_of(scene).unwrap_or_default().into_iter().filter(is_material).filter_map(SweptKey::new).collect();
+        let keys = keys_of(scene).unwrap_or_default().into_iter();
+        let keys = keys.filter(describes_material).filter_map(SweptKey::new).collect();
         Self { base, keys, count: 1000, directions: 4096, preset: scene.quality.preset.clone(), ms }
     }
 

@@ -40,7 +40,7 @@ pub(super) fn number_or_vector_ui(
     } else {
         let mut number = Value::Float(entries[0]);
         let before = number.clone();
-        number_ui(ui, &mut number, range, &suffix(field.unit, context), wrong);
+        number_ui(ui, &mut number, range, &suffix(field.unit, context), field.default, wrong);
         if number != before {
             *value = joined(value, number.as_float().unwrap_or(entries[0]), length);
         }
@@ -80,7 +80,7 @@ pub(super) fn number_or_auto_ui(
         };
     }
     if !value.is_str() {
-        number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, context), wrong);
+        number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, context), field.default, wrong);
     }
 }
 

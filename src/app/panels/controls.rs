@@ -6,14 +6,17 @@ use crate::scene::{Field, FieldShape, Kind};
 use eframe::egui::{self, DragValue, Slider, SliderClamping, Ui};
 use toml::Value;
 
-use super::fields::{PanelContext, caption, display_name, suffix};
+use super::fields::{PanelContext, caption, display_name, format_number, suffix};
 use super::{alternatives, matrix};
 
 /// Makes a drag value reject text that is not a finite number, and set `wrong` if the user types such text.
 fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
     drag.custom_parser(move |text| {
         let plain: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
-        let value: f64 = plain.replace('\u{2212}', "-").parse().ok()?;
+        let plain = plain.replace('\u{2212}', "-");
+        // A fraction such as 1/3 is a number, too.
+        let (above, below) = plain.split_once('/').unwrap_or((&plain, "1"));
+        let value = above.parse::<f64>().ok()? / below.parse::<f64>().ok()?;
         wrong.set(wrong.get() || !value.is_finite());
         value.is_finite().then_some(value)
     })
@@ -27,9 +30,9 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field
     let wrong = Cell::new(false);
     match *shape {
         FieldShape::Number { min, max, soft_max } => {
-            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, context), &wrong);
+            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, context), field.default, &wrong);
         }
-        FieldShape::Integer { min, max } => integer_ui(ui, value, (min, max), &wrong),
+        FieldShape::Integer { min, max } => integer_ui(ui, value, (min, max), field.default, &wrong),
         FieldShape::Color { max } => color_ui(ui, value, max, &wrong),
         FieldShape::Vector { min, max, .. } => vector_ui(ui, value, (min, max), &wrong),
         FieldShape::Bool => {
@@ -72,6 +75,7 @@ pub(super) fn number_ui(
     value: &mut Value,
     (min, max, soft_max): (f64, f64, f64),
     suffix: &str,
+    default: Option<f64>,
     wrong: &Cell<bool>,
 ) {
     let Some(before) = number(value) else { return };
@@ -82,10 +86,14 @@ pub(super) fn number_ui(
     let log = is_logarithmic(soft_min, soft_max) && soft_max > 2.0;
     ui.spacing_mut().slider_width = (ui.available_width() - NUMBER_WIDTH - 8.0).max(40.0);
     let slider = Slider::new(&mut now, range).show_value(false).clamping(SliderClamping::Never).logarithmic(log);
-    ui.add(slider);
+    let slider = ui.add(slider);
+    if is_secondary(ui) {
+        now = tidy(before);
+    }
     let (speed, digits) = ((soft_max - soft_min).min(100.0) / 400.0, decimals(now));
     let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(digits).suffix(suffix);
-    ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
+    let drag = ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
+    number_menu(&(slider | drag), &mut now, default);
     if now.is_finite() && now != tidy(before) {
         *value = Value::Float(now.clamp(min, max));
     }
@@ -102,16 +110,52 @@ fn decimals(value: f64) -> usize {
     }
 }
 
-fn integer_ui(ui: &mut Ui, value: &mut Value, (min, max): (i64, i64), wrong: &Cell<bool>) {
+/// Returns true if the secondary button is in use, with which a slider would follow the pointer.
+fn is_secondary(ui: &Ui) -> bool {
+    let button = egui::PointerButton::Secondary;
+    ui.input(|input| input.pointer.button_down(button) || input.pointer.button_released(button))
+}
+
+/// The menu of a right click on a number: its default, a copy of it, and halves and doubles.
+fn number_menu(response: &egui::Response, now: &mut f64, default: Option<f64>) {
+    response.context_menu(|ui| {
+        if let Some(default) = default
+            && ui.button(format!("Reset to {}", format_number(default))).clicked()
+        {
+            *now = default;
+        }
+        if ui.button("Copy the number").clicked() {
+            ui.copy_text(now.to_string());
+        }
+        ui.separator();
+        for (name, factor) in [("Half", 0.5), ("Double", 2.0)] {
+            if ui.button(name).clicked() {
+                *now *= factor;
+            }
+        }
+        ui.weak("Fractions can be typed: 1/3");
+    });
+}
+
+fn integer_ui(ui: &mut Ui, value: &mut Value, (min, max): (i64, i64), default: Option<f64>, wrong: &Cell<bool>) {
     let Some(mut now) = value.as_integer() else { return };
     let before = now;
-    if max - min <= 5000 {
+    let slider = (max - min <= 5000).then(|| {
         ui.spacing_mut().slider_width = (ui.available_width() - NUMBER_WIDTH - 8.0).max(40.0);
         let slider = Slider::new(&mut now, min..=max).show_value(false).logarithmic(min >= 0 && max > 200);
-        ui.add(slider);
+        ui.add(slider)
+    });
+    if is_secondary(ui) {
+        now = before;
     }
     let drag = DragValue::new(&mut now).range(min..=max).speed(0.2);
-    ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
+    let drag = ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
+    let response = slider.map_or_else(|| drag.clone(), |slider| slider | drag.clone());
+    let mut number = now as f64;
+    number_menu(&response, &mut number, default);
+    if number != now as f64 {
+        now = (number.round() as i64).clamp(min, max);
+    }
     if now != before {
         *value = Value::Integer(now);
     }

@@ -6,7 +6,7 @@ use eframe::egui::{self, Key};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 
-use super::{editor, harness, quick, settle};
+use super::{editor, harness, quick, settle, wait_until};
 use crate::app::actions::Action;
 use crate::app::dialogs::Dialog;
 use crate::app::paint::Tool;
@@ -190,4 +190,60 @@ fn the_ending_of_a_typed_measured_file_selects_its_kind() {
     harness.run_steps(2);
     let brdf = editor(&mut harness).document.scene().materials[0].brdf.clone();
     assert_eq!(brdf, Some(BrdfSpec::One(TermSpec::Rgl { path: "silk.bsdf".into() })));
+}
+
+#[test]
+fn one_click_takes_one_of_nine_variants_and_one_undo_brings_the_scene_back() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let before = editor(&mut harness).document.scene().clone();
+    harness.key_press(Key::V);
+    wait_until(&mut harness, |editor| match &editor.dialog {
+        Some(Dialog::Vary(variants)) => variants.is_complete(),
+        _ => false,
+    });
+    harness.check_accessibility();
+    harness.get_by_label("Nine others").click();
+    harness.run_steps(2);
+    harness.get_by_label("Variant 3").click();
+    harness.run_steps(3);
+    let editor = editor(&mut harness);
+    assert!(editor.dialog.is_none() && editor.document.undo_name() == Some("Vary"));
+    let Geometry::Grooves(varied) = &editor.document.scene().tile.geometry else { panic!("another kind of surface") };
+    let Geometry::Grooves(old) = &before.tile.geometry else { panic!("no grooves") };
+    let change = (varied.depth / old.depth - 1.0).abs();
+    assert!(change > 0.0 && change <= 0.2001, "{change}");
+    editor.document.undo();
+    assert_eq!(*editor.document.scene(), before);
+}
+
+#[test]
+fn a_right_click_on_a_slider_offers_its_default_and_a_fraction_can_be_typed() {
+    let mut harness = harness(quick());
+    settle(&mut harness);
+    let depth =
+        |harness: &mut egui_kittest::Harness<'static, Option<crate::app::editor::Editor>>| match &editor(harness)
+            .document
+            .scene()
+            .tile
+            .geometry
+        {
+            Geometry::Grooves(grooves) => grooves.depth,
+            _ => panic!("another kind of surface"),
+        };
+    let start = depth(&mut harness);
+    harness.get_by_role_and_label(egui::Role::SpinButton, "Depth").click();
+    harness.run_steps(2);
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::A);
+    harness.event(egui::Event::Text("1/3".to_owned()));
+    harness.run_steps(2);
+    harness.key_press(Key::Enter);
+    harness.run_steps(3);
+    assert!((depth(&mut harness) - 1.0 / 3.0).abs() < 1e-4, "{}", depth(&mut harness));
+    harness.get_by_role_and_label(egui::Role::Slider, "Depth").click_secondary();
+    harness.run_steps(3);
+    assert!((depth(&mut harness) - 1.0 / 3.0).abs() < 1e-4, "a right click moves nothing");
+    harness.get_by_label_contains("Reset to").click();
+    harness.run_steps(3);
+    assert_eq!(depth(&mut harness), start);
 }

@@ -1,11 +1,14 @@
 //! The gallery: thumbnails of the shipped scenes.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::scene::shipped;
-use eframe::egui::{self, Color32, Context, Rect, RichText, ScrollArea, Sense, TextureHandle, Ui, pos2, vec2};
+use eframe::egui::{
+    self, Color32, ColorImage, Context, Rect, RichText, ScrollArea, Sense, TextureHandle, Ui, pos2, vec2,
+};
 
-use crate::app::worker::{SceneThumbnail, ThumbnailJob};
+use crate::app::worker::ThumbnailJob;
 
 #[derive(Default)]
 pub struct Gallery {
@@ -17,10 +20,10 @@ pub struct Gallery {
 }
 
 impl Gallery {
-    pub fn receive(&mut self, ctx: &Context, thumbnail: SceneThumbnail) {
+    pub fn receive(&mut self, ctx: &Context, name: &'static str, image: Option<Arc<ColorImage>>) {
         let options = egui::TextureOptions::LINEAR;
-        let texture = thumbnail.image.map(|image| ctx.load_texture(thumbnail.name, image, options));
-        self.images.insert(thumbnail.name, texture);
+        let texture = image.map(|image| ctx.load_texture(name, image, options));
+        self.images.insert(name, texture);
         self.requested = None;
     }
 
@@ -31,7 +34,7 @@ impl Gallery {
         }
         let name = shipped::names().find(|name| !self.images.contains_key(name))?;
         self.requested = Some(name);
-        Some(ThumbnailJob { name })
+        Some(ThumbnailJob::Shipped(name))
     }
 
     /// Notes that the current job was cancelled.

@@ -142,7 +142,7 @@ pub fn spawn_thumbnail(
 ) -> Option<Worker<ThumbnailJob>> {
     let work =
         move |state: &mut thumbnail::ThumbnailWorker, job: ThumbnailJob, context: &runner::JobContext<ThumbnailJob>| {
-            thumbnail::work(state, &job, context, &report);
+            thumbnail::work(state, job, context, &report);
         };
     Worker::spawn("thumbnails", 1, thumbnail::ThumbnailWorker::default, work, |_| {}).ok()
 }

@@ -1,4 +1,4 @@
-//! Thumbnails of the shipped scenes, one per job.
+//! Thumbnails of shipped scenes and of variants of the open scene, one per job.
 
 use std::sync::Arc;
 
@@ -7,8 +7,7 @@ use crate::pipeline::Pipeline;
 use crate::render::RenderScene;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::seen_through::SlabScene;
-use crate::scene;
-use crate::scene::Quality;
+use crate::scene::{self, LoadedScene, Quality};
 use eframe::egui::ColorImage;
 
 use super::preview_renderer::{PreviewRenderer, RenderRequest, ShadedMaterial};
@@ -20,15 +19,21 @@ pub const SIDE: usize = 112;
 /// Maximum number of directional lights that replace an environment.
 const LIGHTS: usize = 12;
 
-/// A shipped scene to render.
+/// A scene to render.
 #[derive(Debug, Clone)]
-pub struct ThumbnailJob {
-    pub name: &'static str,
+pub enum ThumbnailJob {
+    Shipped(&'static str),
+    /// Variant `at` of those that were drawn with `seed`.
+    Variant {
+        seed: u64,
+        at: usize,
+        loaded: Box<LoadedScene>,
+    },
 }
 
-/// Thumbnail of a shipped scene; `image` is absent if the scene cannot be rendered.
+/// Thumbnail of a job; `image` is absent if the scene cannot be rendered.
 pub struct SceneThumbnail {
-    pub name: &'static str,
+    pub job: ThumbnailJob,
     pub image: Option<Arc<ColorImage>>,
 }
 
@@ -46,19 +51,22 @@ impl Default for ThumbnailWorker {
 
 pub fn work(
     worker: &mut ThumbnailWorker,
-    job: &ThumbnailJob,
+    job: ThumbnailJob,
     context: &JobContext<ThumbnailJob>,
     report: &dyn Fn(SceneThumbnail),
 ) {
-    let image = render(worker, job.name, context);
+    let image = render(worker, &job, context);
     // The gallery submits a cancelled thumbnail again.
     if !context.cancel.is_set() {
-        report(SceneThumbnail { name: job.name, image: image.ok().map(Arc::new) });
+        report(SceneThumbnail { job, image: image.ok().map(Arc::new) });
     }
 }
 
-fn render(worker: &mut ThumbnailWorker, name: &str, context: &JobContext<ThumbnailJob>) -> Result<ColorImage> {
-    let mut loaded = scene::open(name, &[])?;
+fn render(worker: &mut ThumbnailWorker, job: &ThumbnailJob, context: &JobContext<ThumbnailJob>) -> Result<ColorImage> {
+    let mut loaded = match job {
+        ThumbnailJob::Shipped(name) => scene::open(name, &[])?,
+        ThumbnailJob::Variant { loaded, .. } => (**loaded).clone(),
+    };
     loaded.scene.quality =
         Quality { preset: "draft".to_owned(), backend: "cpu".to_owned(), facets: Some(1024), ..Quality::default() };
     loaded.scene.light.count = loaded.scene.light.count.min(LIGHTS);
