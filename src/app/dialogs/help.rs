@@ -4,7 +4,7 @@ use eframe::egui::{self, Context, Grid, RichText, ScrollArea};
 
 use crate::app::actions;
 
-const TASKS: [(&str, &str); 15] = [
+const TASKS: [(&str, &str); 16] = [
     (
         "Make a blue velvet",
         "Search the gallery for \"velvet\" and click a scene. Under Materials, set the colour of \"Default\" to \
