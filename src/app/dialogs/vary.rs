@@ -64,7 +64,7 @@ impl Variants {
     pub fn ui(&mut self, ctx: &Context) -> Option<Option<Scene>> {
         let mut result = None;
         let modal = egui::Modal::new(Id::unique("vary")).show(ctx, |ui| {
-            ui.set_width(PER_SIDE as f32 * (SIDE + 8.0));
+            ui.set_width(PER_SIDE as f32 * (SIDE + 6.0));
             ui.heading("Vary the material");
             ui.label("Each number of the surface, the materials and the colour map is changed by up to 20 %.");
             ui.add_space(6.0);

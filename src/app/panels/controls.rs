@@ -118,7 +118,8 @@ fn is_secondary(ui: &Ui) -> bool {
 
 /// The menu of a right click on a number: its default, a copy of it, and halves and doubles.
 fn number_menu(response: &egui::Response, now: &mut f64, default: Option<f64>) {
-    response.context_menu(|ui| {
+    // A slider senses drags and no clicks.
+    response.container_context_menu(|ui| {
         if let Some(default) = default
             && ui.button(format!("Reset to {}", format_number(default))).clicked()
         {

@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::{editor, harness, quick, settle, wait_until};
 use crate::app::actions::Action;
 use crate::app::dialogs::Dialog;
+use crate::app::editor::Editor;
 use crate::app::paint::Tool;
 use crate::app::worker::TableChoice;
 
@@ -221,29 +222,25 @@ fn one_click_takes_one_of_nine_variants_and_one_undo_brings_the_scene_back() {
 fn a_right_click_on_a_slider_offers_its_default_and_a_fraction_can_be_typed() {
     let mut harness = harness(quick());
     settle(&mut harness);
-    let depth =
-        |harness: &mut egui_kittest::Harness<'static, Option<crate::app::editor::Editor>>| match &editor(harness)
-            .document
-            .scene()
-            .tile
-            .geometry
-        {
-            Geometry::Grooves(grooves) => grooves.depth,
-            _ => panic!("another kind of surface"),
-        };
-    let start = depth(&mut harness);
-    harness.get_by_role_and_label(egui::Role::SpinButton, "Depth").click();
+    let depth = |editor: &Editor| match &editor.document.scene().tile.geometry {
+        Geometry::Grooves(grooves) => grooves.depth,
+        _ => panic!("another kind of surface"),
+    };
+    let start = depth(editor(&mut harness));
+    let row = harness.get_by_role_and_label(egui::Role::Slider, "Depth").rect().center().y;
+    let in_row = |rect: egui::Rect| (rect.center().y - row).abs() < 8.0 && rect.left() > 1000.0;
+    harness.get_all_by_role(egui::Role::SpinButton).find(|number| in_row(number.rect())).unwrap().click();
     harness.run_steps(2);
     harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::A);
     harness.event(egui::Event::Text("1/3".to_owned()));
     harness.run_steps(2);
     harness.key_press(Key::Enter);
     harness.run_steps(3);
-    assert!((depth(&mut harness) - 1.0 / 3.0).abs() < 1e-4, "{}", depth(&mut harness));
+    assert!((depth(editor(&mut harness)) - 1.0 / 3.0).abs() < 1e-4, "{}", depth(editor(&mut harness)));
     harness.get_by_role_and_label(egui::Role::Slider, "Depth").click_secondary();
     harness.run_steps(3);
-    assert!((depth(&mut harness) - 1.0 / 3.0).abs() < 1e-4, "a right click moves nothing");
+    assert!((depth(editor(&mut harness)) - 1.0 / 3.0).abs() < 1e-4, "a right click moves nothing");
     harness.get_by_label_contains("Reset to").click();
     harness.run_steps(3);
-    assert_eq!(depth(&mut harness), start);
+    assert_eq!(depth(editor(&mut harness)), start);
 }
