@@ -89,7 +89,7 @@ impl Editor {
                 let text = "Lines of Python that compute this material are in the clipboard. They need the Python package biscale.";
                 self.messages.put(Level::Note, "python", text);
             }
-            Action::Vary => self.dialog = Some(Dialog::Vary(Variants::new(self.document.scene()))),
+            Action::Vary => self.dialog = Some(Dialog::Vary(Box::new(Variants::new(self.document.scene())))),
             Action::Frame => {
                 let mut scene = (**self.document.scene()).clone();
                 object::frame(&mut scene);

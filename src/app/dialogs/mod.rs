@@ -56,7 +56,7 @@ pub enum Dialog {
         path: PathBuf,
         sweep: Sweep,
     },
-    Vary(Variants),
+    Vary(Box<Variants>),
     Image {
         path: PathBuf,
         width: usize,
