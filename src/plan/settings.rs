@@ -307,18 +307,21 @@ impl Settings {
     /// noise falls with the root of their number. There are as many elements for any share, because walks read the
     /// visibility of the nearest one.
     pub fn interreflection(&self, bounced: Option<BouncedShare>) -> InterreflectionSettings {
-        /// Share from which all rays are cast.
+        /// Share from which all rays are cast, and the smallest part of them.
         const FULL_SHARE: f64 = 0.3;
+        const LEAST_PART: f64 = 0.125;
         let (elements, rays, grid) = match self.preset {
-            Preset::Draft => (2048, 6_u8, PolarGrid::new(8, 24)),
+            Preset::Draft => (2048_u16, 6_u8, PolarGrid::new(8, 24)),
             Preset::Standard | Preset::Wu2011 => (6144, 6, PolarGrid::new(12, 36)),
             Preset::Fine | Preset::Reference => (16_384, 12, PolarGrid::new(16, 48)),
         };
         // In steps, so that an edit of a colour seldom casts other rays.
         let step = |share: f64| (share / FULL_SHARE).powi(2).log2().round().exp2();
-        let part = bounced.map_or(1.0, |bounced| step(bounced.share).min(1.0));
-        let rays = ((f64::from(rays) * part).ceil() as usize).max(1);
-        let elements = elements.min(self.facets);
+        let part = bounced.map_or(1.0, |bounced| step(bounced.share).clamp(LEAST_PART, 1.0));
+        let all = f64::from(elements) * f64::from(rays) * part;
+        let elements = (elements as usize).min(self.facets);
+        // Few facets cast more rays each, up to the preset's.
+        let rays = (all / elements.max(1) as f64).ceil().clamp(1.0, f64::from(rays)) as usize;
         InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
     }
 

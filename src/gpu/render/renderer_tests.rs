@@ -153,7 +153,7 @@ fn images_of_the_papers_five_scenes_that_the_gpu_computes_from_the_tile_match_th
     let Some(gpu) = open_gpu() else { return };
     let background = ImageBackground::Uniform(Vec3::ZERO);
     for name in ["table4_plate", "table4_teapot", "table4_pillow", "table4_cup", "table4_skirt"] {
-        let loaded = scene::open(name, &[]).unwrap();
+        let loaded = scene::open(name, &[]).unwrap().without_interreflection();
         let outcome = Pipeline::new().effective(&loaded).unwrap();
         let reads = outcome.shading_brdf(&Cancel::default()).unwrap().brdf;
         let tile = Pipeline::new().gpu_tile(&loaded).unwrap().unwrap();
