@@ -179,7 +179,7 @@ impl<'a> Exchange<'a> {
         Ok((g, variance))
     }
 
-    /// What a ray adds to the variance of all pairs, if rays are independent. It contributes `a(o) b(i)`, and the values of
+    /// The part of the variance of all pairs that is due to one of many independent rays. The ray contributes `a(o) b(i)`, and the values of
     /// swapped pairs are averaged: `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|² |b|² + (a·b)²)/2`.
     fn variance(&self, a: &[f32], b: &[f32], images: &[f32]) -> f64 {
         let norm = sum_of_products(a, |at| images[at] * a[at]);

@@ -318,7 +318,7 @@ impl Shading {
     }
 }
 
-/// What images read.
+/// The form of f̄ that images read.
 struct Found {
     brdf: Arc<EffectiveBrdf>,
     errors: Option<Errors>,
@@ -398,3 +398,7 @@ impl Check {
         upper_errors(&self.values(brdf), &self.exact)
     }
 }
+
+#[cfg(test)]
+#[path = "shading_tests.rs"]
+mod tests;

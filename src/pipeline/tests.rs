@@ -11,7 +11,7 @@ use super::{Env, Keyed, Outcome, Pipeline, Stage, StageTimes};
 use crate::base::Cancel;
 use crate::brdf::{Brdf, Material, Measured, MeasuredReport, Term};
 use crate::cache::{Cache, Key, KeyBuilder, Stored, Writer};
-use crate::effective::{Direct, FacetSum, Nodes, Reflectance, Representation};
+use crate::effective::{Direct, FacetSum, Nodes, Representation};
 use crate::geometry::Facets;
 use crate::math::directions::{HemispherePairGrid, PolarGrid};
 use crate::metrics::image_pairs;
@@ -423,35 +423,4 @@ fn an_edit_of_a_colour_finds_the_papers_factors_in_the_memo() {
     let edited = pipeline.effective(&dark).unwrap().brdf.eval(i, o);
     assert_eq!(pipeline.memo.runs("basis"), 1);
     assert_eq!(edited, Pipeline::new().effective(&dark).unwrap().brdf.eval(i, o));
-}
-
-#[test]
-fn images_read_one_table_of_direct_and_of_bounced_light() {
-    let source = "[tile]\ngeometry = { kind = \"heightfield\", path = \"asset:ripples.png\", height_scale = 0.3 }\n\
-        [[material]]\nname = \"default\"\nbrdf = { kind = \"cook_torrance\", roughness = 0.4, f0 = 0.9 }\n\
-        [quality]\npreset = \"draft\"\nbackend = \"cpu\"\nmethod = \"direct\"\n\
-        [effects]\ninterreflection = \"on\"\npicture_table = \"on\"\n";
-    let loaded = LoadedScene {
-        scene: scene::parse(source).unwrap(),
-        base_dir: "".into(),
-        name: "test".to_owned(),
-        painted: scene::Painted::default(),
-    };
-    let outcome = Pipeline::new().effective(&loaded).unwrap();
-    let shading = outcome.shading_brdf(&Cancel::default()).unwrap();
-    assert!(matches!(shading.brdf.representation, Representation::Table(_)), "{:?}", shading.errors);
-    let (mut error, mut norm) = (0.0, 0.0);
-    for pair in crate::metrics::image_pairs(300, 4) {
-        let bounced = [&shading.brdf, &outcome.brdf].map(|brdf| {
-            let mut bounced = [Vec3::ZERO];
-            brdf.eval_bounced(&[pair.i], pair.o, &mut bounced);
-            bounced[0].as_dvec3()
-        });
-        error += (bounced[0] - bounced[1]).length_squared();
-        norm += bounced[1].length_squared();
-    }
-    let error = (error / norm).sqrt();
-    eprintln!("bounced light of the table: {error:.4}, all light {:?}", shading.errors);
-    assert!(norm > 0.0 && error < 0.1, "{error}");
-    assert!(shading.errors.unwrap().rel_l2 < 0.1, "{:?}", shading.errors);
 }

@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use targets::{TARGETS, Target};
 
 /// Longest time of one input, in a debug build on a busy machine.
-const MAX_DURATION: Duration = Duration::from_secs(60);
+const MAX_DURATION: Duration = Duration::from_secs(20);
 /// Most memory of the process, in bytes. All targets run in it at the same time.
 const MAX_MEMORY: u64 = 6 << 30;
 

@@ -163,7 +163,7 @@ fn photographs(folder: &Path, bytes: &[u8]) -> std::result::Result<bool, String>
     let rig = Rig::parse(&text).map_err(|error| error.to_string())?;
     match Photographs::open(&rig, folder) {
         // Large photographs are valid, but they would only cost time.
-        Ok(opened) if opened.size.element_product() > 4096 => return Ok(true),
+        Ok(opened) if opened.size.element_product() > 1024 => return Ok(true),
         Ok(_) => {}
         Err(error) => return refused(&error),
     }
