@@ -63,6 +63,8 @@ pub struct BackgroundJobs {
     pub(super) loaded: Option<(u64, Arc<LoadedScene>)>,
     /// The first image is shown, or cannot be computed; from then on, other jobs are submitted.
     opened: bool,
+    /// The version of the last image that the other views followed.
+    followed: Option<u64>,
     /// A job whose refinement is not submitted yet.
     unrefined: Option<ImageJob>,
 }
@@ -109,6 +111,7 @@ impl BackgroundJobs {
             results,
             loaded: None,
             opened: false,
+            followed: None,
             unrefined: None,
         }
     }
@@ -205,6 +208,9 @@ impl Editor {
             }
             return;
         }
+        if self.is_draft_awaited() {
+            return;
+        }
         if let (Some(worker), Some(job)) = (&self.background.tiles, self.tile.job(&loaded, self.lobe.light)) {
             worker.submit(job);
         }
@@ -228,6 +234,17 @@ impl Editor {
         }
     }
 
+    /// Returns true while the draft of the last edit is computed, on all cores. The other views follow each image once.
+    fn is_draft_awaited(&mut self) -> bool {
+        let shown = self.object.preview.as_ref().map(|preview| preview.version);
+        let is_shown = shown >= self.object.requested.map(|(version, _)| version) || self.object.failed.is_some();
+        if is_shown || shown != self.background.followed {
+            self.background.followed = shown;
+            return false;
+        }
+        self.background.images.is_some()
+    }
+
     /// Submits the object's image if version or size changed; returns the scene in the form that workers read.
     fn request_image(&mut self) -> Option<Arc<LoadedScene>> {
         let version = self.document.version();
@@ -244,6 +261,10 @@ impl Editor {
         let wanted = (version, self.size);
         if self.object.requested != Some(wanted) {
             self.object.requested = Some(wanted);
+            // The plot would take the cores from the image. It is requested again after the draft.
+            if let (Some(worker), true) = (&self.background.lobes, self.lobe.interrupt()) {
+                worker.cancel();
+            }
             self.object.requested_at.get_or_insert_with(Instant::now);
             if let Some(worker) = &self.background.images {
                 let job = ImageJob { version, loaded: loaded.clone(), size: self.size, submitted: Instant::now() };

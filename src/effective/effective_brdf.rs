@@ -118,6 +118,12 @@ impl EffectiveBrdf {
         }
         self.representation.sums(lights, o, out)
     }
+
+    /// Divides `a_v f̄` by `a_v`. A tile without visible facets reflects nothing.
+    fn divide(&self, sums: &mut [Vec3], area: f64) {
+        let scale = if area > 1e-12 * self.base_area { (1.0 / area) as f32 } else { 0.0 };
+        sums.iter_mut().for_each(|sum| *sum *= scale);
+    }
 }
 
 impl Representation {
@@ -137,11 +143,13 @@ impl Representation {
 impl Reflectance for EffectiveBrdf {
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
         let area = self.sums(lights, o, |k, sum| out[k] = sum.as_vec3());
-        // A tile without visible facets reflects nothing.
-        let scale = if area > 1e-12 * self.base_area { (1.0 / area) as f32 } else { 0.0 };
-        for value in out.iter_mut().take(lights.len()) {
-            *value *= scale;
-        }
+        self.divide(&mut out[..lights.len()], area);
+    }
+
+    fn eval_direct(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) -> bool {
+        let area = self.direct_representation().sums(lights, o, |k, sum| out[k] = sum.as_vec3());
+        self.divide(&mut out[..lights.len()], area);
+        matches!(self.representation, Representation::Interreflecting(..))
     }
 
     fn eval_bounced(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
@@ -153,7 +161,6 @@ impl Reflectance for EffectiveBrdf {
             Representation::Table(table) => table.bounced_sums(lights, o, |k, sum| out[k] = sum.as_vec3()),
             _ => 0.0,
         };
-        let scale = if area > 1e-12 * self.base_area { (1.0 / area) as f32 } else { 0.0 };
-        out.iter_mut().take(lights.len()).for_each(|value| *value *= scale);
+        self.divide(&mut out[..lights.len()], area);
     }
 }

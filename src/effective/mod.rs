@@ -40,6 +40,13 @@ pub trait Reflectance: Sync {
     /// Directions are unit vectors in the tangent frame (x, y along the tile, z the surface normal).
     fn eval_lights(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]);
 
+    /// As [`Reflectance::eval_lights`], but may leave out the light of [`Reflectance::eval_bounced`]; returns true if it does.
+    /// That light varies slowly, so that images interpolate it between points.
+    fn eval_direct(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) -> bool {
+        self.eval_lights(lights, o, out);
+        false
+    }
+
     /// As [`Reflectance::eval_lights`], of the light that several facets reflected, which a close-up of the tile does not
     /// compute itself.
     fn eval_bounced(&self, lights: &[Vec3], _: Vec3, out: &mut [Vec3]) {

@@ -163,6 +163,10 @@ impl Reflectance for Outcome {
         self.brdf.eval_lights(lights, o, out);
     }
 
+    fn eval_direct(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) -> bool {
+        self.brdf.eval_direct(lights, o, out)
+    }
+
     fn eval_bounced(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {
         self.brdf.eval_bounced(lights, o, out);
     }

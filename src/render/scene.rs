@@ -60,7 +60,7 @@ impl RenderScene {
 
     /// Takes the shadow cache of an earlier render scene with the same object and lights.
     pub fn reuse_shadows(&mut self, earlier: &Self) {
-        if (earlier.object.key, earlier.lights.key) == (self.object.key, self.lights.key) {
+        if earlier.keys() == self.keys() {
             self.shadow_cache.clone_from(&earlier.shadow_cache);
         }
     }
@@ -68,6 +68,11 @@ impl RenderScene {
     /// The key of the object, which changes with it.
     pub fn object_key(&self) -> Key {
         self.object.key
+    }
+
+    /// The keys of the object and of the lights.
+    pub fn keys(&self) -> [Key; 2] {
+        [self.object.key, self.lights.key]
     }
 
     pub fn mesh(&self) -> &ObjectMesh {

@@ -2,20 +2,32 @@
 
 use std::time::{Duration, Instant};
 
+use egui_kittest::Harness;
+
 use super::{editor, harness};
 use crate::app::document::Document;
+use crate::app::editor::Editor;
 use crate::app::worker::Grade;
 use crate::scene::Scene;
 
 /// Maximum wait for the final image.
 const MAX_WAIT: Duration = Duration::from_secs(45);
 
-/// Returns the median milliseconds from an edit to the draft, the refined and the final image; NaN for an image that came
-/// too late. `edit` receives the number of the edit.
-fn latency_ms(name: &str, backend: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> (f64, f64, f64) {
+/// Times of images after an edit, medians in milliseconds; NaN for an image that came too late.
+struct Latency {
+    draft: f64,
+    refined: f64,
+    last: f64,
+    /// Mean radiance of the draft over that of the final image, less 1; the largest of all edits.
+    brightness_step: f64,
+}
+
+/// Opens a scene in a window of 1440 x 900 points and waits for its final image.
+fn opened(name: &str) -> Harness<'static, Option<Editor>> {
     let mut harness = harness(Document::open(name).unwrap());
+    harness.set_size(eframe::egui::vec2(1440.0, 900.0));
     let mut scene = (**editor(&mut harness).document.scene()).clone();
-    scene.quality.backend = backend.to_owned();
+    "cpu".clone_into(&mut scene.quality.backend);
     editor(&mut harness).document.edit(scene);
     harness.step();
     let opened = Instant::now();
@@ -23,14 +35,20 @@ fn latency_ms(name: &str, backend: &str, edits: usize, edit: impl Fn(&mut Scene,
         harness.step();
         std::thread::sleep(Duration::from_millis(10));
     }
-    let mut times = Vec::new();
+    harness
+}
+
+/// Edits a scene as a slider does, and waits for all images after each edit. `edit` receives the number of the edit.
+fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latency {
+    let mut harness = opened(name);
+    let (mut times, mut brightness_step) = (Vec::new(), 0.0_f64);
     for number in 0..edits {
         let mut scene = (**editor(&mut harness).document.scene()).clone();
         edit(&mut scene, number);
         let start = Instant::now();
         editor(&mut harness).document.edit(scene);
         let version = editor(&mut harness).document.version();
-        let mut arrival_ms = [None; 3];
+        let (mut arrival_ms, mut means) = ([None; 3], [None; 3]);
         while arrival_ms[2].is_none() {
             harness.step();
             if let Some(preview) =
@@ -42,6 +60,10 @@ fn latency_ms(name: &str, backend: &str, edits: usize, edit: impl Fn(&mut Scene,
                     Grade::Final => 2,
                 };
                 arrival_ms[at].get_or_insert(start.elapsed().as_secs_f64() * 1e3);
+                means[at] = preview.radiance.as_ref().map(|image| {
+                    image.pixels.iter().map(|pixel| f64::from(pixel.element_sum())).sum::<f64>()
+                        / image.pixels.len() as f64
+                });
             }
             if start.elapsed() > MAX_WAIT {
                 break;
@@ -49,31 +71,58 @@ fn latency_ms(name: &str, backend: &str, edits: usize, edit: impl Fn(&mut Scene,
             std::thread::sleep(Duration::from_millis(2));
         }
         times.push(arrival_ms);
+        if let [Some(draft), _, Some(last)] = means {
+            brightness_step = brightness_step.max((draft / last - 1.0).abs());
+        }
     }
     let median = |at: usize| {
         let mut found: Vec<f64> = times.iter().filter_map(|arrival_ms| arrival_ms[at]).collect();
         found.sort_by(f64::total_cmp);
         found.get(found.len() / 2).copied().unwrap_or(f64::NAN)
     };
-    (median(0), median(1), median(2))
+    Latency { draft: median(0), refined: median(1), last: median(2), brightness_step }
+}
+
+/// Images per second while the camera turns: each image is followed by the next turn at once.
+fn images_per_second(name: &str) -> f64 {
+    const IMAGES: u32 = 40;
+    let mut harness = opened(name);
+    let (start, mut shown) = (Instant::now(), 0);
+    while shown < IMAGES && start.elapsed() < MAX_WAIT {
+        let mut scene = (**editor(&mut harness).document.scene()).clone();
+        scene.camera.get_or_insert_default().azimuth_deg += 2.0;
+        editor(&mut harness).document.edit(scene);
+        let version = editor(&mut harness).document.version();
+        while editor(&mut harness).object.preview.as_ref().is_none_or(|preview| preview.version < version)
+            && start.elapsed() < MAX_WAIT
+        {
+            harness.step();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        shown += 1;
+    }
+    f64::from(shown) / start.elapsed().as_secs_f64()
 }
 
 #[test]
 #[ignore = "a measurement: cargo bench --bench measure -- latency; one scene without BISCALE_TABLE=1"]
 fn latency_from_a_slider_on_the_scenes_of_table_4() {
     let _alone = super::alone();
-    println!(
-        "scene            backend draft  refined (coarse)  final   [ms, median of 3 geometry edits; of 1 on the GPU]"
-    );
+    println!("| scene | draft | refined | final | mean of the draft against the final image | turning camera |");
+    println!("|---|---|---|---|---|---|");
     let all = std::env::var_os("BISCALE_TABLE").is_some();
-    let scenes = ["table4_cup", "table4_plate", "table4_teapot", "table4_pillow", "table4_skirt"];
-    for name in &scenes[..if all { 5 } else { 1 }] {
-        for (backend, edits) in [("cpu", 3), ("gpu", 1)] {
-            let nudge = |scene: &mut Scene, _| drop(scene.nudge_geometry().unwrap());
-            let (draft, coarse, last) = latency_ms(name, backend, edits, nudge);
-            println!("{name:<16} {backend:<7} {draft:>5.0} {coarse:>12.0} {last:>12.0}");
-            assert!(draft.is_finite());
-        }
+    let scenes = ["table4_cup", "table4_plate", "table4_teapot", "table4_pillow", "table4_skirt", "default"];
+    for name in &scenes[..if all { scenes.len() } else { 1 }] {
+        let nudge = |scene: &mut Scene, _| drop(scene.nudge_geometry().unwrap());
+        let Latency { draft, refined, last, brightness_step } = latency(name, 7, nudge);
+        println!(
+            "| `{name}` | {draft:.0} ms | {:.2} s | {:.2} s | within {:.1} % | {:.0} images/s |",
+            refined * 1e-3,
+            last * 1e-3,
+            100.0 * brightness_step,
+            images_per_second(name)
+        );
+        assert!(draft.is_finite());
     }
 }
 
@@ -91,8 +140,8 @@ fn latency_from_a_dragged_stop_of_a_colour_map() {
         map.layer[0].stops.last_mut().unwrap().value += if number.is_multiple_of(2) { 0.05 } else { -0.04 };
     };
     for name in &scenes[..if all { scenes.len() } else { 1 }] {
-        let (draft, coarse, last) = latency_ms(name, "cpu", 9, drag);
-        println!("| `{name}` | {draft:.0} ms | {:.1} s | {:.1} s |", coarse * 1e-3, last * 1e-3);
+        let Latency { draft, refined, last, .. } = latency(name, 9, drag);
+        println!("| `{name}` | {draft:.0} ms | {:.1} s | {:.1} s |", refined * 1e-3, last * 1e-3);
         assert!(draft.is_finite());
     }
 }

@@ -19,6 +19,8 @@ pub struct LobeState {
     plot: Option<Box<LobePlot>>,
     /// BRDF, light, viewer and scale of the last request.
     requested: Option<(*const EffectiveBrdf, Vec3, Option<Vec3>, bool)>,
+    /// The plot of the last request is complete.
+    is_complete: bool,
 }
 
 impl Default for LobeState {
@@ -30,6 +32,7 @@ impl Default for LobeState {
             texture: None,
             plot: None,
             requested: None,
+            is_complete: false,
         }
     }
 }
@@ -41,11 +44,21 @@ impl LobeState {
         if self.requested == Some(wanted) {
             return None;
         }
-        self.requested = Some(wanted);
+        (self.requested, self.is_complete) = (Some(wanted), false);
         Some(LobeJob { brdf: brdf.clone(), light: self.light, viewer: self.viewer, log: self.log })
     }
 
+    /// Forgets a plot that is not complete, so that it is requested again. Returns true if there is one.
+    pub fn interrupt(&mut self) -> bool {
+        let is_running = self.requested.is_some() && !self.is_complete;
+        if is_running {
+            self.requested = None;
+        }
+        is_running
+    }
+
     pub fn receive(&mut self, ctx: &egui::Context, plot: Box<LobePlot>) {
+        self.is_complete = plot.is_complete;
         let options = egui::TextureOptions::LINEAR;
         match &mut self.texture {
             Some(texture) => texture.set(plot.image.clone(), options),

@@ -178,6 +178,7 @@ fn image(
     let request = RenderRequest {
         camera: &camera,
         material: ShadedMaterial::Outcome(outcome),
+        bounced: None,
         size,
         samples_per_side: 3,
         build_caches: true,

@@ -12,15 +12,14 @@ use crate::render::tile_view::TileScene;
 use crate::scene::{Camera, LoadedScene};
 
 use super::dark;
+use super::draft_detail::DraftDetail;
 use super::gpu_drafts::{GpuDrafts, as_preset};
-use super::preview_renderer::{CloseUpTile, PreviewRenderer, RenderRequest, ShadedMaterial};
+use super::preview_renderer::{CloseUpTile, KnownPoints, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 use super::runner::JobContext;
 use super::shared::{SharedState, SmallScale, lock, small_scale};
 use super::tone::color_image;
 
-/// Time limit for shading a draft [ms]. A draft that would take longer has fewer pixels.
-const DRAFT_MS: f64 = 60.0;
 /// Time limits for shading the intermediate images [ms].
 const STEPS_MS: [f64; 2] = [300.0, 2000.0];
 /// Time limit for shading the final image [ms]. An exported image has no limit.
@@ -32,7 +31,7 @@ const DRAFT_CANCEL_DELAY: Duration = Duration::from_millis(700);
 /// Interval at which refinement checks whether the draft has ended.
 const POLL: Duration = Duration::from_millis(5);
 /// Time without a new edit after which refinement begins.
-const PAUSE: Duration = Duration::from_millis(120);
+const PAUSE: Duration = Duration::from_millis(80);
 
 /// Time without a new edit after the final image, after which its error is estimated.
 const STATED_PAUSE: Duration = Duration::from_millis(400);
@@ -50,15 +49,26 @@ pub struct ImageWorker {
     pub(super) renderer: PreviewRenderer,
     /// The tile, while the camera is so close that the tile itself is visible.
     close: Option<(SmallScale, CloseUpTile)>,
-    /// Milliseconds per pixel with the draft's BRDF and with the refined BRDF.
-    cost: [f64; 2],
+    /// With the draft's BRDF and with the refined BRDF.
+    cost: [PixelCost; 2],
     gpu_drafts: GpuDrafts,
+    detail: DraftDetail,
     /// Backend of the next image: the scene's setting, or `cpu` until the window reports the GPUs.
     backend: String,
 }
 
-/// Assumed cost of a pixel until one is measured [ms].
-const FIRST_COST: f64 = 2e-2;
+/// Milliseconds per pixel.
+#[derive(Debug, Clone, Copy)]
+struct PixelCost {
+    /// To find the point that the pixel shows, and the lights that reach it.
+    point: f64,
+    shading: f64,
+}
+
+/// Assumed until it is measured.
+const FIRST_COST: PixelCost = PixelCost { point: 4e-3, shading: 1.6e-2 };
+/// The first of several images of one view may take so many times as long as the others, which have the same points.
+const FIRST_OF_VIEW: f64 = 1.6;
 
 impl ImageWorker {
     pub fn new(shared: Arc<SharedState>, cache: &Cache) -> Self {
@@ -71,6 +81,7 @@ impl ImageWorker {
             close: None,
             cost: [FIRST_COST; 2],
             gpu_drafts: GpuDrafts::default(),
+            detail: DraftDetail::default(),
             backend: String::new(),
         }
     }
@@ -87,21 +98,31 @@ impl ImageWorker {
     }
 
     fn render_draft(&mut self, job: &ImageJob, cancel: &Cancel) -> Result<RenderedPreview> {
+        let start = Instant::now();
         self.pipeline.set_cancel(cancel.clone());
         self.choose_backend(job, false);
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
         if job.loaded.scene.slab.is_some() {
             return self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel);
         }
-        let (outcome, cost_index) = match self.shared.known(&job.loaded) {
-            Some(outcome) => (outcome.without_times(), 1),
-            None => match self.render_gpu_draft(job, cancel)? {
-                Some(preview) => return Ok(preview),
-                None => (self.pipeline.effective(&as_preset(&job.loaded, Preset::Draft))?, 0),
-            },
-        };
-        let size = self.affordable(job.size, cost_index, DRAFT_MS);
-        self.render(job, ShadedMaterial::Outcome(&outcome), cost_index, size, 1, cancel)
+        if let Some(outcome) = self.shared.known(&job.loaded) {
+            let size = self.affordable(job, 1, DraftDetail::shading_ms(start));
+            return self.render(job, ShadedMaterial::Outcome(&outcome.without_times()), 1, size, 1, cancel);
+        }
+        if let Some(preview) = self.render_gpu_draft(job, cancel)? {
+            return Ok(preview);
+        }
+        let mut draft = as_preset(&job.loaded, Preset::Draft);
+        draft.scene.quality.facets = self.detail.facets();
+        let outcome = self.pipeline.effective(&draft)?;
+        if self.backend == "cpu" || !self.renderer.is_hardware() {
+            outcome.shading_brdf(cancel)?;
+        }
+        if !outcome.times.is_empty() {
+            self.detail.record(ms(start));
+        }
+        let size = self.affordable(job, 0, DraftDetail::shading_ms(start));
+        self.render(job, ShadedMaterial::Outcome(&outcome), 0, size, 1, cancel)
     }
 
     /// Renders a draft whose visibility and facet sum the GPU computes, at the finest level that meets the time limit.
@@ -113,7 +134,7 @@ impl ImageWorker {
             return Ok(None);
         }
         let Some(tile) = self.gpu_drafts.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
-        let size = self.affordable(job.size, 0, DRAFT_MS);
+        let size = self.affordable(job, 0, DraftDetail::shading_ms(Instant::now()));
         let preview = match self.render(job, ShadedMaterial::GpuTile(&tile), 0, size, 1, cancel) {
             Ok(preview) => preview,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
@@ -191,9 +212,9 @@ impl ImageWorker {
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
         let mut rendered_pixels = 0;
         for budget in STEPS_MS {
-            let step = self.affordable(job.size, 1, budget);
+            let step = self.affordable(job, 1, budget);
             let pixels = step[0] * step[1];
-            let full = self.affordable(job.size, 1, FINAL_MS);
+            let full = self.affordable(job, 1, FINAL_MS);
             // Steps that add few pixels are skipped.
             if pixels >= 2 * rendered_pixels && pixels * 3 < full[0] * full[1] * 2 {
                 let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), 1, step, 1, context.cancel)?;
@@ -203,7 +224,7 @@ impl ImageWorker {
                 report(ImageResult::Rendered(Box::new(preview)));
             }
         }
-        let full = self.affordable(job.size, 1, FINAL_MS);
+        let full = self.affordable(job, 1, FINAL_MS);
         let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), 1, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
         let health = outcome.health_unless(context.cancel)?;
@@ -269,8 +290,19 @@ impl ImageWorker {
         } else {
             self.close = None;
         }
-        let request =
-            RenderRequest { camera: &camera, material, size, samples_per_side, build_caches, backend: &self.backend };
+        let bounced = match material {
+            ShadedMaterial::Outcome(of) if !of.plan.interreflection => self.shared.bounced_light_like(&job.loaded),
+            _ => None,
+        };
+        let request = RenderRequest {
+            camera: &camera,
+            material,
+            bounced: bounced.as_ref(),
+            size,
+            samples_per_side,
+            build_caches,
+            backend: &self.backend,
+        };
         let close = self.close.as_ref().map(|(_, close)| close);
         let shown = if close.is_none() { self.renderer.render_to_screen(&request, &tone_map, cancel)? } else { None };
         let (radiance, image, times, table_ms, tone) = match shown {
@@ -282,9 +314,12 @@ impl ImageWorker {
                 (Some(Arc::new(rendered.image)), image, rendered.times, table_ms, Some(ms(start)))
             }
         };
-        let spent = times.gbuffer_ms + times.shadows_ms + times.shading_ms;
         if samples_per_side == 1 {
-            self.cost[cost_index] = spent / (size[0] * size[1]) as f64;
+            let (cost, pixels) = (&mut self.cost[cost_index], (size[0] * size[1]) as f64);
+            cost.shading = times.shading_ms / pixels;
+            if times.gbuffer_ms > 0.0 {
+                cost.point = (times.gbuffer_ms + times.shadows_ms) / pixels;
+            }
         }
         let large = [
             (SUM_STAGE, times.product_ms),
@@ -333,14 +368,23 @@ impl ImageWorker {
     }
 
     /// The largest size with the view's aspect ratio that is estimated to take at most `budget_ms`.
-    fn affordable(&self, size: [usize; 2], cost_index: usize, budget_ms: f64) -> [usize; 2] {
-        let full = fitting(size, MAX_PIXELS[usize::from(self.backend != "cpu" && self.renderer.is_hardware())]);
-        let pixels = (full[0] * full[1]) as f64;
-        let scale = (budget_ms / self.cost[cost_index] / pixels).sqrt();
+    fn affordable(&self, job: &ImageJob, cost_index: usize, budget_ms: f64) -> [usize; 2] {
+        let full = fitting(job.size, MAX_PIXELS[usize::from(self.backend != "cpu" && self.renderer.is_hardware())]);
+        let (camera, cost) = (camera(&job.loaded), self.cost[cost_index]);
         // Few sizes, so that the image does not change its size at every edit.
-        let parts = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
-        let part = parts.into_iter().find(|part| 1.0 / part <= scale).unwrap_or(8.0);
-        full.map(|side| ((side as f64 / part).round() as usize).max(24))
+        let parts = [1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0];
+        let mut sizes = parts.map(|part| full.map(|side| ((side as f64 / part).round() as usize).max(24))).into_iter();
+        let is_quick = |size: &[usize; 2]| {
+            let pixels = (size[0] * size[1]) as f64;
+            let (shading, points) = (pixels * cost.shading, pixels * cost.point);
+            match self.renderer.known_points(&camera, *size) {
+                KnownPoints::All => shading <= budget_ms,
+                KnownPoints::OtherSize => shading <= budget_ms && shading + points <= FIRST_OF_VIEW * budget_ms,
+                KnownPoints::None => shading + points <= budget_ms,
+            }
+        };
+        let smallest = sizes.next_back().unwrap_or(full);
+        sizes.find(is_quick).unwrap_or(smallest)
     }
 }
 

@@ -35,6 +35,8 @@ pub struct LobePlot {
     /// f̄ towards the picked viewer.
     pub value: Option<Vec3>,
     pub light: Vec3,
+    /// False if a finer image follows.
+    pub is_complete: bool,
 }
 
 /// Sides of the image in pixels, coarse then fine.
@@ -80,8 +82,9 @@ pub fn work(job: &LobeJob, context: &JobContext<LobeJob>, report: &dyn Fn(LobePl
                 Color32::from_rgb(r, g, b)
             }
         };
+        let is_complete = side == SIDES[1];
         let image = ColorImage::new([side, side], values.iter().map(color).collect());
-        report(LobePlot { image: Arc::new(image), cut: cut.clone(), max, value, light: job.light });
+        report(LobePlot { image: Arc::new(image), cut: cut.clone(), max, value, light: job.light, is_complete });
     }
 }
 

@@ -5,6 +5,7 @@ mod accuracy;
 mod capture;
 mod color_map;
 mod dark;
+mod draft_detail;
 mod export;
 mod gpu_drafts;
 mod gpu_state;

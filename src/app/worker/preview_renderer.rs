@@ -6,12 +6,13 @@ use std::time::Instant;
 
 use crate::base::{Cancel, Error, Result};
 use crate::brdf::MaterialAssignment;
+use crate::cache::Key;
 use crate::effective::{Black, EffectiveBrdf, Reflectance};
-use crate::pipeline::{GpuTile, Outcome, Pipeline};
-use crate::render::image::render::RenderTimes;
+use crate::interreflection::InterreflectionTable;
+use crate::pipeline::{GpuTile, Outcome, Pipeline, ShadingBrdf};
+use crate::render::image::render::{RenderTimes, VisiblePoints};
 use crate::render::image::shading::ImageBackground;
 use crate::render::image::tone_map::ToneMap;
-use crate::render::render;
 use crate::render::tile_view::filtered::Corrections;
 use crate::render::tile_view::{ShadedMaterials, TileScene, on_object};
 use crate::render::{CameraView, RenderInput, RenderScene, Rendered};
@@ -28,6 +29,28 @@ pub struct PreviewRenderer {
     gpu: GpuState,
     screen: Option<Screen>,
     images: ImagePool,
+    /// Points of the last image on the CPU, which the next image has unless the view changed.
+    visible: Option<(ViewKey, VisiblePoints)>,
+}
+
+/// What the visible points of an image depend on.
+#[derive(Debug, Clone, PartialEq)]
+struct ViewKey {
+    scene: [Key; 2],
+    camera: Camera,
+    size: [usize; 2],
+    samples_per_side: usize,
+    has_shadow_cache: bool,
+}
+
+/// What is known of the points of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KnownPoints {
+    /// The last image had the same points.
+    All,
+    /// The last image showed the same view in another size.
+    OtherSize,
+    None,
 }
 
 /// An image on the window's GPU.
@@ -53,6 +76,8 @@ pub enum ShadedMaterial<'a> {
 pub struct RenderRequest<'a> {
     pub camera: &'a Camera,
     pub material: ShadedMaterial<'a>,
+    /// The light between facets of a similar material, for a draft that was computed without.
+    pub bounced: Option<&'a Arc<InterreflectionTable>>,
     pub size: [usize; 2],
     pub samples_per_side: usize,
     /// Allows building a shadow cache, which takes longer than a draft and pays off when the camera moves.
@@ -160,9 +185,22 @@ impl PreviewRenderer {
                 if request.build_caches && scene.shadow_cache().is_none() {
                     scene.cache_shadows(pipeline)?;
                 }
-                let shading_brdf = outcome.shading_brdf(cancel)?;
-                let reflectance = Cancellable { brdf: &shading_brdf.brdf, cancel };
-                (render(&render_input(scene, request, &reflectance, &background))?, shading_brdf.ms)
+                let ShadingBrdf { mut brdf, ms, .. } = outcome.shading_brdf(cancel)?;
+                if let Some(bounced) = request.bounced {
+                    brdf = Arc::new(brdf.as_ref().clone().interreflecting(bounced.clone()));
+                }
+                let reflectance = Cancellable { brdf: &brdf, cancel };
+                let input = render_input(scene, request, &reflectance, &background);
+                let key = view_key(scene, request.camera, request.size, request.samples_per_side);
+                let last = self.visible.take().filter(|(last, _)| *last == key);
+                let (visible, times) = match last {
+                    Some((_, visible)) => (visible, RenderTimes::default()),
+                    None => VisiblePoints::new(&input)?,
+                };
+                let rendered = visible.shade(&input)?;
+                self.visible = Some((key, visible));
+                let times = RenderTimes { shading_ms: rendered.times.shading_ms, ..times };
+                (Rendered { times, ..rendered }, ms)
             }
         };
         cancel.check()?;
@@ -182,6 +220,19 @@ impl PreviewRenderer {
             rendered.times.shading_ms += start.elapsed().as_secs_f64() * 1e3;
         }
         Ok((rendered, table_ms))
+    }
+
+    /// What is known of the points of an image on the CPU.
+    pub fn known_points(&self, camera: &Camera, size: [usize; 2]) -> KnownPoints {
+        let (Some(scene), Some((last, _))) = (&self.scene, &self.visible) else { return KnownPoints::None };
+        let key = view_key(scene, camera, size, last.samples_per_side);
+        if key == *last {
+            KnownPoints::All
+        } else if (ViewKey { size: last.size, ..key }) == *last {
+            KnownPoints::OtherSize
+        } else {
+            KnownPoints::None
+        }
     }
 
     /// Returns true if the camera is so close that the tiles themselves are visible.
@@ -216,6 +267,11 @@ impl PreviewRenderer {
     }
 }
 
+fn view_key(scene: &RenderScene, camera: &Camera, size: [usize; 2], samples_per_side: usize) -> ViewKey {
+    let has_shadow_cache = scene.shadow_cache().is_some();
+    ViewKey { scene: scene.keys(), camera: camera.clone(), size, samples_per_side, has_shadow_cache }
+}
+
 /// Collects the inputs of an image.
 fn render_input<'a>(
     scene: &'a RenderScene,
@@ -238,6 +294,10 @@ impl Reflectance for Cancellable<'_> {
         if !self.cancel.is_set() {
             self.brdf.eval_lights(lights, o, out);
         }
+    }
+
+    fn eval_direct(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) -> bool {
+        !self.cancel.is_set() && self.brdf.eval_direct(lights, o, out)
     }
 
     fn eval_bounced(&self, lights: &[Vec3], o: Vec3, out: &mut [Vec3]) {

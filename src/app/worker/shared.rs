@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
+use crate::effective::Representation;
+use crate::interreflection::InterreflectionTable;
 use crate::pipeline::Outcome;
 use crate::scene::{ColorMap, Effects, LoadedScene, MaterialSpec, Painted, Quality, Tile};
 
@@ -41,6 +43,20 @@ impl SharedState {
     pub fn known(&self, loaded: &LoadedScene) -> Option<Outcome> {
         let best = lock(&self.best);
         best.as_ref().filter(|(key, _)| *key == small_scale(loaded)).map(|(_, outcome)| outcome.clone())
+    }
+
+    /// The light between facets of the last BRDF at a scene's own quality, if it differs from the scene only in settings of
+    /// the surface. A draft under the hand adds this light, so that the brightness does not jump when it is refined.
+    pub fn bounced_light_like(&self, loaded: &LoadedScene) -> Option<Arc<InterreflectionTable>> {
+        let best = lock(&self.best);
+        let (key, outcome) = best.as_ref()?;
+        let Representation::Interreflecting(_, bounced) = &outcome.brdf.representation else { return None };
+        let mut like_last = small_scale(loaded);
+        if like_last.0.geometry.kind() != key.0.geometry.kind() {
+            return None;
+        }
+        like_last.0.geometry.clone_from(&key.0.geometry);
+        (like_last == *key).then(|| bounced.clone())
     }
 
     pub fn is_drafted(&self, version: u64) -> bool {

@@ -85,6 +85,7 @@ fn render(worker: &mut ThumbnailWorker, job: &ThumbnailJob, context: &JobContext
     let request = RenderRequest {
         camera: &camera,
         material: ShadedMaterial::Outcome(&outcome),
+        bounced: None,
         size: [SIDE, SIDE],
         samples_per_side: 2,
         build_caches: false,

@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use glam::Vec3;
 
 use super::{from_angles, to_angles};
-use crate::math::simd::cubic_weights;
+use crate::math::simd::{azimuth_and_polar_angle, cubic_weights};
 
 /// One node of an interpolation: its index in the grid and its weight.
 pub type Tap = (usize, f32);
@@ -24,6 +24,27 @@ pub struct PolarGrid {
 
 /// `1 / cos 89.9°`.
 const INVERSE_HORIZON_COSINE: f32 = 572.9581;
+
+/// Sixteen taps of a cubic: four consecutive azimuths on each of four rings.
+#[derive(Debug, Clone, Copy)]
+pub struct CubicTaps {
+    /// Ring, first azimuth and weight. Azimuths after the last one of the grid continue at 0.
+    pub rings: [(usize, usize, f32); 4],
+    /// Weights of the azimuths.
+    pub azimuths: [f32; 4],
+    /// Azimuths per ring of the grid.
+    turn: usize,
+}
+
+impl CubicTaps {
+    /// The taps as nodes of the grid.
+    pub fn nodes(&self) -> [Tap; 16] {
+        std::array::from_fn(|k| {
+            let (ring, first, weight) = self.rings[k / 4];
+            (ring * self.turn + (first + k % 4) % self.turn, weight * self.azimuths[k % 4])
+        })
+    }
+}
 
 impl PolarGrid {
     /// Polar angle of the last ring [degrees]. It is below 90° because a bidirectional quantity need not vanish at the
@@ -82,29 +103,37 @@ impl PolarGrid {
         ((ring as f32 * step).cos() - ((ring + 1) as f32 * step).cos()) * TAU / self.azimuths as f32
     }
 
-    /// The sixteen taps of a cubic (Catmull and Rom 1974) in the elevation and in the azimuth; weights sum to one, and some
-    /// are negative.
-    pub fn cubic_taps(&self, direction: Vec3) -> [Tap; 16] {
-        let (theta, phi) = to_angles(direction);
+    /// The taps of a cubic (Catmull and Rom 1974) in the elevation and in the azimuth; weights sum to one, and some are
+    /// negative.
+    pub fn cubic_taps(&self, direction: Vec3) -> CubicTaps {
+        let (turns, theta) = azimuth_and_polar_angle(direction);
         let step = FRAC_PI_2 / self.rings as f32;
         let at = (theta / step - 0.5).clamp(-0.5, self.rings as f32);
         let lower = (at.floor() as i32).min(self.rings as i32 - 1);
-        let angle = |ring: i32| if ring < 0 { (ring as f32 + 0.5) * step } else { self.theta(ring as usize) };
         let knots = [lower - 1, lower, lower + 1, lower + 2];
         let last = self.rings as i32;
-        let weights = elevation_weights(knots.map(|ring| (ring <= last).then(|| angle(ring))), theta);
-        let mut taps = [(0, 0.0); 16];
-        for ((ring, weight), taps) in knots.into_iter().zip(weights).zip(taps.as_chunks_mut::<4>().0) {
+        // All rings but the last have the same distance.
+        let weights = if lower + 2 < last {
+            cubic_weights(at - lower as f32)
+        } else {
+            let angle = |ring: i32| if ring < 0 { (ring as f32 + 0.5) * step } else { self.theta(ring as usize) };
+            elevation_weights(knots.map(|ring| (ring <= last).then(|| angle(ring))), theta)
+        };
+        let at = turns * self.azimuths as f32;
+        let second = (at as usize).min(self.azimuths - 1);
+        let wrapped = |azimuth: usize| if azimuth >= self.azimuths { azimuth - self.azimuths } else { azimuth };
+        let first = wrapped(second + self.azimuths - 1);
+        let opposite = wrapped(first + self.azimuths / 2);
+        let mut rings = [(0, 0, 0.0); 4];
+        for ((ring, weight), run) in knots.into_iter().zip(weights).zip(&mut rings) {
             // Ring -1 is ring 0, rotated by half a turn.
-            let (ring, phi) = if ring < 0 { (-1 - ring, phi + PI) } else { (ring.min(last), phi) };
-            let at = phi.rem_euclid(TAU) / TAU * self.azimuths as f32;
-            let first = at as usize;
-            for (k, (tap, along)) in taps.iter_mut().zip(cubic_weights(at - first as f32)).enumerate() {
-                let azimuth = (first + k + self.azimuths - 1) % self.azimuths;
-                *tap = (ring as usize * self.azimuths + azimuth, weight * along);
-            }
+            *run = if ring < 0 {
+                ((-1 - ring) as usize, opposite, weight)
+            } else {
+                (ring.min(last) as usize, first, weight)
+            };
         }
-        taps
+        CubicTaps { rings, azimuths: cubic_weights(at - second as f32), turn: self.azimuths }
     }
 
     /// The four bilinear taps of a direction; weights are in `[0,1]` and sum to one.
@@ -188,7 +217,7 @@ mod tests {
     fn cubic_taps_reproduce_a_constant_the_nodes_and_smooth_functions() {
         let grid = PolarGrid::new(12, 36);
         for node in 0..grid.len() {
-            let taps = grid.cubic_taps(grid.direction(node));
+            let taps = grid.cubic_taps(grid.direction(node)).nodes();
             let weight: f32 = taps.iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
             assert!((weight - 1.0).abs() < 2e-3, "node {node}: {taps:?}");
         }
@@ -196,7 +225,7 @@ mod tests {
         let values: Vec<f32> = grid.directions().into_iter().map(smooth).collect();
         for k in 0..2000 {
             let d = from_angles(k as f32 / 2000.0 * PolarGrid::HORIZON_DEG.to_radians(), k as f32 * 0.7);
-            let taps = grid.cubic_taps(d);
+            let taps = grid.cubic_taps(d).nodes();
             assert!((taps.iter().map(|tap| tap.1).sum::<f32>() - 1.0).abs() < 1e-5);
             let value: f32 = taps.iter().map(|tap| tap.1 * values[tap.0]).sum();
             assert!((value - smooth(d)).abs() < 4e-3, "{d}: {value} instead of {}", smooth(d));

@@ -1,4 +1,4 @@
-//! The query of low-rank factors: two short gathers and a dot product.
+//! Weighted sums of the rows of a table: the query of low-rank factors, and a table along one direction.
 
 use super::multiversion;
 
@@ -38,5 +38,37 @@ multiversion! {
             start += WIDTH;
         }
         total
+    }
+}
+
+/// Columns of [`gathered_row`] that are processed at a time.
+const ROW_WIDTH: usize = 64;
+
+multiversion! {
+    /// Writes `Σ_t w_t table[n_t][c]` to each column `c` of `out`, for rows of `out.len()` contiguous values. The terms are
+    /// added in the order of the taps.
+    pub fn gathered_row(table: &[f32], taps: &[(usize, f32); 16], out: &mut [f32]) {
+        let columns = out.len();
+        let (whole, rest) = out.as_chunks_mut::<ROW_WIDTH>();
+        let first_of_rest = columns - rest.len();
+        for (k, out) in whole.iter_mut().enumerate() {
+            let mut sums = [0.0_f32; ROW_WIDTH];
+            for &(node, weight) in taps {
+                let at = node * columns + k * ROW_WIDTH;
+                if let Some(row) = table.get(at..).and_then(|row| row.first_chunk::<ROW_WIDTH>()) {
+                    for l in 0..ROW_WIDTH {
+                        sums[l] += weight * row[l];
+                    }
+                }
+            }
+            *out = sums;
+        }
+        rest.fill(0.0);
+        for &(node, weight) in taps {
+            let at = node * columns + first_of_rest;
+            for (sum, x) in rest.iter_mut().zip(&table[at..]) {
+                *sum += weight * x;
+            }
+        }
     }
 }

@@ -16,10 +16,10 @@ mod tests;
 mod visibility;
 
 pub(crate) use f32x8::{F32x8Array, SimdF32x8, SimdTask, with_simd_f32x8};
-pub use gather::gathered_dot;
+pub use gather::{gathered_dot, gathered_row};
 pub use lobes::{Lobe, PairVectors, add_lobes_around, light_lobes, lobe_sums, lobe_values};
 pub(crate) use math::cubic_weights;
-pub use pairs::{LightPairs, azimuth_and_cosine, pair_grid_coordinates, pair_vectors};
+pub use pairs::{LightPairs, azimuth_and_cosine, azimuth_and_polar_angle, pair_grid_coordinates, pair_vectors};
 pub use paths::{RayLane, enter_lane, facing_lane, facing_sum, leave_lane, ln_of_sum, mask_lane};
 pub(crate) use refraction::smith_lambda;
 pub use refraction::{

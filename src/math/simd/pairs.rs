@@ -93,6 +93,12 @@ pub fn azimuth_and_cosine(d: Vec3) -> (f32, f32) {
     (azimuth, (d.x * d.x + d.y * d.y).sqrt())
 }
 
+/// Azimuth in turns, as [`azimuth_and_cosine`], and polar angle in `[0, π]` of one direction.
+pub fn azimuth_and_polar_angle(d: Vec3) -> (f32, f32) {
+    let (azimuth, sine) = azimuth_and_cosine(d);
+    (azimuth, upper_angle(sine, d.z))
+}
+
 /// The angle of `(x, y)` in `[0, π]` for `y >= 0`, 0 at the origin. The absolute error is 1e-7 plus rounding
 /// (Abramowitz and Stegun, 4.4.49).
 #[inline(always)]

@@ -7,8 +7,8 @@ use super::shading::ImageBackground;
 use super::shading_points::ShadingPoints;
 use crate::base::{InputError, Result};
 use crate::effective::Reflectance;
-use crate::render::shadow::Occluder;
 use crate::render::shadow::shadow_cache::ShadowCache;
+use crate::render::shadow::{LightVisibility, Occluder};
 use crate::render::{CameraView, DirectionalLight, GBuffer, Image, ObjectMesh};
 use crate::scene;
 
@@ -61,26 +61,55 @@ pub struct Rendered {
 }
 
 /// Renders on the CPU. The same input gives the same bits with any number of threads.
+///
+/// # Errors
+/// The size is not allowed, or the camera is invalid.
 pub fn render(input: &RenderInput) -> Result<Rendered> {
-    check_size(input.size, input.samples_per_side)?;
-    let view = CameraView::new(input.camera, input.mesh, input.size)?;
-    let start = Instant::now();
-    let points = visible_points(input.mesh, &view, input.samples_per_side);
-    let after_gbuffer = Instant::now();
-    let visibility = input
-        .occluder
-        .map(|occluder| occluder.visible_lights(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
-    let after_shadows = Instant::now();
-    let radiance = shading::radiance(&points, input.lights, visibility.as_ref(), view.eye, input.reflectance);
-    let image = shading::gather(&points, &radiance, &view, input.background);
-    let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
-    let times = RenderTimes {
-        product_ms: 0.0,
-        gbuffer_ms: ms(start, after_gbuffer),
-        shadows_ms: ms(after_gbuffer, after_shadows),
-        shading_ms: ms(after_shadows, Instant::now()),
-    };
-    Ok(Rendered { image, times, points: points.len() })
+    let (visible, times) = VisiblePoints::new(input)?;
+    let rendered = visible.shade(input)?;
+    Ok(Rendered { times: RenderTimes { shading_ms: rendered.times.shading_ms, ..times }, ..rendered })
+}
+
+/// The points that the camera sees, and the lights that reach them. Images of several materials can share them.
+#[derive(Debug)]
+pub struct VisiblePoints {
+    points: ShadingPoints,
+    /// Without it, every light is visible.
+    visibility: Option<LightVisibility>,
+}
+
+impl VisiblePoints {
+    /// Finds the points, and the times of both steps. The reflectance is not read.
+    ///
+    /// # Errors
+    /// The size is not allowed, or the camera is invalid.
+    pub fn new(input: &RenderInput) -> Result<(Self, RenderTimes)> {
+        check_size(input.size, input.samples_per_side)?;
+        let view = CameraView::new(input.camera, input.mesh, input.size)?;
+        let start = Instant::now();
+        let points = visible_points(input.mesh, &view, input.samples_per_side);
+        let after_gbuffer = Instant::now();
+        let visibility = input
+            .occluder
+            .map(|occluder| occluder.visible_lights(input.mesh, &points, input.lights, view.eye, input.shadow_cache));
+        let gbuffer_ms = (after_gbuffer - start).as_secs_f64() * 1e3;
+        let shadows_ms = after_gbuffer.elapsed().as_secs_f64() * 1e3;
+        Ok((Self { points, visibility }, RenderTimes { gbuffer_ms, shadows_ms, ..RenderTimes::default() }))
+    }
+
+    /// Shades the points of the same object, lights and camera in the same size.
+    ///
+    /// # Errors
+    /// The camera is invalid.
+    pub fn shade(&self, input: &RenderInput) -> Result<Rendered> {
+        let view = CameraView::new(input.camera, input.mesh, input.size)?;
+        let start = Instant::now();
+        let radiance =
+            shading::radiance(&self.points, input.lights, self.visibility.as_ref(), view.eye, input.reflectance);
+        let image = shading::gather(&self.points, &radiance, &view, input.background);
+        let times = RenderTimes { shading_ms: start.elapsed().as_secs_f64() * 1e3, ..RenderTimes::default() };
+        Ok(Rendered { image, times, points: self.points.len() })
+    }
 }
 
 /// The points of an object that the camera sees.

@@ -1,6 +1,6 @@
 //! Deferred shading: `Σ_k E_k f̄(i_k, o)` at every shading point, and the average of the points of each pixel.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::shading_points::ShadingPoints;
@@ -11,6 +11,12 @@ use crate::render::{CameraView, DirectionalLight, Image};
 /// Points per task.
 const CHUNK: usize = 256;
 
+/// Light that facets send to each other is interpolated over at most so many points.
+const RUN: usize = 8;
+/// Bounds the angles between the normals, tangents and views of such points: the cosine of 4°. The table that holds this
+/// light has steps of 7.5°.
+const MIN_RUN_COSINE: f32 = 0.997_56;
+
 /// Returns the radiance of each point towards the eye. Without `visibility`, every light is visible.
 pub fn radiance(
     points: &ShadingPoints,
@@ -19,33 +25,114 @@ pub fn radiance(
     eye: Vec3,
     reflectance: &dyn Reflectance,
 ) -> Vec<Vec3> {
+    let shading = Shading { points, lights, visibility, eye, reflectance };
     let mut radiance = vec![Vec3::ZERO; points.len()];
     radiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, radiance)| {
-        let (mut directions, mut irradiances) = (Vec::with_capacity(lights.len()), Vec::with_capacity(lights.len()));
-        let mut values = vec![Vec3::ZERO; lights.len()];
-        for (k, radiance) in radiance.iter_mut().enumerate() {
-            let point = chunk * CHUNK + k;
-            let (z, x) = (points.normals[point], points.tangents[point]);
-            let y = z.cross(x);
-            let in_tangent = |d: Vec3| Vec3::new(d.dot(x), d.dot(y), d.dot(z));
+        let first = chunk * CHUNK;
+        if shading.add_direct(first, radiance) {
+            shading.add_bounced(first, radiance);
+        }
+    });
+    radiance
+}
+
+/// The inputs of [`radiance`].
+struct Shading<'a> {
+    points: &'a ShadingPoints,
+    lights: &'a [DirectionalLight],
+    visibility: Option<&'a LightVisibility>,
+    eye: Vec3,
+    reflectance: &'a dyn Reflectance,
+}
+
+impl Shading<'_> {
+    /// Adds what the points from `first` on reflect directly. Returns true if bounced light is missing.
+    fn add_direct(&self, first: usize, radiance: &mut [Vec3]) -> bool {
+        let (mut directions, mut irradiances) = (Vec::new(), Vec::new());
+        let mut values = vec![Vec3::ZERO; self.lights.len()];
+        let mut is_bounced_missing = false;
+        for (point, radiance) in (first..).zip(radiance) {
+            let frame = self.frame(point);
             directions.clear();
             irradiances.clear();
-            for (k, light) in lights.iter().enumerate() {
-                if visibility.is_none_or(|visibility| visibility.is_lit(point, k)) && light.direction.dot(z) > 0.0 {
-                    directions.push(in_tangent(light.direction));
+            for (k, light) in self.lights.iter().enumerate() {
+                if self.is_lit(point, k) {
+                    directions.push(frame.transpose() * light.direction);
                     irradiances.push(light.irradiance);
                 }
             }
             if directions.is_empty() {
                 continue;
             }
-            let o = in_tangent((eye - points.positions[point]).try_normalize().unwrap_or(z));
             let values = &mut values[..directions.len()];
-            reflectance.eval_lights(&directions, o, values);
+            is_bounced_missing |= self.reflectance.eval_direct(&directions, self.view(point, frame), values);
             *radiance = values.iter().zip(&irradiances).map(|(f, e)| *f * *e).sum();
         }
-    });
-    radiance
+        is_bounced_missing
+    }
+
+    /// Adds the light that facets send to each other. It is evaluated at the ends of runs of similar points, and
+    /// interpolated between them.
+    fn add_bounced(&self, first: usize, radiance: &mut [Vec3]) {
+        let end = first + radiance.len();
+        let mut directions = Vec::with_capacity(self.lights.len());
+        let mut values = [(); 2].map(|()| vec![Vec3::ZERO; self.lights.len()]);
+        let mut eval = |point: usize, values: &mut Vec<Vec3>| {
+            let frame = self.frame(point);
+            directions.clear();
+            directions.extend(self.lights.iter().map(|light| frame.transpose() * light.direction));
+            self.reflectance.eval_bounced(&directions, self.view(point, frame), values);
+        };
+        let [at_start, at_last] = &mut values;
+        let (mut start, mut is_known) = (first, false);
+        while start < end {
+            if !is_known {
+                eval(start, at_start);
+            }
+            let longest = (start + 1..end.min(start + RUN + 1)).take_while(|point| self.is_similar(start, *point));
+            let last = longest.last().unwrap_or(start);
+            is_known = last > start;
+            if is_known {
+                eval(last, at_last);
+            }
+            // The last point begins the next run.
+            for point in start..last.max(start + 1) {
+                let t = (point - start) as f32 / (last - start).max(1) as f32;
+                let lit = (0..self.lights.len()).filter(|k| self.is_lit(point, *k));
+                radiance[point - first] +=
+                    lit.map(|k| at_start[k].lerp(at_last[k], t) * self.lights[k].irradiance).sum::<Vec3>();
+            }
+            std::mem::swap(at_start, at_last);
+            start = last.max(start + 1);
+        }
+    }
+
+    fn is_similar(&self, a: usize, b: usize) -> bool {
+        let points = self.points;
+        let towards_eye = |point: usize| (self.eye - points.positions[point]).normalize_or_zero();
+        points.pixels[b] - points.pixels[a] <= RUN as u32
+            && points.normals[a].dot(points.normals[b]) >= MIN_RUN_COSINE
+            && points.tangents[a].dot(points.tangents[b]) >= MIN_RUN_COSINE
+            && towards_eye(a).dot(towards_eye(b)) >= MIN_RUN_COSINE
+    }
+
+    /// Returns whether a light reaches a point, on the side of its normal.
+    fn is_lit(&self, point: usize, light: usize) -> bool {
+        self.visibility.is_none_or(|visibility| visibility.is_lit(point, light))
+            && self.lights[light].direction.dot(self.points.normals[point]) > 0.0
+    }
+
+    /// The axes of the tangent frame.
+    fn frame(&self, point: usize) -> Mat3 {
+        let (z, x) = (self.points.normals[point], self.points.tangents[point]);
+        Mat3::from_cols(x, z.cross(x), z)
+    }
+
+    /// The direction towards the eye in the tangent frame.
+    fn view(&self, point: usize, frame: Mat3) -> Vec3 {
+        let to_eye = (self.eye - self.points.positions[point]).try_normalize().unwrap_or(frame.z_axis);
+        frame.transpose() * to_eye
+    }
 }
 
 /// The background of an image.
