@@ -114,7 +114,7 @@ fn latency_from_a_slider_on_the_scenes_of_table_4() {
     let scenes = ["table4_cup", "table4_plate", "table4_teapot", "table4_pillow", "table4_skirt", "default"];
     for name in &scenes[..if all { scenes.len() } else { 1 }] {
         let nudge = |scene: &mut Scene, _| drop(scene.nudge_geometry().unwrap());
-        let Latency { draft, refined, last, brightness_step } = latency(name, 7, nudge);
+        let Latency { draft, refined, last, brightness_step } = latency(name, if all { 7 } else { 2 }, nudge);
         println!(
             "| `{name}` | {draft:.0} ms | {:.2} s | {:.2} s | within {:.1} % | {:.0} images/s |",
             refined * 1e-3,
@@ -140,7 +140,7 @@ fn latency_from_a_dragged_stop_of_a_colour_map() {
         map.layer[0].stops.last_mut().unwrap().value += if number.is_multiple_of(2) { 0.05 } else { -0.04 };
     };
     for name in &scenes[..if all { scenes.len() } else { 1 }] {
-        let Latency { draft, refined, last, .. } = latency(name, 9, drag);
+        let Latency { draft, refined, last, .. } = latency(name, if all { 9 } else { 2 }, drag);
         println!("| `{name}` | {draft:.0} ms | {:.1} s | {:.1} s |", refined * 1e-3, last * 1e-3);
         assert!(draft.is_finite());
     }

@@ -49,8 +49,8 @@ pub struct ImageWorker {
     pub(super) renderer: PreviewRenderer,
     /// The tile, while the camera is so close that the tile itself is visible.
     close: Option<(SmallScale, CloseUpTile)>,
-    /// With the draft's BRDF and with the refined BRDF.
-    cost: [PixelCost; 2],
+    /// With the draft's BRDF, with the refined BRDF, and of a final image under a colour map.
+    cost: [PixelCost; 3],
     gpu_drafts: GpuDrafts,
     detail: DraftDetail,
     /// Backend of the next image: the scene's setting, or `cpu` until the window reports the GPUs.
@@ -79,7 +79,7 @@ impl ImageWorker {
             pipeline,
             renderer,
             close: None,
-            cost: [FIRST_COST; 2],
+            cost: [FIRST_COST; 3],
             gpu_drafts: GpuDrafts::default(),
             detail: DraftDetail::default(),
             backend: String::new(),
@@ -211,10 +211,11 @@ impl ImageWorker {
         report(ImageResult::Doing(job.version, "Refining the image"));
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
         let mut rendered_pixels = 0;
+        let final_cost = if job.loaded.scene.color_map.is_some() { 2 } else { 1 };
         for budget in STEPS_MS {
             let step = self.affordable(job, 1, budget);
             let pixels = step[0] * step[1];
-            let full = self.affordable(job, 1, FINAL_MS);
+            let full = self.affordable(job, final_cost, FINAL_MS);
             // Steps that add few pixels are skipped.
             if pixels >= 2 * rendered_pixels && pixels * 3 < full[0] * full[1] * 2 {
                 let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), 1, step, 1, context.cancel)?;
@@ -224,8 +225,8 @@ impl ImageWorker {
                 report(ImageResult::Rendered(Box::new(preview)));
             }
         }
-        let full = self.affordable(job, 1, FINAL_MS);
-        let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), 1, full, 2, context.cancel)?;
+        let full = self.affordable(job, final_cost, FINAL_MS);
+        let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), final_cost, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
         let health = outcome.health_unless(context.cancel)?;
         preview.warnings.clone_from(&health.warnings);
@@ -314,7 +315,7 @@ impl ImageWorker {
                 (Some(Arc::new(rendered.image)), image, rendered.times, table_ms, Some(ms(start)))
             }
         };
-        if samples_per_side == 1 {
+        if samples_per_side == 1 || has_color_map {
             let (cost, pixels) = (&mut self.cost[cost_index], (size[0] * size[1]) as f64);
             cost.shading = times.shading_ms / pixels;
             if times.gbuffer_ms > 0.0 {
