@@ -116,8 +116,8 @@ fn latency_from_a_slider_on_the_scenes_of_table_4() {
         let nudge = |scene: &mut Scene, _| drop(scene.nudge_geometry().unwrap());
         let Latency { draft, refined, last, brightness_step } = latency(name, if all { 7 } else { 2 }, nudge);
         println!(
-            "| `{name}` | {draft:.0} ms | {:.2} s | {:.2} s | within {:.1} % | {:.0} images/s |",
-            refined * 1e-3,
+            "| `{name}` | {draft:.0} ms | {} | {:.2} s | within {:.1} % | {:.0} images/s |",
+            if refined.is_nan() { String::new() } else { format!("{:.2} s", refined * 1e-3) },
             last * 1e-3,
             100.0 * brightness_step,
             images_per_second(name)
