@@ -55,6 +55,7 @@ impl InTests {
 /// Returns true for the lines that the test harness prints around those of a test.
 fn is_of_the_harness(line: &str) -> bool {
     let is_count = line.starts_with("running ") && line.contains(" test");
-    let is_result = line.starts_with("test ") && (line.ends_with("... ok") || line.ends_with("... FAILED"));
+    let is_slow = line.contains(" has been running for over ");
+    let is_result = line.starts_with("test ") && (line.ends_with("... ok") || line.ends_with("... FAILED") || is_slow);
     line.is_empty() || is_count || is_result || line.starts_with("test result: ")
 }

@@ -140,8 +140,8 @@ fn latency_from_a_dragged_stop_of_a_colour_map() {
         map.layer[0].stops.last_mut().unwrap().value += if number.is_multiple_of(2) { 0.05 } else { -0.04 };
     };
     for name in &scenes[..if all { scenes.len() } else { 1 }] {
-        let Latency { draft, refined, last, .. } = latency(name, if all { 9 } else { 2 }, drag);
-        println!("| `{name}` | {draft:.0} ms | {:.1} s | {:.1} s |", refined * 1e-3, last * 1e-3);
+        let Latency { draft, refined, last, .. } = latency(name, if all { 5 } else { 2 }, drag);
+        println!("| `{name}` | {draft:.0} ms | {:.2} s | {:.1} s |", refined * 1e-3, last * 1e-3);
         assert!(draft.is_finite());
     }
 }

@@ -20,8 +20,10 @@ use super::runner::JobContext;
 use super::shared::{SharedState, SmallScale, lock, small_scale};
 use super::tone::color_image;
 
-/// Time limits for shading the intermediate images [ms].
-const STEPS_MS: [f64; 2] = [300.0, 2000.0];
+/// Intermediate images: the index of their cost, the time limit [ms], and samples per side of a pixel.
+const STEPS: [(usize, f64, usize); 2] = [(1, 300.0, 1), (1, 2000.0, 1)];
+/// The same under a colour map: by `f̄` alone, then filtered.
+const FILTERED_STEPS: [(usize, f64, usize); 2] = [(1, 300.0, 1), (2, 1200.0, 2)];
 /// Time limit for shading the final image [ms]. An exported image has no limit.
 const FINAL_MS: f64 = 8000.0;
 /// Maximum number of pixels of an image on the CPU and on the GPU. A larger view shows the image enlarged.
@@ -210,18 +212,20 @@ impl ImageWorker {
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
         report(ImageResult::Doing(job.version, "Refining the image"));
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
-        let mut rendered_pixels = 0;
-        let final_cost = if job.loaded.scene.color_map.is_some() { 2 } else { 1 };
-        for budget in STEPS_MS {
-            let step = self.affordable(job, 1, budget);
+        let (final_cost, steps) = if job.loaded.scene.color_map.is_some() { (2, FILTERED_STEPS) } else { (1, STEPS) };
+        let mut rendered = (0, 1);
+        for (cost_index, budget, samples) in steps {
+            let step = self.affordable(job, cost_index, budget);
             let pixels = step[0] * step[1];
             let full = self.affordable(job, final_cost, FINAL_MS);
             // Steps that add few pixels are skipped.
-            if pixels >= 2 * rendered_pixels && pixels * 3 < full[0] * full[1] * 2 {
-                let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), 1, step, 1, context.cancel)?;
+            let adds = cost_index != rendered.1 || pixels >= 2 * rendered.0;
+            if adds && (cost_index != final_cost || pixels * 3 < full[0] * full[1] * 2) {
+                let material = ShadedMaterial::Outcome(&outcome);
+                let mut preview = self.render(job, material, cost_index, step, samples, context.cancel)?;
                 preview.grade = Grade::Refining;
                 outcome.times = Vec::new();
-                rendered_pixels = pixels;
+                rendered = (pixels, cost_index);
                 report(ImageResult::Rendered(Box::new(preview)));
             }
         }
