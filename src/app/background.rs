@@ -23,6 +23,8 @@ use super::worker::{
 
 /// Height of menu, toolbar and status line [points].
 const BARS: f32 = 79.0;
+/// Time for which the other views wait for a draft of the object.
+const LONGEST_HOLD: Duration = Duration::from_millis(150);
 /// Minimum time between recovery files [s].
 const AUTOSAVE_SECS: f64 = 5.0;
 
@@ -208,7 +210,7 @@ impl Editor {
             }
             return;
         }
-        if self.is_draft_awaited() {
+        if !self.tile.painting && self.holds_back_other_views(ctx) {
             return;
         }
         if let (Some(worker), Some(job)) = (&self.background.tiles, self.tile.job(&loaded, self.lobe.light)) {
@@ -234,15 +236,20 @@ impl Editor {
         }
     }
 
-    /// Returns true while the draft of the last edit is computed, on all cores. The other views follow each image once.
-    fn is_draft_awaited(&mut self) -> bool {
+    /// Returns true while the draft of the last edit is computed, on all cores, for a short time. The other views follow
+    /// each image once.
+    fn holds_back_other_views(&mut self, ctx: &Context) -> bool {
         let shown = self.object.preview.as_ref().map(|preview| preview.version);
         let is_shown = shown >= self.object.requested.map(|(version, _)| version) || self.object.failed.is_some();
-        if is_shown || shown != self.background.followed {
+        let waited = self.object.requested_at.map_or(LONGEST_HOLD, |since| since.elapsed());
+        let is_held =
+            !is_shown && shown == self.background.followed && waited < LONGEST_HOLD && self.background.images.is_some();
+        if is_held {
+            ctx.request_repaint_after(LONGEST_HOLD - waited);
+        } else {
             self.background.followed = shown;
-            return false;
         }
-        self.background.images.is_some()
+        is_held
     }
 
     /// Submits the object's image if version or size changed; returns the scene in the form that workers read.

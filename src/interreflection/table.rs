@@ -8,7 +8,7 @@ use crate::math::simd;
 /// Mean square of the error of a cubic between nodes, relative to that in the middle.
 const MEAN_OF_STEP: f64 = 0.4;
 
-/// Number of lights from which on the sum over the rows around the viewer takes less time than the columns of each light.
+/// From this number of lights on, it is faster to sum whole rows once than the columns that each light reads.
 const MIN_LIGHTS_FOR_A_ROW: usize = 3;
 
 /// Azimuths that are stored twice, so that the taps of a ring are contiguous.

@@ -83,6 +83,11 @@ fn latency(name: &str, edits: usize, edit: impl Fn(&mut Scene, usize)) -> Latenc
     Latency { draft: median(0), refined: median(1), last: median(2), brightness_step }
 }
 
+/// Milliseconds in seconds; nothing for an image that did not come.
+fn seconds(ms: f64) -> String {
+    if ms.is_nan() { String::new() } else { format!("{:.2} s", ms * 1e-3) }
+}
+
 /// Images per second while the camera turns: each image is followed by the next turn at once.
 fn images_per_second(name: &str) -> f64 {
     const IMAGES: u32 = 40;
@@ -117,7 +122,7 @@ fn latency_from_a_slider_on_the_scenes_of_table_4() {
         let Latency { draft, refined, last, brightness_step } = latency(name, if all { 7 } else { 2 }, nudge);
         println!(
             "| `{name}` | {draft:.0} ms | {} | {:.2} s | within {:.1} % | {:.0} images/s |",
-            if refined.is_nan() { String::new() } else { format!("{:.2} s", refined * 1e-3) },
+            seconds(refined),
             last * 1e-3,
             100.0 * brightness_step,
             images_per_second(name)
@@ -141,7 +146,7 @@ fn latency_from_a_dragged_stop_of_a_colour_map() {
     };
     for name in &scenes[..if all { scenes.len() } else { 1 }] {
         let Latency { draft, refined, last, .. } = latency(name, if all { 5 } else { 2 }, drag);
-        println!("| `{name}` | {draft:.0} ms | {:.2} s | {:.1} s |", refined * 1e-3, last * 1e-3);
+        println!("| `{name}` | {draft:.0} ms | {} | {:.1} s |", seconds(refined), last * 1e-3);
         assert!(draft.is_finite());
     }
 }

@@ -1,4 +1,4 @@
-//! The detail of drafts on the CPU: as much as the time of a picture under the hand allows.
+//! The detail of drafts on the CPU while the user drags a control: as much as the time of a draft allows.
 
 use std::time::Instant;
 
@@ -7,21 +7,31 @@ use crate::plan::{Preset, Settings};
 use super::image_worker::ms;
 
 /// Time limit for a draft [ms].
-const DRAFT_MS: f64 = 45.0;
+pub const DRAFT_MS: f64 = 45.0;
 /// Time limit for the part that does not depend on the number of pixels: facets, visibility and table [ms].
 const MATERIAL_MS: f64 = 26.0;
-/// Least time for shading [ms], so that a picture can be recognised.
+/// Part of this limit below which twice as many facets are expected to meet it.
+const ROOM: f64 = 0.45;
+/// Least time for shading [ms], so that a draft can be recognised.
 const MIN_SHADING_MS: f64 = 14.0;
-/// A level has half as many facets as the one before.
+/// Each level has half as many facets as the one before.
 const LEVELS: u32 = 3;
-/// Quick drafts after which a finer level is tried.
+/// Number of quick drafts after which a finer level is tried. It doubles with each trial, up to a limit.
 const QUICK_DRAFTS: u32 = 6;
+const MOST_QUICK_DRAFTS: u32 = 96;
 
 /// The number of facets of the next draft, from the times of those before.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct DraftDetail {
     level: u32,
     quick: u32,
+    required: u32,
+}
+
+impl Default for DraftDetail {
+    fn default() -> Self {
+        Self { level: 0, quick: 0, required: QUICK_DRAFTS }
+    }
 }
 
 impl DraftDetail {
@@ -30,13 +40,20 @@ impl DraftDetail {
         (self.level > 0).then(|| Settings::of_preset(Preset::Draft).facets >> self.level)
     }
 
-    /// Records the time of a material that was computed anew [ms].
+    /// Records the time from a new surface to its table [ms], also of a draft that was cancelled.
     pub fn record(&mut self, material_ms: f64) {
-        self.quick = if material_ms < MATERIAL_MS / 3.0 { self.quick + 1 } else { 0 };
         if material_ms > MATERIAL_MS {
             self.level = (self.level + 1).min(LEVELS - 1);
-        } else if self.quick >= QUICK_DRAFTS {
-            (self.level, self.quick) = (self.level.saturating_sub(1), 0);
+            self.quick = 0;
+        } else if material_ms < ROOM * MATERIAL_MS && self.level > 0 {
+            self.quick += 1;
+            if self.quick >= self.required {
+                self.level -= 1;
+                self.quick = 0;
+                self.required = (2 * self.required).min(MOST_QUICK_DRAFTS);
+            }
+        } else {
+            self.quick = 0;
         }
     }
 
@@ -62,7 +79,9 @@ mod tests {
         assert_eq!(after(&[60.0]), Some(1024));
         assert_eq!(after(&[30.0, 30.0, 30.0]), Some(512), "the coarsest stays");
         assert_eq!(after(&[20.0; 20]), Some(512), "which is just quick enough");
-        assert_eq!(after(&[5.0; 6]), Some(1024));
-        assert_eq!(after(&[5.0; 6]), None);
+        assert_eq!(after(&[10.0; 6]), Some(1024));
+        assert_eq!(after(&[60.0]), Some(512), "the trial was too slow");
+        assert_eq!(after(&[10.0; 11]), Some(512), "so that the next one comes later");
+        assert_eq!(after(&[10.0]), Some(1024));
     }
 }

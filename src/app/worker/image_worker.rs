@@ -5,14 +5,14 @@ use std::time::{Duration, Instant};
 
 use crate::base::{Cancel, Error, Result};
 use crate::cache::Cache;
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Outcome, Pipeline};
 use crate::plan::Preset;
 use crate::render::image::tone_map::ToneMap;
 use crate::render::tile_view::TileScene;
 use crate::scene::{Camera, LoadedScene};
 
 use super::dark;
-use super::draft_detail::DraftDetail;
+use super::draft_detail::{DRAFT_MS, DraftDetail};
 use super::gpu_drafts::{GpuDrafts, as_preset};
 use super::preview_renderer::{CloseUpTile, KnownPoints, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
@@ -20,10 +20,10 @@ use super::runner::JobContext;
 use super::shared::{SharedState, SmallScale, lock, small_scale};
 use super::tone::color_image;
 
-/// Intermediate images: the index of their cost, the time limit [ms], and samples per side of a pixel.
-const STEPS: [(usize, f64, usize); 2] = [(1, 300.0, 1), (1, 2000.0, 1)];
-/// The same under a colour map: by `f̄` alone, then filtered.
-const FILTERED_STEPS: [(usize, f64, usize); 2] = [(1, 300.0, 1), (2, 1200.0, 2)];
+/// Intermediate images: their shading, the time limit [ms], and samples per side of a pixel.
+const STEPS: [(Shading, f64, usize); 2] = [(Shading::Refined, 300.0, 1), (Shading::Refined, 2000.0, 1)];
+/// The same under a colour map: without its filter, then with it.
+const FILTERED_STEPS: [(Shading, f64, usize); 2] = [(Shading::Refined, 300.0, 1), (Shading::Filtered, 1200.0, 2)];
 /// Time limit for shading the final image [ms]. An exported image has no limit.
 const FINAL_MS: f64 = 8000.0;
 /// Maximum number of pixels of an image on the CPU and on the GPU. A larger view shows the image enlarged.
@@ -51,25 +51,32 @@ pub struct ImageWorker {
     pub(super) renderer: PreviewRenderer,
     /// The tile, while the camera is so close that the tile itself is visible.
     close: Option<(SmallScale, CloseUpTile)>,
-    /// With the draft's BRDF, with the refined BRDF, and of a final image under a colour map.
-    cost: [PixelCost; 3],
+    /// Milliseconds per pixel of each [`Shading`].
+    shading_cost: [f64; 3],
+    /// Milliseconds per pixel to find the point that it shows and the lights that reach it, for one and for four samples.
+    point_cost: [f64; 2],
     gpu_drafts: GpuDrafts,
     detail: DraftDetail,
     /// Backend of the next image: the scene's setting, or `cpu` until the window reports the GPUs.
     backend: String,
 }
 
-/// Milliseconds per pixel.
-#[derive(Debug, Clone, Copy)]
-struct PixelCost {
-    /// To find the point that the pixel shows, and the lights that reach it.
-    point: f64,
-    shading: f64,
+/// Kinds of shading, whose costs differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shading {
+    /// With the draft's BRDF.
+    Draft,
+    /// With the refined BRDF.
+    Refined,
+    /// Under a colour map that is filtered in each pixel.
+    Filtered,
 }
 
-/// Assumed until it is measured.
-const FIRST_COST: PixelCost = PixelCost { point: 4e-3, shading: 1.6e-2 };
-/// The first of several images of one view may take so many times as long as the others, which have the same points.
+/// Assumed until they are measured [ms].
+const FIRST_SHADING_COST: f64 = 1.6e-2;
+const FIRST_POINT_COST: f64 = 4e-3;
+/// Factor on the time limit for an image whose points must be found again in a new size. Later images of the view have
+/// the same points.
 const FIRST_OF_VIEW: f64 = 1.6;
 
 impl ImageWorker {
@@ -81,7 +88,8 @@ impl ImageWorker {
             pipeline,
             renderer,
             close: None,
-            cost: [FIRST_COST; 3],
+            shading_cost: [FIRST_SHADING_COST; 3],
+            point_cost: [FIRST_POINT_COST; 2],
             gpu_drafts: GpuDrafts::default(),
             detail: DraftDetail::default(),
             backend: String::new(),
@@ -108,23 +116,35 @@ impl ImageWorker {
             return self.render_slab(job, Grade::Draft, fitting(job.size, MAX_PIXELS[0]), cancel);
         }
         if let Some(outcome) = self.shared.known(&job.loaded) {
-            let size = self.affordable(job, 1, DraftDetail::shading_ms(start));
-            return self.render(job, ShadedMaterial::Outcome(&outcome.without_times()), 1, size, 1, cancel);
+            let size = self.affordable(job, Shading::Refined, DraftDetail::shading_ms(start));
+            return self.render(
+                job,
+                ShadedMaterial::Outcome(&outcome.without_times()),
+                Shading::Refined,
+                size,
+                1,
+                cancel,
+            );
         }
         if let Some(preview) = self.render_gpu_draft(job, cancel)? {
             return Ok(preview);
         }
         let mut draft = as_preset(&job.loaded, Preset::Draft);
         draft.scene.quality.facets = self.detail.facets();
-        let outcome = self.pipeline.effective(&draft)?;
-        if self.backend == "cpu" || !self.renderer.is_hardware() {
-            outcome.shading_brdf(cancel)?;
+        let material_start = Instant::now();
+        let outcome = self.pipeline.effective(&draft).and_then(|outcome| {
+            if self.backend == "cpu" || !self.renderer.is_hardware() {
+                outcome.shading_brdf(cancel)?;
+            }
+            Ok(outcome)
+        });
+        let has_new_surface = |outcome: &Outcome| outcome.times.iter().any(|(name, _)| *name == "facets");
+        if outcome.as_ref().map_or(true, has_new_surface) {
+            self.detail.record(ms(material_start));
         }
-        if !outcome.times.is_empty() {
-            self.detail.record(ms(start));
-        }
-        let size = self.affordable(job, 0, DraftDetail::shading_ms(start));
-        self.render(job, ShadedMaterial::Outcome(&outcome), 0, size, 1, cancel)
+        let outcome = outcome?;
+        let size = self.affordable(job, Shading::Draft, DraftDetail::shading_ms(start));
+        self.render(job, ShadedMaterial::Outcome(&outcome), Shading::Draft, size, 1, cancel)
     }
 
     /// Renders a draft whose visibility and facet sum the GPU computes, at the finest level that meets the time limit.
@@ -136,8 +156,8 @@ impl ImageWorker {
             return Ok(None);
         }
         let Some(tile) = self.gpu_drafts.tile(&job.loaded, &mut self.pipeline)? else { return Ok(None) };
-        let size = self.affordable(job, 0, DraftDetail::shading_ms(Instant::now()));
-        let preview = match self.render(job, ShadedMaterial::GpuTile(&tile), 0, size, 1, cancel) {
+        let size = self.affordable(job, Shading::Draft, DRAFT_MS);
+        let preview = match self.render(job, ShadedMaterial::GpuTile(&tile), Shading::Draft, size, 1, cancel) {
             Ok(preview) => preview,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
             // The GPU does not support this tile, or failed.
@@ -212,25 +232,29 @@ impl ImageWorker {
         *lock(&self.shared.best) = Some((small_scale(&job.loaded), outcome.clone()));
         report(ImageResult::Doing(job.version, "Refining the image"));
         self.renderer.prepare(&self.pipeline, &job.loaded)?;
-        let (final_cost, steps) = if job.loaded.scene.color_map.is_some() { (2, FILTERED_STEPS) } else { (1, STEPS) };
-        let mut rendered = (0, 1);
-        for (cost_index, budget, samples) in steps {
-            let step = self.affordable(job, cost_index, budget);
+        let (of_final, steps) = if job.loaded.scene.color_map.is_some() {
+            (Shading::Filtered, FILTERED_STEPS)
+        } else {
+            (Shading::Refined, STEPS)
+        };
+        let mut rendered = (0, Shading::Refined);
+        for (shading, budget, samples) in steps {
+            let step = self.affordable(job, shading, budget);
             let pixels = step[0] * step[1];
-            let full = self.affordable(job, final_cost, FINAL_MS);
+            let full = self.affordable(job, of_final, FINAL_MS);
             // Steps that add few pixels are skipped.
-            let adds = cost_index != rendered.1 || pixels >= 2 * rendered.0;
-            if adds && (cost_index != final_cost || pixels * 3 < full[0] * full[1] * 2) {
+            let adds = shading != rendered.1 || pixels >= 2 * rendered.0;
+            if adds && (shading != of_final || pixels * 3 < full[0] * full[1] * 2) {
                 let material = ShadedMaterial::Outcome(&outcome);
-                let mut preview = self.render(job, material, cost_index, step, samples, context.cancel)?;
+                let mut preview = self.render(job, material, shading, step, samples, context.cancel)?;
                 preview.grade = Grade::Refining;
                 outcome.times = Vec::new();
-                rendered = (pixels, cost_index);
+                rendered = (pixels, shading);
                 report(ImageResult::Rendered(Box::new(preview)));
             }
         }
-        let full = self.affordable(job, final_cost, FINAL_MS);
-        let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), final_cost, full, 2, context.cancel)?;
+        let full = self.affordable(job, of_final, FINAL_MS);
+        let mut preview = self.render(job, ShadedMaterial::Outcome(&outcome), of_final, full, 2, context.cancel)?;
         preview.grade = Grade::Final;
         let health = outcome.health_unless(context.cancel)?;
         preview.warnings.clone_from(&health.warnings);
@@ -280,7 +304,7 @@ impl ImageWorker {
         &mut self,
         job: &ImageJob,
         material: ShadedMaterial,
-        cost_index: usize,
+        shading: Shading,
         size: [usize; 2],
         samples_per_side: usize,
         cancel: &Cancel,
@@ -319,12 +343,12 @@ impl ImageWorker {
                 (Some(Arc::new(rendered.image)), image, rendered.times, table_ms, Some(ms(start)))
             }
         };
+        let pixels = (size[0] * size[1]) as f64;
         if samples_per_side == 1 || has_color_map {
-            let (cost, pixels) = (&mut self.cost[cost_index], (size[0] * size[1]) as f64);
-            cost.shading = times.shading_ms / pixels;
-            if times.gbuffer_ms > 0.0 {
-                cost.point = (times.gbuffer_ms + times.shadows_ms) / pixels;
-            }
+            self.shading_cost[shading as usize] = times.shading_ms / pixels;
+        }
+        if times.gbuffer_ms > 0.0 {
+            self.point_cost[usize::from(samples_per_side > 1)] = (times.gbuffer_ms + times.shadows_ms) / pixels;
         }
         let large = [
             (SUM_STAGE, times.product_ms),
@@ -373,18 +397,19 @@ impl ImageWorker {
     }
 
     /// The largest size with the view's aspect ratio that is estimated to take at most `budget_ms`.
-    fn affordable(&self, job: &ImageJob, cost_index: usize, budget_ms: f64) -> [usize; 2] {
+    fn affordable(&self, job: &ImageJob, shading: Shading, budget_ms: f64) -> [usize; 2] {
         let full = fitting(job.size, MAX_PIXELS[usize::from(self.backend != "cpu" && self.renderer.is_hardware())]);
-        let (camera, cost) = (camera(&job.loaded), self.cost[cost_index]);
+        let (camera, samples_per_side) = (camera(&job.loaded), if shading == Shading::Filtered { 2 } else { 1 });
         // Few sizes, so that the image does not change its size at every edit.
         let parts = [1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0];
         let mut sizes = parts.map(|part| full.map(|side| ((side as f64 / part).round() as usize).max(24))).into_iter();
         let is_quick = |size: &[usize; 2]| {
             let pixels = (size[0] * size[1]) as f64;
-            let (shading, points) = (pixels * cost.shading, pixels * cost.point);
-            match self.renderer.known_points(&camera, *size) {
+            let shading = pixels * self.shading_cost[shading as usize];
+            let points = pixels * self.point_cost[samples_per_side - 1];
+            match self.renderer.known_points(&camera, *size, samples_per_side) {
                 KnownPoints::All => shading <= budget_ms,
-                KnownPoints::OtherSize => shading <= budget_ms && shading + points <= FIRST_OF_VIEW * budget_ms,
+                KnownPoints::OtherSampling => shading <= budget_ms && shading + points <= FIRST_OF_VIEW * budget_ms,
                 KnownPoints::None => shading + points <= budget_ms,
             }
         };

@@ -48,8 +48,8 @@ struct ViewKey {
 pub enum KnownPoints {
     /// The last image had the same points.
     All,
-    /// The last image showed the same view in another size.
-    OtherSize,
+    /// The last image showed the same view with other pixels or samples.
+    OtherSampling,
     None,
 }
 
@@ -76,7 +76,7 @@ pub enum ShadedMaterial<'a> {
 pub struct RenderRequest<'a> {
     pub camera: &'a Camera,
     pub material: ShadedMaterial<'a>,
-    /// The light between facets of a similar material, for a draft that was computed without.
+    /// The interreflection of a similar material, for a draft on the CPU that was computed without.
     pub bounced: Option<&'a Arc<InterreflectionTable>>,
     pub size: [usize; 2],
     pub samples_per_side: usize,
@@ -185,10 +185,8 @@ impl PreviewRenderer {
                 if request.build_caches && scene.shadow_cache().is_none() {
                     scene.cache_shadows(pipeline)?;
                 }
-                let ShadingBrdf { mut brdf, ms, .. } = outcome.shading_brdf(cancel)?;
-                if let Some(bounced) = request.bounced {
-                    brdf = Arc::new(brdf.as_ref().clone().interreflecting(bounced.clone()));
-                }
+                let ShadingBrdf { brdf, ms, .. } = outcome.shading_brdf(cancel)?;
+                let brdf = with_bounced(brdf, request);
                 let reflectance = Cancellable { brdf: &brdf, cancel };
                 let input = render_input(scene, request, &reflectance, &background);
                 let key = view_key(scene, request.camera, request.size, request.samples_per_side);
@@ -213,6 +211,7 @@ impl PreviewRenderer {
                 Some(_) => outcome.shading_brdf(cancel)?.brdf,
                 None => outcome.brdf.clone(),
             };
+            let brdf = with_bounced(brdf, request);
             let reflectance = Cancellable { brdf: &brdf, cancel };
             let input = render_input(scene, request, &reflectance, &background);
             let corrections = if request.build_caches { Corrections::Measured } else { Corrections::Known };
@@ -223,13 +222,13 @@ impl PreviewRenderer {
     }
 
     /// What is known of the points of an image on the CPU.
-    pub fn known_points(&self, camera: &Camera, size: [usize; 2]) -> KnownPoints {
+    pub fn known_points(&self, camera: &Camera, size: [usize; 2], samples_per_side: usize) -> KnownPoints {
         let (Some(scene), Some((last, _))) = (&self.scene, &self.visible) else { return KnownPoints::None };
-        let key = view_key(scene, camera, size, last.samples_per_side);
+        let key = view_key(scene, camera, size, samples_per_side);
         if key == *last {
             KnownPoints::All
-        } else if (ViewKey { size: last.size, ..key }) == *last {
-            KnownPoints::OtherSize
+        } else if (ViewKey { size: last.size, samples_per_side: last.samples_per_side, ..key }) == *last {
+            KnownPoints::OtherSampling
         } else {
             KnownPoints::None
         }
@@ -270,6 +269,14 @@ impl PreviewRenderer {
 fn view_key(scene: &RenderScene, camera: &Camera, size: [usize; 2], samples_per_side: usize) -> ViewKey {
     let has_shadow_cache = scene.shadow_cache().is_some();
     ViewKey { scene: scene.keys(), camera: camera.clone(), size, samples_per_side, has_shadow_cache }
+}
+
+/// A BRDF with the interreflection that a draft adds.
+fn with_bounced(brdf: Arc<EffectiveBrdf>, request: &RenderRequest) -> Arc<EffectiveBrdf> {
+    match request.bounced {
+        Some(bounced) => Arc::new(brdf.as_ref().clone().interreflecting(bounced.clone())),
+        None => brdf,
+    }
 }
 
 /// Collects the inputs of an image.

@@ -45,8 +45,8 @@ impl SharedState {
         best.as_ref().filter(|(key, _)| *key == small_scale(loaded)).map(|(_, outcome)| outcome.clone())
     }
 
-    /// The light between facets of the last BRDF at a scene's own quality, if it differs from the scene only in settings of
-    /// the surface. A draft under the hand adds this light, so that the brightness does not jump when it is refined.
+    /// The interreflection of the last BRDF at a scene's own quality, if it differs from the scene only in settings of the
+    /// surface. Drafts add it while the user drags a control, so that the brightness does not jump when they are refined.
     pub fn bounced_light_like(&self, loaded: &LoadedScene) -> Option<Arc<InterreflectionTable>> {
         let best = lock(&self.best);
         let (key, outcome) = best.as_ref()?;

@@ -1,4 +1,4 @@
-//! Polar grids: rings of constant elevation with azimuths in each. Interpolation is bilinear and crosses the pole.
+//! Polar grids: rings of constant elevation with azimuths in each. Interpolation is bilinear or cubic, and crosses the pole.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 

@@ -11,10 +11,10 @@ use crate::render::{CameraView, DirectionalLight, Image};
 /// Points per task.
 const CHUNK: usize = 256;
 
-/// Light that facets send to each other is interpolated over at most so many points.
+/// Largest number of points over which interreflection is interpolated.
 const RUN: usize = 8;
-/// Bounds the angles between the normals, tangents and views of such points: the cosine of 4°. The table that holds this
-/// light has steps of 7.5°.
+/// Bounds the angles between the normals, tangents and views of the ends of such a run: the cosine of 4°. The tables of
+/// interreflection have steps of 5.6° and more.
 const MIN_RUN_COSINE: f32 = 0.997_56;
 
 /// Returns the radiance of each point towards the eye. Without `visibility`, every light is visible.
@@ -71,8 +71,7 @@ impl Shading<'_> {
         is_bounced_missing
     }
 
-    /// Adds the light that facets send to each other. It is evaluated at the ends of runs of similar points, and
-    /// interpolated between them.
+    /// Adds interreflection. It is evaluated at the ends of runs of similar points, and interpolated between them.
     fn add_bounced(&self, first: usize, radiance: &mut [Vec3]) {
         let end = first + radiance.len();
         let mut directions = Vec::with_capacity(self.lights.len());
