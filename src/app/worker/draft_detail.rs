@@ -14,47 +14,64 @@ const MATERIAL_MS: f64 = 26.0;
 const ROOM: f64 = 0.45;
 /// Least time for shading [ms], so that a draft can be recognised.
 const MIN_SHADING_MS: f64 = 14.0;
-/// Each level has half as many facets as the one before.
-const LEVELS: u32 = 3;
-/// Number of quick drafts after which a finer level is tried. It doubles with each trial, up to a limit.
-const QUICK_DRAFTS: u32 = 6;
-const MOST_QUICK_DRAFTS: u32 = 96;
+/// Coarser levels than the preset's number of facets; each has half as many facets as the next.
+const COARSER: usize = 2;
+
+/// A level of detail that follows the times of drafts.
+#[derive(Debug, Default)]
+pub struct DetailLevel {
+    /// The level, from coarse to fine.
+    pub index: usize,
+    /// Quick drafts that remain until a level that was too slow is tried again.
+    remaining: u32,
+    /// Number of quick drafts required at the last such trial.
+    required: u32,
+}
+
+impl DetailLevel {
+    /// Chooses the next level. A draft that takes longer than `max_ms` makes it coarser, one quicker than `min_ms`, if a
+    /// finer level exists, finer. A level that was too slow is tried again after a number of quick drafts that grows with
+    /// each failure.
+    pub fn record(&mut self, ms: f64, max_ms: f64, min_ms: Option<f64>) {
+        if ms > max_ms {
+            // Below the coarsest level there is none to try again from.
+            let Some(coarser) = self.index.checked_sub(1) else { return };
+            self.index = coarser;
+            self.required = (4 * self.required).clamp(8, 1 << 20);
+            self.remaining = self.required;
+        } else if min_ms.is_some_and(|least| ms < least) {
+            match self.remaining {
+                0 => self.index += 1,
+                _ => self.remaining -= 1,
+            }
+        }
+    }
+}
 
 /// The number of facets of the next draft, from the times of those before.
 #[derive(Debug)]
 pub struct DraftDetail {
-    level: u32,
-    quick: u32,
-    required: u32,
+    /// [`COARSER`] for the preset's number of facets.
+    level: DetailLevel,
 }
 
 impl Default for DraftDetail {
     fn default() -> Self {
-        Self { level: 0, quick: 0, required: QUICK_DRAFTS }
+        Self { level: DetailLevel { index: COARSER, ..DetailLevel::default() } }
     }
 }
 
 impl DraftDetail {
     /// The number of facets; `None` for those of the preset.
     pub fn facets(&self) -> Option<usize> {
-        (self.level > 0).then(|| Settings::of_preset(Preset::Draft).facets >> self.level)
+        let halvings = COARSER - self.level.index;
+        (halvings > 0).then(|| Settings::of_preset(Preset::Draft).facets >> halvings)
     }
 
     /// Records the time from a new surface to its table [ms], also of a draft that was cancelled.
     pub fn record(&mut self, material_ms: f64) {
-        if material_ms > MATERIAL_MS {
-            self.level = (self.level + 1).min(LEVELS - 1);
-            self.quick = 0;
-        } else if material_ms < ROOM * MATERIAL_MS && self.level > 0 {
-            self.quick += 1;
-            if self.quick >= self.required {
-                self.level -= 1;
-                self.quick = 0;
-                self.required = (2 * self.required).min(MOST_QUICK_DRAFTS);
-            }
-        } else {
-            self.quick = 0;
-        }
+        let has_finer = self.level.index < COARSER;
+        self.level.record(material_ms, MATERIAL_MS, has_finer.then_some(ROOM * MATERIAL_MS));
     }
 
     /// Time that is left for the pixels of a draft that began at `start` [ms].
@@ -79,9 +96,8 @@ mod tests {
         assert_eq!(after(&[60.0]), Some(1024));
         assert_eq!(after(&[30.0, 30.0, 30.0]), Some(512), "the coarsest stays");
         assert_eq!(after(&[20.0; 20]), Some(512), "which is just quick enough");
-        assert_eq!(after(&[10.0; 6]), Some(1024));
-        assert_eq!(after(&[60.0]), Some(512), "the trial was too slow");
-        assert_eq!(after(&[10.0; 11]), Some(512), "so that the next one comes later");
+        assert_eq!(after(&[10.0; 32]), Some(512), "levels that failed are seldom tried again");
         assert_eq!(after(&[10.0]), Some(1024));
+        assert_eq!(after(&[10.0]), None, "and what is quick enough becomes finer at once");
     }
 }

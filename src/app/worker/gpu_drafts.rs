@@ -7,6 +7,7 @@ use crate::pipeline::{GpuTile, Pipeline};
 use crate::plan::{Preset, Settings, VisibilityAlgorithm};
 use crate::scene::{LoadedScene, Quality};
 
+use super::draft_detail::DetailLevel;
 use super::shared::{SmallScale, small_scale};
 
 /// Presets from coarse to fine. The next finer step is the scene's own quality.
@@ -22,13 +23,9 @@ const MIN_MS: [f64; PRESETS.len()] = [2.0, 7.0];
 pub struct GpuDrafts {
     last: Option<Last>,
     /// Index into [`PRESETS`], or their number for the scene's own quality.
-    level: usize,
+    level: DetailLevel,
     /// Presence of a table, number of lobes, and visibility algorithm of the last tile.
     kind: Option<(bool, usize, VisibilityAlgorithm)>,
-    /// Quick drafts that remain until a level that was too slow is tried again.
-    remaining: u32,
-    /// Number of quick drafts required at the last such trial.
-    required: u32,
 }
 
 struct Last {
@@ -44,7 +41,7 @@ impl GpuDrafts {
     /// # Errors
     /// Returns the errors of [`Pipeline::gpu_tile`].
     pub fn tile(&mut self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<GpuTile>>> {
-        let key = (small_scale(loaded), self.level);
+        let key = (small_scale(loaded), self.level.index);
         if let Some(last) = self.last.as_ref().filter(|last| last.key == key) {
             return Ok(last.tile.clone());
         }
@@ -52,7 +49,7 @@ impl GpuDrafts {
         // The cost of a level is comparable only among tiles of one kind.
         let kind =
             tile.as_ref().map(|tile| (tile.input.nodes.is_some(), tile.input.sum.lobe_count(), tile.plan.algorithm));
-        if kind == self.kind || self.level == 0 {
+        if kind == self.kind || self.level.index == 0 {
             self.kind = kind;
             self.last = Some(Last { key, tile: tile.clone() });
             return Ok(tile);
@@ -62,7 +59,7 @@ impl GpuDrafts {
     }
 
     fn build(&self, loaded: &LoadedScene, pipeline: &mut Pipeline) -> Result<Option<Arc<GpuTile>>> {
-        let tile = match PRESETS.get(self.level) {
+        let tile = match PRESETS.get(self.level.index) {
             Some(preset) if !is_below(loaded, *preset) => pipeline.gpu_tile(&as_preset(loaded, *preset))?,
             _ => pipeline.gpu_tile(&loaded.without_interreflection())?,
         };
@@ -70,19 +67,8 @@ impl GpuDrafts {
     }
 
     /// Chooses the level of the next draft from `ms`, the time of the work that grows with the level.
-    ///
-    /// A level that was too slow is tried again after a number of quick drafts that grows with each failure.
     pub fn record(&mut self, ms: f64) {
-        if ms > MAX_MS {
-            self.level = self.level.saturating_sub(1);
-            self.required = (4 * self.required).clamp(8, 1 << 20);
-            self.remaining = self.required;
-        } else if MIN_MS.get(self.level).is_some_and(|least| ms < *least) {
-            match self.remaining {
-                0 => self.level += 1,
-                _ => self.remaining -= 1,
-            }
-        }
+        self.level.record(ms, MAX_MS, MIN_MS.get(self.level.index).copied());
     }
 }
 
@@ -116,7 +102,7 @@ mod tests {
         let mut levels = |times: &[f64]| -> Vec<usize> {
             let after = times.iter().map(|ms| {
                 drafts.record(*ms);
-                drafts.level
+                drafts.level.index
             });
             after.collect()
         };

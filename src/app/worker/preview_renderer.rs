@@ -33,7 +33,7 @@ pub struct PreviewRenderer {
     visible: Option<(ViewKey, VisiblePoints)>,
 }
 
-/// What the visible points of an image depend on.
+/// Inputs of the visible points of an image.
 #[derive(Debug, Clone, PartialEq)]
 struct ViewKey {
     scene: [Key; 2],
@@ -43,7 +43,7 @@ struct ViewKey {
     has_shadow_cache: bool,
 }
 
-/// What is known of the points of an image.
+/// Points of an image that are kept from the last one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KnownPoints {
     /// The last image had the same points.
@@ -221,7 +221,7 @@ impl PreviewRenderer {
         Ok((rendered, table_ms))
     }
 
-    /// What is known of the points of an image on the CPU.
+    /// Compares the points of an image on the CPU with those that are kept.
     pub fn known_points(&self, camera: &Camera, size: [usize; 2], samples_per_side: usize) -> KnownPoints {
         let (Some(scene), Some((last, _))) = (&self.scene, &self.visible) else { return KnownPoints::None };
         let key = view_key(scene, camera, size, samples_per_side);

@@ -232,7 +232,7 @@ fn bounced_light_between_points_is_that_at_the_points() {
         }
         let rel_l2 = (error / sum).sqrt();
         eprintln!("{kind}: relative L2 {rel_l2:.5}, worst {worst:.4}");
-        // Here the bounced light is as strong as the direct light; in shipped scenes it has a fifth of the light at most.
+        // Here the bounced light is as strong as the direct light; in shipped scenes it has a third of the light at most.
         assert!(rel_l2 < 6e-3 && worst < 0.05, "{kind}: {rel_l2} {worst}");
         assert!(rel_l2 > 0.0, "{kind}: nothing was interpolated");
     }
