@@ -34,7 +34,7 @@ impl DetailLevel {
     /// each failure.
     pub fn record(&mut self, ms: f64, max_ms: f64, min_ms: Option<f64>) {
         if ms > max_ms {
-            // Below the coarsest level there is none to try again from.
+            // The coarsest level stays, and no level was tried.
             let Some(coarser) = self.index.checked_sub(1) else { return };
             self.index = coarser;
             self.required = (4 * self.required).clamp(8, 1 << 20);
