@@ -43,7 +43,7 @@ pub fn bounced_share(part: Option<&str>, print: &mut dyn FnMut(String)) -> Resul
         let full = share(&off, &on);
         let auto = outcome(&at(&loaded, Switch::Auto))?;
         let times = times(&at(&loaded, Switch::On), &at(&loaded, Switch::Auto))?;
-        let is_on = auto.plan.interreflection;
+        let is_on = auto.plan.interreflection.is_some();
         ratios.push((told.share / full).max(full / told.share));
         if is_on {
             costs.push((times.decision + times.light) / times.without);

@@ -96,6 +96,17 @@ impl Term {
         matches!(self, Self::CookTorrance { .. } | Self::Ggx { .. })
     }
 
+    /// The roughness of a lobe as Beckmann's `m`; `None` without a lobe and for a measured term.
+    pub fn roughness(&self) -> Option<f32> {
+        match *self {
+            Self::Lambertian { .. } | Self::Measured(_) => None,
+            Self::BlinnPhong { exponent, .. } => Some((2.0 / exponent.max(1.0)).sqrt()),
+            Self::CookTorrance { roughness, .. } | Self::Ward { roughness, .. } | Self::Ggx { roughness, .. } => {
+                Some(roughness)
+            }
+        }
+    }
+
     /// The scalar lobe `f_r / tint · (n·i)+ (n·o)+` [1/sr]. It is finite, not negative, and has the same bits if `i`
     /// and `o` are swapped. A measured term has no scalar lobe: this function returns its luminance, and [`Term::tint`]
     /// is white. Its exact value is [`Term::f_cos`].

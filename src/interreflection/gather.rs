@@ -1,5 +1,7 @@
 //! The light that leaves the tile after it was reflected by two facets or more.
 
+use std::ops::Range;
+
 use glam::Vec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,10 +19,12 @@ use crate::math::linalg::gemm::add_outer_products;
 use crate::math::simd::{Lobe, add_lobes_around};
 use crate::visibility::Visibility;
 
-/// Rays per matrix product.
+/// Groups of rays per matrix product.
 const BLOCK: usize = 2048;
-/// Most viewers per task of a matrix product.
-const ROWS: usize = 128;
+/// Most lights per task of a matrix product.
+const ROWS: usize = 256;
+/// One of so many groups is walked again for its variance.
+const EXAMINED: usize = 8;
 /// Elements whose visibility is transposed at once.
 const TRANSPOSED: usize = 16;
 /// Lower limit of the cosine that a lobe is divided by. It bounds the contribution of rays along their own surface.
@@ -56,6 +60,8 @@ struct Reflector<'a> {
     material: &'a Material,
     lobes: Vec<Option<Lobe>>,
     sampler: &'a LobeSampler,
+    /// All terms are Lambertian, so that a ray does not depend on where its light came from.
+    is_matte: bool,
 }
 
 /// Computes `G` of interreflection by walks over the surface.
@@ -87,7 +93,7 @@ pub fn gather(
     let scale = 1.0 / f64::from(mesh.base_area());
     let at = |pair: usize| {
         let (viewer, light) = mirrored.original_of(pair / nodes, pair % nodes);
-        let of = |c: usize| (g[(c.min(channels - 1) * viewers + viewer) * nodes + light] * scale) as f32;
+        let of = |c: usize| (g[(c.min(channels - 1) * nodes + light) * viewers + viewer] * scale) as f32;
         Vec3::new(of(0), of(1), of(2))
     };
     let raw: Vec<Vec3> = (0..nodes * nodes).into_par_iter().map(at).collect();
@@ -97,7 +103,8 @@ pub fn gather(
 
 impl<'a> Reflector<'a> {
     fn new((material, sampler): (&'a Material, &'a LobeSampler)) -> Self {
-        Self { material, lobes: material.brdf.terms.iter().map(analytic_lobe).collect(), sampler }
+        let is_matte = material.brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
+        Self { material, lobes: material.brdf.terms.iter().map(analytic_lobe).collect(), sampler, is_matte }
     }
 }
 
@@ -134,82 +141,107 @@ impl<'a> Exchange<'a> {
         }
     }
 
-    /// The sums over all rays, a matrix of viewers and lights per channel, and the sum of the variances of all pairs and
+    /// The sums over all rays, a matrix of lights and viewers per channel, and the sum of the variances of all pairs and
     /// three channels. `images` is the number of nodes that each viewer stands for.
     fn sum(&self, images: &[f32], cancel: &Cancel) -> Result<(Vec<f64>, f64)> {
         let (nodes, viewers, channels) = (self.nodes[0].len(), self.viewers.len(), self.channels);
-        let rays = self.transport.rays;
-        let useful: Vec<u32> = (0..self.transport.hits.len())
-            .filter(|ray| {
-                let hit = self.transport.hits[*ray];
-                let element = ray / rays;
-                let reflects = !self.is_black(element) && self.openness[element] > 0.0;
-                reflects && hit.is_some_and(|hit| !self.is_black(hit.element as usize))
-            })
-            .map(|ray| ray as u32)
-            .collect();
+        let groups = self.groups();
         let mut g = vec![0.0_f64; channels * viewers * nodes];
-        let rows = useful.len().min(BLOCK);
+        let rows = groups.len().min(BLOCK);
         let mut to_viewer = vec![0.0_f32; rows * channels * viewers];
         let mut from_light = vec![0.0_f32; rows * channels * nodes];
         let mut variance = 0.0;
-        for block in useful.chunks(BLOCK) {
+        for block in groups.chunks(BLOCK) {
             cancel.check()?;
-            let of_rays: Vec<f64> = to_viewer
+            let of_groups: Vec<f64> = to_viewer
                 .par_chunks_mut(channels * viewers)
                 .zip(from_light.par_chunks_mut(channels * nodes))
                 .zip(block)
-                .map(|((to_viewer, from_light), &ray)| {
-                    self.fill(ray as usize, to_viewer, from_light);
-                    let channels = to_viewer.chunks(viewers).zip(from_light.chunks(nodes));
-                    channels.map(|(a, b)| self.variance(a, b, images)).sum()
+                .enumerate()
+                .map(|(at, ((to_viewer, from_light), group))| {
+                    self.fill(group, to_viewer, from_light);
+                    if at % EXAMINED == 0 { self.variance(group, images, to_viewer) } else { 0.0 }
                 })
                 .collect();
-            variance += of_rays.iter().sum::<f64>() * 3.0 / channels as f64;
-            let rows = viewers.div_ceil(viewers.div_ceil(ROWS).max(2));
+            variance += of_groups.iter().sum::<f64>() * (EXAMINED * 3) as f64 / channels as f64;
+            let rows = nodes.div_ceil(nodes.div_ceil(ROWS).max(2));
             g.par_chunks_mut(viewers * nodes).enumerate().for_each(|(c, sums)| {
-                sums.par_chunks_mut(rows * nodes).enumerate().for_each(|(task, sums)| {
-                    let a = &to_viewer[c * viewers + task * rows..];
-                    let b = &from_light[c * nodes..];
-                    let strides = [channels * viewers, channels * nodes];
-                    add_outer_products(block.len(), [sums.len() / nodes, nodes], [a, b], strides, sums);
+                sums.par_chunks_mut(rows * viewers).enumerate().for_each(|(task, sums)| {
+                    let a = &from_light[c * nodes + task * rows..];
+                    let b = &to_viewer[c * viewers..];
+                    let strides = [channels * nodes, channels * viewers];
+                    add_outer_products(block.len(), [sums.len() / viewers, viewers], [a, b], strides, sums);
                 });
             });
         }
         Ok((g, variance))
     }
 
-    /// The part of the variance of all pairs that is due to one of many independent rays. The ray contributes `a(o) b(i)`, and the values of
-    /// swapped pairs are averaged: `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|² |b|² + (a·b)²)/2`.
-    fn variance(&self, a: &[f32], b: &[f32], images: &[f32]) -> f64 {
-        let norm = sum_of_products(a, |at| images[at] * a[at]);
-        let product = sum_of_products(a, |at| images[at] * b[self.viewers[at]]);
-        let of_lights = sum_of_products(b, |at| b[at]);
-        0.5 * (f64::from(norm) * f64::from(of_lights) + f64::from(product).powi(2))
+    /// Rays that carry light, in groups whose light reaches all viewers in the same proportions: the rays of a matte
+    /// element are one group, every other ray is a group of its own.
+    fn groups(&self) -> Vec<Range<usize>> {
+        let Transport { hits, rays, .. } = self.transport;
+        let is_useful = |ray: &usize| hits[*ray].is_some_and(|hit| !self.is_black(hit.element as usize));
+        let mut groups = Vec::new();
+        for element in (0..self.materials.len()).filter(|at| !self.is_black(*at) && self.openness[*at] > 0.0) {
+            let all = element * rays..(element + 1) * rays;
+            if !self.materials[element].is_matte {
+                groups.extend(all.filter(is_useful).map(|ray| ray..ray + 1));
+            } else if all.clone().any(|ray| is_useful(&ray)) {
+                groups.push(all);
+            }
+        }
+        groups
     }
 
-    /// Writes what one ray sends to each viewer, and what it carries from each light.
-    fn fill(&self, ray: usize, to_viewer: &mut [f32], from_light: &mut [f32]) {
-        to_viewer.fill(0.0);
-        from_light.fill(0.0);
-        let Transport { facets, hits, directions, areas, rays, .. } = self.transport;
-        let (element, away) = (ray / rays, directions[ray]);
-        let Some(mut at) = hits[ray] else { return };
+    /// Writes what a group of rays sends to each viewer, and what it carries from each light.
+    fn fill(&self, group: &Range<usize>, to_viewer: &mut [f32], from_light: &mut [f32]) {
+        let Transport { facets, directions, rays, .. } = self.transport;
+        let element = group.start / rays;
         let normal = self.facets.normals[facets[element] as usize];
-        let cosine = normal.dot(away).max(MIN_COSINE);
-        // `add_lobe` divides by the cosine.
-        let scale = areas[element] * cosine / (*rays as f32 * first_density(cosine));
+        let away = if self.materials[element].is_matte { normal } else { directions[group.start] };
         let row = self.visible(element);
         let visibility: Vec<f32> = self.viewers.iter().map(|node| row[*node]).collect();
-        let viewers = (&self.viewer_nodes, visibility.as_slice());
-        self.add_lobe(element, [normal, away], Vec3::splat(scale), viewers, to_viewer);
+        to_viewer.fill(0.0);
+        self.add_lobe(element, [normal, away], Vec3::ONE, (&self.viewer_nodes, &visibility), to_viewer);
+        from_light.fill(0.0);
+        group.clone().for_each(|ray| self.walk(ray, from_light));
+    }
+
+    /// The part of the variance of all pairs that is due to a group of many independent rays. A ray contributes `a(o) b(i)`,
+    /// and the values of swapped pairs are averaged: `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|² |b|² + (a·b)²)/2`.
+    fn variance(&self, group: &Range<usize>, images: &[f32], to_viewer: &[f32]) -> f64 {
+        let (viewers, nodes) = (self.viewers.len(), self.nodes[0].len());
+        let of_ray = |ray: usize| {
+            let mut from_light = vec![0.0; self.channels * nodes];
+            self.walk(ray, &mut from_light);
+            let of_channel = |(a, b): (&[f32], &[f32])| {
+                let norm = sum_of_products(a, |at| images[at] * a[at]);
+                let product = sum_of_products(a, |at| images[at] * b[self.viewers[at]]);
+                let of_lights = sum_of_products(b, |at| b[at]);
+                0.5 * (f64::from(norm) * f64::from(of_lights) + f64::from(product).powi(2))
+            };
+            to_viewer.chunks(viewers).zip(from_light.chunks(nodes)).map(of_channel).sum::<f64>()
+        };
+        group.clone().map(of_ray).sum()
+    }
+
+    /// Follows a ray over the surface and adds the light from each node that returns along it, times the area over the
+    /// density of the ray.
+    fn walk(&self, ray: usize, from_light: &mut [f32]) {
+        let Transport { facets, hits, directions, areas, rays, .. } = self.transport;
+        let Some(mut at) = hits[ray] else { return };
+        let element = ray / rays;
+        let cosine = self.facets.normals[facets[element] as usize].dot(directions[ray]).max(MIN_COSINE);
+        // `add_lobe` divides what is sent to the viewers by this cosine.
+        let scale = areas[element] * cosine / (*rays as f32 * first_density(cosine));
         let mut rng = ChaCha8Rng::seed_from_u64(ray as u64);
-        let (mut towards, mut weight) = (-away, Vec3::ONE);
+        let (mut towards, mut weight) = (-directions[ray], Vec3::ONE);
         for bounce in 1..=self.bounces {
             let element = at.element as usize;
             let lights = (&self.nodes, self.visible(element));
             if self.openness[element] > 0.0 {
-                self.add_lobe(element, [at.normal, towards], weight, lights, from_light);
+                self.add_lobe(element, [at.normal, towards], weight * scale, lights, from_light);
             }
             if bounce < self.bounces {
                 let Some(next) = self.step(&at, towards, &mut weight, &mut rng) else { break };

@@ -49,11 +49,11 @@ fn the_measured_share_is_that_of_the_whole_result_within_its_error() {
 fn the_plans_own_choice_gives_the_bits_of_the_forced_one() {
     let deep = |effects: &str| Pipeline::new().effective(&open(GROOVES, WHITE, effects)).unwrap();
     let (auto, on) = (deep(""), deep("interreflection = \"on\""));
-    assert!(auto.plan.interreflection);
+    assert!(auto.plan.interreflection.is_some());
     let black = r#"{ kind = "lambertian", albedo = 0.02 }"#;
     let dark = |effects: &str| Pipeline::new().effective(&open(GROOVES, black, effects)).unwrap();
     let (dark_auto, off) = (dark(""), dark("interreflection = \"off\""));
-    assert!(!dark_auto.plan.interreflection);
+    assert!(dark_auto.plan.interreflection.is_none());
     for (a, b) in [(auto, on), (dark_auto, off)] {
         for pair in crate::metrics::mirror_biased_pairs(64, 3) {
             assert_eq!(a.brdf.eval(pair.i, pair.o), b.brdf.eval(pair.i, pair.o));
@@ -68,7 +68,7 @@ fn a_tile_whose_facets_see_nothing_of_each_other_runs_no_stage_of_interreflectio
     for geometry in [r#"{ kind = "flat" }"#, shallow] {
         let pipeline = Pipeline::new();
         let outcome = pipeline.effective(&open(geometry, WHITE, "")).unwrap();
-        assert!(!outcome.plan.interreflection);
+        assert!(outcome.plan.interreflection.is_none());
         let stages = ["lobe_samplers", "bounced_share", "cells", "mirrors", "transport", "interreflection"];
         let ran: Vec<_> =
             pipeline.runs().into_iter().filter(|(name, runs)| stages.contains(name) && *runs > 0).collect();

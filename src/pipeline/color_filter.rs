@@ -327,14 +327,7 @@ impl ColorFilter {
     /// Slopes around which the narrowest lobe makes the density of slopes narrow.
     fn focus(&self, i: DVec3, o: DVec3) -> Option<Focus> {
         let terms = self.materials.iter().flat_map(|material| &material.brdf.terms);
-        let width = terms.filter_map(|term| match term {
-            Term::Lambertian { .. } | Term::Measured(_) => None,
-            Term::BlinnPhong { exponent, .. } => Some(1.0 / f64::from(exponent.max(1.0)).sqrt()),
-            Term::CookTorrance { roughness, .. } | Term::Ward { roughness, .. } | Term::Ggx { roughness, .. } => {
-                Some(f64::from(*roughness))
-            }
-        });
-        let width = width.reduce(f64::min)?;
+        let width = f64::from(terms.filter_map(Term::roughness).reduce(f32::min)?);
         let h = half_vector(i.as_vec3(), o.as_vec3()).as_dvec3();
         if h.z <= 1e-3 {
             return None;

@@ -45,8 +45,7 @@ impl Pipeline {
         facets.slots.iter().for_each(|slot| is_used[surface.material_of_slot[usize::from(*slot)]] = true);
         let used: Vec<usize> = (0..materials.len()).filter(|material| is_used[*material]).collect();
         let black_materials = used.iter().filter(|index| materials[**index].is_black()).count();
-        let is_lambertian =
-            |index: &usize| materials[*index].brdf.terms.iter().all(|term| matches!(term, Term::Lambertian { .. }));
+        let terms = used.iter().flat_map(|index| &materials[*index].brdf.terms);
         Ok(SceneFeatures {
             flat: tile.flat,
             mirrors: None,
@@ -67,7 +66,7 @@ impl Pipeline {
             colors_vary: sum.colors_vary(),
             lobes: sum.lobe_count(),
             lookups: sum.measured_count(),
-            only_lambertian: used.iter().all(is_lambertian),
+            narrowest_lobe: terms.filter_map(Term::roughness).fold(f32::INFINITY, f32::min),
             distinct_normals: sum.normal_count(),
             object_self_shadows: !matches!(scene.object.kind.as_str(), "sphere" | "cylinder"),
             lights: scene.light.count + scene.light.directional.len(),

@@ -66,7 +66,7 @@ impl Pipeline {
             None => self.tile_inputs(loaded, Processor::Gpu { max_facets: None }, &mut times)?,
         };
         let TileInputs { tile, sum, plan, settings, .. } = &inputs;
-        if settings.preset == Preset::Wu2011 || plan.interreflection || sum.measured_count() > 0 {
+        if settings.preset == Preset::Wu2011 || plan.interreflection.is_some() || sum.measured_count() > 0 {
             return Ok(None);
         }
         if !is_clustered_tile && is_clustered(sum, plan.algorithm) {

@@ -58,7 +58,7 @@ use crate::cache::{Cache, Key, KeyBuilder};
 use crate::diagnostics::{Health, HealthInputs, VisibilityInput};
 use crate::effective::{Direct, EffectiveBrdf, Representation};
 use crate::geometry::{Facets, TileMesh};
-use crate::interreflection::{BouncedShare, InterreflectionSettings, InterreflectionTable};
+use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
 use crate::metrics::Errors;
 use crate::plan::{Preset, ProductMethod, Refinement, Settings, VisibilityAlgorithm};
 use crate::scene::{LoadedScene, Scene};
@@ -267,7 +267,7 @@ impl Pipeline {
         times.push(("product", elapsed_ms(start)));
         let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
         let is_low_rank = matches!(brdf.representation, Representation::LowRank(_));
-        if plan.interreflection {
+        if let Some(settings) = &plan.interreflection {
             let surface = VisibleSurface {
                 tile: &tile,
                 facets: &facets,
@@ -275,12 +275,7 @@ impl Pipeline {
                 assignment: &materials,
                 material_of_slot: &material_of_slot,
             };
-            brdf = brdf.interreflecting(self.interreflection(
-                &surface,
-                &settings,
-                (plan.mirrors, plan.bounced),
-                &mut times,
-            )?);
+            brdf = brdf.interreflecting(self.interreflection(&surface, settings, &mut times)?);
         }
         plan.note_times(&times);
         if let Some(errors) = factored {
@@ -347,12 +342,10 @@ impl Pipeline {
     fn interreflection(
         &self,
         surface: &VisibleSurface<'_>,
-        settings: &Settings,
-        (mirrors, bounced): ([bool; 2], Option<BouncedShare>),
+        settings: &InterreflectionSettings,
         times: &mut StageTimes,
     ) -> Result<Arc<InterreflectionTable>> {
         let VisibleSurface { tile, facets, visibility, assignment, material_of_slot } = *surface;
-        let settings = &InterreflectionSettings { mirrors, ..settings.interreflection(bounced) };
         let materials = &assignment.materials[..];
         let samplers = &self.get(PrepareSamplers { materials }, times)?;
         let grid = &self.get(BuildCells { tile }, times)?.value;

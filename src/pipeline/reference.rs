@@ -53,7 +53,7 @@ impl Pipeline {
     /// As [`Pipeline::effective`].
     pub fn interreflects(&self, loaded: &LoadedScene) -> Result<bool> {
         let processor = Processor::Gpu { max_facets: None };
-        Ok(self.tile_inputs(loaded, processor, &mut StageTimes::new())?.plan.interreflection)
+        Ok(self.tile_inputs(loaded, processor, &mut StageTimes::new())?.plan.interreflection.is_some())
     }
 
     /// The scene with its own decision on interreflection forced, so that every preset computes the same light.

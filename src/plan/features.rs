@@ -35,7 +35,8 @@ pub struct SceneFeatures {
     /// Lobes that a direct sum adds up, and measured look-ups.
     pub lobes: usize,
     pub lookups: usize,
-    pub only_lambertian: bool,
+    /// The smallest roughness of the materials' lobes; infinite without lobes.
+    pub narrowest_lobe: f32,
     pub distinct_normals: Option<usize>,
     pub object_self_shadows: bool,
     pub lights: usize,

@@ -52,7 +52,7 @@ impl SceneFeatures {
 
     /// Predicted milliseconds of interreflection.
     fn interreflection_ms(&self, settings: &Settings, costs: &Costs) -> f64 {
-        let exchange = settings.interreflection(self.bounced);
+        let exchange = settings.interreflection(self);
         let rays = (exchange.elements * exchange.rays) as f64;
         let (walks, nodes) = (rays * self.hidden_directions(), exchange.grid.len() as f64);
         let halves = self.mirrors.unwrap_or_default().map(|plane| if plane { 2.0 } else { 1.0 });
@@ -67,7 +67,7 @@ pub(super) fn decide(context: &Context<'_>, switch: Switch) -> Decision {
     let Context { features, settings, costs, interreflection: on, .. } = *context;
     let tolerance = settings.bounced_tolerance();
     let ms = features.interreflection_ms(settings, costs);
-    let exchange = settings.interreflection(features.bounced);
+    let exchange = settings.interreflection(features);
     let means =
         format!("up to {} bounces from {} rays of {} facets", exchange.bounces, exchange.rays, exchange.elements);
     let measured = features.bounced.map(|bounced| {

@@ -26,7 +26,7 @@ pub use refinement::Refinement;
 pub use settings::{Backend, Preset, ProductMethod, Settings, VisibilityMethod};
 pub use slab::{SlabDecision, SlabFeatures, SlabSettings};
 
-use crate::interreflection::BouncedShare;
+use crate::interreflection::{BouncedShare, InterreflectionSettings};
 use crate::scene::Switch;
 
 /// The part of the program that an effect belongs to.
@@ -80,8 +80,8 @@ pub struct Plan {
     pub algorithm: VisibilityAlgorithm,
     /// Try the low-rank representation first. It must pass its check against the direct sum.
     pub try_low_rank: bool,
-    /// Add the light that facets send to each other.
-    pub interreflection: bool,
+    /// The resolution at which the light that facets send to each other is added; `None` if it is not.
+    pub interreflection: Option<InterreflectionSettings>,
     /// The share of bounced light on which the decision rests; `None` if it was not measured.
     pub bounced: Option<BouncedShare>,
     /// Mirror planes x = const and y = const that save part of the directions.
@@ -99,7 +99,9 @@ impl Plan {
         Self {
             algorithm: context.algorithm,
             try_low_rank: context.try_low_rank,
-            interreflection: context.interreflection,
+            interreflection: context
+                .interreflection
+                .then(|| InterreflectionSettings { mirrors: context.mirrors(), ..settings.interreflection(features) }),
             bounced: features.bounced,
             mirrors: context.mirrors(),
             try_shading_table: context.try_shading_table,

@@ -1,7 +1,8 @@
 //! Presets and settings: the accuracy of every computation, as typed values.
 
+use super::SceneFeatures;
 use crate::effective::{BasisGrid, ErrorBound, Interpolation, LowRankSettings};
-use crate::interreflection::{BouncedShare, InterreflectionSettings};
+use crate::interreflection::InterreflectionSettings;
 use crate::math::directions::{HalfDifferenceGrid, HemispherePairGrid, PolarGrid};
 use crate::scene::{Effects, Quality, Scene};
 
@@ -303,26 +304,28 @@ impl Settings {
         }
     }
 
-    /// The resolution of interreflection. Where it is a small share of the light, fewer rays have the same error in f̄: their
-    /// noise falls with the root of their number. There are as many elements for any share, because walks read the
-    /// visibility of the nearest one.
-    pub fn interreflection(&self, bounced: Option<BouncedShare>) -> InterreflectionSettings {
-        /// Share from which all rays are cast, and the smallest part of them.
-        const FULL_SHARE: f64 = 0.3;
-        const LEAST_PART: f64 = 0.125;
-        let (elements, rays, grid) = match self.preset {
-            Preset::Draft => (2048_u16, 6_u8, PolarGrid::new(8, 24)),
-            Preset::Standard | Preset::Wu2011 => (6144, 6, PolarGrid::new(12, 36)),
-            Preset::Fine | Preset::Reference => (16_384, 12, PolarGrid::new(16, 48)),
+    /// The resolution of interreflection. Where it is a small share of the light, fewer rays have the same error in f̄, and
+    /// so has a coarser table, unless a lobe is narrower than its steps. There are as many elements for any share, because
+    /// walks read the visibility of the nearest one.
+    pub fn interreflection(&self, features: &SceneFeatures) -> InterreflectionSettings {
+        /// Smallest share that is computed with all rays and the finer table.
+        const LARGE_SHARE: f64 = 0.3;
+        /// Smallest roughness of lobes in the coarser table.
+        const WIDE_LOBE: f32 = 0.15;
+        let (elements, rays, grids) = match self.preset {
+            Preset::Draft => (2048, 6, [[8, 24], [8, 24]]),
+            Preset::Standard | Preset::Wu2011 => (6144, 6, [[8, 24], [12, 36]]),
+            Preset::Fine | Preset::Reference => (16_384, 12, [[12, 36], [16, 48]]),
         };
-        // In steps, so that an edit of a colour seldom casts other rays.
-        let step = |share: f64| (share / FULL_SHARE).powi(2).log2().round().exp2();
-        let part = bounced.map_or(1.0, |bounced| step(bounced.share).clamp(LEAST_PART, 1.0));
-        let all = f64::from(elements) * f64::from(rays) * part;
-        let elements = (elements as usize).min(self.facets);
-        // Few facets cast more rays each, up to the preset's.
-        let rays = (all / elements.max(1) as f64).ceil().clamp(1.0, f64::from(rays)) as usize;
-        InterreflectionSettings { elements, rays, bounces: self.effects.bounces, grid, mirrors: [false; 2] }
+        let is_large = features.bounced.is_none_or(|bounced| bounced.share >= LARGE_SHARE);
+        let [rings, azimuths] = grids[usize::from(is_large || features.narrowest_lobe < WIDE_LOBE)];
+        InterreflectionSettings {
+            elements: self.facets.min(elements),
+            rays: if is_large { rays } else { rays / 3 },
+            bounces: self.effects.bounces,
+            grid: PolarGrid::new(rings, azimuths),
+            mirrors: [false; 2],
+        }
     }
 
     /// The settings of the low-rank representation.

@@ -133,7 +133,7 @@ fn features() -> SceneFeatures {
         colors_vary: false,
         lobes: 1000,
         lookups: 0,
-        only_lambertian: false,
+        narrowest_lobe: 0.3,
         distinct_normals: None,
         object_self_shadows: true,
         lights: 4,
@@ -183,8 +183,8 @@ fn interreflection_is_on_where_it_adds_more_than_the_preset_tolerates() {
     let is_on = |share, preset, switch| {
         let (features, settings) = bouncing(share, preset, switch);
         let plan = Plan::new(&features, &settings, &Costs::default());
-        assert_eq!(plan.interreflection, plan.is_on("interreflection"));
-        plan.interreflection
+        assert_eq!(plan.interreflection.is_some(), plan.is_on("interreflection"));
+        plan.interreflection.is_some()
     };
     let tolerances = [(Preset::Draft, 0.35), (Preset::Standard, 0.04), (Preset::Fine, 0.015)];
     for (preset, tolerance) in tolerances {
@@ -213,11 +213,17 @@ fn light_is_left_out_only_if_asked_and_then_the_plan_tells_how_much() {
 }
 
 #[test]
-fn a_small_share_is_computed_with_fewer_rays_and_without_a_share_all_are_cast() {
+fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_is_narrow() {
     let settings = Settings::of_preset(Preset::Standard);
-    let rays = |share: f64| settings.interreflection(Some(BouncedShare { share, std_error: 0.0 })).rays;
-    assert_eq!(settings.interreflection(None).rays, 6);
-    assert_eq!([0.0, 0.05, 0.15, 0.2, 0.22, 0.3, 0.9].map(rays), [1, 1, 2, 3, 3, 6, 6]);
+    let resolution = |share: Option<f64>, narrowest_lobe| {
+        let bounced = share.map(|share| BouncedShare { share, std_error: 0.0 });
+        let settings = settings.interreflection(&SceneFeatures { bounced, narrowest_lobe, ..features() });
+        (settings.rays, settings.grid.rings)
+    };
+    for narrowest_lobe in [0.1, 0.3, f32::INFINITY] {
+        assert_eq!([None, Some(0.31)].map(|share| resolution(share, narrowest_lobe)), [(6, 12); 2]);
+    }
+    assert_eq!([0.1, 0.3, f32::INFINITY].map(|lobe| resolution(Some(0.29), lobe)), [(2, 12), (2, 8), (2, 8)]);
 }
 
 #[test]

@@ -320,7 +320,9 @@ impl ImageWorker {
             self.close = None;
         }
         let bounced = match material {
-            ShadedMaterial::Outcome(of) if !of.plan.interreflection => self.shared.bounced_light_like(&job.loaded),
+            ShadedMaterial::Outcome(of) if of.plan.interreflection.is_none() => {
+                self.shared.bounced_light_like(&job.loaded)
+            }
             _ => None,
         };
         let request = RenderRequest {
