@@ -20,7 +20,7 @@ use crate::math::simd::{Lobe, add_lobes_around};
 use crate::visibility::Visibility;
 
 /// Groups of rays per matrix product.
-const BLOCK: usize = 2048;
+const BLOCK: usize = 512;
 /// Most lights per task of a matrix product.
 const ROWS: usize = 256;
 /// One of so many groups is walked again for its variance.

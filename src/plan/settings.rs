@@ -313,15 +313,15 @@ impl Settings {
         /// Smallest roughness of lobes in the coarser table.
         const WIDE_LOBE: f32 = 0.15;
         let (elements, rays, grids) = match self.preset {
-            Preset::Draft => (2048, 6, [[8, 24], [8, 24]]),
-            Preset::Standard | Preset::Wu2011 => (6144, 6, [[8, 24], [12, 36]]),
-            Preset::Fine | Preset::Reference => (16_384, 12, [[12, 36], [16, 48]]),
+            Preset::Draft => (2048, [2, 6], [[8, 24], [8, 24]]),
+            Preset::Standard | Preset::Wu2011 => (6144, [2, 5], [[8, 24], [12, 36]]),
+            Preset::Fine | Preset::Reference => (16_384, [4, 12], [[12, 36], [16, 48]]),
         };
         let is_large = features.bounced.is_none_or(|bounced| bounced.share >= LARGE_SHARE);
         let [rings, azimuths] = grids[usize::from(is_large || features.narrowest_lobe < WIDE_LOBE)];
         InterreflectionSettings {
             elements: self.facets.min(elements),
-            rays: if is_large { rays } else { rays / 3 },
+            rays: rays[usize::from(is_large)],
             bounces: self.effects.bounces,
             grid: PolarGrid::new(rings, azimuths),
             mirrors: [false; 2],

@@ -221,7 +221,7 @@ fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_i
         (settings.rays, settings.grid.rings)
     };
     for narrowest_lobe in [0.1, 0.3, f32::INFINITY] {
-        assert_eq!([None, Some(0.31)].map(|share| resolution(share, narrowest_lobe)), [(6, 12); 2]);
+        assert_eq!([None, Some(0.31)].map(|share| resolution(share, narrowest_lobe)), [(5, 12); 2]);
     }
     assert_eq!([0.1, 0.3, f32::INFINITY].map(|lobe| resolution(Some(0.29), lobe)), [(2, 12), (2, 8), (2, 8)]);
 }
