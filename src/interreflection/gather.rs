@@ -21,10 +21,9 @@ use crate::visibility::Visibility;
 
 /// Groups of rays per matrix product.
 const BLOCK: usize = 512;
-/// Most lights per task of a matrix product.
-const ROWS: usize = 256;
-/// One of so many groups is walked again for its variance.
-const EXAMINED: usize = 8;
+/// Groups that are walked again for their variance, and most groups for one that is.
+const EXAMINED: usize = 2048;
+const MOST_PER_EXAMINED: usize = 8;
 /// Elements whose visibility is transposed at once.
 const TRANSPOSED: usize = 16;
 /// Lower limit of the cosine that a lobe is divided by. It bounds the contribution of rays along their own surface.
@@ -150,21 +149,24 @@ impl<'a> Exchange<'a> {
         let rows = groups.len().min(BLOCK);
         let mut to_viewer = vec![0.0_f32; rows * channels * viewers];
         let mut from_light = vec![0.0_f32; rows * channels * nodes];
-        let mut variance = 0.0;
+        let per_examined = (groups.len() / EXAMINED).clamp(1, MOST_PER_EXAMINED);
+        let (mut examined, mut variance) = (0, 0.0);
+        // Two threads take one channel alike. The bits of a product do not depend on the number of tasks.
+        let tasks = rayon::current_num_threads().div_ceil(channels).max(2);
         for block in groups.chunks(BLOCK) {
             cancel.check()?;
-            let of_groups: Vec<f64> = to_viewer
+            let of_groups: Vec<Option<f64>> = to_viewer
                 .par_chunks_mut(channels * viewers)
                 .zip(from_light.par_chunks_mut(channels * nodes))
                 .zip(block)
-                .enumerate()
-                .map(|(at, ((to_viewer, from_light), group))| {
+                .map(|((to_viewer, from_light), group)| {
                     self.fill(group, to_viewer, from_light);
-                    if at % EXAMINED == 0 { self.variance(group, images, to_viewer) } else { 0.0 }
+                    is_examined(group, per_examined).then(|| self.variance(group, images, to_viewer))
                 })
                 .collect();
-            variance += of_groups.iter().sum::<f64>() * (EXAMINED * 3) as f64 / channels as f64;
-            let rows = nodes.div_ceil(nodes.div_ceil(ROWS).max(2));
+            examined += of_groups.iter().flatten().count();
+            variance += of_groups.iter().flatten().sum::<f64>();
+            let rows = nodes.div_ceil(tasks);
             g.par_chunks_mut(viewers * nodes).enumerate().for_each(|(c, sums)| {
                 sums.par_chunks_mut(rows * viewers).enumerate().for_each(|(task, sums)| {
                     let a = &from_light[c * nodes + task * rows..];
@@ -174,7 +176,8 @@ impl<'a> Exchange<'a> {
                 });
             });
         }
-        Ok((g, variance))
+        let per_pair = 3.0 / channels as f64 * groups.len() as f64 / examined.max(1) as f64;
+        Ok((g, variance * per_pair))
     }
 
     /// Rays that carry light, in groups whose light reaches all viewers in the same proportions: the rays of a matte
@@ -323,6 +326,11 @@ impl<'a> Exchange<'a> {
     fn is_black(&self, element: usize) -> bool {
         self.colors[element] == Vec3::ZERO
     }
+}
+
+/// Returns true for one of `of` groups, whatever the sequence of their rays.
+fn is_examined(group: &Range<usize>, of: usize) -> bool {
+    (group.start as u32).wrapping_mul(0x9e37_79b9) >> 16 < (1 << 16) / of as u32
 }
 
 /// The visibility of each element (row) along each node.

@@ -35,7 +35,7 @@ pub struct SceneFeatures {
     /// Lobes that a direct sum adds up, and measured look-ups.
     pub lobes: usize,
     pub lookups: usize,
-    /// The smallest roughness of the materials' lobes; infinite without lobes.
+    /// The smallest roughness of analytic lobes; infinite without.
     pub narrowest_lobe: f32,
     pub distinct_normals: Option<usize>,
     pub object_self_shadows: bool,

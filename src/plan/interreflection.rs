@@ -17,8 +17,8 @@ impl SceneFeatures {
         if self.flat { 0.0 } else { (1.0 - 1.0 / self.area_ratio.max(1.0)).clamp(0.0, 1.0) }
     }
 
-    /// Returns true if the share of bounced light must be measured: it decides whether interreflection is computed and with
-    /// how many rays, and tells what is missing. It is not measured if facets see too little of each other to reach half of
+    /// Returns true if the share of bounced light must be measured: it decides whether interreflection is computed and at
+    /// which resolution, and tells what is missing. It is not measured if facets see too little of each other to reach half of
     /// the tolerance, nor for drafts that are forced to leave the light out, which previews are.
     pub fn needs_bounced_share(&self, settings: &Settings) -> bool {
         let is_used = match settings.effects.interreflection {
@@ -57,8 +57,12 @@ impl SceneFeatures {
         let (walks, nodes) = (rays * self.hidden_directions(), exchange.grid.len() as f64);
         let halves = self.mirrors.unwrap_or_default().map(|plane| if plane { 2.0 } else { 1.0 });
         let pairs = nodes * nodes / halves.iter().product::<f64>();
-        let per_walk = self.facets_of_walk() * (RAY_NS + nodes * LOBE_NS) + nodes * LOBE_NS + pairs * PRODUCT_NS;
-        (rays * RAY_NS + walks * per_walk) * 1e-6 / costs.threads
+        let per_walk = self.facets_of_walk() * (RAY_NS + nodes * LOBE_NS);
+        // The rays of a matte element share what reaches the viewers.
+        let is_matte = self.narrowest_lobe == f32::INFINITY && self.lookups == 0;
+        let groups = if is_matte { walks.min(exchange.elements as f64) } else { walks };
+        let per_group = nodes * LOBE_NS + pairs * PRODUCT_NS;
+        (rays * RAY_NS + walks * per_walk + groups * per_group) * 1e-6 / costs.threads
     }
 }
 

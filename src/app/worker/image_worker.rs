@@ -211,7 +211,13 @@ impl ImageWorker {
         report: &dyn Fn(ImageResult),
     ) -> Result<()> {
         if self.differs_only_in_tone(job) {
-            return Ok(());
+            // The draft showed the last final image, unless that image was finished after the draft.
+            let is_shown = lock(&self.shared.last).as_ref().is_none_or(|(.., last)| last.version == job.version);
+            if !is_shown && let Some(preview) = self.retone(job)? {
+                report(ImageResult::Rendered(Box::new(preview)));
+            }
+            let known = if job.loaded.scene.slab.is_none() { self.shared.known(&job.loaded) } else { None };
+            return known.map_or(Ok(()), |outcome| state_error(&outcome, context, report));
         }
         self.pipeline.set_cancel(context.cancel.clone());
         self.choose_backend(job, true);
@@ -263,13 +269,7 @@ impl ImageWorker {
         let last = preview.radiance.is_some().then(|| (Box::new((*job.loaded).clone()), job.size, preview.clone()));
         *lock(&self.shared.last) = last;
         report(ImageResult::Rendered(Box::new(preview)));
-        // The estimate takes some tenths of a second on all cores. It never runs while the user edits.
-        if context.is_newest_after(STATED_PAUSE)
-            && let Some(errors) = outcome.errors_unless(context.cancel)?
-        {
-            report(ImageResult::Stated(outcome.brdf.clone(), errors.estimate()));
-        }
-        Ok(())
+        state_error(&outcome, context, report)
     }
 
     /// Returns true if the job differs from the last final image only in exposure or tone map.
@@ -431,6 +431,17 @@ pub(super) fn fitting(size: [usize; 2], max_pixels: f64) -> [usize; 2] {
     let longest = size[0].max(size[1]) as f64;
     let scale = (max_pixels / (size[0] * size[1]) as f64).sqrt().min(MAX_SIDE / longest).min(1.0);
     size.map(|side| ((side as f64 * scale) as usize).max(24))
+}
+
+/// Estimates the error of a BRDF and reports it, unless the user edits within a pause: the estimate takes some tenths of a
+/// second on all cores.
+fn state_error(outcome: &Outcome, context: &JobContext<ImageJob>, report: &dyn Fn(ImageResult)) -> Result<()> {
+    if context.is_newest_after(STATED_PAUSE)
+        && let Some(errors) = outcome.errors_unless(context.cancel)?
+    {
+        report(ImageResult::Stated(outcome.brdf.clone(), errors.estimate()));
+    }
+    Ok(())
 }
 
 /// Reports an error; a cancelled job reports nothing.

@@ -238,3 +238,38 @@ pub fn spawn_autosave(done: impl Fn(Result<(), String>) + Clone + Send + Sync + 
     };
     Worker::spawn("autosave", 1, || (), work, move |text| report_fault(Err(text))).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+    use std::time::Instant;
+
+    use super::*;
+
+    #[test]
+    fn a_scene_that_is_saved_while_its_final_image_is_computed_shows_that_image() {
+        let (sender, results) = channel();
+        let workers = PreviewWorkers::spawn(&Cache::default(), move |result| drop(sender.send(result))).unwrap();
+        let loaded = crate::scene::open("fig5a_isotropic", &["quality.preset=draft".to_owned()]).unwrap();
+        let loaded = Arc::new(loaded);
+        let job = |version| ImageJob { version, loaded: loaded.clone(), size: [48, 48], submitted: Instant::now() };
+        let wait_for_final = |version| {
+            while let Ok(result) = results.recv_timeout(Duration::from_secs(60)) {
+                match result {
+                    ImageResult::Rendered(image) if image.version == version && image.grade == Grade::Final => {
+                        return true;
+                    }
+                    _ => {}
+                }
+            }
+            false
+        };
+        workers.submit(job(1));
+        assert!(wait_for_final(1));
+        // The draft of the saved version ended before the final image was known.
+        drop(workers.shared.draft_guard(2));
+        workers.refine(job(2));
+        assert!(wait_for_final(2));
+        workers.finish(Duration::from_secs(4));
+    }
+}
