@@ -60,6 +60,7 @@ pub(super) fn shading_table(context: &Context<'_>, _: Switch) -> Decision {
 pub(super) fn exact_lobes(context: &Context<'_>, switch: Switch) -> Decision {
     let normals = context.features.distinct_normals;
     let reason = match normals {
+        Some(1) => "one normal: one exact lobe, for any number of facets".to_owned(),
         Some(count) => format!("{count} distinct normals: one exact lobe each, for any number of facets"),
         None => "normals differ from facet to facet".to_owned(),
     };

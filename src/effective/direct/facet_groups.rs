@@ -29,7 +29,8 @@ pub(crate) struct NormalCluster {
     pub(crate) normal: Vec3,
 }
 
-/// Smallest mean number of facets per cluster at which one lobe per cluster pays.
+/// Smallest mean number of facets per cluster at which one lobe per cluster pays. A loop over fewer facets takes as long as
+/// one over this number, so that a single cluster always pays.
 const FACETS_PER_CLUSTER: usize = 8;
 
 impl FacetGroup {
@@ -49,7 +50,7 @@ impl FacetGroup {
         let uniform = colors.iter().all(|&color| color == Vec3::ONE);
         let rgb_areas = (!uniform).then(|| rgb_areas(facets, range.clone()));
         let clusters = normal_clusters(facets, range.clone());
-        let is_clustered = clusters.len() * FACETS_PER_CLUSTER <= range.len();
+        let is_clustered = clusters.len() * FACETS_PER_CLUSTER <= range.len().max(FACETS_PER_CLUSTER);
         Self {
             range,
             color: Vec3::ONE,
