@@ -151,7 +151,7 @@ impl<'a> Exchange<'a> {
         let mut from_light = vec![0.0_f32; rows * channels * nodes];
         let per_examined = (groups.len() / EXAMINED).clamp(1, MOST_PER_EXAMINED);
         let (mut examined, mut variance) = (0, 0.0);
-        // Two threads take one channel alike. The bits of a product do not depend on the number of tasks.
+        // At least two tasks per channel, so that few threads end together. Their number changes no bit of the products.
         let tasks = rayon::current_num_threads().div_ceil(channels).max(2);
         for block in groups.chunks(BLOCK) {
             cancel.check()?;

@@ -14,7 +14,8 @@ use crate::scene::{Camera, LoadedScene};
 use super::dark;
 use super::draft_detail::{DRAFT_MS, DraftDetail};
 use super::gpu_drafts::{GpuDrafts, as_preset};
-use super::preview_renderer::{CloseUpTile, KnownPoints, PreviewRenderer, RenderRequest, ShadedMaterial};
+use super::pixel_costs::{PixelCosts, Shading, fitting};
+use super::preview_renderer::{CloseUpTile, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 use super::runner::JobContext;
 use super::shared::{SharedState, SmallScale, lock, small_scale};
@@ -34,15 +35,11 @@ const DRAFT_CANCEL_DELAY: Duration = Duration::from_millis(700);
 const POLL: Duration = Duration::from_millis(5);
 /// Time without a new edit after which refinement begins.
 const PAUSE: Duration = Duration::from_millis(80);
-
 /// Time without a new edit after the final image, after which its error is estimated.
 const STATED_PAUSE: Duration = Duration::from_millis(400);
 
 /// Stage that computes visibility and facet sum on the GPU.
 const SUM_STAGE: &str = "visibility and product";
-
-/// Maximum side of an image in pixels. Every GPU can render the final image, which has twice as many samples per side.
-const MAX_SIDE: f64 = 4096.0;
 
 /// The state of a worker that renders the object. One worker drafts, another one refines.
 pub struct ImageWorker {
@@ -51,33 +48,12 @@ pub struct ImageWorker {
     pub(super) renderer: PreviewRenderer,
     /// The tile, while the camera is so close that the tile itself is visible.
     close: Option<(SmallScale, CloseUpTile)>,
-    /// Milliseconds per pixel of each [`Shading`].
-    shading_cost: [f64; 3],
-    /// Milliseconds per pixel to find the point that it shows and the lights that reach it, for one and for four samples.
-    point_cost: [f64; 2],
+    costs: PixelCosts,
     gpu_drafts: GpuDrafts,
     detail: DraftDetail,
     /// Backend of the next image: the scene's setting, or `cpu` until the window reports the GPUs.
     backend: String,
 }
-
-/// Kinds of shading, whose costs differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shading {
-    /// With the draft's BRDF.
-    Draft,
-    /// With the refined BRDF.
-    Refined,
-    /// Under a colour map that is filtered in each pixel.
-    Filtered,
-}
-
-/// Assumed until they are measured [ms].
-const FIRST_SHADING_COST: f64 = 1.6e-2;
-const FIRST_POINT_COST: f64 = 4e-3;
-/// Factor on the time limit for an image whose points must be found again in a new size. Later images of the view have
-/// the same points.
-const FIRST_OF_VIEW: f64 = 1.6;
 
 impl ImageWorker {
     pub fn new(shared: Arc<SharedState>, cache: &Cache) -> Self {
@@ -88,8 +64,7 @@ impl ImageWorker {
             pipeline,
             renderer,
             close: None,
-            shading_cost: [FIRST_SHADING_COST; 3],
-            point_cost: [FIRST_POINT_COST; 2],
+            costs: PixelCosts::default(),
             gpu_drafts: GpuDrafts::default(),
             detail: DraftDetail::default(),
             backend: String::new(),
@@ -345,13 +320,8 @@ impl ImageWorker {
                 (Some(Arc::new(rendered.image)), image, rendered.times, table_ms, Some(ms(start)))
             }
         };
-        let pixels = (size[0] * size[1]) as f64;
-        if samples_per_side == 1 || has_color_map {
-            self.shading_cost[shading as usize] = times.shading_ms / pixels;
-        }
-        if times.gbuffer_ms > 0.0 {
-            self.point_cost[usize::from(samples_per_side > 1)] = (times.gbuffer_ms + times.shadows_ms) / pixels;
-        }
+        let shading = (samples_per_side == 1 || has_color_map).then_some(shading);
+        self.costs.record(shading, samples_per_side, size, &times);
         let large = [
             (SUM_STAGE, times.product_ms),
             ("picture table", table_ms),
@@ -401,36 +371,15 @@ impl ImageWorker {
     /// The largest size with the view's aspect ratio that is estimated to take at most `budget_ms`.
     fn affordable(&self, job: &ImageJob, shading: Shading, budget_ms: f64) -> [usize; 2] {
         let full = fitting(job.size, MAX_PIXELS[usize::from(self.backend != "cpu" && self.renderer.is_hardware())]);
-        let (camera, samples_per_side) = (camera(&job.loaded), if shading == Shading::Filtered { 2 } else { 1 });
-        // Few sizes, so that the image does not change its size at every edit.
-        let parts = [1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0];
-        let mut sizes = parts.map(|part| full.map(|side| ((side as f64 / part).round() as usize).max(24))).into_iter();
-        let is_quick = |size: &[usize; 2]| {
-            let pixels = (size[0] * size[1]) as f64;
-            let shading = pixels * self.shading_cost[shading as usize];
-            let points = pixels * self.point_cost[samples_per_side - 1];
-            match self.renderer.known_points(&camera, *size, samples_per_side) {
-                KnownPoints::All => shading <= budget_ms,
-                KnownPoints::OtherSampling => shading <= budget_ms && shading + points <= FIRST_OF_VIEW * budget_ms,
-                KnownPoints::None => shading + points <= budget_ms,
-            }
-        };
-        let smallest = sizes.next_back().unwrap_or(full);
-        sizes.find(is_quick).unwrap_or(smallest)
+        let camera = camera(&job.loaded);
+        let known = |size, samples_per_side| self.renderer.known_points(&camera, size, samples_per_side);
+        self.costs.affordable(full, shading, budget_ms, known)
     }
 }
 
 /// Returns true if images show an analytic surface at every distance, and `f̄` at none.
 fn has_analytic_surface(loaded: &LoadedScene) -> bool {
     loaded.scene.color_map.as_ref().is_some_and(|map| map.surface.is_some())
-}
-
-/// The view's size, reduced to the largest size that is rendered.
-pub(super) fn fitting(size: [usize; 2], max_pixels: f64) -> [usize; 2] {
-    let size = size.map(|side| side.clamp(24, 8192));
-    let longest = size[0].max(size[1]) as f64;
-    let scale = (max_pixels / (size[0] * size[1]) as f64).sqrt().min(MAX_SIDE / longest).min(1.0);
-    size.map(|side| ((side as f64 * scale) as usize).max(24))
 }
 
 /// Estimates the error of a BRDF and reports it, unless the user edits within a pause: the estimate takes some tenths of a

@@ -20,7 +20,8 @@ use crate::scene::{
 use eframe::egui::ColorImage;
 use glam::Vec3;
 
-use super::image_worker::{camera, fitting};
+use super::image_worker::camera;
+use super::pixel_costs::fitting;
 use super::runner::JobContext;
 use super::tone::color_image;
 

@@ -12,6 +12,7 @@ mod gpu_state;
 mod image_worker;
 mod lobe;
 mod methods;
+mod pixel_costs;
 mod preview_renderer;
 mod rendered_preview;
 mod runner;

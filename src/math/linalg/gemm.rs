@@ -116,3 +116,30 @@ pub fn gram(m: usize, n: usize, a: &[f32]) -> nalgebra::DMatrix<f64> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outer_products_have_the_same_bits_however_their_rows_are_divided() {
+        const K: usize = 700;
+        const M: usize = 193;
+        const N: usize = 37;
+        let value = |at: usize| ((at * 2_654_435_761) % 1000) as f32 / 700.0 - 0.5;
+        let (a, b): (Vec<f32>, Vec<f32>) = ((0..K * M).map(value).collect(), (7..7 + K * N).map(value).collect());
+        let of_rows = |rows: usize| {
+            let mut c = vec![0.0; M * N];
+            for (task, c) in c.chunks_mut(rows * N).enumerate() {
+                add_outer_products(K, [c.len() / N, N], [&a[task * rows..], &b], [M, N], c);
+            }
+            c
+        };
+        let whole = of_rows(M);
+        let exact = |m: usize, n: usize| (0..K).map(|k| f64::from(a[k * M + m]) * f64::from(b[k * N + n])).sum::<f64>();
+        assert!((whole[5 * N + 3] - exact(5, 3)).abs() < 1e-3);
+        for rows in [1, 13, 25, 64, 97] {
+            assert_eq!(of_rows(rows), whole, "{rows} rows per task");
+        }
+    }
+}
