@@ -15,8 +15,8 @@ use super::layout::{OBJECT_PART, is_narrow};
 use super::messages::Level;
 use super::worker::{
     AccuracyJob, AccuracyResult, CaptureJob, CaptureResult, ColorMapJob, ColorMapResult, ExportJob, ExportResult,
-    GpuShare, ImageJob, ImageResult, LobeJob, LobePlot, MethodsJob, MethodsResult, PreviewWorkers, SceneThumbnail,
-    SlabLobeJob, SlabLobeResult, TargetJob, TargetResult, ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy,
+    GpuShare, ImageJob, ImageResult, LobeJob, LobePlot, MethodsJob, MethodsResult, PreviewWorkers, SlabLobeJob,
+    SlabLobeResult, TargetJob, TargetResult, Thumbnail, ThumbnailJob, TileJob, TileResult, Worker, spawn_accuracy,
     spawn_autosave, spawn_capture, spawn_color_map, spawn_export, spawn_lobe, spawn_methods, spawn_slab_lobe,
     spawn_target, spawn_thumbnail, spawn_tile,
 };
@@ -33,7 +33,7 @@ enum JobResult {
     Image(ImageResult),
     Tile(TileResult),
     Lobe(Box<LobePlot>),
-    Thumbnail(SceneThumbnail),
+    Thumbnail(Thumbnail),
     Export(ExportResult),
     Accuracy(AccuracyResult),
     Target(TargetResult),
@@ -80,7 +80,7 @@ impl BackgroundJobs {
             let _ = sender.send(result);
             wake.request_repaint();
         };
-        let (to_tile, to_lobe, to_gallery, to_export, to_save) =
+        let (to_tile, to_lobe, to_thumbnails, to_export, to_save) =
             (send.clone(), send.clone(), send.clone(), send.clone(), send.clone());
         let (to_chart, to_map, to_slab, to_methods) = (send.clone(), send.clone(), send.clone(), send.clone());
         let (to_target, to_capture) = (send.clone(), send.clone());
@@ -92,7 +92,7 @@ impl BackgroundJobs {
         let methods = spawn_methods(move |result| to_methods(JobResult::Methods(result)));
         let images = PreviewWorkers::spawn(cache, move |result| send(JobResult::Image(result)));
         let tiles = spawn_tile(move |result| to_tile(JobResult::Tile(result)));
-        let thumbnails = spawn_thumbnail(move |thumbnail| to_gallery(JobResult::Thumbnail(thumbnail)));
+        let thumbnails = spawn_thumbnail(move |thumbnail| to_thumbnails(JobResult::Thumbnail(thumbnail)));
         let exports = spawn_export(cache, move |result| to_export(JobResult::Export(result)));
         let autosaver = spawn_autosave(move |done| to_save(JobResult::Autosaved(done)));
         let lobes = spawn_lobe(move |plot| to_lobe(JobResult::Lobe(Box::new(plot))));
@@ -314,9 +314,9 @@ impl Editor {
         }
     }
 
-    fn receive_thumbnail(&mut self, ctx: &Context, SceneThumbnail { job, image }: SceneThumbnail) {
+    fn receive_thumbnail(&mut self, ctx: &Context, Thumbnail { job, image }: Thumbnail) {
         match (job, &mut self.dialog) {
-            (ThumbnailJob::Shipped(name), _) => self.gallery.receive(ctx, name, image),
+            (ThumbnailJob::Subject(subject), _) => self.thumbnails.receive(ctx, subject, image),
             (ThumbnailJob::Variant { seed, at, .. }, Some(Dialog::Vary(variants))) => {
                 variants.receive(ctx, (seed, at), image);
             }

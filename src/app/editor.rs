@@ -21,6 +21,7 @@ use super::views::methods::MethodsState;
 use super::views::object::ObjectView;
 use super::views::pointer::Pointer;
 use super::views::slab_lobe::SlabLobeState;
+use super::views::thumbnails::Thumbnails;
 use super::views::tile::TileState;
 use super::views::zoom::TileScale;
 
@@ -68,6 +69,7 @@ pub struct Editor {
     /// The finished fraction of an export, and its current work.
     pub(super) exporting: Option<(f32, &'static str)>,
     pub gallery: Gallery,
+    pub(super) thumbnails: Thumbnails,
     pub(super) slots: Vec<String>,
     /// Size of the object view in pixels.
     pub(super) size: [usize; 2],
@@ -132,6 +134,7 @@ impl Editor {
             background,
             exporting: None,
             gallery: Gallery::default(),
+            thumbnails: Thumbnails::default(),
             copied: None,
             window_width: 0.0,
             drawer: false,
@@ -154,7 +157,7 @@ impl Editor {
         self.lobe.move_to();
         self.slab_lobe.move_to();
         self.methods.move_to();
-        self.gallery = Gallery::default();
+        self.thumbnails = Thumbnails::default();
         self.accuracy = panels::AccuracyState::default();
         self.targets = panels::TargetState::default();
         self.capture = CaptureState::default();
@@ -248,7 +251,7 @@ impl Editor {
         }
         self.submit_jobs(&ctx);
         self.update_recovery(&ctx);
-        self.fill_gallery();
+        self.render_thumbnails();
         self.search_for_targets();
         self.measure_accuracy();
         self.compare_methods();

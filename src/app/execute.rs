@@ -224,15 +224,30 @@ impl Editor {
             return;
         };
         self.messages.clear("paste");
+        self.set_material(slot, copied, "Paste a material");
+    }
+
+    /// Gives a slot the material of a shipped scene: that of the slot with the same name, or the default.
+    pub(super) fn take_material_of(&mut self, name: &str, slot: &str) {
+        let Ok(opened) = crate::scene::open(name, &[]) else { return };
+        let materials = &opened.scene.materials;
+        let of = |name: &str| materials.iter().find(|material| material.name == name);
+        let default = of("default").cloned().unwrap_or_else(materials::grey);
+        let mut material = of(slot).cloned().unwrap_or_else(|| default.clone());
+        material.brdf = material.brdf.or(default.brdf);
+        self.set_material(slot, material, "Take a material of the gallery");
+    }
+
+    fn set_material(&mut self, slot: &str, material: MaterialSpec, action: &'static str) {
         let mut scene = (**self.document.scene()).clone();
-        let pasted = MaterialSpec { name: slot.to_owned(), ..copied };
+        let pasted = MaterialSpec { name: slot.to_owned(), ..material };
         match scene.materials.iter_mut().find(|material| material.name == slot) {
             Some(place) => *place = pasted,
             None => scene.materials.push(pasted),
         }
         match scene.validate() {
-            Ok(()) => self.document.edit_as("Paste a material", scene),
-            Err(error) => self.messages.put(Level::Error, "paste", format!("Not pasted: {error}")),
+            Ok(()) => self.document.edit_as(action, scene),
+            Err(error) => self.messages.put(Level::Error, "paste", format!("Not changed: {error}")),
         }
     }
 

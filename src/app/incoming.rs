@@ -40,6 +40,7 @@ impl Editor {
             }
             Some(materials::MaterialRequest::Copy { material }) => self.copy_material(ctx, material),
             Some(materials::MaterialRequest::Paste { slot }) => self.paste_material(&slot),
+            Some(materials::MaterialRequest::FromScene { slot, scene }) => self.take_material_of(scene, &slot),
             None => {}
         }
         if let Some(file) = requests.slab_file {
@@ -48,6 +49,7 @@ impl Editor {
         if let Some(place) = requests.driver_image {
             self.browse(Purpose::DriverImage(place), "");
         }
+        self.tile.changing = requests.changing;
         if let Some(text) = requests.error {
             self.messages.put(Level::Error, "edit", text);
         }

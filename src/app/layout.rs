@@ -83,7 +83,7 @@ impl Editor {
                     let margin = 16.0;
                     ui.set_width(150.0);
                     ui.set_height(area.height() - margin);
-                    self.gallery.ui(ui, &self.document.name)
+                    self.gallery.ui(ui, &self.document.name, &self.thumbnails)
                 })
             });
             let chosen = shown.inner.inner;
@@ -94,7 +94,9 @@ impl Editor {
                 return None;
             }
             let panel = Panel::left(window.salt("gallery")).default_size(self.settings.gallery_width);
-            let shown = panel.size_range(118.0..=480.0).show(ui, |ui| self.gallery.ui(ui, &self.document.name));
+            let shown = panel
+                .size_range(118.0..=480.0)
+                .show(ui, |ui| self.gallery.ui(ui, &self.document.name, &self.thumbnails));
             window.store(ui, "gallery", &mut self.settings.gallery_width, shown.response.rect.width());
             shown.inner
         };
@@ -128,6 +130,7 @@ impl Editor {
                     file,
                     reveal,
                     is_new,
+                    thumbnails: &self.thumbnails,
                 };
                 panels::ui(ui, scene, &painted, &self.document.name, &self.slots, shown)
             });
@@ -187,7 +190,7 @@ impl Editor {
         let fill = ui.visuals().panel_fill;
         egui::Frame::new().fill(fill).inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
             ui.take_available_width();
-            self.from_view = self.object.toolbar(ui, scene, self.methods.on);
+            self.from_view = self.object.toolbar(ui, scene, self.methods.on, &self.thumbnails);
         });
         let version = self.document.version();
         let methods = Some(&mut self.methods).filter(|methods| methods.on && MethodsState::applies_to(scene));
@@ -252,7 +255,8 @@ impl Editor {
             self.slab_lobe.ui(ui, &mut self.lobe.light, &mut self.lobe.log);
         } else {
             let shown = self.tile.rendered.as_ref().map(|rendered| &*rendered.section);
-            section::ui(ui, shown, &scene.tile.unit);
+            let changing = self.tile.changing.and_then(|key| section::length_of(&scene.tile, key));
+            section::ui(ui, shown, &scene.tile.unit, changing);
             ui.add_space(4.0);
             self.lobe.ui(ui);
         }

@@ -6,26 +6,26 @@ use super::worker::{Grade, RenderedPreview};
 
 impl Editor {
     /// Submits thumbnails while no other job waits.
-    pub(super) fn fill_gallery(&mut self) {
+    pub(super) fn render_thumbnails(&mut self) {
         let is_refined =
             |preview: &RenderedPreview| preview.grade >= Grade::Refining && preview.version == self.document.version();
         let idle = self.object.preview.as_deref().is_some_and(is_refined) && self.exporting.is_none();
         let Some(worker) = &self.background.thumbnails else { return };
         if let Some(Dialog::Vary(variants)) = &mut self.dialog {
             // A new job cancels that of the gallery.
-            self.gallery.interrupted();
+            self.thumbnails.interrupted();
             if let Some(job) = variants.job(|| self.document.loaded()) {
                 worker.submit(job);
             }
             return;
         }
-        if idle && self.settings.gallery {
-            if let Some(job) = self.gallery.job() {
+        if idle {
+            if let Some(job) = self.thumbnails.job() {
                 worker.submit(job);
             }
-        } else if self.gallery.is_waiting() {
+        } else if self.thumbnails.is_waiting() {
             worker.cancel();
-            self.gallery.interrupted();
+            self.thumbnails.interrupted();
         }
     }
 

@@ -10,6 +10,7 @@ mod background;
 mod dialogs;
 mod document;
 mod editor;
+mod event_queue;
 mod execute;
 mod incoming;
 mod layout;

@@ -15,6 +15,7 @@ use eframe::egui::{self, Context, ViewportBuilder, ViewportCommand};
 
 use super::document::{Document, EditorSettings};
 use super::editor::Editor;
+use super::event_queue::EventQueue;
 use super::start_times::{FirstFrames, StartTimes};
 use super::worker::{GpuShare, Screen};
 use crate::cli::cache;
@@ -109,7 +110,13 @@ fn open(
         }
         drop(editor);
         times.note("editor created");
-        Ok(Box::new(Window { editor: shared, lost, gpu, first: FirstFrames::new(times) }))
+        Ok(Box::new(Window {
+            editor: shared,
+            lost,
+            gpu,
+            first: FirstFrames::new(times),
+            events: EventQueue::default(),
+        }))
     });
     eframe::run_native_ext("biscale", options, Some(ctx), create)
 }
@@ -205,9 +212,16 @@ struct Window {
     lost: Arc<AtomicBool>,
     gpu: Option<Arc<Gpu>>,
     first: FirstFrames,
+    events: EventQueue,
 }
 
 impl eframe::App for Window {
+    fn raw_input_hook(&mut self, ctx: &Context, raw_input: &mut egui::RawInput) {
+        if self.events.split(&mut raw_input.events) {
+            ctx.request_repaint();
+        }
+    }
+
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let mut editor = self.editor.borrow_mut();
         let Some(editor) = editor.as_mut() else { return };

@@ -8,6 +8,8 @@ use toml::Value;
 
 use super::fields::{PanelContext, caption, display_name, format_number, suffix};
 use super::{alternatives, matrix};
+use crate::app::views::thumbnails::{Choice, Thumbnails};
+use crate::app::worker::Subject;
 
 /// Makes a drag value reject text that is not a finite number, and set `wrong` if the user types such text.
 fn finite<'a>(drag: DragValue<'a>, wrong: &'a Cell<bool>) -> DragValue<'a> {
@@ -30,7 +32,9 @@ pub(super) fn value_ui(ui: &mut Ui, value: &mut Value, shape: &FieldShape, field
     let wrong = Cell::new(false);
     match *shape {
         FieldShape::Number { min, max, soft_max } => {
-            number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, context), field.default, &wrong);
+            if number_ui(ui, value, (min, max, soft_max), &suffix(field.unit, context), field.default, &wrong) {
+                context.changing = Some(field.key);
+            }
         }
         FieldShape::Integer { min, max } => integer_ui(ui, value, (min, max), field.default, &wrong),
         FieldShape::Color { max } => color_ui(ui, value, max, &wrong),
@@ -70,6 +74,7 @@ fn is_logarithmic(min: f64, soft_max: f64) -> bool {
     min >= 0.0 && soft_max / min.max(1e-4) > 500.0
 }
 
+/// Draws the control of a number. Returns true while the user changes it.
 pub(super) fn number_ui(
     ui: &mut Ui,
     value: &mut Value,
@@ -77,8 +82,8 @@ pub(super) fn number_ui(
     suffix: &str,
     default: Option<f64>,
     wrong: &Cell<bool>,
-) {
-    let Some(before) = number(value) else { return };
+) -> bool {
+    let Some(before) = number(value) else { return false };
     // Displays 0.1 that was stored as f32 as 0.1, not as 0.10000000149.
     let mut now = tidy(before);
     let soft_min = if min < -10.0 * soft_max { -soft_max } else { min };
@@ -93,10 +98,12 @@ pub(super) fn number_ui(
     let (speed, digits) = ((soft_max - soft_min).min(100.0) / 400.0, decimals(now));
     let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(digits).suffix(suffix);
     let drag = ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
-    number_menu(&(slider | drag), &mut now, default);
+    let response = slider | drag;
+    number_menu(&response, &mut now, default);
     if now.is_finite() && now != tidy(before) {
         *value = Value::Float(now.clamp(min, max));
     }
+    response.dragged() || response.has_focus()
 }
 
 /// Returns the decimals that show three significant digits.
@@ -304,6 +311,43 @@ pub fn kind_ui(ui: &mut Ui, label: &str, now: &str, kinds: &[Kind]) -> Option<&'
         }
     });
     chosen
+}
+
+/// Draws the choice of a tagged table's kind as [`kind_ui`] does, with an image of each.
+pub fn pictured_kind_ui(
+    ui: &mut Ui,
+    label: &str,
+    now: &str,
+    kinds: &[Kind],
+    (thumbnails, subject): (&Thumbnails, fn(&'static str) -> Subject),
+) -> Option<&'static str> {
+    let choices = kinds.iter().map(|kind| Choice {
+        name: kind.kind,
+        caption: display_name(kind.kind),
+        doc: kind.doc.to_owned(),
+        subject: subject(kind.kind),
+    });
+    let width = (ui.available_width() - 30.0).min(200.0);
+    let combo = egui::ComboBox::from_id_salt(("kind", label)).selected_text(display_name(now)).width(width);
+    thumbnails.picker(ui, combo, now, choices)
+}
+
+/// Draws the choice of an object in a combo box of this width, with an image of each. Returns a newly chosen kind.
+pub fn object_kind_ui(
+    ui: &mut Ui,
+    now: &str,
+    kinds: impl Iterator<Item = &'static str>,
+    width: f32,
+    thumbnails: &Thumbnails,
+) -> Option<&'static str> {
+    let choices = kinds.map(|kind| Choice {
+        name: kind,
+        caption: display_name(kind),
+        doc: String::new(),
+        subject: Subject::Object(kind),
+    });
+    let combo = egui::ComboBox::from_id_salt("object").selected_text(display_name(now)).width(width);
+    thumbnails.picker(ui, combo, now, choices)
 }
 
 fn number(value: &Value) -> Option<f64> {

@@ -5,12 +5,13 @@ use eframe::egui::{self, Align, Layout, RichText, Ui};
 use toml::Table;
 
 use super::controls::{starting_value, value_ui};
+use crate::app::views::thumbnails::Thumbnails;
 
 /// Width of the captions [points].
 const CAPTION_WIDTH: f32 = 104.0;
 
 /// The document's unit, and the requests that the rows of a panel collect.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct PanelContext {
     /// Name of the tile unit.
     pub unit: String,
@@ -22,6 +23,10 @@ pub struct PanelContext {
     pub in_force: Vec<(&'static str, String)>,
     /// The field that has no effect at present, and why.
     pub ignored: Option<(&'static str, &'static str)>,
+    /// Images of the choices.
+    pub thumbnails: Thumbnails,
+    /// Key of the field whose number the user is changing.
+    pub changing: Option<&'static str>,
 }
 
 /// Draws controls for all fields of a table except `skip`, and writes edits into the table.

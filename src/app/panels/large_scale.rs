@@ -1,13 +1,16 @@
 //! Panels of the large scale: object, light, camera, quality.
 
 use crate::plan::Settings;
-use crate::scene::{Camera, Light, Object, Quality, Scene};
+use crate::scene::{Camera, Light, OBJECT_KINDS, Object, Quality, Scene};
 use eframe::egui::{self, Ui};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::Table;
 
+use super::controls;
 use super::fields::{self, PanelContext};
+use crate::app::views::thumbnails::Choice;
+use crate::app::worker::Subject;
 
 const ENVIRONMENTS: [(&str, &str); 5] = [
     ("studio", "Studio"),
@@ -20,7 +23,14 @@ const ENVIRONMENTS: [(&str, &str); 5] = [
 pub fn object_ui(ui: &mut Ui, scene: &mut Scene, context: &mut PanelContext) {
     let fields = Object::fields();
     let mut object = scene.object.clone();
-    edit(ui, &mut object, &fields, &["path"], context);
+    let doc = fields.iter().find(|field| field.key == "kind").map_or("", |field| field.doc);
+    let chosen = fields::row(ui, "Kind", doc, |ui| {
+        let width = ui.available_width().min(180.0);
+        controls::object_kind_ui(ui, &object.kind, OBJECT_KINDS.iter().copied(), width, &context.thumbnails)
+    });
+    if let Some(kind) = chosen {
+        kind.clone_into(&mut object.kind);
+    }
     if object.kind == "mesh" {
         if object.path.is_none() {
             // A mesh needs a file. The object stays until the user has chosen one.
@@ -41,13 +51,16 @@ pub fn light_ui(ui: &mut Ui, light: &mut Light, context: &mut PanelContext) {
     let now = ENVIRONMENTS.iter().find(|(name, _)| *name == light.environment);
     let shown = now.map_or_else(|| file_name(&light.environment), |(_, label)| (*label).to_owned());
     fields::row(ui, "Environment", "Light from all directions: a built-in sky, or a .hdr or .exr file.", |ui| {
-        egui::ComboBox::from_id_salt("environment").selected_text(shown).width(150.0).show_ui(ui, |ui| {
-            for (name, label) in ENVIRONMENTS {
-                if ui.selectable_label(light.environment == name, label).clicked() {
-                    name.clone_into(&mut light.environment);
-                }
-            }
+        let combo = egui::ComboBox::from_id_salt("environment").selected_text(shown).width(150.0);
+        let choices = ENVIRONMENTS.map(|(name, label)| Choice {
+            name,
+            caption: label.to_owned(),
+            doc: String::new(),
+            subject: Subject::Environment(name),
         });
+        if let Some(name) = context.thumbnails.picker(ui, combo, &light.environment, choices) {
+            name.clone_into(&mut light.environment);
+        }
         if ui.button("…").on_hover_text("A .hdr or .exr file").clicked() {
             context.browse = Some("environment");
         }

@@ -9,6 +9,8 @@ use toml::Table;
 
 use super::controls;
 use super::fields::{self, PanelContext};
+use crate::app::views::gallery::DraggedScene;
+use crate::app::worker::Subject;
 
 const DEFAULT: &str = "default";
 
@@ -23,6 +25,11 @@ pub enum MaterialRequest {
     /// Replace the material of a slot by the copied one.
     Paste {
         slot: String,
+    },
+    /// Replace the material of a slot by that of a shipped scene.
+    FromScene {
+        slot: String,
+        scene: &'static str,
     },
     Copy {
         material: usize,
@@ -46,13 +53,19 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, slots: &[String], context: &mut PanelC
     for slot in names {
         let index = scene.materials.iter().position(|material| material.name == slot);
         let is_used = slot == DEFAULT || slots.contains(&slot);
-        let from_slot = ui
-            .push_id(&slot, |ui| match index {
-                Some(index) => own_ui(ui, scene, index, (is_used, &inheriting), context),
-                None => inherited_ui(ui, scene, &slot),
-            })
-            .inner;
-        request = request.or(from_slot);
+        let from_slot = ui.push_id(&slot, |ui| match index {
+            Some(index) => own_ui(ui, scene, index, (is_used, &inheriting), context),
+            None => inherited_ui(ui, scene, &slot),
+        });
+        // A picture of the gallery can be dropped onto a slot.
+        let area = from_slot.response;
+        if area.dnd_hover_payload::<DraggedScene>().is_some() {
+            let stroke = egui::Stroke::new(2.0, crate::app::theme::ACCENT);
+            ui.painter().rect_stroke(area.rect, 4.0, stroke, egui::StrokeKind::Outside);
+        }
+        let dropped = area.dnd_release_payload::<DraggedScene>();
+        let dropped = dropped.map(|scene| MaterialRequest::FromScene { slot: slot.clone(), scene: scene.0 });
+        request = request.or(from_slot.inner).or(dropped);
         ui.add_space(2.0);
     }
     if is_implied && scene.materials == [grey()] {
@@ -148,7 +161,8 @@ fn brdf_ui(ui: &mut Ui, brdf: &mut BrdfSpec, material: usize, context: &mut Pane
             let doc = kinds.iter().find(|kind| kind.kind == term.kind()).map_or("", |kind| kind.doc);
             let caption = if at == 0 { "BRDF" } else { "+ BRDF" };
             let chosen = fields::row(ui, caption, doc, |ui| {
-                let chosen = controls::kind_ui(ui, "BRDF", term.kind(), &kinds);
+                let chosen =
+                    controls::pictured_kind_ui(ui, "BRDF", term.kind(), &kinds, (&context.thumbnails, Subject::Brdf));
                 if count > 1 && ui.small_button("×").on_hover_text("Remove this term").clicked() {
                     removed = Some(at);
                 }

@@ -5,7 +5,7 @@ mod accuracy_chart;
 mod accuracy_ui;
 mod alternatives;
 pub mod color_map;
-mod controls;
+pub mod controls;
 pub mod effects;
 pub mod fields;
 pub mod large_scale;
@@ -17,6 +17,7 @@ mod stage_bars;
 pub mod surface;
 mod targets;
 
+use crate::app::views::thumbnails::Thumbnails;
 use crate::plan::Effect;
 use crate::scene::{Painted, Scene};
 use eframe::egui::{self, RichText, Ui};
@@ -39,6 +40,8 @@ pub struct PanelRequests {
     pub slab_file: Option<SlabFile>,
     /// Message about an invalid value.
     pub error: Option<String>,
+    /// Key of the parameter of the surface that the user is changing.
+    pub changing: Option<&'static str>,
 }
 
 /// The sections that the panel shows.
@@ -69,6 +72,8 @@ pub struct PanelInputs<'a> {
     pub reveal: &'a mut Option<&'static str>,
     /// True in the first frame of a document: sections that its scene uses unfold.
     pub is_new: bool,
+    /// Images of the choices.
+    pub thumbnails: &'a Thumbnails,
 }
 
 /// Draws the sections of the open tab and writes the edits into `scene`.
@@ -80,7 +85,8 @@ pub fn ui(
     slots: &[String],
     inputs: PanelInputs<'_>,
 ) -> PanelRequests {
-    let mut context = PanelContext { unit: scene.tile.unit.clone(), ..PanelContext::default() };
+    let (unit, thumbnails) = (scene.tile.unit.clone(), inputs.thumbnails.clone());
+    let mut context = PanelContext { unit, thumbnails, ..PanelContext::default() };
     let (mut material, mut driver_image, mut slab_file) = (None, None, None);
     let reveal = inputs.reveal;
     // A wide row must not widen the panel.
@@ -110,6 +116,7 @@ pub fn ui(
     let unfolds = |used: bool| inputs.is_new.then_some(used);
     let (shows_map, shows_slab) = (scene.color_map.is_some(), scene.slab.is_some());
     section(ui, reveal, "Surface", true, |ui| surface::ui(ui, scene, painted, name, &mut context));
+    let changing = context.changing.take();
     section(ui, reveal, "Materials", true, |ui| material = materials::ui(ui, scene, slots, &mut context));
     foldable(ui, reveal, "Colour map", shows_map, unfolds(shows_map), |ui| {
         driver_image = color_map::ui(ui, scene, inputs.color_map, &mut context);
@@ -118,7 +125,7 @@ pub fn ui(
     section(ui, reveal, "Object", true, |ui| large_scale::object_ui(ui, scene, &mut context));
     section(ui, reveal, "Light", true, |ui| large_scale::light_ui(ui, &mut scene.light, &mut context));
     section(ui, reveal, "Camera", false, |ui| large_scale::camera_ui(ui, scene, &mut context));
-    PanelRequests { browse: context.browse, material, driver_image, slab_file, error: context.error }
+    PanelRequests { browse: context.browse, material, driver_image, slab_file, error: context.error, changing }
 }
 
 fn section(ui: &mut Ui, reveal: &mut Option<&'static str>, title: &str, open: bool, body: impl FnOnce(&mut Ui)) {

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use super::controls;
 use super::fields::{self, PanelContext};
+use crate::app::worker::Subject;
 
 /// Initial image of a height field.
 const FIRST_HEIGHTS: &str = "asset:leather.png";
@@ -18,7 +19,9 @@ pub fn ui(ui: &mut Ui, scene: &mut Scene, painted: &Painted, name: &str, context
     let kinds = Geometry::kinds();
     let now = scene.tile.geometry.kind();
     let doc = kinds.iter().find(|kind| kind.kind == now).map_or("", |kind| kind.doc);
-    let chosen = fields::row(ui, "Surface", doc, |ui| controls::kind_ui(ui, "surface", now, &kinds));
+    let chosen = fields::row(ui, "Surface", doc, |ui| {
+        controls::pictured_kind_ui(ui, "surface", now, &kinds, (&context.thumbnails, Subject::Surface))
+    });
     if let Some(kind) = chosen {
         match initial_geometry(kind, painted, name) {
             Some(geometry) => scene.tile.geometry = geometry,

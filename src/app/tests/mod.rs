@@ -14,6 +14,7 @@ mod latency;
 mod methods;
 mod newcomer;
 mod painting;
+mod pickers;
 mod slab;
 mod soak;
 mod stability;

@@ -1,53 +1,24 @@
 //! The gallery: thumbnails of the shipped scenes.
 
-use std::collections::HashMap;
-use std::sync::Arc;
-
 use crate::scene::shipped;
-use eframe::egui::{
-    self, Color32, ColorImage, Context, Rect, RichText, ScrollArea, Sense, TextureHandle, Ui, pos2, vec2,
-};
+use eframe::egui::{self, RichText, ScrollArea, Sense, Ui};
 
-use crate::app::worker::ThumbnailJob;
+use super::thumbnails::Thumbnails;
+use crate::app::worker::Subject;
 
 #[derive(Default)]
 pub struct Gallery {
-    /// Thumbnails. `None` means that a scene could not be rendered.
-    images: HashMap<&'static str, Option<TextureHandle>>,
-    requested: Option<&'static str>,
     /// Search text for names and descriptions.
     pub search: String,
 }
 
+/// A scene of the gallery that is dragged, and whose material a slot takes.
+#[derive(Debug, Clone, Copy)]
+pub struct DraggedScene(pub &'static str);
+
 impl Gallery {
-    pub fn receive(&mut self, ctx: &Context, name: &'static str, image: Option<Arc<ColorImage>>) {
-        let options = egui::TextureOptions::LINEAR;
-        let texture = image.map(|image| ctx.load_texture(name, image, options));
-        self.images.insert(name, texture);
-        self.requested = None;
-    }
-
-    /// Returns the job for the next missing thumbnail, unless one is being rendered.
-    pub fn job(&mut self) -> Option<ThumbnailJob> {
-        if self.requested.is_some() {
-            return None;
-        }
-        let name = shipped::names().find(|name| !self.images.contains_key(name))?;
-        self.requested = Some(name);
-        Some(ThumbnailJob::Shipped(name))
-    }
-
-    /// Notes that the current job was cancelled.
-    pub fn interrupted(&mut self) {
-        self.requested = None;
-    }
-
-    pub fn is_waiting(&self) -> bool {
-        self.requested.is_some()
-    }
-
     /// Draws the thumbnails and returns the clicked one.
-    pub fn ui(&mut self, ui: &mut Ui, current: &str) -> Option<&'static str> {
+    pub fn ui(&mut self, ui: &mut Ui, current: &str, thumbnails: &Thumbnails) -> Option<&'static str> {
         let mut chosen = None;
         ui.add_space(4.0);
         ui.label(RichText::new("Gallery").heading());
@@ -68,7 +39,7 @@ impl Gallery {
             let side = ((ui.available_width() - (columns - 1.0) * 6.0) / columns).floor() - 1.0;
             ui.horizontal_wrapped(|ui| {
                 for name in found {
-                    if self.item(ui, name, side, name == current) {
+                    if item(ui, (name, side, name == current), thumbnails) {
                         chosen = Some(name);
                     }
                 }
@@ -76,32 +47,19 @@ impl Gallery {
         });
         chosen
     }
+}
 
-    fn item(&self, ui: &mut Ui, name: &'static str, side: f32, current: bool) -> bool {
-        let (area, response) = ui.allocate_exact_size(vec2(side, side * 0.82 + 17.0), Sense::click());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, title(name)));
-        if !ui.is_rect_visible(area) {
-            return response.clicked();
-        }
-        let frame = Rect::from_min_size(area.min, vec2(side, side * 0.82));
-        let painter = ui.painter().with_clip_rect(area.intersect(ui.clip_rect()));
-        match self.images.get(name) {
-            Some(Some(texture)) => {
-                let uv = Rect::from_min_max(pos2(0.0, 0.09), pos2(1.0, 0.91));
-                let image = egui::Image::new((texture.id(), frame.size())).uv(uv).corner_radius(4);
-                image.paint_at(ui, frame);
-            }
-            _ => {
-                painter.rect_filled(frame, 4.0, ui.visuals().faint_bg_color);
-            }
-        }
-        let color = if current || response.hovered() { super::super::theme::ACCENT } else { Color32::TRANSPARENT };
-        painter.rect_stroke(frame, 4.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Inside);
-        let text = if current { ui.visuals().strong_text_color() } else { ui.visuals().text_color() };
-        let at = pos2(area.left() + 1.0, frame.bottom() + 2.0);
-        painter.text(at, egui::Align2::LEFT_TOP, title(name), egui::FontId::proportional(11.0), text);
-        response.on_hover_text(format!("{name}\n{}", shipped::description(name).unwrap_or_default())).clicked()
+/// Draws a scene of the gallery, and returns true if it is clicked.
+fn item(ui: &mut Ui, (name, side, is_current): (&'static str, f32, bool), thumbnails: &Thumbnails) -> bool {
+    let subject = Subject::Scene(name);
+    let response = thumbnails.button(ui, (subject, &title(name)), side, is_current, Sense::click_and_drag());
+    response.dnd_set_drag_payload(DraggedScene(name));
+    if response.dragged() {
+        thumbnails.drag_image(ui.ctx(), subject);
     }
+    let description = shipped::description(name).unwrap_or_default();
+    let tip = format!("{name}\n{description}\nDrag it onto a material to use the scene's material there.");
+    response.on_hover_text(tip).clicked()
 }
 
 /// Returns true if a scene's name and description contain all words of the search text.

@@ -12,6 +12,7 @@ pub mod pointer;
 pub mod section;
 pub mod slab_lobe;
 pub mod spinner;
+pub mod thumbnails;
 pub mod tile;
 pub mod wipe;
 pub mod zoom;

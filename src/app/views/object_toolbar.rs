@@ -5,17 +5,24 @@ use eframe::egui::{self, Ui};
 
 use super::methods::MethodsState;
 use super::object::ObjectView;
+use super::thumbnails::Thumbnails;
 use crate::app::actions::Action;
-use crate::app::panels::fields::display_name;
+use crate::app::panels::controls;
 
 impl ObjectView {
     /// Draws the toolbar above the view.
-    pub fn toolbar(&mut self, ui: &mut Ui, scene: &mut Scene, compares_methods: bool) -> Option<Action> {
+    pub fn toolbar(
+        &mut self,
+        ui: &mut Ui,
+        scene: &mut Scene,
+        compares_methods: bool,
+        thumbnails: &Thumbnails,
+    ) -> Option<Action> {
         let mut action = None;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             let title = ui.strong("Object");
-            ui.label_inputs_by(title.id, |ui| object_ui(ui, scene));
+            ui.label_inputs_by(title.id, |ui| object_ui(ui, scene, thumbnails));
             ui.name_inputs("Exposure", |ui| exposure_ui(ui, scene));
             ui.separator();
             for (choice, name, tip, on) in [
@@ -53,16 +60,12 @@ impl ObjectView {
     }
 }
 
-fn object_ui(ui: &mut Ui, scene: &mut Scene) {
-    let combo = egui::ComboBox::from_id_salt("object here").selected_text(display_name(&scene.object.kind)).width(90.0);
-    combo.show_ui(ui, |ui| {
-        for kind in OBJECT_KINDS.iter().filter(|kind| **kind != "mesh") {
-            if ui.selectable_label(scene.object.kind == *kind, display_name(kind)).clicked() {
-                (*kind).clone_into(&mut scene.object.kind);
-                scene.object.path = None;
-            }
-        }
-    });
+fn object_ui(ui: &mut Ui, scene: &mut Scene, thumbnails: &Thumbnails) {
+    let kinds = OBJECT_KINDS.iter().copied().filter(|kind| *kind != "mesh");
+    if let Some(kind) = controls::object_kind_ui(ui, &scene.object.kind, kinds, 90.0, thumbnails) {
+        kind.clone_into(&mut scene.object.kind);
+        scene.object.path = None;
+    }
 }
 
 fn exposure_ui(ui: &mut Ui, scene: &mut Scene) {

@@ -12,11 +12,7 @@ use glam::{Vec2, Vec3};
 
 use super::pointer::{self, Pointer};
 use crate::app::paint::Brush;
-use crate::app::worker::{RenderedTile, TileDisplay, TileJob};
-
-/// Azimuth and elevation of the viewer when the view opens [degrees]. Nearly along y, the bottoms of deep grooves are visible.
-const AZIMUTH_DEG: f32 = -74.0;
-const ELEVATION_DEG: f32 = 35.0;
+use crate::app::worker::{RenderedTile, TILE_AZIMUTH_DEG, TILE_ELEVATION_DEG, TileDisplay, TileJob};
 
 /// Inputs of a tile image.
 type Inputs = (Tile, Vec<MaterialSpec>, Painted, Option<(Light, Option<Camera>)>);
@@ -42,6 +38,8 @@ pub struct TileState {
     size: [usize; 2],
     /// The picked view direction, and the value of f̄ that is displayed as white.
     pub picked: Option<(Vec3, f32)>,
+    /// Key of the parameter of the surface that the user is changing.
+    pub changing: Option<&'static str>,
     /// The view to restore after painting, which looks straight down.
     before_paint: Option<(f32, f32, f32, Vec2)>,
 }
@@ -60,8 +58,8 @@ pub enum TileMode {
 impl Default for TileState {
     fn default() -> Self {
         Self {
-            azimuth: AZIMUTH_DEG.to_radians(),
-            elevation: ELEVATION_DEG.to_radians(),
+            azimuth: TILE_AZIMUTH_DEG.to_radians(),
+            elevation: TILE_ELEVATION_DEG.to_radians(),
             span: 1.7,
             center: Vec2::splat(0.5),
             show: TileMode::Clay,
@@ -75,6 +73,7 @@ impl Default for TileState {
             inputs: None,
             size: [0, 0],
             picked: None,
+            changing: None,
             before_paint: None,
         }
     }

@@ -51,8 +51,8 @@ pub use section::Section;
 pub use shared::GpuShare;
 pub use slab_lobe::{LobeCurve, SlabLobe, SlabLobeJob, SlabLobeResult};
 pub use target::{FoundSettings, TargetJob, TargetNews, TargetResult};
-pub use thumbnail::{SceneThumbnail, ThumbnailJob};
-pub use tile_image_worker::{RenderedTile, TileDisplay, TileJob, TileResult};
+pub use thumbnail::{Subject, Thumbnail, ThumbnailJob};
+pub use tile_image_worker::{RenderedTile, TILE_AZIMUTH_DEG, TILE_ELEVATION_DEG, TileDisplay, TileJob, TileResult};
 
 /// Starts the thread that renders the tile.
 pub fn spawn_tile(report: impl Fn(TileResult) + Clone + Send + Sync + 'static) -> Option<Worker<TileJob>> {
@@ -139,9 +139,7 @@ impl PreviewWorkers {
 }
 
 /// Starts the thread that renders thumbnails. A thumbnail that fails stays a grey square.
-pub fn spawn_thumbnail(
-    report: impl Fn(SceneThumbnail) + Clone + Send + Sync + 'static,
-) -> Option<Worker<ThumbnailJob>> {
+pub fn spawn_thumbnail(report: impl Fn(Thumbnail) + Clone + Send + Sync + 'static) -> Option<Worker<ThumbnailJob>> {
     let work =
         move |state: &mut thumbnail::ThumbnailWorker, job: ThumbnailJob, context: &runner::JobContext<ThumbnailJob>| {
             thumbnail::work(state, job, context, &report);

@@ -19,6 +19,10 @@ use super::runner::JobContext;
 use super::section::Section;
 use super::tone::color_image;
 
+/// Azimuth and elevation from which a tile is seen at first [degrees]. Nearly along y, the bottoms of deep grooves are
+/// visible.
+pub const TILE_AZIMUTH_DEG: f32 = -74.0;
+pub const TILE_ELEVATION_DEG: f32 = 35.0;
 /// Number of facets in the overlay.
 const FACETS: usize = 1500;
 /// Maximum number of directional lights that replace the environment; each costs one ray per pixel.
