@@ -139,7 +139,7 @@ fn measure(name: String, tile: [&str; 2], color: &'static str, pairs: &[Pair]) -
         let stages = on.times.iter().filter(|(stage, _)| ["transport", "interreflection"].contains(stage));
         let total: f64 = pairs.iter().map(|pair| value(&on, pair).powi(2)).sum();
         let stated = match &on.brdf.representation {
-            Representation::Interreflecting(_, bounced) => bounced.rel_error,
+            Representation::Interreflecting(_, bounced) => bounced.rel_error(),
             _ => 0.0,
         };
         ((error / norm).sqrt(), stages.map(|(_, ms)| ms).sum::<f64>(), (norm / total).sqrt(), stated)

@@ -259,6 +259,40 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
     estimate
 }
 
+/// Estimates the part of the errors of `f̄` that is due to the light between facets. Few pairs suffice if they do not show
+/// an error that may exceed the bound.
+pub(crate) fn estimate_of_bounced(
+    direct: &Direct,
+    bounced: &InterreflectionTable,
+    base_area: f64,
+    bound: ErrorBound,
+) -> ErrorEstimate {
+    let quick = bounced_at(direct, bounced, base_area, QUICK_PAIRS);
+    if quick.may_exceed(bound) { bounced_at(direct, bounced, base_area, PAIRS) } else { quick }
+}
+
+fn bounced_at(direct: &Direct, bounced: &InterreflectionTable, base_area: f64, pairs: PairCount) -> ErrorEstimate {
+    let values = |Pair { i, o }: Pair| {
+        let (mut reflected, mut g) = (DVec3::ZERO, DVec3::ZERO);
+        let area = direct.sums(&[i], o, |_, sum| reflected = sum);
+        if area <= 0.0 {
+            return [DVec3::ZERO; 2];
+        }
+        bounced.eval_lights(&[i], o, |_, value| g = value * base_area);
+        [(reflected + g) / area, g / area]
+    };
+    let all = pairs.evaluate(values, |at| at[0]);
+    let totals = Totals::of(all.iter().map(|at| at[0]));
+    let mut estimate = ErrorEstimate::default();
+    if totals.norm > 0.0 {
+        let of_bounced: f64 = all.iter().map(|at| at[1].length_squared()).sum();
+        estimate.interreflection = bounced.rel_error() * (of_bounced / totals.norm).sqrt();
+        estimate.rel_l2 = estimate.interreflection;
+        estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
+    }
+    estimate
+}
+
 impl ErrorEstimator {
     /// Examines a direct sum over `facets`. `second` is the sum over a second sample of the surface, with
     /// [`SECOND_SAMPLE_DIVISOR`] times fewer facets. Without it, facets count as random samples: their error then is too large,
@@ -313,7 +347,7 @@ impl ErrorEstimator {
     }
 
     fn rel_error_of_bounced(&self) -> f64 {
-        self.bounced.as_ref().map_or(0.0, |(bounced, _)| bounced.rel_error)
+        self.bounced.as_ref().map_or(0.0, |(bounced, _)| bounced.rel_error())
     }
 
     fn examine(&mut self, second: Option<&Direct>, table: f64) {

@@ -263,7 +263,7 @@ fn the_stated_error_of_a_smooth_table_is_its_spread_between_seeds() {
             scene.scene.quality.seed = seed;
             let brdf = Pipeline::new().effective(&scene).unwrap().brdf;
             let Representation::Interreflecting(_, table) = &brdf.representation else { panic!("no interreflection") };
-            stated += table.rel_error / 8.0;
+            stated += table.rel_error() / 8.0;
             let mut values = Vec::new();
             pairs.clone().for_each(|pair| table.eval_lights(&[pair.i], pair.o, |_, g| values.push(g.x)));
             values

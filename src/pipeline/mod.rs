@@ -267,7 +267,9 @@ impl Pipeline {
         times.push(("product", elapsed_ms(start)));
         let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
         let is_low_rank = matches!(brdf.representation, Representation::LowRank(_));
-        if let Some(settings) = &plan.interreflection {
+        let (mut notes, mut close_to_bound) = (notes(&tile.mesh, &facets), close_to_bound);
+        notes.extend(refinement_note);
+        if let Some(first) = plan.interreflection {
             let surface = VisibleSurface {
                 tile: &tile,
                 facets: &facets,
@@ -275,7 +277,11 @@ impl Pipeline {
                 assignment: &materials,
                 material_of_slot: &material_of_slot,
             };
-            brdf = brdf.interreflecting(self.interreflection(&surface, settings, &mut times)?);
+            let light = self.refined_interreflection(&surface, first, (&direct, &settings), &mut times)?;
+            close_to_bound |= light.close_to_bound;
+            notes.extend(light.note(&first, settings.preset));
+            plan.interreflection = Some(light.settings);
+            brdf = brdf.interreflecting(light.table);
         }
         plan.note_times(&times);
         if let Some(errors) = factored {
@@ -301,7 +307,7 @@ impl Pipeline {
             settings,
             times,
             factored,
-            notes: notes(&tile.mesh, &facets).into_iter().chain(refinement_note).collect(),
+            notes,
             health_inputs,
             examined: Arc::default(),
             shading: Arc::new(shading),

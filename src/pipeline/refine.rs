@@ -1,14 +1,16 @@
 //! Refinement: facets, azimuths and the sharpness of shadows are raised until the estimated error of the direct sum is
 //! within the bound of the preset.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::inputs::{Processor, TileInputs};
 use super::stage::elapsed_ms;
-use super::{Keyed, Pipeline, StageTimes};
+use super::{Keyed, Pipeline, StageTimes, VisibleSurface};
 use crate::base::Result;
-use crate::effective::{Direct, ErrorBound, ErrorEstimate, ErrorEstimator, quick_estimate};
-use crate::plan::Refinement;
+use crate::effective::{Direct, ErrorBound, ErrorEstimate, ErrorEstimator, estimate_of_bounced, quick_estimate};
+use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
+use crate::plan::{Preset, Refinement, Settings, finer_interreflection};
 use crate::scene::LoadedScene;
 use crate::visibility::Visibility;
 
@@ -75,8 +77,7 @@ impl Pipeline {
     ) -> Result<RefinedSum> {
         let settings = inputs.settings.clone();
         let mut sum = RefinedSum::new(inputs, visibility, Refinement::NONE);
-        let may_refine = settings.max_refined_facets.is_some();
-        let Some(bound) = settings.error_bound().filter(|_| may_refine) else { return Ok(sum) };
+        let Some(bound) = settings.refinement_bound() else { return Ok(sum) };
         loop {
             let start = Instant::now();
             sum.examine(bound);
@@ -87,6 +88,58 @@ impl Pipeline {
             let inputs = self.tile_inputs(loaded, Processor::Cpu(refinement), times)?;
             let visibility = self.visibility(&inputs, times)?;
             sum = RefinedSum::new(inputs, visibility, refinement);
+        }
+    }
+}
+
+/// Light between facets with raised settings.
+pub(super) struct RefinedInterreflection {
+    pub table: Arc<InterreflectionTable>,
+    pub settings: InterreflectionSettings,
+    pub close_to_bound: bool,
+}
+
+impl RefinedInterreflection {
+    /// A sentence about settings that were raised above the `first` ones, if any were.
+    pub fn note(&self, first: &InterreflectionSettings, preset: Preset) -> Option<String> {
+        let InterreflectionSettings { rays, grid, .. } = self.settings;
+        (self.settings != *first).then(|| {
+            format!(
+                "interreflection refined to {rays} rays per facet and {} x {} directions, because its estimated error was \
+                 larger than `{}` allows",
+                grid.rings,
+                grid.azimuths,
+                preset.name()
+            )
+        })
+    }
+}
+
+impl Pipeline {
+    /// The light between facets, with more rays and directions than those of `first` if its part of the estimated errors is
+    /// larger than the preset allows.
+    pub(super) fn refined_interreflection(
+        &self,
+        surface: &VisibleSurface<'_>,
+        first: InterreflectionSettings,
+        (direct, settings): (&Direct, &Settings),
+        times: &mut StageTimes,
+    ) -> Result<RefinedInterreflection> {
+        let base_area = f64::from(surface.tile.mesh.base_area());
+        let mut refined = first;
+        let mut close_to_bound = false;
+        loop {
+            let table = self.interreflection(surface, &refined, times)?;
+            let next = settings.refinement_bound().and_then(|bound| {
+                let estimate = estimate_of_bounced(direct, &table, base_area, bound);
+                close_to_bound |= estimate.excess(bound) > QUICK_PART;
+                finer_interreflection([&first, &refined], &table, &estimate, bound)
+            });
+            let Some(next) = next else {
+                return Ok(RefinedInterreflection { table, settings: refined, close_to_bound });
+            };
+            self.env.cancel.check()?;
+            refined = next;
         }
     }
 }

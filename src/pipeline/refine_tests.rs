@@ -79,3 +79,21 @@ fn a_scene_that_sets_the_resolution_is_not_refined() {
         assert!(!refines(&outcome) && outcome.times.iter().all(|(name, _)| *name != "error_estimate"), "{setting}");
     }
 }
+
+#[test]
+fn light_between_facets_is_refined_until_its_error_is_within_the_bound() {
+    const MIRRORS: [&str; 3] = [
+        "tile.geometry={ kind = \"pyramids\", height = 0.5 }",
+        "material.default.brdf={ kind = \"ggx\", roughness = 0.08, f0 = 1 }",
+        "effects.interreflection=on",
+    ];
+    let refined = effective(&open("default", "draft", &MIRRORS));
+    let plain = effective(&open("default", "draft", &[&MIRRORS[..], &["quality.adaptive=false"]].concat()));
+    let bound = refined.settings.error_bound().unwrap();
+    let stated = |outcome: &Outcome| outcome.errors().unwrap().estimate();
+    assert!(stated(&plain).may_exceed(bound), "{:?}", stated(&plain));
+    assert!(!stated(&refined).may_exceed(bound), "{:?}", stated(&refined));
+    let note = "interreflection refined to ";
+    assert!(refined.notes.iter().any(|text| text.starts_with(note)), "{:?}", refined.notes);
+    assert!(plain.notes.is_empty(), "{:?}", plain.notes);
+}

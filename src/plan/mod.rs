@@ -22,7 +22,7 @@ use context::Context;
 pub use context::IMAGE_CHECK_PAIRS;
 pub use effects::{effect_names, switch_mut};
 pub use features::{ColorMapFeatures, Costs, SceneFeatures};
-pub use refinement::Refinement;
+pub use refinement::{Refinement, finer_interreflection};
 pub use settings::{Backend, Preset, ProductMethod, Settings, VisibilityMethod};
 pub use slab::{SlabDecision, SlabFeatures, SlabSettings};
 

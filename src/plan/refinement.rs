@@ -2,6 +2,8 @@
 
 use super::Settings;
 use crate::effective::{ErrorBound, ErrorEstimate, FACETS_POWER};
+use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
+use crate::math::directions::PolarGrid;
 
 /// Part of the bound that a refined result should have, so that one refinement usually suffices.
 const AIM: f64 = 0.7;
@@ -13,6 +15,11 @@ const MAX_AZIMUTHS: usize = 384;
 const MAX_WORK: usize = 32;
 /// Largest factor by which refinement narrows the soft step. `standard` then has a tenth of a degree.
 const MAX_SHARPNESS: usize = 8;
+
+/// Rings of the tables of interreflection to which refinement goes, with three times as many azimuths.
+const TABLE_RINGS: [usize; 4] = [8, 12, 16, 24];
+/// Largest factor by which one step raises the rays of interreflection.
+const MAX_RAYS_STEP: usize = 4;
 
 /// Factors by which settings are raised above those of the preset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +83,41 @@ impl Refinement {
     }
 }
 
+/// The settings that should bring the light between facets within `bound`. `estimate` is its part of the errors with the
+/// settings `now`, for which refinement started from `first`. `None` if it is within the bound, or if the work would be
+/// more than [`MAX_WORK`] times that of `first`.
+pub fn finer_interreflection(
+    [first, now]: [&InterreflectionSettings; 2],
+    table: &InterreflectionTable,
+    estimate: &ErrorEstimate,
+    bound: ErrorBound,
+) -> Option<InterreflectionSettings> {
+    if !estimate.may_exceed(bound) {
+        return None;
+    }
+    let total = AIM * table.rel_error() / estimate.excess(bound);
+    // Noise and interpolation may have what the smaller one leaves, but at least an equal part.
+    let relative = |part: f64, other: f64| {
+        let smaller = if other < part { other * other } else { 0.0 };
+        part / (total * total - smaller).max(0.5 * total * total).sqrt()
+    };
+    let noise = relative(table.noise, table.interpolation);
+    let interpolation = relative(table.interpolation, table.noise);
+    // Independent rays would have a square; stratified ones do better.
+    let rays = (noise * noise).clamp(1.0, MAX_RAYS_STEP as f64).ceil() as usize;
+    let finer = TABLE_RINGS.into_iter().filter(|rings| *rings > now.grid.rings);
+    let finer: Vec<_> = finer.take(usize::from(interpolation > 1.0) + usize::from(interpolation > 2.5)).collect();
+    let with = |rays: usize, rings: Option<&usize>| {
+        let grid = rings.map_or(now.grid, |rings| PolarGrid::new(*rings, 3 * rings));
+        InterreflectionSettings { rays: now.rays * rays, grid, ..*now }
+    };
+    let work = |settings: &InterreflectionSettings| (settings.rays * settings.grid.len().pow(2)) as f64;
+    let is_affordable = |next: &InterreflectionSettings| work(next) <= MAX_WORK as f64 * work(first) && next != now;
+    // The table counts more, because its error falls faster with the work.
+    let choices = [with(rays, finer.last()), with(1, finer.last()), with(1, finer.first()), with(rays, None)];
+    choices.into_iter().find(is_affordable)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,5 +163,41 @@ mod tests {
         let most = refinement.apply(&settings());
         assert_eq!((most.facets, most.horizon_azimuths, most.penumbra), (49_152, 192, 0.0025));
         assert!(steps < 6, "{steps}");
+    }
+
+    /// The rays, and the rings of the table, that follow errors of noise and of interpolation which are the error of `f̄`.
+    fn finer(now: [usize; 2], noise: f64, interpolation: f64) -> Option<[usize; 2]> {
+        let with = |[rays, rings]: [usize; 2]| InterreflectionSettings {
+            elements: 6144,
+            rays,
+            bounces: 8,
+            grid: PolarGrid::new(rings, 3 * rings),
+            mirrors: [false; 2],
+        };
+        let table = InterreflectionTable::with_errors(noise, interpolation);
+        let estimate = ErrorEstimate { rel_l2: table.rel_error(), ..ErrorEstimate::default() };
+        let next = finer_interreflection([&with([6, 12]), &with(now)], &table, &estimate, BOUND);
+        next.map(|next| [next.rays, next.grid.rings])
+    }
+
+    #[test]
+    fn more_rays_follow_noise_and_a_finer_table_follows_interpolation() {
+        assert_eq!(finer([6, 12], 0.06, 0.04), None, "within the bound");
+        // 0.15 is to become 0.07 at most: (0.15/0.07)² = 4.6, of which one step takes four.
+        assert_eq!(finer([6, 12], 0.15, 0.001), Some([24, 12]));
+        assert_eq!(finer([6, 12], 0.001, 0.12), Some([6, 16]));
+        assert_eq!(finer([6, 12], 0.001, 0.3), Some([6, 24]));
+    }
+
+    #[test]
+    fn the_work_of_interreflection_ends_its_refinement() {
+        let (mut now, mut steps) = ([6, 12], 0);
+        while let Some(next) = finer(now, 0.5, 0.5) {
+            now = next;
+            steps += 1;
+        }
+        let work = |[rays, rings]: [usize; 2]| rays * PolarGrid::new(rings, 3 * rings).len().pow(2);
+        assert!(work(now) <= MAX_WORK * work([6, 12]) && work(now) > 8 * work([6, 12]), "{now:?}");
+        assert!(steps < 5, "{steps}");
     }
 }

@@ -294,6 +294,11 @@ impl Settings {
         Some(ErrorBound { rel_l2, psnr_db })
     }
 
+    /// The bound to which refinement brings the error; `None` if the settings are not refined.
+    pub fn refinement_bound(&self) -> Option<ErrorBound> {
+        self.error_bound().filter(|_| self.max_refined_facets.is_some())
+    }
+
     /// The part of the reflected light that may be missing because interreflection is left out.
     pub fn bounced_tolerance(&self) -> f64 {
         match self.preset {
