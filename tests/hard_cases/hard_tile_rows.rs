@@ -129,3 +129,39 @@ fn grooves_whose_bottom_few_pairs_see_state_their_error() {
         assert!((errors.rel_l2 / 3.0..errors.rel_l2 * 3.0).contains(&stated), "{name}: {} {stated}", errors.rel_l2);
     }
 }
+
+/// `cargo bench --bench measure -- errors` measures `draft` and `standard`.
+#[test]
+#[ignore = "a minute: 22 tiles with up to 131,072 facets"]
+fn hard_tiles_at_fine_are_within_the_bound_or_warn_of_their_error() {
+    const RAYS: RayCast = RayCast { points: 4096, max_passes: 16, target: 4e-3 };
+    let mut silent = Vec::new();
+    // Level tiles are exact. Sheets with holes take minutes, because refinement goes to its limits; they warn. Between 96
+    // azimuths, thin rods have a wrong projected area at grazing angles, which the estimate misses.
+    const LEFT_OUT: [&str; 3] = ["hole", "leaning hairs", "needles"];
+    let is_examined = |tile: &HardTile| {
+        !matches!(tile.truth, Truth::Level(_)) && !LEFT_OUT.iter().any(|name| tile.name.contains(name))
+    };
+    for tile in all().into_iter().filter(is_examined) {
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = tile.open(folder.path(), "fine", 1);
+        let (pairs, truth) = tile.pairs_and_values(&loaded, &RAYS);
+        let Measured { errors, stated, warns, .. } = measure(&loaded, "fine", 1, &pairs, &truth);
+        let is_within = errors.rel_l2 <= 0.04 && errors.psnr_db >= 43.0;
+        let is_known = warns && (errors.rel_l2 / 3.0..errors.rel_l2 * 3.0).contains(&stated);
+        let text = format!(
+            "{}: {:.2} ± {:.2} %, {:.1} dB, stated {:.2} %{}",
+            tile.name,
+            100.0 * errors.rel_l2,
+            100.0 * truth.std_error,
+            errors.psnr_db,
+            100.0 * stated,
+            if warns { ", warned" } else { "" }
+        );
+        eprintln!("{text}");
+        if !is_within && !is_known {
+            silent.push(text);
+        }
+    }
+    assert!(silent.is_empty(), "{silent:#?}");
+}

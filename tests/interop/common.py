@@ -97,7 +97,8 @@ class Table:
         self.row(*columns)
 
     def row(self, *cells):
-        print("  ".join(str(cell).ljust(width) for cell, width in zip(cells, self.widths)), flush=True)
+        widths = self.widths + [0] * (len(cells) - len(self.widths))
+        print("  ".join(str(cell).ljust(width) for cell, width in zip(cells, widths)), flush=True)
 
     def check(self, condition, *cells):
         self.passed &= bool(condition)
