@@ -222,12 +222,13 @@ impl Totals {
 
 /// Estimates `rel_l2` and `psnr_db` of a direct sum from few pairs, in a small part of the time of an edit. The parts are
 /// left out, and the estimate tends to be too large: facets count as random samples, and convergence as of first order.
-pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate {
+/// Returns the values of the pairs as well, unless the sum is exact.
+pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate, PairValues) {
     let exact_facets = facets.replicates.is_empty();
     let has_coarse = direct.visibility.has_azimuth_step(COARSE.azimuth_step);
     let mut estimate = ErrorEstimate::of_table(0.0);
     if exact_facets && !has_coarse {
-        return estimate;
+        return (estimate, PairValues::default());
     }
     let sum = &direct.sum;
     let deviations = |pair: Pair| {
@@ -244,11 +245,11 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
             (area, reflected, 2.0 * half - reflected - reflected / area * (2.0 * half_area - area))
         });
         if area <= 0.0 {
-            return (DVec3::ZERO, 0.0);
+            return (DVec3::ZERO, 0.0, area);
         }
         let f_bar = reflected / area;
         let coarse = if has_coarse { f_bar_at(direct, COARSE, pair) - f_bar } else { DVec3::ZERO };
-        (f_bar, (difference / area).length_squared() + coarse.length_squared())
+        (f_bar, (difference / area).length_squared() + coarse.length_squared(), area)
     };
     let all = QUICK_PAIRS.evaluate(deviations, |at| at.0);
     let totals = Totals::of(all.iter().map(|at| at.0));
@@ -256,41 +257,42 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> ErrorEstimate 
         estimate.rel_l2 = (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
         estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
     }
-    estimate
+    (estimate, PairValues(all.into_iter().map(|(f_bar, _, area)| (f_bar, area)).collect()))
 }
+
+/// `f̄` without interreflection and `a_v` of the first pairs of an estimate.
+#[derive(Debug, Default)]
+pub(crate) struct PairValues(Vec<(DVec3, f64)>);
 
 /// Estimates the part of the errors of `f̄` that is due to the light between facets. Few pairs suffice if they do not show
-/// an error that may exceed the bound.
+/// an error that may exceed the bound; their values may be `known`.
 pub(crate) fn estimate_of_bounced(
     direct: &Direct,
-    bounced: &InterreflectionTable,
-    base_area: f64,
+    (bounced, base_area): (&InterreflectionTable, f64),
+    known: &PairValues,
     bound: ErrorBound,
 ) -> ErrorEstimate {
-    let quick = bounced_at(direct, bounced, base_area, QUICK_PAIRS);
-    if quick.may_exceed(bound) { bounced_at(direct, bounced, base_area, PAIRS) } else { quick }
-}
-
-fn bounced_at(direct: &Direct, bounced: &InterreflectionTable, base_area: f64, pairs: PairCount) -> ErrorEstimate {
-    let values = |Pair { i, o }: Pair| {
-        let (mut reflected, mut g) = (DVec3::ZERO, DVec3::ZERO);
-        let area = direct.sums(&[i], o, |_, sum| reflected = sum);
-        if area <= 0.0 {
-            return [DVec3::ZERO; 2];
-        }
-        bounced.eval_lights(&[i], o, |_, value| g = value * base_area);
-        [(reflected + g) / area, g / area]
+    let of = |pair: Pair| {
+        let mut reflected = DVec3::ZERO;
+        let area = direct.sums(&[pair.i], pair.o, |_, sum| reflected = sum);
+        (if area > 0.0 { reflected / area } else { DVec3::ZERO }, area)
     };
-    let all = pairs.evaluate(values, |at| at[0]);
-    let totals = Totals::of(all.iter().map(|at| at[0]));
-    let mut estimate = ErrorEstimate::default();
-    if totals.norm > 0.0 {
+    let error = |values: &[(DVec3, f64)]| {
+        let pairs = mirror_biased_pairs(values.len(), PAIRS_SEED);
+        let of_pair = |(pair, &(f_bar, area)): (&Pair, &(DVec3, f64))| {
+            let mut g = DVec3::ZERO;
+            bounced.eval_lights(&[pair.i], pair.o, |_, value| g = value * base_area);
+            if area > 0.0 { [f_bar + g / area, g / area] } else { [DVec3::ZERO; 2] }
+        };
+        let all: Vec<[DVec3; 2]> = pairs.iter().zip(values).map(of_pair).collect();
+        let totals = Totals::of(all.iter().map(|at| at[0]));
         let of_bounced: f64 = all.iter().map(|at| at[1].length_squared()).sum();
-        estimate.interreflection = bounced.rel_error() * (of_bounced / totals.norm).sqrt();
-        estimate.rel_l2 = estimate.interreflection;
-        estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
-    }
-    estimate
+        let rel_l2 = if totals.norm > 0.0 { bounced.rel_error() * (of_bounced / totals.norm).sqrt() } else { 0.0 };
+        let psnr_db = totals.psnr_db(rel_l2);
+        ErrorEstimate { rel_l2, psnr_db, interreflection: rel_l2, ..ErrorEstimate::default() }
+    };
+    let quick = if known.0.is_empty() { error(&QUICK_PAIRS.evaluate(of, |at| at.0)) } else { error(&known.0) };
+    if quick.may_exceed(bound) { error(&PAIRS.evaluate(of, |at| at.0)) } else { quick }
 }
 
 impl ErrorEstimator {

@@ -20,7 +20,7 @@ pub use direct::facet_sum::FacetSum;
 pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
 pub use error_estimate::{ErrorBound, ErrorEstimate, ErrorEstimator};
-pub(crate) use error_estimate::{FACETS_POWER, SECOND_SAMPLE_DIVISOR, estimate_of_bounced, quick_estimate};
+pub(crate) use error_estimate::{FACETS_POWER, PairValues, SECOND_SAMPLE_DIVISOR, estimate_of_bounced, quick_estimate};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};

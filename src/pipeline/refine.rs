@@ -8,7 +8,9 @@ use super::inputs::{Processor, TileInputs};
 use super::stage::elapsed_ms;
 use super::{Keyed, Pipeline, StageTimes, VisibleSurface};
 use crate::base::Result;
-use crate::effective::{Direct, ErrorBound, ErrorEstimate, ErrorEstimator, estimate_of_bounced, quick_estimate};
+use crate::effective::{
+    Direct, ErrorBound, ErrorEstimate, ErrorEstimator, PairValues, estimate_of_bounced, quick_estimate,
+};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
 use crate::plan::{Preset, Refinement, Settings, finer_interreflection};
 use crate::scene::LoadedScene;
@@ -25,13 +27,15 @@ pub(super) struct RefinedSum {
     pub direct: Direct,
     /// The estimate from the replicates of this sum, if its error was close to the bound.
     pub estimate: Option<ErrorEstimate>,
+    /// Values of this sum that its quick estimate found.
+    pub values: PairValues,
     pub refinement: Refinement,
 }
 
 impl RefinedSum {
     fn new(inputs: TileInputs, visibility: Keyed<Visibility>, refinement: Refinement) -> Self {
         let direct = Direct::new(inputs.sum.clone(), visibility.value.clone());
-        Self { inputs, visibility, direct, estimate: None, refinement }
+        Self { inputs, visibility, direct, estimate: None, values: PairValues::default(), refinement }
     }
 
     /// Examines the sum, if a quick estimate does not rule out that its error exceeds the bound.
@@ -39,8 +43,12 @@ impl RefinedSum {
         let TileInputs { facets, material_of_slot, materials, .. } = &self.inputs;
         let is_first = self.refinement == Refinement::NONE;
         let is_quick = is_first && !facets.has_rare_part();
-        if is_quick && quick_estimate(&self.direct, facets).excess(bound) <= QUICK_PART {
-            return;
+        if is_quick {
+            let (quick, values) = quick_estimate(&self.direct, facets);
+            self.values = values;
+            if quick.excess(bound) <= QUICK_PART {
+                return;
+            }
         }
         let slots = (&material_of_slot[..], &materials.materials[..]);
         self.estimate = Some(ErrorEstimator::new(&self.direct, facets, slots, None, 0.0, None).estimate());
@@ -122,7 +130,7 @@ impl Pipeline {
         &self,
         surface: &VisibleSurface<'_>,
         first: InterreflectionSettings,
-        (direct, settings): (&Direct, &Settings),
+        (direct, values, settings): (&Direct, &PairValues, &Settings),
         times: &mut StageTimes,
     ) -> Result<RefinedInterreflection> {
         let base_area = f64::from(surface.tile.mesh.base_area());
@@ -131,7 +139,7 @@ impl Pipeline {
         loop {
             let table = self.interreflection(surface, &refined, times)?;
             let next = settings.refinement_bound().and_then(|bound| {
-                let estimate = estimate_of_bounced(direct, &table, base_area, bound);
+                let estimate = estimate_of_bounced(direct, (&table, base_area), values, bound);
                 close_to_bound |= estimate.excess(bound) > QUICK_PART;
                 finer_interreflection([&first, &refined], &table, &estimate, bound)
             });
