@@ -11,6 +11,8 @@ const CLICK_DISTANCE: f32 = 6.0;
 #[derive(Debug, Default)]
 pub struct EventQueue {
     waiting: VecDeque<Event>,
+    /// Number of events of the last call that no frame has taken. A window that is not shown offers them again.
+    given: usize,
 }
 
 impl EventQueue {
@@ -19,6 +21,8 @@ impl EventQueue {
     /// for that of its clicks and drags, so a click before a movement in the same frame would hit what lies at its end.
     /// Returns true if events wait for the next frame.
     pub fn split(&mut self, events: &mut Vec<Event>) -> bool {
+        let back: Vec<Event> = events.drain(..self.given.min(events.len())).collect();
+        back.into_iter().rev().for_each(|event| self.waiting.push_front(event));
         self.waiting.extend(events.drain(..));
         let mut button_at: Option<Pos2> = None;
         while let Some(event) = self.waiting.pop_front() {
@@ -31,12 +35,18 @@ impl EventQueue {
                 && at.distance(button_at) > CLICK_DISTANCE
             {
                 self.waiting.push_front(event);
-                return true;
+                break;
             }
             button_at = at.filter(|_| is_button).or(button_at);
             events.push(event);
         }
-        false
+        self.given = events.len();
+        !self.waiting.is_empty()
+    }
+
+    /// Notes that a frame took the events.
+    pub fn taken(&mut self) {
+        self.given = 0;
     }
 }
 
@@ -70,6 +80,7 @@ mod tests {
             let more = queued && queue.split(&mut events);
             harness.input_mut().events.append(&mut events);
             harness.step();
+            queue.taken();
             if !more {
                 return harness.state().clone();
             }
@@ -113,5 +124,22 @@ mod tests {
         let mut events = sent.to_vec();
         assert!(!EventQueue::default().split(&mut events));
         assert_eq!(events, sent);
+    }
+
+    #[test]
+    fn events_that_no_frame_took_keep_their_order() {
+        let (here, there) = (pos2(5.0, 5.0), pos2(90.0, 5.0));
+        let first = [button(here, true), button(here, false)];
+        let second = [Event::PointerMoved(there), button(there, true), button(there, false)];
+        let mut queue = EventQueue::default();
+        let mut events = [&first[..], &second[..]].concat();
+        for _ in 0..3 {
+            assert!(queue.split(&mut events));
+            assert_eq!(events, first, "a window that is not shown offers them again");
+        }
+        queue.taken();
+        events.clear();
+        assert!(!queue.split(&mut events));
+        assert_eq!(events, second);
     }
 }

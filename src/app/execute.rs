@@ -223,7 +223,6 @@ impl Editor {
             self.messages.put(Level::Note, "paste", "No material has been copied yet: use Copy at a material first.");
             return;
         };
-        self.messages.clear("paste");
         self.set_material(slot, copied, "Paste a material");
     }
 
@@ -239,11 +238,12 @@ impl Editor {
     }
 
     fn set_material(&mut self, slot: &str, material: MaterialSpec, action: &'static str) {
+        self.messages.clear("paste");
         let mut scene = (**self.document.scene()).clone();
-        let pasted = MaterialSpec { name: slot.to_owned(), ..material };
+        let changed = MaterialSpec { name: slot.to_owned(), ..material };
         match scene.materials.iter_mut().find(|material| material.name == slot) {
-            Some(place) => *place = pasted,
-            None => scene.materials.push(pasted),
+            Some(place) => *place = changed,
+            None => scene.materials.push(changed),
         }
         match scene.validate() {
             Ok(()) => self.document.edit_as(action, scene),

@@ -9,7 +9,9 @@ impl Editor {
     pub(super) fn render_thumbnails(&mut self) {
         let is_refined =
             |preview: &RenderedPreview| preview.grade >= Grade::Refining && preview.version == self.document.version();
-        let idle = self.object.preview.as_deref().is_some_and(is_refined) && self.exporting.is_none();
+        let is_idle = self.object.preview.as_deref().is_some_and(is_refined) && self.exporting.is_none();
+        let varies = matches!(self.dialog, Some(Dialog::Vary(_)));
+        let job = self.thumbnails.end_frame(is_idle && !varies && self.background.thumbnails.is_some());
         let Some(worker) = &self.background.thumbnails else { return };
         if let Some(Dialog::Vary(variants)) = &mut self.dialog {
             // A new job cancels that of the gallery.
@@ -19,11 +21,9 @@ impl Editor {
             }
             return;
         }
-        if idle {
-            if let Some(job) = self.thumbnails.job() {
-                worker.submit(job);
-            }
-        } else if self.thumbnails.is_waiting() {
+        if let Some(job) = job {
+            worker.submit(job);
+        } else if !is_idle && self.thumbnails.is_waiting() {
             worker.cancel();
             self.thumbnails.interrupted();
         }

@@ -223,6 +223,7 @@ impl eframe::App for Window {
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.events.taken();
         let mut editor = self.editor.borrow_mut();
         let Some(editor) = editor.as_mut() else { return };
         let ctx = ui.ctx().clone();

@@ -264,13 +264,13 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate
 #[derive(Debug, Default)]
 pub(crate) struct PairValues(Vec<(DVec3, f64)>);
 
-/// Estimates the part of the errors of `f̄` that is due to the light between facets. Few pairs suffice if they do not show
-/// an error that may exceed the bound; their values may be `known`.
+/// Estimates the part of the errors of `f̄` that is due to the light between facets. Few pairs suffice if they show less than
+/// a part of the bound; their values may be `known`.
 pub(crate) fn estimate_of_bounced(
     direct: &Direct,
     (bounced, base_area): (&InterreflectionTable, f64),
     known: &PairValues,
-    bound: ErrorBound,
+    (bound, part): (ErrorBound, f64),
 ) -> ErrorEstimate {
     let of = |pair: Pair| {
         let mut reflected = DVec3::ZERO;
@@ -292,7 +292,7 @@ pub(crate) fn estimate_of_bounced(
         ErrorEstimate { rel_l2, psnr_db, interreflection: rel_l2, ..ErrorEstimate::default() }
     };
     let quick = if known.0.is_empty() { error(&QUICK_PAIRS.evaluate(of, |at| at.0)) } else { error(&known.0) };
-    if quick.may_exceed(bound) { error(&PAIRS.evaluate(of, |at| at.0)) } else { quick }
+    if quick.excess(bound) > part { error(&PAIRS.evaluate(of, |at| at.0)) } else { quick }
 }
 
 impl ErrorEstimator {

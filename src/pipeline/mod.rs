@@ -344,20 +344,21 @@ impl Pipeline {
         Ok((brdf, Some(errors)))
     }
 
-    /// Interreflection. Rays are cast again only if the facets changed.
+    /// Interreflection. Rays are cast again only if the facets or the number of rays changed. `refined` settings leave the
+    /// results of the main ones in the memo.
     fn interreflection(
         &self,
         surface: &VisibleSurface<'_>,
-        settings: &InterreflectionSettings,
+        (settings, refined): (&InterreflectionSettings, bool),
         times: &mut StageTimes,
     ) -> Result<Arc<InterreflectionTable>> {
         let VisibleSurface { tile, facets, visibility, assignment, material_of_slot } = *surface;
         let materials = &assignment.materials[..];
         let samplers = &self.get(PrepareSamplers { materials }, times)?;
         let grid = &self.get(BuildCells { tile }, times)?.value;
-        let transport = &self.get(CastTransport { tile, grid, facets, settings }, times)?;
+        let transport = &self.get(CastTransport { tile, grid, facets, settings, refined }, times)?;
         let reflection = &Reflection { assignment: assignment.key, material_of_slot, materials, samplers };
-        Ok(self.get(Interreflect { tile, facets, visibility, transport, reflection, settings }, times)?.value)
+        Ok(self.get(Interreflect { tile, facets, visibility, transport, reflection, settings, refined }, times)?.value)
     }
 
     /// The tile's mesh.

@@ -137,12 +137,16 @@ impl Pipeline {
         let mut refined = first;
         let mut close_to_bound = false;
         loop {
-            let table = self.interreflection(surface, &refined, times)?;
+            let table = self.interreflection(surface, (&refined, refined != first), times)?;
+            let start = Instant::now();
             let next = settings.refinement_bound().and_then(|bound| {
-                let estimate = estimate_of_bounced(direct, (&table, base_area), values, bound);
+                let estimate = estimate_of_bounced(direct, (&table, base_area), values, (bound, QUICK_PART));
                 close_to_bound |= estimate.excess(bound) > QUICK_PART;
                 finer_interreflection([&first, &refined], &table, &estimate, bound)
             });
+            if settings.refinement_bound().is_some() {
+                times.push(("error_estimate", elapsed_ms(start)));
+            }
             let Some(next) = next else {
                 return Ok(RefinedInterreflection { table, settings: refined, close_to_bound });
             };

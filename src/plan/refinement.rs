@@ -114,7 +114,11 @@ pub fn finer_interreflection(
     let work = |settings: &InterreflectionSettings| (settings.rays * settings.grid.len().pow(2)) as f64;
     let is_affordable = |next: &InterreflectionSettings| work(next) <= MAX_WORK as f64 * work(first) && next != now;
     // The table counts more, because its error falls faster with the work.
-    let choices = [with(rays, finer.last()), with(1, finer.last()), with(1, finer.first()), with(rays, None)];
+    let affordable = |rings: Option<&usize>| {
+        let most = MAX_WORK as f64 * work(first) / work(&with(1, rings));
+        with(rays.min(most as usize).max(1), rings)
+    };
+    let choices = [affordable(finer.last()), affordable(finer.first()), affordable(None)];
     choices.into_iter().find(is_affordable)
 }
 
@@ -197,7 +201,10 @@ mod tests {
             steps += 1;
         }
         let work = |[rays, rings]: [usize; 2]| rays * PolarGrid::new(rings, 3 * rings).len().pow(2);
-        assert!(work(now) <= MAX_WORK * work([6, 12]) && work(now) > 8 * work([6, 12]), "{now:?}");
+        assert!(work(now) <= MAX_WORK * work([6, 12]) && work(now) > 24 * work([6, 12]), "{now:?}");
         assert!(steps < 5, "{steps}");
+        // Rays alone end at the limit.
+        assert_eq!(finer([96, 12], 0.5, 0.001), Some([192, 12]));
+        assert_eq!(finer([192, 12], 0.5, 0.001), None);
     }
 }

@@ -5,7 +5,7 @@ table of biscale, with one scattering and with all; the difference is the bounce
     python tests/interop/bounces_check.py
 
 BISCALE names the program, DRJIT_LIBLLVM_PATH an LLVM library of version 15 or later if that of the system is older. Without
-LLVM, Mitsuba traces one path at a time, and fewer of them.
+LLVM, Mitsuba traces one path at a time, which is too slow: the check is skipped.
 """
 
 import tempfile
@@ -75,9 +75,10 @@ def scattered_light(mesh, middle, material, pairs, paths):
 
 def main():
     print(f"Mitsuba {mi.__version__}")
-    compiled = llvm_works()
-    mi.set_variant("llvm_ad_rgb" if compiled else "scalar_rgb")
-    paths = 1 << 16 if compiled else 1 << 12
+    if not llvm_works():
+        skip("Mitsuba finds no LLVM that works")
+    mi.set_variant("llvm_ad_rgb")
+    paths = 1 << 16
     pairs = random_pairs(PAIRS, seed=5, lowest_deg=LOWEST_DEG)
     table = Table("tile, material", "direct light", "share bounced", "difference", "Mitsuba's error", "allowed")
     with tempfile.TemporaryDirectory() as folder:
@@ -96,7 +97,7 @@ def main():
                 allowed = limits["matte" not in name]
                 share = norm / np.linalg.norm(ours[0])
                 percent = (f"{100 * value:.2f} %" for value in (direct, share, difference, noise, allowed))
-                table.check(difference < allowed + 2 * noise, f"{tile}, {name}", *percent)
+                table.check(direct < 0.01 and noise < 0.5 * allowed and difference < allowed + 2 * noise, f"{tile}, {name}", *percent)
     table.finish()
 
 

@@ -98,12 +98,13 @@ pub(super) fn number_ui(
     let (speed, digits) = ((soft_max - soft_min).min(100.0) / 400.0, decimals(now));
     let drag = DragValue::new(&mut now).range(min..=max).speed(speed).max_decimals(digits).suffix(suffix);
     let drag = ui.add_sized([NUMBER_WIDTH, ui.spacing().interact_size.y], finite(drag, wrong));
+    let is_focused = slider.has_focus() || drag.has_focus();
     let response = slider | drag;
     number_menu(&response, &mut now, default);
     if now.is_finite() && now != tidy(before) {
         *value = Value::Float(now.clamp(min, max));
     }
-    response.dragged() || response.has_focus()
+    response.dragged() || is_focused
 }
 
 /// Returns the decimals that show three significant digits.

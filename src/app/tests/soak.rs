@@ -159,12 +159,14 @@ fn two_thousand_random_edits_neither_crash_nor_grow() {
     if std::env::var_os(OWN_PROCESS).is_some() {
         return soak(2000, 2);
     }
-    let status = std::process::Command::new(std::env::current_exe().unwrap())
+    let run = std::process::Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "app::tests::soak::two_thousand_random_edits_neither_crash_nor_grow"])
         .args(["--ignored", "--nocapture"])
         .env(OWN_PROCESS, "1")
-        .status();
-    assert!(status.unwrap().success());
+        .output()
+        .unwrap();
+    eprint!("{}", String::from_utf8_lossy(&run.stderr));
+    assert!(run.status.success() && String::from_utf8_lossy(&run.stdout).contains("1 passed"));
 }
 
 /// Repeatedly writes settings and a recovery file into the shared folder. `other_ended` returns true if the other

@@ -27,15 +27,16 @@ pub enum Length {
 /// Returns the length that a parameter of the surface sets in a section, if it is one.
 pub fn length_of(tile: &Tile, key: &str) -> Option<Length> {
     let pitch = |count: u32| tile.size.x / count.max(1) as f32;
+    // A whole number of cells fits the tile.
+    let fitted = |spacing: f32| tile.size.x / (tile.size.x / spacing).round().max(1.0);
     Some(match (&tile.geometry, key) {
         (Geometry::Grooves(grooves), "depth") => Length::Up(grooves.depth),
         (Geometry::Grooves(grooves), "bottom_width") => Length::Across(grooves.bottom_width * pitch(grooves.count)),
-        (Geometry::Pyramids(pyramids), "height") => Length::Up(pyramids.height),
-        (Geometry::Pyramids(pyramids), "spacing") => Length::Across(pyramids.spacing),
-        (Geometry::Pyramids(pyramids), "base_size") => Length::Across(pyramids.base_size * pyramids.spacing),
+        (Geometry::Pyramids(pyramids), "height") => Length::Up(pyramids.height * (1.0 - pyramids.truncation)),
+        (Geometry::Pyramids(pyramids), "spacing") => Length::Across(fitted(pyramids.spacing)),
+        (Geometry::Pyramids(pyramids), "base_size") => Length::Across(pyramids.base_size * fitted(pyramids.spacing)),
         (Geometry::Rods(rods), "length") => Length::Up(rods.length * rods.lean_deg.to_radians().cos()),
         (Geometry::Rods(rods), "radius") => Length::Across(2.0 * rods.radius),
-        (Geometry::Weave(weave), "warp_width") => Length::Across(weave.warp_width * pitch(weave.warp_count)),
         (Geometry::Weave(weave), "warp_height") => Length::Up(weave.warp_height),
         (Geometry::Weave(weave), "weft_height") => Length::Up(weave.weft_height),
         (Geometry::Heightfield(field), "height_scale") => Length::Up(field.height_scale.abs()),
@@ -112,6 +113,9 @@ mod tests {
         assert_eq!(length_of(&grooves, "depth"), Some(Length::Up(0.3)));
         assert_eq!(length_of(&grooves, "bottom_width"), Some(Length::Across(0.2)));
         assert_eq!(length_of(&grooves, "side_angle_deg"), None);
+        let pyramids = tile("{ kind = \"pyramids\", spacing = 0.55, height = 0.4, truncation = 0.5 }");
+        assert_eq!(length_of(&pyramids, "height"), Some(Length::Up(0.2)));
+        assert_eq!(length_of(&pyramids, "spacing"), Some(Length::Across(0.5)));
         let rods = tile("{ kind = \"rods\", radius = 0.05, length = 0.4, lean_deg = 60 }");
         assert_eq!(length_of(&rods, "radius"), Some(Length::Across(0.1)));
         let Some(Length::Up(up)) = length_of(&rods, "length") else { panic!("the length of rods goes up") };

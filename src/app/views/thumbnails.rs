@@ -1,4 +1,4 @@
-//! Thumbnails of scenes and of choices. They are rendered when they are drawn for the first time.
+//! Thumbnails of scenes and of choices. They are rendered when a view asks for them for the first time.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -29,7 +29,7 @@ pub struct Thumbnails(Rc<RefCell<State>>);
 struct State {
     /// Textures; `None` if a subject cannot be rendered.
     textures: HashMap<Subject, Option<TextureHandle>>,
-    /// Subjects that were drawn in this frame without a texture.
+    /// Subjects without a texture that a view asked for in this frame.
     missing: Vec<Subject>,
     requested: Option<Subject>,
 }
@@ -43,11 +43,12 @@ impl Thumbnails {
         state.requested = None;
     }
 
-    /// Returns the job of the next missing thumbnail, unless one is being rendered. Open pickers come before the gallery.
-    pub fn job(&self) -> Option<ThumbnailJob> {
+    /// Ends a frame. Returns the job of the next thumbnail that it missed, unless one is being rendered or `is_idle` is
+    /// false. Open pickers come before the gallery.
+    pub fn end_frame(&self, is_idle: bool) -> Option<ThumbnailJob> {
         let mut state = self.0.borrow_mut();
         let missing = std::mem::take(&mut state.missing);
-        if state.requested.is_some() {
+        if state.requested.is_some() || !is_idle {
             return None;
         }
         let choice = missing.iter().find(|subject| !matches!(subject, Subject::Scene(_)));

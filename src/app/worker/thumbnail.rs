@@ -1,5 +1,6 @@
 //! Thumbnails of shipped scenes, of choices and of variants of the open scene, one per job.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use crate::base::{Cancel, Result};
@@ -74,10 +75,14 @@ pub fn work(
     context: &JobContext<ThumbnailJob>,
     report: &dyn Fn(Thumbnail),
 ) {
-    let image = render(worker, &job, context.cancel);
+    // A fault must not keep other thumbnails waiting.
+    let image = catch_unwind(AssertUnwindSafe(|| render(worker, &job, context.cancel)));
+    if image.is_err() {
+        *worker = ThumbnailWorker::default();
+    }
     // A cancelled thumbnail is submitted again.
     if !context.cancel.is_set() {
-        report(Thumbnail { job, image: image.ok().map(Arc::new) });
+        report(Thumbnail { job, image: image.ok().and_then(Result::ok).map(Arc::new) });
     }
 }
 

@@ -99,6 +99,8 @@ pub struct CastTransport<'a> {
     pub grid: &'a Arc<PeriodicGrid>,
     pub facets: &'a Keyed<Facets>,
     pub settings: &'a InterreflectionSettings,
+    /// True if the settings are refined: the rays of the main settings stay in the memo.
+    pub refined: bool,
 }
 
 impl Stage for CastTransport<'_> {
@@ -108,6 +110,10 @@ impl Stage for CastTransport<'_> {
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.key("tile", &self.tile.key).key("facets", &self.facets.key);
         key.counts("rays", [self.settings.elements, self.settings.rays]);
+    }
+
+    fn slot(&self) -> &'static str {
+        if self.refined { "refined transport" } else { Self::NAME }
     }
 
     fn run(&self, env: &Env) -> Result<Transport> {
@@ -124,6 +130,8 @@ pub struct Interreflect<'a> {
     pub transport: &'a Keyed<Transport>,
     pub reflection: &'a Reflection<'a>,
     pub settings: &'a InterreflectionSettings,
+    /// True if the settings are refined: the light of the main settings stays in the memo.
+    pub refined: bool,
 }
 
 impl Stage for Interreflect<'_> {
@@ -134,6 +142,10 @@ impl Stage for Interreflect<'_> {
         key.key("transport", &self.transport.key).key("visibility", &self.visibility.key);
         self.reflection.hash_into(key);
         key.debug("settings", self.settings);
+    }
+
+    fn slot(&self) -> &'static str {
+        if self.refined { "refined interreflection" } else { Self::NAME }
     }
 
     fn run(&self, env: &Env) -> Result<InterreflectionTable> {
