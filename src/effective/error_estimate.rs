@@ -20,15 +20,13 @@ use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
 /// Numbers of direction pairs that an estimate for a whole BRDF examines.
-const PAIRS: PairCount = PairCount { min: 200, min_effective: 16.0 };
-/// Numbers of direction pairs of a quick estimate.
-const QUICK_PAIRS: PairCount = PairCount { min: 16, min_effective: 1.5 };
+pub(super) const PAIRS: PairCount = PairCount { min: 200, min_effective: 16.0 };
 /// Most pairs of an estimate.
 const MAX_PAIRS: usize = 6400;
 /// Seed of these pairs.
-const PAIRS_SEED: u64 = 20_261_123;
-/// Factor by which the true error may exceed an estimate. With it, no hard tile is out of its bound without a warning
-/// (`cargo bench --bench measure -- errors`).
+pub(super) const PAIRS_SEED: u64 = 20_261_123;
+/// Factor by which the true error may exceed an estimate. With it, no hard tile is out of its bound without a warning at
+/// `draft` and `standard` (`cargo bench --bench measure -- errors`).
 const UNCERTAINTY: f64 = 1.25;
 /// The variance of a sum over systematic samples falls with the number of facets to this power: 1 for random samples, 2
 /// for smooth integrands.
@@ -50,8 +48,6 @@ const TYPICAL_WEIGHT: f64 = 0.3;
 const HALF: Resolution = Resolution { azimuth_step: 2, softness: 1.0 };
 const QUARTER: Resolution = Resolution { azimuth_step: 4, softness: 1.0 };
 const SHARPER: Resolution = Resolution { azimuth_step: 1, softness: 0.5 };
-/// Fewer azimuths and a wider soft step at once, for a quick estimate.
-const COARSE: Resolution = Resolution { azimuth_step: 2, softness: 2.0 };
 
 /// The error that a preset allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +89,7 @@ impl ErrorEstimate {
         if percent < 0.1 { format!("{percent:.3} %{psnr}") } else { format!("{percent:.1} %{psnr}") }
     }
 
-    fn of_table(table: f64) -> Self {
+    pub(super) fn of_table(table: f64) -> Self {
         Self { rel_l2: table, table, ..Self::default() }
     }
 
@@ -154,7 +150,7 @@ impl Deviations {
 }
 
 /// `f̄` of `direct` with visibility of a lower resolution, for directions above the horizon.
-fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: Pair) -> DVec3 {
+pub(super) fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: Pair) -> DVec3 {
     let count = direct.sum.facet_count();
     let (mut v_i, mut v_o) = (vec![0.0; count], vec![0.0; count]);
     direct.visibility.fill_at(resolution, i, &mut v_i);
@@ -165,15 +161,15 @@ fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: Pair) -> DVe
 
 /// Number of direction pairs of an estimate. It is doubled while few pairs hold most of the sum of squares, such as those
 /// that see the bottom of deep grooves.
-struct PairCount {
-    min: usize,
+pub(super) struct PairCount {
+    pub min: usize,
     /// Smallest effective number of pairs, `(Σ|f̄|²)² / Σ|f̄|⁴`.
-    min_effective: f64,
+    pub min_effective: f64,
 }
 
 impl PairCount {
     /// Evaluates `of` at enough pairs. `f_bar` returns `f̄` of an evaluation.
-    fn evaluate<T: Send>(&self, of: impl Fn(Pair) -> T + Sync, f_bar: impl Fn(&T) -> DVec3) -> Vec<T> {
+    pub fn evaluate<T: Send>(&self, of: impl Fn(Pair) -> T + Sync, f_bar: impl Fn(&T) -> DVec3) -> Vec<T> {
         let mut all: Vec<T> = Vec::new();
         let mut count = self.min;
         loop {
@@ -193,9 +189,9 @@ impl PairCount {
 }
 
 /// Sums of squares over the pairs of an estimate, and the largest value.
-struct Totals {
+pub(super) struct Totals {
     /// Sum of `|f̄|²`.
-    norm: f64,
+    pub norm: f64,
     /// Largest value of `f̄`.
     peak: f64,
     /// Number of values: three per pair.
@@ -203,7 +199,7 @@ struct Totals {
 }
 
 impl Totals {
-    fn of(f_bars: impl Iterator<Item = DVec3>) -> Self {
+    pub fn of(f_bars: impl Iterator<Item = DVec3>) -> Self {
         let mut totals = Self { norm: 0.0, peak: 0.0, values: 0 };
         for f_bar in f_bars {
             totals.norm += f_bar.length_squared();
@@ -214,85 +210,10 @@ impl Totals {
     }
 
     /// The PSNR of a relative L2 [dB].
-    fn psnr_db(&self, rel_l2: f64) -> Option<f64> {
+    pub fn psnr_db(&self, rel_l2: f64) -> Option<f64> {
         let rms = rel_l2 * (self.norm / self.values as f64).sqrt();
         (rms > 0.0).then(|| 20.0 * (self.peak / rms).log10())
     }
-}
-
-/// Estimates `rel_l2` and `psnr_db` of a direct sum from few pairs, in a small part of the time of an edit. The parts are
-/// left out, and the estimate tends to be too large: facets count as random samples, and convergence as of first order.
-/// Returns the values of the pairs as well, unless the sum is exact.
-pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate, PairValues) {
-    let exact_facets = facets.replicates.is_empty();
-    let has_coarse = direct.visibility.has_azimuth_step(COARSE.azimuth_step);
-    let mut estimate = ErrorEstimate::of_table(0.0);
-    if exact_facets && !has_coarse {
-        return (estimate, PairValues::default());
-    }
-    let sum = &direct.sum;
-    let deviations = |pair: Pair| {
-        let Pair { i, o } = pair;
-        let (area, reflected, difference) = direct.with_visibility(i, o, |v_i, v_o| {
-            let (area, reflected) = (sum.projected_area(v_o, o), sum.sum(i, o, v_i, v_o));
-            if exact_facets || area <= 0.0 {
-                return (area, reflected, DVec3::ZERO);
-            }
-            // The squared difference of two halves of the sample has the variance of their sum as its expectation.
-            let half: Vec<f32> =
-                v_o.iter().zip(&facets.replicates).map(|(v, replicate)| v * f32::from(replicate % 2)).collect();
-            let (half_area, half) = (sum.projected_area(&half, o), sum.sum(i, o, v_i, &half));
-            (area, reflected, 2.0 * half - reflected - reflected / area * (2.0 * half_area - area))
-        });
-        if area <= 0.0 {
-            return (DVec3::ZERO, 0.0, area);
-        }
-        let f_bar = reflected / area;
-        let coarse = if has_coarse { f_bar_at(direct, COARSE, pair) - f_bar } else { DVec3::ZERO };
-        (f_bar, (difference / area).length_squared() + coarse.length_squared(), area)
-    };
-    let all = QUICK_PAIRS.evaluate(deviations, |at| at.0);
-    let totals = Totals::of(all.iter().map(|at| at.0));
-    if totals.norm > 0.0 {
-        estimate.rel_l2 = (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
-        estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
-    }
-    (estimate, PairValues(all.into_iter().map(|(f_bar, _, area)| (f_bar, area)).collect()))
-}
-
-/// `f̄` without interreflection and `a_v` of the first pairs of an estimate.
-#[derive(Debug, Default)]
-pub(crate) struct PairValues(Vec<(DVec3, f64)>);
-
-/// Estimates the part of the errors of `f̄` that is due to the light between facets. Few pairs suffice if they show less than
-/// a part of the bound; their values may be `known`.
-pub(crate) fn estimate_of_bounced(
-    direct: &Direct,
-    (bounced, base_area): (&InterreflectionTable, f64),
-    known: &PairValues,
-    (bound, part): (ErrorBound, f64),
-) -> ErrorEstimate {
-    let of = |pair: Pair| {
-        let mut reflected = DVec3::ZERO;
-        let area = direct.sums(&[pair.i], pair.o, |_, sum| reflected = sum);
-        (if area > 0.0 { reflected / area } else { DVec3::ZERO }, area)
-    };
-    let error = |values: &[(DVec3, f64)]| {
-        let pairs = mirror_biased_pairs(values.len(), PAIRS_SEED);
-        let of_pair = |(pair, &(f_bar, area)): (&Pair, &(DVec3, f64))| {
-            let mut g = DVec3::ZERO;
-            bounced.eval_lights(&[pair.i], pair.o, |_, value| g = value * base_area);
-            if area > 0.0 { [f_bar + g / area, g / area] } else { [DVec3::ZERO; 2] }
-        };
-        let all: Vec<[DVec3; 2]> = pairs.iter().zip(values).map(of_pair).collect();
-        let totals = Totals::of(all.iter().map(|at| at[0]));
-        let of_bounced: f64 = all.iter().map(|at| at[1].length_squared()).sum();
-        let rel_l2 = if totals.norm > 0.0 { bounced.rel_error() * (of_bounced / totals.norm).sqrt() } else { 0.0 };
-        let psnr_db = totals.psnr_db(rel_l2);
-        ErrorEstimate { rel_l2, psnr_db, interreflection: rel_l2, ..ErrorEstimate::default() }
-    };
-    let quick = if known.0.is_empty() { error(&QUICK_PAIRS.evaluate(of, |at| at.0)) } else { error(&known.0) };
-    if quick.excess(bound) > part { error(&PAIRS.evaluate(of, |at| at.0)) } else { quick }
 }
 
 impl ErrorEstimator {

@@ -5,6 +5,7 @@ mod effective_brdf;
 mod error_estimate;
 mod gpu_tile;
 pub mod low_rank;
+mod quick_estimate;
 pub mod shading_table;
 mod tint;
 mod view_paths;
@@ -20,11 +21,12 @@ pub use direct::facet_sum::FacetSum;
 pub use direct::forced::mean_colors;
 pub use effective_brdf::{EffectiveBrdf, Representation};
 pub use error_estimate::{ErrorBound, ErrorEstimate, ErrorEstimator};
-pub(crate) use error_estimate::{FACETS_POWER, PairValues, SECOND_SAMPLE_DIVISOR, estimate_of_bounced, quick_estimate};
+pub(crate) use error_estimate::{FACETS_POWER, SECOND_SAMPLE_DIVISOR};
 pub use gpu_tile::{GpuTileInput, GpuVisibilityInput, HeightMarchInput, ShadowMapInput, SliceInput};
 pub use low_rank::bvndf::VisibilityRows;
 pub use low_rank::rotated_basis::{BasisGrid, RotatedBasis, RotatedLobe};
 pub use low_rank::{ChannelTables, Factors, LowRank, LowRankSettings};
+pub(crate) use quick_estimate::{PairValues, estimate_of_bounced, quick_estimate};
 
 pub use shading_table::content::TableContent;
 #[cfg(feature = "gpu")]

@@ -260,14 +260,14 @@ impl Pipeline {
     fn outcome_of(&self, scene: &Scene, refined: RefinedSum, mut times: StageTimes) -> Result<Outcome> {
         let refinement_note = refined.note();
         let RefinedSum { inputs, visibility, direct, estimate, values, .. } = refined;
-        let (close_to_bound, algorithm) = (estimate.is_some(), inputs.plan.algorithm);
+        let (mut close_to_bound, algorithm) = (estimate.is_some(), inputs.plan.algorithm);
         let keys = self.shading_keys(&inputs, &visibility);
         let start = Instant::now();
         let (mut brdf, factored) = self.product(direct.clone(), &inputs, &visibility, keys.lobes)?;
         times.push(("product", elapsed_ms(start)));
         let TileInputs { tile, settings, materials, facets, material_of_slot, mut plan, .. } = inputs;
         let is_low_rank = matches!(brdf.representation, Representation::LowRank(_));
-        let (mut notes, mut close_to_bound) = (notes(&tile.mesh, &facets), close_to_bound);
+        let mut notes = notes(&tile.mesh, &facets);
         notes.extend(refinement_note);
         if let Some(first) = plan.interreflection {
             let surface = VisibleSurface {
@@ -280,7 +280,7 @@ impl Pipeline {
             let light = self.refined_interreflection(&surface, first, (&direct, &values, &settings), &mut times)?;
             close_to_bound |= light.close_to_bound;
             notes.extend(light.note(&first, settings.preset));
-            plan.interreflection = Some(light.settings);
+            plan.note_interreflection(light.settings);
             brdf = brdf.interreflecting(light.table);
         }
         plan.note_times(&times);

@@ -1,5 +1,5 @@
 //! Refinement: facets, azimuths and the sharpness of shadows are raised until the estimated error of the direct sum is
-//! within the bound of the preset.
+//! within the bound of the preset, and so are the rays and the directions of the light between facets.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -100,10 +100,11 @@ impl Pipeline {
     }
 }
 
-/// Light between facets with raised settings.
+/// The light between facets, and the settings to which refinement brought it.
 pub(super) struct RefinedInterreflection {
     pub table: Arc<InterreflectionTable>,
     pub settings: InterreflectionSettings,
+    /// True if the estimate was too close to the bound to rule refinement out.
     pub close_to_bound: bool,
 }
 
@@ -138,18 +139,15 @@ impl Pipeline {
         let mut close_to_bound = false;
         loop {
             let table = self.interreflection(surface, (&refined, refined != first), times)?;
+            let done =
+                |close_to_bound| RefinedInterreflection { table: table.clone(), settings: refined, close_to_bound };
+            let Some(bound) = settings.refinement_bound() else { return Ok(done(false)) };
             let start = Instant::now();
-            let next = settings.refinement_bound().and_then(|bound| {
-                let estimate = estimate_of_bounced(direct, (&table, base_area), values, (bound, QUICK_PART));
-                close_to_bound |= estimate.excess(bound) > QUICK_PART;
-                finer_interreflection([&first, &refined], &table, &estimate, bound)
-            });
-            if settings.refinement_bound().is_some() {
-                times.push(("error_estimate", elapsed_ms(start)));
-            }
-            let Some(next) = next else {
-                return Ok(RefinedInterreflection { table, settings: refined, close_to_bound });
-            };
+            let estimate = estimate_of_bounced(direct, (&table, base_area), values, (bound, QUICK_PART));
+            times.push(("error_estimate", elapsed_ms(start)));
+            close_to_bound |= estimate.excess(bound) > QUICK_PART;
+            let next = finer_interreflection([&first, &refined], &table, &estimate, bound);
+            let Some(next) = next else { return Ok(done(close_to_bound)) };
             self.env.cancel.check()?;
             refined = next;
         }

@@ -96,4 +96,9 @@ fn light_between_facets_is_refined_until_its_error_is_within_the_bound() {
     let note = "interreflection refined to ";
     assert!(refined.notes.iter().any(|text| text.starts_with(note)), "{:?}", refined.notes);
     assert!(plain.notes.is_empty(), "{:?}", plain.notes);
+    let reason = |outcome: &Outcome| {
+        let effect = outcome.plan.effects.iter().find(|effect| effect.name == "interreflection");
+        effect.unwrap().reason.clone()
+    };
+    assert!(reason(&refined).contains("; refined to ") && !reason(&plain).contains("refined"), "{}", reason(&refined));
 }

@@ -133,6 +133,20 @@ impl Plan {
         }
     }
 
+    /// Records the resolution of interreflection, which refinement may have raised.
+    pub fn note_interreflection(&mut self, settings: InterreflectionSettings) {
+        if self.interreflection == Some(settings) {
+            return;
+        }
+        self.interreflection = Some(settings);
+        if let Some(effect) = self.effect_mut("interreflection") {
+            let InterreflectionSettings { rays, grid, .. } = settings;
+            effect
+                .reason
+                .push_str(&format!("; refined to {rays} rays and {} x {} directions", grid.rings, grid.azimuths));
+        }
+    }
+
     /// Records the milliseconds of stages beside what was predicted for their effects.
     pub fn note_times(&mut self, times: &[(&'static str, f64)]) {
         for (stage, ms) in times {

@@ -1,5 +1,8 @@
 //! The gallery: thumbnails of the shipped scenes.
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 use crate::scene::shipped;
 use eframe::egui::{self, RichText, ScrollArea, Sense, Ui};
 
@@ -52,14 +55,16 @@ impl Gallery {
 /// Draws a scene of the gallery, and returns true if it is clicked.
 fn item(ui: &mut Ui, (name, side, is_current): (&'static str, f32, bool), thumbnails: &Thumbnails) -> bool {
     let subject = Subject::Scene(name);
-    let response = thumbnails.button(ui, (subject, &title(name)), side, is_current, Sense::click_and_drag());
+    let response = thumbnails.button(ui, (subject, title(name)), side, is_current, Sense::click_and_drag());
     response.dnd_set_drag_payload(DraggedScene(name));
     if response.dragged() {
         thumbnails.drag_image(ui.ctx(), subject);
     }
-    let description = shipped::description(name).unwrap_or_default();
-    let tip = format!("{name}\n{description}\nDrag it onto a material to use the scene's material there.");
-    response.on_hover_text(tip).clicked()
+    let tip = |ui: &mut Ui| {
+        let description = shipped::description(name).unwrap_or_default();
+        ui.label(format!("{name}\n{description}\nDrag it onto a material to use the scene's material there."));
+    };
+    response.on_hover_ui(tip).clicked()
 }
 
 /// Returns true if a scene's name and description contain all words of the search text.
@@ -69,9 +74,17 @@ fn matches_search(name: &str, search: &str) -> bool {
     search.to_lowercase().split_whitespace().all(|word| text.contains(word))
 }
 
-/// Returns the caption of a scene: `Velvet spread` for `fig6a_velvet_spread`, `Slab: window` for `slab_window`. Scenes that
+/// Returns the caption of a shipped scene, or an empty one for another name. All captions are made once, because the gallery
+/// draws them in every frame.
+fn title(name: &str) -> &'static str {
+    static TITLES: LazyLock<HashMap<&str, String>> =
+        LazyLock::new(|| shipped::names().map(|name| (name, new_title(name))).collect());
+    TITLES.get(name).map_or("", |title| title)
+}
+
+/// Makes the caption of a scene: `Velvet spread` for `fig6a_velvet_spread`, `Slab: window` for `slab_window`. Scenes that
 /// show one subject are told apart by their figures.
-pub fn title(name: &str) -> String {
+fn new_title(name: &str) -> String {
     let subject = subject(name);
     let repeats = |other: &str| other != name && self::subject(other) == subject;
     match name.split('_').find(|part| part.starts_with("fig")) {
@@ -120,7 +133,7 @@ mod tests {
         assert_eq!(title("slab_fig5_30"), "Slab: light at 30°");
         assert_eq!(title("slab_fig7_leaf_glass"), "Slab: leaf glass (fig7)");
         assert_eq!(title("fig1a_noise_color_map"), "Colours: noise");
-        let mut titles: Vec<String> = shipped::names().map(title).collect();
+        let mut titles: Vec<&str> = shipped::names().map(title).collect();
         assert!(titles.iter().all(|title| !title.contains('_')), "{titles:?}");
         titles.sort();
         let count = titles.len();

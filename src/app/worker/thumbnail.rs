@@ -24,7 +24,7 @@ pub const SIDE: usize = 112;
 /// Maximum number of directional lights that replace an environment.
 const LIGHTS: usize = 12;
 
-/// What a thumbnail shows.
+/// Subject of a thumbnail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Subject {
     /// A shipped scene.
