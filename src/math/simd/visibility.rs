@@ -52,9 +52,11 @@ multiversion! {
     }
 }
 
-/// Tangent of the difference of two horizons above which they belong to different parts of the surface and are not
-/// interpolated.
+/// Two horizons belong to different parts of the surface, and are not interpolated, if the tangent of their difference is
+/// above [`JUMP`], or if their slopes differ by more than [`JUMP_PART`] of the higher one. Far parts have low horizons:
+/// their jumps are small, but at grazing angles they decide what is seen.
 const JUMP: f32 = 0.1;
+const JUMP_PART: f32 = 0.5;
 
 /// Slope of the change from one azimuth's visibility to the next one's, per azimuth step, if their horizons differ.
 pub const SWITCH_RATE: f32 = 6.0;
@@ -75,7 +77,7 @@ multiversion! {
             let (before, after) = (taps.above(from), taps.above(to));
             let either = before + (after - before) * changed;
             // The tangent of the difference of two angles is the difference of their tangents over 1 + their product.
-            let is_jump = (to - from).abs() > JUMP * (1.0 + from * to);
+            let is_jump = (to - from).abs() > (JUMP * (1.0 + from * to)).min(JUMP_PART * from.max(to));
             *out = if is_jump { either } else { soft(taps.between(from, to)) };
         }
     }
