@@ -20,7 +20,7 @@ use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
 /// Numbers of direction pairs that an estimate for a whole BRDF examines.
-pub(super) const PAIRS: PairCount = PairCount { known: 800, min_effective: 16.0, examined: 200 };
+pub(super) const PAIRS: PairCount = PairCount { min: 200, min_effective: 16.0 };
 /// Most pairs of an estimate.
 const MAX_PAIRS: usize = 6400;
 /// Seed of these pairs.
@@ -159,31 +159,24 @@ pub(super) fn f_bar_at(direct: &Direct, resolution: Resolution, Pair { i, o }: P
     if area > 0.0 { direct.sum.sum(i, o, &v_i, &v_o) / area } else { DVec3::ZERO }
 }
 
-/// Numbers of direction pairs of an estimate.
+/// Number of direction pairs of an estimate. It is doubled while few pairs hold most of the sum of squares, such as those
+/// that see the bottom of deep grooves.
 pub(super) struct PairCount {
-    /// Pairs of which `f̄` is known. Their number is doubled while few of them hold most of the sum of squares, such as
-    /// those that see the bottom of deep grooves.
-    pub known: usize,
+    pub min: usize,
     /// Smallest effective number of pairs, `(Σ|f̄|²)² / Σ|f̄|⁴`.
     pub min_effective: f64,
-    /// Pairs whose errors are examined.
-    pub examined: usize,
 }
-
-/// Part of the examined pairs that are drawn evenly. The others are drawn in proportion to `|f̄|²`, because errors are large
-/// where `f̄` is.
-const EVEN_PART: f64 = 0.25;
 
 impl PairCount {
     /// Evaluates `of` at enough pairs. `f_bar` returns `f̄` of an evaluation.
-    pub fn evaluate<T: Send>(&self, of: impl Fn(Pair) -> T + Sync, f_bar: impl Fn(&T) -> DVec3) -> Vec<(Pair, T)> {
-        let mut all: Vec<(Pair, T)> = Vec::new();
-        let mut count = self.known;
+    pub fn evaluate<T: Send>(&self, of: impl Fn(Pair) -> T + Sync, f_bar: impl Fn(&T) -> DVec3) -> Vec<T> {
+        let mut all: Vec<T> = Vec::new();
+        let mut count = self.min;
         loop {
             let pairs = mirror_biased_pairs(count, PAIRS_SEED);
-            all.par_extend(pairs[all.len()..].par_iter().map(|&pair| (pair, of(pair))));
+            all.par_extend(pairs[all.len()..].par_iter().map(|&pair| of(pair)));
             let (mut norm, mut squares) = (0.0, 0.0);
-            for value in all.iter().map(|(_, at)| f_bar(at).length_squared()) {
+            for value in all.iter().map(|at| f_bar(at).length_squared()) {
                 norm += value;
                 squares += value * value;
             }
@@ -192,26 +185,6 @@ impl PairCount {
             }
             count *= 2;
         }
-    }
-
-    /// Draws the pairs to examine from pairs with known `f̄`, by systematic sampling. Returns the index of each with its
-    /// weight: weighted sums over them estimate sums over all pairs.
-    pub fn draw(&self, f_bars: &[DVec3]) -> Vec<(usize, f64)> {
-        let norm: f64 = f_bars.iter().map(|f_bar| f_bar.length_squared()).sum();
-        let even = EVEN_PART / f_bars.len() as f64;
-        let mut drawn = Vec::with_capacity(self.examined);
-        let mut expected = 0.0;
-        let mut reached = 0;
-        for (at, f_bar) in f_bars.iter().enumerate() {
-            let probability = if norm > 0.0 { even + (1.0 - EVEN_PART) * f_bar.length_squared() / norm } else { 0.0 };
-            expected += probability * self.examined as f64;
-            let next = (expected + 0.5).floor() as usize;
-            if next > reached {
-                drawn.push((at, (next - reached) as f64 / (probability * self.examined as f64)));
-                reached = next;
-            }
-        }
-        drawn
     }
 }
 
@@ -301,16 +274,12 @@ impl ErrorEstimator {
     }
 
     fn examine(&mut self, second: Option<&Direct>, table: f64) {
-        let known = PAIRS.evaluate(|pair| self.f_bar_and_bounced(pair), |at| at.0 + at.1);
-        let f_bars: Vec<DVec3> = known.iter().map(|(_, (f_bar, bounced))| f_bar + bounced).collect();
-        let totals = Totals::of(f_bars.iter().copied());
+        let all = PAIRS.evaluate(|pair| self.deviations(second, pair), |at| at.f_bar + at.bounced);
+        let totals = Totals::of(all.iter().map(|at| at.f_bar + at.bounced));
         if totals.norm <= 0.0 {
             return;
         }
-        let drawn = PAIRS.draw(&f_bars);
-        let examined: Vec<(Deviations, f64)> =
-            drawn.into_par_iter().map(|(at, weight)| (self.deviations(second, known[at].0), weight)).collect();
-        let total = |of: &dyn Fn(&Deviations) -> f64| examined.iter().map(|(at, weight)| weight * of(at)).sum::<f64>();
+        let total = |of: &dyn Fn(&Deviations) -> f64| all.iter().map(of).sum::<f64>();
         let random = total(&|at| at.random_variance().element_sum());
         if second.is_some() && random > 0.0 {
             // The squared difference of two samples has the sum of their variances as its expectation.
@@ -330,31 +299,12 @@ impl ErrorEstimator {
         let azimuths = self.azimuth_ratio * relative(half * half);
         let soft_step = self.soft_step_ratio * relative(sharper * sharper);
         let (facets, visibility) = (relative(variance), azimuths.hypot(soft_step));
-        let bounced: f64 = known.iter().map(|(_, (_, bounced))| bounced.length_squared()).sum();
+        let bounced = total(&|at| at.bounced.length_squared());
         let interreflection = self.rel_error_of_bounced() * relative(bounced);
         let rel_l2 = facets.hypot(visibility).hypot(table).hypot(interreflection);
         let psnr_db = totals.psnr_db(rel_l2);
         self.estimate =
             ErrorEstimate { rel_l2, psnr_db, facets, visibility, table, interreflection, azimuths, soft_step };
-    }
-
-    /// `f̄` of a pair without interreflection, and the part of interreflection.
-    fn f_bar_and_bounced(&self, Pair { i, o }: Pair) -> (DVec3, DVec3) {
-        let mut reflected = DVec3::ZERO;
-        let area = self.direct.sums(&[i], o, |_, sum| reflected = sum);
-        if area <= 0.0 {
-            return (DVec3::ZERO, DVec3::ZERO);
-        }
-        (reflected / area, self.bounced_over(area, i, o))
-    }
-
-    /// The part of `f̄` that facets send to each other, for a projected area.
-    fn bounced_over(&self, area: f64, i: Vec3, o: Vec3) -> DVec3 {
-        let mut part = DVec3::ZERO;
-        if let Some((bounced, base_area)) = &self.bounced {
-            bounced.eval_lights(&[i], o, |_, g| part = g * (base_area / area));
-        }
-        part
     }
 
     /// The change of `f̄` from the resolution of the result to the first of others, and from each to the next.
@@ -389,7 +339,9 @@ impl ErrorEstimator {
             return deviations;
         }
         deviations.f_bar = parts.iter().map(|part| part.1).sum::<DVec3>() / area;
-        deviations.bounced = self.bounced_over(area, i, o);
+        if let Some((bounced, base_area)) = &self.bounced {
+            bounced.eval_lights(&[i], o, |_, g| deviations.bounced = g * (base_area / area));
+        }
         if !self.replicates.is_empty() {
             for (deviation, (part_area, reflected)) in deviations.replicates.iter_mut().zip(&parts) {
                 *deviation = (reflected - deviations.f_bar * part_area) * (REPLICATES as f64 / area);

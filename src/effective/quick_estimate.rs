@@ -1,17 +1,16 @@
 //! Estimates of errors from few direction pairs, which rule out that a result must be refined.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::Direct;
-use super::error_estimate::{ErrorBound, ErrorEstimate, PAIRS, PairCount, Totals, f_bar_at};
+use super::error_estimate::{ErrorBound, ErrorEstimate, PAIRS, PAIRS_SEED, PairCount, Totals, f_bar_at};
 use crate::geometry::Facets;
 use crate::interreflection::InterreflectionTable;
-use crate::metrics::Pair;
+use crate::metrics::{Pair, mirror_biased_pairs};
 use crate::visibility::Resolution;
 
 /// Numbers of direction pairs.
-const QUICK_PAIRS: PairCount = PairCount { known: 64, min_effective: 1.5, examined: 16 };
+const QUICK_PAIRS: PairCount = PairCount { min: 16, min_effective: 1.5 };
 /// Fewer azimuths and a wider soft step at once.
 const COARSE: Resolution = Resolution { azimuth_step: 2, softness: 2.0 };
 
@@ -25,49 +24,39 @@ pub(crate) fn quick_estimate(direct: &Direct, facets: &Facets) -> (ErrorEstimate
     if exact_facets && !has_coarse {
         return (estimate, PairValues::default());
     }
-    let known = QUICK_PAIRS.evaluate(|pair| f_bar_and_area(direct, pair), |at| at.0);
-    let f_bars: Vec<DVec3> = known.iter().map(|(_, (f_bar, _))| *f_bar).collect();
-    let totals = Totals::of(f_bars.iter().copied());
     let sum = &direct.sum;
-    let squared_deviation = |pair: Pair| {
+    let deviations = |pair: Pair| {
         let Pair { i, o } = pair;
-        let (f_bar, difference) = direct.with_visibility(i, o, |v_i, v_o| {
+        let (area, reflected, difference) = direct.with_visibility(i, o, |v_i, v_o| {
             let (area, reflected) = (sum.projected_area(v_o, o), sum.sum(i, o, v_i, v_o));
-            if area <= 0.0 {
-                return (DVec3::ZERO, DVec3::ZERO);
-            }
-            if exact_facets {
-                return (reflected / area, DVec3::ZERO);
+            if exact_facets || area <= 0.0 {
+                return (area, reflected, DVec3::ZERO);
             }
             // The squared difference of two halves of the sample has the variance of their sum as its expectation.
             let half: Vec<f32> =
                 v_o.iter().zip(&facets.replicates).map(|(v, replicate)| v * f32::from(replicate % 2)).collect();
             let (half_area, half) = (sum.projected_area(&half, o), sum.sum(i, o, v_i, &half));
-            (reflected / area, (2.0 * half - reflected - reflected / area * (2.0 * half_area - area)) / area)
+            (area, reflected, 2.0 * half - reflected - reflected / area * (2.0 * half_area - area))
         });
+        if area <= 0.0 {
+            return (DVec3::ZERO, 0.0, area);
+        }
+        let f_bar = reflected / area;
         let coarse = if has_coarse { f_bar_at(direct, COARSE, pair) - f_bar } else { DVec3::ZERO };
-        difference.length_squared() + coarse.length_squared()
+        (f_bar, (difference / area).length_squared() + coarse.length_squared(), area)
     };
-    let drawn = QUICK_PAIRS.draw(&f_bars);
-    let examined: Vec<f64> =
-        drawn.into_par_iter().map(|(at, weight)| weight * squared_deviation(known[at].0)).collect();
+    let all = QUICK_PAIRS.evaluate(deviations, |at| at.0);
+    let totals = Totals::of(all.iter().map(|at| at.0));
     if totals.norm > 0.0 {
-        estimate.rel_l2 = (examined.iter().sum::<f64>() / totals.norm).sqrt();
+        estimate.rel_l2 = (all.iter().map(|at| at.1).sum::<f64>() / totals.norm).sqrt();
         estimate.psnr_db = totals.psnr_db(estimate.rel_l2);
     }
-    (estimate, PairValues(known))
+    (estimate, PairValues(all.into_iter().map(|(f_bar, _, area)| (f_bar, area)).collect()))
 }
 
-/// `f̄` without interreflection, and `a_v`.
-fn f_bar_and_area(direct: &Direct, Pair { i, o }: Pair) -> (DVec3, f64) {
-    let mut reflected = DVec3::ZERO;
-    let area = direct.sums(&[i], o, |_, sum| reflected = sum);
-    (if area > 0.0 { reflected / area } else { DVec3::ZERO }, area)
-}
-
-/// `f̄` without interreflection and `a_v` of pairs of an estimate.
+/// `f̄` without interreflection and `a_v` of the first pairs of an estimate.
 #[derive(Debug, Default)]
-pub(crate) struct PairValues(Vec<(Pair, (DVec3, f64))>);
+pub(crate) struct PairValues(Vec<(DVec3, f64)>);
 
 /// Estimates the part of the errors of `f̄` that is due to the light between facets. Few pairs suffice if they show less than
 /// a part of the bound; their values may be `known`.
@@ -77,14 +66,19 @@ pub(crate) fn estimate_of_bounced(
     known: &PairValues,
     (bound, part): (ErrorBound, f64),
 ) -> ErrorEstimate {
-    let of = |pair: Pair| f_bar_and_area(direct, pair);
-    let error = |values: &[(Pair, (DVec3, f64))]| {
-        let of_pair = |&(pair, (f_bar, area)): &(Pair, (DVec3, f64))| {
+    let of = |pair: Pair| {
+        let mut reflected = DVec3::ZERO;
+        let area = direct.sums(&[pair.i], pair.o, |_, sum| reflected = sum);
+        (if area > 0.0 { reflected / area } else { DVec3::ZERO }, area)
+    };
+    let error = |values: &[(DVec3, f64)]| {
+        let pairs = mirror_biased_pairs(values.len(), PAIRS_SEED);
+        let of_pair = |(pair, &(f_bar, area)): (&Pair, &(DVec3, f64))| {
             let mut g = DVec3::ZERO;
             bounced.eval_lights(&[pair.i], pair.o, |_, value| g = value * base_area);
             if area > 0.0 { [f_bar + g / area, g / area] } else { [DVec3::ZERO; 2] }
         };
-        let all: Vec<[DVec3; 2]> = values.iter().map(of_pair).collect();
+        let all: Vec<[DVec3; 2]> = pairs.iter().zip(values).map(of_pair).collect();
         let totals = Totals::of(all.iter().map(|at| at[0]));
         let of_bounced: f64 = all.iter().map(|at| at[1].length_squared()).sum();
         let rel_l2 = if totals.norm > 0.0 { bounced.rel_error() * (of_bounced / totals.norm).sqrt() } else { 0.0 };
