@@ -178,6 +178,6 @@ fn hairs_hide_as_much_between_azimuths_as_at_them() {
         (0..AZIMUTHS).map(ratio).sum::<f64>() / AZIMUTHS as f64
     };
     let means = [0.0, 0.25, 0.5].map(mean_at);
-    // Sampling scatters the ratios by 2.5 %. Interpolation of all small differences gave 1.10 half-way.
+    // Sampling scatters the ratios by 2.5 %. If all small differences were interpolated, the mean would be 1.11 half-way.
     assert!(means.iter().all(|mean| (mean - 1.0).abs() < 0.04), "{means:?}");
 }
