@@ -316,7 +316,7 @@ impl Settings {
         /// Smallest share that is computed with all rays and the finer table: what `draft` may leave out.
         const LARGE_SHARE: f64 = 0.35;
         /// Smallest roughness of lobes in the coarser table.
-        const WIDE_LOBE: f32 = 0.15;
+        const WIDE_LOBE: f32 = 0.2;
         let (elements, [few, all], grids) = match self.preset {
             Preset::Draft => (2048_usize, [2_usize, 6], [[8, 24], [8, 24]]),
             Preset::Standard | Preset::Wu2011 => (6144, [2, 6], [[8, 24], [12, 36]]),
