@@ -167,7 +167,7 @@ fn horizon_visibility_is_a_linear_transition_about_the_interpolated_slope() {
 #[test]
 fn a_facet_switches_between_azimuths_if_their_horizons_differ_by_more_than_a_tenth_of_a_radian() {
     let (blocked, free) = (1e9, -0.02);
-    for elevation in [0.05_f32, 0.8, 1.5] {
+    for elevation in [0.3_f32, 0.8, 1.5] {
         // 0.09 and 0.11 apart at any height, or at the ends of the range.
         let [low, near, far] = [0.0, 0.09, 0.11].map(|more: f32| (elevation - 0.06 + more).tan());
         let from = [low, low, blocked, free, blocked];
@@ -182,6 +182,17 @@ fn a_facet_switches_between_azimuths_if_their_horizons_differ_by_more_than_a_ten
         }
         assert!(at.between(low, far) < 1.0, "{elevation}: interpolation would differ");
     }
+}
+
+#[test]
+fn a_facet_switches_between_azimuths_if_one_horizon_is_less_than_half_as_high() {
+    let at = taps(0.5, 0.05_f32.atan(), 100.0);
+    let (from, to) = ([0.025, 0.041], [0.08, 0.08]);
+    let mut out = [f32::NAN; 2];
+    stepped_visibility(&from, &to, &[0.9; 2], &at, &mut out);
+    let interpolated = at.between(from[1], to[1]).clamp(0.0, 1.0);
+    assert!((out[0] - 1.0).abs() < 1e-5 && (out[1] - interpolated).abs() < 1e-5, "{out:?}");
+    assert!(at.between(from[0], to[0]) < 0.9 && interpolated < 0.9, "the two rules would agree");
 }
 
 #[test]
