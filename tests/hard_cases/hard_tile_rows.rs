@@ -149,7 +149,7 @@ fn reference(loaded: &LoadedScene, pairs: &[Pair]) -> TrueValues {
 
 /// `cargo bench --bench measure -- errors` measures `draft` and `standard`.
 #[test]
-#[ignore = "a minute: 21 tiles with up to 131,072 facets"]
+#[ignore = "minutes: 24 tiles with up to 131,072 facets"]
 fn hard_tiles_at_fine_are_within_the_bound_or_warn_of_their_error() {
     const RAYS: RayCast = RayCast { points: 4096, max_passes: 16, target: 4e-3 };
     let mut silent = Vec::new();
