@@ -7,9 +7,9 @@ fn above(taps: VisibilityTaps, slope: f32) -> f32 {
     return clamp(taps.base - taps.scale * slope, 0.0, 1.0);
 }
 
-// If the tangent of the difference of two horizons exceeds JUMP, or their slopes differ by more than JUMP_PART of the
-// higher one, they belong to different surfaces. There visibility switches between the azimuths over 1/SWITCH of their
-// distance. The constants are those of src/math/simd/visibility.rs.
+// If the tangent of the difference of two horizons exceeds JUMP, or JUMP_PART of the higher slope where that is less,
+// they belong to different surfaces. There visibility switches between the azimuths over 1/SWITCH of their distance. The
+// constants are those of src/math/simd/visibility.rs.
 const JUMP: f32 = 0.1;
 const JUMP_PART: f32 = 0.5;
 const SWITCH: f32 = 6.0;
@@ -20,7 +20,7 @@ fn between_slices(facet: u32, taps: VisibilityTaps, horizons: vec2f, hidden: vec
     let switch_at = f32(facet * 2654435769u) / 4294967296.0;
     let changed = clamp((taps.blend - switch_at) * SWITCH + 0.5, 0.0, 1.0);
     let either = mix(above(taps, horizons.x), above(taps, horizons.y), changed);
-    let largest = min(JUMP * (1.0 + horizons.x * horizons.y), JUMP_PART * max(horizons.x, horizons.y));
+    let largest = (1.0 + horizons.x * horizons.y) * min(JUMP, JUMP_PART * max(horizons.x, horizons.y));
     let is_jump = abs(horizons.y - horizons.x) > largest;
     let open = select(clamp(between(taps, horizons), 0.0, 1.0), either, is_jump);
     return max(open - mix(hidden.x, hidden.y, changed), 0.0);

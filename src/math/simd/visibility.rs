@@ -53,8 +53,8 @@ multiversion! {
 }
 
 /// Two horizons belong to different parts of the surface, and are not interpolated, if the tangent of their difference is
-/// above [`JUMP`], or if their slopes differ by more than [`JUMP_PART`] of the higher one. Far parts have low horizons:
-/// their jumps are small, but at grazing angles they decide what is seen.
+/// above [`JUMP`], or above [`JUMP_PART`] of the higher slope where that is less. Far parts have low horizons: their
+/// jumps are small, but at grazing angles they decide what is seen.
 const JUMP: f32 = 0.1;
 const JUMP_PART: f32 = 0.5;
 
@@ -77,7 +77,7 @@ multiversion! {
             let (before, after) = (taps.above(from), taps.above(to));
             let either = before + (after - before) * changed;
             // The tangent of the difference of two angles is the difference of their tangents over 1 + their product.
-            let is_jump = (to - from).abs() > (JUMP * (1.0 + from * to)).min(JUMP_PART * from.max(to));
+            let is_jump = (to - from).abs() > (1.0 + from * to) * JUMP.min(JUMP_PART * from.max(to));
             *out = if is_jump { either } else { soft(taps.between(from, to)) };
         }
     }
