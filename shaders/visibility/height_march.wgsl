@@ -35,8 +35,8 @@ const FREE: f32 = -0.020002667;
 const BLOCKED: f32 = 1e9;
 // The number of edges of one family that a walk may cross, in addition to those of sixteen tiles.
 const MIN_LINES: u32 = 8192u;
-// Slopes below this are not resolved.
-const MIN_SLOPE: f32 = 0.005;
+// The smallest slope that is resolved, as in src/visibility/mod.rs.
+const MIN_SLOPE: f32 = 0.01;
 
 // If set, the output is the number of crossed edges, for tests.
 override COUNTING: bool = false;
@@ -55,10 +55,21 @@ fn height_at(column: f32, row: f32) -> f32 {
 
 var<private> crossings: u32;
 
-// The highest slope at the crossings of one family of edges, and at least `min_slope`. `across` and `along` hold the
-// start and the speed of the walk, across the edges and along them.
-fn highest_slope(edges: u32, across: vec2f, along: vec2f, max_crossings: u32, z: f32, min_slope: f32) -> f32 {
-    var slope = min_slope;
+// A walk over one family of edges: the start and the speed across the edges and along them, the largest number of
+// crossings, and the smallest slope that is resolved.
+struct Walk {
+    across: vec2f,
+    along: vec2f,
+    max_crossings: u32,
+    min_slope: f32,
+}
+
+// The highest slope at the crossings of one family of edges, and at least `known`.
+fn highest_slope(edges: u32, walk: Walk, z: f32, known: f32) -> f32 {
+    let across = walk.across;
+    let along = walk.along;
+    let min_slope = walk.min_slope;
+    var slope = known;
     let step = 1.0 / abs(across.y);
     let sign_across = sign(across.y);
     var first = select(ceil(across.x) - 1.0, floor(across.x) + 1.0, across.y > 0.0);
@@ -67,10 +78,14 @@ fn highest_slope(edges: u32, across: vec2f, along: vec2f, max_crossings: u32, z:
         first += sign_across;
     }
     let begin = (first - across.x) * sign_across * step;
-    for (var k = 0u; k < max_crossings; k++) {
+    for (var k = 0u; k < walk.max_crossings; k++) {
         let distance = begin + step * f32(k);
-        if distance * max(slope, MIN_SLOPE) >= params.top - z {
+        let highest = (params.top - z) / distance;
+        if highest <= slope {
             break;
+        }
+        if highest <= min_slope {
+            return max(slope, min(min_slope, (params.top - z) / begin));
         }
         crossings++;
         let line = first + sign_across * f32(k);
@@ -107,20 +122,21 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         let speed = direction * params.samples_from_tile;
         let along_x = abs(direction.y) < 1e-6;
         let along_y = abs(direction.x) < 1e-6;
-        // Along an axis, everything repeats after one tile, at a larger distance.
+        // Along an axis, everything repeats after one tile, at a larger distance, so that the walk is exact.
         var max_crossings = MIN_LINES + 16u * (params.size.x + params.size.y);
         if along_x {
             max_crossings = params.size.x + 1u;
         } else if along_y {
             max_crossings = params.size.y + 1u;
         }
+        let min_slope = select(MIN_SLOPE, 0.0, along_x || along_y);
         let x = vec2f(at.x, speed.x);
         let y = vec2f(at.y, speed.y);
         if !along_y {
-            slope = highest_slope(COLUMNS, x, y, max_crossings, start.z, slope);
+            slope = highest_slope(COLUMNS, Walk(x, y, max_crossings, min_slope), start.z, slope);
         }
         if !along_x {
-            slope = highest_slope(ROWS, y, x, max_crossings, start.z, slope);
+            slope = highest_slope(ROWS, Walk(y, x, max_crossings, min_slope), start.z, slope);
         }
     }
     if COUNTING {

@@ -48,8 +48,8 @@ override COUNTING: bool = false;
 // HorizonMap::FREE and HorizonMap::BLOCKED.
 const FREE: f32 = -0.020002667;
 const BLOCKED: f32 = 1e9;
-// The lowest slope that is resolved, and the highest below the vertical.
-const MIN_SLOPE: f32 = 0.005;
+// The lowest slope that is resolved, as in src/visibility/mod.rs, and the highest below the vertical.
+const MIN_SLOPE: f32 = 0.01;
 const MAX_SLOPE: f32 = 1e12;
 const FAR: f32 = 1e30;
 // Overhangs that a walk distinguishes, and overhangs that a slice stores.
@@ -235,7 +235,11 @@ fn walk(facet: Facet, along: vec2f, overhead: f32) -> u32 {
         if count > 0u && overhangs[0].y >= open {
             open = min(overhangs[0].x, open);
         }
-        if open <= max(ground, MIN_SLOPE) || (entered > period && !(count > 0u && overhangs[0].x < overhead)) {
+        if open <= max(ground, MIN_SLOPE) {
+            insert(0.0, open);
+            break;
+        }
+        if entered > period && !(count > 0u && overhangs[0].x < overhead) {
             break;
         }
         step_count++;

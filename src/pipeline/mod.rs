@@ -195,6 +195,16 @@ impl Pipeline {
 
     /// Visibility of the facets by the plan's algorithm. Without an algorithm, no stage runs.
     fn visibility(&self, inputs: &TileInputs, times: &mut StageTimes) -> Result<Keyed<Visibility>> {
+        self.finer_visibility(inputs, None, times)
+    }
+
+    /// As [`Pipeline::visibility`], from that of the same facets along fewer azimuths, if there is one.
+    fn finer_visibility(
+        &self,
+        inputs: &TileInputs,
+        coarser: Option<&Visibility>,
+        times: &mut StageTimes,
+    ) -> Result<Keyed<Visibility>> {
         let TileInputs { tile, facets, settings, plan, refined, .. } = inputs;
         if plan.algorithm == VisibilityAlgorithm::None {
             let mut key = KeyBuilder::of_stage("unblocked");
@@ -202,7 +212,8 @@ impl Pipeline {
             let value = Arc::new(Visibility::Unblocked { facets: facets.len() });
             return Ok(Keyed { key: key.finish(), value });
         }
-        self.get(ComputeVisibility { tile, facets, algorithm: plan.algorithm, settings, refined: *refined }, times)
+        let (algorithm, refined) = (plan.algorithm, *refined);
+        self.get(ComputeVisibility { tile, facets, algorithm, settings, refined, coarser }, times)
     }
 
     /// The key of all settings.

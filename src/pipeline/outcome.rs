@@ -70,7 +70,7 @@ impl ExaminedSum {
         let facets = Arc::new(run_without_memo(&sample, &env, &disk, &mut times)?);
         let facets = Keyed { key: Key::of_numbers(b"second sample"), value: facets };
         let (algorithm, settings) = (*algorithm, &settings);
-        let visible = ComputeVisibility { tile, facets: &facets, algorithm, settings, refined: false };
+        let visible = ComputeVisibility { tile, facets: &facets, algorithm, settings, refined: false, coarser: None };
         let visibility = run_without_memo(&visible, &env, &disk, &mut times)?;
         let mut sum = FacetSum::new(&facets, material_of_slot, materials);
         sum.force(&facets, &settings.effects);

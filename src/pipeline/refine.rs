@@ -94,7 +94,9 @@ impl Pipeline {
             let Some(refinement) = next else { return Ok(sum) };
             self.env.cancel.check()?;
             let inputs = self.tile_inputs(loaded, Processor::Cpu(refinement), times)?;
-            let visibility = self.visibility(&inputs, times)?;
+            let has_same_facets = inputs.facets.key == sum.inputs.facets.key;
+            let coarser = has_same_facets.then_some(&*sum.visibility);
+            let visibility = self.finer_visibility(&inputs, coarser, times)?;
             sum = RefinedSum::new(inputs, visibility, refinement);
         }
     }

@@ -275,6 +275,7 @@ fn each_input_of_visibility_changes_its_key() {
             algorithm,
             settings: &changed,
             refined: false,
+            coarser: None,
         })
     };
     let march = VisibilityAlgorithm::HeightMarch;

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::MIN_SLOPE;
 use super::scan::FACING_MARGIN;
 use crate::geometry::{Facets, HeightGrid};
 use crate::math::simd::multiversion;
@@ -51,6 +52,8 @@ struct Walk {
     along: [f32; 2],
     /// Maximum number of edges to cross, rounded up to a multiple of [`WIDTH`].
     max_edges: usize,
+    /// The smallest slope that is resolved.
+    min_slope: f32,
 }
 
 /// Returns the whole number `k` modulo `n`. Below 2²¹ the result is exact, because the rounding error of `(k + ½)/n` is
@@ -84,18 +87,18 @@ impl HeightMarch {
         let at = from.truncate() * self.samples_from_tile - 0.5;
         let speed = along * self.samples_from_tile;
         let (is_along_x, is_along_y) = (along.y.abs() < 1e-6, along.x.abs() < 1e-6);
-        // Along an axis the same heights return after one tile, farther away.
-        let max_edges = match (is_along_x, is_along_y) {
-            (true, _) => self.size[0] + 1,
-            (_, true) => self.size[1] + 1,
-            _ => MIN_EDGES + 16 * (self.size[0] + self.size[1]),
+        // Along an axis the same heights return after one tile, farther away, so that the walk is exact.
+        let (max_edges, min_slope) = match (is_along_x, is_along_y) {
+            (true, _) => (self.size[0] + 1, 0.0),
+            (_, true) => (self.size[1] + 1, 0.0),
+            _ => (MIN_EDGES + 16 * (self.size[0] + self.size[1]), MIN_SLOPE),
         };
         let [x, y] = [[at.x, speed.x], [at.y, speed.y]];
         if !is_along_y {
-            slope = self.cross(Edges::Columns, Walk { across: x, along: y, max_edges }, from.z, slope);
+            slope = self.cross(Edges::Columns, Walk { across: x, along: y, max_edges, min_slope }, from.z, slope);
         }
         if !is_along_x {
-            slope = self.cross(Edges::Rows, Walk { across: y, along: x, max_edges }, from.z, slope);
+            slope = self.cross(Edges::Rows, Walk { across: y, along: x, max_edges, min_slope }, from.z, slope);
         }
         slope
     }
@@ -104,8 +107,6 @@ impl HeightMarch {
     /// increasing distance and ends when no farther height can raise the slope.
     #[inline(always)]
     fn cross(&self, edges: Edges, walk: Walk, z: f32, mut slope: f32) -> f32 {
-        /// The smallest slope that is resolved.
-        const MIN_SLOPE: f32 = 0.005;
         let ([at, speed], [beside, drift]) = (walk.across, walk.along);
         let step = 1.0 / speed.abs();
         let (mut first, sign) = if speed > 0.0 { (at.floor() + 1.0, 1.0) } else { (at.ceil() - 1.0, -1.0) };
@@ -122,8 +123,12 @@ impl HeightMarch {
         };
         for k in (0..walk.max_edges).step_by(WIDTH) {
             let near = start + step * k as f32;
-            if near * slope.max(MIN_SLOPE) >= self.top - z {
+            let highest = (self.top - z) / near;
+            if highest <= slope {
                 break;
+            }
+            if highest <= walk.min_slope {
+                return slope.max(walk.min_slope.min((self.top - z) / start));
             }
             let line = first + sign * k as f32;
             let (mut distances, mut indices, mut fractions) = ([0.0_f32; WIDTH], [0_u32; WIDTH], [0.0_f32; WIDTH]);

@@ -110,6 +110,18 @@ impl OcclusionIntervals {
 
     /// Cuts the mesh along every azimuth for every facet. Visibility has soft steps of `transition_width` radians.
     pub fn scan(grid: &PeriodicGrid, facets: &Facets, azimuths: usize, transition_width: f32) -> Self {
+        Self::scan_between(None, grid, facets, azimuths, transition_width)
+    }
+
+    /// As [`OcclusionIntervals::scan`], without cutting along the azimuths of `coarser` again. It has the same facets.
+    pub(crate) fn scan_between(
+        coarser: Option<&Self>,
+        grid: &PeriodicGrid,
+        facets: &Facets,
+        azimuths: usize,
+        transition_width: f32,
+    ) -> Self {
+        let coarser = coarser.filter(|coarser| azimuths.is_multiple_of(coarser.horizon_map.azimuths()));
         let (slicer, origins) = (Slicer::new(grid), lifted_origins(facets, grid.tile_size));
         // Multiples of the golden ratio fill [0, 1] evenly, also for consecutive facets.
         let switch: Vec<f32> =
@@ -117,6 +129,10 @@ impl OcclusionIntervals {
         let scanned: Vec<(Vec<f32>, Overhangs, usize)> = (0..azimuths)
             .into_par_iter()
             .map(|azimuth| {
+                if let Some((row, above)) = coarser.and_then(|coarser| coarser.slice(azimuth, azimuths)) {
+                    grid.cancel.step(azimuths);
+                    return (row, above, 0);
+                }
                 let along = from_angles(FRAC_PI_2, TAU * azimuth as f32 / azimuths as f32).truncate();
                 let (mut row, mut above) = (vec![0.0; facets.len()], Vec::new());
                 let truncated = scan_all(&slicer.rotated(along), facets, &origins, &mut |facet, blocked| {
@@ -130,7 +146,8 @@ impl OcclusionIntervals {
                 (row, Overhangs::new(above.into_iter(), &switch), truncated)
             })
             .collect();
-        let (mut rows, mut overhangs, mut truncated) = (Vec::with_capacity(facets.len() * azimuths), Vec::new(), 0);
+        let (mut rows, mut overhangs) = (Vec::with_capacity(facets.len() * azimuths), Vec::new());
+        let mut truncated = coarser.map_or(0, |coarser| coarser.horizon_map.truncated);
         for (row, above, row_truncated) in scanned {
             rows.extend(row);
             overhangs.push(above);
@@ -139,6 +156,13 @@ impl OcclusionIntervals {
         let mut horizon_map = HorizonMap::from_slopes(facets.len(), azimuths, transition_width, rows);
         horizon_map.truncated = truncated;
         Self { horizon_map, overhangs, switch }
+    }
+
+    /// The horizons and overhangs along one of `azimuths` azimuths, a multiple of the own ones, if it is one of them.
+    fn slice(&self, azimuth: usize, azimuths: usize) -> Option<(Vec<f32>, Overhangs)> {
+        let step = azimuths / self.horizon_map.azimuths();
+        let own = azimuth / step;
+        azimuth.is_multiple_of(step).then(|| (self.horizon_map.row(own).to_vec(), self.overhangs[own].clone()))
     }
 
     pub fn facets(&self) -> usize {
@@ -230,5 +254,42 @@ impl OcclusionIntervals {
             }
         }
         SoftMaps { grid, packed }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+    use crate::geometry::families::heightfield;
+    use crate::geometry::{FacetSampler, SampleShift};
+
+    #[test]
+    fn slices_along_the_azimuths_of_a_coarser_visibility_are_those_of_it() {
+        let waves = |height: f32| {
+            heightfield::from_function(glam::UVec2::new(9, 7), Vec2::ONE, |p| {
+                height * (7.0 * p.x).sin() * (9.0 * p.y).cos()
+            })
+        };
+        let (mesh, higher) = (waves(0.2), waves(0.3));
+        let facets = FacetSampler::new(&mesh).sample(&mesh, 60, SampleShift::from_seed(1));
+        let grids = [&mesh, &higher].map(PeriodicGrid::for_slices);
+        let slopes = |intervals: &OcclusionIntervals| -> Vec<Vec<f32>> {
+            (0..intervals.horizon_map.azimuths()).map(|azimuth| intervals.horizon_map.row(azimuth).to_vec()).collect()
+        };
+        let anew = slopes(&OcclusionIntervals::scan(&grids[0], &facets, 12, 0.02));
+        let coarser = OcclusionIntervals::scan(&grids[0], &facets, 6, 0.02);
+        assert_eq!(slopes(&OcclusionIntervals::scan_between(Some(&coarser), &grids[0], &facets, 12, 0.01)), anew);
+        // The coarser slices of another mesh show which ones are not cut again.
+        let other = OcclusionIntervals::scan(&grids[1], &facets, 4, 0.02);
+        let mixed = slopes(&OcclusionIntervals::scan_between(Some(&other), &grids[0], &facets, 12, 0.02));
+        let other = slopes(&other);
+        for azimuth in 0..12 {
+            let expected = if azimuth % 3 == 0 { &other[azimuth / 3] } else { &anew[azimuth] };
+            assert_eq!(&mixed[azimuth], expected, "{azimuth}");
+        }
+        let unrelated = OcclusionIntervals::scan(&grids[1], &facets, 5, 0.02);
+        assert_eq!(slopes(&OcclusionIntervals::scan_between(Some(&unrelated), &grids[0], &facets, 12, 0.02)), anew);
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::{IVec2, Vec2, Vec3};
 
+use super::MIN_SLOPE;
 use super::slicer::{RotatedSlicer, WIDTH};
 use crate::geometry::Facets;
 use crate::geometry::grid::periodic_grid::CellWalk;
@@ -76,27 +77,29 @@ impl BlockedSlopes {
         let with_slack = |slope: f32| slope + 1e-5 * (1.0 + slope * slope);
         if low <= with_slack(self.ground) {
             self.ground = high;
-        } else {
-            let first = self.floating.iter().take_while(|&&(_, b)| with_slack(b) < low).count();
-            let mut end = first;
-            while let Some(&(a, b)) = self.floating.get(end).filter(|&&(a, _)| a <= with_slack(high)) {
-                (low, high) = (low.min(a), high.max(b));
-                end += 1;
+            let mut absorbed = 0;
+            while let Some(&(_, b)) = self.floating.get(absorbed).filter(|&&(a, _)| a <= with_slack(self.ground)) {
+                self.ground = self.ground.max(b);
+                absorbed += 1;
             }
-            if end == first {
-                self.floating.insert(first, (low, high));
-            } else {
-                self.floating[first] = (low, high);
+            if absorbed > 0 {
+                self.floating.drain(..absorbed);
+            }
+            return;
+        }
+        let first = self.floating.iter().take_while(|&&(_, b)| with_slack(b) < low).count();
+        let mut end = first;
+        while let Some(&(a, b)) = self.floating.get(end).filter(|&&(a, _)| a <= with_slack(high)) {
+            (low, high) = (low.min(a), high.max(b));
+            end += 1;
+        }
+        if end == first {
+            self.floating.insert(first, (low, high));
+        } else {
+            self.floating[first] = (low, high);
+            if end > first + 1 {
                 self.floating.drain(first + 1..end);
             }
-        }
-        let mut absorbed = 0;
-        while let Some(&(_, b)) = self.floating.get(absorbed).filter(|&&(a, _)| a <= with_slack(self.ground)) {
-            self.ground = self.ground.max(b);
-            absorbed += 1;
-        }
-        if absorbed > 0 {
-            self.floating.drain(..absorbed);
         }
     }
 }
@@ -111,9 +114,6 @@ pub(crate) struct KnownSlopes {
 
 /// Sine of the angle behind a facet up to which its visibility is computed. It exceeds the step between azimuths.
 pub(crate) const FACING_MARGIN: f32 = 0.3;
-
-/// The smallest slope that is resolved. A walk ends when the rest of the tiling can block no higher slope.
-const MIN_SLOPE: f32 = 0.005;
 
 /// Minimum of the number of steps (cells and blocks of triangles) that a walk may take, besides the cells of sixteen
 /// tiles. It bounds the time on tiles that are much higher than long, on which an unblocked walk would take millions of
@@ -175,6 +175,7 @@ impl RotatedSlicer<'_> {
             // A cell at distance r blocks no slope above clearance / r.
             let open = blocked.open_below(clearance / walk.entered);
             if open <= blocked.ground.max(MIN_SLOPE) {
+                blocked.insert(0.0, open);
                 return;
             }
             // Along an axis the same surface returns after one tile, farther away, and cannot rise above the ground.

@@ -192,6 +192,35 @@ fn all_algorithms_agree_under_overhangs_up_to_85_degrees() {
     assert!(scanned < 0.003 && mapped < 0.003, "{scanned} {mapped}");
 }
 
+/// Walks end where all that is left blocks slopes below 0.01. Along these directions, up to a third of a degree above the
+/// horizon, nearly nothing is visible.
+#[test]
+fn what_walks_do_not_resolve_is_hidden_as_rays_find_it() {
+    let low: Vec<Vec3> = (0..48)
+        .map(|k| from_angles(90_f32.to_radians() - [0.002, 0.004, 0.006][k % 3], 0.4 + 0.731 * k as f32))
+        .collect();
+    for (name, mesh) in [("dunes", dunes(40)), ("tables", tables())] {
+        let (facets, grid) = (sample(&mesh, 1500), PeriodicGrid::new(&mesh));
+        let visibility = match &mesh.height_grid {
+            Some(heights) => Visibility::HorizonMap(HorizonMap::march(heights, mesh.size, &facets, 48, 0.005)),
+            None => Visibility::OcclusionIntervals(OcclusionIntervals::scan(&grid, &facets, 48, 0.005)),
+        };
+        let exact = ray_cast(&grid, &facets, &low);
+        let rows = visibility_rows(&visibility, &low);
+        let facing = |d: usize, s: usize| facets.normals[s].dot(low[d]) > 0.0;
+        let share = |seen: &dyn Fn(usize, usize) -> f64| -> f64 {
+            let facing =
+                (0..low.len()).flat_map(|d| (0..facets.len()).map(move |s| (d, s))).filter(|&(d, s)| facing(d, s));
+            let (sum, count) = facing.fold((0.0, 0.0), |(sum, count), (d, s)| (sum + seen(d, s), count + 1.0));
+            sum / count
+        };
+        let (rays, walks) =
+            (share(&|d, s| f64::from(u8::from(exact.is_visible(d, s)))), share(&|d, s| f64::from(rows[d][s])));
+        eprintln!("{name}: rays see {rays:.4}, walks {walks:.4}");
+        assert!((rays - walks).abs() < 0.03, "{name}: {rays} {walks}");
+    }
+}
+
 #[test]
 fn marching_over_the_samples_finds_the_horizons_of_the_sliced_mesh() {
     for mesh in [dunes(24), noise([12, 12]), noise([9, 16])] {

@@ -19,6 +19,8 @@ pub struct ComputeVisibility<'a> {
     pub settings: &'a Settings,
     /// True if the settings are refined: visibility of the main settings stays in the memo.
     pub refined: bool,
+    /// Visibility of the same facets along fewer azimuths. Its slices are reused, and the result has the same bits without it.
+    pub coarser: Option<&'a Visibility>,
 }
 
 impl Stage for ComputeVisibility<'_> {
@@ -54,12 +56,15 @@ impl Stage for ComputeVisibility<'_> {
             (VisibilityAlgorithm::HeightMarch | VisibilityAlgorithm::HorizonScan, _) => {
                 Visibility::HorizonMap(HorizonMap::scan(&grid(), facets, azimuths, width))
             }
-            (VisibilityAlgorithm::OcclusionIntervals, _) => Visibility::OcclusionIntervals(OcclusionIntervals::scan(
-                &grid(),
-                facets,
-                settings.slice_azimuths,
-                width,
-            )),
+            (VisibilityAlgorithm::OcclusionIntervals, _) => {
+                let coarser = match self.coarser {
+                    Some(Visibility::OcclusionIntervals(coarser)) => Some(coarser),
+                    _ => None,
+                };
+                let azimuths = settings.slice_azimuths;
+                let intervals = OcclusionIntervals::scan_between(coarser, &grid(), facets, azimuths, width);
+                Visibility::OcclusionIntervals(intervals)
+            }
             (VisibilityAlgorithm::GpuMaps | VisibilityAlgorithm::CpuMaps, _) => {
                 let (grid, resolution) = (settings.map_grid, settings.map_resolution);
                 let directions = grid.directions();
