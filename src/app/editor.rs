@@ -27,8 +27,8 @@ use super::views::zoom::TileScale;
 
 /// Message of the first start, shown until the user closes it.
 const WELCOME: &str = "welcome";
-const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (left) and change its surface and materials \
-                            (right). F1 explains common tasks and lists all shortcuts.";
+const WELCOME_TEXT: &str = "New here? Start from a material of the gallery (press G if it is hidden) and change its surface \
+                            and materials (right). F1 explains common tasks and lists all shortcuts.";
 
 /// The state of the editor, independent of its window.
 pub struct Editor {

@@ -113,7 +113,8 @@ impl LobeState {
         let (area, response) = ui.allocate_exact_size(size, Sense::hover());
         let painter = ui.painter().with_clip_rect(area);
         let radius = (0.5 * area.width() - 6.0).min(area.height() - 22.0).max(10.0);
-        let origin = pos2(area.center().x, area.center().y + 0.5 * radius);
+        // The caption below the plot stays inside of a low area.
+        let origin = pos2(area.center().x, (area.center().y + 0.5 * radius).min(area.bottom() - 18.0));
         let grid = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
         for part in [0.5, 1.0] {
             let arc: Vec<Pos2> = (0..=48).map(|k| on_arc(origin, radius * part, k as f32 * 3.75 - 90.0)).collect();
