@@ -1,5 +1,6 @@
 //! Capture of a whole sheet: from a folder of photographs to an SVBTDF.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -211,29 +212,42 @@ impl<'a> Sheet<'a> {
 
     /// Reads the points of pixels.
     fn points(&self, pixels: &[usize]) -> Result<Vec<Point>> {
+        Ok(self.points_of(pixels, &self.radiances(pixels)?, 0..pixels.len()))
+    }
+
+    /// Radiances of pixels per camera, by pixel and then by dot.
+    fn radiances(&self, pixels: &[usize]) -> Result<Vec<Vec<Vec3>>> {
         let cameras = 0..self.photographs.rig.cameras.len();
-        let values: Vec<Vec<Vec3>> =
-            cameras.map(|camera| self.photographs.gather(camera, pixels, self.cancel)).collect::<Result<_>>()?;
+        cameras.map(|camera| self.photographs.gather(camera, pixels, self.cancel)).collect()
+    }
+
+    /// The points of a range of pixels, from the radiances of all of them.
+    fn points_of(&self, pixels: &[usize], radiances: &[Vec<Vec3>], range: Range<usize>) -> Vec<Point> {
         let count = self.dots.len();
         let point = |k: usize| {
-            let radiances: Vec<&[Vec3]> = values.iter().map(|all| &all[k * count..(k + 1) * count]).collect();
+            let radiances: Vec<&[Vec3]> = radiances.iter().map(|all| &all[k * count..(k + 1) * count]).collect();
             let place = self.photographs.rig.place(pixels[k], self.photographs.size);
             Point::new(self.photographs.rig, &self.dots, place, &radiances)
         };
-        Ok((0..pixels.len()).into_par_iter().map(point).collect())
+        range.into_par_iter().map(point).collect()
     }
 
-    /// Calls `work` with the points of all pixels, as many at once as the memory holds.
+    /// Calls `work` with the points of all pixels, some at once. The photographs are read again for as many pixels as the
+    /// memory holds radiances of; points are larger.
     fn for_all(&self, progress: &Progress<'_>, mut work: impl FnMut(&[usize], Vec<Point>)) -> Result<()> {
+        const POINTS_AT_ONCE: usize = 1024;
         let all = self.photographs.size.element_product() as usize;
-        // The radiances and the samples of a value.
-        let bytes = self.dots.len() * self.figures.cameras * (size_of::<Vec3>() + size_of::<super::fit::Sample>());
+        let bytes = self.dots.len() * self.figures.cameras * size_of::<Vec3>();
         let at_once = (self.settings.memory / bytes.max(1)).clamp(1, all.max(1));
         for first in (0..all).step_by(at_once) {
             progress::report(progress, first as f32 / all as f32)?;
             let pixels: Vec<usize> = (first..(first + at_once).min(all)).collect();
-            let points = self.points(&pixels)?;
-            work(&pixels, points);
+            let radiances = self.radiances(&pixels)?;
+            for start in (0..pixels.len()).step_by(POINTS_AT_ONCE) {
+                self.cancel.check()?;
+                let range = start..(start + POINTS_AT_ONCE).min(pixels.len());
+                work(&pixels[range.clone()], self.points_of(&pixels, &radiances, range));
+            }
         }
         Ok(())
     }
