@@ -104,7 +104,8 @@ impl HeightMarch {
     }
 
     /// Returns the maximum of `slope` and of the slopes at the crossings with one family of edges. The walk goes to
-    /// increasing distance and ends when no farther height can raise the slope.
+    /// increasing distance and ends when no farther height can raise the slope, or only up to the smallest slope that is
+    /// resolved, which then counts as blocked.
     #[inline(always)]
     fn cross(&self, edges: Edges, walk: Walk, z: f32, mut slope: f32) -> f32 {
         let ([at, speed], [beside, drift]) = (walk.across, walk.along);
