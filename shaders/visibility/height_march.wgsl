@@ -36,7 +36,7 @@ const BLOCKED: f32 = 1e9;
 // The number of edges of one family that a walk may cross, in addition to those of sixteen tiles.
 const MIN_LINES: u32 = 8192u;
 // The smallest slope that is resolved, as in src/visibility/mod.rs.
-const MIN_SLOPE: f32 = 0.01;
+const MIN_SLOPE: f32 = 0.005;
 
 // If set, the output is the number of crossed edges, for tests.
 override COUNTING: bool = false;

@@ -49,7 +49,7 @@ override COUNTING: bool = false;
 const FREE: f32 = -0.020002667;
 const BLOCKED: f32 = 1e9;
 // The lowest slope that is resolved, as in src/visibility/mod.rs, and the highest below the vertical.
-const MIN_SLOPE: f32 = 0.01;
+const MIN_SLOPE: f32 = 0.005;
 const MAX_SLOPE: f32 = 1e12;
 const FAR: f32 = 1e30;
 // Overhangs that a walk distinguishes, and overhangs that a slice stores.
@@ -222,11 +222,13 @@ fn walk(facet: Facet, along: vec2f, overhead: f32) -> u32 {
     // The centre of the cell, so that rounding of the division does not matter.
     var tile = vec2i(floor((position + 0.5) / vec2f(params.cells)));
     var local = clamp(vec2i(position) - tile * params.cells, vec2i(0), params.cells - 1);
-    // Along an axis everything repeats after one tile, further away, and then never rises above the ground.
-    let period = 1.001 * min(
-        select(FAR, params.tile_size.x, abs(along.y) < 1e-6),
-        select(FAR, params.tile_size.y, abs(along.x) < 1e-6),
-    );
+    // Along axes and diagonals everything repeats after one period, as in PeriodicGrid::period_along.
+    let tiles_per_length = abs(along / params.tile_size);
+    let fewer = min(tiles_per_length.x, tiles_per_length.y);
+    let more = max(tiles_per_length.x, tiles_per_length.y);
+    let period = select(FAR, 1.001 / more, fewer < 1e-6 * more || more - fewer < 1e-6 * more);
+    var period_end = period;
+    var lowest_before = -1.0;
     var entered = 0.0;
     var step_count = 0u;
     while step_count < params.max_steps {
@@ -239,8 +241,19 @@ fn walk(facet: Facet, along: vec2f, overhead: f32) -> u32 {
             insert(0.0, open);
             break;
         }
-        if entered > period && !(count > 0u && overhangs[0].x < overhead) {
-            break;
+        // The same surface returns after each period, farther away, and cannot rise above the ground.
+        if entered > period_end {
+            if count == 0u || overhangs[0].x >= overhead {
+                break;
+            }
+            // Copies that lowered the interval without a gap are followed by copies with even smaller gaps.
+            let lowest = overhangs[0];
+            if open == lowest.x && lowest.x < lowest_before && lowest_before <= lowest.y {
+                insert(0.0, lowest.x);
+                break;
+            }
+            period_end += period;
+            lowest_before = lowest.x;
         }
         step_count++;
         let cell = u32(local.y * params.cells.x + local.x);

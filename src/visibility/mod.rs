@@ -44,7 +44,7 @@ pub enum Visibility {
 /// The smallest slope that walks resolve. Where the rest of the tiling blocks no slope above it, a walk ends and takes
 /// all that the rest could block as blocked: an endless tiling hides nearly all of it, with farther and farther copies.
 /// The shaders repeat this value.
-pub(crate) const MIN_SLOPE: f32 = 0.01;
+pub(crate) const MIN_SLOPE: f32 = 0.005;
 
 /// A resolution at which visibility is read.
 #[derive(Debug, Clone, Copy)]

@@ -170,6 +170,7 @@ impl RotatedSlicer<'_> {
         }
         let mut walk = CellWalk::new(grid, origin.truncate(), along);
         let period = grid.period_along(along);
+        let (mut period_end, mut lowest_before) = (period, None);
         let mut steps_left = MIN_STEPS + 16 * (grid.cells.x + grid.cells.y) as usize;
         loop {
             // A cell at distance r blocks no slope above clearance / r.
@@ -178,9 +179,15 @@ impl RotatedSlicer<'_> {
                 blocked.insert(0.0, open);
                 return;
             }
-            // Along an axis the same surface returns after one tile, farther away, and cannot rise above the ground.
-            if walk.entered > period && blocked.floating_faced().next().is_none() {
-                return;
+            // The same surface returns after each period, farther away, and cannot rise above the ground.
+            if walk.entered > period_end {
+                let Some((low, high)) = blocked.floating_faced().next() else { return };
+                // Copies that lowered the interval without a gap are followed by copies with even smaller gaps.
+                if open == low && lowest_before.is_some_and(|before| low < before && before <= high) {
+                    blocked.insert(0.0, low);
+                    return;
+                }
+                (period_end, lowest_before) = (period_end + period, Some(low));
             }
             let (cell, tile) = walk.cell();
             let (first, bounds) = self.blocks(cell);

@@ -1,6 +1,6 @@
 //! Algorithms of visibility: against each other, against brute force, and the invariants of any tile.
 
-use std::f32::consts::TAU;
+use std::f32::consts::{FRAC_PI_2, TAU};
 
 use biscale::brdf::{Brdf, Material, Term};
 use biscale::effective::{Direct, EffectiveBrdf, FacetSum, Representation};
@@ -218,6 +218,33 @@ fn what_walks_do_not_resolve_is_hidden_as_rays_find_it() {
             (share(&|d, s| f64::from(u8::from(exact.is_visible(d, s)))), share(&|d, s| f64::from(rows[d][s])));
         eprintln!("{name}: rays see {rays:.4}, walks {walks:.4}");
         assert!((rays - walks).abs() < 0.03, "{name}: {rays} {walks}");
+    }
+}
+
+/// Along axes and diagonals walks see a repetition, and end before all slopes are searched.
+#[test]
+fn along_directions_in_which_the_tile_repeats_walks_hide_what_rays_find_hidden() {
+    let directions: Vec<Vec3> = (0..8)
+        .flat_map(|b| {
+            [0.003, 0.007, 0.012, 0.02, 0.035, 0.06, 0.1, 0.17, 0.3, 0.5, 0.9, 1.3]
+                .map(|elevation| from_angles(FRAC_PI_2 - elevation, TAU * b as f32 / 8.0))
+        })
+        .collect();
+    for (name, mesh) in [("tables", tables()), ("wall", wall())] {
+        let (facets, grid) = (sample(&mesh, 1500), PeriodicGrid::new(&mesh));
+        let exact = ray_cast(&grid, &facets, &directions);
+        let rows = visibility_rows(
+            &Visibility::OcclusionIntervals(OcclusionIntervals::scan(&grid, &facets, 8, 1e-4)),
+            &directions,
+        );
+        let mut differ = vec![0; directions.len()];
+        for (d, s) in (0..directions.len()).flat_map(|d| (0..facets.len()).map(move |s| (d, s))) {
+            let faces = facets.normals[s].dot(directions[d]) > 0.0;
+            differ[d] += usize::from(faces && exact.is_visible(d, s) != (rows[d][s] > 0.5));
+        }
+        let (worst, all) = (differ.iter().max().unwrap(), differ.iter().sum::<usize>());
+        eprintln!("{name}: {all} differ, at most {worst} in one direction");
+        assert!(*worst <= 8, "{name}: {differ:?}");
     }
 }
 

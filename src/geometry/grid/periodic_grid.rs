@@ -112,10 +112,12 @@ impl PeriodicGrid {
     }
 
     /// Distance after which a walk along the unit plane direction `along` repeats; infinite unless the direction
-    /// follows an axis.
+    /// follows an axis or a diagonal of the tile.
     pub(crate) fn period_along(&self, along: Vec2) -> f32 {
-        let axis = |across: f32, side: f32| if across.abs() < 1e-6 { 1.001 * side } else { f32::INFINITY };
-        axis(along.y, self.tile_size.x).min(axis(along.x, self.tile_size.y))
+        let tiles_per_length = (along / self.tile_size).abs();
+        let (fewer, more) = (tiles_per_length.min_element(), tiles_per_length.max_element());
+        let repeats = fewer < 1e-6 * more || more - fewer < 1e-6 * more;
+        if repeats { 1.001 / more } else { f32::INFINITY }
     }
 
     pub(crate) fn entries(&self, cell: usize) -> &[CellEntry] {
