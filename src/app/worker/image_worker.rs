@@ -15,7 +15,7 @@ use super::dark;
 use super::draft_detail::{DRAFT_MS, DraftDetail};
 use super::gpu_drafts::{GpuDrafts, as_preset};
 use super::pixel_costs::{PixelCosts, Shading, fitting};
-use super::preview_renderer::{CloseUpTile, PreviewRenderer, RenderRequest, ShadedMaterial};
+use super::preview_renderer::{CloseUpTile, KnownPoints, PreviewRenderer, RenderRequest, ShadedMaterial};
 use super::rendered_preview::{DisplayImage, Grade, ImageJob, ImageResult, RenderedPreview};
 use super::runner::JobContext;
 use super::shared::{SharedState, SmallScale, lock, small_scale};
@@ -25,6 +25,8 @@ use super::tone::color_image;
 const STEPS: [(Shading, f64, usize); 2] = [(Shading::Refined, 300.0, 1), (Shading::Refined, 2000.0, 1)];
 /// The same under a colour map: without its filter, then with it.
 const FILTERED_STEPS: [(Shading, f64, usize); 2] = [(Shading::Refined, 300.0, 1), (Shading::Filtered, 1200.0, 2)];
+/// Time of the final image [ms] below which no intermediate image delays it.
+const QUICK_FINAL_MS: f64 = 700.0;
 /// Time limit for shading the final image [ms]. An exported image has no limit.
 const FINAL_MS: f64 = 8000.0;
 /// Maximum number of pixels of an image on the CPU and on the GPU. A larger view shows the image enlarged.
@@ -223,9 +225,12 @@ impl ImageWorker {
             let step = self.affordable(job, shading, budget);
             let pixels = step[0] * step[1];
             let full = self.affordable(job, of_final, FINAL_MS);
-            // Steps that add few pixels are skipped.
+            // Steps that add few pixels are skipped, and those before a quick final image.
             let adds = shading != rendered.1 || pixels >= 2 * rendered.0;
-            if adds && (shading != of_final || pixels * 3 < full[0] * full[1] * 2) {
+            if adds
+                && !self.is_quick(job, of_final, full)
+                && (shading != of_final || pixels * 3 < full[0] * full[1] * 2)
+            {
                 let material = ShadedMaterial::Outcome(&outcome);
                 let mut preview = self.render(job, material, shading, step, samples, context.cancel)?;
                 preview.grade = Grade::Refining;
@@ -320,7 +325,6 @@ impl ImageWorker {
                 (Some(Arc::new(rendered.image)), image, rendered.times, table_ms, Some(ms(start)))
             }
         };
-        let shading = (samples_per_side == 1 || has_color_map).then_some(shading);
         self.costs.record(shading, samples_per_side, size, &times);
         let large = [
             (SUM_STAGE, times.product_ms),
@@ -366,6 +370,13 @@ impl ImageWorker {
             self.close = Some((key, (tile, self.pipeline.materials(loaded)?)));
         }
         Ok(())
+    }
+
+    /// Returns true if a final image is estimated to take at most [`QUICK_FINAL_MS`].
+    fn is_quick(&self, job: &ImageJob, shading: Shading, size: [usize; 2]) -> bool {
+        let [shading, points] = self.costs.of_image(size, shading, 2);
+        let is_known = self.renderer.known_points(&camera(&job.loaded), size, 2) == KnownPoints::All;
+        shading + if is_known { 0.0 } else { points } <= QUICK_FINAL_MS
     }
 
     /// The largest size with the view's aspect ratio that is estimated to take at most `budget_ms`.

@@ -51,15 +51,19 @@ impl Default for PixelCosts {
 }
 
 impl PixelCosts {
-    /// Records the times of an image. Those of shading count only if its kind is given.
-    pub fn record(&mut self, shading: Option<Shading>, samples_per_side: usize, size: [usize; 2], times: &RenderTimes) {
+    /// Records the times of an image.
+    pub fn record(&mut self, shading: Shading, samples_per_side: usize, size: [usize; 2], times: &RenderTimes) {
         let pixels = (size[0] * size[1]) as f64;
-        if let Some(shading) = shading {
-            self.shading[shading as usize] = times.shading_ms / pixels;
-        }
+        self.shading[shading as usize] = times.shading_ms / pixels;
         if times.gbuffer_ms > 0.0 {
             self.points[usize::from(samples_per_side > 1)] = (times.gbuffer_ms + times.shadows_ms) / pixels;
         }
+    }
+
+    /// The estimated times of an image [ms]: of its shading, and of its points, unless they are known.
+    pub fn of_image(&self, size: [usize; 2], shading: Shading, samples_per_side: usize) -> [f64; 2] {
+        let pixels = (size[0] * size[1]) as f64;
+        [self.shading[shading as usize], self.points[samples_per_side - 1]].map(|cost| pixels * cost)
     }
 
     /// The largest size with the aspect ratio of `full` that is estimated to take at most `budget_ms`. `known` returns the
@@ -75,9 +79,7 @@ impl PixelCosts {
         let mut sizes =
             DIVISORS.map(|part| full.map(|side| ((side as f64 / part).round() as usize).max(MIN_SIDE))).into_iter();
         let is_quick = |size: &[usize; 2]| {
-            let pixels = (size[0] * size[1]) as f64;
-            let shading = pixels * self.shading[shading as usize];
-            let points = pixels * self.points[samples_per_side - 1];
+            let [shading, points] = self.of_image(*size, shading, samples_per_side);
             match known(*size, samples_per_side) {
                 KnownPoints::All => shading <= budget_ms,
                 KnownPoints::OtherSampling => shading <= budget_ms && shading + points <= FIRST_OF_VIEW * budget_ms,
@@ -105,7 +107,7 @@ mod tests {
     fn an_image_has_fewer_pixels_where_they_cost_more_and_more_where_their_points_are_known() {
         let mut costs = PixelCosts::default();
         let times = RenderTimes { gbuffer_ms: 30.0, shadows_ms: 10.0, shading_ms: 10.0, ..RenderTimes::default() };
-        costs.record(Some(Shading::Draft), 1, [100, 100], &times);
+        costs.record(Shading::Draft, 1, [100, 100], &times);
         // 5 µs per pixel, of which 4 are for its point.
         let size = |budget_ms, known| costs.affordable([400, 200], Shading::Draft, budget_ms, |_, _| known);
         assert_eq!(size(400.0, KnownPoints::None), [400, 200]);

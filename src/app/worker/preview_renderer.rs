@@ -29,9 +29,12 @@ pub struct PreviewRenderer {
     gpu: GpuState,
     screen: Option<Screen>,
     images: ImagePool,
-    /// Points of the last image on the CPU, which the next image has unless the view changed.
-    visible: Option<(ViewKey, VisiblePoints)>,
+    /// Points of the last images on the CPU, which the next image has unless the view changed. The newest is the last.
+    visible: Vec<(ViewKey, VisiblePoints)>,
 }
+
+/// Number of images whose points are kept: one before the final image, and the final one.
+const KEPT_POINTS: usize = 2;
 
 /// Inputs of the visible points of an image.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,12 +46,12 @@ struct ViewKey {
     has_shadow_cache: bool,
 }
 
-/// Points of an image that are kept from the last one.
+/// Points of an image that are kept from the last ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KnownPoints {
-    /// The last image had the same points.
+    /// One of the last images had the same points.
     All,
-    /// The last image showed the same view with other pixels or samples.
+    /// One of the last images showed the same view with other pixels or samples.
     OtherSampling,
     None,
 }
@@ -190,13 +193,16 @@ impl PreviewRenderer {
                 let reflectance = Cancellable { brdf: &brdf, cancel };
                 let input = render_input(scene, request, &reflectance, &background);
                 let key = view_key(scene, request.camera, request.size, request.samples_per_side);
-                let last = self.visible.take().filter(|(last, _)| *last == key);
-                let (visible, times) = match last {
-                    Some((_, visible)) => (visible, RenderTimes::default()),
+                let known = self.visible.iter().position(|(known, _)| *known == key);
+                let (visible, times) = match known {
+                    Some(at) => (self.visible.remove(at).1, RenderTimes::default()),
                     None => VisiblePoints::new(&input)?,
                 };
                 let rendered = visible.shade(&input)?;
-                self.visible = Some((key, visible));
+                if self.visible.len() == KEPT_POINTS {
+                    self.visible.remove(0);
+                }
+                self.visible.push((key, visible));
                 let times = RenderTimes { shading_ms: rendered.times.shading_ms, ..times };
                 (Rendered { times, ..rendered }, ms)
             }
@@ -223,15 +229,17 @@ impl PreviewRenderer {
 
     /// Compares the points of an image on the CPU with those that are kept.
     pub fn known_points(&self, camera: &Camera, size: [usize; 2], samples_per_side: usize) -> KnownPoints {
-        let (Some(scene), Some((last, _))) = (&self.scene, &self.visible) else { return KnownPoints::None };
+        let Some(scene) = &self.scene else { return KnownPoints::None };
         let key = view_key(scene, camera, size, samples_per_side);
-        if key == *last {
-            KnownPoints::All
-        } else if (ViewKey { size: last.size, samples_per_side: last.samples_per_side, ..key }) == *last {
-            KnownPoints::OtherSampling
-        } else {
-            KnownPoints::None
+        let mut is_same_view = false;
+        for (known, _) in &self.visible {
+            if *known == key {
+                return KnownPoints::All;
+            }
+            let (size, samples_per_side) = (known.size, known.samples_per_side);
+            is_same_view |= ViewKey { size, samples_per_side, ..key.clone() } == *known;
         }
+        if is_same_view { KnownPoints::OtherSampling } else { KnownPoints::None }
     }
 
     /// Returns true if the camera is so close that the tiles themselves are visible.
