@@ -123,9 +123,11 @@ pub(super) fn in_passes(
 
 impl<'a> Reference<'a> {
     pub fn new(mesh: &'a TileMesh, material_of_slot: &[usize], materials: &[Material]) -> Self {
+        let grid = PeriodicGrid::new(mesh);
+        grid.rays();
         Self {
             mesh,
-            grid: PeriodicGrid::new(mesh),
+            grid,
             material_of_slot: material_of_slot.to_vec(),
             materials: materials.to_vec(),
             bounces: 0,

@@ -101,9 +101,17 @@ impl PeriodicGrid {
         }
     }
 
-    /// The hierarchy of the triangles, for rays.
-    pub(super) fn rays(&self) -> &TileHierarchy {
-        self.rays.get_or_init(|| TileHierarchy::new(&self.corners, self.tile_size))
+    /// The hierarchy of the triangles, for rays. Whoever casts rays on several threads asks for it before, because
+    /// each of them would build it.
+    pub(crate) fn rays(&self) -> &TileHierarchy {
+        match self.rays.get() {
+            Some(rays) => rays,
+            None => {
+                // Built outside of the lock: a thread that builds in parallel may meet a task that waits for the lock.
+                let rays = TileHierarchy::new(&self.corners, self.tile_size);
+                self.rays.get_or_init(|| rays)
+            }
+        }
     }
 
     /// The cell of a point of the plane, in the base period.

@@ -2,11 +2,14 @@
 //! bounding volume hierarchies").
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Number of children per node, and of triangles per leaf: the values of one vector.
 pub(crate) const WIDTH: usize = 8;
 
 const BINS: usize = 16;
+/// Subtrees of fewer triangles are built by one thread.
+const MIN_PARALLEL_ITEMS: usize = 2048;
 /// Depth from which on a node splits its triangles into halves, which bounds the depth of the whole hierarchy.
 const MAX_SPLIT_DEPTH: usize = 20;
 /// Bounds the depth of a hierarchy over fewer than 2³² triangles: halves divide them by eight per level.
@@ -69,7 +72,7 @@ pub(crate) struct Topology {
 }
 
 impl Topology {
-    /// Builds the hierarchy, on the current thread alone: other threads may wait for it.
+    /// Builds the hierarchy, the same with any number of threads.
     pub fn new(mut items: Vec<Item>) -> Self {
         let mut topology = Self::default();
         if !items.is_empty() {
@@ -122,7 +125,12 @@ fn subtree(items: &mut [Item], depth: usize) -> Subtree {
         parts.extend([left, right].map(|part| (cost(bounds_of(part).half_area(), part.len()), part)));
     }
     let child = |(_, part): (f32, &mut [Item])| (bounds_of(part), subtree(part, depth + 1));
-    Subtree::Node(parts.into_iter().map(child).collect())
+    let is_large = parts.iter().map(|(_, part)| part.len()).sum::<usize>() > MIN_PARALLEL_ITEMS;
+    Subtree::Node(if is_large {
+        parts.into_par_iter().map(child).collect()
+    } else {
+        parts.into_iter().map(child).collect()
+    })
 }
 
 fn bounds_of(items: &[Item]) -> Bounds {

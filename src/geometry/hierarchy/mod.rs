@@ -7,9 +7,11 @@ mod rays;
 mod tests;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use self::build::{Bounds, Item, Topology};
 use self::rays::RayTree;
+use super::grid::cell_lists::MIN_ITEMS_PER_TASK;
 
 /// A bounding-volume hierarchy over the triangles of one period.
 #[derive(Debug)]
@@ -26,9 +28,13 @@ impl TileHierarchy {
     /// Builds the hierarchy of triangles, given by their corners. Triangles with corners that are not finite, or without
     /// area, block nothing.
     pub fn new(corners: &[[Vec3; 3]], tile_size: Vec2) -> Self {
-        let corners: Vec<[Vec3; 3]> = corners.iter().map(|corners| in_tile(*corners, tile_size)).collect();
-        let item = |(triangle, corners): (u32, &[Vec3; 3])| Item { bounds: Bounds::of(corners), triangle };
-        let items: Vec<Item> = (0..).zip(&corners).filter(|(_, corners)| is_solid(corners)).map(item).collect();
+        let in_tile = |corners: &[Vec3; 3]| in_tile(*corners, tile_size);
+        let corners: Vec<[Vec3; 3]> = corners.par_iter().with_min_len(MIN_ITEMS_PER_TASK).map(in_tile).collect();
+        let item = |(triangle, corners): (usize, &[Vec3; 3])| {
+            is_solid(corners).then(|| Item { bounds: Bounds::of(corners), triangle: triangle as u32 })
+        };
+        let items =
+            corners.par_iter().enumerate().with_min_len(MIN_ITEMS_PER_TASK).filter_map(item).collect::<Vec<_>>();
         let bounds = items.iter().fold(Bounds::EMPTY, |sum, item| sum.with(item.bounds));
         let rays = RayTree::new(&Topology::new(items), &corners, tile_size);
         Self { tile_size, bounds, corners, rays }

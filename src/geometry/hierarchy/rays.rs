@@ -1,6 +1,7 @@
 //! Rays through the endless tiling, by a hierarchy of boxes that tests eight boxes or triangles at once.
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::TileHierarchy;
 use super::build::{Child, MAX_DEPTH, Topology, WIDTH};
@@ -58,7 +59,7 @@ pub(super) struct RayTree {
 impl RayTree {
     pub fn new(topology: &Topology, corners: &[[Vec3; 3]], tile_size: Vec2) -> Self {
         let leaf = |triangles: &Vec<u32>| TrianglePacket::new(triangles, corners, tile_size);
-        let leaves: Vec<TrianglePacket> = topology.leaves.iter().map(leaf).collect();
+        let leaves = topology.leaves.par_iter().with_min_len(MIN_LEAVES_PER_TASK).map(leaf).collect();
         let nodes = topology.nodes.iter().zip(&topology.bounds).map(|(children, bounds)| {
             let axis = |value: &dyn Fn(usize) -> f32| F32x8Array::from(std::array::from_fn(value));
             let link = |child: &Child| match child {
@@ -75,6 +76,8 @@ impl RayTree {
         Self { nodes: nodes.collect(), leaves }
     }
 }
+
+const MIN_LEAVES_PER_TASK: usize = 256;
 
 /// Rounding of corners that are moved by whole tiles, in units of the tile's diagonal.
 const CORNER_ROUNDING: f32 = 5e-7;
