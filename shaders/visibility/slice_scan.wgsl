@@ -246,7 +246,8 @@ fn walk(facet: Facet, along: vec2f, overhead: f32) -> u32 {
             if count == 0u || overhangs[0].x >= overhead {
                 break;
             }
-            // Copies that lowered the interval without a gap are followed by copies with even smaller gaps.
+            // If the copies of one period lower the interval without a gap, all farther ones do: they follow each other
+            // at smaller relative distances.
             let lowest = overhangs[0];
             if open == lowest.x && lowest.x < lowest_before && lowest_before <= lowest.y {
                 insert(0.0, lowest.x);

@@ -35,7 +35,7 @@ pub struct BouncedShare {
 /// # Errors
 /// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
 pub fn measure(tile: &WalkedTile<'_>, cancel: &Cancel) -> Result<BouncedShare> {
-    tile.grid.rays();
+    tile.grid.prepare_rays();
     let bottom = tile.mesh.z_range().0;
     let walks = (0..WALKS).into_par_iter().with_min_len(TASK);
     let weights: Vec<[f64; 2]> = walks.map(|number| reflected(tile, bottom, number)).collect();

@@ -81,7 +81,7 @@ impl Transport {
         let chosen_area: f64 = chosen.iter().map(|facet| f64::from(facets.areas[*facet as usize])).sum();
         let scale = total / chosen_area.max(f64::MIN_POSITIVE);
         let areas = chosen.iter().map(|facet| (f64::from(facets.areas[*facet as usize]) * scale) as f32).collect();
-        grid.rays();
+        grid.prepare_rays();
         let tracer = Tracer::new((mesh, grid), facets, &chosen);
         let origins = lifted_origins(facets, mesh.size);
         let mut directions = vec![Vec3::Z; chosen.len() * rays];

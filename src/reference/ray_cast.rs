@@ -124,7 +124,7 @@ pub(super) fn in_passes(
 impl<'a> Reference<'a> {
     pub fn new(mesh: &'a TileMesh, material_of_slot: &[usize], materials: &[Material]) -> Self {
         let grid = PeriodicGrid::new(mesh);
-        grid.rays();
+        grid.prepare_rays();
         Self {
             mesh,
             grid,

@@ -8,7 +8,7 @@ use crate::geometry::{Facets, PeriodicGrid, is_facet_visible};
 
 /// Computes the exact visibility of every facet along every direction.
 pub fn ray_cast(grid: &PeriodicGrid, facets: &Facets, directions: &[Vec3]) -> PackedVisibility {
-    grid.rays();
+    grid.prepare_rays();
     let mut packed = PackedVisibility::new(facets.len(), directions.len());
     let words = packed.words_per_row().max(1);
     packed.words.par_chunks_mut(words).zip(directions).for_each(|(row, &to)| {

@@ -179,10 +179,12 @@ impl RotatedSlicer<'_> {
                 blocked.insert(0.0, open);
                 return;
             }
-            // The same surface returns after each period, farther away, and cannot rise above the ground.
+            // Along an axis or a diagonal the same surface returns after each period, farther away, and cannot rise above the
+            // ground.
             if walk.entered > period_end {
                 let Some((low, high)) = blocked.floating_faced().next() else { return };
-                // Copies that lowered the interval without a gap are followed by copies with even smaller gaps.
+                // If the copies of one period lower the interval without a gap, all farther ones do: they follow each other
+                // at smaller relative distances.
                 if open == low && lowest_before.is_some_and(|before| low < before && before <= high) {
                     blocked.insert(0.0, low);
                     return;

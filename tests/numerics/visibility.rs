@@ -192,7 +192,7 @@ fn all_algorithms_agree_under_overhangs_up_to_85_degrees() {
     assert!(scanned < 0.003 && mapped < 0.003, "{scanned} {mapped}");
 }
 
-/// Walks end where all that is left blocks slopes below 0.01. These directions are up to a third of a degree above the
+/// Walks end where all that is left blocks slopes below 0.005. These directions are up to a third of a degree above the
 /// horizon.
 #[test]
 fn what_walks_do_not_resolve_is_hidden_as_rays_find_it() {

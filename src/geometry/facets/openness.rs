@@ -37,6 +37,7 @@ impl Openness {
     pub fn measure(sampler: &FacetSampler, mesh: &TileMesh) -> Self {
         let facets = sampler.sample(mesh, TESTED_FACETS, SampleShift::from_seed(0));
         let grid = PeriodicGrid::new(mesh);
+        grid.prepare_rays();
         let directions: Vec<Vec3> = (0..TESTED_DIRECTIONS).map(direction).collect();
         let seen = |facet: usize| {
             let normal = facets.normals[facet];

@@ -101,9 +101,14 @@ impl PeriodicGrid {
         }
     }
 
-    /// The hierarchy of the triangles, for rays. Whoever casts rays on several threads asks for it before, because
-    /// each of them would build it.
-    pub(crate) fn rays(&self) -> &TileHierarchy {
+    /// Builds the hierarchy for rays now. Without it, the first ray builds it; if several threads begin to cast rays, each
+    /// of them does so.
+    pub(crate) fn prepare_rays(&self) {
+        self.rays();
+    }
+
+    /// The hierarchy of the triangles, for rays.
+    pub(super) fn rays(&self) -> &TileHierarchy {
         match self.rays.get() {
             Some(rays) => rays,
             None => {

@@ -77,6 +77,7 @@ impl RayTree {
     }
 }
 
+/// Smallest number of leaves that a thread fills.
 const MIN_LEAVES_PER_TASK: usize = 256;
 
 /// Rounding of corners that are moved by whole tiles, in units of the tile's diagonal.

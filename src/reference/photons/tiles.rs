@@ -66,7 +66,7 @@ impl TracedTile {
             .into());
         }
         let grid = Arc::new(PeriodicGrid::new(&mesh));
-        grid.rays();
+        grid.prepare_rays();
         let bottom = mesh.z_range().0;
         Ok(Self { mesh, grid, bottom })
     }

@@ -105,6 +105,7 @@ impl TileView {
 impl TileScene {
     pub fn new(mesh: Arc<TileMesh>) -> Self {
         let grid = PeriodicGrid::new(&mesh);
+        grid.prepare_rays();
         let (low, high) = mesh.z_range();
         let bottom = low - 1e-3 * (high - low).max(mesh.size.max_element());
         Self { mesh, grid, bottom, filtered: OnceLock::new() }
