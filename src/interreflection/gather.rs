@@ -9,12 +9,13 @@ use rayon::prelude::*;
 
 use super::mirrored::MirroredNodes;
 use super::sampler::LobeSampler;
-use super::transport::{Vertex, first_density};
+use super::table::NodeWeights;
+use super::transport::{Ray, Vertex, first_density};
 use super::{InterreflectionSettings, InterreflectionTable, Transport};
 use crate::base::{Cancel, Result};
 use crate::brdf::{LobeAngles, Material, Term, analytic_lobe};
 use crate::geometry::{Facets, TileMesh};
-use crate::math::directions::half_vector;
+use crate::math::directions::{ReducedGrid, half_vector};
 use crate::math::linalg::gemm::add_outer_products;
 use crate::math::simd::{Lobe, add_lobes_around};
 use crate::visibility::Visibility;
@@ -22,8 +23,10 @@ use crate::visibility::Visibility;
 /// Groups of rays per matrix product.
 const BLOCK: usize = 512;
 /// Groups that are walked again for their variance, and most groups for one that is.
-const EXAMINED: usize = 2048;
+const EXAMINED: usize = 1024;
 const MOST_PER_EXAMINED: usize = 8;
+/// Variance of the stratified rays relative to independent ones, on many tiles.
+const STRATIFIED: f64 = 0.6;
 /// Elements whose visibility is transposed at once.
 const TRANSPOSED: usize = 16;
 /// Lower limit of the cosine that a lobe is divided by. It bounds the contribution of rays along their own surface.
@@ -88,7 +91,7 @@ pub fn gather(
     let surface = (facets, visibility, transport);
     let exchange = Exchange::new(surface, (material_of_slot, &reflectors), directions, settings.bounces);
     let (nodes, viewers, channels) = (exchange.nodes[0].len(), exchange.viewers.len(), exchange.channels);
-    let (g, variance) = exchange.sum(&mirrored.images(), cancel)?;
+    let (g, variance) = exchange.sum(&ViewerWeights::new(settings.grid, &mirrored), cancel)?;
     let scale = 1.0 / f64::from(mesh.base_area());
     let at = |pair: usize| {
         let (viewer, light) = mirrored.original_of(pair / nodes, pair % nodes);
@@ -98,6 +101,31 @@ pub fn gather(
     let raw: Vec<Vec3> = (0..nodes * nodes).into_par_iter().map(at).collect();
     let noise = variance.sqrt() * scale;
     Ok(InterreflectionTable::new(settings.grid, &raw, noise, transport.hit_fraction()))
+}
+
+/// The weights of [`NodeWeights`], for all nodes and for the computed ones, which stand for their mirror images.
+struct ViewerWeights {
+    viewers: Vec<f32>,
+    lights: Vec<f32>,
+    all_viewers: Vec<f32>,
+    all_lights: Vec<f32>,
+}
+
+impl ViewerWeights {
+    fn new(grid: ReducedGrid, mirrored: &MirroredNodes) -> Self {
+        let NodeWeights { lights, viewers } = NodeWeights::new(grid);
+        let images = mirrored.image_counts();
+        let of_computed = |weights: &[f64]| -> Vec<f32> {
+            mirrored.computed.iter().zip(&images).map(|(node, images)| weights[*node] as f32 * images).collect()
+        };
+        let of_all = |weights: &[f64]| weights.iter().map(|weight| *weight as f32).collect();
+        Self {
+            viewers: of_computed(&viewers),
+            lights: of_computed(&lights),
+            all_viewers: of_all(&viewers),
+            all_lights: of_all(&lights),
+        }
+    }
 }
 
 impl<'a> Reflector<'a> {
@@ -141,8 +169,8 @@ impl<'a> Exchange<'a> {
     }
 
     /// The sums over all rays, a matrix of lights and viewers per channel, and the sum of the variances of all pairs and
-    /// three channels. `images` is the number of nodes that each viewer stands for.
-    fn sum(&self, images: &[f32], cancel: &Cancel) -> Result<(Vec<f64>, f64)> {
+    /// three channels, weighted.
+    fn sum(&self, weights: &ViewerWeights, cancel: &Cancel) -> Result<(Vec<f64>, f64)> {
         let (nodes, viewers, channels) = (self.nodes[0].len(), self.viewers.len(), self.channels);
         let groups = self.groups();
         let mut g = vec![0.0_f64; channels * viewers * nodes];
@@ -161,7 +189,7 @@ impl<'a> Exchange<'a> {
                 .zip(block)
                 .map(|((to_viewer, from_light), group)| {
                     self.fill(group, to_viewer, from_light);
-                    is_examined(group, per_examined).then(|| self.variance(group, images, to_viewer))
+                    is_examined(group, per_examined).then(|| self.variance(group, weights, [to_viewer, from_light]))
                 })
                 .collect();
             examined += of_groups.iter().flatten().count();
@@ -176,18 +204,24 @@ impl<'a> Exchange<'a> {
                 });
             });
         }
-        let per_pair = 3.0 / channels as f64 * groups.len() as f64 / examined.max(1) as f64;
+        let per_pair = STRATIFIED * 3.0 / channels as f64 * groups.len() as f64 / examined.max(1) as f64;
         Ok((g, variance * per_pair))
     }
 
     /// Rays that carry light, in groups whose light reaches all viewers in the same proportions: the rays of a matte
     /// element are one group, every other ray is a group of its own.
     fn groups(&self) -> Vec<Range<usize>> {
-        let Transport { hits, rays, .. } = self.transport;
-        let is_useful = |ray: &usize| hits[*ray].is_some_and(|hit| !self.is_black(hit.element as usize));
+        let rays = &self.transport.rays;
+        let is_useful = |ray: &usize| rays[*ray].hit.is_some_and(|hit| !self.is_black(hit.element as usize));
         let mut groups = Vec::new();
-        for element in (0..self.materials.len()).filter(|at| !self.is_black(*at) && self.openness[*at] > 0.0) {
-            let all = element * rays..(element + 1) * rays;
+        let mut start = 0;
+        for of_element in rays.chunk_by(|a, b| a.element == b.element) {
+            let all = start..start + of_element.len();
+            start = all.end;
+            let element = of_element[0].element as usize;
+            if self.is_black(element) || self.openness[element] <= 0.0 {
+                continue;
+            }
             if !self.materials[element].is_matte {
                 groups.extend(all.filter(is_useful).map(|ray| ray..ray + 1));
             } else if all.clone().any(|ray| is_useful(&ray)) {
@@ -199,10 +233,10 @@ impl<'a> Exchange<'a> {
 
     /// Writes what a group of rays sends to each viewer, and what it carries from each light.
     fn fill(&self, group: &Range<usize>, to_viewer: &mut [f32], from_light: &mut [f32]) {
-        let Transport { facets, directions, rays, .. } = self.transport;
-        let element = group.start / rays;
-        let normal = self.facets.normals[facets[element] as usize];
-        let away = if self.materials[element].is_matte { normal } else { directions[group.start] };
+        let Ray { element, direction, .. } = self.transport.rays[group.start];
+        let element = element as usize;
+        let normal = self.facets.normals[self.transport.facets[element] as usize];
+        let away = if self.materials[element].is_matte { normal } else { direction };
         let row = self.visible(element);
         let visibility: Vec<f32> = self.viewers.iter().map(|node| row[*node]).collect();
         to_viewer.fill(0.0);
@@ -211,35 +245,48 @@ impl<'a> Exchange<'a> {
         group.clone().for_each(|ray| self.walk(ray, from_light));
     }
 
-    /// The part of the variance of all pairs that is due to a group of many independent rays. A ray contributes `a(o) b(i)`,
-    /// and the values of swapped pairs are averaged: `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|² |b|² + (a·b)²)/2`.
-    fn variance(&self, group: &Range<usize>, images: &[f32], to_viewer: &[f32]) -> f64 {
+    /// The part of the weighted variance of all pairs that is due to a group of many independent rays. A ray contributes
+    /// `a(o) b(i)`, and the values of swapped pairs are averaged: with `|a|²` and `a·b` weighted as viewers (`v`) or lights
+    /// (`l`), `Σ ((a(o) b(i) + a(i) b(o))/2)² = (|a|²_v |b|²_l + |a|²_l |b|²_v + 2 (a·b)_v (a·b)_l)/4`.
+    fn variance(&self, group: &Range<usize>, weights: &ViewerWeights, [to_viewer, from_light]: [&[f32]; 2]) -> f64 {
         let (viewers, nodes) = (self.viewers.len(), self.nodes[0].len());
-        let of_ray = |ray: usize| {
-            let mut from_light = vec![0.0; self.channels * nodes];
-            self.walk(ray, &mut from_light);
+        let of_ray = |from_light: &[f32]| {
             let of_channel = |(a, b): (&[f32], &[f32])| {
-                let norm = sum_of_products(a, |at| images[at] * a[at]);
-                let product = sum_of_products(a, |at| images[at] * b[self.viewers[at]]);
-                let of_lights = sum_of_products(b, |at| b[at]);
-                0.5 * (f64::from(norm) * f64::from(of_lights) + f64::from(product).powi(2))
+                let sums = |w: &[f32], all: &[f32]| {
+                    [
+                        f64::from(sum_of_products(a, |at| w[at] * a[at])),
+                        f64::from(sum_of_products(b, |at| all[at] * b[at])),
+                        f64::from(sum_of_products(a, |at| w[at] * b[self.viewers[at]])),
+                    ]
+                };
+                let [[a_v, b_v, ab_v], [a_l, b_l, ab_l]] =
+                    [sums(&weights.viewers, &weights.all_viewers), sums(&weights.lights, &weights.all_lights)];
+                0.25 * (a_v * b_l + a_l * b_v + 2.0 * ab_v * ab_l)
             };
             to_viewer.chunks(viewers).zip(from_light.chunks(nodes)).map(of_channel).sum::<f64>()
         };
-        group.clone().map(of_ray).sum()
+        if group.len() == 1 {
+            return of_ray(from_light);
+        }
+        let of_number = |ray: usize| {
+            let mut from_light = vec![0.0; self.channels * nodes];
+            self.walk(ray, &mut from_light);
+            of_ray(&from_light)
+        };
+        group.clone().map(of_number).sum()
     }
 
     /// Follows a ray over the surface and adds the light from each node that returns along it, times the area over the
     /// density of the ray.
-    fn walk(&self, ray: usize, from_light: &mut [f32]) {
-        let Transport { facets, hits, directions, areas, rays, .. } = self.transport;
-        let Some(mut at) = hits[ray] else { return };
-        let element = ray / rays;
-        let cosine = self.facets.normals[facets[element] as usize].dot(directions[ray]).max(MIN_COSINE);
+    fn walk(&self, number: usize, from_light: &mut [f32]) {
+        let Ray { element, area, direction, hit } = self.transport.rays[number];
+        let Some(mut at) = hit else { return };
+        let facet = self.transport.facets[element as usize] as usize;
+        let cosine = self.facets.normals[facet].dot(direction).max(MIN_COSINE);
         // `add_lobe` divides what is sent to the viewers by this cosine.
-        let scale = areas[element] * cosine / (*rays as f32 * first_density(cosine));
-        let mut rng = ChaCha8Rng::seed_from_u64(ray as u64);
-        let (mut towards, mut weight) = (-directions[ray], Vec3::ONE);
+        let scale = area * cosine / first_density(cosine);
+        let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
+        let (mut towards, mut weight) = (-direction, Vec3::ONE);
         for bounce in 1..=self.bounces {
             let element = at.element as usize;
             let lights = (&self.nodes, self.visible(element));

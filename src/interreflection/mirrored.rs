@@ -1,34 +1,38 @@
 //! Nodes of a polar grid under the mirror planes of a tile. One of each set of mirror images is computed; the others
 //! follow.
 
-use crate::math::directions::PolarGrid;
+use crate::math::directions::ReducedGrid;
 
 /// For each node, the node that is computed in its place and the reflection that maps one to the other.
 #[derive(Debug, Clone)]
 pub(super) struct MirroredNodes {
     /// Nodes that are computed.
     pub computed: Vec<usize>,
-    /// Position in `computed`, and the reflection, of each node.
-    originals: Vec<(usize, Reflection)>,
-    grid: PolarGrid,
+    /// Position in `computed`, and the index of the reflection, of each node.
+    originals: Vec<(usize, usize)>,
+    /// The image of each node under each reflection.
+    images: Vec<Vec<usize>>,
 }
 
 /// Reflections in a plane x = const and in a plane y = const.
 type Reflection = [bool; 2];
 
 impl MirroredNodes {
-    pub fn new(grid: PolarGrid, planes: [bool; 2]) -> Self {
+    pub fn new(grid: ReducedGrid, planes: [bool; 2]) -> Self {
         let group: Vec<Reflection> = [[false, false], [true, false], [false, true], [true, true]]
             .into_iter()
             .filter(|[x, y]| (!x || planes[0]) && (!y || planes[1]))
             .collect();
+        let images: Vec<Vec<usize>> = group
+            .iter()
+            .map(|reflection| (0..grid.len()).map(|node| image(grid, node, *reflection)).collect())
+            .collect();
         let mut computed = Vec::new();
         let mut originals = Vec::with_capacity(grid.len());
         for node in 0..grid.len() {
-            let images = group.iter().map(|reflection| (image(grid, node, *reflection), *reflection));
             // The order of the group breaks ties; the identity is its first element.
-            let (lowest, reflection) =
-                images.fold((usize::MAX, [false; 2]), |best, found| if found.0 < best.0 { found } else { best });
+            let of_node = images.iter().map(|images| images[node]).enumerate();
+            let (reflection, lowest) = of_node.fold((0, usize::MAX), |best, of| if of.1 < best.1 { of } else { best });
             if lowest == node {
                 computed.push(node);
             }
@@ -36,34 +40,34 @@ impl MirroredNodes {
             let at = computed.binary_search(&lowest).unwrap_or(0);
             originals.push((at, reflection));
         }
-        Self { computed, originals, grid }
+        Self { computed, originals, images }
     }
 
     /// The number of nodes that each node of `computed` stands for.
-    pub fn images(&self) -> Vec<f32> {
-        let mut images = vec![0.0; self.computed.len()];
-        self.originals.iter().for_each(|(at, _)| images[*at] += 1.0);
-        images
+    pub fn image_counts(&self) -> Vec<f32> {
+        let mut counts = vec![0.0; self.computed.len()];
+        self.originals.iter().for_each(|(at, _)| counts[*at] += 1.0);
+        counts
     }
 
     /// The entry that has the value of `(row, column)`: a position in `computed`, and a column.
     pub fn original_of(&self, row: usize, column: usize) -> (usize, usize) {
         let (at, reflection) = self.originals[row];
-        (at, image(self.grid, column, reflection))
+        (at, self.images[reflection][column])
     }
 }
 
 /// The mirror image of a node.
-fn image(grid: PolarGrid, node: usize, [x, y]: Reflection) -> usize {
-    let n = grid.azimuths;
-    let (ring, mut azimuth) = (node / n, node % n);
+fn image(grid: ReducedGrid, node: usize, [x, y]: Reflection) -> usize {
+    let (ring, mut azimuth) = grid.ring_and_azimuth(node);
+    let n = grid.azimuths_of(ring);
     if x {
         azimuth = (n + n / 2 - azimuth) % n;
     }
     if y {
         azimuth = (n - azimuth) % n;
     }
-    ring * n + azimuth
+    grid.first_node(ring) + azimuth
 }
 
 #[cfg(test)]
@@ -74,7 +78,7 @@ mod tests {
 
     #[test]
     fn images_are_mirrored_directions_and_a_plane_halves_the_work() {
-        let grid = PolarGrid::new(4, 12);
+        let grid = ReducedGrid::new(4);
         for node in 0..grid.len() {
             let d = grid.direction(node);
             for (planes, mirrored) in
@@ -85,12 +89,12 @@ mod tests {
         }
         let counts =
             [[false; 2], [true, false], [true, true]].map(|planes| MirroredNodes::new(grid, planes).computed.len());
-        assert_eq!(counts, [60, 5 * 7, 5 * 4]);
+        assert_eq!(counts, [88, 49, 27]);
     }
 
     #[test]
     fn a_symmetric_function_is_rebuilt_from_its_computed_values() {
-        let grid = PolarGrid::new(3, 8);
+        let grid = ReducedGrid::new(3);
         // Invariant when both directions are mirrored together.
         let f = |o: Vec3, i: Vec3| o.x * i.x + 0.3 * o.y * i.y + 0.1 * o.z * i.z * i.z;
         for planes in [[false; 2], [true, false], [false, true], [true, true]] {

@@ -22,23 +22,23 @@ pub use gather::{gather, is_grey};
 pub use sampler::LobeSampler;
 pub use share::{BouncedShare, measure as measure_share};
 pub use table::InterreflectionTable;
-pub use transport::{Tracer, Transport, Vertex};
+pub use transport::{MOST_RAYS_PER_USEFUL, Ray, Tracer, Transport, Vertex};
 pub use walk::{WalkPoint, WalkedTile};
 
 use crate::brdf::Brdf;
-use crate::math::directions::PolarGrid;
+use crate::math::directions::ReducedGrid;
 
 /// Resolution of interreflection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InterreflectionSettings {
     /// Number of elements: the facets that send and receive light.
     pub elements: usize,
-    /// Rays per element.
-    pub rays: usize,
+    /// Number of rays that should meet another facet from an element that sees the sky.
+    pub useful_rays: usize,
     /// Largest number of bounces; at least one.
     pub bounces: usize,
     /// Nodes of the table.
-    pub grid: PolarGrid,
+    pub grid: ReducedGrid,
     /// Planes x = const and y = const that map the tile to itself. Values that follow from this symmetry are not
     /// computed.
     pub mirrors: [bool; 2],

@@ -8,7 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::sampler::LobeSampler;
-use super::{Tracer, Vertex};
+use super::{Tracer, Transport, Vertex};
+use crate::base::Cancel;
 use crate::effective::{EffectiveBrdf, Representation};
 use crate::geometry::{FacetSampler, PeriodicGrid, SampleShift, is_facet_visible, lifted_origins};
 use crate::math::directions::{PolarGrid, from_angles};
@@ -242,10 +243,16 @@ fn white_tiles_return_no_more_than_they_receive() {
         let angles = [0.0_f32, 0.3, 0.6, 0.9, 1.2, 1.4];
         let most = angles.iter().map(|theta| furnace(&flat, from_angles(*theta, 0.2))).fold(0.0, f64::max);
         for theta in angles {
-            let returned = furnace(&tile, from_angles(theta, 0.7));
-            eprintln!("{geometry}, {brdf}, {theta}: {returned:.3} of at most {most:.3}");
-            // The facets and their visibility have errors of up to 2 % at grazing views of pyramids.
-            assert!(returned <= most.min(1.0) + 0.025, "{geometry}, {brdf}, {theta}: {returned}, flat {most}");
+            // On and beside the axes and diagonals, where the horizons of pyramids have kinks.
+            let returned = [0.0_f32, 0.09, 0.35, 0.7, 0.785].map(|phi| furnace(&tile, from_angles(theta, phi)));
+            let mean = returned.iter().sum::<f64>() / returned.len() as f64;
+            eprintln!("{geometry}, {brdf}, {theta}: {returned:.3?} of at most {most:.3}");
+            // Visibility between azimuths has errors of up to 8 % at grazing views of pyramids.
+            assert!(mean <= most.min(1.0) + 0.025, "{geometry}, {brdf}, {theta}: {mean}, flat {most}");
+            assert!(
+                returned.iter().all(|some| *some <= most.min(1.0) + 0.08),
+                "{geometry}, {brdf}, {theta}: {returned:?}"
+            );
         }
     }
 }
@@ -332,4 +339,31 @@ fn a_colour_edit_does_not_cast_the_first_rays_again() {
     assert!(names.contains(&"interreflection") && !names.contains(&"transport"), "{names:?}");
     let sum = outcome.brdf.eval(Vec3::Z, from_angles(0.5, 0.3)).as_dvec3();
     assert!(sum.cmpgt(DVec3::ZERO).all() && sum.x > sum.y && sum.y > sum.z);
+}
+
+#[test]
+fn as_many_rays_are_cast_as_are_needed_for_the_useful_ones() {
+    const WANTED: usize = 3000;
+    let rays_and_useful = |depth: f32| {
+        let geometry = format!(
+            r#"{{ kind = "grooves", profile = "trapezoid", count = 2, depth = {depth}, side_angle_deg = 60 }}"#
+        );
+        let mesh = Pipeline::new().mesh(&open(&geometry, WHITE, "")).unwrap();
+        let facets = FacetSampler::new(&mesh).sample(&mesh, 2048, SampleShift::from_seed(1));
+        let grid = Arc::new(PeriodicGrid::new(&mesh));
+        let transport = Transport::new((&mesh, grid), &facets, 2048, WANTED, &Cancel::default()).unwrap();
+        let mut hits = vec![[0.0_f64; 2]; transport.facets.len()];
+        for ray in &transport.rays {
+            hits[ray.element as usize][usize::from(ray.hit.is_some())] += 1.0;
+        }
+        // Of the rays that meet a facet, those from facets whose other rays leave the tile.
+        let useful: f64 = hits.iter().map(|[left, met]| met * left / (met + left)).sum();
+        (transport.rays.len(), useful)
+    };
+    for depth in [0.02, 0.3] {
+        let (rays, useful) = rays_and_useful(depth);
+        eprintln!("depth {depth}: {useful:.0} of {rays} rays are useful");
+        assert!((0.6..1.6).contains(&(useful / WANTED as f64)), "{depth}: {useful} of {rays}");
+    }
+    assert!(rays_and_useful(0.02).0 > 2 * rays_and_useful(0.3).0);
 }

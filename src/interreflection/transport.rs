@@ -15,6 +15,11 @@ use crate::geometry::{Facets, Hit, PeriodicGrid, TileMesh, lifted_origins};
 /// Distance by which the origin of a ray is lifted off the surface, in units of the tile's diagonal.
 const LIFT: f32 = 2e-6;
 
+/// Elements whose rays are counted to find the part that is useful.
+const COUNTED: usize = 512;
+/// Most rays that are cast for a useful one.
+pub const MOST_RAYS_PER_USEFUL: f64 = 16.0;
+
 /// Spacings by which an element counts as farther away if its normal is perpendicular to that of a point. They keep the
 /// two walls of a crease, and the two sides of a thin sheet, apart.
 const TURN_SPACINGS: f32 = 3.0;
@@ -51,18 +56,24 @@ pub struct Transport {
     pub tracer: Tracer,
     /// The facet of each element.
     pub facets: Vec<u32>,
-    /// Surface area that each element represents.
-    pub areas: Vec<f32>,
-    /// Rays per element. [`first_density`] is their density.
-    pub rays: usize,
-    /// Direction of ray `element * rays + k`, away from the element.
-    pub directions: Vec<Vec3>,
-    /// The point that each ray hits; `None` if it leaves the tile or hits a back side, which does not reflect.
-    pub hits: Vec<Option<Vertex>>,
+    /// The rays, ordered by their elements. Each element has at least one. [`first_density`] is their density.
+    pub rays: Vec<Ray>,
+}
+
+/// A ray away from an element.
+#[derive(Debug, Clone, Copy)]
+pub struct Ray {
+    pub element: u32,
+    /// Surface area that the ray represents: that of its element over the number of its rays.
+    pub area: f32,
+    pub direction: Vec3,
+    /// The point that it hits; `None` if it leaves the tile or hits a back side, which does not reflect.
+    pub hit: Option<Vertex>,
 }
 
 impl Transport {
-    /// Casts `rays` rays from each of about `elements` facets.
+    /// Casts rays from about `elements` facets: as many as are needed for `useful` of them to meet another facet from a
+    /// facet that sees the sky, but at least one from each.
     ///
     /// # Errors
     /// Returns [`crate::base::Error::Cancelled`] if `cancel` is set.
@@ -70,7 +81,7 @@ impl Transport {
         (mesh, grid): (&TileMesh, Arc<PeriodicGrid>),
         facets: &Facets,
         elements: usize,
-        rays: usize,
+        useful: usize,
         cancel: &Cancel,
     ) -> Result<Self> {
         let stride = facets.len().div_ceil(elements.max(1)).max(1);
@@ -79,34 +90,40 @@ impl Transport {
         let total: f64 = facets.areas.iter().map(|area| f64::from(*area)).sum();
         // Each element represents the facets around it, whose areas are nearly equal to its own.
         let chosen_area: f64 = chosen.iter().map(|facet| f64::from(facets.areas[*facet as usize])).sum();
-        let scale = total / chosen_area.max(f64::MIN_POSITIVE);
-        let areas = chosen.iter().map(|facet| (f64::from(facets.areas[*facet as usize]) * scale) as f32).collect();
+        let scale = (total / chosen_area.max(f64::MIN_POSITIVE)) as f32;
         grid.prepare_rays();
         let tracer = Tracer::new((mesh, grid), facets, &chosen);
         let origins = lifted_origins(facets, mesh.size);
-        let mut directions = vec![Vec3::Z; chosen.len() * rays];
-        let mut hits = vec![None; chosen.len() * rays];
-        directions.par_chunks_mut(rays).zip(hits.par_chunks_mut(rays)).zip(&chosen).enumerate().for_each(
-            |(element, ((directions, hits), &facet))| {
-                if cancel.is_set() {
-                    return;
-                }
-                let s = facet as usize;
-                for (k, (direction, hit)) in directions.iter_mut().zip(hits).enumerate() {
-                    *direction = first_direction(facets.normals[s], (element * rays + k) as u64);
-                    if direction.dot(facets.geometric_normals[s]) > 0.0 {
-                        *hit = tracer.trace(origins[s], *direction, facets.triangles[s]);
-                    }
-                }
-            },
-        );
+        let cast = |element: usize, number: usize| {
+            let s = chosen[element] as usize;
+            let direction = first_direction(facets.normals[s], number as u64);
+            let leaves = direction.dot(facets.geometric_normals[s]) > 0.0;
+            (direction, leaves.then(|| tracer.trace(origins[s], direction, facets.triangles[s])).flatten())
+        };
+        let elements = chosen.len();
+        // A second ray shows whether the facet sees the sky.
+        let is_useful = |k: usize| {
+            let meets = |number: usize| cast((2 * k + 1) * elements / (2 * COUNTED), number).1.is_some();
+            elements > 0 && meets(k) && !meets(COUNTED + k)
+        };
+        let counted = (0..COUNTED).into_par_iter().filter(|k| is_useful(*k)).count();
+        let part = (counted as f64 / COUNTED as f64).max(1.0 / MOST_RAYS_PER_USEFUL);
+        // The same number for all elements: if it varied with them, directions would be correlated with points.
+        let per_element = ((useful as f64 / part / elements.max(1) as f64).round() as usize).max(1);
+        let ray = |number: usize| {
+            let element = number / per_element;
+            let (direction, hit) = if cancel.is_set() { (Vec3::Z, None) } else { cast(element, number) };
+            let area = facets.areas[chosen[element] as usize] * scale / per_element as f32;
+            Ray { element: element as u32, area, direction, hit }
+        };
+        let rays = (0..elements * per_element).into_par_iter().map(ray).collect();
         cancel.check()?;
-        Ok(Self { tracer, facets: chosen, areas, rays, directions, hits })
+        Ok(Self { tracer, facets: chosen, rays })
     }
 
     /// Fraction of all rays that hit an element.
     pub fn hit_fraction(&self) -> f64 {
-        self.hits.iter().flatten().count() as f64 / self.hits.len().max(1) as f64
+        self.rays.iter().filter(|ray| ray.hit.is_some()).count() as f64 / self.rays.len().max(1) as f64
     }
 }
 
@@ -176,11 +193,6 @@ fn first_direction(normal: Vec3, number: u64) -> Vec3 {
     }
 }
 
-/// Density of the directions of first rays at a cosine to the normal.
-pub(super) fn first_density(cosine: f32) -> f32 {
-    COSINE_PART * cosine * FRAC_1_PI + (1.0 - COSINE_PART) * 0.5 * FRAC_1_PI
-}
-
 /// The digits of a number in some base, mirrored at the point (van der Corput 1935).
 fn radical_inverse(mut number: u64, base: u64) -> f64 {
     let (mut value, mut digit) = (0.0, 1.0 / base as f64);
@@ -190,6 +202,11 @@ fn radical_inverse(mut number: u64, base: u64) -> f64 {
         digit /= base as f64;
     }
     value
+}
+
+/// Density of the directions of first rays at a cosine to the normal.
+pub(super) fn first_density(cosine: f32) -> f32 {
+    COSINE_PART * cosine * FRAC_1_PI + (1.0 - COSINE_PART) * 0.5 * FRAC_1_PI
 }
 
 fn wrap(position: Vec3, size: Vec2) -> Vec3 {

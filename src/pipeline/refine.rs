@@ -113,13 +113,12 @@ pub(super) struct RefinedInterreflection {
 impl RefinedInterreflection {
     /// A sentence about settings that were raised above the `first` ones, if any were.
     pub fn note(&self, first: &InterreflectionSettings, preset: Preset) -> Option<String> {
-        let InterreflectionSettings { rays, grid, .. } = self.settings;
+        let InterreflectionSettings { useful_rays: rays, grid, .. } = self.settings;
         (self.settings != *first).then(|| {
             format!(
-                "interreflection refined to {rays} rays per facet and {} x {} directions, because its estimated error was \
+                "interreflection refined to {rays} rays between facets and {} directions, because its estimated error was \
                  larger than `{}` allows",
-                grid.rings,
-                grid.azimuths,
+                grid.len(),
                 preset.name()
             )
         })

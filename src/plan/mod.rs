@@ -140,10 +140,8 @@ impl Plan {
         }
         self.interreflection = Some(settings);
         if let Some(effect) = self.effect_mut("interreflection") {
-            let InterreflectionSettings { rays, grid, .. } = settings;
-            effect
-                .reason
-                .push_str(&format!("; refined to {rays} rays and {} x {} directions", grid.rings, grid.azimuths));
+            let InterreflectionSettings { useful_rays: rays, grid, .. } = settings;
+            effect.reason.push_str(&format!("; refined to {rays} rays and {} directions", grid.len()));
         }
     }
 

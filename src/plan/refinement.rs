@@ -3,7 +3,7 @@
 use super::Settings;
 use crate::effective::{ErrorBound, ErrorEstimate, FACETS_POWER};
 use crate::interreflection::{InterreflectionSettings, InterreflectionTable};
-use crate::math::directions::PolarGrid;
+use crate::math::directions::ReducedGrid;
 
 /// Part of the bound that a refined result should have, so that one refinement usually suffices.
 const AIM: f64 = 0.7;
@@ -16,8 +16,8 @@ const MAX_WORK: usize = 32;
 /// Largest factor by which refinement narrows the soft step. `standard` then has a tenth of a degree.
 const MAX_SHARPNESS: usize = 8;
 
-/// Rings of the tables of interreflection to which refinement goes, with three times as many azimuths.
-const TABLE_RINGS: [usize; 4] = [8, 12, 16, 24];
+/// Rings of the tables of interreflection to which refinement goes.
+const TABLE_RINGS: [usize; 3] = [12, 16, 24];
 /// Largest factor by which one step raises the rays of interreflection.
 const MAX_RAYS_STEP: usize = 4;
 
@@ -108,10 +108,10 @@ pub fn finer_interreflection(
     let finer = TABLE_RINGS.into_iter().filter(|rings| *rings > now.grid.rings);
     let finer: Vec<_> = finer.take(usize::from(interpolation > 1.0) + usize::from(interpolation > 2.5)).collect();
     let with = |rays: usize, rings: Option<&usize>| {
-        let grid = rings.map_or(now.grid, |rings| PolarGrid::new(*rings, 3 * rings));
-        InterreflectionSettings { rays: now.rays * rays, grid, ..*now }
+        let grid = rings.map_or(now.grid, |rings| ReducedGrid::new(*rings));
+        InterreflectionSettings { useful_rays: now.useful_rays * rays, grid, ..*now }
     };
-    let work = |settings: &InterreflectionSettings| (settings.rays * settings.grid.len().pow(2)) as f64;
+    let work = |settings: &InterreflectionSettings| (settings.useful_rays * settings.grid.len().pow(2)) as f64;
     let is_affordable = |next: &InterreflectionSettings| work(next) <= MAX_WORK as f64 * work(first) && next != now;
     // The table counts more, because its error falls faster with the work.
     let affordable = |rings: Option<&usize>| {
@@ -171,17 +171,17 @@ mod tests {
 
     /// The rays, and the rings of the table, that follow errors of noise and of interpolation which are the error of `f̄`.
     fn finer(now: [usize; 2], noise: f64, interpolation: f64) -> Option<[usize; 2]> {
-        let with = |[rays, rings]: [usize; 2]| InterreflectionSettings {
+        let with = |[useful_rays, rings]: [usize; 2]| InterreflectionSettings {
             elements: 6144,
-            rays,
+            useful_rays,
             bounces: 8,
-            grid: PolarGrid::new(rings, 3 * rings),
+            grid: ReducedGrid::new(rings),
             mirrors: [false; 2],
         };
         let table = InterreflectionTable::with_errors(noise, interpolation);
         let estimate = ErrorEstimate { rel_l2: table.rel_error(), ..ErrorEstimate::default() };
         let next = finer_interreflection([&with([6, 12]), &with(now)], &table, &estimate, BOUND);
-        next.map(|next| [next.rays, next.grid.rings])
+        next.map(|next| [next.useful_rays, next.grid.rings])
     }
 
     #[test]
@@ -200,7 +200,7 @@ mod tests {
             now = next;
             steps += 1;
         }
-        let work = |[rays, rings]: [usize; 2]| rays * PolarGrid::new(rings, 3 * rings).len().pow(2);
+        let work = |[rays, rings]: [usize; 2]| rays * ReducedGrid::new(rings).len().pow(2);
         assert!(work(now) <= MAX_WORK * work([6, 12]) && work(now) > 24 * work([6, 12]), "{now:?}");
         assert!(steps < 5, "{steps}");
         // Rays alone end at the limit.

@@ -3,7 +3,7 @@
 use super::SceneFeatures;
 use crate::effective::{BasisGrid, ErrorBound, Interpolation, LowRankSettings};
 use crate::interreflection::InterreflectionSettings;
-use crate::math::directions::{HalfDifferenceGrid, HemispherePairGrid, PolarGrid};
+use crate::math::directions::{HalfDifferenceGrid, HemispherePairGrid, PolarGrid, ReducedGrid};
 use crate::scene::{Effects, Quality, Scene};
 
 /// Named settings of the `[quality]` table.
@@ -311,26 +311,24 @@ impl Settings {
 
     /// The resolution of interreflection. Where it is a small share of the light, fewer rays and a coarser table have a small
     /// error in f̄, unless a lobe is narrower than the steps of the table. There are as many elements for any share, because
-    /// walks read the visibility of the nearest one; a tile of few facets casts more rays from each.
+    /// walks read the visibility of the nearest one.
     pub fn interreflection(&self, features: &SceneFeatures) -> InterreflectionSettings {
-        /// Smallest share that is computed with all rays and the finer table: what `draft` may leave out.
+        /// Smallest share that is computed with three times the rays and the finer table: what `draft` may leave out.
         const LARGE_SHARE: f64 = 0.35;
         /// Smallest roughness of lobes in the coarser table.
         const WIDE_LOBE: f32 = 0.2;
-        let (elements, [few, all], grids) = match self.preset {
-            Preset::Draft => (2048_usize, [2_usize, 6], [[8, 24], [8, 24]]),
-            Preset::Standard | Preset::Wu2011 => (6144, [2, 6], [[8, 24], [12, 36]]),
-            Preset::Fine | Preset::Reference => (16_384, [4, 12], [[12, 36], [16, 48]]),
+        let (elements, rays, rings) = match self.preset {
+            Preset::Draft => (2048, 600, [8, 8]),
+            Preset::Standard | Preset::Wu2011 => (6144, 1600, [10, 12]),
+            Preset::Fine | Preset::Reference => (16_384, 9000, [12, 16]),
         };
         let is_large = features.bounced.is_none_or(|bounced| bounced.share >= LARGE_SHARE);
         let has_narrow_lobe = features.narrowest_lobe < WIDE_LOBE || features.lookups > 0;
-        let [rings, azimuths] = grids[usize::from(is_large || has_narrow_lobe)];
-        let rays = if is_large { all } else { (elements * few).div_ceil(self.facets.max(1)).clamp(few, all) };
         InterreflectionSettings {
             elements: self.facets.min(elements),
-            rays,
+            useful_rays: if is_large { 3 * rays } else { rays },
             bounces: self.effects.bounces,
-            grid: PolarGrid::new(rings, azimuths),
+            grid: ReducedGrid::new(rings[usize::from(is_large || has_narrow_lobe)]),
             mirrors: [false; 2],
         }
     }

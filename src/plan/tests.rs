@@ -218,18 +218,15 @@ fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_i
     let resolution = |share: f64, narrowest_lobe, lookups| {
         let bounced = Some(BouncedShare { share, std_error: 0.0 });
         let settings = standard.interreflection(&SceneFeatures { bounced, narrowest_lobe, lookups, ..features() });
-        (settings.rays, settings.grid.rings)
+        (settings.useful_rays, settings.grid.rings)
     };
     for (narrowest_lobe, lookups) in [(0.1, 0), (0.3, 0), (f32::INFINITY, 0), (f32::INFINITY, 100)] {
-        assert_eq!(resolution(0.36, narrowest_lobe, lookups), (6, 12));
+        assert_eq!(resolution(0.36, narrowest_lobe, lookups), (4800, 12));
     }
-    assert_eq!([0.1, 0.3, f32::INFINITY].map(|lobe| resolution(0.34, lobe, 0)), [(2, 12), (2, 8), (2, 8)]);
-    assert_eq!(resolution(0.34, f32::INFINITY, 100), (2, 12), "a measured lobe may be narrow");
+    assert_eq!([0.1, 0.3, f32::INFINITY].map(|lobe| resolution(0.2, lobe, 0)), [(1600, 12), (1600, 10), (1600, 10)]);
+    assert_eq!(resolution(0.2, f32::INFINITY, 100), (1600, 12), "a measured lobe may be narrow");
     let unknown = standard.interreflection(&features());
-    assert_eq!((unknown.rays, unknown.grid.rings), (6, 12));
-    let few_facets = Settings { facets: 3072, ..standard };
-    let bounced = Some(BouncedShare { share: 0.1, std_error: 0.0 });
-    assert_eq!(few_facets.interreflection(&SceneFeatures { bounced, ..features() }).rays, 4);
+    assert_eq!((unknown.useful_rays, unknown.grid.rings), (4800, 12));
 }
 
 #[test]

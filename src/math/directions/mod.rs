@@ -5,13 +5,15 @@ mod half_difference;
 mod hemisphere_pair_grid;
 mod paraboloid;
 mod polar_grid;
+mod reduced_grid;
 
 use glam::{DVec3, Vec3};
 
 pub use half_difference::HalfDifferenceGrid;
 pub use hemisphere_pair_grid::{GridCoordinates, HemispherePairGrid};
 pub use paraboloid::{ParaboloidMap, ParaboloidSphere};
-pub use polar_grid::{CubicTaps, PolarGrid, Tap};
+pub use polar_grid::{PolarGrid, Tap};
+pub use reduced_grid::{CubicTaps, ReducedGrid, RingTaps};
 
 /// The unit vector at `theta` from +z and `phi` from +x towards +y.
 pub fn from_angles(theta: f32, phi: f32) -> Vec3 {

@@ -1,11 +1,10 @@
-//! Polar grids: rings of constant elevation with azimuths in each. Interpolation is bilinear or cubic, and crosses the pole.
+//! Polar grids: rings of constant elevation with azimuths in each. Interpolation is bilinear, and crosses the pole.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::Vec3;
 
 use super::{from_angles, to_angles};
-use crate::math::simd::{azimuth_and_polar_angle, cubic_weights};
 
 /// One node of an interpolation: its index in the grid and its weight.
 pub type Tap = (usize, f32);
@@ -24,27 +23,6 @@ pub struct PolarGrid {
 
 /// `1 / cos 89.9°`.
 const INVERSE_HORIZON_COSINE: f32 = 572.9581;
-
-/// Sixteen taps of a cubic: four consecutive azimuths on each of four rings.
-#[derive(Debug, Clone, Copy)]
-pub struct CubicTaps {
-    /// Ring, first azimuth and weight. Azimuths after the last one of the grid continue at 0.
-    pub rings: [(usize, usize, f32); 4],
-    /// Weights of the azimuths.
-    pub azimuths: [f32; 4],
-    /// Azimuths per ring of the grid.
-    turn: usize,
-}
-
-impl CubicTaps {
-    /// The taps as nodes of the grid.
-    pub fn nodes(&self) -> [Tap; 16] {
-        std::array::from_fn(|k| {
-            let (ring, first, weight) = self.rings[k / 4];
-            (ring * self.turn + (first + k % 4) % self.turn, weight * self.azimuths[k % 4])
-        })
-    }
-}
 
 impl PolarGrid {
     /// Polar angle of the last ring [degrees]. It is below 90° because a bidirectional quantity need not vanish at the
@@ -103,39 +81,6 @@ impl PolarGrid {
         ((ring as f32 * step).cos() - ((ring + 1) as f32 * step).cos()) * TAU / self.azimuths as f32
     }
 
-    /// The taps of a cubic (Catmull and Rom 1974) in the elevation and in the azimuth; weights sum to one, and some are
-    /// negative.
-    pub fn cubic_taps(&self, direction: Vec3) -> CubicTaps {
-        let (turns, theta) = azimuth_and_polar_angle(direction);
-        let step = FRAC_PI_2 / self.rings as f32;
-        let at = (theta / step - 0.5).clamp(-0.5, self.rings as f32);
-        let lower = (at.floor() as i32).min(self.rings as i32 - 1);
-        let knots = [lower - 1, lower, lower + 1, lower + 2];
-        let last = self.rings as i32;
-        // All rings but the last have the same distance.
-        let weights = if lower + 2 < last {
-            cubic_weights(at - lower as f32)
-        } else {
-            let angle = |ring: i32| if ring < 0 { (ring as f32 + 0.5) * step } else { self.theta(ring as usize) };
-            elevation_weights(knots.map(|ring| (ring <= last).then(|| angle(ring))), theta)
-        };
-        let at = turns * self.azimuths as f32;
-        let second = (at as usize).min(self.azimuths - 1);
-        let wrapped = |azimuth: usize| if azimuth >= self.azimuths { azimuth - self.azimuths } else { azimuth };
-        let first = wrapped(second + self.azimuths - 1);
-        let opposite = wrapped(first + self.azimuths / 2);
-        let mut rings = [(0, 0, 0.0); 4];
-        for ((ring, weight), run) in knots.into_iter().zip(weights).zip(&mut rings) {
-            // Ring -1 is ring 0, rotated by half a turn.
-            *run = if ring < 0 {
-                ((-1 - ring) as usize, opposite, weight)
-            } else {
-                (ring.min(last) as usize, first, weight)
-            };
-        }
-        CubicTaps { rings, azimuths: cubic_weights(at - second as f32), turn: self.azimuths }
-    }
-
     /// The four bilinear taps of a direction; weights are in `[0,1]` and sum to one.
     pub fn taps(&self, direction: Vec3) -> [Tap; 4] {
         let (theta, phi) = to_angles(direction);
@@ -165,34 +110,6 @@ impl PolarGrid {
     }
 }
 
-/// Weights of the values at four elevations for a cubic between the second and the third. Its slopes there are those of
-/// parabolas through three values. Without a fourth elevation, the slope at the third is that of the line.
-fn elevation_weights([a, b, c, d]: [Option<f32>; 4], theta: f32) -> [f32; 4] {
-    let [Some(a), Some(b), Some(c)] = [a, b, c] else { return [0.0, 1.0, 0.0, 0.0] };
-    let (before, width) = (b - a, c - b);
-    let t = ((theta - b) / width).clamp(0.0, 1.0);
-    let (t2, t3) = (t * t, t * t * t);
-    // Hermite's cubic: the values at both ends, and the slopes times the width.
-    let (at_c, slope_b, slope_c) = (3.0 * t2 - 2.0 * t3, t3 - 2.0 * t2 + t, t3 - t2);
-    let mut weights = [0.0, 1.0 - at_c, at_c, 0.0];
-    let mut add = |slope: f32, [left, right]: [f32; 2], first: usize| {
-        // The slope times `width` of the parabola through three values, `left` and `right` apart, at the middle one.
-        let scale = slope * width / (left + right);
-        weights[first] -= scale * right / left;
-        weights[first + 1] += scale * (right / left - left / right);
-        weights[first + 2] += scale * left / right;
-    };
-    add(slope_b, [before, width], 0);
-    match d {
-        Some(d) => add(slope_c, [width, d - c], 1),
-        None => {
-            weights[1] -= slope_c;
-            weights[2] += slope_c;
-        }
-    }
-    weights
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -210,25 +127,6 @@ mod tests {
             let taps = grid.taps(from_angles(theta, k as f32 * 0.7));
             assert!((taps.iter().map(|tap| tap.1).sum::<f32>() - 1.0).abs() < 1e-5);
             assert!(taps.iter().all(|tap| tap.1 >= 0.0 && tap.0 < grid.len()));
-        }
-    }
-
-    #[test]
-    fn cubic_taps_reproduce_a_constant_the_nodes_and_smooth_functions() {
-        let grid = PolarGrid::new(12, 36);
-        for node in 0..grid.len() {
-            let taps = grid.cubic_taps(grid.direction(node)).nodes();
-            let weight: f32 = taps.iter().filter(|tap| tap.0 == node).map(|tap| tap.1).sum();
-            assert!((weight - 1.0).abs() < 2e-3, "node {node}: {taps:?}");
-        }
-        let smooth = |d: Vec3| d.x + 2.0 * d.y + 0.3 * d.z * d.z + d.x * d.y;
-        let values: Vec<f32> = grid.directions().into_iter().map(smooth).collect();
-        for k in 0..2000 {
-            let d = from_angles(k as f32 / 2000.0 * PolarGrid::HORIZON_DEG.to_radians(), k as f32 * 0.7);
-            let taps = grid.cubic_taps(d).nodes();
-            assert!((taps.iter().map(|tap| tap.1).sum::<f32>() - 1.0).abs() < 1e-5);
-            let value: f32 = taps.iter().map(|tap| tap.1 * values[tap.0]).sum();
-            assert!((value - smooth(d)).abs() < 4e-3, "{d}: {value} instead of {}", smooth(d));
         }
     }
 

@@ -109,7 +109,7 @@ impl Stage for CastTransport<'_> {
 
     fn hash_into(&self, key: &mut KeyBuilder) {
         key.key("tile", &self.tile.key).key("facets", &self.facets.key);
-        key.counts("rays", [self.settings.elements, self.settings.rays]);
+        key.counts("rays", [self.settings.elements, self.settings.useful_rays]);
     }
 
     fn slot(&self) -> &'static str {
@@ -118,7 +118,7 @@ impl Stage for CastTransport<'_> {
 
     fn run(&self, env: &Env) -> Result<Transport> {
         let surface = (&self.tile.mesh, self.grid.clone());
-        Transport::new(surface, self.facets, self.settings.elements, self.settings.rays, &env.cancel)
+        Transport::new(surface, self.facets, self.settings.elements, self.settings.useful_rays, &env.cancel)
     }
 }
 
