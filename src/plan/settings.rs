@@ -319,8 +319,8 @@ impl Settings {
         const WIDE_LOBE: f32 = 0.2;
         let (elements, rays, rings) = match self.preset {
             Preset::Draft => (2048, 600, [8, 8]),
-            Preset::Standard | Preset::Wu2011 => (6144, 1600, [10, 12]),
-            Preset::Fine | Preset::Reference => (16_384, 9000, [12, 16]),
+            Preset::Standard | Preset::Wu2011 => (6144, 1800, [10, 12]),
+            Preset::Fine | Preset::Reference => (16_384, 10_000, [12, 16]),
         };
         let is_large = features.bounced.is_none_or(|bounced| bounced.share >= LARGE_SHARE);
         let has_narrow_lobe = features.narrowest_lobe < WIDE_LOBE || features.lookups > 0;

@@ -221,12 +221,12 @@ fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_i
         (settings.useful_rays, settings.grid.rings)
     };
     for (narrowest_lobe, lookups) in [(0.1, 0), (0.3, 0), (f32::INFINITY, 0), (f32::INFINITY, 100)] {
-        assert_eq!(resolution(0.36, narrowest_lobe, lookups), (4800, 12));
+        assert_eq!(resolution(0.36, narrowest_lobe, lookups), (5400, 12));
     }
-    assert_eq!([0.1, 0.3, f32::INFINITY].map(|lobe| resolution(0.2, lobe, 0)), [(1600, 12), (1600, 10), (1600, 10)]);
-    assert_eq!(resolution(0.2, f32::INFINITY, 100), (1600, 12), "a measured lobe may be narrow");
+    assert_eq!([0.1, 0.3, f32::INFINITY].map(|lobe| resolution(0.2, lobe, 0)), [(1800, 12), (1800, 10), (1800, 10)]);
+    assert_eq!(resolution(0.2, f32::INFINITY, 100), (1800, 12), "a measured lobe may be narrow");
     let unknown = standard.interreflection(&features());
-    assert_eq!((unknown.useful_rays, unknown.grid.rings), (4800, 12));
+    assert_eq!((unknown.useful_rays, unknown.grid.rings), (5400, 12));
 }
 
 #[test]
