@@ -41,6 +41,11 @@ impl SceneFeatures {
         is_needed && self.can_interreflect(settings)
     }
 
+    /// Returns true if all materials are matte.
+    pub fn is_matte(&self) -> bool {
+        self.narrowest_lobe == f32::INFINITY && self.lookups == 0
+    }
+
     fn can_interreflect(&self, settings: &Settings) -> bool {
         !self.flat && self.materials > 0 && settings.preset != Preset::Wu2011
     }
@@ -63,8 +68,7 @@ impl SceneFeatures {
         let pairs = nodes * nodes / halves.iter().product::<f64>();
         let per_walk = self.facets_of_walk() * (RAY_NS + nodes * LOBE_NS);
         // The rays of a matte element share what reaches the viewers.
-        let is_matte = self.narrowest_lobe == f32::INFINITY && self.lookups == 0;
-        let groups = if is_matte { walks.min(exchange.elements as f64) } else { walks };
+        let groups = if self.is_matte() { walks.min(exchange.elements as f64) } else { walks };
         let per_group = nodes * LOBE_NS + pairs * PRODUCT_NS;
         (rays * RAY_NS + walks * per_walk + groups * per_group) * 1e-6 / costs.threads
     }

@@ -313,7 +313,7 @@ impl Settings {
     /// error in f̄, unless a lobe is narrower than the steps of the table. There are as many elements for any share, because
     /// walks read the visibility of the nearest one.
     pub fn interreflection(&self, features: &SceneFeatures) -> InterreflectionSettings {
-        /// Smallest share that is computed with three times the rays and the finer table: what `draft` may leave out.
+        /// Smallest share that is computed with four times the rays and the finer table: what `draft` may leave out.
         const LARGE_SHARE: f64 = 0.35;
         /// Smallest roughness of lobes in the coarser table.
         const WIDE_LOBE: f32 = 0.2;
@@ -324,9 +324,11 @@ impl Settings {
         };
         let is_large = features.bounced.is_none_or(|bounced| bounced.share >= LARGE_SHARE);
         let has_narrow_lobe = features.narrowest_lobe < WIDE_LOBE || features.lookups > 0;
+        // The rays of a matte element share what reaches the viewers, so that twice as many cost little.
+        let rays = if features.is_matte() { 2 * rays } else { rays };
         InterreflectionSettings {
             elements: self.facets.min(elements),
-            useful_rays: if is_large { 3 * rays } else { rays },
+            useful_rays: if is_large { 4 * rays } else { rays },
             bounces: self.effects.bounces,
             grid: ReducedGrid::new(rings[usize::from(is_large || has_narrow_lobe)]),
             mirrors: [false; 2],

@@ -220,13 +220,14 @@ fn a_small_share_is_computed_with_fewer_rays_and_a_coarser_table_unless_a_lobe_i
         let settings = standard.interreflection(&SceneFeatures { bounced, narrowest_lobe, lookups, ..features() });
         (settings.useful_rays, settings.grid.rings)
     };
-    for (narrowest_lobe, lookups) in [(0.1, 0), (0.3, 0), (f32::INFINITY, 0), (f32::INFINITY, 100)] {
-        assert_eq!(resolution(0.36, narrowest_lobe, lookups), (5400, 12));
+    for (narrowest_lobe, lookups) in [(0.1, 0), (0.3, 0), (f32::INFINITY, 100)] {
+        assert_eq!(resolution(0.36, narrowest_lobe, lookups), (7200, 12));
     }
-    assert_eq!([0.1, 0.3, f32::INFINITY].map(|lobe| resolution(0.2, lobe, 0)), [(1800, 12), (1800, 10), (1800, 10)]);
+    assert_eq!([0.1, 0.3].map(|lobe| resolution(0.2, lobe, 0)), [(1800, 12), (1800, 10)]);
+    assert_eq!([0.2, 0.36].map(|share| resolution(share, f32::INFINITY, 0)), [(3600, 10), (14_400, 12)], "matte");
     assert_eq!(resolution(0.2, f32::INFINITY, 100), (1800, 12), "a measured lobe may be narrow");
     let unknown = standard.interreflection(&features());
-    assert_eq!((unknown.useful_rays, unknown.grid.rings), (5400, 12));
+    assert_eq!((unknown.useful_rays, unknown.grid.rings), (7200, 12));
 }
 
 #[test]
