@@ -45,11 +45,12 @@ impl PolarGrid {
     }
 
     pub fn theta(&self, ring: usize) -> f32 {
-        if ring >= self.rings {
-            Self::HORIZON_DEG.to_radians()
-        } else {
-            (ring as f32 + 0.5) * FRAC_PI_2 / self.rings as f32
-        }
+        Self::theta_of(self.rings, ring)
+    }
+
+    /// The polar angle of a ring of any grid with so many `rings` and one at the horizon.
+    pub(super) fn theta_of(rings: usize, ring: usize) -> f32 {
+        if ring >= rings { Self::HORIZON_DEG.to_radians() } else { (ring as f32 + 0.5) * FRAC_PI_2 / rings as f32 }
     }
 
     pub fn phi(&self, azimuth: usize) -> f32 {

@@ -79,11 +79,7 @@ impl ReducedGrid {
     }
 
     pub fn theta(&self, ring: usize) -> f32 {
-        if ring >= self.rings {
-            PolarGrid::HORIZON_DEG.to_radians()
-        } else {
-            (ring as f32 + 0.5) * FRAC_PI_2 / self.rings as f32
-        }
+        PolarGrid::theta_of(self.rings, ring)
     }
 
     /// The ring of a node, and its azimuth in this ring.
