@@ -3,6 +3,7 @@
     python benches/wheel.py versions WHEEL PYTHON...    installs the wheel for each interpreter, and compares all shipped scenes
     python benches/wheel.py speed                       calls from Python beside the work that they contain
     python benches/wheel.py batch [ROWS]                materials per second of `biscale.batch`, with 1 and more processes
+    python benches/wheel.py engine [ROWS]               time that Dask takes, beside a plain loop over threads
     python benches/wheel.py cost [ROWS]                 core-hours and bytes of a million materials, from ROWS materials of each family
 
 `versions` needs BISCALE, the program that it compares with; the others need the package, and `batch` its extras.
@@ -10,10 +11,12 @@
 
 import itertools
 import os
+import queue
 import resource
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -123,6 +126,19 @@ def speed():
     print(f"an edit of a roughness and 300 pairs: {whole:.2f} ms, of which {whole - inside:.2f} ms are neither stages nor evaluation")
 
 
+def grooves_and_pyramids(quality, rows):
+    """A specification of grooves and pyramids at 4096 pairs."""
+    return {
+        "base": ["default", "table4_teapot"],
+        "count": rows,
+        "sample": {
+            "material.default.brdf.roughness": {"uniform": [0.1, 0.6]},
+            "tile.geometry.rotation_deg": {"uniform": [0.0, 30.0]},
+        },
+        "output": {"directions": 4096, "quality": quality},
+    }
+
+
 def batch(rows):
     from distributed import Client, LocalCluster
 
@@ -132,21 +148,60 @@ def batch(rows):
     print("|---|---|---|")
     os.environ["RAYON_NUM_THREADS"] = "1"
     for quality in ("draft", "standard"):
-        spec = {
-            "base": ["default", "table4_teapot"],
-            "count": rows,
-            "sample": {
-                "material.default.brdf.roughness": {"uniform": [0.1, 0.6]},
-                "tile.geometry.rotation_deg": {"uniform": [0.0, 30.0]},
-            },
-            "output": {"directions": 4096, "quality": quality},
-        }
+        spec = grooves_and_pyramids(quality, rows)
         for count in sorted({1, os.cpu_count() or 1}):
             with tempfile.TemporaryDirectory() as folder:
                 with LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
                     with Client(cluster) as client:
                         made = batches.run(spec, folder, client, progress=False)
             print(f"| {quality} | {count} | {made.made / made.seconds:.1f} |")
+
+
+def plain_loop(spec, name, threads):
+    """Evaluates all rows in `threads` threads of this process, and returns the seconds. Nothing is written."""
+    from biscale.batch import evaluate
+
+    waiting = queue.SimpleQueue()
+    for index in range(spec.count):
+        waiting.put(index)
+
+    def work(thread):
+        while True:
+            try:
+                index = waiting.get_nowait()
+            except queue.Empty:
+                return
+            # Rows of one name share a scene, which belongs to one thread.
+            evaluate(spec, f"{name}, thread {thread}", [index])
+
+    start = time.perf_counter()
+    workers = [threading.Thread(target=work, args=(thread,)) for thread in range(threads)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    return time.perf_counter() - start
+
+
+def engine(rows):
+    from distributed import Client, LocalCluster
+
+    from biscale import batch as batches
+
+    threads = os.cpu_count() or 1
+    # The threads of the plain loop share the pool of this process; each process of Dask has a pool of one thread.
+    os.environ["RAYON_NUM_THREADS"] = "1"
+    print("| quality | turn | plain loop [s] | Dask [s] | Dask / plain loop |")
+    print("|---|---|---|---|---|")
+    with LocalCluster(n_workers=threads, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        with Client(cluster) as client:
+            os.environ["RAYON_NUM_THREADS"] = str(threads)
+            for quality, turn in itertools.product(("draft", "standard"), range(3)):
+                spec = grooves_and_pyramids(quality, rows) | {"seed": turn}
+                loop = plain_loop(batches.load(spec), f"{quality} {turn}", threads)
+                with tempfile.TemporaryDirectory() as folder:
+                    dask = batches.run(spec, folder, client, progress=False).seconds
+                print(f"| {quality} | {turn + 1} | {loop:.2f} | {dask:.2f} | {dask / loop:.3f} |", flush=True)
 
 
 #: A scene of each family, and the keys that vary.
@@ -196,6 +251,8 @@ if __name__ == "__main__":
             speed()
         case ["batch", *rows]:
             batch(int(rows[0]) if rows else 400)
+        case ["engine", *rows]:
+            engine(int(rows[0]) if rows else 200)
         case ["cost", *rows]:
             cost(int(rows[0]) if rows else 50)
         case _:

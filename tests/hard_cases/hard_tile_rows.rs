@@ -125,7 +125,7 @@ fn grooves_whose_bottom_few_pairs_see_state_their_error() {
         let tile = all().into_iter().find(|tile| tile.name == name).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let loaded = tile.open(folder.path(), "draft", 1);
-        let (pairs, truth) = tile.pairs_and_values(&loaded, &RayCast { points: 1, max_passes: 1, target: 0.0 });
+        let (pairs, truth) = tile.pairs_and_values(&loaded, 200, &RayCast { points: 1, max_passes: 1, target: 0.0 });
         let Measured { errors, stated, .. } = measure(&loaded, "draft", 1, &pairs, &truth);
         eprintln!("{name}: {:.1} %, stated {:.1} %", 100.0 * errors.rel_l2, 100.0 * stated);
         assert!((errors.rel_l2 / 3.0..errors.rel_l2 * 3.0).contains(&stated), "{name}: {} {stated}", errors.rel_l2);
@@ -168,7 +168,7 @@ fn hard_tiles_at_fine_are_within_the_bound_or_warn_of_their_error() {
             let truth = reference(&loaded, &pairs);
             (pairs, truth)
         } else {
-            tile.pairs_and_values(&loaded, &RAYS)
+            tile.pairs_and_values(&loaded, 200, &RAYS)
         };
         let Measured { errors, stated, warns, .. } = measure(&loaded, "fine", 1, &pairs, &truth);
         let is_within = errors.rel_l2 <= 0.04 && errors.psnr_db >= 43.0;

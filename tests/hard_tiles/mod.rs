@@ -119,10 +119,14 @@ impl HardTile {
         }
     }
 
-    /// Direction pairs that resolve the error, and the true values at them. Closed forms cost nothing, so that there are enough
-    /// pairs that see through a deep or small opening.
-    pub fn pairs_and_values(&self, loaded: &LoadedScene, settings: &RayCast) -> (Vec<Pair>, TrueValues) {
-        let mut count = 200;
+    /// `count` direction pairs and the true values at them. Closed forms cost nothing, so that there are more pairs if few see
+    /// through a deep or small opening.
+    pub fn pairs_and_values(
+        &self,
+        loaded: &LoadedScene,
+        mut count: usize,
+        settings: &RayCast,
+    ) -> (Vec<Pair>, TrueValues) {
         loop {
             let pairs = mirror_biased_pairs(count, PAIRS_SEED);
             let truth = self.true_values(loaded, &pairs, settings);
