@@ -252,7 +252,7 @@ if __name__ == "__main__":
         case ["batch", *rows]:
             batch(int(rows[0]) if rows else 400)
         case ["engine", *rows]:
-            engine(int(rows[0]) if rows else 200)
+            engine(int(rows[0]) if rows else 400)
         case ["cost", *rows]:
             cost(int(rows[0]) if rows else 50)
         case _:

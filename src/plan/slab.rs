@@ -16,7 +16,7 @@ pub struct SlabSettings {
     pub virtual_table: usize,
     /// Photons per ring of the table of inner reflections.
     pub photons: usize,
-    /// Paths per shading point of an image; 0 for one filtered lookup.
+    /// Paths per shading point of an image; 0 for filtered lookups.
     pub paths: usize,
     pub seed: u64,
     /// Largest number of walks per pair of a reference.

@@ -57,6 +57,10 @@ fn write_shape(out: &mut String, path: &str, shape: FieldShape, is_entry: bool) 
 }
 
 fn write_rows(out: &mut String, fields: &[Field], defaults: &Table) {
+    if fields.is_empty() {
+        out.push_str("\nThere are no keys.\n");
+        return;
+    }
     out.push_str("\n| key | kind | range | default | meaning |\n|---|---|---|---|---|\n");
     for field in fields {
         let (kind, range) = kind_and_range(field.shape, field.unit);
@@ -159,7 +163,9 @@ fn kind_and_range(shape: FieldShape, unit: &str) -> (String, String) {
         }
         FieldShape::AnyOf(shapes) => {
             let (kinds, ranges): (Vec<_>, Vec<_>) = shapes.iter().map(|shape| kind_and_range(*shape, unit)).unzip();
-            return (kinds.join(" or "), ranges.join(", or "));
+            let mut distinct: Vec<String> = ranges.into_iter().filter(|range| !range.is_empty()).collect();
+            distinct.dedup();
+            return (kinds.join(" or "), distinct.join(", or "));
         }
     };
     (kind.to_owned(), range)

@@ -70,7 +70,7 @@ scene_table! {
         /// Number of facets that the method `faces` of a slab sums; 0: the method `auto` never sums.
         #[serde(skip_serializing_if = "Option::is_none")]
         slab_facets: Option<usize> = None, FieldShape::Integer { min: 0, max: 65_536 }, "";
-        /// Number of paths per shading point for what is seen through a slab; 0: one filtered lookup per point.
+        /// Number of paths per shading point for what is seen through a slab; 0: filtered lookups per point.
         #[serde(skip_serializing_if = "Option::is_none")]
         paths: Option<usize> = None, FieldShape::Integer { min: 0, max: 1_000_000 }, "";
         /// Width of the soft transition of visibility at a horizon.

@@ -36,7 +36,7 @@ scene_table! {
         /// Distance of the faces.
         thickness: f32 = 0.0, length(0.0, 2.0), "tile units";
         /// Absorption along the refracted ray.
-        #[serde(with = "color")] absorption: Vec3 = Vec3::ZERO, FieldShape::Color { max: 1e6 }, "1 / tile unit";
+        #[serde(with = "color")] absorption: Vec3 = Vec3::ZERO, FieldShape::Color { max: 1e6 }, "per tile unit";
         /// Part of the light that leaves the other side evenly.
         #[serde(with = "color")] diffuse: Vec3 = Vec3::ZERO, FieldShape::Color { max: 1.0 }, "";
         /// Method for light that meets rough facets on both faces: auto, dual (one formula) or faces (a sum).

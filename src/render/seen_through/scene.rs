@@ -169,7 +169,7 @@ impl SlabScene {
     /// Describes the computation of the image in words.
     pub fn describe(&self) -> String {
         match self.paths {
-            0 => "one filtered lookup per lobe".to_owned(),
+            0 => "two filtered lookups per lobe".to_owned(),
             paths => format!("{paths} paths per point through facets of both faces"),
         }
     }
